@@ -1,4 +1,5 @@
-"""Contact in the time step: search if scheduled, detect active contacts, apply impulses, book their work.
+"""Contact in the time step: searches candidate pairs if scheduled, detects active contacts, applies impulses and books
+the work of the impulses.
 
 Every contact is computed by one rank: the owner of its node, or the rank of its first edge. Ghosts of other ranks'
 surfaces provide the data. Impulses on a node are summed over all ranks that hold the node or have a contact of it,
@@ -37,7 +38,7 @@ from .solver.sweep_count import SweepCount
 from .surface import normals, sharp
 
 _FORESIGHT = 32
-"""Steps between two checks of the crack widths."""
+"""Number of steps between two checks of the widths of cracks."""
 
 
 @dataclass(frozen=True)
@@ -46,9 +47,9 @@ class _Scheme:
 
     restitution: float
     interval: int
-    """Steps between two searches for edges that became sharp."""
+    """Number of steps between two searches for edges that became sharp."""
     sharp: Floats
-    """(parts,) cosine of the angle from which on an edge is sharp."""
+    """(parts,) cosine of the smallest angle between the normals of the two faces of a sharp edge."""
 
     @classmethod
     def of(cls, case: Case) -> "_Scheme":
@@ -80,9 +81,9 @@ class Contact:
         self.limit = 0.0
         """Inverse of the step in which no node of any rank passes more than half of a tet in contact with it, 1/s."""
         self.last_push = 0.0
-        """Last time with an impulse on a node of this rank, s."""
+        """Time of the last contact impulse on a node of this rank, s."""
         self._mean_dt = 0.0
-        """Mean step at the last step with a scene, s."""
+        """Mean time step (duration of the kick) at the last step with a scene, s."""
 
     def keep(self, parcel: Parcel) -> None:
         """Adds everything except the candidate pairs to the ``parcel`` (a checkpoint or migration message): a search
@@ -181,24 +182,25 @@ class Contact:
 
     @property
     def opening(self) -> bool:
-        """Whether a crack became wide enough in the last step to open."""
+        """True if a crack became wide enough in the last step to open."""
         return len(self.found.opening) > 0
 
     def open_cracks(self) -> None:
-        """Makes surface of the cracks that became wide. Collective."""
+        """Adds the sides of cracks that became wide to the surface. Collective."""
         with self._timers.phase("contact"):
             received = self._comm.join(self.exterior.widened(self.found.opening))
             self.found.opening = self.found.opening[:0]
             self.searches.due |= self.exterior.open(received, self.searches.scene)
 
     def separate(self, split: Split) -> None:
-        """Follows the separation of nodes; called on all ranks, see topology_updates.py for those that exchange
-        messages."""
+        """Updates contact after the separation of nodes; called on all ranks, see topology_updates.py for those that
+        exchange messages.
+        """
         self.exterior.separate(split)
         self.searches.separate(split)
 
     def grow(self, split: Split, ids: Ints) -> None:
-        """Extends the arrays by the copies of nodes; booked energies stay with the parents."""
+        """Extends the arrays by the copies of nodes; booked energies remain at the parent nodes."""
         self.books.grow(split.copies.n)
         self.exterior.grow(split)
 
@@ -288,5 +290,5 @@ class Contact:
         self.detection.detect(now, self.exterior, self.searches.mu, give, ahead, redraw, self.found.stray)
 
     def free(self) -> None:
-        """Releases the messages of MPI."""
+        """Frees the persistent MPI messages."""
         self.searches.free()

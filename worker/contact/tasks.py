@@ -1,6 +1,6 @@
 """Tasks of the passes over candidates, faces and contacts (parallel/team.py).
 
-Each task writes its rows from an offset of its own on, and their number into ``counts``.
+Each task writes its rows from its own offset on, and the number of its rows into ``counts``.
 """
 
 from ..kernels.jit import njit, types
@@ -15,12 +15,14 @@ from .solver.stops import BRACED
 from .surface.families import CORNERS
 
 PAIRS_OF_A_TASK = 1024
-"""Chosen: some 20 us of work, against 2 us that a region of threads costs."""
+"""Number of candidate pairs in a task. Chosen value: a task takes about 20 us; to start a parallel region takes 2
+us."""
 CRACKS_OF_A_TASK = 512
 FAMILIES_OF_A_TASK = 128
 CONTACTS_OF_A_TASK = 1024
 SLOTS_OF_A_TASK = 2048
-"""Chosen in the same way."""
+"""Numbers of cracks, families, contacts and slots in a task. Chosen values, by the same comparison as
+PAIRS_OF_A_TASK."""
 _F, _I = types.float64, types.int64
 _F1, _F2, _I1, _I2 = types.float64[::1], types.float64[:, ::1], types.int64[::1], types.int64[:, ::1]
 _N1, _N2, _U1 = types.int32[::1], types.int32[:, ::1], types.uint8[::1]
@@ -55,14 +57,14 @@ _bound = reader(*BOUND)
 
 @njit(TASK, cache=True)
 def due_faces(table, first, stop, thread):  # type: ignore[no-untyped-def]
-    """``node_face.due``."""
+    """Task: ``node_face.due``."""
     pairs, slots, faces, end, counts = _due_faces(table)
     counts[first // PAIRS_OF_A_TASK] = node_face.due(pairs, slots, faces, end, first, stop)
 
 
 @njit(TASK, cache=True)
 def node_face_pairs(table, first, stop, thread):  # type: ignore[no-untyped-def]
-    """``node_face.node_face`` of the pairs to be tested."""
+    """Task: ``node_face.node_face`` of the pairs to be tested."""
     out, depth, base, pairs, slots, faces, step, end, due, counts, coming = _node_face(table)
     k = first // PAIRS_OF_A_TASK
     counts[k], coming[k] = node_face.node_face(out, depth, base, pairs, slots, faces, step, end, first, first + due[k])
@@ -70,7 +72,7 @@ def node_face_pairs(table, first, stop, thread):  # type: ignore[no-untyped-def]
 
 @njit(TASK, cache=True)
 def edge_edge_pairs(table, first, stop, thread):  # type: ignore[no-untyped-def]
-    """``edge_edge.edge_edge``."""
+    """Task: ``edge_edge.edge_edge``."""
     out, base, pairs, edges, step, course, end, tested, counts = _edge_edge(table)
     k = first // PAIRS_OF_A_TASK
     counts[k], tested[k] = edge_edge.edge_edge(out, base, pairs, edges, step, course, end, first, stop)
@@ -78,7 +80,7 @@ def edge_edge_pairs(table, first, stop, thread):  # type: ignore[no-untyped-def]
 
 @njit(TASK, cache=True)
 def across_cracks(table, first, stop, thread):  # type: ignore[no-untyped-def]
-    """``crack_contact.across``."""
+    """Task: ``crack_contact.across``."""
     out, base, opening, some, typical, step, counts, wide = _across(table)
     k = first // CRACKS_OF_A_TASK
     counts[k], wide[k] = crack_contact.across(out, base, opening, some, typical, step, first, stop)
@@ -86,21 +88,21 @@ def across_cracks(table, first, stop, thread):  # type: ignore[no-untyped-def]
 
 @njit(TASK, cache=True)
 def entering_nodes(table, first, stop, thread):  # type: ignore[no-untyped-def]
-    """``corner_contact.entering``."""
+    """Task: ``corner_contact.entering``."""
     out, base, each, narrow, of, step, counts = _entering(table)
     counts[first // FAMILIES_OF_A_TASK] = corner_contact.entering(out, base, each, narrow, of, step, first, stop)
 
 
 @njit(TASK, cache=True)
 def approach(table, first, stop, thread):  # type: ignore[no-untyped-def]
-    """``closing_speed.approach``."""
+    """Task: ``closing_speed.approach``."""
     out, found, pairs, faces, step, most = _approach(table)
     most[first // CONTACTS_OF_A_TASK] = closing_speed.approach(out, found, pairs, faces, step, first, stop)
 
 
 @njit(TASK, cache=True)
 def rebound(table, first, stop, thread):  # type: ignore[no-untyped-def]
-    """``restitution.rebound`` with a share above 0, and ``hold_back`` if ``back``."""
+    """Task: ``restitution.rebound`` with a share above 0, and ``hold_back`` if ``back``."""
     out, found, v, before, share, back = _rebound(table)
     if share > 0.0:
         restitution.rebound(out, found, v, before, share, first, stop)
@@ -110,14 +112,14 @@ def rebound(table, first, stop, thread):  # type: ignore[no-untyped-def]
 
 @njit(TASK, cache=True)
 def mark(table, first, stop, thread):  # type: ignore[no-untyped-def]
-    """``slot_numbers.mark``."""
+    """Task: ``slot_numbers.mark``."""
     touched, set_of, nodes, found, zone, shared, many = _mark(table)
     slot_numbers.mark(touched, set_of, nodes, found, zone, shared, many, first // CONTACTS_OF_A_TASK, first, stop)
 
 
 @njit(TASK, cache=True)
 def sort(table, first, stop, thread):  # type: ignore[no-untyped-def]
-    """``slot_numbers.sort``."""
+    """Task: ``slot_numbers.sort``."""
     row, slots, reach, begins, set_of, found, nodes, slot = _sort(table)
     task = first // CONTACTS_OF_A_TASK
     slot_numbers.sort(row, slots, reach, begins, set_of, found, nodes, slot, task, first, stop)
@@ -125,14 +127,14 @@ def sort(table, first, stop, thread):  # type: ignore[no-untyped-def]
 
 @njit(TASK, cache=True)
 def load(table, first, stop, thread):  # type: ignore[no-untyped-def]
-    """``slot_numbers.load``."""
+    """Task: ``slot_numbers.load``."""
     active, places, v, mobility, fastest = _load(table)
     fastest[first // SLOTS_OF_A_TASK] = slot_numbers.load(active, places, v, mobility, first, stop)
 
 
 @njit(TASK, cache=True)
 def weigh(table, first, stop, thread):  # type: ignore[no-untyped-def]
-    """``sweeps.add_row_weights`` of a range of sets of contacts."""
+    """Task: ``sweeps.add_row_weights`` of a range of sets of contacts."""
     active, contacts, loaded = _weigh(table)
     for k in range(first, stop):
         sweeps.add_row_weights(active, contacts, loaded, k)
@@ -140,7 +142,7 @@ def weigh(table, first, stop, thread):  # type: ignore[no-untyped-def]
 
 @njit(TASK, cache=True)
 def resume(table, first, stop, thread):  # type: ignore[no-untyped-def]
-    """``loading.load_kept`` and ``sweeps.resume`` of a range of sets of contacts."""
+    """Task: ``loading.load_kept`` and ``sweeps.resume`` of a range of sets of contacts."""
     active, contacts, loaded, kept, ratio, scale = _resume(table)
     for k in range(first, stop):
         loading.load_kept(loaded, contacts, active, kept, k)
@@ -149,7 +151,7 @@ def resume(table, first, stop, thread):  # type: ignore[no-untyped-def]
 
 @njit(TASK, cache=True)
 def sweep(table, first, stop, thread):  # type: ignore[no-untyped-def]
-    """``loading.load`` and ``sweeps.sweep`` of a range of sets of contacts."""
+    """Task: ``loading.load`` and ``sweeps.sweep`` of a range of sets of contacts."""
     active, contacts, loaded, fastest, turn, scale = _sweep(table)
     ahead = sweeps.momentum(turn[0], turn[1])
     for k in range(first, stop):
@@ -159,14 +161,14 @@ def sweep(table, first, stop, thread):  # type: ignore[no-untyped-def]
 
 @njit(TASK, cache=True)
 def give(table, first, stop, thread):  # type: ignore[no-untyped-def]
-    """``sweeps.give``; ``turn`` (2,): which sweep it is, and of how many."""
+    """Task: ``sweeps.give``; ``turn`` (2,): number of the sweep, and number of sweeps in the step."""
     active, scale, turn = _give(table)
     sweeps.give(active, scale, turn[0] + 1 == turn[1], first, stop)
 
 
 @njit(TASK, cache=True)
 def brace(table, first, stop, thread):  # type: ignore[no-untyped-def]
-    """``stops.stop``, and the end of a sweep."""
+    """Task: ``stops.stop``; then increases the number of the sweep by one."""
     active, braced, turn = _brace(table)
     stops.stop(active, braced)
     turn[0] += 1
@@ -174,7 +176,7 @@ def brace(table, first, stop, thread):  # type: ignore[no-untyped-def]
 
 @njit(TASK, cache=True)
 def store(table, first, stop, thread):  # type: ignore[no-untyped-def]
-    """``sweeps.store`` of a range of sets of contacts."""
+    """Task: ``sweeps.store`` of a range of sets of contacts."""
     kept, loaded, pair = _store(table)
     for k in range(first, stop):
         sweeps.store(kept, loaded, pair, k)
@@ -182,7 +184,7 @@ def store(table, first, stop, thread):  # type: ignore[no-untyped-def]
 
 @njit(TASK, cache=True)
 def cost(table, first, stop, thread):  # type: ignore[no-untyped-def]
-    """``impulse_work.cost`` of a range of sets of contacts, or ``impulse_work.heat`` if ``rubs``; sums by set."""
+    """Task: ``impulse_work.cost`` of a range of sets of contacts, or ``impulse_work.heat`` if ``rubs``; sums by set."""
     words, loaded, active, before, places, joule, rubs = _cost(table)
     for k in range(first, stop):
         if rubs:
@@ -193,7 +195,7 @@ def cost(table, first, stop, thread):  # type: ignore[no-untyped-def]
 
 @njit(TASK, cache=True)
 def leave(table, first, stop, thread):  # type: ignore[no-untyped-def]
-    """``slot_numbers.leave``, sums by task."""
+    """Task: ``slot_numbers.leave``, with sums by task."""
     node_v, parts, unsettled, total, active, places, index, part, owned = _leave(table)
     k = first // SLOTS_OF_A_TASK
     slot_numbers.leave(node_v, parts[k], unsettled[k], total, active, places, index, part, owned, first, stop)
@@ -201,21 +203,21 @@ def leave(table, first, stop, thread):  # type: ignore[no-untyped-def]
 
 @njit(TASK, cache=True)
 def book(table, first, stop, thread):  # type: ignore[no-untyped-def]
-    """``impulse_work.book``."""
+    """Task: ``impulse_work.book``."""
     loss, external, places, index, before, total, mobility, scale = _book(table)
     impulse_work.book(loss, external, places, index, before, total, mobility, scale, first, stop)
 
 
 @njit(TASK, cache=True)
 def take(table, first, stop, thread):  # type: ignore[no-untyped-def]
-    """``slot_numbers.take``."""
+    """Task: ``slot_numbers.take``."""
     x, v, slots, node_x, node_v, local = _take(table)
     slot_numbers.take(x, v, slots, node_x, node_v, local, first, stop)
 
 
 @njit(TASK, cache=True)
 def bound(table, first, stop, thread):  # type: ignore[no-untyped-def]
-    """``closing_speed.bound``."""
+    """Task: ``closing_speed.bound``."""
     box, v = _bound(table)
     closing_speed.bound(box, first // SLOTS_OF_A_TASK, v, first, stop)
 

@@ -1,10 +1,11 @@
-"""Rows of the nodal means of the averaged pressure forms, if nodes have tets of several materials: one row for each
-material of a node.
+"""Rows of the nodal means of the averaged pressure forms, if nodes have tets of several materials. There is one row for
+each material of a node.
 
 A mean over the tets round a node is a value of the material there. At an interface of two materials the stress is
-continuous, so that their volume strains differ: one mean over both would give each material the strain, and so the
-pressure, of the other. Hence a node has a mean for each material of its tets, and a tet contributes to those of its
-own material. If no node has several materials, the rows of the means are the nodes.
+continuous, so the volume strains of the two materials differ. A single mean over both materials would give each
+material the strain, and therefore the pressure, of the other material. A node therefore has a mean for each material of
+its tets, and a tet contributes only to the means of its own material. If no node has several materials, the rows of the
+means are the nodes.
 """
 
 from collections.abc import Iterator, Sequence
@@ -22,13 +23,13 @@ from ..parallel.ownership import Neighbour
 
 
 def kinds(case: Case) -> Indices:
-    """(parts,) the first part that has the same material."""
+    """Returns (parts,) for each part the first part that has the same material."""
     names = [part.material for part in case.parts]
     return np.array([names.index(name) for name in names], np.int32)
 
 
 class Averages:
-    """Rows of the means of one rank. A rank that has a node has all its means."""
+    """Rows of the means of one rank. A rank that has a node has all means of the node."""
 
     def __init__(self, model: Model, neighbours: list[Neighbour], kinds: Indices) -> None:
         """``kinds`` (parts,): for each part the part that represents its material."""
@@ -36,9 +37,9 @@ class Averages:
         nodes = model.nodes
         more = _more(nodes, kinds)
         self.node: Ints = np.concatenate([np.arange(nodes.n), more[:, 0]])
-        """(rows,) local node."""
+        """(rows,) local node of each row."""
         self.kind: Indices = np.concatenate([kinds[nodes.part], more[:, 1].astype(np.int32)])
-        """(rows,) part that represents the material."""
+        """(rows,) part that represents the material of each row."""
         self._index()
         for block in model.blocks:
             block.own_averages = self._rows(block)
@@ -47,7 +48,9 @@ class Averages:
 
     @classmethod
     def of(cls, case: Case, model: Model, neighbours: list[Neighbour]) -> "Averages | None":
-        """Returns the rows of a case; None if no bond joins two materials, so that the rows are the nodes."""
+        """Returns the rows of a case; None if no bond joins two materials. In that case each node has exactly one
+        row.
+        """
         found = kinds(case)
         mixed = any(found[i] != found[j] for _, _, i, j in shared_bonds(case))
         return cls(model, neighbours, found) if mixed else None
@@ -59,7 +62,7 @@ class Averages:
 
     @property
     def further(self) -> Ints:
-        """Rows after the first one of each node, at the start."""
+        """Number of rows at the start in addition to the first row of each node."""
         return np.arange(self._model.nodes.n, self.n)
 
     def at(self, node: "np.ndarray", part: "np.ndarray | int") -> Ints:
@@ -90,7 +93,7 @@ class Averages:
         return parents
 
     def layers(self) -> Iterator[Ints]:
-        """Yields the rows in groups; in each group a node occurs at most once."""
+        """Yields the rows in groups such that a node occurs at most once in each group."""
         left = np.arange(self.n)
         while len(left):
             _, first = np.unique(self.node[left], return_index=True)

@@ -48,7 +48,7 @@ class AveragedElements(Elements):
 
     @property
     def _kind(self) -> Indices:
-        """(rows,) a part with the material of each row."""
+        """(rows,) for each row a part that has the material of the row."""
         return self.model.nodes.part if self._averages is None else self._averages.kind
 
     @property
@@ -134,5 +134,5 @@ class AveragedElements(Elements):
         return self.means.fields
 
     def _constants(self) -> Values:
-        """Arguments of ``nodal.complete`` except means and volumes."""
+        """Returns the arguments of ``nodal.complete`` except means and volumes."""
         return self._columns > 2, self.means.bulk, self.means.pressed, self._kind, self._kinds, self._params

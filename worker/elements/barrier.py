@@ -1,9 +1,9 @@
 """Barrier potential against the collapse of tets in the averaged pressure forms.
 
 The pressure of such a tet depends on the mean volume strain of its nodes; only its deviatoric stress resists a change
-of its own volume. Once that yields, a tet at an edge of a body, whose nodes have few other tets, may go to zero volume
-while the mean stays constant. Below the share SQUEEZED of the initial volume a pressure of its own is added, with the
-potential
+of its own volume. After yield, the volume of a tet at an edge of a body, whose nodes have few other tets, may decrease
+to zero while the mean volume strain stays constant. If the volume of a tet is below the share SQUEEZED of its initial
+volume, an additional pressure acts in the tet, with the potential
 
     b(J) = STIFF K (SQUEEZED / J - 1)^2,    J = V / V0 < SQUEEZED
 
@@ -20,14 +20,15 @@ from ..model.state import CHUNK
 from .scratch import CHANGE, LIMIT, MODULUS, VOLUME
 
 SQUEEZED = 0.2
-"""Share of the initial volume below which the barrier acts. Chosen: tets of Taylor bars keep 0.56, of a long rod
-without erosion 0.28."""
+"""Volume of a tet over its initial volume below which the barrier acts. Chosen value: the smallest ratio of tets in
+Taylor bars is 0.56, in a long rod without erosion 0.28."""
 STIFF = 0.1
-"""Stiffness of the barrier over the bulk modulus. Chosen: compression to half of SQUEEZED takes 10 % of the bulk
-modulus, far more than the yield stress of metals."""
+"""Stiffness of the barrier over the bulk modulus. Chosen value: compression to half of SQUEEZED requires a pressure
+of 10 % of the bulk modulus, far more than the yield stress of metals."""
 
 _ROUNDING = 1e-9
-"""Relative tolerance of a volume: far above the difference between two ways of computing a ratio."""
+"""Relative tolerance of a volume ratio. It is far above the rounding difference between two ways of computing the
+same ratio."""
 _Q, _MASS, _WORK, _WORK_VISCOUS = VISCOUS * CHUNK, MASS * CHUNK, WORK * CHUNK, WORK_VISCOUS * CHUNK
 
 
@@ -58,8 +59,8 @@ def resist(w, s, params, n):  # type: ignore[no-untyped-def]
     """Adds the barrier to the row VISCOUS, which is computed anew in every step, its work to WORK, and its stiffness to
     LIMIT.
 
-    The viscosity has booked half of the work of the old row VISCOUS; the part of that which the barrier did is taken
-    back.
+    The viscosity has booked half of the work of the old row VISCOUS; the share of the barrier in this work is
+    subtracted again.
     """
     if not _any_squeezed(w, s, params[DENSITY], n):
         return

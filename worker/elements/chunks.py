@@ -33,7 +33,7 @@ from .records import BODY, HOT, LARGEST_FORCE, LARGEST_LIMIT, LIMITING_TET, MARK
 from .wear import SOUND, mark_worn
 
 _NO_TET = 2**62
-"""Greater than any global id of a tet."""
+"""Value above any global id of a tet."""
 _F, _I, _B, _B1, _T2 = types.float64, types.int64, types.boolean, types.boolean[::1], types.uint32[:, ::1]
 _F1, _F2, _I1, _I2 = types.float64[::1], types.float64[:, ::1], types.int64[::1], types.int64[:, ::1]
 
@@ -56,7 +56,8 @@ def first_speeds(w, v, t, n):  # type: ignore[no-untyped-def]
 def from_rates(strength, w, s, params, n, dt):  # type: ignore[no-untyped-def]
     """Computes the deviatoric stress of a chunk and its work: rotation, elastic trial, plastic return.
 
-    For a law that acts after the pressure only the trial stress; ``return_at_pressure`` completes it.
+    For a law that acts after the pressure, this function computes only the trial stress; ``return_at_pressure``
+    completes the step.
     """
     predict(w, s, n, params[SHEAR], dt)
     if params[ORDER] == BEFORE_PRESSURE:
@@ -77,7 +78,8 @@ def return_at_pressure(strength, w, s, params, n, dt):  # type: ignore[no-untype
 @njit(types.void(_F1, _F1, _F1, _I, _F, _B), cache=True, error_model="numpy")
 def viscosity_and_limit(w, s, params, n, dt, averaged):  # type: ignore[no-untyped-def]
     """Computes bulk viscosity and stable step of a chunk at its new pressure; ``averaged``: True in the averaged
-    pressure forms, in which the viscosity resists a mean rate, except for materials that dilate.
+    pressure forms, in which the viscosity resists the averaged volume rate. Exception: for materials that dilate the
+    viscosity resists the rate of the tet itself.
     """
     if params[ORDER] == FROM_SHAPE:
         stiffen(w, s, params, n)
@@ -124,7 +126,9 @@ def gather_peaks(threads):  # type: ignore[no-untyped-def]
 
 @njit(_I(_I2, _F1, _I1, _I1, _I1, _T2, _F1, _I1, _I, _F), cache=True, error_model="numpy")
 def sum_forces(force, w, wi, bits, peaks, t, s, ids, n, scale):  # type: ignore[no-untyped-def]
-    """Adds the forces of a chunk of tets with these global ids to the nodal sums; returns the bits of the largest."""
+    """Adds the forces of a chunk of tets with these global ids to the nodal sums; returns the bits of the largest
+    force.
+    """
     largest = forces.internal_forces(wi, w, s, n, scale)
     forces.scatter_forces(force, wi, t, n)
     note_peaks(peaks, bits, ids, n, largest)
@@ -133,8 +137,8 @@ def sum_forces(force, w, wi, bits, peaks, t, s, ids, n, scale):  # type: ignore[
 
 @njit(_I(_I2, _F1, _F1, _I1, _I1, _B1, _T2, _I, _F), cache=True, error_model="numpy")
 def sum_fluxes(gradient, pressure, w, wi, peaks, flat, t, n, scale):  # type: ignore[no-untyped-def]
-    """Adds the pressure gradient of a chunk to the nodal sums, without ``flat`` tets; returns the bits of the
-    largest.
+    """Adds the pressure gradient of a chunk to the nodal sums, without ``flat`` tets; returns the bits of the largest
+    contribution.
     """
     largest = averaged.pressure_fluxes(wi, w, pressure, t, n, scale)
     if len(flat) > 0:
@@ -162,7 +166,9 @@ def mark(marks, first, last, w, peaks, s, params, rows):  # type: ignore[no-unty
 
 @njit(types.void(_F1, _F2, _T2, _F1, _B, _I), cache=True, error_model="numpy")
 def volumes_at_rest(w, x, t, s, shape, n):  # type: ignore[no-untyped-def]
-    """Sets VOLUME_MID and DILATATION of a chunk at rest; ``shape``: its law acts from the undeformed shape."""
+    """Sets VOLUME_MID and DILATATION of a chunk at rest; ``shape``: True if the law computes the stress from the
+    undeformed shape.
+    """
     if shape:
         tet4.unchanged(w, s, n)
     else:
@@ -182,7 +188,9 @@ def take_means(w, s, body, means, means_of, flat, n):  # type: ignore[no-untyped
 
 @njit(types.void(_F1, _F1, _F2, _T2, _B, _I, _F), cache=True, error_model="numpy")
 def own_change(w, s, v, t, shape, n, dt):  # type: ignore[no-untyped-def]
-    """Sets CHANGE and SPEED of a chunk after the first pass; ``shape``: its law acts from the undeformed shape."""
+    """Sets CHANGE and SPEED of a chunk after the first pass; ``shape``: True if the law computes the stress from the
+    undeformed shape.
+    """
     if shape:
         averaged.recall_growth(w, s, n, dt)
         if dt <= 0.0:
@@ -193,8 +201,8 @@ def own_change(w, s, v, t, shape, n, dt):  # type: ignore[no-untyped-def]
 
 @njit(types.void(_F1, _F1, BODY, _F2, _T2, _B1, _I), cache=True, error_model="numpy", forceinline=True)
 def averaged_pressure(w, s, body, matter, means_of, flat, n):  # type: ignore[no-untyped-def]
-    """Computes the pressure of a chunk, its work and MODULUS, in the averaged forms: in its tets or from its nodes;
-    that of ``flat`` tets from their own strain.
+    """Computes the pressure of a chunk, its work and MODULUS, in the averaged forms: in its tets or from its nodes. The
+    pressure of ``flat`` tets is computed from their own strain.
     """
     params, eos, rows = body.params, body.eos, body.rows
     if len(flat) > 0:

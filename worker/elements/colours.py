@@ -13,7 +13,7 @@ from ..kernels.jit import njit
 from ..model.state import CHUNK, Block, Ints
 
 _BITS = 63
-"""Number of colours in a word of bits; a chunk for which none is free gets a colour of its own."""
+"""Number of colours in a word of bits. A chunk for which no colour is free gets an additional colour of its own."""
 
 
 @dataclass(frozen=True)
@@ -21,9 +21,9 @@ class Coloured:
     """Tasks sorted by colour."""
 
     tasks: Ints
-    """(k, 2) first chunk, and one past the last."""
+    """(k, 2) first chunk of each task, and one past the last chunk."""
     starts: Ints
-    """(colours + 1,) first task of each colour, and the end."""
+    """(colours + 1,) first task of each colour; the last value is the number of tasks."""
 
 
 @njit("void(uint32[:, ::1], int64, int64, int64[::1], int64[::1])", cache=True)

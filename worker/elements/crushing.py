@@ -31,13 +31,13 @@ _SXX, _SYY, _SZZ = S_XX * CHUNK, S_YY * CHUNK, S_ZZ * CHUNK
 _SYZ, _SZX, _SXY = S_YZ * CHUNK, S_ZX * CHUNK, S_XY * CHUNK
 _P = PRESSURE * CHUNK
 _MOST = 100
-"""Most Newton steps. Chosen: 6 are enough in general; if two principal stresses are nearly equal, each step halves
-the distance, so that 30 reach rounding."""
+"""Largest number of Newton steps. Chosen value: in general 6 steps are enough. If two principal stresses are nearly
+equal, each step only halves the error, and 30 steps reduce it to rounding."""
 _ROUNDING = 1e-15
-"""Relative residual, of the cube of the root, at which the iteration ends: a few last bits of a float64. A double
-root is then known to the square root of that."""
+"""Residual over the cube of the root at which the iteration ends: a few last bits of a float64. The relative error
+of a double root is then the square root of this value."""
 CHUNKS_OF_A_TASK = 16
-"""Chunks of a task. Chosen: at least 10 us of work, against 2 us for a region of threads."""
+"""Number of chunks in a task. Chosen value: a task takes at least 10 us; to start a parallel region takes 2 us."""
 _I, _F, _I1, _F1, _F3 = types.int64, types.float64, types.int64[::1], types.float64[::1], types.float64[:, :, ::1]
 _LOOK = _I1, _F1, _F3, _I1, _I, _F, _F
 _COUNT = _I1, _F3, _I, _F
@@ -90,8 +90,8 @@ def _below(s, i, least):  # type: ignore[no-untyped-def]
 
 @njit("boolean(float64[::1], int64, float64)", cache=True, error_model="numpy", forceinline=True)
 def _above(s, i, least):  # type: ignore[no-untyped-def]
-    """Returns True if it is above, by two bounds: s1 - s3 >= sqrt(3 J2), s1 + s3 <= 2 p + r; and s1 >= p + r, also
-    if s3 is tension, which counts as zero.
+    """Returns True if 8 T times the ratio of tet ``i`` of a chunk is above ``least``, Pa, by two bounds: s1 - s3 >=
+    sqrt(3 J2), s1 + s3 <= 2 p + r; and s1 >= p + r, also if s3 is tension, which counts as zero.
     """
     xx, yy, zz, yz, zx, xy = s[_SXX + i], s[_SYY + i], s[_SZZ + i], s[_SYZ + i], s[_SZX + i], s[_SXY + i]
     j2 = 0.5 * (xx * xx + yy * yy + zz * zz) + yz * yz + zx * zx + xy * xy
@@ -113,10 +113,11 @@ def _not_below(s, n, least):  # type: ignore[no-untyped-def]
 @njit("Tuple((int64, float64))(float64[:, :, ::1], int64[::1], int64, float64, float64, int64, int64)", cache=True,
       error_model="numpy")  # fmt: skip
 def hardest(state, ids, n, strength, known, first, stop):  # type: ignore[no-untyped-def]
-    """Returns the place of the tet with the largest ratio, and the ratio, if it is above ``known``; else -1. Of equal
-    ones that with the smallest id. Checks those of the ``n`` tets that are in the chunks from ``first`` to ``stop``.
+    """Returns the place of the tet with the largest ratio, and the ratio, if it is above ``known``; else -1. Of tets
+    with equal ratio, the tet with the smallest id is returned. Checks those of the ``n`` tets that are in the chunks
+    from ``first`` to ``stop``.
 
-    Bounds exclude most chunks, and most tets of the others.
+    Bounds exclude most chunks, and most tets of the remaining chunks.
     """
     place, best = -1, known
     for c in range(first, stop):
@@ -191,7 +192,9 @@ class Met:
 
 
 class Crushing:
-    """Largest compression so far in each part of such a material; on this rank until the ranks compare."""
+    """Largest compression so far in each part of a brittle material without a law of compressive failure. The values
+    are those of this rank; ``keep`` and ``found`` take the maximum over the ranks.
+    """
 
     def __init__(self, model: Model, strengths: Floats, comm: Comm, clock: Clock, team: Team) -> None:
         """``strengths`` (parts,): tensile strength, Pa; 0 for other materials; ``team``: threads of the rank."""
@@ -204,7 +207,7 @@ class Crushing:
 
     @classmethod
     def of(cls, case: Case, model: Model, comm: Comm, clock: Clock, team: Team) -> "Crushing | None":
-        """Returns None if no part has such a material."""
+        """Returns None if no part has a brittle material without a law of compressive failure."""
         made = [material(case, part.material) for part in case.parts]
         strengths = [
             each.brittle.strength if each.brittle and bears_all(each) and part.rigid is None else 0.0
@@ -213,14 +216,14 @@ class Crushing:
         return cls(model, np.array(strengths), comm, clock, team) if any(strengths) else None
 
     def update(self) -> None:
-        """Compares with the present stresses."""
+        """Updates the largest compression by the present stresses."""
         for block in self._blocks():
             place, times = self._hardest(block, self._met[block.part].times)
             if place >= 0:
                 self._met[block.part] = self._of(block, place, times)
 
     def _blocks(self) -> list[Block]:
-        """Blocks of such materials."""
+        """Blocks of brittle materials without a law of compressive failure."""
         return [block for block in self._model.blocks if self._strengths[block.part] > 0.0]
 
     def _hardest(self, block: Block, known: float) -> tuple[int, float]:
@@ -251,7 +254,9 @@ class Crushing:
         return Met(times, most, least, int(block.id[place]), (x, y, z), self._clock.t)
 
     def _of_all(self) -> list[Met]:
-        """Returns the largest compression of each part over all ranks; of equal ones the earliest. Collective."""
+        """Returns the largest compression of each part over all ranks; of equal compressions the earliest.
+        Collective.
+        """
         shared = self._comm.share(self._met)
         return [min(found, key=lambda met: (-met.times, met.time, met.tet)) for found in zip(*shared, strict=True)]
 
@@ -265,7 +270,7 @@ class Crushing:
         self._most = np.array(known[1], np.int64)
 
     def found(self) -> list[Compressed]:
-        """Returns the results of each such part, the largest ratio first. Collective."""
+        """Returns the results of each part of such a material, the largest ratio first. Collective."""
         met = [
             Compressed(
                 part=name, times=each.times, most=each.most, least=each.least, tet=each.tet,

@@ -19,8 +19,8 @@ def why(sim: Simulation) -> str:
 
 
 def _compression(block: Block, tet: int) -> Floats:
-    """(2,) compression in the equation of state of a tet, and the pole of that; -inf if the block does not have the
-    tet.
+    """(2,) compression in the equation of state of a tet, and the compression at the pole of the equation of state;
+    -inf if the block does not contain the tet.
     """
     places = np.flatnonzero(block.id == tet)
     if EQUATIONS[block.eos] is not GRUNEISEN or not len(places):

@@ -1,9 +1,10 @@
-"""Flat tets in the averaged pressure forms: their pressure depends on their own volume strain, and they do not
+"""Flat tets in the averaged pressure forms: their pressure depends on their own volume strain, and flat tets do not
 contribute to the nodal means.
 
-The volume of a flat tet is small beside that of its neighbours, so that a nodal mean hardly changes with it: a
-motion along its altitude, which hardly strains the neighbours, closes it, and after yield no stress resists. With
-its own pressure it resists as in the ``standard`` form; flat tets are few, so that they cause no locking.
+The volume of a flat tet is small compared with the volume of its neighbours, so it has little influence on a nodal
+mean. A motion along its altitude hardly strains the neighbours but may reduce the volume of the flat tet to zero; after
+yield no stress resists. With its own pressure the flat tet resists as in the ``standard`` form. The number of flat tets
+is small, so they cause no locking.
 """
 
 import numpy as np
@@ -20,14 +21,15 @@ from .pressure import STABILISE
 from .scratch import CHANGE, MODULUS, SEEN, VOLUME, VOLUME_MID
 
 THINNEST = 0.1
-"""Smallest altitude over longest edge of a tet whose volume strain is averaged; 0.82 for a regular tet. Chosen: a
-motion that strains its neighbours by a tenth closes it (docs/theory/elements.md)."""
+"""Smallest ratio of altitude to longest edge of a tet whose volume strain is averaged; the ratio of a regular tet is
+0.82. Chosen value: at this ratio a motion that strains the neighbours by a tenth reduces the volume of the tet to
+zero (docs/theory/elements.md)."""
 
 _HEAT, _NODAL_WORK, _MASS, _GROWN = HEAT * CHUNK, NODAL_WORK * CHUNK, MASS * CHUNK, DILATION * CHUNK
 
 
 def flat_tets(block: Block, x0: Floats) -> Flags:
-    """(n,) which tets of a block are flat at the start; (0,) if none is."""
+    """(n,) True for tets of a block that are flat at the start; (0,) if no tet is flat."""
     tets = block.tets.astype(np.int64)
     x = x0[tets]
     edges = x[:, 1:] - x[:, :1]
@@ -52,15 +54,15 @@ def exclude_flat(w, flat, n):  # type: ignore[no-untyped-def]
 def own_strain(w, s, params, flat, rows, n):  # type: ignore[no-untyped-def]
     """Sets SEEN of flat tets, and HEAT if they have heat, to their own values.
 
-    The change of volume over the volume at mid-step, which is that of the end less half the change, up to terms of
-    third order.
+    The volume strain is the change of volume over the volume at mid-step. The volume at mid-step is the volume at the
+    end less half of the change, up to terms of third order.
     """
     unit = params[DENSITY] / params[BULK]
     for i in range(n):
         if flat[i]:
             w[SEEN + i] = w[CHANGE + i] / (w[VOLUME + i] - 0.5 * w[CHANGE + i])
             if params[DILATES] > 0.0:
-                w[SEEN + i] += s[_GROWN + i]  # the dilation that ``subtract_dilation`` has taken back
+                w[SEEN + i] += s[_GROWN + i]  # the dilation that ``subtract_dilation`` has subtracted
             if rows > NODAL_WORK + 1:
                 for k in range(4):
                     stretch_corner(w, s, i, k, w[SEEN + i])
@@ -74,7 +76,7 @@ def own_strain(w, s, params, flat, rows, n):  # type: ignore[no-untyped-def]
     error_model="numpy",
 )
 def own_pressure(eos, w, s, alone, params, flat, rows, n):  # type: ignore[no-untyped-def]
-    """Computes pressure, its work and MODULUS of flat tets, if those of other tets are means of their nodes:
+    """Computes pressure, its work and MODULUS of flat tets, if the pressures of other tets are means of their nodes:
     ``alone`` is the state before the pressure, and is overwritten.
     """
     modulus = w[MODULUS : MODULUS + CHUNK].copy()

@@ -19,13 +19,14 @@ _P, _Q = PRESSURE * CHUNK, VISCOUS * CHUNK
 _NEAREST_BITS = 0x4338000000000000
 """Bits of NEAREST."""
 MAGNITUDE = 0x7FFFFFFFFFFFFFFF
-"""Mask of the bits of a float64 without the sign: as integers these order like absolute values, with NaN above all."""
+"""Mask of the bits of a float64 without the sign bit. Compared as integers, the masked bits have the order of
+absolute values, and NaN is above all numbers."""
 
 
 @njit("int64(float64)", cache=True, error_model="numpy", forceinline=True)
 def _whole(x):  # type: ignore[no-untyped-def]
-    """Returns the integer nearest to x, |x| < 2^51, and the even one of two: the last bits of a sum. Many processors
-    have no instruction that converts a vector of float64 to integers.
+    """Returns the integer nearest to x, |x| < 2^51; of two equally near integers the even one. The integer is read from
+    the last bits of a sum. Many processors have no instruction that converts a vector of float64 to integers.
     """
     return np.float64(x + NEAREST).view(np.int64) - _NEAREST_BITS
 
@@ -39,7 +40,7 @@ def quanta(a, b, c, scale):  # type: ignore[no-untyped-def]
 
 @njit("int64(float64, float64, float64)", cache=True, error_model="numpy")
 def largest_of(a, b, c):  # type: ignore[no-untyped-def]
-    """Returns the bits of the largest magnitude; NaN is above all."""
+    """Returns the bits of the largest magnitude; NaN is above all numbers."""
     return max(
         max(np.float64(a).view(np.int64) & MAGNITUDE, np.float64(b).view(np.int64) & MAGNITUDE),
         np.float64(c).view(np.int64) & MAGNITUDE,
@@ -48,9 +49,10 @@ def largest_of(a, b, c):  # type: ignore[no-untyped-def]
 
 @njit("int64(int64[::1], float64[::1], float64[::1], int64, float64)", cache=True, error_model="numpy")
 def internal_forces(wi, w, s, n, scale):  # type: ignore[no-untyped-def]
-    """Sets nine rows of -V stress grad N of nodes 1, 2, 3, N, in quanta of 1/scale; returns the bits of the largest.
+    """Sets nine rows of -V stress grad N of nodes 1, 2, 3, N, in quanta of 1/scale; returns the bits of the largest
+    force.
 
-    ``scatter_forces`` gives node 0 minus their sum.
+    ``scatter_forces`` adds minus the sum of these forces to node 0.
     """
     peak = 0
     for i in range(n):
@@ -85,7 +87,9 @@ def internal_forces(wi, w, s, n, scale):  # type: ignore[no-untyped-def]
 
 @njit("void(int64[:, ::1], int64[::1], uint32[:, ::1], int64)", cache=True)
 def scatter_forces(force, wi, tets, n):  # type: ignore[no-untyped-def]
-    """Adds the quantised forces to the nodal sums; node 0 gets minus the sum, so that they add up to exactly zero."""
+    """Adds the quantised forces to the nodal sums; node 0 gets minus the sum, so that the four forces of a tet add up
+    to exactly zero.
+    """
     first, second, third = wi, wi[3 * CHUNK :], wi[6 * CHUNK :]
     for i in range(n):
         a, b, c, d = tets[i, 0], tets[i, 1], tets[i, 2], tets[i, 3]

@@ -30,10 +30,10 @@ class Bridges(Protocol):
     """Forces between nodes other than those of tets: cohesive facets."""
 
     def open(self, x: Floats) -> None:
-        """Updates the forces at the positions of the end of the step."""
+        """Computes the forces at the positions at the end of the step."""
 
     def scatter(self, force: Ints, scale: float) -> int:
-        """Adds the forces in quanta of 1 / ``scale`` N; returns the bits of the largest."""
+        """Adds the forces in quanta of 1 / ``scale`` N; returns the bits of the largest force."""
 
 
 class FlagExchange(Protocol):
@@ -58,13 +58,14 @@ class Elements:
         self._timers, self._team = timers, team
         self._scratches = Scratches.of(team.threads)
         self.peaks: Ints = self._scratches.peaks[0, : records.PEAKS]
-        """(5,) see elements/records.py."""
+        """(5,) peaks over all tets of the rank, see elements/records.py."""
         self._words = self.peaks.data
         self._reals = self.peaks.view(np.float64).data
         self._standard = BlockPass(tasks.standard, tasks.STANDARD)
         self._again = BlockPass(tasks.again, tasks.AGAIN, marked=False)
         self._coloured: dict[tuple[int, int], tuple[int, Coloured]] = {}
-        """Tasks by part and first chunk, with the count of moved tets (``Block.moved``) for which they are valid."""
+        """Tasks by part and first chunk, and the count of moved tets (``Block.moved``) for which the tasks are
+        valid."""
         self._comm, self._neighbours = comm, neighbours
         self._flags: FlagExchange | None = None
         self._connect()
@@ -88,7 +89,7 @@ class Elements:
 
     @property
     def limiting(self) -> int:
-        """Smallest global id of the tets of this rank that have the limit."""
+        """Smallest global id of the tets of this rank whose one-over-stable-step is equal to ``limit``."""
         return self._words[records.LIMITING_TET]
 
     @property
@@ -139,8 +140,8 @@ class Elements:
         self.peaks[records.LARGEST_FORCE] = max(int(self.peaks[records.LARGEST_FORCE]), largest)
 
     def grow(self, split: Split) -> None:
-        """Updates the exchange after a split; the copies are shared nodes already, and the tets have their new
-        nodes.
+        """Updates the exchange after a node separation. The copies must already be shared nodes, and the tets must have
+        their new nodes.
         """
         if not self.shared_forces.serves(self._neighbours):
             self.free()
@@ -159,7 +160,7 @@ class Elements:
         self.peaks[[records.LARGEST_LIMIT, records.LIMITING_TET]] = parcel.known["peaks"]
 
     def attach(self, flags: FlagExchange) -> None:
-        """Sends these flags with the forces from now on. Collective among neighbours."""
+        """From now on sends the given flags with the forces. Collective among neighbours."""
         self.free()
         self._flags = flags
         self._connect()

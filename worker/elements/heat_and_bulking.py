@@ -1,8 +1,8 @@
 """Nodal means of heat and bulking in the averaged pressure forms.
 
-An equation of state with heat uses energy averaged in the same way as the volume strain: the heat of a single tet
-would raise its pressure against its neighbours, and the volumes of its nodes would not resist. The same holds for
-bulking.
+An equation of state with heat uses energy averaged in the same way as the volume strain: the heat of a single tet would
+increase its pressure relative to its neighbours, and the averaged volume strain would not reduce this pressure. The
+same holds for bulking.
 """
 
 import numpy as np
@@ -18,15 +18,15 @@ _WORK, _WORK_VISCOUS, _TAKEN = WORK * CHUNK, WORK_VISCOUS * CHUNK, WORK_AVERAGED
 _MASS, _HEAT, _NODAL_WORK = MASS * CHUNK, HEAT * CHUNK, NODAL_WORK * CHUNK
 _BULKING, _BULKING_STEP, _CORNERS = BULKING * CHUNK, BULKING_STEP * CHUNK, CORNERS * CHUNK
 HEATED = NODAL_WORK + 1
-"""Number of state rows of a tet with heat; one with bulking has more."""
+"""Number of state rows of a tet with heat; a tet with bulking has more rows."""
 
 
 @njit("void(float64[::1], float64[::1], int64, float64)", cache=True, error_model="numpy", forceinline=True)
 def take_bulking(s, params, i, more):  # type: ignore[no-untyped-def]
-    """Adds ``more`` to the bulking of tet ``i``, Pa, and books the energy that this stores, since the law has booked
-    the energy that its own bulking would store at the nodes. As there (materials/johnson_holmquist.py) it is (K m +
-    bulking)^2 / 2K per volume, with a quarter of the volume at each corner; zero where the material is expanded
-    beyond zero stress.
+    """Adds ``more`` to the bulking of tet ``i``, Pa, and books the change of the stored energy, because the law has
+    booked the energy that its own bulking would store at the nodes. As in materials/johnson_holmquist.py, the stored
+    energy is (K m + bulking)^2 / 2K per volume, with a quarter of the volume at each corner; it is zero if the material
+    is expanded beyond zero stress.
     """
     bulk, stored = params[BULK], 0.0
     for k in range(4):
@@ -42,7 +42,8 @@ def take_bulking(s, params, i, more):  # type: ignore[no-untyped-def]
 def scatter_heat(sums, w, s, params, weight, tets, n):  # type: ignore[no-untyped-def]
     """Adds a quarter of the work of each tet since the last step, over its mass, to the sums of its nodes.
 
-    Weighted by volume, as the volume change is, in units of the bulk modulus over the density; ``sums`` (nodes, 3).
+    The heat is weighted by volume, as the volume change is, in units of the bulk modulus over the density; ``sums``
+    (nodes, 3).
     """
     unit = params[DENSITY] / params[BULK]
     for i in range(n):
@@ -59,7 +60,7 @@ def scatter_bulking(sums, w, s, params, weight, tets, n):  # type: ignore[no-unt
     """Adds a quarter of the new bulking of each tet to the sums of its nodes, weighted by volume as in
     ``scatter_heat``.
 
-    In units of the bulk modulus. A flat tet, whose volume is zero here, keeps its bulking itself.
+    The unit is the bulk modulus. A flat tet, whose volume is zero here, keeps its bulking itself.
     """
     per_bulk = 1.0 / params[BULK]
     for i in range(n):
@@ -93,7 +94,7 @@ def gather_heat(s, heat, tets, n):  # type: ignore[no-untyped-def]
 
 @njit("void(float64[::1], float64[::1], float64[::1], uint32[:, ::1], boolean[::1], int64)", cache=True)
 def gather_bulking(s, params, bulking, tets, flat, n):  # type: ignore[no-untyped-def]
-    """Adds the mean of the four nodes to BULKING; tets that are ``flat``, (n,) or (0,), keep their own."""
+    """Adds the mean of the four nodes to BULKING; tets that are ``flat``, (n,) or (0,), keep their own bulking."""
     quarter = 0.25 * params[BULK]
     for i in range(n):
         if len(flat) == 0 or not flat[i]:

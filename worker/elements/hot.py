@@ -1,4 +1,6 @@
-"""Overstressed faces of a tet by its own stress: the inexpensive test before the criterion (fracture/criterion.py)."""
+"""Overstressed faces of a tet by the stress of the tet alone: the inexpensive test before the fracture criterion
+(fracture/criterion.py).
+"""
 
 from ..kernels.jit import njit
 from ..model.rows import PRESSURE, S_XX, S_XY, S_YY, S_YZ, S_ZX, S_ZZ
@@ -25,8 +27,8 @@ def _passes(bx, by, bz, xx, yy, zz, yz, zx, xy, weight, square):  # type: ignore
 
 @njit("boolean(uint8[::1], float64[::1], float64[::1], float64[::1], float64, int64)", cache=True, error_model="numpy")
 def mark_hot(hot, w, s, weakest, weight, n):  # type: ignore[no-untyped-def]
-    """Sets bit k of ``hot`` if face k of a tet passes by the stress of the tet without its viscous part; returns True
-    if any face does.
+    """Sets bit k of ``hot`` if face k of a tet is overstressed by the stress of the tet without the viscous part;
+    returns True if any face does.
 
     ``w`` holds the area vectors b1, b2, b3 of a chunk (elements/tet4.py).
     """

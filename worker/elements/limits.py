@@ -9,9 +9,9 @@ from .scratch import AREAS, LIMIT, MODULUS, SPEED, VOLUME
 
 _MASS = MASS * CHUNK
 CLOSING = 4.0
-"""Fewest steps in which a tet would lose, or gain, all of its volume at the rate of the last step. Chosen: about the
-value that the default viscosity requires, 4.3; after such a step the error of p = -K ln J is 0.5 %
-(docs/theory/time_integration.md)."""
+"""Smallest number of steps in which the volume of a tet may change by its whole value, at the rate of the last step.
+Chosen value: close to 4.3, the value that the default viscosity requires; after a step of this size the error of p =
+-K ln J is 0.5 % (docs/theory/time_integration.md)."""
 LENGTH_FACTOR = 1.2009369551760027
 """V^(1/3) times sqrt(sum |grad N|^2) of a regular tet, sqrt(6) / (6 sqrt(2))^(1/3): the length l, LENGTH_FACTOR over
 that root, is V^(1/3) for a regular tet and decreases with the altitude of a flat one."""

@@ -1,15 +1,15 @@
 """Material state at the nodes, in the averaged pressure forms: for pressures that are not linear in the volume strain.
 
-The volume strain of a node is a mean over its tets; so each node has a volume ratio and pores of its own, and a
-pressure that follows from these. The pressure of a tet is the mean of its four nodes. The work of the forces on the
+The volume strain of a node is a mean over its tets; so each node has its own volume ratio and pores, and a pressure
+computed from volume ratio and pores. The pressure of a tet is the mean of its four nodes. The work of the forces on the
 volumes of the tets is then that of the nodal pressures on the nodal volumes:
 
     sum_e V_e e_e mean_a(p_a) = sum_a p_a V_a e_a,    V_a e_a = sum_e V_e e_e / 4
 
-so that the mean neither creates nor dissipates energy (docs/theory/elements.md, "Matter at the nodes"). Nodal
-pressures are used for a linear material with a tension cut-off. For a pressure that is linear in the strain, the
-mean of the strain is the mean of the pressure, which then stays with the tet; so does the pressure of an equation of
-state with heat.
+so that the mean neither creates nor dissipates energy (docs/theory/elements.md, "Matter at the nodes"). Nodal pressures
+are used for a linear material with a tension cut-off. If the pressure is linear in the strain, the mean of the strain
+gives the mean of the pressure, and the pressure is computed in the tet. The pressure of an equation of state with heat
+is also computed in the tet.
 """
 
 import numpy as np
@@ -26,9 +26,10 @@ RATIO, PORES_AT, PRESSURE_AT, WORKED, TORN, OPENED, STIFF = range(7)
 of the pressure, J/m^3; the part of it dissipated in pores, J/m^3; volume of new pores. Modulus of the wave speed,
 Pa."""
 COLUMNS = 8
-"""Number of columns: one more than above, so that a row is a cache line."""
+"""Number of columns: one more than the columns that are used, so that a row is a cache line."""
 TETS, LINEAR = range(2)
-"""Place where the pressure is computed: in the tets; at the nodes, linear with a tension cut-off."""
+"""Place where the pressure is computed. TETS: in the tets; LINEAR: at the nodes, for a linear pressure with a
+tension cut-off."""
 
 _P, _MASS, _WORK, _PORES = (row * CHUNK for row in (PRESSURE, MASS, WORK, PORES))
 _TAKEN, _PLASTIC = WORK_AVERAGED * CHUNK, WORK_PLASTIC * CHUNK
@@ -38,8 +39,9 @@ _TAKEN, _PLASTIC = WORK_AVERAGED * CHUNK, WORK_PLASTIC * CHUNK
 def pressure_place(eos, params):  # type: ignore[no-untyped-def]
     """Returns TETS or LINEAR for the number of the equation of state and the constants of a part.
 
-    With heat it is TETS: a node at the surface of a strong shock is compressed more than the mean of four (at 10
-    km/s more than a step resolves). With dilation too: the pressure then contains a share of the flow of the tet.
+    With heat it is TETS: a node at the surface of a strong shock is compressed more than the mean of four (at 10 km/s
+    more than a step resolves). With dilation it is TETS too, because the pressure then contains a share of the flow of
+    the tet.
     """
     return LINEAR if eos == 0 and params[SPALL] < np.inf and params[DILATES] == 0.0 else TETS
 
@@ -58,8 +60,8 @@ def _book(at, params_bulk, old, before, after, opened):  # type: ignore[no-untyp
 
 @njit("void(float64[::1], float64[::1], float64)", cache=True, error_model="numpy")
 def _linear(at, params, strain):  # type: ignore[no-untyped-def]
-    """p -= K d(volume strain), limited from below by minus the spall pressure and, while there are pores, from above
-    by zero.
+    """Updates the pressure of a node by p -= K d(volume strain), limited from below by minus the spall pressure and,
+    while there are pores, from above by zero.
     """
     bulk, spall = params[BULK], params[SPALL]
     old, pores, before, half = at[PRESSURE_AT], at[PORES_AT], at[RATIO], 0.5 * strain
@@ -95,7 +97,7 @@ def _mean(matter, tets, i, k):  # type: ignore[no-untyped-def]
 )
 def from_nodes(w, s, params, matter, tets, n):  # type: ignore[no-untyped-def]
     """Sets pressure, its work and MODULUS of ``n`` tets from the state at their nodes; WORK_AVERAGED: work on the
-    own volume less the work at the nodes.
+    volume of the tet less the work at the nodes.
     """
     porous, shaped = params[SPALL] < np.inf, params[ORDER] == FROM_SHAPE
     for i in range(n):

@@ -22,9 +22,10 @@ def keep_before(w, s, params, n):  # type: ignore[no-untyped-def]
     """Sets BEFORE: pressure before the step; CHANGE_SEEN: change of the averaged volume; VOLUME_SEEN: averaged volume
     at mid-step.
 
-    Called before the equation of state; on entry VOLUME_SEEN is that of the start of the step. A material that
-    dilates uses its own volume: its pressure does not determine a volume, and its flow adds to the volume of all
-    tets round its nodes. The dilation that ``subtract_dilation`` has taken back is of the step before.
+    Called before the equation of state; on entry VOLUME_SEEN is the averaged volume at the start of the step. A
+    material that dilates uses its own volume: its pressure does not determine a volume, and its flow adds to the volume
+    of all tets round its nodes. The dilation that ``subtract_dilation`` has subtracted is the dilation of the previous
+    step.
     """
     if params[DILATES] > 0.0:
         for i in range(n):
@@ -42,11 +43,11 @@ def keep_before(w, s, params, n):  # type: ignore[no-untyped-def]
 
 @njit("void(float64[::1], float64[::1], float64[::1], int64)", cache=True, error_model="numpy")
 def book_averaged(w, s, params, n):  # type: ignore[no-untyped-def]
-    """Adds the work of the mean pressure of the step on the own volume, less that on the averaged one, to
+    """Adds the work of the mean pressure of the step on the volume of the tet, less its work on the averaged volume, to
     WORK_AVERAGED.
 
-    The stress of a material that dilates acts on its own volume: if the dilation of others increases that, more
-    energy is stored.
+    The stress of a material that dilates acts on its own volume: if the dilation of neighbours increases this volume,
+    more energy is stored.
     """
     dilates = params[DILATES] > 0.0
     for i in range(n):

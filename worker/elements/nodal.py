@@ -11,10 +11,11 @@ from .records import MEANS
 
 _FLAG, _F1 = types.boolean, types.float64[::1]
 COMPLETE = (MEANS, _F1, _FLAG, _F1, _FLAG, types.int32[::1], types.int64[::1], types.float64[:, ::1])
-"""Types of: means; (nodes,) room for volumes; whether heat or bulking is averaged; (nodes,) bulk modulus, Pa;
-whether there are nodal pressures; (nodes,) part of each node; (parts,) TETS or LINEAR; (parts, SIZE) constants."""
+"""Types of the arguments: means; (nodes,) array for volumes; whether heat or bulking is averaged; (nodes,) bulk
+modulus, Pa; whether there are nodal pressures; (nodes,) part of each node; (parts,) TETS or LINEAR; (parts, SIZE)
+constants."""
 PROJECT = (MEANS, _F1, types.float64)
-"""Types of: means, those volumes, and the quanta per newton of the sums."""
+"""Types of the arguments: means, nodal volumes, and the quanta per newton of the sums."""
 _complete, _project = reader(*COMPLETE), reader(*PROJECT)
 
 

@@ -1,4 +1,6 @@
-"""Arrays of the averaged pressure forms: sums and means by row, a row for each node and each further material of it."""
+"""Arrays of the averaged pressure forms: sums and means by row, one row for each node, and one row for each further
+material of a node.
+"""
 
 import numpy as np
 
@@ -7,7 +9,7 @@ from . import matter
 from .passes import Values
 
 _STORED = {"_weight": "weight", "pressure": "pressure", "_projected": "projected", "_matter": "matter"}
-"""Names in a checkpoint, and attributes."""
+"""Names of the columns in a checkpoint, and names of the attributes."""
 
 
 class NodalMeans:
@@ -24,7 +26,7 @@ class NodalMeans:
         self.pressure, self.projected = np.zeros(of_split), np.zeros((of_split, 3))
         self.gradient: Ints = np.zeros((of_split, 3), np.int64)
         self.volumes = np.zeros(of_split)
-        """(rows,) nodal volumes of the step, m^3; one row without ``split``."""
+        """(rows,) nodal volumes of the step, m^3; the array has one row if the form is not ``split``."""
         self.matter = matter.at_start(n if pressed else 1)
 
     @property
@@ -34,7 +36,7 @@ class NodalMeans:
 
     @property
     def fields(self) -> Values:
-        """The fields of records.Means."""
+        """Returns the fields of records.Means."""
         return (
             self.sums, self.weight, self.strain, self.more, self.split, self.pressure, self.projected, self.gradient,
             self.matter,
@@ -51,7 +53,7 @@ class NodalMeans:
 
     @property
     def stored(self) -> dict[str, "np.ndarray"]:
-        """Columns of a checkpoint, by the names there."""
+        """Returns the columns for a checkpoint, by name."""
         names = ["_weight", *(["pressure", "_projected"] if self.split else []), *(["_matter"] if self.pressed else [])]
         return {name: getattr(self, _STORED[name]) for name in names}
 

@@ -1,4 +1,4 @@
-"""A pass over the tets for the threads: the kernel of its tasks, and a table of arguments for each block."""
+"""A pass over the tets by the threads of a rank: the kernel of the tasks, and a table of arguments for each block."""
 
 from typing import Any
 
@@ -19,7 +19,7 @@ class BlockPass:
         self.kernel = kernel
         self._kinds, self._marked = kinds, marked
         self._tables: dict[int, Arguments] = {}
-        """Tables by part."""
+        """Tables of arguments, by part."""
 
     def address(self, nodes: Nodes, block: Block, scratches: Scratches, means: Values, numbers: Values) -> int:
         """Returns the address of the arguments for a block; ``means``: the fields of Means, or none."""

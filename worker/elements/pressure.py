@@ -1,12 +1,12 @@
 """Averaged pressure forms: the volume strain in the pressure of a tet is averaged over its nodes.
 
 One-point tets with their own pressure lock in plastic flow. ``nodal`` replaces the volume strain of a tet by the mean
-of the values of its nodes, each the volume-weighted mean over the tets round it (averaged nodal pressure, Bonet and
-Burton 1998, in rate form; the pressure is stored by tet, so that any equation of state works and the separation of a
-node changes no pressure). ``split`` adds the projection form of the operator split for pressure gradients to the nodal
-balance (Zienkiewicz et al. 1998): an Oñate-Codina stabilisation, proportional to the difference between the pressure
-gradient of a tet and the mean of the projected gradients of its nodes; it vanishes for a linear pressure. Heat and
-bulking are averaged in the same way (heat_and_bulking.py).
+of the values of its nodes, the value of a node is the volume-weighted mean over the tets round the node (averaged nodal
+pressure, Bonet and Burton 1998, in rate form; the pressure is stored by tet, so that any equation of state works and
+the separation of a node changes no pressure). ``split`` adds the projection form of the operator split for pressure
+gradients to the nodal balance (Zienkiewicz et al. 1998): an Oñate-Codina stabilisation, proportional to the difference
+between the pressure gradient of a tet and the mean of the projected gradients of its nodes; it vanishes for a linear
+pressure. Heat and bulking are averaged in the same way (heat_and_bulking.py).
 
 Nodal sums are integers. Each contribution is relative to the reference volume of the node and so of order one, for
 any size of tets: one fixed scale, QUANTA, serves every case.
@@ -27,11 +27,11 @@ QUANTA = float(2**52)
 _FLUX, _VOLUME, _MASS = VOLUME_FLUX * CHUNK, TET_VOLUME * CHUNK, MASS * CHUNK
 _WORK, _P, _GROWN = WORK * CHUNK, PRESSURE * CHUNK, DILATION * CHUNK
 STABILISE = NODAL
-"""Scratch rows: the four stabilising volume fluxes, m^3/s."""
+"""First scratch row of the four stabilising volume fluxes, m^3/s."""
 _PROJECTED = NODAL + 4 * CHUNK
-"""Scratch rows: mean projected pressure gradient, Pa/m."""
+"""First scratch row of the mean projected pressure gradient, Pa/m."""
 _DIFFERENCE = NODAL + 7 * CHUNK
-"""Scratch rows: nodal pressures less that of node 0, Pa."""
+"""First scratch row of the nodal pressures less the pressure of node 0, Pa."""
 
 
 @njit("void(float64[::1], float64[::1], int64)", cache=True)
@@ -43,11 +43,11 @@ def keep_flux(w, s, n):  # type: ignore[no-untyped-def]
 
 @njit("void(float64[::1], float64[::1], float64[::1], int64, float64)", cache=True, error_model="numpy")
 def subtract_dilation(w, s, params, n, dt):  # type: ignore[no-untyped-def]
-    """Subtracts the dilation of the last step from tets, so that the nodal mean of it enters their pressure in its
-    place.
+    """Subtracts the dilation of the last step from the pressure of tets, which then contains the nodal mean of the
+    dilation instead.
 
-    The law has added its own dilation to the pressure at once, so that the stress lies on the yield surface; this is
-    taken back here, with its work. DILATATION is from now on that of the elastic strain.
+    The law has added its own dilation to the pressure at once, so that the stress lies on the yield surface; this
+    function subtracts that dilation and its work again. Afterwards DILATATION is the trace of the elastic strain rate.
     """
     if dt <= 0.0:
         return
@@ -70,7 +70,7 @@ def recall_flux(w, s, n, dt):  # type: ignore[no-untyped-def]
 
 @njit("void(float64[::1], float64[::1], int64, float64)", cache=True, error_model="numpy")
 def recall_growth(w, s, n, dt):  # type: ignore[no-untyped-def]
-    """Sets the same for tets that store their volume, and stores the present volume."""
+    """Does the same for tets that store their volume, and stores the present volume."""
     frequency = 1.0 / dt if dt > 0.0 else 0.0
     for i in range(n):
         volume = w[VOLUME + i]
@@ -98,7 +98,9 @@ def scatter_volumes(sums, w, weight, tets, n, dt):  # type: ignore[no-untyped-de
 
 @njit("void(int64[:, ::1], float64[::1], float64[::1], uint32[:, ::1], int64, float64)", cache=True)
 def scatter_stabilised(sums, w, weight, tets, n, dt):  # type: ignore[no-untyped-def]
-    """Adds the same, with the stabilising fluxes of ``stabilise`` in the volume change."""
+    """Adds a quarter of each tet's volume change, including the stabilising fluxes of ``stabilise``, and of its volume
+    to the sums of its nodes.
+    """
     for i in range(n):
         volume = 0.25 * w[VOLUME_MID + i]
         flux = volume * w[DILATATION + i]
@@ -169,7 +171,7 @@ def own_strains(w, n, dt):  # type: ignore[no-untyped-def]
 
 @njit("void(float64[::1], float64[::1], int64, float64)", cache=True, error_model="numpy")
 def own_growth(w, s, n, dt):  # type: ignore[no-untyped-def]
-    """Sets the same for tets that store their volume, and stores the present volume."""
+    """Does the same for tets that store their volume, and stores the present volume."""
     frequency = 1.0 / dt if dt > 0.0 else 0.0
     for i in range(n):
         volume = w[VOLUME + i]
@@ -186,7 +188,7 @@ def own_growth(w, s, n, dt):  # type: ignore[no-untyped-def]
 
 @njit("int64(int64[::1], float64[::1], float64[::1], uint32[:, ::1], int64, float64)", cache=True)
 def pressure_fluxes(wi, w, pressure, tets, n, scale):  # type: ignore[no-untyped-def]
-    """Sets three rows of V grad p / 4 of the tet, N, in quanta of 1/scale; returns the bits of the largest."""
+    """Sets three rows of V grad p / 4 of the tet, N, in quanta of 1/scale; returns the bits of the largest value."""
     b1, b2, b3 = w[EDGE:], w[EDGE + 3 * CHUNK :], w[EDGE + 6 * CHUNK :]
     peak = 0
     for i in range(n):

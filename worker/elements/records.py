@@ -13,9 +13,9 @@ LARGEST_LIMIT, LIMITING_TET, LARGEST_FORCE, WORN, HOT = range(5)
 """Places in ``Scratch.peaks``: bits of the largest one-over-stable-step, 1/s; smallest global id of the tets that
 have it; bits of the largest force, N; state of the worn tets (wear.py); whether faces are overstressed (hot.py)."""
 PEAKS = 5
-"""Number of these places."""
+"""Number of places in ``Scratch.peaks``."""
 _LINE = 8
-"""Float64 numbers in a cache line."""
+"""Number of float64 in a cache line."""
 
 
 class Motion(NamedTuple):
@@ -35,9 +35,9 @@ class Body(NamedTuple):
     """Elements of a block."""
 
     tets: Tets
-    """(n, 4) local nodes."""
+    """(n, 4) local nodes of each tet."""
     id: Ints
-    """(n,) global ids."""
+    """(n,) global ids of the tets."""
     state: Floats
     """State of the whole block, flat."""
     rows: int
@@ -49,7 +49,7 @@ class Body(NamedTuple):
     eos: int
     """Number of the equation of state."""
     quiet: Ints
-    """(chunks, 3) see rest.py."""
+    """(chunks, 3) marks of chunks at rest, see rest.py."""
     flat: Flags
     """(n,) flat tets, whose volume strain is not averaged; (0,) if there is none."""
     averages: Tets
@@ -62,9 +62,9 @@ class Marks(NamedTuple):
     worn: Flags
     """(n,) worn tets, which will be removed; (0,) if the part does not erode."""
     life: Floats
-    """(5,) see wear.py."""
+    """(5,) limits of worn tets, see wear.py."""
     hot: Bits
-    """(n,) see hot.py; (0,) if the part does not fracture."""
+    """(n,) overstressed faces as bits, see hot.py; (0,) if the part does not fracture."""
     weakest: Floats
     """(n,) smallest strength of the faces of each tet, Pa."""
     shear: float
@@ -75,22 +75,22 @@ class Scratch(NamedTuple):
     """Scratch for one chunk, and the peaks over all tets of a thread."""
 
     w: Floats
-    """Rows of CHUNK numbers, see scratch.py."""
+    """Scratch rows of CHUNK numbers each, see scratch.py."""
     wi: Ints
     """Nine rows of forces, quanta."""
     bits: Ints
     """Same memory as ``w``, as integers."""
     peaks: Ints
-    """(5,) see LARGEST_LIMIT and the names beside it."""
+    """(5,) peaks of the thread: see LARGEST_LIMIT and the following names."""
 
 
 class Scratches(NamedTuple):
     """A scratch for each thread."""
 
     w: Floats
-    """(threads, SCRATCH)."""
+    """(threads, SCRATCH) scratch rows of each thread."""
     wi: Ints
-    """(threads, 9 * CHUNK)."""
+    """(threads, 9 * CHUNK) force rows of each thread."""
     bits: Ints
     """Same memory as ``w``, as integers."""
     peaks: Ints
@@ -127,7 +127,7 @@ class Means(NamedTuple):
     gradient: Ints
     """(rows, 3) sums of the pressure gradient, quanta."""
     matter: Floats
-    """(rows, COLUMNS) see matter.py; one row if there are no nodal pressures."""
+    """(rows, COLUMNS) material state at the nodes, see matter.py; one row if there are no nodal pressures."""
 
     @classmethod
     def none(cls) -> "Means":

@@ -1,5 +1,5 @@
-"""Chunks at rest, which no wave has reached yet: a pass over them changes nothing, so it is omitted, with identical
-results.
+"""Chunks at rest, which no wave has reached yet. A pass over such a chunk changes nothing, so the pass is omitted, with
+identical results.
 
 A chunk is noted as at rest after a complete pass that found zero velocity at all its nodes, left every bit of its
 state unchanged and made no force. A pass is a function of that state, the nodal velocities, the positions, which are
@@ -14,8 +14,8 @@ from .forces import MAGNITUDE
 from .scratch import LIMIT
 
 NOTED, TET, STEADY = range(3)
-"""Places of a chunk in ``Block.quiet``: bits of its largest one-over-stable-step, 1/s, 0 if it is not noted; the
-smallest global id of its tets that have it; 1 if the first of two passes left its state unchanged."""
+"""Places of a chunk in ``Block.quiet``: bits of its largest one-over-stable-step, 1/s, 0 if the chunk is not noted;
+the smallest global id of its tets that have this limit; 1 if the first of two passes left its state unchanged."""
 
 
 @njit("boolean(float64[:, ::1], uint32[:, ::1], int64)", cache=True)
@@ -51,7 +51,7 @@ def same(before, after):  # type: ignore[no-untyped-def]
 
 @njit("void(int64[::1], int64[::1], int64[::1], int64)", cache=True)
 def note(quiet, bits, ids, n):  # type: ignore[no-untyped-def]
-    """Notes a chunk as at rest, with the limit from its pass and the smallest id that has it."""
+    """Notes a chunk as at rest, with the limit from its pass and the smallest id of the tets with this limit."""
     limit, first = 0, 0
     for i in range(n):
         own = bits[LIMIT + i] & MAGNITUDE
@@ -62,8 +62,8 @@ def note(quiet, bits, ids, n):  # type: ignore[no-untyped-def]
 
 @njit("void(int64[::1], int64[::1], int64, int64)", cache=True)
 def pass_over(peaks, quiet, place, tet):  # type: ignore[no-untyped-def]
-    """Raises the ``peaks`` by those of a noted chunk: its limit at ``place``, and the smallest id that has it at
-    ``tet``.
+    """Raises the ``peaks`` to the limit of a noted chunk at ``place``, and to the smallest id of the tets with this
+    limit at ``tet``.
     """
     if quiet[NOTED] > peaks[place]:
         peaks[place], peaks[tet] = quiet[NOTED], quiet[TET]

@@ -26,9 +26,9 @@ MODULUS = 22 * CHUNK
 LIMIT = 23 * CHUNK
 """One over the largest stable step, 1/s."""
 TRIAL = 24 * CHUNK
-"""Von Mises stress of the trial stress, Pa."""
+"""Von Mises equivalent of the trial stress, Pa."""
 SEEN = 25 * CHUNK
-"""Volume strain of the step in the pressure: of the tet, or the mean over its nodes."""
+"""Volume strain of the step from which the pressure is computed: the strain of the tet, or the mean over its nodes."""
 CHANGE = 26 * CHUNK
 """Change of the volume of the tet in the step, m^3."""
 NODAL = 27 * CHUNK
@@ -37,9 +37,9 @@ CORNER_CHANGE = 36 * CHUNK
 MOVED = 40 * CHUNK
 """9 rows: differences of the displacements of nodes 1, 2, 3 to node 0, m."""
 SPEED = 49 * CHUNK
-"""Rate of change of the volume over it, 1/s."""
+"""Rate of change of the volume over the volume, 1/s."""
 VOLUME_SEEN = 50 * CHUNK
-"""Volume that belongs to the pressure, m^3."""
+"""Volume from which the pressure is computed, m^3."""
 CHANGE_SEEN = 51 * CHUNK
 """Change of VOLUME_SEEN in the step, m^3."""
 BEFORE = 52 * CHUNK

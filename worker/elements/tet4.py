@@ -44,7 +44,7 @@ from .scratch import (
 _VOLUME = TET_VOLUME * CHUNK
 _SIXTH = 1.0 / 6.0
 _LINE = 8
-"""Float64 numbers in a cache line of 64 bytes; with longer lines some are fetched twice."""
+"""Number of float64 in a cache line of 64 bytes. On processors with longer lines some lines are fetched twice."""
 
 
 @njit("void(float64[::1], int64, int64)", cache=True, forceinline=True)
@@ -59,8 +59,8 @@ def _prefetch_tet(ahead, i, rows):  # type: ignore[no-untyped-def]
 def gather(rows, values, tets, ahead, n):  # type: ignore[no-untyped-def]
     """Sets nine ``rows``: the differences of nodes 1, 2, 3 to node 0 in nodal ``values`` (nodes, 3).
 
-    The edges, from x, in the rows from EDGE on; the velocity differences, from v, in those from RATE on. ``ahead``:
-    rows of the state, or none, which are in the cache afterwards.
+    The edges, from x, in the rows from EDGE on; the velocity differences, from v, in the rows from RATE on. ``ahead``:
+    rows of the state that are prefetched into the cache, or none.
     """
     first, second, third = rows, rows[3 * CHUNK :], rows[6 * CHUNK :]
     near = len(ahead) // CHUNK
@@ -83,8 +83,8 @@ def gather_moved(w, x0, x, tets, ahead, n):  # type: ignore[no-untyped-def]
     """Sets EDGE: the edges, and MOVED: the differences of the displacements of nodes 1, 2, 3 to node 0; ``ahead`` as in
     ``gather``.
 
-    The edges of both times are gathered one after the other: 18 rows at once are more streams than a processor
-    stores at full speed.
+    The two groups of nine rows are written one after the other, because 18 rows at once are more write streams than a
+    processor can store at full speed.
     """
     gather(w[EDGE:], x, tets, ahead, n)
     gather(w[MOVED:], x0, tets, ahead[:0], n)
@@ -96,7 +96,7 @@ def gather_moved(w, x0, x, tets, ahead, n):  # type: ignore[no-untyped-def]
 
 @njit("UniTuple(float64, 9)(float64[::1], int64)", cache=True, error_model="numpy", forceinline=True)
 def _rates(w, i):  # type: ignore[no-untyped-def]
-    """Returns the velocity differences of tet ``i``."""
+    """Returns the differences of the velocities of nodes 1, 2, 3 to node 0 of tet ``i``."""
     return (
         w[RATE + i], w[RATE + CHUNK + i], w[RATE + 2 * CHUNK + i],
         w[RATE + 3 * CHUNK + i], w[RATE + 4 * CHUNK + i], w[RATE + 5 * CHUNK + i],
@@ -177,8 +177,8 @@ def volumes(w, n):  # type: ignore[no-untyped-def]
 
 @njit("void(float64[::1], float64[::1], int64, float64)", cache=True, error_model="numpy")
 def growth(w, s, n, dt):  # type: ignore[no-untyped-def]
-    """Sets VOLUME_MID, the mean of VOLUME and the volume before the step, and DILATATION, their difference over it and
-    dt.
+    """Sets VOLUME_MID, the mean of VOLUME and the volume before the step, and DILATATION, the difference of the two
+    volumes over VOLUME_MID and dt.
 
     Equal to those of ``kinematics`` up to terms of third order in the step. With dt = 0 the change is zero.
     """
@@ -225,7 +225,7 @@ def end_gradients(w, n):  # type: ignore[no-untyped-def]
 
 @njit("void(float64[::1], int64)", cache=True, error_model="numpy")
 def speeds(w, n):  # type: ignore[no-untyped-def]
-    """Sets SPEED, the rate of change of the volume over it, 1/s, from V grad N and the velocity differences."""
+    """Sets SPEED, the rate of change of the volume over the volume, 1/s, from V grad N and the velocity differences."""
     for i in range(n):
         ax, ay, az, bx, by, bz, cx, cy, cz = _rates(w, i)
         first = ax * w[EDGE + i] + ay * w[EDGE + CHUNK + i] + az * w[EDGE + 2 * CHUNK + i]

@@ -1,8 +1,8 @@
 """Worn tets, which erosion removes: by plastic strain, damage, volume or stable step.
 
 A tet that becomes flat or inverted must be removed before it collapses: its velocity gradient is proportional to one
-over its altitude, and a single tet that passes zero would accelerate its nodes without bound. Such a tet is removed
-at once; one that exceeds only a strain or damage limit can wait for others (worker/erosion.py).
+over its altitude, and a single tet whose altitude passes zero would accelerate its nodes without bound. Such a tet is
+removed at once; one that exceeds only a strain or damage limit can wait for others (worker/erosion.py).
 """
 
 import math
@@ -35,7 +35,8 @@ STRAIN, LOW, HIGH, FREQUENCY, DAMAGED = range(5)
 """Places in ``life`` of a block: largest plastic strain, smallest and largest volume over the initial one, largest
 one-over-stable-step, 1/s, damage."""
 SOUND, TIRED, BROKEN = range(3)
-"""Result of a check: no worn tet; worn tets that can wait; worn tets that cannot."""
+"""Results of a check. SOUND: no worn tet; TIRED: worn tets whose removal can be delayed; BROKEN: worn tets that must
+be removed in the next step."""
 
 _SIXTH = 1.0 / 6.0
 _MASS, _STRAIN, _DAMAGE = MASS * CHUNK, PLASTIC_STRAIN * CHUNK, DAMAGE * CHUNK
@@ -86,8 +87,8 @@ def any_inverted(w, n):  # type: ignore[no-untyped-def]
 
 @njit("UniTuple(float64, 2)(float64[::1], float64[:, ::1], float64[:, ::1], uint32[::1], int64, float64)", cache=True)
 def _half_of_last(s, x, v, tet, i, dt):  # type: ignore[no-untyped-def]
-    """Half of the work of the nodes of tet ``i`` against its forces of n, from n to n+1, J: without viscosity, and of
-    viscosity.
+    """Returns half of the work of the nodes of tet ``i`` against the forces of the tet at n, on the way from n to n+1,
+    J: the part without viscosity, and the part of viscosity.
 
     1/2 dt sum v_a . (stress b_a), b_a = V grad N_a at x(n) = x(n+1) - dt v.
     """
@@ -119,8 +120,8 @@ def _half_of_last(s, x, v, tet, i, dt):  # type: ignore[no-untyped-def]
 def reset_inverted(w, s, before, x, v, tets, rows, n, dt):  # type: ignore[no-untyped-def]
     """Resets inverted tets of a chunk to their state ``before`` the step, with zero stress.
 
-    The stress at the end of the step never acts on a node; that at its start has done half of its work in the step
-    ``dt``, which is booked here. They do not contribute to the nodal means.
+    The stress at the end of the step never acts on a node. The stress at the start of the step has done half of its
+    work in the step ``dt``; this half is booked here. These tets do not contribute to the nodal means.
     """
     for i in range(n):
         if w[VOLUME + i] <= 0.0:
@@ -139,8 +140,8 @@ def reset_inverted(w, s, before, x, v, tets, rows, n, dt):  # type: ignore[no-un
     error_model="numpy",
 )
 def mark_worn(worn, w, s, params, life, rows, n):  # type: ignore[no-untyped-def]
-    """Marks the worn tets of a chunk; one that cannot wait no longer limits the time step. Returns SOUND, TIRED or
-    BROKEN.
+    """Marks the worn tets of a chunk. A tet whose removal cannot be delayed no longer limits the time step. Returns
+    SOUND, TIRED or BROKEN.
 
     The stress of an inverted tet is set to zero before it acts on a node. A tet whose stress is not a number is not
     removed: its limit becomes NaN, which ends the run with an error that names the tet.

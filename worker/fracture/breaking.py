@@ -21,7 +21,7 @@ class Breaking:
 
     @property
     def rows(self) -> Ints:
-        """(m, 2) place of the tet and local face of each, as in the table of the body."""
+        """(m, 2) place of the tet and local face of each facet, as in the table of the body."""
         one, two = self.facets.sides[:, 0, 1:], self.facets.sides[:, 1, 1:]
         return np.where(one[:, :1] >= 0, one, two).astype(np.int64)
 
@@ -49,7 +49,7 @@ def _mass(mesh, e):  # type: ignore[no-untyped-def]
 
 @njit(types.void(BREAKING, types.int64, types.int64, CANDIDATES, INTERFACE, MESH, types.int64), cache=True)
 def _fill(out, m, i, found, shared, mesh, block):  # type: ignore[no-untyped-def]
-    """Fills row ``m`` of ``out`` from candidate ``i``."""
+    """Fills row ``m`` of ``out`` with the data of candidate ``i``."""
     place, face, row = found.place[i], found.face[i], found.shared[i]
     behind, mass = mesh.across[place, face], _mass(mesh, place)
     first = row < 0 or shared.first[row]

@@ -19,15 +19,15 @@ r"""Cohesive facets: a traction that falls linearly with the opening, irreversib
 
 With e = 0 this is the usual law, whose stiffness is unbounded just after insertion: rounding would determine the
 direction of the traction, and unloading would require a time step of zero. The offset reproduces the traction at
-insertion in size and direction, leaves the area under the curve unchanged, and bounds the stiffness by strength / e;
-e is the smallest size that leaves the stable time step unchanged. With three pairs every mode of opening has a
-stiffness. Under pressure only d_t counts; contact resists the closing.
+insertion in size and direction, leaves the area under the curve unchanged, and bounds the stiffness by strength / e; e
+is the smallest size that leaves the stable time step unchanged. With three pairs of nodes every mode of opening has a
+stiffness. Under pressure only d_t counts; contact prevents penetration.
 
 At insertion the spring is under tension: it stores strength e / 2 per area, for which no work was done. That energy is
-lent: while D >= e (column ``lent``), the pair has absorbed at least what it releases by closing. A pair that would
-close further is unloaded, partly or completely: its offset is shortened, so that it follows the law again from its
-present position. Its stiffness stays; strength and critical opening are set so that the area under the remaining law
-is the remaining energy (formulas in law.py; when, in unloading.py).
+a loan: while D >= e (column ``lent``), the pair has absorbed at least as much energy as it would release by closing. A
+pair that would close further is unloaded, partly or completely: its offset is shortened, so that it follows the law
+again from its present position. The stiffness of the pair is unchanged; strength and critical opening are set so that
+the area under the remaining law is the remaining energy (formulas in law.py; when, in unloading.py).
 
 A facet whose nodes have not separated has no opening: the two nodes of a pair are one, on which its tractions cancel.
 """
@@ -49,7 +49,7 @@ class Cohesion:
         """``energy``: order of magnitude of the work on a facet, J; it sets the quantum of the sums."""
         self.facets = Facets.none()
         self.gone = Tally(np.array([energy, energy]))
-        """Sums over the facets that have failed: work done on them, J, and their fracture energy, J."""
+        """Sums over the failed facets: work done on the facets, J, and fracture energy of the facets, J."""
 
     def insert(self, new: Facets) -> None:
         """Adds facets that have just broken."""
@@ -84,7 +84,7 @@ class Cohesion:
         law.unload(change, self.facets, nodes.x, nodes.v, nodes.force, nodes.mass, steps, nodes.scale, whole)
 
     def foresee(self, nodes: Nodes, mean_dt: float) -> None:
-        """Stores the opening velocities of the next step that follow from the present nodal forces alone."""
+        """Stores the opening velocities in the next step that the present nodal forces alone would cause."""
         law.foresee(self.facets, nodes.v, nodes.force, nodes.mass, mean_dt / nodes.scale)
 
     def keep(self, parcel: Parcel) -> None:
@@ -107,8 +107,8 @@ class Cohesion:
         return int(law.scatter(force, self.facets.nodes, self.facets.state.pull, scale))
 
     def columns(self) -> Floats:
-        """(m, 3) of each facet, J: work done on it, recoverable energy (released if it closes), and its fracture
-        energy.
+        """(m, 3) energies of each facet, J: work done on the facet, recoverable energy (released if the facet closes),
+        and fracture energy.
         """
         f, s = self.facets.softening, self.facets.state
         beyond = np.maximum(s.top - f.knee, 0.0)
@@ -119,8 +119,8 @@ class Cohesion:
 
     @staticmethod
     def energies(sums: Floats, gone: Floats) -> tuple[float, float, float]:
-        """Energies, J: dissipated, recoverable by closing, and the fracture energy of all facets ever inserted; from
-        the sums of ``columns`` and of ``gone`` over all ranks.
+        """Returns energies, J: dissipated energy, energy recoverable by closing, and fracture energy of all facets
+        inserted so far; from the sums of ``columns`` and of ``gone`` over all ranks.
         """
         work, reversible, whole = sums
         gone_work, gone_whole = gone

@@ -1,4 +1,6 @@
-"""Columns of the cohesive facets, grouped by what changes them, and their numba types."""
+"""Columns of the cohesive facets and their numba types: constants, columns that unloading changes, columns that every
+step changes.
+"""
 
 from collections.abc import Mapping
 from typing import Any, NamedTuple
@@ -13,11 +15,11 @@ class FacetConstants(NamedTuple):
     """Constants of a facet since its insertion, SI."""
 
     energy: Floats
-    """(m,) J/m^2."""
+    """(m,) fracture energy per area, J/m^2."""
     area: Floats
-    """(m,) at insertion."""
+    """(m,) area at insertion, m^2."""
     shear: Floats
-    """(m,) b^2."""
+    """(m,) weight of shear b^2."""
 
 
 class Softening(NamedTuple):
@@ -26,12 +28,12 @@ class Softening(NamedTuple):
     strength: Floats
     """(m, 3) traction at which softening begins, Pa."""
     critical: Floats
-    """(m, 3) opening from there to zero traction, m."""
+    """(m, 3) opening from the start of softening to zero traction, m."""
     knee: Floats
     """(m, 3) size D of the opening at which softening begins, m."""
     lent: Floats
-    """(m, 3) size D at insertion, e, m: a pair that closes below it would release more than it absorbed. Smaller, or
-    0, once the pair has been unloaded."""
+    """(m, 3) size D at insertion, e, m: a pair that closes below this size would release more energy than it
+    absorbed. The value is smaller, or 0, after the pair has been unloaded."""
     offset: Floats
     """(m, 3, 3) offset of the opening, m: along the normal, along the first edge, and across both."""
 
@@ -40,7 +42,7 @@ class PairState(NamedTuple):
     """Present state of each pair; every step changes it."""
 
     top: Floats
-    """(m, 3) largest size D so far, with the offset, m; at least the knee."""
+    """(m, 3) largest size D so far, with the offset, m; at least the size at which softening begins."""
     size: Floats
     """(m, 3) present size D, m."""
     opening: Floats
@@ -54,13 +56,13 @@ class PairState(NamedTuple):
 
 
 class Facets(NamedTuple):
-    """Cohesive facets of one rank: those whose tet of smaller id is on this rank."""
+    """Cohesive facets of one rank: the facets whose tet of smaller id is on this rank."""
 
     tets: Ints
     """(m, 2) global ids of the tets of the two sides."""
     nodes: Indices
-    """(m, 6) local nodes of the first side, counter-clockwise seen from outside of it, and those opposite on the
-    second side."""
+    """(m, 6) local nodes of the first side, counter-clockwise seen from outside of its tet, and the opposite nodes
+    of the second side."""
     constants: FacetConstants
     softening: Softening
     state: PairState

@@ -12,14 +12,15 @@ from ..model.state import Block, Indices, Ints, Model
 from ..parallel.comm import Comm
 
 _PART = 1 << 62
-"""Added to the number of a part; above all tet ids. Such a name joins all tets of a part that has no facets."""
+"""Offset above all tet ids. The offset plus the number of a part is the name of a node of the graph that connects
+all tets of a part without facets."""
 
 
 def labels(model: Model, held: Ints, comm: Comm) -> list[Ints]:
     """Labels of fragments, (n,) for each block, a label for each tet: the smallest global id of its tets. Collective.
 
-    Tets are connected through faces whose bond is intact, and through ``held``, (m, 2) global ids of tets of
-    cohesive facets; a pair is given on a rank that has one of the two. A block without ``across`` is one piece.
+    Tets are connected through faces whose bond is intact, and through ``held``, (m, 2) global ids of tets of cohesive
+    facets; a pair is given on a rank that has one of the two. A block without the array ``across`` is one piece.
     """
     ids = np.concatenate([np.zeros(0, np.int64), *(block.id for block in model.blocks)])
     where, root, first = IdIndex(ids), np.arange(len(ids), dtype=np.int32), 0
@@ -50,8 +51,8 @@ def components(n: int, edges: Ints | Indices) -> Ints:
 
 
 def _bind_held(root: Indices, ids: Ints, where: IdIndex, pairs: Ints) -> Ints:
-    """Joins pairs of tets (m, 2); returns (k, 2) the place of the tet here and the id of the other, for pairs across
-    ranks.
+    """Joins pairs of tets (m, 2); returns, for pairs across ranks, (k, 2) the place of the tet on this rank and the id
+    of the other tet.
     """
     at = where.places(pairs)
     here = at >= 0
@@ -121,8 +122,9 @@ def _bind(root, pairs, ids):  # type: ignore[no-untyped-def]
 
 @njit("UniTuple(int64, 2)(int64[:, ::1], int64[::1], int32[:, ::1], int32[:, ::1], uint8[:, ::1], int64)", cache=True)
 def _across_faces(pairs, outer, behind, across, bond, first):  # type: ignore[no-untyped-def]
-    """Fills ``pairs`` with the places of tets of a block and of the tets ``behind`` their intact faces, and
-    ``outer`` with the faces, 4 * tet + face, whose other tet is on another rank; returns both numbers.
+    """Fills ``pairs`` with the places of tets of a block and of the tets ``behind`` their intact faces, and ``outer``
+    with the faces, 4 * tet + face, whose other tet is on another rank; returns the number of pairs and the number of
+    faces.
     """
     inner, rest = 0, 0
     for tet in range(len(behind)):

@@ -1,16 +1,17 @@
 """Fracture criterion: the traction on a facet, the mean of those of its two tets, against its strength.
 
 A facet breaks where sqrt(<t_n>^2 + w t_s^2) reaches the strength, with the Macaulay bracket that the paper's eq. (1)
-lacks; under pressure where sqrt(w) <t_s - mu |t_n|> does (Camacho and Ortiz 1996). ::
+lacks; under pressure, where sqrt(w) <t_s - mu |t_n|> reaches the strength (Camacho and Ortiz 1996). ::
 
                   n                              t = (stress_1 + stress_2) / 2 n
           tet 2   ^    t                         t_n = t . n, positive in tension
         +---------|--/------+  facet             t_s = |t - t_n n|
           tet 1   | /                            n: outward normal of the tet of smaller id, tet 1
 
-The first form bounds the second and is convex: the mean of two tractions passes only if one of them does. So the pass
-over the elements marks the overstressed faces of each tet (elements/hot.py), and only the facets of these are
-computed: those whose mean traction reaches the strength are candidates.
+The first form is an upper bound of the second form and is convex: the mean of two tractions reaches the strength only
+if one of the two reaches it. The pass over the elements therefore marks the overstressed faces of each tet
+(elements/hot.py), and the mean traction is computed only for facets with a marked face. A facet whose mean traction
+reaches the strength is a candidate.
 """
 
 import numpy as np
@@ -26,7 +27,7 @@ _SXX, _SYY, _SZZ = S_XX * CHUNK, S_YY * CHUNK, S_ZZ * CHUNK
 _SYZ, _SZX, _SXY = S_YZ * CHUNK, S_ZX * CHUNK, S_XY * CHUNK
 _P = PRESSURE * CHUNK
 _TOGETHER = 64
-"""Number of facets whose stresses are read together."""
+"""Number of facets whose stresses are read in one loop."""
 _I1, _F1 = types.int64[::1], types.float64[::1]
 
 
@@ -92,8 +93,8 @@ def effective(t, normal, weight, friction):  # type: ignore[no-untyped-def]
 
 @njit(types.int64(CANDIDATES, types.int64, types.int64, types.uint8[::1], MESH), cache=True)
 def _of_tet(out, n, e, hot, mesh):  # type: ignore[no-untyped-def]
-    """Appends the overstressed facets of tet ``e`` to the ``n`` of ``out``, each from the first of its sides that is
-    overstressed, while there is room; returns the new number.
+    """Appends the overstressed facets of tet ``e`` to the ``n`` facets of ``out`` while ``out`` has free rows; a facet
+    with two overstressed sides is appended once, from its first side. Returns the new number.
     """
     for k in range(4):
         if not (hot[e] & mesh.intact[e]) >> k & 1:
@@ -110,8 +111,8 @@ def _of_tet(out, n, e, hot, mesh):  # type: ignore[no-untyped-def]
 
 @njit(types.int64(CANDIDATES, types.uint8[::1], MESH), cache=True)
 def _overstressed(out, hot, mesh):  # type: ignore[no-untyped-def]
-    """Fills ``out`` with the overstressed facets within this rank; returns their number, also if it is above the
-    room. ``hot`` (tets,): bit k for an overstressed face k, read eight tets at a time.
+    """Fills ``out`` with the overstressed facets within this rank; returns the number of these facets, even if it is
+    larger than the number of rows. ``hot`` (tets,): bit k for an overstressed face k, read eight tets at a time.
     """
     n, words = 0, len(hot) // 8
     one, two = hot[: 8 * words].view(np.uint64), mesh.intact[: 8 * words].view(np.uint64)
@@ -126,7 +127,7 @@ def _overstressed(out, hot, mesh):  # type: ignore[no-untyped-def]
 @njit(types.int64(CANDIDATES, types.int64, MESH, TABLE, POINTS, LAW), cache=True)
 def within(out, n, mesh, table, x, law):  # type: ignore[no-untyped-def]
     """Moves the candidates among the ``n`` facets of ``out`` to the front; returns their number. The stresses of
-    some facets are read together, so that the memory serves many reads at once.
+    several facets are read in one loop, so that many reads of memory overlap.
     """
     normal, one, two, m = np.empty(3), np.empty(3), np.empty(3), 0
     near, far = np.empty((_TOGETHER, 6)), np.empty((_TOGETHER, 6))
@@ -216,8 +217,8 @@ def clock(found, n, table, law, step, t):  # type: ignore[no-untyped-def]
     """Updates the clocks of the ``n`` candidates, and moves those that break by the delayed criterion to the front;
     returns their number.
 
-    The clock of an overstressed facet continues if it ran in the last step, number ``step`` - 1; else it starts at
-    the time ``t``. With nodal tractions some candidates are not overstressed.
+    The clock of an overstressed facet continues if it ran in the last step, number ``step`` - 1; else it starts at the
+    time ``t``. With nodal tractions, some candidates are not overstressed and have no clock.
     """
     m = 0
     for i in range(n):
@@ -243,7 +244,7 @@ def clock(found, n, table, law, step, t):  # type: ignore[no-untyped-def]
 )  # fmt: skip
 def search(out, hot, shared, chosen, mesh, table, x, law, step, t):  # type: ignore[no-untyped-def]
     """Finds the candidates of a body that break by their clocks in step number ``step``; all candidates if it is 0.
-    Returns their number, or, if there is too little room, a bound of the room that is needed.
+    Returns their number, or, if ``out`` has too few rows, an upper bound of the number of rows that are needed.
     """
     n = _overstressed(out, hot, mesh)
     if n + len(chosen) <= len(out.place):

@@ -15,14 +15,16 @@ from .records import FacetTable, Law, Mesh
 from .strength import Toughness
 
 _BATCH = 10_000
-"""Number of tets that are initialised together; it bounds the temporary memory."""
+"""Number of tets that are initialised in one call; it limits the temporary memory."""
 ELSEWHERE = -2
-"""Place of a tet that is on another rank; -1 for no tet."""
+"""Value for the place of a tet that is on another rank; -1 is the value for no tet."""
 
 
 @dataclass
 class Body:
-    """Facets of a block that break by one law: those between its own tets, or those to the tets of another part."""
+    """Body: the facets of a block that break by one law. These are either the facets between tets of the block, or the
+    facets between the block and another part.
+    """
 
     index: int
     """Index of the block among those of the rank."""
@@ -30,7 +32,7 @@ class Body:
     spec: Spec
     tough: Toughness
     behind: tuple[int, int]
-    """Tets behind the facets have ids from the first number on and below the second."""
+    """Range of the global ids of the tets on the other side of the facets: first id, and one past the last id."""
     mesh: Mesh
     facets: FacetTable
     """The tets of the block; all bodies of a block share it, and ``facets``."""
@@ -44,7 +46,7 @@ class Body:
 
     @property
     def hot(self) -> Bits:
-        """(n,) see Block.hot, if the facets are within the part; else (0,)."""
+        """(n,) marks of overstressed faces, see Block.hot, if the facets are within the part; else (0,)."""
         return self.block.hot if self.own else self.block.hot[:0]
 
     def set_strengths(self, places: Ints, x0: Floats) -> None:
@@ -57,8 +59,8 @@ class Body:
         self.facets.strength[place, face] = self.tough.strengths(facet_ids(self.block, place, face), area)
 
     def follow(self, split: Split, x0: Floats) -> None:
-        """Recomputes strengths that depend on areas, at tets whose nodes separated: the order of the nodes changes
-        the last bit of an area, and a body from a checkpoint has the present nodes only.
+        """Recomputes strengths that depend on areas, at tets whose nodes separated: the order of the nodes changes the
+        last bit of an area, and a run that resumes from a checkpoint has the present nodes only.
         """
         scatter = self.tough.scatter
         if scatter is not None and scatter.area is not None:
@@ -66,7 +68,7 @@ class Body:
 
 
 Terms = tuple[Spec, Toughness, tuple[int, int]]
-"""Fracture specification, constants, and the range of ids of the tets behind the facets."""
+"""Fracture specification, constants, and the range of ids of the tets on the other side of the facets."""
 
 
 def bodies_of(index: int, block: Block, own: Terms, bonds: list[Terms], x0: Floats) -> list[Body]:
@@ -92,12 +94,14 @@ def bodies_of(index: int, block: Block, own: Terms, bonds: list[Terms], x0: Floa
 
 
 def shear_weight(spec: Spec) -> float:
-    """Returns the weight of shear against normal traction: as given, else 1 for cohesive facets and 0 for others."""
+    """Returns the weight of shear against normal traction: the given weight, else 1 for cohesive facets and 0 for other
+    facets.
+    """
     return spec.shear_weight if spec.shear_weight is not None else float(spec.model == "cohesive")
 
 
 def mesh_of(block: Block) -> Mesh:
-    """Returns the record of a block that kernels take."""
+    """Returns the record of a block for kernels."""
     beside, state = _beside(block), block.state.reshape(-1)
     intact = np.packbits((block.bond == INTACT) & (beside >= 0), axis=1, bitorder="little")[:, 0].copy()
     return Mesh(block.tets, block.id, block.across, beside, block.bond, intact, state, block.state.shape[1])

@@ -4,12 +4,12 @@ The label of a fragment is the smallest global id of its tets. Each rank finds i
 solve the small graph of the pieces that are connected across ranks, in the same way (connectivity.py).
 
 A tet gives a quarter of its mass to each of its nodes, at the position and with the velocity of the node: so mass,
-momentum, angular momentum and energy of all fragments are those of the nodes. (The inertia is that of lumped masses:
-larger than that of the solid, five times as large for a single tet.) Nodes without tets belong to no fragment. The
-values of tets are summed by fragment as integers; the quantum of each fragment is 2^-60 of its largest term, so that
-the result is independent of order and ranks, and small fragments keep their digits beside a large one. Centre and
-velocity are summed first, and quantities relative to them in a second pass: sums about the origin would lose the
-digits of r^2 / extent^2.
+momentum, angular momentum and energy of all fragments together are equal to the sums over the nodes. (The inertia is
+that of lumped masses: larger than that of the solid, five times as large for a single tet.) Nodes without tets belong
+to no fragment. The values of tets are summed by fragment as integers; the quantum of each fragment is 2^-60 of its
+largest term, so that the result is independent of order and ranks, and small fragments keep their digits beside a large
+one. Centre and velocity are summed first, and quantities relative to them in a second pass: sums about the origin would
+lose the digits of r^2 / extent^2.
 """
 
 import csv
@@ -31,9 +31,9 @@ from ..parallel.comm import Comm
 _NODE_BITS = 40
 """Number of bits of a global node id."""
 _LIMB = 2.0**30
-"""Quanta of a limb, see parallel/fixed_point.py."""
+"""Number of quanta in a limb, see parallel/fixed_point.py."""
 _FLAT = 1e-10
-"""Share of the largest principal moment of inertia below which an axis counts as without inertia."""
+"""An axis counts as without inertia if its principal moment of inertia is below this share of the largest one."""
 
 FRAGMENT = np.dtype([
     ("label", np.int64), ("part", np.int64), ("tets", np.int64), ("nodes", np.int64), ("mass", float),
@@ -41,7 +41,7 @@ FRAGMENT = np.dtype([
     ("translation", float), ("rotation", float), ("deformation", float), ("low", float, 3), ("high", float, 3),
     ("extent", float), ("new_surface", float),
 ])  # fmt: skip
-"""Row of the table; the columns are those of cases/output/fragments.py."""
+"""Row of the table of fragments; cases/output/fragments.py describes the columns."""
 
 
 class Groups:
@@ -58,7 +58,7 @@ class Groups:
         self._starts = np.searchsorted(self.of[self._order], np.arange(len(self.label)))
         everywhere, ranks = np.unique(np.concatenate(comm.share(self.label)), return_counts=True)
         self.split = everywhere[ranks > 1]
-        """(s,) labels of fragments with tets on several ranks, equal on every rank."""
+        """(s,) labels of fragments with tets on several ranks; the array is equal on every rank."""
         at = places(self.split, self.label)
         self._here, self._at = np.flatnonzero(at >= 0), at[at >= 0]
 
@@ -107,7 +107,7 @@ def table(model: Model, labels: list[Ints], comm: Comm) -> "np.ndarray | None":
     rows = np.zeros(len(groups.label), FRAGMENT)
     rows["label"] = groups.label
     part = np.concatenate([np.zeros(0), *(np.full(block.n, float(block.part)) for block in blocks)])
-    rows["part"] = -groups.largest(-part[:, None])[:, 0]  # the first one, where parts share nodes
+    rows["part"] = -groups.largest(-part[:, None])[:, 0]  # the first part, if parts share nodes
     rows["tets"] = groups.count(np.ones((len(tets), 1), np.int64))[:, 0]
     rows["nodes"] = _node_counts(model, tets, groups, comm)
     _move(rows, groups, tets, mass, nodes.x, nodes.v)

@@ -22,7 +22,7 @@ from .records import MESH, POINTS, Mesh
 from .separation import common
 
 _ROWS = VISCOUS + 1
-"""Rows of the state that the forces depend on."""
+"""Rows of the state from which the forces are computed."""
 _I1, _I2, _N1 = types.int64[::1], types.int64[:, ::1], types.int32[::1]
 
 
@@ -32,7 +32,7 @@ class Room(NamedTuple):
     w: Floats
     """(SCRATCH,)."""
     forces: Ints
-    """(9 * CHUNK,) on nodes 1, 2, 3."""
+    """(9 * CHUNK,) forces on nodes 1, 2, 3, quanta."""
     state: Floats
     """(_ROWS * CHUNK,)."""
     tets: Tets
@@ -56,7 +56,8 @@ class Handover:
         """Moves the forces of the tets and facets of each copy from its parent to it; ``fresh``: new cohesive facets.
         Collective among the ranks that share copies.
 
-        A copy receives exactly what its parent loses: both nodes of a facet were one node before.
+        The force that a copy receives is subtracted exactly from its parent, because copy and parent were one node
+        before.
         """
         nodes, copies = self._model.nodes, split.copies
         change = np.zeros((copies.n, 3), np.int64)
@@ -75,7 +76,7 @@ class Handover:
         _apply(nodes.force, change, copies.parents, split.first)
 
     def _complete(self, change: Ints, parents: Ints) -> None:
-        """Adds the changes of other ranks to those of shared copies."""
+        """Adds the changes of the forces from other ranks to the changes at shared copies."""
         shared = {o.rank: at for o in self._neighbours if len(at := common(parents, o.nodes))}
         if shared:
             received = self._comm.trade({rank: change[at] for rank, at in shared.items()}, shared)

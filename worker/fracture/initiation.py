@@ -21,7 +21,7 @@ from .stars import Stars
 
 
 class Initiation:
-    """Facets that break on one rank, and the clocks of the delayed criterion."""
+    """Finds the facets that break on one rank, and keeps the clocks of the delayed criterion."""
 
     def __init__(
         self, model: Model, bodies: list[Body], specs: dict[int, Fracture], stars: dict[int, Stars],
@@ -44,9 +44,9 @@ class Initiation:
         self._heaviest = comm.maximum(heaviest)
         """(parts,) mass of the heaviest tet of all ranks, kg; 0 for a part that does not fracture."""
         self._rooms = [Candidates.of(1 + len(rows)) for rows in self.interface.of_body]
-        """Room for the candidates of each body; valid until the next step."""
+        """Arrays for the candidates of each body; the content is valid until the next step."""
         self._step = 1
-        """Number of the step, as stored with the clocks; starts at 1."""
+        """Number of the step, as stored with the clocks; the first step has number 1."""
 
     @property
     def smooth(self) -> bool:
@@ -54,7 +54,7 @@ class Initiation:
         return any(self._averaged)
 
     def begin_step(self) -> None:
-        """Starts a new step: clocks of facets that are not overstressed in it stop."""
+        """Starts a new step. The clock of a facet stops if the facet is not overstressed in the step."""
         self._step += 1
 
     def breaking(self, hot: bool) -> list[Breaking]:
@@ -67,7 +67,7 @@ class Initiation:
         return [some for some in every if some is not None]
 
     def candidates(self) -> list[tuple[Body, Candidates]]:
-        """Returns the bodies with candidates, and these. Called once a step, since it advances the clocks;
+        """Returns the bodies with candidates, and the candidates. Called once a step, since it advances the clocks;
         collective as ``breaking``.
         """
         self.interface.exchange(self._model.nodes.x)
@@ -114,7 +114,9 @@ class Initiation:
         self.interface.free()
 
     def _candidates(self, k: int, body: Body) -> Candidates:
-        """Returns the candidates of a body, after the delayed criterion; with nodal tractions that is applied later."""
+        """Returns the candidates of a body, after the delayed criterion; with nodal tractions, the delayed criterion is
+        applied later.
+        """
         room, rows = self._rooms[k], self.interface.of_body[k]
         step = self._step if body.spec.traction == "tets" else 0
         where = body.hot, self.interface.facets, rows, body.mesh, body.facets, self._model.nodes.x, body.law
@@ -125,7 +127,7 @@ class Initiation:
         return room.first(n)
 
     def _smoothed(self, found: list[tuple[Body, Candidates]]) -> list[tuple[Body, Candidates]]:
-        """Replaces tractions by those from nodal stress, in parts that use these. Collective."""
+        """Replaces the tractions by tractions from nodal stress, in parts that use nodal tractions. Collective."""
         left = dict[int, Candidates]()
         for parts in self._averaged:
             left |= self._of_nodes([(body, each) for body, each in found if body.own and body.block.part in parts])

@@ -10,10 +10,10 @@ from .cohesive import frames, fresh
 from .columns import Facets
 
 _LEAST = 0.05
-"""Share of the square of the highest resolved frequency that cohesive facets may use at least."""
+"""Smallest share of the square of the highest frequency resolved by the time step that cohesive facets may use."""
 _SHARES = 24.0
-"""A node has a quarter of the mass of its tet, and up to three of the faces of the tet open there, between two nodes
-that both move."""
+"""Factor 4 * 3 * 2: a node has a quarter of the mass of its tet, up to three faces of the tet open at the node, and
+both nodes of a pair move."""
 
 
 class Insertion:
@@ -58,7 +58,7 @@ def inserted(
 ) -> Facets:  # fmt: skip
     """Returns new facets at the present positions.
 
-    ``before`` and ``after`` (m, 6): nodes of the first side and those opposite, before and after separation;
+    ``before`` and ``after`` (m, 6): nodes of the first side and the opposite nodes, before and after separation;
     ``traction`` (m, 3) on the outward normal of the first side and its ``effective`` size (m,), Pa; ``weight`` of
     shear; ``stiffness`` (m,) that the time step allows, Pa/m.
     """

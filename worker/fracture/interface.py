@@ -1,7 +1,8 @@
-"""Shared facets: their two tets are on different ranks, or in two blocks; both sides compute the same mean traction.
+"""Shared facets: facets whose two tets are on different ranks, or in two blocks of one rank. Both sides compute the
+same mean traction.
 
 A facet breaks only if one of its tets alone would break it, so two ranks exchange tractions only in steps in which a
-facet that they share is overstressed. The flag for that is sent with the forces of shared nodes.
+facet shared by the two ranks is overstressed. A flag for this is sent with the forces of shared nodes.
 """
 
 import numpy as np
@@ -33,7 +34,7 @@ class Interface:
         self._inner: Ints = np.flatnonzero(of == last)
         """Rows of facets between two blocks of this rank."""
         self._partner = _partners(table[self._inner])
-        """Place of the other side of each of these, among them."""
+        """Place of the other side of each of these facets, among the facets between two blocks of this rank."""
         self.facets = InterfaceFacets(
             np.column_stack([table[:, 3], table[:, 0] % 4]).astype(np.int32), table[:, 0] < table[:, 1],
             np.ascontiguousarray(table[:, 5]).view(np.float64), np.zeros((m, 3)), np.zeros((m, 3)),
@@ -52,7 +53,7 @@ class Interface:
             index[rank]: comm.exchange([(rank, own[a:b])], [(rank, theirs[a:b])], Tag.TRACTION)
             for rank, a, b in zip(met, ends[:-1], ends[1:], strict=True) if b > a and rank != comm.rank
         }  # fmt: skip
-        """By the index of the neighbour."""
+        """Facets shared with each neighbour, by the index of the neighbour."""
         self.hot = False
         """True if a shared facet is overstressed on either side."""
 

@@ -1,8 +1,9 @@
 r"""Kernels of the traction-separation law of cohesive facets; cohesive.py draws the law.
 
-A pair is a node of the first side of a facet and the node opposite; each facet has three. T = k d with the secant
-stiffness k = s(top) / top; by closing, a pair can release k (D^2 - lent^2) / 2 per area. Where D would fall below
-``lent``, it would release more than it absorbed. Then its offset is shortened first, by the factor q:
+A pair is a node of the first side of a facet and the opposite node; each facet has three pairs. T = k d with the secant
+stiffness k = s(top) / top; by closing, a pair can release k (D^2 - lent^2) / 2 per area. If D decreased below ``lent``,
+the pair would release more energy than it absorbed. In that case the offset of the pair is shortened first, by the
+factor q:
 
     d -> q d,   lent^2 -> max(lent^2 - (1 - q^2) D^2, 0),   k unchanged,
 
@@ -19,9 +20,10 @@ from ..kernels.jit import njit, types
 from .columns import FACETS
 
 _SLACK = 1e-6
-"""Share of the fracture energy that a pair may release beyond what it absorbed; above rounding. Chosen."""
+"""Largest energy, as a share of the fracture energy, that a pair may release beyond the energy that it absorbed.
+Chosen value, above rounding."""
 _EXHAUSTED = 1e-6
-"""Least share of the fracture energy that is left to a pair after unloading. Chosen."""
+"""Smallest share of the fracture energy that remains to a pair after unloading. Chosen value."""
 
 
 _F1, _F2, _F3 = types.float64[::1], types.float64[:, ::1], types.float64[:, :, ::1]
@@ -84,7 +86,7 @@ def _shorten(f, m, p, frame, d, kept):  # type: ignore[no-untyped-def]
     left = max(f.constants.energy[m] - 3.0 * s.work[m, p] / f.constants.area[m], _EXHAUSTED * f.constants.energy[m])
     left = (
         2.0 / k * left + s.size[m, p] ** 2 - lent
-    )  # squares of the opening: twice the energy over k, as the triangles below
+    )  # squares of openings: each is twice an energy over k, as are the areas of the triangles
     knee = min(s.top[m, p], np.sqrt(lent + left))
     law.strength[m, p] = k * knee
     law.critical[m, p] = max(left - (knee * knee - lent), 0.0) / knee
@@ -126,7 +128,7 @@ def open_facets(f, x):  # type: ignore[no-untyped-def]
 
 @njit(types.void(_F1, FACETS, _I, _I, _F2, _I2, _F1, _F), cache=True, error_model="numpy")
 def _foresee(ahead, f, m, p, v, force, mass, quantum):  # type: ignore[no-untyped-def]
-    """Sets ``ahead`` to the opening velocity of a pair at n+1/2 by the present nodal forces alone."""
+    """Sets ``ahead`` to the opening velocity of a pair at n+1/2 that the present nodal forces alone would cause."""
     a, b = f.nodes[m, p], f.nodes[m, 3 + p]
     for i in range(3):
         ahead[i] = v[b, i] - v[a, i] + quantum * (force[b, i] / mass[b] - force[a, i] / mass[a])
@@ -175,8 +177,8 @@ def unload(change, f, x, v, force, mass, steps, scale, whole):  # type: ignore[n
 
 @njit(types.void(FACETS, _F2, _I2, _F1, _F), cache=True, error_model="numpy")
 def foresee(f, v, force, mass, quantum):  # type: ignore[no-untyped-def]
-    """Stores the opening velocities of pairs by the present nodal forces alone; ``quantum``: mean time step over the
-    force scale, N s.
+    """Stores the opening velocities of pairs that the present nodal forces alone would cause; ``quantum``: mean time
+    step over the force scale, N s.
     """
     law, s = f.softening, f.state
     for m in range(len(f.nodes)):

@@ -1,8 +1,8 @@
 """Facet tractions from nodal stress: mean over the stars of the three nodes, smoother than the mean of the two tets.
 
-The stress of a node is the mean over its tets, weighted with their initial volumes; sums of integers, so that both
-sides of a facet compute the same traction on any ranks. A facet must pass the criterion of its two tets as well:
-only such facets are candidates (criterion.py).
+The stress of a node is the mean over its tets, weighted with their initial volumes; The sums are sums of integers, so
+that both sides of a facet compute the same traction on any ranks. A facet must pass the criterion of its two tets as
+well: only such facets are candidates (criterion.py).
 """
 
 import numpy as np
@@ -20,7 +20,7 @@ from .records import CANDIDATES, INTERFACE, MESH, POINTS, Candidates, InterfaceF
 from .stars import Stars
 
 _QUANTA = 2.0**30
-"""Quanta per strength, and per mass of the heaviest tet."""
+"""Number of quanta in the strength, and number of quanta in the mass of the heaviest tet."""
 _SXX, _SYY, _SZZ = S_XX * CHUNK, S_YY * CHUNK, S_ZZ * CHUNK
 _SYZ, _SZX, _SXY = S_YZ * CHUNK, S_ZX * CHUNK, S_XY * CHUNK
 _P, _MASS = PRESSURE * CHUNK, MASS * CHUNK
@@ -35,7 +35,7 @@ def stresses(
     comm: Comm,
 ) -> Floats:
     """(nodes, 6) mean Cauchy stress xx, yy, zz, yz, zx, xy without the viscous part, Pa, of the ``wanted`` (nodes,) and
-    the shared nodes of these bodies; zero at others.
+    the shared nodes of these bodies; zero at other nodes.
 
     ``heaviest`` (parts,): mass of the heaviest tet of each part on all ranks, kg. The quanta of the sums depend on
     it and on the strength of the part; so no two of the bodies have a node in common. Collective.

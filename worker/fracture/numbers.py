@@ -7,7 +7,7 @@ from ..model.state import Ints
 from ..parallel.comm import Comm
 
 UNKNOWN = -1
-"""Number of a tet that has none yet."""
+"""Value for a tet that has no fragment number yet."""
 
 
 def numbered(before: Ints, labels: Ints, first: int, comm: Comm) -> tuple[Ints, Ints]:
@@ -15,8 +15,8 @@ def numbered(before: Ints, labels: Ints, first: int, comm: Comm) -> tuple[Ints, 
     ascending; the rows are equal on all ranks. Collective.
 
     ``before`` (n,): the old numbers of tets, or UNKNOWN; ``labels`` (n,): label of the fragment of each; new numbers
-    start at ``first``, in the order of the labels. Of pieces with equally many tets the one with the smallest label
-    keeps the number.
+    start at ``first``, in the order of the labels. Of pieces with the same number of tets, the piece with the smallest
+    label keeps the number.
     """
     rows = _in_common(before, labels, comm)
     names = np.unique(rows[:, 1])

@@ -1,7 +1,8 @@
 """Order of breaking ``local_maximum``: a facet breaks only if no facet at its nodes is loaded more strongly.
 
-In a uniform field all facets pass in the same step, although the first one to break would relieve its neighbours.
-With local maxima a facet waits for each facet that shares a node with it and is loaded more strongly.
+In a uniform field all facets reach the criterion in the same step, although the first facet that breaks would relieve
+its neighbours. With ``local_maximum`` a facet does not break in a step if another facet that passes the criterion
+shares a node with it and has a larger load.
 """
 
 import numpy as np
@@ -12,7 +13,8 @@ from ..parallel.ownership import Neighbour
 
 
 def strongest(facets: Ints, load: Floats, nodes: Indices, ids: Ints, neighbours: list[Neighbour], comm: Comm) -> Flags:
-    """(m,) which facets have the largest load at all of their nodes; of equal loads that of the smaller id.
+    """(m,) which facets have the largest load at all of their nodes; of equal loads, the facet of smaller id counts as
+    larger.
 
     ``facets`` (m,) their ids; ``load`` (m,) positive; ``nodes`` (m, 3) local; ``ids`` (nodes,) global ids.
     Collective.

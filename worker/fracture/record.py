@@ -24,15 +24,15 @@ class Record:
         self.labels: list[Ints] = []
         """Label of the fragment of each tet (``connectivity``), (n,) for each block, of the last ``update``."""
         self.numbers: list[Ints] = []
-        """Number of that fragment in the last frame, (n,) for each block; a fragment keeps its number while it
-        exists."""
+        """Number of the fragment of each tet in the last frame, (n,) for each block; a fragment keeps its number
+        while it exists."""
         self._before: tuple[Ints, Ints] = np.zeros(0, np.int64), np.zeros(0, np.int64)
         """Ids of tets, ascending, and their numbers in the last frame."""
         self._family: Ints = np.zeros((0, 3), np.int64)
         self.count = 0
         """Number of fragments, of the last ``update``."""
         self.initial = self.next = 0
-        """Number of fragments at the start, which have the first numbers, and the next free number."""
+        """Number of fragments at the start, which have the smallest numbers, and the next free number."""
 
     def keep(self, parcel: Parcel) -> None:
         """Adds the numbers of the last frame to a parcel (a checkpoint or migration message)."""
@@ -42,7 +42,7 @@ class Record:
                 table["fragment"] = self._last(table["id"])
 
     def resume(self, parcel: Parcel) -> None:
-        """Restores them from a parcel (a checkpoint or migration message)."""
+        """Restores the numbers of the last frame from a parcel (a checkpoint or migration message)."""
         self.count, self.initial, self.next = parcel.known["record"]
         if self.next:
             tables = [table for table in parcel.tets.values() if length(table)]
@@ -56,8 +56,8 @@ class Record:
         self.count = connectivity.count(self._model, self.labels, self._comm)
 
     def number(self) -> None:
-        """Numbers the fragments of the last ``update``. Called at the start and at frames only: these are the same
-        in every run of a case, so that the numbers are part of its answer.
+        """Numbers the fragments of the last ``update``. Called at the start and at frames only. Frames are at the same
+        times in every run of a case, so the numbers are reproducible.
         """
         ids = _flat([block.id for block in self._model.blocks])
         found, self._family = numbered(self._last(ids), _flat(self.labels), self.next, self._comm)

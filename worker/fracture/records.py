@@ -33,17 +33,17 @@ class FacetTable(NamedTuple):
     """Facets of a body, by place and local face of the tet of smaller id, or of the only one in the block."""
 
     strength: Floats
-    """(n, 4) Pa, equal on both sides; infinite on the surface."""
+    """(n, 4) strength of each facet, Pa, equal on both sides; infinite on the surface."""
     since: Floats
     """(n, 4) start time of the clock of the delayed criterion, s."""
     seen: Ints
-    """(n, 4) number of the last step in which the facet was overstressed: the clock continues if that was the step
-    before."""
+    """(n, 4) number of the last step in which the facet was overstressed. The clock continues if this was the
+    previous step."""
 
 
 class InterfaceFacets(NamedTuple):
-    """Facets whose other tet is on another rank, or in another block of this one, by rank and id of the facet; those
-    between blocks have a row for each side.
+    """Facets whose other tet is on another rank, or in another block of this one, by rank and id of the facet; a facet
+    between two blocks has a row for each side.
     """
 
     sides: Indices
@@ -51,11 +51,11 @@ class InterfaceFacets(NamedTuple):
     first: Flags
     """(m,) whether this rank has the tet of smaller id."""
     mass: Floats
-    """(m,) of the other tet, kg."""
+    """(m,) mass of the other tet, kg."""
     own: Floats
     """(m, 3) traction of this rank's tet on the outward normal of the tet of smaller id, Pa."""
     theirs: Floats
-    """(m, 3) that of the other tet."""
+    """(m, 3) traction of the other tet on the same normal, Pa."""
     of: Ints
     """(m,) index of the other rank among the neighbours; the number of neighbours for this rank."""
     hot: Ints
@@ -77,12 +77,14 @@ class Law(NamedTuple):
 
 
 class Candidates(NamedTuple):
-    """Intact facets whose traction reaches their strength in a step: first those within the rank, then shared ones."""
+    """Intact facets whose traction reaches their strength in a step: first the facets within the rank, then shared
+    facets.
+    """
 
     place: Ints
     """(m,) place of the tet of smaller id; of this rank's tet for a shared facet."""
     face: Ints
-    """(m,) local face of that tet."""
+    """(m,) local face of the tet in ``place``."""
     shared: Ints
     """(m,) row of a shared facet, -1 for one within the rank."""
     traction: Floats
@@ -90,7 +92,7 @@ class Candidates(NamedTuple):
 
     @classmethod
     def of(cls, m: int) -> "Candidates":
-        """Returns room for ``m`` facets."""
+        """Allocates arrays for ``m`` facets."""
         places = np.empty((3, m), np.int64)
         return cls(places[0], places[1], places[2], np.empty((m, 4)))
 
@@ -113,7 +115,7 @@ class BreakingFacets(NamedTuple):
     traction: Floats
     """(m, 4) traction on the outward normal of the first side, and the effective one, Pa."""
     mass: Floats
-    """(m,) of the lighter tet, kg."""
+    """(m,) mass of the lighter tet, kg."""
 
     def take(self, chosen: Flags) -> "BreakingFacets":
         """Returns the chosen facets."""
@@ -126,7 +128,7 @@ class BreakingFacets(NamedTuple):
 _I1, _I2, _N2, _N3 = types.int64[::1], types.int64[:, ::1], types.int32[:, ::1], types.int32[:, :, ::1]
 _F1, _F2, _B1 = types.float64[::1], types.float64[:, ::1], types.boolean[::1]
 POINTS = _F2
-"""Type of positions; those below are of the records."""
+"""Numba type of positions; the other types are types of the records."""
 MESH = record(Mesh, types.uint32[:, ::1], _I1, _N2, _N2, types.uint8[:, ::1], types.uint8[::1], _F1, types.int64)
 TABLE = record(FacetTable, _F2, _F2, _I2)
 INTERFACE = record(InterfaceFacets, _N2, _B1, _F1, _F2, _F2, _I1, _I1, _N2)

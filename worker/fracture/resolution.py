@@ -9,15 +9,17 @@ from ..materials.elementary import power
 from .strength import Toughness
 
 _RESOLVED = 1.0 / 3.0
-"""Largest size of an element over the cohesive zone at which the dissipated energy is that of the law."""
+"""Largest ratio of element size to cohesive zone at which the dissipated energy is equal to the fracture energy of
+the law."""
 _STEP = 1.0 / math.sqrt(6.0)
-"""Stable step of a regular tet times the wave speed, over its edge."""
+"""Stable step of a regular tet, as a multiple of its edge over the wave speed."""
 _REGULAR = 6.0 * math.sqrt(2.0)
 """Cube of the edge of a regular tet over its volume."""
 _ROUNDING = 1e-9
-"""Relative tolerance of the ratio: a strength that was lowered for a given resolution meets it up to rounding."""
+"""Relative tolerance of the ratio of element size to cohesive zone. A strength that was lowered for a given ratio
+reaches this ratio only up to rounding."""
 _NAMED = 5
-"""Most parts that a warning names. Chosen: enough to find them."""
+"""Largest number of parts that a warning names. Chosen value."""
 
 log = logging.getLogger("conoid.worker")
 
@@ -30,7 +32,8 @@ def edge(volume: float) -> float:
 def warnings(part: Part, tough: Toughness, size: float, safety: float) -> list[str]:
     """Returns the warnings for a part with tets of edge ``size``, m; ``safety``: safety factor of the time step.
 
-    A facet opens when its stress is released, and by the initial stretch rate of the part.
+    The opening of a facet in one step is estimated from the release of its stress and from the initial stretch rate of
+    the part.
     """
     spec = part.fracture
     assert spec is not None
@@ -67,7 +70,7 @@ def unresolved(tough: Toughness, size: float) -> str:
 
 
 def merged(found: dict[str, list[str]]) -> list[str]:
-    """Returns one line for each warning, with the parts that it is for: the first few of many."""
+    """Returns one line for each warning, with the names of the parts; of many parts only the first few."""
     return [f"{_listed(names)}: {text}" for text, names in found.items()]
 
 

@@ -1,8 +1,9 @@
 """Node separation: nodes whose star broken facets have cut get copies, numbered alike for any number of ranks.
 
-A rank that has a node has all its copies: so the completed sums of a shared node are available on both sides of a
-facet, on any rank that computes one of them. The steps, among the ranks that have a node of a broken facet (all ranks
-read from the reduction of the step which these are; the others continue with their next step):
+A rank that has a node has all copies of the node. The completed sums of a shared node are therefore available on both
+sides of a facet, on any rank that computes one of the sides. The following steps are executed by the ranks that have a
+node of a broken facet. All ranks receive the list of these ranks in the reduction of the step; the other ranks continue
+with their next step.
 
     1. mark the broken facets and their nodes                  survey
     2. exchange the touched nodes with neighbours              _touched
@@ -32,7 +33,7 @@ _NO_NODES = np.zeros(0, np.int64)
 
 
 class Separation:
-    """Topology of the parts that fracture, on one rank."""
+    """Node separation in the parts that fracture, on one rank."""
 
     def __init__(self, model: Model, neighbours: list[Neighbour], meshes: dict[int, Mesh], comm: Comm) -> None:
         """``meshes``: of the parts that fracture, by index of the block."""
@@ -46,8 +47,8 @@ class Separation:
         """Local nodes, ascending, of the facets that break in this step."""
 
     def survey(self, broken: list[Indices], count: int, touched: Ints) -> None:
-        """Marks the facets broken, and sets ``touched`` (ranks,) for the ranks that have a node of them: 1, and for
-        this rank 1 + ``count``, the number of facets whose first side is here.
+        """Marks the facets broken, and sets ``touched`` (ranks,) for the ranks that have a node of a broken facet: 1,
+        and for this rank 1 + ``count``, the number of facets whose first side is here.
 
         ``broken``: tables (m, 2, 3) of block, place and face of either side, -1 for a side of another rank.
         """
@@ -73,7 +74,7 @@ class Separation:
         return self._separated(self._touched(touched), touched)
 
     def _separated(self, some: Ints, touched: Ints) -> Split:
-        """Separates; ``some``: local nodes of the broken facets of any rank."""
+        """Separates nodes; ``some``: local nodes of the broken facets of any rank."""
         model = self._model
         rows, places = self._stars(some)
         of, mine, node, owner, mass = stars.pieces(rows)
@@ -131,8 +132,8 @@ class Separation:
         return stars.ordered(rows, np.concatenate([places for _, places, _ in found]))
 
     def _received(self, touched: Ints, found: list[tuple[Ints, Ints, Ints]]) -> list[Ints]:
-        """Exchanges the rows of stars of shared touched nodes: sends those ``found`` here, returns those of other
-        ranks.
+        """Exchanges the rows of stars of shared touched nodes: sends the rows ``found`` on this rank, returns the rows
+        of other ranks.
         """
         shared = {other.rank: common(touched, other.nodes) for other in self._neighbours}
         sends = {
@@ -214,7 +215,7 @@ def intersects(some, others):  # type: ignore[no-untyped-def]
 
 @njit(types.int64[:, ::1](_I2, _I1, _I1), cache=True)
 def _stretches(rows, begin, end):  # type: ignore[no-untyped-def]
-    """Returns the rows from each of ``begin`` (k,) to each of ``end``, range after range."""
+    """Returns the concatenated ranges of rows from ``begin[i]`` to ``end[i]``; ``begin``, ``end`` (k,)."""
     out, n = np.empty(((end - begin).sum(), rows.shape[1]), np.int64), 0
     for i in range(len(begin)):
         out[n : n + end[i] - begin[i]] = rows[begin[i] : end[i]]
@@ -224,7 +225,9 @@ def _stretches(rows, begin, end):  # type: ignore[no-untyped-def]
 
 @njit(several(_I1, _N1, _N1, _N1, _N1)(_I2, _I2, _I1, types.int64), cache=True)
 def _leaving(rows, places, of, new):  # type: ignore[no-untyped-def]
-    """Of the rows whose node becomes a copy: key of node and tet, the copy, and place, corner and block of the tet."""
+    """Returns, for the rows whose node becomes a copy: key of node and tet, the copy, and place, corner and block of
+    the tet.
+    """
     m = (of >= 0).sum()
     key, found, n = np.empty(m, np.int64), np.empty((4, m), np.int32), 0
     for r in range(len(rows)):

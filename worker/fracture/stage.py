@@ -5,10 +5,10 @@ connected get copies; the forces of the tets of a copy are moved from its parent
 node is extended by the copies. In ``cohesive`` parts a broken facet keeps its traction, which decreases with the
 opening.
 
-The reduction of the step contains whether a facet breaks, and on which ranks: ``find`` precedes it, ``advance``
-follows it. A rank without overstressed facets learns from the flags of its neighbours whether a shared one is
-overstressed. A rank that has no node of what breaks, and no ghosts of the surface of a rank that has one, continues
-with the next step at once.
+The reduction of the step contains whether a facet breaks, and on which ranks: ``find`` precedes it, ``advance`` follows
+it. A rank without overstressed facets receives flags from its neighbours, which show whether a shared facet is
+overstressed. A rank without a node of a broken facet, and without ghosts of a rank that has such a node, continues with
+the next step immediately.
 """
 
 import numpy as np
@@ -37,7 +37,8 @@ from .unloading import Unloading
 from .update import TopologyUpdate
 
 NOTHING, OVERSTRESSED, BREAKS = range(3)
-"""State of the facets in a step, reduced by maximum: no face is overstressed; some are; facets break, or may break."""
+"""State of the facets in a step, reduced by maximum over the ranks. NOTHING: no face is overstressed; OVERSTRESSED:
+some faces are; BREAKS: facets break, or may break."""
 
 
 class Fracture:
@@ -60,7 +61,7 @@ class Fracture:
         if neighbours:
             elements.attach(self.initiation.interface)
         self._found: list[Breaking] | None = None
-        """Facets that break in this step; None while they are not known."""
+        """Facets that break in this step; None before they have been found."""
         self.cohesion: Cohesion | None = None
         if cohesive(case):
             self.cohesion = elements.cohesion = Cohesion(work)
@@ -78,8 +79,8 @@ class Fracture:
 
     def find(self, touched: Ints) -> int:
         """Returns the contribution of this rank to the reduction of the step: NOTHING, OVERSTRESSED or BREAKS; with
-        nodal tractions BREAKS if a facet may break. Sets ``touched`` (ranks,) for the ranks that have a node of what
-        breaks. Collective among neighbours.
+        nodal tractions BREAKS if a facet may break. Sets ``touched`` (ranks,) for the ranks that have a node of a facet
+        that breaks. Collective among neighbours.
         """
         self.initiation.begin_step()
         hot, self._found, touched[:] = self._elements.hot, None, 0
@@ -94,7 +95,7 @@ class Fracture:
         return BREAKS
 
     def advance(self, agreed: int, touched: Ints) -> None:
-        """Breaks the facets; ``agreed``, ``touched``: the maxima of what ``find`` returned on the ranks. Called on
+        """Breaks the facets; ``agreed``, ``touched``: the maxima over the ranks of the results of ``find``. Called on
         all ranks; collective among all with nodal tractions or ``order = "local_maximum"``, else among the touched
         ranks.
         """

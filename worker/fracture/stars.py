@@ -15,7 +15,8 @@ the node. A connection through an edge or through the node alone is a hinge; it 
              +-------+                  +-------+
 
 If a star has more than one piece, the piece with the smallest tet id keeps the node and each other piece gets a copy of
-it. One broken facet inside a body separates nothing; broken facets that form a closed surface round a node do.
+it. A single broken facet inside a body separates no node; a node separates if broken facets divide its star into
+pieces.
 """
 
 import numpy as np
@@ -49,7 +50,7 @@ class Stars:
         """``tets`` (n, 4) over ``nodes`` local nodes."""
         corners = tets.reshape(-1)
         self.pool: Indices = (np.argsort(corners, kind="stable") // 4).astype(np.int32)
-        """Places of tets, node after node."""
+        """Places of the tets of the stars, node after node."""
         self.count: Indices = np.bincount(corners, minlength=nodes).astype(np.int32)
         """(nodes,) number of tets of each node."""
         self.first: Indices = (np.cumsum(self.count) - self.count).astype(np.int32)
@@ -86,7 +87,7 @@ def describe(nodes, first, count, pool, ids, mesh, block, rank):  # type: ignore
     for i in range(len(nodes)):
         a = nodes[i]
         star = pool[first[a] : first[a] + count[a]].copy()
-        for s in range(1, len(star)):  # insertion sort: a star has about twenty tets
+        for s in range(1, len(star)):  # insertion sort, because a star has only about twenty tets
             e, r = star[s], s
             while r > 0 and mesh.id[star[r - 1]] > mesh.id[e]:
                 star[r] = star[r - 1]
@@ -125,14 +126,14 @@ def _root(parent, i):  # type: ignore[no-untyped-def]
 
 @njit("boolean(int64[::1], int64[:, ::1], int64[::1], int64, int64)", cache=True)
 def _join(parent, rows, tets, begin, end):  # type: ignore[no-untyped-def]
-    """Joins the rows of one star that are connected through intact facets; the root of each piece is its smallest
-    row. Returns True if the star is one piece.
+    """Joins the rows of one star that are connected through intact facets; the root of each piece is its smallest row.
+    Returns True if the star is a single piece.
     """
     apart = end - begin - 1
     for i in range(begin, end):
         for m in range(BEHIND, COLUMNS):
             behind, j = rows[i, m], i + 1
-            if behind <= tets[i]:  # no facet, or one that was joined from the other side
+            if behind <= tets[i]:  # no facet, or a facet that was joined from the other side
                 continue
             while j < end and tets[j] < behind:
                 j += 1

@@ -1,8 +1,9 @@
 """Strength of facets, from material, mesh and a hash of the facet id; and the delayed criterion.
 
 The paper's eqs (2) to (4): a facet is fully open at the time t after its traction first reached the strength if the
-incident stress is strength * e^(t/t_c) / (e^(t/t_c) - 1). This follows from two half-spaces with a linearly falling
-traction, and with the energy as the area under it t_c = density * c * energy / strength^2, twice the printed value.
+incident stress is strength * e^(t/t_c) / (e^(t/t_c) - 1). The formula is derived for two half-spaces with a traction
+that decreases linearly with the opening. With the fracture energy as the area under the traction t_c = density * c *
+energy / strength^2, twice the printed value.
 """
 
 import math
@@ -67,7 +68,7 @@ class Toughness:
             return np.full(len(face), self.strength)
         share = np.ones(len(face)) if scatter.area is None else scatter.area / area
         drawn = _weibull(uniform(face, scatter.seed), share, scatter.modulus)
-        with np.errstate(over="ignore"):  # a modulus far below 1 draws infinite strengths: such facets never break
+        with np.errstate(over="ignore"):  # modulus far below 1: infinite strengths, such facets never break
             return np.asarray(scatter.minimum + (self.strength - scatter.minimum) * drawn)
 
 
@@ -108,12 +109,12 @@ def toughness(material: Material, spec: Fracture, size: float) -> Toughness:
 
 
 UNBREAKABLE = Toughness(math.inf, 0.0, None, 0.0, math.inf, 1.0, 1.0)
-"""Constants of facets that never break."""
+"""Returns the constants of facets that never break."""
 
 
 def of_bond(bond: SharedBond, materials: Sequence[Material]) -> Toughness:
     """Returns the constants of a bond between parts of two ``materials``; the cohesive zone is that of the softer
-    one.
+    material.
     """
     (strength, _), (energy, shear_energy) = bond.strengths, bond.energies
     soft = min(materials, key=_plane)
@@ -133,7 +134,7 @@ def terms(bond: SharedBond) -> Fracture:
 
 
 def _plane(material: Material) -> float:
-    """E / (1 - nu^2), Pa."""
+    """Returns E / (1 - nu^2), Pa."""
     return material.elastic.young / (1.0 - material.elastic.poisson**2)
 
 

@@ -28,11 +28,11 @@ class Terms:
         self._bonds = [self._of_bond(number) for number in range(len(case.bond))]
 
     def own(self, index: int) -> facets.Terms:
-        """Returns those of the facets within a part."""
+        """Returns specification and constants of the facets within a part."""
         return *self._own[index], self._ids(index)
 
     def bonds(self, index: int) -> list[facets.Terms]:
-        """Returns those of the facets between a part and others, for bonds that break."""
+        """Returns specifications and constants of the facets between a part and other parts, for bonds that break."""
         found = []
         for number, bond, i, j in shared_bonds(self._case):
             if bond.breaks and index in (i, j):

@@ -171,8 +171,9 @@ class Searches:
         now.enliven(sides[~now.faces.live[sides]])
 
     def separate(self, split: Split) -> None:
-        """Follows the separation of nodes; called on all ranks, see topology_updates.py for those that exchange
-        messages."""
+        """Updates the scene after the separation of nodes; called on all ranks, see topology_updates.py for those that
+        exchange messages.
+        """
         if self.scene is None:
             return
         nodes, here = self._model.nodes, self._exterior.motion.here(self._model.nodes)

@@ -13,14 +13,15 @@ from ...model.cache_lines import LINE, cache_lines
 from ...model.state import Floats, Indices, Ints
 
 V, IMPULSE = 0, 3
-"""First word of the velocity of a slot, m/s, and of its impulse of the sweep, quanta, in ``ActiveNodes.moving``."""
+"""Places in a row of ``ActiveNodes.moving``: first word of the velocity of a slot, m/s, and first word of the
+impulse of the sweep on the slot, quanta."""
 MOBILITY, TOTAL, CHANGED = 0, 3, 6
-"""First word of the mobility of a slot, 1/kg, and of its impulse of the step, quanta, in ``ActiveNodes.fixed``, and
-the l1 norm of the change of that impulse by the last sweep, quanta."""
+"""Places in a row of ``ActiveNodes.fixed``: first word of the mobility of a slot, 1/kg; first word of the impulse of
+the step on the slot, quanta; and the l1 norm of the change of that impulse by the last sweep, quanta."""
 WANTED, ROW_NORM, PUSH, MU, LAST = 3, 4, 5, 6, 7
-"""Columns of ``Loaded.normal`` after the unit normal."""
+"""Numbers of the columns of ``Loaded.normal`` after the unit normal."""
 ROW_NORM_T, PUSH_T = 4, 5
-"""Columns of ``Loaded.tangent`` after the weights."""
+"""Numbers of the columns of ``Loaded.tangent`` after the weights."""
 
 
 class ActiveContacts(NamedTuple):
@@ -29,16 +30,16 @@ class ActiveContacts(NamedTuple):
     """
 
     row: Indices
-    """(contacts,) row of each."""
+    """(contacts,) row of each contact in the arrays of the narrow phase."""
     slots: Indices
     """(contacts, 4) slots of the nodes; the third is -1 in a contact of two nodes, of weights 1 and -1."""
     reach: Floats
     """(contacts,) bound of the sum of the paths of its nodes, m/s, below which an idle contact stays idle; infinite
     for a loaded one."""
     weights: Floats
-    """(room, 4)."""
+    """(room, 4) see tables.ContactRows."""
     normals: Floats
-    """(room, 3)."""
+    """(room, 3) see tables.ContactRows."""
     wanted: Floats
     """(room,) target normal velocity, m/s."""
     friction: Floats
@@ -48,17 +49,18 @@ class ActiveContacts(NamedTuple):
 
 
 class Kept(NamedTuple):
-    """Stored impulses of the last step times their row norms, for the warm start; zero where there were none: along
-    the normal (1) and across (3), m/s."""
+    """Stored impulses of the last step times their row norms, for the warm start, m/s: along the normal (1) and across
+    (3). Zero for a pair that had no impulse.
+    """
 
     pairs: Floats
-    """(candidates, 4) of node-face pairs."""
+    """(candidates, 4) stored impulses of node-face pairs."""
     cracks: Floats
-    """(3 cracks, 4) of node pairs across cracks."""
+    """(3 cracks, 4) stored impulses of node pairs across cracks."""
 
 
 class ActiveNodes(NamedTuple):
-    """Data of the slots; floats and integers of a line share their memory."""
+    """Data of the slots. The float and the integer view of a cache line use the same memory."""
 
     moving: Floats
     """(slots, 8) velocities and impulses, read and written by a sweep; a cache line each."""
@@ -80,8 +82,8 @@ class ActiveNodes(NamedTuple):
 
 
 class Loaded(NamedTuple):
-    """Contacts with an impulse in the step, in the order of their sets (zones.py): those of set k from ``begin[k]``
-    on.
+    """Loaded contacts, which have an impulse in the step, in the order of their sets (zones.py); the contacts of set k
+    begin at row ``begin[k]``.
     """
 
     normal: Floats
@@ -92,7 +94,7 @@ class Loaded(NamedTuple):
     slots: Indices
     """(contacts, 4) slots of the nodes; the third is -1 in a contact of two nodes, of weights 1 and -1."""
     row: Indices
-    """(contacts,) row of each."""
+    """(contacts,) row of each contact in the arrays of the narrow phase."""
     begin: Ints
     """(sets + 1,) offsets of the sets among all active contacts."""
     many: Ints

@@ -1,4 +1,4 @@
-"""Work of the impulses of a step: along the normals, by friction, and of the supports of held nodes."""
+"""Work of the contact impulses of a step: along the normals, by friction, and by the supports of held nodes."""
 
 import numpy as np
 
@@ -15,7 +15,7 @@ def cost(words, loaded, active, before, places, joule, k):  # type: ignore[no-un
     first half gives back, to two limbs (rows of ``words``) of quanta of 1 / ``joule`` J.
 
     An impulse J between the speeds u(n-1/2), of ``before`` (surface_nodes, 3) at the ``places`` of the slots, and
-    u(n+1/2) takes -J (u(n-1/2) + u(n+1/2)) / 2; the ledger at time n has the first half of that.
+    u(n+1/2) takes -J (u(n-1/2) + u(n+1/2)) / 2; the ledger at time n contains the first half of this energy.
     """
     values, normal, tangent, slots = active.moving, loaded.normal, loaded.tangent, loaded.slots
     value = np.empty(2)

@@ -1,8 +1,9 @@
-"""Selection of the contacts that are swept: contacts that asked for an impulse in the step are loaded, the others idle.
+"""Selection of the contacts that are swept: a contact is loaded if it has needed an impulse in the step; all other
+contacts are idle.
 
-An idle contact closes at less than its allowed speed. It needs no new test until sweeps have changed the velocities
-of its nodes by more than its margin, the reach. The reach of loaded contacts is infinite, and their data are
-contiguous.
+An idle contact closes at less than its allowed speed. An idle contact needs no new test until sweeps have changed the
+velocities of its nodes by more than its margin, the ``reach``. The reach of loaded contacts is infinite; the data of
+loaded contacts are contiguous.
 """
 
 import numpy as np
@@ -16,7 +17,8 @@ SHARES = float(2**30)
 _ACROSS = (1.0, -1.0, 0.0, 0.0)
 """Weights of the two nodes of a contact across a crack."""
 _ROUNDING = 2.0**-40
-"""Rounding allowance relative to the velocities: far above the error of a contact's speed, a sum of twelve products."""
+"""Allowance for rounding, relative to the velocities. It is far above the rounding error of the speed of a contact,
+which is a sum of twelve products."""
 _ROWS, _F1, _F, _I = types.int32[::1], types.float64[::1], types.float64, types.int64
 
 
@@ -54,9 +56,9 @@ def fill(loaded, contacts, active, first, end):  # type: ignore[no-untyped-def]
 
 @njit(_I(_ROWS, CONTACTS, _F1, _I, _I), cache=True)
 def _due(due, contacts, path, first, end):  # type: ignore[no-untyped-def]
-    """Finds the contacts from ``first`` to ``end`` whose nodes have changed, by ``path`` (slots,), as much as their
-    reach; returns their number. Every sweep tests all contacts and few pass: a test takes 1 ns, and 2 ns with signed
-    slot numbers.
+    """Finds the contacts from ``first`` to ``end`` whose nodes have changed their velocity, by ``path`` (slots,), at
+    least as much as the reach of the contact; returns the number of these contacts. Every sweep tests all contacts, and
+    few of them pass. A test takes 1 ns; with signed slot numbers 2 ns.
     """
     slots, reach, n = contacts.slots, contacts.reach, 0
     for q in range(first, end):
@@ -71,7 +73,7 @@ def _due(due, contacts, path, first, end):  # type: ignore[no-untyped-def]
 
 @njit(types.void(LOADED, CONTACTS, NODES, _F, _I), cache=True, error_model="numpy")
 def load(loaded, contacts, active, fastest, k):  # type: ignore[no-untyped-def]
-    """Adds the idle contacts of set ``k`` that close faster than allowed to the loaded ones.
+    """Adds the idle contacts of set ``k`` that close faster than allowed to the loaded contacts.
 
     The speed of a contact changes by at most the paths of its nodes times its largest weight w, so its reach is
     (speed - wanted) / max |w|, less rounding. ``fastest``: bound of the l1 norm of any velocity at the start of the
@@ -110,7 +112,7 @@ def load(loaded, contacts, active, fastest, k):  # type: ignore[no-untyped-def]
 @njit(types.void(LOADED, CONTACTS, NODES, KEPT, _I), cache=True)
 def load_kept(loaded, contacts, active, kept, k):  # type: ignore[no-untyped-def]
     """Adds the contacts of set ``k``, all idle, that have a stored impulse of the last step, ``kept``, to the loaded
-    ones.
+    contacts.
     """
     pair, pairs, cracks, first = contacts.pair, kept.pairs, kept.cracks, loaded.begin[k]
     n = first

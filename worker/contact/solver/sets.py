@@ -12,7 +12,7 @@ from .shared_sums import ActiveSum
 
 
 class Sets:
-    """Kernels over the sets of active contacts, each with its table of arguments."""
+    """Runs kernels over the sets of active contacts; each kernel has its own table of arguments."""
 
     def __init__(self, team: Team, many: int) -> None:
         """``many``: number of zones."""
@@ -28,16 +28,16 @@ class Sets:
         self._team.run(kernel, table, *self._inner)
 
     def inner(self, kernel: Kernel, table: int) -> Stage:
-        """Returns the work on contacts without shared slots as a stage of a program."""
+        """Returns the tasks of contacts without shared slots as a stage of a program of the team of threads."""
         return Stage(kernel, table, *self._inner)
 
     def repeat(self, stages: list[Stage], rounds: int) -> None:
-        """Runs a program: see ``Team.repeat``."""
+        """Runs a program of stages on the team of threads: see ``Team.repeat``."""
         self._team.repeat(stages, rounds)
 
     def complete(self, kernel: Kernel, table: int, shared: ActiveSum, words: Ints, first: int, columns: int) -> None:
         """Runs ``kernel`` over all contacts and completes ``columns`` columns of ``words`` over the ranks. Contacts
-        without shared slots are computed while the sums of the others are in transit.
+        without shared slots are computed while the sums of contacts with shared slots are exchanged.
         """
         if not len(shared.shared):
             self._team.run(kernel, table, *self._inner)

@@ -1,9 +1,9 @@
 """Sums over the ranks that share a node with an impulse.
 
-Most nodes that a rank shares with another get no impulse from either in a step. So the ranks first exchange two bits
-a node: whether the rank has an active contact of the node, and whether it needs the sum, because it has such a
-contact or holds the node. Only the sums that one rank has and the other needs are sent in the step. Sums are
-integers, and those left out are zero.
+In a step, most nodes that two ranks share get no impulse from either rank. The ranks therefore first exchange two bits
+for each shared node: whether the rank has an active contact of the node, and whether it needs the sum, because it has
+such a contact or holds the node. In the step, a sum is sent only if one rank has it and the other rank needs it. Sums
+are integers, and the sums that are not sent are zero.
 """
 
 import numpy as np
@@ -16,9 +16,10 @@ from ...parallel.tags import Tag
 from ..narrow_phase.rows import ActiveRows
 
 _WORD = 63
-"""Used bits of a word."""
+"""Number of bits used in a word of flags."""
 _ROOM = 4
-"""Words by which the messages of a rank grow. Chosen: up to some 250 separated nodes fit without new messages."""
+"""Number of words by which the messages of a rank are enlarged. Chosen value: about 250 separated nodes fit before
+new messages are needed."""
 _COLUMNS = 4
 """Largest number of columns summed at once (active.ActiveNodes.row_weights)."""
 
@@ -66,7 +67,7 @@ class SharedSums:
         return ActiveSum(ranks, sends, receives, counts, self._comm)
 
     def free(self) -> None:
-        """Releases the messages of MPI."""
+        """Frees the persistent MPI messages."""
         if self._exchange is not None:
             self._exchange.free()
 
@@ -78,7 +79,7 @@ class ActiveSum:
         """``sends`` and ``receives``: slots, rank after rank; ``counts`` (ranks, 2): number of each by rank."""
         self._sends, self._receives = sends, receives
         self.shared: Indices = np.concatenate([sends, receives])
-        """Slots that are sent or received, some of them several times."""
+        """Slots whose sums are sent or received; a slot may occur several times."""
         self._out, self._in = (np.zeros((len(some), _COLUMNS), np.int64) for some in (sends, receives))
         out, into = (_parts(words, ranks, many) for words, many in zip((self._out, self._in), counts.T, strict=True))
         self._exchange = comm.exchange(out, into, Tag.CONTACT)
@@ -93,17 +94,17 @@ class ActiveSum:
         self._exchange.begin()
 
     def finish(self, words: Ints, first: int, columns: int) -> None:
-        """Adds the sums of the other ranks."""
+        """Receives the sums of the other ranks and adds them."""
         self._exchange.finish()
         _add(words, first, self._receives, self._in, columns)
 
     def free(self) -> None:
-        """Releases the messages of MPI."""
+        """Frees the persistent MPI messages."""
         self._exchange.free()
 
 
 def _parts(words: Ints, ranks: list[int], counts: Ints) -> list[tuple[int, Ints]]:
-    """Rows of each rank that has any."""
+    """Returns the range of rows of each rank that has rows."""
     parts, end = [], 0
     for rank, many in zip(ranks, counts.tolist(), strict=True):
         end += many
@@ -137,7 +138,9 @@ def _flag(out, nodes, ends, words, contacts, local):  # type: ignore[no-untyped-
     cache=True,
 )
 def _agreed(mine, theirs, nodes, ends, words):  # type: ignore[no-untyped-def]
-    """Nodes to send and nodes to receive, rank after rank, and (ranks, 2) the number of each."""
+    """Returns the nodes to send and the nodes to receive, rank after rank, and the number of nodes to send and to
+    receive for each rank (ranks, 2).
+    """
     sends, receives = np.empty(len(nodes), np.int32), np.empty(len(nodes), np.int32)
     counts = np.zeros((len(ends) - 1, 2), np.int64)
     n, m = 0, 0

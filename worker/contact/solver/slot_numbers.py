@@ -1,9 +1,9 @@
 """Numbering of the nodes of active contacts: copies between local nodes, surface nodes of the scene and slots of the
 solver.
 
-``held`` (h,) are rows of surface nodes and ``local`` (h,) the local indices of the same nodes. ``places`` (slots,)
-are the rows of the nodes of active contacts, and ``index`` (surface_nodes,) the local index of each surface node, -1
-for a copy of another rank's.
+``held`` (h,) are rows of surface nodes and ``local`` (h,) the local indices of the same nodes. ``places`` (slots,) are
+the rows of the nodes of active contacts, and ``index`` (surface_nodes,) the local index of each surface node, -1 for a
+ghost of a node of another rank.
 """
 
 import numpy as np
@@ -12,10 +12,10 @@ from ...kernels.jit import njit, prefetch, types
 from .active import CHANGED, IMPULSE, MOBILITY, NODES, TOTAL, V
 
 _SMALL = 16
-"""Low bits of an impulse that the residual ignores: 2^-30 of the largest (fixed_point.py), so that the sum over 2^28
-nodes does not overflow."""
+"""Number of low bits of an impulse that the residual ignores: 2^-30 of the largest (fixed_point.py), so that the sum
+over 2^28 nodes does not overflow."""
 _AHEAD = 16
-"""Distance of the prefetch of node data, in nodes."""
+"""Prefetch distance of the data of nodes, in nodes."""
 _I2, _N1, _N2, _U1 = types.int64[:, ::1], types.int32[::1], types.int32[:, ::1], types.uint8[::1]
 _F1, _F2, _F, _I, _I1, _B1 = (
     types.float64[::1], types.float64[:, ::1], types.float64, types.int64, types.int64[::1], types.boolean[::1],
@@ -47,9 +47,10 @@ def mark(touched, set_of, nodes, found, zone, shared, many, task, first, stop): 
     """Writes the set of each contact ``found`` from ``first`` to ``stop``, and the number ``many`` (tasks, sets) of
     this task in each set.
 
-    A contact belongs to the smallest box (zones.py) with all its nodes; ``zone`` (surface_nodes,): of each node. The
-    sets come twice: first those of contacts with a ``shared`` (surface_nodes,) node, then those of contacts without.
-    ``nodes`` (room, 4); ``touched`` (surface_nodes,): set to 1 for all nodes of the contacts.
+    A contact belongs to the smallest box (zones.py) with all its nodes; ``zone`` (surface_nodes,): of each node. There
+    are two groups of sets: first the sets of contacts with a ``shared`` (surface_nodes,) node, then the sets of
+    contacts without such a node. ``nodes`` (room, 4); ``touched`` (surface_nodes,): set to 1 for all nodes of the
+    contacts.
     """
     sets = many.shape[1] // 2
     zones = (sets + 1) // 2
@@ -86,8 +87,8 @@ def number(places, slot, touched):  # type: ignore[no-untyped-def]
 @njit(types.void(_N1, _N2, _F1, _I2, _N1, _N1, _N2, _N1, _I, _I, _I), cache=True)
 def sort(row, slots, reach, begins, set_of, found, nodes, slot, task, first, stop):  # type: ignore[no-untyped-def]
     """Orders the contacts ``found`` from ``first`` to ``stop`` by their sets, all idle: their rows, slots and
-    ``reach``, -1, which has them computed at once. ``begins`` (tasks, sets): offset of this task in each set,
-    advanced to its end; ``slot`` (surface_nodes,): see ``number``.
+    ``reach``, -1, with which the contacts are computed in the first sweep. ``begins`` (tasks, sets): offset of this
+    task in each set, advanced to its end; ``slot`` (surface_nodes,): see ``number``.
     """
     for q in range(first, stop):
         p, kind = found[q], set_of[q]

@@ -20,26 +20,29 @@ from .stops import Braced, Stops
 from .zones import Zones
 
 _ROW_WEIGHTS = 4
-"""Columns of ``ActiveNodes.row_weights``."""
+"""Number of columns of ``ActiveNodes.row_weights``."""
 _SPARE = 1.25
-"""Factor of the room over the present number of nodes and contacts: these grow in nearly every step while a body
-breaks, and the system clears every new page of memory. Chosen: a bar of glass has a quarter more after 400 steps."""
+"""Allocated rows over the present number of nodes and contacts. While a body breaks, these numbers increase in
+nearly every step, and each new allocation costs time because the operating system clears new pages. Chosen value: a
+bar of glass has a quarter more rows after 400 steps."""
 
 
 class Bodies(Protocol):
     """Interface of rigid bodies, whose nodes are slots (rigid/rows.py)."""
 
     active: bool
-    """Whether any rank has an active contact with a rigid body."""
+    """True if any rank has an active contact with a rigid body."""
 
     def take_up(self, places: Indices, surface_nodes: SurfaceNodes, scale: float) -> None:
         """Finds the slots of rigid bodies."""
 
     def weigh(self, active: ActiveNodes) -> None:
-        """Sets the row weights of these slots, once all contacts have added theirs. Collective."""
+        """Sets the row weights of the slots of rigid bodies, after all contacts have added their row weights.
+        Collective.
+        """
 
     def give(self, active: ActiveNodes) -> None:
-        """Takes the impulses on these slots, moves the bodies, and sets the velocities of the slots. Collective."""
+        """Moves the rigid bodies by the impulses on their slots, and sets the velocities of the slots. Collective."""
 
     def unsettled(self) -> Ints:
         """Residual of the sweeps, see sweep_count.py."""
@@ -48,7 +51,9 @@ class Bodies(Protocol):
         """Adds the impulses of the step to the sums ``parts`` (parts, 3), quanta."""
 
     def add_pressed(self, pressed: Ints) -> None:
-        """Adds the impulses of the step to those of this rank's nodes, ``pressed`` (nodes, 3), quanta."""
+        """Adds the impulses of the step on rigid bodies to the impulses ``pressed`` (nodes, 3) on the nodes of this
+        rank, quanta.
+        """
 
 
 class ActiveSet:
@@ -59,12 +64,12 @@ class ActiveSet:
         bodies."""
         self.scale, self.stops, self._bodies = scale, near, bodies
         self.places: Indices = np.zeros(0, np.int32)
-        """(slots,) rows of the scene of the nodes of the last step."""
+        """(slots,) rows in the scene of the nodes that were slots in the last step."""
         self._zones, self._passes = Zones(team.threads), Slots(team)
         self._sets, self._room = Sets(team, self._zones.many), _Room(0, 0, 0, self._zones.many)
         self._scratch = Scratch()
         self._turn = np.zeros(2, np.int64)
-        """Number of the sweep, and of all sweeps of the step."""
+        """Number of the present sweep, and number of sweeps in the step."""
 
     def go_on(self, scale: float, sides: Floats) -> None:
         """Sets the scale, and the ``sides`` of the stops, after a restart or a repartition."""
@@ -152,7 +157,7 @@ class ActiveSet:
         stops.stop(room.active, room.braced)
 
     def sweep(self, many: int) -> None:
-        """Runs ``many`` sweeps, in one call if no other rank and no rigid body takes part."""
+        """Runs ``many`` sweeps, in one call of the thread team if no other rank and no rigid body takes part."""
         room, n, turn, bodies, sets, passes = (
             self._room, len(self.places), self._turn, self._bodies, self._sets, self._passes,
         )  # fmt: skip
@@ -216,7 +221,7 @@ class ActiveSet:
         return bool(left[:, 2].any())
 
     def press(self, pressed: Ints) -> None:
-        """Adds the impulses of rigid bodies in the step to ``pressed`` (nodes, 3), quanta, if it has rows."""
+        """Adds the impulses of rigid bodies in the step to ``pressed`` (nodes, 3), quanta, if ``pressed`` has rows."""
         if self._bodies is not None and len(pressed):
             self._bodies.add_pressed(pressed)
 
@@ -231,7 +236,7 @@ class ActiveSet:
 
 
 class _Room:
-    """Arrays with room for ``contacts``, ``nodes`` of the surface, ``many`` stops, and ``of`` zones."""
+    """Allocates arrays for ``contacts`` contacts, ``nodes`` surface nodes, ``many`` stops and ``of`` zones."""
 
     def __init__(self, contacts: int, nodes: int, many: int, of: int) -> None:
         self.row, self.set_of = np.empty((2, contacts), np.int32)

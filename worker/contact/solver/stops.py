@@ -1,10 +1,10 @@
 """Walls and planes of symmetry within the sweeps: a node at a plane is stopped there after every sweep.
 
-Walls and mirror images act after contact (walls.py, mirrors.py), node by node. Without stops a node between a body
-and a wall would yield in every sweep as if it were free, and the wall would then undo the result of the sweeps. So
-each node that would end the step behind a plane gets an impulse that stops it there, which later sweeps may reduce
-but not below zero, and friction across. After the last sweep these impulses are removed: the boundary applies and
-books them. Every rank with a copy of a node computes the same stop.
+Walls and mirror images act after contact (walls.py, mirrors.py), node by node. Without stops, the sweeps would treat a
+node between a body and a wall as free, and the wall would then cancel the result of the sweeps. Each node that would
+end the step behind a plane therefore gets an impulse that stops the node at the plane, and an impulse of friction along
+the plane. Later sweeps may reduce the normal impulse, but not below zero. After the last sweep these impulses are
+removed: the boundary applies and books them. Every rank with a copy of a node computes the same stop.
 """
 
 from typing import NamedTuple
@@ -23,23 +23,23 @@ from ...scene.selection import named
 from .active import MOBILITY, NODES, V
 
 _NEAR = 0.25
-"""Share of the typical size of a face: nodes further from a plane are ignored. Chosen: no step moves a node so far
-(clock.py), and if one did, the boundary would still stop it."""
+"""Distance from a plane over the typical size of a face; nodes at a larger distance are ignored. Chosen value: no
+step moves a node so far (clock.py). If a step did, the boundary would still stop the node."""
 
 
 class Stops(NamedTuple):
     """Half spaces of the plain walls and planes of symmetry."""
 
     points: Floats
-    """(k, 3), m."""
+    """(k, 3) a point on each plane, m."""
     normals: Floats
-    """(k, 3) unit normals to the free side."""
+    """(k, 3) unit normals, towards the free side."""
     sides: Floats
     """(k, parts) 1 for a part in front, -1 behind, 0 for a part that the plane does not hold."""
     friction: Floats
     """(k,) Coulomb's coefficient."""
     mirrors: Flags
-    """(k,) planes of symmetry: nodes without tets pass these."""
+    """(k,) True for planes of symmetry, which nodes without tets may pass."""
 
     @classmethod
     def of(cls, case: Case, model: Model, comm: Comm) -> "Stops":
@@ -65,10 +65,10 @@ class Stops(NamedTuple):
 
 
 class Braced(NamedTuple):
-    """Slots near stops, one row for each pair of both."""
+    """Slots near stops: one row for each pair of a slot and a stop."""
 
     rows: Indices
-    """(room, 2) slot and stop."""
+    """(room, 2) slot and stop of each pair."""
     normal: Floats
     """(room, 3) unit normal of the stop towards the side of the node, zero in held components."""
     least: Floats
@@ -80,7 +80,7 @@ class Braced(NamedTuple):
     mu: Floats
     """(room,) coefficient of friction."""
     many: Ints
-    """(1,) number of rows."""
+    """(1,) number of pairs."""
 
     @classmethod
     def room(cls, n: int) -> "Braced":
@@ -127,9 +127,10 @@ def find(braced, active, stops, places, x, part, local, loose, size, dt):  # typ
 
 @njit(types.void(NODES, BRACED), cache=True)
 def stop(active, braced):  # type: ignore[no-untyped-def]
-    """Stops the nodes that would end the step behind a plane, and reduces the impulse of those that would not.
+    """Stops the nodes that would end the step behind a plane, and reduces the impulse of nodes that would not.
 
-    push = max(0, push + (least - n.v) / n.n), and friction limited to mu push."""
+    push = max(0, push + (least - n.v) / n.n), and friction limited to mu push.
+    """
     v, path, slide = active.moving, active.path, np.empty(3)
     for r in range(braced.many[0]):
         s, speed, along = braced.rows[r, 0], 0.0, 0.0

@@ -1,4 +1,4 @@
-"""Adaptive sweep count: from the residual of the previous step."""
+"""Number of sweeps of a step, adapted to the residual of the previous step."""
 
 import numpy as np
 
@@ -7,15 +7,15 @@ from conoid.cases.estimates.impact import Sweeps
 from ...model.state import Ints
 
 _SETTLED = 0.0015
-"""Target residual: change by the last sweep of a step over the impulses of the step. Chosen with rubble between a
-ram and walls, which is then as stiff as with many more sweeps (docs/theory/contact.md, "Sweeps by need"); metals are
-below it with the fewest sweeps."""
+"""Target residual: change of the impulses by the last sweep of a step, over the impulses of the step. Chosen value:
+with it, rubble between a ram and walls is as stiff as with many more sweeps (docs/theory/contact.md, "Sweeps by
+need"). Metals are below the target with the smallest number of sweeps."""
 _ENOUGH = 0.5
-"""Share of the target below which the count falls by one."""
+"""The number of sweeps is reduced by one if the residual is below this share of the target."""
 _MORE = 4
-"""Inverse of the share by which the count grows in a step."""
+"""Inverse of the share by which the number of sweeps is increased in a step."""
 _WARNED = 2.0
-"""Multiple of _SETTLED for the residual of the whole run from which on there is a warning. Chosen."""
+"""A warning is given if the residual of the whole run is above this multiple of _SETTLED. Chosen value."""
 
 
 class SweepCount:
@@ -32,7 +32,7 @@ class SweepCount:
         self._changed, self._impulse = 0, 0
 
     def known(self) -> tuple[int, int, int]:
-        """State, equal on all ranks."""
+        """Returns the state, equal on all ranks."""
         return self.sweeps, self._changed, self._impulse
 
     def resume(self, known: tuple[int, int, int]) -> None:
@@ -41,7 +41,7 @@ class SweepCount:
 
     @property
     def warnings(self) -> list[str]:
-        """One line if the residual of the run is above the limit."""
+        """Returns a warning of one line if the residual of the run is above the limit."""
         if not self._changed > _WARNED * _SETTLED * self._impulse:
             return []
         left, limit = 100.0 * self._changed / self._impulse, 100.0 * _WARNED * _SETTLED
@@ -56,7 +56,7 @@ class SweepCount:
         return self._bounds.least == self._bounds.most
 
     def agree(self, unsettled: Ints) -> None:
-        """Adapts the count to the residual; ``unsettled`` (2,): sum over all ranks."""
+        """Adapts the number of sweeps to the residual; ``unsettled`` (2,): sum over all ranks."""
         changed, impulse = (int(word) for word in unsettled)
         self._changed, self._impulse = self._changed + changed, self._impulse + impulse
         if changed > _SETTLED * impulse:

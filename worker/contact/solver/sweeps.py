@@ -2,15 +2,15 @@
 
 Every contact has a target for its normal velocity: u >= ``wanted``. A sweep corrects its impulse by (wanted - u) over a
 bound of the l1 norm of its row of the contact matrix (Baker, Falgout, Kolev and Yang 2011): the sum over its nodes k
-and axes i of |w_k| |n_i| S_ki / m_k, where S_ki is the sum of |w| |n_i| over all contacts at the node. This is exact
-for one contact alone and for any number along one normal, and never overshoots when contacts share nodes. The bound is
-far above the diagonal where many contacts share a node, and plain sweeps converge slowly there: so normal impulses are
-extrapolated by Nesterov's ``momentum``. Normal impulses are never negative; friction is Coulomb's, on the sum over the
-sweeps. Impulses are integers: those of a contact add up to zero, and no order of contacts or ranks changes a bit.
-Node-face pairs and node pairs across a crack start from their impulses of the last step (warm start): sticking contacts
-do not creep and compressed ones do not sink in, however few sweeps there are.
+and axes i of |w_k| |n_i| S_ki / m_k, where S_ki is the sum of |w| |n_i| over all contacts at the node. The correction
+is exact for a single contact and for any number of contacts along one normal, and never overshoots when contacts share
+nodes. The bound is far above the diagonal where many contacts share a node, and plain sweeps converge slowly there: so
+normal impulses are extrapolated by Nesterov's ``momentum``. Normal impulses are never negative; friction is Coulomb's,
+on the sum over the sweeps. Impulses are integers: those of a contact add up to zero, and no order of contacts or ranks
+changes a bit. Node-face pairs and node pairs across a crack start from their impulses of the last step (warm start):
+with any number of sweeps, sticking contacts do not creep and the penetration of compressed contacts does not increase.
 
-Only contacts that asked for an impulse in the step are swept (loading.py).
+Only contacts that have needed an impulse in the step are swept (loading.py).
 
 Kernels call no kernel within a loop over contacts: numba counts a reference for each array of a record at each call.
 """
@@ -40,9 +40,10 @@ from .active import (  # fmt: skip
 from .loading import SHARES
 
 _PAIR, _CRACK = 0.8, 1.0
-"""Share of the stored normal impulse in the warm start. Node-face pairs: the whole of it lags behind and adds
-energy. Node pairs across a crack: so many press on each other that sweeps could not restore any missing part
-(docs/theory/contact.md, "Dust under pressure")."""
+"""Shares of the stored normal impulse that the warm start applies, for node-face pairs and for node pairs across a
+crack. Node-face pairs: the whole impulse is out of date by one step and would add energy. Node pairs across a crack:
+so many pairs press on each other that the sweeps could not restore a missing part (docs/theory/contact.md, "Dust
+under pressure")."""
 
 _ROWS, _F, _I = types.int32[::1], types.float64, types.int64
 
@@ -62,9 +63,9 @@ def add_row_weights(active, contacts, loaded, k):  # type: ignore[no-untyped-def
 
 @njit(types.void(NODES, LOADED, KEPT, _ROWS, _F, _F, _I), cache=True)
 def resume(active, loaded, kept, pair, ratio, scale, k):  # type: ignore[no-untyped-def]
-    """Warm start of the loaded contacts of set ``k``: ``ratio`` times their stored impulses ``kept``, along the
-    present normal and across, divided by the present row norms, so that a node that separated and lost mass, or that
-    shares its load with new contacts, starts with less.
+    """Warm start of the loaded contacts of set ``k``: ``ratio`` times their stored impulses ``kept``, along the present
+    normal and across, divided by the present row norms. The row norms reduce the start value of a node that has lost
+    mass by separation, or that shares its load with new contacts.
     """
     words, normal, tangent, slots, row = active.moving_words, loaded.normal, loaded.tangent, loaded.slots, loaded.row
     pairs, cracks, last = kept.pairs, kept.cracks, np.empty(4)
@@ -96,8 +97,9 @@ def momentum(k, many):  # type: ignore[no-untyped-def]
 
 @njit(types.void(NODES, LOADED, _F, _F, _I), cache=True, error_model="numpy")
 def sweep(active, loaded, ahead, scale, k):  # type: ignore[no-untyped-def]
-    """Adds the corrections of the loaded contacts of set ``k`` to the impulses of their nodes; those of one contact add
-    up to zero. ``ahead``: Nesterov's factor. Row norms R and R_t: docs/theory/contact.md, "Several contacts of a node".
+    """Adds the corrections of the loaded contacts of set ``k`` to the impulses of their nodes; the corrections of one
+    contact add up to zero. ``ahead``: Nesterov's factor. Row norms R and R_t: docs/theory/contact.md, "Several contacts
+    of a node".
     """
     values, words = active.moving, active.moving_words
     first = loaded.begin[k]
@@ -133,7 +135,7 @@ def sweep(active, loaded, ahead, scale, k):  # type: ignore[no-untyped-def]
             for i in range(3):
                 change[i] += factor * rate[i] - tangent[q, PUSH_T + i]
                 tangent[q, PUSH_T + i] = factor * rate[i]
-        for i in range(3):  # node k gets w_k (dp n + dt) in quanta, the first one minus the sum of the others
+        for i in range(3):  # node k gets w_k (dp n + dt) in quanta; the first node gets minus the sum of the others
             if c < 0:
                 rest = np.int64(np.rint(-change[i] * scale))
             else:

@@ -1,12 +1,13 @@
-"""Zones: boxes in space whose contacts different threads sweep at the same time.
+"""Zones: boxes in space. Different threads sweep the contacts of different zones at the same time.
 
-Every surface node belongs to the zone in which it enters the scene. Zones come from halving larger boxes, and a contact
-belongs to the smallest box with all its nodes. The contacts of a box are a set. Boxes that have been halved equally
-often have no node in common, so different threads sweep their sets: first those of the zones, then those across the
-border of two zones, and so on up to the one across the border of the first two halves. With one thread there is one
-zone. No bit of the answer depends on zones.
+Every surface node belongs to the zone in which it enters the scene. Zones are made by recursive halving of boxes. A
+contact belongs to the smallest box that contains all its nodes. The contacts of a box are a set. Boxes that have been
+halved equally often have no node in common, so different threads sweep their sets: first the sets of the zones, then
+the sets of contacts across the border of two zones, and so on, until the set across the border of the first two halves.
+With one thread there is one zone. No bit of the answer depends on zones.
 
-Box 1 has all nodes, its halves are the boxes 2 and 3, and those of box k are 2 k and 2 k + 1; the zones are the last.
+Box 1 has all nodes, its halves are the boxes 2 and 3, and those of box k are 2 k and 2 k + 1; the zones are the boxes
+of the last level.
 """
 
 import numpy as np
@@ -17,14 +18,13 @@ from ..surface.records import SurfaceNodes
 _SAMPLE = 8192
 """Largest sample of the nodes by which boxes are halved."""
 _PER_THREAD = 4
-"""Zones per thread: contacts are not spread evenly, and a thread that has finished its zones takes one of another
-thread. Chosen.
-"""
+"""Number of zones for each thread. It is above 1 because contacts are not distributed evenly: a thread that has
+finished its zones computes a zone of another thread. Chosen value."""
 
 
 class Zones:
-    """Recursive bisection of the surface nodes, each box across its longest side; later nodes belong to the box that
-    contains them.
+    """Recursive bisection of the surface nodes; each box is halved across its longest side. Nodes that are added later
+    belong to the box that contains them.
     """
 
     def __init__(self, threads: int) -> None:
@@ -66,8 +66,8 @@ class Zones:
 
 
 def sets(zones: int) -> int:
-    """Number of sets of contacts with a node that other ranks share, and of those without; the set of box k is number
-    ``sets(zones) - k`` of them.
+    """Number of sets of contacts with a node that other ranks share, and number of sets of contacts without such a
+    node; the set of box k is number ``sets(zones) - k`` of them.
     """
     return 2 * zones - 1
 

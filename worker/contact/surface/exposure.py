@@ -1,9 +1,9 @@
 """Exposure of the faces behind tets that erode, without a search.
 
-A tet is near erosion when its strain or damage is above a share of its limit. A search includes the faces behind
-such tets, as it includes the sides of cracks: with their nodes, on all ranks near them, but without candidate pairs.
-When the tet erodes its neighbours' faces are exposed in the same step. Only the erosion of a tet that was not near
-it at the last search, for example by early inversion, needs a search of all ranks.
+A tet is near erosion when its strain or damage is above a share of its limit. A search includes the faces behind such
+tets, as it includes the sides of cracks: with their nodes, on all ranks near them, but without candidate pairs. When
+the tet erodes, the faces of its neighbours are exposed in the same step. A search of all ranks is needed only if a tet
+erodes that was not near erosion at the last search, for example by early inversion.
 """
 
 from typing import NamedTuple
@@ -19,21 +19,22 @@ from ...parallel.comm import Comm
 from ...parallel.ownership import Neighbour
 
 NEAR_EROSION = 0.5
-"""Share of the plastic strain or damage at erosion. Of the tets eroded in the case long_rod to 20 us, 1.6 to 5.7 %
-were below it 50 to 200 steps before (counts of one run)."""
+"""A tet is near erosion if its plastic strain or damage is above this share of the limit. Of the tets eroded in the
+case long_rod to 20 us, 1.6 to 5.7 % were below this share 50 to 200 steps before the erosion (counts of one run)."""
 WORDS = 9
-"""Words of a tet that erodes: its id, the faces across (state.Block.across), and its nodes."""
+"""Number of words of a message about a tet that erodes: its id, the faces across (state.Block.across), and its
+nodes."""
 
 
 class Exposure(NamedTuple):
-    """Faces exposed by the erosion of tets of all ranks; ids, ascending."""
+    """Faces exposed by the erosion of tets of all ranks, given by ids, ascending."""
 
     gone: Ints
     """Ids of the faces of the eroded tets."""
     bare: Ints
-    """Ids of the faces behind them."""
+    """Ids of the faces of other tets that coincide with the faces of eroded tets."""
     nodes: Ints
-    """Ids of the nodes of the faces behind them."""
+    """Ids of the nodes of the exposed faces."""
 
 
 def near_erosion(blocks: list[Block]) -> Ints:

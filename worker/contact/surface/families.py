@@ -1,5 +1,6 @@
-"""Families: all nodes that one node of the start has separated into. A rank with a tet at a node holds all of its
-family."""
+"""Families: a family is all copies of one original node of the start, with the node itself. A rank with a tet at a node
+has all nodes of the family.
+"""
 
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -18,9 +19,9 @@ class Families:
     """Families of the local nodes."""
 
     root: Ints
-    """(nodes,) global id of the node of the start."""
+    """(nodes,) global id of the original node at the start of the run."""
     ring: Indices
-    """(nodes,) next local node of the family, cyclic; the node itself where it is alone."""
+    """(nodes,) next local node of the family, cyclic; the node itself if the family has one node."""
     leader: Indices
     """(nodes,) local node that represents the family."""
 
@@ -49,7 +50,7 @@ class Families:
 
 @njit("void(int32[::1], int64[::1], int64)", cache=True)
 def _insert(ring, parents, first):  # type: ignore[no-untyped-def]
-    """Inserts copies, numbered from ``first`` on, behind their parents."""
+    """Inserts copies, numbered from ``first`` on, into the ring after their parents."""
     for c in range(len(parents)):
         ring[first + c], ring[parents[c]] = ring[parents[c]], first + c
 
@@ -71,13 +72,13 @@ class Corners(NamedTuple):
     members: Indices
     """Nodes of the families, one family after the other."""
     begin: Indices
-    """(families + 1,) offsets of the members of each."""
+    """(families + 1,) offsets of the members of each family."""
     among: Indices
     """(nodes,) position of a node of a family in ``members``."""
     corners: Indices
     """Codes 8 crack + 4 side + corner (0 to 2), one family after the other."""
     start: Indices
-    """(families + 1,) offsets of the corners of each."""
+    """(families + 1,) offsets of the corners of each family."""
 
 
 CORNERS = record(Corners, _N1, _N1, _N1, _N1, _N1)

@@ -2,7 +2,7 @@
 (facing.facing).
 
 They are recomputed at every ``EVERY``-th step and after erosion; a face that a crack exposes in between adds its
-contribution to its nodes. So they depend on the step number alone, not on the steps of searches.
+contribution to its nodes. The normals therefore depend on the step number alone, not on the steps of searches.
 """
 
 import numpy as np
@@ -16,10 +16,10 @@ from ...parallel.tags import Tag
 from ..solver.loading import SHARES
 
 EVERY = 16
-"""Steps between two computations. A fragment that rotates at 1e5 rad/s (100 m/s over 1 mm) turns by 3 degrees in
-between."""
+"""Number of steps between two computations of the mean normals. Between two computations, a fragment that rotates at
+1e5 rad/s (100 m/s over 1 mm) rotates by 3 degrees."""
 COLUMNS, SHARE = 12, 18
-"""Sums of a node, and words that a face adds to those of its three nodes."""
+"""Number of sums of a node, and number of words that a face adds to the sums of its three nodes."""
 _NOTHING = 1e-300
 """Least area, m^2: prevents a division by zero for a degenerate face."""
 
@@ -112,7 +112,9 @@ def _add_exposed(sums, x, tets, across, bond, planes, scale):  # type: ignore[no
 
 @njit("void(int64[:, ::1], int64[:, ::1], int32[:, ::1])", cache=True)
 def add(sums, some, faces):  # type: ignore[no-untyped-def]
-    """Adds ``some`` shares (f, SHARE) to the sums of the nodes of ``faces`` (f, 3); -1 for nodes that are not here."""
+    """Adds ``some`` shares (f, SHARE) to the sums of the nodes of ``faces`` (f, 3); -1 for nodes that are not on this
+    rank.
+    """
     for f in range(len(faces)):
         for m in range(3):
             if faces[f, m] >= 0:

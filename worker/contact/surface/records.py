@@ -22,7 +22,7 @@ AGED, OPEN = 1, 2
 
 @dataclass
 class Rows:
-    """Table of columns of equal length."""
+    """Table whose columns are arrays of equal length."""
 
     @property
     def n(self) -> int:
@@ -31,7 +31,7 @@ class Rows:
 
     @cached_property
     def _rooms(self) -> Rooms:
-        """Spare room of a table that grows."""
+        """Allocated rows of a table beyond its present length."""
         return Rooms(*vars(self))
 
     def columns(self) -> list["np.ndarray"]:
@@ -45,7 +45,7 @@ class Rows:
         self._rooms.append(self, rows.n, **columns)
 
     def take(self, chosen: "np.ndarray") -> Self:
-        """Returns the ``chosen`` rows."""
+        """Returns the ``chosen`` rows as a table."""
         return type(self)(*(column[chosen] for column in self.columns()))
 
     @classmethod
@@ -70,8 +70,8 @@ class Faces(Rows):
 
 @dataclass
 class Edges(Rows):
-    """Edges; a row (a, b, c, d, e, f): edge ab between face abc of tet abce and face bad of tet badf, the face of
-    smaller id first. If more than two faces share an edge, every two of them that may enclose material make a row.
+    """Edges; a row (a, b, c, d, e, f) means: edge ab between face abc of tet abce and face bad of tet badf, the face of
+    smaller id first. If more than two faces share an edge, every two of them that may enclose material are a row.
     """
 
     nodes: Ints
@@ -86,7 +86,7 @@ class Edges(Rows):
     """(n, 2) state of either face: OPEN if it is exposed, AGED for a side of a crack older than cracks.AGE, else 0.
     The edge is in edge-edge contact when it is sharp, neither state is 0 and one is OPEN."""
     sharp: Flags
-    """(n,) see sharp.py."""
+    """(n,) True for sharp edges, see sharp.py."""
 
     @property
     def names(self) -> Ints:
@@ -99,9 +99,9 @@ class CrackSides:
     """Sides of cracks on a rank: rows of block, tet and face."""
 
     young: Indices
-    """(k, 3) sides whose edges are not in contact yet."""
+    """(k, 3) sides of young cracks, whose edges are not in edge-edge contact yet."""
     aged: Indices
-    """(m, 3) sides whose edges are in contact."""
+    """(m, 3) sides of aged cracks, whose edges are in edge-edge contact."""
 
 
 @dataclass
@@ -111,7 +111,7 @@ class SurfaceNodes(Rows):
     id: Ints
     """(n,) global ids."""
     local: Indices
-    """(n,) index on this rank, -1 for a copy."""
+    """(n,) local index on this rank, -1 for a ghost."""
     owner: Indices
     """(n,) rank that owns the node."""
     part: Indices

@@ -1,9 +1,9 @@
 """Edges between two faces of the surface, and which of them are sharp: sharp edges are in edge-edge contact.
 
-A half edge is an edge of one face, (a, b) of the face abc. Two half edges of opposite direction between the same
-nodes make an edge, except the two sides of one facet. An edge is sharp when its faces enclose an angle at the start,
-or when they do so and the edge is convex at a later check: every normals.EVERY steps, or every PRESSED steps, since
-flow makes edges too. So sharpness depends on the step number alone, not on the steps of searches.
+A half edge is an edge of one face, (a, b) of the face abc. Two half edges of opposite direction between the same nodes
+make an edge, except the two sides of one facet. An edge is sharp when its faces enclose an angle at the start, or when
+they do so and the edge is convex at a later check: every normals.EVERY steps, or every PRESSED steps, because plastic
+flow also makes sharp edges. Sharpness therefore depends on the step number alone, not on the steps of searches.
 """
 
 import math
@@ -21,22 +21,24 @@ from ..narrow_phase.tables import DEEP, DEEP_SELF
 from .records import Edges, Faces
 
 SHARP = sine_and_cosine(math.radians(25.0))[1]
-"""Cosine of the angle between the normals of two faces from which on their edge is sharp. Chosen."""
+"""Cosine of the smallest angle between the normals of the two faces of a sharp edge. Chosen value."""
 BENT, PRESSED = sine_and_cosine(math.radians(5.0))[1], 4
-"""The same for parts that are pressed together beyond their strength (cases/estimates/impact.py), and the steps
-between two checks there: ridges of surfaces that were flat cross without a node inside, and overlapping matter has
-no pressure. Chosen with flyer plates of copper at 1 to 2.4 km/s (docs/theory/contact.md, "Ridges under pressure")."""
+"""Cosine of the smallest angle of a sharp edge for parts that are pressed together beyond their strength
+(cases/estimates/impact.py), and number of steps between two checks of these parts. The angle is smaller than that of
+other parts because ridges of initially flat surfaces may cross without a node inside of the other body, and contact
+exerts no pressure on overlapping material. Chosen values, by tests of flyer plates of copper at 1 to 2.4 km/s
+(docs/theory/contact.md, "Ridges under pressure")."""
 
 _A, _B, _C, _D, _OWNER, _TOP, _FACE, _OPEN, _LENGTH, _LOW, _NORMAL = range(11)
 """Columns of a half edge that is sent: its nodes, the third node of its face and the opposite one, the owners of
 these two, the face, its state, initial length, m, lowest initial height of its tet, m, and the unit normal of the
 face; floats by their bits."""
 _HALF, _ROW = 13, 17
-"""Number of columns of a half edge, and of an edge (``_matched``)."""
+"""Number of columns of a half edge, and number of columns of an edge (``_matched``)."""
 
 
 def none() -> tuple[Edges, Ints, Indices]:
-    """Returns the result of ``find`` without edges."""
+    """Returns the result of ``find`` for a surface without edges."""
     nothing = np.zeros((0, 6), np.int64)
     lengths = np.zeros(0), np.zeros(0)
     edges = Edges(nothing, nothing[:, :2], *lengths, np.zeros((0, 2), np.uint8), np.zeros(0, bool))

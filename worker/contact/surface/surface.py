@@ -15,13 +15,13 @@ from . import sharp
 from .records import CrackSides, Edges, Faces
 
 _UNSEEN, _COVERED, _YOUNG, _AGED, _EXPOSED, _BARE = range(6)
-"""Kinds of faces: not on the surface; exposed if a tet erodes; side of a crack that may open, without or with
-edge-edge contact; exposed; exposed by erosion."""
+"""Numbers of the kinds of faces: not on the surface; exposed if a tet erodes; side of a crack that may open, without
+or with edge-edge contact; exposed; exposed by erosion."""
 
 
 @dataclass
 class Surface:
-    """Share of one rank of the surface."""
+    """Surface on one rank."""
 
     faces: Faces
     """Faces of this rank's tets."""
@@ -34,7 +34,7 @@ class Surface:
     far: Ints
     """(k,) ids of nodes of ``edges`` that this rank does not hold."""
     far_owner: Indices
-    """(k,) their owners."""
+    """(k,) owners of the nodes of ``edges`` that this rank does not hold."""
     turned: Ints = field(default_factory=lambda: np.zeros(0, np.int64))
     """(t,) names of the ``edges`` that became sharp during the run, ascending."""
 
@@ -56,10 +56,11 @@ def build(
 ) -> Surface:
     """Builds the surface. Collective.
 
-    ``planes`` (nodes, planes): membership of nodes in symmetry planes. A face with all three nodes on one plane is
-    not on the surface; a face of a body one tet thick, with nodes on two parallel planes, is. ``cracks``: sides that
-    may open before the next search; ``covered`` (m, 3): block, row and face of faces that erosion may expose. Faces
-    exposed by erosion are in contact with nodes; their edges are in no edge-edge contact: nearly all would be sharp.
+    ``planes`` (nodes, planes): membership of nodes in symmetry planes. A face with all three nodes on one plane is not
+    on the surface; a face of a body one tet thick, with nodes on two parallel planes, is. ``cracks``: sides that may
+    open before the next search; ``covered`` (m, 3): block, row and face of faces that erosion may expose. Faces exposed
+    by erosion are in contact with nodes; the edges of such faces are not in edge-edge contact, because nearly all of
+    them would be sharp.
     """
     local, ids, kind = _faces(model, planes, cracks, covered)
     nodes, n = model.nodes, len(ids)
