@@ -1,5 +1,7 @@
-"""Rows of the table of runs as JSON. The values of similar cases are sent once for all their runs; a row has only
-the values that differ from these common values.
+"""Rows of the table of runs as JSON.
+
+The values of similar cases are sent once for all their runs; a row has only the values that differ from these common
+values.
 """
 
 from collections.abc import Iterator, Mapping, Sequence

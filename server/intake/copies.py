@@ -21,16 +21,17 @@ from .uploads import Uploads, give
 _LACKING = "you have sent no such file, or it has been removed since; send it first (PUT /v1/files/{sha256})"
 _NAMING = re.compile(rb"""path["']?[ \t]*[=:]|\\[uUx]""")
 Source = Callable[[FileName, Path], None]
-"""Puts a file that a case names at a path. Raises FileNotFoundError, OSError."""
+"""Writes a file that a case names to a path. Raises FileNotFoundError, OSError."""
 
 
 def of_owner(sent: Uploads, owner: str) -> Source:
-    """Copies of files that a user has sent."""
+    """Source of files for a run: the files that a user has uploaded."""
     return lambda file, target: sent.give(owner, file.sha256, target)
 
 
 def of_run(folder: Path) -> Source:
-    """Copies of files of another run of the same user. Raises ServiceError 409 if that run has lost one."""
+    """Source of files for a run: the files of another run of the same user. Raises ServiceError 409 if that run has
+    lost a file."""
 
     def put(file: FileName, target: Path) -> None:
         try:
@@ -43,7 +44,8 @@ def of_run(folder: Path) -> Source:
 
 
 def fill(files: Sequence[FileName], source: Source, folder: Path) -> None:
-    """Adds a copy of each file to a folder; they are on disk on return. Raises CaseError for missing files, OSError."""
+    """Adds a copy of each file to a folder; the copies are on disk on return. Raises CaseError for missing files,
+    OSError."""
     place = folder / layout.FILES
     if files:
         place.mkdir(0o700)
@@ -63,8 +65,8 @@ def fill(files: Sequence[FileName], source: Source, folder: Path) -> None:
 
 @contextmanager
 def apart(runs: Path, files: Sequence[FileName], source: Source) -> Iterator[Path]:
-    """A temporary folder with the files, as in the folder of a run. If the server is killed, the next server removes
-    it. Raises the errors of ``fill``.
+    """Creates a temporary folder with the files, as in the folder of a run. If the server is killed, the next server
+    removes the temporary folder. Raises the errors of ``fill``.
     """
     place = runs / f"{APART}{secrets.token_hex(8)}"
     place.mkdir(0o700)
@@ -77,5 +79,5 @@ def apart(runs: Path, files: Sequence[FileName], source: Source) -> Iterator[Pat
 
 
 def names_files(body: bytes) -> bool:
-    """Whether the text of a case may name files: it contains a key ``path``, or escaped characters."""
+    """Whether the text of a case may name files: whether it contains a key ``path``, or escaped characters."""
     return _NAMING.search(body) is not None

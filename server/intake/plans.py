@@ -1,4 +1,4 @@
-"""Stored sweeps: a plain file ``<runs>/sweeps/<id>.json`` each, and a copy of all in memory."""
+"""Stored sweeps. Each sweep is a plain file ``<runs>/sweeps/<id>.json``, and a copy of all sweeps is in memory."""
 
 from collections.abc import Iterator
 from typing import Any
@@ -16,7 +16,7 @@ FOLDER = "sweeps"
 
 
 class Plan(msgspec.Struct, kw_only=True, frozen=True):
-    """A stored sweep; ``runs`` is empty until all of them are accepted. ``submitted`` in Unix s."""
+    """A stored sweep. ``runs`` is empty until all runs are accepted; ``submitted`` is a Unix time in s."""
 
     id: str
     owner: str
@@ -25,22 +25,23 @@ class Plan(msgspec.Struct, kw_only=True, frozen=True):
     key: str | None
     digest: str
     at_once: int | None
-    """Largest number of runs of the sweep at a time; None: no limit but the slots."""
+    """Largest number of runs of the sweep at a time; None: only the number of cores of the server limits it."""
     points: list[dict[str, Any]]
     runs: list[str] = []
     case: dict[str, Any] | None = None
     """Changed values of each point, until all runs are accepted."""
     tries: list[int] = []
-    """Number of repetitions of each point; empty: none."""
+    """Number of repetitions of each point; empty: no point was repeated."""
     repeated: list[int] = []
-    """Points that are repeated, until all of these runs are accepted; ``earlier`` has the previous runs."""
+    """Points that are being repeated, until all new runs are accepted; ``earlier`` has the previous runs."""
     earlier: list[str] = []
     search: Search | None = None
     """Last report of an adaptive sweep, whose client chooses the points."""
     reported: float = 0.0
-    """Time of this report, Unix s."""
+    """Time of the last report of an adaptive sweep, Unix s."""
     cancelled: float = 0.0
-    """Start time (``began``) of the command whose runs were cancelled here; it must submit no more of them."""
+    """Start time (``began``) of the command whose runs were cancelled on the server. This command must submit no
+    more runs."""
 
     @property
     def whole(self) -> bool:
@@ -60,7 +61,8 @@ class Plan(msgspec.Struct, kw_only=True, frozen=True):
 
 
 class Plans:
-    """All sweeps of a server. Methods may be called from any thread; the caller serialises changes of one sweep."""
+    """All sweeps of a server. Methods may be called from any thread. The caller makes sure that one sweep is changed
+    by one thread at a time."""
 
     def __init__(self, settings: Settings) -> None:
         """Reads the stored sweeps; an unreadable file is ignored."""

@@ -1,4 +1,4 @@
-"""Reads cases in separate processes with limits (``reading``), users in rotation."""
+"""Reads cases in separate processes with limits (``reading``); the users take turns."""
 
 import atexit
 import logging
@@ -21,35 +21,39 @@ from .reading import CPU, PID, WALL, Answer, Question, Reading, WrongCaseError
 
 _log = logging.getLogger("conoid.server")
 _LOAD = 30.0
-"""Time in s in which the program must load its modules. Chosen: it takes half a second."""
+"""Time in s in which the program must load its modules. The value was chosen because loading takes half a second."""
 _FORK = 10.0
-"""Time in s in which the program must begin with a case; else it is replaced. Chosen: it takes 10 ms."""
+"""Time in s in which the program must begin with a case; a slower program is replaced. The value was chosen because
+this step takes 10 ms."""
 _REST = 5.0
-"""Time in s beyond ``WALL`` after which the server kills the process of a case. Chosen."""
+"""Time in s beyond ``WALL`` after which the server kills the process of a case (chosen value)."""
 _WAITING = 100
-"""Largest number of waiting bodies of one owner. Chosen: each may have 1 MiB."""
+"""Largest number of waiting bodies of one owner. The value was chosen because each body may have 1 MiB."""
 CASE, SWEEP, FILES = 120.0, 900.0, 300.0
-"""Longest time in s for a case, for all cases of a sweep, and for a case with files, with the waiting time. Chosen."""
+"""Longest times in s, with the waiting time (chosen values): for a case, for all cases of a sweep, and for a case
+with files."""
 
 
 def pool(patience: float) -> ThreadPool:
-    """Returns a pool for as many cases at a time as there are cores; one owner alone never uses all threads."""
+    """Returns a pool of threads that reads as many cases at a time as there are cores. One owner alone never uses
+    all threads."""
     places = max(2, usable_cores())
     return ThreadPool(each=places - 1, waiting=_WAITING, patience=patience, most=places)
 
 
 def surveyors() -> ThreadPool:
-    """Returns a pool for one case with files of an owner at a time, and of all owners as many as there are cores."""
+    """Returns a pool of threads that reads one case with files of an owner at a time, and as many cases of all
+    owners as there are cores."""
     return ThreadPool(each=1, waiting=_WAITING, patience=FILES, most=max(2, usable_cores()))
 
 
 class Reader:
-    """A program that reads cases. It is started at the first case, and again if it has ended or hangs. For any
-    thread.
+    """A program that reads cases. The program is started at the first case, and again if it has ended or hangs.
+    Methods may be called from any thread.
     """
 
     def __init__(self) -> None:
-        """Starts no program yet."""
+        """Creates the object; no program is started yet."""
         self._lock = threading.Lock()
         self._program: _Program | None = None
 
@@ -89,7 +93,7 @@ class Reader:
             return self._program
 
     def close(self) -> None:
-        """Ends the program; cases in work are read to their end."""
+        """Ends the program. A case that is being read is completed."""
         with self._lock:
             if self._program is not None:
                 self._program.close()
@@ -97,7 +101,8 @@ class Reader:
 
 
 class _Program:
-    """A running program. It receives a connection for each case, and forks a process for it."""
+    """A running program that reads cases. It receives a connection for each case, and forks a process for each
+    connection."""
 
     def __init__(self) -> None:
         """Starts the program. Raises OSError."""
@@ -157,7 +162,7 @@ def _answer(connection: socket.socket, pid: int, question: bytes) -> bytes:
 
 @cache
 def the_reader() -> Reader:
-    """Connection of a client to one process, which keeps nothing between two cases."""
+    """Connection of a client to one process, which is closed after one case."""
     made = Reader()
     atexit.register(made.close)
     return made

@@ -32,30 +32,32 @@ from ..requests import limits
 from ..requests.limits import Limits
 
 CPU, WALL, MEMORY = 5, 20, 1 << 30
-"""Limits for reading a case: s of CPU time, s of wall-clock time, bytes of memory. Chosen: the largest shipped case
-takes 0.1 s and 100 MB; a machine may be busy."""
+"""Limits for reading a case: CPU time in s, wall-clock time in s, memory in bytes. The values were chosen because
+the largest shipped case takes 0.1 s and 100 MB, and a machine may be busy."""
 _NICE = 5
-"""Priority below that of the server, so that the server can answer. Chosen."""
+"""Increment of the nice value of the process (chosen value): its priority is below that of the server, so that the
+server can answer."""
 _SHIPPED = "demo"
-"""A shipped case that is read before all others. Chosen: small, with a material of the library."""
+"""Name of a shipped case that is read before all others. This case was chosen because it is small and has a material
+of the library."""
 _MOST_FILES = 1000
-"""Largest number of files that are listed of a case with problems. Chosen."""
+"""Largest number of files in the list of a case with problems (chosen value)."""
 _UNREAD = "was not read yet: its run reads it"
 PID = 4
 """Number of bytes of the process number, which each process sends first."""
 
 
 class Question(msgspec.Struct, frozen=True, kw_only=True):
-    """A body, its type, and what it may use."""
+    """A request body with a case, its type, and the resources that the case may use."""
 
     body: bytes
     json: bool
     limits: Limits
     survey: bytes | None = None
-    """Survey of the mesh files that the case names (conoid.cases.reading.survey); empty: it could not be made. None:
-    not made yet; then a case with files is read and checked, but not estimated."""
+    """Survey of the mesh files that the case names (conoid.cases.reading.survey). Empty: no survey could be made.
+    None: no survey was made yet; then a case with files is read and checked, but not estimated."""
     folder: str = ""
-    """Folder of these files."""
+    """Folder of the files that the case names."""
 
 
 class FileName(msgspec.Struct, frozen=True, kw_only=True):
@@ -70,7 +72,7 @@ class WrongCaseError(CaseError):
     """A case with problems, and the files that it names."""
 
     def __init__(self, problems: Iterable[Problem], files: Sequence[FileName]) -> None:
-        """``problems`` of the case and its ``files``."""
+        """Creates the error with the ``problems`` of the case and its ``files``."""
         super().__init__(problems)
         self.files = files
 
@@ -87,7 +89,7 @@ class Reading(msgspec.Struct, frozen=True, kw_only=True):
     wall_time: float | None
     estimate: dict[str, int | float]
     resolved: bytes
-    """case.resolved.json"""
+    """Content of case.resolved.json"""
     case: bytes
     """The case with every default, as JSON."""
     doubts: list[Problem]
@@ -97,12 +99,13 @@ class Reading(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class Answer(msgspec.Struct, frozen=True, kw_only=True):
-    """A reading, or every problem; ``crash`` is the traceback of an error in this program."""
+    """Answer of the program: a case that was read, or every problem. ``crash`` is the traceback of an error in this
+    program."""
 
     reading: Reading | None = None
     problems: list[Problem] = []
     files: list[FileName] = []
-    """Files of a case with problems: those that it names, as far as they could be read; ``sha256`` may be empty."""
+    """Files that a case with problems names, as far as the files could be read; ``sha256`` may be empty."""
     crash: str = ""
 
 
@@ -185,7 +188,7 @@ def _text(body: bytes) -> str:
 
 
 def main() -> int:
-    """Answers until standard input ends. One byte reports that the program is ready."""
+    """Answers requests until standard input ends. One byte reports that the program is ready."""
     signal.signal(signal.SIGCHLD, signal.SIG_IGN)
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     os.nice(_NICE)
@@ -215,7 +218,7 @@ def _warm() -> None:
 
 
 def _child(connection: socket.socket) -> None:
-    """Answers one case, then exits without the clean-up of the interpreter, which belongs to the parent."""
+    """Answers one case, then exits without the clean-up of the interpreter, which only the parent process must do."""
     code = 1
     try:
         _limit()

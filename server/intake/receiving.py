@@ -24,18 +24,21 @@ from .uploads import Part, Upload, Uploads
 
 _RANGE = re.compile(r"bytes (?:(\d{1,18})-(\d{1,18})|\*)/(\d{1,18})")
 _GATHERED = 1 << 18
-"""Bytes that are collected before a write. Chosen: larger writes are not faster."""
+"""Number of bytes that are collected before a write. The value was chosen because larger writes are not faster."""
 _SLICE = 1 << 25
-"""Bytes that are hashed in one task. Chosen: 0.1 s, between which other requests of the user are served."""
+"""Number of bytes that are hashed in one task. The value was chosen because such a task takes 0.1 s; other requests
+of the user are served between two tasks."""
 _SILENCE = 30.0
-"""s within which a part of a body must arrive. Chosen, as for other bodies."""
+"""Time in s within which the next part of a body must arrive: the same limit as for other bodies (chosen value)."""
 _STALLED = 5.0
-"""s without data after which another connection may continue with a file. Chosen: for a connection that broke."""
+"""Time in s without data after which another connection may continue with a file. The value was chosen for files
+whose connection broke."""
 
 
 @dataclass(frozen=True)
 class Span:
-    """The bytes ``first`` to ``end``, exclusive, of a file of ``total`` bytes; ``anew``: replaces what is there."""
+    """Range of a file of ``total`` bytes: from ``first`` to ``end``, exclusive. ``anew``: whether the body replaces
+    the stored bytes."""
 
     first: int
     end: int
@@ -50,15 +53,15 @@ class _Transfer:
     heard: float = field(default_factory=time.monotonic)
     given_up: bool = False
     busy: bool = False
-    """All bytes have arrived; they are verified."""
+    """Whether all bytes have arrived and are being verified."""
     over: asyncio.Event = field(default_factory=asyncio.Event)
     patience: asyncio.Timeout | None = None
 
     def give_up(self) -> None:
-        """Another connection continues with the file, at once."""
+        """Stops this transfer at once, because another connection continues with the file."""
         self.given_up = True
         if self.patience is not None:
-            with suppress(RuntimeError):  # it does not wait for its body now
+            with suppress(RuntimeError):  # this transfer does not wait for its body any more
                 self.patience.reschedule(0.0)
 
 
@@ -66,7 +69,7 @@ class Receiver:
     """Receives files. Used in the thread of the event loop; files are written in threads of the user."""
 
     def __init__(self, sent: Uploads, pool: ThreadPool) -> None:
-        """No connection sends yet."""
+        """Creates the object without transfers."""
         self._sent, self._pool = sent, pool
         self._open: dict[tuple[str, str], _Transfer] = {}
 
@@ -99,7 +102,8 @@ class Receiver:
             transfer.over.set()
 
     async def _begun(self, owner: str, sha256: str) -> _Transfer:
-        """The connection that sends bytes of a file; a file has one at a time. Raises ServiceError 409."""
+        """Registers the connection that sends bytes of a file. A file has one such connection at a time. Raises
+        ServiceError 409."""
         while (other := self._open.get((owner, sha256))) is not None:
             if other.busy or time.monotonic() - other.heard < _STALLED:
                 raise _in_progress()
@@ -137,8 +141,8 @@ class Receiver:
                 await self._pool.run(part.write, bytes(gathered))
 
     async def _verify(self, owner: str, sha256: str, part: Part) -> None:
-        """Gives the verified file its name, on disk on return. Raises ServiceError 422 if the hash differs; then the
-        bytes are removed."""
+        """Gives the verified file its final name; the file is on disk on return. Raises ServiceError 422 if the hash
+        differs; then the bytes are removed."""
         total, offset = hashlib.sha256(), 0
         while offset < part.size:
             offset = await self._pool.run(_hashed, total, part, offset)
@@ -150,7 +154,7 @@ class Receiver:
 
 
 async def _next(chunks: AsyncIterator[bytes], transfer: _Transfer) -> bytes | None:
-    """The next piece of a body; None at its end. Raises ServiceError 400, 408, 409."""
+    """Returns the next piece of a body; None at its end. Raises ServiceError 400, 408, 409."""
     try:
         async with asyncio.timeout(_SILENCE) as transfer.patience:
             return await anext(chunks, None)
@@ -169,7 +173,7 @@ def _in_progress() -> ServiceError:
 
 
 def _hashed(total: "hashlib._Hash", part: Part, offset: int) -> int:
-    """Adds a slice to the digest; returns its end. Raises OSError."""
+    """Adds a slice of the file to the digest; returns the end of the slice. Raises OSError."""
     end = min(part.size, offset + _SLICE)
     while offset < end:
         data = part.read(min(_GATHERED, end - offset), offset)
@@ -181,7 +185,7 @@ def _hashed(total: "hashlib._Hash", part: Part, offset: int) -> int:
 
 
 def span_of(request: Request) -> Span:
-    """The range of bytes of a PUT, by its headers alone. Raises ServiceError 400, 411, 415."""
+    """Returns the range of bytes of a PUT from its headers. Raises ServiceError 400, 411, 415."""
     check_encoding(request)
     length, told = request.headers.get("content-length", ""), request.headers.get("content-range")
     if not length.isdecimal():

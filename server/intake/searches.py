@@ -1,4 +1,5 @@
-"""Adaptive sweeps: their client decides the points, hands each in as a run, and reports; the report is kept here."""
+"""Adaptive sweeps. The client selects the points, submits each point as a run, and sends a report; the server stores
+the report."""
 
 import re
 import threading
@@ -16,22 +17,25 @@ from ..runs import folder
 from .plans import Plan, Plans
 
 _NAME = re.compile(r"[0-9a-f]{16,64}")
-"""Of an adaptive sweep: the client makes it of what is looked for, so that the same command has the same one."""
+"""Pattern of the name of an adaptive sweep. The client computes the name from its request, so that the same command
+has the same name."""
 _MOST_BYTES = 256 << 10
-"""Of a report. Chosen: the most points that it may have, with three keys each."""
+"""Largest size in bytes of a report. The value was chosen because a report with the largest number of points, and
+three keys for each point, fits in it."""
 _MOST = 100
-"""Adaptive sweeps of a user that are kept; the oldest make room, without their runs. Chosen: 25 MB of memory."""
+"""Largest number of adaptive sweeps of a user. A new sweep replaces the oldest one, whose runs stay. The value was
+chosen because so many sweeps need 25 MB of memory."""
 
 
 class Searches:
-    """May be used from any thread."""
+    """Adaptive sweeps of all users. Methods may be called from any thread."""
 
     def __init__(self, plans: Plans, store: Store) -> None:
-        """``plans`` are those of all sweeps."""
+        """Creates the object. ``plans``: the stored sweeps of the server."""
         self._plans, self._store, self._lock = plans, store, threading.Lock()
 
     def report(self, owner: str, name: str, body: bytes) -> Plan:
-        """Keeps a report; the first one of a name makes the sweep. Raises ServiceError."""
+        """Stores a report. The first report with a new name creates the sweep. Raises ServiceError."""
         if not _NAME.fullmatch(name):
             raise not_found(f"adaptive sweep {name[:40]!r}")
         search = _read(body)
@@ -47,7 +51,7 @@ class Searches:
         return plan
 
     def cancel(self, plan: Plan) -> None:
-        """The command that decides the points now is to make no more of them."""
+        """Cancels an adaptive sweep: the command that selects its points at present must submit no more runs."""
         with self._lock:
             plan = self._plans.get(plan.id) or plan
             if plan.search is not None and not plan.search.over:
@@ -59,7 +63,7 @@ class Searches:
 
 
 def _read(body: bytes) -> Search:
-    """Raises ServiceError 413, 422."""
+    """Decodes a report. Raises ServiceError 413, 422."""
     if len(body) > _MOST_BYTES:
         raise ServiceError(413, "too_large", f"the report has {size(len(body))}; allowed: {size(_MOST_BYTES)}")
     try:
@@ -74,7 +78,8 @@ def _begun(owner: str, name: str, search: Search) -> Plan:
 
 
 def _reported(plan: Plan, search: Search) -> Plan:
-    """``points`` and ``runs`` are those of runs that are there, as other sweeps have them."""
+    """Returns the plan with the report. Its ``points`` and ``runs`` are those with an existing run, as for other
+    sweeps."""
     there = [point for point in search.points if point.run]
     return msgspec.structs.replace(
         plan, search=search, reported=time.time(), points=[dict(point.changed) for point in there],

@@ -1,5 +1,5 @@
-"""Submission: from a body to an accepted run. It is read, checked, estimated and written to disk before it is
-acknowledged."""
+"""Submission: the steps from a request body to an accepted run. The run is read, checked, estimated and written to
+disk before it is acknowledged."""
 
 import hashlib
 import logging
@@ -37,7 +37,7 @@ KINDS = {"application/toml": "case.toml", "application/json": "case.json"}
 """Content types of a case, and the names of the stored files."""
 _LABEL = re.compile(r"([A-Za-z0-9._-]{1,63})=([^\x00-\x1f\x7f]{0,200})")
 _MOST_LABELS = 16
-"""Largest number of labels of a run. Chosen."""
+"""Largest number of labels of a run (chosen value)."""
 _KEY = re.compile(r"[\x21-\x7e]{1,255}")
 
 
@@ -47,11 +47,11 @@ class Wishes:
 
     labels: Mapping[str, str] = field(default_factory=dict)
     profile: str = ""
-    """Profile of a batch system; empty: the profile of the case, or the default of the site."""
+    """Profile of a batch system; empty: the profile in the case, or the default of the site."""
     priority: int = 0
-    """Priority among the runs of the owner."""
+    """Priority of the run among the runs of its owner."""
     restart: str = ""
-    """Run of the same owner from whose newest checkpoint the new run continues."""
+    """Id of a run of the same owner. The new run continues from the newest checkpoint of that run."""
 
     @property
     def digest(self) -> str:
@@ -63,12 +63,13 @@ class Desk:
     """Accepts submissions. Methods may be called from any thread."""
 
     def __init__(self, settings: Settings, store: Store, supervisor: Supervisor, sent: Uploads) -> None:
-        """A server has one desk: its lock makes two requests with one key into one run. ``sent`` has uploaded files."""
+        """Creates the only object of this class in a server: its lock makes two requests with one key into one run.
+        ``sent``: uploaded files."""
         self._settings, self._store, self._supervisor, self._sent = settings, store, supervisor, sent
         self._reader, self._limits = the_reader(), limits.of(settings)
         self._lock = threading.Lock()
         self.kept: Callable[[str], int] = lambda owner: 0
-        """Bytes of the folders of an owner's runs."""
+        """Function that returns the bytes of the folders of an owner's runs."""
 
     def read(
         self, body: bytes, content_type: str, source: Source, surveys: dict[bytes, bytes] | None = None
@@ -97,10 +98,10 @@ class Desk:
         self, owner: str, body: bytes, content_type: str, key: str | None, wishes: Wishes | None = None,
         reading: Reading | None = None,
     ) -> dict[str, Any]:  # fmt: skip
-        """Accepts a run and returns its receipt: the same one for the same key and body. ``reading``: the case, if it
-        has been read already. Raises ServiceError.
+        """Accepts a run and returns its receipt; the same key and body give the same receipt.
 
-        The case and the first line of the journal are on disk on return.
+        ``reading``: the case, if it has been read already. Raises ServiceError. The case and the first line of the
+        journal are on disk on return.
         """
         if key is not None and not _KEY.fullmatch(key):
             raise ServiceError(
@@ -130,13 +131,14 @@ class Desk:
             )
 
     def check_room(self, owner: str, keys: Sequence[str]) -> None:
-        """Raises ServiceError 422, 429, 507 if the owner may not submit a run for each of ``keys`` without one."""
+        """Raises ServiceError 422, 429, 507 if the owner may not submit a run for each of ``keys`` that has no run
+        yet."""
         more = sum(self._store.run_of_key(owner, key) is None for key in keys)
         if more:
             self._check_room(owner, more)
 
     def check_output(self, owner: str) -> None:
-        """Raises ServiceError 429 where the runs of the owner have as many bytes as they may."""
+        """Raises ServiceError 429 if the runs of the owner have reached their limit of bytes."""
         limits.check_output(self.kept(owner), self._settings.site.quota)
 
     def _check_room(self, owner: str, more: int = 1) -> None:
@@ -148,14 +150,14 @@ class Desk:
         return [run_id for key in keys if (run_id := self._store.run_of_key(owner, key)) is not None]
 
     def take_back(self, run_id: str) -> None:
-        """Cancels a run; an error is logged."""
+        """Cancels a run; if this fails, logs the error and does not raise it."""
         try:
             self._supervisor.cancel(run_id)
         except Exception as error:
             _log.error("run %s is not taken back: %s", run_id, words(error))
 
     def _profile(self, name: str, *, named: bool = False) -> str:
-        """Returns the profile of the run; empty without a batch system. ``named``: in the request, not in the case.
+        """Returns the profile of the run; empty without a batch system. ``named``: the profile in the request.
         Raises ServiceError 400.
         """
         site = self._settings.site
@@ -227,7 +229,8 @@ class Desk:
 
 
 def _surveyed(reading: Reading, place: Path, known: dict[bytes, bytes]) -> bytes:
-    """Returns the content of the files of a case. It is read once for all cases that make the same bodies of them."""
+    """Returns the content of the files of a case. The content is read once for all cases that make the same bodies
+    from the files."""
     case = msgspec.json.decode(reading.case)
     bodies = msgspec.json.encode([(part["mesh"], part["turn"]) for part in case["parts"]])
     if bodies not in known:
@@ -236,7 +239,7 @@ def _surveyed(reading: Reading, place: Path, known: dict[bytes, bytes]) -> bytes
 
 
 def labels_of(texts: Sequence[str]) -> dict[str, str]:
-    """Returns the labels of ``NAME=VALUE``. Raises ServiceError 400."""
+    """Returns the labels from texts ``NAME=VALUE``. Raises ServiceError 400."""
     found = [_LABEL.fullmatch(word) for word in texts]
     if None in found or len(texts) > _MOST_LABELS:
         wrong = next((word for word, read in zip(texts, found, strict=True) if read is None), f"{len(texts)} of them")

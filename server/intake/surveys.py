@@ -14,14 +14,15 @@ from ..launch.bounded import Bounds
 
 _log = logging.getLogger("conoid.server")
 BOUNDS = Bounds(cpu=200, wall=240, memory=8 << 30, file=4 << 30)
-"""Chosen: 16 MB of text (384,000 tets) take some 10 s; a longer file is read by its run only."""
+"""Limits of the program that reads mesh files. The values were chosen because 16 MB of text (384,000 tets) take some
+10 s. A longer file is read by its run only."""
 
 
 def surveyed(case: Mapping[str, object], folder: Path) -> bytes:
-    """Returns the survey of a case's mesh files in ``folder`` as JSON (conoid.cases.reading.survey). Blocks.
+    """Returns the survey of a case's mesh files in ``folder`` as JSON (conoid.cases.reading.survey).
 
-    Empty if the files cannot be read here or not within the limits. The run is not refused for that: it has limits
-    of its own.
+    Blocks. Empty if the files cannot be read on this machine or within the limits. The run is not refused in this
+    case, because it has limits of its own.
     """
     if not survey.installed():
         return b""

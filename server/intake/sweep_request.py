@@ -12,7 +12,7 @@ from ..errors import ServiceError, invalid_case
 
 
 class Wish(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=True):
-    """A request: a case as plain data, the changes of each point, the largest number of runs at a time."""
+    """Request for a sweep: a case as plain data, the changes of each point, the largest number of runs at a time."""
 
     case: dict[str, Any]
     points: list[dict[str, Any]]

@@ -29,9 +29,10 @@ from .sweep_request import Wish, at_point, changed, wish_of
 
 _log = logging.getLogger("conoid.server")
 _AGAIN = 2.0
-"""Time in s after which an incomplete sweep is tried again. Chosen."""
+"""Time in s after which an incomplete sweep is tried again (chosen value)."""
 _MOST_BYTES = 16 << 20
-"""Largest number of values of all cases of a sweep. Chosen: they are expanded in a second."""
+"""Largest number of values of all cases of a sweep. The value was chosen because so many values are computed in a
+second."""
 _JSON = "application/json"
 _HASHES = re.compile(r"[0-9a-f]{64}")
 
@@ -40,7 +41,7 @@ class Sweeps:
     """The sweeps of a server. Methods may be called from any thread."""
 
     def __init__(self, settings: Settings, desk: Desk) -> None:
-        """Reads what is there."""
+        """Reads the stored sweeps."""
         self.plans, self._desk = Plans(settings), desk
         self._locks: dict[str, threading.Lock] = {}
         """Locks by owner, so that a large sweep does not delay other users."""
@@ -50,7 +51,8 @@ class Sweeps:
         self._filling |= {plan.id for plan in self._left}
 
     def complete(self) -> None:
-        """Completes the incomplete sweeps of an earlier server in a thread; their runs wait meanwhile."""
+        """Completes the incomplete sweeps of an earlier server in a thread. The runs of these sweeps wait until
+        then."""
         for plan in self._left:
             runs = plan.earlier or self._desk.runs_of(plan.owner, plan.keys)
             self.plans.put(msgspec.structs.replace(plan, runs=runs))
@@ -66,8 +68,8 @@ class Sweeps:
                 time.sleep(_AGAIN)
 
     def _completed(self, plan: Plan) -> bool:
-        """Completes a sweep; False if it must be tried again. A sweep that cannot be completed is removed, and so is
-        one without a key: its sender got no answer and sends another one.
+        """Completes a sweep; False if it must be tried again. A sweep that cannot be completed is removed. A sweep
+        without an idempotency key is removed too, because its sender got no answer and sends another sweep.
         """
         with self._locks.setdefault(plan.owner, threading.Lock()):
             there = self.plans.get(plan.id)
@@ -111,7 +113,7 @@ class Sweeps:
             return self._accepted(fresh)
 
     def again(self, plan: Plan, body: bytes, failed: Mapping[int, str]) -> Plan:
-        """Repeats points: those of ``failed``, by number, whose present run is the given one. ``body`` is the
+        """Repeats points of a sweep. ``failed``: number and present run of each point to repeat; ``body``: the
         request of the sweep. Raises ServiceError; then the sweep is unchanged.
         """
         with self._locks.setdefault(plan.owner, threading.Lock()):
@@ -129,7 +131,7 @@ class Sweeps:
             return self._accepted(fresh)
 
     def _accepted(self, plan: Plan) -> Plan:
-        """Returns the plan with its missing runs, all of them or none. Raises ServiceError."""
+        """Returns the plan with its missing runs: all of these runs are accepted, or none. Raises ServiceError."""
         cases = self._cases(plan)
         self._desk.check_room(plan.owner, [plan.keys[n] for n in plan.wanted])
         self.plans.write(plan)
@@ -143,12 +145,12 @@ class Sweeps:
             self._complete_later([plan])
             raise
         self._filling.discard(plan.id)
-        self._cancelled.discard(plan.id)  # requested when all runs existed: the runs are cancelled
+        self._cancelled.discard(plan.id)  # all runs exist now: a later cancel cancels the runs
         return filled
 
     def held(self, need: Need, active: Iterable[Need]) -> str:
-        """Returns why a run waits for its sweep: until all runs exist, or for the ``active`` ones. The label of the
-        run has the id of the sweep.
+        """Returns why a run waits for its sweep: until all runs of the sweep exist, or while its ``active`` runs are
+        as many as allowed. The label of the run has the id of the sweep.
         """
         plan = self.get(need.sweep, need.owner)
         if plan is None:
@@ -161,7 +163,8 @@ class Sweeps:
         return f"{own} runs of its sweep are running, as many as may at a time" if own >= plan.at_once else ""
 
     def needed(self) -> set[str]:
-        """Returns the hashes in sweeps that are being accepted: they may name files of future runs."""
+        """Returns the hashes of files in sweeps that are being accepted, because future runs of these sweeps may
+        name the files."""
         plans = [plan for plan in self.plans if not plan.whole]
         return {
             word for plan in plans for word in _HASHES.findall(msgspec.json.encode([plan.case, plan.points]).decode())
@@ -209,8 +212,8 @@ class Sweeps:
         return plan
 
     def _take_back(self, plan: Plan) -> None:
-        """Cancels the runs of a refused sweep, before any of them has started. A sweep that was repeated otherwise
-        stays unchanged.
+        """Cancels the runs of a refused sweep before any of the runs has started. If the sweep was repeated, its
+        other runs stay unchanged.
         """
         for run_id in self._desk.runs_of(plan.owner, [plan.keys[n] for n in plan.wanted]):
             self._desk.take_back(run_id)

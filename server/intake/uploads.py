@@ -30,12 +30,14 @@ from ..requests.limits import later
 FOLDER = "uploads"
 _PART = ".part"
 _SYNCED = 1 << 26
-"""Bytes after which arrived data is flushed to disk. Chosen: a second of a slow disk, the longest delay of a write."""
+"""Number of bytes after which arrived data is flushed to disk. The value was chosen because a slow disk takes a
+second for so many bytes, which is the longest delay of a write."""
 
 
 @dataclass(frozen=True)
 class Upload:
-    """A file of a user: ``size`` bytes, of which ``offset`` have arrived; ``asked``: last request, Unix s."""
+    """A file of a user: ``size`` bytes, of which ``offset`` bytes have arrived; ``asked``: time of the last request,
+    Unix s."""
 
     sha256: str
     size: int
@@ -45,8 +47,8 @@ class Upload:
 
 
 class Part:
-    """An incomplete file, open for writing. It is closed when its last reference is dropped: after its request was
-    given up a thread may still write to a hanging disk.
+    """An incomplete file, open for writing. The file is closed when no reference to this object is left, because a
+    thread may still write to a hanging disk after its request was given up.
     """
 
     def __init__(self, path: Path, size: int, *, anew: bool) -> None:
@@ -84,15 +86,15 @@ class Part:
 
 
 class Uploads:
-    """Uploaded files. Methods may be called from any thread. There is no state in memory: the folder is read each
+    """Uploaded files. Methods may be called from any thread. No state is kept in memory: the folder is read each
     time."""
 
     def __init__(self, runs: Path, rules: Files, free_disk: int) -> None:
-        """Creates nothing yet. ``free_disk``: bytes of the disk that uploads may not use."""
+        """Creates the object; no folder is created yet. ``free_disk``: bytes of the disk that uploads may not use."""
         self._runs, self._folder, self._rules, self._free_disk = runs, runs / FOLDER, rules, free_disk
         self._locks: dict[str, threading.Lock] = {}
         self.left: Callable[[str], int | None] = lambda owner: None
-        """Returns the bytes that an owner may still add; None: only the limit of ``rules``."""
+        """Function that returns the bytes that an owner may still add; None: only the limit of ``rules`` applies."""
 
     def _lock(self, owner: str) -> threading.Lock:
         """Returns the lock of an owner, so that users do not wait for each other's files."""
@@ -184,7 +186,8 @@ class Uploads:
             give(self._folder / owner / sha256, target)
 
     def remove(self, owner: str, sha256: str) -> bool:
-        """Removes a file, complete or incomplete; False if there is none. Runs keep their own. Raises OSError."""
+        """Removes a file, complete or incomplete; False if the file does not exist. Runs keep their own copies.
+        Raises OSError."""
         with self._lock(owner):
             there = [path for path in self._paths(owner, sha256) if path.exists()]
             for path in there:
@@ -193,18 +196,19 @@ class Uploads:
 
     def purge(self, now: float, needed: Container[str] = ()) -> list[str]:
         """Removes files that no run uses and that were not requested lately, except the hashes in ``needed``;
-        returns a line for each. A file that a run also uses needs no space of its own, and stays. Raises OSError.
+        returns a line for each removed file. A file that a run also uses stays, because it needs no additional
+        space. Raises OSError.
         """
         gone: list[str] = []
         for owner in self.owners():
             hashes = [sent.sha256 for sent in self.of(owner) if sent.sha256 not in needed]
             gone += [f"file {sha256} of {owner}" for sha256 in hashes if self._dropped(owner, sha256, now)]
             with self._lock(owner), suppress(OSError):
-                (self._folder / owner).rmdir()  # fails unless the folder is empty
+                (self._folder / owner).rmdir()  # fails if the folder is not empty
         return gone
 
     def _dropped(self, owner: str, sha256: str, now: float) -> bool:
-        """Whether the file was old and has been removed. The lock prevents requests meanwhile."""
+        """Whether the file was old and has been removed. The lock prevents requests for the file during the call."""
         with self._lock(owner):
             for path in self._paths(owner, sha256):
                 with suppress(FileNotFoundError):
@@ -239,8 +243,8 @@ def _wrong_offset(there: int, first: int | None) -> ServiceError:
 
 
 def give(source: Path, target: Path) -> None:
-    """Links a file that never changes, or copies it if the file system has no links; on disk with its folder. Raises
-    FileNotFoundError, OSError.
+    """Links a file that never changes, or copies the file if the file system has no links. File and folder are on
+    disk on return. Raises FileNotFoundError, OSError.
     """
     try:
         os.link(source, target, follow_symlinks=False)
@@ -251,12 +255,12 @@ def give(source: Path, target: Path) -> None:
 
 
 def _want(path: Path, status: os.stat_result) -> None:
-    """Sets the time of the last request to now."""
+    """Sets the time of the last request of a file to now."""
     os.utime(path, ns=(time.time_ns(), status.st_mtime_ns), follow_symlinks=False)
 
 
 def _sent(entry: "os.DirEntry[str]") -> Upload | None:
-    """Returns None for other files and for one that has been removed."""
+    """Returns the upload of a path; None for other files and for a file that has been removed."""
     with suppress(FileNotFoundError):
         return _told(entry.name, entry.stat(follow_symlinks=False))
     return None

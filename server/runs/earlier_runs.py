@@ -1,4 +1,4 @@
-"""Runs of an earlier server. Each folder is read once; a failed reading is repeated."""
+"""Runs of an earlier server. Each run's folder is read once; a failed reading is repeated."""
 
 import logging
 from collections.abc import Callable
@@ -19,17 +19,17 @@ _log = logging.getLogger("conoid.server")
 
 
 class EarlierRuns:
-    """Reads the runs of an earlier server. Used in the supervisor's thread."""
+    """Reads the runs of an earlier server. The class is used in the supervisor's thread."""
 
     def __init__(
         self, runs: Path, store: Store, index: Index, launcher: Launcher, found: Callable[[Left], None]
     ) -> None:
-        """``found`` receives each run that can be read, ended or open."""
+        """Creates the reader. ``found`` is called with each run that can be read, ended or open."""
         self._runs, self._store, self._index, self._launcher, self._found = runs, store, index, launcher, found
         self._failed: dict[Path, str] = {}
 
     def all(self) -> None:
-        """Reads every run that is not known to have ended, including those with an empty folder. Raises OSError,
+        """Reads every run that is not known to have ended; empty folders count as runs. Raises OSError,
         SQLAlchemyError.
         """
         ended, known, last = self._store.ended(), self._store.open(), ""
@@ -58,8 +58,8 @@ class EarlierRuns:
         self._take_up(path, lambda: self._store.get(path.name))
 
     def _take_up(self, path: Path, known_of: Callable[[], Run | None]) -> None:
-        """Reads a run, and writes the database only if it is behind the folder: a thousand runs then cause no
-        writes."""
+        """Reads a run. Writes the database only if its state is older than the state in the folder, so that a
+        thousand unchanged runs cause no writes."""
         told = self._failed.pop(path, "")
         try:
             known = known_of()

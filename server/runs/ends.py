@@ -16,13 +16,13 @@ from .events import Run
 M = TypeVar("M", bound=Message)
 
 _BLOCK = 4 << 20
-"""Bytes of one read of a journal. Chosen."""
+"""Number of bytes of one read of a journal (chosen value)."""
 _TYPE = slice(9, 13)
-"""The first letters of a message's type in a line, after ``{"type":"``."""
+"""The bytes of a journal line before the type of its message."""
 
 
 class _Said(msgspec.Struct):
-    """The part of a message that has its time."""
+    """The field of a message that contains its time."""
 
     wall: float
 
@@ -31,8 +31,8 @@ _said = msgspec.json.Decoder(_Said)
 
 
 def when(path: Path) -> float:
-    """Returns the Unix time in s of the last sign of the run in ``path``: of the last message of its journal, or of
-    its outcome without a journal; 0 if neither can be read.
+    """Returns the Unix time in s of the last sign of the run in ``path``: the time of the last message of its
+    journal, or of its outcome if there is no journal; 0 if neither can be read.
     """
     try:
         return _said.decode(journal.last(path / layout.JOURNAL)).wall or _written(path)
@@ -48,7 +48,8 @@ def _written(path: Path) -> float:
 
 
 def so_far(outcome: Outcome, run: Run, path: Path) -> Outcome:
-    """Returns ``outcome`` with the last step, time and energies of the journal in ``path``, if there is a step."""
+    """Returns ``outcome`` with the last step, time and energies of the journal in ``path``, if the journal has a
+    step."""
     started, told, counts = _newest(path / layout.JOURNAL)
     if started is None:
         return outcome
@@ -66,7 +67,7 @@ def so_far(outcome: Outcome, run: Run, path: Path) -> Outcome:
 
 
 def _newest(path: Path) -> tuple[Started | None, Progress | None, Counts | None]:
-    """The newest message of each type; lines that cannot be read are skipped."""
+    """Returns the newest message of each type. Lines that cannot be read are skipped."""
     lines = {b"star": b"", b"prog": b"", b"coun": b""}
     try:
         tail = journal.Tail(path)

@@ -1,5 +1,5 @@
-"""The state of a run in the server, the events that change it, and the actions that follow. Data only; the rules are
-in ``lifecycle``."""
+"""The state of a run in the server, the events that change the state, and the resulting actions. This module has
+data only; the rules are in ``lifecycle``."""
 
 from dataclasses import dataclass
 from typing import Literal
@@ -10,7 +10,7 @@ from conoid.cases.run import Cause, State
 
 @dataclass(frozen=True)
 class Run:
-    """State of a run in the server. Times are Unix s, 0 while unknown."""
+    """State of a run in the server. Times are Unix s; an unknown time is 0."""
 
     id: str
     owner: str
@@ -23,15 +23,15 @@ class Run:
     started: float = 0.0
     finished: float = 0.0
     stopping_for: Cause | None = None
-    """Reason of the requested stop."""
+    """Reason of the requested stop, as a word."""
     threads: int = 1
-    """Threads of each rank."""
+    """Number of threads of each rank."""
     title: str = ""
     """Title of the case."""
 
     @property
     def cores(self) -> int:
-        """Cores that the run takes."""
+        """Number of cores that the run uses: ranks times threads."""
         return self.ranks * self.threads
 
 
@@ -45,7 +45,7 @@ class Admitted:
 
 @dataclass(frozen=True)
 class Granted:
-    """Enough slots are free. ``batch``: the run was handed over and waits in the queue of a batch system."""
+    """Enough cores are free for the run. ``batch``: the run was submitted to a batch system and waits in its queue."""
 
     batch: bool = False
 
@@ -59,7 +59,7 @@ class WorkerStarts:
 
 @dataclass(frozen=True)
 class WorkerWaits:
-    """A batch system has stopped the worker; it continues from its checkpoint when it gets cores again."""
+    """A batch system has stopped the worker. The worker continues from its checkpoint when it gets cores again."""
 
 
 @dataclass(frozen=True)
@@ -72,7 +72,8 @@ class LaunchFailed:
 
 @dataclass(frozen=True)
 class LaunchPutOff:
-    """The worker could not be started now: a full disk, no free descriptor. The run stays in the queue."""
+    """The worker could not be started now, for example because the disk is full or no file descriptor is free. The
+    run stays in the queue."""
 
     message: str
 
@@ -92,7 +93,7 @@ class WorkerRuns:
 
 @dataclass(frozen=True)
 class CancelAsked:
-    """The owner has asked for a cancel. ``handed``: a worker runs, or a batch system has the run."""
+    """The owner has asked for a cancel. ``handed``: a worker runs, or the run was submitted to a batch system."""
 
     handed: bool = False
 
@@ -114,20 +115,20 @@ class GraceOver:
 
 @dataclass(frozen=True)
 class WorkerExited:
-    """The worker's processes have ended. ``code``: the exit code; negative: minus the number of the signal; None
-    where no process could collect it."""
+    """The worker's processes have ended. ``code``: the exit code, or minus the number of the signal; None if no
+    process could collect the exit code."""
 
     code: int | None
     outcome: Outcome | None
     out_of_memory: bool = False
     disk_failed: bool = False
-    """Whether the worker's disk is full, or it reported an error of its disk."""
+    """Whether the worker's disk is full, or the worker reported an error of its disk."""
     traces: str = ""
     """Message of a worker that wrote no outcome."""
     reading: tuple[State, Cause, str] | None = None
-    """The end as a batch system reports it, where there is no outcome."""
+    """State, cause and message of the end from a batch system, for a run without an outcome."""
     at: float = 0.0
-    """Unix time of the end by the run's files, s; 0 where they do not show it: now."""
+    """Unix time of the end by the run's files, s. 0: the files do not have the time, and the present time is used."""
 
 
 @dataclass(frozen=True)
@@ -138,10 +139,10 @@ class Found:
     outcome: Outcome | None = None
     rebooted: bool = False
     code: int | None = None
-    """The end as its launcher reports it, where it could."""
+    """Exit code from the log of the launcher; None if unknown."""
     disk_failed: bool = False
     at: float = 0.0
-    """Unix time of the last sign of the run in its files, s; 0 where there is none."""
+    """Unix time of the last sign of the run in its files, s; 0 without a sign."""
 
 
 Event = (
@@ -162,14 +163,14 @@ Event = (
 )
 
 ONCE = (LaunchFailed, LaunchPutOff, Broken, Found)
-"""Events that are not sent a second time."""
+"""Events that occur only once. If the step of such an event fails, the event is stored for the next try."""
 
 # Actions --------------------------------------------------------------------------------------------------------------
 
 
 @dataclass(frozen=True)
 class Journal:
-    """Appends a Status line to the journal and publishes it. Only while no worker writes."""
+    """Action: append a Status line to the journal and publish it. Used only while no worker writes the journal."""
 
     state: State
     cause: Cause | None = None
@@ -178,31 +179,32 @@ class Journal:
 
 @dataclass(frozen=True)
 class WriteOutcome:
-    """Writes outcome.json."""
+    """Action: write outcome.json."""
 
     outcome: Outcome
 
 
 @dataclass(frozen=True)
 class Launch:
-    """Starts the worker."""
+    """Action: start the worker."""
 
 
 @dataclass(frozen=True)
 class Adopt:
-    """Watches a worker that an earlier server started."""
+    """Action: watch a worker that an earlier server started."""
 
 
 @dataclass(frozen=True)
 class Stop:
-    """Asks the worker to stop at its next step, and kills it when it does not. ``why`` is kept in the run's folder."""
+    """Action: ask the worker to stop at its next step, and kill it if it does not stop. ``why`` is stored in the
+    run's folder."""
 
     why: Cause
 
 
 @dataclass(frozen=True)
 class Kill:
-    """Kills the worker's processes now."""
+    """Action: kill the worker's processes now."""
 
 
 Action = Journal | WriteOutcome | Launch | Adopt | Stop | Kill

@@ -1,5 +1,5 @@
-"""Runs whose folder exists. A run that has ended and has no folder, however it was removed, is in no list, no count
-and no sweep, and is answered with 410."""
+"""Runs whose folder exists. A run that has ended and has no folder is in no list, no count and no sweep, and is
+answered with 410; it makes no difference how the folder was removed."""
 
 import errno
 import os
@@ -12,29 +12,30 @@ from ..database.identity import FILE
 from .events import Run
 
 _FRESH = 1.0
-"""Time in s for which the list of folders is used: a run without a folder stays in lists for at most this time.
-Chosen: reading 10,000 names takes 5 ms."""
+"""Time in s for which a list of folders is used again. A run without a folder stays in lists for at most this time.
+The value was chosen because reading 10,000 names takes 5 ms."""
 
 
 class ExistingRuns:
-    """The names in the folder of runs. Methods may be called from any thread; the folders of the runs are not read."""
+    """The names of the folders of all runs. Methods may be called from any thread; the content of the folders is not
+    read."""
 
     def __init__(self, runs: Path) -> None:
-        """Reads nothing yet."""
+        """Creates the object; no name is read yet."""
         self._runs, self._reading = runs, threading.Lock()
         self._names: set[str] = set()
         self._gone: set[str] = set()
-        """Runs that were looked up singly and not found: each is looked up once."""
+        """Runs that were looked up one by one and not found. Each run is looked up once."""
         self._read = -_FRESH
 
     def left(self, runs: Iterable[Run]) -> list[Run]:
-        """Returns the runs without those that have ended and have no folder, by a list of at most ``_FRESH`` s.
-        Raises OSError."""
+        """Returns the runs without those that have ended and have no folder. The list of folders is at most
+        ``_FRESH`` s old. Raises OSError."""
         self._refresh()
         return [run for run in runs if not (run.state.final and self._is_gone(run.id))]
 
     def gone(self, ended: Set[str]) -> set[str]:
-        """Returns those of the ended runs that have no folder. Raises OSError."""
+        """Returns the ended runs that have no folder. Raises OSError."""
         self._refresh()
         return {run_id for run_id in ended - self._names if self._is_gone(run_id)}
 
@@ -48,11 +49,12 @@ class ExistingRuns:
         return False
 
     def _is_gone(self, run_id: str) -> bool:
-        """A run that is newer than the list is looked up once."""
+        """Whether the run has no folder. A run that is newer than the list of folders is looked up once."""
         return run_id not in self._names and (run_id in self._gone or not self.there(run_id))
 
     def _refresh(self) -> None:
-        """One thread reads; the others use the previous list, however long it takes."""
+        """Reads the list of folders again if it is old. One thread reads; other threads use the previous list,
+        however long the reading takes."""
         if time.monotonic() < self._read + _FRESH or not self._reading.acquire(blocking=False):
             return
         try:
@@ -64,7 +66,7 @@ class ExistingRuns:
             self._reading.release()
 
     def _require(self) -> None:
-        """Raises FileNotFoundError if the folder of all runs lacks the server's file: it is another folder or its
-        disk is not mounted, and no run counts as removed."""
+        """Raises FileNotFoundError if the folder of all runs lacks the server's file. Then it is another folder or
+        its disk is not mounted, and no run counts as removed."""
         if not (self._runs / FILE).exists():
             raise FileNotFoundError(errno.ENOENT, "the folder of all runs is not there now", str(self._runs))

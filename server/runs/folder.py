@@ -30,22 +30,22 @@ _ID = re.compile(r"[0-9a-z]{22}")
 _LETTERS = "0123456789abcdefghjkmnpqrstvwxyz"
 _NEW, _GONE = ".new-", ".gone-"
 APART = f"{_NEW}files-"
-"""Beginnings of the names of temporary folders; a server removes them when it starts."""
+"""Beginnings of the names of temporary folders. A server removes such folders when it starts."""
 _TELLING = (layout.SUBMISSION, layout.JOURNAL, layout.WORKER)
-"""Files of a run. At least one of them exists in the folder of a run, even a damaged one."""
+"""Names of the files of a run. The folder of a run has at least one of these files, even if the file is damaged."""
 _UNREADABLE = "outcome.unreadable.json"
 _TITLE = 200
-"""Characters of a title in lists. Chosen: a line or two."""
+"""Largest number of characters of a title in lists: a line or two of text (chosen value)."""
 DAMAGED = (FileNotFoundError, IsADirectoryError, NotADirectoryError, PermissionError)
-"""Errors of the system for a file that is missing, not regular (``whole.opened``), or not readable."""
+"""Errors of the operating system for a file that is missing, not regular (``whole.opened``), or not readable."""
 _NO_FILE = (FileNotFoundError, IsADirectoryError, NotADirectoryError)
 
 
 class Copy(msgspec.Struct, kw_only=True, frozen=True):
-    """A file that the case names. The run has a copy of its own: ``files/<sha256>`` with the ending of its name."""
+    """A file that the case names. The run has its own copy: ``files/<sha256>`` with the suffix of the name."""
 
     path: str
-    """The name in the case."""
+    """Name of the file in the case."""
     sha256: str
 
 
@@ -65,20 +65,20 @@ class Submission(msgspec.Struct, kw_only=True, frozen=True):
     """Time limit of the run, s."""
     estimate: dict[str, int | float]
     labels: dict[str, str] = {}
-    """Labels of the submitter."""
+    """Labels that the submission gave to the run."""
     profile: str = ""
-    """Profile of the batch system; empty where there is none."""
+    """Profile of the batch system; empty without a batch system."""
     priority: int = 0
-    """Priority among the runs of its owner."""
+    """Priority of the run among the runs of its owner."""
     wishes_sha256: str = ""
-    """Hash of labels, profile and priority as they were sent; empty in files of earlier servers."""
+    """Hash of labels, profile and priority as they were sent. Empty in files of earlier servers."""
     threads: int = 1
-    """Threads of each rank."""
+    """Number of threads of each rank."""
     files: list[Copy] = []
 
     @property
     def cores(self) -> int:
-        """Cores that the run takes."""
+        """Number of cores that the run uses."""
         return self.ranks * self.threads
 
 
@@ -109,7 +109,7 @@ def new_id() -> tuple[str, float]:
 
 
 def begin_after(run_id: str) -> None:
-    """Makes later ids sort after this one, whatever the time of the clock."""
+    """Makes later ids sort after this id, whatever the time of the clock."""
     global _last_stamp
     stamp = 0
     for letter in run_id[:11]:
@@ -129,8 +129,8 @@ def _letters(number: int, length: int) -> str:
 def create(
     runs: Path, submission: Submission, case: bytes, resolved: bytes, fill: Callable[[Path], None] | None = None
 ) -> Path:
-    """Creates the folder of an accepted run; ``fill`` adds further files. It appears whole, and is on disk on
-    return. Raises OSError, and the errors of ``fill``.
+    """Creates the folder of an accepted run; ``fill`` adds further files. The folder appears with all its files at
+    once, and is on disk on return. Raises OSError, and the errors of ``fill``.
     """
     beside, folder = runs / f"{_NEW}{submission.id}", runs / submission.id
     accepted = Status(run=submission.id, seq=1, wall=submission.submitted, state=State.ACCEPTED)
@@ -149,13 +149,13 @@ def create(
 
 
 def discard(runs: Path, run_id: str) -> None:
-    """Removes the folder of a run that was not acknowledged."""
+    """Removes the folder of a run whose submission was not acknowledged."""
     for path in (runs / f"{_NEW}{run_id}", runs / run_id):
         shutil.rmtree(path, ignore_errors=True)
 
 
 def purge(runs: Path, run_id: str) -> None:
-    """Removes the folder of a run: renames it, then removes file by file. Raises OSError."""
+    """Removes the folder of a run: renames the folder, then removes file by file. Raises OSError."""
     beside = runs / f"{_GONE}{run_id}"
     os.rename(runs / run_id, beside)
     durable.sync_folder(runs)
@@ -177,7 +177,7 @@ def scan(runs: Path) -> Iterator[Path]:
 
 
 def there(path: Path) -> bool:
-    """Whether the file exists; True also where its folder may not be read."""
+    """Whether the file exists. True also if the folder of the file may not be read."""
     try:
         path.lstat()
     except (FileNotFoundError, NotADirectoryError):
@@ -196,19 +196,19 @@ def submission(folder: Path) -> Submission:
 
 
 def run(folder: Path) -> Run:
-    """The run by its folder: submission.json, and the Status lines of the journal."""
+    """Returns the run from its folder: submission.json, and the Status lines of the journal."""
     return replay(first(submission(folder)), journal.statuses(folder / layout.JOURNAL))
 
 
 def first(made: Submission) -> Run:
-    """The run as it was accepted."""
+    """Returns the run as it was accepted."""
     return Run(
         made.id, made.owner, made.name, made.ranks, made.submitted, threads=made.threads, title=made.title[:_TITLE]
     )  # fmt: skip
 
 
 def replay(accepted: Run, told: Iterable[Status]) -> Run:
-    """The run by the Status lines of its journal."""
+    """Returns the run with the changes in the Status lines of its journal."""
     return reduce(_after, told, accepted)
 
 
@@ -221,7 +221,7 @@ def _after(told: Run, status: Status) -> Run:
 
 
 def outcome(folder: Path) -> Outcome | None:
-    """The outcome of outcome.json; None when it is missing or damaged."""
+    """Returns the outcome of outcome.json; None when the file is missing or damaged."""
     try:
         return outcome_from_json(whole.read(folder / layout.OUTCOME, links=False))
     except (*_NO_FILE, msgspec.MsgspecError, UnicodeDecodeError, RecursionError):
@@ -240,14 +240,14 @@ def outcome_error(folder: Path) -> str:
 
 
 def write_outcome(folder: Path, ended: Outcome) -> None:
-    """Writes outcome.json completely or not at all; a damaged one is kept beside it. Raises OSError."""
+    """Writes outcome.json completely or not at all; a damaged outcome.json is renamed and kept. Raises OSError."""
     if outcome_error(folder):
         put_away(folder / layout.OUTCOME, folder / _UNREADABLE)
     durable.write(folder / layout.OUTCOME, outcome_to_json(ended))
 
 
 def put_away(path: Path, kept: Path | None = None) -> None:
-    """Frees the name of a file that will be written; an existing one is renamed to ``kept``. Raises OSError."""
+    """Frees the name of a file that will be written. An existing file is renamed to ``kept``. Raises OSError."""
     if kept is not None and not kept.exists():
         os.replace(path, kept)
     elif path.is_dir():
@@ -257,17 +257,17 @@ def put_away(path: Path, kept: Path | None = None) -> None:
 
 
 def is_as_accepted(folder: Path, made: Submission) -> bool:
-    """Whether the case on disk is the checked one. Raises OSError."""
+    """Whether the case on disk is the case that was checked at the submission. Raises OSError."""
     return made.body_sha256 in {"", digest_of(made.case_file, whole.read(folder / made.case_file, links=False))}
 
 
 def digest_of(case_file: str, body: bytes) -> str:
-    """Hash of a submitted case and of its type."""
+    """Returns the hash of a submitted case and of its type."""
     return hashlib.sha256(case_file.encode() + b"\0" + body).hexdigest()
 
 
 def write_stop(folder: Path, why: Cause) -> None:
-    """Records that a stop was asked for. Raises OSError."""
+    """Records that a stop of the run was requested. Raises OSError."""
     durable.write(folder / layout.STOP_REQUEST, why.value.encode())
 
 
@@ -280,7 +280,7 @@ def stop_asked(folder: Path) -> Cause | None:
 
 
 def process(folder: Path) -> Process | None:
-    """The process that was started for the run; None before that."""
+    """Returns the process that was started for the run; None before the start."""
     try:
         return _process.decode(whole.read(folder / layout.WORKER, links=False))
     except (*DAMAGED, msgspec.MsgspecError):
@@ -288,12 +288,12 @@ def process(folder: Path) -> Process | None:
 
 
 def write_process(folder: Path, started: Process) -> None:
-    """Records the process. Raises OSError."""
+    """Records the process of the run. Raises OSError."""
     durable.write(folder / layout.WORKER, msgspec.json.encode(started))
 
 
 def runs_for(folder: Path) -> float:
-    """s since the start of the recorded process, by the clock since the boot; 0 without a record."""
+    """Returns the time since the start of the recorded process, s, by the clock since the boot; 0 without a record."""
     made = process(folder)
     if made is None or not made.started:
         return 0.0

@@ -12,20 +12,21 @@ from .retries import words
 
 _log = logging.getLogger("conoid.server")
 _REST = 5.0
-"""s for which a database that failed is not used, so that the supervisor does not wait for it again. Chosen."""
+"""Time in s for which a database that failed is not used (chosen value), so that the supervisor does not wait for it
+again."""
 
 
 class Index:
-    """Used in the supervisor's thread."""
+    """Writes changed runs into the database. The class is used in the supervisor's thread."""
 
     def __init__(self, store: Store) -> None:
-        """Starts with all runs saved."""
+        """Creates the index with no unsaved run."""
         self._store, self._rests_until = store, 0.0
         self.unsaved: set[str] = set()
         """Runs that changed after they were saved."""
 
     def save(self, run: Run) -> bool:
-        """False, with a line in the log, when the run is not in the database yet."""
+        """Adds a run to the database. Returns False, and logs an error, if this fails."""
         self.unsaved.add(run.id)
         if time.monotonic() < self._rests_until:
             return False
@@ -39,7 +40,8 @@ class Index:
         return True
 
     def add(self, run: Run, key: str | None, labels: Mapping[str, str]) -> None:
-        """Writes changed runs. Rows that cannot be written keep their old values. Raises SQLAlchemyError."""
+        """Adds a run, or updates its row. A row that cannot be updated keeps its old values for now. Raises
+        SQLAlchemyError if the run is not in the database."""
         try:
             self._store.add(run, key, labels)
         except SQLAlchemyError:

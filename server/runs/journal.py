@@ -1,5 +1,5 @@
-"""journal.jsonl: all events of a run, the source of its state. It has one writer at a time: the worker while it
-runs, the server before and after."""
+"""journal.jsonl: all events of a run, from which its state is read. One process at a time writes the file: the
+worker while it runs, the server before and after."""
 
 import os
 from collections.abc import Iterator
@@ -13,17 +13,19 @@ from conoid.cases.reading import whole
 from conoid.cases.run import Cause, State
 
 _CHUNK = 1 << 18
-"""Bytes of one read: some hundred lines. Chosen."""
+"""Number of bytes of one read: some hundred lines (chosen value)."""
 _LONGEST = 16 << 20
-"""Bytes of a line that is read; a longer one is passed over. Chosen: the report of 10,000 ranks has 2 MB."""
+"""Largest size in bytes of a line that is read; a longer line is skipped. The value was chosen because the report of
+10,000 ranks has 2 MB."""
 _PASSED = 256 << 20
-"""Bytes of such a line that are passed over at a time. Chosen: 0.1 s from memory."""
+"""Number of bytes of a too long line that are skipped at a time. The value was chosen because so many bytes take 0.1
+s from memory."""
 DAMAGED = msgspec.MsgspecError, ValueError, RecursionError
-"""Errors of msgspec for damaged JSON: text that is not UTF-8, and lists that are nested too deeply, included."""
+"""Errors of msgspec for damaged JSON, including text that is not UTF-8 and lists that are nested too deeply."""
 
 
 class _Head(msgspec.Struct):
-    """Fields that the server reads of every line; a newer worker may write others besides."""
+    """Fields that the server reads of every line. Lines of a newer worker may have other fields too."""
 
     seq: int
     type: str
@@ -35,7 +37,7 @@ _status = msgspec.json.Decoder(Status)
 
 @dataclass(frozen=True)
 class Line:
-    """One event as it stands in the journal, without the line feed."""
+    """One event as the bytes of its line in the journal, without the line feed."""
 
     seq: int
     type: str
@@ -43,17 +45,17 @@ class Line:
 
 
 class Tail:
-    """Reads a journal from its beginning as it grows; returns complete lines only. A journal that does not exist yet
-    is empty.
+    """Reads a journal from its beginning while the file grows. Only complete lines are returned. A journal that does
+    not exist yet is empty.
     """
 
     def __init__(self, path: Path, after: int = 0) -> None:
-        """Skips the lines whose ``seq`` is at most ``after``."""
+        """Creates the reader. Lines whose ``seq`` is at most ``after`` are skipped."""
         self._path, self._after, self._passing = path, after, False
         self._offset = _line_before(path, after) if after else 0
 
     def read(self) -> list[Line]:
-        """The new events, about 256 kB at most; empty when there are none."""
+        """Returns the new events, about 256 kB at most; empty without new events."""
         while True:
             chunk = self._chunk()
             if not chunk:
@@ -70,7 +72,8 @@ class Tail:
         return chunk
 
     def _chunk(self, size: int = _CHUNK) -> bytes:
-        """The next complete lines. One longer than the chunk is read whole, one longer than ``_LONGEST`` not at all."""
+        """Returns the next complete lines. A line that is longer than the chunk is read completely; a line that is
+        longer than ``_LONGEST`` is skipped."""
         try:
             with whole.opened(self._path, links=False) as file:
                 while not self._passing or self._pass_over(file.fileno()):
@@ -85,7 +88,8 @@ class Tail:
         return b""
 
     def _pass_over(self, descriptor: int) -> bool:
-        """Goes to the end of a line that is too long; False where it goes on, or is passed over later."""
+        """Skips a line that is too long. Returns False while its end has not been reached; the rest is skipped
+        later."""
         for _ in range(_PASSED // _LONGEST):
             data = os.pread(descriptor, _LONGEST, self._offset)
             end = data.find(b"\n") + 1
@@ -99,7 +103,8 @@ class Tail:
 
 
 def _line_before(path: Path, after: int) -> int:
-    """Offset of a line with ``seq`` at most ``after``, close to the last such line: numbers increase along the file."""
+    """Returns the offset of a line with ``seq`` at most ``after``, close to the last such line. The numbers increase
+    along the file."""
     if not path.exists():
         return 0
     with whole.opened(path) as file:
@@ -125,20 +130,20 @@ def _line(raw: bytes) -> Line | None:
 
 
 def seq_of(raw: bytes) -> int:
-    """The number of a line; 0 for a damaged one."""
+    """Returns the number of a line; 0 for a damaged line."""
     line = _line(raw)
     return line.seq if line is not None else 0
 
 
 def lines(path: Path, after: int = 0) -> Iterator[Line]:
-    """Every complete line with ``seq`` above ``after``, in order."""
+    """Yields every complete line with ``seq`` above ``after``, in order."""
     tail = Tail(path, after)
     while batch := tail.read():
         yield from batch
 
 
 def statuses(path: Path) -> list[Status]:
-    """The Status messages of a journal, in order; damaged lines are skipped."""
+    """Returns the Status messages of a journal, in order; damaged lines are skipped."""
     found = (_status_in(line.raw) for line in lines(path) if line.type == "status")
     return [status for status in found if status is not None]
 
@@ -154,15 +159,15 @@ def _status_in(raw: bytes) -> Status | None:
 
 
 def last(path: Path) -> bytes:
-    """The last whole line, without the line feed; b"" where there is none. Raises OSError."""
+    """Returns the last complete line, without the line feed; b"" without a line. Raises OSError."""
     with whole.opened(path, links=False) as file:
         known = _last_lines(file.fileno(), os.fstat(file.fileno()).st_size)
         return known[-1].raw if known else b""
 
 
 def _last_lines(descriptor: int, end: int) -> list[Line]:
-    """Lines before ``end``, the last of which is the last whole one there; none where there is no line. At most
-    ``_LONGEST`` bytes are in memory.
+    """Returns lines before ``end``. The last of them is the last complete line before ``end``. Empty if there is no
+    line. At most ``_LONGEST`` bytes are in memory.
     """
     window = _CHUNK
     while True:
@@ -176,8 +181,9 @@ def _last_lines(descriptor: int, end: int) -> list[Line]:
 
 
 def append(path: Path, status: Status) -> Status:
-    """Appends ``status`` with the next number and returns it as written; it is on disk on return. Raises OSError. An
-    incomplete last line of a killed worker is cut off first; this line is cut off when it cannot be written whole.
+    """Appends ``status`` with the next number and returns it as written; the line is on disk on return. Raises
+    OSError. An incomplete last line of a killed worker is removed first. The new line is removed if it cannot be
+    written completely.
     """
     with whole.appended(path, 0o600) as file:
         numbered = msgspec.structs.replace(status, seq=_mend(file.fileno()) + 1)
@@ -192,8 +198,8 @@ def append(path: Path, status: Status) -> Status:
 
 
 def _mend(descriptor: int) -> int:
-    """Returns the largest number of the last lines, even with damaged lines after it. Text after the last line feed
-    is completed or cut off.
+    """Returns the largest number of the last lines, even if damaged lines follow. Text after the last line feed is
+    completed or removed.
     """
     size = os.fstat(descriptor).st_size
     end = _after_last_feed(descriptor, size)
@@ -207,7 +213,7 @@ def _mend(descriptor: int) -> int:
 
 
 def _after_last_feed(descriptor: int, size: int) -> int:
-    """Where the text begins that no line feed ends."""
+    """Returns the offset of the text after the last line feed."""
     while size:
         start = max(0, size - _CHUNK)
         end = os.pread(descriptor, size - start, start).rfind(b"\n") + 1

@@ -1,4 +1,4 @@
-"""The end of the ranks as the launcher's log shows it, for a server that is not the parent of the launcher."""
+"""The end of the ranks by the launcher's log, for a server that is not the parent process of the launcher."""
 
 import errno
 import os
@@ -9,36 +9,37 @@ from conoid.cases.output import layout
 from conoid.cases.reading import whole
 
 _TAIL = 1 << 14
-"""Bytes at the end of the log that are searched for the launcher's banner. Chosen: a banner has 700."""
+"""Number of bytes at the end of the log in which the launcher's banner is searched for. The value was chosen because
+a banner has 700 bytes."""
 _ABORTS = "Abort("
-"""The beginning of MPICH's line for a rank that aborts all others."""
+"""Beginning of the line that MPICH writes for a rank that aborts all others."""
 _LAST_WORDS = 300
-"""Characters of the last line that are shown. Chosen."""
+"""Largest number of characters of the last line that are shown (chosen value)."""
 _COMPLAINTS = [
     os.strerror(number).encode()
     for number in (errno.ENOSPC, errno.EDQUOT, errno.EIO, errno.EROFS, errno.ESTALE, errno.EFBIG)
 ]
 _CODE = re.compile(rb"^=   EXIT CODE: (\d{1,3})$", re.MULTILINE)
 _PID = re.compile(rb"^=   PID (\d+) RUNNING AT ", re.MULTILINE)
-"""The banner of Hydra, MPICH's launcher, for a rank that ended before the others; for a killed rank with the number
-of the signal."""
+"""Banner of Hydra, MPICH's launcher, for a rank that ended before the others. For a killed rank the banner has the
+number of the signal."""
 
 
 def exit_code(folder: Path) -> int | None:
-    """Exit code of the rank that ended first, by the newest banner; None without a banner."""
+    """Returns the exit code of the rank that ended first, by the newest banner; None without a banner."""
     found = _CODE.findall(_tail(folder))
     return int(found[-1]) if found else None
 
 
 def rank_killed(folder: Path) -> int | None:
-    """Process number of the rank that ended first, by the newest banner; None without a banner."""
+    """Returns the process number of the rank that ended first, by the newest banner; None without a banner."""
     found = _PID.findall(_tail(folder))
     return int(found[-1]) if found else None
 
 
 def last_words(folder: Path, log: Path | None = None) -> str:
-    """The last line of the launcher's log, or of another ``log``, that is neither the banner nor a line of MPI;
-    empty where there is none.
+    """Returns the last line of the launcher's log, or of another ``log``, that is neither the banner nor a line of
+    MPI; empty without such a line.
     """
     text = _tail(folder, log).decode(errors="replace")
     said = [line.strip() for line in text.partition("=====")[0].splitlines() if not line.startswith(_ABORTS)]
@@ -46,7 +47,7 @@ def last_words(folder: Path, log: Path | None = None) -> str:
 
 
 def disk_failed(folder: Path) -> bool:
-    """Whether a rank reported an error of its disk, or the log itself has no room for such a report."""
+    """Whether a rank reported an error of its disk, or the disk of the log itself has no space for such a report."""
     said = _tail(folder)
     if any(words in said for words in _COMPLAINTS):
         return True

@@ -36,7 +36,7 @@ from .events import (
 Next = tuple[Run, tuple[Action, ...]]
 
 _SIGKILL, _SIGTERM = 9, 15
-"""Numbers of signals on every POSIX system. This module imports nothing of the system."""
+"""Numbers of signals that are the same on every POSIX system. This module imports no module of the operating system."""
 
 
 def advance(run: Run, event: Event, now: float) -> Next:
@@ -94,7 +94,7 @@ def _enter(run: Run, state: State, message: str = "") -> Next:
 
 
 def _end(run: Run, now: float, outcome: Outcome, *, written: bool = False) -> Next:
-    """The final state of ``outcome``; the file is written before the line of the journal."""
+    """Returns the final state of ``outcome``. The outcome file is written before its line in the journal."""
     state, cause = State(outcome.state), Cause(outcome.cause) if outcome.cause else None
     ended = replace(run, state=state, cause=cause, message=outcome.message, finished=now)
     write = () if written else (WriteOutcome(outcome),)
@@ -102,7 +102,8 @@ def _end(run: Run, now: float, outcome: Outcome, *, written: bool = False) -> Ne
 
 
 def _broken(run: Run, event: Broken, now: float) -> Next:
-    """The run is lost, unless its owner has asked for a cancel; a worker that may still run is killed first."""
+    """Marks the run as lost, or as cancelled if its owner has asked for a cancel. A worker that may still run is
+    killed first."""
     asked = run.stopping_for is Cause.CANCELLED
     state, cause = (State.CANCELLED, Cause.CANCELLED) if asked else (State.LOST, Cause.STORAGE)
     message = f"stopped on request, without results: {event.message}" if asked else event.message
@@ -125,7 +126,7 @@ def _cancel(run: Run, now: float, handed: bool) -> Next:
 
 
 def _stop(run: Run, why: Cause) -> Next:
-    """Changes the state without a line in the journal, which the worker writes now."""
+    """Changes the state without a line in the journal, because the worker now writes the journal."""
     return replace(run, state=State.STOPPING, stopping_for=why), (Stop(why),)
 
 
@@ -140,13 +141,13 @@ def _exited(run: Run, event: WorkerExited, now: float) -> Next:
 
 
 def _at(run: Run, event: WorkerExited | Found, now: float) -> float:
-    """Returns the time of the end: by the files, if no server ran at that time."""
+    """Returns the time of the end. If no server ran at that time, it is read from the files."""
     return max(event.at, run.started) if event.at else now
 
 
 def _renamed(run: Run, event: WorkerExited, outcome: Outcome) -> Outcome:
-    """Returns the cause of a stop. A worker records that it was stopped, without a reason: without a request it is
-    no cancel."""
+    """Returns the cause of a stop. A worker records that it was stopped, but not why. Without a request for a cancel
+    the stop is no cancel."""
     if run.stopping_for is Cause.STORAGE:
         state, message = State.FAILED, "its output has passed what this server allows a run"
         return msgspec.structs.replace(outcome, state=state, cause=Cause.STORAGE, message=message)
@@ -166,7 +167,8 @@ def _readable(outcome: Outcome) -> bool:
 
 
 def _without_outcome(run: Run, event: WorkerExited) -> Outcome:
-    """Returns the final state of a worker without an outcome. The exit code is a hint, never a proof of success."""
+    """Returns the final state of a worker without an outcome. The exit code suggests a cause, but never proves
+    success."""
     state, cause, message = _reading_of(run, event)
     said = f"; {event.traces}" if event.traces else ""
     return Outcome(state=state, cause=cause, message=f"{message}{said}", ranks=run.ranks, threads=run.threads)

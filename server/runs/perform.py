@@ -24,14 +24,14 @@ _log = logging.getLogger("conoid.server")
 
 
 class Performer:
-    """Used in the supervisor's thread; ``watches`` may be read from any thread."""
+    """Performs actions. The class is used in the supervisor's thread; ``watches`` may be read from any thread."""
 
     def __init__(self, settings: Settings, launcher: Launcher, telemetry: Telemetry | None) -> None:
-        """Has no workers yet."""
+        """Creates the object without workers."""
         self._settings, self._launcher, self._telemetry = settings, launcher, telemetry
         self._root = os.stat(settings.runs).st_ino
         self.watches: dict[str, Watch] = {}
-        """Running workers by run."""
+        """Watches of the running workers, by run."""
         self.found: dict[str, Worker] = {}
         """Workers of an earlier server that are not adopted yet."""
 
@@ -76,7 +76,7 @@ class Performer:
         return watch is not None and watch.worker.exited() is None
 
     def beyond_use(self, run_id: str) -> bool:
-        """Whether only the run's folder fails: files can be written in the folder of all runs."""
+        """Whether only the run's folder fails, and files can be written in the folder of all runs."""
         if self.gone(run_id):
             return True
         try:
@@ -86,7 +86,7 @@ class Performer:
         return True
 
     def _stop(self, run_id: str, path: Path, why: Cause) -> None:
-        """Records the request to stop. On a full disk it is in the database only."""
+        """Records the request to stop. On a full disk the request is in the database only."""
         try:
             folder.write_stop(path, why)
         except OSError as error:
@@ -125,8 +125,8 @@ class Performer:
         return self._watch(path, worker, made.wall_time)
 
     def _watch(self, path: Path, worker: Worker, allowed: float | None) -> Watch:
-        """Time limit of the server: the worker itself ends at ``run.max_wall_time``, the server acts a grace period
-        later, a batch system at the limit of the job.
+        """Watches a worker up to the time limit of the server. The worker itself ends at ``run.max_wall_time``; the
+        server stops it a grace period later; a batch system stops it at the limit of the job.
         """
         left = (
             None if allowed is None or self._launcher.queues else allowed + self._settings.grace - folder.runs_for(path)
@@ -135,7 +135,7 @@ class Performer:
 
 
 def _allowed(path: Path) -> float | None:
-    """Returns the time limit of a run by its submission. The worker applies its own limit in any case."""
+    """Returns the time limit of a run from its submission. The worker applies its own limit in any case."""
     try:
         return folder.submission(path).wall_time
     except (OSError, msgspec.MsgspecError):
@@ -143,8 +143,8 @@ def _allowed(path: Path) -> float | None:
 
 
 def of_launch(error: LaunchError) -> LaunchFailed | LaunchPutOff:
-    """Whether the launch is delayed: by a passing error, or because the folder has no readable case, an error of its
-    disk."""
+    """Returns the event of a failed launch. The launch is delayed if the error is temporary, or if the folder has no
+    readable case because of an error of its disk."""
     if passing(error):
         return LaunchPutOff(f"the launch is tried again: {error}")
     return LaunchFailed(str(error), Cause.STORAGE if isinstance(error, DamagedError) else Cause.LAUNCH)

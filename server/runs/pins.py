@@ -1,5 +1,5 @@
-"""Runs that are kept permanently: by the label ``keep``, or by the last request, which is a hidden file in the run's
-folder."""
+"""Runs that are kept permanently, by the label ``keep`` or by a later request. The last request is a hidden file in
+the run's folder."""
 
 from pathlib import Path
 
@@ -24,7 +24,7 @@ def pinned(folder: Path) -> bool:
 
 
 def told(folder: Path) -> str:
-    """The last request, ``yes`` or ``no``; empty without one."""
+    """Returns the last request to keep the run, ``yes`` or ``no``; empty without a request."""
     try:
         return whole.read(folder / _PINNED, 80).decode()
     except (OSError, UnicodeDecodeError):
@@ -32,8 +32,8 @@ def told(folder: Path) -> str:
 
 
 def labels(folder: Path) -> dict[str, str]:
-    """Labels of the submission, with ``keep`` by the last request; none where the folder has been removed or
-    damaged.
+    """Returns the labels of the submission, with ``keep`` by the last request. A removed or damaged folder gives no
+    labels.
     """
     try:
         made = submission(folder).labels
@@ -44,5 +44,5 @@ def labels(folder: Path) -> dict[str, str]:
 
 
 def pin(folder: Path, keep: bool) -> None:
-    """Keeps a run permanently, or no longer. Raises OSError."""
+    """Keeps a run permanently, or allows its removal again. Raises OSError."""
     durable.write(folder / _PINNED, (_YES if keep else _NO).encode())

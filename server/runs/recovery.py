@@ -30,8 +30,8 @@ class Left:
 
 
 def look(path: Path, known: Run | None, launcher: Launcher) -> Left:
-    """Reads a run. ``known``: its row in the database, which replaces damaged files. Raises OSError, and ValueError
-    if neither has the owner of the run.
+    """Reads a run from its folder. ``known``: its row in the database, which replaces damaged files. Raises OSError,
+    and ValueError if neither has the owner of the run.
     """
     made = _submission(path)
     if made is None and known is None:
@@ -55,7 +55,7 @@ def _submission(path: Path) -> Submission | None:
 
 
 def _outcome(path: Path) -> Outcome | None:
-    """Returns the submission; None if it cannot be read."""
+    """Returns the submission of the run; None if it cannot be read."""
     try:
         return folder.outcome(path)
     except PermissionError:
@@ -63,7 +63,7 @@ def _outcome(path: Path) -> Outcome | None:
 
 
 def _told(path: Path) -> list[Status]:
-    """The Status messages of the journal; none where it cannot be read."""
+    """Returns the Status messages of the journal; none if the journal cannot be read."""
     try:
         return journal.statuses(path / layout.JOURNAL)
     except folder.DAMAGED:
@@ -78,7 +78,7 @@ def _as_accepted(known: Run | None) -> Run:
 
 
 def _fate(path: Path, trace: Trace) -> Literal["none", "alive", "gone"]:
-    """Returns the process record. An unreadable record is still a trace of a launch."""
+    """Returns the process record. A record that cannot be read still proves that the run was launched."""
     if trace.worker is not None:
         return "alive"
     return "gone" if trace.launched or folder.there(path / layout.WORKER) else "none"
@@ -86,7 +86,7 @@ def _fate(path: Path, trace: Trace) -> Literal["none", "alive", "gone"]:
 
 def _mended(run: Run, journal_there: bool, known: Run | None, path: Path, trace: Trace, queues: bool) -> Run:
     """Returns the status of a run whose journal is missing or older than its processes. A run that was started is
-    never started twice; one that a batch system ``queues`` may still wait for its cores.
+    never started twice. A run that a batch system ``queues`` may still wait for its cores.
     """
     if not journal_there and known is not None:
         run = replace(known, message="") if known.state is not State.STOPPING else replace(run, state=State.STARTING)
@@ -101,7 +101,8 @@ def _launched(path: Path, trace: Trace) -> bool:
 
 
 def _stopping(run: Run, known: Run | None, path: Path, queues: bool) -> Run:
-    """A waiting job that reported a stop by itself was preempted and continues, unless a stop was asked for."""
+    """Returns the state of a waiting job that reported a stop without a request. Such a job was preempted and
+    continues; after a request to stop, it has ended."""
     why = folder.stop_asked(path) or (known.stopping_for if known is not None else None)
     if why is None and queues and run.state is State.STOPPING:
         return replace(run, state=State.RUNNING)

@@ -1,4 +1,4 @@
-"""Restart: a new run that continues from a checkpoint of another one, with links to the files of that run."""
+"""Restart: a new run that continues from a checkpoint of another run, with links to the files of that run."""
 
 import json
 import os
@@ -15,21 +15,22 @@ from ..errors import ServiceError
 from .folder import outcome
 
 _TRIES = 5
-"""Number of tries to find a newest checkpoint that is not removed meanwhile. Chosen."""
+"""Number of tries to find a newest checkpoint that is not removed meanwhile (chosen value)."""
 LABEL = "restart"
-"""Label of the new run: the id of the other one."""
+"""Name of the label of a new run that contains the id of the other run."""
 
 
 def body(case: Path, ranks: int | None, threads: int | None = None, max_steps: int | None = None) -> dict[str, object]:
-    """The case of a run with other ranks, threads and ``run.max_steps``; None: unchanged. Raises CaseError, OSError."""
+    """Returns the case of a run with other ranks, threads and ``run.max_steps``; a value of None changes nothing.
+    Raises CaseError, OSError."""
     whole.check(case)
     wanted = {"run.ranks": ranks, "run.threads": threads, "run.max_steps": max_steps}
     return apply_overrides(read_data(case), {key: value for key, value in wanted.items() if value is not None})
 
 
 def check(source: Path, max_steps: int | None) -> None:
-    """Raises ServiceError 409 if no step remains for a run that continues ``source``. ``max_steps``: None for the
-    value of its case.
+    """Raises ServiceError 409 if a run that continues ``source`` has no step left. ``max_steps``: None for the value
+    of its case.
     """
     ended = outcome(source)
     spent = ended is not None and ended.cause == Cause.STEPS
@@ -57,8 +58,8 @@ def fill(source: Path, folder: Path) -> None:
 
 
 def _taken(source: Path, target: Path) -> bool:
-    """Links every checkpoint with a complete manifest. Returns False if they were removed meanwhile: a running run
-    keeps only its newest ones. Raises ServiceError 409 without any checkpoint.
+    """Links every checkpoint with a complete manifest. Returns False if checkpoints were removed during the call,
+    because a running run keeps only its newest ones. Raises ServiceError 409 if there is no checkpoint.
     """
     damaged: list[str] = []
     taken = 0
@@ -72,7 +73,7 @@ def _taken(source: Path, target: Path) -> bool:
             if place.is_dir():
                 damaged.append(f"{place.name}: {error}")
                 _describe(place, target / place.name)
-        except OSError:  # shutil.Error is an OSError, too
+        except OSError:  # shutil.Error is a subclass of OSError
             shutil.rmtree(target / place.name, ignore_errors=True)
             if place.is_dir():
                 raise
@@ -83,8 +84,8 @@ def _taken(source: Path, target: Path) -> bool:
 
 
 def _describe(place: Path, target: Path) -> None:
-    """Copies the two files that describe a damaged checkpoint; from these the worker writes the warning that it is
-    skipped.
+    """Copies the two files that describe a damaged checkpoint. The worker reads them and warns that this checkpoint
+    is skipped.
     """
     shutil.rmtree(target, ignore_errors=True)
     target.mkdir(parents=True)
@@ -93,7 +94,7 @@ def _describe(place: Path, target: Path) -> None:
 
 
 def _why(source: Path) -> str:
-    """Returns why the run has no checkpoint, and how to get one."""
+    """Returns why the run has no checkpoint, and how the user can get one."""
     ended = outcome(source)
     if ended is not None and ended.state == State.SUCCEEDED:
         return "one that has succeeded keeps none"
@@ -103,7 +104,7 @@ def _why(source: Path) -> str:
 
 
 def _every(source: Path) -> str:
-    """``run.checkpoint_every`` of the case."""
+    """Returns ``run.checkpoint_every`` of the case."""
     try:
         every = json.loads(whole.read(source / layout.RESOLVED_CASE))["run"]["checkpoint_every"]
     except (OSError, ValueError, KeyError, TypeError):
@@ -120,6 +121,6 @@ def _link(source: str, target: str) -> None:
 
 
 def _copy(source: str, target: str) -> None:
-    """Links a regular file; anything else, or a missing file, is skipped."""
+    """Links a regular file. A missing file, a folder or a link is skipped."""
     with suppress(FileNotFoundError, IsADirectoryError), whole.opened(source) as file, open(target, "xb") as copy:
         shutil.copyfileobj(file, copy)

@@ -1,4 +1,4 @@
-"""Steps of runs that failed and are tried again: which run, when, and why. The timers of the supervisor."""
+"""Timers of the supervisor: steps of runs that failed and are tried again, with the time and the reason."""
 
 import errno
 import logging
@@ -9,21 +9,23 @@ from .events import Event
 
 _log = logging.getLogger("conoid.server")
 _AGAIN, _LONGEST = 1.0, 8.0
-"""Delay in s before a failed step is tried again: first, and at most; the delay doubles. Chosen."""
+"""Delay in s before a failed step is tried again: the first delay, and the largest one (chosen values). The delay
+doubles at each failure."""
 _QUIET = 60.0
-"""Time in s for which the same error of the same run is not logged again. Chosen."""
+"""Time in s for which the same error of the same run is not logged again (chosen value)."""
 _PASSING = frozenset(
     {errno.ENOSPC, errno.EDQUOT, errno.EIO, errno.EROFS, errno.ESTALE, errno.EMFILE, errno.ENFILE, errno.ENOMEM,
      errno.EAGAIN}
 )  # fmt: skip
 _LASTING = 4.0
-"""Delay in s from which an error of a run's own files counts as lasting. Chosen: the fourth try, after 7 s."""
+"""Delay in s from which an error of a run's own files counts as permanent. The value was chosen because this delay
+is reached at the fourth try, after 7 s."""
 DAMAGE = frozenset({errno.EISDIR, errno.ENOTDIR, errno.EACCES, errno.EPERM, errno.ELOOP, errno.EROFS})
-"""Errors of one folder that last although other folders can be written."""
+"""Errors of one folder that are permanent although other folders can be written."""
 
 
 def passing(error: BaseException) -> bool:
-    """True for errors of the machine that may end, such as a full disk, anywhere in the chain of causes."""
+    """True for temporary errors of the machine, such as a full disk, anywhere in the chain of causes."""
     cause = error.__cause__ or error.__context__
     if isinstance(error, OSError) and error.errno in _PASSING:
         return True
@@ -46,11 +48,11 @@ class _Hold:
 
 
 class Retries:
-    """Failed steps and the times of their next try. Used in the supervisor's thread; ``why`` may be called from any
-    thread."""
+    """Failed steps and the times of their next try. The class is used in the supervisor's thread; ``why`` may be
+    called from any thread."""
 
     def __init__(self) -> None:
-        """Starts without failed steps."""
+        """Creates the object without failed steps."""
         self._retries: dict[str, _Hold] = {}
 
     def __len__(self) -> int:
@@ -58,7 +60,7 @@ class Retries:
         return len(self._retries)
 
     def put_off(self, run_id: str, error: Exception, event: Event | None = None) -> Exception:
-        """Schedules another try: of the step that the run waits for, or of ``event``, which occurs only once."""
+        """Schedules another try of the step for which the run waits, or of ``event``, which occurs only once."""
         before = self._retries.get(run_id)
         self._hold(run_id, words(error), event or (before.event if before else None))
         return error
@@ -86,11 +88,11 @@ class Retries:
         return [(run_id, hold.event) for run_id, hold in self._retries.items() if hold.event and hold.until <= now]
 
     def timed(self) -> set[str]:
-        """The runs that have a scheduled event."""
+        """Returns the runs that have a scheduled event."""
         return {run_id for run_id, hold in tuple(self._retries.items()) if hold.event is not None}
 
     def done(self, run_id: str, event: Event) -> None:
-        """Removes the entry after a successful step; a different scheduled event stays."""
+        """Removes the entry of a run after a successful step. The entry of a different scheduled event stays."""
         hold = self._retries.get(run_id)
         if hold is not None and hold.event in (None, event):
             del self._retries[run_id]
@@ -101,7 +103,7 @@ class Retries:
         return hold is not None and hold.delay >= _LASTING
 
     def damaged(self, run_id: str, error: Exception) -> bool:
-        """Whether the error is one of the run's own files, and lasts."""
+        """Whether the error is an error of the run's own files, and is permanent."""
         return isinstance(error, OSError) and error.errno in DAMAGE and self.lasts(run_id)
 
     def forget(self, run_id: str) -> None:
@@ -109,6 +111,6 @@ class Retries:
         self._retries.pop(run_id, None)
 
     def why(self, run_id: str) -> str:
-        """The error of the last step; empty without one."""
+        """Returns the error of the last step; empty without an error."""
         hold = self._retries.get(run_id)
         return hold.why if hold is not None else ""

@@ -33,12 +33,12 @@ _log = logging.getLogger("conoid.server")
 _LOOK = 0.02
 """Time in s between two checks of the running workers: the longest delay of a live event."""
 _TIDY = 5.0
-"""Time in s between two checks of the tokens."""
+"""Time in s between two checks whether the tokens have changed."""
 _AGAIN = 1.0
 """Time in s between two checks while failed steps wait for their next try."""
 _GONE, _DAMAGED = "the folder of the run has been removed", "the folder of the run cannot be used"
 _ANSWER = 10.0
-"""Time in s in which the supervisor's thread must answer. Chosen: it checks fifty times a second."""
+"""Time in s in which the supervisor's thread must answer. The value was chosen: the thread checks 50 times a second."""
 
 
 @dataclass(frozen=True)
@@ -58,7 +58,7 @@ class Supervisor:
         telemetry: Telemetry | None,
         ring: Callable[[str], None],
     ) -> None:
-        """``ring`` is called with the id of a run that has changed."""
+        """Starts no thread yet. ``ring`` is called with the id of a run that has changed."""
         self._settings, self._store, self._launcher = settings, store, launcher
         self._telemetry, self._ring = telemetry, ring
         self._inbox: queue.SimpleQueue[_Cancel | None] = queue.SimpleQueue()
@@ -85,13 +85,13 @@ class Supervisor:
         self._thread.start()
 
     def close(self) -> None:
-        """Stops supervising. Workers go on; the next server adopts them."""
+        """Stops the supervision. Workers continue, and the next server adopts them."""
         self._leaving = True
         self._inbox.put(None)
         self._thread.join(_ANSWER)
 
     def end_all(self) -> None:
-        """Cancels every open run. Returns when all have ended, or after twice the grace period."""
+        """Cancels every open run. Returns when all runs have ended, or after twice the grace period."""
         deadline = time.monotonic() + 2 * self._settings.grace
         for run_id in tuple(self._open):
             self._inbox.put(_Cancel(run_id, Future()))
@@ -104,7 +104,7 @@ class Supervisor:
         return self._thread.is_alive()
 
     def admit(self, run: Run) -> None:
-        """Adds a new run, which is on disk and in the store."""
+        """Adds a new run, which is already on disk and in the store."""
         self._open[run.id] = run
         self._waitlist.changed()
         self._inbox.put(None)
@@ -135,7 +135,7 @@ class Supervisor:
         return sum(run.cores for run_id in tuple(self._watches) if (run := self._open.get(run_id)))
 
     def reason(self, run_id: str) -> str:
-        """Returns what a queued run waits for, or the message of a batch system; else empty."""
+        """Returns what a queued run waits for, or the message of a batch system; empty for other runs."""
         if why := self._retries.why(run_id):
             return f"tried again soon: {why}"
         watch = self._watches.get(run_id)
@@ -144,12 +144,12 @@ class Supervisor:
         return self._waitlist.why(run_id)
 
     def taken(self, owner: str) -> tuple[int, float]:
-        """Returns the number of an owner's runs with cores or in a batch system, and the counted core-seconds."""
+        """Returns the number of an owner's runs with cores or in a batch system, and its decayed core-seconds."""
         own = [run for run in tuple(self._open.values()) if run.owner == owner]
         return sum(run.id in self._watches for run in own), self._waitlist.used(owner, own)
 
     def stranded(self) -> list[str]:
-        """Returns open runs without a watch, a place in the queue or a timer. There must be none at any time."""
+        """Returns open runs without a watch, a queue entry or a timer. Any such run is an error."""
         looked_after = {*self._watches, *self._index.unsaved, *self._retries.timed()}
         return scheduling.stranded(tuple(self._open.values()), looked_after)
 
@@ -199,8 +199,8 @@ class Supervisor:
             self._ring(run_id)
 
     def _grant(self) -> None:
-        """Starts the runs that the queue selects. A failed start delays no other run; nothing is announced that
-        could not be written.
+        """Starts the runs that the queue selects. A failed start delays no other run. A change that could not be
+        written to disk is not announced.
         """
         held = Held(self._retries.held, self.held_back)
         for run_id in self._waitlist.turn(tuple(self._open.values()), tuple(self._watches), held):
@@ -250,7 +250,7 @@ class Supervisor:
         return self._retries.put_off(run.id, error, event if isinstance(event, ONCE) else None)
 
     def _settle(self, run: Run) -> None:
-        """Completes a step: memory first, then the database, then the waiters for a change."""
+        """Completes a step: updates first the memory, then the database, then the waiters for a change."""
         self._waitlist.settled(self._open.get(run.id), run)
         self._open[run.id] = run
         if run.state.final:
@@ -284,7 +284,7 @@ class Supervisor:
                 _log.error("the router does not have the newest tokens: %s", error)
 
     def _take_up(self) -> None:
-        """Makes memory and database agree with the runs' folders, and continues the runs of an earlier server."""
+        """Updates memory and database from the runs' folders, and continues the runs of an earlier server."""
         self._earlier_runs.all()
         for run_id, run in self._store.open().items():
             if run_id not in self._open and self._hands.gone(run_id):
@@ -292,7 +292,7 @@ class Supervisor:
                 self._apply(run_id, Broken(_GONE))
 
     def _found(self, left: Left) -> None:
-        """Adds a run of an earlier server. One that has ended is kept in memory until the database has its end."""
+        """Adds a run of an earlier server. A run that has ended is kept in memory until the database has its end."""
         if left.worker is not None:
             self._hands.found[left.run.id] = left.worker
         if not left.run.state.final or left.run.id in self._index.unsaved:

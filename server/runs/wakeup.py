@@ -1,4 +1,5 @@
-"""Wake-up of coroutines that wait for a change of a run. It carries no data: the waiter reads the run's files again."""
+"""Wake-up of coroutines that wait for a change of a run. The wake-up carries no data: the waiting coroutine reads
+the run's files again."""
 
 import asyncio
 from collections.abc import Iterator
@@ -6,8 +7,8 @@ from contextlib import contextmanager
 
 
 class Listener:
-    """A waiter. Call ``clear``, read the files, then ``wait`` if nothing is new: no change can be missed in this
-    order."""
+    """A waiter for changes of a run. Call ``clear``, read the files, and call ``wait`` if nothing is new. In this
+    order no change can be missed."""
 
     def __init__(self) -> None:
         self._rung = asyncio.Event()
@@ -17,11 +18,12 @@ class Listener:
         self._rung.clear()
 
     def ring(self) -> None:
-        """Sets the event. Called in the thread of the event loop."""
+        """Sets the event of the waiter. Called in the thread of the event loop."""
         self._rung.set()
 
     async def wait(self, timeout: float) -> bool:
-        """True when the event was set since ``clear``, False after ``timeout`` seconds without."""
+        """Waits. Returns True when the event was set since ``clear``, and False after ``timeout`` seconds without an
+        event."""
         try:
             await asyncio.wait_for(self._rung.wait(), timeout)
         except TimeoutError:
@@ -51,8 +53,8 @@ class Wakeups:
             listener.ring()
 
     def close(self) -> None:
-        """Wakes all waiters for the last time; they leave when they read ``closed``. Called in the thread of the
-        loop."""
+        """Wakes all waiters for the last time; the waiters end when they read ``closed``. Called in the thread of
+        the event loop."""
         self.closed = True
         for run_id in self._listeners:
             self._ring(run_id)
@@ -64,7 +66,7 @@ class Wakeups:
 
     @contextmanager
     def listen(self, run_id: str) -> Iterator[Listener]:
-        """A waiter that is registered while the block runs. Called in the thread of the loop."""
+        """Registers a waiter while the block runs. Called in the thread of the event loop."""
         listener = Listener()
         self._listeners.setdefault(run_id, set()).add(listener)
         try:
