@@ -15,7 +15,7 @@ from .errors import ClientError, UsageError
 Column: TypeAlias = "array[float] | list[str]"
 """Numbers as a double array; text, such as the limiter of dt, as a list."""
 _SHOWN = 5
-"""Lines of the head and the end of a table that are shown. Chosen."""
+"""Number of lines of the head and the end of a table that are shown. Chosen values."""
 
 
 class Columns(dict[str, Column]):
@@ -74,7 +74,7 @@ def read_columns(text: str) -> Columns:
 
 
 def _whole(rows: Iterator[list[str]], length: int) -> Iterator[list[str]]:
-    """Returns the rows with all columns: the last line of a growing file may be incomplete."""
+    """Returns the rows with all columns; the last line of a growing file may be incomplete."""
     return (row for row in rows if len(row) == length)
 
 
@@ -86,7 +86,7 @@ def _column(column: list[str]) -> Column:
 
 
 def by_part(told: Columns) -> dict[str, dict[str, Sequence[float]]]:
-    """Returns the energies of the parts in a history by name and part; empty for a case with one part."""
+    """Returns the energies of the parts in a history, by energy and part; empty for a case with one part."""
     found: dict[str, dict[str, Sequence[float]]] = {}
     for column in told:
         if (named := history.part_of(column)) is not None:

@@ -1,21 +1,21 @@
-"""What can go wrong for a user, as one clear line each.
+"""Errors for users. Each error has a message of one line.
 
 ::
 
     ConoidError
-    ├── CaseError            the case is wrong, whoever has found it: every error at once (cases/reading/problems.py)
-    ├── …                    what a worker raises that is called from Python (worker/errors.py)
+    ├── CaseError            the case is wrong; contains all errors of the case (cases/reading/problems.py)
+    ├── …                    errors of a worker that Python code calls (worker/errors.py)
     └── ClientError
-        ├── ServiceError     the server refused: the fields of an RFC 9457 problem
+        ├── ServiceError     the server refused the request; has the fields of an RFC 9457 problem
         ├── UnreachableError no server answered
-        │   └── AnswerError  what answered cannot be read, has no end, or is somewhere else
-        ├── NotFoundError    there is no such run, file or folder, here or on the server (then a ServiceError, too)
-        ├── UnfinishedError  a result was asked of a run that has none yet
-        ├── UsageError       what was asked for is wrong: an argument, a value, a name that nobody knows
+        │   └── AnswerError  the answer cannot be read, has no end, or redirects elsewhere
+        ├── NotFoundError    a run, file or folder does not exist, here or on the server (then also a ServiceError)
+        ├── UnfinishedError  the run has not written the requested result yet
+        ├── UsageError       an argument or a value is wrong, or a name is unknown
         └── ViewError        no picture could be made
-            └── LookError    a picture was asked for that there is none of (then a UsageError, too)
+            └── LookError    an option of a picture is wrong (also a UsageError)
 
-The command line ends with 2 where what was asked for is wrong, be it a case or an argument, and with 1 for the rest.
+The exit code of the command line is 2 for a wrong case or argument, and 1 for other errors.
 """
 
 from collections.abc import Mapping
@@ -24,7 +24,7 @@ from typing import Any
 from conoid.cases.reading.problems import CaseError, ConoidError, Problem
 
 _LONGEST = 1000
-"""Largest number of characters of a server's message that are shown. Chosen: half a screen."""
+"""Largest number of characters of a server's message that are shown. Chosen value: half a screen."""
 
 
 class ClientError(ConoidError):
@@ -72,7 +72,9 @@ class AnswerError(UnreachableError):
 
 
 def passes(error: ClientError) -> bool:
-    """Whether the same request may succeed soon: no server answered, or its answer says that it is temporary."""
+    """Returns True if the same request may succeed soon: no server answered, or the server reported a temporary
+    problem.
+    """
     if isinstance(error, UnreachableError):
         return not isinstance(error, AnswerError)
     return isinstance(error, ServiceError) and error.retryable

@@ -1,6 +1,6 @@
 """Check of a case before it runs: errors, warnings, cost.
 
-Mesh files are read by a program of the worker, if that is installed, in a process of its own.
+A program of the worker, if it is installed, reads mesh files in a process of its own.
 """
 
 import subprocess
@@ -31,7 +31,8 @@ from .errors import ClientError
 @dataclass(frozen=True)
 class Examination:
     """A valid case: ``odd`` are its warnings, ``survey`` is the content of its mesh files, ``touching`` are the
-    parts whose surfaces coincide."""
+    parts whose surfaces coincide.
+    """
 
     case: Case
     expected: Estimate

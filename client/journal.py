@@ -11,8 +11,8 @@ _STATES = frozenset(State)
 
 
 def from_line(line: bytes | str | msgspec.Raw) -> AnyMessage:
-    """Returns the message. An unknown type or state becomes a Log line with the same number, so that no number is
-    missing. Raises msgspec.DecodeError for anything else.
+    """Returns the message in a line. A message of an unknown type or state becomes a Log message with the same
+    number: no number is missing. Raises msgspec.DecodeError for any other line.
     """
     try:
         message = from_json(line)

@@ -13,7 +13,7 @@ DESCHEDULED = "descheduled"
 PHASE_GROUPS = ("compute", "contact", "exchange", "output", "wait", DESCHEDULED)
 _IDLE = "exchange", "wait", DESCHEDULED
 _LOG_TAIL = 200
-"""Number of log lines that are kept for display: some screens full. Chosen."""
+"""Number of log lines that are kept for display: some screens full. Chosen value."""
 
 
 @dataclass
@@ -56,8 +56,8 @@ class Live:
 
     @property
     def pieces(self) -> tuple[str, int | None]:
-        """Noun and number of what the bodies have come to: fragments where something can break (its counts have
-        sizes), else the pieces that erosion leaves, which the snapshots count. As the page has it (live.js).
+        """Noun and number of the pieces of all bodies. If something can break, fragments are counted (the message
+        Counts has sizes); else snapshots count the pieces that erosion leaves. The page has the same rule (live.js).
         """
         if self.counts is None or self.counts.sizes:
             return "fragment", None if self.counts is None else self.counts.fragments
@@ -102,7 +102,7 @@ class Live:
 
     @property
     def told(self) -> str:
-        """Message of the state, or the reason for which a queued run waits."""
+        """Message of the state; for a queued run, the reason for which the run waits."""
         return self.message or (self.reason if self.state is State.QUEUED else "")
 
     @property

@@ -31,8 +31,8 @@ from .reports import html
 
 _TABLE = re.compile(rf"{fragments.FOLDER}/fragments_(\d+)\.csv")
 _BEYOND = 0.01
-"""Share of the time between the first and the last frame by which a requested time may lie outside. Chosen: a run
-ends within a step of its end.
+"""Share of the time between the first and the last frame by which a requested time may lie outside. Chosen value: a
+run ends within a step of its end.
 """
 
 
@@ -47,7 +47,7 @@ class _Part(msgspec.Struct):
 
 
 class _Boundary(msgspec.Struct):
-    """Fields of a boundary that pictures use; a wall has a point and a normal, a plane of symmetry an axis."""
+    """Fields of a boundary that pictures use. A wall has a point and a normal, a plane of symmetry has an axis."""
 
     kind: str
     axis: Literal["x", "y", "z"] | None = None
@@ -205,7 +205,7 @@ class Result:
         """
         every = str(out or "").lower().endswith(FILMS)
         if not self.frames:
-            self.folder.path(layout.JOURNAL)  # a folder without frames may not be that of a run
+            self.folder.path(layout.JOURNAL)  # a folder without frames is possibly not that of a run
             raise UnfinishedError(f"{self.folder.name} has not written any frame")
         chosen = self._chosen(_listed(frame), [seconds(one) for one in _listed(time)], every)
         scene = self.scene()
@@ -233,7 +233,7 @@ class Result:
         return known[min(known, key=lambda at: abs(at - time))]
 
     def scene(self) -> Scene:
-        """Returns the data of the case that a picture uses; empty without a case."""
+        """Returns the data of the case that a picture uses; empty for a run without a case."""
         try:
             case = self.case
         except ClientError:
@@ -259,7 +259,7 @@ class Result:
 
 
 def _is_plain(boundary: dict[str, Any]) -> bool:
-    """Whether a boundary is a fixed plane wall: other walls are not drawn."""
+    """Returns True if a boundary is a fixed plane wall: other walls are not drawn."""
     moves = any(boundary.get("velocity") or ()) or boundary.get("mass") is not None
     return boundary["kind"] == "wall" and boundary.get("shape", "plane") == "plane" and not moves
 

@@ -26,10 +26,10 @@ from .result import Result
 from .snapshots import Snapshot
 
 _WAIT = 20.0
-"""Time in s of a single request that waits for the end of a run: below the 30 s after which a request is given up
-(http.py)."""
+"""Time limit of a single request that waits for the end of a run, s: below the 30 s after which a request is given
+up (http.py)."""
 _PATIENCE = 120.0
-"""Time in s without a server after which waiting for a run ends. Chosen: twice the time of a restart."""
+"""Time without a server after which waiting for a run ends, s. Chosen value: twice the time of a restart."""
 
 
 @dataclass
@@ -55,8 +55,8 @@ class Run:
         return self.session.get(RunInfo, self.path)
 
     def wait(self, timeout: float | None = None) -> RunInfo:
-        """Waits for the end of the run. Raises TimeoutError after ``timeout`` s. A server that does not answer, or
-        is too busy, is waited for, for two minutes.
+        """Waits for the end of the run. Raises TimeoutError after ``timeout`` s. If the server does not answer, or
+        is too busy, the client repeats the request for two minutes.
         """
         deadline = math.inf if timeout is None else time.monotonic() + timeout
         heard = time.monotonic()
@@ -108,8 +108,9 @@ class Run:
             after = page.last
 
     def messages(self, after: int = 0, link: Link | None = None) -> Generator[AnyMessage]:
-        """Yields every message after ``after`` once and in order, past ones and new ones, until the end of the run.
-        Over Zenoh if it can be reached, else over SSE; ``link`` selects one.
+        """Yields every message after ``after`` once and in order, past messages and new ones, until the end of the run.
+
+        Messages come over Zenoh if the router can be reached, else over SSE; ``link`` selects one.
         """
         from .remote.stream import follow  # zenoh is loaded when it is needed
 
@@ -127,14 +128,16 @@ class Run:
 
     def watch(self, live: bool | None = None) -> Live:
         """Shows the run in the terminal until it ends. ``live`` selects the panel or plain lines; None: by the
-        terminal."""
+        terminal.
+        """
         from .watch import watch  # rich is loaded when it is needed
 
         return watch(self, live)
 
     def history(self, points: int = 1000) -> dict[str, Any]:
         """Returns the history of the run with at most so many reports: ``series``, ``ranks``, ``balance``,
-        ``snapshots``, ``last``."""
+        ``snapshots``, ``last``.
+        """
         return self.session.get(dict[str, Any], f"{self.path}/history", points=points)
 
     # Snapshots --------------------------------------------------------------------------------------------------------
@@ -152,8 +155,9 @@ class Run:
             raise self._lacks(f"snapshot {number}") from None
 
     def fragments(self, after: int = 0, link: Link | None = None) -> Generator[Snapshot]:
-        """Yields every snapshot whose message comes after message ``after``, until the end of the run. Over Zenoh
-        the data comes with the message; missing data is fetched from the server.
+        """Yields every snapshot whose message comes after message ``after``, until the end of the run.
+
+        Over Zenoh the data comes with the message; missing data is fetched from the server.
         """
         chosen = link or self.link()
         for message in self.messages(after, chosen):
@@ -180,7 +184,7 @@ class Run:
         return root
 
     def over(self) -> bool:
-        """Whether the run has ended: its files change no more."""
+        """Returns True if the run has ended: the files of the run no longer change."""
         return self.status().state.final
 
     def fetch(self, folder: Path, file: FileInfo, final: bool = False) -> Path:
@@ -195,7 +199,9 @@ class Run:
         return target
 
     def _address(self, file: FileInfo) -> str:
-        """Returns the address that the server lists if it belongs to this run; else that of the path."""
+        """Returns the address that the server lists if this address belongs to the run; else the address of the
+        path.
+        """
         own = f"{self.path}/files/"
         return file.url if file.url.startswith(own) else f"{own}{quoted(file.path, safe='/')}"
 
@@ -214,7 +220,8 @@ class Run:
 
 class RemoteFolder:
     """A run's folder on a server. Each file is fetched once, into a temporary folder that is removed with this
-    object."""
+    object.
+    """
 
     def __init__(self, run: Run) -> None:
         """Fetches nothing yet."""

@@ -21,12 +21,12 @@ from .live import Live
 from .remote.link import Link
 
 REASON_EVERY = 3.0
-"""Time in s between two requests of the reason for which a queued run waits. Chosen: below the 8 s after which a
-progress line is printed."""
+"""Time between two requests for the reason for which a queued run waits, s. Chosen value: below the 8 s after which
+a progress line is printed."""
 
 
 class Titled(Protocol):
-    """A status with a title."""
+    """Interface of a status with a title."""
 
     @property
     def title(self) -> str:
@@ -34,7 +34,7 @@ class Titled(Protocol):
 
 
 class Watched(Protocol):
-    """A run that can be followed."""
+    """Interface of a run that can be followed."""
 
     id: str
 
@@ -88,7 +88,7 @@ def _ask(run: Watched, known: Live) -> None:
         known.reason, known.away = getattr(run.status(), "reason", ""), 0.0
     except UnreachableError:
         known.away = known.away or time.time()
-    except (ClientError, RuntimeError):  # the session may be closed by now
+    except (ClientError, RuntimeError):  # the session may be closed already
         return
 
 
@@ -102,8 +102,8 @@ def show(messages: Iterable[AnyMessage], known: Live, out: Console) -> Live:
 
 
 def tell(messages: Iterable[AnyMessage], known: Live, write: Callable[[str], None]) -> Live:
-    """Prints one plain line for each change of state, each warning and each percent of progress, and progress lines
-    while there is no message, which become rarer.
+    """Prints one plain line for each change of state, each warning and each percent of progress. While no message
+    arrives, prints progress lines, which become rarer.
     """
     told, texts = -1, set[str]()
     with progress.broken(write, lambda: _waiting(known)) as say:

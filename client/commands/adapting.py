@@ -1,4 +1,4 @@
-"""``conoid sweep --adaptive``: the goal from the arguments, the answer as lines or JSON."""
+"""``conoid sweep --adaptive``: reads the goal from the arguments and prints the result as lines or JSON."""
 
 import hashlib
 from collections.abc import Sequence
@@ -20,7 +20,7 @@ from .options import aloud, complain
 
 
 def file_of(case: str, goal: str, sets: Sequence[str]) -> Path:
-    """Returns the default file of an adaptive sweep: the same file for the same arguments."""
+    """Returns the default file of an adaptive sweep. The same arguments give the same file."""
     keys = sorted(word.partition("=")[0].strip() for word in sets)
     told = hashlib.sha256("\n".join([goal.replace(" ", ""), *keys]).encode()).hexdigest()[:6]
     return Path(f"{locate(case).stem}-{told}.sweep.json")
@@ -30,7 +30,7 @@ def adaptive(
     session: Session, case: str, goal: str, sets: Sequence[str], more: Sequence[str], tolerance: str | None,
     at_once: int | None, most: int | None, out: Path | None, *, new: bool, as_json: bool,
 ) -> Found:  # fmt: skip
-    """Runs the search and prints its answer. ``more``: further overrides. Raises CaseError, ClientError."""
+    """Runs the search and prints its result. ``more``: further overrides. Raises CaseError, ClientError."""
     if not sets:
         raise UsageError("--adaptive takes --set KEY=LOW:HIGH, the key that varies")
     spans, constants = spans_of(sets)

@@ -1,4 +1,6 @@
-"""``conoid batch``: a run as a job of Slurm, without a server. The folder is the same, and so is the result."""
+"""``conoid batch``: submits a run as a job of Slurm, without a server. Folder and result are those of a run on a
+server.
+"""
 
 import json
 import os
@@ -31,7 +33,7 @@ from .console import echo, echo_json
 from .options import CaseArgument, Json, Overrides, Ranks, Threads, aloud, on_cores, warn
 
 _CASE = "case.json"
-"""Command of the worker for this case."""
+"""Command that starts the worker for this case."""
 _PLACES = ("~/.config/conoid/site.toml", "/etc/conoid/site.toml")
 
 
@@ -77,7 +79,8 @@ def batch_run(
 
 def slurm_of(site: Path | None) -> Slurm:
     """Returns the Slurm settings of the site; without a settings file one profile with Slurm's defaults. Raises
-    ClientError."""
+    ClientError.
+    """
     named = site or (Path(os.environ["CONOID_SITE"]) if os.environ.get("CONOID_SITE") else None)
     found = named or next((path for place in _PLACES if (path := Path(place).expanduser()).is_file()), None)
     try:
@@ -88,7 +91,9 @@ def slurm_of(site: Path | None) -> Slurm:
 
 
 def job_of(folder: Path) -> Job | None:
-    """Returns the record in a run's folder; None if it does not exist. Raises ClientError for an unreadable record."""
+    """Returns the record in a run's folder; None for a folder without a record. Raises ClientError for an unreadable
+    record.
+    """
     try:
         return batch.read_job(folder)
     except msgspec.MsgspecError as error:
@@ -96,7 +101,7 @@ def job_of(folder: Path) -> Job | None:
 
 
 def hand_over(case: str, overrides: Iterable[str], out: Path | None, profile: str, site: Slurm) -> Handed:
-    """Makes one job for the run in a folder, whatever happened before. Raises CaseError, ClientError."""
+    """Makes one job for the run in a folder, for any earlier state of the folder. Raises CaseError, ClientError."""
     data = data_of(case, overrides)
     files = Hashes().of(data, folder_of(case))
     data = with_hashes(data, files)
@@ -126,8 +131,8 @@ def hand_over(case: str, overrides: Iterable[str], out: Path | None, profile: st
 
 
 def _known(folder: Path, resolved: bytes, profile: str, site: Slurm) -> Job | None:
-    """Returns the record of a folder that was submitted before: of its job, or of a new one if that job is lost.
-    Raises ClientError if it belongs to another case, or to another ``profile`` than the requested one.
+    """Returns the record of the job of a folder that was submitted before. A lost job is replaced by a new one.
+    Raises ClientError if the folder belongs to another case, or to another ``profile`` than the requested one.
     """
     job = job_of(folder)
     if job is None:
@@ -168,8 +173,9 @@ def _prepared(
 
 
 def _command(folder: Path, ranks: int, threads: int, profile: batch.Profile) -> list[str]:
-    """Returns the command that starts the ranks. It is made anew for every job: a record in a folder must not choose
-    a program."""
+    """Returns the command that starts the ranks. The command is made again for every job: a record in a folder must
+    not choose a program.
+    """
     worker = [sys.executable, "-m", "mpi4py", "-m", "conoid.worker", str(folder / _CASE), "--out", str(folder)]
     words = ["--run", folder.name, "--ranks", str(ranks), "--interruptible"]
     return [*batch.starter(profile, ranks, _mpiexec, threads), *worker, *words]
@@ -191,7 +197,7 @@ def _mpiexec() -> list[str]:
 
 
 def cancel_folder(folder: Path) -> str:
-    """Cancels the run in a folder, and its job if that waits; returns one line that describes it.
+    """Cancels the run in a folder, and the waiting job of the run; returns one line about the result.
 
     Slurm's commands are those of the site's file, or of PATH. The job number of the record is used only if a job of
     this number has the name in the record. Raises UnfinishedError for a folder that is not a run's, ClientError,

@@ -1,4 +1,4 @@
-"""Commands that measure."""
+"""The command ``conoid bench``: measures the speed-up of a case."""
 
 import tempfile
 from collections.abc import Callable
@@ -70,7 +70,7 @@ def bench_scale(
 
 
 def layouts_of(text: str) -> list[Layout]:
-    """Returns the ranks, and threads of each, of ``1,2,4x4``. Raises ClientError."""
+    """Returns the numbers of ranks, and of threads for each rank, in a text such as ``1,2,4x4``. Raises ClientError."""
     found = []
     for word in text.split(","):
         numbers = [int(each[:9]) if each.isascii() and each.isdigit() else 0 for each in word.strip().split("x")]

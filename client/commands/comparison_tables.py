@@ -8,10 +8,12 @@ from ..reports.compare import AT_THE_END, Comparison
 from .tables import pairs, table
 
 _LONGEST = 60
-"""Characters of the value of a key that are shown. Chosen: two lines beside another one; a description has a page."""
+"""Largest number of characters of a key's value that are shown. Chosen value: two columns fit side by side; a
+description may have a page."""
 _NUMBERS = ("A", "B", "B - A", "% of A")
 _LEAST = 26
-"""Characters of names beside numbers. Chosen: the rest of 80, and most names fit."""
+"""Largest number of characters of names beside numbers. Chosen value: most names fit, and the line has 80
+characters."""
 
 
 def _brief(text: str) -> str:

@@ -76,7 +76,7 @@ class PlainConsole(Console):
     """
 
     def __init__(self, **options: Any) -> None:
-        """``options`` are those of rich."""
+        """Makes a console; ``options`` are those of rich."""
         super().__init__(**{"markup": False, "emoji": False, "highlight": False, **options})
 
     def print(self, *things: Any, **options: Any) -> None:
@@ -85,7 +85,7 @@ class PlainConsole(Console):
             super().print(*things, **options)
 
     def render_str(self, text: str, **options: Any) -> Text:
-        """Escapes text before the layout: an escape has a width."""
+        """Escapes text before the layout, because an escape is wider than its character."""
         return super().render_str(plain(text), **options)
 
     def render(self, renderable: RenderableType, options: ConsoleOptions | None = None) -> Iterable[Segment]:

@@ -31,8 +31,8 @@ from .options import CaseArgument, Overrides, Token, Url, aloud, complain
 from .reports import drawing
 
 _ENSEMBLE = 5
-"""Number of members for each point of a scene with fracture. Chosen: the standard deviation of five is good to a
-third."""
+"""Number of members for each point of a scene with fracture. Chosen value: the standard deviation of five is good to
+a third."""
 
 
 def converge(

@@ -31,18 +31,19 @@ _PHASE_STYLE = {
 }
 _LEVEL_STYLE = {"warning": "yellow", "error": "red"}
 _MOST_RANKS = 12
-"""Largest number of ranks with a bar of their own in the panel. Chosen: more do not fit a terminal."""
+"""Largest number of ranks with a bar in the panel. Chosen value: more bars do not fit a terminal."""
 _BAR = 36
-"""Characters of a full bar. Chosen for a terminal of 80 columns; a narrower one has shorter bars."""
+"""Characters of a full bar. Chosen value for a terminal of 80 columns; a narrower one has shorter bars."""
 _FRAME = 4
-"""Characters of the border in each line."""
+"""Number of characters of the border in each line."""
 _APART = 2
-"""Characters between two columns."""
+"""Number of characters between two columns."""
 _DETAILS = (_MOST_RANKS, 6, True), (4, 3, True), (2, 2, True), (2, 2, False), (1, 1, False)
 """Layouts from large to small: ranks, lines of the log, whether terms of the energy are shown. The first that fits
 the height of the terminal is used."""
 _SMALL = 0.005
-"""Share of the whole energy below which terms share a line. Chosen: their bar has no length."""
+"""Fraction of the whole energy below which terms of the energy are on a common line. Chosen value: such a term has a
+bar of no length."""
 Pair = tuple[str, str]
 
 
@@ -50,11 +51,11 @@ class panel:  # noqa: N801
     """The panel of a run for rich.live, with the width and height of the terminal."""
 
     def __init__(self, live: Live, log_lines: int = 6) -> None:
-        """``log_lines``: largest number of log lines."""
+        """Makes the panel; ``log_lines``: largest number of log lines."""
         self.live, self.log_lines = live, log_lines
 
     def __rich_console__(self, console: Console, options: ConsoleOptions) -> RenderResult:
-        """Method that rich calls."""
+        """Returns the panel; rich calls this method."""
         for detail in _DETAILS:
             drawn = self._drawn(options.max_width - _FRAME, detail)
             if len(console.render_lines(drawn, options, pad=False)) < console.size.height:
@@ -77,7 +78,7 @@ class panel:  # noqa: N801
 
 
 def _under(live: Live) -> str | None:
-    """Returns run and subscription, for the line below the panel."""
+    """Returns the name of the run and of the subscription for the line below the panel."""
     return " ".join([*([live.run] if live.title else []), *([f"over {live.link}"] if live.link else [])]) or None
 
 
@@ -93,7 +94,7 @@ def _why(live: Live) -> list[Text]:
 
 
 def _told(live: Live) -> list[str]:
-    """Returns cause and message if they say more than the state, and that no server answers."""
+    """Returns cause and message, if they add to the state, and a line if no server answers."""
     if live.away:
         return ["at its last message; no server answers"]
     return [part for part in (live.cause, live.told) if part and part != live.state.value]
@@ -126,7 +127,7 @@ def _numbers(facts: list[Pair], width: int) -> list[RenderableType]:
 
 
 def _fits(facts: list[Pair], width: int, columns: int) -> bool:
-    """Whether at least three quarters of the facts fit into so many columns."""
+    """Returns True if at least three quarters of the facts fit into that many columns."""
     share, name = (width - _APART * (columns - 1)) // columns, max((len(name) for name, _ in facts), default=0)
     return sum(name + 1 + len(value) > share for _, value in facts) <= max(2, len(facts) // 4)
 
@@ -204,7 +205,8 @@ def _helped(live: Live, rank: int) -> str:
 
 def _stacked(parts: dict[str, float], longest: float, cells: int) -> Text:
     """Returns a bar of at most so many cells. Its pieces end at the cumulative sums, so that rounding errors do not
-    add up."""
+    add up.
+    """
     edges, total = [0], 0.0
     for seconds in parts.values():
         total += seconds
@@ -216,7 +218,7 @@ def _stacked(parts: dict[str, float], longest: float, cells: int) -> Text:
 
 
 def _ledger(energy: Energy, width: int, *, terms: bool) -> RenderableType:
-    """Returns a bar for each term of the energy; small terms share a line. Without ``terms`` only the residual."""
+    """Returns a bar for each term of the energy; small terms have one line. Without ``terms``: only the residual."""
     residual = Text("energy residual ", style="bright_black").append(_residual(energy.residual))
     supplied = f"of {si(energy.initial, 'J')} at the start and {si(energy.external, 'J')} from outside"
     residual.append(f"  {supplied}", style="bright_black")
@@ -254,7 +256,8 @@ def _residual(residual: float) -> Text:
 
 def _once(live: Live) -> list[tuple[Log, int]]:
     """Returns the lines of the log, warnings last: each text once, at its last position, with its number of
-    repetitions."""
+    repetitions.
+    """
     times = Counter(entry.text for entry in live.log)
     last = {entry.text: entry for entry in live.log}
     ordered = sorted(last.values(), key=lambda entry: (entry.level in _LEVEL_STYLE, entry.seq))
@@ -262,7 +265,7 @@ def _once(live: Live) -> list[tuple[Log, int]]:
 
 
 def _log_line(entry: Log, times: int) -> Text:
-    """Returns a whole warning; other lines are cut to one line."""
+    """Returns a log message as text: a warning is complete, others are cut to one line."""
     warns = entry.level in _LEVEL_STYLE
     text = Text(overflow="fold" if warns else "ellipsis", no_wrap=not warns)
     text.append(f"{clock(entry.wall)} ", style="bright_black")
@@ -271,7 +274,7 @@ def _log_line(entry: Log, times: int) -> Text:
 
 
 def _who(entry: Log) -> str:
-    """Returns the level of the line, or its rank."""
+    """Returns the level of a log line, or its rank."""
     return f"{entry.level}: " if entry.level in _LEVEL_STYLE else f"[{entry.rank}] "
 
 

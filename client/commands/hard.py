@@ -39,7 +39,7 @@ class Verdict:
     title: str
     outcome: Outcome
     drifted: float | None
-    """Drift of the momentum; None if an external force acts."""
+    """Drift of the momentum; None for a case with an external force."""
     faults: list[str]
 
 
@@ -83,7 +83,8 @@ def hard(
 
 def chosen(known: Sequence[Hard], words: Sequence[str]) -> list[Hard]:
     """Returns the cases with these names or in these rows; all without arguments. Raises ClientError for an unknown
-    word."""
+    word.
+    """
     for word in words:
         if not any(word == each.name or word in each.rows for each in known):
             names = allowed(word, [each.name for each in known])
@@ -92,7 +93,7 @@ def chosen(known: Sequence[Hard], words: Sequence[str]) -> list[Hard]:
 
 
 def run_all(session: Session, some: Sequence[Hard], ranks: int, threads: int = 1) -> Iterator[Verdict]:
-    """Submits all cases, and yields each after its end. Raises CaseError for an invalid case."""
+    """Submits all cases, and yields the result of each case after its end. Raises CaseError for an invalid case."""
     quiet = {
         "run.ranks": ranks, "run.threads": threads, "run.frames": 0, "run.snapshots": 0,
         "run.checkpoint_every": "none",

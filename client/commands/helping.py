@@ -53,14 +53,16 @@ EXAMPLES: dict[str, tuple[str, ...]] = {
     "bench": ("conoid bench --help",),
     "hard": ("conoid hard",),
 }
-"""Lines of the help; a line that begins with blanks continues the line before."""
+"""Lines of the help. A line that begins with blanks continues the line before."""
 
 
 class Grouped(TyperGroup):
-    """A group whose help lists its commands by GROUPS, and the help of each command its EXAMPLES."""
+    """A group of commands. GROUPS orders the list of commands, and EXAMPLES has examples for the help of each
+    command.
+    """
 
     def format_commands(self, ctx: typer.Context, formatter: object) -> None:  # type: ignore[override]
-        """Writes the list of commands; those without a group come last."""
+        """Writes the list of commands; commands without a group are last."""
         there = {name: self.get_command(ctx, name) for name in self.list_commands(ctx)}
         named = {name for names in GROUPS.values() for name in names}
         groups = {**GROUPS, "More": tuple(name for name in there if name not in named)}

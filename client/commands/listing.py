@@ -14,7 +14,7 @@ from .options import Json, Labels, Token, Url, labels_of, show_lines
 from .times import moment
 
 _VALUES = 4
-"""Largest number of values that are shown of a run. Chosen: as many as fit into a line."""
+"""Largest number of values that are shown of a run. Chosen value: as many as fit into a line."""
 
 
 Words = Annotated[

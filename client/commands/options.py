@@ -27,13 +27,14 @@ from . import progress
 from .console import PlainConsole, echo, one_line
 
 _MOST_WARNINGS = 12
-"""Largest number of warnings that are printed. Chosen: half a screen."""
+"""Largest number of warnings that are printed. Chosen value: half a screen."""
 
 _RARER = 1.2
-"""Growth of the time between two progress lines, relative to the whole duration. Chosen: some forty lines in a day."""
+"""Growth of the time between two progress lines, relative to the whole duration. Chosen value: a day has some forty
+lines."""
 
 _NO_WIDTH = 1000
-"""Characters of a line in a file or a pipe. Chosen: more than any table needs."""
+"""Width of a line in a file or a pipe, characters. Chosen value: wider than any table."""
 
 Url = Annotated[
     str | None, typer.Option("--url", help="Address of the server [CONOID_URL, or the configuration file].")
@@ -84,7 +85,7 @@ def sweep_named(text: str) -> str:
 
 
 def folder_of(text: str) -> Path | None:
-    """Returns the folder of this name, None if there is none."""
+    """Returns the path of a folder with this name; None without such a folder."""
     try:
         return Path(text) if Path(text).is_dir() else None
     except (OSError, ValueError):  # a name that is too long or not allowed
@@ -142,7 +143,7 @@ def complain(*lines: str) -> None:
 
 
 def warn(odd: Sequence[Problem]) -> None:
-    """Prints each warning in one line, and the number of further ones."""
+    """Prints each warning in one line, and the number of warnings that are not printed."""
     complain(*(f"warning: {each}" for each in odd[:_MOST_WARNINGS]))
     if len(odd) > _MOST_WARNINGS:
         complain(f"warning: and {len(odd) - _MOST_WARNINGS} more; conoid validate --json has all")
@@ -158,7 +159,7 @@ def warn_of(case: str, overrides: Iterable[str]) -> None:
 
 
 def show(thing: RenderableType) -> None:
-    """Prints for people."""
+    """Prints a text, a table or a panel."""
     PlainConsole().print(thing)
 
 

@@ -15,7 +15,7 @@ from .sweep_columns import Row, number_of, telling
 from .tables import short_names, table
 
 _MOST = 4
-"""Number of results that are shown by default. Chosen: with keys and state they fit 80 characters."""
+"""Number of results that are shown by default. Chosen value: with keys and state they fit 80 characters."""
 
 
 def narrowed(text: str, keys: Sequence[str], columns: Sequence[str]) -> str:

@@ -8,15 +8,15 @@ from contextlib import contextmanager
 LONGEST = 8.0
 """Time in s without output after which a line is printed."""
 _RARER = 1.2
-"""Growth of the time between two lines, relative to the silent time. Chosen: some forty lines in a day."""
+"""Growth of the time between two lines, relative to the silent time. Chosen value: a day has some forty lines."""
 _LOOK = 0.125
-"""Time between two checks of the thread, relative to ``LONGEST``."""
+"""Time between two checks of the thread, over ``LONGEST``."""
 
 
 @contextmanager
 def broken(write: Callable[[str], None], words: Callable[[], str]) -> Iterator[Callable[[str], None]]:
-    """Context in which the caller prints with ``write``. After ``LONGEST`` s without a line it writes ``words()``,
-    and again each time that the silent time has grown by a fifth.
+    """Context in which the caller prints with ``write``. After ``LONGEST`` s without a line, the context writes
+    ``words()``, and again each time that the silent time has increased by a fifth.
     """
     last, spoken, over = time.monotonic(), 0.0, threading.Event()
 

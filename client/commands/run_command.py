@@ -82,7 +82,7 @@ def run_once(
 
 
 def _warn_of_cores(case: Case) -> None:
-    """Warns of more threads than cores: they make a run slower."""
+    """Prints a warning if there are more threads than cores: such a run is slower."""
     run, there = case.run, usable_cores()
     if run.cores > there:
         wanted = f"{crew(run.ranks, run.threads)} want {counted(run.cores, 'core')}"
@@ -92,8 +92,8 @@ def _warn_of_cores(case: Case) -> None:
 
 
 def _follow(run: Run, case: Case, out: Console, plain: bool) -> tuple[RunInfo, set[str]]:
-    """Shows the run until its end. The first Ctrl-C cancels it; further ones have no effect. Also returns the log
-    texts that were printed as lines: a panel shows only the last ones.
+    """Shows the run until its end. The first Ctrl-C cancels the run; further ones have no effect. Returns the log
+    texts that were printed as lines as well: a panel shows only the last ones.
     """
     known, told = Live(run.id, title=case.title or case.name), set[str]()
     try:
@@ -116,7 +116,7 @@ def _follow(run: Run, case: Case, out: Console, plain: bool) -> tuple[RunInfo, s
 
 
 def _report(result: Result, outcome: Outcome, told: set[str], out: Console) -> None:
-    """``told``: warnings that were printed before."""
+    """Prints the outcome; ``told``: warnings that were printed before."""
     out.print()
     for part in tables.end_tables(outcome, told):
         out.print(part)
@@ -126,7 +126,8 @@ def _report(result: Result, outcome: Outcome, told: set[str], out: Console) -> N
 
 def _telling_field(case: Case) -> str:
     """Returns the field of the picture: fragments if something can break, plastic strain if something can yield,
-    else the stress."""
+    else the stress.
+    """
     if case.fractures:
         return "fragment"
     yields = any(material(case, part.material).strength is not None for part in case.parts)

@@ -47,7 +47,9 @@ from .options import (
 
 
 def _filled(key: str | None) -> str | None:
-    """Returns the idempotency key. Raises UsageError for an empty one: an unset variable would make a second run."""
+    """Returns the idempotency key. Raises UsageError for an empty key, such as that of an unset variable: it would
+    make a second run.
+    """
     if key is not None and not key.strip():
         raise UsageError("--key is empty: write one, or leave it out")
     return key
@@ -161,7 +163,7 @@ def _watched(run: str, plain: bool, url: str | None, token: str | None, as_json:
 
 
 def _tell_probes(status: Callable[[], RunInfo]) -> None:
-    """Prints the probes if they can be read: the run itself has been shown already."""
+    """Prints the probes if the server sends them; the run itself has been shown before."""
     with suppress(ClientError):
         ended = status().outcome
         if ended is not None and ended.probes:
@@ -227,7 +229,8 @@ def get(
 ) -> None:
     """Copy a run's files to this machine.
 
-    If files are missing, they are listed and the exit code is 1."""
+    If files are missing, they are listed and the exit code is 1.
+    """
     if (folder := folder_of(run)) is not None and local_run.at_hand(folder):
         _copy(local_run.FolderFiles(folder), names, out, as_json)
         return

@@ -161,7 +161,9 @@ def _handed_in(
 
 
 def _changed(session: Session, detail: str, data: Mapping[str, Any], point: Point, folder: Path) -> str:
-    """What is another in the case than in the sweep whose id ends the ``detail``: the keys; empty if not known."""
+    """Returns the keys in which the case differs from that of an earlier sweep, whose id is at the end of
+    ``detail``; empty if unknown.
+    """
     try:
         (_, sweep), first = detail.rsplit(": ", 1), session.outbox.ready(apply_overrides(data, point), folder)
         run = session.find_sweep(sweep).status().points[0].run.id
@@ -268,7 +270,8 @@ def sweep_plot(
     token: Token = None,
 ) -> None:
     """Draw the results of a sweep over the changed key: a panel for each result, a curve for each value of the other
-    keys."""
+    keys.
+    """
     with aloud(f"drawing {out}"):
         if (path := file_named(sweep)) is not None:
             made = columns_of(path)

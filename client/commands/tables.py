@@ -41,8 +41,8 @@ from .display import STATE_STYLE
 
 
 def table(*columns: str, right: Sequence[str] = (), wide: Sequence[str] = ("case",), least: int | None = None) -> Table:
-    """Returns an open table with these columns; those in ``right`` are numbers, ``wide`` ones are wrapped if
-    necessary, the first of them to ``least`` characters.
+    """Returns a table without borders. Columns in ``right`` are numbers. Columns in ``wide`` are wrapped if
+    necessary; the first of these has at least ``least`` characters.
     """
     made = Table(box=box.SIMPLE_HEAD, header_style="bold", pad_edge=False, show_edge=False, padding=(0, 1, 0, 0))
     for column in columns:
@@ -115,7 +115,7 @@ def _how(row: RunRow) -> Text:
 
 
 def short_names(keys: Sequence[str]) -> dict[str, str]:
-    """Returns each key by its last parts, as many as make it unique."""
+    """Returns a short name for each key: as many of its last parts as make the name unique."""
     tails = {key: [".".join(key.split(".")[-n:]) for n in range(1, key.count(".") + 2)] for key in keys}
     times = Counter(tail for own in tails.values() for tail in own)
     return {key: next((tail for tail in own if times[tail] == 1), key) for key, own in tails.items()}
@@ -225,14 +225,17 @@ def _a_step(outcome: Outcome) -> str:
 
 
 def _compressed(met: Compressed) -> str:
-    """Returns the largest compression of a part without a law for it."""
+    """Returns the largest compressive stress of a part whose law has no failure in compression, over that of
+    Griffith's criterion.
+    """
     beyond = f", {counted(met.tets, 'tet')} beyond it at once" if met.tets else ""
     return f"{met.part} up to {si(met.most, 'Pa')}, {fixed(met.times)} times Griffith's criterion{beyond}"
 
 
 def balance_table(accounts: Sequence[Account], happened: Account) -> Table:
     """Prints costs of balance policies beside the actual ones; the saved time is relative to a run without
-    balancing."""
+    balancing.
+    """
     made = table(
         "policy", "cuts", "lost", "cost of cuts", "total", "saved", "imbalance",
         right=("cuts", "lost", "cost of cuts", "total", "saved", "imbalance"),

@@ -54,14 +54,14 @@ def _clock(case: Case, expected: Estimate) -> str:
 def _up_to(
     value: float | None, more: float, shown: Callable[[float], str], when: str = "all that may break turns to dust"
 ) -> str:
-    """Returns the memory, and the larger memory ``more`` ``when`` bodies break into single tets."""
+    """Returns the memory as text; with ``more``, also the larger memory ``when`` bodies break into single tets."""
     if value is None or not more:
         return _about(value, shown)
     return f"{_about(value, shown)}, up to {shown(value + more)} if {when}"
 
 
 def parts_table(case: Case, expected: Estimate) -> Table:
-    """Prints the approximate model of each part: its size and its initial state."""
+    """Prints the model of each part: its approximate size and its initial state."""
     right = ("tets", "mass", "extent", "momentum", "energy")
     made = table("part", "material", *right, right=right, wide=("material",))
     brought = _brings([each.bulk for each in expected.parts])
@@ -72,7 +72,8 @@ def parts_table(case: Case, expected: Estimate) -> Table:
 
 def files_table(case: Case, survey: Survey) -> Table:
     """Prints measurements of mesh files, combinations and CAD: the volumes, and the smallest altitude of a tet,
-    which determines the time step."""
+    which determines the time step.
+    """
     right = ("nodes", "volume", "smallest altitude")
     made = table("part", "from", "group", *right, right=right, wide=("from",))
     for each in survey.parts:

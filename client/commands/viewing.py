@@ -21,7 +21,7 @@ from .console import echo, echo_json
 from .options import Json, Token, Url, aloud, complain, find
 
 _NEAR = 0.005
-"""Relative difference of times below which no note is printed. Chosen: three digits are shown."""
+"""Relative difference of times below which no note is printed. Chosen value: three digits of a time are shown."""
 
 
 def view_frames(
@@ -129,7 +129,7 @@ def _shares(told: Sequence[str]) -> dict[str, float]:
 
 
 def _tell_of_times(asked: list[float], drawn: list[float | None]) -> None:
-    """Prints for each time the distance of the nearest frame, if it is not practically the same."""
+    """Prints for each time the distance of the nearest frame if this distance is not negligible."""
     for wanted, found in zip(asked, drawn[len(drawn) - len(asked) :], strict=True):
         if found is not None and abs(found - wanted) > _NEAR * max(abs(wanted), abs(found)):
             complain(f"time = {si(wanted, 's')}: the nearest frame is of {si(found, 's')}")

@@ -47,7 +47,7 @@ class Entry:
 
     @property
     def decided(self) -> bool:
-        """Whether the keyword has been decided."""
+        """True if the keyword has been decided."""
         return self.barred or bool(self.places or self.reasons)
 
     def take(self, *places: str) -> None:

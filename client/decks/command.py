@@ -21,7 +21,7 @@ from .toml import NOTE
 
 _FORMATS = ", ".join(DIALECTS)
 _SHOWN = 20
-"""Reasons of a refusal that are printed. Chosen: a screen; the account has all."""
+"""Reasons of a refusal that are printed. Chosen value: a screen; the account has all."""
 
 
 def import_deck(

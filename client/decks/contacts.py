@@ -13,7 +13,8 @@ from .draft import Body, Draft
 @dataclass(frozen=True)
 class Meeting:
     """A contact of a deck: bodies, by their keys, in contact with ``other``, or with each other and themselves
-    (None)."""
+    (None).
+    """
 
     one: frozenset[str]
     other: frozenset[str] | None
@@ -22,7 +23,7 @@ class Meeting:
 
     @property
     def meets(self) -> bool:
-        """Whether there are bodies on both sides."""
+        """True if there are bodies on both sides."""
         return bool(self.one) and self.other != frozenset()
 
     def pairs(self) -> set[tuple[str, str]]:

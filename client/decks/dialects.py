@@ -18,7 +18,7 @@ from .radioss.reading import Radioss
 from .units import System, Weighed
 
 _LOOKED = 2000
-"""Lines at the start of a file that are searched. Chosen: no heading of comments is longer."""
+"""Lines at the start of a file that are searched. Chosen value: no heading of comments is longer."""
 
 
 class Dialect(Protocol):

@@ -32,7 +32,7 @@ class Fields(Generic[Place]):
         raise NotImplementedError
 
     def given(self, name: str) -> bool:
-        """Whether the field exists and is not empty."""
+        """Returns True if the field exists and is not empty."""
         return name in self._found and bool(self._found[name][1])
 
     def real(self, name: str, default: float = 0.0) -> float:

@@ -13,8 +13,8 @@ AXES = ("x", "y", "z")
 Course = tuple[tuple[float, float], ...]
 """Times, in the unit of the deck, and factors."""
 _NEAR = 1e-6
-"""Tolerance of nodes on one plane, over the size of a body. Chosen: above the six digits of files, far below any
-tet."""
+"""Tolerance of nodes on one plane, over the size of a body. Chosen value: above the six digits of files, far below
+any tet."""
 
 
 @dataclass
@@ -52,14 +52,15 @@ class Holding:
                 self._one(each, walls)
 
     def _slides(self, hold: Hold) -> bool:
-        """Whether the nodes are restrained along some axes and free along others."""
+        """Returns True if the nodes are restrained along some axes and free along others."""
         return 0 < sum(speed == 0.0 for speed in hold.speeds.values()) < 3 and not any(hold.speeds.values())
 
     # Planes of symmetry -----------------------------------------------------------------------------------------------
 
     def _planes(self, axis: str, holds: list[Hold]) -> None:
         """Makes a boundary for each plane whose nodes are all restrained across it, at an end of the bodies that it
-        cuts."""
+        cuts.
+        """
         held = set().union(*(self._topology.nodes(each.chosen) for each in holds))
         planes: dict[float, list[str]] = {}
         done: set[int] = set()
@@ -82,7 +83,8 @@ class Holding:
 
     def _plane(self, axis: str, key: str, held: set[int]) -> float | None:
         """Returns the coordinate of the restrained nodes of a body if they are all nodes of one plane at an end of
-        it."""
+        it.
+        """
         d, mine = AXES.index(axis), self._topology.of[key] & held
         if not mine:
             return None
@@ -131,7 +133,8 @@ class Holding:
 
 def velocity_course(curve: Course, end: float) -> tuple[float, Course]:
     """Returns speed and course of velocities over time: the largest one, and its factors. Raises ValueError for a
-    missing curve."""
+    missing curve.
+    """
     if not curve:
         raise ValueError("the curve has no points")
     most = max((value for _, value in curve), key=abs)
@@ -144,7 +147,8 @@ def velocity_course(curve: Course, end: float) -> tuple[float, Course]:
 
 def displacement_speed(curve: Course, end: float) -> float:
     """Returns the constant velocity of displacements that grow linearly from 0 up to the end. Raises ValueError for
-    others."""
+    others.
+    """
     inside = [(time, value) for time, value in curve if time <= end]
     if curve and curve[-1][0] < end:
         raise ValueError(f"the curve ends at {curve[-1][0]:g}, before the end of the run at {end:g}")

@@ -1,5 +1,6 @@
-"""Files that are written completely or not at all: after an error the incomplete file is removed, and an earlier one
-stays."""
+"""Files that are written completely or not at all. After an error the incomplete file is removed, and an earlier
+file stays.
+"""
 
 import os
 from collections.abc import Iterator
@@ -11,11 +12,13 @@ from ..errors import ClientError
 
 @contextmanager
 def whole(out: Path) -> Iterator[Path]:
-    """Yields a path to write to, whose file replaces ``out`` at the end; it has the same ending, by which libraries
-    choose the format. A target that is not a regular file, such as /dev/stdout, is written directly. Raises
-    ClientError with the name of ``out``.
+    """Yields a path to write to. At the end the file at this path replaces ``out``. Both have the same ending:
+    libraries choose the format by the ending.
+
+    A target that is not a regular file, such as /dev/stdout, is written directly. Raises ClientError with the name
+    of ``out``.
     """
-    target = out.resolve()  # a link is kept, its target is replaced
+    target = out.resolve()  # a link stays, and the file that the link points to is replaced
     plain = target.is_file() or not target.exists()
     part = target.with_name(f".{target.stem}.{os.getpid()}.part{target.suffix}") if plain else target
     try:

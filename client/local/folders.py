@@ -9,7 +9,7 @@ from conoid.cases.output import layout
 from ..errors import ClientError, UnfinishedError
 
 _NAMED = 8
-"""Number of runs that are listed for a folder of several runs. Chosen: as many as fit into a line."""
+"""Number of runs that are listed for a folder of several runs. Chosen value: as many as fit into a line."""
 
 
 class Folder(Protocol):
@@ -54,11 +54,11 @@ class LocalFolder:
         return path
 
     def told(self, name: str) -> str:
-        """Returns its path."""
+        """Returns the path of the folder."""
         return str(self.root / name)
 
     def _lacks(self, name: str) -> str:
-        """Returns why a file is missing: the folder may be one that contains runs."""
+        """Returns the reason for a missing file: the folder may contain runs and be no run itself."""
         found = (path for depth in ("*", "*/*") for path in self.root.glob(f"{depth}/{layout.JOURNAL}"))
         runs = sorted(path.parent.relative_to(self.root).as_posix() for path in found)
         if not runs or (self.root / layout.JOURNAL).exists():

@@ -19,16 +19,16 @@ from ..journal import from_line
 from ..remote.link import Link
 
 _PAUSE = 0.5
-"""Time in s between two readings of the journal. Chosen: a run reports four times a second."""
+"""Time in s between two readings of the journal. Chosen value: a run reports four times a second."""
 _ASK_EVERY = 10.0
-"""Time in s of silence after which Slurm is asked. Chosen: a few hundred watchers make one request in 30 ms."""
+"""Time in s of silence after which Slurm is asked. Chosen value: a few hundred watchers make one request in 30 ms."""
 _AT_WORK = {State.STARTING, State.RUNNING}
 """States in which a worker writes into the folder."""
 
 
 @dataclass(frozen=True)
 class Titled:
-    """Head of the display."""
+    """Id and title for the head of the display."""
 
     title: str
 
@@ -48,13 +48,15 @@ class FolderRun:
     """A run in a folder, which can be followed."""
 
     def __init__(self, folder: Path, place: str = "") -> None:
-        """``place``: the folder of Slurm's commands; empty: they are in PATH."""
+        """Prepares to follow a run; ``place``: the folder of Slurm's commands. If it is empty, the commands are in
+        PATH.
+        """
         self.folder, self._place = folder.resolve(), place
         self.id = self.folder.name
         self._asked, self._told = time.monotonic(), ""
 
     def status(self) -> Titled:
-        """Title of its case, if it exists already."""
+        """Title of the run's case, if the case exists already."""
         try:
             case = msgspec.json.decode(whole.read(self.folder / layout.RESOLVED_CASE), type=dict[str, Any])
         except (OSError, msgspec.MsgspecError):
@@ -62,7 +64,7 @@ class FolderRun:
         return Titled(str(case.get("title") or case.get("name", "")))
 
     def link(self) -> Link:
-        """Returns a subscription without messages: the journal is read."""
+        """Returns a subscription without messages: the messages come from the journal."""
         return _File()
 
     def messages(
@@ -71,12 +73,12 @@ class FolderRun:
         """Yields every line once and in order, until the end of the run."""
         offset, state = 0, State.QUEUED
         while True:
-            end = self._outcome()  # it is written last, so the journal is complete
+            end = self._outcome()  # the outcome is written last: the journal is complete
             raw, offset = self._read(offset)
             for line in raw:
                 try:
                     message = from_line(line)
-                except msgspec.DecodeError:  # incomplete line of a killed worker
+                except msgspec.DecodeError:  # a killed worker may leave an incomplete line
                     continue
                 yield message
                 if isinstance(message, Status):
@@ -129,8 +131,8 @@ class FolderRun:
         return Status(run=self.id, wall=time.time(), state=state, cause=cause, message=message)
 
     def _ask(self, state: State) -> Iterator[Status]:
-        """Returns new information about a silent job from Slurm; without a job, whether its worker still exists.
-        ``state``: the last reported state.
+        """Returns new information about a silent job from Slurm. Without a job, returns whether the worker still
+        exists. ``state``: the last reported state.
         """
         if time.monotonic() - self._asked <= _ASK_EVERY:
             return

@@ -1,4 +1,4 @@
-"""Files that a case names on this machine: found, hashed, copied."""
+"""Files on this machine that a case names: the files are found, hashed and copied."""
 
 import copy
 import hashlib
@@ -28,14 +28,14 @@ State = tuple[int, int, int, int]
 
 @dataclass(frozen=True)
 class LocalFile:
-    """A file that a case names, in the state in which it was hashed."""
+    """A file that a case names, with its state at the time of hashing."""
 
     named: Named
     path: Path
     sha256: str
     state: State
     named_in: str = ""
-    """For a deck with includes, which is written as one file to ``path``: hash of the deck itself."""
+    """Hash of the deck itself; used for a deck with includes, which is written as one file to ``path``."""
 
     @property
     def size(self) -> int:
@@ -48,7 +48,7 @@ class LocalFile:
             raise self.changed()
 
     def changed(self) -> ClientError:
-        """Returns the error line for it."""
+        """Returns the error line for a file that has changed since it was hashed."""
         return ClientError(f"{self.path}: has changed since it was hashed; nothing is handed in: try again")
 
 
@@ -56,7 +56,7 @@ class Hashes:
     """Hashes of files, computed once for each state of a file."""
 
     def __init__(self) -> None:
-        """Starts without hashes."""
+        """Makes an empty store of hashes."""
         self._known: dict[State, str] = {}
         self._decks: dict[tuple[Path, State], _Deck] = {}
         self._place: Path | None = None
@@ -86,8 +86,8 @@ class Hashes:
         return found
 
     def _hashed(self, named: Named, path: Path) -> LocalFile:
-        """Opens and hashes a file. Raises OSError; IsADirectoryError for anything but a regular file, also behind a
-        link; ValueError for a deck with unusable includes.
+        """Opens and hashes a file. Raises OSError; IsADirectoryError for a path or a link that does not lead to a
+        regular file; ValueError for a deck with unusable includes.
         """
         itself = self._read(named, path)
         if not one_deck.includes(path):
@@ -152,8 +152,8 @@ def with_hashes(case: Mapping[str, Any], files: Iterable[LocalFile]) -> dict[str
 
 
 def keep_copies(files: Iterable[LocalFile], folder: Path) -> None:
-    """Copies files into the folder of a run, named by their hashes. Raises ClientError for one that has changed
-    since it was hashed, OSError.
+    """Copies files into the folder of a run; the copies are named by their hashes. Raises ClientError for a file
+    that has changed since it was hashed, OSError.
     """
     for file in files:
         target = folder / layout.FILES / Named(file.named.table, file.named.path, file.sha256).copy

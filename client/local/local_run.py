@@ -21,7 +21,7 @@ from .folders import LocalFolder
 from .safe_paths import inside
 
 _ID = re.compile(r"[0-9a-z]{22}")
-"""Id of a run on a server, which is the name of the folder into which ``conoid get`` copies it."""
+"""Id of a run on a server. ``conoid get`` copies the run into a folder with this name."""
 _AT_WORK = {State.STARTING, State.RUNNING, State.STOPPING}
 """States in which a worker writes into the folder."""
 
@@ -54,7 +54,7 @@ def status(folder: Path) -> RunInfo:
 
 
 def _cores(case: dict[str, Any], known: Live, what: str) -> int:
-    """Returns the ``ranks`` or ``threads`` of the started worker, or those of the case."""
+    """Returns ``ranks`` or ``threads`` of the started worker; before its start, of the case."""
     if known.started is not None:
         return int(getattr(known.started, what))
     asked = case.get("run", {}).get(what, 1) if isinstance(case.get("run"), dict) else 1
@@ -62,7 +62,7 @@ def _cores(case: dict[str, Any], known: Live, what: str) -> int:
 
 
 def ask(folder: Path, request: str, wish: str) -> str:
-    """Writes a request file that the worker reads; returns one line that describes it. Raises UnfinishedError
+    """Writes a request file that the worker reads; returns one line about the request. Raises UnfinishedError
     without a worker, OSError.
     """
     LocalFolder(folder).path(layout.JOURNAL)
@@ -73,7 +73,7 @@ def ask(folder: Path, request: str, wish: str) -> str:
 
 
 def at_hand(folder: Path) -> bool:
-    """Whether the worker runs in this folder: not if it may be a copy of a server's run by ``conoid get``."""
+    """Returns True if the worker runs in this folder. A copy of a server's run by ``conoid get`` has no worker."""
     copied = _ID.fullmatch(str(folder)) is not None
     return not copied or (folder / layout.JOB).exists() or slurm.held(folder)
 
@@ -82,7 +82,7 @@ class FolderFiles:
     """The files of a run in a folder, with the interface of a run on a server."""
 
     def __init__(self, folder: Path) -> None:
-        """Reads nothing yet."""
+        """Stores the folder; reads nothing yet."""
         self._folder = LocalFolder(folder)
         self.id = self._folder.name
 

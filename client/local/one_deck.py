@@ -11,15 +11,16 @@ from conoid.cases.reading.included import LONGEST_LINE, Included, flattened, inc
 ENDINGS = (".k", ".key", ".dyn")
 """Endings of keyword decks."""
 _PLAIN: dict[str, Callable[[str], str | None]] = {".inp": inp.included_by, ".rad": included_by}
-"""Endings of the other decks, and patterns of a line that includes a file: the lines of that file replace it."""
+"""Endings of the other decks, each with a pattern of a line that includes a file. The lines of the included file
+replace this line."""
 _INCLUDES = re.compile(rb"(?im)^[ \t]*[*#][ \t]*INCLUDE")
 _CHUNK = 1 << 24
-"""Bytes that are searched at a time. Chosen."""
+"""Number of bytes that are searched at a time. Chosen value."""
 _STANDARD = "*KEYWORD"
 
 
 def includes(path: Path) -> bool:
-    """Whether a file is a deck that may include others. Raises OSError."""
+    """Returns True if a file is a deck that may include others. Raises OSError."""
     if path.suffix.lower() not in (*ENDINGS, *_PLAIN):
         return False
     rest = b""
@@ -46,10 +47,10 @@ def write(deck: Path, target: Path) -> list[Path]:
 
 @dataclass
 class _Flat:
-    """Yields the lines of a deck with those of its includes in their places.
+    """Yields the lines of a deck with the lines of its includes in their places.
 
-    The format of ``*KEYWORD`` holds in its own file and in the files that this includes afterwards. It is written
-    again after a file that has changed it.
+    The format of ``*KEYWORD`` holds in its own file and in the files that this file includes afterwards. After a
+    file that has changed the format, the format line is written again.
     """
 
     included: Included
@@ -91,6 +92,6 @@ class _Flat:
 
 
 def _name(text: str) -> str:
-    """Returns the keyword of a line in upper case, with its suffix if it has one."""
+    """Returns the keyword of a line in upper case, with its suffix; "?" for another line."""
     word = text[1:].partition("$")[0].split()
     return word[0].upper() if word[:1] and (len(word) == 1 or word[0].upper() == "KEYWORD") else "?"

@@ -20,11 +20,12 @@ ADDRESS_FILE = "server.json"
 LOG_FILE = "server.log"
 OWNER = "local"
 _START_SECONDS = 60.0
-"""Time in s for the start of a server. Chosen: it takes one or two, and many times that on a busy machine."""
+"""Time limit for the start of a server, s. Chosen value: a start takes one or two seconds, and many times that on a
+busy machine."""
 _STOP_SECONDS = 15.0
-"""Time in s for its end before it is killed: ``GRACE`` for its workers, and five for itself."""
+"""Time limit for the end of the server before it is killed, s: ``GRACE`` for its workers, and five for itself."""
 GRACE = 10.0
-"""Time in s for a cancelled worker before it is killed."""
+"""Time limit for the end of a cancelled worker before it is killed, s."""
 
 
 class Address(msgspec.Struct, kw_only=True, frozen=True):
@@ -35,10 +36,10 @@ class Address(msgspec.Struct, kw_only=True, frozen=True):
 
 
 class LocalServer:
-    """A server on free loopback ports, with a token that only this process has.
+    """A server on free loopback ports, with a token that only this process has; a context manager.
 
-    A context manager: the server runs inside, and is stopped afterwards. It is not in the terminal's process group,
-    so that Ctrl-C reaches only this process; on Linux it ends when this process dies.
+    The server runs inside the context and is stopped afterwards. It is not in the terminal's process group: Ctrl-C
+    reaches only this process. On Linux the server ends when this process dies.
     """
 
     def __init__(self, runs: Path, slots: int) -> None:
@@ -86,7 +87,7 @@ class LocalServer:
         raise ClientError(f"the server did not start within {duration(_START_SECONDS)}; see {self.runs / LOG_FILE}")
 
     def stop(self) -> None:
-        """Asks the server to end, and kills it if it does not."""
+        """Asks the server to end, and kills the server after a time limit."""
         if self._process is None or self._process.poll() is not None:
             return
         self._process.terminate()
@@ -109,7 +110,7 @@ if sys.platform == "linux":
 runpy.run_module("conoid.server", run_name="__main__", alter_sys=True)
 """
 _TETHERED = [sys.executable, "-c", _TETHER]
-"""Command of the server. The kernel sends SIGTERM to it when the process of the first argument dies."""
+"""Command of the server. The kernel sends SIGTERM to the server when the process of the first argument dies."""
 
 
 def _token(runs: Path) -> str:

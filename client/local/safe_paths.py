@@ -9,19 +9,17 @@ from conoid.cases.reading.problems import shown
 from ..errors import ClientError
 
 _LONGEST_NAME = 255
-"""Bytes of the name of a file: NAME_MAX of Linux."""
+"""Largest length of the name of a file, bytes: NAME_MAX of Linux."""
 
 
 def quoted(text: str, safe: str = "") -> str:
-    """Returns ``text`` as a part of an address."""
+    """Returns ``text`` encoded as a part of an address."""
     return quote(text, safe=safe)
 
 
 def inside(root: Path, name: str) -> Path:
-    """Returns the path of ``name``, which a server or a user has given, below ``root``.
-
-    Raises ClientError for a name that leaves ``root`` on any system, also through a link inside, and for an
-    impossible name.
+    """Returns the path of ``name`` below ``root``; the name is from a server or a user. Raises ClientError for an
+    impossible name, and for a name that leaves ``root`` on any system, also through a link inside ``root``.
     """
     path, other = PurePosixPath(name), PureWindowsPath(name)
     if path.is_absolute() or other.anchor or ".." in (*path.parts, *other.parts) or not path.parts:
@@ -35,7 +33,7 @@ def inside(root: Path, name: str) -> Path:
 
 
 def _writable(name: str) -> bool:
-    """Whether each part of the name fits a file system."""
+    """Returns True if each part of the name fits a file system."""
     try:
         return all(len(os.fsencode(part)) <= _LONGEST_NAME for part in name.split("/"))
     except UnicodeEncodeError:

@@ -44,8 +44,9 @@ def target(url: str | None = None, token: str | None = None) -> Target:
 
 
 def address(url: str) -> str:
-    """Returns the address of a server: scheme, host, perhaps port and path, without a slash at its end. Raises
-    UsageError."""
+    """Returns the address of a server: scheme, host, and optionally port and path, without a slash at its end.
+    Raises UsageError.
+    """
     try:
         parts = urlsplit(url)
         fits = parts.port is None or parts.port > 0

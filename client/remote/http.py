@@ -1,6 +1,6 @@
-"""Requests to a server over HTTP; refusals become one clear line.
+"""Requests to a server over HTTP; a refusal becomes one clear line.
 
-Answers have limits: the time until the head has arrived, the number of bytes, and the mean rate of the bytes. So no
+Answers have limits: the time until the head has arrived, the number of bytes, and the mean rate of the bytes. No
 request waits for ever, and no answer fills the memory or the disk.
 """
 
@@ -29,29 +29,31 @@ from .config import address
 T = TypeVar("T")
 
 _AS_IT_IS = {"Accept-Encoding": "identity"}
-"""A file is requested with its length."""
+"""Header of a request for a file: the answer must have its length."""
 
 _ANSWER, _CONNECTION = 30.0, 5.0
-"""Timeouts in s: an answer may take a while with a slow disk, a connection may not. Chosen."""
+"""Timeouts in s: an answer may take a while with a slow disk, a connection may not. Chosen value."""
 _TIMEOUT = httpx2.Timeout(_ANSWER, connect=_CONNECTION)
 _STREAM_TIMEOUT = httpx2.Timeout(60.0, connect=_CONNECTION)
-"""Silence of a stream in s: four times the 15 s after which the server sends a comment (server/answers/stream.py)."""
+"""Longest silence of a stream, s: four times the 15 s after which the server sends a comment
+(server/answers/stream.py)."""
 _SPARE = 10.0
-"""Time in s beyond the allowed silence after which an answer whose head arrives byte by byte is given up."""
+"""Time beyond the allowed silence after which an answer is given up whose head arrives byte by byte, s."""
 _SLOWEST = 1000.0
-"""Least mean rate of an answer in bytes per s, after its first 30 s. Chosen: slower than any connection."""
+"""Smallest mean rate of an answer after its first 30 s, bytes per s. Chosen value: slower than any real connection."""
 UNAUTHORIZED = 401
 """HTTP status of a request without a valid token."""
 NOT_FOUND = 404
 _TRIES = 3
-"""Number of tries of a request that may be repeated, 0.3 and 0.6 s apart. Chosen: a lost connection is back by then."""
+"""Number of tries of a request that may be repeated, 0.3 and 0.6 s apart. Chosen value: most lost connections are
+back after this time."""
 _PATIENCE = 10.0
-"""Time in s after which a failed request is not repeated: a server that is silent for so long hangs. Chosen: three
-connections that time out are tried, and one answer that does."""
+"""Time after which a failed request is not repeated, s. Chosen value: a server that is silent for this time hangs.
+The time allows three timeouts of a connection, or one of an answer."""
 
 
 class Router(msgspec.Struct, kw_only=True, frozen=True):
-    """Address of the Zenoh router, and user and password for it (both None: without access control)."""
+    """Address of the Zenoh router, and user and password for the router (both None: without access control)."""
 
     endpoint: str
     user: str | None = None
@@ -88,7 +90,7 @@ class Http:
             raise UsageError(f"url = {self.url!r}: {error}") from None
 
     def __enter__(self) -> Self:
-        """Returns itself."""
+        """Returns this client."""
         return self
 
     def __exit__(self, *_: object) -> None:
@@ -105,15 +107,16 @@ class Http:
 
     def get(self, kind: type[T], path: str, **query: str | float | list[str]) -> T:
         """Returns the answer of a GET; a parameter with a list is sent several times. Raises ServiceError,
-        UnreachableError."""
+        UnreachableError.
+        """
         return self._decoded(kind, self._request("GET", path, params=query))
 
     def post(
         self, kind: type[T], path: str, body: bytes = b"", content: str = "", key: str | None = None,
         more: float = 0.0,
     ) -> T:  # fmt: skip
-        """Returns the answer of a POST. After a network error it is repeated only with an idempotency key. ``more``:
-        additional time for the answer in s.
+        """Returns the answer of a POST. After a network error a POST is repeated only with an idempotency key.
+        ``more``: additional time for the answer, s.
         """
         headers = {"Content-Type": content} if content else {}
         if key is not None:
@@ -162,7 +165,7 @@ class Http:
             beside.unlink(missing_ok=True)
 
     def stream(self, path: str, after: int = 0) -> Iterator[AnyMessage]:
-        """Yields the messages of an SSE stream after a number as they arrive, until the server ends it."""
+        """Yields the messages of an SSE stream after a number, as they arrive, until the server ends the stream."""
         headers = {"Accept": "text/event-stream", "Last-Event-ID": str(after)}
         with self._opened("GET", path, headers=headers, timeout=_STREAM_TIMEOUT) as response:
             for event in httpx2.EventSource(response) if response.status_code == 200 else ():
@@ -209,8 +212,9 @@ class Http:
             raise self._unreadable(error) from None
 
     def _begun(self, method: str, path: str, timeout: httpx2.Timeout = _TIMEOUT, **options: Any) -> httpx2.Response:
-        """Returns the answer once its head has arrived, within a time limit: httpx limits only the silence between
-        two bytes."""
+        """Returns the answer once its head has arrived, within a time limit. httpx limits only the silence between
+        two bytes.
+        """
         request = self._http.build_request(method, path, timeout=timeout, **options)
         done: queue.SimpleQueue[httpx2.Response | Exception] = queue.SimpleQueue()
 
@@ -234,7 +238,7 @@ class Http:
         return b"".join(self._chunks(response, replies.LONGEST))
 
     def _chunks(self, response: httpx2.Response, most: int) -> Iterator[bytes]:
-        """Yields at most ``most`` bytes of an answer. Raises AnswerError for an endless or slow one."""
+        """Yields at most ``most`` bytes of an answer. Raises AnswerError for a larger answer, or a slow one."""
         began, got = time.monotonic(), 0
         for chunk in response.iter_bytes():
             got += len(chunk)
@@ -246,7 +250,7 @@ class Http:
             yield chunk
 
     def _refusal(self, response: httpx2.Response) -> Mapping[str, Any]:
-        """Returns the message of the server; for a missing token, how to set one for this client."""
+        """Returns the message of the server; for a missing token, a text about how to set a token for this client."""
         told = replies.problem(response.status_code, self._body(response))
         if response.status_code != UNAUTHORIZED:
             return told
@@ -265,10 +269,10 @@ class Http:
             raise self._unreadable(error) from None
 
     def endless(self, what: str) -> ClientError:
-        """Error for a list whose pages do not end."""
+        """Returns the error for a list whose pages do not end."""
         return AnswerError(f"the list of {what} of {self.url} has no end")
 
     def _unreadable(self, error: Exception) -> ClientError:
-        """Error for an answer of another program, or of a newer server."""
+        """Returns the error for an answer of another program, or of a newer server."""
         why = " ".join(str(error).split())[: replies.WORDS]
         return AnswerError(f"the answer of {self.url} cannot be read: {why}; is it a Conoid server, and no newer?")

@@ -1,4 +1,4 @@
-"""A subscription to a run's messages, over any transport."""
+"""Interface of a subscription to a run's messages, over any transport."""
 
 from typing import Protocol
 
@@ -6,7 +6,7 @@ from conoid.cases.messages import AnyMessage
 
 
 class Link(Protocol):
-    """Messages as they arrive, perhaps with gaps and repetitions."""
+    """A source of messages as they arrive, possibly with gaps and repetitions."""
 
     name: str
     trouble: str

@@ -1,4 +1,6 @@
-"""Messages in the order of ``seq``, each once; missing ones are read from the journal. This module uses no network."""
+"""Messages in the order of ``seq``, each once. Missing messages are read from the journal. This module uses no
+network.
+"""
 
 import time
 from collections.abc import Callable, Iterator
@@ -9,16 +11,16 @@ Refill = Callable[[int], list[AnyMessage]]
 """Function that returns the messages of the journal after a number, in order."""
 
 _TRIES = 3
-"""Number of readings of the journal for a missing message before it is given up. Chosen: the journal is written
-before the sample is sent, so the first reading has it unless the file system lags."""
+"""Number of readings of the journal for a missing message before the message is given up. Chosen value: the journal
+is written before a message is sent, and the first reading has it unless the file system lags."""
 
 
 class InOrder:
     """Sorts arriving messages into the order in which they were written.
 
-    A message with a known number is dropped; a gap in the numbers calls ``refill``. The journal is written before
-    anything is published, so a refill has the missing messages. If it does not (a file system that lags), it is
-    called again a little later, and ``missing`` counts the messages that never came.
+    A message with a known number is dropped; a gap in the numbers calls ``refill``, which reads the journal. The
+    journal is written before anything is published. If a message is not in the journal yet (a file system that
+    lags), ``refill`` is called again a little later. ``missing`` counts the messages that never came.
     """
 
     def __init__(self, refill: Refill, after: int = 0, pause: float = 0.2) -> None:

@@ -15,24 +15,24 @@ from .sending import send
 from .submission import CaseSource, body_of, data_of, folder_of, to_json
 
 SURVEY = 330.0
-"""Time in s in which a server must read the files of a case before it answers: server/intake/reader.py has 300.
-Chosen."""
+"""Time limit for the answer to a case with files, which the server reads before it answers, s.
+server/intake/reader.py has 300. Chosen value."""
 _POINT = 30.0
-"""Additional time in s for each point of a sweep with other files than the point before. Chosen."""
+"""Additional time for each point of a sweep with other files than the point before, s. Chosen value."""
 
 
 class Outbox:
     """Files of cases; each file is hashed once for each state."""
 
     def __init__(self, http: Http) -> None:
-        """Sends nothing yet."""
+        """Prepares uploads; nothing is sent yet."""
         self._http, self._hashes = http, Hashes()
         self.say: Callable[[str], None] = lambda text: None
         """Callback with the progress of the upload."""
 
     def ready(self, case: Mapping[str, Any], folder: Path) -> dict[str, Any]:
-        """Returns a case in plain data with the hash of each file that it names; the server has all of them on
-        return. Relative paths are relative to ``folder``. Raises CaseError for unusable files, ClientError.
+        """Returns a case in plain data with the hash of each file that the case names. On return the server has all
+        of these files. Relative paths are relative to ``folder``. Raises CaseError for unusable files, ClientError.
         """
         files = self._hashes.of(case, folder)
         for file in {file.sha256: file for file in files}.values():
@@ -78,7 +78,9 @@ class Outbox:
 
 
 def place_of(case: CaseSource, folder: Path | str | None) -> Path:
-    """Returns the folder of relative paths: the given one, else that of the case. Raises CaseError."""
+    """Returns the folder of relative paths: ``folder`` if it is given, else the folder of the case. Raises
+    CaseError.
+    """
     return folder_of(case) if folder is None else Path(folder)
 
 

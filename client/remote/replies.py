@@ -13,14 +13,14 @@ from conoid.cases.figures import size
 from ..errors import ClientError
 
 WORDS = 300
-"""Largest number of characters of an error message that are shown. Chosen."""
+"""Largest number of characters of an error message that are shown. Chosen value."""
 LONGEST = 1 << 28
-"""Largest size in bytes of an answer that is read into memory, or has no length. Chosen: ten times the largest
+"""Largest size of an answer that is read into memory, or has no length, bytes. Chosen value: ten times the largest
 snapshot."""
 
 
 def problem(status: int, content: bytes) -> Mapping[str, Any]:
-    """Returns the problem of a refusal; a made-up one if the body is not JSON."""
+    """Returns the problem of a refusal; a replacement if the body is not JSON."""
     try:
         body = json.loads(content)
     except (ValueError, RecursionError):
@@ -34,8 +34,9 @@ def place(response: httpx2.Response) -> str:
 
 
 def most(response: httpx2.Response, target: Path) -> int:
-    """Returns the largest size of a downloaded file: its announced size, if the disk has room for it. Raises
-    ClientError."""
+    """Returns the largest size of a downloaded file: its announced size if the disk has enough space. Raises
+    ClientError.
+    """
     told = response.headers.get("content-length", "")
     if not told.isdecimal() or "content-encoding" in response.headers:
         return LONGEST
@@ -46,12 +47,12 @@ def most(response: httpx2.Response, target: Path) -> int:
 
 
 def reason(error: Exception) -> str:
-    """Returns why there was no answer, in one line."""
+    """Returns the reason for a missing answer in one line."""
     if isinstance(error, httpx2.ConnectError):
         return "is it running there? (conoid serve; another address: CONOID_URL or --url)"
     return " ".join(str(error).split()) or type(error).__name__
 
 
 def visible(text: str) -> bool:
-    """Whether all characters are visible ASCII, as a header requires."""
+    """Returns True if all characters are visible ASCII, as a header requires."""
     return all("!" <= letter <= "~" for letter in text)

@@ -62,7 +62,7 @@ class RunRow:
     references: int
     """Number of reference values with which the run was compared."""
     missed: list[str]
-    """Names of the reference values that the run does not reach."""
+    """Names of the reference values that the run misses."""
     alike: Alike | None
     """Common data of its group of similar cases in the same answer."""
 

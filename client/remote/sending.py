@@ -14,14 +14,14 @@ from ..local.local_files import LocalFile
 from .http import Http
 
 _LARGEST, _SMALLEST = 1 << 20, 1 << 14
-"""Smallest and largest size of a piece in bytes. Chosen: a proxy takes bodies of 1 MiB; at 1 kB/s 16 KiB are sent
-before a timeout."""
+"""Smallest and largest size of a piece in bytes. Chosen value: a proxy takes bodies of 1 MiB; at 1 kB/s 16 KiB are
+sent before a timeout."""
 _FIRST = 1 << 17
-"""Bytes of the first piece, before the speed of the connection is known. Chosen."""
+"""Bytes of the first piece, before the speed of the connection is known. Chosen value."""
 _WANTED = 2.0
-"""Target duration of a piece in s; a slower piece makes the next ones smaller. Chosen: a break loses as much."""
+"""Target duration of a piece in s; a slower piece makes the next ones smaller. Chosen value: a break loses as much."""
 _PATIENCE = 60.0
-"""Time in s without progress after which the upload is given up. Chosen: a restarted server is back by then."""
+"""Time in s without progress after which the upload is given up. Chosen value: a restarted server is back by then."""
 _PAUSE = 0.5
 """Time in s after a break before the server is asked for its number of bytes."""
 _LAST = 120.0
@@ -69,7 +69,8 @@ class _Sending:
 
     def go_on(self, offset: int) -> None:
         """Sends piece after piece. Waits and continues when the connection breaks or another client sends the same
-        file."""
+        file.
+        """
         moved = time.monotonic()
         while True:
             self._say(f"sending {self._file.path.name}, {size(offset)} of {size(self._file.size)}")
@@ -110,7 +111,7 @@ class _Sending:
         return told
 
     def _passes(self, error: ClientError) -> bool:
-        """Whether the upload may continue. Raises ClientError if the file has changed since it was hashed."""
+        """Returns True if the upload may continue. Raises ClientError if the file has changed since it was hashed."""
         if not isinstance(error, ServiceError):
             return isinstance(error, UnreachableError)
         code = error.problem.get("code")

@@ -31,19 +31,19 @@ from .run_query import Moment, query_of, words_of
 from .submission import CaseSource, data_of, to_json
 
 _CANDIDATES = 8
-"""Largest number of ids that are listed for an ambiguous prefix. Chosen: as many as fit into a line."""
+"""Largest number of ids that are listed for an ambiguous prefix. Chosen value: as many as fit into a line."""
 _LAST = "z" * 22
-"""Text after a prefix of an id that sorts after every id with this prefix."""
+"""Text that, after a prefix of an id, sorts after every id with this prefix."""
 _MOST_PAGES = 10_000
-"""Largest number of pages of a list. Chosen: a million runs; more pages are an error of the server."""
+"""Largest number of pages of a list. Chosen value: a million runs; more pages are an error of the server."""
 _POINT = 0.5
-"""Time in s for each point of a sweep, which the server reads, checks and writes to disk before it answers. Chosen:
-ten times the time on two cores at a load of 4.
+"""Time in s for each point of a sweep, which the server reads, checks and writes to disk before it answers. Chosen
+value: ten times the time on two cores at a load of 4.
 """
 _PAGE = 500
 """Rows of a page of the table: the largest number that a server sends."""
 _READING, _REST = 60.0, 0.2
-"""Time in s to wait for results that a server still reads, and between two requests. Chosen."""
+"""Time limit for results that a server still reads, and time between two requests, s. Chosen values."""
 
 
 class _Known(Protocol):
@@ -80,7 +80,8 @@ class Session(Http):
 
     def validate(self, case: CaseSource, overrides: Overrides = (), folder: Path | str | None = None) -> dict[str, Any]:
         """Checks a case on the server, and returns its estimate; ``folder`` as for ``submit``. Raises CaseError with
-        every problem."""
+        every problem.
+        """
         kind, body, more = self.outbox.body(case, overrides, folder)
         answer = self.post(Verdict, "/v1/cases:validate", body, kind, more=more)
         if not answer.valid:
@@ -120,8 +121,8 @@ class Session(Http):
         """Submits a new run of the same case that continues from the newest checkpoint of ``run``.
 
         ``ranks``, ``threads`` and ``max_steps`` (``run.max_steps``) replace the values of the case if given. The
-        final answer is the same as without an interruption. Raises ServiceError without a checkpoint, and when
-        ``run`` has used up its steps and ``max_steps`` is not larger.
+        final answer is the same as without an interruption. Raises ServiceError for a run without a checkpoint, and
+        for a run that has used up its steps if ``max_steps`` is not larger.
         """
         numbers = {"ranks": ranks, "threads": threads, "max_steps": max_steps}
         words = {name: str(number) for name, number in numbers.items() if number is not None}
@@ -153,13 +154,17 @@ class Session(Http):
         overrides: Overrides = (), at_once: int | None = None, most: int = MOST, out: Path | str | None = None,
         folder: Path | str | None = None, say: Callable[[str], None] = lambda text: None,
     ) -> Found:  # fmt: skip
-        """Where a result passes a threshold, ``goal``: ``"probe.core_speed = 0"``, any column of the table of a sweep.
+        """Runs an adaptive sweep: finds where a result passes a threshold.
 
-        ``spans`` has the keys that vary, together, and both ends of each: ``{"parts[0].velocity[2]": ("-200 m/s",
-        "-800 m/s")}``. Runs are made, ``at_once`` of them at a time (None: as the server has room), at most ``most``,
-        until the threshold lies in a bracket of ``tolerance``, by the first key: a quantity, a hundredth of the larger
-        end when it is None. ``out`` is a JSON file from which a later call goes on: what has succeeded is not run
-        again. ``say`` hears of each run. Raises CaseError, UsageError for a file of another sweep, ClientError.
+        ``goal``: result and threshold, such as ``"probe.core_speed = 0"``, with any column of the table of a sweep.
+        ``spans`` has the keys that vary together, and both ends of each: ``{"parts[0].velocity[2]": ("-200 m/s", "-800
+        m/s")}``.
+
+        At most ``most`` runs are made, ``at_once`` of them at a time (None: as the free slots allow), until the
+        bracket of the threshold has the width ``tolerance``. The tolerance is a quantity of the first key; None: a
+        hundredth of the larger end. ``out`` is a JSON file from which a later call continues without repeating
+        points that have succeeded. ``say`` receives a line for each run. Raises CaseError, UsageError for a file of
+        another sweep, ClientError.
         """
         data = data_of(case, overrides)
         return found_by(
@@ -208,7 +213,7 @@ class Session(Http):
         return self.get(Page, "/v1/runs", limit=_CANDIDATES + 1, prefix=beginning).runs
 
     def _named(self, what: str, path: str, name: str, after: Callable[[str], Iterable[_Known]]) -> str:
-        """Returns the id of a prefix; ``after`` returns runs, or sweeps, from a prefix on."""
+        """Returns the id that begins with a prefix; ``after`` returns runs, or sweeps, from a prefix on."""
         if not re.fullmatch(ID, name):
             raise NotFoundError(f"{what} {shown(name)}: there is none; an id has letters and digits")
         try:
@@ -227,7 +232,7 @@ class Session(Http):
         return found[0]
 
     def _candidates(self, name: str, after: Callable[[str], Iterable[_Known]]) -> list[str]:
-        """Returns some ids with this prefix; none if the server is too old for the request."""
+        """Returns some ids with this prefix; an empty list from a server that is too old for the request."""
         try:
             named = takewhile(lambda one: one.id.startswith(name), after(name))
             return [one.id for one in islice(named, _CANDIDATES + 1)]
@@ -270,7 +275,7 @@ class Session(Http):
         raise self.endless("runs")
 
     def _table(self, limit: int, query: Mapping[str, Any]) -> TablePage:
-        """Returns a page of the table. Repeats the request for a while if the server still reads results."""
+        """Returns a page of the table. Repeats the request for a limited time while the server still reads results."""
         until = time.monotonic() + _READING
         while (page := self.get(TablePage, "/v1/table", limit=limit, **query)).pending and time.monotonic() < until:
             time.sleep(_REST)
@@ -279,6 +284,7 @@ class Session(Http):
 
 def connect(url: str | None = None, token: str | None = None) -> Session:
     """Opens a session with the server of the arguments, of CONOID_URL and CONOID_TOKEN, or of the configuration
-    file."""
+    file.
+    """
     chosen = target(url, token)
     return Session(chosen.url, chosen.token)

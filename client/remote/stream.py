@@ -1,7 +1,7 @@
-"""Live messages of a run: over Zenoh if it can be reached, else over SSE; gaps are refilled over REST.
+"""Live messages of a run: over Zenoh if the router can be reached, else over SSE. Missing messages are read over REST.
 
 This is the only module of the client that imports zenoh. A client subscribes first, then reads the past messages,
-then the stream: no message is missing, and none comes twice.
+then the stream: no message is missing, and no message comes twice.
 """
 
 import hashlib
@@ -29,30 +29,30 @@ from .message_order import InOrder, Refill
 T = TypeVar("T")
 
 _CAPACITY = 4096
-"""Largest number of messages that wait to be read. Chosen: minutes of a run, which sends some ten per second."""
+"""Largest number of messages that wait to be read. Chosen value: minutes of a run, which sends some ten per second."""
 _BLOBS = 4
-"""Number of snapshots that are kept until they are read. Chosen: a reader is seconds behind at most."""
+"""Number of snapshots that are kept until they are read. Chosen value: a reader is seconds behind at most."""
 _OPEN_SECONDS = 5.0
-"""Time in s in which a router must answer before SSE is used. Chosen."""
+"""Time limit for the answer of a router before SSE is used, s. Chosen value."""
 _CLOSE_SECONDS = 2.0
-"""Time in s for closing a subscription. Chosen: nothing is lost without it."""
+"""Time limit for closing a subscription, s. Chosen value: an open subscription does no harm."""
 _SILENCE = 3.0
-"""Time in s without a message after which the journal is read. Chosen: a run reports four times a second."""
+"""Time without a message after which the journal is read, s. Chosen value: a run reports four times a second."""
 _PATIENCE = 60.0
-"""Time in s without a server after which following a run ends. Chosen: the time of a restart."""
+"""Time without a server after which following a run ends, s. Chosen value: a restart takes less."""
 
 
 class StreamError(ClientError):
-    """Zenoh cannot be used: there is no router, or it refuses the user."""
+    """Error: Zenoh cannot be used, because there is no router, or the router refuses the user."""
 
 
 class Mailbox:
-    """A bounded queue between the receiving threads and the reading one. When it is full, new messages are dropped;
-    gaps in ``seq`` are refilled.
+    """A bounded queue between the receiving threads and the reading thread. A full queue drops new messages; gaps in
+    ``seq`` are filled from the journal.
     """
 
     def __init__(self) -> None:
-        """Starts empty."""
+        """Makes an empty queue."""
         self._queue: queue.Queue[AnyMessage] = queue.Queue(_CAPACITY)
 
     def put(self, message: AnyMessage) -> None:
@@ -90,7 +90,7 @@ class ZenohLink:
             self._mailbox.put(message)
 
     def _keep(self, message: Snapshot, payload: bytes) -> None:
-        """Returns the bytes of a snapshot, if they have arrived and are complete."""
+        """Returns the bytes of a snapshot; None if they have not arrived or are incomplete."""
         with suppress(msgspec.MsgspecError):
             data = fragments_from_msgpack(payload).blob
             if hashlib.sha256(data).hexdigest() == message.sha256:
@@ -122,7 +122,9 @@ def _config(router: Router) -> zenoh.Config:
 
 
 def _within(seconds: float, work: Callable[[], T]) -> T:
-    """Returns the result of ``work``, computed in a thread. Raises StreamError when it fails or takes longer."""
+    """Returns the result of ``work``, computed in a thread. Raises StreamError if ``work`` fails or exceeds the time
+    limit.
+    """
     done: queue.Queue[tuple[T | None, Exception | None]] = queue.Queue()
 
     def attempt() -> None:
@@ -143,7 +145,8 @@ def _within(seconds: float, work: Callable[[], T]) -> T:
 
 class SseLink:
     """The SSE stream of the server, read in a thread. After a break it returns no more messages, and the journal is
-    read."""
+    read.
+    """
 
     name, trouble = "SSE", ""
 
@@ -177,9 +180,10 @@ def follow(link: Link, refill: Refill, ended: Callable[[], bool], after: int = 0
     """Yields every message after ``after`` once and in order, until the final status of the run; closes ``link``.
 
     ``refill`` reads the journal, ``ended`` asks the server whether the run has ended. While the link is silent both
-    are called every few seconds, so a failed router delays messages and loses none. A server that does not answer,
-    or is temporarily unavailable, is waited for, for a minute; then UnreachableError or ServiceError is raised. If a
-    message cannot be decoded, a warning comes before the next one; it is not in the journal and has no number.
+    are called every few seconds: a failed router delays messages and loses none. A server that does not answer, or
+    is temporarily unavailable, has a minute to return; then UnreachableError or ServiceError is raised. A message
+    that cannot be decoded is not in the journal and has no number; a warning about this message precedes the next
+    one.
     """
     order, said = InOrder(_patient(refill), after), False
     try:
@@ -207,7 +211,7 @@ def _told(link: Link, order: InOrder, ended: Callable[[], bool]) -> Iterator[Any
 
 
 def _asked(ended: Callable[[], bool]) -> bool:
-    """Whether the run has ended; False while no server answers."""
+    """Returns True if the run has ended; False while no server answers."""
     try:
         return ended()
     except ClientError as error:

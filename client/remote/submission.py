@@ -1,4 +1,4 @@
-"""A case as the user gives it: a file, the name of a shipped case, or plain data. It is sent unchanged."""
+"""A case in the form of the user: a file, the name of a shipped case, or plain data. The case is sent unchanged."""
 
 import json
 from collections.abc import Iterator, Mapping
@@ -28,7 +28,9 @@ def locate(source: str | Path) -> Path:
 
 
 def folder_of(source: CaseSource) -> Path:
-    """Returns the folder of relative paths: that of the case, for plain data the working folder. Raises CaseError."""
+    """Returns the folder of relative paths: the folder of the case file, for plain data the working folder. Raises
+    CaseError.
+    """
     return locate(source).parent if isinstance(source, str | Path) else Path()
 
 
@@ -51,8 +53,8 @@ def case_of(source: CaseSource, overrides: Overrides = ()) -> Case:
 
 
 def body_of(source: CaseSource, overrides: Overrides = ()) -> tuple[str, bytes]:
-    """Returns content type and body: a file unchanged, anything else as JSON. The server checks it. Raises CaseError
-    for a missing file, and for an impossible override.
+    """Returns content type and body: a file unchanged, anything else as JSON. The server checks the case. Raises
+    CaseError for a missing file, and for an impossible override.
     """
     changes = list(overrides) if isinstance(overrides, Iterator) else overrides
     if isinstance(source, str | Path) and not changes:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from .study import Study
 
 _WIDTH, _HEIGHT, _LEFT, _TOP, _SIDE = 424, 464, 56, 36, 320
-"""Sizes in pixels: the picture, and the square of the axes inside it with room for numbers and legend. Chosen."""
+"""Sizes in pixels: the picture, and the square of the axes inside it with room for numbers and legend. Chosen value."""
 _BLUE, _RED, _GREY = "#1b6ca8", "#c8553d", "#999999"
 
 

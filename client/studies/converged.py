@@ -19,7 +19,7 @@ from .trade import Target
 from .variants import Variant
 
 _ENOUGH = 0.05
-"""Relative difference of means for which the table of ensembles gives the required number of runs. Chosen."""
+"""Relative difference of means for which the table of ensembles gives the required number of runs. Chosen value."""
 
 
 @dataclass(frozen=True)
@@ -50,8 +50,8 @@ class Book:
         return {name: (each, goal) for name, (each, goal) in found.items() if goal is not None}
 
     def leading(self, wanted: str | None = None) -> str | None:
-        """Quantity of the advice: as requested, otherwise the first that converges and differs between the meshes. A
-        quantity without differences is excluded if a reference has no limit.
+        """Quantity of the advice: the requested one, otherwise the first quantity that converges and differs between
+        the meshes. A quantity without differences is excluded if a reference has no limit.
         """
         goals = self.goals()
         if wanted is not None:
@@ -234,7 +234,7 @@ def _seconds(value: float) -> str:
 
 
 def _percent(share: float) -> str:
-    """Returns two digits, without the sign."""
+    """Returns a number with two digits, without its sign."""
     return exact(100.0 * share, "", 2)
 
 

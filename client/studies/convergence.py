@@ -60,10 +60,10 @@ class Series:
 
 
 def run_all(session: Session, data: Mapping[str, Any], plan: Plan, folder: Path) -> Iterator[Done]:
-    """Submits every point and yields each when it has ended, in the order of the points.
+    """Submits every point and yields each point after its end, in the order of the points.
 
-    A point that has been run by the same server before is not run again. Relative paths of files begin in
-    ``folder``. Raises CaseError for a point that is not a valid case, before any is submitted.
+    A point that the same server has run before is not run again. Relative paths of files begin in ``folder``. Before
+    any run is submitted, raises CaseError for a point that is not a valid case.
     """
     points = plan.points(parse_case(data))
     cases = [apply_overrides(data, point.changes) for point in points]
@@ -82,7 +82,8 @@ def run_all(session: Session, data: Mapping[str, Any], plan: Plan, folder: Path)
 
 def _key(case: Mapping[str, Any]) -> str:
     """Returns the idempotency key of a point: the same for the same case and version, so that an interrupted study
-    continues."""
+    continues.
+    """
     text = json.dumps([metadata.version("conoid"), case], sort_keys=True, default=str)
     return f"converge-{hashlib.sha256(text.encode()).hexdigest()[:40]}"
 
@@ -127,7 +128,8 @@ def _mesh(factor: float, members: Sequence[Done], own: Done) -> Mesh:
 
 def _limit(name: str, meshes: Sequence[Mesh], floor: float) -> Limit:
     """Returns the limit of the means; SCATTERS instead of an order where the scatter exceeds the differences between
-    meshes."""
+    meshes.
+    """
     there = [mesh for mesh in meshes if name in mesh.samples]
     samples = [mesh.samples[name] for mesh in there]
     found = limit([mesh.size for mesh in there], [sample.mean for sample in samples], floor)

@@ -12,9 +12,9 @@ from .trade import Target
 
 _COLOURS = ("#4c78a8", "#f58518", "#54a24b", "#e45756", "#72b7b2", "#b279a2")
 _PANELS = 6
-"""Largest number of quantities in the picture. Chosen."""
+"""Largest number of quantities in the picture. Chosen value."""
 _LEAST = 1e-6
-"""Relative error drawn for 0: the axis is logarithmic. Chosen."""
+"""Relative error drawn for 0: the axis is logarithmic. Chosen value."""
 
 
 def figure(book: Book) -> Figure:

@@ -61,7 +61,7 @@ class Projection(msgspec.Struct, frozen=True, kw_only=True):
     longest: float
     """Sum over windows of the largest work of a rank."""
     longest_coarse: float
-    """The same over windows twice as long."""
+    """Sum of the largest work of a rank over windows of twice the length."""
     messages: float
     """Time of messages between two ranks."""
     collectives: float
@@ -79,10 +79,10 @@ class Projection(msgspec.Struct, frozen=True, kw_only=True):
     threads: int = 1
     """Threads of each rank."""
     by_tasks: bool = False
-    """Whether ``work`` is computed from tasks that were timed one after the other; otherwise it is measured with so
+    """True if ``work`` is computed from tasks that were timed one after the other; otherwise it is measured with so
     many threads."""
     helped: float = 0.0
-    """Working time of all threads of each rank except the first."""
+    """Working time of all threads of each rank except the first thread."""
     serial: dict[str, float] = {}
     """Serial wall time by phase, of the rank with the largest sum over all phases."""
     parallel: dict[str, float] = {}
@@ -96,7 +96,7 @@ class Projection(msgspec.Struct, frozen=True, kw_only=True):
 
     @property
     def name(self) -> str:
-        """``4``, or ``4x4`` with several threads; with a star if ``by_tasks``."""
+        """Name of the layout: ``4``, or ``4x4`` with several threads; with a star if ``by_tasks``."""
         threads = f"x{self.threads}" if self.threads > 1 or self.by_tasks else ""
         return f"{self.ranks}{threads}{'*' if self.by_tasks else ''}"
 
@@ -169,7 +169,7 @@ def project(
 
 
 def _of_one(outcome: Outcome, seconds: Seconds) -> dict[str, float]:
-    """Returns the serial and parallel times of the rank with the largest serial time."""
+    """Returns serial and parallel times of the rank with the largest serial time."""
     totals = _busy(outcome.serial) if outcome.serial else []
     return {name: each[totals.index(max(totals))] for name, each in seconds.items()} if totals else {}
 
@@ -195,7 +195,8 @@ def _messages(load: Load, network: Network) -> float:
 
 def _collectives(load: Load, network: Network) -> float:
     """Returns the time of a collective: up a binary tree and down again; the bytes of all ranks pass through every
-    rank."""
+    rank.
+    """
     levels = (len(load.collectives) - 1).bit_length()
     if not levels:
         return 0.0

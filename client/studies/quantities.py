@@ -14,7 +14,7 @@ _COUNTS = ("broken", "fragments", "eroded")
 _NO_STORE = ("initial", "external", "stepping", "averaging", "residual")
 """Lines of the ledger that are not energies at the end."""
 _FLOOR, _SHARE = 1e-6, 0.01
-"""Negligible differences: a millionth of the value, and a hundredth of the tolerance of a reference. Chosen."""
+"""Negligible differences: a millionth of the value, and a hundredth of the tolerance of a reference. Chosen values."""
 
 
 @dataclass(frozen=True)
@@ -35,12 +35,12 @@ class Number:
 
     @property
     def of_nothing(self) -> bool:
-        """Whether the expected value is about 0: then there is no relative error."""
+        """True if the expected value is about 0: then there is no relative error."""
         return self.expected is not None and abs(self.expected) <= self.tolerance
 
     @property
     def scale(self) -> float:
-        """Divisor of errors: the expected value, or the measured one if zero is expected."""
+        """Divisor of errors: the expected value; the measured value if zero is expected."""
         return max(abs(self.expected if self.expected is not None else self.value), self.tolerance)
 
 
@@ -74,7 +74,7 @@ def _references(outcome: Outcome) -> Iterator[Number]:
 
 
 def _probes(case: Case, told: Columns) -> Iterator[Number]:
-    """Returns mean over time, value of the largest magnitude, and last value."""
+    """Returns the mean over time, the value of the largest magnitude, and the last value."""
     for name in (probe.name for probe in case.probes):
         values, unit = told.numbers(name), told.units[name]
         finite = [value for value in values if value == value]

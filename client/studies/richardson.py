@@ -17,10 +17,11 @@ SAFETY, CAUTION = 1.25, 3.0
 SLOWEST = 0.5
 """Order below which Eca and Hoekstra do not trust an extrapolation."""
 _ORDERS = (0.01, 12.0)
-"""Range in which an order is searched. Chosen: beyond it differences are not significant."""
+"""Range in which an order is searched. Chosen value: beyond it differences are not significant."""
 _GOLDEN = (math.sqrt(5.0) - 1.0) / 2.0
 _SCAN, _HALVINGS = 240, 80
-"""Number of orders that are tried, and steps of the golden section about the best one. Chosen: 1e-12 of the order."""
+"""Number of orders that are tried, and number of golden-section steps about the best one. Chosen values: they give
+the order to 1e-12."""
 
 
 class Trend(StrEnum):
@@ -49,7 +50,7 @@ class Limit:
 
 @dataclass(frozen=True)
 class Fit:
-    """f(h) = ``value`` + ``slope`` h^``order``, and the standard deviation of the values from it."""
+    """Curve f(h) = ``value`` + ``slope`` h^``order``, and the standard deviation of the values from this curve."""
 
     value: float
     slope: float
@@ -106,7 +107,7 @@ def fitted(sizes: Sequence[float], values: Sequence[float], order: float | None 
 
 
 def _line(sizes: Sequence[float], values: Sequence[float], order: float) -> Fit:
-    """Weighted straight line in h^order."""
+    """Fits a weighted straight line in h^order."""
     weights = [1.0 / h for h in sizes]
     total = math.fsum(weights)
     x = [(h / max(sizes)) ** order for h in sizes]

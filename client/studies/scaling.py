@@ -36,7 +36,7 @@ class Trial:
     ranks: int
     threads: int
     by_tasks: bool = False
-    """Whether the run uses one thread per rank and times its tasks, from which times with ``threads`` and fewer
+    """True if the run uses one thread per rank and times its tasks, from which times with ``threads`` and fewer
     threads follow."""
 
     @property
@@ -96,7 +96,7 @@ def found(trial: Trial, folder: Path, layouts: Sequence[Layout], network: Networ
 
 
 def _there(folder: Path, case: bytes) -> bool:
-    """Whether the run exists. Raises ClientError if the folder contains another one."""
+    """Returns True if the run exists. Raises ClientError if the folder contains another one."""
     if not folder.exists():
         return False
     names = (layout.OUTCOME, layout.RESOLVED_CASE)
@@ -136,7 +136,8 @@ def _run(case: Path, trial: Trial, overrides: Sequence[str], folder: Path, secon
 
 def mpiexec() -> list[str]:
     """Returns the mpiexec of the site if it names one, otherwise that beside this Python or in PATH. Raises
-    ClientError."""
+    ClientError.
+    """
     beside = Path(sys.executable).with_name("mpiexec")
     chosen = shlex.split(os.environ.get("CONOID_MPIEXEC", ""))
     found = str(beside) if beside.is_file() else shutil.which("mpiexec")

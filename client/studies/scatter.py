@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from statistics import NormalDist, fmean, stdev
 
 CONFIDENCE, POWER = 0.95, 0.8
-"""Significance level, and power of the test. Chosen: usual in experiments."""
+"""Significance level, and power of the test. Chosen value: usual in experiments."""
 _NORMAL = NormalDist()
 
 
@@ -33,7 +33,8 @@ class Sample:
 
 def perturbations(members: int, least: float = 1e-3, most: float = 1e-2) -> list[float]:
     """Returns the share by which each member's steps are shorter: 0 for the first, then ``least`` to ``most``,
-    evenly in log."""
+    evenly in log.
+    """
     last = max(members - 2, 1)
     return [0.0, *(least * (most / least) ** (k / last) for k in range(members - 1))][:members]
 
@@ -52,7 +53,7 @@ def runs_needed(deviation: float, difference: float, confidence: float = CONFIDE
 
 
 def differ(a: Sample, b: Sample, confidence: float = CONFIDENCE) -> bool:
-    """Whether two means differ significantly: Welch's test; single values differ if they are not equal."""
+    """Returns True if two means differ significantly: Welch's test; single values differ if they are not equal."""
     variances = a.error**2, b.error**2
     if sum(variances) == 0.0:
         return a.mean != b.mean

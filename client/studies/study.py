@@ -23,17 +23,18 @@ class Study:
 
     @property
     def equal(self) -> bool:
-        """Whether all runs have the same answer."""
+        """True if all runs have the same answer."""
         return len({run.digest for run in self.runs}) == 1
 
     def speed_up(self, run: Projection) -> float:
         """Projected speed-up; with threads by timed tasks, relative to one thread by the same tasks, under the same
-        load of the cores."""
+        load of the cores.
+        """
         alone = next((each for each in self.runs if each.by_tasks and each.cores == 1), self.runs[0])
         return (alone if run.by_tasks else self.runs[0]).time / run.time
 
     def within(self, run: Projection) -> bool:
-        """Whether each thread had its own core, so that the wall time is significant."""
+        """Returns True if each thread had its own core, so that the wall time is significant."""
         return run.cores <= self.cores and not run.by_tasks
 
     @property
@@ -44,7 +45,8 @@ class Study:
 
     def losses(self, run: Projection) -> dict[str, tuple[float, float]]:
         """Returns the additional time of each phase per rank, s: its share of the work beyond that of one rank, and
-        imbalance."""
+        imbalance.
+        """
         one = self.runs[0].phases
         share = {name: one[name].total / run.threads for name in run.phases}
         found = {name: ((p.total - share[name]) / run.ranks, p.imbalance) for name, p in run.phases.items()}

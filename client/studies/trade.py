@@ -13,7 +13,7 @@ from .richardson import FORMAL, Trend
 from .variants import Variant
 
 _VAGUE = 0.3
-"""Relative uncertainty of a limit above which it is not used as target. Chosen."""
+"""Relative uncertainty of a limit above which it is not used as target. Chosen value."""
 
 
 @dataclass(frozen=True)
@@ -87,7 +87,9 @@ def _error(value: float, series: Series, number: Number, goal: Target) -> float:
 
 
 def front(points: Sequence[Worth]) -> list[Worth]:
-    """The Pareto front: no other point costs at most as much and has at most its error."""
+    """Returns the Pareto front: points for which no other point costs at most as much and has at most the same
+    error.
+    """
     kept: list[Worth] = []
     for point in sorted(points, key=lambda worth: (worth.cost, worth.error)):
         if not kept or point.error < kept[-1].error:
@@ -124,7 +126,8 @@ def _order(all_series: Sequence[Series], number: Number, variant: Variant) -> fl
 
 def _growth(all_series: Sequence[Series], variant: Variant) -> float:
     """Returns the exponent of the cost in 1 / size, from the finest and the coarsest mesh; 4, that of theory, from
-    one mesh."""
+    one mesh.
+    """
     meshes = next(each for each in all_series if each.variant == variant).meshes
     fine, coarse = meshes[0], meshes[-1]
     if fine.size >= coarse.size or not (fine.cpu > 0.0 and coarse.cpu > 0.0):

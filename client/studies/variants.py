@@ -35,7 +35,7 @@ class Point:
 
     variant: Variant
     factor: float
-    """Factor of the element sizes of the case."""
+    """Factor on the element sizes of the case."""
     member: int
     changes: Mapping[str, Any]
     """Changed keys with their values."""
@@ -105,5 +105,5 @@ def seeds(case: Case, member: int) -> dict[str, int]:
 
 
 def chaotic(case: Case) -> bool:
-    """Whether the case is sensitive to small changes: parts break or erode."""
+    """Returns True if the case is sensitive to small changes: parts break or erode."""
     return case.fractures or case.erodes

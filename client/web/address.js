@@ -13,8 +13,8 @@ function decoded(word) {
 // Least and largest number of names of each page.
 const NAMES = { runs: [0, 1], compare: [2, Infinity], sweeps: [1, 1], new: [0, 0] };
 
-// { page, names, query }: page is "runs", "run", "compare", "sweep" or "new". A malformed address is that of
-// the runs.
+// Returns { page, names, query }: page is "runs", "run", "compare", "sweep" or "new". A malformed address gives the
+// page of the runs.
 export function place(hash) {
   const [path, search = ""] = hash.replace(/^#\/?/, "").split("?", 2);
   const [page, ...words] = path.split("/").filter((word) => word !== "");
@@ -27,5 +27,5 @@ export function place(hash) {
 
 const WORDS = { run: "runs", sweep: "sweeps", compare: "compare" };
 
-// Address of a page with its names.
+// Returns the address of a page with its names.
 export const addressOf = (page, names) => `#/${[WORDS[page], ...names.map(encodeURIComponent)].join("/")}`;

@@ -13,7 +13,7 @@ export class Problem extends Error {
   }
 }
 
-// Whether a later request would fail as well. A proxy answers 502 and 503 while the server restarts.
+// True if a later request would fail as well. A proxy answers 502 and 503 while the server restarts.
 export const refused = (error) => error instanceof Problem && error.status < 500 && error.status !== 429;
 
 const address = (path) => new URL(path, document.baseURI);
@@ -30,9 +30,9 @@ export const binary = async (path, options) => (await send(path, { ...options, c
 
 export const text = async (path, options) => (await send(path, options)).text();
 
-const TAIL = 65536; // Bytes of a log that are shown.
+const TAIL = 65536; // Number of bytes at the end of a log that are shown.
 
-// End of the log of a rank, or of "launcher". A Range request of an empty file would fail.
+// Fetches the end of the log of a rank, or of "launcher". A Range request of an empty file would fail.
 export async function tail(run, rank) {
   const path = `v1/runs/${encodeURIComponent(run)}/logs/${rank}`;
   const { headers } = await send(path, { method: "HEAD" });
@@ -62,7 +62,7 @@ export async function download(path, name, size, onBytes) {
   return setTimeout(() => URL.revokeObjectURL(href), 60000);
 }
 
-// Messages of a run after the number `after` as they arrive, until the server ends the stream; calls `onOpen` at its start.
+// Yields messages of a run after the number `after` as they arrive, until the server ends the stream; calls `onOpen` at its start.
 export async function* messages(run, after, signal, onOpen) {
   const headers = { Accept: "text/event-stream", "Last-Event-ID": String(after) };
   const response = await send(`v1/runs/${encodeURIComponent(run)}/stream`, { headers, signal });

@@ -1,8 +1,8 @@
 // Velocities as arrows, of a few triangles that are spread evenly over the body (docs/snapshots.md).
 
-const LONGEST = 0.09; // Length of the arrow of the largest speed, as a share of the diagonal of the frame.
+const LONGEST = 0.09; // Length of the arrow of the largest speed over the diagonal of the frame.
 const SIDES = 6;
-const [SHAFT, HEAD, TIP] = [0.014, 0.05, 0.26]; // Radii and length of the head, as shares of the arrow's length.
+const [SHAFT, HEAD, TIP] = [0.014, 0.05, 0.26]; // Radii of shaft and head, and length of the head, over the arrow's length.
 const MOST = 600; // Largest number of arrows, with all images.
 
 export class Arrows {
@@ -13,7 +13,7 @@ export class Arrows {
     Object.assign(this.mesh, { frustumCulled: false, visible: false, count: 0 });
   }
 
-  // The largest speed, m/s. `keep` (part, place) selects the arrows, `reach` is the size of the framed region, m.
+  // Draws the arrows and returns the largest speed, m/s. `keep` (part, place) selects the arrows, `reach` is the size of the framed region, m.
   show(snapshot, { explode, middle, mirrors, keep, ink, reach }) {
     const { Matrix4, Quaternion, Vector3 } = this.three;
     const found = collect(snapshot, explode, middle, keep);
@@ -73,7 +73,7 @@ function reflected({ place, way }, mirrors, image) {
   return [at, along];
 }
 
-// A shaft and a head along y, 1 long.
+// Geometry of a shaft and a head along y with length 1.
 function shape({ BufferGeometry, BufferAttribute }) {
   const out = [];
   const ring = (k, radius, y) => [radius * Math.cos((2 * Math.PI * k) / SIDES), y, radius * Math.sin((2 * Math.PI * k) / SIDES)];

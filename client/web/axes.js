@@ -50,14 +50,14 @@ export function axis(unit, most, more = {}) {
   };
 }
 
-// Powers of ten; a unit gets its prefix at each of them.
+// Labels at powers of ten; the unit of each label has its own prefix.
 export const logarithmic = (unit, more = {}) => ({
   type: "log", splitLine: rule(), axisLabel: label((value) => exact(value, unit, 1)), ...more,
 });
 
 export const shares = (more = {}) => ({ ...axis("", 1), min: 0, max: 1, interval: 0.25, axisLabel: label((value) => percent(value, 0)), ...more });
 
-// Largest magnitude in some series; for a stack of the sum at each place.
+// Largest magnitude in some series; for stacked series, of the sum at each point.
 export function largest(list) {
   let most = 0;
   const sums = new Map();

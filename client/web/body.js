@@ -126,7 +126,7 @@ export class Body {
     return this.known(this.kept, n, MOST_KEPT, async () => decode(await binary(`${this.path}/snapshots/${n}`)));
   }
 
-  // Null if the snapshot has none.
+  // Returns null for a snapshot without all tets.
   async readVolume({ n, tets }) {
     return tets ? this.known(this.volumes, n, MOST_VOLUMES, async () => unpack(await binary(`${this.path}/snapshots/${n}/tets`))) : null;
   }
@@ -177,7 +177,7 @@ export class Body {
     return this.view.colour(by, ends, this.tools.choice.bands);
   }
 
-  // Another plane: through the middle of the frame; the side towards the camera is cut away.
+  // Moves to another section plane through the middle of the frame; the side towards the camera is cut away.
   async choose() {
     const name = this.tools.across.value;
     this.slicing = name !== "none";
@@ -235,7 +235,7 @@ export class Body {
 
   // Fragments -----------------------------------------------------------------------------------------------------------
 
-  // `kept`: the selection is kept in a new snapshot, which may lack the fragment.
+  // `kept`: the selection stays in a new snapshot, which may lack the fragment.
   pick(row, kept = false) {
     const found = row >= 0 ? fragment(this.snapshot, row) : null;
     this.view.mark(row);
@@ -250,7 +250,7 @@ export class Body {
     this.tools.heaviest.replaceChildren(...table(this.snapshot, row, (chosen) => this.pick(chosen)));
   }
 
-  // { t, mass, speed } of a fragment: from the server, or from the snapshots in memory.
+  // Returns { t, mass, speed } of a fragment: from the server, or from the snapshots in memory.
   async history(id) {
     return call(`${this.path}/fragments/${id}`).catch(() => this.remembered(id));
   }

@@ -5,8 +5,8 @@ import { mirrored, points, stand } from "./framing.js";
 const ANGLE = 30; // Vertical angle of view, degrees.
 const MARGIN = 1.06; // Margin round the framed region.
 const TURN = Math.PI / 24; // Turn of one arrow key.
-const FREE = 0.16; // Share of the height that is left free for axes and scale bar.
-const LEGEND = [90, 0.2]; // Space at the right for the legend: px, and largest share of the width.
+const FREE = 0.16; // Fraction of the height that is left free for axes and scale bar.
+const LEGEND = [90, 0.2]; // Space at the right for the legend: px, and largest fraction of the width.
 const VIEWS = { "+x": [1, 0, 0], "-x": [-1, 0, 0], "+y": [0, 1, 0], "-y": [0, -1, 0], "+z": [0, 0, 1], "-z": [0, 0, -1] };
 
 export const VIEW_NAMES = [...Object.keys(VIEWS), "isometric"];
@@ -50,14 +50,14 @@ export class ViewCamera {
     for (const other of this.others) other.copy(this);
   }
 
-  // Turning keeps the frame; zooming and shifting make it free.
+  // Turning keeps the frame; zooming and shifting end the automatic frame.
   released() {
     const shifted = this.framedAt && this.controls.target.distanceTo(this.framedAt) > 1e-6 * this.distance;
     if (this.mode !== "free" && (shifted || Math.abs(this.distance / this.touched - 1) > 1e-3)) this.follow(this.mode === "part" ? "part" : "free", this.part);
     this.onMode?.();
   }
 
-  // "fit", "all", "free", or "part" with its number.
+  // Sets the frame: "fit", "all", "free", or "part" with the number of a part.
   follow(mode, part = null) {
     const before = [this.mode, this.part];
     Object.assign(this, { mode, part, home: null });
@@ -65,14 +65,14 @@ export class ViewCamera {
     else if (mode === "fit" || mode === "all") this.fit();
   }
 
-  // A new snapshot, or another change of what the frame depends on.
+  // Updates the camera after a new snapshot or another change of the framed region.
   keep() {
     if (!this.direction) this.first();
     else if (this.mode === "fit" || this.mode === "all") this.fit();
     else if (this.mode === "part") this.carry();
   }
 
-  // A long body lies along the picture, seen from slightly above and from the side cut open by planes of symmetry.
+  // Sets the first view: a long body is horizontal, and the view is from slightly above onto the planes of symmetry.
   first() {
     const list = this.list();
     const side = [0, 1, 2].map((axis) => extent(list, axis));
@@ -85,7 +85,7 @@ export class ViewCamera {
     this.look(away, up);
   }
 
-  // View along a direction; `up` is an axis.
+  // Sets the view along a direction; `up` is an axis.
   look(away, up) {
     this.direction = true;
     this.camera.up.set(0, 0, 0).setComponent(up, 1);
@@ -103,7 +103,7 @@ export class ViewCamera {
     this.onMode?.();
   }
 
-  // Points of the framed region, of all views that share the frame.
+  // Points of the framed regions of all views that share the frame.
   list(more = {}) {
     return [this, ...this.others].flatMap((eye) => eye.places({ all: this.mode === "all", ...more }));
   }
@@ -137,7 +137,7 @@ export class ViewCamera {
     return list.map((value, i) => value + explode * (value - (box[0][i % 3] + box[1][i % 3]) / 2));
   }
 
-  // Follows the centre of mass of its part.
+  // Follows the centre of mass of the selected part.
   carry() {
     const now = this.centre();
     if (!now || !this.home) return;
@@ -203,7 +203,7 @@ export class ViewCamera {
     this.onMode?.();
   }
 
-  // Takes the view of another camera. `share` couples several views.
+  // Copies the view of another camera. `share` couples several views.
   copy(other) {
     this.quiet = true;
     this.direction = true;
@@ -218,7 +218,7 @@ export class ViewCamera {
   }
 }
 
-// All views move with one of them; each is { eye }. The frame is that of the first one.
+// Couples several views, each { eye }: all views move together. The frame is that of the first view.
 export function share(views) {
   for (const { eye } of views) eye.others = new Set(views.map((other) => other.eye).filter((other) => other !== eye));
   if (views[0]?.eye.direction) views[0].eye.moved();

@@ -21,7 +21,7 @@ export class Cards {
     return this.cards.has(name) && !this.closed.includes(name) ? name : "";
   }
 
-  // A card with its title, an element beside it, and its content; `name` is its key in the storage.
+  // Adds a card with its title, an element beside the title, and its content; `name` is the card's key in the storage.
   add(name, title, beside, ...content) {
     const words = typeof title === "string" ? title : title.textContent;
     const tool = (what, told, act) => h(`button.tool.${what}`, { type: "button", title: told, "aria-label": `${told}: ${words}`, onclick: act });
@@ -33,7 +33,7 @@ export class Cards {
     return element;
   }
 
-  // Whether a card has content.
+  // Shows or hides a card, according to whether it has content.
   show(name, there) {
     const card = this.cards.get(name);
     if (card.there === there) return;

@@ -123,7 +123,7 @@ export function withKey(text, table, name, literal) {
 // Rest of the line after a number or a quoted text.
 const comment = (value) => LITERAL.exec(value)?.[2] ?? "";
 
-// The text with the sha256 of a file wherever the case names it by `path`.
+// Returns the text with the sha256 of a file in each table that names the file by `path`.
 export function withHash(text, path, sha256) {
   if (isJson(text)) return changed(text, (data) => eachTable(data, (one) => { if (one.path === path) one.sha256 = sha256; }));
   const all = placed(text);
@@ -137,7 +137,7 @@ export function withHash(text, path, sha256) {
 const literals = (path) => [JSON.stringify(path), `'${path}'`];
 const reads = (text, { value, end }, path) => literals(path).some((one) => text.slice(value, end).startsWith(one));
 
-// `mesh.path = "…"` on a line of its own: the hash becomes the next line, or replaces the one in the same table.
+// For `mesh.path = "…"` on a line of its own, the hash becomes the next line, or replaces the hash in the same table.
 function beside(text, all, one, sha256) {
   const name = `${one.key.slice(0, -"path".length)}sha256`;
   const known = all.find(({ table, key }) => table === one.table && key === name);

@@ -49,7 +49,7 @@ export class Chart {
     if (stale) this.draw();
   }
 
-  // Out of view it is drawn the first time, and when it is `needed`.
+  // A chart out of view is drawn while the browser is idle: the first time, and later when it is `needed`.
   draw(needed = false) {
     if (this.seen) this.paint();
     else if ((needed || !this.chart) && !this.waiting) this.waiting = whenIdle(() => this.late());
@@ -78,7 +78,7 @@ export class Chart {
     this.points = Math.max(...option.series.map((one) => one.data?.length ?? 0));
   }
 
-  // A chart of several panels, one below the other, is higher.
+  // Height of a chart: several panels, one below the other, need more.
   stretch(panels) {
     this.panels = panels;
     this.element.style.height = `${Math.round(this.height * (0.4 + 0.6 * panels))}px`;
@@ -97,7 +97,7 @@ export class Chart {
     return chart;
   }
 
-  // Of all charts with the cursor, the one with the pointer or the focus shows the values of its lines.
+  // One chart shows the values of its lines: of all charts with the cursor, the chart with the pointer or the focus.
   read(cursor) {
     const focused = document.activeElement === this.element;
     if (!this.reads || !cursor || !(this.pointer || focused)) return;

@@ -5,10 +5,10 @@
 const HUES = [252, 70, 165, 15, 305, 120, 205, 345];
 // 2^64 over the powers of 1.2207, the root of g^4 = g + 1: their multiples fill a cube evenly (Roberts 2018, R3).
 const STEPS = [0xd1b54a32d192ed03n, 0xabc98388fb8fac03n, 0x8cb92ba72f3d8dd7n];
-// Lightness and chroma of a part by name, and of unbroken parts: muted, so that detached fragments stand out.
+// Lightness and chroma of the colour of a part, and of its intact body. The second is muted: fragments have stronger colours.
 const [STRONG, MUTED] = [[0.66, 0.12], [0.84, 0.045]];
 const DARKER = 0.13; // Difference of lightness between parts with the same hue.
-const REST = [140, 146, 152]; // Colour of the fragments without a row of their own, number -1.
+const REST = [140, 146, 152]; // Colour of the fragments without a row in the table of fragments, number -1.
 
 // [r, g, b] of a rank or a part by its number from 0, and the same as a CSS colour.
 export const ofName = (number) => rgb(STRONG[0] - DARKER * (Math.floor(number / HUES.length) % 3), STRONG[1], HUES[number % HUES.length]);

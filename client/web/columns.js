@@ -1,4 +1,4 @@
-// Columns of the tables of runs: the value that each shows of a row, and its unit.
+// Columns of the tables of runs: the value of a row that a column shows, and its unit.
 
 import { count, duration, exact, scaleOf, si, UNKNOWN, when } from "./figures.js";
 import { FINAL } from "./live.js";
@@ -26,11 +26,11 @@ const LAST = [
   { id: "title", title: "title", value: (row) => row.title, text: (row) => row.title, shown: false },
   { id: "message", title: "message", value: (row) => row.message || null, text: (row) => row.message, shown: false },
 ];
-const IF_ANY = new Set(["references", "labels"]); // Shown if a row has a value.
-const unsure = ({ state }) => state !== "succeeded"; // The result of such a run belongs to a time before the end.
+const IF_ANY = new Set(["references", "labels"]); // Columns that are shown if a row has a value.
+const unsure = ({ state }) => state !== "succeeded"; // True for a run whose result belongs to a time before its end.
 const TELLING = /^(fragments|reference\.penetration.*)$/; // Results that are shown by default.
-const MOST_PROBES = 4; // Probes that are shown by default.
-const MOST_VALUES = 6; // Keys that are shown by default.
+const MOST_PROBES = 4; // Largest number of probes that are shown by default.
+const MOST_VALUES = 6; // Largest number of keys that are shown by default.
 
 function labels(row) {
   const own = Object.entries(row.labels).filter(([name]) => name !== "sweep" && name !== "point");

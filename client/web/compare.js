@@ -16,9 +16,9 @@ import { decode } from "./snapshot.js";
 
 const TALL = 260;
 const AGAIN = 5000; // ms after which open runs, and runs without an answer, are read again.
-const POINTS = 600; // Points of a line; twelve lines are drawn at a time.
-const REPORTS = 200; // Points of a line of reports.
-const AT_ONCE = 4; // Runs that are read at the same time.
+const POINTS = 600; // Number of points of a line; twelve lines are drawn at a time.
+const REPORTS = 200; // Number of points of a line of reports.
+const AT_ONCE = 4; // Number of runs that are read at the same time.
 const MOST_CHARTS = 8;
 const LEDGER = ["kinetic", "elastic", "plastic", "viscous", "contact", "friction", "eroded", "fracture", "cohesive", "external", "residual"];
 const JOURNAL = { fragments: "", nodes: "", imbalance: "" }; // Quantities of reports, with their units.

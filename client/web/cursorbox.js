@@ -3,8 +3,8 @@
 import { colour } from "./axes.js";
 import { exact, h } from "./figures.js";
 
-const AWAY = 14; // Distance from the pointer, px.
-const MOST = 24; // Largest number of lines.
+const AWAY = 14; // Distance of the box from the pointer, px.
+const MOST = 24; // Largest number of lines in the box.
 
 // Index in `data` nearest to x; data is sorted by x.
 export function nearestTo(data, x) {
@@ -18,7 +18,7 @@ export function nearestTo(data, x) {
   return Math.abs(at(high) - x) < Math.abs(at(low) - x) ? high : low;
 }
 
-// [{ name, value, colour, dash, text }] of series at x, sorted by value, the largest first; a stack from its top.
+// Returns [{ name, value, colour, dash, text }] of series at x, sorted by value, the largest first; a stack from its top.
 export function worth(list, x) {
   const known = list.filter(({ data, aside, tooltip }) => data?.length && !aside && tooltip);
   const told = known.flatMap(({ name, data, color, lineStyle, tooltip: { valueFormatter }, stack }) => {

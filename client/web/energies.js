@@ -6,7 +6,7 @@ import { rough } from "./figures.js";
 import { TERMS } from "./live.js";
 
 export const VIEWS = { ledger: "all terms of the ledger", lost: "without the kinetic energy", internal: "internal energy by part", kinetic: "kinetic energy by part" };
-const FLOOR = 1e-10; // Residuals below it are rounding errors.
+const FLOOR = 1e-10; // Residuals below this value are rounding errors.
 const RESIDUAL = 1e-2; // Limit of the residual.
 
 export const end = ({ plan, progress, columns, ledger }) => plan?.run?.end_time ?? progress?.end_time ?? columns.values.t.at(-1) ?? ledger.at(-1)?.t ?? 1;

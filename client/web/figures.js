@@ -13,18 +13,18 @@ const LADDERS = {
   "m^3": [[1e-3, "m^3"], [1e-12, "mm^3"], [1e-18, "µm^3"]],
 };
 const WORTH = { "m^2": 1, "mm^2": 1e-6, "µm^2": 1e-12, "m^3": 1, "mm^3": 1e-9, "µm^3": 1e-18 };
-const PLAIN = [1e-3, 5]; // Numbers from here on, with fewer digits before the point than this, have no power of ten.
-const MOST = 1e12; // Integers from here on are written with a power of ten.
+const PLAIN = [1e-3, 5]; // A power of ten is written for numbers below the first value, and for as many digits before the point as the second.
+const MOST = 1e12; // Integers above this value are written with a power of ten.
 const MOST_HOURS = 10000;
 export const UNKNOWN = "–";
 
 const known = (value) => (typeof value === "number" ? value : NaN);
 const tied = (text, unit) => (text === UNKNOWN ? text : `${text} ${unit}`.trim());
 
-// A number with significant digits and the unit, with a fitting prefix if the unit takes one.
+// Returns a number with significant digits and the unit, with a fitting prefix if the unit takes a prefix.
 export const si = (value, unit = "", digits = 3) => alike([value], unit, digits)[0];
 
-// The same without trailing zeros.
+// Returns the text of `si` without trailing zeros.
 export const exact = (value, unit = "", digits = 6) => trimmed(si(value, unit, digits));
 
 // Values of one group: all have the prefix of the largest magnitude.

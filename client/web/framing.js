@@ -1,8 +1,8 @@
 // Region of a body that the frame shows, and the camera position from which all of it is visible.
 
-const HEAVY = 0.02; // Share of the mass of its part above which a fragment is always in the frame.
-const ENOUGH = 0.9; // Share of the mass of a part: the fragments beyond it, sorted by mass, are debris.
-const INNER = [0.05, 0.95]; // Shares by mass of the debris that lies in the frame along each axis.
+const HEAVY = 0.02; // A fragment with more than this fraction of the mass of its part is always in the frame.
+const ENOUGH = 0.9; // Fraction of the mass of a part: with fragments sorted by mass, the fragments beyond this fraction are debris.
+const INNER = [0.05, 0.95]; // Fractions by mass between which the debris lies in the frame along each axis.
 const MOST = 6000; // Largest number of points.
 
 // Points (m, three numbers each) of the framed region: heavy fragments of every visible part completely, and
@@ -24,7 +24,7 @@ export function partOf({ fragment_id: ids, triangles, vertex_fragment: rows, tri
   return out;
 }
 
-// Whether a row is a heavy fragment of its part.
+// True if a row is a heavy fragment of its part.
 function heavy({ fragment_mass: masses, fragment_id: ids }, part, wanted) {
   const total = new Float64Array(256);
   for (let row = 0; row < masses.length; row += 1) total[part[row]] += masses[row];
@@ -89,7 +89,7 @@ export function stand(list, { right, up, back }, [toLeft, toRight], tall) {
   return { place, depth: away - (far[4] + far[5]) / 2 };
 }
 
-// The same points with their images behind planes of symmetry, { axis, at } each.
+// Returns the same points together with their images behind planes of symmetry, { axis, at } each.
 export function mirrored(list, planes) {
   let out = list;
   for (const { axis, at } of planes) out = [...out, ...out.map((value, i) => (i % 3 === axis ? 2 * at - value : value))];

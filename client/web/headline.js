@@ -23,7 +23,7 @@ export class Headline {
       this.progress, this.told);
   }
 
-  // `connection` is [kind, words]; `busy` has the requests in progress.
+  // `connection` is [kind, words]; `busy` has the names of the requests in progress.
   draw(live, info, { connection: [kind, words], state, notice, busy }) {
     const over = FINAL.has(state);
     const old = !over && live.age > OLD ? `numbers ${duration(live.age)} old` : "";

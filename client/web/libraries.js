@@ -2,7 +2,7 @@
 
 const known = {};
 
-// Result of `read`, read once; after a failure it is read again.
+// Returns the result of `read`, which runs once; after a failure it runs again.
 const once = (name, read) => (known[name] ??= read().catch((error) => {
   delete known[name];
   throw error;

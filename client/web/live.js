@@ -73,7 +73,7 @@ export class Live {
     keep(this.loads, { t: message.t, imbalance: message.imbalance, ...compared(groups) });
   }
 
-  // Its fragments may belong to an earlier step, and a snapshot may have reported later ones.
+  // Handles a Counts message. Its fragments may belong to an earlier step than those of a snapshot.
   on_counts(message) {
     const { t, step, nodes, facets, counted = -1 } = message;
     const fragments = this.spreads(counted < 0 ? step : counted, message) ? message.fragments : this.counts?.fragments ?? message.fragments;
@@ -81,7 +81,7 @@ export class Live {
     keep(this.sizes, { t, nodes, facets, fragments });
   }
 
-  // Whether the fragments of a message are the newest; then their sizes are stored.
+  // True if the fragments of a message are the newest; then their sizes are stored.
   spreads(step, { t, smallest, sizes }) {
     if (step < this.found) return false;
     this.found = step;
@@ -91,7 +91,7 @@ export class Live {
 
   on_balance(message) { this.balances.push(message); }
 
-  // It also has the number of fragments.
+  // Handles a Snapshot message, which also has the number of fragments.
   on_snapshot(message) {
     if (this.spreads(message.step, message) && this.counts) this.counts = { ...this.counts, fragments: message.fragments };
     if (!this.snapshots.some(({ n }) => n === message.n)) this.snapshots.push(message);

@@ -22,7 +22,7 @@ export function draw(ctx, told) {
   if (told.caption) text(ctx, told, told.caption, told.axes ? PAD + 2.9 * ARM : PAD, told.height - PAD - 4, 12.5, told.ink);
 }
 
-// With a rim in the colour of the background, readable over any body.
+// Writes a text with a rim in the colour of the background: the text is readable over any body.
 function text(ctx, { ink, paper }, words, x, y, size = 12, colour = ink, align = "left", weight = 400) {
   ctx.font = `${weight} ${size}px ${FONT}`;
   ctx.textAlign = align;
@@ -49,7 +49,7 @@ function axes(ctx, told) {
   }
 }
 
-// Its scale is exact at the depth of the point about which the camera turns.
+// Draws the scale bar. Its scale is exact at the depth of the point about which the camera turns.
 function bar(ctx, told) {
   const { width, height, camera, distance } = told;
   const metre = height / (2 * distance * Math.tan((camera.fov * Math.PI) / 360));
@@ -70,7 +70,7 @@ function bar(ctx, told) {
   text(ctx, told, round(length), x + wide / 2, y - 9, 12, told.ink, "center");
 }
 
-// "5 mm" of 5e-3: without zeros behind the point.
+// Writes a length, such as "5 mm" for 5e-3, without zeros at the end of the decimals.
 const round = (length) => si(length, "m").replace(/(\.\d*?)0+(?= )/, "$1").replace(/\.(?= )/, "");
 
 function legend(ctx, told) {

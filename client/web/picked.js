@@ -37,7 +37,7 @@ export class Picked {
     this.course.replaceChildren(...[["mass", told.mass, "kg"], ["speed", told.speed, "m/s"]].map(([name, values, unit]) => small(name, told.t, values, unit)));
   }
 
-  // A line at the present time.
+  // Draws a line at the present time.
   place(t) {
     if (!this.told) return;
     const x = across(this.told.t)(t);

@@ -14,8 +14,8 @@ import { sizes } from "./snapshot.js";
 
 const TALL = 250;
 const COUNTED = [["nodes", "compute"], ["facets", "exchange"], ["fragments", "fracture"]];
-const CURVE = 60; // Points of a fitted law.
-const LEAST = 1; // Least number of fragments on its axis.
+const CURVE = 60; // Number of points of the curve of a fitted law.
+const LEAST = 1; // Smallest number of fragments on the axis.
 
 // { name: [chart, title, element beside the title] }; `onBalance` is called with the index of a balance event in live.balances.
 export function plots(live, onBalance) {

@@ -3,7 +3,7 @@
 const RATE = 8; // Snapshots per second of a film.
 const BITS = 12e6; // Bits per second.
 const KINDS = ["video/webm;codecs=vp9", "video/webm;codecs=vp8", "video/webm"];
-const HOLD = 800; // ms for which the last one is shown.
+const HOLD = 800; // Time for which the last snapshot of a film is shown, ms.
 
 // Draws the view on the background colour of the page onto `onto` (a canvas, created if missing).
 export function composed(view, onto = document.createElement("canvas")) {

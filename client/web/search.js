@@ -80,7 +80,7 @@ export class Answer {
     };
   }
 
-  // SI units, as in the other saved tables.
+  // Values are in SI units, as in the other saved tables.
   table() {
     const { search: { points, key, unit, result, result_unit: up } } = this.info;
     const head = (name, si_unit) => (si_unit ? `${name} [${si_unit}]` : name);
@@ -94,7 +94,7 @@ function constants({ factor, exponent }) {
   return exponent === null ? `slope ${si(factor, "", 4)}` : `a = ${si(factor, "", 4)}, p = ${si(exponent, "", 4)}`;
 }
 
-// Further data.
+// Further data of the sweep.
 function remarks({ why, mixed, curve, bracket }, x) {
   const beyond = curve && bracket && (curve.limit < bracket[0] || curve.limit > bracket[1]);
   return [

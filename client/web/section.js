@@ -24,7 +24,7 @@ export function nodes(steps) {
   return out;
 }
 
-const INSET = 0.02; // Of the extent of the tets along the normal.
+const INSET = 0.02; // Distance of a section from the end of the tets along the normal, over the extent of the tets.
 
 // The place (m) along `normal` next to `middle` that is inside of the tets, whose box is given: in a half or quarter model the
 // middle of the body with its mirror images is the plane of symmetry, where the tets end.

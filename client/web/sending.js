@@ -42,5 +42,5 @@ function piece(file, sha256, offset, signal) {
   return call(`v1/files/${sha256}`, { method: "PUT", headers, body, signal });
 }
 
-// Whether the same piece may be sent later: another client sends the file now, or the server does not answer.
+// True if the same piece may be sent later: another client sends the file now, or the server does not answer.
 const passes = (error) => !(error instanceof Problem) || error.status >= 500 || error.status === 408 || PASSING.has(error.body?.code);

@@ -38,7 +38,7 @@ export class Sha256 {
     return this;
   }
 
-  // Signed words throughout: engines keep those in registers, unsigned ones become floating-point numbers.
+  // All words are signed: engines keep signed words in registers, unsigned words become floating-point numbers.
   block(bytes, at) {
     const { state, words: w } = this;
     for (let i = 0, o = at; i < 16; i += 1, o += 4) w[i] = (bytes[o] << 24) | (bytes[o + 1] << 16) | (bytes[o + 2] << 8) | bytes[o + 3];

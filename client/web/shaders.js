@@ -1,6 +1,6 @@
 // Shaders of the body: positions from 16 bits, an offset and a colour of each fragment from small textures.
 
-export const ROWS_WIDTH = 256; // Texels in a line of a texture that has one texel a fragment.
+export const ROWS_WIDTH = 256; // Number of texels in a line of a texture that has one texel for each fragment.
 export const MOST_PARTS = 256;
 
 // `mirrors`: planes, x y z of the normal and the distance; bit k of the image's number: it lies behind plane k.

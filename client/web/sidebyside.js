@@ -43,7 +43,7 @@ export class SideBySide {
     if (this.seen) this.place();
   }
 
-  // It is drawn when it comes near the window.
+  // The body is drawn when it comes near the window.
   whenSeen() {
     const eye = new IntersectionObserver((entries) => {
       if (!entries.at(-1).isIntersecting) return;

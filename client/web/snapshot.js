@@ -6,8 +6,8 @@ const START = 16;
 const TYPES = {
   uint8: Uint8Array, uint16: Uint16Array, uint32: Uint32Array, int64: BigInt64Array, float32: Float32Array, float64: Float64Array,
 };
-const DUST = 10; // Tets, as in conoid.cases.output.fragments.
-const MOST_ROWS = 65536; // A vertex names its row in 16 bits.
+const DUST = 10; // Smallest number of tets of a fragment that is not dust, as in conoid.cases.output.fragments.
+const MOST_ROWS = 65536; // Largest number of rows: a vertex has the number of its row in 16 bits.
 
 // { header, arrays: { name: typed array, flat } }, without a copy. Throws Error for other data.
 export function decode(buffer) {

@@ -210,7 +210,7 @@ export class Surface {
     return new this.three.Vector3(...centres.subarray(3 * heaviest, 3 * heaviest + 3));
   }
 
-  // The number of the row at each pixel.
+  // Draws the number of the row at each pixel.
   numbers(renderer, camera, layers = [-1]) {
     const before = [this.own.mode.value, this.capOwn.mode.value];
     this.own.mode.value = this.capOwn.mode.value = 2;

@@ -2,7 +2,7 @@
 
 import { h } from "./figures.js";
 
-const MORE = 8; // Rows beyond the view, above and below, so that the Tab key can continue there.
+const MORE = 8; // Number of rows beyond the view, above and below: the Tab key can continue there.
 
 export class Windowed {
   // `make(item, n)` returns the row element of an item; it is made again when `item` or `version` has changed.

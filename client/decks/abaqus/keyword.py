@@ -26,7 +26,8 @@ class Keyword:
 
     def get(self, name: str) -> str | None:
         """Returns the value of a parameter without quotation marks; empty for one without value, None if it is
-        missing."""
+        missing.
+        """
         joined = "".join(name.split())
         self._read.add(joined)
         if joined not in self.parameters:
@@ -34,7 +35,7 @@ class Keyword:
         return (self.parameters[joined] or "").strip().strip('"')
 
     def has(self, name: str) -> bool:
-        """Whether a parameter exists."""
+        """Returns True if a parameter exists."""
         return self.get(name) is not None
 
     def key(self, name: str) -> str:
@@ -59,7 +60,8 @@ class Keyword:
 
     def table(self, columns: int) -> list[list[float]]:
         """Reads the numbers of its data lines. Raises InpError where a line has more than ``columns`` that are not
-        0."""
+        0.
+        """
         found = [(line, numbers(line, text)) for line, text in self.filled()]
         for line, row in found:
             if any(row[columns:]):

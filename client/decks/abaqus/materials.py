@@ -17,8 +17,9 @@ from .keyword import Keyword
 
 @dataclass(frozen=True)
 class Heat:
-    """Whether plastic work heats (``*DYNAMIC, EXPLICIT, ADIABATIC``), and the temperature of the deck's absolute
-    zero."""
+    """Two settings of the deck: True if plastic work heats (``*DYNAMIC, EXPLICIT, ADIABATIC``), and the temperature
+    of the deck's absolute zero.
+    """
 
     adiabatic: bool
     zero: float
@@ -160,7 +161,8 @@ class Material:
 
     def _damage(self, law: dict[str, Any]) -> dict[str, Any]:
         """Reads ``*DAMAGE INITIATION, CRITERION=JOHNSON COOK``: d3 has the opposite sign there (exp(-d3
-        triaxiality))."""
+        triaxiality)).
+        """
         found = self._below.get("DAMAGE INITIATION")
         if found is None or found.key("CRITERION") != "JOHNSONCOOK":
             return {}

@@ -15,7 +15,7 @@ from .words import spelt
 _SHIFT = 40
 """Bits of a number in a file; the bits above contain the index of the instance."""
 _MOST = 20_000_000
-"""Largest number of members of one line of GENERATE. Chosen: more than any mesh that is run has."""
+"""Largest number of members of one line of GENERATE. Chosen value: more than any mesh that is run has."""
 
 
 @dataclass

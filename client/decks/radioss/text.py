@@ -37,7 +37,7 @@ class Option:
 
     @property
     def local(self) -> bool:
-        """Whether a second number follows, which selects other units."""
+        """True if the identifier has a second number, which selects other units."""
         return sum(_WHOLE.fullmatch(word) is not None and int(word) > 0 for word in self.words) > 1
 
 
@@ -100,7 +100,8 @@ class Fields(fields.Fields[int]):
 
     def __init__(self, option: Option, entry: Entry, rows: Sequence[Row], layout: Sequence[str]) -> None:
         """``layout``: for each line its fields; a name with ``:`` has 10 columns, others 20, ``-`` for an unused
-        one."""
+        one.
+        """
         self.option = option
         found: dict[str, tuple[int, str]] = {}
         for row, names in zip(rows, layout, strict=False):
