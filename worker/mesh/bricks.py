@@ -15,19 +15,19 @@ from .model import Floats, Ids
 from .patterns import QUADS, skin
 
 _SEEN = 1e-6
-"""Share of the volume below which no note is given. Chosen: the round-off of coordinates with six digits."""
+"""Share of the volume below which no note is given. Chosen value: the round-off of coordinates with six digits."""
 
 
 @dataclass(frozen=True, eq=False)
 class Bricks:
-    """Elements that are not yet cut, of all kinds in one list."""
+    """Elements that are not yet cut into tets, of all kinds in one list."""
 
     nodes: Ids
-    """(m, 8) indices of their corners, as of hexahedra."""
+    """(m, 8) indices of the corners; every element is written as a hexahedron."""
     numbers: Ids
     lines: Ids
     forms: list[Form]
-    """Form of each kind, in order."""
+    """Form of each kind of element, in the order of the kinds."""
     counts: list[int]
 
     def called(self, k: int) -> str:
@@ -55,7 +55,8 @@ def bricks(cells: list[Cells]) -> Bricks:
 
 
 def cut_up(some: Bricks, triangles: Ids, points: Floats) -> Cut:
-    """Return the tets of the elements, which have faces in common with ``triangles`` (k, 3) of other elements.
+    """Return the tets of the elements. Triangles ``triangles`` (k, 3) of other elements are faces of these tets.
+
     Raises MeshError for an element that is inverted, flat or too distorted.
     """
     diagonals = _fitting(some.nodes, triangles)
@@ -70,7 +71,7 @@ def cut_up(some: Bricks, triangles: Ids, points: Floats) -> Cut:
 
 
 def _what(nodes: Ids, points: Floats, diagonals: int) -> str:
-    """Return why an element cannot be cut."""
+    """Return the reason for which an element cannot be cut."""
     at = points[nodes]
     volume = sum(float((np.cross(at[a] - at[0], at[b] - at[0]) * (at[c] - at[0])).sum()) for a, b, c in skin(diagonals))
     size = float(np.ptp(at, axis=0).max()) ** 3
@@ -80,7 +81,7 @@ def _what(nodes: Ids, points: Floats, diagonals: int) -> str:
 
 
 def _fitting(nodes: Ids, triangles: Ids) -> Ids:
-    """Return (m,) the diagonals of faces: by node numbers, or as triangles of other elements require."""
+    """Return (m,) the diagonals of faces, which are determined by node numbers or by triangles of other elements."""
     diagonals = pattern(nodes)
     if not len(triangles):
         return diagonals
@@ -95,7 +96,7 @@ def _fitting(nodes: Ids, triangles: Ids) -> Ids:
 
 
 def _known(faces: Ids, triangles: Ids) -> "np.ndarray":
-    """Return (m, k) which of the faces (m, k, 3) are among triangles, in any rotation."""
+    """Return (m, k) which of the faces (m, k, 3) are among the triangles, in any rotation of their corners."""
     both = np.sort(np.concatenate([triangles, faces.reshape(-1, 3)]), axis=1)
     _, of = np.unique(both, axis=0, return_inverse=True)
     of = of.reshape(-1)
@@ -105,7 +106,7 @@ def _known(faces: Ids, triangles: Ids) -> "np.ndarray":
 
 
 def triangles_of(cells: list[Cells]) -> Ids:
-    """Return (k, 3) the triangular faces of elements; none if no element has a face with four corners."""
+    """Return (k, 3) the triangular faces of elements; no face if no element has a face with four corners."""
     if not any(len(side) == 4 for each in cells for side in sides(each.kind.form)):
         return np.zeros((0, 3), np.int64)
     faces = [each.corners[:, side] for each in cells for side in sides(each.kind.form) if len(side) == 3]
@@ -116,7 +117,7 @@ def triangles_of(cells: list[Cells]) -> Ids:
 
 
 def notes_of_cut(some: Bricks, made: Cut, points: Floats, volume: float) -> Iterator[str]:
-    """Return notes: the number of tets that the elements were cut into, and the effect of warped faces on the
+    """Return notes: the number of tets into which the elements were cut, and the effect of warped faces on the
     ``volume``.
     """
     if not len(some.numbers):
@@ -134,8 +135,10 @@ def notes_of_cut(some: Bricks, made: Cut, points: Floats, volume: float) -> Iter
 
 
 def _warped(nodes: Ids, points: Floats) -> float:
-    """Return the volume between bilinear faces and their triangles: for each face a twelfth of the triple product of
-    three edges, with the sign of the diagonal, as it is the mean of both ways to cut it.
+    """Return the volume between bilinear faces and their triangles.
+
+    For each face it is a twelfth of the triple product of three edges, with the sign of the diagonal, because the
+    bilinear face has the mean volume of both cuts of the face.
     """
     diagonals, total = pattern(nodes), 0.0
     for bit, quad in enumerate(QUADS):
@@ -146,8 +149,10 @@ def _warped(nodes: Ids, points: Floats) -> float:
 
 
 def notes_of_middles(cells: list[Cells], points: Floats, tags: Ids) -> Iterator[str]:
-    """Return notes about hexahedra, wedges and pyramids of second order, of which only the corners are used, and the
-    volume that is lost. Raises MeshError if a node is not near the middle of its edge.
+    """Return notes about hexahedra, wedges and pyramids of second order, and the volume that is lost. Only the corners
+    of these elements are used.
+
+    Raises MeshError if a node is not near the middle of its edge.
     """
     for each in cells:
         if each.kind.form is Form.TET or not each.kind.edges or not len(each.numbers):

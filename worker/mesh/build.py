@@ -1,4 +1,6 @@
-"""Entry point of meshing: the tets of a mesh of a case, made once, then read from a cache by content."""
+"""Entry point of meshing: the tets of a mesh of a case, made once, then read from a cache that is indexed by
+content.
+"""
 
 import contextlib
 import hashlib
@@ -28,16 +30,16 @@ from .store import load, save
 from .structured import structured
 
 _CACHE_BYTES = 4 * 2**30
-"""Size of the cache above which the least recently used meshes are removed."""
+"""Size of the cache, bytes, above which the least recently used meshes are removed."""
 
 
 def build(
     mesh: Mesh, folder: Path, key: str = "mesh", limits: Limits | None = None, made: Callable[[], None] = lambda: None
 ) -> TetMesh:
-    """Return the tets of ``mesh``: checked, in Morton order, the same bits every time. Raises MeshError.
+    """Return the tets of ``mesh``: checked, in Morton order, bit-identical in every call. Raises MeshError.
 
-    ``folder``: where a relative path of a mesh file starts; ``key``: of the mesh in its case, for messages; ``made``
-    is called before a mesh is made. A child process within ``limits`` runs gmsh and reads files.
+    ``folder``: folder at which a relative path of a mesh file starts; ``key``: key of the mesh in its case, for
+    messages; ``made`` is called before a mesh is made. A child process within ``limits`` runs gmsh and reads files.
     """
     source = sources(mesh, folder, key)
     if not isinstance(mesh, MeshFile) and mesh.generator == "gmsh":
@@ -84,7 +86,9 @@ def _loaded(target: Path, count: int) -> list[TetMesh] | None:
 
 @contextlib.contextmanager
 def _writable(target: Path) -> Iterator[Path]:
-    """Yield the path itself, or one of that name in a temporary folder: an unwritable cache costs time, not the run."""
+    """Yield the path itself, or a path of the same name in a temporary folder. An unwritable cache costs time, but
+    the run continues.
+    """
     try:
         target.parent.mkdir(parents=True, exist_ok=True)
         tempfile.TemporaryFile(dir=target.parent).close()
@@ -98,7 +102,7 @@ def _writable(target: Path) -> Iterator[Path]:
 
 
 def _changed(mesh: TetMesh) -> bool:
-    """Return whether a file that the file of a mesh includes has changed or was removed."""
+    """Return whether a file included by the file of a mesh has changed or was removed."""
     for path, digest in mesh.origin.included if mesh.origin is not None else ():
         try:
             with whole.opened(path) as file:
@@ -139,8 +143,8 @@ def _need_gmsh(key: str) -> None:
 
 
 def _content(mesh: Mesh, found: Sources, key: str) -> str:
-    """Return the sha256 of all that determines the mesh: the request, the files' bytes, this package's source, the
-    versions.
+    """Return the sha256 of everything that determines the mesh: the request, the bytes of the files, the source of
+    this package, and the versions.
     """
     asked = mesh.model_dump(mode="json")
     for file in files_of({"parts": [{"mesh": asked}]}):
@@ -150,7 +154,7 @@ def _content(mesh: Mesh, found: Sources, key: str) -> str:
 
 
 def _forget(asked: Any, place: tuple[int | str, ...]) -> None:
-    """Remove path and expected hash of a file from a request: only its bytes matter."""
+    """Remove path and expected hash of a file from a request, because only the bytes of the file determine the mesh."""
     for step in place:
         asked = asked[step]
     asked.update(path="", sha256=None)
@@ -158,7 +162,7 @@ def _forget(asked: Any, place: tuple[int | str, ...]) -> None:
 
 @cache
 def _maker() -> str:
-    """Return the sources of this package and of what it computes with, and the versions of the libraries that it
+    """Return the sources of this package and of the modules that it uses, and the versions of the libraries that it
     calls.
     """
     text, here = hashlib.sha256(), Path(__file__).parent
@@ -177,7 +181,7 @@ def _versions(*packages: str) -> Iterator[str]:
 
 
 def _trim(folder: Path) -> None:
-    """Remove the least recently used meshes until the rest fits."""
+    """Remove the least recently used meshes until the remaining meshes fit into the cache."""
     kept = sorted((file.stat().st_mtime, file.stat().st_size, file) for file in folder.glob("*.npz"))
     total = sum(size for _, size, _ in kept)
     for _, size, file in kept[:-1]:

@@ -15,7 +15,9 @@ Edges = tuple[tuple[int, int], ...]
 
 
 class Form(Enum):
-    """A shape: its name in messages, its number of corners, and where these are in a hexahedron (``patterns``)."""
+    """Form of an element: its name in messages, its number of corners, and the positions of these corners in a
+    hexahedron (``patterns``).
+    """
 
     TET = "tet", 4, (0, 1, 2, 2, 3, 3, 3, 3)
     HEXAHEDRON = "hexahedron", 8, (0, 1, 2, 3, 4, 5, 6, 7)
@@ -28,14 +30,16 @@ class Form(Enum):
 
     @property
     def several(self) -> str:
-        """Return a count with the name: ``12 tets``, ``1 hexahedra``."""
+        """Return the plural of the name: ``tets``, ``hexahedra``."""
         return "hexahedra" if self is Form.HEXAHEDRON else f"{self.word}s"
 
 
 @dataclass(frozen=True)
 class Kind:
-    """Elements of one form and order. ``edges`` have a node in their middle each, in this order, behind the corners;
-    ``nodes`` is the number of all nodes, of which those behind the middles of edges are ignored.
+    """Elements of one form and order.
+
+    Each of the ``edges`` has a node in its middle. These nodes follow the corners, in the order of ``edges``.
+    ``nodes`` is the number of all nodes; nodes after the middles of edges are ignored.
     """
 
     form: Form
@@ -49,20 +53,20 @@ class Cells:
 
     kind: Kind
     numbers: Ids
-    """(m,) numbers in the file."""
+    """(m,) numbers of the elements in the file."""
     nodes: Ids
-    """(m, kind.nodes) tags of their nodes."""
+    """(m, kind.nodes) tags of the nodes of each element."""
     lines: Ids
-    """(m,) lines in the file; 0 if the reader counts no lines."""
+    """(m,) line of each element in the file; 0 if the reader counts no lines."""
 
     @property
     def corners(self) -> Ids:
-        """(m, corners) tags of the corners."""
+        """(m, corners) tags of the corners of each element."""
         return self.nodes[:, : self.kind.form.corners]
 
     @property
     def middles(self) -> Ids:
-        """(m, edges) tags of the nodes in the middle of edges."""
+        """(m, edges) tags of the nodes in the middle of the edges of each element."""
         first = self.kind.form.corners
         return self.nodes[:, first : first + len(self.kind.edges)]
 
@@ -76,7 +80,7 @@ class Cells:
 
 
 def sides(form: Form) -> list[list[int]]:
-    """Return the corners of the faces of a form, three or four each, anticlockwise seen from outside."""
+    """Return the corners of the faces of a form, three or four for each face, anticlockwise seen from outside."""
     found = []
     for quad in form.inside[QUADS].tolist():
         different = [node for k, node in enumerate(quad) if node != quad[k - 1]]
@@ -86,7 +90,7 @@ def sides(form: Form) -> list[list[int]]:
 
 
 def cells(kind: Kind, numbers: Ids, nodes: Ids, lines: Iterable[int] | Ids = ()) -> Cells:
-    """Return elements from a reader's data: flat or (m, kind.nodes) tags."""
+    """Return elements from the data of a reader: flat or (m, kind.nodes) tags."""
     known = np.asarray(lines, np.int64) if not isinstance(lines, tuple) else np.zeros(len(numbers), np.int64)
     return Cells(kind, numbers, nodes.reshape(-1, kind.nodes), known)
 

@@ -1,8 +1,9 @@
 """Child process that runs gmsh and reads foreign files: ``python -m conoid.worker.mesh.child``.
 
-gmsh is GPL, and it and any parser may crash, hang or request all memory. So they run in a process of their own with
-limits on memory, CPU time and wall time, an environment without secrets and an empty working folder. One JSON
-request on standard input; the mesh is returned as an .npz file, an error as one line on standard error.
+gmsh is GPL, and gmsh and any parser may crash, hang or request all memory. Therefore they run in a separate process
+with limits on memory, CPU time and wall time, an environment without secrets and an empty working folder. The
+process reads one JSON request from standard input. The mesh is returned as an .npz file, an error as one line on
+standard error.
 """
 
 import ctypes
@@ -29,19 +30,19 @@ from ..run.signals import REQUESTS
 from .sources import Sources
 
 _PASSED_ON = ("HOME", "LANG", "LC_ALL", "LD_LIBRARY_PATH", "PATH", "PYTHONPATH", "TMPDIR", "VIRTUAL_ENV")
-"""Environment variables of the child."""
+"""Environment variables of the child process."""
 
 _LOOK = 0.2
-"""s between two tests of a running child."""
+"""Interval between two tests of a running child, s."""
 
 _FULL = 0.97
-"""Share of its memory limit above which a child may be unable to report that it is full."""
+"""Share of its memory limit above which a child may be unable to report that its memory is full."""
 
 _GRACE = 5
-"""CPU s between the signal that the limit is reached and the end of a child. Chosen."""
+"""CPU time between the signal that the limit is reached and the end of a child, s. Chosen value."""
 
 _DIES_WITH_PARENT = 1
-"""Linux: prctl(PR_SET_PDEATHSIG)."""
+"""Option of prctl on Linux: PR_SET_PDEATHSIG, the child ends when its parent ends."""
 
 
 @dataclass(frozen=True)
@@ -53,7 +54,7 @@ class Limits:
     wall: int = 900
 
     def allowed(self) -> "Limits":
-        """Return these limits, or lower hard limits of this process (``ulimit -H``)."""
+        """Return these limits, each reduced to the hard limit of this process (``ulimit -H``) if that is lower."""
         memory, cpu = (resource.getrlimit(which)[1] for which in (resource.RLIMIT_AS, resource.RLIMIT_CPU))
         none = resource.RLIM_INFINITY
         return replace(
@@ -64,11 +65,11 @@ class Limits:
 
 
 def run_child(mesh: Mesh | Mapping[str, Mesh], sources: Sources, target: Path, key: str, limits: Limits) -> None:
-    """Make ``mesh`` (of the files in ``sources``) in a child process, which writes it to ``target``; several, by their
-    keys, are meshed together and written to ``beside(target, k)``.
+    """Make ``mesh`` (from the files in ``sources``) in a child process, which writes the mesh to ``target``.
 
-    Raises MeshError with the child's line, or with the limit that it exceeded; StoppedError if the run was asked to
-    stop: launchers send the signal to all processes of a rank.
+    Several meshes, by their keys, are meshed together and written to ``beside(target, k)``. Raises MeshError with
+    the message line of the child, or with the limit that the child exceeded. Raises StoppedError if the run was
+    asked to stop: launchers send the signal to all processes of a rank.
     """
     limits = limits.allowed()
     request = {
@@ -94,8 +95,11 @@ def run_child(mesh: Mesh | Mapping[str, Mesh], sources: Sources, target: Path, k
 
 
 def _watched(child: subprocess.Popen[bytes], request: bytes, key: str, limits: Limits) -> bytes:
-    """Return the text of the child on standard error, once it has ended. Ends it, and raises MeshError, when it
-    exceeds a limit. Memory is tested from here, too: Python can loop for ever when even an exception does not fit.
+    """Return the text of the child on standard error, once the child has ended. If the child exceeds a limit, end the
+    child and raise MeshError.
+
+    Memory is tested from this process, too: Python can loop for ever when even an exception does not fit into
+    memory.
     """
     last, message = time.monotonic() + limits.wall, request
     try:
@@ -113,7 +117,9 @@ def _watched(child: subprocess.Popen[bytes], request: bytes, key: str, limits: L
 
 
 def _address_space(process: int) -> int:
-    """Return the address space, bytes; 0 if the system does not provide it (no /proc) or the process has just ended."""
+    """Return the address space, bytes; 0 if the system does not provide the value (no /proc) or the process has just
+    ended.
+    """
     try:
         return int(Path(f"/proc/{process}/statm").read_text().split()[0]) * resource.getpagesize()
     except (OSError, IndexError, ValueError):
@@ -161,7 +167,10 @@ def main() -> int:
 
 
 def perform(mesh: Mesh, key: str, sources: Sources, target: Path) -> None:
-    """Make or read a mesh, check, order and store it. Imports gmsh and numpy here, within the limits."""
+    """Make or read a mesh, check, order and store it.
+
+    gmsh and numpy are imported here, within the limits.
+    """
     from .model import check
     from .order import morton_ordered
     from .store import save
@@ -187,7 +196,7 @@ def beside(target: Path, k: int) -> Path:
 
 
 def perform_together(meshes: dict[str, Mesh], sources: Sources, target: Path) -> None:
-    """Make meshes with common nodes at their interfaces, by their keys, and store each."""
+    """Make meshes with common nodes at their interfaces, by their keys, and store each mesh."""
     from .model import check
     from .order import morton_ordered
     from .store import save
@@ -204,7 +213,7 @@ def perform_together(meshes: dict[str, Mesh], sources: Sources, target: Path) ->
 
 
 def limit(limits: Limits) -> None:
-    """Set the limits of this process; on Linux it ends when its parent does."""
+    """Set the limits of this process. On Linux the process ends when its parent ends."""
     resource.setrlimit(resource.RLIMIT_AS, (limits.memory, limits.memory))
     hard = resource.getrlimit(resource.RLIMIT_CPU)[1]
     last = limits.cpu + _GRACE if hard == resource.RLIM_INFINITY else min(limits.cpu + _GRACE, hard)

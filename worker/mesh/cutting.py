@@ -1,9 +1,10 @@
-"""Cuts of hexahedra, wedges and pyramids into tets that meet face to face.
+"""Cuts of hexahedra, wedges and pyramids into tets with matching faces.
 
-Each quadrilateral face is cut by the diagonal through the smallest of its four node numbers: both of its elements
-cut it alike, on any rank, and there is always a cut of the element with these diagonals (Dompierre, Labbe, Vallet,
-Camarero 1999, "How to subdivide pyramids, prisms and hexahedra into tetrahedra"). Of several cuts the one with the
-longest stable step is chosen. If all are flat or far worse, a node in the middle of the element is added.
+Each quadrilateral face is cut by the diagonal through the smallest of its four node numbers. Both elements of the
+face therefore cut it in the same way, on any rank. A cut of an element with these diagonals always exists
+(Dompierre, Labbe, Vallet, Camarero 1999, "How to subdivide pyramids, prisms and hexahedra into tetrahedra"). If
+there are several such cuts, the cut with the longest stable step is chosen. If all cuts are flat or have a far
+shorter step, a node in the middle of the element is added.
 """
 
 from collections.abc import Iterator
@@ -16,17 +17,20 @@ from .model import FLAT, Floats, Ids, step_lengths, volume_and_area
 from .patterns import QUADS, cuts, skin
 
 _TOGETHER = 20_000
-"""Elements that are processed at once. Chosen: 100 MB."""
+"""Number of elements that are processed at once. Chosen value: about 100 MB."""
 _NOTHING = np.zeros((0, 4), np.int64), np.zeros(0, np.int64), np.zeros(0, np.int64)
 _WORSE = 0.5
-"""Share of the step with a node in the middle below which a cut is replaced by that. Chosen: it makes twelve tets of
-an element instead of five or six, a cost that half the number of steps outweighs."""
+"""A cut is replaced by a cut with a node in the middle if its stable step is below this share of the step of the
+replacement. Chosen value: the replacement makes twelve tets of an element instead of five or six, a cost that is
+smaller than the gain from half the number of steps."""
 
 
 @dataclass(frozen=True)
 class Cut:
-    """``tets`` (k, 4) of the elements ``owner`` (k,); node numbers from the number of points on are ``middles`` (j,
-    3).
+    """Tets made from elements.
+
+    ``tets`` (k, 4): tets of the elements ``owner`` (k,); node numbers from the number of points on are the nodes
+    ``middles`` (j, 3).
     """
 
     tets: Ids
@@ -49,8 +53,8 @@ def cut(nodes: Ids, points: Floats, diagonals: Ids) -> Cut:
 
 
 def pattern(nodes: Ids) -> Ids:
-    """Return (m,) the diagonals of the faces (see ``patterns.cuts``): through the smallest node, the first of equal
-    ones.
+    """Return (m,) the diagonals of the faces (``patterns.cuts``). Each diagonal contains the smallest node number;
+    of equal numbers the first.
     """
     rank = np.argsort(np.argsort(nodes, axis=1, kind="stable"), axis=1, kind="stable")
     second = rank[:, QUADS].argmin(axis=2) % 2
@@ -72,7 +76,9 @@ def _portions(diagonals: Ids) -> Iterator[Ids]:
 
 
 def _cut_alike(nodes: Ids, points: Floats, some: Ids, diagonals: Ids) -> tuple[Ids, Ids, Ids]:
-    """Return the tets and owners of the elements ``some``, and the elements that are better cut round a middle node."""
+    """Return the tets and owners of the elements ``some``, and the elements for which a cut with a middle node is
+    better.
+    """
     table = cuts(int(diagonals[some[0]]))
     if not len(table):
         return np.zeros((0, 4), np.int64), np.zeros(0, np.int64), some
@@ -86,8 +92,8 @@ def _cut_alike(nodes: Ids, points: Floats, some: Ids, diagonals: Ids) -> tuple[I
 
 
 def _around(nodes: Ids, points: Floats, diagonals: Ids, poor: Ids) -> tuple[Ids, Ids, Floats, Ids, Ids]:
-    """Return tets and owners of the elements ``poor`` with a middle node, these nodes, their elements, and those
-    that are flat.
+    """Return tets and owners of the elements ``poor`` with a middle node, the middle nodes, their elements, and the
+    flat elements.
     """
     found = [_spoked(nodes[[each]], points, int(diagonals[each])) for each in poor]
     good = np.array([_shortest(*each)[0] > 0 for each in found], bool)
@@ -102,8 +108,9 @@ def _around(nodes: Ids, points: Floats, diagonals: Ids, poor: Ids) -> tuple[Ids,
 
 
 def _spoked(nodes: Ids, points: Floats, diagonals: int) -> tuple[Floats, Ids, Ids]:
-    """Return corners and middle (9 s, 3) of each element, and the tets (s, 12, 4) between its faces and its middle:
-    by indices of these points, and by nodes, with -1 for the middle.
+    """Return corners and middle (9 s, 3) of each element, and the tets (s, 12, 4) between its faces and its middle.
+
+    The tets are returned twice: by indices of these points, and by nodes, with -1 for the middle.
     """
     wheel = np.array([(a, c, b, 8) for a, b, c in skin(diagonals)], np.int64)
     different = np.array([(nodes[:, :k] != nodes[:, k, None]).all(axis=1) for k in range(8)]).T[..., None]
@@ -114,7 +121,7 @@ def _spoked(nodes: Ids, points: Floats, diagonals: int) -> tuple[Floats, Ids, Id
 
 
 def _shortest(points: Floats, tets: Ids, names: Ids) -> Floats:
-    """Return the shortest step length, m, of tets (..., k, 4), without those that repeat a node; 0 if one has no
+    """Return the shortest step length, m, of tets (..., k, 4), except tets that repeat a node; 0 if a tet has no
     volume.
     """
     length = step_lengths(points, tets)

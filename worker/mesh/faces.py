@@ -1,4 +1,6 @@
-"""Triangular faces of tets. Face ``i`` is opposite to node ``i``, anticlockwise seen from outside."""
+"""Triangular faces of tets. Face ``i`` is opposite to node ``i``. The nodes of a face run anticlockwise seen from
+outside.
+"""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -6,11 +8,13 @@ from numpy.typing import NDArray
 from .model import Floats, Ints
 
 FACES = np.array([[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]], np.int32)
-"""Local nodes of the four faces."""
+"""Local nodes of the four faces of a tet."""
 
 
 def boundary_faces(tets: Ints) -> Ints:
-    """Return (k, 3) nodes of the faces that belong to one tet only, outward, in the order of tet and local face."""
+    """Return (k, 3) nodes of the faces that belong to one tet only, in the order of tet and local face. The normals
+    point outward.
+    """
     faces = tets[:, FACES].reshape(-1, 3)
     group, size = _groups(faces)
     outer: Ints = faces[size[group] == 1]
@@ -18,8 +22,9 @@ def boundary_faces(tets: Ints) -> Ints:
 
 
 def same_side(tets: Ints) -> NDArray[np.int64]:
-    """Return (k, 2) tets, positively oriented, on the same side of a common face: they overlap. Of more than two on
-    one side every two successive ones.
+    """Return (k, 2) pairs of positively oriented tets on the same side of a common face: such tets overlap.
+
+    If more than two tets are on one side, every two successive tets form a pair.
     """
     faces = tets[:, FACES].reshape(-1, 3)
     a, b, c = faces.T
@@ -33,7 +38,9 @@ def same_side(tets: Ints) -> NDArray[np.int64]:
 
 
 def across(tets: Ints) -> Ints:
-    """Return (n, 4) the neighbour of each face: 4 * tet + local face of its other side, -1 for none."""
+    """Return (n, 4) the neighbour of each face: 4 * tet + local face of the neighbour; -1 for a face without
+    neighbour.
+    """
     group, size = _groups(tets[:, FACES].reshape(-1, 3))
     order = np.argsort(group, kind="stable")
     first = order[np.concatenate([[0], np.cumsum(size)[:-1]])]
@@ -57,7 +64,9 @@ def normals(points: Floats, faces: NDArray[np.integer]) -> Floats:
 
 
 def _groups(faces: Ints) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Return the number of the distinct face of each row, and the number of rows of each distinct face."""
+    """Return for each row the number of its face among the distinct faces, and for each distinct face its number of
+    rows.
+    """
     low, middle, high = np.sort(faces, axis=1).astype(np.int64).T
     order = np.lexsort((high, low << 32 | middle))
     pair, last = (low << 32 | middle)[order], high[order]

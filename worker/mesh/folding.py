@@ -1,4 +1,4 @@
-"""Degenerate hexahedra, with repeated nodes, by which decks represent wedges, pyramids and tets."""
+"""Degenerate hexahedra: hexahedra with repeated nodes, which represent wedges, pyramids and tets in decks."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,8 +11,11 @@ _TET = Form.TET.inside
 
 
 def folded(nodes: Ids) -> tuple[Ids, NDArray[np.bool_]]:
-    """Return hexahedra (m, 8), those with four different nodes as tets, and which of them can have a volume:
-    repeated nodes must be connected by edges, and no face may have two equal opposite corners.
+    """Return hexahedra (m, 8), hexahedra with four different nodes as tets, and which of the elements can have a
+    volume.
+
+    An element has a volume only if repeated nodes are connected by edges, and if no face has two equal opposite
+    corners.
     """
     first = (nodes[:, :, None] == nodes[:, None, :]).argmax(axis=2)
     kinds, of = np.unique(first, axis=0, return_inverse=True)
@@ -28,7 +31,9 @@ def folded(nodes: Ids) -> tuple[Ids, NDArray[np.bool_]]:
 
 
 def _folds(first: Ids) -> bool:
-    """Return whether the repeated nodes, given by the first index of each, are allowed: see ``folded``."""
+    """Return whether the repeated nodes are allowed (``folded``). The repeated nodes are given by the first index of
+    each node.
+    """
     reached = np.arange(8)
     for _ in range(8):
         for a, b in EDGES:

@@ -1,7 +1,8 @@
-"""Local frame of bodies: origin where the sector is cut, third direction along the body's axis.
+"""Local frame of bodies: its origin is the point where the sector is cut, its third direction is the axis of the body.
 
-Both generators work in (a, b, c), the cyclic order of ``across(axis)`` and ``axis``, and turn the points at the end,
-so that each body is implemented once, not once an axis; the turn only permutes coordinates and is exact.
+Both generators work in (a, b, c), the cyclic order of ``across(axis)`` and ``axis``, and rotate the points at the
+end. Therefore each body is implemented once and not for each axis. The rotation only permutes coordinates and is
+exact.
 """
 
 import numpy as np
@@ -35,13 +36,13 @@ def to_frame(body: Generated, point: tuple[float, float, float]) -> tuple[float,
 
 
 def block(body: Generated) -> tuple[list[float], list[float]]:
-    """Return the lowest and highest (a, b, c) of the modelled sector, m."""
+    """Return the lowest and the highest (a, b, c) of the modelled sector, m."""
     low, high = bounds(body) or ((0.0,) * 3, (0.0,) * 3)
     return list(to_frame(body, low)), list(to_frame(body, high))
 
 
 def refuse_impossible(body: Generated, key: str) -> None:
-    """Raise MeshError for a body without volume or with too many tets; ``key``: of the mesh in its case."""
+    """Raise MeshError for a body without volume or with too many tets; ``key``: key of the mesh in its case."""
     whole = volume(body)
     if not whole > 0:
         raise MeshError(f"{key}: the {body.shape} has no volume; check its sizes")

@@ -1,4 +1,4 @@
-"""Sessions of gmsh. They run in the child process only: gmsh is GPL and can crash."""
+"""Sessions of gmsh. They run in the child process only, because gmsh is GPL and can crash."""
 
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
@@ -11,7 +11,7 @@ from .model import TetMesh
 from .named import NamedMesh, gathered
 
 _TET = 4
-"""gmsh's element type of the 4-node tet."""
+"""Number of the element type of the 4-node tet in gmsh."""
 
 
 OPTIONS = {
@@ -26,13 +26,13 @@ OPTIONS = {
     "Mesh.OptimizeThreshold": 0.45,
     "Mesh.RandomSeed": 1,
 }
-"""Options of every mesh that is made; the reasons are in ``mesh/unstructured.py``."""
+"""Options of every mesh that is made. The reasons for the values are in ``mesh/unstructured.py``."""
 
 
 @contextmanager
 def session(options: Mapping[str, float]) -> Iterator[Any]:
-    """Yield the gmsh module, silent, without the user's own settings; an error that it logs or raises becomes
-    MeshError.
+    """Yield the gmsh module without output and without the settings of the user. An error that gmsh logs or raises
+    becomes MeshError.
     """
     import gmsh
 
@@ -58,7 +58,9 @@ def tet_mesh(gmsh: Any) -> TetMesh:
 
 
 def named_mesh(gmsh: Any) -> NamedMesh:
-    """Return the same with gmsh's numbers of the nodes and tets; the nodes in the order of their numbers."""
+    """Return the tets and nodes of the current model, with gmsh's numbers of both. The nodes are in the order of
+    their numbers.
+    """
     tags, corners = gmsh.model.mesh.getElementsByType(_TET)
     node_tags, coordinates, _ = gmsh.model.mesh.getNodes()
     nodes, points = np.asarray(node_tags, np.int64), coordinates.reshape(-1, 3)
@@ -66,5 +68,5 @@ def named_mesh(gmsh: Any) -> NamedMesh:
 
 
 def first_error(gmsh: Any) -> str | None:
-    """Return the first error in gmsh's log: gmsh continues after many errors."""
+    """Return the first error in the log of gmsh; gmsh continues after many errors."""
     return next((line.removeprefix("Error: ") for line in gmsh.logger.get() if line.startswith("Error")), None)

@@ -1,4 +1,4 @@
-"""Parts that bonds join by shared nodes: their coincident nodes become one node, their coincident faces an
+"""Parts that bonds join by shared nodes: coincident nodes of two parts become one node, coincident faces become an
 interface.
 """
 
@@ -15,15 +15,17 @@ from .model import Floats, Ids, Ints, Origin
 from .sharing import same_places
 
 _SAME = 1e-9
-"""Share of the size of a body: nodes of structured meshes nearer than this are merged. Chosen: far above round-off."""
+"""Distance, as a share of the size of a body, below which nodes of structured meshes are merged. Chosen value: far
+above round-off."""
 
 Placed = tuple[int, Origin | None, Floats]
 """Index of the first node of a part, origin of its mesh, and its nodes (n, 3), m, after the rotation of the part."""
 
 
 def joined(case: Case, placed: Mapping[int, Placed], n: int) -> Ids:
-    """Return (n,) the node that represents each of the ``n`` nodes of the ``placed`` parts, by their numbers: the
-    first of those that bonds merge. Raises InputError for a bond without common nodes.
+    """Return (n,) the node that represents each of the ``n`` nodes of the ``placed`` parts, by their numbers.
+
+    Of nodes that bonds merge, the first represents all of them. Raises InputError for a bond without common nodes.
     """
     edges = [np.zeros((0, 2), np.int64)]
     for k, _, i, j in shared_bonds(case):
@@ -44,8 +46,9 @@ def joined(case: Case, placed: Mapping[int, Placed], n: int) -> Ids:
 
 
 def _refuse_open(case: Case, placed: Mapping[int, Placed], stands: Ids) -> None:
-    """Raise InputError for two parts of one body, without a bond between them, with coincident faces: they would
-    separate there without contact. ``stands``: see ``joined``.
+    """Raise InputError for two parts of one body with coincident faces, but without a bond between them.
+
+    Such parts would separate at these faces without contact. ``stands``: the result of ``joined``.
     """
     body = bodies(case)
     numbers = {part.name: i for i, part in enumerate(case.parts)}
@@ -68,7 +71,9 @@ def _wide(x: Floats) -> bool:
 
 
 def _common(one: Origin | None, x: Floats, other: Origin | None, y: Floats) -> tuple[Ids, Ids]:
-    """Return the common nodes of two parts: equal numbers in one file or, in structured meshes, equal positions."""
+    """Return the common nodes of two parts. Common nodes have equal numbers in one file or, in structured meshes,
+    equal positions.
+    """
     if one is not None and other is not None:
         return same_places(one, x, other, y)
     labels = np.column_stack([_lines(np.concatenate([a, b])) for a, b in zip(x.T, y.T, strict=True)])
@@ -80,7 +85,7 @@ def _common(one: Origin | None, x: Floats, other: Origin | None, y: Floats) -> t
 
 
 def _lines(values: Floats) -> Ids:
-    """Return (n,) a number for each coordinate, the same for those that differ by round-off."""
+    """Return (n,) a number for each coordinate. Coordinates that differ by round-off have the same number."""
     order = np.argsort(values, kind="stable")
     steps = np.diff(values[order], prepend=values[order[:1]])
     numbers = np.empty(len(values), np.int64)
@@ -89,8 +94,10 @@ def _lines(values: Floats) -> Ids:
 
 
 def require_faces(case: Case, there: Container[int], across: Ints, tet_part: Ints) -> None:
-    """Raise InputError for a bond of parts in ``there``, by number, without a common face, and for parts of one body
-    with a common face but without a bond. ``across``: (tets, 4) of all tets, see ``faces.across``.
+    """Raise InputError for a bond without a common face, and for parts of one body with a common face but without a
+    bond.
+
+    Only parts in ``there``, by number, are checked. ``across``: (tets, 4) neighbours of all tets (``faces.across``).
     """
     tet, face = np.nonzero(across >= 0)
     pairs = np.column_stack([tet_part[tet], tet_part[across[tet, face] // 4]])

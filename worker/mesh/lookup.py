@@ -1,4 +1,4 @@
-"""Search for the set of a mesh file that a name in a case refers to."""
+"""Search for the set of a mesh file to which a name in a case refers."""
 
 from collections.abc import Sequence
 
@@ -8,14 +8,16 @@ from ..errors import MeshError
 from .model import NodeSet
 
 _KINDS = {"nodes": False, "surface": True}
-"""Words before a colon that select one of two kinds."""
+"""Words before a colon that select one of two kinds of sets."""
 _SHOWN = 20
-"""Number of names in a message. Chosen: three lines of a terminal."""
+"""Largest number of names in a message. Chosen value: three lines of a terminal."""
 
 
 def meant(sets: Sequence[NodeSet], name: str) -> NodeSet | None:
-    """Return the set; None if there is none of this name. Several equal sets count as one, and sets without a node
-    of the mesh are ignored. Raises MeshError for an ambiguous name.
+    """Return the set of a name; None if no set has this name.
+
+    Several equal sets count as one. Sets without a node of the mesh are ignored. Raises MeshError for an ambiguous
+    name.
     """
     found = _called(sets, name)
     if not found and (kind := name.partition(":"))[0] in _KINDS:
@@ -30,7 +32,9 @@ def meant(sets: Sequence[NodeSet], name: str) -> NodeSet | None:
 
 
 def _called(sets: Sequence[NodeSet], name: str) -> list[NodeSet]:
-    """Return the sets of that name; of each kind with another case of letters if none matches exactly."""
+    """Return the sets with this name. For each kind without an exact match, return the sets whose names differ in
+    the case of letters.
+    """
     found = list[NodeSet]()
     for surfaces in (True, False):
         kind = [each for each in sets if (each.faces is not None) == surfaces]

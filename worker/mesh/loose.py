@@ -14,7 +14,7 @@ from ..model.hashing import uniform
 from .model import Floats, TetMesh
 
 _CORNERS = np.array([[1, 1, 1], [1, -1, -1], [-1, -1, 1], [-1, 1, -1]]) / math.sqrt(8.0)
-"""Corners of the regular tet of edge 1 about its centre, positive."""
+"""Corners of the regular tet of edge 1, relative to its centre. Its volume is positive."""
 
 _RANDOM = 15
 """Random numbers of a shard: 3 for its rotation, 12 for its nodes."""
@@ -47,7 +47,9 @@ def rotations(random: Floats) -> Floats:
 
 
 def two_tets(body: TwoTets) -> tuple[Floats, NDArray[np.int32]]:
-    """Return points in the body's frame, m, and tets: the common face is at the origin, across the third direction."""
+    """Return points in the frame of the body, m, and tets. The common face is at the origin, normal to the third
+    direction.
+    """
     edge = body.element_size
     sine, cosine = sines_and_cosines(2.0 * math.pi / 3.0 * np.arange(3.0))
     face = edge / math.sqrt(3.0) * np.stack([cosine, sine, np.zeros(3)], axis=1)

@@ -31,8 +31,8 @@ REGULAR_STEP = 1.0 / math.sqrt(6.0)
 """Step length of the regular tet with edge 1: half its altitude."""
 
 FLAT = 1e-9
-"""A tet has no volume if the volume is below this share of (root of the sum of its squared face areas)^(3/2).
-Chosen: a regular tet has 0.15, round-off of its nodes 1e-16."""
+"""A tet has no volume if the volume is below this share of (root of the sum of its squared face areas)^(3/2). Chosen
+value: the share is 0.15 for a regular tet, and 1e-16 for the round-off of its nodes."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,9 +44,9 @@ class Origin:
     nodes: Ids
     """(n,) number of each node, unique in the file."""
     notes: tuple[str, ...] = ()
-    """Contents of the file that are not in the mesh or are interpreted in an unexpected way, a line each."""
+    """Contents of the file that are not in the mesh or are interpreted in an unexpected way, one line each."""
     included: tuple[tuple[str, str], ...] = ()
-    """Path and sha256 of each further file that was read for it."""
+    """Path and sha256 of each further file that was read for the mesh."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,13 +54,13 @@ class NodeSet:
     """A set of nodes or a surface in a mesh file."""
 
     names: tuple[str, ...]
-    """Names in a case, the first one in lists."""
+    """Names of the set in a case. Lists show the first name."""
     nodes: Ints
-    """(k,) nodes of the mesh, ascending; of a surface those of all its faces."""
+    """(k,) nodes of the mesh in the set, ascending. A surface has the nodes of all its faces."""
     faces: Ints | None = None
     """(n, 3) faces of a surface that are outer faces of the mesh. None for a set of nodes."""
     inner: int = 0
-    """Number of faces of the surface with all nodes in the mesh that are not outer faces of it."""
+    """Number of faces of the surface that have all nodes in the mesh and are not outer faces of the mesh."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,9 +73,9 @@ class TetMesh:
     points: Floats
     tets: Ints
     origin: Origin | None = None
-    """None for a generated mesh."""
+    """Origin of the mesh in a file; None for a generated mesh."""
     sets: tuple[NodeSet, ...] = ()
-    """Sets of its file, with empty ones."""
+    """Sets of the file of the mesh, including empty sets."""
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "points", np.ascontiguousarray(self.points, np.float64))
@@ -90,15 +90,17 @@ class TetMesh:
         return volume_and_area(self.points, self.tets)[0]
 
     def step_lengths(self) -> Floats:
-        """Return (m,) 1 / sqrt(sum |grad N|^2), m, with the sign of the volume: the stable time step is this over
-        the speed of sound (lumped linear tets: omega_max^2 <= 4 c^2 sum |grad N|^2).
+        """Return (m,) 1 / sqrt(sum |grad N|^2), m, with the sign of the volume.
+
+        The stable time step is this length divided by the speed of sound (lumped linear tets: omega_max^2 <= 4 c^2
+        sum |grad N|^2).
         """
         return step_lengths(self.points, self.tets)
 
 
 @dataclass(frozen=True)
 class Names:
-    """Numbers of the nodes, (n,), and tets, (m,), in the file of a mesh."""
+    """Numbers of the nodes, (n,), and of the tets, (m,), in the file of a mesh."""
 
     nodes: Ids
     tets: Ids
@@ -112,13 +114,13 @@ class Names:
 
 
 def step_lengths(points: Floats, tets: NDArray[np.integer]) -> Floats:
-    """Return step lengths, m, of the tets (..., 4) over ``points``; see ``TetMesh.step_lengths``."""
+    """Return the step lengths, m, of the tets (..., 4) over ``points`` (``TetMesh.step_lengths``)."""
     volume, area = volume_and_area(points, tets)
     return np.divide(3 * volume, area, out=np.zeros_like(volume), where=area > 0)
 
 
 def check(mesh: TetMesh, names: Names | None = None) -> TetMesh:
-    """Return the mesh if it can be computed with, else raise MeshError.
+    """Return the mesh if it can be computed, else raise MeshError.
 
     Conditions: finite coordinates, at least one tet, every index in range, every node used, every volume positive.
     Messages use ``names`` of nodes and tets if given, otherwise indices from 0.
@@ -158,7 +160,7 @@ def _check_volumes(mesh: TetMesh, names: Names) -> None:
 
 
 def volume_and_area(points: Floats, tets: NDArray[np.integer]) -> tuple[Floats, Floats]:
-    """Return signed volume, m^3, and root of the sum of the four squared face areas, m^2."""
+    """Return the signed volume, m^3, and the root of the sum of the four squared face areas, m^2."""
     x, y, z = ([column[tets[..., i]] for i in range(4)] for column in points.T)
     e = [[x[i] - x[0], y[i] - y[0], z[i] - z[0]] for i in (1, 2, 3)]
     a, b, c = _cross(e[1], e[2]), _cross(e[2], e[0]), _cross(e[0], e[1])

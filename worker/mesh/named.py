@@ -19,7 +19,7 @@ class NamedMesh:
     places: Ids
     """(n,) number of each node, unique in the file."""
     notes: tuple[str, ...] = ()
-    """Contents of the file that are not in the mesh or are interpreted in an unexpected way, a line each."""
+    """Contents of the file that are not in the mesh or are interpreted in an unexpected way, one line each."""
 
 
 def gathered(node_tags: Ids, points: Any, tet_tags: Ids, corners: Ids) -> NamedMesh:
@@ -38,8 +38,10 @@ def gathered(node_tags: Ids, points: Any, tet_tags: Ids, corners: Ids) -> NamedM
 
 
 def placed(tags: Ids, nodes: Ids, called: Callable[[int], str]) -> Ids:
-    """Return node numbers (m, k) of a file as indices into ``tags``. Raises MeshError for an unknown number, with
-    the name of the element, ``called`` with its index.
+    """Return node numbers (m, k) of a file as indices into ``tags``.
+
+    Raises MeshError for an unknown number, with the name of the element. The function ``called`` returns this name
+    from the index of the element.
     """
     order = np.argsort(tags, kind="stable")
     found = np.minimum(np.searchsorted(tags, nodes, sorter=order), max(len(tags) - 1, 0))

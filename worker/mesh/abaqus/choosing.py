@@ -25,7 +25,7 @@ def _every(mesh: Scope) -> Ids:
 
 
 def grouped(deck: Deck, pieces: list[Piece], group: str, key: str) -> Chosen:
-    """Return the elements of a name. Raises MeshError for an unknown or ambiguous name."""
+    """Return the elements of a name in a case. Raises MeshError for an unknown or ambiguous name."""
     meant = list(_meant(deck, pieces, group))
     if not meant:
         known = ", ".join(sorted(_known(deck, pieces), key=str.casefold)) or "none"
@@ -41,8 +41,8 @@ def grouped(deck: Deck, pieces: list[Piece], group: str, key: str) -> Chosen:
 
 
 def _meant(deck: Deck, pieces: list[Piece], group: str) -> Iterator[tuple[str, Chosen]]:
-    """Return the candidates for a name. A set of the model or the assembly hides sets of this name in parts, as in
-    Abaqus.
+    """Return the candidates for a name. A set of the model or the assembly hides sets of the same name in parts, as
+    in Abaqus.
     """
     outer = [(name.text, one) for name, one in deck.root.sets.meant(group)]
     for text, one in outer:
@@ -85,8 +85,8 @@ def _part(scope: Scope) -> Scope:
 
 
 def _sets(scope: Scope, wanted: str) -> list[tuple[str, ElementSet]]:
-    """Return the sets that ``wanted`` may refer to in an instance or a part: those of the instance hide those of its
-    part.
+    """Return the sets to which ``wanted`` may refer in an instance or a part. The sets of an instance hide the sets
+    of its part.
     """
     for each in (scope, _part(scope)):
         if found := each.sets.meant(wanted):
@@ -119,7 +119,9 @@ def _same(one: Chosen, other: Chosen) -> bool:
 
 
 def _known(deck: Deck, pieces: list[Piece]) -> set[str]:
-    """Return every name that a group may have; a set that several parts have is written with the name of the part."""
+    """Return every name that a group may have. A set of a name that occurs in several parts is written with the name
+    of its part.
+    """
     names = {name.text for name, _ in deck.root.sets}
     owners = {_part(piece.scope).name.key: piece.scope for piece in pieces if piece.scope.line}
     sets = Counter(name.key for scope in owners.values() for name, _ in _part(scope).sets)

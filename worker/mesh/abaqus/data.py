@@ -11,14 +11,16 @@ from ...materials.turning import sine_and_cosine
 from .elements import ElementType, Kind
 
 _AXIS = 7
-"""Numbers of a rotation: two points and an angle."""
+"""Number of values of a rotation: two points and an angle."""
 _MOST_MADE = 20_000_000
-"""Largest count of numbers of one line of GENERATE. Chosen: more than a mesh that a machine of some 100 GB can run."""
+"""Largest number of members that one line of GENERATE may make. Chosen value: more than the elements of a mesh that
+a machine of some 100 GB can run."""
 
 
 def element_rows(lines: Iterator[tuple[int, str]], kind: ElementType) -> Iterator[tuple[int, list[str]]]:
     """Yield the first line and the fields of each element: its number and its nodes, which may take several lines.
-    An omitted node is the ground, which elements without volume only may have. Raises MeshError.
+
+    An omitted node represents the ground. Only elements without volume may have an omitted node. Raises MeshError.
     """
     row: list[str] = []
     first = 0
@@ -48,7 +50,7 @@ def _expected(kind: ElementType) -> str:
 
 
 def numbers_of(line: int, text: str) -> "array[int]":
-    """Return the numbers that GENERATE makes of a first one, a last one and a step. Raises MeshError."""
+    """Return the numbers that GENERATE makes from a first number, a last number and a step. Raises MeshError."""
     items = fields(text)
     while len(items) > 2 and not items[-1]:
         items.pop()
@@ -66,7 +68,7 @@ def numbers_of(line: int, text: str) -> "array[int]":
 
 
 def _step(line: int, items: list[str]) -> int:
-    """Return the third number, which may be 0; 1 if there is none. Raises MeshError."""
+    """Return the third number of the line, which may be 0; 1 if there is no third number. Raises MeshError."""
     if not items[2:]:
         return 1
     return int(items[2]) if is_whole(items[2]) else whole(line, items[2])
@@ -94,6 +96,6 @@ def axis(line: int, text: str) -> tuple[float, ...]:
 
 
 def cylindrical(radius: float, angle: float, height: float) -> tuple[float, float, float]:
-    """Return the Cartesian coordinates of a point in cylindrical ones, ``angle`` in degrees."""
+    """Return the Cartesian coordinates of a point in cylindrical coordinates, ``angle`` in degrees."""
     sine, cosine = sine_and_cosine(math.radians(angle))
     return radius * cosine, radius * sine, height

@@ -17,7 +17,7 @@ from .scopes import OWN, ElementSet, Instance, Rows, Scope, Surface
 
 _ROOT = Label("", "")
 _NODE_VALUES = 6
-"""Largest number of coordinates of a node and components of a normal (Keywords Guide, *NODE)."""
+"""Largest number of values of a node: coordinates and components of a normal (Keywords Guide, *NODE)."""
 
 
 class Deck:
@@ -38,7 +38,7 @@ class Deck:
         for block in self._source.blocks():
             self._take(block)
         self.files = self._source.included.files
-        """The file, and those that it includes."""
+        """The file, and the files that it includes."""
         if self._here is not self.root:
             raise MeshError(f"the file ends inside of {_named(self._here)}; is it cut off?")
 
@@ -98,7 +98,9 @@ class Deck:
         self._here = self.instances.add(name, Instance(name, block.line, part=part, move=move, axis=axis))
 
     def _placing(self) -> tuple[tuple[float, ...], tuple[float, ...]]:
-        """Return the two data lines of *INSTANCE: a translation, then an axis with an angle; either may be empty."""
+        """Return the two data lines of *INSTANCE: a translation, then an axis with an angle. Either line may be
+        empty.
+        """
         lines = list(self._source.data())
         while lines and not lines[-1][1].strip():
             lines.pop()
@@ -190,7 +192,9 @@ class Deck:
         return instance
 
     def _member(self, one: ElementSet, instance: Instance | None, item: str, line: int, of_nodes: bool) -> None:
-        """Add an element, or the elements of a set, of an instance or of this scope, to a set; or nodes."""
+        """Add members to a set: an element, or the elements of a set, of an instance or of this scope. For a set of
+        nodes add nodes.
+        """
         owner = OWN if instance is None else instance.name.key
         if is_whole(item):
             one.add(owner, array("q", [whole(line, item)]))
@@ -214,7 +218,9 @@ class Deck:
             raise MeshError(f"line {line}: {shortened(item)} is no {what} that is defined above")
 
     def _surface(self, block: Block) -> None:
-        """Keep a surface as it is written; its elements may be defined below."""
+        """Store a surface as it is written in the file. The elements of the surface may be defined later in the
+        file.
+        """
         found = dict(block.parameters)
         kind, name = (found.get("TYPE") or "ELEMENT").upper(), found.get("NAME")
         if name is None or "COMBINE" in found or kind not in ("ELEMENT", "NODE"):
@@ -224,7 +230,9 @@ class Deck:
         self._here.surfaces.append(Surface(label(name), block.line, kind == "NODE", rows))
 
     def _qualified(self, item: str) -> tuple[Instance | None, str]:
-        """Return the instance and the rest of ``Bar-1.5`` or ``Bar-1.Set-1``, at the level of the assembly."""
+        """Return the instance and the rest of a name such as ``Bar-1.5`` or ``Bar-1.Set-1``, at the level of the
+        assembly.
+        """
         if self._here is self.root:
             for at in (i for i, sign in enumerate(item) if sign == "."):
                 start, rest = item[:at], item[at + 1 :]
@@ -251,7 +259,7 @@ _READERS: dict[str, Callable[[Deck, Block, dict[str, str]], None]] = {
 
 
 def _named(scope: Scope) -> str:
-    """Return the name in messages: ``the part 'Bar' (line 7)``."""
+    """Return the name for messages: ``the part 'Bar' (line 7)``."""
     if not scope.line:
         return "the assembly"
     kind = "instance" if isinstance(scope, Instance) else "part"

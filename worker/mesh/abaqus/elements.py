@@ -21,20 +21,22 @@ class Kind(Enum):
 
 
 FORMS = {4: TET4, 5: PYRAMID5, 6: WEDGE6, 8: HEX8, 10: TET10, 15: WEDGE15, 20: HEX20}
-"""Volumes that are read, by their nodes."""
+"""Kinds of the volumes that are read, by their number of nodes."""
 FACES = {
     Form.TET: ((0, 1, 2), (0, 3, 1), (1, 3, 2), (2, 3, 0)),
     Form.PYRAMID: ((0, 1, 2, 3), (0, 4, 1), (1, 4, 2), (2, 4, 3), (3, 4, 0)),
     Form.WEDGE: ((0, 1, 2), (3, 5, 4), (0, 3, 4, 1), (1, 4, 5, 2), (2, 5, 3, 0)),
     Form.HEXAHEDRON: ((0, 1, 2, 3), (4, 7, 6, 5), (0, 4, 5, 1), (1, 5, 6, 2), (2, 6, 7, 3), (3, 7, 4, 0)),
 }
-"""Corners of the faces S1, S2, ... (Elements Guide, "Three-dimensional solid element library")."""
+"""Corners of the faces S1, S2, ... of each form (Elements Guide, "Three-dimensional solid element library")."""
 
 
 @dataclass(frozen=True)
 class ElementType:
-    """An element type: ``name`` as in the file, in upper case; ``nodes``: of one element, None if the name does not
-    contain it.
+    """An element type.
+
+    ``name``: name in the file, in upper case; ``nodes``: number of nodes of one element, None if the name does not
+    contain this number.
     """
 
     name: str
@@ -43,7 +45,7 @@ class ElementType:
 
     @property
     def corners(self) -> int | None:
-        """Corners of an element of a surface, 3 or 4; None for others."""
+        """Number of corners of a surface element, 3 or 4; None for elements that are not surface elements."""
         plate = self.kind is Kind.EMPTY and _PLATE.fullmatch(self.name)
         return {3: 3, 6: 3, 4: 4, 8: 4, 9: 4}.get(self.nodes or 0) if plate else None
 
@@ -61,12 +63,12 @@ _PAIR = re.compile(
     r"(?:SPRING2|SPRINGA|DASHPOT2|DASHPOTA|JOINTC|JOINT[23]D|GAPUNIT?|GAPCYL|GAPSPHER|ITSUNI|ITSCYL|DRAG[23]D|FLINK)"
 )
 _NODES = {"STRI65": 6, "S4R5": 4, "S8R5": 8, "S9R5": 9}
-"""Families whose last figure is the number of degrees of freedom of a node."""
+"""Families with a name that ends with the number of degrees of freedom of a node."""
 
 
 @cache
 def element_type(name: str) -> ElementType:
-    """Return the type of this ``name``."""
+    """Return the element type of this ``name``."""
     name = "".join(name.split()).upper()
     if found := _SOLID.fullmatch(name):
         return ElementType(name, Kind.SOLID, int(found[1]))

@@ -1,7 +1,7 @@
 """Keywords of Abaqus and CalculiX input files, by their effect on a mesh.
 
-A word may be shortened as long as no other one begins like it (Analysis User's Guide, "Input syntax rules"). A word
-that is not listed is an error: it could make or move nodes.
+A word may be shortened as long as no other word has the same beginning (Analysis User's Guide, "Input syntax
+rules"). A word that is not listed is an error: it could make or move nodes.
 """
 
 from conoid.cases.reading.inp import Block
@@ -32,8 +32,8 @@ MESH: dict[str, dict[str, bool]] = {
         "UNSORTED": False,
     },
 }
-"""Keywords that are read, with their parameters and whether these have a value. ``*SURFACE`` is read, too: its other
-parameters do not affect a mesh."""
+"""Keywords that are read, with their parameters. The value of a parameter is True if it has a value in the file.
+``*SURFACE`` is read, too: its other parameters do not affect a mesh."""
 SURFACE = "SURFACE"
 
 REFUSED = _words(
@@ -123,7 +123,7 @@ ANALYSIS = _words(
     VOIDNUCLEATION VOLUMETRICTESTDATA WAVE WEARCONTROLS WIND XFEM
     """
 )
-"""Keywords of materials, loads, steps and output: they and their data lines are skipped."""
+"""Keywords of materials, loads, steps and output. These keywords and their data lines are skipped."""
 
 
 JOINING = {
@@ -167,13 +167,14 @@ JOINING = {
         "TIE",
     )
 }
-"""Keywords of ``ANALYSIS`` that join bodies, hold them together, move their nodes to each other, crack or remove
-them, as they are written. They have no effect here."""
+"""Keywords of ``ANALYSIS``, as they are written, that join bodies, hold bodies together, move nodes of bodies to
+each other, crack bodies or remove bodies. These keywords have no effect here."""
 
 
 def known(block: Block, in_step: bool = False) -> str:
-    """Return the whole word of a keyword of the three kinds. Raises MeshError for an unknown or ambiguous one. In a
-    step, where no mesh is defined, an unknown word counts as one of the analysis.
+    """Return the whole word of a keyword of the three kinds. Raises MeshError for an unknown or ambiguous keyword.
+
+    In a step, where no mesh is defined, an unknown word counts as a keyword of the analysis.
     """
     every = [*MESH, SURFACE, *REFUSED, *ANALYSIS]
     alike = [word for word in every if word.startswith(block.word)] if block.word else []
@@ -190,8 +191,9 @@ def known(block: Block, in_step: bool = False) -> str:
 
 
 def options(block: Block, word: str) -> dict[str, str]:
-    """Return the parameters of a mesh keyword by their whole names; empty text for those without value. Raises
-    MeshError.
+    """Return the parameters of a mesh keyword by their whole names. A parameter without value has an empty text.
+
+    Raises MeshError.
     """
     found: dict[str, str] = {}
     for written, value in block.parameters:

@@ -1,7 +1,8 @@
 """Names in an Abaqus input file.
 
 Abaqus turns a name to upper case and removes its blanks, but keeps text in quotation marks unchanged (Analysis
-User's Guide, "Input syntax rules"). A name that is not found otherwise is searched without regard to its case.
+User's Guide, "Input syntax rules"). If no name matches exactly, names are compared again without regard to the case
+of letters.
 """
 
 from collections.abc import Iterator
@@ -20,7 +21,7 @@ class Label:
 
 
 def label(written: str) -> Label:
-    """Return the name of ``written`` text."""
+    """Return the name from the text ``written`` in a file."""
     bare = written.strip()
     if len(bare) > 1 and bare[0] == bare[-1] == '"':
         return Label(bare[1:-1], bare[1:-1])
@@ -32,7 +33,7 @@ class Labelled(Generic[T]):
     """Named values of one scope of a file, in the order of the file."""
 
     def __init__(self) -> None:
-        """Empty."""
+        """Start without any value."""
         self._found: dict[str, tuple[Label, T]] = {}
 
     def __iter__(self) -> Iterator[tuple[Label, T]]:
@@ -45,15 +46,18 @@ class Labelled(Generic[T]):
         return value
 
     def get(self, name: Label) -> T | None:
-        """Return the value of ``name``, else the only one whose name differs in case alone."""
+        """Return the value of ``name``. Without this name, return the value of the only name that differs in the
+        case of letters alone.
+        """
         if name.key in self._found:
             return self._found[name.key][1]
         alike = [value for each, value in self if each.key.casefold() == name.key.casefold()]
         return alike[0] if len(alike) == 1 else None
 
     def meant(self, wanted: str) -> list[tuple[Label, T]]:
-        """Return the candidates for ``wanted``, a name from outside of the file in any case of letters; several if
-        these differ in case.
+        """Return the candidates for ``wanted``, a name from outside of the file in any case of letters.
+
+        There are several candidates if names in the file differ in the case of letters alone.
         """
         words = {wanted.casefold(), _joined(wanted).casefold()}
         alike = [(name, value) for name, value in self if name.key.casefold() in words]

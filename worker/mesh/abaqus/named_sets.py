@@ -19,8 +19,10 @@ _NONE = np.zeros(0, np.int64)
 
 
 def named_sets(model: Placed) -> tuple[list[Named], list[str]]:
-    """Return the sets, and remarks on those that are not read. A set of a part or an instance is ``Bar.CLAMP`` or
-    ``Bar-1.CLAMP``, and also ``CLAMP`` if the assembly has none of this name.
+    """Return the sets, and remarks on the sets that are not read.
+
+    A set of a part or an instance has the name ``Bar.CLAMP`` or ``Bar-1.CLAMP``. It also has the name ``CLAMP`` if
+    the assembly has no set of this name.
     """
     remarks = nodes_of_elements(model.deck)
     found = list(_sets(model, model.deck.root, None, remarks))
@@ -42,7 +44,9 @@ def named_sets(model: Placed) -> tuple[list[Named], list[str]]:
 
 
 def _sets(model: Placed, scope: Scope, place: int | None, remarks: list[str]) -> Iterator[Named]:
-    """Yield the sets of a scope for the piece ``place``; None for the model outside of parts, or the assembly."""
+    """Yield the sets of a scope for the piece ``place``. ``place`` is None for the model outside of parts, or for
+    the assembly.
+    """
     for name, one in scope.node_sets:
         nodes = [model.nodes(at, _ids(one, owner)) for owner, at in _owners(model, scope, one, place)]
         yield Named((name.text,), np.unique(np.concatenate([_NONE, *nodes])))
@@ -92,7 +96,7 @@ def _ids(one: ElementSet, owner: str) -> Ids:
 
 
 def nodes_of_elements(deck: Deck) -> list[str]:
-    """Fill the sets of nodes that are given by sets of elements; return remarks on undefined sets."""
+    """Fill the sets of nodes that are defined by sets of elements. Return remarks on undefined sets."""
     remarks = []
     for scope in (deck.root, *(part for _, part in deck.parts), *(each for _, each in deck.instances)):
         for one, name, line in scope.node_sets_of:

@@ -1,4 +1,4 @@
-"""Elements of an Abaqus input file with global indices of their nodes, in their position in the model."""
+"""Elements of an Abaqus input file in their position in the model, with global indices of their nodes."""
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
@@ -16,7 +16,7 @@ from .scopes import Piece
 
 @dataclass(frozen=True, eq=False)
 class Tags:
-    """Nodes of a piece: their numbers, ascending, and the index of the first one among all nodes."""
+    """Nodes of a piece: their numbers, ascending, and the index of its first node among all nodes."""
 
     numbers: Ids
     first: int
@@ -41,8 +41,11 @@ class Placed:
                 yield cells(made.kind, made.numbers, nodes, made.lines)
 
     def faces(self, place: int, wanted: Ids, side: str) -> Iterator[Ids]:
-        """Return the corners (n, 3) or (n, 4) of the faces ``side`` of elements: ``S3``; all faces if it is empty.
-        Elements of surfaces are their own faces. Raises MeshError for a face that an element does not have.
+        """Return the corners (n, 3) or (n, 4) of the faces ``side`` of elements, such as ``S3``; all faces if ``side``
+        is empty.
+
+        The face of a surface element is the element itself. Raises MeshError for a face that an element does not
+        have.
         """
         for each in self.solids(place, wanted):
             known = FACES[each.kind.form]
@@ -59,7 +62,7 @@ class Placed:
             yield placed(tags.numbers, nodes[chosen], _called(kind, numbers[chosen])) + tags.first
 
     def nodes(self, place: int, numbers: Ids) -> Ids:
-        """Return the indices of nodes of a piece, without undefined ones."""
+        """Return the indices of nodes of a piece. Undefined nodes are omitted."""
         tags = self.tags[place]
         there = tags.numbers[np.isin(tags.numbers, numbers)]
         return np.asarray(np.searchsorted(tags.numbers, there) + tags.first, np.int64)

@@ -1,4 +1,4 @@
-"""Selection from an Abaqus input file: all of its elements, or those of a set, an instance or a part."""
+"""Selection from an Abaqus input file: all elements of the file, or the elements of a set, an instance or a part."""
 
 import math
 from collections import Counter
@@ -23,11 +23,12 @@ from .scopes import Piece, Scope
 
 
 def read_inp(path: Path, group: str | None, key: str) -> Content:
-    """Return the elements of an .inp file, all or those of ``group``, in the unit of the file, and its sets.
+    """Return the elements of an .inp file, all or the elements of ``group``, in the unit of the file, and the sets of
+    the file.
 
     ``group`` is an element set of the model or of the assembly, ``Bar-1.Set-1`` (a set of an instance or of a part),
     an instance, a part, or a set that one part alone has. Raises MeshError, with the number of the line if there is
-    one. Nodes and elements are called by the numbers in the file.
+    one. Nodes and elements have the numbers of the file.
     """
     try:
         deck = Deck(path)
@@ -48,7 +49,7 @@ def read_inp(path: Path, group: str | None, key: str) -> Content:
 
 
 def _nodes(pieces: list[Piece]) -> tuple[Ids, Floats, list[Tags]]:
-    """Return all nodes, those of each piece by ascending number, and their positions."""
+    """Return the nodes of all pieces, each piece by ascending number, and the positions of these nodes."""
     tags, points, places, first = [], [], list[Tags](), 0
     for piece in pieces:
         numbers = np.array(piece.mesh.nodes, np.int64)
@@ -61,7 +62,7 @@ def _nodes(pieces: list[Piece]) -> tuple[Ids, Floats, list[Tags]]:
 
 
 def _pieces(deck: Deck) -> Iterator[Piece]:
-    """Return the pieces of the model. In a file without instances each part is one."""
+    """Return the pieces of the model. In a file without instances each part is a piece."""
     if not deck.root.empty:
         yield Piece(deck.root, deck.root, _points(deck.root))
     for _, part in deck.parts if not list(deck.instances) else ():
@@ -76,7 +77,7 @@ def _points(scope: Scope) -> Floats:
 
 
 def _turned(points: Floats, axis: tuple[float, ...]) -> Floats:
-    """Return points turned about a line (Rodrigues)."""
+    """Return points rotated about a line (Rodrigues)."""
     start, end = np.array(axis[:3]), np.array(axis[3:6])
     along, arm = (end - start) / math.sqrt(((end - start) ** 2).sum()), points - start
     sine, cosine = sine_and_cosine(math.radians(axis[6]))

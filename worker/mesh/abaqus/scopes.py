@@ -11,14 +11,14 @@ from .elements import ElementType
 from .labels import Label, Labelled
 
 OWN = ""
-"""Key, in the members of a set, of the scope in which the set is defined."""
+"""Key in the members of a set for the scope in which the set is defined."""
 
 
 class ElementSet:
-    """Numbers of elements, or of nodes, by the key of their instance (``OWN``: of its own scope)."""
+    """Numbers of elements, or of nodes, by the key of their instance. The key ``OWN`` means the scope of the set."""
 
     def __init__(self) -> None:
-        """Empty."""
+        """Start without members."""
         self.members: dict[str, array[int]] = {}
 
     def add(self, owner: str, numbers: "array[int]") -> None:
@@ -26,7 +26,9 @@ class ElementSet:
         self.members.setdefault(owner, array("q")).extend(numbers)
 
     def include(self, other: "ElementSet", owner: str = OWN) -> None:
-        """Add the present contents of ``other``; its own elements become those of ``owner`` here."""
+        """Add the present contents of ``other``. Elements of the scope of ``other`` become elements of ``owner``
+        here.
+        """
         for place, numbers in list(other.members.items()):
             self.add(owner if place == OWN else place, array("q", numbers))
 
@@ -37,7 +39,7 @@ class Rows:
 
     numbers: "array[int]" = field(default_factory=lambda: array("q"))
     nodes: "array[int]" = field(default_factory=lambda: array("q"))
-    """Nodes of each element, one after the other."""
+    """Numbers of the nodes of each element, one element after the other."""
     lines: "array[int]" = field(default_factory=lambda: array("q"))
 
     def extend(self, other: "Rows") -> None:
@@ -49,13 +51,15 @@ class Rows:
 
 @dataclass
 class Surface:
-    """A ``*SURFACE`` as it is written: in each line an element, or a set of elements, and the name of a face."""
+    """A ``*SURFACE`` as it is written in the file: each line has an element or a set of elements, and the name of a
+    face.
+    """
 
     name: Label
     line: int
     of_nodes: bool
     rows: list[tuple[int, list[str]]]
-    """Number and fields of each line."""
+    """Number of the line, and its fields, for each line."""
 
 
 @dataclass
@@ -64,39 +68,41 @@ class Scope:
 
     name: Label
     line: int
-    """Line of its keyword in the file."""
+    """Number of the line of its keyword in the file."""
     nodes: "array[int]" = field(default_factory=lambda: array("q"))
     points: "array[float]" = field(default_factory=lambda: array("d"))
     solids: dict[ElementType, Rows] = field(default_factory=dict)
     """Volume elements, by type."""
     plates: dict[ElementType, Rows] = field(default_factory=dict)
-    """Surface elements, which are among the others, by type."""
+    """Surface elements by type. Their numbers are also in ``others``."""
     others: "dict[ElementType, array[int]]" = field(default_factory=dict)
-    """Numbers of the elements without volume, or that are not read, by type."""
+    """Numbers of the elements without volume, or of a type that is not read, by type."""
     sets: Labelled[ElementSet] = field(default_factory=Labelled)
     node_sets: Labelled[ElementSet] = field(default_factory=Labelled)
     node_sets_of: list[tuple[ElementSet, Label, int]] = field(default_factory=list)
-    """Sets of the nodes of a set of elements: both, and the line."""
+    """Sets with the nodes of a set of elements: the set of nodes, the name of the set of elements, and the number of
+    the line."""
     surfaces: list[Surface] = field(default_factory=list)
 
     @property
     def empty(self) -> bool:
-        """Whether it has neither nodes nor elements."""
+        """Whether the scope has neither nodes nor elements."""
         return not (self.nodes or self.solids or self.others)
 
     @property
     def volumes(self) -> int:
-        """Number of its volume elements."""
+        """Number of volume elements of the scope."""
         return sum(len(rows.numbers) for rows in self.solids.values())
 
     def numbers(self) -> Ids:
-        """Numbers of all elements, in the order of types."""
+        """Numbers of all elements, in the order of their types."""
         every = (*(rows.numbers for rows in self.solids.values()), *self.others.values())
         return np.concatenate([np.zeros(0, np.int64), *(np.array(each, np.int64) for each in every)])
 
     def named_set(self, name: Label, among: Labelled[ElementSet] | None = None) -> ElementSet:
-        """Return the set of elements of this name, or that of nodes ``among`` these; an empty one if there is none:
-        a second definition adds to the first.
+        """Return the set of elements with this name, or the set of nodes ``among`` these.
+
+        An empty set is made if there is none: a second definition adds to the first.
         """
         sets = self.sets if among is None else among
         found = sets.get(name)
@@ -110,20 +116,22 @@ class Scope:
 
 @dataclass
 class Instance(Scope):
-    """A part in its position: the mesh of ``part``, or one of its own, moved and then turned."""
+    """A part in its position: the mesh of ``part`` or a mesh of the instance itself, first translated and then
+    rotated.
+    """
 
     part: Scope = field(default_factory=lambda: Scope(Label("", ""), 0))
     move: tuple[float, ...] = (0.0, 0.0, 0.0)
     axis: tuple[float, ...] = ()
-    """Two points of the axis and an angle in degrees; empty for no rotation."""
+    """Two points of the axis of rotation and an angle in degrees; empty without rotation."""
 
     @property
     def mesh(self) -> Scope:
-        """Scope of its nodes and elements."""
+        """Scope of the nodes and elements of the instance."""
         return self.part if self.empty else self
 
     def set_named(self, name: Label, of_nodes: bool = False) -> ElementSet | None:
-        """Return a set of its own, else of its part."""
+        """Return a set of the instance, or a set of its part if the instance has none of this name."""
         if of_nodes:
             return self.node_sets.get(name) or self.part.node_sets.get(name)
         return self.sets.get(name) or self.part.sets.get(name)
@@ -136,4 +144,4 @@ class Piece:
     scope: Scope
     mesh: Scope
     points: Floats
-    """(n, 3) positions, in the unit of the file."""
+    """(n, 3) positions of the nodes, in the unit of the file."""

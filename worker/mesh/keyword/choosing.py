@@ -11,7 +11,7 @@ from .deck import Deck
 from .sets import Set
 
 DEEPEST = 20
-"""Largest depth of sets within sets. Chosen: decks have up to three."""
+"""Largest depth of sets within sets. Chosen value: decks have up to three levels."""
 _KINDS = {"part": "PART", "set_part": "PART", "set_solid": "SOLID"}
 """Words before a colon that select the kind of a name."""
 
@@ -28,7 +28,7 @@ class Content:
     """Return the nodes of some parts."""
 
     def members(self, kind: str, number: int, depth: int = 0) -> Ids:
-        """Return the ids of defined nodes, parts or elements in a set. Raises MeshError."""
+        """Return the ids in a set that belong to defined nodes, parts or elements. Raises MeshError."""
         one = self.deck.sets.found[kind].get(number)
         if one is None or depth > DEEPEST or one.unread:
             why = "is not defined" if one is None else one.unread or "has itself among its members"
@@ -58,7 +58,9 @@ class Content:
         return np.union1d(np.array(list(self.deck.titles), np.int64), self.parts)
 
     def chosen(self, group: str, key: str) -> "np.ndarray":
-        """Return (m,) the elements of a name: of a part, a set of parts or a set of solids, by title or id."""
+        """Return (m,) which elements a name contains: the name of a part, a set of parts or a set of solids, by
+        title or id.
+        """
         meant = list(self._meant(group))
         if not meant:
             raise MeshError(f"{key}.group = {group!r}: no such part or set; known: {self._known()}")
@@ -105,8 +107,8 @@ class Content:
 
 
 def _ranged(numbers: Ids, every: Ids) -> Ids:
-    """Return the ids of ``every`` in ranges. The list has the count of each range's numbers, two or three, before
-    them.
+    """Return the ids of ``every`` that are in ranges. In the list each range begins with the count of its numbers,
+    two or three.
     """
     step, found = int(numbers[0]), np.zeros(len(every), bool)
     for k in range(1, len(numbers) - step + 1, step):

@@ -15,9 +15,10 @@ from .sets import Sets
 _NODE = (8, 16, 16, 16, 8, 8)
 _TEN = (8,) * 10
 _EIGHT = (10,) * 8
-"""Widths of fields: of a node, of the nodes of an element, of other cards (the manual, "*NODE", "*ELEMENT_SOLID")."""
+"""Widths of the fields: of a node, of the nodes of an element, of other cards (the manual, "*NODE",
+"*ELEMENT_SOLID")."""
 _OPTIONS = ("INERTIA", "CONTACT", "PRINT", "REPOSITION", "ATTACHMENT_NODES", "FIELD")
-"""Options of ``*PART``, which add cards behind those of the part."""
+"""Options of ``*PART`` that add cards after the cards of the part."""
 _MOST = 2**53
 """Upper bound of the numbers of nodes and elements."""
 
@@ -30,7 +31,7 @@ class Solids:
     parts: "array[int]" = field(default_factory=lambda: array("q"))
     nodes: "array[int]" = field(default_factory=lambda: array("q"))
     lines: "array[int]" = field(default_factory=lambda: array("q"))
-    """Line of each; 0 in an included file."""
+    """Line of each element in the file; 0 in an included file."""
 
 
 class Deck:
@@ -45,9 +46,9 @@ class Deck:
         """Titles of parts by their ids."""
         self.sets = Sets()
         self.passed, self.volumes, self.joining = Counter[str](), Counter[str](), Counter[str]()
-        """Cards of elements that are not read, and keywords that join bodies, by keyword."""
+        """Counts, by keyword, of cards of elements that are not read, and of keywords that join bodies."""
         self.held = 0
-        """Number of nodes with constraints of their own."""
+        """Number of nodes with constraints on the card of the node."""
         deck = cards.Deck(path)
         for block in deck.blocks():
             self._take(block)
@@ -116,7 +117,7 @@ class Deck:
         rows.lines.append(0 if block.file else card.number)
 
     def _part(self, block: Block, single: bool) -> None:
-        """Read parts of two cards each; with options one part and more cards."""
+        """Read parts of two cards each. With options read one part and further cards."""
         rows = list(block.cards)
         while rows and not rows[-1].text.strip():
             rows.pop()

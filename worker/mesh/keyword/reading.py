@@ -1,4 +1,4 @@
-"""Selection from an LS-DYNA keyword deck: all solid elements, or those of a part or a set."""
+"""Selection from an LS-DYNA keyword deck: all solid elements, or the elements of a part or a set."""
 
 from collections.abc import Iterator
 from pathlib import Path
@@ -17,14 +17,15 @@ from .choosing import DEEPEST, Content
 from .deck import Deck, Solids
 
 _KINDS = {4: TET4, 8: HEX8, 10: TET10, 20: Kind(Form.HEXAHEDRON, 20), 27: Kind(Form.HEXAHEDRON, 27)}
-"""Kinds by number of nodes; of hexahedra of more than eight the corners are the first eight."""
+"""Kinds by number of nodes. Of hexahedra of more than eight nodes the first eight nodes are the corners."""
 
 
 def read_keyword(path: Path, group: str | None, key: str) -> solid.Content:
-    """Return the solid elements of a deck, all or those of ``group``, and its sets of nodes and segments.
+    """Return the solid elements of a deck, all or the elements of ``group``, and the sets of nodes and segments of the
+    deck.
 
-    ``group`` is a part, a ``*SET_PART`` or a ``*SET_SOLID`` by its title or id; a number alone is that of a part, if
-    there is one. Raises MeshError, with the number of the line if there is one.
+    ``group`` is a part, a ``*SET_PART`` or a ``*SET_SOLID``, by its title or id. A number alone is the id of a part,
+    if there is such a part. Raises MeshError, with the number of the line if there is one.
     """
     try:
         deck = Deck(path)
@@ -68,7 +69,7 @@ def _content(deck: Deck, tags: Ids, every: list[Cells]) -> Content:
 
 
 def _named(content: Content) -> tuple[list[Named], list[str]]:
-    """Return the sets of nodes and of segments by title and id, and remarks on those that are not read."""
+    """Return the sets of nodes and of segments by title and id, and remarks on the sets that are not read."""
     found, remarks = list[Named](), list[str]()
     for kind in ("NODE", "SEGMENT"):
         for number, one in content.deck.sets.found[kind].items():
@@ -85,7 +86,7 @@ def _named(content: Content) -> tuple[list[Named], list[str]]:
 
 
 def _segments(content: Content, number: int, depth: int = 0) -> Iterator[Ids]:
-    """Return the faces (1 or more, 3 or 4) of a set; a fourth node of 0 repeats the third."""
+    """Return the faces (1 or more, 3 or 4) of a set. A fourth node of 0 repeats the third node."""
     one = content.deck.sets.found["SEGMENT"].get(number)
     if one is None or one.unread or depth > DEEPEST:
         why = "is not defined" if one is None else one.unread or "has itself among its members"

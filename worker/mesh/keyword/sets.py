@@ -8,35 +8,37 @@ _WIDTHS = (10,) * 8
 _KINDS = ("NODE", "SEGMENT", "PART", "SOLID")
 _OPTIONS = ("TITLE", "LIST", "GENERATE", "INCREMENT", "COLUMN", "GENERAL", "ADD", "COLLECT", "SMOOTH")
 _FIRST = 1
-"""Number of cards before the members: id of the set and attributes."""
+"""Number of cards before the members of a set: a card with the id of the set and its attributes."""
 _GENERAL = {"NODE": ("ALL", "NODE", "DNODE", "PART", "DPART"), "PART": ("ALL", "PART", "DPART"),
             "SOLID": ("ALL", "ELEM", "DELEM", "PART", "DPART"), "SEGMENT": ("SEG",)}  # fmt: skip
-"""First words of cards of ``_GENERAL`` that are supported; with ``D`` the members are removed."""
+"""First words of cards of a set with the option ``_GENERAL`` that are supported. A word that begins with ``D``
+removes members."""
 MOST = 20_000_000
-"""Largest count of numbers of one range. Chosen: more than a mesh that a machine of some 100 GB can run."""
+"""Largest count of numbers of one range. Chosen value: more than the elements of a mesh that a machine of some 100
+GB can run."""
 
 
 @dataclass
 class Set:
-    """A set as it is written: steps that add and remove members, in order."""
+    """A set as it is written in the deck: steps that add and remove members, in order."""
 
     id: int
     title: str
     steps: list[tuple[str, list[int]]] = field(default_factory=list)
-    """A word (``NODE``, ``DNODE``, ``RANGE``, ``PART``, ``ALL``, ``SET``, ``SEG``) and its numbers."""
+    """Steps: a word (``NODE``, ``DNODE``, ``RANGE``, ``PART``, ``ALL``, ``SET``, ``SEG``) and its numbers."""
     unread: str = ""
-    """Reason for which it is not read, or empty."""
+    """Reason for which the set is not read; empty if it is read."""
 
 
 class Sets:
     """Sets by kind and id."""
 
     def __init__(self) -> None:
-        """Empty."""
+        """Start without any set."""
         self.found: dict[str, dict[int, Set]] = {kind: {} for kind in _KINDS}
 
     def take(self, block: Block) -> bool:
-        """Read a block; return whether it is one of a set. Raises CardError."""
+        """Read a block; return whether the block belongs to a set. Raises CardError."""
         name, options = block.parted(_OPTIONS)
         kind = name.removeprefix("SET_")
         if not name.startswith("SET_") or kind not in _KINDS:

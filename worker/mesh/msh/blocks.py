@@ -7,7 +7,7 @@ from ..cells import HEX8, PYRAMID5, TET4, WEDGE6, Form, Kind
 from ..model import Floats, Ids
 
 VOLUME = 3
-"""Dimension of volumes."""
+"""Dimension of volumes in gmsh."""
 
 _TYPES = {
     0: {15: 1},
@@ -19,7 +19,7 @@ _TYPES = {
         92: 64, 93: 125, 94: 216, 95: 343, 96: 512, 97: 729, 98: 1000, 99: 32, 106: 126, 107: 196, 108: 288, 109: 405,
         110: 550, 111: 24, 118: 30, 119: 55, 120: 91, 121: 140, 122: 204, 123: 285, 124: 385, 125: 21, 132: 1},
 }  # fmt: skip
-"""Number of nodes of gmsh's element types by dimension (its source, GmshDefines.h)."""
+"""Number of nodes of gmsh's element types, by dimension (its source, GmshDefines.h)."""
 _RING = ((0, 1), (0, 3), (0, 4), (1, 2), (1, 5), (2, 3), (2, 6), (3, 7), (4, 5), (4, 7), (5, 6), (6, 7))
 _OF_WEDGE = ((0, 1), (0, 2), (0, 3), (1, 2), (1, 4), (2, 5), (3, 4), (3, 5), (4, 5))
 _OF_PYRAMID = ((0, 1), (0, 3), (0, 4), (1, 2), (1, 4), (2, 3), (2, 4), (3, 4))
@@ -30,10 +30,10 @@ KINDS = {
     18: Kind(Form.WEDGE, 15, _OF_WEDGE), 13: Kind(Form.WEDGE, 18, _OF_WEDGE),
     19: Kind(Form.PYRAMID, 13, _OF_PYRAMID), 14: Kind(Form.PYRAMID, 14, _OF_PYRAMID),
 }  # fmt: skip
-"""Volume elements that are read (order of nodes: gmsh reference manual, "Node ordering")."""
+"""Kinds of volume elements that are read (order of nodes: gmsh reference manual, "Node ordering")."""
 TRIANGLES = frozenset((2, 9, 20, 21, 22, 23, 24, 25, 42, 43, 44, 45, 46))
 QUADRILATERALS = frozenset((3, 10, 16, 36, 37, 38, 39, 40, 41, 47, 48, 49, 50, 51))
-"""Surface elements whose first four nodes are the corners."""
+"""Numbers of gmsh's types of triangles and quadrilaterals. The first three or four nodes are the corners."""
 
 
 @dataclass(frozen=True)
@@ -44,18 +44,18 @@ class Block:
     numbers: Ids
     """(m,) numbers of the elements."""
     nodes: Ids
-    """(m, k) numbers of their nodes."""
+    """(m, k) numbers of the nodes of each element."""
     groups: frozenset[int]
     """Physical groups of the dimension of the elements."""
 
     @property
     def dimension(self) -> int:
-        """Dimension, 0 to 3."""
+        """Dimension of the elements, 0 to 3."""
         return shape_of(self.kind)[0]
 
     @property
     def name(self) -> str:
-        """Name of the type, for messages."""
+        """Name of the element type, for messages."""
         return f"type {self.kind} of gmsh"
 
 

@@ -1,4 +1,4 @@
-"""Selection from a .msh file: all of its volume elements, or those of a physical group."""
+"""Selection from a .msh file: all of its volume elements, or the elements of a physical group."""
 
 import re
 from collections.abc import Iterator
@@ -24,12 +24,12 @@ _LISTED = {
     "MeshFormat", "NodeData", "Nodes", "ParametricNodes", "Parametrizations", "PartitionedEntities", "Periodic",
     "PhysicalNames",
 }  # fmt: skip
-"""Sections of the format; those without a part of the mesh are skipped."""
+"""Sections of the format. Sections without data of the mesh are skipped."""
 
 
 def read_msh(path: Path, group: str | None, key: str) -> Content:
-    """Return the elements of an .msh file, all or those of a physical group of volumes, and the physical groups of
-    points, curves and surfaces as sets.
+    """Return the elements of an .msh file, all or the elements of a physical group of volumes. The physical groups of
+    points, curves and surfaces are returned as sets.
 
     ``group`` is the name of the physical group, or its number. Groups with the same name are united. Raises
     MeshError.
@@ -92,7 +92,7 @@ def _refuse_others(chosen: list[Block]) -> None:
 
 
 def _once(chosen: list[Block]) -> list[Block]:
-    """Return the blocks with each element once: in the format 2.2 an element is repeated for each of its groups."""
+    """Return the blocks with each element once. In the format 2.2 an element is repeated for each of its groups."""
     found = []
     for kind in dict.fromkeys(block.kind for block in chosen):
         alike = [block for block in chosen if block.kind == kind]

@@ -18,14 +18,14 @@ from ..model import Floats, Ids
 VERSIONS = ("4.1", "2.2")
 _MARK = b"\xef\xbb\xbf"
 _SINGLE = ("MeshFormat", "PhysicalNames", "Entities", "PartitionedEntities", "Nodes", "ParametricNodes", "Elements")
-"""Sections that a file has once."""
+"""Sections that occur only once in a file."""
 _LARGEST = 2**53
-"""Integers up to this one are exact as float64."""
+"""Largest integer up to which all integers are exact as float64."""
 
 
 @dataclass(frozen=True)
 class Sections:
-    """A file: its version, its sections by name, and the byte order if it is binary (else empty)."""
+    """A file: its version, its sections by name, and the byte order if the file is binary (else empty)."""
 
     version: str
     parts: dict[str, bytes]
@@ -40,7 +40,7 @@ class Sections:
 
 
 def read_sections(path: Path) -> Sections:
-    """Divide a file into sections. Raises MeshError for one that is no .msh file, is damaged, or has another
+    """Divide a file into sections. Raises MeshError for a file that is no .msh file, is damaged, or has another
     version.
     """
     data = path.read_bytes().removeprefix(_MARK)
@@ -98,10 +98,10 @@ def _formatted(parts: dict[str, bytes]) -> Sections:
 
 
 class Numbers(ABC):
-    """Sequential reader of the numbers of a section. Raises MeshError for contents that do not fit."""
+    """Sequential reader of the numbers of a section. Raises MeshError if the contents do not agree with the format."""
 
     def __init__(self, name: str, content: bytes, order: str) -> None:
-        """``content``: bytes of the section ``name``; ``order``: their byte order."""
+        """``content``: bytes of the section ``name``; ``order``: byte order of these bytes."""
         self.name, self.content, self.order, self.at = name, content, order, 0
 
     def count(self) -> int:
@@ -114,7 +114,7 @@ class Numbers(ABC):
 
     @abstractmethod
     def sizes(self, n: int) -> Ids:
-        """Read (n,) counts, or numbers of nodes and elements, of 8 bytes."""
+        """Read (n,) counts, or numbers of nodes and elements, of 8 bytes each."""
 
     @abstractmethod
     def floats(self, n: int) -> Floats:
@@ -122,7 +122,7 @@ class Numbers(ABC):
 
     @abstractmethod
     def close(self) -> None:
-        """Raise MeshError if numbers are left."""
+        """Raise MeshError if numbers of the section are left."""
 
     def damaged(self, why: str) -> MeshError:
         """Return the error of a section whose contents do not agree with its counts."""
@@ -130,7 +130,7 @@ class Numbers(ABC):
 
 
 class Written(Numbers):
-    """Numbers as text."""
+    """Reader of numbers that are text."""
 
     def __init__(self, name: str, content: bytes) -> None:
         """Read all numbers of the section."""
@@ -164,7 +164,7 @@ class Written(Numbers):
 
 
 class Stored(Numbers):
-    """Numbers as in memory; in the format 2.2 the counts are text (``line``)."""
+    """Reader of numbers that are stored as in memory. In the format 2.2 the counts are text (``line``)."""
 
     def line(self) -> int:
         """Read a count that is text, on a line of its own."""

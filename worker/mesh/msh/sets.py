@@ -10,12 +10,12 @@ from ..sets import Named, surface
 from .blocks import QUADRILATERALS, TRIANGLES, VOLUME, Block
 
 _SURFACE = 2
-"""Dimension of a surface."""
+"""Dimension of a surface in gmsh."""
 
 
 def named_sets(blocks: list[Block], names: Mapping[tuple[int, int], str], tags: Ids) -> Iterator[Named]:
-    """Yield for each name, or number of a group without one, the nodes of points and curves, or the faces of a
-    surface.
+    """Yield the physical groups: for each name, or number of a group without a name, the nodes of points and curves,
+    or the faces of a surface.
     """
     groups = sorted({(each.dimension, tag) for each in blocks if each.dimension < VOLUME for tag in each.groups})
     called: dict[tuple[int, str], list[int]] = {}

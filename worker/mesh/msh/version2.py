@@ -1,4 +1,4 @@
-"""Nodes and elements of the format 2.2: an element has one physical group and is repeated for each further one."""
+"""Nodes and elements of the format 2.2. An element has one physical group and is repeated for each further group."""
 
 from collections import defaultdict
 
@@ -62,7 +62,7 @@ def _tags(numbers: Numbers, values: Floats) -> Ids:
 
 
 Rows = dict[tuple[int, ...], tuple[list[int], list[list[int]]]]
-"""Numbers and nodes of elements, by type and physical group (none for an element in no group)."""
+"""Numbers and nodes of elements, by type and physical group. An element without a group has no group number."""
 
 
 def _elements(numbers: Numbers) -> Rows:

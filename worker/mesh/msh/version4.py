@@ -1,4 +1,6 @@
-"""Nodes and elements of the format 4.1: a block for each geometric entity, which has the physical groups."""
+"""Nodes and elements of the format 4.1. The format has a block for each geometric entity, and entities have the
+physical groups.
+"""
 
 from collections import defaultdict
 
@@ -41,7 +43,7 @@ def _entities(numbers: Numbers) -> Groups:
 
 
 def _partitioned(numbers: Numbers) -> tuple[Groups, dict[int, frozenset[int]], frozenset[int]]:
-    """Return groups of the parts of entities, the partitions of each part of a volume, and the entities of ghost
+    """Return the groups of the parts of entities, the partitions of each part of a volume, and the entities of ghost
     cells.
     """
     found: Groups = {}
@@ -63,7 +65,7 @@ def _partitioned(numbers: Numbers) -> tuple[Groups, dict[int, frozenset[int]], f
 
 
 def _listed(numbers: Numbers) -> frozenset[int]:
-    """Return the physical groups of an entity; a negative number is the same group with reversed orientation."""
+    """Return the physical groups of an entity. A negative number is the same group with reversed orientation."""
     return frozenset(np.abs(numbers.ints(numbers.count())).tolist())
 
 
@@ -83,8 +85,9 @@ def _nodes(numbers: Numbers) -> tuple[Ids, Floats]:
 
 
 def _elements(numbers: Numbers, groups: Groups, ghosts: frozenset[int]) -> tuple[list[Block], set[int]]:
-    """Return the blocks, and the volumes with elements. Ghost cells are copies of elements of another file, and
-    omitted.
+    """Return the blocks, and the volumes with elements.
+
+    Ghost cells are copies of elements of another file, and are omitted.
     """
     many, total, *_ = numbers.sizes(4)
     found: list[Block] = []
