@@ -8,10 +8,11 @@
 # make drill      the long tests: 800 faults (table in build/drill; continues an earlier drill; DRILL="--shard 1/4"),
 #                 then studies of minutes; as root on Debian it installs Slurm, libfaketime and systemd
 #
-# Each target first brings .venv to the versions of requirements.lock when that file or pyproject.toml has changed.
-# Commands over 10 s print progress. Kernels are compiled while pip installs packages that they do not need.
-# `kept` writes the bytecode of changed sources before the tests, so that their some hundred processes do not compile
-# it each; also where the environment sets PYTHONDONTWRITEBYTECODE, as many containers do.
+# Each target first updates .venv to the versions of requirements.lock, if that file or pyproject.toml has changed.
+# Commands that take more than 10 s print progress. Kernels are compiled while pip installs packages that the kernels
+# do not need. The target `kept` writes the bytecode of changed sources before the tests, so that the hundreds of test
+# processes do not compile these sources again. It also does so if the environment sets PYTHONDONTWRITEBYTECODE, as
+# many containers do.
 
 PYTHON ?= $(firstword $(foreach name,python3.11 python3.12 python3.13 python3,$(shell command -v $(name))))
 BIN := .venv/bin

@@ -1,7 +1,7 @@
 #!/bin/sh
-# A backup of the server's database, beside a server that runs: backup.sh DATABASE FILE
+# Makes a backup of the server's database while the server runs: backup.sh DATABASE FILE
 #   /opt/conoid/deploy/backup.sh /var/lib/conoid/runs/server.sqlite /backup/server.sqlite
-# The copy is whole, whatever is being written, and takes the place of the last one only when it is finished.
+# The copy is consistent, also during writes to the database. It replaces the previous copy when it is complete.
 set -eu
 umask 077
 rm -f "$2.part"
