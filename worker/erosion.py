@@ -199,8 +199,8 @@ class Erosion:
             bound.release(self._loose, self._bounds)
 
     def _unload(self, gone: Ints) -> None:
-        """Removes the boundary loads of the removed tets ``gone`` (global ids, of this rank), on every rank that has
-        a node of them. Collective.
+        """Removes the boundary loads of the removed tets ``gone`` (global ids, of this rank), on every rank that has a
+        node of a removed tet. Collective.
         """
         if any(bound.on_faces for bound in self._bounds):
             gone = self._comm.join(gone)

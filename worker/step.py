@@ -23,8 +23,7 @@ step:
 ==  =====================================================  ==========================
 
 ``first_half`` executes rows 1 to 9, ``second_half`` rows 11 to 15; the loop (run/loop.py) writes the output of row 10
-between the halves. After the last step, rows 1 to 10 are executed once more, and ``end`` sets the velocities to those
-at n.
+between the halves. After the last step, rows 1 to 10 are executed once more, and ``end`` sets the velocities to v(n).
 
 - Rigid bodies (rigid/stage.py) and moving walls act in rows 2, 6, 8, 9 and 11 only.
 - Surface that erosion exposes in 3 is in contact from 4 of the same step on.

@@ -1,14 +1,14 @@
 """Tied interface at the start: the nodes of one part that are tied to faces of another, and their weights.
 
-The nodes of the finer surface, the tied side, are tied to faces of the other, the mortar side; for the velocities of
-both
+The nodes of the finer surface, the tied side, are tied to faces of the other surface, the mortar side. The velocities
+v_i of the tied side and v_j of the mortar side fulfil
 
     D_i v_i = sum_j M_ij v_j,   D_i = int psi_i dA,   M_ij = int psi_i N_j dA,
 
-with the shape functions N of the mortar side and psi dual to those of the tied side on every tied face (dual mortar
-method, Wohlmuth 2000): a constant stress is transmitted exactly, and each row contains one tied node. On a tied face
-that the mortar side covers only in part, the nodes that lie on the mortar side are tied to the point of the face
-below them (collocation), with their shares of the covered area.
+with the shape functions N of the mortar side, and functions psi that are dual to the shape functions of the tied side
+on every tied face (dual mortar method, Wohlmuth 2000). A constant stress is transmitted exactly, and each row contains
+one tied node. On a tied face that the mortar side covers only in part, the nodes that lie on the mortar side are tied
+to the point of the face below them (collocation), with the shares of these nodes of the covered area.
 """
 
 from dataclasses import dataclass
@@ -198,8 +198,8 @@ def _dual(own: Floats, lumped: Floats) -> Floats:
 
 
 def _collocate(weights: Floats, cut: _Cut, some: Flags, lumped: Floats) -> None:
-    """Sets the weights on tied faces that are covered in part: for each corner those in the piece in which it lies
-    deepest.
+    """Sets the weights on tied faces that are covered in part: for each corner the weights in the piece in which the
+    corner lies deepest.
     """
     rows = np.flatnonzero(some)
     inside = cut.corner[rows].min(axis=2)

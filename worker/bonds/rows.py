@@ -9,12 +9,12 @@ from ..model.state import Flags, Floats, Ints
 from .pieces import Pieces
 
 _NOTHING = 1e-12
-"""Share of the area of a row below which a weight is rounding."""
+"""Share of the area of a row; a smaller weight is treated as rounding error."""
 
 
 @dataclass
 class Rows:
-    """Rows by bond and node."""
+    """Rows of tied nodes, sorted by bond and node."""
 
     bond: Ints
     """(r,) number of the bond."""
@@ -27,11 +27,11 @@ class Rows:
     master: Ints
     """(e,) global id of the mortar node of each weight."""
     weight: Floats
-    """(e,) weights; those of a row add up to one."""
+    """(e,) weights; the weights of a row add up to one."""
     side: Ints
     """(s,) row of each tied face at its node."""
     face: Ints
-    """(s, 3) global ids of its corners."""
+    """(s, 3) global ids of the corners of each tied face."""
 
     def take(self, chosen: Flags) -> "Rows":
         """Returns the chosen rows."""
@@ -50,7 +50,7 @@ def assembled(pieces: Pieces, slaves: Ints, masters: Ints) -> Rows:
     key = np.repeat(pieces.bond[:, None] * many + slaves, 3, axis=1).reshape(-1)
     other, value = np.tile(masters, (1, 3)).reshape(-1), pieces.weights.reshape(-1)
     names, of = np.unique(key, return_inverse=True)
-    area = np.bincount(of, value, len(names)).astype(np.float64)  # bincount of no pieces gives integers
+    area = np.bincount(of, value, len(names)).astype(np.float64)  # without pieces bincount returns integers
     some = area > _NOTHING * area.max(initial=0.0)
     renumbered = np.cumsum(some) - 1
     kept = some[of]

@@ -1,9 +1,9 @@
 """Tied bonds between non-matching meshes, in the time step.
 
-The rows (rows.py) follow from the pieces of the interface (interface.py) and the present corners of their faces: copies
-of a separated node are tied by their own faces, and faces of removed tets are no longer tied. Every rank has the list
-of all pieces and rows (ties.py); the state of a row is on the rank that owns its node (layout.py), and is sent to all
-ranks when rows change. Contact ignores pairs whose nodes are tied by one bond (``Ties.bits``).
+The rows (rows.py) are computed from the pieces of the interface (interface.py) and the present corners of their faces:
+copies of a separated node are tied by their own faces, and faces of removed tets are no longer tied. Every rank has the
+list of all pieces and rows (ties.py); the state of a row is on the rank that owns its node (layout.py), and is sent to
+all ranks when rows change. Contact ignores pairs whose nodes are tied by one bond (``Ties.bits``).
 """
 
 import numpy as np
@@ -36,8 +36,8 @@ class Bonds:
         self, case: Case, model: Model, pieces: Pieces, bounds: list[Boundary], comm: Comm, clock: Clock, team: Team,
         impulse: float,
     ) -> None:  # fmt: skip
-        """``pieces``: of all ranks; none for a run that resumes. ``impulse``: bound of the impulse on one node in a
-        step, N s. Collective.
+        """``pieces``: the pieces of all ranks; none for a run that resumes. ``impulse``: bound of the impulse on one
+        node in a step, N s. Collective.
         """
         self._model, self._bounds, self._comm, self._clock = model, bounds, comm, clock
         self._laws, self._passes = _laws(case), _Passes(team)
@@ -63,8 +63,8 @@ class Bonds:
         self.account.note(state.v, self._laid.local)
 
     def predict(self, state: Nodes) -> None:
-        """After the kick: applies the impulses of the last step (warm start), so that contact starts from velocities at
-        which the bonds nearly hold. Collective.
+        """After the kick: applies the impulses of the last step (warm start), so that contact starts from velocities
+        that nearly fulfil the conditions of the bonds. Collective.
         """
         layout, mean_dt = self._laid, self._clock.mean_dt
         ratio = mean_dt / self._mean_dt if self._mean_dt > 0.0 else 0.0

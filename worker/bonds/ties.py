@@ -13,16 +13,16 @@ from .records import DAMAGE, KEPT, PUSH
 from .rows import Rows, assembled
 
 _BITS = 62
-"""Bonds that contact distinguishes; further ones share a bit."""
+"""Number of bonds that contact distinguishes; further bonds have a common bit."""
 Known = tuple[Ints, Ints, Floats]
-"""Bonds, nodes and states of rows, (r,), (r,) and (r, KEPT)."""
+"""Type of bonds (r,), nodes (r,) and states (r, KEPT) of rows."""
 
 
 class Ties:
     """Pieces, rows and states of the tied bonds of a case, equal on all ranks."""
 
     def __init__(self, pieces: Pieces, model: Model, comm: Comm) -> None:
-        """``pieces``: of all ranks."""
+        """``pieces``: the pieces of all ranks."""
         self._model, self._comm = model, comm
         self.version = 0
         """Number that increases when rows change."""
@@ -64,8 +64,8 @@ class Ties:
         self.rows, self.states = rows, carried
 
     def mark(self, rows: Rows) -> None:
-        """Sets the bits of nodes that contact ignores with each other: nodes of the intact ``rows``, and corners of
-        tied faces that lie beside the mortar side.
+        """Sets the bits by which contact ignores pairs of nodes: nodes of the intact ``rows``, and corners of tied
+        faces that lie beside the mortar side.
         """
         corner, bond = rows.face.reshape(-1), np.repeat(rows.bond[rows.side], 3)
         beside = ~np.isin(corner, self.rows.node)
@@ -118,8 +118,8 @@ class Ties:
 
 
 def _of(bonds: Ints, nodes: Ints, bond: Ints, node: Ints, states: Floats) -> Floats:
-    """States by ``bonds`` and ``nodes`` (k,), taken from those of each ``bond`` and ``node`` (r,); zero for rows
-    without one.
+    """Returns states by ``bonds`` and ``nodes`` (k,), taken from the states of each ``bond`` and ``node`` (r,); zero
+    for rows without a known state.
     """
     many = int(max(nodes.max(initial=0), node.max(initial=0))) + 1
     keys, wanted = bond * many + node, bonds * many + nodes
@@ -131,8 +131,8 @@ def _of(bonds: Ints, nodes: Ints, bond: Ints, node: Ints, states: Floats) -> Flo
 
 
 def _carried(rows: Rows, old: Rows, states: Floats, bond: Ints, now: Ints, before: Ints) -> Floats:
-    """States of ``rows`` from those of the ``old`` ones: a copy inherits from its parent, found by the corners of
-    tied faces ``now`` and ``before`` (p, 3); the impulse in proportion to the area.
+    """Returns states of ``rows`` from the states of the ``old`` rows: a copy inherits from its parent, found by the
+    corners of tied faces ``now`` and ``before`` (p, 3); the impulse in proportion to the area.
     """
     pairs = np.unique(np.column_stack([np.repeat(bond, 3), now.reshape(-1), before.reshape(-1)]), axis=0)
     parents = _of(pairs[:, 0], pairs[:, 2], old.bond, old.node, np.column_stack([states, old.area]))

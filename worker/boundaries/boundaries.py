@@ -1,9 +1,9 @@
-"""Boundary conditions on velocities between kick and move: planes of symmetry here, walls in walls.py, loads and
-prescribed motion in drivers.py.
+"""Boundary conditions on velocities between kick and move: planes of symmetry are in this file, walls in walls.py,
+loads and prescribed motion in drivers.py.
 
-Each boundary books the work that it does on the body. The work of an impulse at time n is booked in two halves, with
-the velocity before and after: the kinetic energy of the ledger at n, 1/2 m v(n-1/2) . v(n+1/2), contains the first
-half only; ``note`` books the second one before the next kick.
+Each boundary books the work of its impulses on the body. The work of an impulse at time n is booked in two halves, with
+the velocity before and with the velocity after the impulse: the kinetic energy of the ledger at n, 1/2 m v(n-1/2) .
+v(n+1/2), contains the first half only; ``note`` books the second half before the next kick.
 """
 
 from abc import ABC, abstractmethod
@@ -27,18 +27,20 @@ FREE, PRESCRIBED, MIRRORED = range(3)
 """Effect of a boundary on a velocity component: free (changed by forces and impulses only); prescribed; zero,
 because the node lies on a plane of symmetry across that axis."""
 KEPT = ("contact_loss", "external_work", "_impulse")
-"""Columns by node that every boundary stores in a checkpoint."""
+"""Names of the columns by node that every boundary stores in a checkpoint."""
 
 
 class Boundary(ABC):
     """Interface of a boundary to the time step."""
 
     after_contact = False
-    """True if it acts after contact: contact must not change the velocities that it corrects."""
+    """True if the boundary acts after contact, because contact must not change the velocities that the boundary has
+    corrected."""
     mirrors = False
-    """True if its nodes lie on one plane in which the body is mirrored: exposed faces in that plane are not surface."""
+    """True if all nodes of the boundary lie on one plane in which the body is mirrored; exposed faces in that plane
+    are not surface."""
     on_faces = False
-    """True if it acts on faces of tets, not on nodes."""
+    """True if the boundary acts on faces of tets, not on nodes."""
 
     def __init__(self, nodes: Indices) -> None:
         self.nodes = nodes
@@ -59,11 +61,11 @@ class Boundary(ABC):
         self._impulse = np.zeros((len(nodes), 3))
         """(n, 3) impulse of the last step, N s."""
         self.over = Ranges(team(1))
-        """Threads for the ranges of its nodes."""
+        """Threads that process the nodes of the boundary."""
         self._notes = Arguments(*impulses.NOTE)
         self._rooms = Rooms("nodes", *KEPT, "_before")
         self._kept: tuple[str, ...] = KEPT
-        """Columns by node that it stores in a checkpoint."""
+        """Names of the columns by node that the boundary stores in a checkpoint."""
 
     @abstractmethod
     def held_components(self) -> Bits:
@@ -76,8 +78,8 @@ class Boundary(ABC):
         """Before the kick: stores v(n-1/2), and books the second half of the work of the last impulses."""
 
     def _note(self, state: Nodes, account: Floats, factor: float) -> None:
-        """Does ``note`` with an account of the work of its impulses, J; ``factor``: 1/2 with the sign of the work in
-        the account.
+        """Executes ``note`` with an account of the work of the impulses, J; ``factor``: 1/2 with the sign of the work
+        in the account.
         """
         table = self._notes.set(state.v, self.nodes, self._before, self._impulse, account, factor)
         self.over.run(impulses.note, table, len(self.nodes))
@@ -96,14 +98,14 @@ class Boundary(ABC):
         """Corrects x(n+1)."""
 
     def release(self, loose: Flags, bounds: "list[Boundary]") -> None:  # noqa: B027 (most hold a node, tets or not)
-        """Treats nodes without tets, ``loose`` (nodes,), as particles from now on; ``bounds``: all boundaries, of
-        which those before this one have been called.
+        """Treats nodes without tets, ``loose`` (nodes,), as particles from now on; ``bounds``: all boundaries; the
+        boundaries that precede this boundary in the list have already been called.
         """
 
     def grow(self, split: Split, ids: Ints) -> None:
-        """Adds the copies of its nodes; ``ids``: global ids of the local nodes.
+        """Adds the copies of the nodes of the boundary; ``ids``: global ids of the local nodes.
 
-        Booked values and the impulse of the last step stay with the parent.
+        Booked values and the impulse of the last step remain at the parent.
         """
         parents, n = split.copies.parents, len(self.nodes)
         rooms = self._rooms.of(self, len(parents))
@@ -158,8 +160,8 @@ class Stopping(Boundary):
 
 
 class SymmetryPlane(Boundary):
-    """Plane of symmetry: nodes that start on it have no velocity across it while they have tets; the mirrored tets
-    hold such a node on the plane. A node without tets, and its image, are particles (mirrors.py).
+    """Plane of symmetry: nodes that start on the plane have no velocity across the plane while they have tets; the
+    mirrored tets hold such a node on the plane. A node without tets, and its image, are particles (mirrors.py).
     """
 
     mirrors = True
@@ -228,7 +230,7 @@ def mirrored(n: int, bounds: Iterable[Boundary]) -> Flags:
 
 
 def driven(n: int, bounds: Iterable[Boundary]) -> Flags:
-    """(n,) nodes with a prescribed velocity component."""
+    """(n,) True for nodes with a prescribed velocity component."""
     found = np.zeros(n, bool)
     for bound in bounds:
         found[bound.nodes] |= (bound.held_components() == PRESCRIBED).any(axis=1)
@@ -236,7 +238,7 @@ def driven(n: int, bounds: Iterable[Boundary]) -> Flags:
 
 
 def free(nodes: Indices) -> Bits:
-    """(n, 3) FREE for all components."""
+    """Returns (n, 3) FREE for all components."""
     return np.full((len(nodes), 3), FREE, np.uint8)
 
 

@@ -1,8 +1,8 @@
 """Planes of symmetry for the nodes beside them: a node that reaches the plane hits its mirror image there.
 
 A node with tets and its image exert equal forces on each other, so that neither passes the plane: the plane is a wall
-for each side. Nodes without tets do not interact: such a node passes its image, and is replaced by it, with mirrored
-position and velocity. Debris is therefore reflected at a plane without loss of energy.
+for each side. Nodes without tets do not interact: such a node passes its image and is replaced by the image, with
+mirrored position and velocity. Debris is therefore reflected at a plane without loss of energy.
 """
 
 from typing import Self
@@ -21,7 +21,7 @@ from .boundaries import Boundary, driven, free
 
 _TOGETHER = 64
 """Number of nodes that are tested together in one loop with vector instructions. The nodes are tested one by one
-only if one of them would end beyond the plane."""
+only if at least one node would end beyond the plane."""
 _TURNS = 1000
 """Largest number of planes that a node without tets may pass in a step. The limit ends the loop if the velocity is
 not finite."""
@@ -52,8 +52,8 @@ class Mirrors(Boundary):
         """Places of the nodes without tets."""
         self._reflected: Ints = np.zeros(0, np.int64)
         self._aside = np.zeros((0, 3))
-        """Places of the nodes that are reflected in this step, and the vectors from their new positions to those of
-        their images, m."""
+        """Places of the nodes that are reflected in this step, and the vectors from the new positions of the nodes
+        to the positions of their images, m."""
 
     @classmethod
     def of(cls, case: Case, model: Model, bounds: list[Boundary], comm: Comm) -> Self:
@@ -160,9 +160,9 @@ def _stop(x, v, before, impulse, mass, nodes, axes, at, sides, restitution, dt):
     cache=True,
 )
 def _reflect(x, v, impulse, mass, nodes, rows, axes, at, sides, dt):  # type: ignore[no-untyped-def]
-    """Reflects the nodes at the places ``rows`` that would end the step beyond planes: sets the velocity of their
-    last image. Adds to ``impulse``; returns the places of these nodes, and (n, 3) the vectors from the ends of their
-    motion to those of their images, m.
+    """Reflects the nodes at the places ``rows`` that would end the step beyond planes: sets the velocity of their last
+    image. Adds to ``impulse``; returns the places of these nodes, and (n, 3) the vectors from the positions of the
+    nodes at the end of the step to the positions of their images, m.
     """
     turned, aside, n = np.empty(len(rows), np.int64), np.zeros((len(rows), 3)), 0
     for j in rows:

@@ -193,11 +193,10 @@ def deepest(found, shapes, x, nodes, held):  # type: ignore[no-untyped-def]
 def _push_out(table, begin, end, thread):  # type: ignore[no-untyped-def]
     """Task of ``MovingWalls._sum``, for the nodes that wall ``k`` stops.
 
-    1. Nodes whose gap would be negative at the end of the step.
-    2. Normal impulse, along the components that are not mirrored.
-    3. Sliding velocity after it, and the share of it that Coulomb's friction takes.
-    4. Impulse in quanta: applied to the node if ``gives``; added to the sum, on the rank that owns the node.
-    5. Derivative of the impulse by the velocity of the wall, unless ``gives``.
+    1. Nodes whose gap would be negative at the end of the step. 2. Normal impulse, along the components that are not
+    mirrored. 3. Sliding velocity after the normal impulse, and the share of this velocity that Coulomb's friction
+    takes. 4. Impulse in quanta: applied to the node if ``gives``; added to the sum, on the rank that owns the node. 5.
+    Derivative of the impulse by the velocity of the wall, unless ``gives``.
     """
     (
         sums, x, v, mass, nodes, owned, held, mirrored, given, step, rubbed, shapes, wall, k, mu, scale, weight, dt,

@@ -1,9 +1,9 @@
 """Pressure that follows the surface: on the present area of each face, along its present normal.
 
 The force of a face, -p (b - a) x (c - a) / 2, is distributed to its nodes a, b, c in thirds, in quanta of a power of
-two: sums over faces are independent of their order, and shared nodes are completed in one exchange. Impulses and their
-work are those of a traction: with x(n), v(n-1/2) and v(n+1/2) of the nodes the energy account closes for any motion of
-the surface.
+two: sums over faces are independent of their order, and shared nodes are completed in one exchange. Impulses and work
+are computed as for a traction: with x(n), v(n-1/2) and v(n+1/2) of the nodes the energy account closes for any motion
+of the surface.
 
 The faces of a closed surface have zero total force and moment, up to rounding: half a quantum for each node and
 face; the largest force on a node of a face is 2^42 quanta at the start.

@@ -111,13 +111,12 @@ def book_all(loss, impulse, before):  # type: ignore[no-untyped-def]
 def _push_out(table, begin, end, thread):  # type: ignore[no-untyped-def]
     """Task: stops the nodes of a range at all walls, and books half of the work.
 
-    Adds to ``impulse``, to ``rubbed``, the part of it by friction, and to ``given``, the impulses of each wall; sets
-    ``pushed`` (threads, 8; the rest is padding) if a wall stopped a node.
+    Adds the impulses to ``impulse``, their part by friction to ``rubbed``, and the impulses of each wall to ``given``;
+    sets ``pushed`` (threads, 8; the rest is padding) if a wall stopped a node.
 
-    1. Gap and velocity along the normal, and the square of the normal without ``mirrored`` components.
-    2. Impulse such that the gap at the end of the step is zero.
-    3. Friction: sliding velocity across the normal, at most mu times the normal one.
-    4. Next pass, if a node between several walls was stopped by one of them.
+    1. Gap and velocity along the normal, and the square of the normal without ``mirrored`` components. 2. Impulse such
+    that the gap at the end of the step is zero. 3. Friction: sliding velocity across the normal, at most mu times the
+    normal one. 4. Next pass, if a node between several walls was stopped by a wall.
     """
     (
         x, v, mass, nodes, before, impulse, rubbed, given, loss, friction_loss, points, normals, friction, held,

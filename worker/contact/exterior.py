@@ -84,8 +84,8 @@ class Exterior:
 
     def _build(self, flags: Flags, turned: Ints) -> surface.Surface:
         """Returns the surface, with the sides of cracks that may open and the faces behind tets near erosion. Nodes
-        once on the surface, ``flags`` (n,), stay on it, and edges that became sharp, ``turned``, stay sharp.
-        Collective.
+        that have been on the surface, ``flags`` (n,), stay surface nodes, and edges that became sharp, ``turned``, stay
+        sharp. Collective.
         """
         model, neighbours, comm = self._model, self._neighbours, self._comm
         sides, covered = self.cracks.foresee(), np.zeros((0, 3), np.int32)

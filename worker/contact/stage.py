@@ -2,8 +2,8 @@
 the work of the impulses.
 
 Every contact is computed by one rank: the owner of its node, or the rank of its first edge. Ghosts of other ranks'
-surfaces provide the data. Impulses on a node are summed over all ranks that hold the node or have a contact of it,
-so that all copies get the same velocity, to the bit.
+surfaces provide the data. Impulses on a node are summed over all ranks that hold the node or compute a contact of the
+node, so that all copies get the same velocity, to the bit.
 """
 
 from dataclasses import dataclass
@@ -79,7 +79,8 @@ class Contact:
         self._scheme, self.sweep_count = _Scheme.of(case), SweepCount(sweeps(case))
         self.detection = Detection(team)
         self.limit = 0.0
-        """Inverse of the step in which no node of any rank passes more than half of a tet in contact with it, 1/s."""
+        """Inverse of the step in which no node of any rank passes more than half of a tet with which the node is in
+        contact, 1/s."""
         self.last_push = 0.0
         """Time of the last contact impulse on a node of this rank, s."""
         self._mean_dt = 0.0
@@ -193,8 +194,8 @@ class Contact:
             self.searches.due |= self.exterior.open(received, self.searches.scene)
 
     def separate(self, split: Split) -> None:
-        """Updates contact after the separation of nodes; called on all ranks, see topology_updates.py for those that
-        exchange messages.
+        """Updates contact after the separation of nodes; called on all ranks, see topology_updates.py for the ranks
+        that exchange messages.
         """
         self.exterior.separate(split)
         self.searches.separate(split)

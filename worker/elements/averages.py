@@ -147,15 +147,15 @@ class Averages:
 
 
 def _more(nodes: Nodes, kinds: Indices) -> Ints:
-    """(k, 2) nodes and their materials other than that of the part that represents the node."""
+    """(k, 2) nodes and their further materials: all except the material of the part that represents the node."""
     shares = nodes.shares
     pairs = np.column_stack([shares.node, kinds[shares.part]]).astype(np.int64)
     return np.unique(pairs[pairs[:, 1] != kinds[nodes.part[shares.node]]], axis=0)
 
 
 def volumes(averages: "Averages | None", nodes: Nodes, node_volume: Floats, density: Sequence[float]) -> Floats:
-    """(rows,) reference volumes at the start, m^3: ``node_volume`` (nodes,); for nodes of several materials that of
-    each, from the ``density`` of the parts, kg/m^3.
+    """(rows,) reference volumes at the start, m^3: ``node_volume`` (nodes,); for nodes of several materials the volume
+    of each material, from the ``density`` of the parts, kg/m^3.
     """
     if averages is None:
         return node_volume

@@ -44,8 +44,8 @@ def _barrier(ratio, bulk):  # type: ignore[no-untyped-def]
 
 @njit("boolean(float64[::1], float64[::1], float64, int64)", cache=True, error_model="numpy")
 def _any_squeezed(w, s, density, n):  # type: ignore[no-untyped-def]
-    """Returns True if a tet has, or had before the step, a volume below SQUEEZED or within rounding of it. The loop
-    uses vector instructions.
+    """Returns True if a tet has, or had before the step, a volume below SQUEEZED or equal to SQUEEZED up to rounding.
+    The loop uses vector instructions.
     """
     per_mass, found = density / (SQUEEZED * (1.0 + _ROUNDING)), 0
     for i in range(n):
@@ -56,8 +56,8 @@ def _any_squeezed(w, s, density, n):  # type: ignore[no-untyped-def]
 
 @njit("void(float64[::1], float64[::1], float64[::1], int64)", cache=True, error_model="numpy")
 def resist(w, s, params, n):  # type: ignore[no-untyped-def]
-    """Adds the barrier to the row VISCOUS, which is computed anew in every step, its work to WORK, and its stiffness to
-    LIMIT.
+    """Adds the barrier to the row VISCOUS, which is recomputed in every step, the work of the barrier to WORK, and its
+    stiffness to LIMIT.
 
     The viscosity has booked half of the work of the old row VISCOUS; the share of the barrier in this work is
     subtracted again.

@@ -95,7 +95,7 @@ def viscosity_and_limit(w, s, params, n, dt, averaged):  # type: ignore[no-untyp
 
 @njit(types.void(_I1, _I1, _I1, _I, _I), cache=True)
 def note_peaks(peaks, bits, ids, n, force):  # type: ignore[no-untyped-def]
-    """Raises the peaks by those of a chunk of tets with these global ids, whose largest force has the bits
+    """Raises the peaks to the peaks of a chunk of tets with these global ids, whose largest force has the bits
     ``force``.
     """
     peaks[LARGEST_FORCE] = max(peaks[LARGEST_FORCE], force)
@@ -178,7 +178,9 @@ def volumes_at_rest(w, x, t, s, shape, n):  # type: ignore[no-untyped-def]
 
 @njit(types.void(_F1, _F1, BODY, MEANS, _T2, _B1, _I), cache=True, error_model="numpy", forceinline=True)
 def take_means(w, s, body, means, means_of, flat, n):  # type: ignore[no-untyped-def]
-    """Sets SEEN from the nodal means of a chunk, and adds those of heat or bulking to its state."""
+    """Sets SEEN from the nodal means of a chunk, and adds the nodal means of heat or bulking to the state of the
+    chunk.
+    """
     averaged.gather_strains(w, means.strain, means_of, n)
     if body.rows == HEATED:
         gather_heat(s, means.more, means_of, n)

@@ -1,11 +1,11 @@
 """Largest compression of brittle materials without a law of compressive failure, in every step, over Griffith's
 criterion (cases/warnings/compression.py).
 
-Such a material breaks in tension only and bears any compression. Each stress is compared with the criterion of
-Griffith (1924): (s1 - s3)^2 / (8 T (s1 + s3)) for the largest and the smallest pressure, s1 and s3, and the tensile
-strength T. A material of this strength cracks at 1, and the ratio grows in proportion to the stress. Tension, s3 <
-0, counts as zero: the tensile criterion covers it. The stress is that of the tets at the end of a step, without its
-viscous part.
+Such a material breaks in tension only and bears any compression. Each stress is compared with the criterion of Griffith
+(1924): (s1 - s3)^2 / (8 T (s1 + s3)) for the largest and the smallest pressure, s1 and s3, and the tensile strength T.
+A material of this strength cracks at 1, and the ratio grows in proportion to the stress. Tension, s3 < 0, counts as
+zero: the tensile criterion covers it. The stress is the stress of the tets at the end of a step, without its viscous
+part.
 """
 
 from dataclasses import astuple, dataclass, replace
@@ -114,8 +114,8 @@ def _not_below(s, n, least):  # type: ignore[no-untyped-def]
       error_model="numpy")  # fmt: skip
 def hardest(state, ids, n, strength, known, first, stop):  # type: ignore[no-untyped-def]
     """Returns the place of the tet with the largest ratio, and the ratio, if it is above ``known``; else -1. Of tets
-    with equal ratio, the tet with the smallest id is returned. Checks those of the ``n`` tets that are in the chunks
-    from ``first`` to ``stop``.
+    with equal ratio, the tet with the smallest id is returned. Checks the tets, of the ``n`` tets of the block, that
+    are in the chunks from ``first`` to ``stop``.
 
     Bounds exclude most chunks, and most tets of the remaining chunks.
     """

@@ -27,7 +27,7 @@ from .records import Means, Scratches
 
 
 class Bridges(Protocol):
-    """Forces between nodes other than those of tets: cohesive facets."""
+    """Forces between nodes other than the forces of tets: cohesive facets."""
 
     def open(self, x: Floats) -> None:
         """Computes the forces at the positions at the end of the step."""
@@ -148,7 +148,7 @@ class Elements:
             self._connect()
 
     def keep(self, parcel: Parcel) -> None:
-        """Adds the state of the form, except that of the tets, to a parcel (a checkpoint or migration message).
+        """Adds the state of the form, except the state of the tets, to a parcel (a checkpoint or migration message).
         Collective.
         """
         limit = fixed_point.bits_of(float(self._comm.maximum(np.array([self.limit]))[0]))

@@ -2,7 +2,7 @@
 
 The volume strain of a node is a mean over its tets; so each node has its own volume ratio and pores, and a pressure
 computed from volume ratio and pores. The pressure of a tet is the mean of its four nodes. The work of the forces on the
-volumes of the tets is then that of the nodal pressures on the nodal volumes:
+volumes of the tets is then the work of the nodal pressures on the nodal volumes:
 
     sum_e V_e e_e mean_a(p_a) = sum_a p_a V_a e_a,    V_a e_a = sum_e V_e e_e / 4
 
@@ -23,8 +23,8 @@ from .scratch import CHANGE, MODULUS
 
 RATIO, PORES_AT, PRESSURE_AT, WORKED, TORN, OPENED, STIFF = range(7)
 """Columns by node. State: volume ratio; pores as in state.PORES; pressure, Pa. Of the step, per initial volume: work
-of the pressure, J/m^3; the part of it dissipated in pores, J/m^3; volume of new pores. Modulus of the wave speed,
-Pa."""
+of the pressure, J/m^3; the part of this work that is dissipated in pores, J/m^3; volume of new pores. Modulus of the
+wave speed, Pa."""
 COLUMNS = 8
 """Number of columns: one more than the columns that are used, so that a row is a cache line."""
 TETS, LINEAR = range(2)

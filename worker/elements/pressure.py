@@ -1,7 +1,7 @@
 """Averaged pressure forms: the volume strain in the pressure of a tet is averaged over its nodes.
 
 One-point tets with their own pressure lock in plastic flow. ``nodal`` replaces the volume strain of a tet by the mean
-of the values of its nodes, the value of a node is the volume-weighted mean over the tets round the node (averaged nodal
+of the values of its nodes; the value of a node is the volume-weighted mean over the tets round the node (averaged nodal
 pressure, Bonet and Burton 1998, in rate form; the pressure is stored by tet, so that any equation of state works and
 the separation of a node changes no pressure). ``split`` adds the projection form of the operator split for pressure
 gradients to the nodal balance (Zienkiewicz et al. 1998): an Oñate-Codina stabilisation, proportional to the difference
@@ -70,7 +70,7 @@ def recall_flux(w, s, n, dt):  # type: ignore[no-untyped-def]
 
 @njit("void(float64[::1], float64[::1], int64, float64)", cache=True, error_model="numpy")
 def recall_growth(w, s, n, dt):  # type: ignore[no-untyped-def]
-    """Does the same for tets that store their volume, and stores the present volume."""
+    """Variant of the previous function for tets that store their volume; also stores the present volume."""
     frequency = 1.0 / dt if dt > 0.0 else 0.0
     for i in range(n):
         volume = w[VOLUME + i]
@@ -171,7 +171,7 @@ def own_strains(w, n, dt):  # type: ignore[no-untyped-def]
 
 @njit("void(float64[::1], float64[::1], int64, float64)", cache=True, error_model="numpy")
 def own_growth(w, s, n, dt):  # type: ignore[no-untyped-def]
-    """Does the same for tets that store their volume, and stores the present volume."""
+    """Variant of the previous function for tets that store their volume; also stores the present volume."""
     frequency = 1.0 / dt if dt > 0.0 else 0.0
     for i in range(n):
         volume = w[VOLUME + i]

@@ -180,7 +180,8 @@ def growth(w, s, n, dt):  # type: ignore[no-untyped-def]
     """Sets VOLUME_MID, the mean of VOLUME and the volume before the step, and DILATATION, the difference of the two
     volumes over VOLUME_MID and dt.
 
-    Equal to those of ``kinematics`` up to terms of third order in the step. With dt = 0 the change is zero.
+    The values are equal to the values of ``kinematics`` up to terms of third order in the step. With dt = 0 the change
+    is zero.
     """
     frequency = 1.0 / dt if dt > 0.0 else 0.0
     for i in range(n):

@@ -43,7 +43,7 @@ _MASS, _STRAIN, _DAMAGE = MASS * CHUNK, PLASTIC_STRAIN * CHUNK, DAMAGE * CHUNK
 
 
 def life(erosion: Erosion | None) -> Floats:
-    """(5,) limits of the tets of a part; that of the stable step is set after the first step."""
+    """(5,) limits of the tets of a part; the limit of the stable step is set after the first step."""
     if erosion is None:
         return np.full(5, math.inf)
     strain = math.inf if erosion.plastic_strain is None else erosion.plastic_strain

@@ -46,7 +46,7 @@ class PairState(NamedTuple):
     size: Floats
     """(m, 3) present size D, m."""
     opening: Floats
-    """(m, 3, 3) position of the node of the second side relative to that of the first, m."""
+    """(m, 3, 3) position of the node of the second side relative to the node of the first side, m."""
     pull: Floats
     """(m, 3, 3) force on the node of the first side, N."""
     work: Floats

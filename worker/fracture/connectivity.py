@@ -1,6 +1,6 @@
 """Connected components of tets: pieces on each rank, joined across ranks to fragments.
 
-Union-find by Rem's algorithm: each tet points to one of a smaller id, and the paths of two tets to their roots are
+Union-find by Rem's algorithm: each tet points to a tet of smaller id, and the paths of two tets to their roots are
 merged while they are walked (Patwary, Blair and Manne, Experiments on union-find algorithms, 2010).
 """
 
@@ -20,7 +20,8 @@ def labels(model: Model, held: Ints, comm: Comm) -> list[Ints]:
     """Labels of fragments, (n,) for each block, a label for each tet: the smallest global id of its tets. Collective.
 
     Tets are connected through faces whose bond is intact, and through ``held``, (m, 2) global ids of tets of cohesive
-    facets; a pair is given on a rank that has one of the two. A block without the array ``across`` is one piece.
+    facets; a pair is given on a rank that has at least one of the two tets. A block without the array ``across`` is one
+    piece.
     """
     ids = np.concatenate([np.zeros(0, np.int64), *(block.id for block in model.blocks)])
     where, root, first = IdIndex(ids), np.arange(len(ids), dtype=np.int32), 0

@@ -214,8 +214,8 @@ def across(out, n, shared, chosen, mesh, table, x, law):  # type: ignore[no-unty
 
 @njit(types.int64(CANDIDATES, types.int64, TABLE, LAW, types.int64, types.float64), cache=True, error_model="numpy")
 def clock(found, n, table, law, step, t):  # type: ignore[no-untyped-def]
-    """Updates the clocks of the ``n`` candidates, and moves those that break by the delayed criterion to the front;
-    returns their number.
+    """Updates the clocks of the ``n`` candidates, and moves the facets that break by the delayed criterion to the
+    front; returns the number of these facets.
 
     The clock of an overstressed facet continues if it ran in the last step, number ``step`` - 1; else it starts at the
     time ``t``. With nodal tractions, some candidates are not overstressed and have no clock.

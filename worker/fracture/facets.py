@@ -27,7 +27,7 @@ class Body:
     """
 
     index: int
-    """Index of the block among those of the rank."""
+    """Index of the block among the blocks of the rank."""
     block: Block
     spec: Spec
     tough: Toughness
@@ -72,8 +72,8 @@ Terms = tuple[Spec, Toughness, tuple[int, int]]
 
 
 def bodies_of(index: int, block: Block, own: Terms, bonds: list[Terms], x0: Floats) -> list[Body]:
-    """Adds the arrays for fracture to a block, if it has none yet; returns the bodies: its ``own`` facets, and those
-    of its ``bonds``. ``x0`` (nodes, 3): initial positions.
+    """Adds the arrays for fracture to a block, if it has none yet; returns the bodies: one for the ``own`` facets of
+    the block, and one for each of its ``bonds``. ``x0`` (nodes, 3): initial positions.
     """
     begins = not len(block.bond)
     if begins:

@@ -5,11 +5,11 @@ solve the small graph of the pieces that are connected across ranks, in the same
 
 A tet gives a quarter of its mass to each of its nodes, at the position and with the velocity of the node: so mass,
 momentum, angular momentum and energy of all fragments together are equal to the sums over the nodes. (The inertia is
-that of lumped masses: larger than that of the solid, five times as large for a single tet.) Nodes without tets belong
-to no fragment. The values of tets are summed by fragment as integers; the quantum of each fragment is 2^-60 of its
-largest term, so that the result is independent of order and ranks, and small fragments keep their digits beside a large
-one. Centre and velocity are summed first, and quantities relative to them in a second pass: sums about the origin would
-lose the digits of r^2 / extent^2.
+the inertia of lumped masses. It is larger than the inertia of the solid, for a single tet five times as large.) Nodes
+without tets belong to no fragment. The values of tets are summed by fragment as integers; the quantum of each fragment
+is 2^-60 of its largest term, so that the result is independent of order and ranks, and small fragments keep their
+digits beside a large one. Centre and velocity are summed first, and quantities relative to them in a second pass: sums
+about the origin would lose the digits of r^2 / extent^2.
 """
 
 import csv

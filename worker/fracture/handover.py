@@ -53,8 +53,8 @@ class Handover:
         )
 
     def hand_over(self, split: Split, cohesion: Cohesion | None, fresh: list[Facets]) -> None:
-        """Moves the forces of the tets and facets of each copy from its parent to it; ``fresh``: new cohesive facets.
-        Collective among the ranks that share copies.
+        """Moves the forces of the tets and facets of each copy from the parent to the copy; ``fresh``: new cohesive
+        facets. Collective among the ranks that share copies.
 
         The force that a copy receives is subtracted exactly from its parent, because copy and parent were one node
         before.
@@ -86,7 +86,9 @@ class Handover:
 
 @njit(types.void(_I2, _I2, _I1, types.int64), cache=True)
 def _apply(force, change, parents, first):  # type: ignore[no-untyped-def]
-    """Adds ``change`` (copies, 3) to the forces of the copies and subtracts it from those of their ``parents``."""
+    """Adds ``change`` (copies, 3) to the forces of the copies and subtracts ``change`` from the forces of the
+    ``parents``.
+    """
     for c in range(len(parents)):
         for k in range(3):
             force[first + c, k] += change[c, k]
@@ -116,7 +118,7 @@ def _forces(room, place, chosen, n, mesh, x, scale):  # type: ignore[no-untyped-
     error_model="numpy",
 )
 def _of_tets(change, node, place, corner, blocks, block, first, mesh, x, room, scale):  # type: ignore[no-untyped-def]
-    """Adds the forces of the tets of one ``block`` whose ``node`` (r,) is now a copy to those of the copies;
+    """Adds the forces of the tets of one ``block`` whose ``node`` (r,) is now a copy to the forces of the copies;
     ``first``: local index of the first copy.
     """
     chosen, n = np.empty(CHUNK, np.int64), 0

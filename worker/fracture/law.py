@@ -95,8 +95,8 @@ def _shorten(f, m, p, frame, d, kept):  # type: ignore[no-untyped-def]
 
 @njit(types.boolean(FACETS, _F2), cache=True, error_model="numpy")
 def open_facets(f, x):  # type: ignore[no-untyped-def]
-    """Computes openings, tractions and work of all facets at the positions ``x``; returns True if a facet has failed
-    at all three pairs. The work is that of the mean of the old and the new force.
+    """Computes openings, tractions and work of all facets at the positions ``x``; returns True if a facet has failed at
+    all three pairs. The work is computed with the mean of the old and the new force.
     """
     law, s = f.softening, f.state
     frame, d, moved = np.empty((3, 3)), np.empty(3), np.empty(3)

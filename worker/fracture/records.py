@@ -109,7 +109,7 @@ class BreakingFacets(NamedTuple):
     nodes: Indices
     """(m, 3) local nodes, counter-clockwise seen from outside of the first side."""
     sides: Indices
-    """(m, 2, 3) block, place and face of either side, -1 for one of another rank."""
+    """(m, 2, 3) block, place and face of either side, -1 for a side on another rank."""
     first: Flags
     """(m,) true if the first side is on this rank."""
     traction: Floats

@@ -160,7 +160,7 @@ class Separation:
 
 
 def _positions(every: Ints, mine: Ints) -> Ints:
-    """(k,) places of the rows of ``mine`` (k, 2) among those of ``every``, both sorted."""
+    """(k,) places of the rows of ``mine`` (k, 2) among the rows of ``every``; both are sorted."""
     return np.arange(len(mine)) if len(every) == len(mine) else np.searchsorted(keys(*every.T), keys(*mine.T))
 
 
@@ -205,7 +205,7 @@ def common(some, others):  # type: ignore[no-untyped-def]
 
 @njit(types.boolean(_I1, types.int32[::1]), cache=True)
 def intersects(some, others):  # type: ignore[no-untyped-def]
-    """Returns True if one of ``some`` is among the ascending ``others``."""
+    """Returns True if any value of ``some`` is among the ascending ``others``."""
     for value in some:
         at = np.searchsorted(others, value)
         if at < len(others) and others[at] == value:

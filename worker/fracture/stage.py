@@ -1,9 +1,9 @@
 """Fracture in the time step: initiation, separation of nodes, and update of all tables that depend on the topology.
 
 At the end of a step, with the stress of n+1: facets that pass the criterion break; nodes whose star is no longer
-connected get copies; the forces of the tets of a copy are moved from its parent to it, in integers; and every table by
-node is extended by the copies. In ``cohesive`` parts a broken facet keeps its traction, which decreases with the
-opening.
+connected get copies; the forces of the tets of a copy are moved from the parent to the copy, in integers; and every
+table by node is extended by the copies. In ``cohesive`` parts a broken facet keeps its traction, which decreases with
+the opening.
 
 The reduction of the step contains whether a facet breaks, and on which ranks: ``find`` precedes it, ``advance`` follows
 it. A rank without overstressed facets receives flags from its neighbours, which show whether a shared facet is

@@ -110,7 +110,7 @@ def describe(nodes, first, count, pool, ids, mesh, block, rank):  # type: ignore
 
 
 def ordered(rows: Ints, places: Ints) -> tuple[Ints, Ints]:
-    """Sorts rows by node and tet; ``places`` (p, 3) belong to the first p of them, -1 for the others."""
+    """Sorts rows by node and tet; ``places`` (p, 3) belong to the first p rows; the others get -1."""
     order = np.argsort(keys(rows[:, NODE], rows[:, TET]))
     every = np.concatenate([places, np.full((len(rows) - len(places), 3), -1)])
     return rows[order], every[order]
@@ -153,7 +153,7 @@ def pieces(rows):  # type: ignore[no-untyped-def]
     """Returns the pieces that separate from their nodes, by node and smallest tet; ``rows`` by node and tet.
 
     (r,) the piece of each row, -1 in the piece with the smallest tet of its node, which keeps the node; and for each
-    piece: ids of the node and of its smallest tet, place of the node among those of ``rows``, rank of that tet, and
+    piece: ids of the node and of its smallest tet, place of the node among the nodes of ``rows``, rank of that tet, and
     a quarter of the mass of its tets, kg.
     """
     n, i_node = len(rows), 0
@@ -184,7 +184,9 @@ def pieces(rows):  # type: ignore[no-untyped-def]
 
 @njit(types.void(_N1, _N1, _N1, types.uint32[:, ::1], _I1, _I2, _I2, _I1, types.int64, types.int64), cache=True)
 def _reconnect(pool, first, count, tets, nodes, rows, places, of, new, block):  # type: ignore[no-untyped-def]
-    """See Stars.reconnect. The range of a node in the pool: tets that keep the node, then those of each copy, by id."""
+    """See Stars.reconnect. The range of a node in the pool: first the tets that keep the node, then the tets of each
+    copy, by id.
+    """
     begin, n, k = 0, len(rows), 0
     while begin < n:
         end = begin

@@ -1,4 +1,4 @@
-"""Fracture specifications and constants of a case: for the facets within each part, and for those of bonds between
+"""Fracture specifications and constants of a case: for the facets within each part, and for the facets of bonds between
 parts.
 """
 

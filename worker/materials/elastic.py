@@ -1,4 +1,4 @@
-"""Hypoelastic deviatoric stress with an exact rotation: the trial stress of materials with a strength law."""
+"""Hypoelastic deviatoric stress with an exact rotation. It is the trial stress of materials with a strength law."""
 
 import numpy as np
 
@@ -31,9 +31,10 @@ def squeezed(s, params, i):  # type: ignore[no-untyped-def]
 
 @njit("void(float64[::1], int64)", cache=True, error_model="numpy")
 def turn_rate(w, n):  # type: ignore[no-untyped-def]
-    """Rotates the rate of deformation from mid-step to the end of the step: by half of the angle of Q.
+    """Rotates the rate of deformation from mid-step to the end of the step: by half of the rotation angle of Q.
 
-    With a the axial vector of W dt/2, |a| = tan(angle / 2), that of the half angle is b = a / (1 + sqrt(1 + a.a)).
+    If a is the axial vector of W dt/2, with |a| = tan(angle / 2), the axial vector of half of the angle is b = a / (1 +
+    sqrt(1 + a.a)).
     """
     for i in range(n):
         ax, ay, az = w[SPIN + i], w[SPIN + CHUNK + i], w[SPIN + 2 * CHUNK + i]
@@ -61,22 +62,22 @@ def turn_rate(w, n):  # type: ignore[no-untyped-def]
 def predict(w, s, n, shear, dt):  # type: ignore[no-untyped-def]
     """Rotates the deviatoric stress, adds 2 G dt dev D, and books the first half of its work: the trial stress.
 
-    s becomes Q s Q^T with Q = (I - W dt/2)^-1 (I + W dt/2), a rotation to round-off (Hughes and Winget 1980); in
-    closed form, with a the axial vector of W dt/2, Q = I + 2 (A + A^2) / (1 + a.a). The work is V s : D over the
-    step by the trapezoidal rule: here the half with the rotated old stress; ``deviatoric_work`` adds the half with
-    the new stress.
+    s becomes Q s Q^T with Q = (I - W dt/2)^-1 (I + W dt/2), a rotation to round-off (Hughes and Winget 1980); in closed
+    form, where a is the axial vector of W dt/2, Q = I + 2 (A + A^2) / (1 + a.a). The work is V s : D over the step by
+    the trapezoidal rule: here the half with the rotated old stress; ``deviatoric_work`` adds the half with the new
+    stress.
     """
     turn_rate(w, n)
     twice_shear_dt = 2.0 * shear * dt
     for i in range(n):
-        # 1. Q from the axial vector a.
+        # 1. Compute Q from the axial vector a.
         ax, ay, az = w[SPIN + i], w[SPIN + CHUNK + i], w[SPIN + 2 * CHUNK + i]
         f = 2.0 / (1.0 + ax * ax + ay * ay + az * az)
         qxx, qyy, qzz = 1.0 - f * (ay * ay + az * az), 1.0 - f * (ax * ax + az * az), 1.0 - f * (ax * ax + ay * ay)
         qxy, qyx = f * (ax * ay - az), f * (ax * ay + az)
         qxz, qzx = f * (ax * az + ay), f * (ax * az - ay)
         qyz, qzy = f * (ay * az - ax), f * (ay * az + ax)
-        # 2. T = Q s, then s = T Q^T.
+        # 2. Rotate the stress: T = Q s, then s = T Q^T.
         sxx, syy, szz = s[_SXX + i], s[_SYY + i], s[_SZZ + i]
         syz, szx, sxy = s[_SYZ + i], s[_SZX + i], s[_SXY + i]
         txx, txy = qxx * sxx + qxy * sxy + qxz * szx, qxx * sxy + qxy * syy + qxz * syz
@@ -94,7 +95,7 @@ def predict(w, s, n, shear, dt):  # type: ignore[no-untyped-def]
             tzx * qxx + tzy * qxy + tzz * qxz,
             txx * qyx + txy * qyy + txz * qyz,
         )
-        # 3. Work of the rotated stress; trial stress s + 2 G dt dev D.
+        # 3. Book the work of the rotated stress; compute the trial stress s + 2 G dt dev D.
         mean = w[DILATATION + i] * _THIRD
         dxx, dyy, dzz = w[D_XX + i] - mean, w[D_YY + i] - mean, w[D_ZZ + i] - mean
         dyz, dzx, dxy = w[D_YZ + i], w[D_ZX + i], w[D_XY + i]

@@ -1,7 +1,7 @@
-"""Own log and exp, with the same bits on any processor, in loops over a chunk that the compiler vectorises.
+"""Functions log and exp with the same bits on any processor, for loops over a chunk that the compiler vectorises.
 
-Only + - * /, and the bits of a float64 as an integer, which give the same result in a vector lane and in a scalar;
-so no result depends on a C library. Derived in docs/theory/sums.md.
+The functions use only + - * / and the bits of a float64 as an integer. These operations give the same result in a
+vector lane and in a scalar, so no result depends on a C library. Derived in docs/theory/sums.md.
 """
 
 import numpy as np
@@ -14,12 +14,13 @@ _LN2_HIGH, _LN2_LOW = 0.693147180369123816490, 1.90821492927058770002e-10
 _INVERSE_LN2 = 1.4426950408889634
 """1 / ln 2."""
 NEAREST = 6755399441055744.0
-"""1.5 times 2^52: after adding it to a smaller number, the last bits of the sum contain the nearest integer."""
+"""1.5 times 2^52. If this constant is added to a smaller number, the last bits of the sum contain the nearest
+integer."""
 _ROOT_HALF = 0x3FE6A09E667F3BCD
-"""Bits of sqrt(1/2): larger arguments are divided by a power of two until they are below it times 2."""
+"""Bits of sqrt(1/2). An argument is divided by a power of two such that the result is between sqrt(1/2) and sqrt(2)."""
 _WHOLE, _OFFSET, _BIASED = 0x4330000000000000, 4096, 4503599627374592.0
-"""Bits of 2^52; a number that makes exponents positive; and their sum, as a float64: they convert integers to
-floats."""
+"""Constants that convert integers to float64: the bits of 2^52, an offset that makes exponents positive, and the sum
+of both as a float64."""
 LEAST, MOST = -700.0, 700.0
 """Range of arguments of ``exp`` in which the result is a normal number, 1e-304 to 1e304."""
 
@@ -61,7 +62,7 @@ def _reduced(x):  # type: ignore[no-untyped-def]
 
 @njit("float64(float64, float64)", cache=True, error_model="numpy", forceinline=True)
 def _doubled(x, shifted):  # type: ignore[no-untyped-def]
-    """Returns 2^k x, with k in the last bits of ``shifted``."""
+    """Returns 2^k x, where the last bits of ``shifted`` contain k."""
     return np.int64(np.float64(x).view(np.int64) + (np.float64(shifted).view(np.int64) << 52)).view(np.float64)
 
 

@@ -1,7 +1,7 @@
 """Equations of state: pressure from the volume strain, and the tangent modulus for the wave speed.
 
-The volume strain of the step (of the tet, or averaged over its nodes) is in row SEEN of the scratch, the change of
-the volume of the tet in CHANGE, so that the work booked is that of the nodal forces.
+The volume strain of the step (of the tet, or averaged over its nodes) is in row SEEN of the scratch, the change of the
+volume of the tet in CHANGE, so that the booked work is equal to the work of the nodal forces.
 """
 
 import numpy as np
@@ -32,15 +32,16 @@ _P, _MASS, _WORK, _RATIO = PRESSURE * CHUNK, MASS * CHUNK, WORK * CHUNK, VOLUME_
 _WORK_VISCOUS, _WORK_PLASTIC, _PORES = WORK_VISCOUS * CHUNK, WORK_PLASTIC * CHUNK, PORES * CHUNK
 _HEAT, _GROWN = HEAT * CHUNK, DILATION * CHUNK
 _OLD, _KNOWN, _FACTOR = NODAL, NODAL + CHUNK, NODAL + 2 * CHUNK
-"""Scratch rows: pressure before the step, Pa; coefficients of the energy equation factor * new = cold part + known."""
+"""Scratch rows: pressure before the step, Pa; coefficients ``factor``, ``cold part`` and ``known`` of the energy
+equation factor * (new pressure) = cold part + known."""
 _LEAST = 0.05
-"""Least share of the bulk modulus at rest in the wave speed. Chosen: it shortens the stable step, never lengthens
-it."""
+"""Smallest bulk modulus in the wave speed, as a share of the bulk modulus at rest. Chosen value; this limit can only
+decrease the stable step."""
 
 
 @njit("void(float64[::1], float64[::1], float64[::1], int64)", cache=True, error_model="numpy")
 def linear(w, s, params, n):  # type: ignore[no-untyped-def]
-    """Linear pressure p -= K d(volume strain): integrates to p = -K ln(V/V0)."""
+    """Computes the linear pressure p -= K d(volume strain), which integrates to p = -K ln(V/V0)."""
     bulk, stiff = params[BULK], params[BULK] + 4.0 / 3.0 * params[SHEAR]
     for i in range(n):
         old = s[_P + i]
@@ -54,8 +55,9 @@ def linear(w, s, params, n):  # type: ignore[no-untyped-def]
 
 @njit("void(float64[::1], float64[::1], float64[::1], int64, float64, float64)", cache=True, error_model="numpy")
 def _book_pores(w, s, params, i, strain, mean):  # type: ignore[no-untyped-def]
-    """Books the plastic work of pores that have grown by the volume strain ``strain``: ``mean`` pressure of the step
-    times it, as for the whole work. The elastic energy density then belongs to more volume, or to less.
+    """Books the plastic work of pores that have grown by the volume strain ``strain``: the ``mean`` pressure of the
+    step times ``strain``, as for the total work. The elastic energy is corrected because its density then belongs to a
+    larger or smaller volume.
     """
     stored = squeezed(s, params, i)
     if params[ORDER] != FROM_SHAPE:
@@ -65,9 +67,9 @@ def _book_pores(w, s, params, i, strain, mean):  # type: ignore[no-untyped-def]
 
 @njit("void(float64[::1], float64[::1], float64[::1], int64)", cache=True, error_model="numpy")
 def _tear_linear(w, s, params, n):  # type: ignore[no-untyped-def]
-    """Limits the pressure by the tension cut-off, by moving volume strain between solid and pores: p >= -spall, and
-    p <= 0 while there are pores. A dilation that averaging took back (row DILATION below zero) was in the pressure
-    before the step.
+    """Limits the pressure by the tension cut-off, by moving volume strain between solid and pores: p >= -spall, and p
+    <= 0 while there are pores. If the averaged forms have subtracted a dilation (row DILATION below zero), the pressure
+    before the step contains this dilation.
     """
     bulk, spall, dilates = params[BULK], params[SPALL], params[DILATES] > 0.0
     for i in range(n):
@@ -102,8 +104,7 @@ def volumes_by_pressure(w, s, params, n):  # type: ignore[no-untyped-def]
 
 @njit("UniTuple(float64, 2)(float64[::1], float64)", cache=True, error_model="numpy", forceinline=True)
 def cold(params, ratio):  # type: ignore[no-untyped-def]
-    """Returns the pressure without heat at a volume ratio, p_H (1 - gamma chi / 2), and its derivative by chi less
-    gamma p_H / 2.
+    """Returns the pressure without heat at a volume ratio, p = p_H (1 - gamma chi / 2), and its derivative dp/dchi.
 
     NaN where the Hugoniot does not exist: from the pole of p_H on, chi = 1 / S, and for a volume that is not
     positive.
@@ -122,8 +123,8 @@ def cold(params, ratio):  # type: ignore[no-untyped-def]
 
 @njit("float64(float64[::1], float64, float64, float64)", cache=True, error_model="numpy", forceinline=True)
 def modulus(params, ratio, tangent, pressure):  # type: ignore[no-untyped-def]
-    """Returns rho c^2, Pa: with a bulk modulus of at least _LEAST of that at rest, since strong tension makes it
-    negative; NaN stays NaN.
+    """Returns rho c^2, Pa: with a bulk modulus of at least _LEAST times the bulk modulus at rest, because strong
+    tension makes the tangent negative; NaN stays NaN.
     """
     bulk, least = ratio * (tangent + params[_GAMMA] * pressure), _LEAST * params[BULK]
     return (least if bulk < least else bulk) + 4.0 / 3.0 * params[SHEAR]
@@ -134,10 +135,10 @@ def mie_gruneisen(w, s, params, n):  # type: ignore[no-untyped-def]
     """Mie-Grueneisen: p = p_H(chi) (1 - gamma chi / 2) + gamma rho_0 e, chi = 1 - V/V0; in tension p_H is rho_0 c0^2
     chi.
 
-    e is the work so far (stress, plastic and viscous) over the mass. The energy equation with the mean pressure of
-    the step is linear in the new pressure, and solved in closed form. The factor 1 - gamma chi / 2 applies to
-    compression only. In the averaged forms e is HEAT, a mean over nodes except for flat tets, up to the work of the
-    pressure in this step; that work is the one on the averaged volume.
+    e is the work so far (stress, plastic and viscous) over the mass. The energy equation with the mean pressure of the
+    step is linear in the new pressure, and solved in closed form. The factor 1 - gamma chi / 2 applies to compression
+    only. In the averaged forms e is HEAT, a mean over nodes except for flat tets, up to the work of the pressure in
+    this step; the work of the pressure is then the work on the averaged volume.
     """
     gamma, heating = params[_GAMMA], params[_GAMMA] * params[DENSITY]
     averaged, bulk = len(s) > NODAL_WORK * CHUNK, params[BULK]
@@ -167,8 +168,8 @@ def mie_gruneisen(w, s, params, n):  # type: ignore[no-untyped-def]
 @njit("void(float64[::1], float64[::1], float64[::1], int64)", cache=True, error_model="numpy")
 def _tear(w, s, params, n):  # type: ignore[no-untyped-def]
     """Limits the pressure as ``_tear_linear``: at the cut-off, and at zero while pores close, the cold pressure is
-    linear in the ratio of the solid, which so follows from the pressure; after the pores have closed, the pressure
-    follows from the ratio.
+    linear in the volume ratio of the solid, and the ratio is computed from the pressure. After the pores have closed,
+    the pressure is computed from the ratio.
     """
     spall, stiffness = params[SPALL], params[BULK]
     for i in range(n):

@@ -19,7 +19,7 @@ _WORK, _MASS, _DISTORTION = WORK * CHUNK, MASS * CHUNK, DISTORTION * CHUNK
 _THIRD = 1.0 / 3.0
 _ONE = 0x3FF0000000000000
 """Bits of 1.0."""
-# Scratch rows: those of rate of deformation and spin are free here.
+# Scratch rows; the rows of rate of deformation and spin are not needed by this law and are used again.
 _AXX, _AYY, _AZZ, _AYZ, _AZX, _AXY = (RATE + k * CHUNK for k in range(6))
 _MORE, _LESS, _HALF_SHEAR, _K = RATE + 6 * CHUNK, RATE + 7 * CHUNK, RATE + 8 * CHUNK, TRIAL
 
@@ -29,9 +29,9 @@ def inverse_sixth_root(u):  # type: ignore[no-untyped-def]
     """Returns u^(-1/6), to round-off for u from 1e-24 to 1e24: y (1 - r)^(-1/6), 1 - r = u y^6, by its series, three
     times.
 
-    Only + - * and the bits of a float64 as an integer, with equal results in a vector lane and in a scalar: no root
-    and no quotient, which take as long as ten products. The bits are a piecewise linear logarithm; a sixth of their
-    distance from those of 1, by shifts, gives the first y, which is exact at 1.
+    Only + - * and the bits of a float64 as an integer, with equal results in a vector lane and in a scalar: there is no
+    root and no quotient, because each takes as long as ten products. The bits are a piecewise linear logarithm; a sixth
+    of the distance of the bits from the bits of 1, computed by shifts, gives the first y, which is exact at 1.
     """
     far = np.float64(u).view(np.int64) - _ONE
     y = np.int64(_ONE - ((far >> 3) + (far >> 5) + (far >> 7) + (far >> 9) + (far >> 11))).view(np.float64)
@@ -75,8 +75,8 @@ def _strains(w, n):  # type: ignore[no-untyped-def]
 
 @njit("void(float64[::1], int64, float64)", cache=True, error_model="numpy")
 def _roots(w, n, shear):  # type: ignore[no-untyped-def]
-    """Sets rows k = det(1 + A)^(-1/3), k - 1 without cancellation, and G / 2J. In a loop of their own these long chains
-    of operations overlap.
+    """Sets rows k = det(1 + A)^(-1/3), k - 1 without cancellation, and G / 2J. This is a separate loop so that these
+    long chains of operations overlap.
 
     NaN if round-off leaves no positive determinant.
     """
@@ -141,4 +141,4 @@ def stiffen(w, s, params, n):  # type: ignore[no-untyped-def]
 
 
 LAW = Law("", FROM_SHAPE, lambda _: TET_VOLUME + 1, lambda _: (), lambda *_: {}, hyperelastic)
-"""Law of materials without a strength."""
+"""Law of materials without a strength law."""

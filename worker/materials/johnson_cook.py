@@ -4,8 +4,8 @@ sigma = (A + B e^n) (1 + C ln max(rate / rate_0, 1)) (1 - T*^m). Johnson and Coo
 multiplied by 1 - s D, with the damage D at the start of the step. Borvik and others 2001.
 
 The yielding tets of a chunk are copied side by side into the scratch and solved together, loop after loop, with own
-logarithms and powers. Converged tets are moved behind the others and not changed any more: no answer depends on
-which tets share the chunk.
+logarithms and powers. Converged tets are moved to the end of the list and are not changed any more, so that no result
+depends on which tets are in the same chunk.
 """
 
 from conoid.cases.laws.johnson_cook import JohnsonCook
@@ -38,33 +38,39 @@ _SXX, _SYY, _SZZ = S_XX * CHUNK, S_YY * CHUNK, S_ZZ * CHUNK
 _SYZ, _SZX, _SXY = S_YZ * CHUNK, S_ZX * CHUNK, S_XY * CHUNK
 _STRAIN, _WORK, _YIELD, _FLOW = PLASTIC_STRAIN * CHUNK, WORK_PLASTIC * CHUNK, YIELD * CHUNK, FLOW * CHUNK
 _TEMPERATURE, _MASS, _P, _DAMAGE = TEMPERATURE * CHUNK, MASS * CHUNK, PRESSURE * CHUNK, DAMAGE * CHUNK
-# Scratch rows, by yielding tet: place in the chunk; known quantities, with the share of the strength that
+# Scratch rows, by yielding tet: place in the chunk; known quantities; share of the strength that
 # damage leaves; bracket, increment, whether it is not converged; flow stress without rate; e, T* and the
-# relative rate, then their logarithms and powers.
+# relative rate; then the logarithms and powers of these.
 _PLACE, _Q, _KNOWN, _HOT, _WARM, _LEFT, _LOW, _HIGH, _D, _OPEN, _STATIC, _SUM, _FAST, _SOFT, _T = (
     NODAL + k * CHUNK for k in range(15)
 )
 _MOST = 140
-"""Most iterations: the halvings among them alone reach the last bit of a float64 (52 bits)."""
+"""Largest number of iterations. Every second iteration is a halving, and the halvings alone reach the last bit of a
+float64 (52 bits)."""
 _CLOSE = 1e-4
-"""Relative Newton step at which the iteration ends: the error is its square, below 1e-8 of the stress."""
+"""Relative Newton step at which the iteration ends. The remaining error is the square of this step, below 1e-8 of
+the stress."""
 _PATIENT = 20
-"""Iterations after which every second one is a halving: with softening, Newton's method may alternate between two
-values. The first yield, with increments between 1e-2 and 1e-21, takes up to 20 by itself; still smaller ones, of a
-trial stress less than 1e5 Pa above the flow stress, up to 100 with the halvings."""
+"""Number of iterations after which every second iteration is a halving, because with softening Newton's method may
+alternate between two values. The first yield, with increments between 1e-2 and 1e-21, takes up to 20 iterations
+without halving. Smaller increments, for a trial stress less than 1e5 Pa above the flow stress, take up to 100 with
+the halvings."""
 _BELOW = 1.0 - 2.0**-40
-"""Share of the increment at which the rate term begins, a kink of the flow stress: just below the kink."""
+"""Factor slightly below 1: its product with the increment at which the rate term begins is just below this kink of
+the flow stress."""
 _NARROW = 1e-12
 """Relative width of a bracket that ends the iteration."""
 _STEEPEST = 600.0
-"""Largest magnitude of the exponent of e in the fracture strain: strains from 0 to 1e260."""
+"""Largest magnitude of the exponent of e in the fracture strain; the strain is then between 0 and 1e260."""
 _MOST_TENSE = 1.5
-"""Largest tension over the flow stress: above it the fracture strain of Johnson and Cook 1985 is not measured."""
+"""Largest ratio of tension to flow stress in the fracture strain; for larger ratios Johnson and Cook 1985 have no
+measurements."""
 _LEAST_STRAIN = 1e-6
-"""Smallest fracture strain. Chosen: with constants that make it negative, a tet breaks at first yield."""
+"""Smallest fracture strain. Chosen value: if the constants give a negative fracture strain, a tet breaks at first
+yield."""
 _TWO_THIRDS = 2.0 / 3.0
 _TINY = 1e-300
-"""Replaces zero, which has no logarithm."""
+"""Smallest argument of a logarithm; it replaces zero."""
 
 
 @njit("int64(float64[::1], float64[::1], float64[::1], int64)", cache=True, error_model="numpy")
@@ -112,7 +118,8 @@ def _factors(w, params, m, dt):  # type: ignore[no-untyped-def]
 
 @njit("int64(float64[::1], float64[::1], int64, float64, boolean)", cache=True, error_model="numpy")
 def _newton(w, params, m, dt, halve):  # type: ignore[no-untyped-def]
-    """One iteration of q - 3 G d = flow stress(d) for ``m`` tets; returns the number that have not converged.
+    """Executes one iteration of q - 3 G d = flow stress(d) for ``m`` tets; returns the number of tets that have not
+    converged.
 
     The left side decreases with d, and the right side increases until the metal softens: the root stays in its bracket.
 
@@ -128,7 +135,7 @@ def _newton(w, params, m, dt, halve):  # type: ignore[no-untyped-def]
     shear3, going, kink = 3.0 * params[SHEAR], 0, _BELOW * dt * params[_RATE]
     a, b, n, c, per_span = params[_A], params[_B], params[_N], params[_C], params[_M] / (params[_MELT] - params[_T0])
     for j in range(m):
-        # 1.
+        # 1. Compute residual and slope at d.
         d, low, high, warm = w[_D + j], w[_LOW + j], w[_HIGH + j], w[_WARM + j]
         stress, within = w[_Q + j] - shear3 * d, w[_T + j]
         power, strain = b * w[_SUM + j], max(w[_KNOWN + j] + d, _TINY)
@@ -145,9 +152,9 @@ def _newton(w, params, m, dt, halve):  # type: ignore[no-untyped-def]
         by_strain = n * power / strain * rate * heat
         residual = stress - hardening * rate * heat
         slope = -shear3 - by_strain - by_rate - hardening * rate * by_heat * warm * (stress - shear3 * d)
-        # 2.
+        # 2. Update the bracket.
         low, high = (d if residual > 0.0 else low), (high if residual > 0.0 else d)
-        # 3.
+        # 3. Compute the Newton step.
         new = d - residual / slope
         x = (new - d) / d
         grown = 1.0 + abs(x) + 0.5 * x * x
@@ -156,10 +163,10 @@ def _newton(w, params, m, dt, halve):  # type: ignore[no-untyped-def]
         new = grown if steep else new
         passes = counts & (new < kink)
         new = kink if passes else new
-        # 4.
+        # 4. Halve the bracket instead, if needed.
         newton = (low <= new) & (new <= high) & (slope < 0.0) & (not halve)
         new = new if newton else 0.5 * (low + high)
-        # 5.
+        # 5. Test the convergence.
         done = (newton & (not passes) & (abs(new - d) <= _CLOSE * new)) | (high - low <= _NARROW * high)
         w[_STATIC + j] = hardening * heat
         w[_D + j], w[_LOW + j], w[_HIGH + j] = new, low, high
@@ -170,7 +177,7 @@ def _newton(w, params, m, dt, halve):  # type: ignore[no-untyped-def]
 
 @njit("int64(float64[::1], int64)", cache=True)
 def _open_first(w, m):  # type: ignore[no-untyped-def]
-    """Moves those of ``m`` tets that have not converged before the others; returns their number."""
+    """Moves the tets among the ``m`` tets that have not converged to the front; returns the number of these tets."""
     n = 0
     for j in range(m):
         if w[_OPEN + j] > 0.0:
@@ -197,8 +204,9 @@ def increments(w, params, m, dt):  # type: ignore[no-untyped-def]
 
 @njit("void(float64[::1], float64[::1], float64[::1], int64, int64, float64)", cache=True, error_model="numpy")
 def _return(w, s, params, m, n, dt):  # type: ignore[no-untyped-def]
-    """Scales the deviatoric stress to the flow stress; books strain, heat, and the work of the mean of the rotated
-    old stress and the new one (as in mohr_coulomb.py), so that the rest is the elastic energy of the stress.
+    """Scales the deviatoric stress to the flow stress; books strain, heat, and the work of the mean of the rotated old
+    stress and the new one (as in mohr_coulomb.py), so that the remaining work is equal to the elastic energy of the
+    stress.
     """
     shear3, shear2 = 3.0 * params[SHEAR], 2.0 * params[SHEAR]
     for i in range(n):
@@ -288,4 +296,4 @@ def _begin(law: JohnsonCook, temperature: float) -> dict[int, float]:
 
 
 LAW = Law("johnson_cook", BEFORE_PRESSURE, _rows, _constants, _begin, johnson_cook)
-"""Strength with heat from plastic work, and damage, at which erosion removes tets."""
+"""Johnson-Cook strength law with heat from plastic work, and with damage, at which erosion removes tets."""

@@ -1,8 +1,8 @@
 """Johnson-Holmquist 2: strength of a brittle material by pressure, rate and damage; pressure with bulking; tension
 cut-off.
 
-Johnson and Holmquist 1994. Order in a step (docs/theory/materials.md): pressure of n+1, with bulking and damage of
-n; strength at that pressure; return; damage and bulking of n+1.
+Johnson and Holmquist 1994. Order of the computation in a step (docs/theory/materials.md): pressure at n+1, with bulking
+and damage at n; strength at that pressure; return to the strength; damage and bulking at n+1.
 """
 
 import math
@@ -66,10 +66,10 @@ _AVERAGED, _MASS = WORK_AVERAGED * CHUNK, MASS * CHUNK
 # Scratch rows: (p* + T*)^N; (p* + T*)^D2; p*^M; logarithm of the relative rate.
 _INTACT, _FRACTURE, _CRUMBLED, _FAST = (NODAL + k * CHUNK for k in range(4))
 _TINY = 1e-300
-"""Replaces zero, which has no logarithm."""
+"""Smallest argument of a logarithm; it replaces zero."""
 _LEAST = 0.05
-"""Least share of the bulk modulus at rest in the wave speed. Chosen: it shortens the stable step, never lengthens
-it."""
+"""Smallest bulk modulus in the wave speed, as a share of the bulk modulus at rest. Chosen value; this limit can only
+decrease the stable step."""
 _THIRD, _TWO_THIRDS = 1.0 / 3.0, 2.0 / 3.0
 
 
@@ -90,9 +90,9 @@ def _pressed(params, ratio, bulking, least):  # type: ignore[no-untyped-def]
 
 @njit("float64(float64[::1], float64, float64, float64, float64)", cache=True, error_model="numpy")
 def _stored(params, ratio, p, bulking, least):  # type: ignore[no-untyped-def]
-    """Returns the elastic energy of the pressure ``p`` of ``_pressed``, per initial volume, Pa: the integral of -p
-    over the volume ratio, from the ratio at zero pressure. Beyond the ratio at ``least`` it is constant; under
-    compression it is a triangle.
+    """Returns the elastic energy of the pressure ``p`` of ``_pressed``, per initial volume, Pa: the integral of -p over
+    the volume ratio, from the ratio at zero pressure. Above the volume ratio at which the pressure is ``least``, the
+    energy is constant; under compression it is computed as a triangle.
     """
     bulk = params[BULK]
     stiff = bulk - bulking
@@ -116,7 +116,9 @@ def _beyond(params, before, after, old, new, bulking, least):  # type: ignore[no
 
 @njit("float64(float64[::1], float64, float64, float64, float64)", cache=True, error_model="numpy", forceinline=True)
 def _opened(params, before, after, bulking, least):  # type: ignore[no-untyped-def]
-    """Returns the growth of the volume ratio of a tet beyond the tension cut-off, from ``before`` to ``after``."""
+    """Returns the increase of the volume ratio of a tet from ``before`` to ``after`` that lies beyond the tension
+    cut-off.
+    """
     end = params[BULK] / (params[BULK] - bulking + least)
     return max(after - end, 0.0) - max(before - end, 0.0)
 
@@ -127,17 +129,17 @@ def crumbling(w, s, params, n):  # type: ignore[no-untyped-def]
     cut-off, and with the energy summed over them (elements/heat_and_bulking.py).
 
     Booked as plastic work: the difference between the work of the pressure of n and that at the same ratio with the
-    present bulking and damage, and the work beyond the cut-off. There the pressure does not determine a volume
-    ratio: the opening of the tet itself counts, not the ratio at its nodes, which neighbours without tension may
-    have opened.
+    present bulking and damage, and the work of the expansion beyond the tension cut-off. Beyond the cut-off the
+    pressure does not determine a volume ratio. The work is therefore computed from the opening of the tet itself, not
+    from the ratio at its nodes, which also contains the opening of neighbours without tension.
     """
     bulk, averaged = params[BULK], len(s) > _BULKING_STEP
     for i in range(n):
-        # 1. Volume ratio of n+1, and the cut-off.
+        # 1. Compute the volume ratio at step n+1, and the tension cut-off.
         half = 0.5 * w[SEEN + i]
         ratio = s[_RATIO + i] * (1.0 + half) / (1.0 - half)
         least = -params[_T] * (1.0 - s[_DAMAGE + i])
-        # 2. Pressure of n+1, and the work beyond the cut-off: mean over the corners, or of the tet.
+        # 2. Compute pressure and work beyond the cut-off at n+1: mean over the corners, or value of the tet.
         if averaged:
             new, stiff, stored, beyond = 0.0, 0.0, 0.0, 0.0
             whole = s[_MASS + i] / params[DENSITY]
@@ -162,7 +164,7 @@ def crumbling(w, s, params, n):  # type: ignore[no-untyped-def]
             old, _ = _pressed(params, s[_RATIO + i], s[_BULKING + i], least)
             s[_PLASTIC + i] -= 0.5 * (s[_P + i] - old) * w[CHANGE + i]
             beyond = _beyond(params, s[_RATIO + i], ratio, old, new, s[_BULKING + i], least)
-        # 3. Work, state, modulus.
+        # 3. Book the work, update the state, compute the modulus.
         s[_PLASTIC + i] += s[_MASS + i] / params[DENSITY] * beyond
         s[_WORK + i] -= 0.5 * (s[_P + i] + new) * w[CHANGE + i]
         s[_P + i], s[_RATIO + i] = new, ratio
@@ -171,8 +173,8 @@ def crumbling(w, s, params, n):  # type: ignore[no-untyped-def]
 
 @njit("void(float64[::1], float64[::1], float64[::1], int64)", cache=True, error_model="numpy")
 def _factors(w, s, params, n):  # type: ignore[no-untyped-def]
-    """Computes powers of the pressure, about zero where there is none, and the logarithm of the squared relative
-    rate, at least 0.
+    """Computes powers of the pressure, which are about zero if the pressure is zero, and the logarithm of the squared
+    relative rate, at least 0.
     """
     per_pressure, tension = 1.0 / params[_PHEL], params[_T] / params[_PHEL]
     per_rate = _TWO_THIRDS / (params[_RATE] * params[_RATE])
@@ -197,7 +199,9 @@ def _factors(w, s, params, n):  # type: ignore[no-untyped-def]
 
 @njit("float64(float64[::1], float64[::1], int64, float64, float64, boolean)", cache=True, error_model="numpy")
 def _tension_lost(s, params, i, damage, grown, averaged):  # type: ignore[no-untyped-def]
-    """Returns the loss of tensile energy when the damage of tet ``i`` has ``grown``, per initial volume, Pa."""
+    """Returns the decrease of the elastic energy of tension by an increase ``grown`` of the damage of tet ``i``, per
+    initial volume, Pa.
+    """
     before, after = -params[_T] * (1.0 - damage), -params[_T] * (1.0 - grown)
     lost = 0.0
     for k in range(4 if averaged else 1):
@@ -212,10 +216,10 @@ def _tension_lost(s, params, i, damage, grown, averaged):  # type: ignore[no-unt
 def johnson_holmquist(w, s, params, n, dt):  # type: ignore[no-untyped-def]
     """Returns the trial stress to the strength at the new pressure; updates damage and bulking; books the plastic work.
 
-    The strength uses the damage of n, so that the return is a division. The plastic work is that of the mean of the
-    rotated old stress and the new one (as in mohr_coulomb.py), also where damage or pressure lower the strength;
-    energy that becomes bulking is stored, and subtracted. In the averaged forms new bulking is distributed to the
-    nodes first (elements/heat_and_bulking.py).
+    The strength uses the damage at n, so that the return to the strength needs no iteration. The plastic work is the
+    work of the mean of the rotated old stress and the new stress (as in mohr_coulomb.py), also where damage or pressure
+    lower the strength; the energy that is converted to bulking is stored, and therefore subtracted from the plastic
+    work. In the averaged forms new bulking is distributed to the nodes first (elements/heat_and_bulking.py).
     """
     equivalent_stress(w, s, n)
     _factors(w, s, params, n)
@@ -223,7 +227,7 @@ def johnson_holmquist(w, s, params, n, dt):  # type: ignore[no-untyped-def]
     tension, averaged = params[_T], len(s) > _BULKING_STEP
     grows = _BULKING_STEP if averaged else _BULKING
     for i in range(n):
-        # 1. Strength at the new pressure, between those of intact and of fractured material.
+        # 1. Compute the strength at the new pressure, between the strengths of intact and of fractured material.
         q, p, damage = w[TRIAL + i], s[_P + i], s[_DAMAGE + i]
         rate = 1.0 + 0.5 * params[_C] * w[_FAST + i]
         intact = hel * params[_A] * rate * w[_INTACT + i] if p > -tension else 0.0
@@ -232,11 +236,11 @@ def johnson_holmquist(w, s, params, n, dt):  # type: ignore[no-untyped-def]
         strength = intact - damage * (intact - crumbled)
         if q <= strength:
             continue
-        # 2. Plastic strain, and damage by its share of the fracture strain.
+        # 2. Compute plastic strain, and damage as plastic strain over fracture strain.
         strain = (q - strength) / (3.0 * shear)
         fracture = params[_D1] * w[_FRACTURE + i] if p > -tension else 0.0
         grown = damage + strain / fracture if strain < (1.0 - damage) * fracture else 1.0
-        # 3. Return, and its work.
+        # 3. Return the stress to the strength, and book the work.
         factor = strength / q
         mean = w[DILATATION + i] * _THIRD
         moved = (
@@ -250,7 +254,7 @@ def johnson_holmquist(w, s, params, n, dt):  # type: ignore[no-untyped-def]
             s[row * CHUNK + i] *= factor
         s[_STRAIN + i] += strain
         s[_PLASTIC + i] += w[VOLUME_MID + i] * max(lost, 0.0)
-        # 4. Damage: less tension, and bulking by the deviatoric energy that the lower strength releases.
+        # 4. Damage reduces tension, and adds bulking by the deviatoric energy that the lower strength releases.
         s[_DAMAGE + i] = grown
         s[_PLASTIC + i] += s[_MASS + i] / params[DENSITY] * _tension_lost(s, params, i, damage, grown, averaged)
         m = 1.0 / s[_RATIO + i] - 1.0
@@ -274,10 +278,11 @@ def _constants(law: JohnsonHolmquist) -> tuple[float, ...]:
 
 
 PRESSURE_LAW = Equation("johnson_holmquist", DAMAGE + 1, lambda _: (), crumbling, volumes_by_ratio, CORNERS + 4)
-"""Pressure of the law: contains bulking, a nodal mean in the averaged forms, and its own tension cut-off."""
+"""Equation of state of the law. Its pressure contains bulking (a nodal mean in the averaged forms) and the tension
+cut-off of the law."""
 LAW = Law(
     "johnson_holmquist", AFTER_PRESSURE, lambda _: DAMAGE + 1, _constants,
     lambda *_: {CORNERS + k: 1.0 for k in range(4)}, johnson_holmquist,
     PRESSURE_LAW.model,
 )  # fmt: skip
-"""Tension is limited to T (1 - D): fully damaged material has none."""
+"""Tension is limited to T (1 - D), so fully damaged material has no tensile strength."""

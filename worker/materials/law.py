@@ -1,8 +1,8 @@
-"""Interface of a strength law: one file has its constants, its state rows, its place in the step, and its kernel for a
-chunk.
+"""Interface of a strength law. One file contains the constants of the law, its state rows, its place in the step, and
+its kernel for a chunk.
 
-Its keys in a case, its cost and its plausibility warnings are in the file of the same name in cases/laws. models.py
-lists the laws; a law needs no other file.
+The keys of the law in a case, its cost and its plausibility warnings are in the file of the same name in cases/laws.
+The file models.py lists the laws; a law needs no other file.
 """
 
 from collections.abc import Callable
@@ -16,10 +16,12 @@ DENSITY, BULK, SHEAR, Q_LINEAR, Q_SHOCK, Q_QUADRATIC, ORDER, SPALL, DILATES, BRE
 material has none; DILATES: sine of the dilation angle, zero if plastic flow keeps the volume; BREAKS: 1 if the part
 fractures."""
 EQUATION, FIRST, SIZE = 10, 15, 42
-"""First places of the constants of the equation of state and of the law, and the number of places."""
+"""First place of the constants of the equation of state, first place of the constants of the law, and number of
+places in the constants of a block."""
 FROM_SHAPE, BEFORE_PRESSURE, AFTER_PRESSURE = range(3)
-"""Place of a law in the step: computes the deviatoric stress from the undeformed shape; returns the trial stress
-before the equation of state; returns it after that, since its strength depends on the new pressure."""
+"""Place of a law in the step. FROM_SHAPE: the law computes the deviatoric stress from the undeformed shape.
+BEFORE_PRESSURE: the law returns the trial stress to the yield surface before the equation of state. AFTER_PRESSURE:
+the law does so after the equation of state, because its strength depends on the new pressure."""
 
 
 @dataclass(frozen=True)
@@ -31,16 +33,17 @@ class Law:
     order: int
     """FROM_SHAPE, BEFORE_PRESSURE or AFTER_PRESSURE."""
     rows: Callable[[Any], int]
-    """Function of its table in the case: number of state rows of a tet (worker/model/rows.py)."""
+    """Function of the law's table in the case: number of state rows of a tet (worker/model/rows.py)."""
     constants: Callable[[Any], tuple[float, ...]]
-    """Function of its table: its constants, stored from FIRST on."""
+    """Function of the law's table in the case: constants of the law, stored from FIRST on."""
     begin: Callable[[Any, float], dict[int, float]]
-    """Function of its table and the temperature, K: initial values of the rows that do not start at zero."""
+    """Function of the law's table and the temperature, K: initial values of the state rows whose initial value is
+    not zero."""
     kernel: Any
     equation: str = ""
-    """Name of the equation of state that belongs to the law; empty: that of the material."""
+    """Name of the equation of state that belongs to the law; empty: the equation of state of the material is used."""
     dilates: Callable[[Any], float] = lambda _: 0.0
-    """Function of its table: sine of the dilation angle; above zero the law uses row DILATION."""
+    """Function of the law's table: sine of the dilation angle. If the sine is above zero, the law uses row DILATION."""
 
 
 @dataclass(frozen=True)
@@ -52,15 +55,17 @@ class Equation:
     rows: int
     """Number of state rows of a tet."""
     constants: Callable[[Any], tuple[float, ...]]
-    """Function of its table in the case: its constants, stored from EQUATION on."""
+    """Function of the table of the equation of state in the case: constants of the equation, stored from EQUATION
+    on."""
     kernel: Any
     volume: Any
     """Kernel(w, s, params, n) that sets VOLUME_SEEN of n, m^3: volume of solid and pores at the pressure of n."""
     averaged: int = 0
-    """Rows in the averaged pressure forms if the equation has a nodal mean of its own (BULKING_STEP, HEAT)."""
+    """Number of state rows in the averaged pressure forms if the equation has an additional nodal mean
+    (BULKING_STEP, HEAT)."""
 
 
 def placed(params: Floats, begin: int, constants: tuple[float, ...], room: int) -> None:
-    """Copies constants into ``params`` (SIZE,) from ``begin`` on; there must be ``room`` for them."""
+    """Copies constants into ``params`` (SIZE,) from ``begin`` on; ``room``: largest number of constants."""
     assert len(constants) <= room
     params[begin : begin + len(constants)] = constants

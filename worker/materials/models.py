@@ -1,7 +1,7 @@
-"""Lists of the strength laws and equations of state, and the kernels that select that of a block.
+"""Lists of the strength laws and equations of state, and the kernels that call the law or equation of a block.
 
-``LAWS`` and ``EQUATIONS`` number them by their places; a block stores both numbers and one vector of constants. A
-new law needs a line in LAWS and a branch below; tests/worker/test_laws.py checks that it has its branch.
+``LAWS`` and ``EQUATIONS`` number them by their places; a block stores both numbers and one vector of constants. A new
+law needs a line in LAWS and a branch below; tests/worker/test_laws.py checks that every law has a branch.
 """
 
 import math
@@ -125,6 +125,6 @@ def rows_of(material: Material, pressure: str) -> int:
 
 
 def beginning(material: Material, temperature: float) -> dict[int, float]:
-    """Returns the initial values of rows that do not start at zero, as far as a block has them."""
+    """Returns the initial values of the state rows whose initial value is not zero, for the rows that a block has."""
     own = law_of(material).begin(material.strength, temperature)
     return {rows.VOLUME_RATIO: 1.0, rows.TEMPERATURE: temperature, **own}

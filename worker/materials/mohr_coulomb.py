@@ -1,9 +1,9 @@
 """Mohr-Coulomb strength of brittle materials: return of the deviatoric stress at constant pressure, or with dilation.
 
 f = (s1 - s3) + (s1 + s3) sin(phi) - 2 c cos(phi) <= 0 with s1 >= s2 >= s3, tension positive, and s1 - s3 <= cap.
-Plastic flow keeps the volume; or it follows the same form with the dilation angle psi in place of phi, and the
-pressure increases. Derived in docs/theory/materials.md. The parts of the return are inlined: as calls they take
-three times as long.
+Plastic flow either keeps the volume, or has the same form with the dilation angle psi in place of phi; the flow then
+increases the pressure. Derived in docs/theory/materials.md. The functions of the return are inlined, because calls
+would take three times as long.
 """
 
 import math
@@ -36,7 +36,7 @@ from .turning import sine_and_cosine
 
 _SINE, _COHESION, _CAP, _FAILURE = FIRST, FIRST + 1, FIRST + 4, FIRST + 5
 _RESIDUAL = 2
-"""Distance in the constants from _SINE and _COHESION to those of failed material."""
+"""Offset in the constants from _SINE and _COHESION of intact material to the same constants of failed material."""
 _SXX, _SYY, _SZZ = S_XX * CHUNK, S_YY * CHUNK, S_ZZ * CHUNK
 _SYZ, _SZX, _SXY = S_YZ * CHUNK, S_ZX * CHUNK, S_XY * CHUNK
 _P, _STRAIN, _WORK = PRESSURE * CHUNK, PLASTIC_STRAIN * CHUNK, WORK_PLASTIC * CHUNK
@@ -55,8 +55,8 @@ _SHEAR, _AXIAL = 1.0 / math.sqrt(3.0), 2.0 / 3.0
     forceinline=True,
 )
 def principal(xx, yy, zz, yz, zx, xy):  # type: ignore[no-untyped-def]
-    """Returns the principal values, the largest first, of a deviator with von Mises stress one; to round-off, also
-    equal values.
+    """Returns the principal values, the largest first, of a deviator with von Mises stress one; the error is of the
+    order of round-off, also for equal values.
 
     The isolated value x solves x^3 - x / 3 = det s, which is well conditioned: three Newton steps from the chord.
     The rest of s, without x and its projector (s^2 + x s + x^2 - 1/3) / (3 x^2 - 1/3), gives the distance of the
@@ -88,10 +88,12 @@ def principal(xx, yy, zz, yz, zx, xy):  # type: ignore[no-untyped-def]
     forceinline=True,
 )
 def returned(d1, d2, d3, strength, sine, cap):  # type: ignore[no-untyped-def]
-    """Returns the principal deviatoric stresses d1 >= d2 >= d3 projected onto the yield surface; unchanged if below it.
+    """Returns the principal deviatoric stresses d1 >= d2 >= d3 projected onto the yield surface; unchanged if they are
+    below the surface.
 
     (1 + sine) d1 - (1 - sine) d3 <= strength and d1 - d3 <= cap. Flow is along (1, 0, -1), at constant d2, for both
-    planes; where that would change the order, two of the three are equal, which leaves one point.
+    planes; where such a flow would change the order of the three values, two of them are equal, which leaves a single
+    point.
     """
     new = min(0.5 * (strength - (1.0 - sine) * d2), 0.5 * (cap - d2))
     if not new < d1:
@@ -112,8 +114,9 @@ def returned(d1, d2, d3, strength, sine, cap):  # type: ignore[no-untyped-def]
     forceinline=True,
 )
 def dilated(d1, d2, d3, strength, sine, cap, psi, shear2, bulk):  # type: ignore[no-untyped-def]
-    """Returns the same with flow along (1 + psi, 0, psi - 1), which increases volume, pressure and strength; psi: sine
-    of the dilation angle. Also returns the amount of flow; the plastic volume strain is 2 psi of it.
+    """Returns the principal deviatoric stresses projected onto the yield surface with flow along (1 + psi, 0, psi - 1),
+    which increases volume, pressure and strength; psi: sine of the dilation angle. Also returns the amount of flow; the
+    plastic volume strain is 2 psi times this amount.
 
     The cap is applied first, at constant volume. Flow ends where the deviator is zero.
     """
@@ -161,9 +164,9 @@ def grow(w, s, i, grown, subtracted, bulk):  # type: ignore[no-untyped-def]
 def with_values(xx, yy, zz, yz, zx, xy, d1, d2, d3, e1, e2, e3):  # type: ignore[no-untyped-def]
     """Returns the tensor with the principal directions of the given one, and the values e in place of its values d.
 
-    e2 + [e2, e3] (s - d2) + [e1, e2, e3] (s - d2) (s - d3), Newton's interpolation, which needs no directions. After
-    ``returned`` the first differences are between 0 and 1, so that equal values cause no error: e is equal where d
-    is.
+    e2 + [e2, e3] (s - d2) + [e1, e2, e3] (s - d2) (s - d3), by Newton's interpolation, which needs no principal
+    directions. After ``returned`` the first differences are between 0 and 1, so that equal values cause no error: where
+    two values d are equal, the two values e are equal too.
     """
     upper = (e1 - e2) / (d1 - d2) if e1 > e2 else 0.0
     lower = (e2 - e3) / (d2 - d3) if e2 > e3 else 0.0
@@ -186,16 +189,17 @@ def with_values(xx, yy, zz, yz, zx, xy, d1, d2, d3, e1, e2, e3):  # type: ignore
 def mohr_coulomb(w, s, params, n, dt):  # type: ignore[no-untyped-def]
     """Returns the trial stress of tets above the yield surface at their new pressure; books the plastic work.
 
-    The plastic work is that of the mean of the rotated old stress and the new one, as the whole work is: the rest is
-    the elastic energy of the stress, also where the strength decreases, by lower pressure or by failure. Where the
-    volume grows, that energy belongs to more volume afterwards, and comes from the flow. With open pores there is no
-    dilation: the pores would take the growth, and the pressure would not increase.
+    The plastic work is the work of the mean of the rotated old stress and the new stress, as for the total work. The
+    remaining work is equal to the change of the elastic energy of the stress, also if the strength decreases by lower
+    pressure or by failure. If the volume increases by dilation, the elastic energy density belongs to a larger volume
+    afterwards; this energy is subtracted from the work of the flow. With open pores there is no dilation: the
+    additional volume would go into the pores, and the pressure would not increase.
     """
     equivalent_stress(w, s, n)
     shear2, cap, dilates = 2.0 * params[SHEAR], params[_CAP], params[DILATES] > 0.0
     porous = params[SPALL] < np.inf
     for i in range(n):
-        # 1. Strength at the new pressure, or residual strength; no return below it.
+        # 1. Compute the strength at the new pressure, or the residual strength; skip tets below the strength.
         k, subtracted = _RESIDUAL if s[_STRAIN + i] > params[_FAILURE] else 0, 0.0
         if dilates:
             subtracted = max(-s[_GROWN + i], 0.0)
@@ -206,13 +210,13 @@ def mohr_coulomb(w, s, params, n, dt):  # type: ignore[no-untyped-def]
         most = _MISES * q
         if (most * np.sqrt(1.0 + sine * sine * _THIRD) <= strength and most <= cap) or q == 0.0:
             continue
-        # 2. Principal values d of the deviator with von Mises stress one.
+        # 2. Compute the principal values d of the deviator, scaled to von Mises stress one.
         r = 1.0 / q
         mean = (s[_SXX + i] + s[_SYY + i] + s[_SZZ + i]) * _THIRD
         sxx, syy, szz = r * (s[_SXX + i] - mean), r * (s[_SYY + i] - mean), r * (s[_SZZ + i] - mean)
         syz, szx, sxy = r * s[_SYZ + i], r * s[_SZX + i], r * s[_SXY + i]
         d1, d2, d3 = principal(sxx, syy, szz, syz, szx, sxy)
-        # 3. Values e on the yield surface; with dilation also the pressure.
+        # 3. Compute the values e on the yield surface; with dilation also the pressure.
         if dilates and k == 0 and not (porous and s[_PORES + i] > 0.0):
             e1, e2, e3, flow = dilated(d1, d2, d3, r * strength, sine, r * cap, params[DILATES], shear2, params[BULK])
             grown = 2.0 * params[DILATES] * q * flow
@@ -223,7 +227,7 @@ def mohr_coulomb(w, s, params, n, dt):  # type: ignore[no-untyped-def]
             e1, e2, e3 = returned(d1, d2, d3, max(r * strength, 0.0), sine, r * cap)
         if e1 == d1:
             continue
-        # 4. Tensor with the values e; plastic strain and work.
+        # 4. Compute the tensor with the values e; book plastic strain and work.
         nxx, nyy, nzz, nyz, nzx, nxy = with_values(sxx, syy, szz, syz, szx, sxy, d1, d2, d3, e1, e2, e3)
         s[_SXX + i], s[_SYY + i], s[_SZZ + i] = q * nxx, q * nyy, q * nzz
         s[_SYZ + i], s[_SZX + i], s[_SXY + i] = q * nyz, q * nzx, q * nxy
@@ -240,7 +244,7 @@ def mohr_coulomb(w, s, params, n, dt):  # type: ignore[no-untyped-def]
 
 
 def _constants(law: MohrCoulomb) -> tuple[float, ...]:
-    """Returns the constants; infinite for limits that are not given."""
+    """Returns the constants of the law; limits that are not given are infinite."""
     residual = law.residual_friction_angle
     angle = min(math.radians(30.0), law.friction_angle) if residual is None else residual
     return (
@@ -265,4 +269,5 @@ LAW = Law(
     "mohr_coulomb", AFTER_PRESSURE, _rows, _constants, lambda *_: {}, mohr_coulomb,
     dilates=lambda law: sine_and_cosine(law.dilation_angle)[0],
 )  # fmt: skip
-"""Beyond the apex the deviator is zero; the pressure stays tensile until facets break."""
+"""Mohr-Coulomb strength law. For tension beyond the apex of the yield surface the deviator is zero; the pressure
+stays tensile until facets break."""

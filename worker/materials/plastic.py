@@ -27,8 +27,8 @@ def equivalent_stress(w, s, n):  # type: ignore[no-untyped-def]
 
 @njit("void(float64[::1], float64[::1], float64[::1], int64, float64)", cache=True, error_model="numpy")
 def linear_hardening(w, s, params, n, dt):  # type: ignore[no-untyped-def]
-    """Returns the trial stress to the yield surface; strain increment (q - yield) / (3 G + H), exact for this law.
-    The plastic work is that of the mean of the rotated old stress and the new one (as in mohr_coulomb.py).
+    """Returns the trial stress to the yield surface; strain increment (q - yield) / (3 G + H), exact for this law. The
+    plastic work is the work of the mean of the rotated old stress and the new stress (as in mohr_coulomb.py).
     """
     equivalent_stress(w, s, n)
     shear3, shear2, hardening = 3.0 * params[SHEAR], 2.0 * params[SHEAR], params[_HARDENING]
@@ -63,4 +63,4 @@ def _begin(law: LinearHardening, _: float) -> dict[int, float]:
 LAW = Law(
     "linear_hardening", BEFORE_PRESSURE, lambda _: YIELD + 1, lambda law: (law.hardening,), _begin, linear_hardening
 )  # fmt: skip
-"""The yield stress is a state row."""
+"""J2 strength law with linear hardening; the yield stress is a state row."""

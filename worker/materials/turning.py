@@ -1,4 +1,6 @@
-"""Sine and cosine to the last bit: those of C libraries differ between processors, and so would digests."""
+"""Sine and cosine, correct to the last bit. The functions of C libraries differ between processors, and digests would
+then differ too.
+"""
 
 from decimal import Context, Decimal
 
@@ -6,9 +8,11 @@ import numpy as np
 import numpy.typing as npt
 
 _DIGITS = Context(prec=60)
-"""Decimal digits: more than a float64 needs after the cancellation of terms of a whole turn."""
+"""Number of decimal digits in the computation: more than a float64 needs after the cancellation of terms for an
+angle of a whole turn."""
 _MANY = Context(prec=120)
-"""Digits for the largest angle of a case: as many again before the decimal point."""
+"""Number of decimal digits for the largest angle of a case: the same number of digits is added before the decimal
+point."""
 _SMALL = Decimal("1e-40")
 """Size of a term that no longer changes a float64."""
 

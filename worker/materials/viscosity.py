@@ -9,12 +9,13 @@ from ..model.rows import MASS, PRESSURE, VISCOUS, WORK_VISCOUS
 from ..model.state import CHUNK
 
 HALF = 0.01
-"""Velocity difference over a tet, over the wave speed, at which the shock term has half of its value. Chosen between
-elastic waves in bars (10 m/s over some tets: 5e-4) and weak shocks (300 m/s in copper: 0.03)."""
+"""Velocity difference over a tet, over the wave speed, at which the shock term has half of its full value. Chosen
+value, between the ratios of elastic waves in bars (10 m/s over some tets: 5e-4) and of weak shocks (300 m/s in
+copper: 0.03)."""
 SQUEEZED = 0.1
-"""Volume strain in compression at which the viscosity of an averaged tet resists its own rate in full. Chosen by
-loads on columns of metal at 1.5 and 2 km/s (docs/theory/contact.md, "Plates under 100 GPa"); in metal that flows at
-100 m/s the strain is about 1e-3."""
+"""Volume strain in compression above which the viscosity of a tet with averaged pressure resists the full rate of
+the tet itself. Chosen value, by tests of columns of metal loaded at 1.5 and 2 km/s (docs/theory/contact.md, "Plates
+under 100 GPa"); in metal that flows at 100 m/s the strain is about 1e-3."""
 _P, _Q, _MASS, _WORK = PRESSURE * CHUNK, VISCOUS * CHUNK, MASS * CHUNK, WORK_VISCOUS * CHUNK
 
 
@@ -23,9 +24,10 @@ def resisted(own, mean, kept, squeezed):  # type: ignore[no-untyped-def]
     """Returns the rate of compression, 1/s, that the viscosity of an averaged tet resists: the ``mean`` rate in its
     pressure, and a share of the excess of its ``own`` rate.
 
-    The excess is mostly noise. The share is the volume that the tet has lost to its neighbours (``kept``: its own
-    volume over the averaged one), and the common compression ``squeezed``, 1 - V_seen / V0, over SQUEEZED. A tet
-    smaller than its averaged volume has no pressure of its own that stops it; under high pressure noise crushes it.
+    The excess of the own rate is mostly numerical noise. The share is the volume that the tet has lost to its
+    neighbours (``kept``: its own volume over the averaged one), and the common compression ``squeezed``, 1 - V_seen /
+    V0, over SQUEEZED. A tet that is smaller than its averaged volume has no own pressure that stops further
+    compression; under high pressure, noise would crush such a tet.
     """
     mean = max(mean, 0.0)
     share = min(max(1.0 - kept, 0.0) + max(squeezed, 0.0) / SQUEEZED, 1.0)
@@ -41,13 +43,13 @@ def bulk_viscosity(w, s, n, linear, shock, quadratic, rate_of_change, breaks, in
     """Computes q = density u ((linear + shock S) c + quadratic u), u = l |rate|, in compression, Pa; its work; LIMIT,
     1/s.
 
-    von Neumann and Richtmyer 1950 (quadratic), Landshoff 1955 (linear); S = u / (u + HALF c) distinguishes a shock
-    from an elastic wave. ``rate_of_change`` converts CHANGE to a volume flux, 1/s. With G = sqrt(sum |grad N|^2) and
-    Q the tangent (linear + shock S (2 - S)) c + 2 quadratic u the largest stable step is 1 / (G (G l Q + sqrt((G l
-    Q)^2 + c^2))); l = LENGTH_FACTOR / G. Both are derived in docs/theory/time_integration.md. An inverted tet has no
+    von Neumann and Richtmyer 1950 (quadratic), Landshoff 1955 (linear); S = u / (u + HALF c) distinguishes a shock from
+    an elastic wave. ``rate_of_change`` converts CHANGE to a volume flux, 1/s. With G = sqrt(sum |grad N|^2) and Q the
+    tangent (linear + shock S (2 - S)) c + 2 quadratic u the largest stable step is 1 / (G (G l Q + sqrt((G l Q)^2 +
+    c^2))); l = LENGTH_FACTOR / G. Both are derived in docs/theory/time_integration.md. An inverted tet has no
     viscosity, and NaN as its limit. The limit of a tet at rest or in expansion is that at the onset of compression;
-    where a part ``breaks``, that of a tet in tension is the one in compression at the speed of its release, |p| /
-    (density c). ``initial``: initial density in the averaged forms, whose viscosity resists a mean rate
+    where a part ``breaks``, the limit of a tet in tension is the limit in compression at the speed of its release, |p|
+    / (density c). ``initial``: initial density in the averaged forms, in which the viscosity resists a mean rate
     (``resisted``); else 0.
     """
     for i in range(n):

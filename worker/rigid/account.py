@@ -48,8 +48,9 @@ class BodyAccount:
         self.before[0], self.before[1] = self._bodies.speed, self._bodies.momentum
 
     def book(self, impulse: Floats, stops: BodyStops) -> None:
-        """Books half of the work of the impulses (b, 6) of contact and walls at the velocities before, and stores the
-        half at those after for the next step. Other changes of the motion, and driven walls, do work from outside.
+        """Books half of the work of the impulses (b, 6) of contact and walls with the velocities before the impulses;
+        stores the half with the velocities after the impulses for the next step. Other changes of the motion, and
+        driven walls, do work from outside.
         """
         bodies, rubbed, walls = self._bodies, stops.rubbed, stops.walls
         speed, momentum = self.before

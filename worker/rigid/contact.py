@@ -36,7 +36,9 @@ class _Slots(NamedTuple):
 
     @classmethod
     def of(cls, places: Indices, surface: SurfaceNodes, of_part: Indices, bodies: Bodies, rank: int) -> Self:
-        """Finds the slots among those at ``places`` of the surface nodes; ``of_part`` (parts,): body of each part."""
+        """Finds the slots of rigid bodies among the slots at ``places`` of the surface nodes; ``of_part`` (parts,):
+        body of each part.
+        """
         body = of_part[surface.part[places]]
         slot: Indices = np.flatnonzero(body >= 0).astype(np.int32)
         at, body = places[slot], body[slot]
@@ -108,7 +110,7 @@ class BodyContacts:
         rows.spread(active, slots.slot, slots.body, slots.arm, bodies.speed, self._rate)
 
     def add_pressed(self, pressed: Ints) -> None:
-        """Adds the impulses of contact in the step to those of the nodes of this rank, ``pressed`` (nodes, 3),
+        """Adds the impulses of contact in the step to the impulses on the nodes of this rank, ``pressed`` (nodes, 3),
         quanta.
         """
         mine = np.flatnonzero(self._slots.node >= 0)
@@ -124,6 +126,6 @@ class BodyContacts:
         return both
 
     def of_contact(self, parts: Ints) -> None:
-        """Adds the impulses of the step to those of the ``parts`` (parts, 3), quanta, on rank 0."""
+        """Adds the impulses of the step to the impulses on the ``parts`` (parts, 3), quanta, on rank 0."""
         if self._comm.rank == 0:
             parts[self._bodies.part] += self._total[:, :3]

@@ -1,8 +1,8 @@
 """Free rotation of rigid bodies, and positions and velocities of their nodes.
 
-Orientations are unit quaternions q with rotations R(q); the state is the angular momentum l in space, so that it is
-constant to the bit without a moment. A step rotates a body by the implicit midpoint rule for Euler's equations: with p
-= R^T l in the body and m the mean of p before and after,
+Orientations are unit quaternions q with rotations R(q); the state is the angular momentum l in space, which is constant
+to the bit if there is no moment. A step rotates a body by the implicit midpoint rule for Euler's equations: with p =
+R^T l in the body and m the mean of p before and after,
 
     m = p + dt/2 m x (I^-1 m),    q' = q (1, dt/2 I^-1 m) / norm.
 
@@ -123,7 +123,7 @@ def place(x, nodes, body, arms, rotation, centre):  # type: ignore[no-untyped-de
     cache=True,
 )
 def carry(v, x, nodes, body, centre, speed, rate):  # type: ignore[no-untyped-def]
-    """Sets the velocities of the ``nodes``: that of the centre, ``speed`` (b, 3), plus ``rate`` (b, 3) x arm."""
+    """Sets the velocities of the ``nodes``: velocity of the centre, ``speed`` (b, 3), plus ``rate`` (b, 3) x arm."""
     for k in range(len(nodes)):
         a, b = nodes[k], body[k]
         rx, ry, rz = x[a, 0] - centre[b, 0], x[a, 1] - centre[b, 1], x[a, 2] - centre[b, 2]

@@ -2,9 +2,10 @@
 
 Contacts give integer impulses to slots (contact/solver/sweeps.py), and shared slots are completed as for other nodes.
 On the rank that owns the node of a slot, the impulses and their moments about the centre of the body are summed as
-integers, then over the ranks; the body moves, and its slots with it. All rows of a body are therefore coupled through
-its mass and inertia, and the sweeps are Jacobi sweeps, as for shared nodes: the norm of a row is bounded by the l1 norm
-over all rows of the body (``norms``), and the result is independent of the order of contacts and ranks.
+integers, then over the ranks; these sums change the motion of the body, and the velocities of its slots are set to this
+motion. All rows of a body are therefore coupled through its mass and inertia, and the sweeps are Jacobi sweeps, as for
+shared nodes: the norm of a row is bounded by the l1 norm over all rows of the body (``norms``), and the result is
+independent of the order of contacts and ranks.
 """
 
 import numpy as np
@@ -72,8 +73,8 @@ def norms(active, words, slots, body, arms, reach, lightness, yielding):  # type
 
 @njit(types.void(_I2, NODES, _N1, _N1, _F2, _B1, _F1), cache=True)
 def gather(words, active, slots, body, arms, owned, reach):  # type: ignore[no-untyped-def]
-    """Moves the impulses of a sweep from ``slots`` to their bodies: adds those of ``owned`` slots to ``words`` (b,
-    WORDS), and sets all to zero.
+    """Moves the impulses of a sweep from ``slots`` to their bodies: adds the impulses of ``owned`` slots to ``words``
+    (b, WORDS), and sets the impulses of all slots to zero.
     """
     moving = active.moving_words
     for k in range(len(slots)):

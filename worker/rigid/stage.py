@@ -2,9 +2,9 @@
 
 The step from n, with the bodies at their positions of n: v(n-1/2) -> v*(n+1/2) by loads from outside (``kick``),
 impulses of contact and walls to v(n+1/2) (``contacts``, ``settle``), positions and orientations of n+1 (``move``).
-Impulses act at the arms of n, and rotation vectors follow from the angular momentum in the orientation of n: so the
-work of an impulse is half of it times the sum of the velocities of its node before and after, to round-off, and no
-other energy is lost.
+Impulses act at the arms of n, and rotation vectors follow from the angular momentum in the orientation of n: the work
+of an impulse is then half of the impulse times the sum of the velocities of its node before and after, to round-off,
+and no other energy is lost.
 """
 
 from typing import Any
@@ -32,7 +32,7 @@ thousandth of a turn in each turn, and the path of a node differs from the chord
 
 
 class Rigid:
-    """Rigid bodies of a case on one rank; every rank has all of them."""
+    """Rigid bodies of a case on one rank; every rank has all bodies."""
 
     def __init__(
         self, case: Case, nodes: Nodes, bodies: Bodies, walls: Walls, beside: Ints, comm: Comm
@@ -94,7 +94,7 @@ class Rigid:
         return bodies
 
     def resume(self, known: dict[str, Any]) -> None:
-        """Restores the state other than that of the bodies."""
+        """Restores the state except the state of the bodies."""
         self.account.resume(known["own"])
         self.last_dt = known["last_dt"]
         self.stops.given[:] = known["given"]
@@ -178,7 +178,7 @@ class Rigid:
 
 
 def _restitution(case: Case, walls: Walls) -> Floats:
-    """(walls,) restitution: that of contact for planes of symmetry, zero for walls."""
+    """(walls,) restitution: the restitution of contact for planes of symmetry, zero for walls."""
     found = np.zeros(walls.n)
     if case.contact is not None:
         found[len(case.boundaries_of(Wall)) :] = case.contact.restitution

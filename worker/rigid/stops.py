@@ -119,7 +119,7 @@ class BodyStops:
         least[:] = np.where((along < least) & (self._restitution[wall] > 0.0), np.maximum(least, back), least)
 
     def _along(self, speed: Floats, rate: Floats) -> Floats:
-        """(rows,) velocity of each node along the normal of its wall, relative to it, m/s."""
+        """(rows,) velocity of each node relative to its wall, along the normal of the wall, m/s."""
         rows, n = self._all, self._many
         b, r, w = rows.body[:n], rows.arm[:n], rate[rows.body[:n]]
         turning = [w[:, i] * r[:, j] - w[:, j] * r[:, i] for i, j in ((1, 2), (2, 0), (0, 1))]
@@ -188,8 +188,8 @@ def press(  # type: ignore[no-untyped-def]
 ):
     """Passes over the rows until the impulses settle.
 
-    Adds the impulses to ``impulse`` (b, 6) and ``given`` (walls, b, 3), those of friction to ``rubbed`` and ``by`` as
-    well.
+    Adds the impulses to ``impulse`` (b, 6) and ``given`` (walls, b, 3), and the impulses of friction to ``rubbed`` and
+    ``by`` as well.
 
     1. Velocity u of the node relative to the wall.
     2. Compliance along n of body and wall: 1 / m + (r x n) . I^-1 (r x n) + 1 / M.

@@ -13,9 +13,9 @@ def energy_of(rigid: Rigid | None, walls: Walls) -> float:
 
 
 def add_undeformed(sums: Floats, of_parts: Floats, rigid: Rigid | None, walls: Walls) -> None:
-    """Adds to ``sums`` (10,) over the nodes (accounts/nodal.py): kinetic energy, loss by contact and work from
-    outside, J, momentum, kg m/s, the work of unequal steps (zero here), and angular momentum, kg m^2/s; adds the
-    kinetic energy to that of each part, ``of_parts`` (parts, .).
+    """Adds to ``sums`` (10,) over the nodes (accounts/nodal.py): kinetic energy, loss by contact and work from outside,
+    J, momentum, kg m/s, the work of unequal steps (zero here), and angular momentum, kg m^2/s; adds the kinetic energy
+    to the kinetic energy of each part, ``of_parts`` (parts, .).
     """
     if rigid is None and not walls.lightness.any():
         return

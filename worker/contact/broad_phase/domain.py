@@ -108,7 +108,7 @@ def _place(codes, used, code, bits):  # type: ignore[no-untyped-def]
 
 @njit("boolean[::1](boolean[::1], float64[:, ::1], float64[:, ::1], int64[::1], float64)", cache=True)
 def _named(flags, low, high, cells, edge):  # type: ignore[no-untyped-def]
-    """Flagged boxes that touch one of the ``cells``, ascending codes."""
+    """Returns the flagged boxes that touch one of the ``cells``, given by ascending codes."""
     kept = np.zeros(len(flags), np.bool_)
     if len(cells) == 0:
         return kept

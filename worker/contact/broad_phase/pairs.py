@@ -8,8 +8,8 @@ contact is not tested again as long as
     slack > U t + left_1 + left_2 (now) + left_1 + left_2 (when it was tested),
 
 with U the relative speed of the two reference motions and t the time since the test; for a face or an edge, ``left`` is
-that of its farthest corner. A pair therefore stores one number and U. The condition is exact: a pair that is not tested
-cannot be active. No bit of the answer depends on it, and it may differ between ranks.
+the distance of the farthest corner. A pair therefore stores one number and U. The condition is exact: a pair that is
+not tested cannot be active. No bit of the answer depends on the deactivation of pairs, which may differ between ranks.
 
 A pair whose face is turned away from the node is not tested until the face may have turned towards it
 (node_face.py).
@@ -55,7 +55,9 @@ class PairTable:
             self._rooms.append(self, len(rows), rows=rows, **_FRESH)
 
     def take_tested(self, active: Indices, begins: Ints, counts: Ints) -> None:
-        """Stores which pairs the tasks have tested: those of ``active``, ``counts`` from each of ``begins`` on."""
+        """Stores which pairs the tasks have tested: the ranges of ``active`` that begin at ``begins``, with ``counts``
+        pairs each.
+        """
         self._tested = active, begins, counts
 
     @property

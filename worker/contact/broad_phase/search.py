@@ -95,8 +95,8 @@ _EVERYWHERE = np.full((1, 2, 3), (((-np.inf,) * 3, (np.inf,) * 3)))
     cache=True,
 )
 def _boxed(corners, reach, some, x, v, horizon, part, allowed, hull):  # type: ignore[no-untyped-def]
-    """Lowest and highest corner of the boxes of ``some`` primitives that touch the ``hull`` (parts, 2, 3) of a part
-    with which theirs may be in contact; their rows; and the hulls of their own parts.
+    """Returns the lowest and highest corner of the boxes of ``some`` primitives that touch the ``hull`` (parts, 2, 3)
+    of a part with which the part of the primitive may be in contact; their rows; and the hulls of their own parts.
     """
     low, high, rows, n = np.empty((len(some), 3)), np.empty((len(some), 3)), np.empty(len(some), np.int32), 0
     own = np.empty(hull.shape)
@@ -130,9 +130,9 @@ def find(
 ) -> Indices:  # fmt: skip
     """(pairs, 2) candidates: row of a small primitive and of a large one.
 
-    ``x``, ``v`` (nodes, 3), less the mean velocity, and ``part`` (nodes,) of the nodes of corners; ``allowed``
-    (parts, parts): parts that may be in contact. Primitives with a common corner are no candidates. ``rank``
-    (large,): the small primitives are the first of the large ones, and a pair is found only from the one of lower
+    ``x``, ``v`` (nodes, 3), less the mean velocity, and ``part`` (nodes,) of the nodes of corners; ``allowed`` (parts,
+    parts): parts that may be in contact. Primitives with a common corner are no candidates. ``rank`` (large,): the
+    small primitives are the first rows of the large primitives, and a pair is found only from the primitive of lower
     rank.
     """
     order = np.zeros(0, np.int64) if rank is None else rank
@@ -154,8 +154,9 @@ def find(
 def _touching(
     of: tuple[Primitives, Flags], lines: tuple[Floats, Floats, float, Indices], hull: Floats, rank: Ints
 ) -> "tuple[Sought, Floats]":  # fmt: skip
-    """Primitives that touch the ``hull`` (parts, 2, 3) of a part with which theirs may be in contact, and their own
-    hulls."""
+    """Returns the primitives that touch the ``hull`` (parts, 2, 3) of a part with which the part of the primitive may
+    be in contact, and the hulls of the parts of these primitives.
+    """
     things, allowed = of
     low, high, rows, own = _boxed(things.corners, things.reach, things.searched, *lines, allowed, hull)
     return Sought(low, high, things.corners, rows, rank), own
@@ -220,8 +221,9 @@ def _meet(small, large, i, j):  # type: ignore[no-untyped-def]
 def _ask(out, n, asked, table, small, large, part, allowed):  # type: ignore[no-untyped-def]
     """Finds the small primitives near each large one in the buckets that its box touches.
 
-    On entry ``out`` has ``n`` pairs, and ``asked`` large primitives are finished; returns both anew, when all are
-    finished or ``out`` is full. Conditions of a pair, numbered at the ends of lines:
+    On entry ``out`` has ``n`` pairs, and ``asked`` large primitives are finished; the function returns the new values
+    of ``n`` and ``asked`` when all large primitives are finished or ``out`` is full. Conditions of a pair, numbered at
+    the ends of lines:
 
         +-----------+          1. The entry has the code of the cell, not only its hash.
         |     +-----|----+     2. The two boxes overlap.

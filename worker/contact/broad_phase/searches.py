@@ -171,8 +171,8 @@ class Searches:
         now.enliven(sides[~now.faces.live[sides]])
 
     def separate(self, split: Split) -> None:
-        """Updates the scene after the separation of nodes; called on all ranks, see topology_updates.py for those that
-        exchange messages.
+        """Updates the scene after the separation of nodes; called on all ranks, see topology_updates.py for the ranks
+        that exchange messages.
         """
         if self.scene is None:
             return

@@ -1,10 +1,10 @@
 """Common volume of bodies: tets that overlap tets of another body or fragment, and by how much.
 
 Bodies may overlap without a node of one inside of the other (``inside``): by their edges, or face on face. Every tet
-with a corner on the surface, or with a separated corner, is cut by all tets of parts that may be in contact with its
-own and that have no node in common with it; in a part that breaks, tets of the same fragment are excluded. The common
-volume of two tets is their intersection, exact except for rounding. Tets of other ranks are exchanged by bounding
-boxes, so that no cut of the domain changes the result.
+with a corner on the surface, or with a separated corner, is cut by all tets that have no node in common with the tet
+and whose part may be in contact with the part of the tet; in a part that breaks, tets of the same fragment are
+excluded. The common volume of two tets is their intersection, exact except for rounding. Tets of other ranks are
+exchanged by bounding boxes, so that no cut of the domain changes the result.
 """
 
 from dataclasses import dataclass
@@ -181,9 +181,9 @@ def _meet(point, tet, height, a, b):  # type: ignore[no-untyped-def]
     cache=True, _nrt=True,
 )  # fmt: skip
 def _in_front(out, n, tet, height, wedge, order):  # type: ignore[no-untyped-def]
-    """Cuts a tet by a plane, given by the heights of its corners, and writes the pieces in front of it to ``out``
-    from row ``n`` on; returns their new number. With one corner in front the result is a tet; with two or three a
-    wedge, of three tets. ``wedge`` (6, 3), ``order`` (4,): working arrays.
+    """Cuts a tet by a plane, given by the heights of its corners, and writes the pieces in front of the plane to
+    ``out`` from row ``n`` on; returns their new number. With one corner in front the result is a tet; with two or three
+    a wedge, of three tets. ``wedge`` (6, 3), ``order`` (4,): working arrays.
     """
     before, end = 0, 4
     for k in range(4):

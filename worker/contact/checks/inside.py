@@ -108,8 +108,9 @@ def look(contact: Contact, model: Model, labels: list[Ints] | None, comm: Comm) 
 
 
 def _may(contact: Contact) -> Flags:
-    """(parts, parts) pairs of parts to be tested: those that may be in contact, and each of these with its own nodes
-    without tets."""
+    """(parts, parts) pairs of parts to be tested: pairs that may be in contact, and each part of such a pair with its
+    own nodes without tets.
+    """
     meet = ~np.isnan(contact.searches.mu)
     return np.asarray(meet | (np.eye(len(meet), dtype=bool) & meet.any(axis=1)))
 
@@ -166,7 +167,7 @@ def _at_surface(
 
 
 def _exposed(block: Block, contact: Contact) -> Flags:
-    """(n, 4) faces of tets that are exposed or broken, except those in symmetry planes."""
+    """(n, 4) faces of tets that are exposed or broken, except faces in symmetry planes."""
     faces = contact.exterior.surface.faces
     opened = np.isin(4 * block.id[:, None] + np.arange(4), faces.id[faces.exposed])
     if len(block.bond):

@@ -45,7 +45,9 @@ class Surface:
 
 @dataclass(frozen=True)
 class Overlaps:
-    """Nodes inside another part: their depth below its surface, m, and the unit direction out of it."""
+    """Nodes inside another part: depth of each node below the surface of that part, m, and unit direction out of that
+    part.
+    """
 
     nodes: Indices
     part: Indices
@@ -55,8 +57,9 @@ class Overlaps:
 
 
 def find(points: Floats, tets: Indices, part: Indices, surface: Surface, allowed: Flags) -> Overlaps:
-    """Finds surface nodes inside the tets (k, 4) of another part that may be in contact with theirs; ``points`` (n,
-    3), m."""
+    """Finds surface nodes inside the tets (k, 4) of another part that may be in contact with the part of the node;
+    ``points`` (n, 3), m.
+    """
     others = allowed & ~np.eye(len(allowed), dtype=bool)
     nodes = np.unique(surface.faces).astype(np.int32)
     small = Primitives(nodes[:, None].copy(), np.zeros(len(nodes)))
@@ -104,8 +107,8 @@ def crushed(before: Floats, after: Floats, tets: Indices) -> Indices:
 
 
 def nested(points: Floats, tets: Indices, part: Indices, surface: Surface, allowed: Flags) -> Indices:
-    """(n, 2) tets of the surface whose centre lies inside a tet of another part that may be in contact with theirs, and
-    those tets.
+    """(n, 2) tets of the surface whose centre lies inside a tet of another part, and these other tets; only parts that
+    may be in contact count.
 
     Bodies whose surfaces coincide have no node inside each other: their nodes lie on each other's faces.
     """
@@ -138,8 +141,8 @@ def within(points: Floats, tets: Indices, body: Indices) -> tuple[Indices, Indic
 
 
 def crossing(points: Floats, part: Indices, surface: Surface, allowed: Flags) -> Indices:
-    """(n, 2) nodes at one end of surface edges that pass through a face of another part that may be in contact with
-    theirs, and at a corner of these faces: bodies that cross each other may have no node inside each other.
+    """(n, 2) nodes at one end of surface edges that pass through a face of another part, and nodes at a corner of these
+    faces; only parts that may be in contact count: bodies that cross each other may have no node inside each other.
     """
     others, faces = allowed & ~np.eye(len(allowed), dtype=bool), np.ascontiguousarray(surface.faces, np.int32)
     edges = np.unique(np.sort(faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1), axis=0)
@@ -175,8 +178,8 @@ def _shares(nodes: Floats, corners: Floats) -> Floats:
 def _faced(outward: Floats, inward: Floats) -> Flags:
     """(p, 4) faces, by their normals into tets (p, 4, 3), on which a node with the outward direction (p, 3) may lie.
 
-    Where sides of two bodies lie in one plane, a rim node of one that sinks into the other is on a face of it but
-    does not rest on that face.
+    If sides of two bodies lie in one plane and one body penetrates the other, a rim node of the first body is on that
+    side of the second body, but this side does not support the node.
     """
     return np.asarray((inward * outward[:, None]).sum(axis=2) >= -FACING)
 

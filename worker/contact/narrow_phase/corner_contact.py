@@ -112,8 +112,8 @@ def _nearer(r, inward, e, f, depth):  # type: ignore[no-untyped-def]
 
 @njit(f"boolean({VECTOR}, {VECTOR}, {VECTOR}, {VECTOR}, {VECTOR}, int64)", cache=True, forceinline=True)
 def _beside(r, inward, e, f, g, opened):  # type: ignore[no-untyped-def]
-    """Whether the point ``r``, below the side of edges f and g of a corner of edges e, f, g, with the normal
-    ``inward``, is above another ``opened`` side (_opened), or nearer to it.
+    """Returns True if the point ``r``, below the side of edges f and g of a corner of edges e, f, g, with the normal
+    ``inward``, is above another ``opened`` side (_opened), or nearer to another opened side.
     """
     depth, k = dot(inward, r) / np.sqrt(dot(inward, inward)), 1
     while k < 3:
@@ -132,10 +132,10 @@ def _beside(r, inward, e, f, g, opened):  # type: ignore[no-untyped-def]
     error_model="numpy",
 )
 def _pushed_out(out, step, first, stop):  # type: ignore[no-untyped-def]
-    """Completes the contacts of entering nodes in place: rows of ``out`` from ``first`` to ``stop`` that have the
-    slots of the node, of the corner and of the other two nodes of the side, clockwise seen from outside, and the
-    weights of these three at the foot. Returns their number, without those deeper than DEEP_SELF at the beginning of
-    the step.
+    """Completes the contacts of entering nodes in place: rows of ``out`` from ``first`` to ``stop`` that have the slots
+    of the node, of the corner and of the other two nodes of the side, clockwise seen from outside, and the weights of
+    these three at the foot. Contacts deeper than DEEP_SELF at the beginning of the step are removed. Returns the number
+    of remaining contacts.
     """
     x, v, ahead, n = step.x, step.v, step.ahead, first
     for r in range(first, stop):
@@ -209,8 +209,8 @@ def entering(out, base, each, narrow, of, step, first, stop):  # type: ignore[no
     from ``first`` to ``stop``.
 
     They are rows of ``out``, from ``base`` plus ``each`` times the number of corners before the first family on, up to
-    ``each`` for every corner in the mean. Returns their number; if it is larger than the room, not all have a row.
-    Numbers at the ends of lines: conditions listed above.
+    ``each`` for every corner in the mean. Returns the number of contacts; if this number is larger than the number of
+    rows, some contacts have no row. Numbers at the ends of lines: conditions listed above.
     """
     ahead, part, mu, nodes, weights = step.ahead, step.part, step.mu, out.nodes, out.weights
     members, begin, among, corners, start = of

@@ -54,7 +54,8 @@ def measure(w, n):  # type: ignore[no-untyped-def]
 
 @njit(types.void(types.uint8[::1], _F1, _I, _I, _F, _F, _F), cache=True, error_model="numpy")
 def under(flags, w, n, member, x, y, z):  # type: ignore[no-untyped-def]
-    """Flags those of the first ``n`` corners whose side is above the ``member`` at x, y, z, with its foot on the side.
+    """Sets the flags of the corners among the first ``n`` whose side is above the ``member`` at x, y, z, if the foot of
+    the member is on the side.
 
     A foot beyond an edge still counts if a neighbouring face, at less than the angle of a sharp edge, could contain the
     foot. A foot on the far side of the corner does not count.

@@ -61,7 +61,7 @@ def widening(cracks, x, typical):  # type: ignore[no-untyped-def]
     error_model="numpy",
 )
 def across(out, base, opening, cracks, typical, step, first, stop):  # type: ignore[no-untyped-def]
-    """Writes contacts of nodes across the ``cracks`` (m, 6; -1 for those of other ranks) from ``first`` to ``stop``:
+    """Writes contacts of nodes across the ``cracks`` (m, 6; -1 for cracks of other ranks) from ``first`` to ``stop``:
     rows of ``out`` from ``base + 3 first`` on.
 
     ``typical``: size of a face, m. Returns their number, and the number of cracks that have become wide enough to open;

@@ -32,7 +32,7 @@ class Cracks:
     """Cracks: broken facets with a side on this rank whose sides are not surface yet."""
 
     faces: Ints
-    """(m, 2) global ids of the sides, that of the smaller tet id first."""
+    """(m, 2) global ids of the two sides; the side of the tet of smaller id is first."""
     nodes: Indices
     """(m, 6) local nodes of the first side, counter-clockwise seen from outside of its tet, and the nodes across."""
     sides: Indices
@@ -42,8 +42,8 @@ class Cracks:
     aged: Flags
     """(m,) aged cracks: edges between their sides and the surface are in edge-edge contact."""
     places: Indices
-    """(m, 6) slots of the nodes; all -1 for a crack without separated nodes, and for one that another rank computes,
-    that of the first side."""
+    """(m, 6) slots of the nodes; all -1 for a crack without separated nodes, and for a crack that another rank
+    computes. The rank of the first side computes the crack."""
     kept: Floats
     """(m, 12) stored impulse of each of the three pairs of nodes across, times the row norm of the pair, m/s: along
     the normal (1) and across (3). Zero for a pair that was not active; undefined for a crack that another rank
@@ -139,8 +139,8 @@ class Cracks:
         return due
 
     def beside(self, rows: Ints, blocks: list[Block]) -> tuple[Flags, Flags]:
-        """(nodes,) nodes of the local tets at the cracks ``rows`` and of the families at their corners; and those of
-        these that have separated.
+        """Returns (nodes,) flags of the nodes of the local tets at the cracks ``rows`` and of the families at their
+        corners; and flags of the separated nodes among these nodes.
         """
         families, near = self.families, np.zeros(len(self.families.ring), bool)
         nodes = self.nodes[rows]

@@ -30,7 +30,7 @@ numbers, one for each block."""
 _JOIN = 0.6
 """Share of the distance from its line at which a slot must be registered again. In a step in which one rank has to
 register slots, all other ranks register their slots beyond this share too, so that the ranks register in the same
-step and wait for each other only once. No bit of the answer depends on it."""
+step and wait for each other only once. No bit of the answer depends on this share."""
 
 
 @dataclass
@@ -67,8 +67,8 @@ class Ahead:
 
     def beyond(self, fastest: float) -> float:
         """Returns the largest length of the next step, s, if velocities that differ by up to ``fastest``, m/s, may
-        close a distance of FAST of a face in it; else 0. Slower pairs cannot limit a step, so ranks that have only slow
-        nodes need no data of other ranks.
+        close in this step a distance of FAST times the size of a face; else 0. Slower pairs cannot limit a step, so
+        ranks that have only slow nodes need no data of other ranks.
         """
         return self.most if fastest * self.most > FAST * self.size else 0.0
 

@@ -59,8 +59,8 @@ def _sector(u, x, v, edges, e, h):  # type: ignore[no-untyped-def]
 
 @njit(f"boolean({_SECTOR}, {VECTOR}, float64)", cache=True)
 def _points_out(sector, n, sign):  # type: ignore[no-untyped-def]
-    """Whether ``sign`` n, perpendicular to a convex edge, lies between the normals of its two faces (``_sector``),
-    or within _FLUSH of one of them, as for edges of faces that lie on each other.
+    """Returns True if ``sign`` n, perpendicular to a convex edge, lies between the normals of the two faces of the edge
+    (``_sector``), or within _FLUSH of one of the normals. The second case occurs where faces lie on each other.
     """
     sense, one, two = sector
     along = sense * sign
@@ -90,16 +90,16 @@ def _volume(u, w, r):  # type: ignore[no-untyped-def]
 
 @njit(f"float64({_V2}, int64, int64, int64, int64)", cache=True)
 def _fastest(course, a, b, c, d):  # type: ignore[no-untyped-def]
-    """Largest relative speed of an end of ab and one of cd, m/s."""
+    """Returns the largest relative speed of an end of ab and an end of cd, m/s."""
     p, q, r, s = at(course, a), at(course, b), at(course, c), at(course, d)
     return max(distance(p, r), distance(p, s), distance(q, r), distance(q, s))
 
 
 @njit(f"float64({VECTOR}, {VECTOR}, {VECTOR}, float64, float64)", cache=True, error_model="numpy")
 def beyond_ends(u, w, r, s, t):  # type: ignore[no-untyped-def]
-    """Bound of the motion of the ends of edge u relative to those of edge w, m, while the edges cross beyond an end of
-    one of them: at ``s`` of u and ``t`` of w now, with ``r`` from the beginning of u to that of w. 0 if they cross
-    within both.
+    """Returns a bound of the motion of the ends of edge u relative to the ends of edge w, m, while the edges cross
+    beyond an end of u or w: at ``s`` of u and ``t`` of w now, with ``r`` from the beginning of u to the beginning of w.
+    0 if they cross within both.
 
     Let the edges cross beyond an end of edge a, at a share S of its length from that end, k the vector from that end
     to an end of the other edge b, and n = a x b. Then (k x b) . n = -S n . n, and they cross there while this is

@@ -12,18 +12,18 @@ TOUCHING = 1e-3
 """Depth over the size of a face: a node that is deeper inside of a part has contact only with the nearest face of
 that part."""
 FACING = 0.1
-"""A node faces a face when the cosines between the face's normal and those of the node's own faces have a mean minus
-deviation below -FACING, and either a mean below FACING, or the node's own faces rise from the face by a mean slope
-whose sine exceeds FACING. With this definition, the lowest corner of the tet of a flake faces the plane below it for
-any mean of its three normals."""
+"""A node faces a face when the cosines between the normal of the face and the normals of the node's own faces have a
+mean minus deviation below -FACING, and either a mean below FACING, or the node's own faces rise from the face by a
+mean slope whose sine exceeds FACING. With this definition, the lowest corner of the tet of a flake faces the plane
+below it for any mean of its three normals."""
 _SOME = 0.25
-"""A node of another part that passes a face from outside has contact with it when the mean minus deviation is below
--_SOME: then one of its faces certainly faces it. If no cosine is negative, mean minus deviation is at least (1 -
-sqrt(2)) / 2 = -0.207."""
+"""A node of another part that passes a face from outside has contact with the face when the mean minus deviation of
+the cosines is below -_SOME, because then at least one face of the node faces the face. If no cosine is negative,
+mean minus deviation is at least (1 - sqrt(2)) / 2 = -0.207."""
 RIM = 0.01
-"""Share of the size of a face: a node that faces both faces of a convex edge slides along one of the two, and is not
-deeper below that face than this share, is beside the edge. Chosen value: twice the penetration of a sharp edge that
-slides along another edge, 1e-3 to 4e-3, at the moment when the end of the edge reaches the other edge. This
+"""Share of the size of a face: a node that faces both faces of a convex edge, slides along one of the two, and is
+not deeper below that face than this share, is beside the edge. Chosen value: twice the penetration of a sharp edge
+that slides along another edge, 1e-3 to 4e-3, at the moment when the end of the edge reaches the other edge. This
 penetration occurs because edges have no contact at their ends."""
 _SLIDES = 2e-3
 """Share of the size of a face: a node that slides along a face approaches the face by less in a step. A faster node
@@ -43,8 +43,8 @@ _F, _VECTOR = types.float64, types.UniTuple(types.float64, 3)  # type: ignore[no
 @njit(f"UniTuple(float64, 2)(float64[:, ::1], int64, {VECTOR})", cache=True)
 def facing(normals, s, m):  # type: ignore[no-untyped-def]
     """Returns the angle measures, as differences of cosines, by which m must turn until node s faces a face of this
-    normal (FACING), and until it does or one of its own faces does (_SOME); at most 0 if the condition is fulfilled
-    already, and -1 for a node without faces, because such a node faces any face.
+    normal (FACING), and until node s or one of its own faces faces the face (_SOME); at most 0 if the condition is
+    fulfilled already, and -1 for a node without faces, because such a node faces any face.
     """
     mean, square, length, rise = 0.0, 0.0, 0.0, 0.0
     for a in range(3):

@@ -1,9 +1,9 @@
 """Records of the narrow phase: its input, and its output, one row for each active contact, of four nodes, their weights
 and a normal.
 
-The gap is that of the end of the step without contact, positive outside. It is linear in the velocities: gap = dt n
-. sum(w_k v_k) plus a constant, with the weights w of ``weights``: 1 for the node and minus the area coordinates of
-the point of the face (the defence node, Zhong 1993), or those of the ends of two edges.
+The gap is the gap at the end of a step without contact, positive outside. It is linear in the velocities: gap = dt n .
+sum(w_k v_k) plus a constant, with the weights w of ``weights``: 1 for the node and minus the area coordinates of the
+point of the face (the defence node, Zhong 1993), or the weights of the ends of two edges.
 """
 
 from typing import NamedTuple
@@ -48,7 +48,7 @@ class ContactRows(NamedTuple):
     nodes: Indices
     """(room, 4) slots."""
     weights: Floats
-    """(room, 4)."""
+    """(room, 4) weights of the slots."""
     normals: Floats
     """(room, 3) unit normals, outward from the face or from the body of the first edge."""
     wanted: Floats
@@ -61,7 +61,7 @@ class ContactRows(NamedTuple):
 
     @classmethod
     def room(cls, n: int) -> "ContactRows":
-        """Allocates room for ``n`` active contacts."""
+        """Allocates arrays for ``n`` active contacts."""
         rows, numbers = np.empty((n, 4), np.int32), np.empty(n, np.int32)
         return cls(rows, np.empty((n, 4)), np.empty((n, 3)), np.empty(n), np.empty(n), numbers)
 

@@ -77,7 +77,8 @@ class SceneSlots:
     fresh: Flags
     """(slots,) True for nodes whose pairs must be tested because the mean normals of the node have changed."""
     tracked: Flags
-    """(slots,) True for all nodes of faces and edges in the broad phase, and nodes in it; their motion is measured."""
+    """(slots,) True for nodes in the broad phase, and for nodes of faces and edges in the broad phase; the motion of
+    these nodes is measured."""
     on_surface: Flags
     """(slots,) local nodes on the surface: only these are in contact with faces."""
     first: Indices

@@ -72,8 +72,8 @@ def members(used: Ints, owners: Indices, holders: list[Neighbour], nodes: Nodes,
     """Returns for every other rank the ids, ascending, of the nodes for which both ranks need the sum of impulses.
 
     ``used`` (k,): ids of the nodes to which contacts of this rank may apply impulses; ``owners`` (k,): their owners;
-    ``holders``: shared nodes. The owner of a node collects the ranks with such contacts and sends the list to all of
-    them, and to all ranks that hold the node.
+    ``holders``: shared nodes. The owner of a node collects the ranks with such contacts and sends the list to all ranks
+    in the list, and to all ranks that hold the node.
     """
     pushed, rows = np.zeros(nodes.n, bool), [used[:0]]
     pushed[nodes.places(used[owners == comm.rank])] = True

@@ -17,12 +17,12 @@ class Incidence:
     """The rows of faces or edges at each slot, with the corners at the last search."""
 
     def __init__(self, corners: Indices) -> None:
-        """``corners`` (n, k): slots, before any of them has separated."""
+        """``corners`` (n, k): slots, before any corner has separated."""
         self._begin, self._row = _by_slot(corners, int(corners.max(initial=-1)) + 1)
 
     def at(self, slots: Indices) -> Ints:
-        """Returns the rows, ascending, with a corner that was one of the ``slots`` (m,); -1 stands for no slot of the
-        search.
+        """Returns the rows, ascending, with a corner that was among the ``slots`` (m,) at the search; -1 stands for no
+        slot of the search.
         """
         return np.asarray(_at(self._begin, self._row, slots))
 

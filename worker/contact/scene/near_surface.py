@@ -29,8 +29,8 @@ class Rules:
     cell: float
     """Edge of a cell of the contact domain, m."""
     skin: float
-    """Skin, m: two slots that both depart from their reference motions by less than half of it cannot be in contact
-    without being candidates."""
+    """Skin, m: two slots that both depart from their reference motions by less than half of the skin cannot be in
+    contact without being candidates."""
     halo: float
     """Skin for slots of different ranks, m."""
     self_contact: Flags

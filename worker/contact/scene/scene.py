@@ -132,8 +132,8 @@ class Scene:
         self.enliven(rows)
 
     def uncover(self, gone: Ints, bare: Ints, removed: Indices) -> None:
-        """Removes the faces ``gone`` from the surface and adds the faces ``bare``; ids, ascending; ``removed``:
-        slots of the nodes that left the model, -1 for those without slot.
+        """Removes the faces ``gone`` from the surface and adds the faces ``bare``; ids, ascending; ``removed``: slots
+        of the nodes that left the model, -1 for nodes without slot.
         """
         rows, removed = self.rows_of(gone), removed[removed >= 0]
         self.faces.exposed[rows] = self.faces.live[rows] = False
@@ -221,9 +221,9 @@ def _expose(opened, meets, fresh, faces, shown):  # type: ignore[no-untyped-def]
     cache=True,
 )
 def _enliven(live, new, edges, faces, opened, sharp, searched):  # type: ignore[no-untyped-def]
-    """Adds ``sharp`` edges to the broad phase: one of the ``faces`` (e, 2) is ``searched`` (f,), and the other one
-    too unless it is ``opened`` (e, 2). A face that this rank does not have is treated as searched, because its
-    exposure is unknown.
+    """Adds ``sharp`` edges to the broad phase. Condition: both ``faces`` (e, 2) of the edge are ``searched`` (f,); for
+    one of the two faces it is enough to be ``opened`` (e, 2). A face that this rank does not have is treated as
+    searched, because its exposure is unknown.
     """
     for e in range(len(live)):
         one, both = False, sharp[e] and edges[e, 0] != edges[e, 1]

@@ -93,7 +93,7 @@ class SplitUpdate:
     def share(self, update: TopologyUpdate, neighbours: list[Neighbour]) -> None:
         """Updates the lists of shared nodes without a message. A copy is shared by the ranks that share its parent,
         because the same ranks hold, send and use the copy and its parent. A separated node is shared by all ranks that
-        hold it, because the contacts across the crack may apply impulses to it.
+        hold the node, because contacts across the crack may apply impulses to the node.
         """
         messages, surface_nodes, nodes = self._scene.messages, self._scene.surface_nodes, self._nodes
         family = update.family[np.argsort(update.family[:, 1])]
@@ -250,8 +250,8 @@ def _place(places, pushes, rows, nodes, place):  # type: ignore[no-untyped-def]
 
 @njit("int32[::1](int64[:], int32[:], int32[:], int32[::1], int32[::1], boolean[::1])", cache=True)
 def _newly_shared(ids, local, places, holds, shares, flags):  # type: ignore[no-untyped-def]
-    """Slots, by ascending id and each once, of the parents that a rank ``holds`` and that are not among those that
-    it ``shares`` yet; ``flags``: working array, all false. ``ids``, ``local`` and ``places``: of the parents.
+    """Returns the slots, by ascending id, without duplicates, of the parents that a rank ``holds`` but does not yet
+    ``share``; ``flags``: working array, all false. ``ids``, ``local`` and ``places``: of the parents.
     """
     some, n = np.empty(len(ids), np.int64), 0
     for i in range(len(ids)):

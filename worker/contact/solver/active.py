@@ -37,15 +37,15 @@ class ActiveContacts(NamedTuple):
     """(contacts,) bound of the sum of the paths of its nodes, m/s, below which an idle contact stays idle; infinite
     for a loaded one."""
     weights: Floats
-    """(room, 4) see tables.ContactRows."""
+    """(room, 4) weights, see tables.ContactRows."""
     normals: Floats
-    """(room, 3) see tables.ContactRows."""
+    """(room, 3) normals, see tables.ContactRows."""
     wanted: Floats
     """(room,) target normal velocity, m/s."""
     friction: Floats
     """(room,) Coulomb's coefficient."""
     pair: Indices
-    """(room,) see tables.ContactRows."""
+    """(room,) row of the candidate pair, see tables.ContactRows."""
 
 
 class Kept(NamedTuple):
@@ -75,7 +75,7 @@ class ActiveNodes(NamedTuple):
 
     @classmethod
     def of(cls, n: int) -> "ActiveNodes":
-        """Allocates room for ``n`` slots, aligned to cache lines."""
+        """Allocates arrays for ``n`` slots, aligned to cache lines."""
         moving, fixed = cache_lines(2 * n).reshape(2, n, LINE)
         sums, path = np.empty((n, 4), np.int64), np.empty(n)
         return cls(moving, moving.view(np.int64), fixed, fixed.view(np.int64), sums, path)
@@ -102,7 +102,7 @@ class Loaded(NamedTuple):
 
     @classmethod
     def of(cls, room: int, sets: int) -> "Loaded":
-        """Allocates room for ``room`` contacts and ``sets`` sets."""
+        """Allocates arrays for ``room`` contacts and ``sets`` sets."""
         lines, slots, row = np.empty((2, room, 8)), np.empty((room, 4), np.int32), np.empty(room, np.int32)
         return cls(lines[0], lines[1], slots, row, np.zeros(sets + 1, np.int64), np.zeros(sets, np.int64))
 

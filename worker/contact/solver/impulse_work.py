@@ -39,8 +39,9 @@ def cost(words, loaded, active, before, places, joule, k):  # type: ignore[no-un
 
 @njit(types.void(_I2, LOADED, NODES, _F2, _N1, _F, _I), cache=True)
 def heat(words, loaded, active, before, places, joule, k):  # type: ignore[no-untyped-def]
-    """Adds the work of friction of set ``k``, mean sliding velocity times impulse, and the half of it with v(n+1/2),
-    which the ledger at time n does not have, to two limbs (rows of ``words``) of quanta of 1 / ``joule`` J.
+    """Adds the work of friction of set ``k``, mean sliding velocity times impulse, and the half of this work with
+    v(n+1/2), which the ledger at time n does not contain, to two limbs (rows of ``words``) of quanta of 1 / ``joule``
+    J.
     """
     values, normal, tangent, slots = active.moving, loaded.normal, loaded.tangent, loaded.slots
     value = np.empty(2)

@@ -72,7 +72,7 @@ class Braced(NamedTuple):
     normal: Floats
     """(room, 3) unit normal of the stop towards the side of the node, zero in held components."""
     least: Floats
-    """(room,) normal speed that takes the node onto the plane in the step, m/s."""
+    """(room,) normal speed with which the node reaches the plane at the end of the step, m/s."""
     push: Floats
     """(room,) change of the normal speed by the stop so far, m/s."""
     rub: Floats
@@ -84,7 +84,7 @@ class Braced(NamedTuple):
 
     @classmethod
     def room(cls, n: int) -> "Braced":
-        """Allocates room for ``n`` rows."""
+        """Allocates arrays for ``n`` rows."""
         return cls(
             np.empty((n, 2), np.int32), np.empty((n, 3)), np.empty(n), np.empty(n), np.empty((n, 3)), np.empty(n),
             np.zeros(1, np.int64),

@@ -6,9 +6,10 @@ and axes i of |w_k| |n_i| S_ki / m_k, where S_ki is the sum of |w| |n_i| over al
 is exact for a single contact and for any number of contacts along one normal, and never overshoots when contacts share
 nodes. The bound is far above the diagonal where many contacts share a node, and plain sweeps converge slowly there: so
 normal impulses are extrapolated by Nesterov's ``momentum``. Normal impulses are never negative; friction is Coulomb's,
-on the sum over the sweeps. Impulses are integers: those of a contact add up to zero, and no order of contacts or ranks
-changes a bit. Node-face pairs and node pairs across a crack start from their impulses of the last step (warm start):
-with any number of sweeps, sticking contacts do not creep and the penetration of compressed contacts does not increase.
+on the sum over the sweeps. Impulses are integers: the impulses of a contact add up to zero, and no bit of the result
+depends on the order of contacts or ranks. Node-face pairs and node pairs across a crack start from their impulses of
+the last step (warm start): with any number of sweeps, sticking contacts do not creep and the penetration of compressed
+contacts does not increase.
 
 Only contacts that have needed an impulse in the step are swept (loading.py).
 
@@ -89,8 +90,8 @@ def resume(active, loaded, kept, pair, ratio, scale, k):  # type: ignore[no-unty
 
 @njit(types.float64(_I, _I), cache=True)
 def momentum(k, many):  # type: ignore[no-untyped-def]
-    """Nesterov's factor of sweep ``k`` of ``many`` (Nesterov 1983; Mazhar, Heyn, Negrut and Tasora 2015 for
-    contact); 0 in the last sweep, so that the result is that of a plain sweep.
+    """Nesterov's factor of sweep ``k`` of ``many`` (Nesterov 1983; Mazhar, Heyn, Negrut and Tasora 2015 for contact); 0
+    in the last sweep, so that the last sweep is a plain sweep.
     """
     return k / (k + 3.0) if k + 1 < many else 0.0
 
@@ -152,8 +153,9 @@ def sweep(active, loaded, ahead, scale, k):  # type: ignore[no-untyped-def]
 
 @njit(types.void(NODES, _F, types.boolean, _I, _I), cache=True)
 def give(active, scale, last, first, stop):  # type: ignore[no-untyped-def]
-    """Turns the completed impulses of a sweep at the slots from ``first`` to ``stop`` into velocities, dv = j / m,
-    adds them to those of the step and clears them; in the ``last`` sweep of a step stores their l1 norm.
+    """Converts the completed impulses of a sweep at the slots from ``first`` to ``stop`` into velocities, dv = j / m,
+    adds the impulses to the impulses of the step and sets the impulses of the sweep to zero; in the ``last`` sweep of a
+    step stores their l1 norm.
     """
     v, words, path = active.moving[first:stop], active.moving_words[first:stop], active.path[first:stop]
     mobility, total, a_quantum = active.fixed[first:stop], active.fixed_words[first:stop], 1.0 / scale

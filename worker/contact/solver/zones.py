@@ -6,8 +6,8 @@ halved equally often have no node in common, so different threads sweep their se
 the sets of contacts across the border of two zones, and so on, until the set across the border of the first two halves.
 With one thread there is one zone. No bit of the answer depends on zones.
 
-Box 1 has all nodes, its halves are the boxes 2 and 3, and those of box k are 2 k and 2 k + 1; the zones are the boxes
-of the last level.
+Box 1 has all nodes, its halves are the boxes 2 and 3, and the halves of box k are the boxes 2 k and 2 k + 1; the zones
+are the boxes of the last level.
 """
 
 import numpy as np
@@ -67,7 +67,7 @@ class Zones:
 
 def sets(zones: int) -> int:
     """Number of sets of contacts with a node that other ranks share, and number of sets of contacts without such a
-    node; the set of box k is number ``sets(zones) - k`` of them.
+    node; the set of box k has the number ``sets(zones) - k``.
     """
     return 2 * zones - 1
 

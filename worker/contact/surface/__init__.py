@@ -1,1 +1,1 @@
-"""Exposed faces, edges and nodes of the bodies of one rank, and what fracture and erosion change of them."""
+"""Exposed faces, edges and nodes of the bodies of one rank, and their changes by fracture and erosion."""

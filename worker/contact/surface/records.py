@@ -71,7 +71,8 @@ class Faces(Rows):
 @dataclass
 class Edges(Rows):
     """Edges; a row (a, b, c, d, e, f) means: edge ab between face abc of tet abce and face bad of tet badf, the face of
-    smaller id first. If more than two faces share an edge, every two of them that may enclose material are a row.
+    smaller id first. If more than two faces share an edge, each pair of these faces that may enclose material has a
+    row.
     """
 
     nodes: Ints
@@ -106,7 +107,7 @@ class CrackSides:
 
 @dataclass
 class SurfaceNodes(Rows):
-    """Nodes by ascending global id: those of this rank and copies of other ranks' nodes."""
+    """Nodes by ascending global id: nodes of this rank, and ghosts of nodes of other ranks."""
 
     id: Ints
     """(n,) global ids."""

@@ -55,8 +55,8 @@ def find(
     neighbours: list[Neighbour],
     comm: Comm,
 ) -> tuple[Edges, Ints, Indices]:
-    """Returns the edges by the ids of their faces, and ids and owners of those of their nodes that this rank does not
-    hold.
+    """Returns the edges, sorted by the ids of their faces, and ids and owners of the nodes of edges that this rank does
+    not hold.
 
     Of ``some`` (f,) of the faces, with the ``local`` nodes (f, 4) and unit normals (f, 3); ``opened`` (f,): see
     Edges. Where other ranks may hold faces of an edge, the owner of the lower node matches them, and the rank of the

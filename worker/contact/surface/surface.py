@@ -94,8 +94,8 @@ def _faces(model: Model, planes: Flags, cracks: CrackSides, covered: Indices) ->
 
 @njit("int64(uint8[:, ::1], uint32[:, ::1], int32[:, ::1], uint8[:, ::1], boolean[:, ::1])", cache=True)
 def _sort_out(kind, tets, across, bond, planes):  # type: ignore[no-untyped-def]
-    """Completes the kinds ``kind`` (n, 4) of the faces of a block, which has those that may become surface; returns
-    the number of faces that are on the surface or may be.
+    """Completes the kinds ``kind`` (n, 4) of the faces of a block, which marks the faces that may become surface on
+    entry; returns the number of faces that are on the surface or may be.
     """
     n = 0
     for e in range(len(tets)):
