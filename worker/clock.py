@@ -54,7 +54,7 @@ class Clock:
 
     @property
     def done(self) -> bool:
-        """Whether the end time is reached."""
+        """True if the end time is reached."""
         return self.t >= self._end
 
     def frame_time(self, index: int) -> float:
@@ -63,7 +63,7 @@ class Clock:
 
     @property
     def frame_due(self) -> bool:
-        """Whether a frame is to be written at the present time."""
+        """True if a frame must be written at the present time."""
         if self._of != self.frame:
             self._of, self._landing, self._after = self.frame, *map(self.frame_time, (self.frame, self.frame + 1))
         return self.t >= self._landing and self._frames > 0 and self.frame <= self._frames
@@ -98,12 +98,12 @@ class Clock:
 
     @property
     def collapsed(self) -> bool:
-        """Whether the stable step is so far below the first stable step that the run would never end."""
+        """True if the stable step is so far below the first stable step that the run would never end."""
         return self._stable < COLLAPSE * self._first
 
     @property
     def starved(self) -> bool:
-        """Whether the stable step is so far below the first stable step that a warning is given."""
+        """True if the stable step is so far below the first stable step that a warning is given."""
         return self._stable < STARVED * self._first
 
     @property

@@ -1,10 +1,11 @@
 """Erosion: worn tets are removed, the faces behind them become surface, and the energy and momentum removed are booked.
 
-A tet is marked in the pass over the elements (elements/wear.py), when its force of n+1 is already in the nodal sums. It
-is removed before the contact of the next step, so that the faces behind it are in contact in that step. Its last force
-acts in one more kick: the second half of the work of that force is booked one step later, as for a boundary. Tets that
-exceed only a strain or damage limit are collected for some steps, because each removal requires new mean normals. Nodes
-without tets that contact has pushed are collected too, if their part removes such nodes (``erosion.nodes = "strike"``).
+A tet is marked in the pass over the elements (elements/wear.py), when its force of n+1 is already in the nodal sums.
+The tet is removed before the contact of the next step, so that the exposed faces of its neighbours are in contact in
+that step. Its last force acts in one more kick: the second half of the work of that force is booked one step later, as
+for a boundary. Tets that exceed only a strain or damage limit are collected for some steps, because each removal
+requires new mean normals. Nodes without tets that contact has pushed are collected too, if their part removes such
+nodes (``erosion.nodes = "strike"``).
 """
 
 import numpy as np
@@ -58,7 +59,7 @@ class Erosion:
         self.account = ErosionAccount(clock, extremes)
         self._limit = 0.0
         self.due = False
-        """Whether tets or nodes are removed at the start of the next step."""
+        """True if tets or nodes are removed at the start of the next step."""
 
     def begin(self, limit: float) -> None:
         """Sets the limits of the stable step, as shares of the first one; ``limit``: the largest

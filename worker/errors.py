@@ -28,11 +28,11 @@ class ConoidError(problems.ConoidError):
 
 
 class CompileError(ConoidError):
-    """Kernels cannot be compiled."""
+    """Error: the kernels cannot be compiled."""
 
 
 class StoppedError(ConoidError):
-    """The run was asked to stop before its first step."""
+    """Error: the run was asked to stop before its first step."""
 
     exit_code = ExitCode.INTERRUPTED
     cause = Cause.CANCELLED
@@ -40,26 +40,26 @@ class StoppedError(ConoidError):
 
 
 class InputError(ConoidError, ValueError):
-    """The case, or a file it names, is wrong."""
+    """Error: the case, or a file that the case names, is wrong."""
 
     exit_code = ExitCode.BAD_INPUT
     cause = Cause.INPUT
 
 
 class MeshError(InputError):
-    """The mesh cannot be made, read or used."""
+    """Error: the mesh cannot be made, read or used."""
 
     cause = Cause.MESH
 
 
 class PhysicsError(ConoidError):
-    """The solution has diverged."""
+    """Error: the solution has diverged."""
 
     exit_code = ExitCode.PHYSICS
     cause = Cause.DIVERGED
 
 
 class EnergyError(PhysicsError):
-    """The energy ledger does not close."""
+    """Error: the energy ledger does not close."""
 
     cause = Cause.ENERGY

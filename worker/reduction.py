@@ -1,9 +1,10 @@
 """The reduction of the step (Allreduce): all ranks then have the same limits and flags, and make the same decisions.
 
-It is a maximum of int64 words over all ranks. Each field is one word: an integer, a flag (0 or 1), or the bits of a
-float64 that is not negative. Such bits have the order of the floats, and a NaN is larger than any number, so the
-maximum of the words is the maximum of the values for every field. If parts fracture, there is one more word for each
-rank. If there is contact, a sum of six words is reduced at the same time. A run with a single rank sends no message.
+The reduction takes the maximum of int64 words over all ranks. Each field of the reduction is one word: an integer, a
+flag (0 or 1), or the bits of a float64 that is not negative. The bits of non-negative floats have the order of the
+floats, and a NaN is larger than any number, so the maximum of the words is the maximum of the values for every field.
+If parts fracture, there is one more word for each rank. If there is contact, a sum of six words is reduced at the same
+time. A run with a single rank sends no message.
 """
 
 import struct

@@ -117,7 +117,7 @@ class Simulation:
 
     @property
     def pushing(self) -> "list[Boundary | Contact | Rigid]":
-        """All objects that have a ``last_push``."""
+        """All objects with an attribute ``last_push``, the time of the last impulse."""
         return [*self.boundaries, *(each for each in (self.contact, self.rigid) if each is not None)]
 
     @property

@@ -55,7 +55,7 @@ class _Faces:
     """Exposed faces of a part."""
 
     name: Ints
-    """(f,) 4 * tet + local face."""
+    """(f,) name of each face: 4 * tet + local face."""
     nodes: Indices
     """(f, 3) nodes of each face."""
     size: Floats

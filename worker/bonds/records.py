@@ -21,7 +21,7 @@ class TiedRows(NamedTuple):
     """Rows that this rank computes; nodes are places in the table of layout.py."""
 
     node: Indices
-    """(r,) the tied node."""
+    """(r,) tied node of each row."""
     begin: Ints
     """(r + 1,) start of the weights of each row."""
     master: Indices
@@ -31,10 +31,10 @@ class TiedRows(NamedTuple):
     area: Floats
     """(r,) area of the interface that belongs to the row, m^2."""
     inverse: Floats
-    """(r, 3) one over the bound of the l1 norm of the row, by axis, kg. It is 0 along an axis that the row does not
-    constrain; in a row that may break, the values of all other axes are equal."""
+    """(r, 3) one over the bound of the l1 norm of the row, by axis, kg. The value is 0 along an axis that the row
+    does not constrain; in a row that may break, the values of all other axes are equal."""
     bond: Indices
-    """(r,) row of ``laws``."""
+    """(r,) row of ``laws`` of the bond of each row."""
     laws: Floats
     """(b, 5) constants of the bonds."""
     side: Ints
@@ -53,11 +53,11 @@ class TiedNodes(NamedTuple):
     """Table of nodes, by global id, and the rows that push each node."""
 
     x: Floats
-    """(n, 3) positions, m."""
+    """(n, 3) positions of the nodes, m."""
     v: Floats
-    """(n, 3) velocities, m/s."""
+    """(n, 3) velocities of the nodes, m/s."""
     mobility: Floats
-    """(n, 3) mobilities, 1/kg."""
+    """(n, 3) mobilities (inverse masses) of the nodes, 1/kg."""
     words: Ints
     """(n, 3) sums of the impulses of a sweep, quanta."""
     total: Ints
@@ -65,7 +65,7 @@ class TiedNodes(NamedTuple):
     first: Ints
     """(n + 1,) start of the entries of each node."""
     row: Indices
-    """(m,) row that pushes the node."""
+    """(m,) row that applies an impulse to the node."""
     share: Floats
     """(m,) weight of the node in that row; NaN for the tied node."""
 

@@ -57,9 +57,9 @@ class Boundary(ABC):
         """Time of the last impulse, s."""
 
         self._before = np.zeros((len(nodes), 3))
-        """(n, 3) v(n-1/2), m/s."""
+        """(n, 3) velocity v(n-1/2) of each node, m/s."""
         self._impulse = np.zeros((len(nodes), 3))
-        """(n, 3) impulse of the last step, N s."""
+        """(n, 3) impulse of the boundary on each node in the last step, N s."""
         self.over = Ranges(team(1))
         """Threads that process the nodes of the boundary."""
         self._notes = Arguments(*impulses.NOTE)

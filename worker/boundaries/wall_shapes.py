@@ -18,13 +18,13 @@ class Shapes(NamedTuple):
     """Shapes of walls; each wall is one row of the arrays."""
 
     kind: Ints
-    """(w,) PLANE, CYLINDER or SPHERE."""
+    """(w,) shape of each wall: PLANE, CYLINDER or SPHERE."""
     point: Floats
     """(w, 3) point of the plane or the axis, or the centre, m."""
     axis: Floats
     """(w, 3) unit normal of a plane, unit direction of the axis of a cylinder."""
     radius: Floats
-    """(w,) radius, m."""
+    """(w,) radius of each cylinder or sphere, m."""
     side: Floats
     """(w,) 1 if bodies are outside, -1 if they are inside."""
 
@@ -51,14 +51,14 @@ class Walls:
         self._given = np.array([each.velocity for each in specs]).reshape(n, 3)
         self._courses = [Course(each.course) for each in specs]
         self.mass = np.array([each.mass or np.inf for each in specs])
-        """(w,) kg; infinite for a fixed or driven wall."""
+        """(w,) mass of each wall, kg; infinite for a fixed or driven wall."""
         self.lightness = np.array([0.0 if each.mass is None else 1.0 / each.mass for each in specs])
         self.plain = np.array([each.plain for each in specs], bool)
-        """(w,) True for fixed planes."""
+        """(w,) True for walls that are fixed planes."""
         self.speed = np.array([self._driven(k, 0.0, 0.0) for k in range(n)]).reshape(n, 3)
-        """(w, 3) velocity at mid-step, m/s."""
+        """(w, 3) velocity of each wall at mid-step, m/s."""
         self.before = self.speed.copy()
-        """(w, 3) v(n-1/2), m/s."""
+        """(w, 3) velocity v(n-1/2) of each wall, m/s."""
 
     @property
     def n(self) -> int:

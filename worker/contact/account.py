@@ -1,5 +1,5 @@
 """Account of the energy that contact has taken from the bodies. This energy is the limit of the energy that contact may
-return when it corrects penetrations.
+return to the bodies when contact corrects penetrations.
 """
 
 import numpy as np

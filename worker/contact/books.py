@@ -28,7 +28,7 @@ class Books:
         self.external_work = np.zeros(nodes)
         """(nodes,) work of the supports of held nodes against contact, J."""
         self.scale = fixed_point.scale_for(impulse)
-        """Quanta per N s of impulse."""
+        """Number of quanta of impulse per N s."""
         self.friction = fixed_point.Tally(np.full(2, energy))
         """Work of friction so far, J, and the part of the work of the last step that is not yet in the ledger."""
         self.account = Account(energy)

@@ -15,49 +15,49 @@ VECTOR = "UniTuple(float64, 3)"
 
 @njit(f"{VECTOR}(float64[:, :], int64)", cache=True)
 def at(x, s):  # type: ignore[no-untyped-def]
-    """Row ``s`` of ``x`` (n, 3)."""
+    """Returns row ``s`` of ``x`` (n, 3) as a vector."""
     return x[s, 0], x[s, 1], x[s, 2]
 
 
 @njit(f"{VECTOR}({VECTOR}, {VECTOR})", cache=True)
 def minus(a, b):  # type: ignore[no-untyped-def]
-    """a - b."""
+    """Returns the vector a - b."""
     return a[0] - b[0], a[1] - b[1], a[2] - b[2]
 
 
 @njit(f"{VECTOR}({VECTOR}, {VECTOR})", cache=True)
 def plus(a, b):  # type: ignore[no-untyped-def]
-    """a + b."""
+    """Returns the vector a + b."""
     return a[0] + b[0], a[1] + b[1], a[2] + b[2]
 
 
 @njit(f"{VECTOR}({VECTOR})", cache=True)
 def half(a):  # type: ignore[no-untyped-def]
-    """a / 2."""
+    """Returns the vector a / 2."""
     return 0.5 * a[0], 0.5 * a[1], 0.5 * a[2]
 
 
 @njit(f"{VECTOR}({VECTOR}, float64, {VECTOR})", cache=True)
 def beyond(a, t, b):  # type: ignore[no-untyped-def]
-    """a + t b."""
+    """Returns the vector a + t b."""
     return a[0] + t * b[0], a[1] + t * b[1], a[2] + t * b[2]
 
 
 @njit(f"float64({VECTOR}, {VECTOR})", cache=True)
 def dot(a, b):  # type: ignore[no-untyped-def]
-    """a . b."""
+    """Returns the scalar product a . b."""
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
 @njit(f"{VECTOR}({VECTOR}, {VECTOR})", cache=True)
 def cross(a, b):  # type: ignore[no-untyped-def]
-    """a x b."""
+    """Returns the vector product a x b."""
     return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
 
 
 @njit(f"float64({VECTOR}, {VECTOR})", cache=True)
 def distance(a, b):  # type: ignore[no-untyped-def]
-    """|a - b|."""
+    """Returns the distance |a - b|."""
     r = minus(a, b)
     return np.sqrt(dot(r, r))
 
@@ -72,8 +72,8 @@ def height(s, i, j, k):  # type: ignore[no-untyped-def]
 
 @njit(f"Tuple((boolean, {VECTOR}))({VECTOR}, {VECTOR}, {VECTOR})", cache=True, error_model="numpy")
 def foot(r, e, f):  # type: ignore[no-untyped-def]
-    """Whether the foot of a point lies on the face of edges e and f, and its area coordinates; ``r``: the point
-    minus the common corner of e and f.
+    """Returns True if the foot of a point lies on the face of edges e and f, and the area coordinates of the foot;
+    ``r``: the point minus the common corner of e and f.
     """
     ee, ff, ef, er, fr = dot(e, e), dot(f, f), dot(e, f), dot(e, r), dot(f, r)
     area = ee * ff - ef * ef

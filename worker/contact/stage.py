@@ -177,8 +177,9 @@ class Contact:
 
     @property
     def stray(self) -> bool:
-        """Whether a slot will depart so far from its reference motion in the next step that it must be registered
-        again."""
+        """True if a slot will depart so far from its reference motion in the next step that the slot must be registered
+        again.
+        """
         return self.found.stray
 
     @property
@@ -224,7 +225,7 @@ class Contact:
             self.searches.begin(state)
 
     def spent(self, state: Nodes) -> bool:
-        """Whether a surface node will depart in one step more than the last search allows."""
+        """Returns True if a surface node will depart in one step more than the last search allows."""
         with self._timers.phase("contact"):
             return self.searches.spent(state)
 

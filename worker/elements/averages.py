@@ -1,5 +1,5 @@
-"""Rows of the nodal means of the averaged pressure forms, if nodes have tets of several materials. There is one row for
-each material of a node.
+"""Rows of the nodal means of the averaged pressure forms, if nodes have tets of several materials. The table has one
+row for each material of a node.
 
 A mean over the tets round a node is a value of the material there. At an interface of two materials the stress is
 continuous, so the volume strains of the two materials differ. A single mean over both materials would give each

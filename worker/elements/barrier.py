@@ -27,8 +27,8 @@ STIFF = 0.1
 of 10 % of the bulk modulus, far more than the yield stress of metals."""
 
 _ROUNDING = 1e-9
-"""Relative tolerance of a volume ratio. It is far above the rounding difference between two ways of computing the
-same ratio."""
+"""Relative tolerance of a volume ratio. The tolerance is far above the rounding difference between two ways of
+computing the same ratio."""
 _Q, _MASS, _WORK, _WORK_VISCOUS = VISCOUS * CHUNK, MASS * CHUNK, WORK * CHUNK, WORK_VISCOUS * CHUNK
 
 

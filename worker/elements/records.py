@@ -43,7 +43,7 @@ class Body(NamedTuple):
     rows: int
     """Number of state rows."""
     params: Floats
-    """Constants of the material."""
+    """Constants of the material of the block."""
     strength: int
     """Number of the strength law (materials/models.py)."""
     eos: int
@@ -77,7 +77,7 @@ class Scratch(NamedTuple):
     w: Floats
     """Scratch rows of CHUNK numbers each, see scratch.py."""
     wi: Ints
-    """Nine rows of forces, quanta."""
+    """Nine rows of nodal forces of the tets of the chunk, quanta."""
     bits: Ints
     """Same memory as ``w``, as integers."""
     peaks: Ints
@@ -115,13 +115,13 @@ class Means(NamedTuple):
     weight: Floats
     """(rows,) one over the reference volume, 1/m^3."""
     strain: Floats
-    """(rows,) volume strain of the step."""
+    """(rows,) mean volume strain of each row in the step."""
     more: Floats
     """(rows,) heat or bulking of the step."""
     split: bool
     """True if pressure gradients stabilise; else the arrays below have one row."""
     pressure: Floats
-    """(rows,) nodal pressure, Pa."""
+    """(rows,) nodal pressure of each row, Pa."""
     projected: Floats
     """(rows, 3) projected gradient of the pressure, Pa/m."""
     gradient: Ints

@@ -30,13 +30,13 @@ class Room(NamedTuple):
     """Scratch for a chunk of tets (elements/scratch.py)."""
 
     w: Floats
-    """(SCRATCH,)."""
+    """(SCRATCH,) scratch rows of the elements."""
     forces: Ints
     """(9 * CHUNK,) forces on nodes 1, 2, 3, quanta."""
     state: Floats
-    """(_ROWS * CHUNK,)."""
+    """(_ROWS * CHUNK,) state of the tets of the chunk."""
     tets: Tets
-    """(CHUNK, 4) local nodes."""
+    """(CHUNK, 4) local nodes of the tets of the chunk."""
 
 
 _ROOM = record(Room, types.float64[::1], _I1, types.float64[::1], types.uint32[:, ::1])

@@ -12,15 +12,15 @@ class Mesh(NamedTuple):
     """The tets of a body."""
 
     tets: Tets
-    """(n, 4) local nodes."""
+    """(n, 4) local nodes of each tet."""
     id: Ints
-    """(n,) global ids."""
+    """(n,) global ids of the tets."""
     across: Indices
     """(n, 4) the side behind each face at the start, 4 * global tet id + local face; -1 for an exposed face."""
     beside: Indices
     """(n, 4) place of the tet behind each face; -1 for no tet, -2 for one on another rank."""
     bond: Bits
-    """(n, 4) INTACT, BROKEN or WIDE."""
+    """(n, 4) state of each facet: INTACT, BROKEN or WIDE."""
     intact: Bits
     """(n,) bit k: facet k is intact, and both of its tets are in the block."""
     state: Floats
@@ -69,7 +69,7 @@ class Law(NamedTuple):
     """Constants of the criterion of a body."""
 
     weight: float
-    """Weight of shear."""
+    """Weight of shear against normal traction."""
     friction: float
     """Coefficient of internal friction."""
     delay: float

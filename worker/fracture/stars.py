@@ -47,7 +47,7 @@ class Stars:
     """
 
     def __init__(self, tets: Tets, nodes: int) -> None:
-        """``tets`` (n, 4) over ``nodes`` local nodes."""
+        """``tets`` (n, 4): local nodes of the tets; ``nodes``: number of local nodes."""
         corners = tets.reshape(-1)
         self.pool: Indices = (np.argsort(corners, kind="stable") // 4).astype(np.int32)
         """Places of the tets of the stars, node after node."""

@@ -1,4 +1,6 @@
-"""Hypoelastic deviatoric stress with an exact rotation. It is the trial stress of materials with a strength law."""
+"""Hypoelastic deviatoric stress with an exact rotation. This stress is the trial stress of materials with a strength
+law.
+"""
 
 import numpy as np
 

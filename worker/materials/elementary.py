@@ -12,7 +12,7 @@ from ..model.state import CHUNK
 _LN2_HIGH, _LN2_LOW = 0.693147180369123816490, 1.90821492927058770002e-10
 """ln 2 in two parts: the first has 33 bits, so that its product with an exponent is exact; together they have 86."""
 _INVERSE_LN2 = 1.4426950408889634
-"""1 / ln 2."""
+"""Constant 1 / ln 2."""
 NEAREST = 6755399441055744.0
 """1.5 times 2^52. If this constant is added to a smaller number, the last bits of the sum contain the nearest
 integer."""

@@ -202,4 +202,4 @@ def pole(params: Floats) -> float:
 ELASTIC = Equation("", 0, lambda _: (), linear, volumes_by_pressure)
 """Linear pressure with the bulk modulus of the elasticity."""
 GRUNEISEN = Equation("mie_gruneisen", VOLUME_RATIO + 1, _gruneisen, mie_gruneisen, volumes_by_ratio, NODAL_WORK + 1)
-"""Pressure of compression and heat."""
+"""Mie-Grueneisen equation of state: pressure of compression and heat."""

@@ -22,9 +22,9 @@ class Bodies:
     """Rigid bodies, one row each."""
 
     part: Ints
-    """(b,) number of the part."""
+    """(b,) number of the part of each body."""
     mass: Floats
-    """(b,) mass, kg."""
+    """(b,) mass of each body, kg."""
     origin: Floats
     """(b, 3) centre of mass at the start, m."""
     inertia: Floats

@@ -28,8 +28,8 @@ from .bodies import Bodies, dot
 _NEAR = 2.0
 """Walls are checked for a body within this multiple of the motion of the body in a step."""
 _CLOSE = 1e-3
-"""Length over the reach of a body. It is added to the distance within which walls are checked; a node that ends
-deeper than this behind a wall ends the run."""
+"""Length over the reach of a body. The length is added to the distance within which walls are checked; a node that
+ends deeper than this behind a wall ends the run."""
 _MOST, _ENOUGH = 200, 1e-12
 """Largest number of passes over the rows, and the relative change of an impulse at which the passes end."""
 

@@ -55,7 +55,7 @@ class Lines:
 
 
 class ReferenceMotion:
-    """Reference motions of the slots of a scene."""
+    """Reference motions (straight lines of extrapolation) of the slots of a scene."""
 
     def __init__(self, x: Floats, course: Floats, faces: int, edges: int, drift: Floats, until: float) -> None:
         """``x``, ``course`` (slots, 3): positions, m, and velocities, m/s, at the time of the search."""

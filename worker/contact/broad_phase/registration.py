@@ -1,5 +1,5 @@
 """Registration: the search for the candidate pairs of changed nodes, faces and edges on one rank, without
-communication. Each pair is found once.
+communication. Registration finds each pair once.
 
 The pairs of a changed node, face or edge are removed and searched again among everything in the broad phase. A node,
 face or edge is changed if it has departed from its line (reference_motion.py) or is new on the surface. A complete

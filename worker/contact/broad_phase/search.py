@@ -26,7 +26,7 @@ class Primitives:
     """Points, edges or faces, given by nodes; all with the same number of corners."""
 
     corners: Indices
-    """(n, k) rows of their nodes."""
+    """(n, k) rows of the nodes of the primitives."""
     reach: Floats
     """(n,) reach, m: distance from the hull of the corners within which other primitives are candidates."""
     some: Indices | None = None
@@ -187,7 +187,7 @@ class Sought(NamedTuple):
     """Primitives of one search, with their boxes."""
 
     low: Floats
-    """(m, 3) lowest corners of their boxes."""
+    """(m, 3) lowest corners of the boxes of the primitives."""
     high: Floats
     corners: Indices
     """(n, k) slots of all primitives."""
@@ -204,7 +204,7 @@ SOUGHT = types.NamedTuple(
 
 @njit("boolean(int32[:, ::1], int32[:, ::1], int64, int64)", cache=True)
 def _meet(small, large, i, j):  # type: ignore[no-untyped-def]
-    """Whether two primitives have a common corner."""
+    """Returns True if two primitives have a common corner."""
     for a in range(small.shape[1]):
         for b in range(large.shape[1]):
             if small[i, a] == large[j, b]:

@@ -65,7 +65,7 @@ class Searches:
 
     @cached_property
     def rubs(self) -> bool:
-        """Whether any pair of parts has friction."""
+        """True if any pair of parts has friction."""
         return bool(np.nanmax(self.mu, initial=0.0) > 0.0)
 
     @cached_property
@@ -95,7 +95,7 @@ class Searches:
         self._kept = np.column_stack([kept["node"], kept["face"]]), kept["kept"]
 
     def spent(self, nodes: Nodes) -> bool:
-        """Whether a surface node will depart, within _AHEAD steps, more than the last search allows."""
+        """Returns True if a surface node will depart, within _AHEAD steps, more than the last search allows."""
         return self._exterior.motion.spent(nodes, self._clock.t, _AHEAD * self._clock.dt)
 
     def begin(self, nodes: Nodes) -> None:

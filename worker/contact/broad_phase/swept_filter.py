@@ -2,10 +2,10 @@
 
 A box round a face or an edge is much larger than the primitive. A pair of edges is removed if a single direction
 separates the two edges over the whole horizon. For a node and a face, the height over the face and the distances from
-its sides are computed at the beginning, middle and end of the horizon. Each is nearly a parabola in time: between two
-of these moments it deviates from the straight line by an eighth of its second difference; the filter allows for twice
-that deviation. A pair is removed only if a single measure excludes contact over the whole horizon, with the skin and
-the depth of contacts as margin. A pair that no measure excludes at the beginning is therefore kept.
+its sides are computed at the beginning, middle and end of the horizon. Each of these distances is nearly a parabola in
+time: between two of these moments it deviates from the straight line by an eighth of its second difference; the filter
+allows for twice that deviation. A pair is removed only if a single measure excludes contact over the whole horizon,
+with the skin and the depth of contacts as margin. A pair that no measure excludes at the beginning is therefore kept.
 """
 
 import numpy as np

@@ -62,7 +62,7 @@ class NarrowSides(NamedTuple):
     ring: Indices
     """(nodes,) next node of the family: see Families."""
     place: Indices
-    """(nodes,) slots."""
+    """(nodes,) slot of each local node."""
 
 
 NARROW = record(NarrowSides, _N2, _N3, types.uint32[:, ::1], _N2, types.uint8[:, ::1], _N1, _N1)
@@ -101,8 +101,8 @@ def _foot(r, e, f):  # type: ignore[no-untyped-def]
 
 @njit(f"boolean({VECTOR}, {VECTOR}, {VECTOR}, {VECTOR}, float64)", cache=True, forceinline=True)
 def _nearer(r, inward, e, f, depth):  # type: ignore[no-untyped-def]
-    """Whether the point ``r``, below the side of edges e and f, has its foot between them and is less than ``depth``
-    below.
+    """Returns True if the point ``r``, below the side of edges e and f, has its foot between the two edges and is less
+    than ``depth`` below the side.
     """
     if not dot(inward, r) < depth * np.sqrt(dot(inward, inward)):
         return False
@@ -194,7 +194,7 @@ def _gather(w, rest, corners, head, many, cracks, among, place, ahead):  # type:
 #                                   2. d is below the side at the end of the step, with its foot on it, and is not the
 #                                      twin of p across the facet (under): that one has a contact across the crack.
 #                                   3. d is not above another open side of the corner, or nearer to it (_beside).
-#                                   4. It was no deeper than DEEP_SELF at the beginning of the step (_pushed_out).
+#                                   4. d was no deeper than DEEP_SELF at the beginning of the step (_pushed_out).
 # A node of the side that has not separated is common to both pieces and gets the weight 0. Its weight is
 # redistributed to the other nodes (docs/theory/fracture.md, "Contact").
 
@@ -208,9 +208,9 @@ def entering(out, base, each, narrow, of, step, first, stop):  # type: ignore[no
     """Writes contacts of separated nodes with the narrow sides at their former corner, of the families ``of`` a block
     from ``first`` to ``stop``.
 
-    They are rows of ``out``, from ``base`` plus ``each`` times the number of corners before the first family on, up to
-    ``each`` for every corner in the mean. Returns the number of contacts; if this number is larger than the number of
-    rows, some contacts have no row. Numbers at the ends of lines: conditions listed above.
+    The contacts are written to rows of ``out``, from ``base`` plus ``each`` times the number of corners before the
+    first family on, up to ``each`` for every corner in the mean. Returns the number of contacts; if this number is
+    larger than the number of rows, some contacts have no row. Numbers at the ends of lines: conditions listed above.
     """
     ahead, part, mu, nodes, weights = step.ahead, step.part, step.mu, out.nodes, out.weights
     members, begin, among, corners, start = of

@@ -47,9 +47,9 @@ def widening(cracks, x, typical):  # type: ignore[no-untyped-def]
 #       0 -------- 1           side of the first tet
 #
 # Conditions of a contact of the pair k = 0, 1, 2:
-# 1. Its nodes have separated.
+# 1. The two nodes of the pair have separated.
 # 2. The gap is at most NEAR of the facet at the end of the step, and at its beginning at least -DEEP_SELF of it.
-# 3. Their parts may be in contact.
+# 3. The parts of the two nodes may be in contact.
 # The crack opens, and its sides are surface, when a width reaches _WIDE of the typical size of a face.
 
 

@@ -163,10 +163,10 @@ def _opposite(edges, one, two):  # type: ignore[no-untyped-def]
 #    opposite edges of one tet. Otherwise the pair is deactivated until that changes.
 # 2. No bond ties all four nodes.
 # 3. The lines are not parallel: A > _PARALLEL^2 (u.u)(w.w).
-# 4. They cross within both edges: _END <= s, t <= 1 - _END.
+# 4. The edges cross within both edges: _END <= s, t <= 1 - _END.
 # 5. With one sign of m the gap is at most NEAR of an edge at the end of the step, and at its beginning at least minus
 #    the depth of the edges.
-# 6. That normal points out of both bodies (_points_out).
+# 6. The normal for this sign points out of both bodies (_points_out).
 # 7. A penetration is not deeper than the present shape of the tets allows (_deep).
 
 

@@ -62,8 +62,8 @@ def facing(normals, s, m):  # type: ignore[no-untyped-def]
 
 @njit(f"boolean(float64[:, ::1], int64, {VECTOR}, {VECTOR}, {VECTOR}, float64)", cache=True, error_model="numpy")
 def reaches_over(normals, s, b, e, f, size):  # type: ignore[no-untyped-def]
-    """Whether the faces of node s reach over a face, by their mean direction, from the node's foot on its border;
-    ``b``: area coordinates of the foot on the face of edges ``e`` and ``f``.
+    """Returns True if the faces of node s reach over a face, by their mean direction, from the node's foot on its
+    border; ``b``: area coordinates of the foot on the face of edges ``e`` and ``f``.
 
     In that case the body of the node moves onto the face, not beside it. Example: if two bodies collide with equal
     faces, all nodes have their feet on the border of a face, and no node is ever inside of the other body.
@@ -151,8 +151,8 @@ def outside(pairs, first, faces, x, part, p, depth, strayed, end):  # type: igno
     forceinline=True,
 )
 def in_front(pairs, first, faces, step, normals, p, gap0, gap1, strayed, end):  # type: ignore[no-untyped-def]
-    """Whether the node of pair ``p``, whose foot is on the border (RIM) of its face, is beside it, in front of another
-    face of that part which it faces.
+    """Returns True if the node of pair ``p``, whose foot is on the border (RIM) of its face, is beside this face, and
+    in front of another face of that part which the node faces.
 
     ``gap0``, ``gap1``: height over its own face at the beginning and end of the step; ``strayed``, ``end``: see
     outside.

@@ -68,8 +68,8 @@ def _bent(turn, x, i, j, k):  # type: ignore[no-untyped-def]
     error_model="numpy",
 )
 def _passes(x, ahead, corners, s, f, m, gap0, gap1, most):  # type: ignore[no-untyped-def]
-    """Whether node s, at height ``gap0`` over face f of normal ``m`` and ``gap1`` at the end of the step, passes it,
-    no deeper than ``most``; and the area coordinates of its foot at that moment.
+    """Returns True if node s, at height ``gap0`` over face f of normal ``m`` and ``gap1`` at the end of the step,
+    passes the face, no deeper than ``most``; and the area coordinates of its foot at that moment.
     """
     i, j, k, d = corners[f, 0], corners[f, 1], corners[f, 2], corners[f, 3]
     deep = not gap0 >= -most
@@ -164,9 +164,9 @@ def due(pairs, slots, faces, end, first, stop):  # type: ignore[no-untyped-def]
 # 3. The normals are compatible: node s faces the face (facing.facing), so that the rim of a bar is not in contact with
 #    the side of another bar of the same width, nor the surface below a block that slides with the front of the block.
 # 4. If only one of its own faces faces the face, it passes the face from outside: gap0 >= -NEAR of the face.
-# 5. Its foot at tau is on the face, and it is no deeper than ``reach`` of the face and half the altitude of its tet.
-# 6. It is not beside a convex edge, in front of another face there (facing.in_front).
-# 7. If it is inside by more than TOUCHING, it is not nearer to the front of another face (facing.outside).
+# 5. Its foot at tau is on the face, and s is no deeper than ``reach`` of the face and half the altitude of its tet.
+# 6. The node is not beside a convex edge, in front of another face there (facing.in_front).
+# 7. If s is inside by more than TOUCHING, s is not nearer to the front of another face (facing.outside).
 # A node behind several faces of a part keeps its contact with the nearest one (``nearest``).
 
 

@@ -1,9 +1,9 @@
 """Records of the narrow phase: its input, and its output, one row for each active contact, of four nodes, their weights
 and a normal.
 
-The gap is the gap at the end of a step without contact, positive outside. It is linear in the velocities: gap = dt n .
-sum(w_k v_k) plus a constant, with the weights w of ``weights``: 1 for the node and minus the area coordinates of the
-point of the face (the defence node, Zhong 1993), or the weights of the ends of two edges.
+The gap is the gap at the end of a step without contact, positive outside. The gap is linear in the velocities: gap = dt
+n . sum(w_k v_k) plus a constant, with the weights w of ``weights``: 1 for the node and minus the area coordinates of
+the point of the face (the defence node, Zhong 1993), or the weights of the ends of two edges.
 """
 
 from typing import NamedTuple
@@ -24,14 +24,14 @@ DEEP = 0.25
 its tets. A node or edge that is deeper is on the other side of a thin body."""
 DEEP_SELF = 0.05
 """Largest depth of a penetration, as a share of the size of a face, for a node and a face of the same part, because
-all nodes of a part lie behind its own faces. It is also the smallest value used for the largest depth of a contact
-of edges, for tets of any height."""
+all nodes of a part lie behind its own faces. This share is also the smallest value used for the largest depth of a
+contact of edges, for tets of any height."""
 FAST = 0.1
 """Pairs whose distance decreases in a step by less than this share of the typical size of a face limit the time step
 only when they are active. The altitude of a tet of that size is several times larger."""
 PUSH_OUT = 0.1
 """Largest share of a penetration that is corrected in a step, and largest share of the closing speed that is
-returned for the correction. Both are 0 while contact has no energy to return (``account.Account``)."""
+returned for the correction. Both shares are 0 while contact has no energy to return (``account.Account``)."""
 CRACK = -2
 """First number of pairs of nodes across a crack; these pairs have negative numbers from here downwards."""
 _FEWEST = 2
@@ -46,9 +46,9 @@ class ContactRows(NamedTuple):
     """Arrays of active contacts."""
 
     nodes: Indices
-    """(room, 4) slots."""
+    """(room, 4) slots of the nodes of each contact."""
     weights: Floats
-    """(room, 4) weights of the slots."""
+    """(room, 4) weight of each of these slots in the gap of the contact."""
     normals: Floats
     """(room, 3) unit normals, outward from the face or from the body of the first edge."""
     wanted: Floats
@@ -95,7 +95,7 @@ class StepRoom(Scratch):
 
 
 class Step(NamedTuple):
-    """State of the slots in the step ahead."""
+    """State of the slots (contact nodes) in the present step."""
 
     x: Floats
     """(slots, 3) positions at its beginning, m; in one cache line with ``ahead``."""
@@ -200,7 +200,7 @@ class EdgeTable(NamedTuple):
     corners: Indices
     """(e, 6) slots: records.Edges."""
     size: Floats
-    """(e,) initial length, m."""
+    """(e,) initial length of each edge, m."""
     deep: Floats
     """(e,) greatest depth of a contact, m: records.Edges."""
     meets: Flags

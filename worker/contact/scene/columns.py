@@ -120,9 +120,9 @@ class SceneFaces:
     """Columns of the faces."""
 
     corners: Indices
-    """(f, 4) slots; the opposite node last."""
+    """(f, 4) slots of the corners of each face; the opposite node of the tet is last."""
     id: Ints
-    """(f,) global ids, ascending."""
+    """(f,) global ids of the faces, ascending."""
     size: Floats
     exposed: Flags
     """(f,) True for exposed faces; only these have contacts."""
@@ -189,12 +189,12 @@ class SceneEdges:
 
     @cached_property
     def size(self) -> Floats:
-        """(e,) initial length, m."""
+        """(e,) initial length of each edge, m."""
         return np.asarray(self.lengths[0])
 
     @cached_property
     def deep(self) -> Floats:
-        """(e,) greatest depth of a contact, m."""
+        """(e,) greatest depth of a contact of each edge, m."""
         return np.asarray(self.lengths[1])
 
     @cached_property

@@ -17,8 +17,8 @@ SHARES = float(2**30)
 _ACROSS = (1.0, -1.0, 0.0, 0.0)
 """Weights of the two nodes of a contact across a crack."""
 _ROUNDING = 2.0**-40
-"""Allowance for rounding, relative to the velocities. It is far above the rounding error of the speed of a contact,
-which is a sum of twelve products."""
+"""Allowance for rounding, relative to the velocities. The allowance is far above the rounding error of the speed of
+a contact, which is a sum of twelve products."""
 _ROWS, _F1, _F, _I = types.int32[::1], types.float64[::1], types.float64, types.int64
 
 

@@ -24,7 +24,7 @@ class SweepCount:
     def __init__(self, bounds: Sweeps) -> None:
         self._bounds = bounds
         self.sweeps = bounds.least
-        """Sweeps of the next step."""
+        """Number of sweeps in the next step."""
         self.unsettled: Ints = np.zeros(2, np.int64)
         """(2,) l1 norms over the nodes that this rank owns: of the changes by the last sweep of the step, and of the
         impulses of the step; in units of 2^16 quanta.

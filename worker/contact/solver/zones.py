@@ -18,8 +18,8 @@ from ..surface.records import SurfaceNodes
 _SAMPLE = 8192
 """Largest sample of the nodes by which boxes are halved."""
 _PER_THREAD = 4
-"""Number of zones for each thread. It is above 1 because contacts are not distributed evenly: a thread that has
-finished its zones computes a zone of another thread. Chosen value."""
+"""Number of zones for each thread. The number is above 1 because contacts are not distributed evenly: a thread that
+has finished its zones computes a zone of another thread. Chosen value."""
 
 
 class Zones:

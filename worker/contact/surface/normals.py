@@ -1,7 +1,7 @@
 """Mean normals of surface nodes and mean directions of their faces: they decide which faces a node may contact
 (facing.facing).
 
-They are recomputed at every ``EVERY``-th step and after erosion; a face that a crack exposes in between adds its
+The normals are recomputed at every ``EVERY``-th step and after erosion; a face that a crack exposes in between adds its
 contribution to its nodes. The normals therefore depend on the step number alone, not on the steps of searches.
 """
 

@@ -59,9 +59,9 @@ class Faces(Rows):
     """Exposed faces, and sides of cracks that may open before the next search."""
 
     id: Ints
-    """(n,) 4 * global tet id + local face."""
+    """(n,) id of each face: 4 * global tet id + local face."""
     nodes: Ints
-    """(n, 4) global ids."""
+    """(n, 4) global ids of the corners of each face, then of the opposite node."""
     size: Floats
     """(n,) square root of twice the initial area, m."""
     exposed: Flags
@@ -76,11 +76,11 @@ class Edges(Rows):
     """
 
     nodes: Ints
-    """(n, 6) global ids."""
+    """(n, 6) global ids of the nodes a, b, c, d, e, f of each edge."""
     sides: Ints
     """(n, 2) ids of the faces abc and bad."""
     size: Floats
-    """(n,) initial length, m."""
+    """(n,) initial length of each edge, m."""
     deep: Floats
     """(n,) depth, m, beyond which the edge has no contact, for any deformation of its tets; see sharp.depths."""
     opened: Bits
@@ -110,19 +110,19 @@ class SurfaceNodes(Rows):
     """Nodes by ascending global id: nodes of this rank, and ghosts of nodes of other ranks."""
 
     id: Ints
-    """(n,) global ids."""
+    """(n,) global ids of the nodes."""
     local: Indices
     """(n,) local index on this rank, -1 for a ghost."""
     owner: Indices
     """(n,) rank that owns the node."""
     part: Indices
-    """(n,) index of the part."""
+    """(n,) index of the part of each node."""
     mobility: Floats
     """(n, 3) inverse of the mass, 1/kg; zero where a component of the velocity is held."""
     x: Floats
-    """(n, 3) position, m."""
+    """(n, 3) position of each node, m."""
     v: Floats
-    """(n, 3) velocity, m/s."""
+    """(n, 3) velocity of each node, m/s."""
     course: Floats
     """(n, 3) extrapolated velocity for a search, m/s; see extrapolation.py."""
 
