@@ -87,10 +87,10 @@ def laid_out(
 def _norms(
     rows: Rows, mine: Flags, ids: Ints, table: Floats, planes: Flags, comm: Comm
 ) -> tuple[float, Floats]:  # fmt: skip
-    """Returns a bound of the smallest eigenvalue of all rows over the largest, and (r, 3) one over the bounds of the
-    l1 norms of the rows of this rank, kg: sum_k |w_k| S_k / m_k, S_k the sum of |w_k| over all rows. 0 where no node
-    moves, and across ``planes`` (r, 3) of symmetry that contain the tied node: the mirror image of the mortar side
-    keeps it there.
+    """Returns a bound of the smallest eigenvalue of all rows over the largest, and (r, 3) one over the bounds of the l1
+    norms of the rows of this rank, kg: sum_k |w_k| S_k / m_k, S_k the sum of |w_k| over all rows. The values are 0
+    where no node moves, and across ``planes`` (r, 3) of symmetry that contain the tied node, because the mirror image
+    of the mortar side keeps the node on the plane.
     """
     known = np.unique(np.concatenate([rows.node, rows.master]))
     sums = np.bincount(np.searchsorted(known, rows.master), np.abs(rows.weight), len(known))

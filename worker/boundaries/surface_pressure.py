@@ -145,7 +145,7 @@ class SurfacePressure(Driver):
         return self._shared
 
     def _within(self, block: Block) -> tuple[Block, Ints, Ints]:
-        """Returns a block of a part that fractures, its faces, and the places of their tets. Such parts do not
+        """Returns a block of a part that fractures, its faces, and the places of their tets. Parts that fracture do not
         erode.
         """
         at = IdIndex(block.id).places(self._faces.tets)

@@ -31,7 +31,8 @@ class Exterior:
         self._bounds = bounds
         self.cracks = Cracks.none(model.nodes.id)
         self._near_erosion: Ints | None = None
-        """Ids, ascending, of the local tets that the last search expected to erode; None before any tet has eroded."""
+        """Ids, ascending, of the local tets that were near erosion at the last search; None before any tet has
+        eroded."""
         self.surface = self._build(np.zeros(model.nodes.n, bool), np.zeros(0, np.int64))
         self.size = typical(self.surface.faces.size, comm)
         """Typical size of the faces of all ranks at the start, m."""

@@ -1,11 +1,11 @@
 """Largest compression of brittle materials without a law of compressive failure, in every step, over Griffith's
 criterion (cases/warnings/compression.py).
 
-Such a material breaks in tension only and bears any compression. Each stress is compared with the criterion of Griffith
-(1924): (s1 - s3)^2 / (8 T (s1 + s3)) for the largest and the smallest pressure, s1 and s3, and the tensile strength T.
-A material of this strength cracks at 1, and the ratio grows in proportion to the stress. Tension, s3 < 0, counts as
-zero: the tensile criterion covers it. The stress is the stress of the tets at the end of a step, without its viscous
-part.
+A material without a law of compressive failure breaks in tension only and bears any compression. Each stress is
+compared with the criterion of Griffith (1924): (s1 - s3)^2 / (8 T (s1 + s3)) for the largest and the smallest pressure,
+s1 and s3, and the tensile strength T. A material of this strength cracks at 1, and the ratio grows in proportion to the
+stress. Tension, s3 < 0, counts as zero: the tensile criterion covers it. The stress is the stress of the tets at the
+end of a step, without its viscous part.
 """
 
 from dataclasses import astuple, dataclass, replace

@@ -2,7 +2,8 @@
 
 A tet that becomes flat or inverted must be removed before it collapses: its velocity gradient is proportional to one
 over its altitude, and a single tet whose altitude passes zero would accelerate its nodes without bound. Such a tet is
-removed at once; one that exceeds only a strain or damage limit can wait for others (worker/erosion.py).
+removed in the next step. The removal of a tet that exceeds only a strain or damage limit is delayed until several tets
+are removed together (worker/erosion.py).
 """
 
 import math

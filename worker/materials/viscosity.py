@@ -46,11 +46,11 @@ def bulk_viscosity(w, s, n, linear, shock, quadratic, rate_of_change, breaks, in
     von Neumann and Richtmyer 1950 (quadratic), Landshoff 1955 (linear); S = u / (u + HALF c) distinguishes a shock from
     an elastic wave. ``rate_of_change`` converts CHANGE to a volume flux, 1/s. With G = sqrt(sum |grad N|^2) and Q the
     tangent (linear + shock S (2 - S)) c + 2 quadratic u the largest stable step is 1 / (G (G l Q + sqrt((G l Q)^2 +
-    c^2))); l = LENGTH_FACTOR / G. Both are derived in docs/theory/time_integration.md. An inverted tet has no
-    viscosity, and NaN as its limit. The limit of a tet at rest or in expansion is that at the onset of compression;
-    where a part ``breaks``, the limit of a tet in tension is the limit in compression at the speed of its release, |p|
-    / (density c). ``initial``: initial density in the averaged forms, in which the viscosity resists a mean rate
-    (``resisted``); else 0.
+    c^2))); l = LENGTH_FACTOR / G. The formulas of the step and of l are derived in docs/theory/time_integration.md. An
+    inverted tet has no viscosity, and NaN as its limit. The limit of a tet at rest or in expansion is that at the onset
+    of compression; where a part ``breaks``, the limit of a tet in tension is the limit in compression at the speed of
+    its release, |p| / (density c). ``initial``: initial density in the averaged forms, in which the viscosity resists a
+    mean rate (``resisted``); else 0.
     """
     for i in range(n):
         mass, change = s[_MASS + i], w[CHANGE + i]

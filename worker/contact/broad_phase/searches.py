@@ -70,7 +70,7 @@ class Searches:
 
     @cached_property
     def _self_contact(self) -> Flags:
-        """(parts,) whether the body of each may be in contact with itself."""
+        """(parts,) True if the body of the part may be in contact with itself."""
         return part_pairs.self_contact(self._case, self.mu)
 
     @property

@@ -96,9 +96,9 @@ def _beyond(axis, a, b, c, d, far):  # type: ignore[no-untyped-def]
 
 @njit(f"boolean({_V2}, {_V2}, int64, int64, int64, int64, float64, float64, float64)", cache=True)
 def _separated(x, v, a, b, c, d, begin, end, far):  # type: ignore[no-untyped-def]
-    """Whether the segments ab and cd stay further apart than ``far`` from time ``begin`` to ``end``, along the
-    direction in which they are nearest at the middle: on straight lines their distance along a fixed direction is
-    least at either end.
+    """Returns True if the segments ab and cd stay further apart than ``far`` from time ``begin`` to ``end``, along the
+    direction in which the segments are nearest at the middle of that time: on straight lines their distance along a
+    fixed direction is least at either end.
     """
     half = 0.5 * (begin + end)
     axis = nearest(_then(x, v, a, half), _then(x, v, b, half), _then(x, v, c, half), _then(x, v, d, half))

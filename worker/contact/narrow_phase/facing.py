@@ -104,13 +104,14 @@ def _asked(pairs, faces, part, q, body, strayed, end):  # type: ignore[no-untype
     forceinline=True,
 )
 def outside(pairs, first, faces, x, part, p, depth, strayed, end):  # type: ignore[no-untyped-def]
-    """Whether the node of pair ``p``, ``depth`` below its face, is nearer to the front of another face of that part.
+    """Returns True if the node of pair ``p``, ``depth`` below its face, is nearer to the front of another face of that
+    part.
 
-    Then it is beside an acute edge and not inside the body: the nearest face decides on which side a node is. Only
-    faces within the share of their size that every candidate list covers are tested. A face whose pair is deactivated
-    is further away and is not tested. ``strayed``: distance of the node from its line, infinite if the pairs have no
-    valid bounds; ``end``: of the step plus one more step, because another thread may have just measured a pair at its
-    end.
+    Such a node is beside an acute edge and not inside the body: the nearest face decides on which side a node is. Only
+    faces are tested whose distance is below the share of their size that every candidate list covers. A face whose pair
+    is deactivated is further away and is not tested. ``strayed``: distance of the node from its line, infinite if the
+    pairs have no valid bounds; ``end``: of the step plus one more step, because another thread may have just measured a
+    pair at its end.
     """
     rows, corners, size = pairs.rows, faces.corners, faces.size
     s, body = rows[p, 0], part[corners[rows[p, 1], 0]]

@@ -34,7 +34,7 @@ class Rules:
     halo: float
     """Skin for slots of different ranks, m."""
     self_contact: Flags
-    """(parts,) whether the body of each part may be in contact with itself."""
+    """(parts,) True if the body of the part may be in contact with itself."""
 
 
 @dataclass

@@ -1,10 +1,10 @@
 """Restitution: target velocity of contacts that close, from their speed of approach.
 
 With the normal velocity u- before the step and u+ after it an impulse J takes the energy -J (u- + u+) / 2 from the
-bodies. The target of a contact that closes is u+ = -e u- (Newton's law for each contact), so that this energy is -J
-u- (1 - e) / 2: zero for e = 1, for any number of contacts that share nodes, since contacts without an impulse take
-no energy. This is the reflection in the metric of the masses of Cirak and West (2005), Decomposition contact
-response, Int. J. Numer. Meth. Engng 64.
+bodies. The target of a contact that closes is u+ = -e u- (Newton's law for each contact), so that this energy is -J u-
+(1 - e) / 2: zero for e = 1, for any number of contacts that share nodes, since contacts without an impulse take no
+energy. For e = 1, the impulse is the reflection in the metric of the masses of Cirak and West (2005), Decomposition
+contact response, Int. J. Numer. Meth. Engng 64.
 """
 
 from ...kernels.jit import njit, types

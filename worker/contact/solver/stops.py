@@ -43,8 +43,8 @@ class Stops(NamedTuple):
 
     @classmethod
     def of(cls, case: Case, model: Model, comm: Comm) -> "Stops":
-        """Returns the walls and planes of symmetry of a case. A part with nodes on both sides of a plane is left to
-        the boundary alone. Prescribed motions are not considered, only held components. Collective.
+        """Returns the walls and planes of symmetry of a case. A part with nodes on both sides of a plane has no stop
+        there; only the boundary acts on it. Prescribed motions are not considered, only held components. Collective.
         """
         walls, planes = case.boundaries_of(schema.Wall), case.boundaries_of(schema.Symmetry)
         axes = [np.eye(3)[AXES[plane.axis]] for _, plane in planes]
