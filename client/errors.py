@@ -111,7 +111,7 @@ def _brief(told: object) -> str:
 
 
 def refusal(status: int, problem: Mapping[str, Any]) -> ConoidError:
-    """Returns the error class of a refusal: the same as for the same problem on this machine."""
+    """Returns the error class of a refusal: the class of the same problem on this machine."""
     told = problem.get("errors")
     entries = [entry for entry in told if isinstance(entry, Mapping)] if isinstance(told, list) else []
     if status == 422 and entries:

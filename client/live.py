@@ -44,9 +44,9 @@ class Live:
     phases: dict[str, list[float]] = field(default_factory=dict)
     """Seconds of each rank in each of PHASE_GROUPS between the last two Load messages."""
     helped: list[float] = field(default_factory=list)
-    """Share of that interval in which the further threads of each rank did tasks; empty for ranks of one thread."""
+    """Fraction of that interval in which the further threads of each rank were busy; empty for ranks of one thread."""
     loaded: float = 0.0
-    """Unix time of the last Load message, before the first one that of Started, s."""
+    """Unix time of the last Load message, s; before the first Load message, of the message Started."""
     counts: Counts | None = None
     finished: Finished | None = None
     frames: int = 0
@@ -107,7 +107,7 @@ class Live:
 
     @property
     def fraction(self) -> float:
-        """Share of the simulated time that is complete, 0 to 1."""
+        """Completed fraction of the simulated time, 0 to 1."""
         if self.state is State.SUCCEEDED:
             return 1.0
         if self.progress is None or self.progress.end_time <= 0:
@@ -123,7 +123,7 @@ class Live:
 
     @property
     def busy(self) -> list[float]:
-        """Share of the last interval in which each rank computed: neither exchange nor wait nor descheduled."""
+        """Fraction of the last interval in which each rank computed: without exchange, waiting and descheduled time."""
         totals = [sum(seconds) for seconds in zip(*self.phases.values(), strict=True)]
         idle = [sum(self.phases[name][rank] for name in _IDLE if name in self.phases) for rank in range(len(totals))]
         return [1.0 - lost / total if total > 0 else 0.0 for lost, total in zip(idle, totals, strict=True)]

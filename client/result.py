@@ -31,8 +31,8 @@ from .reports import html
 
 _TABLE = re.compile(rf"{fragments.FOLDER}/fragments_(\d+)\.csv")
 _BEYOND = 0.01
-"""Share of the time between the first and the last frame by which a requested time may lie outside. Chosen value: a
-run ends within a step of its end.
+"""Fraction of the time between the first and the last frame by which a requested time may lie outside. Chosen value:
+a run ends within a step of its end time.
 """
 
 
@@ -69,7 +69,9 @@ class _Case(msgspec.Struct):
 
 @dataclass(frozen=True)
 class FrameFile:
-    """A written frame: its number, its simulated time in s (None if it is not listed), its name in the folder."""
+    """A written frame: number, simulated time in s (None for a frame that is not in the list), and name in the
+    folder.
+    """
 
     index: int
     time: float | None

@@ -15,7 +15,7 @@ from .sweep_columns import Row, number_of, telling
 from .tables import short_names, table
 
 _MOST = 4
-"""Number of results that are shown by default. Chosen value: with keys and state they fit 80 characters."""
+"""Number of results that are shown by default. Chosen value: keys, state and these results fit 80 characters."""
 
 
 def narrowed(text: str, keys: Sequence[str], columns: Sequence[str]) -> str:
@@ -33,8 +33,8 @@ def narrowed(text: str, keys: Sequence[str], columns: Sequence[str]) -> str:
 
 
 def table_of(rows: Sequence[Row], keys: Sequence[str], *, whole: bool) -> Table | Group:
-    """Prints keys, state and results of a table: all of them if ``whole``, else the most informative ones, and the
-    number of further results that differ.
+    """Prints keys, state and results of a table. With ``whole`` all results are printed, otherwise the most
+    informative ones and the number of further results that differ.
     """
     titles = list(rows[0]) if rows else []
     changed = [title for title in titles if split(title)[0] in keys]

@@ -92,8 +92,8 @@ def _warn_of_cores(case: Case) -> None:
 
 
 def _follow(run: Run, case: Case, out: Console, plain: bool) -> tuple[RunInfo, set[str]]:
-    """Shows the run until its end. The first Ctrl-C cancels the run; further ones have no effect. Returns the log
-    texts that were printed as lines as well: a panel shows only the last ones.
+    """Shows the run until its end. The first Ctrl-C cancels the run; a second Ctrl-C has no effect. Also returns the
+    log texts that were printed as lines: a panel shows only the last lines of the log.
     """
     known, told = Live(run.id, title=case.title or case.name), set[str]()
     try:

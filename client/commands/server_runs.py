@@ -227,9 +227,8 @@ def get(
     token: Token = None,
     as_json: Annotated[bool, typer.Option("--json", help="List the run's files as JSON; copies nothing.")] = False,
 ) -> None:
-    """Copy a run's files to this machine.
-
-    If files are missing, they are listed and the exit code is 1.
+    """Copy a run's files to this machine. If files are missing, the command lists these files and ends with the exit
+    code 1.
     """
     if (folder := folder_of(run)) is not None and local_run.at_hand(folder):
         _copy(local_run.FolderFiles(folder), names, out, as_json)

@@ -213,7 +213,7 @@ def _how(point: SweepPoint) -> str:
 
 
 def told(failed: list[SweepPoint], total: int) -> str:
-    """Prints the number of runs without success, and the first of them."""
+    """Prints the number of runs without success, and the first few of these runs."""
     values, run = failed[0].values, failed[0].run
     point = ", ".join(f"{key} = {value}" for key, value in values.items())
     why = run.message or run.cause

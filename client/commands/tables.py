@@ -100,7 +100,7 @@ def row_of(row: RunRow) -> dict[str, Any]:
 
 
 def _own(run: RunInfo) -> dict[str, str]:
-    """Returns the labels without those of a sweep."""
+    """Returns the labels of a run without the labels that a sweep sets."""
     return {name: value for name, value in run.labels.items() if name not in ("sweep", "point")}
 
 
@@ -177,7 +177,7 @@ def materials_table(materials: Mapping[str, Material]) -> Table:
 
 
 def constants_table(constants: Sequence[Constant]) -> Table:
-    """Prints one line for each constant: its confidence, and the key of its source."""
+    """Prints one line for each constant of a material, with its confidence and the key of its source."""
     made = table("key", "value", "known", "source", right=("value",))
     for each in constants:
         made.add_row(each.key, each.value, each.confidence, each.source)
@@ -190,7 +190,7 @@ def sources_table(constants: Sequence[Constant]) -> Table:
 
 
 def outcome_table(outcome: Outcome, told: Collection[str] = ()) -> Table:
-    """Prints the outcome of a run, with its warnings except those in ``told``, which were printed before."""
+    """Prints the outcome of a run and its warnings, except warnings in ``told``, which were printed before."""
     energy, ranks = outcome.energy, crew(outcome.ranks, outcome.threads)
     entries: dict[str, str | Text] = {"state": state_text(State(outcome.state), outcome.cause), "why": outcome.message}
     speed, setup, worst = outcome.element_updates_per_second, outcome.setup, rough(outcome.worst_residual)
@@ -233,8 +233,8 @@ def _compressed(met: Compressed) -> str:
 
 
 def balance_table(accounts: Sequence[Account], happened: Account) -> Table:
-    """Prints costs of balance policies beside the actual ones; the saved time is relative to a run without
-    balancing.
+    """Prints costs of other balance policies beside the costs of the run; the saved time is relative to a run
+    without balancing.
     """
     made = table(
         "policy", "cuts", "lost", "cost of cuts", "total", "saved", "imbalance",

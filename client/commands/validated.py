@@ -21,7 +21,9 @@ from .tables import pairs, table
 
 
 def estimate_table(case: Case, expected: Estimate) -> Table:
-    """Prints the approximate needs of a case, and the share of each stage; a dash if a mesh file is not read."""
+    """Prints the approximate needs of a case, and the fraction of each stage; a dash replaces numbers of a mesh file
+    that is not read.
+    """
     total = expected.core_seconds or 1.0
     shares = sorted(expected.costs.items(), key=lambda cost: -cost[1])
     return pairs({
@@ -93,7 +95,7 @@ def _source(mesh: Mesh) -> tuple[str, str]:
 
 
 def touching_table(case: Case, touches: Sequence[Touch]) -> Table:
-    """Prints the parts that touch at the start without a bond: they are not joined."""
+    """Prints pairs of parts that touch at the start and have no bond: such parts are not joined."""
     title = "parts that touch, not joined (a [[bond]] joins them)"
     made = table(title, "area", right=("area",), wide=(title,))
     for touch in touches:

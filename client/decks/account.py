@@ -9,8 +9,8 @@ from conoid.cases.reading.included import Line
 T = TypeVar("T")
 Fate = Literal["taken", "left", "refused"]
 Remark = Literal["left", "differs", "refused"]
-"""Fate of a field of a translated keyword: omitted, different in meaning, or one without which the answer would be
-wrong."""
+"""Fate of a field of a translated keyword: omitted, with a different meaning in Conoid, or necessary for a right
+answer."""
 
 
 @dataclass(frozen=True)
@@ -32,9 +32,9 @@ class Entry:
     file: str = ""
     """Name of the included file in the deck; empty for the deck itself."""
     places: list[str] = field(default_factory=list)
-    """Keys of the case that it became."""
+    """Keys of the case into which the keyword was translated."""
     reasons: list[str] = field(default_factory=list)
-    """Reason why it was omitted, or why the import is refused."""
+    """Reason why the keyword was omitted, or why the import is refused."""
     details: list[Detail] = field(default_factory=list)
     barred: bool = False
 
@@ -51,20 +51,20 @@ class Entry:
         return self.barred or bool(self.places or self.reasons)
 
     def take(self, *places: str) -> None:
-        """Records the keys of the case that it became."""
+        """Records the keys of the case into which the keyword was translated."""
         self.places += [place for place in places if place not in self.places]
 
     def leave(self, why: str) -> None:
-        """Records that it is omitted without an effect on the answer, or with a note."""
+        """Records that the keyword is omitted without an effect on the answer, or with a note."""
         self.reasons.append(why)
 
     def refuse(self, why: str) -> None:
-        """Records that a case without it would give a wrong answer."""
+        """Records that a case without the keyword would give a wrong answer."""
         self.barred = True
         self.reasons.append(why)
 
     def remark(self, kind: Remark, what: str, why: str) -> None:
-        """Records the fate of one of its fields."""
+        """Records the fate of a field of the keyword."""
         detail = Detail(kind, what, why)
         if detail not in self.details:
             self.details.append(detail)
@@ -75,7 +75,7 @@ class Entry:
         return f"line {self.line} of {self.file}" if self.file else f"line {self.line}"
 
     def refusals(self) -> Iterator[str]:
-        """Returns the reasons why it refuses the import, a line each."""
+        """Returns the reasons for which the keyword refuses the import, a line each."""
         if self.barred:
             yield f"{self.place}, {self.keyword}: {'; '.join(self.reasons)}"
         for each in self.details:
@@ -92,7 +92,7 @@ class Entry:
 
 
 class Account:
-    """Every keyword line of a deck once, in the order of the deck."""
+    """Record of all keyword lines of a deck, each once, in the order of the deck."""
 
     def __init__(self) -> None:
         """Starts without entries."""

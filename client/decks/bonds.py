@@ -1,4 +1,4 @@
-"""Joined parts of a deck as bonds: by common nodes, or tied by a keyword."""
+"""Bonds of a case from joined parts of a deck. The parts have common nodes, or a keyword ties them."""
 
 from collections.abc import Iterable, Sequence
 
@@ -7,7 +7,7 @@ from .draft import Body, Draft
 from .topology import Topology
 
 Tie = tuple[tuple[str, str], Entry]
-"""Keys of two bodies, and the keyword that ties them."""
+"""Keys of two bodies, and the keyword that ties the bodies."""
 
 
 def join(draft: Draft, topology: Topology, bodies: Sequence[Body], ties: Iterable[Tie]) -> None:

@@ -17,12 +17,12 @@ _MOST_FRAMES = 100_000
 
 @dataclass
 class Made:
-    """A material of a deck as one of Conoid."""
+    """A material of a deck, converted to keys of a case."""
 
     material: dict[str, Any]
     """Keys below ``[materials.NAME]``; empty for a law that Conoid lacks."""
     erosion: dict[str, Any] = field(default_factory=dict)
-    """Its criteria for the deletion of tets, which are keys of the part in Conoid."""
+    """Criteria of the material for the deletion of tets. In Conoid these are keys of the part."""
     rigid: bool = False
     temperature: str | float | None = None
     """Initial temperature."""
@@ -56,7 +56,7 @@ class Draft:
     """The tables of a case, filled keyword by keyword."""
 
     def __init__(self, deck: Path, system: System, account: Account) -> None:
-        """``deck``: the file with the mesh of the parts."""
+        """Makes an empty case; ``deck``: the file with the mesh of the parts."""
         self.deck = deck
         self.system = system
         self.account = account
@@ -133,7 +133,8 @@ class Draft:
 
     def set_frames(self, count: float, interval: float, end: float, entry: Entry) -> int:
         """Returns ``run.frames`` for a number, or for an interval up to the end, in the unit of the deck; 0 for
-        none."""
+        none.
+        """
         frames = count if count > 0.0 else end / interval if interval > 0.0 and math.isfinite(end) else 0.0
         if not 0.5 <= frames <= _MOST_FRAMES:
             entry.leave(f"no number of frames from 1 to {_MOST_FRAMES:,}: run.frames is 20")

@@ -1,4 +1,4 @@
-"""Named fields of a keyword, with a record of those that were read."""
+"""Named fields of a keyword, and a record of the fields that were read."""
 
 from collections.abc import Sequence
 from typing import Generic, TypeVar
@@ -17,7 +17,7 @@ class Fields(Generic[Place]):
     """
 
     def __init__(self, entry: Entry, found: dict[str, tuple[Place, str]], extra: Sequence[int]) -> None:
-        """``extra``: numbers of lines behind those with names."""
+        """Stores the fields; ``extra``: numbers of the lines after the lines with named fields."""
         self.entry = entry
         self.extra = list(extra)
         self._found = found

@@ -38,7 +38,7 @@ class Holding:
     """Makes boundaries of all restraints of a deck."""
 
     def __init__(self, draft: Draft, topology: Topology, bodies: Sequence[Body]) -> None:
-        """``bodies``: those of the case, with their names."""
+        """Stores the draft; ``bodies``: bodies of the case, with their names."""
         self._draft, self._topology = draft, topology
         self._names = {body.key: body.name for body in bodies}
 
@@ -82,8 +82,8 @@ class Holding:
             each.open.discard(axis)
 
     def _plane(self, axis: str, key: str, held: set[int]) -> float | None:
-        """Returns the coordinate of the restrained nodes of a body if they are all nodes of one plane at an end of
-        it.
+        """Returns the coordinate of the restrained nodes of a body if these are all nodes of one plane at an end of
+        the body.
         """
         d, mine = AXES.index(axis), self._topology.of[key] & held
         if not mine:
@@ -146,8 +146,8 @@ def velocity_course(curve: Course, end: float) -> tuple[float, Course]:
 
 
 def displacement_speed(curve: Course, end: float) -> float:
-    """Returns the constant velocity of displacements that grow linearly from 0 up to the end. Raises ValueError for
-    others.
+    """Returns the constant velocity of displacements that grow linearly from 0 until the end. Raises ValueError for
+    other displacements.
     """
     inside = [(time, value) for time, value in curve if time <= end]
     if curve and curve[-1][0] < end:

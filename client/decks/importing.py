@@ -44,8 +44,8 @@ class Imported:
 
 
 def read_deck(path: Path, wanted: str | None = None, kind: str | None = None) -> Imported:
-    """Imports a deck. ``wanted``: units as the user names them; ``kind``: one of DIALECTS, otherwise recognised.
-    Raises UsageError with one line where units are needed, or for a file that is not a deck.
+    """Imports a deck. ``wanted``: units in the notation of the user; ``kind``: one of DIALECTS, by default
+    recognised. Raises UsageError with one line if units are missing, or for a file that is not a deck.
     """
     try:
         dialect = dialect_of(path, kind)(path)
@@ -81,7 +81,7 @@ def _units(dialect: Dialect, wanted: str | None) -> tuple[units.System, str]:
 
 
 def _checked(data: dict[str, Any]) -> list[str]:
-    """Returns the errors of the case that was made, as ``conoid validate`` words them."""
+    """Returns the errors of the imported case, in the words of ``conoid validate``."""
     try:
         parse_case(bare(data))
     except CaseError as error:
@@ -93,8 +93,9 @@ def _checked(data: dict[str, Any]) -> list[str]:
 
 
 def lines(found: Imported, target: str) -> list[str]:
-    """Returns the account for users: translated keywords with their keys, omitted ones with the reason; every
-    keyword once."""
+    """Returns the account for users. Each keyword occurs once: a translated keyword with its keys, an omitted
+    keyword with the reason.
+    """
     account = found.account
     told = [f"{found.deck.name}, {found.kind} -> {target}", f"units: {found.system}: {found.why}"]
     told += [f"note: {each}" for each in account.remarks]

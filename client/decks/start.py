@@ -1,4 +1,4 @@
-"""Initial velocities of nodes or parts of a deck as those of the parts of a case."""
+"""Conversion of initial velocities of nodes or parts of a deck to initial velocities of the parts of a case."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -11,8 +11,9 @@ from .units import LENGTH
 
 @dataclass
 class Start:
-    """Initial velocity that a keyword gives to nodes, in units of the deck; later ones add components or replace
-    them."""
+    """Initial velocity that a keyword gives to nodes, in units of the deck. A later keyword adds components or
+    replaces the velocity.
+    """
 
     chosen: Chosen
     entry: Entry

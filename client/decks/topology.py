@@ -48,13 +48,15 @@ class Topology:
         return self._read_points()
 
     def nodes(self, chosen: Chosen) -> set[int]:
-        """The nodes of a target, whether they are of bodies or not."""
+        """Returns the nodes of a target, including nodes of no body."""
         if chosen.bodies is not None:
             return set().union(*(self.of.get(key, set()) for key in chosen.bodies))
         return chosen.nodes() if chosen.nodes is not None else set()
 
     def whole(self, chosen: Chosen) -> tuple[list[str], list[str]]:
-        """Returns the bodies with all nodes in the target, and those with some, in order."""
+        """Returns the bodies whose nodes are all in the target, and the bodies with only some nodes in the target,
+        in order.
+        """
         if chosen.bodies is not None:
             return [key for key in self.bodies if key in chosen.bodies], []
         wanted = self.nodes(chosen)

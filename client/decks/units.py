@@ -41,7 +41,7 @@ _NAMED = {
     STRESS: ("Pa", "kPa", "MPa", "GPa", "Mbar", "psi", "ksi"), SPECIFIC_HEAT: ("J/kg/K",),
     DENSITY: ("kg/m^3",), SPEED: ("m/s",), ACCELERATION: ("m/s^2",),
 }  # fmt: skip
-"""Common units, used where one is exactly that of a system."""
+"""Common units. A common unit is used if it is exactly that of a system."""
 
 
 @dataclass(frozen=True)
@@ -70,7 +70,8 @@ class System:
 
     def quantity(self, value: float, dimension: Dimension) -> str | float:
         """Returns a number of the deck with its unit, as in a case. Raises ValueError for one that a case cannot
-        have."""
+        have.
+        """
         if not math.isfinite(value):
             raise ValueError(f"{value!r} is not finite")
         scaled = Fraction(repr(float(value))) * self.factor(dimension)

@@ -19,7 +19,7 @@ class Stop:
 
 
 def stand(draft: Draft, topology: Topology, bodies: Sequence[Body], stops: Sequence[Stop]) -> list[tuple[str, ...]]:
-    """Adds the walls; returns the keys of the bodies that each one stops."""
+    """Adds the walls to the case; returns the keys of the bodies that each wall stops."""
     names = {body.key: body.name for body in bodies}
     keys: list[tuple[str, ...]] = []
     for each in stops:

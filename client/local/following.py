@@ -45,7 +45,7 @@ class _File:
 
 
 class FolderRun:
-    """A run in a folder, which can be followed."""
+    """A run in a folder of this machine, followed by its journal."""
 
     def __init__(self, folder: Path, place: str = "") -> None:
         """Prepares to follow a run; ``place``: the folder of Slurm's commands. If it is empty, the commands are in

@@ -84,7 +84,7 @@ def rows_of(page: TablePage) -> Iterator[RunRow]:
 
 
 def differing(rows: Sequence[RunRow], most: int) -> list[str]:
-    """Returns the keys whose values differ between rows of similar cases; those of most rows first."""
+    """Returns the keys whose values differ between rows of similar cases; keys that differ in most rows are first."""
     found = Counter[str]()
     for alike in {id(row.alike): row.alike for row in rows if row.alike is not None}.values():
         own = [row for row in rows if row.alike is alike]

@@ -41,7 +41,7 @@ class RunInfo(msgspec.Struct, kw_only=True, frozen=True):
     short: str = ""
     """Shortest unique prefix of the id; in lists only."""
     estimate: dict[str, Any] = {}
-    """This field and the following ones are those of a single run, not of a list (_OF_ONE)."""
+    """The fields from here on are those of a single run; lists do not have these fields (_OF_ONE)."""
     progress: Progress | None = None
     outcome_json: msgspec.Raw = msgspec.field(name="outcome", default=msgspec.Raw(b"null"))
 

@@ -19,7 +19,8 @@ sent before a timeout."""
 _FIRST = 1 << 17
 """Bytes of the first piece, before the speed of the connection is known. Chosen value."""
 _WANTED = 2.0
-"""Target duration of a piece in s; a slower piece makes the next ones smaller. Chosen value: a break loses as much."""
+"""Target duration of sending a piece, s; after a slower piece the next pieces are smaller. Chosen value: a broken
+connection loses at most one piece."""
 _PATIENCE = 60.0
 """Time in s without progress after which the upload is given up. Chosen value: a restarted server is back by then."""
 _PAUSE = 0.5

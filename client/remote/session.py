@@ -51,7 +51,7 @@ class _Known(Protocol):
 
     @property
     def id(self) -> str:
-        """Its id."""
+        """Id of the run or the sweep."""
 
 
 class Verdict(msgspec.Struct, kw_only=True, frozen=True):
@@ -177,7 +177,7 @@ class Session(Http):
         return list(self._sweeps())
 
     def _sweeps(self, beginning: str = "") -> Iterator[SweepInfo]:
-        """Yields sweeps, newest first, from those with this prefix on."""
+        """Yields sweeps, newest first, beginning with ids of this prefix."""
         query = {"before": beginning + _LAST} if beginning else {}
         for _ in range(_MOST_PAGES):
             page = self.get(SweepPage, "/v1/sweeps", limit=500, **query)

@@ -31,7 +31,7 @@ T = TypeVar("T")
 _CAPACITY = 4096
 """Largest number of messages that wait to be read. Chosen value: minutes of a run, which sends some ten per second."""
 _BLOBS = 4
-"""Number of snapshots that are kept until they are read. Chosen value: a reader is seconds behind at most."""
+"""Number of snapshots that are stored until they are read. Chosen value: a reader is at most seconds late."""
 _OPEN_SECONDS = 5.0
 """Time limit for the answer of a router before SSE is used, s. Chosen value."""
 _CLOSE_SECONDS = 2.0

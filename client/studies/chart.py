@@ -1,4 +1,6 @@
-"""Chart of speed-up over cores as SVG: projected, measured with a core for each thread, and measured by others."""
+"""Chart of speed-up over cores as SVG: projected values, values measured with a core for each thread, and values of
+another source.
+"""
 
 import math
 from collections.abc import Mapping

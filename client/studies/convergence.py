@@ -81,8 +81,8 @@ def run_all(session: Session, data: Mapping[str, Any], plan: Plan, folder: Path)
 
 
 def _key(case: Mapping[str, Any]) -> str:
-    """Returns the idempotency key of a point: the same for the same case and version, so that an interrupted study
-    continues.
+    """Returns the idempotency key of a point. The key is the same for the same case and version: an interrupted
+    study continues.
     """
     text = json.dumps([metadata.version("conoid"), case], sort_keys=True, default=str)
     return f"converge-{hashlib.sha256(text.encode()).hexdigest()[:40]}"

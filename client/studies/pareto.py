@@ -18,7 +18,9 @@ _LEAST = 1e-6
 
 
 def figure(book: Book) -> Figure:
-    """Quantities without differences between the meshes are omitted if there are others."""
+    """Draws error over cost of each quantity. Quantities without differences between the meshes are omitted if other
+    quantities have differences.
+    """
     goals = book.goals()
     shown = (book.moving() or list(goals))[:_PANELS]
     across = max(1, min(len(shown), 3))

@@ -17,7 +17,7 @@ from ..errors import ClientError, UsageError
 
 Point = tuple[float, float, float]
 Shares = list[tuple[int, float]]
-"""Groups of a rank, and its share of each."""
+"""Groups of a rank, and the rank's fraction of each group."""
 
 
 @dataclass
@@ -72,7 +72,7 @@ class Record:
 
     @property
     def heaviest(self) -> float:
-        """Largest share of all work that one group has at any time."""
+        """Largest fraction of all work that one group has at any time."""
         return max((max(m.load) / sum(m.load) for m in self.moments if any(m.load)), default=0.0)
 
 
@@ -133,7 +133,9 @@ def replay(record: Record, spec: Spec, ranks: int, cost: float, scale: Point = (
 
 
 def compare(record: Record, spec: Spec, ranks: int, cost: float, scale: Point) -> list[Account]:
-    """Returns the policy of ``spec``, then the others with its ``alpha`` and ``every``."""
+    """Returns the policy of ``spec``, then the other policies with the parameters ``alpha`` and ``every`` of
+    ``spec``.
+    """
     policies = [spec.policy, *(p for p in ("measured", "outside", "every", "never") if p != spec.policy)]
     specs = [spec.model_copy(update={"policy": policy}) for policy in policies]
     return [replay(record, each, ranks, cost, scale) for each in specs]

@@ -13,7 +13,7 @@ from itertools import pairwise
 FORMAL = 2.0
 """Order of linear tets and of the leapfrog scheme in smooth motion: the largest order used for an extrapolation."""
 SAFETY, CAUTION = 1.25, 3.0
-"""Safety factors of V&V 20: with an observed order from three meshes and more, and without."""
+"""Safety factors of V&V 20: with an observed order from at least three meshes, and without an observed order."""
 SLOWEST = 0.5
 """Order below which Eca and Hoekstra do not trust an extrapolation."""
 _ORDERS = (0.01, 12.0)
@@ -41,7 +41,7 @@ class Limit:
 
     trend: Trend
     value: float
-    """Value extrapolated to the size 0 if it converges; otherwise that of the finest mesh."""
+    """Value extrapolated to the element size 0 if the quantity converges; otherwise the value on the finest mesh."""
     uncertainty: float
     """Absolute uncertainty of the value on the finest mesh, at 95 %: the grid convergence index times the value."""
     order: float = math.nan
@@ -88,7 +88,7 @@ def extrapolated(fine: float, coarse: float, ratio: float, order: float) -> floa
 
 
 def grid_convergence_index(fine: float, coarse: float, ratio: float, order: float, safety: float = SAFETY) -> float:
-    """Returns the uncertainty of the fine value, relative to it, at 95 % (Celik and others, eq. 7)."""
+    """Returns the relative uncertainty of the value on the fine mesh, at 95 % (Celik and others, eq. 7)."""
     return safety * abs((fine - coarse) / fine) / (float(ratio**order) - 1.0)
 
 

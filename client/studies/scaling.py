@@ -85,7 +85,7 @@ def run(case: str, overrides: Sequence[str], trial: Trial, folder: Path, seconds
 
 
 def found(trial: Trial, folder: Path, layouts: Sequence[Layout], network: Network) -> list[Projection]:
-    """Returns the projections of a run: of its layout, or of those of ``layouts`` that follow from its tasks."""
+    """Returns the projections of a run: of its layout, or of all ``layouts`` that can be computed from its tasks."""
     place = folder / trial.folder
     if not trial.by_tasks:
         return [read(place, network)]

@@ -200,7 +200,7 @@ def _seconds(value: float) -> str:
 
 
 def table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
-    """Returns Markdown with aligned columns, the first to the left."""
+    """Returns a Markdown table with aligned columns; the first column is aligned left."""
     widths = [max(len(line[i]) for line in (head, *rows)) for i in range(len(head))]
     rule = ["-" * widths[0], *("-" * (width - 1) + ":" for width in widths[1:])]
     lines = [

@@ -55,7 +55,7 @@ def _sure(series: Series, number: Number) -> bool:
 
 
 def elsewhere(all_series: Sequence[Series], number: Number, goal: Target) -> list[Variant]:
-    """Returns the variants whose limit differs from that of the target by more than both uncertainties."""
+    """Returns the variants whose limit differs from the target by more than the uncertainties of both."""
     return [
         each.variant
         for each in all_series
@@ -125,8 +125,8 @@ def _order(all_series: Sequence[Series], number: Number, variant: Variant) -> fl
 
 
 def _growth(all_series: Sequence[Series], variant: Variant) -> float:
-    """Returns the exponent of the cost in 1 / size, from the finest and the coarsest mesh; 4, that of theory, from
-    one mesh.
+    """Returns the exponent of the cost in 1 / size, from the finest and the coarsest mesh. With one mesh the
+    theoretical value 4 is returned.
     """
     meshes = next(each for each in all_series if each.variant == variant).meshes
     fine, coarse = meshes[0], meshes[-1]

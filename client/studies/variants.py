@@ -47,9 +47,9 @@ class Plan:
 
     factors: Sequence[float]
     forms: Sequence[str] = ()
-    """Pressure forms; that of the case when empty."""
+    """Pressure forms; if empty, the form of the case."""
     safeties: Sequence[float] = ()
-    """Values of dt_safety; that of the case when empty."""
+    """Values of dt_safety; if empty, the value of the case."""
     members: int = 1
     vary: str = STEPS
     ranks: int = 1
@@ -75,8 +75,8 @@ class Plan:
 
 
 def sizes(case: Case, factor: float) -> dict[str, float]:
-    """Returns keys and values of all element sizes times ``factor``; those of mesh files and loose tets stay. Raises
-    UsageError if no part has a generated mesh.
+    """Returns keys and values of all element sizes times ``factor``. Sizes of mesh files and loose tets do not
+    change. Raises UsageError if no part has a generated mesh.
     """
     found: dict[str, float] = {}
     for index, part in enumerate(case.parts):

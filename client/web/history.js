@@ -6,8 +6,8 @@ import { pick } from "./tables.js";
 
 const POINTS = 1000;
 const MOST = 4096; // Largest number of reports of the server.
-const SOON = 2000; // ms after which the columns of the history are requested again while the server has none,
-const LATER = 15000; // ms after which they are requested again while the run is open: the stream has only some of the lines.
+const SOON = 2000; // ms after which missing columns of the history are requested again.
+const LATER = 15000; // ms after which the columns of an open run are requested again: the stream has only some of the lines.
 
 const path = (run) => `v1/runs/${encodeURIComponent(run)}`;
 const pause = (ms, signal) => new Promise((resolve) => {

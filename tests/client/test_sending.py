@@ -255,7 +255,7 @@ def unusable(folder: Path, kind: str) -> str:
     ],
 )  # fmt: skip
 def test_what_is_no_file_is_refused_in_a_line(folder: Path, kind: str, said: str) -> None:
-    """The client refuses it before a request to a server, and does not hang."""
+    """The client refuses the path before a request to a server, and does not hang."""
     with Session("http://127.0.0.1:9") as session, pytest.raises(CaseError) as told:
         session.submit(case_with(unusable(folder, kind)))
     (problem,) = told.value.problems

@@ -85,7 +85,7 @@ def test_what_cannot_be_counted_is_not_accepted(tmp_path_factory: pytest.TempPat
 
 @pytest.mark.slow
 def test_a_case_that_takes_too_long_is_given_up(server: Running, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Thousands of bodies are at one place, and each is compared with each."""
+    """The case has thousands of bodies at one place, and the check compares each with each."""
     from .hostile import good
 
     part = good()["parts"][0]

@@ -290,7 +290,7 @@ def test_wherever_a_disk_fails_the_same_again_makes_the_file_whole(tmp_path: Pat
 
 
 def test_another_connection_waits_and_takes_over_from_one_that_is_silent(server: Running) -> None:
-    """The receiver's record has a transfer with recent bytes, and a silent one."""
+    """The receiver has one transfer that received bytes recently, and another without recent bytes."""
     data, sha256 = made(100)
     transfer = receiving._Transfer()
     book = server.service.receiver._open

@@ -1,4 +1,4 @@
-"""A keyword of an Abaqus input file with its parameters and data lines, and a record of those that were read."""
+"""A keyword of an Abaqus input file with its parameters and data lines. It records which parameters were read."""
 
 from dataclasses import dataclass, field
 
@@ -11,7 +11,9 @@ Row = tuple[int, str]
 
 @dataclass
 class Keyword:
-    """``word`` as the manual spells it; ``scope``: name of its part or instance, empty outside."""
+    """``word``: keyword in the spelling of the manual; ``scope``: name of the part or instance that contains it,
+    empty outside.
+    """
 
     word: str
     line: int
@@ -21,7 +23,7 @@ class Keyword:
     scope: str = ""
     material: str = ""
     step: int = 0
-    """Number of its step, from 1; 0 outside of steps."""
+    """Number of the step that contains the keyword, from 1; 0 outside of steps."""
     _read: set[str] = field(default_factory=set)
 
     def get(self, name: str) -> str | None:
@@ -39,7 +41,7 @@ class Keyword:
         return self.get(name) is not None
 
     def key(self, name: str) -> str:
-        """Returns the value for the comparison of names: without blanks, in upper case."""
+        """Returns the value of a parameter in the form for comparisons of names: without blanks, in upper case."""
         return joined(self.get(name) or "")
 
     def forgive(self, names: str, why: str) -> None:
@@ -55,12 +57,12 @@ class Keyword:
                 self.entry.remark("refused", name, "this parameter is not translated")
 
     def filled(self) -> list[Row]:
-        """The data lines that are not empty."""
+        """Data lines that are not empty."""
         return [row for row in self.rows if row[1].strip()]
 
     def table(self, columns: int) -> list[list[float]]:
-        """Reads the numbers of its data lines. Raises InpError where a line has more than ``columns`` that are not
-        0.
+        """Reads the numbers of the data lines. Raises InpError for a line with more than ``columns`` numbers other
+        than 0.
         """
         found = [(line, numbers(line, text)) for line, text in self.filled()]
         for line, row in found:
@@ -69,14 +71,14 @@ class Keyword:
         return [(row + [0.0] * columns)[:columns] for _, row in found]
 
     def single(self, columns: int) -> list[float]:
-        """Reads the numbers of its only data line. Raises InpError if there are more, or none."""
+        """Reads the numbers of the keyword's only data line. Raises InpError for more lines, or for none."""
         found = self.table(columns)
         if len(found) != 1:
             raise InpError(f"line {self.line}: *{self.word} has {len(found)} data lines; one is translated")
         return found[0]
 
     def lists(self) -> list[tuple[int, list[str]]]:
-        """The fields of its data lines."""
+        """Fields of the data lines."""
         return [(line, fields(text)) for line, text in self.filled()]
 
 

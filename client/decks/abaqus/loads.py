@@ -16,11 +16,12 @@ _NAMED = {
     "ENCASTRE": "xyz", "PINNED": "xyz", "XSYMM": "x", "YSYMM": "y", "ZSYMM": "z", "XASYMM": "yz", "YASYMM": "xz",
     "ZASYMM": "xy",
 }  # fmt: skip
-"""Names of restraints, and the translations that they fix (Analysis User's Guide, "Boundary conditions")."""
+"""Names of restraints, with the translations that each restraint fixes (Analysis User's Guide, "Boundary
+conditions")."""
 
 
 class Loads:
-    """Restraints, motions, initial velocities and gravity, as they are read."""
+    """Collects restraints, motions, initial velocities and gravity while the keywords are read."""
 
     def __init__(self, draft: Draft, amplitudes: Sequence[Keyword], chosen: Callable[[str, Entry], Chosen]) -> None:
         """``chosen``: returns the node set of a data line."""

@@ -1,6 +1,6 @@
-"""Materials of Abaqus/Explicit as those of Conoid (Analysis User's Guide, "Materials").
+"""Conversion of materials of Abaqus/Explicit to materials of Conoid (Analysis User's Guide, "Materials").
 
-Differences of the formulas are notes of the keyword; docs/howto/import.md compares them.
+Differences of the formulas are notes of the keyword; docs/howto/import.md compares the formulas.
 """
 
 from collections.abc import Sequence
@@ -29,7 +29,7 @@ class Material:
     """The keywords below one ``*MATERIAL``."""
 
     def __init__(self, head: Keyword, below: Sequence[Keyword], system: System, heat: Heat) -> None:
-        """``below``: in the order of the deck."""
+        """Makes the reader of a material; ``below``: the keywords below ``*MATERIAL``, in the order of the deck."""
         self.head, self._system, self._heat = head, system, heat
         self._below = {each.word: each for each in below}
         self._done: set[str] = set()
@@ -65,7 +65,7 @@ class Material:
         return Made(material, erosion, temperature=temperature)
 
     def taken(self, place: str) -> None:
-        """Records that its keywords became the material of the case."""
+        """Records that the keywords of the material became a material of the case."""
         self.head.entry.take(place)
         for word in self._done:
             if not self._below[word].entry.decided:
@@ -148,7 +148,7 @@ class Material:
         return law, self._system.quantity(max(self._kelvin(0.0), 0.0), TEMPERATURE)
 
     def _heating(self, plastic: Keyword) -> dict[str, Any]:
-        """Reads specific heat and the share of the work that becomes heat: none without ADIABATIC."""
+        """Reads the specific heat, and the fraction of the plastic work that becomes heat: 0 without ADIABATIC."""
         if not self._heat.adiabatic:
             plastic.entry.remark("differs", "no heat", "without *DYNAMIC, EXPLICIT, ADIABATIC no work becomes heat "
                                  "(taylor_quinney = 0); specific_heat has no meaning")  # fmt: skip
@@ -226,7 +226,9 @@ def _cold(room: str | float) -> dict[str, Any]:
 
 
 def weighed(name: str, below: Sequence[Keyword]) -> Weighed | None:
-    """Returns density and Young's modulus of a material, to find the units; None if they cannot be read."""
+    """Returns density and Young's modulus of a material, from which the units are found; None if a value cannot be
+    read.
+    """
     found = {each.word: each for each in below}
     try:
         density = found["DENSITY"].single(1)[0]

@@ -98,7 +98,7 @@ class Meetings:
             self.made.append(Meeting(first, None if second == first else second, friction, each.entry))
 
     def _assigned(self, each: Keyword) -> tuple[float, list[tuple[frozenset[str], frozenset[str], float, Entry]]]:
-        """Reads the friction of general contact, and that of pairs of surfaces."""
+        """Reads the friction of general contact, and the friction of pairs of surfaces."""
         friction, pairs = 0.0, []
         each.rest()
         for _, items in each.lists():

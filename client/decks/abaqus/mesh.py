@@ -1,4 +1,4 @@
-"""Nodes of the parts and sets of an Abaqus input file: a second reading, on demand."""
+"""Nodes of the parts and sets of an Abaqus input file. The file is read a second time if keywords need the nodes."""
 
 import math
 from array import array

@@ -1,4 +1,4 @@
-"""An Abaqus/Explicit input file as a case."""
+"""Import of an Abaqus/Explicit input file as a case."""
 
 from collections.abc import Iterator
 from functools import cached_property
@@ -70,7 +70,7 @@ class Abaqus:
         self.keywords.append(made)
 
     def weighed(self) -> Iterator[Weighed]:
-        """Densities of the materials, to find the units."""
+        """Densities of the materials, from which the units are found."""
         for head in self.of("MATERIAL"):
             found = weighed(head.get("NAME") or "material", self._below(head))
             if found is not None:
@@ -82,7 +82,7 @@ class Abaqus:
     # The case ---------------------------------------------------------------------------------------------------------
 
     def draft(self, system: System) -> Draft:
-        """Returns the case; ``system``: its units."""
+        """Returns the case; ``system``: unit system of the deck."""
         self._draft = Draft(self.path, system, self.account)
         self._heading()
         bodies = list(self._bodies())
@@ -180,8 +180,9 @@ class Abaqus:
             each.entry.take("parts[].rigid")
 
     def _of_elements(self, each: Keyword) -> set[str]:
-        """Returns the keys of the bodies all of whose elements the set has; empty if it has others, or some of a
-        body."""
+        """Returns the keys of the bodies that lie in the set with all elements; empty if the set has other elements,
+        or only some of a body.
+        """
         name = each.get("ELSET") or ""
         if each.scope:
             owners = {each.scope, *(one for one, made in self.instances.items() if made.key("PART") == each.scope)}

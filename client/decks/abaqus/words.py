@@ -1,4 +1,6 @@
-"""Keywords of Abaqus that are omitted, with the reason, and those that change the answer; all others are read."""
+"""Keywords of Abaqus that are omitted, with the reason, and keywords that change the answer. All other known
+keywords are read.
+"""
 
 _OUTPUT = "output: a run writes frames, history.csv and probes"
 _END = "the end of what stands before it"

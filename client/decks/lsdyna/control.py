@@ -23,12 +23,13 @@ _LAYOUT = (
     "SSID MSID SSTYP MSTYP SBOXID MBOXID SPR MPR", "FS FD DC VC VDC PENCHK BT DT", "SFS SFM SST MST SFST SFMT FSF VSF",
 )  # fmt: skip
 Surface = Callable[[int, int, Entry], frozenset[str]]
-"""Returns the bodies of a surface: its number, its type, the keyword. Raises ValueError."""
+"""Interface that returns the bodies of a surface; arguments: its number, its type, the keyword. Raises ValueError."""
 
 
 def contact(block: Block, name: str, options: frozenset[str], entry: Entry, surface: Surface) -> Meeting:
     """Reads a contact from its three cards; bodies of a single surface are in contact with each other and
-    themselves. Raises ValueError."""
+    themselves. Raises ValueError.
+    """
     fields = Fields(block, entry, _behind(block, options, entry), _LAYOUT)
     fields.forgive("SPR MPR PENCHK VC VDC SFS SFM SST MST SFST SFMT VSF", "stiffness and output of the penalty method")
     fields.refuse("SBOXID MBOXID", "boxes are not translated")
@@ -56,7 +57,9 @@ def contact(block: Block, name: str, options: frozenset[str], entry: Entry, surf
 
 
 def _behind(block: Block, options: frozenset[str], entry: Entry) -> list[Card]:
-    """Returns the cards behind a title and those of the option MPP: one, and a second one that begins with ``&``."""
+    """Returns the cards after a title and after the cards of the option MPP. The option has one card, and a second
+    card if that begins with ``&``.
+    """
     cards = trimmed(block.cards)[bool(options & {"ID", "TITLE"}) :]
     if "MPP" not in options or not cards:
         return cards

@@ -31,7 +31,7 @@ class Fields(fields.Fields[Card]):
 
 
 def trimmed(cards: Sequence[Card]) -> list[Card]:
-    """Returns the cards without empty ones at their end; an empty one between others has empty fields."""
+    """Returns the cards without empty cards at their end; an empty card between others has empty fields."""
     found = list(cards)
     while found and not found[-1].text.strip():
         found.pop()
@@ -39,5 +39,5 @@ def trimmed(cards: Sequence[Card]) -> list[Card]:
 
 
 def numbers(block: Block, cards: Sequence[Card], what: str, width: int = _WIDTH, count: int = 8) -> list[int]:
-    """Reads whole numbers of many cards, without the empty ones. Raises CardError."""
+    """Reads whole numbers of many cards; empty fields are skipped. Raises CardError."""
     return [block.whole(card, item, what) for card in cards for item in block.fields(card, *(width,) * count) if item]

@@ -32,4 +32,4 @@ LAYOUTS: dict[str, tuple[str, ...]] = {
     "EOS_GRUNEISEN": ("EOSID C S1 S2 S3 GAMAO A E0", "V0"),
     "EOS_LINEAR_POLYNOMIAL": ("EOSID C0 C1 C2 C3 C4 C5 C6", "E0 V0"),
 }  # fmt: skip
-"""Fields of the cards of a keyword, as the manual names them."""
+"""Fields of the cards of each keyword, with the names of the manual."""

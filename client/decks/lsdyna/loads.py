@@ -23,7 +23,7 @@ _CORNERS = "DOFX DOFY DOFZ"
 
 
 def velocity(scene: Scene, block: Block, options: frozenset[str], entry: Entry) -> None:
-    """Reads ``*INITIAL_VELOCITY``: of a node set, or of all nodes."""
+    """Reads ``*INITIAL_VELOCITY``, the initial velocity of a node set or of all nodes."""
     fields = Fields(block, entry, block.cards, ("NSID NSIDEX BOXID IRIGID ICID", "VX VY VZ VXR VYR VZR"))
     fields.refuse("NSIDEX BOXID ICID", "exceptions, boxes and local axes are not translated")
     fields.forgive("IRIGID", "whether velocities of rigid bodies are overwritten")
@@ -34,7 +34,9 @@ def velocity(scene: Scene, block: Block, options: frozenset[str], entry: Entry) 
 
 
 def velocity_node(scene: Scene, block: Block, options: frozenset[str], entry: Entry) -> None:
-    """Reads ``*INITIAL_VELOCITY_NODE``: of single nodes; nodes with the same velocity are one group."""
+    """Reads ``*INITIAL_VELOCITY_NODE``, initial velocities of single nodes. Nodes with the same velocity become one
+    group.
+    """
     groups: dict[tuple[float, ...], set[int]] = {}
     for card in block.filled():
         fields = Fields(block, entry, [card], ("NID VX VY VZ VXR VYR VZR ICID",))
@@ -152,7 +154,8 @@ def motion(scene: Scene, block: Block, options: frozenset[str], entry: Entry) ->
 
 def body_load(scene: Scene, block: Block, options: frozenset[str], entry: Entry) -> None:
     """Reads ``*LOAD_BODY_X``, ``_Y``, ``_Z``: an acceleration of the base, opposite to the acceleration of the
-    bodies."""
+    bodies.
+    """
     fields = Fields(block, entry, block.cards, ("LCID SF LCIDDR XC YC ZC CID",))
     fields.forgive("LCIDDR", "the load of the dynamic relaxation")
     fields.refuse("CID", "local axes are not translated")
@@ -181,4 +184,4 @@ HANDLERS: Mapping[str, tuple[Handler, frozenset[str]]] = {
     "RIGIDWALL_GEOMETRIC": (walls.geometric, walls.OPTIONS - {"FORCES", "MOVING"}),
     "LOAD_BODY": (body_load, frozenset({"X", "Y", "Z"})),
 }
-"""Translated keywords, with the options that may follow them."""
+"""Translated keywords, each with the options that may follow."""

@@ -1,6 +1,6 @@
-"""Materials and equations of state of LS-DYNA as those of Conoid (LS-DYNA Keyword User's Manual, volume II).
+"""Conversion of materials and equations of state of LS-DYNA to Conoid (LS-DYNA Keyword User's Manual, volume II).
 
-Differences of the formulas are notes of the keyword; docs/howto/import.md compares them.
+Differences of the formulas are notes of the keyword; docs/howto/import.md compares the formulas.
 """
 
 from collections.abc import Callable
@@ -14,7 +14,8 @@ from .johnson import holmquist, johnson_cook, simplified
 
 def translated(name: str, fields: Fields, context: Context) -> Made | None:
     """Returns the material of a keyword; None, with the reason in its entry, for one that Conoid lacks. Raises
-    CardError."""
+    CardError.
+    """
     law = _LAWS.get(name)
     if law is None:
         fields.entry.refuse("Conoid has no such material law")
@@ -44,7 +45,9 @@ def weighed(name: str, fields: Fields) -> tuple[float, float | None]:
 
 
 def erode(fields: Fields | None, made: Made) -> None:
-    """Reads ``*MAT_ADD_EROSION``: criteria of strain; all others change the answer. Raises CardError."""
+    """Reads ``*MAT_ADD_EROSION``. Criteria of strain are translated; all other criteria change the answer. Raises
+    CardError.
+    """
     if fields is None:
         return
     fields.whole("MID")

@@ -1,4 +1,6 @@
-"""Nodes of the parts of an LS-DYNA deck and their positions: a second reading, on demand."""
+"""Nodes of the parts of an LS-DYNA deck and their positions. The deck is read a second time if keywords need the
+nodes.
+"""
 
 from pathlib import Path
 
@@ -24,7 +26,7 @@ def read_points(path: Path) -> dict[int, Point]:
 def _point(block: Block, card: Card) -> tuple[int, Point]:
     text = card.text
     if block.least <= _NODE[0] and "," not in text:
-        try:  # the plain format, ten times as fast
+        try:  # for the plain format, ten times as fast as the general reader
             return int(text[:8]), (float(text[8:24]), float(text[24:40]), float(text[40:56]))
         except ValueError:
             pass
@@ -68,7 +70,8 @@ def parts_of(block: Block) -> set[str]:
 
 def _heads(block: Block) -> list[Card]:
     """Yields the cards with the numbers of element and part: every one, or every second if the nodes are on another
-    card."""
+    card.
+    """
     cards = list(block.filled())
     two = bool(cards) and len(_items(block, cards[0])) <= 2
     return cards[:: 1 + two]

@@ -1,4 +1,4 @@
-"""An LS-DYNA keyword deck as a case."""
+"""Import of an LS-DYNA keyword deck as a case."""
 
 from collections.abc import Iterator
 from functools import partial
@@ -161,7 +161,7 @@ class LsDyna:
     # The case ---------------------------------------------------------------------------------------------------------
 
     def draft(self, system: System) -> Draft:
-        """Returns the case; ``system``: its units."""
+        """Returns the case; ``system``: unit system of the deck."""
         self._draft = Draft(self.path, system, self.account)
         self._draft.title = self.title
         names = self._draft.call(self._bodies, self._solid)

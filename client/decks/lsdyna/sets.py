@@ -23,10 +23,10 @@ class NodeSet:
     sets: set[int] = field(default_factory=set)
     """Other sets of nodes (``_ADD``)."""
     ranges: list[range] = field(default_factory=list)
-    """Ranges of numbers; not all of them need to exist."""
+    """Ranges of node numbers; nodes of some numbers may be missing."""
     everything: bool = False
     odd: str = ""
-    """Reason why its nodes are unknown, if they are."""
+    """Reason for which the nodes of the set are unknown; empty for known nodes."""
 
 
 def titled(block: Block, options: frozenset[str]) -> tuple[str, list[Card]]:
@@ -87,7 +87,7 @@ def segment_set(block: Block, options: frozenset[str], entry: Entry) -> NodeSet:
 
 
 def curve(block: Block, options: frozenset[str], entry: Entry) -> tuple[int, Curve]:
-    """Reads ``*DEFINE_CURVE``: its number and its points, scaled and shifted. Raises CardError."""
+    """Reads ``*DEFINE_CURVE``: the number of the curve, and its scaled and shifted points. Raises CardError."""
     _, cards = titled(block, options)
     head = Fields(block, entry, cards[:1], ("LCID SIDR SFA SFO OFFA OFFO DATTYP LCINT",))
     number = head.whole("LCID")

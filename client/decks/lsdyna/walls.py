@@ -15,9 +15,9 @@ from .scene import Scene
 
 _TAIL, _HEAD = ("XT", "YT", "ZT"), ("XH", "YH", "ZH")
 _SHAPES: Mapping[str, str] = {"CYLINDER": "RADCYL LENCYL NSEGS", "SPHERE": "RADSPH"}
-"""Cards of the round ones (the manual, *RIGIDWALL_GEOMETRIC)."""
+"""Cards of cylinders and spheres (the manual, *RIGIDWALL_GEOMETRIC)."""
 OPTIONS = frozenset({"ID", "FORCES", "DISPLAY", "MOVING", "MOTION", *_SHAPES})
-"""Options that are followed; ORTHO, FINITE, FLAT and PRISM are not."""
+"""Options that are translated. The options ORTHO, FINITE, FLAT and PRISM are not translated."""
 
 
 def planar(scene: Scene, block: Block, options: frozenset[str], entry: Entry) -> None:
@@ -56,7 +56,7 @@ def geometric(scene: Scene, block: Block, options: frozenset[str], entry: Entry)
 
 
 def _cards(block: Block, options: frozenset[str], count: int) -> list[Any]:
-    """The cards of the wall, without those of its number and of what it writes out."""
+    """Returns the cards of the wall, without the card of its number and cards that only request output."""
     cards = list(block.cards["ID" in options :])
     return cards[:count] if options & {"FORCES", "DISPLAY"} else cards
 
@@ -73,7 +73,7 @@ def _direction(fields: Fields) -> list[float]:
 
 
 def _moving(scene: Scene, fields: Fields, table: dict[str, Any]) -> None:
-    """A mass, and the speed along the normal with which it begins; without a mass the wall stays as fast."""
+    """Reads the mass of a wall, and its initial speed along the normal. A speed without a mass is refused."""
     along, speed, mass = table["normal"], fields.real("V0"), fields.real("MASS")
     length = math.hypot(*along)
     if speed:
@@ -87,7 +87,9 @@ def _moving(scene: Scene, fields: Fields, table: dict[str, Any]) -> None:
 
 
 def _driven(scene: Scene, fields: Fields, table: dict[str, Any]) -> None:
-    """A velocity or a displacement by a curve, along a direction whose length scales it not."""
+    """Reads a velocity or a displacement from a curve, along a direction. The length of the direction does not scale
+    the motion.
+    """
     along = [fields.real(name) for name in ("VX", "VY", "VZ")]
     length = math.hypot(*along)
     if length == 0.0:
@@ -100,7 +102,7 @@ def _driven(scene: Scene, fields: Fields, table: dict[str, Any]) -> None:
 
 
 def _stand(scene: Scene, fields: Fields, table: dict[str, Any]) -> None:
-    """Returns the common keys of all walls: stopped nodes, times, and friction."""
+    """Adds a wall, and reads the fields that all kinds of walls have: stopped nodes, times, and friction."""
     fields.refuse("NSIDEX BOXID BIRTH", "exceptions, boxes and times are not translated")
     if 0.0 < fields.real("DEATH") < scene.end:
         fields.refuse("DEATH", "the wall goes before the run ends; here it stays")

@@ -27,7 +27,7 @@ LEFT: dict[str, str] = {
     "DEFINE_VECTOR": "not used by any translated keyword",
     "DEFINE_TABLE": "not used by any translated keyword",
 }
-"""Omitted keywords by the words that they begin with."""
+"""Omitted keywords, identified by their first words."""
 
 REFUSED: dict[str, str] = {
     "ELEMENT_SHELL": "shells: here all bodies are solids",
@@ -61,7 +61,7 @@ REFUSED: dict[str, str] = {
     "EOS": "Conoid has no such equation of state",
     "INCLUDE": "includes that move or change what they bring are not followed",
 }
-"""Keywords that change the answer, by the words that they begin with."""
+"""Keywords that change the answer, identified by their first words."""
 
 
 def reason(name: str, table: dict[str, str]) -> str | None:

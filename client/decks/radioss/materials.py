@@ -1,6 +1,6 @@
-"""Materials, equations of state and failure of Radioss as those of Conoid (Reference Guide, "Material laws").
+"""Conversion of materials, equations of state and failure of Radioss to Conoid (Reference Guide, "Material laws").
 
-Differences of the formulas are notes of the option; docs/howto/import.md compares them.
+Differences of the formulas are notes of the option; docs/howto/import.md compares the formulas.
 """
 
 from collections.abc import Callable
@@ -31,7 +31,7 @@ LAYOUTS: dict[str, tuple[str, ...]] = {
     "GRUNEISEN": ("C S1 S2 S3", "GAMMA0 ALPHA E0 RHO_0"),
     "JOHNSON": ("D1 D2 D3 D4 D5", "EPS_DOT_0 IFAIL_SH: IFAIL_SO: - DADV IXFEM:"),
 }  # fmt: skip
-"""Fields of the lines of an option, with the names of the guide; lines behind the title."""
+"""Fields of the lines after the title of an option, with the names of the guide."""
 
 
 @dataclass
@@ -49,7 +49,8 @@ class Context:
 
 def translated(law: str, fields: Fields, context: Context) -> Made | None:
     """Returns the material of an option; None, with the reason in its entry, for one that Conoid lacks. Raises
-    CardError."""
+    CardError.
+    """
     make = _LAWS.get(law)
     if make is None:
         fields.entry.refuse("Conoid has no such material law")

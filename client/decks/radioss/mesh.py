@@ -1,4 +1,6 @@
-"""Nodes of the parts of a Radioss starter and their positions: a second reading, on demand."""
+"""Nodes of the parts of a Radioss starter and their positions. The starter is read a second time if keywords need
+the nodes.
+"""
 
 from pathlib import Path
 
@@ -33,7 +35,8 @@ def read_nodes(path: Path) -> dict[str, set[int]]:
 
 def _solids(option: Option) -> set[int]:
     """Yields the nodes of elements of a fixed number of nodes, over as many lines as needed: a number, then the
-    nodes."""
+    nodes.
+    """
     count, found = SOLIDS[option.words[0]], set[int]()
     row: list[int] = []
     filled: list[Row] = [row for row in option.rows if row[1].strip()]

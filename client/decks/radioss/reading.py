@@ -1,4 +1,4 @@
-"""A Radioss starter with its engine file as a case."""
+"""Import of a Radioss starter with its engine file as a case."""
 
 from collections.abc import Callable, Iterator
 from functools import partial
@@ -150,7 +150,7 @@ class Radioss:
     # The case ---------------------------------------------------------------------------------------------------------
 
     def draft(self, system: System) -> Draft:
-        """Returns the case; ``system``: its units."""
+        """Returns the case; ``system``: unit system of the deck."""
         self._draft = draft = Draft(self.path, system, self.account)
         draft.name = draft.name.removesuffix("_0000")
         draft.title = self.title
@@ -256,7 +256,9 @@ class Radioss:
     # What options name ------------------------------------------------------------------------------------------------
 
     def _nodes(self, number: int, entry: Entry, within: tuple[int, ...] = ()) -> Chosen:
-        """Returns a group of nodes, ``within`` others. Raises ValueError."""
+        """Returns the nodes of a group; ``within``: numbers of the groups that contain this group. Raises
+        ValueError.
+        """
         if number in within:
             raise ValueError(f"the group of nodes {number} is within itself")
         found = self._groups.get(("GRNOD", number))

@@ -1,7 +1,7 @@
-"""The text of a Radioss starter or engine file: options with their lines, and named fields of these lines.
+"""Text of a Radioss starter or engine file: options with their lines, and named fields of these lines.
 
-Reference Guide, "Block format": a line that begins with ``/`` is an option, one that begins with ``#`` or ``$`` a
-comment; whole numbers take 10 columns, others 20.
+Reference Guide, "Block format": a line that begins with ``/`` is an option, a line that begins with ``#`` or ``$``
+is a comment. Whole numbers take 10 columns, other fields 20.
 """
 
 import re
@@ -22,7 +22,7 @@ Row = tuple[int, str]
 
 @dataclass
 class Option:
-    """``/MAT/LAW2/1``: its words in upper case, and its lines, with their numbers."""
+    """An option such as ``/MAT/LAW2/1``: its words in upper case, and its lines with their numbers."""
 
     shown: str
     """The option as it is in the file."""
@@ -82,7 +82,7 @@ def real(line: int, item: str, what: str) -> float:
 
 
 def cut(row: Row, *widths: int) -> list[str]:
-    """Returns the fields of a line. Raises CardError for a tab, and for text behind them."""
+    """Returns the fields of a line. Raises CardError for a tab, and for text after the last field."""
     line, text = row
     if "\t" in text:
         raise CardError(f"line {line}: a tab in a line of fixed widths; write blanks")
@@ -96,11 +96,11 @@ def cut(row: Row, *widths: int) -> list[str]:
 
 
 class Fields(fields.Fields[int]):
-    """The fields of some lines of an option."""
+    """Named fields of the lines of an option."""
 
     def __init__(self, option: Option, entry: Entry, rows: Sequence[Row], layout: Sequence[str]) -> None:
-        """``layout``: for each line its fields; a name with ``:`` has 10 columns, others 20, ``-`` for an unused
-        one.
+        """Stores the fields; ``layout``: the names of the fields of each line. A field whose name ends in ``:`` has
+        10 columns, another field 20; ``-`` is an unused field.
         """
         self.option = option
         found: dict[str, tuple[int, str]] = {}

@@ -42,7 +42,7 @@ def wall(scene: Scene, option: Option, entry: Entry) -> None:
 
 
 def _start(scene: Scene, fields: Fields, moves: bool) -> list[float]:
-    """Returns the position of the wall: that of a node if it moves. Raises ValueError."""
+    """Returns the position of the wall. A moving wall has the position of its node. Raises ValueError."""
     if not moves:
         return [fields.real(name) for name in ("XM", "YM", "ZM")]
     number = fields.whole("NODE")
@@ -70,7 +70,7 @@ def _moving(scene: Scene, fields: Fields, table: dict[str, Any]) -> None:
 
 
 def _group(fields: Fields) -> int:
-    """Returns the group of nodes that it stops. Raises ValueError."""
+    """Returns the group of nodes that the wall stops. Raises ValueError."""
     group, reach = fields.whole("GRNOD1"), fields.real("D")
     if not group and not reach:
         raise ValueError("neither grnd_ID1 nor d: the wall stops no node")
