@@ -23,17 +23,17 @@ from .settings import Settings, StartError
 _log = logging.getLogger("conoid.server")
 ADDRESS_FILE = "server.json"
 _AGAIN = 5.0
-"""Time in s after which a failed write of the address is repeated. Chosen."""
+"""Time in s after which a failed write of the address is tried again (chosen value)."""
 _SWITCH = 0.001
-"""Time in s after which a computing thread must let another one run: the event loop waits so long for each busy
-thread, several times an answer. Chosen: a fifth of Python's default.
+"""Time in s after which a computing thread must let another thread run. The event loop waits so long for each busy
+thread, several times an answer. The value was chosen: it is a fifth of Python's default.
 """
 _FAREWELL = 3
-"""Time in s for open requests when the server stops."""
+"""Longest time in s to wait for open requests when the server stops."""
 
 
 class ServeError(StartError):
-    """The server cannot start; the text is one line."""
+    """Error: the server cannot start. The text of the error is one line."""
 
 
 def serve(settings: Settings) -> None:
@@ -61,9 +61,9 @@ def _answer(settings: Settings, listener: socket.socket) -> None:
 
 
 class _Server(uvicorn.Server):
-    """Writes the address of the server once it answers, and ends open streams before it waits for open requests. On
-    a full disk it answers without server.json, so that runs can be read and removed, and writes the file when there
-    is room.
+    """Writes the address of the server when the server answers, and ends open streams before it waits for open
+    requests. On a full disk the server runs without server.json, so that runs can be read and removed. The file is
+    written when the disk has space again.
     """
 
     def __init__(self, service: Service) -> None:
@@ -101,7 +101,7 @@ class _Server(uvicorn.Server):
             await asyncio.sleep(_AGAIN)
 
     def handle_exit(self, sig: int, frame: FrameType | None) -> None:
-        """Stores the reason of the end of the server."""
+        """Stores the reason for which the server ended."""
         self._why = signal.Signals(sig).name
         super().handle_exit(sig, frame)
 
@@ -132,14 +132,14 @@ def announce(service: Service, listener: socket.socket, page_problem: str | None
 
 
 def _leave(_signal: int, _frame: FrameType | None) -> None:
-    """uvicorn raises the signal again after its shutdown; this handler then ends the process with code 0."""
+    """Handles the signal that uvicorn raises again after its shutdown, and ends the process with code 0."""
     raise SystemExit(0)
 
 
 @contextmanager
 def _listening(settings: Settings) -> Iterator[socket.socket]:
-    """Creates the socket with protocol TCP explicitly: asyncio disables Nagle's delay of 40 ms for an answer only
-    then."""
+    """Creates the socket with protocol TCP explicitly. Only then asyncio disables Nagle's delay of 40 ms for an
+    answer."""
     family = socket.AF_INET6 if ":" in settings.host else socket.AF_INET
     with socket.socket(family, socket.SOCK_STREAM, socket.IPPROTO_TCP) as listener:
         listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)

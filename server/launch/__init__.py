@@ -1,4 +1,4 @@
-"""Launchers: the protocol by which workers are started and stopped; one module for each launcher."""
+"""Launchers: the protocol by which workers are started and stopped. Each launcher has its own module."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -7,23 +7,24 @@ from typing import Literal, Protocol
 from conoid.cases.run import Cause, State
 
 Phase = Literal["unknown", "waits", "runs"]
-"""State of a worker as its launcher reports it: waiting for cores, or running. A batch system that does not answer
-changes nothing."""
+"""State of a worker as its launcher reports it: waiting for cores, or running. If a batch system does not answer,
+the state is unknown, and nothing is changed."""
 Reading = tuple[State, Cause, str]
-"""The end of a worker without an outcome: state, cause, message."""
+"""End of a worker without an outcome: state, cause, message."""
 
 
 class LaunchError(Exception):
-    """The worker could not be started; the text is one line."""
+    """Error: the worker could not be started. The text of the error is one line."""
 
 
 class DamagedError(LaunchError):
-    """The accepted case, or the folder, has changed or is missing."""
+    """Error: the accepted case, or the folder of the run, has changed or is missing."""
 
 
 @dataclass(frozen=True)
 class Access:
-    """Zenoh address and credentials of a worker (no user: the router needs none)."""
+    """Address and credentials with which the worker publishes on Zenoh. The user is empty for a router without
+    access control."""
 
     endpoint: str
     prefix: str
@@ -43,51 +44,52 @@ class Job:
     profile: str = ""
     """Profile of the batch system; empty: the default of the site."""
     wall_time: float | None = None
-    """Time limit from the start, s."""
+    """Time limit of the run from its start, s."""
     group: str = ""
-    """Group of runs that may be handed over as one job array, such as a sweep; empty: none."""
+    """Name of a group of runs that may be submitted as one job array, such as a sweep; empty: none."""
     threads: int = 1
-    """Threads of each rank."""
+    """Number of threads of each rank."""
 
 
 @dataclass(frozen=True)
 class Exit:
-    """End of a worker's processes. ``code``: the exit code; negative: minus the number of the signal; None where
-    this server is not the parent."""
+    """End of a worker's processes. ``code``: the exit code, or minus the number of the signal; None if this server
+    is not the parent process."""
 
     code: int | None
     out_of_memory: bool
     last_words: str
     reading: Reading | None = None
-    """The end as a batch system reports it, which comes before the exit code."""
+    """State, cause and message of the end from a batch system. They have priority over the exit code."""
 
 
 class Worker(Protocol):
-    """A started worker with all its ranks, or a job handed to a batch system. No method blocks."""
+    """A started worker with all its ranks, or a job that was submitted to a batch system. No method blocks."""
 
     def phase(self) -> Phase:
-        """The state now."""
+        """Returns the present state."""
 
     def began(self) -> float:
-        """Unix time at which it got its cores, s; 0 before that."""
+        """Returns the Unix time at which the worker got its cores, s; 0 before that time."""
 
     def note(self) -> str:
-        """A remark for users: why it waits, or which service does not answer; empty for none."""
+        """Returns a remark for users, such as the reason for which the worker waits, or the service that does not
+        answer; empty without a remark."""
 
     def exited(self) -> Exit | None:
-        """The end; None while any of its processes runs."""
+        """Returns the end of the worker; None while any of its processes runs."""
 
     def stop(self) -> None:
-        """Asks it to stop at its next step."""
+        """Requests the worker to stop at its next step."""
 
     def kill(self) -> None:
-        """Kills all its processes."""
+        """Kills all processes of the worker."""
 
 
 @dataclass(frozen=True)
 class Trace:
-    """The trace of an earlier launch: the worker if it runs, whether there was one, whether that was before the last
-    boot."""
+    """Result of the search for an earlier launch of a run: the worker if it runs, whether there was a launch, and
+    whether the launch was before the last boot."""
 
     worker: Worker | None
     launched: bool
@@ -95,7 +97,7 @@ class Trace:
 
 
 class Launcher(Protocol):
-    """A way to run workers."""
+    """Protocol of a launcher: starts workers and finds workers of an earlier server."""
 
     queues: bool
     """True when workers wait for cores in the queue of a batch system."""
@@ -104,7 +106,7 @@ class Launcher(Protocol):
         """Starts the ranks and records them in the run's folder. Raises LaunchError."""
 
     def find(self, run: str, folder: Path) -> Trace:
-        """The worker that an earlier server started for the run."""
+        """Returns the worker that an earlier server started for the run."""
 
     def tidy(self) -> None:
-        """Removes what killed workers may have left outside of their folders, such as shared memory."""
+        """Removes data that killed workers may have left outside of their folders, such as shared memory."""

@@ -21,17 +21,17 @@ from .slurm_run import SlurmWorker
 
 _log = logging.getLogger("conoid.server")
 _SETTLES = 0.5
-"""s without a new run after which a group is submitted. Chosen: the runs of a sweep are written to disk some
-milliseconds apart."""
+"""Time in s without a new run after which a group of runs is submitted. The value was chosen because the runs of a
+sweep are written to disk some milliseconds apart."""
 _MOST = 1000
 """Largest number of tasks of an array. The default of Slurm's MaxArraySize is 1001 (slurm.conf(5))."""
 
 
 class Arrays:
-    """Used in the launcher's thread."""
+    """Groups of runs that are submitted as arrays. The class is used in the launcher's thread."""
 
     def __init__(self, runs: Path, site: batch.Slurm) -> None:
-        """``runs``: the folder of all runs."""
+        """Creates the object. ``runs``: the folder of all runs."""
         self._place, self._site = runs / layout.ARRAYS, site
 
     def hand_over(self, workers: Iterable[SlurmWorker]) -> set[str]:

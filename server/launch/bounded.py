@@ -1,4 +1,4 @@
-"""A program of another house in a process with limits, which the server waits for in a thread."""
+"""A program of another house in a process with limits. The server waits for the program in a thread."""
 
 import os
 import signal
@@ -22,7 +22,8 @@ _SECRET = ("CONOID_DATABASE", "CONOID_TOKEN")
 
 @dataclass(frozen=True, kw_only=True)
 class Bounds:
-    """s of CPU time, bytes of memory, and bytes of a file, of each process; s on the clock of all of them."""
+    """Limits of a program: CPU time in s, memory in bytes, and size of a file in bytes of each process; wall time in
+    s of all processes together."""
 
     cpu: int
     wall: int
@@ -32,16 +33,17 @@ class Bounds:
 
 @dataclass(frozen=True)
 class Ended:
-    """What a program has written, and its code; below 0: a signal has ended it."""
+    """Output of a program that has ended, and its exit code. A code below 0 is minus the number of the signal that
+    ended the program."""
 
     told: bytes
     said: str
-    """On its standard error; what took too long is said there, too."""
+    """Text of the standard error output. If the time limit was exceeded, it is the message about this."""
     code: int
 
     @property
     def why(self) -> str:
-        """The last line that it has said."""
+        """Last line of the standard error output."""
         return next(iter(self.said.strip().splitlines()[-1:]), f"code {self.code}")
 
 
@@ -49,8 +51,9 @@ def run(
     program: str, bounds: Bounds, arguments: Sequence[str] = (), question: bytes = b"", *, folder: Path,
     **more: str,
 ) -> Ended:  # fmt: skip
-    """Runs the module ``program`` in ``folder``; ``question`` is its standard input, ``more`` of its environment.
-    Blocks until it has ended, and whatever it has started with its standard output.
+    """Runs the module ``program`` in ``folder``. ``question``: bytes of its standard input; ``more``: variables that
+    are added to its environment. Blocks until the program, and every process that shares its standard output, has
+    ended.
     """
     limits = [str(most) for most in (bounds.memory, bounds.cpu, bounds.file)]
     env = {name: value for name, value in os.environ.items() if name not in _SECRET} | more

@@ -1,4 +1,4 @@
-"""The end of a Slurm job, by its record, the run's folder, and Slurm's list."""
+"""The end of a Slurm job, from its record, the run's folder, and Slurm's list."""
 
 from pathlib import Path
 
@@ -21,12 +21,12 @@ _READINGS: dict[str, Reading] = {
 
 
 def exit_of(folder: Path, job: Job, entry: Entry) -> Exit:
-    """The end of the job ``entry`` of the run in ``folder``; ``job``: its record with the accounting data."""
+    """Returns the end of the job ``entry`` of the run in ``folder``. ``job``: its record with the accounting data."""
     return Exit(_code(job), False, _last_words(folder, job), _reading(entry))
 
 
 def _code(job: Job) -> int | None:
-    """Exit code of the job's script; minus the number of its signal; None where it is not known."""
+    """Returns the exit code of the job's script, or minus the number of its signal; None if unknown."""
     code, _, number = job.accounting.get("ExitCode", "").partition(":")
     if not code.isdigit() or not number.isdigit():
         return None
@@ -34,7 +34,8 @@ def _code(job: Job) -> int | None:
 
 
 def _last_words(folder: Path, job: Job) -> str:
-    """Exit code of the ranks; for a task of an array that ended before them, of its script."""
+    """Returns the exit code of the ranks. For a task of an array that ended before its ranks started, returns that
+    of its script."""
     own = launcher_log.last_words(folder)
     if own or not job.array:
         return own

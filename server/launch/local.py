@@ -1,4 +1,5 @@
-"""Workers on this machine: ``mpiexec`` in a session of its own, so that they outlive the server that started them."""
+"""Workers on this machine: ``mpiexec`` in a session of its own, so that workers continue after the end of the server
+that started them."""
 
 import os
 import shutil
@@ -24,14 +25,16 @@ from . import DamagedError, Exit, Job, LaunchError, Phase, Trace, Worker, memory
 _ONE_THREAD = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
 _NOT_FOR_WORKERS = ("CONOID_DATABASE", "CONOID_TOKEN")
 _CROWDED = 4
-"""Ranks per core from which waiting ranks of MPICH sleep instead of polling."""
+"""Number of ranks per core from which waiting ranks of MPICH sleep instead of polling."""
 _BURIAL = 1.0
-"""s to wait for a killed launcher, so that it is no zombie. Chosen: it takes milliseconds."""
+"""Time in s to wait for a killed launcher, so that no zombie process stays. The value was chosen because the end
+takes milliseconds."""
 _FRESH = 1.0
-"""s for which a list of all processes is used. The processes looked for were started by a server that has ended.
-Chosen."""
+"""Time in s for which a list of all processes is used again (chosen value). The list is used for processes that an
+ended server has started."""
 _HOUR = 3600.0
-"""s after which shared memory that no process has mapped is removed: a launch maps it much sooner. Chosen."""
+"""Age in s from which shared memory that no process has mapped is removed (chosen value). A launch maps its shared
+memory much sooner."""
 
 
 class LocalLauncher:
@@ -82,7 +85,7 @@ class LocalLauncher:
         return Trace(worker if not rebooted and worker.alive() else None, True, rebooted)
 
     def _members(self, run: str) -> set[int]:
-        """The processes of a run; one list of all processes serves a thousand runs."""
+        """Returns the processes of a run. One list of all processes is used for a thousand runs."""
         if time.monotonic() > self._looked + _FRESH:
             self._living, self._looked = processes.of_all_runs(), time.monotonic()
         return self._living.get(run, set())
@@ -94,7 +97,7 @@ class LocalLauncher:
 
 
 def _log_of(folder: Path) -> BinaryIO:
-    """Opens the log of the launcher, in a folder that is created again where it is missing."""
+    """Opens the log of the launcher. A missing folder of the log is created again."""
     try:
         (folder / layout.LOGS).mkdir(0o700, exist_ok=True)
         return whole.appended(folder / layout.LOGS / layout.LAUNCHER_LOG)
@@ -103,7 +106,8 @@ def _log_of(folder: Path) -> BinaryIO:
 
 
 def find_mpiexec(chosen: str) -> tuple[str, ...]:
-    """The launcher of the site, else the one beside this Python, else the one in PATH. Raises LaunchError."""
+    """Returns the launcher of the site, else the launcher beside this Python, else the launcher in PATH. Raises
+    LaunchError."""
     if chosen:
         return command(chosen, "--mpiexec")
     beside = Path(sys.executable).with_name("mpiexec")
@@ -114,8 +118,8 @@ def find_mpiexec(chosen: str) -> tuple[str, ...]:
 
 
 def binding(ranks: int, threads: int, cores: Sequence[int]) -> list[str]:
-    """Options of MPICH's mpiexec that bind each rank to cores of its own. None where the run does not take all
-    ``cores``, since other runs may use the rest.
+    """Returns the options of MPICH's mpiexec that bind each rank to cores of its own. Empty if the run does not use
+    all ``cores``, because other runs may use the rest.
     """
     if ranks == 1 or threads == 1 or ranks * threads != len(cores):
         return []
@@ -124,8 +128,8 @@ def binding(ranks: int, threads: int, cores: Sequence[int]) -> list[str]:
 
 
 def environment(base: Mapping[str, str], job: Job) -> dict[str, str]:
-    """The environment of a worker: libraries with one thread, the id of the run, its Zenoh credentials, and nothing
-    that is the server's own.
+    """Returns the environment of a worker: libraries with one thread, the id of the run, its Zenoh credentials.
+    Variables of the server itself are removed.
     """
     env = {name: value for name, value in base.items() if name not in _NOT_FOR_WORKERS}
     env.update(dict.fromkeys(_ONE_THREAD, "1"))
@@ -160,7 +164,7 @@ class LocalWorker:
         self, run: str, folder: Path, process: Process, kills: memory.Kills,
         child: subprocess.Popen[bytes] | None = None,
     ) -> None:  # fmt: skip
-        """``child``: the process object when this server is the parent."""
+        """Creates the worker. ``child``: the process object if this server is the parent process."""
         self._run, self._folder, self._kills, self._child = run, folder, kills, child
         self.process = process
 
@@ -175,16 +179,16 @@ class LocalWorker:
         return "runs"
 
     def began(self) -> float:
-        """Unix time of the launch, s."""
+        """Returns the Unix time of the launch, s."""
         return self.process.launched
 
     def note(self) -> str:
-        """No remark."""
+        """Returns an empty text: a local worker has no remark."""
         return ""
 
     def exited(self) -> Exit | None:
-        """The end; None while ``mpiexec`` runs. Ranks that it left behind are killed, so that nothing writes any
-        more."""
+        """Returns the end of the worker; None while ``mpiexec`` runs. Ranks that still run after the end of
+        ``mpiexec`` are killed, so that no process writes any more."""
         self._kills.count()
         if self.alive() or processes.end_run(self._run):
             return None

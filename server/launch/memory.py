@@ -12,19 +12,19 @@ from pathlib import Path
 
 _PROC, _CGROUPS = Path("/proc"), Path("/sys/fs/cgroup")
 _READ_ALL, _LOG = 3, 1 << 20
-"""Arguments of klogctl(3); newest bytes of the kernel's log that are read."""
+"""Arguments of klogctl(3): command, and number of bytes that are read at the end of the kernel's log."""
 _KILLED = re.compile(rb"Killed process (\d+) \(")
 _PAUSE, _RECENT = 0.25, 3.0
-"""s between two counts; s before the end of the ranks in which a count must have grown. Chosen: Hydra ends the other
-ranks within a second."""
+"""Time in s between two counts; and time in s before the end of the ranks in which a count must have grown. The
+values were chosen because Hydra ends the other ranks within a second."""
 _FIRST_NAMESPACE = "pid:[4026531836]"
-"""Inode of the initial namespace of process numbers, in which those of the kernel's log are valid (linux/proc_ns.h,
-PROC_PID_INIT_INO)."""
+"""Inode of the initial namespace of process numbers. The process numbers in the kernel's log are valid in this
+namespace (linux/proc_ns.h, PROC_PID_INIT_INO)."""
 
 
 def kills() -> int:
-    """Number of processes that the kernel has killed for lack of memory: of this control group, where it counts
-    them, else of the machine.
+    """Returns the number of processes that the kernel has killed for lack of memory: of this control group if the
+    kernel counts them there, else of the machine.
     """
     own = _of_the_group()
     return own if own is not None else _count(_PROC / "vmstat") or 0
@@ -53,14 +53,14 @@ def _count(path: Path) -> int | None:
 
 
 class Kills:
-    """Used in the supervisor's thread."""
+    """Detects workers that were killed for lack of memory. The class is used in the supervisor's thread."""
 
     def __init__(self) -> None:
-        """Counts for the first time."""
+        """Makes the first count."""
         self._counts: deque[tuple[float, int]] = deque([(time.monotonic(), kills())])
 
     def count(self) -> None:
-        """Counts again; called repeatedly while workers run."""
+        """Makes a new count; called repeatedly while workers run."""
         now = time.monotonic()
         if now < self._counts[-1][0] + _PAUSE:
             return
@@ -69,8 +69,8 @@ class Kills:
             self._counts.popleft()
 
     def ended(self, pid: int | None) -> bool:
-        """Whether the kernel has just killed process ``pid``: by its log, or, where that cannot be read, by the
-        count of these seconds.
+        """Whether the kernel has just killed process ``pid``, by its log. If the log cannot be read, the change of
+        the count decides.
         """
         if kills() == self._counts[0][1]:
             return False
@@ -79,7 +79,8 @@ class Kills:
 
 
 def logged() -> set[int] | None:
-    """Process numbers in the kernel's log; None where it cannot be read, or this process has another namespace."""
+    """Returns the process numbers in the kernel's log; None if the log cannot be read, or if this process has
+    another namespace."""
     room = ctypes.create_string_buffer(_LOG)
     size = ctypes.CDLL(None).klogctl(_READ_ALL, room, _LOG)
     if size <= 0 or (_PROC / "self/ns/pid").readlink().name != _FIRST_NAMESPACE:

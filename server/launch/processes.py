@@ -1,4 +1,4 @@
-"""Processes by /proc of Linux: which exist, and which run they belong to."""
+"""Processes in /proc of Linux: which processes exist, and to which run each belongs."""
 
 import os
 import signal
@@ -13,16 +13,17 @@ process group does not hold a run together; this does, with helpers that a rank 
 
 _PROC = Path("/proc")
 _AFTER_NAME_STATE, _AFTER_NAME_PARENT, _AFTER_NAME_START = 0, 1, 19
-"""Places of state, parent and start time among the fields of /proc/PID/stat after the name (proc(5))."""
+"""Positions of state, parent and start time among the fields of /proc/PID/stat after the name (proc(5))."""
 
 
 def boot() -> str:
-    """Id of the present boot of the machine."""
+    """Returns the id of the present boot of the machine."""
     return (_PROC / "sys/kernel/random/boot_id").read_text().strip()
 
 
 def start_time(pid: int) -> int | None:
-    """Clock ticks from the boot to the start of process ``pid``; None when it has ended."""
+    """Returns the time from the boot to the start of process ``pid`` in clock ticks; None when the process has
+    ended."""
     fields = _stat(pid)
     if fields is None or fields[_AFTER_NAME_STATE] in {"Z", "X"}:
         return None
@@ -30,7 +31,7 @@ def start_time(pid: int) -> int | None:
 
 
 def parent(pid: int) -> int:
-    """Parent of process ``pid``; 0 when it has ended."""
+    """Returns the parent of process ``pid``; 0 when the process has ended."""
     fields = _stat(pid)
     return 0 if fields is None else int(fields[_AFTER_NAME_PARENT])
 
@@ -44,7 +45,7 @@ def _stat(pid: int) -> list[str] | None:
 
 
 def of_run(run: str) -> list[int]:
-    """Running processes of a run, smallest number first; of this user only."""
+    """Returns the running processes of a run that belong to this user, smallest number first."""
     marker = f"{RUN_VARIABLE}={run}".encode()
     found = []
     for entry in _PROC.iterdir():
@@ -56,12 +57,12 @@ def of_run(run: str) -> list[int]:
 
 
 def leader_of(members: Collection[int]) -> int | None:
-    """The process of a run whose parent does not belong to it: the one that the server started."""
+    """Returns the process of a run whose parent does not belong to the run: the process that the server started."""
     return next((pid for pid in sorted(members) if parent(pid) not in members), None)
 
 
 def of_all_runs() -> dict[str, set[int]]:
-    """Running processes of every run; of this user only."""
+    """Returns the running processes of every run that belong to this user."""
     found: dict[str, set[int]] = {}
     marker = f"{RUN_VARIABLE}=".encode()
     for entry in _PROC.iterdir():
@@ -74,7 +75,7 @@ def of_all_runs() -> dict[str, set[int]]:
 
 
 def end_run(run: str) -> int:
-    """Kills the running processes of a run; returns how many there were."""
+    """Kills the running processes of a run; returns the number of killed processes."""
     members = of_run(run)
     for pid in members:
         with suppress(ProcessLookupError):
@@ -83,7 +84,7 @@ def end_run(run: str) -> int:
 
 
 def unused_shared_memory(folder: Path, prefix: str, age: float) -> list[Path]:
-    """Files of this user in ``folder``, older than ``age`` s, that no process has mapped."""
+    """Returns the files of this user in ``folder`` that are older than ``age`` s and that no process has mapped."""
     old = time.time() - age
     found = {}
     for path in folder.glob(f"{prefix}*"):

@@ -1,5 +1,5 @@
-"""Workers as jobs of Slurm. Its commands run in a thread of their own: a controller that does not answer blocks
-nothing."""
+"""Workers as jobs of Slurm. The commands of Slurm run in a separate thread, so a controller that does not answer
+blocks nothing else."""
 
 import logging
 import sys
@@ -27,13 +27,13 @@ _log = logging.getLogger("conoid.server")
 
 
 class SlurmLauncher:
-    """The record is on disk when ``start`` returns; the thread makes exactly one job of it, with as many tries as it
-    takes."""
+    """Launcher for Slurm. ``start`` writes the record of a job to disk. Then the thread submits exactly one job for
+    the record, and tries again after failures."""
 
     queues = True
 
     def __init__(self, settings: Settings, site: batch.Slurm) -> None:
-        """The thread starts with the first run."""
+        """Creates the launcher. The thread starts with the first run."""
         self._mpiexec, self._worker, self._site = settings.mpiexec, settings.worker, site
         self._arrays, self._accounting = Arrays(settings.runs, site), Accounting(site.bin)
         self._workers: dict[str, SlurmWorker] = {}
@@ -58,7 +58,8 @@ class SlurmLauncher:
         return self._take(job.run, SlurmWorker(job.folder, record, self._site, job.group, self._accounting))
 
     def find(self, run: str, folder: Path) -> Trace:
-        """Finds the job by its record, which was submitted or was about to be. Raises OSError, ValueError."""
+        """Finds the job of a run by its record. The job was submitted by an earlier server, or was about to be.
+        Raises OSError, ValueError."""
         try:
             record = batch.read_job(folder)
         except msgspec.MsgspecError as error:
@@ -68,7 +69,7 @@ class SlurmLauncher:
         return Trace(self._take(run, SlurmWorker(folder, record, self._site, accounting=self._accounting)), True, False)
 
     def tidy(self) -> None:
-        """Does nothing: Slurm cleans its nodes."""
+        """Does nothing, because Slurm cleans its nodes."""
 
     def _words(self, job: Job) -> list[str]:
         words = [*self._worker, str(job.case), "--out", str(job.folder), "--run", job.run, "--ranks", str(job.ranks)]
@@ -126,7 +127,7 @@ class SlurmLauncher:
                 return
 
     def _hand_over_arrays(self, workers: list[SlurmWorker]) -> set[str]:
-        """Names of runs that are submitted later."""
+        """Returns the names of runs that are submitted later."""
         try:
             return self._arrays.hand_over(workers)
         except (slurm_call.SlurmError, OSError) as error:
@@ -134,8 +135,8 @@ class SlurmLauncher:
             return {worker.name for worker in workers if worker.fresh or worker.waits_for_array}
 
     def _attend(self, run: str, worker: SlurmWorker, entries: list[Entry], arrays: Set[str]) -> bool:
-        """False when the controller has not answered, so that no other run waits for it. A command that hangs is not
-        tried again at once, and does not delay other runs.
+        """Performs the action of one run. False when the controller has not answered, so that no other run waits for
+        it. A command that hangs is not repeated at once, and does not delay other runs.
         """
         try:
             worker.turn(entries, arrays)

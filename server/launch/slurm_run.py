@@ -1,4 +1,5 @@
-"""A run that was submitted to Slurm. The job name identifies it; its folder shows how it ends, Slurm how it waits."""
+"""A run that was submitted to Slurm. The job name identifies the run. The run's folder shows how the run ends, and
+Slurm shows why it waits."""
 
 import time
 from collections.abc import Mapping, Set
@@ -18,20 +19,25 @@ from .accounting import Accounting
 from .job_end import exit_of
 
 _LAG = 5.0
-"""s after the end of a job in which its last files may still arrive over a network file system. Chosen."""
+"""Time in s after the end of a job in which the last files of the job may still arrive over a network file system
+(chosen value)."""
 _LATE = 10.0
-"""s after which an outcome in a folder without new writes is the end of the run, whatever Slurm reports. Chosen."""
+"""Time in s without new writes in a folder with an outcome (chosen value). After this time the outcome is the end of
+the run, whatever Slurm reports."""
 _MOST = 20
-"""Largest number of jobs submitted for one run, each because the one before was lost. Chosen."""
+"""Largest number of jobs that are submitted for one run (chosen value). A further job is submitted only if the job
+before was lost."""
 _RELEASES = 3
-"""Times that a job is released which a node failed to start: a busy or restarting node recovers, a broken one does
-not. Chosen."""
+"""Number of times that a job is released after a node failed to start it (chosen value). A busy or restarting node
+recovers, a broken node does not."""
 _POLITE, _LONGEST_PAUSE = 2.0, 60.0
-"""s until Slurm is asked again after a refusal that may pass: first, and at most. Chosen."""
+"""Time in s until Slurm is asked again after a temporary refusal: the first time, and the largest one (chosen
+values)."""
 
 
 class SlurmWorker:
-    """The first methods are for any thread and do not block; ``turn`` is for the launcher's thread."""
+    """One run as a job of Slurm. The methods before ``turn`` may be called from any thread and do not block;
+    ``turn`` is called from the launcher's thread."""
 
     def __init__(
         self, folder: Path, job: Job, site: batch.Slurm, group: str = "", accounting: Accounting | None = None
@@ -51,41 +57,41 @@ class SlurmWorker:
 
     @property
     def name(self) -> str:
-        """Name and index in an array; unique."""
+        """Name of the job and index in an array; no other job has both."""
         return self._job.key
 
     @property
     def record(self) -> Job:
-        """The record as it stands in the folder."""
+        """Record of the job in the run's folder."""
         return self._job
 
     @property
     def fresh(self) -> bool:
-        """True while it may become a task of an array: it was never submitted."""
+        """True while the run may become a task of an array, because it was never submitted."""
         return bool(self.group) and not self._job.job and not self._stop
 
     @property
     def waits_for_array(self) -> bool:
-        """True when it is to be submitted as a task of an array."""
+        """True when the run will be submitted as a task of an array."""
         waits = not self._job.job and self._job.task is not None and not self._stop and self._exit is None
         return waits and time.monotonic() >= self._not_before
 
     # From any thread --------------------------------------------------------------------------------------------------
 
     def phase(self) -> Phase:
-        """The state by the last list of Slurm."""
+        """Returns the state in the last list of Slurm."""
         entry = self._entry
         if entry is None:
             return "unknown" if self._job.job else "waits"
         return "waits" if entry.state in slurm.PENDING else "runs"
 
     def began(self) -> float:
-        """Unix time of its last start, s."""
+        """Returns the Unix time of the last start of the job, s."""
         entry = self._entry
         return entry.start if entry is not None and entry.state not in slurm.PENDING else 0.0
 
     def note(self) -> str:
-        """Reason for which the job waits, or the time since which Slurm does not answer."""
+        """Returns the reason for which the job waits, or the time since which Slurm does not answer."""
         entry, number = self._entry, self._job.job
         if self._away:
             last = f"; job {number} was {entry.state.lower()} then" if entry else ""
@@ -97,8 +103,8 @@ class SlurmWorker:
         return f"Slurm job {number} is pending: {entry.reason}" if entry.state in slurm.PENDING else ""
 
     def exited(self) -> Exit | None:
-        """The end; None while its job waits or runs. An outcome in a folder without new writes is an end also when
-        Slurm does not answer.
+        """Returns the end of the run; None while its job waits or runs. An outcome in a folder without new writes is
+        an end also when Slurm does not answer.
         """
         return self._exit or (Exit(None, False, "") if self._complete() else None)
 
@@ -110,12 +116,13 @@ class SlurmWorker:
             return False
 
     def stop(self) -> None:
-        """Asks the run to stop by a file; Slurm cancels a waiting job and signals a running one. Raises OSError."""
+        """Asks the run to stop, by a file in its folder. Slurm cancels a waiting job and sends a signal to a running
+        one. Raises OSError."""
         (self._folder / layout.STOP_REQUEST).touch()
         self._stop = True
 
     def kill(self) -> None:
-        """Has its job killed."""
+        """Requests Slurm to kill the job."""
         self._stop = self._kill = True
 
     # The launcher's thread --------------------------------------------------------------------------------------------
@@ -126,7 +133,7 @@ class SlurmWorker:
         return self._exit is not None
 
     def silent(self, why: str) -> None:
-        """Slurm does not answer; the last known state stays."""
+        """Records that Slurm does not answer; the last known state stays."""
         self._away, self._why = self._away or time.monotonic(), why
 
     def turn(self, entries: list[Entry], arrays: Set[str] = frozenset()) -> None:
@@ -190,12 +197,12 @@ class SlurmWorker:
             self._exit = Exit(None, False, "", (State.FAILED, Cause.LAUNCH, f"Slurm refuses the job: {error}"))
 
     def wait(self, why: str) -> None:
-        """Slurm accepts no job now: it is asked again after a delay that doubles."""
+        """Delays the next request after Slurm has refused a job for now; the delay doubles."""
         self._later, self._not_before = why, time.monotonic() + self._pause
         self._pause = min(2.0 * self._pause, _LONGEST_PAUSE)
 
     def leave_array(self) -> None:
-        """The array was refused: the run is submitted alone, under a name of its own. Raises OSError."""
+        """Submits the run alone, under a name of its own, after its array was refused. Raises OSError."""
         job, self.group = self._job, ""
         profile = batch.profile_of(self._site, job.profile)
         fresh = batch.new_job(
@@ -204,14 +211,14 @@ class SlurmWorker:
         self.write_down(name=fresh.name, task=None, array="")
 
     def write_down(self, **changes: object) -> None:
-        """Writes the record; it is on disk before anything follows from it. Raises OSError."""
+        """Writes the record; it is on disk before the next action. Raises OSError."""
         job = msgspec.structs.replace(self._job, **changes)
         whole.write(self._folder / layout.JOB, batch.to_json(job))
         self._job = job
 
     def _chosen(self, entries: list[Entry]) -> Entry | None:
-        """The running job, else the first; a second job, which only a crash of the controller can cause, is
-        cancelled."""
+        """Returns the running job, else the first job. A second job, which only a crash of the controller can cause,
+        is cancelled."""
         begun = slurm.begun(self._folder, self._job) if len(entries) > 1 else ""
         ordered = sorted(entries, key=lambda entry: (entry.job != begun, entry.state in slurm.FINAL, entry.job))
         for extra in ordered[1:]:
@@ -222,7 +229,7 @@ class SlurmWorker:
         return ordered[0] if ordered else None
 
     def _look_for_it(self, arrays: Set[str]) -> None:
-        """Slurm has no job of this name: acted on after two lists in a row."""
+        """Handles a list of Slurm without a job of this name. An action follows only after two such lists in a row."""
         self._missing += 1
         if self._missing < 2 or slurm.held(self._folder):
             return
@@ -239,13 +246,13 @@ class SlurmWorker:
 
     @property
     def _array_number(self) -> str:
-        """Id of the array of which its job is a task."""
+        """Returns the id of the array that has the job as a task."""
         number, task, _ = self._job.job.partition("_")
         return number if task else ""
 
     def _others_began(self) -> bool:
         """Whether another task of the array has started: then Slurm has the whole array on its disk. A task that is
-        cancelled while it waits leaves no entry in the list.
+        cancelled while it waits has no entry in the list.
         """
         if not self._array_number:
             return False
@@ -254,7 +261,7 @@ class SlurmWorker:
         return any(number.partition("_")[0] == self._array_number for number in begun)
 
     def _end(self, entry: Entry) -> None:
-        """The job has ended; the folder shows the meaning."""
+        """Handles the end of the job. The run's folder shows what the end means."""
         self._ended = self._ended or time.monotonic()
         there = (self._folder / layout.OUTCOME).exists()
         begun = bool(slurm.begun(self._folder, self._job))

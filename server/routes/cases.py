@@ -1,4 +1,4 @@
-"""Cases: the check before submission, and the shipped cases."""
+"""Routes for cases: the check of a case before its submission, and the shipped cases."""
 
 import json
 from functools import cache
@@ -91,7 +91,7 @@ def _schema() -> str:
 
 @cache
 def _gallery() -> bytes:
-    """Returns the shipped cases. Computed once: they do not change while a server runs."""
+    """Returns the shipped cases. The list is made once, because it does not change while a server runs."""
     cases = {name: read_case(path) for name, path in shipped().items()}
     entries = [
         {"name": name, "title": case.title, "description": case.description, "url": f"/v1/cases/{name}"}

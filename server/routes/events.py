@@ -1,4 +1,4 @@
-"""Events of a run from its journal: past events, and a live stream."""
+"""Routes for events of a run from its journal: past events, and a live stream."""
 
 from typing import Annotated
 
@@ -20,8 +20,8 @@ router = APIRouter()
 After = Annotated[int, Query(ge=0, description="the seq of the last event that is known")]
 
 _PAGE = 1 << 20
-"""Largest size in bytes of the events of one answer, which has at least one event. Chosen: the answers of a user are
-in memory until they are sent."""
+"""Largest size in bytes of the events of one answer; an answer has at least one event. The value was chosen because
+the answers of a user are in memory until they are sent."""
 Seconds = Annotated[
     float | None, Query(ge=0, le=86400, allow_inf_nan=False, description="s after which the answer ends; none: never")
 ]

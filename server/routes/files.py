@@ -1,4 +1,4 @@
-"""Files of a run's folder: list and download."""
+"""Routes for files of a run's folder: list and download."""
 
 import os
 from dataclasses import asdict
@@ -16,7 +16,8 @@ from .runs import OwnedRun
 
 
 class _AnyPath(PathConvertor):
-    """Convertor for the rest of an address, line feeds included: names of files may contain them."""
+    """Convertor for the rest of an address. The rest may contain line feeds, because names of files may contain
+    them."""
 
     regex = "(?s:.*)"
 

@@ -1,4 +1,4 @@
-"""Health and metrics of the server."""
+"""Routes for health and metrics of the server."""
 
 from typing import Annotated, Any
 

@@ -1,4 +1,5 @@
-"""History of a run, with a limited number of points. A page draws it before it follows the stream."""
+"""Routes for the history of a run, with a limited number of points. A page draws the history before it reads the
+stream of events."""
 
 from typing import Annotated
 

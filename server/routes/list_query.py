@@ -1,4 +1,4 @@
-"""Parameters that lists of runs have in common."""
+"""Query parameters that all lists of runs have."""
 
 from typing import Annotated
 
@@ -11,7 +11,7 @@ from ..errors import ServiceError
 from ..intake.submission import labels_of
 
 _MOST_WORDS, _LONGEST = 8, 200
-"""Largest number of words in a search, and of their characters. Chosen."""
+"""Largest number of words in a search, and largest number of characters of the search text (chosen values)."""
 
 
 def chosen(

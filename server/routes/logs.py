@@ -1,4 +1,4 @@
-"""Log files of the ranks and of the launcher."""
+"""Routes for the log files of the ranks and of the launcher."""
 
 import time
 from collections.abc import AsyncIterator
@@ -21,10 +21,10 @@ from .runs import OwnedRun
 
 router = APIRouter()
 _CHUNK = 1 << 16
-"""Bytes of a log that are sent at once. Chosen."""
+"""Number of bytes of a log that are sent at once (chosen value)."""
 ALIVE = b"\0"
-"""Byte that is sent while a followed log is silent, so that proxies keep the connection. The text of a log does not
-contain it."""
+"""Byte that is sent while no text is added to a followed log, so that proxies keep the connection. The text of a log
+does not contain this byte."""
 _LOOK = 0.25
 """Time in s between two reads of a followed log."""
 Rank = Annotated[str, PathParameter(pattern="^([0-9]{1,5}|launcher)$", description="a rank, or 'launcher'")]
@@ -55,7 +55,7 @@ async def log(
 
 
 async def _follow(service: Service, may: Pass, run_id: str, folder: Path, relative: str) -> AsyncIterator[bytes]:
-    """Yields new bytes of the log without bytes 0, and a byte 0 while it is silent. The log need not exist yet."""
+    """Yields new bytes of the log without bytes 0, and a byte 0 while no text is added. The log need not exist yet."""
     offset, spoke = 0, time.monotonic()
     with service.wakeups.listen(run_id) as listener:
         while await may.holds():

@@ -1,4 +1,4 @@
-"""The user of the request, and what the server offers."""
+"""Routes for the user of the request, and for the resources that the server offers."""
 
 from typing import Annotated, Any
 

@@ -1,4 +1,4 @@
-"""Runs: submit, list, show, cancel; request a checkpoint or a snapshot."""
+"""Routes for runs: submit, list, show, cancel; request a checkpoint or a snapshot."""
 
 import json
 import time
@@ -33,11 +33,11 @@ router = APIRouter()
 Body = Annotated[bytes, Depends(read_body)]
 _MOST_RANKS = _MOST_THREADS = 1_000_000
 _MOST_STEPS = 2**53
-"""Largest value of a number in a request; the server has a lower limit of its own. Chosen."""
+"""Largest value of a number in a request (chosen value). The server has a lower limit of its own."""
 _LAST = "z" * 22
-"""Text after a prefix of an id that sorts after every id with this prefix."""
+"""Text that is added to a prefix of an id; the result sorts after every id with this prefix."""
 MAX_WAIT = 60.0
-"""Largest value of ``?wait=`` in s."""
+"""Largest value of the parameter ``?wait=``, s."""
 
 
 @router.post("/v1/runs", status_code=202, openapi_extra=openapi.CASE_BODY)
@@ -273,7 +273,7 @@ def snapshot(run_id: str, service: ServiceOf, identity: Submitter) -> Response:
 
 
 def _ask(service: Service, run: Run, request: str, words: str) -> Response:
-    """Writes a request file that the worker reads. Raises ServiceError 409, 503."""
+    """Writes a request file, which the worker reads. Raises ServiceError 409, 503."""
     if run.state is not State.RUNNING:
         raise ServiceError(409, "not_running", f"run {run.id} is {run.state.value}; a run that is running {words}")
     try:

@@ -1,4 +1,4 @@
-"""Snapshots of the fragments of a run (docs/reference/snapshots.md)."""
+"""Routes for snapshots of the fragments of a run (docs/reference/snapshots.md)."""
 
 from pathlib import Path
 from typing import Annotated, Any

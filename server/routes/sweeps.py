@@ -1,4 +1,4 @@
-"""Sweeps: submit, show, cancel, repeat, and the table of results."""
+"""Routes for sweeps: submit, show, cancel, repeat, and the table of results."""
 
 from collections import Counter
 from collections.abc import Sequence

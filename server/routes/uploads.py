@@ -1,4 +1,4 @@
-"""Uploaded files, which cases name. Users cannot see the uploads of other users."""
+"""Routes for uploaded files, which cases name. Users cannot see the uploads of other users."""
 
 from typing import Annotated, Any
 
