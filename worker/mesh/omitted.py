@@ -7,8 +7,10 @@ from .cells import Cells
 
 
 def notes(passed: Counter[str], volumes: Counter[str], joining: Counter[str], mark: str) -> Iterator[str]:
-    """Return lines: the number of elements without volume that were ``passed`` over, the number of ``volumes`` that
-    cannot be read, and the keywords that are ``joining`` bodies, with the ``mark`` of the deck before their names.
+    """Return notes about contents of a deck that are not in the mesh.
+
+    The notes give the number of omitted elements without volume (``passed``), the number of ``volumes`` that cannot
+    be read, and the keywords that are ``joining`` bodies, with the ``mark`` of the deck before their names.
     """
     for counts, said in (
         (passed, "elements that carry no volume are skipped"),
@@ -20,7 +22,7 @@ def notes(passed: Counter[str], volumes: Counter[str], joining: Counter[str], ma
 
 
 def by_corners(chosen: Iterable[Cells]) -> Iterator[str]:
-    """Return lines about hexahedra of second order, of which only the corners are used."""
+    """Return notes about hexahedra of second order, of which only the corners are used."""
     for each in chosen:
         if each.kind.nodes > 10 and len(each.numbers):
             yield f"{len(each.numbers):,} hexahedra of {each.kind.nodes} nodes are taken by their corners"

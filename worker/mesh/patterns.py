@@ -19,13 +19,14 @@ from numpy.typing import NDArray
 from .faces import FACES
 
 QUADS = np.array([[0, 3, 2, 1], [4, 5, 6, 7], [0, 1, 5, 4], [1, 2, 6, 5], [2, 3, 7, 6], [3, 0, 4, 7]])
-"""Faces of a hexahedron, anticlockwise seen from outside."""
+"""Faces of a hexahedron: four nodes each, anticlockwise seen from outside."""
 EDGES = ((0, 1), (1, 2), (2, 3), (3, 0), (4, 5), (5, 6), (6, 7), (7, 4), (0, 4), (1, 5), (2, 6), (3, 7))
-"""Edges of a hexahedron."""
+"""Edges of a hexahedron: two nodes each."""
 MOST = 6
-"""Tets of a cut. A cut into five has a tet in the middle, a cut into six a long diagonal."""
+"""Largest number of tets of a cut. A cut into five tets has a tet in the middle, a cut into six tets has a long
+diagonal."""
 _CUBE = ((0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0), (0, 0, 1), (1, 0, 1), (1, 1, 1), (0, 1, 1))
-"""Nodes of the hexahedron."""
+"""Coordinates of the nodes of a hexahedron."""
 
 Triangle = tuple[int, int, int]
 Tet = tuple[int, int, int, int]
@@ -33,10 +34,10 @@ Tet = tuple[int, int, int, int]
 
 @cache
 def cuts(pattern: int) -> NDArray[np.int64]:
-    """Return (n, MOST, 4) the cuts without further nodes.
+    """Return (n, MOST, 4) the cuts of a hexahedron without additional nodes.
 
     Bit f of ``pattern``: whether face f is cut from its second node to its fourth instead of from its first to its
-    third. A row 0, 0, 0, 0 pads a cut into five. n is 0 for some patterns.
+    third. A row 0, 0, 0, 0 pads a cut into five tets. n is 0 for some patterns.
     """
     found = sorted(set(_completed(frozenset(_turned(face) for face in skin(pattern)), ())))
     table = np.zeros((len(found), MOST, 4), np.int64)
@@ -46,7 +47,7 @@ def cuts(pattern: int) -> NDArray[np.int64]:
 
 
 def skin(pattern: int) -> list[Triangle]:
-    """Return the twelve triangles of the faces, anticlockwise seen from outside, two for each face."""
+    """Return the twelve triangles of the faces, anticlockwise seen from outside, two triangles for each face."""
     found = []
     for bit, (a, b, c, d) in enumerate(QUADS.tolist()):
         found += [(b, c, d), (b, d, a)] if pattern >> bit & 1 else [(a, b, c), (a, c, d)]
@@ -54,7 +55,8 @@ def skin(pattern: int) -> list[Triangle]:
 
 
 def _completed(front: frozenset[Triangle], made: tuple[Tet, ...]) -> Iterator[tuple[Tet, ...]]:
-    """Yield all cuts that begin with the tets ``made`` and fill the volume behind the triangles of the ``front``.
+    """Yield all cuts that begin with the tets ``made`` and fill the volume enclosed by the triangles of the ``front``.
+
     Positive tets whose inner faces cancel fill a body once: no other test is needed.
     """
     if not front:
@@ -82,7 +84,7 @@ def _positive(tet: Tet) -> bool:
 
 
 def _turned(face: tuple[int, ...]) -> Triangle:
-    """Return the same triangle from its smallest node on."""
+    """Return the same triangle, beginning with its smallest node."""
     first = face.index(min(face))
     a, b, c = face[first:] + face[:first]
     return a, b, c

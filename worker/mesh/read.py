@@ -1,9 +1,9 @@
 """Reader of mesh files, for the child process: files are untrusted input.
 
-The readers are our own. gmsh takes a .msh file without a known header for a script, which can start programs; it
-puts ghost cells among the elements without a message, and all tets of an entity of the format 2.2 into the groups of
-any of them. meshio ends the process on an unknown element type of .inp, does not place instances and does not name
-the line of an error.
+Conoid has readers of its own, because gmsh and meshio fail on some files. gmsh takes a .msh file without a known
+header for a script, which can start programs. gmsh also adds ghost cells to the elements without a message, and adds
+all tets of an entity of the format 2.2 to the groups of any of them. meshio ends the process on an unknown element
+type of .inp, does not place instances and does not name the line of an error.
 """
 
 import hashlib
@@ -25,9 +25,9 @@ from .vtu.reading import read_vtu
 
 
 def read(file: MeshFile, path: Path, key: str = "mesh") -> TetMesh:
-    """Return the tets of ``path``, of ``file.group`` when given, in m, checked. Raises MeshError, naming ``key``.
+    """Return the tets of ``path``, or of ``file.group`` if given, in m, checked. Raises MeshError, naming ``key``.
 
-    Nodes that no tet uses and all elements without volume are omitted; volume elements that cannot be cut are
+    Nodes that no tet uses and all elements without volume are omitted. Volume elements that cannot be cut are
     refused.
     """
     readers: dict[str, Callable[[Path, str | None, str], Content]] = {

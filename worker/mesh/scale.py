@@ -1,5 +1,5 @@
-"""Conversion of coordinates into metres with one rounding: 0.001 is no binary fraction, and a product with it rounds
-twice.
+"""Conversion of coordinates into metres with one rounding. The number 0.001 is no binary fraction, so a product with
+it rounds twice.
 """
 
 from fractions import Fraction
@@ -7,16 +7,16 @@ from fractions import Fraction
 from .model import Floats
 
 _SPLITTER = 2.0**27 + 1.0
-"""Splits a float64 into two halves of 26 bits (Dekker 1971, Numer. Math. 18, 224)."""
+"""Factor that splits a float64 into two halves of 26 bits (Dekker 1971, Numer. Math. 18, 224)."""
 _WHOLE = 2**53
-"""Integers below it are exact as float64."""
+"""Bound of integers: all integers below it are exact as float64."""
 
 
 def scaled(points: Floats, unit: float) -> Floats:
-    """Return points in m from points in units of ``unit`` m: their product with the decimal number of ``unit``, rounded
+    """Return points in m from points in units of ``unit`` m: the product with the decimal number of ``unit``, rounded
     once.
 
-    If that number is not a fraction of integers below 2^53 the product rounds twice.
+    If this decimal number is not a fraction of integers below 2^53, the product rounds twice.
     """
     exact = Fraction(repr(unit))
     n, d = exact.numerator, exact.denominator

@@ -1,5 +1,6 @@
-"""Elements of second order, with a node in the middle of each edge: the volume that straight edges lose, and cuts of
-tets into eight.
+"""Elements of second order, with a node in the middle of each edge.
+
+The module computes the volume that straight edges lose, and cuts each tet of ten nodes into eight tets.
 """
 
 from collections.abc import Sequence
@@ -15,22 +16,24 @@ from .model import FLAT, Floats, Ids, step_lengths, volume_and_area
 Way = Literal["eight", "corners"]
 
 LOST = 1e-3
-"""Share of the volume that straight edges may lose before tets are cut into eight. Chosen: the mass has the same
-error, and eight tets with half the step cost 16 times as much."""
+"""Share of the volume that straight edges may lose. If more is lost, tets are cut into eight. Chosen value: the mass
+has the same error, and eight tets with half the step cost 16 times as much as one tet."""
 _OFF = 0.4
-"""Largest distance of a node from the middle of its edge, over the length of the edge. Chosen: quarter points are
-0.25 off, and an arc of 90 degrees 0.21; the middle of another edge of a regular tet is 0.5 off, which indicates
-another order of nodes."""
+"""Largest distance of a node from the middle of its edge, divided by the length of the edge. Chosen value: this
+ratio is 0.25 for quarter points, and 0.21 for an arc of 90 degrees. It is 0.5 for the middle of another edge of a
+regular tet, which indicates another order of nodes."""
 _CORNERS = ((0, 4, 6, 7), (4, 1, 5, 8), (6, 5, 2, 9), (7, 8, 9, 3))
 _LONG = ((4, 9), (6, 8), (7, 5))
-"""Opposite corners of the octahedron that is left inside of the four corner tets."""
+"""Opposite corners of the octahedron that remains between the four corner tets."""
 _AT = np.array([[0.0, 0, 0], [2, 0, 0], [0, 2, 0], [0, 0, 2], [1, 0, 0], [1, 1, 0], [0, 1, 0], [0, 0, 1],
                        [1, 0, 1], [0, 1, 1]])  # fmt: skip
-"""Indices of the nodes of a tet of ten."""
+"""Indices of the nodes of a tet of ten nodes."""
 
 
 def checked(cells: Cells, points: Floats, tags: Ids) -> None:
-    """Raise MeshError if a node is not near the middle of its edge; the cells' nodes are indices into ``points``."""
+    """Raise MeshError if a node is not near the middle of its edge. The nodes of ``cells`` are indices into
+    ``points``.
+    """
     for (a, b), middle in zip(cells.kind.edges, cells.middles.T, strict=True):
         one, other = points[cells.corners[:, a]], points[cells.corners[:, b]]
         off, along = points[middle] - 0.5 * (one + other), other - one
@@ -44,10 +47,11 @@ def checked(cells: Cells, points: Floats, tags: Ids) -> None:
 
 
 def lost(cells: Cells, points: Floats) -> float:
-    """Return approximately the volume, in that of ``points``, between curved elements and those with straight edges.
+    """Return the approximate volume between curved elements and elements with straight edges, in the unit of
+    ``points``.
 
-    A node in the middle of an edge has a third of the area of each face with that edge (exactly on triangles and on
-    quadrilaterals of eight nodes): the integral of its shape function.
+    A node in the middle of an edge has a third of the area of each face with this edge: the integral of its shape
+    function. The third is exact on triangles and on quadrilaterals of eight nodes.
     """
     total = 0.0
     for side in sides(cells.kind.form):
@@ -60,14 +64,16 @@ def lost(cells: Cells, points: Floats) -> float:
 
 
 def _area(corners: Sequence[Floats]) -> Floats:
-    """Return (m, 3) area vectors of triangles or quadrilaterals, outward."""
+    """Return (m, 3) area vectors of triangles or quadrilaterals; the vectors point outward."""
     a, b, c, d = (*corners, corners[0])[:4]
     return np.asarray(0.5 * (np.cross(b - a, c - a) if len(corners) == 3 else np.cross(c - a, d - b)))
 
 
 def eight(nodes: Ids, points: Floats) -> Ids:
-    """Return (m, 8, 4) tets of each of the tets (m, 10): one at each corner, and four round one of three diagonals
-    of the octahedron between: the one with the longest stable step, most often the shortest.
+    """Return (m, 8, 4) the eight tets of each of the tets (m, 10).
+
+    One tet is at each corner. Four tets surround one of three diagonals of the octahedron between the corner tets.
+    The chosen diagonal has the longest stable step; most often it is the shortest diagonal.
     """
     every = np.stack([nodes[:, [*_CORNERS, *_inner(*long)]] for long in _LONG], axis=1)
     volume, area = volume_and_area(points, every)
@@ -77,7 +83,7 @@ def eight(nodes: Ids, points: Floats) -> Ids:
 
 
 def _inner(one: int, other: int) -> list[tuple[int, int, int, int]]:
-    """Return the tets round the diagonal between two nodes in the middle of edges, positive."""
+    """Return the positive tets round the diagonal between two nodes in the middle of edges."""
     ring, found = [k for k in range(4, 10) if k not in (one, other)], []
     for p, q in combinations(ring, 2):
         volume = (np.cross(_AT[other] - _AT[one], _AT[p] - _AT[one]) * (_AT[q] - _AT[one])).sum()

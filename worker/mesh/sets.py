@@ -13,20 +13,20 @@ from .model import Ids, Ints, NodeSet
 
 @dataclass(frozen=True, eq=False)
 class Named:
-    """A set as it is in its file, with indices of nodes of the whole file."""
+    """A set as defined in its file, with indices of nodes of the whole file."""
 
     names: tuple[str, ...]
-    """Names in a case."""
+    """Names of the set in a case."""
     nodes: Ids
     """(k,) nodes of a set of nodes."""
     faces: tuple[Ids, ...] | None = None
     """Triangles (n, 3) and quadrilaterals (n, 4) of a surface, by their corners; None for a set of nodes."""
     free: bool = False
-    """Whether only those faces count that are outer faces of the mesh."""
+    """Whether the surface has only faces that are outer faces of the mesh."""
 
 
 def surface(names: tuple[str, ...], faces: Iterable[Ids], free: bool = False) -> Named:
-    """Return a surface of faces (n, 3) and (n, 4); faces of four corners may repeat one."""
+    """Return a surface of faces (n, 3) and (n, 4). Faces of four corners may repeat a corner."""
     threes, fours = [np.zeros((0, 3), np.int64)], [np.zeros((0, 4), np.int64)]
     for each in faces:
         if each.shape[1] == 3:
@@ -52,8 +52,9 @@ class Members:
     """The members of the sets of a file that are in a mesh."""
 
     def __init__(self, used: Ids, tets: Ints, edges: Ids) -> None:
-        """``used``: (n,) the index of each node in the file, ascending; ``tets``: (m, 4) of these. ``edges``: (k, 3)
-        indices of two corners and of the node between them, if tets of ten nodes were cut into eight.
+        """``used``: (n,) the index in the file of each node of the mesh, ascending; ``tets``: (m, 4) indices into
+        ``used``. ``edges``: (k, 3) indices of two corners and of the node between them, if tets of ten nodes were
+        cut into eight.
         """
         self._used = used
         self._outer = np.unique(np.sort(boundary_faces(tets), axis=1), axis=0)
@@ -78,20 +79,22 @@ class Members:
         )
 
     def _indices(self, places: Ids) -> tuple[Ints, NDArray[np.bool_]]:
-        """Return the indices of nodes of the file in the mesh, and which are in it."""
+        """Return the indices in the mesh of nodes of the file, and which of these nodes are in the mesh."""
         if not len(self._used):
             return np.zeros(places.shape, np.int32), np.zeros(places.shape, bool)
         found = np.minimum(np.searchsorted(self._used, places), len(self._used) - 1)
         return found.astype(np.int32), self._used[found] == places
 
     def _whole(self, faces: Ids) -> Ids:
-        """Return the faces with all corners in the mesh; each once."""
+        """Return the faces with all corners in the mesh; each face once."""
         there = self._indices(faces)[1].all(axis=1)
         _, first = np.unique(np.sort(faces[there], axis=1), axis=0, return_index=True)
         return faces[there][np.sort(first)]
 
     def _parted(self, faces: Ids) -> tuple[Ints, NDArray[np.bool_]]:
-        """Return (n, k, 3) the triangles of each face, and whether all of them are outer faces of the mesh."""
+        """Return (n, k, 3) the triangles of each face, and whether all triangles of a face are outer faces of the
+        mesh.
+        """
         if faces.shape[1] == 4:
             ways = [halves(faces).reshape(-1, 2, 3), _other_halves(faces)]
         else:
@@ -118,7 +121,7 @@ class Members:
         return np.stack([np.stack(row, axis=1) for row in rows], axis=1)
 
     def _middle(self, one: Ids, other: Ids) -> Ids:
-        """Return (n,) the nodes between pairs of nodes; one of the pair if there is none."""
+        """Return (n,) the nodes between pairs of nodes; a node of the pair if there is no node between."""
         low, high = np.minimum(one, other), np.maximum(one, other)
         every = np.concatenate([self._edges[:, :2], np.column_stack([low, high])])
         _, of = np.unique(every, axis=0, return_inverse=True)
@@ -130,7 +133,7 @@ class Members:
 
 
 def _other_halves(quads: Ids) -> Ids:
-    """Return (n, 2, 3) the triangles of quadrilaterals by their other diagonal, for tets with such a face."""
+    """Return (n, 2, 3) the triangles of quadrilaterals by their other diagonal, for tets with such a triangle."""
     odd = (quads.argmin(axis=1) % 2 == 0)[:, None]
     rolled = np.where(odd, np.roll(quads, -1, axis=1), quads)
     return rolled[:, [[0, 1, 2], [0, 2, 3]]]

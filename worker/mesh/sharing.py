@@ -1,4 +1,4 @@
-"""Parts from one file with common nodes: without a bond they would separate there."""
+"""Parts from one file with common nodes. Without a bond such parts would separate at these nodes."""
 
 from collections.abc import Iterator, Sequence
 from itertools import combinations
@@ -11,7 +11,8 @@ from conoid.cases.model.schema import Case
 from .model import Floats, Ids, Origin
 
 _SAME = 1e-9
-"""Share of the largest coordinate: nodes nearer than this coincide. Chosen: round-off in files is a millionth."""
+"""Distance, as a share of the largest coordinate, below which two nodes coincide. Chosen value: round-off in files
+is a millionth."""
 
 Placed = tuple[int, Origin, Floats]
 """Number of a part, origin of its mesh, and its nodes (n, 3), m, after the rotation of the part."""
@@ -28,7 +29,9 @@ def shared_nodes(case: Case, parts: Sequence[Placed]) -> Iterator[str]:
 
 
 def same_places(one: Origin, x: Floats, other: Origin, y: Floats) -> tuple[Ids, Ids]:
-    """Return the nodes of two meshes, by their indices in each, that have one number in one file and coincide."""
+    """Return the common nodes of two meshes, by their indices in each mesh. Common nodes have one number in one file
+    and coincide.
+    """
     if one.file != other.file:
         return np.zeros(0, np.int64), np.zeros(0, np.int64)
     _, p, q = np.intersect1d(one.nodes, other.nodes, return_indices=True)

@@ -1,4 +1,6 @@
-"""Constraints that keep the shape of a body when nodes move: nodes of a flat face stay in it, of a round one on it."""
+"""Constraints that keep the shape of a body when nodes move: nodes of a flat face stay in the face, nodes of a round
+face on it.
+"""
 
 from dataclasses import dataclass
 from typing import Self
@@ -14,13 +16,17 @@ from .frame import block
 from .model import Floats, TetMesh
 
 _NEAR = 1e-9
-"""Largest distance of a node on a surface of the body, in lengths that ``scale`` makes of order one."""
+"""Largest distance of a node from a surface of the body at which the node counts as on the surface, in lengths that
+``scale`` makes of order one."""
 
 
 @dataclass(frozen=True)
 class Skin:
-    """``held``: (n, 3), fixed coordinates of a node. ``radius``: (n,), fixed distance from the axis (the centre for
-    a sphere), 0 for none. ``round``: number of the coordinates a, b, c that this distance is made of.
+    """Constraints on the nodes of a body.
+
+    ``held``: (n, 3), fixed coordinates of a node. ``radius``: (n,), fixed distance from the axis (from the centre
+    for a sphere), 0 for a free node. ``round``: number of the coordinates a, b, c from which this distance is
+    computed.
     """
 
     held: NDArray[np.bool_]
@@ -29,8 +35,8 @@ class Skin:
 
     @classmethod
     def of(cls, body: Generated, mesh: TetMesh, scale: float) -> tuple[Self, Floats]:
-        """Return the skin of a ``mesh`` in the body's frame, lengths over ``scale``, and its points, projected onto
-        it.
+        """Return the skin of a ``mesh`` in the frame of the body, and the points of the mesh, projected onto the
+        skin. Lengths are divided by ``scale``.
         """
         points, round_in = mesh.points.copy(), 3 if isinstance(body, Sphere) else 2
         skin = np.zeros(len(points), bool)

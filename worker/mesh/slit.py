@@ -8,13 +8,14 @@ from conoid.cases.shapes.geometry import across, bounds, index
 from .model import TetMesh
 
 _NEAR = 1e-6
-"""Share of the element size within which a node is on a plane."""
+"""Distance from a plane, as a share of the element size, below which a node is on the plane."""
 
 
 def opened(body: Box | Plate, mesh: TetMesh) -> TetMesh:
-    """Return the mesh with the nodes of the body's slit doubled; the copies belong to the tets on the positive side.
+    """Return the mesh with the nodes of the body's slit doubled. The copies belong to the tets on the positive side.
 
-    Nodes on the border of the slit keep both sides together, unless that border is on the surface of the body.
+    Nodes on the border of the slit are not doubled and connect both sides, unless this border is on the surface of
+    the body.
     """
     slit = body.slit
     if slit is None:

@@ -1,8 +1,8 @@
-"""Smoothing of the tets that limit the time step.
+"""Smoothing of the tets that limit the time step. In an explicit run the worst tet limits every step.
 
-An explicit run pays for its worst tet in every step. The tets with the shortest step length are processed worst
-first; one of their nodes is moved along the gradient of that length as far as the worst tet at the node improves.
-Nodes on the boundary slide along it, so the body keeps its shape.
+The tets with the shortest step length are processed first. One node of such a tet is moved along the gradient of the
+step length, as far as the worst tet at the node improves. Nodes on the boundary slide along the boundary, so the
+body keeps its shape.
 """
 
 import heapq
@@ -13,18 +13,19 @@ import numpy as np
 from .model import Floats, Ids, TetMesh, step_lengths
 
 _MOVES = np.array([0.6, 0.3, 0.15, 0.07, 0.03])
-"""Lengths of the tried moves, over the step length of the worst tet."""
+"""Lengths of the tried moves of a node, divided by the step length of the worst tet."""
 
 _GAIN = 1.01
-"""Smallest factor of improvement of the worst tet at the node for which a move is made."""
+"""Smallest ratio of the new to the old step length of the worst tet at the node for which a move is made."""
 
 
 _MOST, _PATIENCE = 10_000, 4
-"""Largest number of tets that are processed: in all, and for each one that starts too low."""
+"""Limits of the number of processed tets: in all, and for each tet with a step length that is too small at the
+start."""
 
 _AHEAD = 1.25
-"""Ratio to the step length of a tet that cannot be improved above which tets are not processed: the time step is
-limited already."""
+"""Largest ratio of the step length of a processed tet to that of a tet that cannot be improved. Tets above this
+ratio are not processed, because the other tet limits the time step already."""
 
 
 class Slides(Protocol):
@@ -56,7 +57,7 @@ def smoothed(mesh: TetMesh, skin: Slides, wanted: float) -> TetMesh:
 
 
 class _Smoothing:
-    """Moving points, and their step lengths."""
+    """Points of the mesh, which move, and the step lengths of the tets."""
 
     def __init__(self, mesh: TetMesh, skin: Slides, wanted: float) -> None:
         self.points = mesh.points.copy()
@@ -68,7 +69,7 @@ class _Smoothing:
         self.first = np.concatenate([[0], np.cumsum(np.bincount(mesh.tets.ravel(), minlength=len(mesh.points)))])
 
     def raise_tet(self, tet: int) -> Ids:
-        """Move one node of ``tet`` if it improves the worst tet; return the changed tets at that node."""
+        """Move one node of ``tet`` if this improves the worst tet at the node. Return the changed tets at this node."""
         for node in self.tets[tet].tolist():
             if self.skin.movable(node):
                 star = self.by_node[self.first[node] : self.first[node + 1]]

@@ -1,4 +1,4 @@
-"""Conversion of the elements of a file into a mesh of tets, the same for all formats."""
+"""Conversion of the elements of a file into a mesh of tets. The conversion is the same for all formats."""
 
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -14,7 +14,7 @@ from .second_order import Way
 from .sets import Named, members
 
 _SEEN = 1e-6
-"""Share of the volume below which no note is given. Chosen: the round-off of coordinates with six digits."""
+"""Share of the volume below which no note is given. Chosen value: the round-off of coordinates with six digits."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -24,31 +24,33 @@ class Content:
     tags: Ids
     """(n,) numbers of the nodes in the file, for messages."""
     points: Floats
-    """(n, 3) positions."""
+    """(n, 3) positions of the nodes."""
     cells: list[Cells]
-    """Volume elements, by indices into these arrays; the order of indices decides how faces are cut."""
+    """Volume elements, by indices into these arrays. The order of the indices determines how faces are cut."""
     named: list[Named] = field(default_factory=list)
     notes: tuple[str, ...] = ()
     included: tuple[Path, ...] = ()
-    """Further files that were read for it."""
+    """Further files that were read for the mesh."""
 
 
 @dataclass(frozen=True, eq=False)
 class _Tets:
-    """Tets with their elements."""
+    """Tets with the elements from which they were made."""
 
     nodes: Ids
     numbers: Ids
     lines: Ids
     middles: Floats = field(default_factory=lambda: np.zeros((0, 3)))
-    """(j, 3) nodes behind those of the file."""
+    """(j, 3) positions of the nodes in the middle of elements. Their indices follow those of the nodes of the file."""
     of: Ids = field(default_factory=lambda: np.zeros(0, np.int64))
     """(j,) element of each middle node."""
 
 
 def solid(content: Content, way: Way | None = None) -> NamedMesh:
-    """Return the mesh of all elements, positive tets that meet face to face, not yet checked. ``way``: cut of tets
-    of ten nodes. Raises MeshError for an element that is inverted, flat or too distorted.
+    """Return the mesh of all elements: positive tets with matching faces, not yet checked.
+
+    ``way``: how tets of ten nodes are cut, into ``eight`` tets or into one tet of their ``corners``. Raises
+    MeshError for an element that is inverted, flat or too distorted.
     """
     tets = [each for each in content.cells if each.kind.form is Form.TET]
     chosen, remarks = _ordered(content, tets, way)
@@ -83,7 +85,7 @@ def _gathered(content: Content, made: list[_Tets], edges: Ids, notes: tuple[str,
 
 
 def _ordered(content: Content, tets: list[Cells], way: Way | None) -> tuple[Way, list[str]]:
-    """Return the tets that tets of ten nodes become, and notes for the user."""
+    """Return the tets that are made from tets of ten nodes, and notes for the user."""
     curved = [each for each in tets if each.kind.edges and len(each.numbers)]
     if not curved:
         return "corners", []
@@ -122,13 +124,13 @@ def _tets(cells: Cells, points: Floats, tags: Ids, way: Way) -> _Tets:
 
 
 def _sorted(cells: Cells) -> Ids:
-    """Return (m, 6) the nodes in the middle of edges in the order of ``TET10``."""
+    """Return (m, 6) the nodes in the middle of edges, in the order of ``TET10``."""
     places = {frozenset(edge): k for k, edge in enumerate(cells.kind.edges)}
     return cells.middles[:, [places[frozenset(edge)] for edge in TET10.edges]]
 
 
 def _edges(tets: list[Cells]) -> Ids:
-    """Return (k, 3) two corners, ascending, and the node between them."""
+    """Return (k, 3) two corners, ascending, and the node between the corners."""
     rows = [
         np.column_stack([np.sort(each.corners[:, edge], axis=1), middle])
         for each in tets

@@ -14,17 +14,17 @@ from conoid.cases.reading.problems import dotted
 from ..errors import MeshError
 
 Sources = Mapping[str, Path]
-"""Absolute paths by the key of the table that names the file, ``parts[0].mesh.of[1]``."""
+"""Absolute paths of files, by the key of the table that names the file, such as ``parts[0].mesh.of[1]``."""
 
 
 def sources(mesh: Mesh, folder: Path, key: str) -> dict[str, Path]:
-    """Return the files of the mesh at ``key`` whose case is in ``folder``. Raises MeshError for a missing file."""
+    """Return the files of the mesh at ``key``, for a case in ``folder``. Raises MeshError for a missing file."""
     return {named: _there(file, folder, named) for named, file in _named(mesh, key)}
 
 
 def digests(mesh: Mesh, found: Sources, key: str) -> list[str]:
-    """Return the suffix of each file and its sha256. Raises MeshError for a file with another hash than given in the
-    case.
+    """Return the suffix of each file and its sha256. Raises MeshError for a file whose hash differs from the hash in
+    the case.
     """
     return [f"{found[named].suffix.lower()} {_digest(found[named], file, named)}" for named, file in _named(mesh, key)]
 
@@ -34,7 +34,7 @@ def _named(mesh: Mesh, key: str) -> list[tuple[str, File]]:
 
 
 def below(key: str, place: Place) -> str:
-    """Return the key of a table below another one."""
+    """Return the key of a table below another table."""
     return f"{key}.{dotted(place)}" if place else key
 
 

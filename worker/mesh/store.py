@@ -1,5 +1,5 @@
-"""Storage of a mesh as an .npz file, which is written under another name and renamed: readers find complete files
-only.
+"""Storage of a mesh as an .npz file. The file is written under another name and renamed, so readers find complete
+files only.
 """
 
 import os
@@ -16,7 +16,7 @@ from .model import Ints, NodeSet, Origin, TetMesh
 
 
 def save(mesh: TetMesh, path: Path) -> None:
-    """Write ``path``. Raises OSError."""
+    """Write the mesh to ``path``. Raises OSError."""
     handle, name = tempfile.mkstemp(dir=path.parent, prefix=".writing-", suffix=".npz")
     try:
         with os.fdopen(handle, "wb") as file:
@@ -30,7 +30,7 @@ def save(mesh: TetMesh, path: Path) -> None:
 
 
 def load(path: Path) -> TetMesh | None:
-    """Return the mesh in ``path``; None if there is none, or the file is damaged (every array has a checksum)."""
+    """Return the mesh in ``path``; None if there is no file, or if the file is damaged (every array has a checksum)."""
     try:
         with path.open("rb") as file, np.load(file, allow_pickle=False) as arrays:
             return TetMesh(arrays["points"], arrays["tets"], _origin(arrays), _sets(arrays))
@@ -53,7 +53,7 @@ def _origin(arrays: Mapping[str, NDArray[Any]]) -> Origin | None:
 
 
 def _of_sets(sets: tuple[NodeSet, ...]) -> dict[str, Any]:
-    """Return all sets in few arrays; a set of nodes has -1 faces."""
+    """Return all sets in few arrays. The number of faces of a set of nodes is -1."""
     if not sets:
         return {}
     faces = [_no_faces() if each.faces is None else each.faces for each in sets]

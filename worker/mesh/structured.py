@@ -1,7 +1,7 @@
 """Regular meshes for verification: hexahedra cut into 5 or 6 tets, in plain numpy.
 
 A block is cut by planes. A solid cylinder is a square grid, mapped to the disk, times planes. A tube is rings times
-sectors times planes. ``element_size`` is rounded to whole divisions, at least one.
+sectors times planes. ``element_size`` is rounded to a whole number of divisions, at least one.
 """
 
 import itertools
@@ -56,8 +56,8 @@ def disk(u: Floats, v: Floats) -> tuple[Floats, Floats]:
     """Return the square [-1, 1]^2 mapped to the unit disk: squares become circles, cut into equal angles (Shirley and
     Chiu 1997).
 
-    The ratio of areas is the same everywhere. The square's corners become smooth, so a cell there needs its diagonal
-    through the corner, which ``_mirrored`` provides.
+    The ratio of areas is the same everywhere. The corners of the square become smooth, so a cell at a corner needs
+    its diagonal through this corner, which ``_mirrored`` provides.
     """
     x, y = np.abs(u), np.abs(v)
     radius, less = np.maximum(x, y), np.minimum(x, y)
@@ -114,8 +114,8 @@ def _plain(count: int) -> Cells:
 
 
 def _mirrored(line: Lines) -> Cells:
-    """Return cells of a line of node numbers around 0: near is the end closer to 0, so that both sides are mirror
-    images.
+    """Return cells of a line of node numbers around 0. The near node is the node closer to 0, so that both sides are
+    mirror images.
     """
     low, high = np.arange(len(line) - 1), np.arange(1, len(line))
     inside = line[:-1] >= 0
@@ -123,7 +123,10 @@ def _mirrored(line: Lines) -> Cells:
 
 
 def _cut(shape: list[int], cells: list[Cells], split: int) -> Ints:
-    """Return (m, 4) tets of all cells. Corner p + 2 q + 4 r of a cell is far along a, b, c if p, q, r is 1."""
+    """Return (m, 4) tets of all cells.
+
+    Corner p + 2 q + 4 r of a cell is far along a, b, c if p, q, r is 1.
+    """
     strides = (shape[1] * shape[2], shape[2], 1)
     ends = [[end * stride for end in cell] for cell, stride in zip(cells, strides, strict=True)]
     corner = [
@@ -144,14 +147,14 @@ def _cut(shape: list[int], cells: list[Cells], split: int) -> Ints:
 
 
 def _odd(numbers: list[Lines]) -> NDArray[np.bool_]:
-    """Return for each cell whether its three numbers, one a direction, have an odd sum."""
+    """Return for each cell whether its three numbers, one per direction, have an odd sum."""
     a, b, c = np.ix_(*numbers)
     return np.asarray((a + b + c) % 2 == 1).ravel()
 
 
 def _six() -> list[tuple[int, int, int, int]]:
-    """Return the six paths from corner 0 to corner 7, one direction after the other (Kuhn): all share the long
-    diagonal.
+    """Return the six paths from corner 0 to corner 7, one direction after the other (Kuhn). All six tets share the
+    long diagonal.
     """
     tets = []
     for first, second, third in itertools.permutations((1, 2, 4)):
@@ -163,4 +166,5 @@ def _six() -> list[tuple[int, int, int, int]]:
 
 _SIX = _six()
 _FIVE = [(0, 5, 3, 6), (0, 1, 3, 5), (0, 3, 2, 6), (0, 5, 6, 4), (3, 6, 5, 7)]
-"""The middle tet, and one at each of the corners 1, 2, 4, 7; neighbours use the mirror image, corner i as 7 - i."""
+"""Cut into five tets: the middle tet, and one tet at each of the corners 1, 2, 4, 7. Neighbouring cells use the
+mirror image, with corner 7 - i in place of corner i."""

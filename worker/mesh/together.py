@@ -1,7 +1,7 @@
-"""Meshing of several bodies together, with common nodes at their interfaces. It runs in the child process.
+"""Meshing of several bodies together, with common nodes at their interfaces. The module runs in the child process.
 
-OpenCASCADE cuts the bodies with each other (fragments): a face of two bodies is one face, with one mesh. Each part
-has its element size in its own volume, the smaller one at the interface.
+OpenCASCADE cuts the bodies with each other (fragments), so that a face of two bodies is one face with one mesh. Each
+part has its element size in its own volume; at the interface the smaller size is used.
 """
 
 import math
@@ -38,7 +38,7 @@ _TURN = 2.0 * math.pi / 3.0
 
 _Solid = Cad | Combination
 Joint = Generated | _Solid
-"""Bodies that can be meshed together."""
+"""Types of bodies that can be meshed together."""
 
 
 @dataclass(frozen=True)
@@ -55,8 +55,9 @@ class _Model:
 
 
 def together(bodies: Mapping[str, Joint], sources: Sources, name: str) -> list[TetMesh]:
-    """Return the meshes of ``bodies``, by the keys of their meshes, with nodes of one numbering; ``name``: the file
-    of their origin. Raises MeshError, naming a key, if gmsh cannot make them.
+    """Return the meshes of ``bodies``, by the keys of their meshes, with nodes of one numbering.
+
+    ``name``: file name in the origin of the meshes. Raises MeshError, naming a key, if gmsh cannot make the meshes.
     """
     for key, body in bodies.items():
         if not isinstance(body, _Solid):
@@ -73,14 +74,14 @@ def together(bodies: Mapping[str, Joint], sources: Sources, name: str) -> list[T
 
 
 def _scale(gmsh: Any, bodies: Mapping[str, Joint], sources: Sources) -> float:
-    """Return approximately the extent of all bodies, the scale of lengths."""
+    """Return the approximate extent of all bodies, which is the scale of lengths."""
     known = [corners for body in bodies.values() if not isinstance(body, _Solid) and (corners := bounds(body))]
     sizes = [extent(gmsh, body, sources, key) for key, body in bodies.items() if isinstance(body, _Solid)]
     return scale_of(max([*sizes, *np.ptp(np.array(known).reshape(-1, 3), axis=0).tolist()] if known else sizes))
 
 
 def _drawn(gmsh: Any, body: Joint, scale: float, sources: Sources, key: str) -> Solids:
-    """Draw a body in its position in space, lengths over ``scale``; return its volumes."""
+    """Draw a body in its position in space, with lengths divided by ``scale``. Return the volumes of the body."""
     occ, start = gmsh.model.occ, body.centre if isinstance(body, _Solid) else centre(body)
     before = set(occ.getEntities(3))
     if isinstance(body, _Solid):
@@ -105,8 +106,9 @@ def _cuts(body: Joint, frame: Frame) -> list[Cut]:
 
 
 def _fragments(occ: Any, drawn: list[Solids], keys: list[str]) -> list[list[int]]:
-    """Return the numbers of the volumes of each body, cut so that they have faces in common. Raises MeshError if two
-    overlap.
+    """Return the numbers of the volumes of each body. The volumes are cut so that they have faces in common.
+
+    Raises MeshError if two bodies overlap.
     """
     every = [(of, each) for of, made in enumerate(drawn) for each in made]
     entities = [each for _, each in every]
@@ -137,7 +139,7 @@ def _sizes(model: _Model) -> None:
 
 
 def _size(gmsh: Any, body: Joint, frame: Frame) -> int:
-    """Return the number of the field of a body's element size: one value, or by its grading."""
+    """Return the number of the field of the element size of a body: one value, or a grading."""
     if body.grading is not None:
         return graded(gmsh, body.element_size, body.grading, frame)
     field = gmsh.model.mesh.field

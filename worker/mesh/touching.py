@@ -1,4 +1,4 @@
-"""Parts from mesh files whose surfaces coincide with those of other parts, without a gap."""
+"""Parts from mesh files whose surfaces coincide with surfaces of other parts, without a gap."""
 
 from collections.abc import Iterator, Mapping
 from itertools import combinations
@@ -15,17 +15,18 @@ from .faces import normals
 from .model import Floats, Ids, Ints
 
 _MOST = 20_000
-"""Largest number of faces within the box round a generated body that are tested. Chosen: half a second."""
+"""Largest number of faces inside of the bounding box of a generated body for which it is tested whether they lie on
+the surface of this body. Chosen value: the test takes half a second."""
 
 Surface = tuple[Floats, Ints]
-"""Nodes (n, 3), m, and faces (k, 3), outward."""
+"""Surface of a part: nodes (n, 3), m, and faces (k, 3) with outward normals."""
 
 
 def touches(case: Case, surfaces: Mapping[int, Surface]) -> Iterator[Touch]:
-    """Yield the pairs of parts that touch without a bond, of which at least one has a mesh from a file; ``surfaces``:
-    of these by part.
+    """Yield the pairs of parts that touch without a bond. At least one part of a pair has a mesh from a file.
 
-    Two meshes from files touch in faces with the same corners; with a generated body all faces on its surface count.
+    ``surfaces``: surfaces of these parts, by part. Two meshes from files touch in faces with the same corners. For a
+    generated body all faces on its surface count.
     """
     for (i, one), (j, other) in combinations(surfaces.items(), 2):
         if not bonded(case, i, j) and (area := _matched(one, other)):
@@ -39,7 +40,7 @@ def touches(case: Case, surfaces: Mapping[int, Surface]) -> Iterator[Touch]:
 
 
 def _matched(one: Surface, other: Surface) -> float:
-    """Return the area, m^2, of the faces that both surfaces have."""
+    """Return the area, m^2, of the faces that belong to both surfaces."""
     grain = NEAR * max(float(np.ptp(points, axis=0).max()) for points, _ in (one, other))
     keys = [_corners(points, faces, grain) for points, faces in (one, other)]
     unique = [np.unique(key, axis=0, return_index=True) for key in keys]
@@ -50,7 +51,7 @@ def _matched(one: Surface, other: Surface) -> float:
 
 
 def _corners(points: Floats, faces: Ints, grain: float) -> Ids:
-    """Return (k, 9) corners of faces in integer multiples of the tolerance, in one order."""
+    """Return (k, 9) corners of faces in integer multiples of the tolerance. The corners of a face are sorted."""
     cells = np.floor(points / grain + 0.5).astype(np.int64)[faces]
     order = np.lexsort((cells[..., 2], cells[..., 1], cells[..., 0]), axis=1)
     return np.take_along_axis(cells, order[..., None], axis=1).reshape(len(faces), 9)

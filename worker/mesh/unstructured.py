@@ -1,8 +1,9 @@
-"""Unstructured meshes of the primitives by gmsh (OpenCASCADE bodies, HXT Delaunay). They are made in the child process.
+"""Unstructured meshes of the primitives by gmsh (OpenCASCADE bodies, HXT Delaunay). The meshes are made in the child
+process.
 
-HXT with an optimisation threshold of 0.45, then ``smooth``, was the best of all settings tried: Delaunay and frontal
-with the Netgen optimiser left worse tets and took two to four times as long. One thread and a fixed seed: the same
-request gives the same bits.
+HXT with an optimisation threshold of 0.45, followed by ``smooth``, was the best of all settings tried: Delaunay and
+frontal with the Netgen optimiser left worse tets and took two to four times as long. gmsh runs on one thread with a
+fixed seed, so the same request gives the same bits.
 """
 
 import math
@@ -45,7 +46,7 @@ def unstructured(body: Generated, key: str = "mesh") -> TetMesh:
 
 
 def draw(gmsh: Any, body: Generated, scale: float) -> None:
-    """Draw the body in its frame, lengths over ``scale``: gmsh's tolerances are absolute."""
+    """Draw the body in its frame, with lengths divided by ``scale``, because the tolerances of gmsh are absolute."""
     if isinstance(body, Plate | Cylinder | Tube | Sphere) and body.aligned and body.sector != "quarter":
         _draw_quarters(gmsh, body, scale)
     elif isinstance(body, Box | Plate):
@@ -60,8 +61,9 @@ def draw(gmsh: Any, body: Generated, scale: float) -> None:
 
 
 def _draw_quarters(gmsh: Any, body: Plate | Cylinder | Tube | Sphere, scale: float) -> None:
-    """Draw a half or a whole body as a quarter and its images, with common faces: gmsh puts nodes on these faces and
-    on the axis, most of which smoothing leaves near them.
+    """Draw a half or a whole body as a quarter and its images, with common faces.
+
+    gmsh puts nodes on these faces and on the axis. Smoothing leaves most of these nodes near the faces and the axis.
     """
     occ = gmsh.model.occ
     draw(gmsh, body.model_copy(update={"sector": "quarter"}), scale)
@@ -74,8 +76,8 @@ def _draw_quarters(gmsh: Any, body: Plate | Cylinder | Tube | Sphere, scale: flo
 
 
 def _draw_sphere(occ: Any, body: Sphere, scale: float) -> None:
-    """Draw a sphere; a half has its pole in the middle of the dome: with poles on the rim gmsh leaves short edges
-    there.
+    """Draw a sphere. A half sphere has its pole in the middle of the dome, because gmsh leaves short edges at poles
+    on the rim.
     """
     radius, right = body.radius / scale, math.pi / 2
     if body.sector == "half":

@@ -1,7 +1,7 @@
 """Solids of STEP and BREP files, read with gmsh's OpenCASCADE kernel.
 
-The checked bytes are copied into the child's own empty folder and read from there, so that a name in them cannot
-refer to another file.
+The checked bytes are copied into the empty folder of the child process and read from there. A name inside of the
+file therefore cannot refer to another file.
 """
 
 import re
@@ -21,8 +21,8 @@ from .printed import said
 from .step import length_units, solids_in
 
 MOST_BYTES = 256 * 2**20
-"""Largest size of a file. Chosen: text of an assembly of thousands of parts; OpenCASCADE needs some ten times as
-much memory."""
+"""Largest size of a file. Chosen value: the text of an assembly of thousands of parts. OpenCASCADE needs some ten
+times as much memory."""
 _MILLIMETRE = Fraction(1, 1000)
 """Unit into which OpenCASCADE converts STEP files."""
 _SYNTAX = b"Incorrect Syntax"
@@ -31,11 +31,13 @@ _BREP, _BREP_END = b"CASCADE Topology V", re.compile(rb"\*\s*[+-]\d+ \d+\s*$")
 """Beginning of a BREP file, within its first lines, and its end: the last shape, and the shape that contains all
 others."""
 _READING = 120
-"""s that OpenCASCADE may take to read a file: a damaged file can take for ever. Chosen."""
+"""Time that OpenCASCADE may take to read a file, s; a damaged file can take for ever. Chosen value."""
 
 
 def imported(gmsh: Any, form: CadForm, path: Path, frame: Frame, head: str) -> Solids:
-    """Return the chosen solids of a file in the frame of the model. Raises MeshError, which begins with ``head``."""
+    """Return the chosen solids of a file in the frame of the model. Raises MeshError with a message that begins with
+    ``head``.
+    """
     occ = gmsh.model.occ
     every, unit = _read(gmsh, form, path, head)
     chosen = _chosen(gmsh, form, every, head)
@@ -73,7 +75,7 @@ def _place(occ: Any, solids: Solids, factor: float, frame: Frame) -> None:
 
 
 def _read(gmsh: Any, form: CadForm, path: Path, head: str) -> tuple[Solids, Fraction]:
-    """Return all solids of a file, in its order, and the length of 1, m."""
+    """Return all solids of a file, in the order of the file, and the length of one unit of the file, m."""
     data = _bytes(path, head)
     if data.lstrip().startswith(b"ISO-10303-21;"):
         kind, unit = "step", _step_unit(form, data, head)
@@ -116,7 +118,7 @@ def _bytes(path: Path, head: str) -> bytes:
 
 
 def _step_unit(form: CadForm, data: bytes, head: str) -> Fraction:
-    """Return the unit of the coordinates: OpenCASCADE converts the units of the file into the requested one."""
+    """Return the unit of the coordinates. OpenCASCADE converts the units of the file into the requested unit."""
     said = length_units(data, head)
     if form.unit is not None and any(abs(float(unit) - form.unit) > 1e-9 * form.unit for unit in said):
         units = choices(sorted(si(float(unit), "m") for unit in said))
@@ -150,7 +152,9 @@ def _chosen(gmsh: Any, form: CadForm, solids: Solids, head: str) -> Solids:
 
 
 def _names(label: str) -> list[str]:
-    """Return the names of a solid: its label, ``Shapes/Bullet/Core``, and every end and part of it."""
+    """Return the names of a solid: its label, such as ``Shapes/Bullet/Core``, and every end and every part of this
+    label.
+    """
     steps = label.split("/")
     return [*("/".join(steps[n:]) for n in range(len(steps))), *steps[1:]]
 

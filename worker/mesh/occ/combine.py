@@ -20,8 +20,8 @@ AnyForm = Operand | CadForm | CombinedForm
 class Drawing:
     """Draws forms into the current model of ``gmsh``, in ``frame``; files are in ``sources``.
 
-    Several parts can be drawn into one model, each by ``solids``, which returns the part's volumes; ``occ.fragment``
-    of all of them, with its map from old to new volumes, gives their meshes common nodes.
+    Several parts can be drawn into one model by several calls of ``solids``, which returns the volumes of a part.
+    ``occ.fragment`` of all volumes, with its map from old to new volumes, gives their meshes common nodes.
     """
 
     gmsh: Any
@@ -29,7 +29,9 @@ class Drawing:
     sources: Sources
 
     def solids(self, form: AnyForm, key: str) -> Solids:
-        """Draw the form at ``key`` of its case, with its rotation; return its volumes, none if nothing is left."""
+        """Draw the form at ``key`` of its case, with its rotation. Return its volumes, or no volume if nothing is
+        left.
+        """
         occ = self.gmsh.model.occ
         if isinstance(form, CombinedForm):
             made = self._combined(form, key)
@@ -64,7 +66,7 @@ def _three(made: Any) -> Solids:
 
 
 def extent(gmsh: Any, form: AnyForm, sources: Sources, key: str) -> float:
-    """Return an upper estimate of the largest extent of a form, m, the scale of lengths."""
+    """Return an upper estimate of the largest extent of a form, m. The extent is the scale of lengths."""
     if isinstance(form, CadForm):
         return size_of(gmsh, form, sources[key], f"{key}.path = {form.path!r}")
     if isinstance(form, CombinedForm):

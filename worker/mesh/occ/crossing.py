@@ -1,8 +1,8 @@
-"""Triangles of a surface that cross each other: candidate pairs by cells, then separating axes.
+"""Triangles of a surface that cross each other: candidate pairs by cells, then the test of separating axes.
 
-Two convex bodies do not overlap if their projections on some axis do not; for two triangles the axes are their
-normals, the products of an edge of each, and the normals of their edges in the planes of both (Gottschalk, Lin and
-Manocha 1996, SIGGRAPH, 171).
+Two convex bodies do not overlap if their projections on some axis do not overlap. For two triangles these axes are
+their normals, the cross products of an edge of one with an edge of the other, and the normals of their edges in the
+planes of both (Gottschalk, Lin and Manocha 1996, SIGGRAPH, 171).
 """
 
 import math
@@ -13,18 +13,21 @@ from numpy.typing import NDArray
 from ..model import Floats
 
 _DEEP = 1e-6
-"""Share of the extent of the surface: projections that overlap by less only touch. Chosen: files have six or seven
-digits."""
+"""Tolerance, as a share of the extent of the surface: projections that overlap by less only touch. Chosen value:
+files have six or seven digits."""
 _MOST = 10_000_000
-"""Largest number of entries of cells; the cells are enlarged to meet it. Chosen: a quarter of a GiB."""
+"""Largest number of entries of cells. The cells are enlarged until the number is below this limit. Chosen value: a
+quarter of a GiB."""
 _CHUNK = 200_000
-"""Pairs that are tested at once."""
+"""Number of pairs that are tested at once."""
 
 Pairs = NDArray[np.int64]
 
 
 def crossing(points: Floats, faces: Pairs) -> Pairs:
-    """Return (k, 2) pairs of ``faces`` (m, 3) over ``points`` (n, 3) with more in common than corners and edges."""
+    """Return (k, 2) pairs of ``faces`` (m, 3) over ``points`` (n, 3) that have more than corners and edges in
+    common.
+    """
     corners = points[faces]
     deep = _DEEP * float(np.ptp(points, axis=0).max())
     pairs = _near(corners, deep)
@@ -36,7 +39,9 @@ def crossing(points: Floats, faces: Pairs) -> Pairs:
 
 
 def _near(corners: Floats, deep: float) -> Pairs:
-    """Yield (k, 2) pairs with overlapping boxes, each once, found by the cells that the boxes touch."""
+    """Yield (k, 2) pairs of triangles with overlapping boxes, each pair once. The pairs are found by the cells that
+    the boxes touch.
+    """
     low, high = corners.min(axis=1), corners.max(axis=1)
     start, extent = low.min(axis=0), float((high.max(axis=0) - low.min(axis=0)).max())
     many = max(1, math.isqrt(len(corners)) // 2)
@@ -89,14 +94,16 @@ def _overlap(a: Floats, b: Floats, deep: float) -> NDArray[np.bool_]:
 
 
 def _depth(a: Floats, b: Floats, axis: Floats) -> Floats:
-    """Return (k,) the overlap of the projections of triangles on an axis; negative if they are apart."""
+    """Return (k,) the overlap of the projections of two triangles on an axis; negative if the projections do not
+    overlap.
+    """
     p, q = ((t * axis[:, None]).sum(axis=2) for t in (a, b))
     depth: Floats = np.minimum(p.max(axis=1) - q.min(axis=1), q.max(axis=1) - p.min(axis=1))
     return depth
 
 
 def _unit(vectors: Floats) -> Floats:
-    """Return vectors of length 1; zeros for vectors of zero length within round-off."""
+    """Return vectors of length 1; zeros for vectors whose length is zero within round-off."""
     length = np.sqrt((vectors**2).sum(axis=1, keepdims=True))
     tiny = length <= 1e-12 * max(float(length.max(initial=0.0)), 1e-300)
     unit: Floats = np.divide(vectors, length, out=np.zeros_like(vectors), where=~tiny)

@@ -1,4 +1,6 @@
-"""Forms drawn into the current model, each in a frame of its own and then moved into that of the model."""
+"""Forms drawn into the current model. Each form is drawn in its own frame and then moved into the frame of the
+model.
+"""
 
 import math
 from collections.abc import Sequence
@@ -23,7 +25,7 @@ from conoid.cases.shapes.profile import Arc, Profile, Segment, profile
 from .frame import Frame, Vector
 
 Solids = list[tuple[int, int]]
-"""gmsh's identification of entities: dimension and number."""
+"""Identification of entities in gmsh: dimension and number."""
 Angles = tuple[float, float]
 Form = (
     BoxForm | PlateForm | CylinderForm | TubeForm | SphereForm | ConeForm | OgiveForm | BallPiece
@@ -35,7 +37,9 @@ ROUND: Angles = (0.0, 2.0 * math.pi)
 
 
 def drawn(occ: Any, form: Form, frame: Frame, ranges: Sequence[Angles] = (ROUND,)) -> Solids:
-    """Draw the form in the model's ``frame``; a body of revolution or a ring sector in the ``ranges`` of angles."""
+    """Draw the form in the ``frame`` of the model. A body of revolution or a ring sector is drawn in the ``ranges``
+    of angles.
+    """
     scale, made = frame.scale, Solids()
     if isinstance(form, BoxForm):
         made = _box(occ, [x / scale for x in form.low], [x / scale for x in form.high])
@@ -65,7 +69,7 @@ def into(occ: Any, solids: Solids, axis: Axis, start: Vector, frame: Frame) -> N
 
 
 def turn(occ: Any, solids: Solids, by: Turn | None, frame: Frame) -> None:
-    """Turn solids of the model by the rotation of a case."""
+    """Rotate solids of the model by the rotation of a case."""
     if by is not None:
         along = [0.0, 0.0, 0.0]
         along[frame.direction(by.axis)] = 1.0
@@ -104,7 +108,7 @@ def _ring(occ: Any, form: RingSectorForm, scale: float, begin: float, end: float
 
 
 def _revolved(occ: Any, outline: Profile, scale: float, begin: float, end: float) -> Solids:
-    """Revolve the area between the outline and the axis about it."""
+    """Revolve the area between the outline and the axis about the axis."""
     segments = outline.segments
     low, high = (radius / scale for radius in outline.ends)
     start = occ.addPoint(0, 0, 0)
@@ -132,7 +136,7 @@ def _side(occ: Any, each: Segment, first: int, last: int, scale: float) -> int:
 
 
 def _in_thirds(occ: Any, sides: list[int]) -> Solids:
-    """Draw a body with a surface of three faces that meet in a tip: with one face gmsh makes two triangles on the
+    """Draw a body with a surface of three faces that meet in a tip. With one face gmsh makes two triangles on the
     same three nodes where the tip is slender.
     """
     third = _swept(occ, sides, 0.0, ROUND[1] / 3.0)
@@ -144,7 +148,7 @@ def _in_thirds(occ: Any, sides: list[int]) -> Solids:
 
 
 def _swept(occ: Any, sides: list[int], begin: float, end: float) -> Solids:
-    """Return the volume that the area within ``sides`` sweeps between two angles, rad; the area is removed."""
+    """Return the volume that the area within ``sides`` sweeps between two angles, rad. The area is removed."""
     area = occ.addPlaneSurface([occ.addCurveLoop(sides)])
     if begin:
         occ.rotate([(2, area)], 0, 0, 0, 0, 0, 1, begin)

@@ -1,4 +1,4 @@
-"""Edges and rounds of a model that are smaller than its elements, which give equally small tets."""
+"""Edges and rounds of a model that are smaller than its elements. They give equally small tets."""
 
 from collections.abc import Iterator
 from typing import Any
@@ -11,11 +11,12 @@ from .draw import Solids
 from .frame import Frame
 
 _SHORT = 0.5
-"""Share of the element size below which edges are reported. Chosen: a tet there has half the time step."""
+"""Length, as a share of the element size, below which edges are reported. Chosen value: a tet at such an edge has
+half the time step."""
 
 
 def small_features(gmsh: Any, element_size: float, frame: Frame, solids: Solids) -> Iterator[str]:
-    """Yield lines about short edges of ``solids``, and fillets with a radius too small for the elements."""
+    """Yield lines about short edges of ``solids``, and about fillets with a radius too small for the elements."""
     least = _SHORT * frame.length(element_size)
     faces = sorted(set(gmsh.model.getBoundary(solids, combined=False, oriented=False)))
     edges = sorted(set(gmsh.model.getBoundary(faces, combined=False, oriented=False)))

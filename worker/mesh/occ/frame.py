@@ -1,5 +1,7 @@
-"""Coordinates in which a model is drawn: origin where sectors are cut, third direction along an axis, and lengths of
-order one, since the tolerances of gmsh and OpenCASCADE are absolute.
+"""Coordinates in which a model is drawn: the origin is the point where sectors are cut, and the third direction is
+along an axis.
+
+Lengths are of order one, because the tolerances of gmsh and OpenCASCADE are absolute.
 """
 
 import math
@@ -17,7 +19,9 @@ Vector = tuple[float, float, float]
 
 @dataclass(frozen=True)
 class Frame:
-    """(a, b, c): the cyclic order of ``across(axis)`` and ``axis``, from ``origin``, m, in lengths of ``scale``, m."""
+    """Frame (a, b, c): the cyclic order of ``across(axis)`` and ``axis``, from ``origin``, m, in lengths of
+    ``scale``, m.
+    """
 
     origin: Vector
     axis: Axis
@@ -38,11 +42,11 @@ class Frame:
         return length / self.scale
 
     def direction(self, axis: Axis) -> int:
-        """Return the index of a, b, c that is along ``axis``."""
+        """Return the index of the direction a, b or c that is along ``axis``."""
         return self.directions.index(AXES.index(axis))
 
     def to_space(self, points: Floats) -> Floats:
-        """Return points (n, 3) of the frame in x, y, z; m. A zero becomes exactly the coordinate of the origin."""
+        """Return points (n, 3) of the frame in x, y, z, m. A zero becomes exactly the coordinate of the origin."""
         turned = np.empty_like(points)
         turned[:, self.directions] = points * self.scale
         moved: Floats = turned + np.array(self.origin)
@@ -50,5 +54,5 @@ class Frame:
 
 
 def scale_of(extent: float) -> float:
-    """Return a power of two near a length, m: division by it is exact and gives lengths of order one."""
+    """Return a power of two near a length, m. Division by this power is exact and gives lengths of order one."""
     return 2.0 ** round(math.log2(extent))

@@ -1,4 +1,6 @@
-"""Solids of one body that touch in edges or points only: they have common nodes there that carry no moment."""
+"""Solids of one body that touch in edges or points only. They have common nodes at these edges and points, which
+carry no moment.
+"""
 
 from collections.abc import Iterator
 from itertools import combinations

@@ -1,5 +1,5 @@
-"""Meshing of a drawn model with its sizes set: tets by gmsh, whose nodes are moved to raise the smallest step
-lengths.
+"""Meshing of a drawn model whose element sizes are set. gmsh makes the tets. Their nodes are then moved to raise the
+smallest step lengths.
 """
 
 from collections.abc import Sequence
@@ -15,19 +15,19 @@ from .frame import Frame
 from .sliding import Cut, Sliding
 
 WANTED = 0.75
-"""Share of a regular tet's step length with edge ``element_size`` below which step lengths are raised where
-possible."""
+"""Step length, as a share of the step length of a regular tet with edge ``element_size``, below which step lengths
+are raised where possible."""
 _OTHERS = ({"Mesh.Algorithm3D": 1}, {"Mesh.Algorithm3D": 1, "Mesh.Algorithm": 1})
-"""Further attempts if gmsh fails: its Delaunay mesher in place of HXT, then triangles by MeshAdapt as well."""
+"""Further attempts if gmsh fails: first its Delaunay mesher in place of HXT, then also triangles by MeshAdapt."""
 
 
 def meshed(gmsh: Any, frame: Frame, element_size: float, cuts: Sequence[Cut]) -> TetMesh:
-    """Return the tets of the current model, m, in space; the model is cut on the planes ``cuts`` of the frame."""
+    """Return the tets of the current model, m, in space. The model is cut on the planes ``cuts`` of the frame."""
     return with_names(gmsh, frame, element_size, cuts)[0]
 
 
 def with_names(gmsh: Any, frame: Frame, element_size: float, cuts: Sequence[Cut]) -> tuple[TetMesh, Names]:
-    """Return the same, and gmsh's numbers of its nodes and tets."""
+    """Return the tets of the current model, and gmsh's numbers of its nodes and tets."""
     _generate(gmsh)
     found = named_mesh(gmsh)
     mesh = found.mesh
@@ -40,7 +40,7 @@ def with_names(gmsh: Any, frame: Frame, element_size: float, cuts: Sequence[Cut]
 
 
 def _generate(gmsh: Any) -> None:
-    """Make tets in every volume; by another of gmsh's meshers if one fails. Raises MeshError if all fail."""
+    """Make tets in every volume, by another of gmsh's meshers if one fails. Raises MeshError if all fail."""
     for n, options in enumerate(({}, *_OTHERS)):
         for name, value in options.items():
             gmsh.option.setNumber(name, value)

@@ -8,7 +8,7 @@ from contextlib import contextmanager
 
 @contextmanager
 def said() -> Iterator[bytearray]:
-    """Collect the bytes that this process prints within the block; they are available after it."""
+    """Collect the bytes that this process prints within the block. The bytes are available after the block."""
     text = bytearray()
     with tempfile.TemporaryFile() as file:
         before = os.dup(1)

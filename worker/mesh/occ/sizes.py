@@ -7,8 +7,8 @@ from conoid.cases.model.grading import Grading
 from .frame import Frame
 
 GMSH_SIZE = 0.87
-"""gmsh's size over ``element_size``. HXT makes 4 tets in the cube of its size; this makes 6 in element_size^3, as
-the structured generator does, and a mean edge of 1.15 element_size."""
+"""gmsh's size divided by ``element_size``. HXT makes 4 tets in the cube of its size. With this factor it makes 6
+tets in element_size^3, as the structured generator does, and the mean edge is 1.15 element_size."""
 
 
 def set_size(gmsh: Any, element_size: float, grading: Grading | None, frame: Frame) -> None:
@@ -21,8 +21,8 @@ def set_size(gmsh: Any, element_size: float, grading: Grading | None, frame: Fra
 
 
 def graded(gmsh: Any, element_size: float, grading: Grading, frame: Frame) -> int:
-    """Return the number of gmsh's field of a size that is a linear function of the distance from a point, a line
-    along an axis, or a sphere or cylinder.
+    """Return the number of a field of gmsh. The field is a size that is a linear function of the distance from a
+    point, from a line along an axis, or from a sphere or cylinder.
     """
     origin = frame.place(grading.origin)
     along = None if grading.axis is None else frame.direction(grading.axis)

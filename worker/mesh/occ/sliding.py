@@ -1,5 +1,5 @@
-"""Constraints that keep the shape of a drawn body when nodes move: nodes slide along the faces and edges of its
-model.
+"""Constraints that keep the shape of a drawn body when nodes move. Nodes slide along the faces and edges of the
+model of the body.
 """
 
 from collections.abc import Callable, Sequence
@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 from ..model import Floats, Ids
 
 NEAR = 1e-9
-"""Largest distance of a node on a plane on which a body is cut, in lengths of order one."""
+"""Largest distance of a node from a plane on which a body is cut at which the node counts as on the plane, in
+lengths of order one."""
 
 Cut = tuple[int, float]
 """A plane on which a body is cut: its direction and its position."""
@@ -22,7 +23,9 @@ Nearest = Callable[[Floats], Floats]
 
 @dataclass(frozen=True)
 class Sliding:
-    """``entity``: (n,) index in ``nearest`` of the entity of each node, -1 inside of the body, -2 at a corner.
+    """Constraints on the nodes of a body.
+
+    ``entity``: (n,) index in ``nearest`` of the entity of each node, -1 inside of the body, -2 at a corner.
     ``held``: (n, 3) fixed coordinates of a node on the planes on which the body is cut.
     """
 
@@ -32,8 +35,9 @@ class Sliding:
 
     @classmethod
     def of(cls, gmsh: Any, tags: Ids, points: Floats, cuts: Sequence[Cut]) -> tuple[Self, Floats]:
-        """Return the constraints of the current model with its mesh, for nodes ``tags`` at ``points``, and the
-        points, projected onto the planes of ``cuts``.
+        """Return the constraints of the current model with its mesh, for nodes ``tags`` at ``points``, and the points.
+
+        The points are projected onto the planes of ``cuts``.
         """
         entity, nearest = np.full(len(tags), -1, np.int32), list[Nearest]()
         for dimension, number in gmsh.model.getEntities():
@@ -72,7 +76,9 @@ def _nearest(gmsh: Any, dimension: int, number: int) -> Nearest:
 
 
 def _flat(gmsh: Any, number: int) -> Nearest:
-    """Return the point at the middle of the parameters of a plane, and its normal; other faces need a search."""
+    """Return the point at the middle of the parameters of a plane, and the normal of the plane. Other faces need a
+    search.
+    """
     low, high = gmsh.model.getParametrizationBounds(2, number)
     middle = 0.5 * (np.asarray(low) + np.asarray(high))
     origin = np.asarray(gmsh.model.getValue(2, number, middle), np.float64)

@@ -35,7 +35,7 @@ class _Made:
 
 
 def measured(mesh: Measured, sources: Sources, key: str) -> TetMesh:
-    """Return the mesh of a body whose size is known only from its geometry. Raises MeshError, naming ``key``."""
+    """Return the mesh of a body with a size that is known only from its geometry. Raises MeshError, naming ``key``."""
     if isinstance(mesh, Stl):
         made = _of_surface(mesh, sources, key)
     elif isinstance(mesh, Cad | Combination):
@@ -59,8 +59,11 @@ def _of_solid(mesh: Cad | Combination, sources: Sources, key: str) -> _Made:
 
 
 def draw_solid(gmsh: Any, mesh: Cad | Combination, frame: Frame, sources: Sources, key: str) -> Solids:
-    """Draw a body in the ``frame`` of the model, which has its centre and its axis; return the volumes of its
-    sector, with common faces where its solids touch. Raises MeshError if nothing is left, or for too many tets.
+    """Draw a body in the ``frame`` of the model, which has the centre and the axis of the body. Return the volumes of
+    its sector.
+
+    Solids that touch have common faces. Raises MeshError if nothing is left, or if the mesh would have too many
+    tets.
     """
     occ = gmsh.model.occ
     solids = joined(occ, sector(occ, Drawing(gmsh, frame, sources).solids(mesh, key), mesh), key)
@@ -84,7 +87,7 @@ def _of_surface(mesh: Stl, sources: Sources, key: str) -> _Made:
 
 
 def sector(occ: Any, solids: Solids, mesh: Solid) -> Solids:
-    """Return the part on the positive sides of the planes at which a solid is cut."""
+    """Return the part of a solid on the positive sides of the planes at which it is cut."""
     cuts = cut_by(mesh.sector, mesh.axis)
     if not cuts or not solids:
         return solids
@@ -97,8 +100,9 @@ def sector(occ: Any, solids: Solids, mesh: Solid) -> Solids:
 
 
 def joined(occ: Any, solids: Solids, key: str) -> Solids:
-    """Return solids with common faces where they touch: their meshes have common nodes there. Raises MeshError if
-    one is inside of another.
+    """Return solids with common faces where they touch, so that their meshes have common nodes at these faces.
+
+    Raises MeshError if a solid is inside of another one.
     """
     if len(solids) < 2:
         return solids

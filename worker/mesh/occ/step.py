@@ -6,7 +6,7 @@ from fractions import Fraction
 from ...errors import MeshError
 
 _TEXT = re.compile(rb"'(?:[^']|'')*'|/\*.*?\*/", re.DOTALL)
-"""Strings and comments, with any contents."""
+"""Pattern of strings and comments, with any contents."""
 _UNITS = re.compile(rb"GLOBAL_UNIT_ASSIGNED_CONTEXT\s*\(\s*\(([^)]*)\)")
 _NAME = re.compile(rb"#(\d+)")
 _DEFINED = re.compile(rb"[;\s]#(\d+)\s*=")
@@ -23,8 +23,10 @@ _PREFIXES = {
 
 
 def length_units(data: bytes, head: str) -> set[Fraction]:
-    """Return the lengths of 1 in the file, m, for each of its contexts. Raises MeshError, which begins with
-    ``head``, if the file is cut off, damaged or refers to others.
+    """Return the lengths of one unit in the file, m, for each context of the file.
+
+    Raises MeshError with a message that begins with ``head`` if the file is cut off, is damaged or refers to other
+    files.
     """
     if not data.rstrip().endswith(b"END-ISO-10303-21;"):
         raise MeshError(f"{head}: the STEP file is cut off: it does not end with END-ISO-10303-21;")
@@ -42,7 +44,7 @@ def length_units(data: bytes, head: str) -> set[Fraction]:
 
 
 def solids_in(data: bytes) -> int:
-    """Return the number of solids that the file defines; an assembly may contain one of them several times."""
+    """Return the number of solids that the file defines. An assembly may contain one solid several times."""
     return len(_SOLID.findall(_TEXT.sub(b"''", data)))
 
 
@@ -52,7 +54,7 @@ def _entity(text: bytes, name: bytes) -> bytes:
 
 
 def _length(text: bytes, name: bytes, depth: int) -> Fraction | None:
-    """Return the unit of an entity, m; None if it is not a length. An inch is based on another unit."""
+    """Return the unit of an entity, m; None if the unit is not a length. An inch is defined by another unit."""
     entity = _entity(text, name)
     if found := _SI.search(entity):
         power = _PREFIXES.get(found[1] or b"", 0)

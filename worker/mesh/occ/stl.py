@@ -1,4 +1,4 @@
-"""STL files, text and binary: one closed surface whose triangles face outwards and have only edges and corners in
+"""STL files, text and binary: one closed surface. Its triangles face outwards and have only edges and corners in
 common.
 """
 
@@ -13,14 +13,14 @@ from .crossing import crossing
 from .shells import Surface, Triangles, astray, shells
 
 MOST_FACETS = 1_000_000
-"""Largest number of facets. Chosen: the search for crossing facets takes a minute."""
+"""Largest number of facets. Chosen value: the search for crossing facets takes a minute."""
 _HEAD, _FACET = 84, 50
-"""Bytes of a binary file before its facets, and of each facet."""
+"""Number of bytes of a binary file before its facets, and number of bytes of each facet."""
 
 
 def read_stl(path: Path, head: str) -> Surface:
-    """Return the surface in a file. Raises MeshError, which begins with ``head``, if it encloses no volume or is
-    damaged.
+    """Return the surface in a file. Raises MeshError, with a message that begins with ``head``, if the surface
+    encloses no volume or is damaged.
     """
     try:
         data = path.read_bytes() if path.stat().st_size <= _HEAD + _FACET * 6 * MOST_FACETS else b""
@@ -48,8 +48,10 @@ def read_stl(path: Path, head: str) -> Surface:
 
 
 def _is_binary(data: bytes) -> bool:
-    """Return whether a file is binary, by its size, or by bytes that no text has: the head of a binary file may
-    begin with ``solid``, too.
+    """Return whether a file is binary.
+
+    The decision uses the size of the file, or bytes that no text has, because the head of a binary file may begin
+    with ``solid``, too.
     """
     if len(data) < _HEAD:
         return False
@@ -83,7 +85,7 @@ def _text(data: bytes, head: str) -> Floats:
 
 
 def _refuse_open(points: Floats, faces: Triangles, head: str) -> None:
-    """Raise MeshError unless each edge belongs to two facets with opposite directions of it."""
+    """Raise MeshError unless each edge belongs to two facets with opposite directions of the edge."""
     if not len(faces):
         raise MeshError(f"{head}: the STL file has no facet")
     same = np.unique(np.sort(faces, axis=1), axis=0, return_counts=True)[1]

@@ -1,4 +1,6 @@
-"""Conversion of a closed surface of triangles into a model of gmsh: faces between its edges, and the volumes inside."""
+"""Conversion of a closed surface of triangles into a model of gmsh: faces between the edges of the surface, and the
+volumes inside.
+"""
 
 import math
 from typing import Any
@@ -8,12 +10,14 @@ import numpy as np
 from .shells import Surface, nested
 
 _TRIANGLE = 2
-"""gmsh's element type of the 3-node triangle."""
+"""Number of the element type of the 3-node triangle in gmsh."""
 
 
 def enclose(gmsh: Any, surface: Surface, factor: float, edge_angle: float) -> None:
-    """Put a surface, lengths times ``factor``, into the current model: smooth faces, cut at edges sharper than
-    ``edge_angle``, rad, as gmsh can parametrise them, and one volume inside of each outer shell.
+    """Put a surface, with lengths times ``factor``, into the current model.
+
+    The model gets smooth faces, cut at edges sharper than ``edge_angle``, rad, that gmsh can parametrise. It gets
+    one volume inside of each outer shell.
     """
     tags = np.arange(1, len(surface.points) + 1)
     gmsh.model.addDiscreteEntity(2, 1)

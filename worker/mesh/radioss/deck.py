@@ -18,15 +18,16 @@ def _words(text: str) -> frozenset[str]:
 SOLIDS = {"BRICK": 8, "TETRA4": 4, "TETRA10": 10, "PENTA6": 6, "BRIC20": 20}
 """Elements that are read, and their number of nodes (Reference Guide, "Elements")."""
 NODES_A_LINE = {"TETRA10": 10, "BRIC20": 8}
-"""Nodes in a line of elements with several lines; those of a tet are below its number."""
+"""Number of nodes in a line of elements that take several lines. The nodes of a tet are in the line below its
+number."""
 VOLUMES = ("SHEL16", "SPHCEL", "QUAD", "TRIA")
-"""Volume elements, or particles, that are not read."""
+"""Keywords of volume elements, or particles, that are not read."""
 PLATES = ("SHELL", "SH3N", "BEAM", "TRUSS", "SPRING", "XELEM", "RIVET")
-"""Elements without volume."""
+"""Keywords of elements without volume."""
 REFUSED = ("TRANSFORM", "CNODE", "MERGE", "SUBMODEL", "ADMESH", "MADYMO", "XREF", "REFSTA", "EREF", "INISTA")
 """Keywords that make, move or join nodes and elements, or fetch their state, and are not supported."""
 JOINING = ("INTER", "RBODY", "RBE2", "RBE3", "RWALL", "RLINK", "MPC", "GJOINT", "CYL_JOINT", "BCS", "ADMAS", "LAG_MUL")
-"""Keywords that join bodies, hold them, or give them mass. They have no effect here."""
+"""Keywords that join bodies, hold bodies, or give mass to bodies. These keywords have no effect here."""
 GROUPS = ("GRNOD", "SURF")
 """First words of groups of nodes and of surfaces."""
 FAMILIES = _words(
@@ -40,7 +41,7 @@ FAMILIES = _words(
     STAMPING STATE TABLE TH THERM_STRESS TITLE UNIT UPWIND USERW VEL VERS VISC
     """
 )
-"""First words of keywords. One that is not listed is an error: it could make or move nodes."""
+"""First words of keywords. A keyword that is not listed is an error: it could make or move nodes."""
 
 
 @dataclass
@@ -55,7 +56,9 @@ class Solids:
 
 @dataclass
 class Group:
-    """A group of nodes or a surface as it is written: ``kind`` (``GRNOD/NODE``) and the numbers of its lines."""
+    """A group of nodes or a surface as it is written in the deck: ``kind`` (``GRNOD/NODE``) and the numbers of its
+    lines.
+    """
 
     kind: str
     title: str
@@ -72,13 +75,13 @@ class Deck:
         self.titles: dict[int, str] = {}
         """Titles of parts by their numbers."""
         self.subset_of: dict[int, int] = {}
-        """Subset of each part."""
+        """Subset to which each part belongs."""
         self.subsets: dict[int, tuple[str, list[int]]] = {}
         """Title and inner subsets of each subset."""
         self.groups: dict[tuple[str, int], Group] = {}
         """Groups by first word and number."""
         self.passed, self.volumes, self.joining = Counter[str](), Counter[str](), Counter[str]()
-        """Lines of elements that are not read, and keywords that join bodies, by first word."""
+        """Counts, by first word, of lines of elements that are not read, and of keywords that join bodies."""
         self.included = Included(path)
         """The deck, and the files that it includes."""
         for block in blocks(self.included):
@@ -157,4 +160,4 @@ KNOWN = frozenset(
         "SURF/SEG", "SURF/SURF", "SURF/PART", "SURF/PART/EXT", "SURF/SUBSET", "SURF/SUBSET/EXT",
     )
 )  # fmt: skip
-"""Groups that are read."""
+"""Kinds of groups that are read."""

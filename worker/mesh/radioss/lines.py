@@ -1,8 +1,8 @@
 """Text of a Radioss starter deck: blocks that begin with ``/``, and their lines.
 
-Rules of the Altair Radioss Reference Guide, "Starter input": a line that begins with ``/`` is a keyword, its words
-divided by ``/``; one that begins with ``#`` or ``$`` is a comment; fields are 10 columns wide for integers and 20
-for others.
+Rules of the Altair Radioss Reference Guide, "Starter input": a line that begins with ``/`` is a keyword, and its
+words are divided by ``/``. A line that begins with ``#`` or ``$`` is a comment. Fields are 10 columns wide for
+integers and 20 columns for other values.
 """
 
 from collections.abc import Iterator
@@ -14,14 +14,14 @@ from conoid.cases.reading.problems import shown
 from ...errors import MeshError
 
 NUMBER, REAL = 10, 20
-"""Columns of an integer and of another number."""
+"""Number of columns of an integer and of another number."""
 _LARGEST = 2**53
 """Upper bound of integers."""
 
 
 @dataclass
 class Block:
-    """A keyword: its words in upper case, its line, and the lines below it with their numbers."""
+    """A keyword: its words in upper case, its line, and the following lines with their numbers."""
 
     words: list[str]
     line: int
@@ -29,26 +29,26 @@ class Block:
 
     @property
     def kind(self) -> str:
-        """Words before the first number: ``GRNOD/NODE``."""
+        """Words before the first number, such as ``GRNOD/NODE``."""
         names = [word for word in self.words if not word.isdecimal()]
         return "/".join(names)
 
     @property
     def id(self) -> int:
-        """First number among the words. Raises MeshError if there is none."""
+        """First number among the words. Raises MeshError if no word is a number."""
         found = next((word for word in self.words if word.isdecimal()), None)
         if found is None or not 0 < int(found) < _LARGEST:
             raise MeshError(f"line {self.line}: /{'/'.join(self.words)} has no number")
         return int(found)
 
     def titled(self) -> tuple[str, list[tuple[int, str]]]:
-        """Return the title, which is the first line, and the lines below it that are not empty."""
+        """Return the title, which is the first line, and the following lines that are not empty."""
         title = self.rows[0][1].strip() if self.rows else ""
         return title, [(number, text) for number, text in self.rows[1:] if text.strip()]
 
 
 def blocks(deck: Included) -> Iterator[Block]:
-    """Yield the blocks of a deck, with those that it includes, up to ``/END``. Raises MeshError."""
+    """Yield the blocks of a deck and of the files that it includes, up to ``/END``. Raises MeshError."""
     block: Block | None = None
     try:
         for number, text in flattened(deck, included_by):
@@ -72,7 +72,7 @@ def blocks(deck: Included) -> Iterator[Block]:
 
 
 def wholes(line: int, text: str) -> list[int]:
-    """Return the integers of a line of fields of 10 columns; 0 for an empty one. Raises MeshError."""
+    """Return the integers of a line of fields of 10 columns; 0 for an empty field. Raises MeshError."""
     if "\t" in text:
         raise MeshError(f"line {line}: a tab among fields of fixed widths; write blanks")
     items = [text[k : k + NUMBER].strip() for k in range(0, len(text.rstrip()), NUMBER)]
@@ -91,7 +91,7 @@ def number(line: int, text: str, what: str) -> int:
 
 
 def point(line: int, text: str) -> list[float]:
-    """Return three coordinates in fields of 20 columns behind the number of a node. Raises MeshError."""
+    """Return three coordinates in fields of 20 columns after the number of a node. Raises MeshError."""
     items = [text[k : k + REAL].strip() for k in range(NUMBER, NUMBER + 3 * REAL, REAL)]
     if "\t" in text or text[NUMBER + 3 * REAL :].strip():
         raise MeshError(f"line {line}: a node has a number of 10 columns and three coordinates of 20")

@@ -1,4 +1,4 @@
-"""Selection from a Radioss starter deck: all volume elements, or those of a part or a subset."""
+"""Selection from a Radioss starter deck: all volume elements, or the elements of a part or a subset."""
 
 from collections.abc import Iterator
 from pathlib import Path
@@ -16,15 +16,15 @@ from .deck import KNOWN, Deck, Group
 
 _KINDS = {"BRICK": HEX8, "TETRA4": TET4, "TETRA10": TET10, "PENTA6": WEDGE6, "BRIC20": Kind(Form.HEXAHEDRON, 20)}
 _DEEPEST = 20
-"""Largest depth of groups within groups, and subsets within subsets. Chosen: decks have up to five."""
+"""Largest depth of groups within groups, and of subsets within subsets. Chosen value: decks have up to five levels."""
 
 
 def read_radioss(path: Path, group: str | None, key: str) -> Content:
-    """Return the volume elements of a starter deck, all or those of ``group``, and its groups of nodes and surfaces as
-    sets.
+    """Return the volume elements of a starter deck, all or the elements of ``group``. The groups of nodes and the
+    surfaces of the deck are returned as sets.
 
-    ``group`` is a part, or a subset with those within it, by title or number; a number alone is that of a part, if
-    there is one. Raises MeshError, with the number of the line if there is one.
+    ``group`` is a part, or a subset with its inner subsets, by title or number. A number alone is the number of a
+    part, if there is such a part. Raises MeshError, with the number of the line if there is one.
     """
     deck = Deck(path)
     numbers = np.array(deck.nodes, np.int64)
@@ -61,11 +61,11 @@ class _Reader:
         return cells(made.kind, made.numbers, placed(self.tags, made.nodes, made.called), made.lines)
 
     def both(self) -> Iterator[tuple[Cells, Ids]]:
-        """Return elements and their parts."""
+        """Return elements and the part of each element."""
         return zip(self.cells, self.of, strict=True)
 
     def parts(self, group: str, key: str) -> Ids:
-        """Return the parts of a name. Raises MeshError for an unknown or ambiguous name."""
+        """Return the parts that a name contains. Raises MeshError for an unknown or ambiguous name."""
         word, colon, name = group.partition(":")
         kinds = [word] if colon and word in ("part", "subset") else ["part", "subset"]
         name = name if len(kinds) == 1 and colon else group
@@ -89,14 +89,14 @@ class _Reader:
         return [self.within(number) for number in _named(titles, name)]
 
     def within(self, subset: int, depth: int = 0) -> set[int]:
-        """Return the parts of a subset and of those within it. Raises MeshError."""
+        """Return the parts of a subset and of its inner subsets. Raises MeshError."""
         if subset not in self.deck.subsets or depth > _DEEPEST:
             raise MeshError(f"the subset {subset} {'is not defined' if depth <= _DEEPEST else 'is within itself'}")
         own = {part for part, of in self.deck.subset_of.items() if of == subset}
         return own.union(*(self.within(each, depth + 1) for each in self.deck.subsets[subset][1]))
 
     def named(self) -> tuple[list[Named], list[str]]:
-        """Return the groups of nodes and surfaces, and remarks on those that are not read."""
+        """Return the groups of nodes and surfaces, and remarks on the groups and surfaces that are not read."""
         found, remarks = list[Named](), list[str]()
         for (word, number), group in self.deck.groups.items():
             names = tuple(filter(None, (group.title, str(number))))
@@ -118,7 +118,7 @@ class _Reader:
         return group
 
     def _nodes(self, number: int, depth: int = 0) -> Ids:
-        """Return the indices of the nodes of a group; a negative number removes a node."""
+        """Return the indices of the nodes of a group. A negative number removes a node."""
         group, found = self._group("GRNOD", number, depth), np.zeros(len(self.tags), bool)
         for _, row in group.rows:
             if group.kind == "GRNOD/GENE":
@@ -140,7 +140,9 @@ class _Reader:
         return np.concatenate([_NONE, *(each.nodes[np.isin(of, parts)].ravel() for each, of in self.both())])
 
     def _faces(self, number: int, depth: int = 0) -> list[Ids]:
-        """Return corners (n, 3) and (n, 4) of the faces of a surface; for parts all faces of their elements."""
+        """Return corners (n, 3) and (n, 4) of the faces of a surface. A surface of parts has all faces of their
+        elements.
+        """
         group, found = self._group("SURF", number, depth), list[Ids]()
         if group.kind == "SURF/SEG":
             rows = [(line, [*row[1:], 0, 0, 0, 0][:4]) for line, row in group.rows]

@@ -1,7 +1,7 @@
-"""Arrays of a .vtu file: text, base64 or bytes, compressed or not. Layout: VTK user's guide, "XML file formats".
+"""Arrays of a .vtu file: text, base64 or bytes, compressed or not.
 
-An array is in its element or behind ``_`` in ``AppendedData``, after a count of bytes or a table of compressed
-blocks.
+Layout: VTK user's guide, "XML file formats". An array is in its XML element or after ``_`` in ``AppendedData``. It
+follows a count of bytes or a table of compressed blocks.
 """
 
 import base64
@@ -31,7 +31,7 @@ class Grid:
     """One piece of an unstructured grid."""
 
     def __init__(self, path: Path) -> None:
-        """Read the file. Raises MeshError for one that is no .vtu file, is damaged, or has several pieces."""
+        """Read the file. Raises MeshError for a file that is no .vtu file, is damaged, or has several pieces."""
         text, self._appended, self._encoding = _divided(path.read_bytes())
         if b"<!DOCTYPE" in text or b"<!ENTITY" in text:
             raise MeshError("the file defines XML entities, which are not followed")
@@ -60,8 +60,9 @@ class Grid:
         return int(found)
 
     def array(self, place: str, name: str | None, count: int | None, kind: str) -> "np.ndarray":
-        """Return the values of an array in ``Points``, ``Cells`` or data, ``count`` of them unless None; ``kind``:
-        ``i`` for integers, ``f`` for any numbers. Raises MeshError.
+        """Return ``count`` values of an array in ``Points``, ``Cells`` or data, or all values if ``count`` is None.
+
+        ``kind``: ``i`` for integers, ``f`` for any numbers. Raises MeshError.
         """
         found = [node for node in self._arrays(place) if name is None or node.get("Name") == name]
         if len(found) != 1:
@@ -69,7 +70,9 @@ class Grid:
         return self._checked(found[0], count, kind)
 
     def whole(self, place: str, count: int) -> Iterator[tuple[str, NDArray[np.int64]]]:
-        """Yield names and values of the arrays of ``PointData`` or ``CellData`` with one integer each."""
+        """Yield names and values of the arrays of ``PointData`` or ``CellData`` with one integer for each point or
+        cell.
+        """
         for node in self._arrays(place):
             single = node.get("NumberOfComponents", "1") in ("", "1")
             if single and node.get("Name") and _TYPES.get(node.get("type", ""), "f")[0] != "f":
@@ -107,7 +110,7 @@ class Grid:
         raise MeshError(f"the array {node.get('Name')!r} has the format {form!r}, which is not read")
 
     def _decoded(self, data: bytes, coded: bool) -> bytes:
-        """Return the bytes of an array behind its count, or behind the table of its blocks."""
+        """Return the bytes of an array after its count, or after the table of its blocks."""
         size = int(str(self._head)[1])
         if not self._compressed:
             (many,) = self._sizes(_bytes(data, size, coded), 1)
@@ -144,7 +147,7 @@ class Grid:
 
 
 def _divided(data: bytes) -> tuple[bytes, bytes, bytes]:
-    """Return the XML of a file without the appended bytes, these bytes from behind ``_`` on, and their encoding."""
+    """Return the XML of a file without the appended bytes, the appended bytes after ``_``, and their encoding."""
     start = data.find(_START)
     if start < 0:
         return data, b"", b""
@@ -157,10 +160,10 @@ def _divided(data: bytes) -> tuple[bytes, bytes, bytes]:
 
 
 def _coded(size: int) -> int:
-    """Return the number of base64 characters for some bytes."""
+    """Return the number of base64 characters for a number of bytes."""
     return -(-size // 3) * 4
 
 
 def _bytes(data: bytes, size: int, coded: bool) -> bytes:
-    """Return the first bytes of data, decoded from base64 if coded."""
+    """Return the first bytes of data, decoded from base64 if ``coded``."""
     return base64.b64decode(data[: _coded(size)], validate=True)[:size] if coded else data[:size]

@@ -1,7 +1,7 @@
-"""Selection from a .vtu file: all volume elements, or those with a value in an array of cells.
+"""Selection from a .vtu file: all volume elements, or the elements with a value in an array of cells.
 
-The reader is our own: VTK's reports a damaged file on a stream and continues with partial contents, and meshio ends
-on unknown arrays.
+Conoid has a reader of its own: the reader of VTK reports a damaged file on a stream and continues with partial
+contents, and meshio ends on unknown arrays.
 """
 
 from collections.abc import Iterator
@@ -21,24 +21,25 @@ _KINDS = {
     10: TET4, 12: HEX8, 13: WEDGE6, 14: PYRAMID5, 24: TET10, 25: HEX20, 26: WEDGE15, 27: PYRAMID13, 11: HEX8,
     29: Kind(Form.HEXAHEDRON, 27),
 }  # fmt: skip
-"""VTK's volume types that are read (vtkCellType.h)."""
+"""Numbers of the VTK volume types that are read (vtkCellType.h), and their kinds."""
 _FACES = {5: 3, 9: 4, 22: 3, 23: 4, 28: 4, 8: 4}
-"""Types of surfaces, and their corners."""
+"""Numbers of the types of surfaces, and the number of their corners."""
 _EMPTY = frozenset((0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 21, 22, 23, 28, 30, 34, 35, 36))
-"""Types without volume."""
+"""Numbers of the types without volume."""
 _VOXEL, _PIXEL = 11, 8
-"""Order of the corners of a voxel, x first, then y, then z."""
+"""Numbers of the types voxel and pixel. Their corners are ordered x first, then y, then z."""
 _ORDER = {_VOXEL: [0, 1, 3, 2, 4, 5, 7, 6], _PIXEL: [0, 1, 3, 2]}
 _MIRRORED = {6: [0, 2, 1, 3, 5, 4], 15: [0, 2, 1, 3, 5, 4, 8, 7, 6, 11, 10, 9, 12, 14, 13]}
-"""Order for wedges: in VTK's text their first triangle faces outwards, most programs write it inwards."""
+"""Order of the nodes of wedges. In VTK's documentation the first triangle of a wedge faces outwards, but most
+programs write it facing inwards."""
 
 
 def read_vtu(path: Path, group: str | None, key: str) -> Content:
-    """Return the volume elements of a .vtu file, all or those of ``group``; integer arrays of points are sets of nodes
-    (those with a value other than 0), and the values of arrays of cells are surfaces.
+    """Return the volume elements of a .vtu file, all or the elements of ``group``, and its sets.
 
-    ``group`` is ``array:value``, or a value if one array of cells alone has integers. Nodes and elements are called
-    by their indices from 0. Raises MeshError.
+    ``group`` is ``array:value``, or a value if one array of cells alone has integers. Integer arrays of points are
+    sets of nodes (nodes with a value other than 0), and the values of arrays of cells are surfaces. Nodes and
+    elements have indices from 0 as names. Raises MeshError.
     """
     grid = Grid(path)
     n, m = grid.points_count, grid.cells_count
@@ -89,7 +90,7 @@ def _rows(
 
 
 def _of(ends: Ids, nodes: Ids, some: Ids, size: int, kind: int) -> Ids:
-    """Return (k, size) nodes of cells of one type. Raises MeshError if one has another number of them."""
+    """Return (k, size) nodes of cells of one type. Raises MeshError if a cell has another number of nodes."""
     sizes = np.diff(ends, prepend=0)[some]
     if (sizes != size).any():
         k = np.flatnonzero(sizes != size)[0]
