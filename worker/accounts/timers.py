@@ -1,10 +1,9 @@
 """Seconds per phase of the step: CPU time of this thread, and wall time inside and outside of regions.
 
-MPI polls while it waits: the time of a phase in calls that wait for other ranks counts as ``exchange``; the other
-phases are work. The loading of kernels at their first call counts in no phase.
-
-A region is a call of ``Team.run``, whose tasks all threads of the rank share. Wall time in regions is ``parallel``,
-the rest except the waiting is ``serial``: then one thread works and the others of the rank are idle.
+MPI polls while it waits: the time of a phase in calls that wait for other ranks counts as ``exchange``. The time of
+the other phases is work. The loading of kernels at their first call counts in no phase. A region is a call of
+``Team.run``; all threads of the rank share its tasks. Wall time in regions is ``parallel``. Wall time outside of
+regions, except the waiting, is ``serial``: one thread of the rank works and the other threads are idle.
 """
 
 from collections.abc import Sequence

@@ -1,9 +1,9 @@
 """Compilation of all kernels ahead of a run, on several cores: ``python -m conoid.worker.kernels.compile``.
 
-Modules whose sources have not changed since an earlier folder are linked from there. One child process a core
-compiles the kernels of the others into the cache folder, module after module. A module comes after those that it
-imports, so that no kernel is compiled twice. numba has separate files for each kernel: two children never write the
-same file.
+Modules with unchanged sources are linked from an earlier cache folder. For each core a child process compiles
+kernels of the other modules into the cache folder, module after module. A module is compiled after the modules that
+it imports, so that no kernel is compiled twice. numba has separate files for each kernel, so two children never
+write the same file.
 """
 
 import fcntl

@@ -1,4 +1,4 @@
-"""Cuts of hexahedra, wedges and pyramids of a file into tets, and notes for the user about them."""
+"""Cuts of hexahedra, wedges and pyramids of a file into tets, and notes for the user about these elements."""
 
 from collections import Counter
 from collections.abc import Iterator

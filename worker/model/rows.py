@@ -21,10 +21,10 @@ DISTORTION = 11
 VOLUME_FLUX = 12
 """Rate of change of the volume at mid-step, m^3/s (averaged pressure forms)."""
 TET_VOLUME = 12
-"""Volume at the end of the last pass, m^3 (materials without a strength). The first pass, of zero time, sets it."""
+"""Volume at the end of the last pass, m^3 (materials without a strength). The first pass, of zero time, sets this
+volume."""
 WORK_AVERAGED = 13
-"""The part of WORK that the pressure has not done on the averaged volume, J (averaged pressure forms;
-elements/mean.py)."""
+"""Part of WORK that the pressure has not done on the averaged volume, J (averaged pressure forms; elements/mean.py)."""
 VOLUME_RATIO = 14
 """Ratio of the current to the initial volume. It is computed from the dilatation that also gives the pressure."""
 PLASTIC_STRAIN = 15

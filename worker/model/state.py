@@ -222,7 +222,7 @@ class Block:
     def __post_init__(self) -> None:
         """Views of ``state``. The array object ``state`` is never replaced."""
         self.flat_state: Floats = self.state.reshape(-1)
-        """The whole state as one row."""
+        """View of the whole state as one row."""
         self.rows = int(self.state.shape[1])
         """Number of rows of the state of a chunk."""
 

@@ -87,7 +87,7 @@ def contact_pressure(x: Floats, tets: Ints, impulses: Floats, passed: float) -> 
 
 
 def _edges(values: Floats, block: Block) -> Floats:
-    """Return (n, 3, 3) differences of nodal values (nodes, 3) from the first node of each tet to the others, as
+    """Return (n, 3, 3) differences of nodal values (nodes, 3) from the first node of each tet to its other nodes, as
     rows.
     """
     corners = values[block.tets]

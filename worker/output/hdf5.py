@@ -90,7 +90,7 @@ class _Disk:
         return size
 
     def seek(self, offset: int, whence: int = 0) -> int:
-        """Move the position and return it."""
+        """Move the position in the file and return the new position."""
         return int(self._raw.seek(offset, whence))
 
     def tell(self) -> int:

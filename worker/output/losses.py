@@ -9,7 +9,7 @@ _KINDS = {layout.FRAMES: ".vtkhdf", fragments.FOLDER: ".csv", layout.SNAPSHOTS: 
 
 
 class Losses:
-    """Compares the files in the folders of a run with those of the last call."""
+    """Compares the files in the folders of a run with the files at the last call."""
 
     def __init__(self, folder: Path) -> None:
         """Record the files that exist now."""

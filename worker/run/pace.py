@@ -1,4 +1,4 @@
-"""Rate of simulated time against wall time."""
+"""Rate of a run: simulated time per wall time."""
 
 
 class Pace:

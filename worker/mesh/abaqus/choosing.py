@@ -16,7 +16,7 @@ Chosen = dict[int, Ids]
 
 
 def everything(pieces: list[Piece]) -> Chosen:
-    """Return all elements."""
+    """Return all elements of the file."""
     return {place: _every(piece.mesh) for place, piece in enumerate(pieces)}
 
 

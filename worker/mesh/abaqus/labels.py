@@ -41,7 +41,7 @@ class Labelled(Generic[T]):
         return iter(self._found.values())
 
     def add(self, name: Label, value: T) -> T:
-        """Add a value with a name and return it."""
+        """Add a value with a name and return the value."""
         self._found[name.key] = name, value
         return value
 

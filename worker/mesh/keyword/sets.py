@@ -31,7 +31,7 @@ class Set:
 
 
 class Sets:
-    """Sets by kind and id."""
+    """Sets of a deck by kind and id."""
 
     def __init__(self) -> None:
         """Start without any set."""

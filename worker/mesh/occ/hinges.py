@@ -10,7 +10,7 @@ from .draw import Solids
 
 
 def hinges(gmsh: Any, solids: Solids) -> Iterator[str]:
-    """Yield a line if some solids of a body have no common face with the others."""
+    """Yield a line if some solids of a body have no common face with the other solids of the body."""
     faces = [_boundary(gmsh, [each]) for each in solids]
     lines = [_boundary(gmsh, sorted(each)) for each in faces]
     points = [_boundary(gmsh, sorted(each)) for each in lines]

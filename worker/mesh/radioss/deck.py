@@ -79,7 +79,7 @@ class Deck:
         self.subsets: dict[int, tuple[str, list[int]]] = {}
         """Title and inner subsets of each subset."""
         self.groups: dict[tuple[str, int], Group] = {}
-        """Groups by first word and number."""
+        """Groups of a deck by first word and number."""
         self.passed, self.volumes, self.joining = Counter[str](), Counter[str](), Counter[str]()
         """Counts, by first word, of lines of elements that are not read, and of keywords that join bodies."""
         self.included = Included(path)

@@ -16,7 +16,7 @@ from ...errors import MeshError
 NUMBER, REAL = 10, 20
 """Number of columns of an integer and of another number."""
 _LARGEST = 2**53
-"""Upper bound of integers."""
+"""Upper bound of integers in a deck."""
 
 
 @dataclass
