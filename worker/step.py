@@ -30,7 +30,7 @@ between the halves. After the last step, rows 1 to 10 are executed once more, an
 - 12 and 13 are one pass over each chunk of tets; the averaged pressure forms need two, with the exchange of the nodal
   volume sums between them.
 - 14 starts after the border tets and ends after the interior ones, before the fracture criterion. The criterion runs
-  before the reduction, which then holds whether any facet breaks, and which ranks have a node of one.
+  before the reduction, which then contains whether any facet breaks, and which ranks have a node of such a facet.
 - Broken facets that have opened wide enough to be surface are found in 8 and become surface after the reduction.
 """
 

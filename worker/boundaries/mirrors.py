@@ -1,4 +1,4 @@
-"""Planes of symmetry for the nodes beside them: a node that reaches the plane hits its mirror image there.
+"""Planes of symmetry for nodes that are not on the plane: a node that reaches the plane hits its mirror image there.
 
 A node with tets and its image exert equal forces on each other, so that neither passes the plane: the plane is a wall
 for each side. Nodes without tets do not interact: such a node passes its image and is replaced by the image, with
@@ -28,8 +28,8 @@ not finite."""
 
 
 class Mirrors(Boundary):
-    """Keeps nodes from ending the step beyond a plane of symmetry that they started beside. An impulse stops a node
-    with tets there, and never pulls; one without tets is reflected.
+    """Prevents nodes that started on one side of a plane of symmetry from ending a step on the other side. An impulse
+    stops a node with tets there, and never pulls; one without tets is reflected.
     """
 
     after_contact = True
@@ -57,8 +57,8 @@ class Mirrors(Boundary):
 
     @classmethod
     def of(cls, case: Case, model: Model, bounds: list[Boundary], comm: Comm) -> Self:
-        """Returns the planes of symmetry of a case, with the nodes that start beside them or may pass them without
-        tets; except nodes of prescribed motion and of rigid parts. Collective.
+        """Returns the planes of symmetry of a case, with the nodes that start next to a plane, or that may pass a plane
+        when they have no tets; except nodes of prescribed motion and of rigid parts. Collective.
         """
         specs, of = [spec for _, spec in case.boundaries_of(Symmetry)], model.nodes.part
         axes, at = np.array([AXES[spec.axis] for spec in specs]), np.array([spec.at for spec in specs])

@@ -24,10 +24,10 @@ class RigidWalls(Stopping):
     pulls. Another one along the wall reduces its sliding velocity, at most by Coulomb's ``friction`` (w,) times the
     normal one.
 
-    ``points`` and ``normals`` (w, 3); ``held`` (n, w): which walls stop which node. A node between two walls is
-    stopped by each in turn, several times. ``mirrored`` (n, 3): components held by planes of symmetry, None for
-    none; a wall that is not at right angles to a plane pushes the nodes on the plane along it; the plane takes the
-    other component.
+    ``points`` and ``normals`` (w, 3); ``held`` (n, w): which walls stop which node. A node between two walls is stopped
+    by the first wall, then by the second wall, several times. ``mirrored`` (n, 3): components held by planes of
+    symmetry, None for none; a wall that is not at right angles to a plane pushes the nodes on the plane of symmetry
+    along this plane; the plane takes the other component.
     """
 
     def __init__(

@@ -271,8 +271,8 @@ class Contact:
         active.press(books.pressed)
 
     def _resume(self, give: float) -> float:
-        """Ratio of this step to the last one: the factor of stored impulses. Without restitution it is 0 while there
-        is no energy to ``give`` back, because a stored impulse that is too large adds energy.
+        """Ratio of this step to the last one: the factor of stored impulses. Without restitution the factor is 0 while
+        contact has no energy to return, ``give`` = 0, because a stored impulse that is too large adds energy.
         """
         mean_dt = self._clock.mean_dt
         ratio = mean_dt / self._mean_dt if self._mean_dt > 0.0 else 0.0

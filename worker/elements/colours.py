@@ -1,8 +1,7 @@
 """Tasks of a pass over a block: ranges of chunks with colours. Chunks of one colour share no node.
 
-Greedy colouring in the order of the chunks: each chunk gets the first colour that none of the earlier chunks with a
-common node has. The colours stay valid until tets move from chunk to chunk; separation of nodes only removes
-neighbours.
+Greedy colouring in the order of the chunks: each chunk gets the first colour that no earlier chunk with a common node
+has. The colours stay valid until tets move from chunk to chunk; separation of nodes only removes neighbours.
 """
 
 from dataclasses import dataclass

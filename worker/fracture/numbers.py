@@ -1,4 +1,4 @@
-"""Numbers of fragments: the largest piece of a fragment keeps its number, each other piece gets a new one."""
+"""Numbers of fragments: the largest piece of a fragment keeps its number, each other piece gets a new number."""
 
 import numpy as np
 

@@ -1,4 +1,5 @@
-"""Node separation: nodes whose star broken facets have cut get copies, numbered alike for any number of ranks.
+"""Node separation: a node gets copies if broken facets have cut its star (the tets round the node) into pieces. The ids
+of the copies are independent of the number of ranks.
 
 A rank that has a node has all copies of the node. The completed sums of a shared node are therefore available on both
 sides of a facet, on any rank that computes one of the sides. The following steps are executed by the ranks that have a

@@ -96,8 +96,8 @@ class Fracture:
 
     def advance(self, agreed: int, touched: Ints) -> None:
         """Breaks the facets; ``agreed``, ``touched``: the maxima over the ranks of the results of ``find``. Called on
-        all ranks; collective among all with nodal tractions or ``order = "local_maximum"``, else among the touched
-        ranks.
+        all ranks; collective among all ranks with nodal tractions or ``order = "local_maximum"``, else among the
+        touched ranks.
         """
         if agreed >= OVERSTRESSED:
             self._insertion.longest = max(self._insertion.longest, self._clock.stable)

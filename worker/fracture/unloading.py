@@ -1,7 +1,7 @@
 """Unloading of cohesive facets that would release more energy in the next step than they absorbed.
 
 Nodal forces are complete, so the opening of a pair of nodes in the next step is known, except the change by contact.
-Unloading of one facet changes the openings of the facets beside it. There are therefore two passes over all facets,
+Unloading of one facet changes the openings of the neighbouring facets. There are therefore two passes over all facets,
 each with the forces at its beginning. The first pass lowers the traction of each pair as far as this pair alone
 requires. The second pass completely unloads the pairs that still close too far.
 """

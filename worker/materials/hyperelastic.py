@@ -96,8 +96,8 @@ def _roots(w, n, shear):  # type: ignore[no-untyped-def]
 def hyperelastic(w, s, params, n, dt):  # type: ignore[no-untyped-def]
     """Computes the deviatoric stress G / 2J dev(b - b^-1) of a chunk, Pa; its work is the change of its potential.
 
-    ``w`` holds V grad N of the end of the step, and from MOVED on the displacements. Everything is computed from A
-    and so from the displacement gradient: small strains keep their digits, and zero strain gives exactly zero
+    ``w`` holds V grad N of the end of the step, and from MOVED on the displacements. The stress is computed from A, and
+    therefore from the displacement gradient: small strains keep their digits, and zero strain gives exactly zero
     stress. b^-1 = k (1 + A), so that b^-1 - 1 = k A + (k - 1); b is the adjugate of b^-1, as its determinant is one.
     """
     _strains(w, n)

@@ -58,9 +58,9 @@ def principal(xx, yy, zz, yz, zx, xy):  # type: ignore[no-untyped-def]
     """Returns the principal values, the largest first, of a deviator with von Mises stress one; the error is of the
     order of round-off, also for equal values.
 
-    The isolated value x solves x^3 - x / 3 = det s, which is well conditioned: three Newton steps from the chord.
-    The rest of s, without x and its projector (s^2 + x s + x^2 - 1/3) / (3 x^2 - 1/3), gives the distance of the
-    other two.
+    The isolated value x solves x^3 - x / 3 = det s, which is well conditioned: three Newton steps from the chord. The
+    rest of s, without x and its projector (s^2 + x s + x^2 - 1/3) / (3 x^2 - 1/3), gives the distance between the other
+    two principal values.
     """
     det = xx * (yy * zz - yz * yz) + xy * (yz * zx - xy * zz) + zx * (xy * yz - yy * zx)
     size = abs(det)

@@ -33,7 +33,9 @@ class Held:
 
     @classmethod
     def of(cls, case: Case, part: Part, beside: Collection[int] = ()) -> "Held":
-        """Collects the boundaries that act on the ``part``, except the planes of symmetry that it starts ``beside``."""
+        """Collects the boundaries that act on the ``part``, except the planes of symmetry in ``beside``, next to which
+        the part starts.
+        """
         found = cls()
         for index, boundary in enumerate(case.boundaries):
             if index in beside:

@@ -37,7 +37,7 @@ class Rigid:
     def __init__(
         self, case: Case, nodes: Nodes, bodies: Bodies, walls: Walls, beside: Ints, comm: Comm
     ) -> None:  # fmt: skip
-        """``beside``: (planes, parts) the side of a plane of symmetry on which a body starts beside it, 1 or -1.
+        """``beside``: (planes, parts) for each plane of symmetry, the side on which each body starts, 1 or -1.
         Collective.
         """
         self.bodies = bodies
@@ -167,7 +167,9 @@ class Rigid:
         self._carry(nodes)
 
     def of_walls(self, walls: list[int], part: int) -> Floats:
-        """(3,) impulses of these walls on the body that is ``part`` so far, N s; zero for a part that is not rigid."""
+        """(3,) sum of the impulses of these walls so far on the rigid body of ``part``, N s; zero for a part that is
+        not rigid.
+        """
         body = int(self.of_part[part])
         return self.stops.given[walls, body].sum(axis=0) if body >= 0 else np.zeros(3)
 

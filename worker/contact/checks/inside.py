@@ -1,14 +1,14 @@
-"""Penetrated nodes: nodes inside of another body or fragment, and nodes without tets inside of the part that they come
-from, whether that part is in contact with itself or not.
+"""Penetrated nodes: nodes inside of another body or fragment, and nodes without tets inside of their own part. The
+second kind is counted whether the part is in contact with itself or not.
 
-A node in a tet of another fragment has passed through that body's surface. Its depth is computed from the tet alone:
-below the nearest exposed face of the tet; in a tet without exposed face but with a corner on the surface, below the
-nearest of all its faces; and at most the distance from such a corner. In a tet without a corner on the surface the node
-is deeper than the outermost layer, unless that layer has been compressed to nearly nothing: then the nearest exposed
-faces of the body decide. A node on an edge between two corners on the surface counts as touching, because a tet with an
-edge on the surface may have no exposed face there; this includes edges that run through a plate of one tet. Nodes of
-the surface and separated nodes are tested against the tets of all ranks, so that the partition does not change the
-result.
+A node in a tet of another fragment has passed through that body's surface. The depth of such a node is computed from
+the tet alone: below the nearest exposed face of the tet; in a tet without exposed face but with a corner on the
+surface, below the nearest of all its faces; and at most the distance from such a corner. In a tet without a corner on
+the surface the node is deeper than the outermost layer, unless that layer has been compressed to nearly nothing: then
+the nearest exposed faces of the body decide. A node on an edge between two corners on the surface counts as touching,
+because a tet with an edge on the surface may have no exposed face there; this includes edges that run through a plate
+of one tet. Nodes of the surface and separated nodes are tested against the tets of all ranks, so that the partition
+does not change the result.
 """
 
 from dataclasses import dataclass

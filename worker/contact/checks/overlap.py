@@ -87,8 +87,8 @@ def find(points: Floats, tets: Indices, part: Indices, surface: Surface, allowed
 def move_apart(
     points: Floats, tets: Indices, part: Indices, surface: Surface, allowed: Flags
 ) -> tuple[Floats, Indices]:
-    """Returns points with overlapping nodes moved to the surface above them, half the depth at a time, in turns; and
-    the part that each was moved out of last, -1 for none.
+    """Returns points in which overlapping nodes have been moved towards the surface of the other part, by half of the
+    depth in each pass; and the part that each was moved out of last, -1 for none.
     """
     moved, out_of = points.copy(), np.full(len(points), -1, np.int32)
     for _ in range(_TRIES):

@@ -209,8 +209,8 @@ def entering(out, base, each, narrow, of, step, first, stop):  # type: ignore[no
     from ``first`` to ``stop``.
 
     The contacts are written to rows of ``out``, from ``base`` plus ``each`` times the number of corners before the
-    first family on, up to ``each`` for every corner in the mean. Returns the number of contacts; if this number is
-    larger than the number of rows, some contacts have no row. Numbers at the ends of lines: conditions listed above.
+    first family on, with ``each`` rows per corner on average. Returns the number of contacts; if this number is larger
+    than the number of rows, some contacts have no row. Numbers at the ends of lines: conditions listed above.
     """
     ahead, part, mu, nodes, weights = step.ahead, step.part, step.mu, out.nodes, out.weights
     members, begin, among, corners, start = of

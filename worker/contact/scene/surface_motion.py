@@ -52,7 +52,7 @@ class SurfaceMotion:
         self._x, self._course, self._t = nodes.x.copy(), course.copy(), t
 
     def spent(self, nodes: Nodes, t: float, dt: float) -> bool:
-        """Returns whether the candidate list will be invalid a step ``dt`` after ``t``: the horizon has passed, or a
+        """Returns True if the candidate list will be invalid a step ``dt`` after ``t``: the horizon has passed, or a
         node departs so far that another rank may lack its ghost.
         """
         if t + dt > self.until:

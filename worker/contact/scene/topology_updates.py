@@ -17,7 +17,7 @@ from .scene import Scene
 
 @dataclass
 class TopologyUpdate:
-    """Topology change of one step: new node of each tet, for all nodes that a rank holds or has a ghost of."""
+    """Topology change of one step: new node of each tet, for all nodes and ghosts on a rank."""
 
     key: Ints
     """(r,) ids of a node and of a tet as one number, ascending."""

@@ -34,8 +34,8 @@ class ActiveContacts(NamedTuple):
     slots: Indices
     """(contacts, 4) slots of the nodes; the third is -1 in a contact of two nodes, of weights 1 and -1."""
     reach: Floats
-    """(contacts,) bound of the sum of the paths of its nodes, m/s, below which an idle contact stays idle; infinite
-    for a loaded one."""
+    """(contacts,) reach of each contact, m/s: an idle contact stays idle while the sum of the velocity changes of
+    its nodes is below this value; infinite for a loaded one."""
     weights: Floats
     """(room, 4) weights, see tables.ContactRows."""
     normals: Floats

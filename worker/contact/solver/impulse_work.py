@@ -11,8 +11,8 @@ _F1, _F2, _F, _I = types.float64[::1], types.float64[:, ::1], types.float64, typ
 
 @njit(types.void(_I2, LOADED, NODES, _F2, _N1, _F, _I), cache=True)
 def cost(words, loaded, active, before, places, joule, k):  # type: ignore[no-untyped-def]
-    """Adds the energy that the impulses along the normals of set ``k`` take from the bodies, and the energy that their
-    first half gives back, to two limbs (rows of ``words``) of quanta of 1 / ``joule`` J.
+    """Adds the energy that the impulses along the normals of set ``k`` take from the bodies, and the energy that the
+    first half of the impulses returns to the bodies, to two limbs (rows of ``words``) of quanta of 1 / ``joule`` J.
 
     An impulse J between the speeds u(n-1/2), of ``before`` (surface_nodes, 3) at the ``places`` of the slots, and
     u(n+1/2) takes -J (u(n-1/2) + u(n+1/2)) / 2; the ledger at time n contains the first half of this energy.
