@@ -99,12 +99,12 @@ def test_an_edge_becomes_sharp_when_it_bulges_by_more_than_25_degrees(angle: flo
 
 
 STOPS = (150, 300)
-MEETING = Path(__file__).parents[1] / "parallel" / "meeting.toml"
+COLLIDING = Path(__file__).parents[1] / "parallel" / "colliding.toml"
 
 
 def flown(comm: Comm, folder: Path, stops: tuple[int, ...]) -> tuple[str | None, int]:
     """Digest of the scene, and number of edges that flow has made sharp; kept and resumed at ``stops``, steps."""
-    case = parse_case(apply_overrides(read_data(MEETING), ["run.frames=0", "balance.weights=tets"]))
+    case = parse_case(apply_overrides(read_data(COLLIDING), ["run.frames=0", "balance.weights=tets"]))
     sim = simulation.build(case, Path(), comm)
     step.prepare(sim)
     while sim.clock.step < STOPS[-1] + 20:

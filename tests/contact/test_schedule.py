@@ -20,7 +20,7 @@ from conoid.worker.simulation import Simulation
 from .ranks import on_ranks
 
 SCENES = Path(__file__).parents[1] / "parallel"
-STEPS = {"breaking": 54, "eroding": 100, "meeting": 120}
+STEPS = {"breaking": 54, "eroding": 100, "colliding": 120}
 CRUSHED = "../../cases/hard/crush_cohesive"
 
 
@@ -121,4 +121,4 @@ def test_a_horizon_ends_with_one_search(monkeypatch: pytest.MonkeyPatch) -> None
     """Not with one that keeps the end, a step or two away, and another one after it."""
     monkeypatch.setattr(surface_motion, "_HORIZONS", surface_motion._HORIZONS[:1])
     good_for = surface_motion._HORIZONS[0] - searches._AHEAD
-    assert ran("meeting", SerialComm())[1] <= 1 + STEPS["meeting"] / good_for
+    assert ran("colliding", SerialComm())[1] <= 1 + STEPS["colliding"] / good_for

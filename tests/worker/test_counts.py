@@ -59,7 +59,7 @@ def breaking(clock: Clock, cost: float) -> Any:
 
     return SimpleNamespace(
         model=model, fracture=SimpleNamespace(broken=0), erosion=None, comm=SerialComm(), shared_nodes=lambda: 0,
-        record=SimpleNamespace(look=look, labels=[], count=3), clock=SimpleNamespace(step=0),
+        record=SimpleNamespace(update=look, labels=[], count=3), clock=SimpleNamespace(step=0),
     )  # fmt: skip
 
 

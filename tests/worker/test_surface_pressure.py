@@ -211,5 +211,5 @@ def test_a_stress_that_follows_is_refused() -> None:
             "shape": "box", "low": [0, 0, 0], "high": [1, 1, 1], "element_size": 0.5}}],
         "boundaries": [{"kind": "traction", "stress": [1e6, 0, 0], "follows": True}],
     }  # fmt: skip
-    with pytest.raises(CaseError, match=r"boundaries\[0\].follows.*give pressure"):
+    with pytest.raises(CaseError, match=r"boundaries\[0\].follows.*needs pressure"):
         parse_case(data)

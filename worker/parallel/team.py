@@ -36,9 +36,6 @@ _NEXT, _DONE, _ASLEEP, _KERNEL, _TABLE, _TASKS, _MOST, _WITHIN, _CLOCK, _SEMAPHO
 """Offsets in the words of a job. Words that several threads write have a cache line of their own. _MOST: number of
 threads that may work; _WITHIN: time in regions so far, ns; _CLOCK: two words for reading the clock. From _THREADS on
 each thread has a line: its time in tasks, ns, and words for the clock."""
-_STAGE = 5
-"""Number of words of a stage: addresses of its kernel, of the table of arguments, of the tasks and of the starts of
-colours, and the number of colours."""
 _BITS, _MASK = 20, (1 << 20) - 1
 """Number of low bits of the word _NEXT, which have the next task, and their mask. The higher bits have the number of
 tasks."""
@@ -102,11 +99,10 @@ def _help(job, semaphore, thread):  # type: ignore[no-untyped-def]
             idle = 0
 
 
-@njit("void(int64[::1], int64, int64[::1])", cache=True)
-def _share(job, semaphore, stage):  # type: ignore[no-untyped-def]
-    """Run the tasks of a stage, one colour after the other; return when all are done."""
-    kernel, table, tasks, starts = stage[0], stage[1], stage[2], stage[3]
-    for colour in range(stage[4]):
+@njit("void(int64[::1], int64, int64, int64, int64, int64, int64)", cache=True)
+def _share(job, semaphore, kernel, table, tasks, starts, colours):  # type: ignore[no-untyped-def]
+    """Run the tasks of a pass, one colour after the other; return when all are done."""
+    for colour in range(colours):
         first = word_at(starts, colour)
         many = word_at(starts, colour + 1) - first
         job[_KERNEL], job[_TABLE], job[_TASKS] = kernel, table, tasks + 16 * first
@@ -123,13 +119,18 @@ def _share(job, semaphore, stage):  # type: ignore[no-untyped-def]
                 sched_yield()
 
 
-@njit("void(int64[::1], int64, int64[:, ::1], int64)", cache=True)
-def _ask(job, semaphore, stages, rounds):  # type: ignore[no-untyped-def]
-    """Run all stages, one after the other, ``rounds`` times."""
+@njit("void(int64, int64, int64, int64, int64)", cache=True)
+def _serial(kernel, table, tasks, starts, colours):  # type: ignore[no-untyped-def]
+    """Run the same on the calling thread."""
+    for k in range(word_at(starts, 0), word_at(starts, colours)):
+        call_task(kernel, table, word_at(tasks, 2 * k), word_at(tasks, 2 * k + 1), 0)
+
+
+@njit("void(int64[::1], int64, int64, int64, int64, int64, int64)", cache=True)
+def _ask(job, semaphore, kernel, table, tasks, starts, colours):  # type: ignore[no-untyped-def]
+    """Run one pass on all threads."""
     begin = now(job, _CLOCK)
-    for _ in range(rounds):
-        for k in range(len(stages)):
-            _share(job, semaphore, stages[k])
+    _share(job, semaphore, kernel, table, tasks, starts, colours)
     job[_WITHIN] += now(job, _CLOCK) - begin
 
 
@@ -138,10 +139,13 @@ def _alone(job, stages, rounds):  # type: ignore[no-untyped-def]
     """Run all stages, ``rounds`` times, on one thread."""
     begin = now(job, _CLOCK)
     for _ in range(rounds):
-        for s in range(len(stages)):
-            kernel, table, tasks, starts = stages[s, 0], stages[s, 1], stages[s, 2], stages[s, 3]
-            for k in range(word_at(starts, 0), word_at(starts, stages[s, 4])):
-                call_task(kernel, table, word_at(tasks, 2 * k), word_at(tasks, 2 * k + 1), 0)
+        for k in range(len(stages)):
+            kernel, table, tasks = stages[k, 0], stages[k, 1], stages[k, 2]
+            starts, colours = stages[k, 3], stages[k, 4]
+            if job[_MOST] == 1:
+                _serial(kernel, table, tasks, starts, colours)
+            else:
+                _share(job, semaphore, kernel, table, tasks, starts, colours)
     job[_WITHIN] += now(job, _CLOCK) - begin
 
 
@@ -182,8 +186,6 @@ class Team:
         self._job: Ints = room[-(room.ctypes.data // room.itemsize) % _LINE :][:size]
         self._job[_MOST] = threads
         self._words = self._job.data
-        self._stage = np.zeros((1, _STAGE), np.int64)
-        self._one = self._stage[0].data
         self._semaphore = int(self._job[_SEMAPHORE:].ctypes.data)
         ctypes.CDLL(None).sem_init(ctypes.c_void_p(self._semaphore), 0, 0)
         for thread in range(1, threads):
@@ -218,10 +220,11 @@ class Team:
         if self.projecting is not None:
             self._words[_WITHIN] += self.projecting.run(kernel, table, tasks, starts)
             return
-        one = self._one
-        one[0], one[1], one[2] = kernel.address, table, address_of(tasks)
-        one[3], one[4] = address_of(starts), len(starts) - 1
-        self._do(self._stage, 1)
+        words = kernel.address, table, address_of(tasks), address_of(starts), len(starts) - 1
+        if self._words[_MOST] == 1:
+            _alone(self._job, *words)
+        else:
+            _ask(self._job, self._semaphore, *words)
 
     def repeat(self, stages: Sequence[Stage], rounds: int) -> None:
         """Run all ``stages``, one after the other, ``rounds`` times, in one call.
@@ -238,13 +241,7 @@ class Team:
             (each.kernel.address, each.table, address_of(each.tasks), address_of(each.starts), len(each.starts) - 1)
             for each in stages
         ]
-        self._do(np.array(words), rounds)
-
-    def _do(self, stages: Ints, rounds: int) -> None:
-        if self._words[_MOST] == 1:
-            _alone(self._job, stages, rounds)
-        else:
-            _ask(self._job, self._semaphore, stages, rounds)
+        _repeat(self._job, self._semaphore, np.array(words), rounds)
 
 
 @cache
