@@ -134,9 +134,17 @@ def _ask(job, semaphore, kernel, table, tasks, starts, colours):  # type: ignore
     job[_WITHIN] += now(job, _CLOCK) - begin
 
 
-@njit("void(int64[::1], int64[:, ::1], int64)", cache=True)
-def _alone(job, stages, rounds):  # type: ignore[no-untyped-def]
-    """Run all stages, ``rounds`` times, on one thread."""
+@njit("void(int64[::1], int64, int64, int64, int64, int64)", cache=True)
+def _alone(job, kernel, table, tasks, starts, colours):  # type: ignore[no-untyped-def]
+    """Run one pass on the calling thread."""
+    begin = now(job, _CLOCK)
+    _serial(kernel, table, tasks, starts, colours)
+    job[_WITHIN] += now(job, _CLOCK) - begin
+
+
+@njit("void(int64[::1], int64, int64[:, ::1], int64)", cache=True)
+def _repeat(job, semaphore, stages, rounds):  # type: ignore[no-untyped-def]
+    """Run all stages, one after the other, ``rounds`` times; ``stages`` (n, 5) has the arguments of each pass."""
     begin = now(job, _CLOCK)
     for _ in range(rounds):
         for k in range(len(stages)):
