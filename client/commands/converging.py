@@ -1,4 +1,4 @@
-"""The command ``conoid converge``: speed against error for any case."""
+"""The command ``conoid converge``: convergence study of a case, with the error over the cost of each mesh."""
 
 import tempfile
 from collections.abc import Iterator, Sequence

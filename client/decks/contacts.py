@@ -64,7 +64,7 @@ def meet(draft: Draft, bodies: Sequence[Body], meetings: Sequence[Meeting]) -> N
 
 
 def _frictions(meetings: Sequence[Meeting]) -> dict[tuple[str, str], float]:
-    """Returns the friction of each pair; a contact of two bodies has priority over one of all."""
+    """Returns the friction of each pair; a contact of two named bodies has priority over a contact of all bodies."""
     met: dict[tuple[str, str], float] = {}
     for each in sorted(meetings, key=lambda one: one.other is not None):
         for pair in each.pairs():

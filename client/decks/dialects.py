@@ -38,7 +38,7 @@ class Dialect(Protocol):
         """Densities of its materials."""
 
     def draft(self, system: System) -> Draft:
-        """Returns the case; every keyword of ``account`` is decided then."""
+        """Returns the case; afterwards every keyword of ``account`` is decided."""
 
 
 DIALECTS: dict[str, type[Dialect]] = {"lsdyna": LsDyna, "abaqus": Abaqus, "radioss": Radioss}

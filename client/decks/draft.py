@@ -53,7 +53,7 @@ class Body:
 
 
 class Draft:
-    """The tables of a case, filled keyword by keyword."""
+    """Tables of a case, which the import fills keyword by keyword."""
 
     def __init__(self, deck: Path, system: System, account: Account) -> None:
         """Makes an empty case; ``deck``: the file with the mesh of the parts."""

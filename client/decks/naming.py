@@ -1,4 +1,4 @@
-"""Names of a case for names of a deck that it cannot have: titles with blanks, numbers, repeated titles."""
+"""Names of a case for names in a deck that a case cannot have: titles with blanks, numbers, repeated titles."""
 
 import re
 import unicodedata

@@ -1,4 +1,4 @@
-"""Rigid walls of a deck, which stop the nodes of a set, as walls of a case, which stop whole parts."""
+"""Conversion of rigid walls of a deck, which stop the nodes of a set, to walls of a case, which stop whole parts."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass

@@ -74,7 +74,7 @@ class ZenohLink:
     name, trouble = "Zenoh", ""
 
     def __init__(self, router: Router, prefix: str) -> None:
-        """Opens a session and subscribes. Raises StreamError if that fails or takes too long."""
+        """Opens a session and subscribes. Raises StreamError if the subscription fails or takes too long."""
         self._mailbox = Mailbox()
         self.blobs: dict[str, bytes] = {}
         """The newest snapshots that have arrived, by their sha256."""

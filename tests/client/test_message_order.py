@@ -1,4 +1,4 @@
-"""Every message once and in order, for any loss, repetition or order in the stream."""
+"""Messages arrive in order and once each, for any loss, repetition or order in the stream."""
 
 import random
 

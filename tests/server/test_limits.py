@@ -136,7 +136,7 @@ def test_a_run_that_is_kept_is_found_by_that(server: Running, run: str) -> None:
 
 
 def test_a_database_without_labels_gets_them_from_the_folders(server: Running) -> None:
-    """The database is that of an earlier version of the server."""
+    """The database is that of an earlier version of the server, which stored no labels."""
     red = labelled(server, "colour=red")
     server.ann.wait_for(red)
     settings = server.service.settings
@@ -154,7 +154,7 @@ def test_a_database_without_labels_gets_them_from_the_folders(server: Running) -
 
 
 def test_a_database_without_threads_has_runs_of_one_thread(tmp_path: Path) -> None:
-    """The database is that of an earlier version of the server."""
+    """The database is that of an earlier version of the server, which stored no threads."""
     url = f"sqlite:///{tmp_path / 'old.sqlite'}"
     run = Run("r1", "ann", "bar", 3, 0.0, State.SUCCEEDED, started=10.0, finished=20.0, threads=4)
     store = Store(url)

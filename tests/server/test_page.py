@@ -84,7 +84,7 @@ def test_an_odd_address_of_the_page_is_not_there(client: TestClient, address: st
 
 
 def test_a_route_is_there_whatever_is_asked_of_it(client: TestClient) -> None:
-    """This also holds if the page answers all other addresses."""
+    """The route also answers if the page answers all other addresses."""
     for method, path, allowed in (
         ("PUT", "/v1/runs", "GET, HEAD, POST"),
         ("DELETE", "/v1/me", "GET, HEAD"),

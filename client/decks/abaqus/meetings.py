@@ -16,7 +16,9 @@ class Meetings:
     """Contacts of a deck, and tied pairs."""
 
     def __init__(self, keywords: Sequence[Keyword], bodies: Sequence[Body], surface: Surface) -> None:
-        """``surface``: returns the bodies of a surface by its name; raises InpError."""
+        """Starts without contacts; ``surface``: function that returns the bodies of a surface by its name, or raises
+        InpError.
+        """
         self.made: list[Meeting] = []
         self.ties: list[tuple[tuple[str, str], Entry]] = []
         self._every = frozenset(body.key for body in bodies)

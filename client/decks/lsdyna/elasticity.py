@@ -13,7 +13,7 @@ Curve = tuple[tuple[float, float], ...]
 
 @dataclass
 class Context:
-    """The context of a material besides its own cards."""
+    """Data of the deck that a material needs in addition to its own cards."""
 
     system: System
     eos: Fields | None = None
