@@ -24,12 +24,13 @@ _LADDERS: dict[str, _Ladder] = {
 _WORTH = {"m^2": 1.0, "mm^2": 1e-6, "µm^2": 1e-12, "m^3": 1.0, "mm^3": 1e-9, "µm^3": 1e-18}
 """Threshold, not factor, of some units in these tables: the value from which the unit is used."""
 _PLAIN = 1e-3, 5
-"""Exponents between which a number is written without a power of ten: at most so many digits before the point.
-Chosen."""
+"""Exponents between which a number is written without a power of ten (chosen values). The larger exponent limits the
+number of digits before the point."""
 _MOST = 1e12
-"""Value from which a whole number is written with a power of ten. Chosen: five groups of digits are hard to read."""
+"""Value from which a whole number is written with a power of ten. The value was chosen because five groups of digits
+are hard to read."""
 _MOST_HOURS = 10_000
-"""Value from which minutes are omitted. Chosen: a year."""
+"""Wall time from which minutes are omitted: a year (chosen value)."""
 UNKNOWN = "–"
 """Text of an unknown number."""
 

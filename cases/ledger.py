@@ -14,16 +14,17 @@ class Energy(msgspec.Struct, kw_only=True, frozen=True):
     plastic: float
     viscous: float
     contact: float
-    """Dissipated by contact impulses between bodies and with walls, without friction."""
+    """Energy dissipated by contact impulses between bodies and with walls, without friction."""
     friction: float = 0.0
     eroded: float = 0.0
     """Elastic energy of deleted tets, and kinetic energy of nodes deleted with them."""
     fracture: float = 0.0
-    """Dissipated by cohesive facets and tied bonds."""
+    """Energy dissipated by cohesive facets and tied bonds."""
     cohesive: float = 0.0
-    """Stored in cohesive facets; released when they close."""
+    """Energy stored in cohesive facets; it is released when the facets close."""
     stepping: float = 0.0
-    """Dissipated by time steps of unequal length, an error of the method; negative where they have added energy."""
+    """Energy dissipated by time steps of unequal length, an error of the method; negative if the steps have added
+    energy."""
     averaging: float = 0.0
     """Work of averaged nodal pressures: stored in pressure differences between tets and nodes, and dissipated where
     neighbours yield or fail at different times; ``nodal`` and ``split`` only."""

@@ -27,8 +27,8 @@ __all__ = [
 _KEY = re.compile(r"[A-Za-z_][A-Za-z0-9_-]*(?:\[\d{1,6}\])*(?:\.[A-Za-z_][A-Za-z0-9_-]*(?:\[\d{1,6}\])*)*")
 _ITEM = re.compile(r"([A-Za-z_][A-Za-z0-9_-]*)|\[(\d+)\]")
 _DEEPEST = 32
-"""Largest number of words of a dotted key in TOML, whose cost grows with their square. Chosen: keys of a case have
-up to 6."""
+"""Largest number of words of a dotted key in TOML, whose cost grows with the square of this number. The value was
+chosen because keys of a case have up to 6 words."""
 _DEEP = re.compile(rf"""(?<![\w"'.-])(?:(?:[\w-]++|"[^"\n]*+"|'[^'\n]*+')[ \t]*+\.[ \t]*+){{{_DEEPEST}}}""", re.ASCII)
 _MARK = "\ufeff"
 """Byte order mark that some editors write at the start of a file in UTF-8."""

@@ -48,7 +48,7 @@ class Started(Message, frozen=True):
     setup: float
     parts: dict[str, int]
     threads: int = 1
-    """Tets of each rank."""
+    """Number of tets of each rank."""
 
 
 class Progress(Message, frozen=True):
@@ -80,25 +80,25 @@ class Load(Message, frozen=True):
     imbalance: float
     steps: int = 0
     waiting: list[float] = []
-    """Share of ``exchange``: CPU seconds in calls that wait for other ranks."""
+    """Share of the phase ``exchange``: CPU seconds in calls that wait for other ranks."""
     messages: list[int] = []
-    """Messages to single ranks."""
+    """Number of messages from each rank to single ranks."""
     bytes: list[int] = []
-    """Bytes of these messages."""
+    """Bytes of the messages to single ranks."""
     collectives: list[int] = []
-    """Calls in which all ranks take part."""
+    """Number of calls in which all ranks take part."""
     collective_bytes: list[int] = []
-    """Bytes that the rank contributes to them."""
+    """Bytes that the rank contributes to calls of all ranks."""
     outside: list[int] = []
     """Surface nodes that each rank owns."""
     serial: list[float] = []
     """Wall time in which a single thread of the rank works, s, without waiting for other ranks."""
     parallel: list[float] = []
-    """Wall time in regions, whose tasks the threads of the rank share, s."""
+    """Wall time in parallel regions, whose tasks are divided among the threads of the rank, s."""
     helped: list[float] = []
     """Working time of all threads of the rank except the first, together, s."""
     threads: int = 1
-    """Threads of each rank."""
+    """Number of threads of each rank."""
     projected: dict[int, dict[str, list[float]]] = {}
     """By number of threads: estimated CPU seconds of each phase with so many threads, without waiting."""
 
@@ -114,7 +114,7 @@ class Counts(Message, frozen=True):
     elements_per_rank: list[int]
     particles: int = 0
     facets: int = 0
-    """Broken facets."""
+    """Number of broken facets."""
     smallest: int = 0
     """Exponent of the first class of ``sizes``."""
     sizes: list[int] = []
@@ -135,7 +135,7 @@ class Balance(Message, frozen=True):
     """Share of each rank in the balanced quantity: CPU seconds per step, outside nodes, or tets."""
     tets: int
     nodes: int
-    """Tets that have moved to other ranks."""
+    """Number of tets that have moved to other ranks."""
     cost: float
     """Wall time of the decomposition, s."""
     saved: float
@@ -152,13 +152,13 @@ class Groups(Message, frozen=True):
     load: list[int]
     """CPU time of each group, ns per step."""
     outside: list[int]
-    """Surface nodes of each group."""
+    """Number of surface nodes of each group."""
     rank: int = 0
     """CPU time of a rank without any group, ns per step."""
     centres: list[tuple[float, float, float]] = []
-    """Centres at the start, m. This field and the next are in the first message only."""
+    """Centres of the groups at the start, m. The fields with centres and tets are in the first message only."""
     tets: list[int] = []
-    """Tets at the start."""
+    """Number of tets of each group at the start."""
     cost: float = 0.0
     """Assumed cost of a decomposition before the first one, wall time, s."""
 
@@ -186,7 +186,7 @@ class Snapshot(Message, frozen=True):
     channel: ClassVar[str] = "fragments"
     n: int
     path: str
-    """Path relative to the run's folder."""
+    """Path of the snapshot, relative to the run's folder."""
     bytes: int
     triangles: int
     fragments: int
@@ -194,15 +194,15 @@ class Snapshot(Message, frozen=True):
     cause: str = ""
     """Reason of the snapshot: ``run.snapshots``, ``asked for``, ``start`` or ``end``."""
     dropped: int = 0
-    """Scheduled snapshots since the one before that were not made."""
+    """Number of scheduled snapshots since the previous snapshot that were not made."""
     smallest: int = 0
     """Exponent of the first class of ``sizes``."""
     sizes: list[int] = []
     """Numbers of fragments by length, from 2^((smallest + i) / 2) m to the next class."""
     tets: int = 0
-    """Bytes of its file of all tets; 0 without one."""
+    """Size of the file with all tets of the snapshot, bytes; 0 without such a file."""
     fields: dict[str, list[float]] = {}
-    """Of each field: minimum, 0.5 % and 99.5 % quantiles over the triangles, maximum."""
+    """Minimum, 0.5 % and 99.5 % quantiles over the triangles, and maximum of each field."""
 
 
 class Fragments(Snapshot, tag="snapshot", kw_only=True, frozen=True):
@@ -212,7 +212,7 @@ class Fragments(Snapshot, tag="snapshot", kw_only=True, frozen=True):
 
 
 class Log(Message, frozen=True):
-    """A line for the user."""
+    """A line of text for the user."""
 
     channel: ClassVar[str] = "log"
     level: str
@@ -265,10 +265,10 @@ def from_json(line: bytes | str) -> AnyMessage:
 
 
 def from_msgpack(payload: bytes) -> AnyMessage:
-    """Reads a Zenoh sample. Raises as ``from_json`` does."""
+    """Reads a Zenoh sample. Raises the same errors as ``from_json``."""
     return _from_msgpack.decode(payload)
 
 
 def fragments_from_msgpack(payload: bytes) -> Fragments:
-    """Reads a Zenoh sample of the class ``fragments``. Raises as ``from_json`` does."""
+    """Reads a Zenoh sample of the class ``fragments``. Raises the same errors as ``from_json``."""
     return _fragments.decode(payload)

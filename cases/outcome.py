@@ -112,11 +112,11 @@ class Outcome(msgspec.Struct, kw_only=True, frozen=True):
     """Nodes that end inside another body or fragment (free nodes: also inside their own part), deeper than 0.05 of
     the typical face size."""
     deepest: float = math.nan
-    """Depth of the deepest of them that has not passed the outermost tets, over the typical face size."""
+    """Depth of the deepest penetrating node that has not passed the outermost tets, over the typical face size."""
     overlapping: int | None = None
-    """Surface tets that end with more than a tenth of their volume in other bodies or fragments."""
+    """Number of surface tets that end with more than a tenth of their volume in other bodies or fragments."""
     overlap: float = math.nan
-    """Common volume of these bodies and fragments over the volume of all surface tets."""
+    """Common volume of penetrating bodies and fragments over the volume of all surface tets."""
     rebalances: int | None = None
     balancing_cost: float = math.nan
     """Wall time of all decompositions, s."""
@@ -130,7 +130,7 @@ class Outcome(msgspec.Struct, kw_only=True, frozen=True):
     compressed: list[Compressed] = []
     """Of each part that breaks in tension only and was compressed: the largest compression, the largest first."""
     phases: dict[str, list[float]] = {}
-    """CPU seconds per phase, one number per rank; of its first thread."""
+    """CPU seconds per phase, one number per rank; only the first thread of the rank counts."""
     serial: dict[str, list[float]] = {}
     """Serial wall time of each phase, s, one number per rank: work of a single thread of the rank, without waiting
     for other ranks. It limits the gain of more threads. Other programs on the same cores increase it."""
@@ -141,7 +141,7 @@ class Outcome(msgspec.Struct, kw_only=True, frozen=True):
     """By number of threads: estimated seconds per phase and rank with so many threads, without waiting; only of a
     run with this option (docs/performance/scaling.md)."""
     sharing: "Sharing | None" = None
-    """The measurements from which these estimates follow."""
+    """Measurements from which the estimates for other numbers of threads are computed."""
     helped: list[float] = []
     """Working time of all threads of the rank except the first, together, s; at most threads - 1 times ``parallel``."""
     without: list[str] = []

@@ -56,7 +56,8 @@ class Cause(StrEnum):
 
 
 class ExitCode:
-    """Exit codes of ``python -m conoid.worker``. The outcome file is decisive, the code is a hint."""
+    """Exit codes of ``python -m conoid.worker``. The outcome file is decisive; the exit code is only additional
+    information."""
 
     SUCCEEDED = 0
     CRASHED = 1

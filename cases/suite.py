@@ -13,8 +13,9 @@ from .outcome import Outcome
 
 _TABLE = Path(__file__).with_name("hard.toml")
 RESIDUAL, DRIFT = 0.01, 1e-9
-"""Largest energy residual, and largest drift of the momentum over the sum of |m v| of the parts, of a correct run.
-Chosen: the limits of the catalogue are 1 %, and 1e-10 for a single body; sums of impulses are rounded."""
+"""Largest energy residual of a correct run, and largest drift of its momentum over the sum of |m v| of the parts.
+The values were chosen because the limits of the catalogue are 1 %, and 1e-10 for a single body; sums of impulses are
+rounded."""
 
 
 @dataclass(frozen=True)
@@ -29,8 +30,8 @@ class Hard:
     limit: float = RESIDUAL
     """Limit of the energy residual."""
     refused: str = ""
-    """The ledger line that creates more than ``run.made_limit``, as is known, which ends the run. Without it the run
-    must succeed."""
+    """Ledger line that is known to create more than ``run.made_limit``, which ends the run. Empty: the run must
+    succeed."""
 
     @property
     def path(self) -> Path:

@@ -33,9 +33,9 @@ _CENTI, _MILLI, _MICRO = Fraction(1, 100), Fraction(1, 1000), Fraction(1, 10**6)
 _NANO, _PICO = Fraction(1, 10**9), Fraction(1, 10**12)
 """SI prefixes, exact."""
 _INCH, _POUND = Fraction("0.0254"), Fraction("0.45359237")
-"""m and kg, exact by the agreement of 1959."""
+"""Inch and pound in m and kg; exact by the agreement of 1959."""
 _PSI = _POUND * Fraction("9.80665") / _INCH**2
-"""A pound of force, by standard gravity, on a square inch; Pa, exact."""
+"""Pound-force per square inch, Pa; exact, with standard gravity."""
 UNITS: dict[str, tuple[Fraction, Dimension]] = {
     "1": (_ONE, _NONE),
     "m": (_ONE, _LENGTH), "km": (_KILO, _LENGTH), "cm": (_CENTI, _LENGTH), "mm": (_MILLI, _LENGTH),
@@ -74,11 +74,11 @@ _FACTOR = re.compile(r"\s*([*/·]?)\s*([A-Za-zµ%]+|1)(?:\^([+-]?\d))?")
 QUANTITY = "the quantity's"
 """Placeholder for the unit of a number whose unit another key determines."""
 _LONGEST = 80
-"""Largest number of characters of a quantity: more than any number with its unit has. Chosen, so that other text
-costs no time."""
+"""Largest number of characters of a quantity (chosen value). Any number with its unit is shorter. Longer text is
+refused early, so that it costs no time."""
 LARGEST = 1e30
-"""Largest quantity in SI units; its inverse is the smallest one. Chosen: the energy of any such mass and speed is a
-finite number."""
+"""Largest quantity in SI units; its inverse is the smallest quantity. The value was chosen because the energy of any
+such mass and speed is a finite number."""
 
 
 _WRITTEN = str.maketrans({
@@ -131,7 +131,8 @@ def written(value: object) -> tuple[str, str] | None:
 
 
 def usable(number: float, what: str = "it") -> float:
-    """Returns the number if it is within LARGEST and its inverse. Raises ValueError; ``what``: the words for it."""
+    """Returns the number if it is within LARGEST and its inverse. Raises ValueError; ``what``: words for the number
+    in the error message."""
     if number and not 1.0 / LARGEST <= abs(number) <= LARGEST:
         raise ValueError(f"{what} is not between {1.0 / LARGEST:g} and {LARGEST:g}")
     return number

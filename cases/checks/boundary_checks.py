@@ -18,8 +18,8 @@ from ..warnings.idle import idle
 from .drives import clash
 
 ROUNDING = 1e-9
-"""Relative tolerance of two lengths or times that are meant to be equal. Chosen: far above the rounding of units
-(1e-16) and far below any tolerance of a drawing."""
+"""Relative tolerance of two lengths or times that are meant to be equal. The value was chosen far above the rounding
+of units (1e-16) and far below any tolerance of a drawing."""
 
 
 def check_boundaries(case: Case) -> Iterator[Problem]:

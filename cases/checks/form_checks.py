@@ -8,7 +8,8 @@ from ..reading.problems import Location, Problem, problem
 from ..shapes.profile import tangent
 
 _LEAST = 1e-6
-"""Smallest size over the radius of a body; a smaller one, except 0, is an error. Chosen: no element is so small."""
+"""Smallest size over the radius of a body; a smaller size, except 0, is an error. The value was chosen because no
+element is so small."""
 _ROUNDED = "shank", "tip_radius", "meplat", "top_radius", "inner_radius", "radius"
 
 

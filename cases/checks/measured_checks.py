@@ -9,7 +9,8 @@ from ..reading.problems import Location, Problem, problem
 from .form_checks import check_form
 
 _DEEPEST, _MOST = 8, 200
-"""Largest depth of nested combinations, and largest number of shapes in all. Chosen: more than any user writes."""
+"""Largest depth of nested combinations, and largest number of shapes in a combination. The values were chosen larger
+than any user needs."""
 
 File = MeshFile | CadForm | Stl
 """Models that name a file by ``path`` and ``sha256``."""

@@ -9,7 +9,7 @@ from ..model.schema import Case, Part
 from ..reading.problems import Location, Problem, problem
 
 MOST = 62
-"""Largest number of sets of a case: a node has a bit for each in a whole number of 64 bits."""
+"""Largest number of sets of a case. Each node has one bit for each set in an integer of 64 bits."""
 
 
 def ons(case: Case) -> list[tuple[Location, Prescribed | Rotation | Traction | Probe]]:

@@ -15,12 +15,14 @@ from ..shapes.placed import Placed, lattice
 from ..shapes.profile import Revolved, profile
 
 _POINTS = 12
-"""Sampling points per direction in the box that two bodies have in common. Chosen: thinner slices than a twelfth of
-that box are found by the worker, which checks the nodes."""
+"""Number of sampling points per direction in the box that two bodies have in common. The value was chosen because
+the worker, which checks the nodes, finds slices that are thinner than a twelfth of this box."""
 _PAIRS = 32
-"""Largest number of pairs of bodies that are checked. Chosen: a second at most; the worker checks all."""
+"""Largest number of pairs of bodies that are checked. The value was chosen because the check takes a second at most;
+the worker checks all pairs."""
 _TOUCH = 1e-9
-"""Depth of contact without overlap, over the size of a body. Far above rounding, far below any gap."""
+"""Depth of contact that is not an overlap, over the size of a body. The value is far above rounding and far below
+any gap."""
 
 
 def overlaps(
@@ -124,7 +126,8 @@ def _common(one: tuple[Vector, Vector], other: tuple[Vector, Vector]) -> tuple[V
 
 
 def _round(point: Vector, margin: float) -> Iterator[Vector]:
-    """Returns six points around one: where turned bodies touch, rounding puts the middle point into both."""
+    """Returns six points around a point. Where turned bodies touch, rounding can put the middle point inside both
+    bodies."""
     x, y, z = point
     for off in (-margin, margin):
         yield from ((x + off, y, z), (x, y + off, z), (x, y, z + off))

@@ -41,7 +41,7 @@ class Guard:
 
 
 _MOMENTS = 32
-"""Largest number of stored moments of a stretch of steps. Chosen."""
+"""Largest number of stored moments of the work since a decomposition (chosen value)."""
 
 
 @dataclass
@@ -49,7 +49,7 @@ class Stretch:
     """The work of each rank since the last decomposition."""
 
     _moments: list[tuple[int, list[float]]] = field(default_factory=list)
-    """Steps and work of each rank, s, from the decomposition up to the end of each of some windows."""
+    """Steps and work of each rank, s, from the decomposition up to the end of each of several time windows."""
     _apart: float = 0.0
     """Steps between two stored moments, except the last."""
 
@@ -65,7 +65,7 @@ class Stretch:
 
     @property
     def steps(self) -> int:
-        """Number of steps."""
+        """Number of steps since the last decomposition."""
         return self._moments[-1][0] if self._moments else 0
 
     @property
@@ -75,7 +75,7 @@ class Stretch:
 
     @property
     def halves(self) -> tuple[float, float]:
-        """Imbalance of the first half of the steps, and of the rest."""
+        """Returns the imbalance in the first half of the steps, and in the second half."""
         if not self._moments:
             return 1.0, 1.0
         half, moments = 0.5 * self.steps, [(0, [0.0] * len(self.work)), *self._moments]
@@ -95,9 +95,10 @@ class Trigger:
     step: int = 0
     """Step of the last decomposition."""
     stretch: Stretch = field(default_factory=Stretch)
-    """Work since then."""
+    """Work of each rank since the last decomposition."""
     fruitless: int = 0
-    """Consecutive decompositions that saved less than they cost: each doubles the loss required for the next."""
+    """Number of consecutive decompositions that saved less than they cost. Each of them doubles the loss that
+    triggers the next decomposition."""
 
     def look(self, loads: Sequence[float], steps: int) -> None:
         """Adds the ``loads`` of all ranks, s per step, over some steps."""
@@ -110,12 +111,12 @@ class Trigger:
 
     @property
     def bearable(self) -> float:
-        """Loss that triggers the next decomposition, s."""
+        """Returns the loss that triggers the next decomposition, s."""
         return self.cost * 2.0**self.fruitless
 
     @property
     def half_way(self) -> bool:
-        """Whether half of that loss is reached."""
+        """Whether half of the loss that triggers a decomposition is reached."""
         return self.lost > 0.5 * self.bearable
 
     def cause(self, step: int, grown: bool) -> str | None:

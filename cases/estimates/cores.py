@@ -38,7 +38,7 @@ def _quota(group: Path) -> float | None:
     if not words:
         words = [_text(group / f"cpu.cfs_{name}_us").strip() for name in ("quota", "period")]
     if len(words) != 2 or not all(word.isdigit() for word in words) or int(words[1]) == 0:
-        return None  # "max", and -1, are no limit
+        return None  # "max" and -1 mean no limit
     return int(words[0]) / int(words[1])
 
 

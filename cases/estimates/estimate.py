@@ -47,7 +47,7 @@ BREAKING_OVERHEAD = 2e-3
 """Core seconds of a rank per step in which any facet breaks: 1 to 4 ms in twelve scenes of 150 to 24,000 tets."""
 
 RIGID_STEPS = 1000.0
-"""Steps of a run with rigid parts only, unless spin needs more (worker/rigid/stage.py)."""
+"""Number of steps of a run with rigid parts only, unless their rotation needs more steps (worker/rigid/stage.py)."""
 
 RANK_BYTES = 280_000_000
 """Memory of a rank without a mesh: interpreter, libraries and the kernels of a single body. Rank 0, which writes all
@@ -89,18 +89,18 @@ class Estimate:
     """First time step, s."""
     steps: int | None
     memory_bytes: int | None
-    """Memory of all ranks together, without fracture."""
+    """Memory of all ranks together without fracture, bytes."""
     core_seconds: float | None
     """CPU time of all ranks together, s."""
     clock: ClockTime | None
-    """Wall time on its ranks and threads."""
+    """Wall time of the case on its ranks and threads."""
     costs: dict[str, float]
     """Its share of each stage of the case (cases/estimates/stages.py), s; empty where unknown. Breakage costs more, by
     an amount that cannot be estimated."""
     breaking: float
     """Additional CPU time, s, if the parts that can fracture break as far as they can; 0 without fracture."""
     dust_bytes: int
-    """Additional memory of all ranks in this case."""
+    """Additional memory of all ranks, bytes, if the parts that can fracture break as far as they can."""
     parts: tuple[PartEstimate, ...]
 
 
@@ -153,7 +153,7 @@ def _size(part: Part, folder: Path | None, found: Surveyed | None) -> MeshSize |
     path = located(part.mesh.path, part.mesh.sha256, folder)
     try:
         return path.stat().st_size // FILE_BYTES.get(path.suffix, FILE_BYTES[".msh"])
-    except (OSError, ValueError):  # a name with a null byte
+    except (OSError, ValueError):  # a name with a null byte raises ValueError
         return None
 
 

@@ -15,14 +15,16 @@ from ..shapes.geometry import Vector
 from ..shapes.placed import Placed, driven, velocity
 
 FEW, MANY, FULL, MOST = 5, 10, 40, 80
-"""Sweeps of contact per step: minimum, minimum at high impact speed, minimum for driven rubble and with restitution,
-and maximum. Reasons: docs/theory/contact.md, "Contact", "Driven rubble", "Sweeps by need" and "Restitution"."""
+"""Number of contact sweeps per step: minimum, minimum at high impact speed, minimum for driven rubble and with
+restitution, and maximum. Reasons: docs/theory/contact.md, "Contact", "Driven rubble", "Sweeps by need" and
+"Restitution"."""
 FAST = 0.2
-"""Share of the wave speed of the target from which there are MANY sweeps. Chosen: below half of the speed at which
-few sweeps failed for columns of metal (docs/theory/contact.md, "Plates under 100 GPa")."""
+"""Impact speed over the wave speed of the target from which the minimum of sweeps is MANY. The value was chosen
+below half of the speed at which few sweeps failed for columns of metal (docs/theory/contact.md, "Plates under 100
+GPa")."""
 PRESSING = 0.1
-"""Share of the wave speed from which flat surfaces buckle. Chosen: half of the speed at which irregular copper
-plates lost their pressure (docs/theory/contact.md, "Ridges under pressure")."""
+"""Impact speed over the wave speed from which flat surfaces buckle. The value was chosen as half of the speed at
+which irregular copper plates lost their pressure (docs/theory/contact.md, "Ridges under pressure")."""
 
 
 def wave_speed(made: Material) -> float:

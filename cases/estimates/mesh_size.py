@@ -24,10 +24,11 @@ from ..shapes.profile import Revolved, tips
 
 TETS_PER_VOLUME, TETS_PER_SURFACE = 5.55, 1.42
 NODES_PER_VOLUME, NODES_PER_SURFACE = 0.87, 1.23
-"""gmsh makes a V / h^3 + b S / h^2 tets and nodes of a body with volume V and surface S: fitted to seven bodies."""
+"""Coefficients a and b: gmsh makes a V / h^3 + b S / h^2 tets and nodes for a body with volume V, surface S and
+element size h. The values were fitted to seven bodies."""
 
 FACES_PER_SURFACE = 1.8
-"""Faces of a surface S over S / h^2; a structured mesh has 2."""
+"""Number of faces of a surface S over S / h^2, with element size h; a structured mesh has the value 2."""
 
 REGULAR = 6**-0.5
 """Step length 1 / sqrt(sum |grad N|^2) of the regular tet, and of the tets of a cut cube, over the edge h."""
@@ -48,7 +49,8 @@ WORST_SHARD = 1.7
 10,000."""
 
 _LATTICE = 20
-"""Sampling points per direction for the mean of a graded size. Chosen: 8,000 points in all."""
+"""Number of sampling points per direction for the mean of a graded size. The value was chosen because it gives 8,000
+points in all."""
 
 
 @dataclass(frozen=True)

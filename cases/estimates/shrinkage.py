@@ -16,7 +16,7 @@ from .impact import wave_speed
 DEEPEST, DEEPEST_ERODING = 12.0, 4.0
 """Largest reduction of the time step of a crushed body: the flattest tets of a part that erodes are deleted."""
 FOOT, SLENDER = 0.9, 4.5
-"""Constant of ``shrinkage``."""
+"""Constant of the function ``shrinkage``."""
 CROSSINGS = 2.0
 """Duration of a shock in a part, over its extent divided by the impact speed. Measured: the step of two copper balls
 of 1 mm that collide at 10 km/s (cases/hard/head_on_10km.toml) is short for 0.2 us."""

@@ -12,9 +12,10 @@ from typing import ClassVar
 from ..model.tables import Model
 
 Likely = tuple[str, str, float]
-"""A key of a law, the quantity that it is (``cases.warnings.plausible.LIKELY``), and its value."""
+"""Value of a constant for a check: key of the law, quantity of the key (``cases.warnings.plausible.LIKELY``), and
+value."""
 Wrong = tuple[str, float, str]
-"""A key of a law, its value, and the error."""
+"""Error in a constant: key of the law, its value, and the error."""
 
 
 class Law(Model):
@@ -47,7 +48,7 @@ class Law(Model):
         raise NotImplementedError
 
     def problems(self) -> Iterator[Wrong]:
-        """Yields the constants that contradict each other; none by default."""
+        """Yields errors for constants that contradict each other; none by default."""
         yield from ()
 
     def likely(self, young: float) -> Iterator[Likely]:

@@ -9,8 +9,9 @@ from ..units import FractureEnergy, Length, Stress
 from .tables import Model, Name, Positive
 
 GAP = 0.1
-"""Largest bonded distance over the size of the smaller of two faces (square root of twice its area), where the case
-gives none. Chosen: chords of a circle of 16 sides are 0.05 of a side from it."""
+"""Largest bonded distance over the size of the smaller of two faces (square root of twice its area), if the case
+gives no distance. The value was chosen because the chords of a circle of 16 sides are 0.05 of a side from the
+circle."""
 
 
 class Bonded(Model):
@@ -41,13 +42,13 @@ class Bonded(Model):
 
     @property
     def strengths(self) -> tuple[float, float]:
-        """Strength in tension and in shear, Pa, of a bond that can break."""
+        """Returns the strength in tension and in shear, Pa, of a bond that can break."""
         assert self.strength is not None
         return self.strength, self.strength if self.shear_strength is None else self.shear_strength
 
     @property
     def energies(self) -> tuple[float, float]:
-        """Fracture energy in tension and in shear, J/m^2."""
+        """Returns the fracture energy in tension and in shear, J/m^2."""
         return self.energy, self.energy if self.shear_energy is None else self.shear_energy
 
 

@@ -22,7 +22,8 @@ class Joined(Protocol):
 
 
 def shared_bonds(case: Joined) -> list[tuple[int, SharedBond, int, int]]:
-    """The bonds by shared nodes: index of each in ``bond``, and indices of its parts, the lower one first."""
+    """Returns the bonds with shared nodes: index of each bond in ``bond``, and the indices of its two parts, the
+    lower one first."""
     numbers = {part.name: i for i, part in enumerate(case.parts)}
     found = [(k, bond, sorted(numbers[name] for name in bond.parts)) for k, bond in enumerate(case.bond)
              if isinstance(bond, SharedBond)]  # fmt: skip
@@ -30,7 +31,8 @@ def shared_bonds(case: Joined) -> list[tuple[int, SharedBond, int, int]]:
 
 
 def bodies(case: Joined) -> list[int]:
-    """(parts,) body of each part: the lowest index of the parts that shared nodes join to it."""
+    """Returns an array (parts,) with the body of each part: the lowest index of the parts that are joined to it by
+    shared nodes."""
     of = list(range(len(case.parts)))
     for _, _, i, j in shared_bonds(case):
         low, high = sorted((of[i], of[j]))
@@ -39,7 +41,8 @@ def bodies(case: Joined) -> list[int]:
 
 
 def breakable(case: Joined) -> list[bool]:
-    """(parts,) whether facets of the body of each part can break: those of one of its parts, or a bond between two."""
+    """Returns an array (parts,): whether facets of the body of each part can break. They can break if a part of the
+    body, or a bond between two of its parts, can break."""
     of = bodies(case)
     some = {of[i] for i, part in enumerate(case.parts) if part.fracture is not None}
     some |= {of[i] for _, bond, i, _ in shared_bonds(case) if bond.breaks}
@@ -47,14 +50,15 @@ def breakable(case: Joined) -> list[bool]:
 
 
 def cohesive(case: Joined) -> set[int]:
-    """Indices of the parts that can have cohesive facets, of their own or of a bond."""
+    """Returns the indices of the parts that can have cohesive facets, of their own or of a bond."""
     own = {i for i, part in enumerate(case.parts) if part.fracture is not None and part.fracture.model == "cohesive"}
     return own.union(*({i, j} for _, bond, i, j in shared_bonds(case) if bond.cohesive))
 
 
 def meeting(case: Joined) -> list[bool]:
-    """(parts,) whether parts of the same body can be in contact with each other: where the body can break, or one of
-    its parts has self-contact. Parts of one body that cannot separate are not in contact.
+    """Returns an array (parts,): whether parts of the same body can be in contact with each other. They can if the
+    body can break, or if one of its parts has self-contact. Parts of one body that cannot separate are not in
+    contact.
     """
     of, names = bodies(case), set(case.self_contact)
     some = {of[i] for i, part in enumerate(case.parts) if part.name in names}

@@ -20,7 +20,7 @@ SUMS = ("mass", "momentum", "kinetic_energy", "centre", "centre_velocity", "resi
 FRAGMENTS = ("fragment_velocity", "fragment_mass")
 """Fields of the heaviest fragment beyond a plane."""
 BEYOND = ("residual_velocity", "residual_mass", *FRAGMENTS)
-"""Fields of what lies beyond a plane."""
+"""Fields of the material beyond a plane."""
 SHAPES = ("penetration", "hole_diameter", "hole_width", "cone_angle")
 """Fields that are lengths and angles of a body, around or along a line."""
 PUSHES = ("contact_force", "contact_impulse", "wall_force", "wall_impulse")
@@ -28,7 +28,7 @@ PUSHES = ("contact_force", "contact_impulse", "wall_force", "wall_impulse")
 
 
 def kind(field: str) -> str:
-    """The field without its component: ``momentum`` of ``momentum_x``."""
+    """Returns the field without its component: ``momentum`` of ``momentum_x``."""
     bare = field[:-2] if field[-2:] in ("_x", "_y", "_z") else field
     return bare if bare in (*SUMS, *PUSHES, "velocity") else field
 

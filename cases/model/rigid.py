@@ -11,10 +11,10 @@ from ..units import Inertia, Mass
 from .tables import Model, Point
 
 Tensor = tuple[Inertia, Inertia, Inertia, Inertia, Inertia, Inertia]
-"""Components xx, yy, zz, yz, zx, xy."""
+"""Names of the components of the inertia: xx, yy, zz, yz, zx, xy."""
 _ROUNDING = 1e-9
-"""Tolerance over the trace: a plate has one moment equal to the sum of the other two, and numbers in text are
-rounded."""
+"""Tolerance of the check of the inertia, relative to its trace. It is needed because a plate has one moment equal to
+the sum of the other two, and numbers in text are rounded."""
 
 
 class Rigid(Model):

@@ -12,7 +12,7 @@ Scale = Annotated[Ratio, Field(gt=0)]
 FrameField = Literal["density", "strain", "strain_rate", "contact_pressure"]
 
 MOST_RANKS, MOST_THREADS = 4096, 256
-"""Largest numbers of ranks and threads. Chosen: far above what has been run."""
+"""Largest number of ranks, and largest number of threads. The values were chosen far above those of any run so far."""
 
 
 class Run(Model):

@@ -72,7 +72,7 @@ class Part(Model):
 
 
 MOST_PARTS = 256
-"""Largest number of parts of a case. Chosen: far above what has been run."""
+"""Largest number of parts of a case. The value was chosen far above the number of parts in any run so far."""
 
 
 Kind = TypeVar("Kind", Symmetry, Wall, Prescribed, Rotation, Gravity, Traction)
@@ -112,7 +112,7 @@ class Case(Model):
     """Values with which the finished run is compared, in TOML one ``[[reference]]`` each."""
 
     def boundaries_of(self, kind: type[Kind]) -> list[tuple[int, Kind]]:
-        """The boundaries of one kind, each with its index in ``boundaries``."""
+        """Returns the boundaries of one kind, each with its index in ``boundaries``."""
         return [(index, spec) for index, spec in enumerate(self.boundaries) if isinstance(spec, kind)]
 
     @property
@@ -127,12 +127,12 @@ class Case(Model):
 
     @property
     def rigid(self) -> list[int]:
-        """Indices of the rigid parts."""
+        """Returns the indices of the rigid parts."""
         return [index for index, part in enumerate(self.parts) if part.rigid is not None]
 
     @property
     def dt_growth(self) -> float:
-        """Largest ratio of one time step to the one before."""
+        """Returns the largest ratio of one time step to the step before."""
         rebounds = self.contact is not None and self.contact.restitution > 0.0
         return self.numerics.dt_growth or (1.002 if rebounds else 1.05)
 
@@ -143,7 +143,7 @@ class Case(Model):
 
     @property
     def self_contact(self) -> tuple[str, ...]:
-        """Names of the parts with self-contact, in the order of the parts."""
+        """Returns the names of the parts with self-contact, in the order of the parts."""
         if self.contact is None:
             return ()
         named, meet = self.contact.self_contact, self.contact.parts

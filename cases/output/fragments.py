@@ -77,7 +77,7 @@ class Fit:
     law: str
     """``rayleigh``, ``exponential`` or ``power``."""
     parameter: float
-    """Mode, mean, or exponent of the density."""
+    """Parameter of the distribution: mode, mean, or exponent of the density."""
     log_likelihood: float
     """Sum of ln(density), with the values in SI."""
 
@@ -110,11 +110,11 @@ class Summary:
     fragments: int
     dust: int
     dust_share: float
-    """Share of the mass."""
+    """Share of the dust in the mass of all fragments."""
     largest_share: float
-    """Share of the mass."""
+    """Share of the largest fragment in the mass of all fragments."""
     sizes: list[Fit]
-    """Distributions of the extent."""
+    """Distributions fitted to the extents of the fragments."""
     masses: list[Fit]
 
 

@@ -10,11 +10,11 @@ LEDGER: dict[str, str] = {name: "" if name == "residual" else "J" for name in En
 MOMENTA: dict[str, str] = {
     **{f"momentum_{axis}": "kg m/s" for axis in "xyz"}, **{f"angular_momentum_{axis}": "kg m^2/s" for axis in "xyz"},
 }  # fmt: skip
-"""The angular momentum is about the origin."""
+"""Columns of the momentum. The angular momentum is about the origin."""
 COLUMNS: dict[str, str] = {**CLOCK, **LEDGER, **MOMENTA}
 """Columns and units of every run, followed by those of its parts and of its probes."""
 OF_PARTS = PartEnergy.__struct_fields__
-"""Energies of each part, J."""
+"""Columns of the energies of each part, J."""
 _HEADER = re.compile(r"(.*?)(?: \[([^\]]*)\])?")
 
 
@@ -24,7 +24,8 @@ def of_parts(parts: Sequence[str]) -> dict[str, str]:
 
 
 def part_of(column: str) -> tuple[str, str] | None:
-    """Energy and part of a column; None for a column that is not of a part. The name of a probe has no point."""
+    """Returns energy and part of a column; None for a column of the whole model. The name of a probe contains no
+    point."""
     name, point, part = column.partition(".")
     return (name, part) if point and name in OF_PARTS else None
 

@@ -23,7 +23,7 @@ from ..units import parse_unit, written
 from .history import header
 
 Cell = int | float | str | None
-"""Value of a cell; None if unknown."""
+"""Value of a cell of the table; None if unknown."""
 Named = tuple[str, str]
 """Name of a column and its unit; the unit is empty if there is none."""
 _VERDICTS = "no", "yes"

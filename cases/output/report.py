@@ -5,12 +5,13 @@ import importlib.util
 PROGRAM = "conoid.client.reports"
 """The program: ``python -m conoid.client.reports FOLDER OUT``, one run a process."""
 NAME = "report.html"
-"""In the folder of a run."""
+"""Name of the report in the folder of a run."""
 
 
 _NEEDS = "conoid.client", "h5py", "matplotlib", "pyvista"
 
 
 def missing() -> list[str]:
-    """The packages that it lacks here; none: it can be started."""
+    """Returns the names of the packages that the program needs and that are missing here; empty if the program can
+    be started."""
     return [name for name in _NEEDS if importlib.util.find_spec(name) is None]

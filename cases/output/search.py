@@ -8,14 +8,14 @@ from typing import Annotated
 import msgspec
 
 MOST_RUNS = 500
-"""Points of a report. Chosen: an adaptive sweep makes 40 runs where nothing else is said."""
+"""Largest number of points of a report. The value was chosen because an adaptive sweep makes 40 runs by default."""
 _Word = Annotated[str, msgspec.Meta(max_length=200)]
 _Value = Annotated[str, msgspec.Meta(max_length=200)] | float | bool
 
 
 class SearchPoint(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=True):
-    """A point that was decided: the value ``x`` of the first key, what was changed, the run, and the ``value`` of the
-    result. Without a value the run goes on, or ``problem`` says why it has none.
+    """A point that was decided: value ``x`` of the first key, changed keys, run, and ``value`` of the result.
+    Without a ``value`` the run has not ended, or ``problem`` gives the reason for which it has no value.
     """
 
     x: float
@@ -26,30 +26,32 @@ class SearchPoint(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fiel
 
 
 class Curve(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=True):
-    """The curve through the points: where it has its limit, with the standard error, and how it runs."""
+    """The curve through the points: the value at its limit, the standard error of this value, and points of the
+    curve."""
 
     law: _Word
     limit: float
     error: float | None = None
     factor: float
-    """a of the law, or the slope of the line."""
+    """Constant a of the law, or slope of the line."""
     exponent: float | None = None
-    """p of the law."""
+    """Exponent p of the law."""
     course: Annotated[list[tuple[float, float, float | None]], msgspec.Meta(max_length=100)] = []
-    """x, value and standard error of the value."""
+    """Points of the curve: x, value and standard error of the value."""
 
 
 class Search(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=True):
-    """The report. ``began`` (Unix s) tells one command from the next one that goes on with the same sweep."""
+    """The report of an adaptive sweep. ``began`` (Unix s) distinguishes a command from a later command that
+    continues the same sweep."""
 
     name: _Word
-    """Of the case."""
+    """Name of the case."""
     began: float
     result: _Word
     threshold: float
     result_unit: _Word = ""
     key: _Word
-    """The key of x; ``more`` are those that vary with it."""
+    """The key whose value is x. ``more``: keys that vary together with this key."""
     more: Annotated[list[_Word], msgspec.Meta(max_length=20)] = []
     unit: _Word = ""
     low: float
@@ -57,11 +59,11 @@ class Search(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=Tr
     tolerance: float
     points: Annotated[list[SearchPoint], msgspec.Meta(max_length=MOST_RUNS)] = []
     bracket: tuple[float, float] | None = None
-    """The points between which the threshold is passed."""
+    """The two values of x between which the result crosses the threshold."""
     mixed: tuple[float, float] | None = None
-    """Between which values it is passed again and again."""
+    """The two values of x between which the result crosses the threshold several times."""
     curve: Curve | None = None
     over: bool = False
-    """No further point follows."""
+    """Whether the sweep has ended: no further point follows."""
     why: Annotated[str, msgspec.Meta(max_length=1000)] = ""
-    """Why it ended before the bracket was as narrow as the tolerance."""
+    """Reason for which the sweep ended before the bracket was as narrow as the tolerance."""

@@ -29,7 +29,7 @@ _PARAMETER = re.compile(r"([IiRrCc])\s*([A-Za-z_][A-Za-z0-9_]*)", re.ASCII)
 
 
 class CardError(ConoidError, ValueError):
-    """An error in a deck: one line, which begins with its place."""
+    """Error in a deck. Its text is one line, which begins with the place of the error."""
 
 
 class Card(NamedTuple):
@@ -64,7 +64,8 @@ class Block:
         return (card for card in self.cards if card.text.strip())
 
     def parted(self, options: Collection[str]) -> tuple[str, frozenset[str]]:
-        """Returns the name without those of ``options`` at its end, and these: ``("SET_NODE", {"TITLE"})``."""
+        """Returns the name without the words of ``options`` at its end, and these words: ``("SET_NODE",
+        {"TITLE"})``."""
         name, found = self.name, set[str]()
         while (last := name.rpartition("_"))[2] in options and last[0]:
             name = last[0]
@@ -148,7 +149,7 @@ class Deck:
     """The keywords of a deck and of the files that it includes, read once from the start."""
 
     def __init__(self, path: Path, without: Collection[str] = ()) -> None:
-        """Opens no file yet. ``without``: keywords whose cards are not kept."""
+        """Creates the object; no file is opened yet. ``without``: keywords whose cards are not stored."""
         self._without = without
         self.included = Included(path)
         """The files that have been read; the deck itself is the first."""

@@ -8,14 +8,15 @@ from typing import Self
 from . import whole
 
 _DEEPEST, _MOST = 8, 1000
-"""Largest depth of includes, and largest number of files. Chosen: decks of whole vehicles have some hundred files,
-three deep."""
+"""Largest depth of includes, and largest number of files. The values were chosen because decks of whole vehicles
+have some hundred files, three deep."""
 _UTF_16 = (b"\xff\xfe", b"\xfe\xff")
 LONGEST = 4096
-"""Largest number of characters of a line of cards. Chosen: the longest format has 200."""
+"""Largest number of characters of a line of cards. The value was chosen because the longest format has 200
+characters."""
 LONGEST_LINE = 65_536
-"""Largest number of characters of a line of values between commas. Chosen: Abaqus has 256, programs that write sets
-in one line some thousand."""
+"""Largest number of characters of a line of values between commas. The value was chosen because Abaqus allows 256
+characters, and programs that write a set in one line write some thousand."""
 
 
 class Included:
@@ -32,7 +33,7 @@ class Included:
         self._count = 0
 
     def start(self) -> Path:
-        """Opens the deck itself; returns its path."""
+        """Opens the deck itself and returns its path."""
         self._open = [self._path.resolve()]
         self.files = [self._open[0]]
         return self._path
@@ -86,12 +87,12 @@ class Line(int):
         return made
 
     def __str__(self) -> str:
-        """The number, and the file that has the line."""
+        """Returns the number of the line, and the file that has the line."""
         return f"{int(self)} of {self.file}" if self.file else f"{int(self)}"
 
 
 def own(line: int) -> int:
-    """The number of a line of the deck itself; 0 for a line of an included file."""
+    """Returns the number of a line of the deck itself; 0 for a line of an included file."""
     return 0 if getattr(line, "file", "") else int(line)
 
 

@@ -22,13 +22,13 @@ _WHOLES = re.compile(r"[0-9,\s]*", re.ASCII)
 _INCLUDE = re.compile(r"\s*\*\s*INCLUDE\s*,", re.ASCII | re.IGNORECASE)
 _D = str.maketrans("dD", "ee")
 _LONGEST = 60
-"""Characters of a line that a message shows. Chosen: half a line of a terminal."""
+"""Number of characters of a line that a message shows: half a line of a terminal (chosen value)."""
 _UTF_16 = (b"\xff\xfe", b"\xfe\xff")
 _UTF_8 = b"\xef\xbb\xbf"
 
 
 class InpError(ConoidError, ValueError):
-    """An error in an input file: one line, with the number of the line in the file."""
+    """Error in an input file. Its text is one line, with the number of the line in the file."""
 
 
 @dataclass(frozen=True)
@@ -45,7 +45,7 @@ class Source:
     """The lines of a file, read once from the start: a block, then its data lines."""
 
     def __init__(self, path: Path) -> None:
-        """Opens ``path``. Raises InpError for a file that is not text."""
+        """Opens the file ``path``. Raises InpError for a file that is not text."""
         self.included = Included(path)
         """The files that are read: the first is ``path``, the others are included (``*INCLUDE, INPUT=``)."""
         self._ahead: tuple[int, str] | None = None

@@ -14,8 +14,9 @@ from .similar import nearest
 
 PATH = Path(__file__).parents[1] / "materials.toml"
 Confidence = Literal["paper", "read", "derived", "memory", "assumed"]
-"""Confidence of a constant: given in the paper that this work starts from; read in the named source; computed from
-other constants; remembered from the literature and not read again; chosen without evidence for this alloy."""
+"""Confidence of a constant of a material: given in the paper on which this project is based; read in the named
+source; computed from other constants; remembered from the literature and not read again; chosen without evidence for
+this alloy."""
 CONFIDENCES: tuple[str, ...] = get_args(Confidence)
 
 
@@ -27,7 +28,7 @@ def library() -> dict[str, Material]:
 
 @cache
 def sources() -> dict[str, str]:
-    """The sources by their keys in the library."""
+    """Returns the sources by their keys in the library."""
     return dict(tomllib.loads(PATH.read_text(encoding="utf-8"))["sources"])
 
 
@@ -46,7 +47,7 @@ class Constant:
     source: str
     """A key of the sources."""
     cited: str
-    """The source."""
+    """Text of the source."""
 
 
 def constants(name: str) -> list[Constant]:

@@ -16,9 +16,9 @@ Location = tuple[int | str, ...]
 
 _DISCRIMINATORS = ("kind", "shape", "model")
 _LONGEST = 80
-"""Largest number of characters of a value in a message: a line of a terminal. Chosen."""
+"""Largest number of characters of a value in a message: a line of a terminal (chosen value)."""
 _MOST = 100
-"""Largest number of problems reported at once: more than a user corrects at once. Chosen."""
+"""Largest number of problems that are reported at once (chosen value). A user corrects fewer at once."""
 
 
 @dataclass(frozen=True)
@@ -43,12 +43,12 @@ class CaseError(ConoidError, ValueError):
     """A case is not valid; ``problems`` lists every error, the text has one line for each."""
 
     def __init__(self, problems: Iterable[Problem]) -> None:
-        """Keeps at most a hundred problems, in the order given."""
+        """Creates the error with at most a hundred problems, in the order given."""
         self.problems: tuple[Problem, ...] = tuple(problems)[:_MOST]
         super().__init__("\n".join(str(problem) for problem in self.problems))
 
     def __reduce__(self) -> tuple[type["CaseError"], tuple[tuple[Problem, ...]]]:
-        """Pickles the problems, not the text."""
+        """Returns the problems, and not the text, for pickle."""
         return CaseError, (self.problems,)
 
 
@@ -74,8 +74,8 @@ def shown(value: object) -> str:
 
 
 def from_pydantic(error: ValidationError, data: Mapping[str, Any]) -> list[Problem]:
-    """Returns the errors of ``error`` under the keys of ``data``, in our own words where they are clearer. At most a
-    hundred, since the search for similar names takes time.
+    """Returns the errors of pydantic in ``error`` under the keys of ``data``, in this module's own words where these
+    are clearer. At most a hundred errors are returned, because the search for similar names takes time.
     """
     details = error.errors(include_url=False, include_context=True)
     places = [detail["loc"] for detail in details]
@@ -84,7 +84,8 @@ def from_pydantic(error: ValidationError, data: Mapping[str, Any]) -> list[Probl
 
 
 def _follows_from_others(detail: ErrorDetails, places: Iterable[Location]) -> bool:
-    """Whether pydantic reports a list as too short only because its entries are in error; ``places``: of all errors."""
+    """Whether pydantic reports a list as too short only because entries of the list have errors. ``places``: places
+    of all errors."""
     own = detail["loc"]
     return detail["type"] == "too_short" and any(len(other) > len(own) and other[: len(own)] == own for other in places)
 

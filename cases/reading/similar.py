@@ -1,14 +1,15 @@
-"""Names similar to a misspelt one, for the end of a message."""
+"""Names that are similar to a misspelt name, for the end of a message."""
 
 import difflib
 from collections.abc import Iterable
 
 _LONGEST = 80
-"""Characters of a word that are compared. Chosen: more than any allowed name has."""
+"""Number of characters of a word that are compared. The value was chosen because no allowed name has more."""
 _CUTOFF, _MOST = 0.6, 3
-"""Similarity from which a name is suggested (default of difflib), and number of suggestions. Chosen."""
+"""Smallest similarity of a suggested name (default of difflib), and number of suggestions (chosen value)."""
 _PART = 3
-"""Smallest number of letters that suggest a name by its start. Chosen: fewer are in too many names."""
+"""Shortest prefix, in letters, for which a name is suggested. The value was chosen because shorter prefixes are in
+too many names."""
 
 
 def close(word: str, known: Iterable[str]) -> list[str]:

@@ -29,7 +29,7 @@ class Question(msgspec.Struct, kw_only=True, frozen=True):
 
 
 class Surveyed(msgspec.Struct, kw_only=True, frozen=True):
-    """One part with a mesh from a file, in its initial place. SI units."""
+    """Survey of one part with a mesh from a file, in its initial place. SI units."""
 
     part: int
     """Index of the part in the case."""
@@ -47,11 +47,11 @@ class Surveyed(msgspec.Struct, kw_only=True, frozen=True):
     """Corners of its bounding box."""
     momentum: Vector
     energy: float
-    """Kinetic energy, without jitter."""
+    """Kinetic energy of the part, J, without jitter."""
     speed: float
-    """Largest speed of a node."""
+    """Largest speed of a node, m/s."""
     notes: list[str]
-    """Contents of the file that are not in the mesh, or are interpreted in an unusual way."""
+    """Contents of the file that are not in the mesh, or that are interpreted in an unusual way."""
 
     @property
     def bulk(self) -> Bulk:
@@ -60,12 +60,11 @@ class Surveyed(msgspec.Struct, kw_only=True, frozen=True):
 
 
 class Survey(msgspec.Struct, kw_only=True, frozen=True):
-    """The contents of the mesh files of a case, and every reason for which a run of it would be refused, a line
-    each."""
+    """Survey of the mesh files of a case, with a line for every reason for which a run of the case would be refused."""
 
     parts: list[Surveyed] = []
     loads: list[Load] = []
-    """Loads of tractions and prescribed velocities that act on parts from mesh files only."""
+    """Loads of tractions and prescribed velocities that act only on parts from mesh files."""
     refused: list[str] = []
     touching: list[Touch] = []
     """Pairs of touching parts, at least one of which has a mesh from a file."""
@@ -73,7 +72,7 @@ class Survey(msgspec.Struct, kw_only=True, frozen=True):
     """Warnings about the meshes, a line each, as a run gives them."""
 
     def of(self, part: int) -> Surveyed | None:
-        """Returns the survey of part ``part``; None where its mesh is generated, or was not read."""
+        """Returns the survey of part ``part``; None if its mesh is generated, or was not read."""
         return next((each for each in self.parts if each.part == part), None)
 
 

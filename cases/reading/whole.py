@@ -10,11 +10,11 @@ from io import BytesIO, FileIO, TextIOWrapper
 from pathlib import Path
 
 MOST = 256 << 20
-"""Largest size of a file that is read as a whole, bytes. Chosen: a case, an outcome and a manifest have some MB at
-most."""
+"""Largest size of a file that is read as a whole, bytes. The value was chosen because a case, an outcome and a
+manifest have some MB at most."""
 _NO_LINK = getattr(os, "O_NOFOLLOW", 0)
 _AT_ONCE = getattr(os, "O_NONBLOCK", 0)
-"""Flags with which a pipe without a writer is opened without blocking."""
+"""Flags of open(2) with which a pipe without a writer is opened without blocking."""
 _NO_FILE = frozenset({errno.ELOOP, errno.ENXIO, errno.ENODEV, errno.EOPNOTSUPP})
 """Errors of open(2) for a link to itself, a socket, and a device without a driver."""
 
@@ -100,7 +100,8 @@ def read(path: str | Path, most: int = MOST, *, links: bool = True) -> bytes:
 
 
 def read_text(path: str | Path) -> str:
-    """Returns the text of such a file in UTF-8, with line feeds as line ends. Raises UnicodeDecodeError besides."""
+    """Returns the text of a file in UTF-8, with line feeds as line ends. Raises UnicodeDecodeError in addition to
+    the errors of ``read``."""
     return TextIOWrapper(BytesIO(read(path)), encoding="utf-8").read()
 
 

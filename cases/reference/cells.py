@@ -9,7 +9,7 @@ from ..units import KINDS, QUANTITY, parse_unit
 from .json_schema import Schema, definition, variants
 
 BAR = r"\|"
-"""A bar inside a cell."""
+"""A vertical bar inside a cell of a Markdown table."""
 
 
 class Cells:

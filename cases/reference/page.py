@@ -55,7 +55,7 @@ _CHAPTERS = {
 """Chapters of the page, and the tables that begin them; a table belongs to the chapter with the longest beginning."""
 
 _SEVERAL = 4
-"""Chosen: a key that so many variants of a table have stands before them."""
+"""Number of variants of a table from which a key that they share is listed before the variants (chosen value)."""
 
 
 def page() -> str:

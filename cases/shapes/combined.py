@@ -31,9 +31,10 @@ WORST = 0.45
 """Step length of the worst tet of gmsh over that of a regular tet, for a combination without edges shorter than an
 element: 0.3 to 0.7 in 40 of the combinations of tests/mesh/test_combinations.py."""
 _LATTICE = 12
-"""Sampling points per direction of a combination. Chosen: 1,728 points, volumes within some per cent."""
+"""Number of sampling points per direction of a combination. The value was chosen because it gives 1,728 points, and
+volumes within some per cent."""
 _BULKY = 1.5
-"""Surface of a combination over that of a cube of its volume. Chosen."""
+"""Surface of a combination over the surface of a cube of the same volume (chosen value)."""
 _BODIES: dict[str, type[Model]] = {
     "box": Box, "plate": Plate, "cylinder": Cylinder, "tube": Tube, "sphere": Sphere, "cone": Cone, "ogive": Ogive,
     "hemisphere": Hemisphere, "spherical_cap": SphericalCap, "ring_sector": RingSector,

@@ -16,12 +16,12 @@ AXES: tuple[Axis, Axis, Axis] = ("x", "y", "z")
 
 
 def index(axis: Axis) -> int:
-    """0, 1, 2 for x, y, z."""
+    """Index 0, 1, 2 of the axes x, y, z."""
     return AXES.index(axis)
 
 
 def across(axis: Axis) -> tuple[int, int]:
-    """The two directions across ``axis``, in cyclic order: x, y for z; y, z for x; z, x for y."""
+    """Returns the two directions across ``axis``, in cyclic order: x, y for z; y, z for x; z, x for y."""
     return (index(axis) + 1) % 3, (index(axis) + 2) % 3
 
 
@@ -31,7 +31,7 @@ def cut_directions(mesh: Primitive, axis: Axis) -> tuple[int, ...]:
 
 
 def centre(mesh: Generated) -> Vector:
-    """The point through which a sector is cut: the origin for a box, the centre or base of the other bodies."""
+    """Returns the point through which a sector is cut: the origin for a box, the centre or base of other bodies."""
     if isinstance(mesh, Box):
         return (0.0, 0.0, 0.0)
     return mesh.centre if isinstance(mesh, Sphere | TwoTets) else mesh.base
@@ -73,7 +73,8 @@ def _reach(mesh: Plate | Cylinder | Tube | Revolved | RingSector) -> tuple[tuple
 
 
 def _two_tets(mesh: TwoTets, i: int, j: int) -> tuple[Vector, Vector]:
-    """The common face has a corner in the direction i, and an edge across it."""
+    """Returns the lowest and highest coordinates of two tets, m. Their common face has a corner in the direction i,
+    and an edge across this direction."""
     edge, low, high = mesh.element_size, [0.0, 0.0, 0.0], [0.0, 0.0, 0.0]
     off = altitude(mesh) * math.tan(mesh.lean)
     low[i], high[i] = min(-edge / math.sqrt(12.0), -off), max(edge / math.sqrt(3.0), off)

@@ -18,23 +18,25 @@ from .region import Region, slack
 from .sheets import sheets
 
 _FINEST = 60
-"""Largest number of patches along a side of a surface. Chosen: a tenth of a second for a body."""
+"""Largest number of patches along a side of a surface. The value was chosen because so many patches take a tenth of
+a second for a body."""
 _MOST = 20
-"""Largest number of bodies per boundary. Chosen: two seconds at most."""
+"""Largest number of bodies per boundary. The value was chosen because so many bodies take two seconds at most."""
 _POINTS = 100_000
-"""Largest number of nodes of a turned grid. Chosen: half a second."""
+"""Largest number of nodes of a turned grid. The value was chosen because so many nodes take half a second."""
 _LATTICE = 20
-"""Sampling points per direction of a body in a box. Chosen: 8,000 points in all."""
+"""Number of sampling points per direction for a body in a box. The value was chosen because it gives 8,000 points in
+all."""
 _FACETS, _CURVED, _FLAT = 0.3, 0.02, 1e-6
 """Relative errors of an area: facets may have less area than the surface, and patches less or more. Curved faces: the
 first value times the square of the element size over the radius (a chord 1.3 times as long as an element and the end
 of a cylinder: a sixth of it squared), plus the second; flat faces: the third. Chosen, except the sixth (geometry)."""
 _CORNERS = 4.0
-"""Area of the faces of curved and unstructured meshes that can be in a region without any patch, over the square of the
-element size. Chosen."""
+"""Area of the faces of curved and unstructured meshes that can be in a region without any patch, over the square of
+the element size (chosen value)."""
 _FACTOR, _NODES = 3.0, 10
-"""Ratio of an estimated number of nodes to the real one, and additional nodes. Chosen: a layer of an unstructured
-mesh has a third to three times as many as the volume of a layer has."""
+"""Ratio of an estimated number of nodes to the real number, and additional nodes. The values were chosen because a
+layer of an unstructured mesh has a third to three times as many nodes as its volume suggests."""
 
 
 @dataclass(frozen=True)
@@ -49,12 +51,12 @@ class Load:
     """Loaded area, m^2."""
     faces: int | None = None
     spread: float = 0.0
-    """Uncertainty of the area of the mesh's faces, m^2."""
+    """Uncertainty of the estimated area of the mesh's faces, m^2."""
     nodes: int | None = None
     fewest: int = 0
     """Nodes in a box that is not widened by half an element on all sides."""
     exact: bool = False
-    """Whether nodes, or faces of a mesh file, are counted, not estimated."""
+    """Whether nodes, or faces of a mesh file, are counted and not estimated."""
 
     def agrees(self, nodes: int, faces: int, area: float) -> bool:
         """Whether a mesh has approximately this load: ``nodes`` that are driven, or ``faces`` with an ``area``, m^2."""
@@ -102,7 +104,7 @@ def near(body: Placed) -> float:
 
 
 def _meets(region: Region, body: Placed) -> bool:
-    """Whether a body reaches into the box of a region."""
+    """Whether a body overlaps the box of a region."""
     margin = near(body)
     return all(
         a <= top + margin and b >= bottom - margin

@@ -11,7 +11,8 @@ from ..model.bodies import Cone, Hemisphere, Ogive, SphericalCap
 from ..model.forms import BallPiece, ConeForm, OgiveForm
 
 _TIP = 1e-7
-"""Largest radius of the end of an arc on the axis, over the height: the root of rounding."""
+"""Largest radius of the end of an arc that counts as on the axis, over the height: the square root of the rounding
+error."""
 
 Revolved = Cone | Ogive | Hemisphere | SphericalCap
 RevolvedForm = ConeForm | OgiveForm | BallPiece
@@ -55,7 +56,7 @@ class Line:
         return math.hypot(self.z1 - self.z0, self.r1 - self.r0)
 
     def mirrored(self, top: float) -> "Line":
-        """The line seen from the other end of a body of height ``top``, m."""
+        """Returns the line as seen from the other end of a body of height ``top``, m."""
         return Line(top - self.z1, self.r1, top - self.z0, self.r0)
 
 
@@ -116,14 +117,14 @@ class Arc:
         return self.radius * self._angle()
 
     def mirrored(self, top: float) -> "Arc":
-        """The arc seen from the other end of a body of height ``top``, m."""
+        """Returns the arc as seen from the other end of a body of height ``top``, m."""
         return Arc(top - self.z1, top - self.z0, top - self.zc, self.rc, self.radius)
 
     def _rise(self, u: float) -> float:
         return math.sqrt(max(0.0, self.radius**2 - u**2))
 
     def _under(self, u: float) -> float:
-        """Integral of the rise from 0."""
+        """Returns the integral of the rise, sqrt(radius^2 - u^2), from 0 to ``u``."""
         return 0.5 * (u * self._rise(u) + self.radius**2 * math.asin(_share(u / self.radius)))
 
     def _angle(self) -> float:

@@ -14,9 +14,10 @@ from ..model.solids import Measured
 from ..model.tables import Point
 
 NEAR, MOST = 0.01, 0.1
-"""Tolerance of a border, over the shortest edge of a part: points up to the first value outside count as inside;
-rounding never exceeds the second. Chosen: far above the rounding of turns, sums and units, and of files with six
-digits up to 2,000 edges from the origin; far below the distance between two layers of nodes."""
+"""Tolerance of a border, over the shortest edge of a part. Points up to the first value outside the border count as
+inside; rounding never exceeds the second value. The values were chosen far above the rounding of turns, sums and
+units, and of files with six digits up to 2,000 edges from the origin, and far below the distance between two layers
+of nodes."""
 GENERATED, FILE = 1e-9, 5e-6
 """Rounding of coordinates, over the largest coordinate of a part: of a generated mesh, far above the errors of turns
 and sums (1e-15); and of a file with six significant digits (half of 1e-5), which includes single precision (6e-8).
@@ -52,7 +53,7 @@ class Region(NamedTuple):
 
     @property
     def everything(self) -> bool:
-        """Whether the region is all space."""
+        """Whether the region is the whole space."""
         return self == Region()
 
     def holds(self, point: Iterable[Any], slack: Any) -> Any:

@@ -8,10 +8,10 @@ Angles = tuple[float, float]
 """Start and end, rad, from the first direction across the axis to the second."""
 
 _WINDOW: dict[str, Angles] = {"half": (-0.5 * math.pi, 0.5 * math.pi), "quarter": (0.0, 0.5 * math.pi)}
-"""The angles that a sector keeps."""
+"""The ranges of angles that are modelled in a sector."""
 
 _QUARTERS = ((1.0, 0.0), (0.0, 1.0), (-1.0, 0.0), (0.0, -1.0))
-"""Cosines and sines of quarters of a turn."""
+"""Cosines and sines of the multiples of a quarter turn."""
 
 
 def angles(mesh: RingSector) -> list[Angles]:
@@ -26,7 +26,7 @@ def angles(mesh: RingSector) -> list[Angles]:
 
 
 def angle(mesh: RingSector) -> float:
-    """Sum of the modelled angles, rad."""
+    """Returns the sum of the modelled angles, rad."""
     return math.fsum(b - a for a, b in angles(mesh))
 
 

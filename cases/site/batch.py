@@ -32,7 +32,7 @@ from . import policy
 
 
 class SiteError(Exception):
-    """An error in the settings file; the text is one line."""
+    """Error in the settings file. The text of the error is one line."""
 
 
 class Profile(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=True):
@@ -42,20 +42,20 @@ class Profile(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=T
     account: str = ""
     qos: str = ""
     time: str = ""
-    """Time limit of a job, such as ``12 h``; empty: that of the partition."""
+    """Time limit of a job, such as ``12 h``; empty: the limit of the partition."""
     modules: list[str] = []
-    """Names that ``module load`` gets."""
+    """Names of modules that ``module load`` loads."""
     mpi: Literal["mpiexec", "srun"] = "mpiexec"
     """Command that starts the ranks inside the job."""
     mpiexec: str = ""
-    """Path of a site's own mpiexec; empty: the one that Conoid finds."""
+    """Path of a site's own mpiexec; empty: the mpiexec that Conoid finds."""
     lines: list[str] = []
     """Lines of the script before the run: what the site's MPI or file system needs."""
     options: list[str] = []
     """Further arguments of sbatch."""
     notice: str = "120 s"
-    """Time before the time limit at which a run receives the signal to save its state. Chosen: some checkpoints of
-    the largest runs."""
+    """Time before the time limit at which a run receives the signal to save its state. The value was chosen because
+    some checkpoints of the largest runs can be written in this time."""
 
 
 class Slurm(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=True):
@@ -76,9 +76,10 @@ class Slurm(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=Tru
     authority: str = ""
     """Certificate by which the nodes verify the router: a file that they can read."""
     poll: float = 2.0
-    """Seconds between two queries of the queue: one squeue for all runs. Chosen."""
+    """Time between two queries of the queue, s (chosen value). One squeue command is used for all runs."""
     slots: int = 100_000
-    """Largest number of cores submitted at a time, with pending ones. Chosen: Slurm has the limits."""
+    """Largest number of cores that are submitted at a time, including pending jobs. The value was chosen so large
+    because Slurm has limits of its own."""
 
 
 class Site(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=True):
@@ -116,7 +117,7 @@ class Job(msgspec.Struct, kw_only=True, frozen=True):
     command: list[str]
     """Command that starts the ranks, without ``--restart``."""
     submitted: float
-    """Unix time, s."""
+    """Unix time of the submission, s."""
     notice: float
     """Seconds before the time limit at which the run receives the signal."""
     bin: str = ""

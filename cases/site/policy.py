@@ -6,7 +6,7 @@ Tables of a site's settings file::
     half_life = "168 h"               # after it the past usage of a user counts half
     memory = 64_000_000_000           # bytes for all runs together
     [queue.users.ann]
-    share = 2.0                       # relative to 1 of all other users
+    share = 2.0                       # share relative to other users; their default is 1
     priority = 1                      # before all users with a lower one
     [quota]                           # of each user
     queued = 1000
@@ -34,7 +34,7 @@ import msgspec
 from ..units import parse_quantity
 
 PRIORITY = 100
-"""Largest priority, and minus the smallest. Chosen."""
+"""Largest priority, and minus the smallest (chosen value)."""
 
 
 class Share(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=True):
@@ -50,7 +50,7 @@ class Queue(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=Tru
     """Settings of the queue."""
 
     half_life: str = "168 h"
-    """Half-life of the usage of a user. Chosen: a week."""
+    """Half-life of the past usage of a user: a week (chosen value)."""
     memory: int | None = None
     """Memory for all runs together, bytes, by their estimates; absent: that of the machine."""
     users: dict[str, Share] = {}
@@ -100,7 +100,7 @@ class Retention(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields
     bytes: int | None = None
     """Size of all folders together; the oldest are removed first. None: no limit."""
     every: str = "10 min"
-    """Time between two checks. Chosen: reading the sizes of 10,000 folders takes seconds."""
+    """Time between two checks. The value was chosen because reading the sizes of 10,000 folders takes seconds."""
 
     @property
     def oldest(self) -> float | None:
@@ -117,14 +117,17 @@ class Files(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=Tru
     """Limits of the files that a user uploads with cases."""
 
     size: int = 4 << 30
-    """Bytes of one file; a larger one is refused with 413. Chosen: ten million tets as text."""
+    """Largest size of one file in bytes; a larger file is refused with 413. The value was chosen because it is the
+    size of ten million tets as text."""
     bytes: int = 16 << 30
-    """Bytes of all files, with uploads in progress; beyond it 429. Chosen."""
+    """Largest size in bytes of all files of a user, with uploads in progress (chosen value). Further files are
+    refused with 429."""
     number: int = 1000
-    """Number of all files; beyond it 429. Chosen: listing so many takes some 10 ms."""
+    """Largest number of files of a user. Further files are refused with 429. The value was chosen because a list of
+    so many files takes some 10 ms."""
     age: str = "24 h"
-    """Time for which a file without a run and without requests is kept. Chosen: a case follows its files within
-    seconds, and an interrupted upload can continue the next morning."""
+    """Time for which a file without a run and without requests is kept. The value was chosen because a case follows
+    its files within seconds, and an interrupted upload can continue the next morning."""
 
     @property
     def oldest(self) -> float:
@@ -136,16 +139,18 @@ class Http(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=True
     """Limits of concurrent requests of one user; also of an address whose requests have no valid token."""
 
     requests: int = 16
-    """Requests in progress: with their bodies, of 1 MiB at most, and answers in memory. Chosen."""
+    """Largest number of requests in progress, with their bodies, of 1 MiB at most, and their answers in memory
+    (chosen value)."""
     waiting: int = 200
-    """Waiting requests; beyond it they are refused with 429. Chosen."""
+    """Largest number of waiting requests (chosen value). Further requests are refused with 429."""
     streams: int = 100
-    """Event streams, followed logs, waits for a change and downloads; beyond it 429. Chosen."""
+    """Largest number of event streams, followed logs, waits for a change and downloads (chosen value). Further
+    requests are refused with 429."""
     threads: int = 2
-    """Answers that are computed, or wait for the disk. Chosen: a server has 64 for all users, and one Python
-    process."""
+    """Largest number of answers that are computed, or wait for the disk, at a time. The value was chosen because a
+    server has 64 for all users, and one Python process."""
     patience: str = "20 s"
-    """Time after which a disk or database without response leads to 503. Chosen."""
+    """Time after which a request is answered with 503 because the disk or database does not respond (chosen value)."""
 
     @property
     def seconds(self) -> float:

@@ -26,7 +26,7 @@ FINAL = frozenset(
 )  # fmt: skip
 """States of squeue(1); in all others a job has its cores."""
 _ONE_BY_ONE = 200
-"""Largest number of names in one squeue command. Chosen: 10 kB of command line."""
+"""Largest number of names in one squeue command. The value was chosen to limit the command line to 10 kB."""
 
 
 _NUMBER = re.compile(r"\d+(_\d+|_\[[^|]*\])?(\+\d+)?")
@@ -39,7 +39,7 @@ class Entry(NamedTuple):
     job: str
     state: str
     start: float
-    """Unix time, s; an estimate for a pending job, 0 if unknown."""
+    """Unix time of the start, s. It is an estimate for a pending job, and 0 if unknown."""
     name: str
     """Name of the job; for a task of an array with its index, as ``batch.key_of`` writes it."""
     reason: str

@@ -12,9 +12,10 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 _LONGEST = {"squeue": 30.0, "sbatch": 30.0, "scancel": 15.0, "scontrol": 15.0, "sacct": 10.0}
-"""Time limit of a command, s. Chosen: one to three times Slurm's own MessageTimeout."""
+"""Time limit of a command, s: one to three times Slurm's own MessageTimeout (chosen value)."""
 _RESTS = 20.0
-"""Time, s, during which a command that exceeded its limit is not repeated, so that it does not delay others. Chosen."""
+"""Time, s, during which a command that exceeded its limit is not repeated, so that it does not delay others (chosen
+value)."""
 _REFUSALS = (
     "invalid", "not permitted", "unspecified", "violates", "not available", "unrecognized", "denied", "more processors",
     "not supported", "exceeds", "disabled", "limit", "unknown", "ambiguous", "too ",
@@ -37,22 +38,23 @@ _PASSED_ON = (
 
 
 class SlurmError(Exception):
-    """A failed command of Slurm; the text is one line."""
+    """Error: a command of Slurm failed. The text of the error is one line."""
 
 
 class AwayError(SlurmError):
-    """The controller was not reached, or not in time; the result is unknown. ``command``: the command without a
-    response."""
+    """Error: the controller was not reached, or not in time, and the result is unknown. ``command``: the command
+    without a response."""
 
     command = ""
 
 
 class LaterError(SlurmError):
-    """The controller refuses for now: a limit of user, account or QOS is reached, or a partition is down."""
+    """Error: the controller refuses the request for now, because a limit of user, account or QOS is reached, or a
+    partition is down."""
 
 
 class RefusedError(SlurmError):
-    """The controller refuses."""
+    """Error: the controller refuses the request."""
 
 
 def call(place: str, words: Sequence[str], keep: int | None = None) -> str:

@@ -15,11 +15,14 @@ from ..shapes.loaded import near
 from ..shapes.placed import Placed
 
 _TIMES = 200
-"""Number of times up to the end that are checked. Chosen: a millisecond for the path of a body."""
+"""Number of times up to the end that are checked. The value was chosen because the path of a body then takes a
+millisecond."""
 _MOST = 200
-"""Largest number of driven bodies, and of pairs of them, that are checked. Chosen: a second at most."""
+"""Largest number of driven bodies, and of pairs of driven bodies, that are checked. The values were chosen because
+the check takes a second at most."""
 _TOUCH = 1e-9
-"""Depth of contact without a warning, over the size of a body. Far above rounding, far below any gap."""
+"""Depth of contact without a warning, over the size of a body. The value is far above rounding and far below any
+gap."""
 
 
 class Driven(NamedTuple):
@@ -137,7 +140,7 @@ def _way(drives: list[Prescribed], direction: int, time: float, speed: float) ->
 
 
 def _integral(course: Course, time: float) -> float:
-    """Integral of the factor of a course from 0 to a time, s."""
+    """Returns the integral of the factor of a course from 0 to a time, s."""
     if not course:
         return time
     times = sorted({0.0, time, *(t for t, _ in course if 0.0 < t < time)})

@@ -27,10 +27,11 @@ from .reach import cut_bodies, scant_probes
 from .stiff import stiff
 
 DAY = 86_400.0
-"""Core time from which a warning is given, core seconds. Chosen: a day."""
+"""Core time from which a warning is given: a day, in core seconds (chosen value)."""
 FEW_STEPS = 10
-"""Smallest number of time steps without a warning. Chosen: a wave crosses a tet in about two steps; a run that ends
-before it has crossed five tets has no result. The usual cause is a wrong unit of a mesh file."""
+"""Smallest number of time steps without a warning. The value was chosen because a wave crosses a tet in about two
+steps, and a run that ends before a wave has crossed five tets has no result. The usual cause is a wrong unit of a
+mesh file."""
 LIKELY: dict[str, tuple[float, float, str]] = {
     "density": (10.0, 23_000.0, "kg/m^3: foams have 10, osmium has 22,590"),
     "wave speed": (20.0, 20_000.0, "m/s: soft rubber has 30, diamond has 18,000"),
@@ -42,7 +43,7 @@ LIKELY: dict[str, tuple[float, float, str]] = {
     "extent": (1e-6, 100.0, "m"),
     "bulk modulus, density c0^2, over that of elastic,": (0.5, 2.0, "both are of one solid at rest"),
 }
-"""Usual ranges of quantities of solids, with known materials near the ends (handbooks)."""
+"""Usual ranges of quantities of solids. The ends of the ranges are near the values of known materials (handbooks)."""
 SHOCKING = 0.1
 """Share of the wave speed from which an impact on a material with linear pressure gives a warning: at this speed of
 an impact between two bodies of the same material, u = v / 2, the pressure is some 7 % too low, and 13 % where the
@@ -51,7 +52,8 @@ materials.toml); the linear pressure -K ln J gives density (c0 + u / 4) u."""
 STIFFENING, LINEAR_STIFFENING = 1.5, 0.25
 """Slope of the shock speed over the particle speed u: s of metals, and the value of the linear pressure."""
 _UNLIKE = 1000.0
-"""Largest ratio of the sizes of two parts without a warning. Chosen: millimetres taken for metres."""
+"""Largest ratio of the sizes of two parts without a warning. The value was chosen to find a length in millimetres
+that was read as metres."""
 
 
 def doubts(data: Mapping[str, Any], case: Case, expected: Estimate) -> list[Problem]:

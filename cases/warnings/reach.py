@@ -13,11 +13,11 @@ from ..shapes.geometry import index, volume
 from ..shapes.placed import Placed
 
 _TOUCH = 1e-9
-"""Depth of a plane that counts as lying on the surface, over the size of a body. Far above rounding, far below any
-tet."""
+"""Largest depth of a plane that counts as on the surface, over the size of a body. The value is far above rounding
+and far below any tet."""
 _FEWEST = 1.0
-"""Smallest number of tets that the box of a probe should contain, by its volume. Chosen: with fewer a mesh may have
-none there."""
+"""Smallest number of tets that the box of a probe should contain, by its volume. The value was chosen because a
+smaller box may contain no tet of some meshes."""
 
 
 def cut_bodies(case: Case) -> Iterator[Problem]:

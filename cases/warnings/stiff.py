@@ -11,8 +11,8 @@ from ..reading.problems import Problem, problem
 from .compression import impact_stresses
 
 STIFF = 20.0
-"""Ratio of the impedance of a part to that of all others. Chosen: of the energy that an impact puts into two bodies
-the stiffer one absorbs the share of the softer one's impedance in the sum of both, 5 % then."""
+"""Ratio of the impedance of a part to that of all others from which a note is given (chosen value). Two bodies
+absorb the energy of an impact in inverse proportion to their impedances; at this ratio the stiffer body absorbs 5 %."""
 
 
 def stiff(case: Case, expected: Estimate) -> Iterator[Problem]:

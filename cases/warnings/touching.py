@@ -16,14 +16,17 @@ from ..shapes.placed import Placed
 from ..shapes.sheets import sheets
 
 NEAR = 1e-6
-"""Largest distance of coincident faces, over the size of a body. Chosen: far above rounding, below any gap."""
+"""Largest distance of coincident faces, over the size of a body. The value was chosen far above rounding and below
+any gap."""
 _FINEST = 40
-"""Largest number of patches along a side of a surface. Chosen: a tenth of a second for a body."""
+"""Largest number of patches along a side of a surface. The value was chosen because so many patches take a tenth of
+a second for a body."""
 _PAIRS = 32
-"""Largest number of pairs of bodies that are checked. Chosen: a second or two at most."""
+"""Largest number of pairs of bodies that are checked. The value was chosen because the check takes a second or two
+at most."""
 _LEAST = 1e-3
-"""Smallest touching area over the surface of the smaller body: less is an edge or a corner, found by rounding.
-Chosen."""
+"""Smallest touching area over the surface of the smaller body (chosen value). A smaller area is an edge or a corner
+that rounding has found."""
 
 
 class Touch(msgspec.Struct, kw_only=True, frozen=True):

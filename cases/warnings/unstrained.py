@@ -8,11 +8,11 @@ from ..model.rigid import Rigid
 from ..model.schema import Case
 
 STRAIN = 1e-3
-"""Largest strain of a part. Chosen: half of the yield strain of a hard steel; it moves the surface by this share of
-the part's size."""
+"""Largest strain of a part that could be rigid: half of the yield strain of a hard steel (chosen value). This strain
+moves the surface by the same share of the part's size."""
 SHARE = 0.05
-"""Largest share of a part in the energies of all parts. Chosen: the share of the stiffer of two bodies by
-stiff.STIFF."""
+"""Largest share of such a part in the energies of all parts. The value was chosen equal to the share of the stiffer
+of two bodies with an impedance ratio of stiff.STIFF."""
 
 
 @dataclass(frozen=True)
@@ -23,9 +23,9 @@ class Strained:
     strain: float
     """sqrt(2 U / (E V)) of the largest energy U in its tets: upper bound of the root mean square of the strain."""
     share: float
-    """Share of that energy in the sum over all parts."""
+    """Share of the energy of the part in the sum over all parts."""
     plastic: bool
-    """Whether one of its tets has yielded or was deleted."""
+    """Whether a tet of the part has yielded or was deleted."""
 
 
 def could_be_rigid(case: Case, found: Sequence[Strained], limiter: str) -> Iterator[str]:
