@@ -1,8 +1,9 @@
-"""Loads of groups of tets, recorded at intervals: from them the effect of other balance policies is computed.
+"""Loads of groups of tets, recorded at intervals. The effect of other balance policies is computed from these records.
 
-``conoid replay-balance`` reads them (docs/performance/balance.md). A group is a fixed set of tets, cut at the start,
-and of nodes and their copies; it moves with them between ranks. Counts are integers and equal for any number of
-ranks, except candidates of edges and cracks whose nodes are on several ranks.
+``conoid replay-balance`` reads the records (docs/performance/balance.md). A group is a fixed set of tets, cut at the
+start, with a set of nodes and their copies. When its tets and nodes move between ranks, they stay in the group.
+Counts are integers and equal for any number of ranks, except candidates of edges and cracks whose nodes are on
+several ranks.
 """
 
 import time

@@ -1,12 +1,12 @@
-"""Domain decomposition by recursive bisection. Berger and Bokhari 1987, with cuts that halve every phase of the step.
+"""Domain decomposition by recursive bisection (Berger and Bokhari 1987), with cuts that halve every phase of the step.
 
 No rank has the points of another rank: a cut is found digit by digit from sums of weights over all ranks.
 
-Ranks wait for each other within a step, after contact and after the elements, so it is not enough to halve the sum
-of the loads: a rank with all contact and a rank with all tets have equal sums and each waits for the other. In three
-dimensions there is a plane that halves any three measures at once (the ham sandwich theorem). So if a point has
-several weights, one for each phase, planes of many directions are tried, each where it halves the sum, and the one
-is chosen that leaves the phases most nearly even.
+Ranks wait for each other within a step, after contact and after the elements. Halving the sum of the loads is
+therefore not sufficient: a rank with all contact and a rank with all tets have equal sums, and each rank waits for
+the other. In three dimensions there is a plane that halves any three measures at once (the ham sandwich theorem). If
+a point has several weights, one for each phase, planes of many directions are tried. Each plane halves the sum of
+the weights, and the plane with the most nearly even phases is chosen.
 """
 
 from dataclasses import dataclass

@@ -1,16 +1,16 @@
 """The threads of a rank: a pass is cut into tasks, and each task is taken by the next free thread.
 
 A task is a range of the pass: chunks of tets, or nodes. Tasks of one colour write to no common memory, so threads need
-no locks and no sums of their own; colours run one after the other. All sums are of integers, so the answer is the same
-on any number of threads.
+no locks and no separate sums. Colours run one after the other. All sums are of integers, so the answer is the same on
+any number of threads.
 
-The calling thread works, too, and waits for tasks that have begun, not for threads: if another program has the core
-of a helper, the other threads do its tasks. OpenMP waits for every thread at the end of every region, which takes
-milliseconds in that case (docs/performance/scaling.md, "Threads"). One word holds the tasks: their number, and the
-next one. A thread takes a task by an atomic increment of the word. A colour does not end before its last task, so
-the arguments of a task stay valid. Helpers poll the word for some 50 us, then sleep until the next pass. Waking a
-thread takes its waker some 20 us, so the calling thread wakes one or two, and each woken thread wakes two more while
-there are tasks.
+The calling thread runs tasks, too. It waits for tasks that have begun, not for threads: if another program uses the
+core of a helper, the other threads run the tasks of this helper. OpenMP waits for every thread at the end of every
+region, which takes milliseconds in that case (docs/performance/scaling.md, "Threads"). One word holds the number of
+tasks and the index of the next task. A thread takes a task by an atomic increment of the word. A colour does not end
+before its last task, so the arguments of a task stay valid. Helpers poll the word for some 50 us, then sleep until
+the next pass. Waking a thread takes some 20 us of the waking thread. The calling thread therefore wakes one or two
+threads, and each woken thread wakes two more while there are tasks.
 """
 
 import ctypes
