@@ -57,7 +57,8 @@ class Live:
     @property
     def pieces(self) -> tuple[str, int | None]:
         """Noun and number of the pieces of all bodies. If something can break, fragments are counted (the message
-        Counts has sizes); else snapshots count the pieces that erosion leaves. The page has the same rule (live.js).
+        Counts has sizes); else snapshots count the pieces that erosion leaves. The web
+        page counts by the same rule (web/live.js).
         """
         if self.counts is None or self.counts.sizes:
             return "fragment", None if self.counts is None else self.counts.fragments

@@ -23,8 +23,8 @@ Array: TypeAlias = "np.ndarray[Any, np.dtype[np.float64]]"
 _DEBRIS = 0.003
 """Fraction of the volume of a part that lies beyond each end of its bulk."""
 _ASIDE = 0.25
-"""Distance from the bulk at which debris begins, over the length of the bulk. Both are chosen values: the camera frames
-the bulk, and a few fragments far ahead do not make the body small in the picture."""
+"""Distance from the bulk at which debris begins, over the length of the bulk. _DEBRIS and _ASIDE are chosen so that a
+few fragments far ahead do not make the body small in the picture: the camera frames the bulk."""
 _ONE = 1e-6
 """Distance below which two points are merged, over the length of a body. Chosen value."""
 

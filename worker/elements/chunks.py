@@ -203,8 +203,9 @@ def own_change(w, s, v, t, shape, n, dt):  # type: ignore[no-untyped-def]
 
 @njit(types.void(_F1, _F1, BODY, _F2, _T2, _B1, _I), cache=True, error_model="numpy", forceinline=True)
 def averaged_pressure(w, s, body, matter, means_of, flat, n):  # type: ignore[no-untyped-def]
-    """Computes the pressure of a chunk, its work and MODULUS, in the averaged forms: in its tets or from its nodes. The
-    pressure of ``flat`` tets is computed from their own strain.
+    """Computes pressure, work of the pressure and MODULUS of a chunk in the averaged pressure forms (`nodal`, `split`):
+    from the volume strains of its tets or from the means of its nodes. The pressure of ``flat`` tets is computed from
+    their own strain.
     """
     params, eos, rows = body.params, body.eos, body.rows
     if len(flat) > 0:

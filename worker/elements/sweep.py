@@ -48,7 +48,7 @@ def standard_pass(motion, body, marks, room, begin, end, dt, scale):  # type: ig
         t, s = tets[c * CHUNK : (c + 1) * CHUNK], state[c * rows * CHUNK : (c + 1) * rows * CHUNK]
         first, last, n = c * CHUNK, c * CHUNK + len(t), len(t)
         ids, quiet = body.id[first:last], noted[c]
-        # 1. A chunk at rest has the result of its last pass.
+        # 1. Skip a chunk whose nodes have not moved: its arrays hold the result of its last pass.
         still = dt > 0.0 and rest.at_rest(v, t, n)
         if still and quiet[rest.NOTED] > 0:
             rest.pass_over(peaks, quiet, LARGEST_LIMIT, LIMITING_TET)
@@ -185,11 +185,11 @@ def force_pass(motion, body, marks, room, means, begin, end, dt, scale):  # type
         tet4.end_gradients(w, n)
         if shape and not more:
             strengthen(strength, w, s, params, n, dt)
-        # 4. Volume strain, heat and bulking from the nodal means; pressure.
+        # 4. Compute volume strain, heat and bulking from the nodal means, then the pressure.
         chunks.take_means(w, s, body, means, means_of, flat, n)
         chunks.own_change(w, s, v, t, shape, n, dt)
         chunks.averaged_pressure(w, s, body, means.matter, means_of, flat, n)
-        # 5. Viscosity, stable step, barrier; plastic return at that pressure.
+        # 5. Compute viscosity, stable step and inversion barrier, then the plastic return at the pressure of 4.
         chunks.viscosity_and_limit(w, s, params, n, dt, True)
         if not erodes:
             resist(w, s, params, n)

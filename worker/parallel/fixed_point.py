@@ -18,8 +18,8 @@ from ..model.state import Floats, Indices, Ints
 from .comm import Comm
 
 CONTRIBUTION_BITS = 51
-"""Number of bits of a contribution. Contributions are below 2^51 quanta: there all float64 values in the round 1.5
-times 2^52 are integers (elements/forces.py)."""
+"""Number of bits of a contribution. A contribution is below 2^51 quanta: adding 1.5 * 2^52 to such
+a value rounds it to an integer in float64 (elements/forces.py)."""
 HEADROOM_BITS = 5
 """Number of bits of headroom: contributions may increase 32-fold in a step before the sum has to be repeated."""
 _NEAREST_BITS = 0x4338000000000000

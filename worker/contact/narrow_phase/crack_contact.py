@@ -48,9 +48,10 @@ def widening(cracks, x, typical):  # type: ignore[no-untyped-def]
 #
 # Conditions of a contact of the pair k = 0, 1, 2:
 # 1. The two nodes of the pair have separated.
-# 2. The gap is at most NEAR of the facet at the end of the step, and at its beginning at least -DEEP_SELF of it.
+# 2. With h the size of the facet: the gap is at most NEAR h at the end of the step, and at least -DEEP_SELF h at
+#    the start of the step.
 # 3. The parts of the two nodes may be in contact.
-# The crack opens, and its sides are surface, when a width reaches _WIDE of the typical size of a face.
+# The sides of the crack become surface when the gap of a pair reaches _WIDE times the typical size of a face.
 
 
 @njit(

@@ -132,7 +132,7 @@ class Cracks:
 
     def age(self, ages: Ints) -> bool:
         """Makes all cracks aged if enough are young, by the ``ages`` of all ranks; returns True if the cracks became
-        aged. The steps of searches have no influence: no answer depends on them.
+        aged. In which steps the broad phase runs has no influence, so no result of a run depends on it.
         """
         if due := bool(ages[0] > _YOUNG * ages[1]):
             self.aged[:] = True
