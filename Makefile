@@ -1,6 +1,6 @@
 # make demo       a steel bar breaks a glass bar: submitted over HTTP, run on 2 MPI ranks, checked, drawn (demo.png)
 # make test       linters, types and every fast test; two groups of tests run at the same time
-# make lint       ruff, the checker of words (tests/plain_words.py) and mypy
+# make lint       ruff, the checker of words and of commit subjects (tests/plain_words.py) and mypy
 # make bench      speed, and speed against error: tables in build/bench, 15 minutes (BENCH=quick: 2, BENCH=long: 60)
 # make accuracy   docs/verification/accuracy.md: the verification catalogue, measured here (ACCURACY=quick: no studies)
 # make reference  docs/reference/case.md, docs/reference/http.md and the JSON schema of cases, from the sources
@@ -39,6 +39,7 @@ test: style
 	@$(MAKE) --no-print-directory --jobs 2 check-solver check-services types
 
 lint: style types
+	$(BIN)/python -m tests.plain_words --subjects
 
 style: $(READY)
 	$(BIN)/ruff check .
