@@ -3,6 +3,7 @@
 import sys
 from collections.abc import Callable
 from contextlib import suppress
+from functools import partial
 from pathlib import Path
 from typing import Annotated
 
@@ -186,34 +187,36 @@ def _tell(info: RunInfo, text: str, as_json: bool) -> None:
         echo(text)
 
 
-def cancel(run: SourceArgument, url: Url = None, token: Token = None, as_json: Json = False) -> None:
-    """Stop a run at its next step; for a run without a server give its folder."""
+def _ask(
+    run: str, here: Callable[[Path], str], there: Callable[[Run], RunInfo], done: str, url: Url, token: Token,
+    as_json: Json,
+) -> None:  # fmt: skip
+    """Applies ``here`` to the folder of the run if its worker runs in this folder, else ``there`` to the run on the
+    server. Prints one line; ``done``: what was requested, empty for the state of the run.
+    """
     if (folder := folder_of(run)) is not None and local_run.at_hand(folder):
-        echo(cancel_folder(folder))
+        echo(here(folder))
         return
     with connect(url, token) as session:
-        info = find(session, run).cancel()
-    _tell(info, f"{info.id} {info.state.value}", as_json)
+        info = there(find(session, run))
+    _tell(info, f"{info.id} {done or info.state.value}", as_json)
+
+
+def cancel(run: SourceArgument, url: Url = None, token: Token = None, as_json: Json = False) -> None:
+    """Stop a run at its next step; for a run without a server give its folder."""
+    _ask(run, cancel_folder, Run.cancel, "", url, token, as_json)
 
 
 def checkpoint(run: SourceArgument, url: Url = None, token: Token = None, as_json: Json = False) -> None:
     """Request a checkpoint, from which a lost run can continue."""
-    if (folder := folder_of(run)) is not None and local_run.at_hand(folder):
-        echo(local_run.ask(folder, layout.CHECKPOINT_REQUEST, "checkpoint"))
-        return
-    with connect(url, token) as session:
-        info = find(session, run).checkpoint()
-    _tell(info, f"{info.id} checkpoint requested", as_json)
+    here = partial(local_run.ask, request=layout.CHECKPOINT_REQUEST, wish="checkpoint")
+    _ask(run, here, Run.checkpoint, "checkpoint requested", url, token, as_json)
 
 
 def snapshot(run: SourceArgument, url: Url = None, token: Token = None, as_json: Json = False) -> None:
     """Request a snapshot of the fragments; watch reports it when it is there."""
-    if (folder := folder_of(run)) is not None and local_run.at_hand(folder):
-        echo(local_run.ask(folder, layout.SNAPSHOT_REQUEST, "snapshot"))
-        return
-    with connect(url, token) as session:
-        info = find(session, run).take_snapshot()
-    _tell(info, f"{info.id} snapshot requested", as_json)
+    here = partial(local_run.ask, request=layout.SNAPSHOT_REQUEST, wish="snapshot")
+    _ask(run, here, Run.take_snapshot, "snapshot requested", url, token, as_json)
 
 
 def get(

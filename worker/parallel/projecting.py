@@ -115,11 +115,9 @@ class Projecting:
         If another program used the core, the wall times of the tasks are too long. All wall times are therefore
         scaled by the ratio of CPU time to wall time.
         """
-        self.regions, self.colours, self.tasks = (
-            self.regions + 1,
-            self.colours + len(starts) - 1,
-            self.tasks + len(tasks),
-        )
+        self.regions += 1
+        self.colours += len(starts) - 1
+        self.tasks += len(tasks)
         began = time.thread_time_ns()
         passed = _timed(
             self._clock, kernel.address, table, tasks, starts, self._costs, self._crews, self._free, self._region

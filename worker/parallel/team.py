@@ -119,13 +119,6 @@ def _share(job, semaphore, kernel, table, tasks, starts, colours):  # type: igno
                 sched_yield()
 
 
-@njit("void(int64, int64, int64, int64, int64)", cache=True)
-def _serial(kernel, table, tasks, starts, colours):  # type: ignore[no-untyped-def]
-    """Run the same on the calling thread."""
-    for k in range(word_at(starts, 0), word_at(starts, colours)):
-        call_task(kernel, table, word_at(tasks, 2 * k), word_at(tasks, 2 * k + 1), 0)
-
-
 @njit("void(int64[::1], int64, int64, int64, int64, int64, int64)", cache=True)
 def _ask(job, semaphore, kernel, table, tasks, starts, colours):  # type: ignore[no-untyped-def]
     """Run one pass on all threads."""
@@ -134,11 +127,12 @@ def _ask(job, semaphore, kernel, table, tasks, starts, colours):  # type: ignore
     job[_WITHIN] += now(job, _CLOCK) - begin
 
 
-@njit("void(int64[::1], int64, int64, int64, int64, int64)", cache=True)
-def _alone(job, kernel, table, tasks, starts, colours):  # type: ignore[no-untyped-def]
+@njit("void(int64[::1], int64, int64, int64[:, ::1])", cache=True)
+def _alone(job, kernel, table, tasks):  # type: ignore[no-untyped-def]
     """Run one pass on the calling thread."""
     begin = now(job, _CLOCK)
-    _serial(kernel, table, tasks, starts, colours)
+    for k in range(len(tasks)):
+        call_task(kernel, table, tasks[k, 0], tasks[k, 1], 0)
     job[_WITHIN] += now(job, _CLOCK) - begin
 
 
@@ -151,7 +145,8 @@ def _repeat(job, semaphore, stages, rounds):  # type: ignore[no-untyped-def]
             kernel, table, tasks = stages[k, 0], stages[k, 1], stages[k, 2]
             starts, colours = stages[k, 3], stages[k, 4]
             if job[_MOST] == 1:
-                _serial(kernel, table, tasks, starts, colours)
+                for t in range(word_at(starts, 0), word_at(starts, colours)):
+                    call_task(kernel, table, word_at(tasks, 2 * t), word_at(tasks, 2 * t + 1), 0)
             else:
                 _share(job, semaphore, kernel, table, tasks, starts, colours)
     job[_WITHIN] += now(job, _CLOCK) - begin
@@ -227,12 +222,11 @@ class Team:
         """
         if self.projecting is not None:
             self._words[_WITHIN] += self.projecting.run(kernel, table, tasks, starts)
-            return
-        words = kernel.address, table, address_of(tasks), address_of(starts), len(starts) - 1
-        if self._words[_MOST] == 1:
-            _alone(self._job, *words)
+        elif self._words[_MOST] == 1:
+            _alone(self._job, kernel.address, table, tasks)
         else:
-            _ask(self._job, self._semaphore, *words)
+            places = address_of(tasks), address_of(starts), len(starts) - 1
+            _ask(self._job, self._semaphore, kernel.address, table, *places)
 
     def repeat(self, stages: Sequence[Stage], rounds: int) -> None:
         """Run all ``stages``, one after the other, ``rounds`` times, in one call.

@@ -163,13 +163,8 @@ class Detection:
 
     def _nodes_and_faces(self, now: Scene, step: Step) -> float:
         """Adds node-face contacts; returns the largest speed over the altitude of a tet, 1/s."""
-        table, rows, slots, faces, end = (
-            now.node_face,
-            now.active,
-            now.slot_table(),
-            now.face_table(),
-            now.reference.end,
-        )
+        table, rows, end = now.node_face, now.active, now.reference.end
+        slots, faces = now.slot_table(), now.face_table()
         pairs, n = table.arrays(), len(table)
         many, depth = self._due_faces.many(n), rows.depth
         due, counts = self._scratch.of("due", many), self._scratch.of("on faces", many)
