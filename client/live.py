@@ -54,16 +54,6 @@ class Live:
     """The newest snapshot."""
     log: deque[Log] = field(default_factory=lambda: deque(maxlen=_LOG_TAIL))
 
-    @property
-    def pieces(self) -> tuple[str, int | None]:
-        """Noun and number of the pieces of all bodies. If something can break, fragments are counted (the message
-        Counts has sizes); else snapshots count the pieces that erosion leaves. The web
-        page counts by the same rule (web/live.js).
-        """
-        if self.counts is None or self.counts.sizes:
-            return "fragment", None if self.counts is None else self.counts.fragments
-        return "piece", self.counts.fragments if self.snapshot is None else self.snapshot.fragments
-
     def take(self, message: AnyMessage) -> None:
         """Adds a message."""
         self.seq, self.wall, self.away = message.seq, message.wall, 0.0

@@ -111,7 +111,7 @@ def tell(messages: Iterable[AnyMessage], known: Live, write: Callable[[str], Non
             known.take(message)
             at = int(100.0 * known.fraction + 1e-9)
             if isinstance(message, Snapshot):
-                say(f"{clock(message.wall)}  {known.run}  {seen(message, known.pieces[0])}")
+                say(f"{clock(message.wall)}  {known.run}  {seen(message)}")
             elif isinstance(message, Log):
                 if message.level in {"warning", "error"} and message.text not in texts:
                     texts.add(message.text)

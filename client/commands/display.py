@@ -149,12 +149,11 @@ def _facts(live: Live) -> list[Pair]:
     if progress is not None:
         facts.append(("speed", f"{large(progress.updates_per_second)} updates/s"))
     if counts is not None:
-        noun, number = live.pieces
-        facts += [(f"{noun}s", count(number or 0)), ("shared", counted(counts.shared, "node")),
+        facts += [("fragments", count(counts.fragments)), ("shared", counted(counts.shared, "node")),
                   ("frames", str(live.frames))]  # fmt: skip
         facts += [("particles", counted(counts.particles, "node"))] if counts.particles else []
     if live.snapshot is not None:
-        facts.append(("seen", seen(live.snapshot, live.pieces[0])))
+        facts.append(("seen", seen(live.snapshot)))
     return facts
 
 
@@ -278,9 +277,9 @@ def _who(entry: Log) -> str:
     return f"{entry.level}: " if entry.level in _LEVEL_STYLE else f"[{entry.rank}] "
 
 
-def seen(snapshot: Snapshot, noun: str = "fragment") -> str:
-    """Describes a snapshot of the fragments, or pieces, in a few words."""
-    return f"snapshot {snapshot.n} at t {si(snapshot.t, 's')}: {counted(snapshot.fragments, noun)}"
+def seen(snapshot: Snapshot) -> str:
+    """Describes a snapshot of the fragments in a few words."""
+    return f"snapshot {snapshot.n} at t {si(snapshot.t, 's')}: {counted(snapshot.fragments, 'fragment')}"
 
 
 def line(live: Live) -> str:

@@ -20,19 +20,16 @@ _CUTS = 50
 _PARAMETERS = {"rayleigh": "mode", "exponential": "mean", "power": "exponent"}
 
 
-def strip(ended: Outcome | None, noun: str, number: int | None) -> str:
-    """Returns the five main numbers of a run. ``noun`` and ``number`` describe its pieces (``Live.pieces``);
-    ``number`` is None if unknown.
-    """
+def strip(ended: Outcome | None) -> str:
+    """Returns the five main numbers of a run; nothing for a run that has not ended."""
     if ended is None:
         return ""
-    many = ended.fragments if noun == "fragment" or number is None else number
     passed = sum(check.passed for check in ended.reference)
     cost = f"{duration(ended.elapsed)}<small>on {escape(crew(ended.ranks, ended.threads))}</small>"
     entries = [
         ("simulated", f"{escape(si(ended.time, 's'))}<small>{escape(counted(ended.steps, 'step'))}</small>"),
         ("took", cost), ("energy residual", f"{escape(rough(ended.worst_residual))}<small>at worst</small>"),
-        (f"{noun}s", f"{count(many)}<small>{escape(counted(ended.broken, 'facet'))} broken</small>"),
+        ("fragments", f"{count(ended.fragments)}<small>{escape(counted(ended.broken, 'facet'))} broken</small>"),
         ("references", f"{passed} of {len(ended.reference)}<small>pass</small>" if ended.reference else "none"),
     ]  # fmt: skip
     shown = "".join(f"<div><dt>{name}</dt><dd>{told}</dd></div>" for name, told in entries)

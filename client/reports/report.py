@@ -10,7 +10,6 @@ from pathlib import Path
 from conoid.cases.outcome import Outcome
 
 from ..errors import ClientError, UnfinishedError
-from ..live import Live
 from ..local.atomic import save_text
 from ..result import Result
 from . import cards, pictures, replay3d
@@ -74,7 +73,7 @@ def write(
     first, *others = filter(None, [stage, pictured, about])
     body = "".join([
         _head(result.folder.name, title, str(case.get("name", "")), ended),
-        f'<div class="bench"><div class="{kind}">{first}</div><div class="now">{_now(result, ended)}</div></div>',
+        f'<div class="bench"><div class="{kind}">{first}</div><div class="now">{_now(ended)}</div></div>',
         '<div class="cards charts">', _card("References", cards.references(ended), wide=True), *others,
         _charts(result, ended, say),
         _card("Messages", cards.messages(result) if _has_journal(result) else "", wide=True),
@@ -109,13 +108,10 @@ def _head(name: str, title: str, case: str, ended: Outcome | None) -> str:
     )
 
 
-def _now(result: Result, ended: Outcome | None) -> str:
+def _now(ended: Outcome | None) -> str:
     """Returns the column beside the body."""
-    known = Live(result.folder.name)
-    for message in result.messages if _has_journal(result) else ():
-        known.take(message)
     return "".join([
-        _card("Run", cards.strip(ended, *known.pieces)), _card("Warnings", cards.warnings(ended)),
+        _card("Run", cards.strip(ended)), _card("Warnings", cards.warnings(ended)),
         _card("Results", cards.results(ended)),
     ])  # fmt: skip
 

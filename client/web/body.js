@@ -4,7 +4,6 @@ import { binary, call } from "./api.js";
 import { count, counted, h, si } from "./figures.js";
 import { act } from "./keys.js";
 import { three } from "./libraries.js";
-import { breaks } from "./live.js";
 import { Picked, table } from "./picked.js";
 import { range } from "./ranges.js";
 import { film, picture } from "./saving.js";
@@ -22,7 +21,7 @@ export class Body {
   // `onShow` is called with the snapshot on the screen. `bare`: without tools and time line, for several bodies side by side;
   // `ready` resolves to the View3d (share() of camera.js), at(t) shows a time.
   constructor(run, onShow = () => {}, { bare = false } = {}) {
-    Object.assign(this, { run, onShow, bare, entries: [], kept: new Map(), volumes: new Map(), noun: "fragment", following: true, picked: null, wanted: null, planes: [] });
+    Object.assign(this, { run, onShow, bare, entries: [], kept: new Map(), volumes: new Map(), following: true, picked: null, wanted: null, planes: [] });
     this.path = `v1/runs/${encodeURIComponent(run)}`;
     this.ready = new Promise((done) => { this.whenReady = done; });
     this.build();
@@ -66,7 +65,6 @@ export class Body {
       const [modules, plan] = await Promise.all([three(), call(`${this.path}/files/case.resolved.json`).catch(() => null)]);
       if (this.closed) return;
       this.cuts(plan);
-      this.noun = breaks(plan) ? "fragment" : "piece";
       this.view = new View3d(modules, (row) => this.pick(row));
       this.view.set({ cuts: this.planes });
       this.view.eye.onMode = () => { this.tools.frame.value = this.view.eye.mode === "part" ? `part ${this.view.eye.part}` : this.view.eye.mode; };
@@ -142,7 +140,7 @@ export class Body {
   present(snapshot, volume) {
     Object.assign(this, { snapshot, volume });
     const { header, arrays } = snapshot;
-    this.note.textContent = `${si(header.t, "s")} · step ${count(header.step)} · ${counted(header.fragments_total, this.noun)} · ${counted(arrays.triangles.length / 3, "triangle")}`;
+    this.note.textContent = `${si(header.t, "s")} · step ${count(header.step)} · ${counted(header.fragments_total, "fragment")} · ${counted(arrays.triangles.length / 3, "triangle")}`;
     this.scrub.setAttribute("aria-valuetext", si(header.t, "s"));
     this.onShow(snapshot);
     this.offer();

@@ -129,15 +129,6 @@ export class Live {
   get age() { return this.heard ? Date.now() / 1000 - this.heard : undefined; }
 }
 
-// [noun, number] of the fragments of a run. The solver counts fragments if something can fracture; otherwise only the
-// snapshots count the pieces that erosion leaves.
-export function pieces({ plan, counts, snapshots }) {
-  return breaks(plan) ? ["fragment", counts?.fragments] : ["piece", snapshots.at(-1)?.fragments ?? counts?.fragments];
-}
-
-// Whether a part or a bond of a case can break; true for an unknown case.
-export const breaks = (plan) => !plan?.parts || plan.bond?.length > 0 || plan.parts.some(({ fracture }) => fracture);
-
 // Removes every second point of the older half of a long series.
 function keep(series, point) {
   series.push(point);

@@ -1,7 +1,7 @@
 // Numbers of a run: the five most important ones, and all others.
 
 import { alike, count, duration, fixed, h, large, moment, rough, si } from "./figures.js";
-import { FINAL, pieces } from "./live.js";
+import { FINAL } from "./live.js";
 import { fold } from "./storage.js";
 
 const entry = (name, value, note) =>
@@ -22,8 +22,7 @@ export class Numbers {
 
 // Time and remaining time, dt and its limiter, residual, fragments, imbalance.
 function five(live, outcome) {
-  const { progress, load, state } = live;
-  const [noun, number] = pieces(live);
+  const { progress, load, counts, state } = live;
   const over = FINAL.has(state);
   const left = over ? `took ${duration(live.elapsed)}` : Number.isFinite(progress?.eta) ? `${duration(progress.eta)} left` : "";
   const { t, residual: told } = ended(progress, outcome);
@@ -31,7 +30,7 @@ function five(live, outcome) {
     entry("time", progress ? timed(t, progress.end_time) : "–", left),
     entry("dt", si(progress?.dt || live.ledger.findLast(({ dt }) => dt > 0)?.dt, "s"), progress?.limiter && `held by ${progress.limiter}`),
     entry("energy residual", told ? residual(...told) : "–"),
-    entry(`${noun}s`, count(number)),
+    entry("fragments", count(counts?.fragments)),
     entry("imbalance", load ? fixed(load.imbalance) : "–"),
   ];
 }

@@ -7,7 +7,7 @@ import { counted, fixed, h, percent, words } from "./figures.js";
 import { Files } from "./files.js";
 import { Headline } from "./headline.js";
 import { fill, followColumns, readPlan } from "./history.js";
-import { FINAL, Live, pieces } from "./live.js";
+import { FINAL, Live } from "./live.js";
 import { Logs, Warnings } from "./logs.js";
 import { Numbers, ended, residual } from "./numbers.js";
 import { Balances, Ranks, checksTable } from "./panels.js";
@@ -241,8 +241,7 @@ export class RunPage {
     const { progress, load, counts } = this.live;
     if (progress) this.notes.residual.replaceChildren(residual(...ended(progress, this.outcome).residual));
     this.notes.imbalance.textContent = load ? fixed(load.imbalance) : "";
-    const [noun, number] = pieces(this.live);
-    this.notes.counts.textContent = counts ? counted(number, noun) : "";
+    this.notes.counts.textContent = counts ? counted(counts.fragments, "fragment") : "";
   }
 
   drawHead() {

@@ -3,13 +3,12 @@
 import io
 import threading
 from collections.abc import Iterator
-from typing import Any
 
 import msgspec
 import pytest
 from rich.console import Console
 
-from conoid.cases.messages import AnyMessage, Counts, Load, Log, Snapshot
+from conoid.cases.messages import AnyMessage, Load, Log
 from conoid.cases.run import State
 from conoid.client.commands import display, progress
 from conoid.client.errors import UnreachableError
@@ -287,16 +286,3 @@ def test_what_a_run_in_the_queue_waits_for_is_told(monkeypatch: pytest.MonkeyPat
     assert run.reason not in rendered(known)
     known.state = State.QUEUED
     assert run.reason in rendered(known), "the panel tells it too"
-
-
-def test_pieces_that_erosion_leaves_are_counted_as_the_page_does() -> None:
-    at: dict[str, Any] = {"run": "r", "step": 1, "t": 1e-6}
-    live = Live("r")
-    counts = Counts(**at, elements=9, nodes=9, shared=0, fragments=2, elements_per_rank=[9])
-    live.take(counts)
-    assert live.pieces == ("piece", 2)
-    live.take(Snapshot(**at, seq=2, n=0, path="x", bytes=1, triangles=1, fragments=14, sha256="0" * 64))
-    assert live.pieces == ("piece", 14)
-    assert "14 pieces" in display.seen(live.snapshot or pytest.fail("no snapshot"), live.pieces[0])
-    live.take(msgspec.structs.replace(counts, seq=3, sizes=[1, 4]))
-    assert live.pieces == ("fragment", 2)

@@ -289,21 +289,6 @@ def test_a_file_that_two_parts_name_is_one_file(web: Path) -> None:
     assert played(web, script) == ["Waits for 1 file", 1, 0]
 
 
-def test_what_erosion_leaves_is_counted_by_the_snapshots_alone(web: Path) -> None:
-    script = """
-        const { Numbers } = await load("numbers.js");
-        const { Live, pieces } = await load("live.js");
-        const live = Object.assign(new Live("a"), { counts: { fragments: 4 }, snapshots: [{ fragments: 17 }] });
-        return [null, {}].map((fracture) => {
-            live.plan = { parts: [{ fracture: null }, { fracture }] };
-            const numbers = new Numbers();
-            numbers.draw(live, {});
-            return [...pieces(live), text(numbers.strip).includes(`${pieces(live)[0]}s ${pieces(live)[1]}`)];
-        });
-    """
-    assert played(web, script) == [["piece", 17, True], ["fragment", 4, True]]
-
-
 def test_what_stands_beside_a_failure_is_of_the_outcome(web: Path) -> None:
     script = """
         const { RunState } = await load("runstate.js");

@@ -1,11 +1,14 @@
 """Fragments between frames: their sizes are those of the tables on any number of ranks, and they take their share."""
 
+from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
 
+from conoid.cases.load import parse_case
+from conoid.worker import simulation, step
 from conoid.worker.fracture import connectivity
 from conoid.worker.output import counts
 from conoid.worker.output.counts import Counter
@@ -14,6 +17,7 @@ from conoid.worker.snapshots import share, table
 
 from ..contact.ranks import on_ranks
 from ..snapshots.shattered import PARTS, shattered
+from .simulations import tick
 
 
 @pytest.mark.parametrize("ranks", [1, 3])
@@ -58,7 +62,8 @@ def breaking(clock: Clock, cost: float) -> Any:
         clock.now += cost
 
     return SimpleNamespace(
-        model=model, fracture=SimpleNamespace(broken=0), erosion=None, comm=SerialComm(), shared_nodes=lambda: 0,
+        model=model, fracture=SimpleNamespace(broken=0), erosion=None, contact=None, comm=SerialComm(),
+        shared_nodes=lambda: 0,
         record=SimpleNamespace(update=look, labels=[], count=3), clock=SimpleNamespace(step=0),
     )  # fmt: skip
 
@@ -103,3 +108,37 @@ def test_counts_are_told_when_they_have_changed(clock: Clock) -> None:
     assert told is not None
     assert told["counted"] == 7
     assert counter.changed(sim, 1) is not None
+
+
+ERODING = {
+    "name": "eroding", "run": {"end_time": 1e-6, "frames": 0}, "numerics": {"pressure": "standard"},
+    "parts": [
+        {"name": name, "material": "copper_ofhc", "erosion": {"plastic_strain": 1.0}, "mesh": {
+            "shape": "box", "low": [0, y, 0], "high": [8e-3, y + 1e-3, 1e-3], "element_size": 1e-3,
+            "generator": "structured"}}
+        for name, y in (("bar", 0.0), ("other", 2e-3))
+    ],
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("ranks", [1, 2])
+def test_what_erosion_cuts_off_is_a_fragment(ranks: int) -> None:
+    """A layer of tets in the middle of one of two bars is removed."""
+
+    def work(comm: Comm) -> list[int]:
+        sim, counter, found = simulation.build(parse_case(ERODING), Path(), comm), Counter(), []
+        step.prepare(sim)
+        for x in (None, 4.5e-3):
+            block = next(one for one in sim.model.blocks if one.part == 0)
+            middle = sim.model.nodes.x[block.tets].mean(axis=1)[:, 0]
+            gone = block.id[np.abs(middle - (x or -1.0)) < 5e-4]
+            tick(sim, np.concatenate(comm.share(gone)))
+            counter.find(sim)
+            told = counter.changed(sim, 0) or pytest.fail("no message")
+            count, labels = counts.fragments(sim)
+            assert [len(of) for of in labels] == [one.n for one in sim.model.blocks]
+            found += [told["fragments"], count, sum(told["sizes"])]
+        return found
+
+    two, three = [2, 2, 2], [3, 3, 3]
+    assert on_ranks(ranks, work)[0] == [*two, *three]

@@ -2,8 +2,9 @@
 
 To find the fragments, all ranks read the state of all their tets (docs/reference/snapshots.md, "Between two
 snapshots"). Fragments are therefore searched only when a facet has broken or a tet was removed since the last
-search. A share of the wall time limits the number of searches: every report of a small model, every few seconds for
-a large model. Rank 0 decides, and its decision is sent with the loads.
+search, and never in a scene that can neither break nor erode. A share of the wall time limits the number of searches:
+every report of a small model, every few seconds for a large model. Rank 0 decides, and its decision is sent with the
+loads.
 """
 
 import math
@@ -14,6 +15,7 @@ import numpy as np
 
 from conoid.cases.model.joined import bodies
 
+from ..fracture import connectivity
 from ..kernels.jit import njit
 from ..model.ids import located, unique
 from ..model.state import Floats, Ints, Model
@@ -38,25 +40,25 @@ class Counter:
         """Step in which the fragments were last found."""
         self._again = -math.inf
         """Wall time from which fragments may be found again, as time.monotonic(), s."""
-        self._smallest, self._sizes = 0, list[int]()
+        self._fragments, self._smallest, self._sizes = 0, 0, list[int]()
 
     def due(self, sim: Simulation, now: float, *, ending: bool) -> bool:
         """Return whether fragments are to be found. Called on rank 0.
 
         ``ending``: whether this is the last report.
         """
-        return sim.record is not None and _state(sim) != self._found and (ending or now >= self._again)
+        return _changing(sim) and _state(sim) != self._found and (ending or now >= self._again)
 
     def find(self, sim: Simulation) -> None:
-        """Find the fragments and their sizes.
+        """Find the fragments and their sizes, unless their number cannot have changed. Collective.
 
         The first search loads a kernel, so its duration does not count for the interval between two searches.
         """
-        if sim.record is None:
+        if not _changing(sim) or (sim.record is None and _state(sim) == self._found):
             return
         began, first = time.monotonic(), self._step < 0
-        sim.record.update()
-        self._smallest, self._sizes = sizes(sim.model, sim.record.labels, sim.comm)
+        self._fragments, labels = fragments(sim)
+        self._smallest, self._sizes = sizes(sim.model, labels, sim.comm)
         self._found, self._step, ended = _state(sim), sim.clock.step, time.monotonic()
         self._again = ended if first else ended + (ended - began) / SHARE
 
@@ -64,19 +66,57 @@ class Counter:
         """Return the fields of a message (messages.Counts) if the counts have changed; ``cuts``: number of cuts so
         far.
         """
-        model, record = sim.model, sim.record
-        fragments = record.count if record is not None and record.count else len(set(bodies(sim.case)))
-        now = model.elements_global, model.nodes_global, cuts, fragments, self._found
+        model, found = sim.model, self._count(sim)
+        now = model.elements_global, model.nodes_global, cuts, found, self._found
         if now == self._sent:
             return None
         self._sent = now
         held, shared = sim.comm.gather(sum(block.n for block in model.blocks)), sim.shared_nodes()
         return {
-            "elements": model.elements_global, "nodes": model.nodes_global, "shared": shared, "fragments": fragments,
+            "elements": model.elements_global, "nodes": model.nodes_global, "shared": shared, "fragments": found,
             "elements_per_rank": held or [], "particles": sim.erosion.particles if sim.erosion is not None else 0,
             "facets": sim.fracture.broken if sim.fracture is not None else 0, "smallest": self._smallest,
             "sizes": self._sizes, "counted": self._step,
         }  # fmt: skip
+
+    def _count(self, sim: Simulation) -> int:
+        """Return the number of fragments of the last search; before the first one that of the last process or of the
+        bodies.
+        """
+        if self._step >= 0:
+            return self._fragments
+        return sim.record.count if sim.record is not None and sim.record.count else len(set(bodies(sim.case)))
+
+
+def fragments(sim: Simulation) -> tuple[int, list[Ints]]:
+    """Return the number of fragments and, for each block, (n,) the fragment of each tet. Collective.
+
+    Fragments are separated by broken facets, or by removed tets where no part breaks. Where the neighbours of the tets
+    are unknown, the fragments are the bodies of the case.
+    """
+    if sim.record is not None:
+        sim.record.update()
+        return sim.record.count, sim.record.labels
+    if not _connected(sim):
+        return len(set(bodies(sim.case))), of_bodies(sim)
+    labels = connectivity.labels(sim.model, np.zeros((0, 2), np.int64), sim.comm)
+    return connectivity.count(sim.model, labels, sim.comm), labels
+
+
+def of_bodies(sim: Simulation) -> list[Ints]:
+    """Return, for each block, (n,) the body of each tet (cases/model/joined.py)."""
+    body = np.array(bodies(sim.case))
+    return [np.full(block.n, body[block.part]) for block in sim.model.blocks]
+
+
+def _connected(sim: Simulation) -> bool:
+    """Return whether the tets have neighbours (``Block.across``), by which fragments are found."""
+    return sim.record is not None or sim.contact is not None
+
+
+def _changing(sim: Simulation) -> bool:
+    """Return whether the number of fragments can change."""
+    return _connected(sim) and (sim.fracture is not None or sim.erosion is not None)
 
 
 def _state(sim: Simulation) -> tuple[int, int]:

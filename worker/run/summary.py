@@ -6,10 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from conoid.cases.estimates.stages import without
-from conoid.cases.model.joined import bodies
 from conoid.cases.outcome import Made, Measured, Outcome, Sharing
 from conoid.cases.reading.quantities import FIELD_UNITS
 from conoid.cases.run import Cause, State
@@ -21,6 +18,7 @@ from ..contact.checks import common_volume, inside
 from ..errors import PhysicsError
 from ..gauges import reference, unstrained
 from ..model.state import Ints
+from ..output.counts import fragments, of_bodies
 from ..output.history import extremes
 from ..parallel.projecting import Projecting
 from ..parallel.team import team
@@ -56,15 +54,15 @@ def sum_up(loop: Loop, folder: Path, failure: PhysicsError | None, start: Start,
     checks = reference.measure(sim, folder, start.thick) if complete else []
     eroded = start.elements - sim.model.elements_global
     sim.count_nodes()
-    fragments, labels = _fragments(sim)
-    contact, warnings = _penetration(sim, labels)
+    count, labels = fragments(sim)
+    contact, warnings = _penetration(sim, labels if sim.record is not None else of_bodies(sim))
     compressed = sim.crushing.found() if sim.crushing is not None else []
     stiff = list(unstrained.found(sim, folder, eroded)) if complete else []
     return Outcome(
         **_end(loop, failure), **costs, **contact, digest=hexdigest or "",
         steps=sim.clock.step, time=sim.clock.t, elements=start.elements, eroded=eroded,
         eroded_mass=sim.ledger.eroded_mass, nodes_initial=start.nodes, nodes=sim.model.nodes_global,
-        fragments=fragments, broken=sim.fracture.broken if sim.fracture is not None else 0,
+        fragments=count, broken=sim.fracture.broken if sim.fracture is not None else 0,
         energy=loop.samples.energy, worst_residual=sim.ledger.worst,
         made=[Made(line=name, share=made.share, time=made.t) for name, made in sim.ledger.making.ranked()],
         compressed=compressed, without=without(sim.case), reference=checks, probes=_probes(loop, folder),
@@ -115,17 +113,6 @@ def _sharing(sim: Simulation) -> Sharing | None:
         steps=max(sim.clock.step, 1), regions=made.regions, colours=made.colours, tasks=made.tasks,
         turn=1e-9 * costs.turn, call=1e-9 * costs.call, wake=1e-9 * costs.wake,
     )  # fmt: skip
-
-
-def _fragments(sim: Simulation) -> tuple[int, list[Ints]]:
-    """Return the number of fragments and, for each block, (n,) the fragment of each tet. Without fracture the bodies
-    are counted.
-    """
-    if sim.record is not None:
-        sim.record.update()
-        return sim.record.count, sim.record.labels
-    body = np.array(bodies(sim.case))
-    return len(np.unique(body)), [np.full(block.n, body[block.part]) for block in sim.model.blocks]
 
 
 def _penetration(sim: Simulation, labels: list[Ints]) -> tuple[dict[str, Any], list[str]]:
