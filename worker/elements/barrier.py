@@ -1,14 +1,14 @@
-"""Barrier potential against the collapse of tets in the averaged pressure forms.
+"""Barrier pressure against the collapse of tets in the averaged pressure forms.
 
-The pressure of such a tet depends on the mean volume strain of its nodes; only its deviatoric stress resists a change
-of its own volume. After yield, the volume of a tet at an edge of a body, whose nodes have few other tets, may decrease
-to zero while the mean volume strain stays constant. If the volume of a tet is below the share SQUEEZED of its initial
-volume, an additional pressure acts in the tet, with the potential
+The averaged pressure of a tet depends on the mean volume strain of its nodes; only the deviatoric stress resists a
+change of the own volume of the tet. After yield, the volume of a tet at an edge of a body, whose nodes have few other
+tets, may decrease to zero while the mean volume strain stays constant. If the volume of a tet is below the fraction
+SQUEEZED of its initial volume, the additional pressure b acts in the tet:
 
     b(J) = STIFF K (SQUEEZED / J - 1)^2,    J = V / V0 < SQUEEZED
 
-Its energy is elastic. Parts that erode have no barrier: such tets are removed (docs/theory/elements.md, Pressure
-forms).
+The energy of the barrier is elastic. Parts with erosion have no barrier: there squeezed tets are removed
+(docs/theory/elements.md, Pressure forms).
 """
 
 import numpy as np

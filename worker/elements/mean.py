@@ -4,7 +4,7 @@ The stress of a tet does the work -p dV on its own volume; an averaged pressure 
 follows from the averaged strain. Summed over the tets round a node the two agree if the pressure is uniform. The
 difference is booked for each tet as WORK_AVERAGED: energy that pressure differences within a mean store, which is
 recoverable; energy dissipated where neighbours yield, tear or are removed at different times; and the dissipation of
-the stabilising fluxes of ``split`` (docs/theory/elements.md, What averaging takes).
+the stabilising fluxes of ``split`` (docs/theory/elements.md, Energy of the averaging).
 """
 
 from ..kernels.jit import njit
