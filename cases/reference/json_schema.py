@@ -3,6 +3,7 @@
 import json
 import re
 from functools import cache
+from pathlib import Path
 from typing import Any
 
 from ..model.schema import Case
@@ -22,6 +23,13 @@ def json_schema(refs: str = "#/$defs/{model}") -> Schema:
     """The JSON schema of a case; ``refs``: the place of its definitions."""
     made = _tidy(Case.model_json_schema(ref_template=refs))
     return {"$schema": "https://json-schema.org/draft/2020-12/schema", **made, "title": "Conoid case"}
+
+
+@cache
+def shipped_schema() -> Schema:
+    """The JSON schema of a case, read from ``FILE``: 2 ms, instead of 60 ms for a schema made from the models."""
+    schema: Schema = json.loads((Path(__file__).parents[1] / FILE).read_bytes())
+    return schema
 
 
 @cache

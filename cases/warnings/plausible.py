@@ -4,7 +4,6 @@ unit.
 
 import math
 from collections.abc import Iterator, Mapping
-from functools import cache
 from itertools import chain
 from typing import Any
 
@@ -16,7 +15,7 @@ from ..model.schema import Case
 from ..reading.library import material
 from ..reading.problems import Location, Problem, problem
 from ..reading.quantities import unit_of_reference
-from ..reference.json_schema import Schema, definition, json_schema, variants
+from ..reference.json_schema import Schema, definition, shipped_schema, variants
 from ..units import QUANTITY
 from .approach import strangers
 from .compression import crushed
@@ -85,13 +84,8 @@ def oddities(case: Case, expected: Estimate) -> list[Problem]:
 
 def bare_numbers(data: Mapping[str, Any]) -> list[Problem]:
     """Yields a warning for each key with numbers other than 0 without a unit, with the unit that was assumed."""
-    whole = _schema()
+    whole = shipped_schema()
     return list(_bare((), data, whole, whole, data))
-
-
-@cache
-def _schema() -> Schema:
-    return json_schema()
 
 
 def _bare(location: Location, value: Any, schema: Schema, whole: Schema, data: Mapping[str, Any]) -> Iterator[Problem]:

@@ -1,5 +1,6 @@
 """Kernels: what names their cache folder, when they are loaded, and how they are compiled ahead."""
 
+import ast
 import fcntl
 import importlib
 import os
@@ -95,6 +96,15 @@ def test_a_copy_elsewhere_and_one_that_was_written_again_have_the_same_folder(tr
     os.utime(tree / "above.py", (1e9, 1e9))
     store.source_hash.cache_clear()
     assert store.source_hash(tree) == before
+
+
+def test_the_imports_found_by_a_pattern_are_those_of_the_syntax_tree() -> None:
+    for path in store.ROOT.rglob("*.py"):
+        found = [node for node in ast.parse(path.read_text()).body if isinstance(node, ast.ImportFrom) and node.level]
+        bases = [(path.parents[node.level - 1].joinpath(*(node.module or "").split(".")), node.names) for node in found]
+        files = [file for base, names in bases for file in (base, *(base / alias.name for alias in names))]
+        imported = [file.with_suffix(".py") for file in files if file.with_suffix(".py").is_file()]
+        assert sorted(store.imported(path)) == sorted(imported), path
 
 
 def test_ranks_but_the_first_hash_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
