@@ -5,6 +5,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
+from ..laws.cowper_symonds import CowperSymonds
 from ..laws.johnson_cook import JohnsonCook, JohnsonCookDamage
 from ..laws.johnson_holmquist import JohnsonHolmquist
 from ..laws.linear_hardening import LinearHardening
@@ -13,8 +14,8 @@ from ..units import Area, Density, FractureEnergy, Ratio, Speed, Stress
 from .tables import Count, Model, Positive
 
 __all__ = [
-    "Brittle", "Elastic", "JohnsonCook", "JohnsonCookDamage", "JohnsonHolmquist", "LinearHardening", "Material",
-    "MieGruneisen", "MohrCoulomb", "Scatter", "Strength",
+    "Brittle", "CowperSymonds", "Elastic", "JohnsonCook", "JohnsonCookDamage", "JohnsonHolmquist", "LinearHardening",
+    "Material", "MieGruneisen", "MohrCoulomb", "Scatter", "Strength",
 ]  # fmt: skip
 
 
@@ -37,7 +38,9 @@ class Elastic(Model):
         return self.young / (3.0 * (1.0 - 2.0 * self.poisson))
 
 
-Strength = Annotated[LinearHardening | JohnsonCook | MohrCoulomb | JohnsonHolmquist, Field(discriminator="model")]
+Strength = Annotated[
+    LinearHardening | JohnsonCook | MohrCoulomb | JohnsonHolmquist | CowperSymonds, Field(discriminator="model")
+]
 
 
 class MieGruneisen(Model):

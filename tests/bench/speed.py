@@ -35,6 +35,7 @@ METALS = (
     Metal("linear hardening, viscosity", "copper_taylor", True, 1e-3),
     Metal("Johnson-Cook, viscosity", "steel_42crmo4", True, 1e-3),
     Metal("Johnson-Cook, Mie-Grueneisen, viscosity", "copper_ofhc", True, 1e-3),
+    Metal("Cowper-Symonds, viscosity", "mild_steel_cowper_symonds", True, 1e-3),
 )
 
 

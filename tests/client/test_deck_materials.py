@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from conoid.cases.model.materials import JohnsonCook, JohnsonHolmquist, LinearHardening, Material
+from conoid.cases.model.materials import CowperSymonds, JohnsonCook, JohnsonHolmquist, LinearHardening, Material
 from conoid.worker.materials.equation_of_state import cold
 from conoid.worker.materials.law import DENSITY, EQUATION
 
@@ -142,6 +142,25 @@ def test_straight_flow_curves_of_lsdyna(
     assert found.refusals == []
     assert hardening(material(found)) == pytest.approx((strength * MPA, slope * MPA), rel=1e-12)
     assert part(found).get("erosion", {}).get("plastic_strain") == failure
+
+
+@pytest.mark.parametrize(
+    "cards",
+    [
+        ("*MAT_003", row(1, "7.85E-6", 210.0, 0.3, 0.35, 1.0, 1.0), row(0.0404, 5.0, 0.0, 1.0)),
+        ("*MAT_024", row(1, "7.85E-6", 210.0, 0.3, 0.35, 1.0), row(0.0404, 5.0)),
+        ("*MAT_018", row(1, "7.85E-6", 210.0, 0.3, 1.004785, 1.0, 0.0404, 5.0), row(0.35, 1.0)),
+    ],
+)
+def test_the_factor_of_cowper_and_symonds_of_lsdyna(tmp_path: Path, cards: tuple[str, ...]) -> None:
+    """In mm, kg, ms: SRC or C is a rate in 1/ms, and the factor multiplies yield stress and hardening."""
+    found = read(tmp_path, "a.k", lsdyna(*cards), "mm,kg,ms")
+    law = material(found).strength
+    assert isinstance(law, CowperSymonds)
+    assert (law.D, law.q) == pytest.approx((40.4, 5.0), rel=1e-12)
+    assert law.yield_stress == pytest.approx(350e6, rel=1e-12)
+    assert law.hardening == pytest.approx(1e9 / (1.0 - 1.0 / 210.0), rel=1e-6)
+    assert found.refusals == []
 
 
 def test_a_bent_flow_curve_refuses(tmp_path: Path) -> None:

@@ -165,9 +165,15 @@ REFUSED = {
     "kinematic hardening": (
         ("*MAT_PLASTIC_KINEMATIC", row(1, "7.85E-9", 2.1e5, 0.3, 350.0, 1000.0, 0.0)), "BETA = 0: kinematic hardening"
     ),
-    "a rate": (
-        ("*MAT_PLASTIC_KINEMATIC", row(1, "7.85E-9", 2.1e5, 0.3, 350.0, 0.0, 1.0), row(40.0, 5.0)),
-        "SRC = 40.0: the flow stress depends on the rate",
+    "half of a rate": (
+        ("*MAT_PLASTIC_KINEMATIC", row(1, "7.85E-9", 2.1e5, 0.3, 350.0, 0.0, 1.0), row(40.0, 0.0)),
+        "SRC = 40 and SRP = 0 are not both above 0",
+    ),
+    "a curve of rates": (
+        ("*MAT_024", row(1, "7.85E-9", 2.1e5, 0.3, 350.0), row(0, 0, 0, 7)), "LCSR = 7: a curve of the flow stress"
+    ),
+    "a rate that is added": (
+        ("*MAT_024", row(1, "7.85E-9", 2.1e5, 0.3, 350.0, 1000.0), row(40.0, 5.0, 0, 0, 1)), "VP = 1: the rate adds"
     ),
     "an unread field": (("*MAT_ELASTIC", row(1, "7.85E-9", 2.1e5, 0.3, 0, 0, 7.0)), "K = 7.0: not translated"),
     "a velocity of a part of a part": (

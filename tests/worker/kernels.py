@@ -46,6 +46,10 @@ STEEL_42CRMO4 = materials.Material(
         melt_temperature=1813.15, specific_heat=460.0,
     ),
 )  # fmt: skip
+MILD_STEEL = materials.Material(
+    density=7850.0, elastic=materials.Elastic(young=200e9, poisson=0.3),
+    strength=materials.CowperSymonds(model="cowper_symonds", yield_stress=250e6, hardening=1.26e9, D=40.4, q=5.0),
+)  # fmt: skip
 COPPER_GAS = materials.Material(
     density=8930.0, elastic=materials.Elastic(young=117e9, poisson=0.35),
     eos=materials.MieGruneisen(model="mie_gruneisen", c0=3940.0, S=1.49, gamma0=1.96),

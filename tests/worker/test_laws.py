@@ -12,9 +12,9 @@ from conoid.worker.elements import scratch
 from conoid.worker.materials import law, models
 from conoid.worker.model import rows, state
 
-from .kernels import COPPER, COPPER_GAS, GLASS, STEEL, STEEL_42CRMO4
+from .kernels import COPPER, COPPER_GAS, GLASS, MILD_STEEL, STEEL, STEEL_42CRMO4
 
-MATERIALS = [STEEL, COPPER, COPPER_GAS, STEEL_42CRMO4, GLASS, *library().values()]
+MATERIALS = [STEEL, COPPER, COPPER_GAS, STEEL_42CRMO4, GLASS, MILD_STEEL, *library().values()]
 SCHEMAS: tuple[type[Constants], ...] = get_args(get_args(Strength)[0])
 N = 300
 

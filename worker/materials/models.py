@@ -14,7 +14,7 @@ from conoid.cases.model.schema import Viscosity
 from ..kernels.jit import njit
 from ..model import rows
 from ..model.state import Floats
-from . import equation_of_state, hyperelastic, johnson_cook, johnson_holmquist, mohr_coulomb, plastic
+from . import cowper_symonds, equation_of_state, hyperelastic, johnson_cook, johnson_holmquist, mohr_coulomb, plastic
 from .law import (
     BREAKS,
     BULK,
@@ -34,7 +34,9 @@ from .law import (
     placed,
 )
 
-LAWS = (hyperelastic.LAW, plastic.LAW, johnson_cook.LAW, mohr_coulomb.LAW, johnson_holmquist.LAW)
+LAWS = (
+    hyperelastic.LAW, plastic.LAW, johnson_cook.LAW, mohr_coulomb.LAW, johnson_holmquist.LAW, cowper_symonds.LAW,
+)  # fmt: skip
 EQUATIONS = (equation_of_state.ELASTIC, equation_of_state.GRUNEISEN, johnson_holmquist.PRESSURE_LAW)
 
 
@@ -51,6 +53,8 @@ def strengthen(law, w, s, params, n, dt):  # type: ignore[no-untyped-def]
         mohr_coulomb.mohr_coulomb(w, s, params, n, dt)
     elif law == 4:
         johnson_holmquist.johnson_holmquist(w, s, params, n, dt)
+    elif law == 5:
+        cowper_symonds.cowper_symonds(w, s, params, n, dt)
 
 
 @njit("void(int64, float64[::1], float64[::1], float64[::1], int64)", cache=True, error_model="numpy")

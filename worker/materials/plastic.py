@@ -4,12 +4,14 @@ import numpy as np
 
 from conoid.cases.laws.linear_hardening import LinearHardening
 
-from ..elements.scratch import D_XX, D_XY, D_YY, D_YZ, D_ZX, D_ZZ, TRIAL, VOLUME_MID
+from ..elements.scratch import D_XX, D_XY, D_YY, D_YZ, D_ZX, D_ZZ, NODAL, TRIAL, VOLUME_MID
 from ..kernels.jit import njit
 from ..model.rows import PLASTIC_STRAIN, S_XX, S_XY, S_YY, S_YZ, S_ZX, S_ZZ, WORK_PLASTIC, YIELD
 from ..model.state import CHUNK
 from .law import BEFORE_PRESSURE, FIRST, SHEAR, Law
 
+FACTOR = NODAL
+"""Row of the scratch: the new deviatoric stress over the trial stress."""
 _HARDENING = FIRST
 _SXX, _SYY, _SZZ = S_XX * CHUNK, S_YY * CHUNK, S_ZZ * CHUNK
 _SYZ, _SZX, _SXY = S_YZ * CHUNK, S_ZX * CHUNK, S_XY * CHUNK
@@ -26,18 +28,14 @@ def equivalent_stress(w, s, n):  # type: ignore[no-untyped-def]
 
 
 @njit("void(float64[::1], float64[::1], float64[::1], int64, float64)", cache=True, error_model="numpy")
-def linear_hardening(w, s, params, n, dt):  # type: ignore[no-untyped-def]
-    """Returns the trial stress to the yield surface; strain increment (q - yield) / (3 G + H), exact for this law. The
-    plastic work is the work of the mean of the rotated old stress and the new stress (as in mohr_coulomb.py).
+def return_radially(w, s, params, n, dt):  # type: ignore[no-untyped-def]
+    """Multiplies the trial stress by row FACTOR and adds the plastic work; TRIAL has the von Mises stress of the trial
+    stress. The plastic work is the work of the mean of the rotated old stress and the new stress (as in
+    mohr_coulomb.py).
     """
-    equivalent_stress(w, s, n)
-    shear3, shear2, hardening = 3.0 * params[SHEAR], 2.0 * params[SHEAR], params[_HARDENING]
+    shear2 = 2.0 * params[SHEAR]
     for i in range(n):
-        q, old = w[TRIAL + i], s[_YIELD + i]
-        over = max(q - old, 0.0)
-        increment = over / (shear3 + hardening)
-        new = old + hardening * increment
-        factor = new / q if over > 0.0 else 1.0
+        q, factor = w[TRIAL + i], w[FACTOR + i]
         moved = (
             s[_SXX + i] * w[D_XX + i]
             + s[_SYY + i] * w[D_YY + i]
@@ -51,9 +49,23 @@ def linear_hardening(w, s, params, n, dt):  # type: ignore[no-untyped-def]
         s[_SYZ + i] *= factor
         s[_SZX + i] *= factor
         s[_SXY + i] *= factor
+        s[_WORK + i] += w[VOLUME_MID + i] * (1.0 - factor) * max(twice, 0.0) / (2.0 * shear2)
+
+
+@njit("void(float64[::1], float64[::1], float64[::1], int64, float64)", cache=True, error_model="numpy")
+def linear_hardening(w, s, params, n, dt):  # type: ignore[no-untyped-def]
+    """Returns the trial stress to the yield surface; strain increment (q - yield) / (3 G + H), exact for this law."""
+    equivalent_stress(w, s, n)
+    shear3, hardening = 3.0 * params[SHEAR], params[_HARDENING]
+    for i in range(n):
+        q, old = w[TRIAL + i], s[_YIELD + i]
+        over = max(q - old, 0.0)
+        increment = over / (shear3 + hardening)
+        new = old + hardening * increment
+        w[FACTOR + i] = new / q if over > 0.0 else 1.0
         s[_YIELD + i] = new
         s[_STRAIN + i] += increment
-        s[_WORK + i] += w[VOLUME_MID + i] * (1.0 - factor) * max(twice, 0.0) / (2.0 * shear2)
+    return_radially(w, s, params, n, dt)
 
 
 def _begin(law: LinearHardening, _: float) -> dict[int, float]:

@@ -79,11 +79,6 @@ def linear(young: float, strength: tuple[float, float], context: Context) -> dic
     return law
 
 
-def no_rate(fields: Fields, names: str) -> None:
-    """Records the fields of a rate dependence."""
-    fields.refuse(names, "the flow stress depends on the rate there, not here")
-
-
 def failing(strain: float) -> dict[str, Any]:
     """Returns ``erosion`` of a plastic strain; none for 0 and for one that cannot be reached."""
     return {"plastic_strain": strain} if 0.0 < strain < 1e10 else {}

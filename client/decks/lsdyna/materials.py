@@ -7,9 +7,10 @@ from collections.abc import Callable
 
 from ..draft import Made
 from ..laws import hardening_of, line_of, young_of
-from .elasticity import Context, Curve, cut_off, elastic, failing, linear, no_rate, with_eos
+from .elasticity import Context, Curve, cut_off, elastic, failing, linear, with_eos
 from .fields import Fields
 from .johnson import holmquist, johnson_cook, simplified
+from .rate import with_rate
 
 
 def translated(name: str, fields: Fields, context: Context) -> Made | None:
@@ -81,20 +82,21 @@ def _mat_plastic_kinematic(fields: Fields, context: Context) -> Made:
             fields.entry.remark("refused", "BETA = 0", "kinematic hardening; here it is isotropic, BETA = 1")
     else:
         fields.real("BETA")
-    no_rate(fields, "SRC SRP")
-    fields.forgive("VP", "how the rate counts, of a law without rate")
     law = linear(young, (fields.real("SIGY"), hardening_of(young, tangent)), context)
+    law = with_rate(law, fields, context, ("SRC", "SRP"))
     return Made({**elastic(fields, context), "strength": law}, failing(fields.real("FS")))
 
 
 def _mat_piecewise(fields: Fields, context: Context) -> Made:
-    no_rate(fields, "C P LCSR")
-    fields.forgive("VP", "how the rate counts, of a law without rate")
+    fields.refuse("LCSR", "a curve of the flow stress by the rate; C and P are translated")
     fields.forgive("TDEL", "elements leave at a small step there; parts[].erosion.time_step does that here")
     failure = fields.real("FAIL")
     if failure < 0.0:
         fields.refuse("FAIL", "failure by a subroutine of the user")
     law = linear(fields.real("E"), _hardening_curve(fields, context), context)
+    law = with_rate(law, fields, context, ("C", "P"))
+    if law["model"] == "cowper_symonds" and "hardening" in law and fields.real("VP") == 1.0:
+        fields.refuse("VP", "the rate adds SIGY (rate/C)^(1/P) there; here it multiplies the hardening as well")
     return Made({**elastic(fields, context), "strength": law}, failing(failure))
 
 
@@ -131,13 +133,11 @@ def _mat_hydro(fields: Fields, context: Context) -> Made:
 
 
 def _mat_power(fields: Fields, context: Context) -> Made:
-    no_rate(fields, "SRC SRP")
-    fields.forgive("VP", "how the rate counts, of a law without rate")
     modulus, first = fields.real("K"), fields.real("SIGY")
     if fields.real("N") != 1.0 or first <= 0.0:
         raise ValueError("the law K (strain)^N is translated with N = 1 and SIGY above 0 alone")
     strength = first if first > 0.02 else modulus * first
-    law = linear(fields.real("E"), (strength, modulus), context)
+    law = with_rate(linear(fields.real("E"), (strength, modulus), context), fields, context, ("SRC", "SRP"))
     return Made({**elastic(fields, context), "strength": law}, failing(fields.real("EPSF")))
 
 
