@@ -17,7 +17,7 @@ from .commands import benches, converging, hard, listing, reports, server_runs, 
 from .commands.batch import batch_run
 from .commands.console import echo, echo_json, one_line, prepare
 from .commands.helping import Grouped
-from .commands.options import CaseArgument, Json, Overrides, Ranks, Threads, aloud, complain, on_cores, show, warn
+from .commands.options import CaseArgument, Json, Overrides, Ranks, aloud, complain, on_cores, show, warn
 from .commands.run_command import run_once
 from .decks.command import import_deck
 from .drawing.fields import FIELDS
@@ -160,7 +160,10 @@ app.command(name="import", short_help="Convert a deck of another code to a case.
 def run_case(
     case: CaseArgument,
     ranks: Ranks = None,
-    threads: Threads = None,
+    threads: Annotated[
+        int | None,
+        typer.Option("--threads", min=1, help="Threads of each rank; without it the case's own, else all cores."),
+    ] = None,
     overrides: Overrides = None,
     out: Annotated[Path, typer.Option("--out", help="Folder of the runs.")] = Path("runs/local"),
     picture: Annotated[Path | None, typer.Option("--view", help="PNG file for a picture of the last frame.")] = None,

@@ -24,7 +24,9 @@ class Run(Model):
     """Number of MPI processes. The answer does not depend on it."""
     threads: Annotated[Count, Field(ge=1, le=MOST_THREADS)] = 1
     """Number of threads of each MPI process. The answer does not depend on it. A run uses ``ranks`` times
-    ``threads`` cores; more of them than the machine has cores make it slower."""
+    ``threads`` cores; more of them than the machine has cores make it slower. ``conoid run`` and ``conoid demo`` use
+    all cores of the machine if a case does not give this key. On a server and in a sweep such a run uses one core,
+    because runs side by side use the cores better than the threads of one run."""
     profile: Annotated[str, Field(pattern=r"^[A-Za-z0-9_-]{0,32}$")] = ""
     """Profile of the site under which a batch system executes the run (docs/howto/cluster.md). The profile that is
     given at submission has priority."""

@@ -10,6 +10,7 @@ from rich.console import Console
 from conoid.cases.estimates.cores import usable_cores
 from conoid.cases.figures import counted, crew
 from conoid.cases.load import material, parse_case
+from conoid.cases.model.run import MOST_THREADS
 from conoid.cases.model.schema import Case
 from conoid.cases.outcome import Outcome
 from conoid.cases.output import fields
@@ -46,13 +47,17 @@ def run_once(
     check: bool = False,
     as_json: bool = False,
 ) -> int:
-    """Runs a case with a server of its own and returns the exit code. Ctrl-C and SIGTERM cancel the run, wait for
-    its end and stop the server. Raises CaseError, ClientError.
+    """Runs a case with a server of its own and returns the exit code. A case without ``run.threads`` runs on all
+    cores of this machine. Ctrl-C and SIGTERM cancel the run, wait for its end and stop the server. Raises CaseError,
+    ClientError.
     """
     if field is not None and field not in FIELDS:
         raise UsageError(f"field = {field!r}: {allowed(field, FIELDS)}")
     data = data_of(case, overrides)
     checked = parse_case(data)
+    if "threads" not in checked.run.model_fields_set:
+        data["run"]["threads"] = all_cores(checked.run.ranks)
+        checked = parse_case(data)
     if field in (lacking := fields.lacking(checked)):
         there = [name for name in FIELDS if name not in lacking]
         raise UsageError(f"field = {field!r}: no frame of {checked.name} has it; {allowed(field, there)}")
@@ -79,6 +84,11 @@ def run_once(
     if as_json:
         echo_json(_document(run.id, result, info, drawn))
     return _code(info, check)
+
+
+def all_cores(ranks: int) -> int:
+    """Returns the number of threads of each of ``ranks`` ranks with which a run uses all cores of this machine."""
+    return min(max(1, usable_cores() // ranks), MOST_THREADS)
 
 
 def _warn_of_cores(case: Case) -> None:

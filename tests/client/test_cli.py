@@ -18,6 +18,7 @@ from typer.testing import CliRunner, Result
 from conoid.cases.estimates.cores import usable_cores
 from conoid.cases.load import read_case, resolved_json, shipped_path
 from conoid.client.cli import app
+from conoid.client.commands import run_command
 from conoid.client.local.own_server import LocalServer
 
 from .bodies import write_run
@@ -320,6 +321,14 @@ def test_a_killed_client_leaves_no_server(alone: Path) -> None:
     wait_for(lambda: not processes_of(runs))
     outcome = next(runs.glob("*/outcome.json"))
     assert json.loads(outcome.read_bytes())["state"] == "succeeded", "the worker went on to its end"
+    resolved = json.loads((outcome.parent / "case.resolved.json").read_bytes())["run"]
+    assert resolved["threads"] == usable_cores(), "a run uses all cores if neither the case nor an option gives threads"
+
+
+@pytest.mark.parametrize(("ranks", "threads"), [(1, 8), (2, 4), (3, 2), (8, 1), (16, 1)])
+def test_ranks_share_the_cores(ranks: int, threads: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(run_command, "usable_cores", lambda: 8)
+    assert run_command.all_cores(ranks) == threads
 
 
 def test_watch_can_be_left(user: Path) -> None:
