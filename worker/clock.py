@@ -7,9 +7,9 @@ COLLAPSE = 1e-6
 Chosen value: a run with a million times as many steps would never end."""
 
 STARVED = 1e-3
-"""Stable step over the first stable step below which a warning is given. The rest of the run would then take a
-thousand times as many steps. Chosen value: dust and penetration reduce the stable step to a hundredth, which needs
-no warning."""
+"""Stable step over the first stable step below which a warning is given. With such a step the rest of the run would
+take a thousand times as many steps. Chosen value: dust and penetration reduce the stable step to a hundredth, which
+needs no warning."""
 
 SLOWED = 0.1
 """Stable step over the first stable step below which the stable step is named as the reason why a run has reached

@@ -1,11 +1,12 @@
-"""Erosion: worn tets are removed, the faces behind them become surface, and the energy and momentum removed are booked.
+"""Erosion: removes worn tets, makes the free faces of their neighbours surface, and books the removed energy and
+momentum.
 
 A tet is marked in the pass over the elements (elements/wear.py), when its force of n+1 is already in the nodal sums.
 The tet is removed before the contact of the next step, so that the exposed faces of its neighbours are in contact in
-that step. Its last force acts in one more kick: the second half of the work of that force is booked one step later, as
-for a boundary. Tets that exceed only a strain or damage limit are collected for some steps, because each removal
-requires new mean normals. Nodes without tets that contact has pushed are collected too, if their part removes such
-nodes (``erosion.nodes = "strike"``).
+that step. The last force of a removed tet acts in one more velocity update. Therefore the second half of the work of
+this force is booked one step later, as for a boundary. Tets that exceed only a strain or damage limit are collected for
+some steps, because each removal requires new mean normals. If a part has ``erosion.nodes = "strike"``, its nodes
+without tets that contact has pushed are collected in the same steps.
 """
 
 import numpy as np
@@ -165,9 +166,7 @@ class Erosion:
         state.v[self.removed] = 0.0
 
     def _remove(self, state: Nodes) -> None:
-        """Removes the marked tets, and the nodes that leave the model because all of their tets are removed.
-        Collective.
-        """
+        """Removes the marked tets, and the nodes that are removed because all of their tets are removed. Collective."""
         gone, left, ids = [np.zeros((0, exposure.WORDS), np.int64)], [], [np.zeros(0, np.int64)]
         for block in self._model.blocks:
             worn = np.flatnonzero(block.worn)

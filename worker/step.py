@@ -1,8 +1,7 @@
 """The time step, in order.
 
 Leapfrog: positions, stresses and forces are known at n, velocities at n-1/2. One pass over the elements computes
-stress(n+1) and from it f(n+1), so f(n) is already known when a step begins. Each row of the table is a part of the
-step:
+stress(n+1) and then f(n+1). Therefore f(n) is known when a step begins. Each row of the table is a part of the step:
 
 ==  =====================================================  ==========================
  1  choose dt (in the first step again, after 4)           from the limits at n
@@ -26,12 +25,13 @@ step:
 between the halves. After the last step, rows 1 to 10 are executed once more, and ``end`` sets the velocities to v(n).
 
 - Rigid bodies (rigid/stage.py) and moving walls act in rows 2, 6, 8, 9 and 11 only.
-- Surface that erosion exposes in 3 is in contact from 4 of the same step on.
-- 12 and 13 are one pass over each chunk of tets; the averaged pressure forms need two, with the exchange of the nodal
-  volume sums between them.
-- 14 starts after the border tets and ends after the interior ones, before the fracture criterion. The criterion runs
-  before the reduction, which then contains whether any facet breaks, and which ranks have a node of such a facet.
-- Broken facets that have opened wide enough to be surface are found in 8 and become surface after the reduction.
+- Surface that erosion exposes in row 3 has contact from row 4 of the same step on.
+- Rows 12 and 13 are one pass over each chunk of tets; the averaged pressure forms need two passes, with the exchange of
+  the nodal volume sums in between.
+- Row 14 starts after the border tets and ends after the interior tets, before the fracture criterion. The criterion is
+  computed before the reduction, which then contains whether any facet breaks, and which ranks have a node of such a
+  facet.
+- Broken facets that have opened wide enough to be surface are found in row 8 and become surface after the reduction.
 """
 
 import math

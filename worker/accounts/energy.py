@@ -1,11 +1,11 @@
 """The energy ledger: every joule is in one line, and the residual shows whether the lines add up.
 
-Kinetic energy is the form that the leapfrog step conserves together with the trapezoidal work of the forces. For
-equal steps this form is 1/2 m v(n-1/2) . v(n+1/2). With the steps dt- before n and dt+ after n, seen from before n,
-the form is 1/2 m v(n-1/2) . v(n+1/2) + 1/4 (dt- - dt+) v(n-1/2) . f(n). Seen from after n the form is less by 1/4
-(dt- - dt+) f(n) . (v(n-1/2) - v(n+1/2)). This difference is an error of the method, and is booked node by node as
-``stepping`` (docs/theory/time_integration.md, Time integration). Work of the stress is summed tet by tet from stress
-and strain rate, not from nodal forces, so the residual compares two independent accounts.
+Kinetic energy is the form that the leapfrog step conserves together with the trapezoidal work of the forces. For equal
+steps this form is 1/2 m v(n-1/2) . v(n+1/2). With the steps dt- before n and dt+ after n, seen from before n, the form
+is 1/2 m v(n-1/2) . v(n+1/2) + 1/4 (dt- - dt+) v(n-1/2) . f(n). Seen from after n the form is less by 1/4 (dt- - dt+)
+f(n) . (v(n-1/2) - v(n+1/2)). The energy that unequal steps create is an error of the method, and is booked for each
+node as ``stepping`` (docs/theory/time_integration.md, Time integration). Work of the stress is summed tet by tet from
+stress and strain rate, not from nodal forces, so the residual compares two independent accounts.
 """
 
 from typing import Any
@@ -65,7 +65,7 @@ class Ledger:
         return largest, self.momentum, self.angular_momentum, self.eroded_mass, self.making.keep()
 
     def resume(self, known: tuple[Any, ...]) -> None:
-        """Set the state of the ledger to ``keep``."""
+        """Restore the state of the ledger from the array of ``keep``."""
         largest, self.momentum, self.angular_momentum, self.eroded_mass, made = known
         self.making.resume(made)
         self.initial, self.came, self.worst, self.lost, self._taken, self.unpaid = largest

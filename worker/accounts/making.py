@@ -1,8 +1,9 @@
 """Energy that a line of the ledger makes, and its limit.
 
-The sum of all lines closes also if one of them is wrong: energy that a line returns and has never received moves the
-bodies, or goes into another line. So each line is judged by itself, over the largest energy so far: of the energy
-received, the work of the stress, or the kinetic energy.
+The sum of all energy lines can be correct although one line is wrong: if a line returns more energy than it has
+received, this energy moves the bodies or goes into another line. Therefore the energy created by each line is checked
+separately, relative to the largest energy so far: the largest of the energy received, the work of the stress, and the
+kinetic energy.
 
 ========  ==========================================  ===============================================
 lasting   plastic, viscous, friction, fracture        decrease of the line since its largest value
@@ -11,9 +12,9 @@ stepping  the time integration                        magnitude of the line: an 
 ========  ==========================================  ===============================================
 
 ``elastic`` is not judged: with an equation of state that depends on heat it is negative in hot matter that has expanded
-(docs/theory/time_integration.md, Time integration). Where such matter erodes, its elastic energy goes to ``eroded`` and
-its heat stays in ``plastic`` and ``viscous``: so ``eroded`` may be negative by that heat, and no more. No line is
-judged while the largest energy is round-off.
+(docs/theory/time_integration.md, Time integration). When such material erodes, its elastic energy moves to ``eroded``,
+and its heat stays in ``plastic`` and ``viscous``. Therefore ``eroded`` may be negative, at most by the heat of the
+eroded tets. No line is judged while the largest energy is round-off.
 """
 
 import math
@@ -60,7 +61,7 @@ class Making:
         return self._largest, self._energy, {name: (made.share, made.t) for name, made in self.worst.items()}
 
     def resume(self, known: tuple[dict[str, float], float, dict[str, tuple[float, float]]]) -> None:
-        """Set the state of the object to ``keep``."""
+        """Restore the state from the array of ``keep``."""
         self._largest, self._energy, worst = known
         self.worst = {name: Made(*made) for name, made in worst.items()}
 

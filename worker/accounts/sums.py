@@ -1,8 +1,8 @@
 """Sums of the energy ledger at time n, over the nodes, tets, boundaries, facets and bonds of all ranks.
 
-One reduction makes all sums, for each part and for the whole model, in the quanta of the whole model. The sums of
-the whole model add the same integers as the sums of the parts, so their bits do not depend on the parts. The sums of
-parts need no further pass.
+One reduction over the ranks adds all sums, for each part and for the whole model, in the quanta of the whole model. The
+sums of the whole model add the same integers as the sums of the parts, so their bits do not depend on the parts. The
+sums of parts need no further pass.
 """
 
 from dataclasses import dataclass, field

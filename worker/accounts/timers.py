@@ -42,8 +42,8 @@ class Spent:
     cpu: dict[str, float] = field(default_factory=_none)
     """CPU time of this thread by phase."""
     serial: dict[str, float] = field(default_factory=_none)
-    """Wall time outside of regions by phase, without the waiting. It includes the time of other programs on the same
-    core."""
+    """Wall time outside of regions by phase, without the waiting. The wall time includes the time of other programs on
+    the same core."""
     parallel: dict[str, float] = field(default_factory=_none)
     """Wall time in regions by phase."""
     waiting: float = 0.0
@@ -89,7 +89,7 @@ class Timers:
         return self.spent.cpu
 
     def begin(self) -> None:
-        """Start to count, in the phase ``rest``."""
+        """Start to measure time, in the phase ``rest``."""
         projecting = self._team.projecting
         self._spans = projecting.spans if projecting is not None else []
         for crew in projecting.crews if projecting is not None else ():
@@ -108,8 +108,8 @@ class Timers:
     def switch(self, name: str) -> str:
         """End the present phase, begin another one, and return the phase that ended.
 
-        Each change of phase reads the clock of the thread, a system call of up to 1 us. Therefore a step has as few
-        changes of phase as possible.
+        Each change of phase reads the clock of the thread, a system call of up to 1 us. Therefore a step changes the
+        phase as rarely as possible.
         """
         cpu, wall, waited, within = cpu_time(), wall_time(), self._comm.waited, self._team.within
         ended, spent = self._phase, self.spent
@@ -144,7 +144,9 @@ class Timers:
 
 
 class _Phase:
-    """Context of a phase. It is a class, since a step opens two dozen contexts and generators take longer."""
+    """Context of a phase. This context manager is a class, because a step opens two dozen contexts, and a generator
+    takes longer.
+    """
 
     __slots__ = ("_name", "_outer", "_timers")
 

@@ -1,10 +1,11 @@
 """Impulses of tied nodes: Jacobi sweeps, independent of order.
 
 A row requires zero relative velocity between its node s and the point of the mortar side, v_s - sum_j W_j v_j = 0,
-along all axes. Its impulse J acts on s, and -W_j J on the mortar nodes; in quanta, the tied node gets minus the sum of
-the impulses on the mortar nodes, so that momentum is conserved exactly. A sweep changes every impulse by the remaining
-relative velocity over a bound of the l1 norm of its row, and extrapolates the change (Nesterov 1983 for a strongly
-convex problem; factor in layout.momentum). In every sweep a row that may break is projected onto its limit (law.py).
+along all axes. The impulse J of a row acts on the tied node s, and -W_j J acts on the mortar nodes j. The impulses of
+the mortar nodes are rounded to quanta, and the tied node gets minus the sum of these quanta, so that momentum is
+conserved exactly. A sweep changes every impulse by the remaining relative velocity over a bound of the l1 norm of its
+row, and extrapolates the change (Nesterov 1983 for a strongly convex problem; factor in layout.momentum). In every
+sweep a row that may break is projected onto its limit (law.py).
 
 A pass over rows computes the impulses; a pass over nodes sums them by the rows of each node: no task reads what
 another task of the same pass writes, and the sums are of integers.

@@ -160,8 +160,9 @@ class Stopping(Boundary):
 
 
 class SymmetryPlane(Boundary):
-    """Plane of symmetry: nodes that start on the plane have no velocity across the plane while they have tets; the
-    mirrored tets hold such a node on the plane. A node without tets, and its image, are particles (mirrors.py).
+    """Plane of symmetry: a node that starts on the plane has no velocity across the plane while it has tets, because
+    the tets and their mirror images hold the node on the plane. A node without tets, and its image, are particles
+    (mirrors.py).
     """
 
     mirrors = True

@@ -111,8 +111,8 @@ def book_all(loss, impulse, before):  # type: ignore[no-untyped-def]
 def _push_out(table, begin, end, thread):  # type: ignore[no-untyped-def]
     """Task: stops the nodes of a range at all walls, and books half of the work.
 
-    Adds the impulses to ``impulse``, their part by friction to ``rubbed``, and the impulses of each wall to ``given``;
-    sets ``pushed`` (threads, 8; the rest is padding) if a wall stopped a node.
+    Adds the impulses to ``impulse``, the friction impulses also to ``rubbed``, and the impulses of each wall to
+    ``given``. Sets column 0 of ``pushed`` (threads, 8; the other columns are padding) if a wall stopped a node.
 
     1. Gap and velocity along the normal, and the square of the normal without ``mirrored`` components. 2. Impulse such
     that the gap at the end of the step is zero. 3. Friction: sliding velocity across the normal, at most mu times the

@@ -1,5 +1,5 @@
-"""Account of the energy that contact has taken from the bodies. This energy is the limit of the energy that contact may
-return to the bodies when contact corrects penetrations.
+"""Account of the energy that contact has taken from the bodies. When contact corrects penetrations, it may return at
+most this energy to the bodies.
 """
 
 import numpy as np

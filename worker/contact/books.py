@@ -16,8 +16,8 @@ from .scene.scene import Scene
 
 
 class Books:
-    """Sums of the energies and impulses of contact. One half of the work of an impulse, with v(n-1/2), is booked in the
-    step that applies it, the other half, with v(n+1/2), in the next step.
+    """Sums of the energies and impulses of contact. Half of the work of an impulse, with v(n-1/2), is booked in the
+    step that applies the impulse. The other half, with v(n+1/2), is booked in the next step.
     """
 
     def __init__(self, nodes: int, case: Case, impulse: float, energy: float, team: Team) -> None:

@@ -52,7 +52,7 @@ class Exterior:
         parcel.nodes["contact.loose"] = self.motion.loose
 
     def resume(self, parcel: Parcel, size: float, broken: bool) -> None:
-        """Restores the state of ``keep``. Collective."""
+        """Restores the state that ``keep`` has added to a parcel. Collective."""
         self.size, self._broken = size, broken
         turned = np.sort(parcel.rows["contact.turned"]["name"])
         self.surface.sharpen(turned)
@@ -106,9 +106,9 @@ class Exterior:
             self.surface.sharpen(np.union1d(self.surface.turned, self.surface.edges.names[turned]))
 
     def uncover(self, gone: Ints, loose: Flags, removed: Flags, scene: Scene | None) -> bool:
-        """Updates mean normals, surface nodes and the ``scene`` after erosion of the tets ``gone`` (k,
-        exposure.WORDS) of this rank. ``loose`` (nodes,): nodes without tets that stay in the model; ``removed``
-        (nodes,): nodes that leave it. Returns whether a search must add faces that the scene lacks. Collective.
+        """Updates mean normals, surface nodes and the ``scene`` after erosion of the tets ``gone`` (k, exposure.WORDS)
+        of this rank. ``loose`` (nodes,): nodes without tets that stay in the model; ``removed`` (nodes,): nodes that
+        are removed from the model. Returns whether a search must add faces that the scene lacks. Collective.
         """
         if self._near_erosion is None:
             self._near_erosion = np.zeros(0, np.int64)

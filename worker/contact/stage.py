@@ -100,7 +100,7 @@ class Contact:
         self.searches.keep(parcel)
 
     def resume(self, parcel: Parcel) -> None:
-        """Restores the state of ``keep``. Collective."""
+        """Restores the state that ``keep`` has added to a parcel. Collective."""
         books = self.books
         (
             books.scale, books.friction.scale, self.limit, self.searches.many, self._mean_dt, size,
@@ -138,8 +138,9 @@ class Contact:
         return self.books.impulses(self._comm)
 
     def uncover(self, gone: Ints, loose: Flags, removed: Flags) -> None:
-        """Updates the surface after erosion of the tets ``gone`` (k, exposure.WORDS) of this rank; ``loose``
-        (nodes,): nodes without tets that stay in the model; ``removed`` (nodes,): nodes that leave it. Collective.
+        """Updates the surface after erosion of the tets ``gone`` (k, exposure.WORDS) of this rank; ``loose`` (nodes,):
+        nodes without tets that stay in the model; ``removed`` (nodes,): nodes that are removed from the model.
+        Collective.
         """
         with self._timers.phase("contact"):
             self.searches.due |= self.exterior.uncover(gone, loose, removed, self.searches.scene)

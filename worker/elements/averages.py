@@ -3,9 +3,9 @@ row for each material of a node.
 
 A mean over the tets round a node is a value of the material there. At an interface of two materials the stress is
 continuous, so the volume strains of the two materials differ. A single mean over both materials would give each
-material the strain, and therefore the pressure, of the other material. A node therefore has a mean for each material of
-its tets, and a tet contributes only to the means of its own material. If no node has several materials, the rows of the
-means are the nodes.
+material the strain, and therefore the pressure, of the other material. Therefore a node has one mean for each material
+of its tets, and a tet contributes only to the means of its own material. If no node has several materials, the rows of
+the means are the nodes.
 """
 
 from collections.abc import Iterator, Sequence
@@ -44,7 +44,7 @@ class Averages:
         for block in model.blocks:
             block.own_averages = self._rows(block)
         self.neighbours = [Neighbour(other.rank, self._shared(other.nodes)) for other in neighbours]
-        """Other ranks, and the rows that this rank shares with each."""
+        """Neighbouring ranks, and the rows that this rank has in common with each of these ranks."""
 
     @classmethod
     def of(cls, case: Case, model: Model, neighbours: list[Neighbour]) -> "Averages | None":

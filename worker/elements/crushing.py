@@ -3,9 +3,9 @@ criterion (cases/warnings/compression.py).
 
 A material without a law of compressive failure breaks in tension only and bears any compression. Each stress is
 compared with the criterion of Griffith (1924): (s1 - s3)^2 / (8 T (s1 + s3)) for the largest and the smallest pressure,
-s1 and s3, and the tensile strength T. A material of this strength cracks at 1, and the ratio grows in proportion to the
-stress. Tension, s3 < 0, counts as zero: the tensile criterion covers it. The stress is the stress of the tets at the
-end of a step, without its viscous part.
+s1 and s3, and the tensile strength T. A material of this strength cracks at a ratio of 1. The ratio is proportional to
+the stress. Tension, s3 < 0, counts as zero: the tensile criterion covers it. The stress is the stress of the tets at
+the end of a step, without its viscous part.
 """
 
 from dataclasses import astuple, dataclass, replace
@@ -79,8 +79,8 @@ def _beyond(s1, s3, strength):  # type: ignore[no-untyped-def]
 @njit("boolean(float64[::1], int64, float64)", cache=True, error_model="numpy", forceinline=True)
 def _below(s, i, least):  # type: ignore[no-untyped-def]
     """Returns True if 8 T times the ratio of tet ``i`` of a chunk is below ``least``, Pa, by two bounds from the
-    invariants. The ratio is at most s1 / 8 T, and s1 <= p + 2 r, r = sqrt(J2 / 3). And s1 - s3 <= 2 sqrt(J2), s1 +
-    s3 >= 2 p - r.
+    invariants. The ratio is at most s1 / 8 T, and s1 <= p + 2 r, r = sqrt(J2 / 3). In addition s1 - s3 <= 2 sqrt(J2)
+    and s1 + s3 >= 2 p - r.
     """
     xx, yy, zz, yz, zx, xy = s[_SXX + i], s[_SYY + i], s[_SZZ + i], s[_SYZ + i], s[_SZX + i], s[_SXY + i]
     j2 = 0.5 * (xx * xx + yy * yy + zz * zz) + yz * yz + zx * zx + xy * xy
@@ -193,7 +193,7 @@ class Met:
 
 class Crushing:
     """Largest compression so far in each part of a brittle material without a law of compressive failure. The values
-    are those of this rank; ``keep`` and ``found`` take the maximum over the ranks.
+    belong to this rank; ``keep`` and ``found`` compute the maximum over the ranks.
     """
 
     def __init__(self, model: Model, strengths: Floats, comm: Comm, clock: Clock, team: Team) -> None:

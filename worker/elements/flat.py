@@ -77,7 +77,7 @@ def own_strain(w, s, params, flat, rows, n):  # type: ignore[no-untyped-def]
 )
 def own_pressure(eos, w, s, alone, params, flat, rows, n):  # type: ignore[no-untyped-def]
     """Computes pressure, its work and MODULUS of flat tets, if the pressures of other tets are means of their nodes:
-    ``alone`` is the state before the pressure, and is overwritten.
+    ``alone`` contains the state before the pressure is computed, and is overwritten.
     """
     modulus = w[MODULUS : MODULUS + CHUNK].copy()
     press(eos, w, alone, params, n)

@@ -1,8 +1,8 @@
 """Nodal means of heat and bulking in the averaged pressure forms.
 
 An equation of state with heat uses energy averaged in the same way as the volume strain: the heat of a single tet would
-increase its pressure relative to its neighbours, and the averaged volume strain would not reduce this pressure. The
-same holds for bulking.
+increase its pressure relative to its neighbours, and the averaged volume strain would not reduce this pressure. Bulking
+is averaged in the same way.
 """
 
 import numpy as np
@@ -60,7 +60,8 @@ def scatter_bulking(sums, w, s, params, weight, tets, n):  # type: ignore[no-unt
     """Adds a quarter of the new bulking of each tet to the sums of its nodes, weighted by volume as in
     ``scatter_heat``.
 
-    The unit is the bulk modulus. A flat tet, whose volume is zero here, keeps its bulking itself.
+    The unit is the bulk modulus. A flat tet has the volume zero in this sum and therefore gives no bulking to its
+    nodes.
     """
     per_bulk = 1.0 / params[BULK]
     for i in range(n):

@@ -22,9 +22,9 @@ from ..model.state import CHUNK, Floats
 from .scratch import CHANGE, MODULUS
 
 RATIO, PORES_AT, PRESSURE_AT, WORKED, TORN, OPENED, STIFF = range(7)
-"""Columns by node. State: volume ratio; pores as in state.PORES; pressure, Pa. Of the step, per initial volume: work
-of the pressure, J/m^3; the part of this work that is dissipated in pores, J/m^3; volume of new pores. Modulus of the
-wave speed, Pa."""
+"""Columns by node. State: volume ratio; pores as in state.PORES; pressure, Pa. Values of the step per initial volume:
+work of the pressure, J/m^3; the part of this work that is dissipated in pores, J/m^3; volume of new pores. Modulus of
+the wave speed, Pa."""
 COLUMNS = 8
 """Number of columns: one more than the columns that are used, so that a row is a cache line."""
 TETS, LINEAR = range(2)
@@ -40,8 +40,8 @@ def pressure_place(eos, params):  # type: ignore[no-untyped-def]
     """Returns TETS or LINEAR for the number of the equation of state and the constants of a part.
 
     With heat it is TETS: a node at the surface of a strong shock is compressed more than the mean of four (at 10 km/s
-    more than a step resolves). With dilation it is TETS too, because the pressure then contains a share of the flow of
-    the tet.
+    more than a step resolves). With dilation the value is also TETS, because the pressure then contains a part of the
+    plastic flow of the tet.
     """
     return LINEAR if eos == 0 and params[SPALL] < np.inf and params[DILATES] == 0.0 else TETS
 

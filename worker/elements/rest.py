@@ -1,5 +1,5 @@
-"""Chunks at rest, which no wave has reached yet. A pass over such a chunk changes nothing, so the pass is omitted, with
-identical results.
+"""Chunks at rest: chunks of tets that no wave has reached yet. A pass over a chunk at rest changes no value. Therefore
+the pass is omitted, and the results are identical.
 
 A chunk is noted as at rest after a complete pass that found zero velocity at all its nodes, left every bit of its
 state unchanged and made no force. A pass is a function of that state, the nodal velocities, the positions, which are

@@ -24,7 +24,7 @@ AREAS = 21 * CHUNK
 MODULUS = 22 * CHUNK
 """Density times the square of the wave speed, Pa."""
 LIMIT = 23 * CHUNK
-"""One over the largest stable step, 1/s."""
+"""Reciprocal of the largest stable step, 1/s."""
 TRIAL = 24 * CHUNK
 """Von Mises equivalent of the trial stress, Pa."""
 SEEN = 25 * CHUNK

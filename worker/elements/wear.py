@@ -1,7 +1,7 @@
 """Worn tets, which erosion removes: by plastic strain, damage, volume or stable step.
 
 A tet that becomes flat or inverted must be removed before it collapses: its velocity gradient is proportional to one
-over its altitude, and a single tet whose altitude passes zero would accelerate its nodes without bound. Such a tet is
+over its altitude, and a single tet whose altitude passes zero would accelerate its nodes without bound. A marked tet is
 removed in the next step. The removal of a tet that exceeds only a strain or damage limit is delayed until several tets
 are removed together (worker/erosion.py).
 """

@@ -11,7 +11,7 @@ r"""Cohesive facets: a traction that falls linearly with the opening, irreversib
       +--+--+----> D                     The opening starts from an offset of size e along the traction at insertion:
          e   e + critical                x+ = x- is D = e, T = that traction.
 
-     second side       3-------------4      A facet from the side (nodes 2 and 5 are behind). It has three pairs of
+     second side       3-------------4      A facet from the side (nodes 2 and 5 are behind). A facet has three pairs of
                       .      n      .       nodes, (0, 3), (1, 4) and (2, 5), each with an opening, a traction and a
      middle    - - - . - - - ^ - - . - -    third of the area. n is the normal of the triangle in the middle between the
                     .        +-> e.         sides, e a unit vector along its first edge:

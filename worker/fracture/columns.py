@@ -95,7 +95,7 @@ class Facets(NamedTuple):
         return Facets.of({name: column[chosen] for name, column in self.columns().items()})
 
     def and_more(self, new: "Facets") -> "Facets":
-        """Returns these facets followed by the ``new`` ones."""
+        """Returns these facets, followed by the ``new`` facets."""
         rows = new.columns()
         return Facets.of({name: extended(column, rows[name]) for name, column in self.columns().items()})
 

@@ -1,4 +1,5 @@
-"""Fracture criterion: the traction on a facet, the mean of those of its two tets, against its strength.
+"""Fracture criterion: compares the traction on a facet, the mean of the tractions of its two tets, with the strength of
+the facet.
 
 A facet breaks where sqrt(<t_n>^2 + w t_s^2) reaches the strength, with the Macaulay bracket that the paper's eq. (1)
 lacks; under pressure, where sqrt(w) <t_s - mu |t_n|> reaches the strength (Camacho and Ortiz 1996). ::

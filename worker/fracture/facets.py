@@ -22,8 +22,8 @@ ELSEWHERE = -2
 
 @dataclass
 class Body:
-    """Body: the facets of a block that break by one law. These are either the facets between tets of the block, or the
-    facets between the block and another part.
+    """Body: the facets of a block that break by one law. The facets of the bond are either all facets between tets of
+    the block, or all facets between the block and another part.
     """
 
     index: int

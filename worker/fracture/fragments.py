@@ -5,11 +5,11 @@ solve the small graph of the pieces that are connected across ranks, in the same
 
 A tet gives a quarter of its mass to each of its nodes, at the position and with the velocity of the node: so mass,
 momentum, angular momentum and energy of all fragments together are equal to the sums over the nodes. (The inertia is
-the inertia of lumped masses. It is larger than the inertia of the solid, for a single tet five times as large.) Nodes
-without tets belong to no fragment. The values of tets are summed by fragment as integers; the quantum of each fragment
-is 2^-60 of its largest term, so that the result is independent of order and ranks, and small fragments keep their
-digits beside a large one. Centre and velocity are summed first, and quantities relative to them in a second pass: sums
-about the origin would lose the digits of r^2 / extent^2.
+the inertia of lumped masses. This inertia is larger than the inertia of the solid; for a single tet it is five times as
+large.) Nodes without tets belong to no fragment. The values of tets are summed by fragment as integers; the quantum of
+each fragment is 2^-60 of its largest term, so that the result is independent of order and ranks, and small fragments
+keep their digits beside a large one. Centre and velocity are summed first, and quantities relative to them in a second
+pass: sums about the origin would lose the digits of r^2 / extent^2.
 """
 
 import csv
@@ -97,8 +97,8 @@ def table(model: Model, labels: list[Ints], comm: Comm) -> "np.ndarray | None":
     """(fragments,) of ``FRAGMENT``, by ascending label, on rank 0, elsewhere None; with the velocities of the nodes.
     Collective.
 
-    The same bits for any number of ranks: the values of a tet result from the same operations everywhere, sums over
-    tets are exact, and quantities derived from them are computed once.
+    The results are the same to the bit for any number of ranks: the values of a tet result from the same operations on
+    every rank, sums over tets are exact, and quantities derived from these sums are computed once.
     """
     blocks, nodes = model.blocks, model.nodes
     tets = np.concatenate([np.zeros((0, 4), np.int64), *(block.tets for block in blocks)]).astype(np.int64)
@@ -184,7 +184,7 @@ def _node_counts(model: Model, tets: Ints, groups: Groups, comm: Comm) -> Ints:
 def _finished(rows: "np.ndarray") -> "np.ndarray":
     """Fills in the quantities that follow from the sums: energies and extent. Rotation is 1/2 L . I^-1 L.
 
-    Axes without inertia have no angular momentum and are left out. On entry ``deformation`` is the kinetic energy
+    Axes without inertia have no angular momentum and are omitted. On entry ``deformation`` is the kinetic energy
     relative to the centre.
     """
     xx, yy, zz, yz, zx, xy = rows["inertia"].T

@@ -21,7 +21,7 @@ from .stars import Stars
 
 
 class Initiation:
-    """Finds the facets that break on one rank, and keeps the clocks of the delayed criterion."""
+    """Finds the facets that break on one rank, and stores the clocks of the delayed criterion."""
 
     def __init__(
         self, model: Model, bodies: list[Body], specs: dict[int, Fracture], stars: dict[int, Stars],

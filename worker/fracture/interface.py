@@ -1,5 +1,5 @@
-"""Shared facets: facets whose two tets are on different ranks, or in two blocks of one rank. Both sides compute the
-same mean traction.
+"""Shared facets: facets whose two tets are on different ranks, or in two blocks of one rank. The two ranks at a facet
+compute the same mean traction.
 
 A facet breaks only if one of its tets alone would break it, so two ranks exchange tractions only in steps in which a
 facet shared by the two ranks is overstressed. A flag for this is sent with the forces of shared nodes.

@@ -65,9 +65,9 @@ class Separation:
     def separate(self, touched: Ints) -> Split:
         """Separates the nodes of the broken facets; returns the topology change.
 
-        ``touched``: the maximum over all ranks; collective among the ranks that it marks. Changes connectivity,
-        masses and shared nodes; the caller moves the forces. Other ranks receive the new number of nodes in the
-        reduction of the next step.
+        ``touched``: the maximum over all ranks; collective among the ranks that it marks. Changes connectivity, masses
+        and shared nodes; the caller moves the forces. Ranks without a changed node receive the new number of nodes in
+        the reduction of the next step.
         """
         self.broken += int(touched.sum() - np.count_nonzero(touched))
         if not touched[self._comm.rank]:

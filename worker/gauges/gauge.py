@@ -35,4 +35,4 @@ class Gauge(Protocol):
         """Return the state of the gauges for a checkpoint: numbers and arrays in lists, equal on all ranks."""
 
     def resume(self, known: Any) -> None:
-        """Set the state of the gauges to ``keep``."""
+        """Restore the state of the gauges from the data of ``keep``."""

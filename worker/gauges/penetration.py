@@ -18,8 +18,7 @@ LINES = np.arange(1, 11) / 10.0
 MEASURED = (0, 2, 4)
 """Indices in ``LINES`` of the lines whose depths are averaged: the lines at 0.1, 0.3 and 0.5 of the radius."""
 _TOUCHING = 1e-6
-"""Largest gap, divided by the radius, that counts as closed. It is the distance by which ``spans`` moves lines
-aside."""
+"""Largest gap, divided by the radius, that counts as closed. ``spans`` moves lines to the side by this distance."""
 
 
 def spans(x: Floats, tets: Tets, axis: int, at: tuple[float, float]) -> tuple[Ints, Floats]:
@@ -103,9 +102,9 @@ def depth(rows: Floats, thick: Floats, radius: float) -> float:
     """Return the part of the thickness ``thick`` (measured lines, parts), m, that lies in front of the end of the hole,
     m.
 
-    The hole starts at the low end of the axis. The remaining thickness of each part is the distance from the end of
-    the hole to the rear of the part. This distance includes cavities. The rear is the furthest point of the part on
-    any line, since a cavity may have opened the rear on some lines.
+    The hole starts at the low end of the axis. The remaining thickness of each part is the distance from the end of the
+    hole to the rear of the part. The distance includes cavities. The rear is the furthest point of the part on any
+    line, since a cavity may have opened the rear on some lines.
     """
     rears = np.full(thick.shape[1], -np.inf)
     np.maximum.at(rears, rows[:, 1].astype(int), rows[:, 3])

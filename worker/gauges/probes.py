@@ -84,7 +84,7 @@ class Probes:
         self._gauges = _gauges(case, scene)
         self._sums = NodeSums(case, scene)
         self.sums = any(isinstance(gauge, NodeSums) for gauge in self._gauges)
-        """Whether some probe is a sum over nodes. Such probes need the velocities at time n."""
+        """Whether some probe is a sum over nodes. Probes of these fields need the velocities at time n."""
         other = (*PUSHES, *SUMS, *BEYOND, *SHAPES)
         self._means = [k for k, name in enumerate(self._fields) if kind(name) not in other]
         model = scene.model
@@ -129,7 +129,7 @@ class Probes:
         return [gauge.keep() for gauge in self._gauges]
 
     def resume(self, known: list[Any]) -> None:
-        """Set the state of the gauges to ``keep``."""
+        """Restore the state of the gauges from the data of ``keep``."""
         for gauge, own in zip(self._gauges, known, strict=True):
             gauge.resume(own)
 

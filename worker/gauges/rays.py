@@ -1,4 +1,4 @@
-"""Rays normal to an axis from a point to the nearest matter. They measure the shape of a hole round the axis."""
+"""Rays normal to an axis from a point to the nearest matter. The rays measure the shape of a hole round the axis."""
 
 import numpy as np
 
@@ -7,8 +7,7 @@ from ..mesh.faces import FACES
 from ..model.state import Floats, Tets
 
 RAYS = 360
-"""Number of rays. This value was chosen: a hole with a hundred tets on its circumference has three or four rays for
-each tet."""
+"""Number of rays. Chosen value: a hole with a hundred tets on its circumference has three or four rays for each tet."""
 
 
 def directions(axis: int) -> Floats:

@@ -19,14 +19,13 @@ from .gauge import Scene
 
 _AXES = "xyz"
 _DAMAGED = 0.5
-"""Damage of a tet above which the tet counts as broken. This value was chosen: damage rises from 0 to 1 within few
-steps."""
+"""Damage of a tet above which the tet counts as broken. Chosen value: damage rises from 0 to 1 within few steps."""
 
 
 class Shapes:
     """The probes of shapes on this rank.
 
-    Their state is measured at the start: thicknesses, rays that hit matter, areas of faces.
+    At the start each probe measures its initial state: thicknesses, rays that hit material, areas of faces.
     """
 
     def __init__(self, case: Case, scene: Scene) -> None:

@@ -38,7 +38,7 @@ _MOST_WORDS = 500
 _PATIENCE = 900.0
 """Time limit for the compilation of a module, s: the largest module takes ten seconds on an idle core."""
 _HASH = "hash"
-"""File in the folder of a module. It marks all kernels of the module as compiled, and contains the hash of their
+"""File in the folder of a module. This file marks all kernels of a module as compiled, and contains the hash of their
 sources."""
 _LOCK, _LOOK = "lock", 0.3
 """Lock file of the program that compiles, and interval between two tests of the lock, s: a tenth of WORD_EVERY."""
@@ -48,8 +48,8 @@ def compile_all(folder: Path, tell: Tell, root: Path = store.ROOT, package: str 
     """Compiles every kernel below ``root`` that ``folder`` lacks; returns False if none is missing. Raises
     CompileError.
 
-    Only one program compiles at a time. Another program waits, and continues the compilation if the first one is
-    killed.
+    A lock ensures that only one program compiles at a time. Another program waits, and continues the compilation if the
+    first one is killed.
     """
     if (folder / COMPLETE).exists():
         return False
@@ -254,7 +254,7 @@ def _serve() -> int:
     """Runs the child: imports the modules named on standard input, compiles their kernels, and writes the name of each
     finished module. Returns the exit code.
 
-    Only the answers go to standard output; all other output goes to standard error.
+    A child prints only its answers to standard output, and everything else to standard error.
     """
     import importlib
 

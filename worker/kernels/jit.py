@@ -110,8 +110,8 @@ class Kernel(CPUDispatcher):
         self._cache = _Cache(self.py_func)  # type: ignore[no-untyped-call]
 
     def load(self) -> None:
-        """Compiles the kernel and the kernels that it calls, or loads them from the cache. This happens once, in any
-        thread.
+        """Compiles the kernel and the kernels that it calls, or loads them from the cache. The kernel is loaded once,
+        in the thread that calls it first.
         """
         with global_compiler_lock:
             if self.overloads:

@@ -66,8 +66,9 @@ def increments(w, params, m, fast):  # type: ignore[no-untyped-def]
 
         OVER = 3 G d + STATIC u + H d (1 + u)
 
-    The right side increases with u and is convex, so that Newton's method converges from above without a bracket. It
-    begins at the smaller of the roots that STATIC u and (3 G + H) d have alone, which is above the root.
+    The right side increases with u and is convex, so that Newton's method converges from above without a bracket. The
+    iteration begins at the smaller of the two roots of the equation with only the term STATIC u and with only the term
+    (3 G + H) d. This value is above the root.
     """
     stiffness, q, count = 3.0 * params[SHEAR] + params[_HARDENING], params[_Q], 0
     for j in range(m):

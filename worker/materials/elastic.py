@@ -1,5 +1,5 @@
-"""Hypoelastic deviatoric stress with an exact rotation. This stress is the trial stress of materials with a strength
-law.
+"""Hypoelastic deviatoric stress with an exact rotation. For materials with a strength law the elastic stress is the
+trial stress.
 """
 
 import numpy as np

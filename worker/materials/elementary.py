@@ -1,7 +1,7 @@
 """Functions log and exp with the same bits on any processor, for loops over a chunk that the compiler vectorises.
 
-The functions use only + - * / and the bits of a float64 as an integer. These operations give the same result in a
-vector lane and in a scalar, so no result depends on a C library. Derived in docs/theory/sums.md.
+The functions use only + - * / and the bits of a float64 as an integer. These operations give the same result in vector
+code and in scalar code, and no result depends on a C library. Derived in docs/theory/sums.md.
 """
 
 import numpy as np

@@ -29,9 +29,10 @@ def inverse_sixth_root(u):  # type: ignore[no-untyped-def]
     """Returns u^(-1/6), to round-off for u from 1e-24 to 1e24: y (1 - r)^(-1/6), 1 - r = u y^6, by its series, three
     times.
 
-    Only + - * and the bits of a float64 as an integer, with equal results in a vector lane and in a scalar: there is no
-    root and no quotient, because each takes as long as ten products. The bits are a piecewise linear logarithm; a sixth
-    of the distance of the bits from the bits of 1, computed by shifts, gives the first y, which is exact at 1.
+    The computation uses only + - * and the bits of a float64 as an integer, with equal results in vector code and in
+    scalar code. It uses no root and no quotient, because each takes as long as ten products. The bits are a piecewise
+    linear logarithm; a sixth of the distance of the bits from the bits of 1, computed by shifts, gives the first y,
+    which is exact at 1.
     """
     far = np.float64(u).view(np.int64) - _ONE
     y = np.int64(_ONE - ((far >> 3) + (far >> 5) + (far >> 7) + (far >> 9) + (far >> 11))).view(np.float64)
@@ -75,8 +76,8 @@ def _strains(w, n):  # type: ignore[no-untyped-def]
 
 @njit("void(float64[::1], int64, float64)", cache=True, error_model="numpy")
 def _roots(w, n, shear):  # type: ignore[no-untyped-def]
-    """Sets rows k = det(1 + A)^(-1/3), k - 1 without cancellation, and G / 2J. This is a separate loop so that these
-    long chains of operations overlap.
+    """Sets rows k = det(1 + A)^(-1/3), k - 1 without cancellation, and G / 2J. This computation is a separate loop, so
+    that the long chains of operations of several tets overlap.
 
     NaN if round-off leaves no positive determinant.
     """

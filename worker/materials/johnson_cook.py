@@ -45,8 +45,8 @@ _PLACE, _Q, _KNOWN, _HOT, _WARM, _LEFT, _LOW, _HIGH, _D, _OPEN, _STATIC, _SUM, _
     NODAL + k * CHUNK for k in range(15)
 )
 _MOST = 140
-"""Largest number of iterations. Every second iteration is a halving, and the halvings alone reach the last bit of a
-float64 (52 bits)."""
+"""Largest number of iterations. Largest number of iterations. Every second iteration halves the bracket at least, so
+the bracket reaches the last bit of a float64 (52 bits)."""
 _CLOSE = 1e-4
 """Relative Newton step at which the iteration ends. The remaining error is the square of this step, below 1e-8 of
 the stress."""

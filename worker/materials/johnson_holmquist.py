@@ -278,7 +278,7 @@ def _constants(law: JohnsonHolmquist) -> tuple[float, ...]:
 
 
 PRESSURE_LAW = Equation("johnson_holmquist", DAMAGE + 1, lambda _: (), crumbling, volumes_by_ratio, CORNERS + 4)
-"""Equation of state of the law. Its pressure contains bulking (a nodal mean in the averaged forms) and the tension
+"""Equation of state of the law. The pressure contains bulking (a nodal mean in the averaged forms) and the tension
 cut-off of the law."""
 LAW = Law(
     "johnson_holmquist", AFTER_PRESSURE, lambda _: DAMAGE + 1, _constants,

@@ -1,5 +1,5 @@
-"""Interface of a strength law. One file contains the constants of the law, its state rows, its place in the step, and
-its kernel for a chunk.
+"""Interface of a strength law. Each law has one file with its constants, its state rows, its place in the step, and its
+kernel for a chunk.
 
 The keys of the law in a case, its cost and its plausibility warnings are in the file of the same name in cases/laws.
 The file models.py lists the laws; a law needs no other file.

@@ -59,8 +59,8 @@ def principal(xx, yy, zz, yz, zx, xy):  # type: ignore[no-untyped-def]
     order of round-off, also for equal values.
 
     The isolated value x solves x^3 - x / 3 = det s, which is well conditioned: three Newton steps from the chord. The
-    rest of s, without x and its projector (s^2 + x s + x^2 - 1/3) / (3 x^2 - 1/3), gives the distance between the other
-    two principal values.
+    distance between the other two principal values follows from s without x and its projector (s^2 + x s + x^2 - 1/3) /
+    (3 x^2 - 1/3).
     """
     det = xx * (yy * zz - yz * yz) + xy * (yz * zx - xy * zz) + zx * (xy * yz - yy * zx)
     size = abs(det)
@@ -115,8 +115,8 @@ def returned(d1, d2, d3, strength, sine, cap):  # type: ignore[no-untyped-def]
 )
 def dilated(d1, d2, d3, strength, sine, cap, psi, shear2, bulk):  # type: ignore[no-untyped-def]
     """Returns the principal deviatoric stresses projected onto the yield surface with flow along (1 + psi, 0, psi - 1),
-    which increases volume, pressure and strength; psi: sine of the dilation angle. Also returns the amount of flow; the
-    plastic volume strain is 2 psi times this amount.
+    which increases volume, pressure and strength; psi: sine of the dilation angle. The kernel also returns the amount
+    of flow; the plastic volume strain is 2 psi times this amount.
 
     The cap is applied first, at constant volume. Flow ends where the deviator is zero.
     """

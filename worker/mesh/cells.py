@@ -38,7 +38,7 @@ class Form(Enum):
 class Kind:
     """Elements of one form and order.
 
-    Each of the ``edges`` has a node in its middle. These nodes follow the corners, in the order of ``edges``.
+    Each of the ``edges`` has a node in its middle. The midside nodes follow the corners, in the order of ``edges``.
     ``nodes`` is the number of all nodes; nodes after the middles of edges are ignored.
     """
 

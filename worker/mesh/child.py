@@ -1,9 +1,9 @@
 """Child process that runs gmsh and reads foreign files: ``python -m conoid.worker.mesh.child``.
 
-gmsh is GPL, and gmsh and any parser may crash, hang or request all memory. Therefore they run in a separate process
-with limits on memory, CPU time and wall time, an environment without secrets and an empty working folder. The
-process reads one JSON request from standard input. The mesh is returned as an .npz file, an error as one line on
-standard error.
+gmsh is GPL, and gmsh and any parser may crash, hang or request all memory. Therefore meshers and readers run in a
+separate process with limits on memory, CPU time and wall time, an environment without secrets and an empty working
+folder. The process reads one JSON request from standard input. The mesh is returned as an .npz file, an error as one
+line on standard error.
 """
 
 import ctypes
@@ -98,8 +98,8 @@ def _watched(child: subprocess.Popen[bytes], request: bytes, key: str, limits: L
     """Return the text of the child on standard error, once the child has ended. If the child exceeds a limit, end the
     child and raise MeshError.
 
-    Memory is tested from this process, too: Python can loop for ever when even an exception does not fit into
-    memory.
+    The memory of the child is also checked from this process: Python can loop for ever when even an exception does not
+    fit into memory.
     """
     last, message = time.monotonic() + limits.wall, request
     try:

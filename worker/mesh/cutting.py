@@ -1,10 +1,10 @@
 """Cuts of hexahedra, wedges and pyramids into tets with matching faces.
 
-Each quadrilateral face is cut by the diagonal through the smallest of its four node numbers. Both elements of the
-face therefore cut it in the same way, on any rank. A cut of an element with these diagonals always exists
-(Dompierre, Labbe, Vallet, Camarero 1999, "How to subdivide pyramids, prisms and hexahedra into tetrahedra"). If
-there are several such cuts, the cut with the longest stable step is chosen. If all cuts are flat or have a far
-shorter step, a node in the middle of the element is added.
+Each quadrilateral face is cut by the diagonal through the smallest of its four node numbers. Therefore the two elements
+of a face cut the face in the same way, on any rank. A cut of an element with these diagonals always exists (Dompierre,
+Labbe, Vallet, Camarero 1999, "How to subdivide pyramids, prisms and hexahedra into tetrahedra"). If there are several
+such cuts, the cut with the longest stable step is chosen. If all cuts are flat or have a far shorter step, a node in
+the middle of the element is added.
 """
 
 from collections.abc import Iterator

@@ -1,8 +1,7 @@
 """Local frame of bodies: its origin is the point where the sector is cut, its third direction is the axis of the body.
 
-Both generators work in (a, b, c), the cyclic order of ``across(axis)`` and ``axis``, and rotate the points at the
-end. Therefore each body is implemented once and not for each axis. The rotation only permutes coordinates and is
-exact.
+The generators work in the frame (a, b, c), the cyclic order of ``across(axis)`` and ``axis``, and rotate the points at
+the end. Therefore each body is implemented for one axis only. The rotation only permutes coordinates and is exact.
 """
 
 import numpy as np

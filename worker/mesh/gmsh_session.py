@@ -1,4 +1,4 @@
-"""Sessions of gmsh. They run in the child process only, because gmsh is GPL and can crash."""
+"""Sessions of gmsh. Sessions run in the child process only, because gmsh has the licence GPL and can crash."""
 
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager

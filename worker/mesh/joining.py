@@ -25,7 +25,8 @@ Placed = tuple[int, Origin | None, Floats]
 def joined(case: Case, placed: Mapping[int, Placed], n: int) -> Ids:
     """Return (n,) the node that represents each of the ``n`` nodes of the ``placed`` parts, by their numbers.
 
-    Of nodes that bonds merge, the first represents all of them. Raises InputError for a bond without common nodes.
+    If bonds merge several nodes, the first of these nodes replaces all of them. Raises InputError for a bond without
+    common nodes.
     """
     edges = [np.zeros((0, 2), np.int64)]
     for k, _, i, j in shared_bonds(case):
@@ -48,7 +49,8 @@ def joined(case: Case, placed: Mapping[int, Placed], n: int) -> Ids:
 def _refuse_open(case: Case, placed: Mapping[int, Placed], stands: Ids) -> None:
     """Raise InputError for two parts of one body with coincident faces, but without a bond between them.
 
-    Such parts would separate at these faces without contact. ``stands``: the result of ``joined``.
+    Parts without a bond would separate at these faces, and no contact would act there. ``stands``: the result of
+    ``joined``.
     """
     body = bodies(case)
     numbers = {part.name: i for i, part in enumerate(case.parts)}
@@ -97,7 +99,8 @@ def require_faces(case: Case, there: Container[int], across: Ints, tet_part: Int
     """Raise InputError for a bond without a common face, and for parts of one body with a common face but without a
     bond.
 
-    Only parts in ``there``, by number, are checked. ``across``: (tets, 4) neighbours of all tets (``faces.across``).
+    Only the parts whose numbers are in ``there`` are checked. ``across``: (tets, 4) neighbours of all tets
+    (``faces.across``).
     """
     tet, face = np.nonzero(across >= 0)
     pairs = np.column_stack([tet_part[tet], tet_part[across[tet, face] // 4]])

@@ -1,7 +1,8 @@
 """Order of nodes and tets along the Morton curve: neighbours in space become neighbours in memory.
 
 A kernel over tets gathers and scatters nodes, so the order determines the rate of cache hits: on unstructured meshes
-the order gives a factor of 1.3 to 1.6 in speed. It also makes the numbering independent of how the mesh was made.
+the order gives a factor of 1.3 to 1.6 in speed. The order also makes the numbering independent of the generator or file
+of the mesh.
 """
 
 from dataclasses import replace
@@ -47,7 +48,7 @@ def _spread(bits: NDArray[np.uint64]) -> NDArray[np.uint64]:
 def morton_ordered(mesh: TetMesh) -> TetMesh:
     """Return the mesh with nodes, and tets by centroid, along the Morton curve of the bounding cube of the mesh.
 
-    Nodes or tets at equal positions keep their order. The node order within a tet is kept, too.
+    Nodes or tets at equal positions keep their order. The order of the nodes within a tet does not change.
     """
     low = mesh.points.min(axis=0)
     edge = float((mesh.points.max(axis=0) - low).max())

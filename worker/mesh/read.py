@@ -1,9 +1,9 @@
 """Reader of mesh files, for the child process: files are untrusted input.
 
-Conoid has readers of its own, because gmsh and meshio fail on some files. gmsh takes a .msh file without a known
-header for a script, which can start programs. gmsh also adds ghost cells to the elements without a message, and adds
-all tets of an entity of the format 2.2 to the groups of any of them. meshio ends the process on an unknown element
-type of .inp, does not place instances and does not name the line of an error.
+Conoid has its own readers, because gmsh and meshio fail on some files. gmsh treats a .msh file without a known header
+as a script, which can start programs. gmsh also adds ghost cells to the elements without a message, and adds all tets
+of an entity of the format 2.2 to the groups of any of them. meshio ends the process on an unknown element type of .inp,
+does not place instances and does not name the line of an error.
 """
 
 import hashlib

@@ -19,9 +19,9 @@ LOST = 1e-3
 """Share of the volume that straight edges may lose. If more is lost, tets are cut into eight. Chosen value: the mass
 has the same error, and eight tets with half the step cost 16 times as much as one tet."""
 _OFF = 0.4
-"""Largest distance of a node from the middle of its edge, divided by the length of the edge. Chosen value: this
-ratio is 0.25 for quarter points, and 0.21 for an arc of 90 degrees. It is 0.5 for the middle of another edge of a
-regular tet, which indicates another order of nodes."""
+"""Largest distance of a node from the middle of its edge, divided by the length of the edge. Chosen value: this ratio
+is 0.25 for quarter points, and 0.21 for an arc of 90 degrees. For the middle of another edge of a regular tet the ratio
+is 0.5; such a value means that the file has another order of nodes."""
 _CORNERS = ((0, 4, 6, 7), (4, 1, 5, 8), (6, 5, 2, 9), (7, 8, 9, 3))
 _LONG = ((4, 9), (6, 8), (7, 5))
 """Opposite corners of the octahedron that remains between the four corner tets."""
@@ -72,8 +72,8 @@ def _area(corners: Sequence[Floats]) -> Floats:
 def eight(nodes: Ids, points: Floats) -> Ids:
     """Return (m, 8, 4) the eight tets of each of the tets (m, 10).
 
-    One tet is at each corner. Four tets surround one of three diagonals of the octahedron between the corner tets.
-    The chosen diagonal has the longest stable step; most often it is the shortest diagonal.
+    Four of the tets are at the corners. Four tets surround one of three diagonals of the octahedron between the corner
+    tets. The chosen diagonal has the longest stable step; most often it is the shortest diagonal.
     """
     every = np.stack([nodes[:, [*_CORNERS, *_inner(*long)]] for long in _LONG], axis=1)
     volume, area = volume_and_area(points, every)

@@ -1,8 +1,8 @@
 """Smoothing of the tets that limit the time step. In an explicit run the worst tet limits every step.
 
-The tets with the shortest step length are processed first. One node of such a tet is moved along the gradient of the
-step length, as far as the worst tet at the node improves. Nodes on the boundary slide along the boundary, so the
-body keeps its shape.
+The tets with the shortest step length are processed first. One node of a tet with a small step length is moved along
+the gradient of the step length, as far as the worst tet at the node improves. Nodes on the boundary slide along the
+boundary, so the body keeps its shape.
 """
 
 import heapq

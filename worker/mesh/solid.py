@@ -41,7 +41,8 @@ class _Tets:
     numbers: Ids
     lines: Ids
     middles: Floats = field(default_factory=lambda: np.zeros((0, 3)))
-    """(j, 3) positions of the nodes in the middle of elements. Their indices follow those of the nodes of the file."""
+    """(j, 3) positions of the nodes in the middle of elements. The indices of the added nodes follow those of the nodes
+    of the file."""
     of: Ids = field(default_factory=lambda: np.zeros(0, np.int64))
     """(j,) element of each middle node."""
 

@@ -1,3 +1,3 @@
-"""The complete state of a run by global ids. It is moved between ranks, written to disk, and read on any number of
+"""The complete state of a run by global ids. A parcel is sent between ranks, written to disk, and read on any number of
 ranks.
 """

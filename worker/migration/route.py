@@ -24,7 +24,7 @@ _NO_TET = np.iinfo(np.int64).max
 
 @dataclass
 class Directory:
-    """This rank's share of the directory of all nodes: the nodes with id % ranks equal to the number of this rank."""
+    """Part of the directory of all nodes on this rank: the nodes with id % ranks equal to the number of this rank."""
 
     comm: Comm
     id: Ints

@@ -1,7 +1,7 @@
 """Numbers of the rows of the element state.
 
-Rows up to DISTORTION exist in every block. The other rows exist where a material or a pressure form needs them. Some
-numbers have another meaning in other materials.
+Rows up to DISTORTION exist in every block. A block has the other rows only if its material or the pressure form needs
+them. Some numbers have another meaning in other materials.
 """
 
 S_XX, S_YY, S_ZZ, S_YZ, S_ZX, S_XY = range(6)
@@ -26,7 +26,7 @@ volume."""
 WORK_AVERAGED = 13
 """Part of WORK that the pressure has not done on the averaged volume, J (averaged pressure forms; elements/mean.py)."""
 VOLUME_RATIO = 14
-"""Ratio of the current to the initial volume. It is computed from the dilatation that also gives the pressure."""
+"""Ratio of the current to the initial volume. The value is computed from the same dilatation as the pressure."""
 PLASTIC_STRAIN = 15
 """Effective plastic strain."""
 WORK_PLASTIC = 16
@@ -34,12 +34,12 @@ WORK_PLASTIC = 16
 YIELD = 17
 """Flow stress at vanishing strain rate, Pa. Below this stress there is no plastic flow."""
 FLOW = 18
-"""Flow stress of the last plastic step, Pa. It is the initial guess of the next plastic step."""
+"""Flow stress of the last plastic step, Pa. The next plastic step starts its iteration with this value."""
 BULKING = 18
 """Bulking pressure, Pa (Johnson-Holmquist)."""
 DILATION = 18
-"""Volume strain of the plastic flow in the last step (Mohr-Coulomb). It is set below zero after it was added to the
-nodal mean (averaged pressure forms)."""
+"""Volume strain of the plastic flow in the last step (Mohr-Coulomb). The value is set below zero after it was added to
+the nodal mean (averaged pressure forms)."""
 TEMPERATURE = 19
 """Temperature, K."""
 DAMAGE = 20

@@ -49,8 +49,8 @@ class Shares:
     def members(self, part: Indices) -> tuple[Ints, Indices]:
         """Return (m,) nodes and (m,) their parts.
 
-        First come all nodes with their representative ``part`` (n,). Then come further rows for nodes of several
-        parts, one row for each of their other parts.
+        First come all nodes with their representative ``part`` (n,). Further rows follow for nodes of several parts,
+        one row for each of their other parts.
         """
         more = self.part != part[self.node]
         return np.concatenate([np.arange(len(part)), self.node[more]]), np.concatenate([part, self.part[more]])

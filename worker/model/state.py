@@ -1,8 +1,8 @@
 """Arrays of a rank: nodes, and blocks of elements in chunks.
 
-A block holds the elements of one part. Their state is stored chunk by chunk, ``(chunks, rows, CHUNK)``: the rows of
-a chunk are contiguous, at offsets known at compile time, so that loops over a chunk use vector instructions and the
-whole state of a chunk fits in the first cache levels. All in SI; stress positive in tension, pressure in
+A block holds the elements of one part. The state of the tets is stored chunk by chunk, ``(chunks, rows, CHUNK)``: the
+rows of a chunk are contiguous, at offsets known at compile time, so that loops over a chunk use vector instructions and
+the whole state of a chunk fits in the first cache levels. All in SI; stress positive in tension, pressure in
 compression.
 """
 
@@ -21,7 +21,7 @@ Indices = npt.NDArray[np.int32]
 Flags = npt.NDArray[np.bool_]
 Bits = npt.NDArray[np.uint8]
 Tets = npt.NDArray[np.uint32]
-"""Type of local indices. It is unsigned, so numba omits the test for negative indices."""
+"""Type of local indices. The type is unsigned, so numba omits the test for negative indices."""
 
 CHUNK = 376
 """Number of elements in a chunk."""
@@ -137,7 +137,7 @@ class Nodes:
 
 @dataclass
 class Copies:
-    """New nodes of a separation, in ascending order of global id. They are appended to the nodes of the rank."""
+    """New nodes of a separation, in ascending order of global id. The copies are appended to the nodes of the rank."""
 
     parents: Ints
     """(n,) local index of the parent, the node from which each copy was separated."""
@@ -278,7 +278,8 @@ class Model:
     mean_volumes: Floats = field(default_factory=lambda: np.zeros(0))
     """(parts,) mean volume of a tet at the start, m^3."""
     size: float = 0.0
-    """Largest absolute coordinate of the whole mesh at the start, m. It determines the round-off of positions."""
+    """Largest absolute coordinate of the whole mesh at the start, m. The largest coordinate determines the round-off of
+    positions."""
     slack: Floats = field(default_factory=lambda: np.zeros(0))
     """(parts,) distance, m, outside of a region at which a node still counts as inside (cases/shapes/region.py)."""
     rounding: Floats = field(default_factory=lambda: np.zeros(0))

@@ -29,7 +29,7 @@ class KeptByNode(Protocol):
 class Split:
     """Separation of nodes in one step, on one rank.
 
-    It has the tets at each separated node of this rank, and the new nodes of these tets.
+    The table has the tets at each separated node of this rank, and the new nodes of these tets.
     """
 
     copies: Copies

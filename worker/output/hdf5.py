@@ -1,8 +1,8 @@
 """HDF5 files that are safe on a full disk.
 
-After a failed write HDF5 continues with the data that it could not write. HDF5 then fails again at each object that
-is freed, which Python can only print, and ends in a segmentation fault. In other cases a file opens as complete
-although a part is missing. Therefore this module records the failures and does not pass them to HDF5.
+After a failed write HDF5 continues with the data that it could not write. HDF5 then fails again at each object that is
+freed, which Python can only print, and ends in a segmentation fault. In other cases a file opens as complete although a
+part is missing. Therefore this module records the failures of the disk and does not report them to HDF5.
 """
 
 import errno
@@ -20,8 +20,8 @@ import h5py
 def created(path: Path) -> Iterator["h5py.File"]:
     """Open a new HDF5 file and flush it to disk at the end.
 
-    Raises OSError with the name of the file if the file is incomplete. The error is the first failure of the disk,
-    whatever HDF5 did after it.
+    Raises OSError with the name of the file if the file is incomplete. The raised error is the first failure of the
+    disk; later errors of HDF5 are ignored.
     """
     with open(path, "w+b", buffering=0, opener=_at_once) as raw:
         disk = _Disk(raw)

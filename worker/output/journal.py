@@ -19,7 +19,7 @@ from . import storage
 
 M = TypeVar("M", bound=messages.Message)
 _MOST = 1 << 40
-"""Largest size of a journal that is read, bytes. It is practically unlimited."""
+"""Largest size of a journal that is read, bytes. This number is practically unlimited."""
 
 
 class _Head(msgspec.Struct):
@@ -48,7 +48,7 @@ class Journal:
         self.frames: set[int] = set()
         """Indices of the frames in the journal."""
         self.snapshots = 0
-        """Number of the next snapshot. It continues the numbers of the snapshots in the journal."""
+        """Number of the next snapshot. The numbering continues that of the snapshots in the journal."""
         self._file = whole.appended(path)
         self._seq, content = 0, whole.read(path, _MOST)
         for line in content.splitlines():

@@ -59,7 +59,7 @@ class Telemetry:
             self._wake.notify()
 
     def _thin_out(self) -> None:
-        """Remove the bytes of all waiting snapshots except the newest ones."""
+        """Remove the bytes of all waiting snapshots except the newest snapshots."""
         waiting = [i for i, message in enumerate(self._ring) if isinstance(message, messages.Fragments)]
         for i in waiting[:-_BLOBS]:
             self._ring[i] = messages.without_blob(self._ring[i])  # type: ignore[arg-type]

@@ -91,8 +91,8 @@ class Comm(Protocol):
         """Send words of any length to the ranks in ``sends``; return the words of the ranks ``sources``, flat, in their
         order.
 
-        Only the partners take part: a rank is in the ``sources`` of exactly the ranks to which it sends. An empty
-        array is sent as an empty message.
+        Only ranks that send or receive call this function: a rank is in the ``sources`` of exactly the ranks to which
+        it sends. An empty array is sent as an empty message.
         """
 
     def join(self, words: Ints) -> Ints:

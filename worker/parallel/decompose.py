@@ -42,9 +42,9 @@ increase with the number of ranks."""
 _THICK = 2
 """Number of slices on either side of a cut from which the weight at the cut is computed."""
 _SAMPLE = 4096
-"""Size of the sample of points in a box by which directions are compared. Only points with a weight in the first
-phase alone are sampled. Chosen value: with 4,000 points in 128 slices the error of the middle is below a hundredth
-of the box."""
+"""Size of the sample of points in a box by which directions are compared. Only points that have a weight in the first
+phase and in no other phase are sampled. Chosen value: with 4,000 points in 128 slices the error of the middle is below
+a hundredth of the box."""
 
 
 def _directions() -> Floats:
@@ -214,8 +214,8 @@ def _unevenness(slices: Floats, parts: int) -> tuple[Floats, Floats]:
 def _drawn(chosen, luck, quanta, stride):  # type: ignore[no-untyped-def]
     """Return the indices of a sample of the ``chosen`` points, and their ``quanta`` (n, phases).
 
-    The sample has all points with a weight in a later phase. Of the other points one in ``stride`` is chosen by the
-    hash ``luck`` (n,), with ``stride`` times its weight.
+    The sample has all points with a weight in a later phase. From the other points one in ``stride`` points is chosen
+    by the hash ``luck`` (n,), with ``stride`` times its weight.
     """
     some, weights, n = np.empty(len(chosen), np.int64), np.empty((len(chosen), quanta.shape[1]), np.int64), 0
     for a in chosen:

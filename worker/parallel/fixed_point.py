@@ -172,7 +172,7 @@ class Tally:
 
 
 class Columns(Protocol):
-    """Columns of values. They need not be contiguous in memory."""
+    """Columns of values. The rows need not be contiguous in memory."""
 
     def largest(self) -> Floats:
         """Return (k,) the largest magnitude of each column; infinite if a value is not finite."""

@@ -158,8 +158,8 @@ class MpiComm:
 
 
 class _Waiting:
-    """Context of a block that waits. It is a class, since every step opens dozens of contexts and generators take
-    longer.
+    """Context of a block that waits. This context manager is a class, because every step opens dozens of contexts, and
+    a generator takes longer.
     """
 
     __slots__ = ("_comm", "_sign", "_start")

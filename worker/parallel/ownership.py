@@ -1,8 +1,8 @@
 """Shared nodes: the ranks that hold them, and the completion of their integer sums.
 
-Each rank sums the contributions of its own tets. One exchange with the neighbours adds the contributions of their
-tets. Integer addition does not depend on the order, so every holder of a node gets the same bits and integrates the
-same motion.
+Each rank sums the contributions of its own tets. One exchange with the neighbouring ranks adds the contributions of the
+tets of these ranks. Integer addition does not depend on the order, so every holder of a node gets the same bits and
+integrates the same motion.
 """
 
 from dataclasses import dataclass

@@ -4,13 +4,13 @@ A task is a range of the pass: chunks of tets, or nodes. Tasks of one colour wri
 no locks and no separate sums. Colours run one after the other. All sums are of integers, so the answer is the same on
 any number of threads.
 
-The calling thread runs tasks, too. It waits for tasks that have begun, not for threads: if another program uses the
-core of a helper, the other threads run the tasks of this helper. OpenMP waits for every thread at the end of every
-region, which takes milliseconds in that case (docs/performance/scaling.md, "Threads"). One word holds the number of
-tasks and the index of the next task. A thread takes a task by an atomic increment of the word. A colour does not end
-before its last task, so the arguments of a task stay valid. Helpers poll the word for some 50 us, then sleep until
-the next pass. Waking a thread takes some 20 us of the waking thread. The calling thread therefore wakes one or two
-threads, and each woken thread wakes two more while there are tasks.
+The calling thread also runs tasks. At the end the calling thread waits for the tasks that have begun, not for threads:
+if another program uses the core of a helper, the other threads run the tasks of this helper. OpenMP waits for every
+thread at the end of every region, which takes milliseconds in that case (docs/performance/scaling.md, "Threads"). One
+word holds the number of tasks and the index of the next task. A thread takes a task by an atomic increment of the word.
+A colour does not end before its last task, so the arguments of a task stay valid. Helpers poll the word for some 50 us,
+then sleep until the next pass. Waking a thread takes some 20 us of the waking thread. The calling thread therefore
+wakes one or two threads, and each woken thread wakes two more while there are tasks.
 """
 
 import ctypes
@@ -163,8 +163,8 @@ class Stage:
 
 
 class Timed(Protocol):
-    """A replacement for a team. It runs tasks one after the other, and sums up the time of teams of the sizes
-    ``crews``.
+    """A replacement for a team. This team runs tasks one after the other, and sums up the time that teams of the sizes
+    ``crews`` would take.
     """
 
     crews: list[int]
@@ -178,7 +178,7 @@ class Timed(Protocol):
 
 
 class Team:
-    """A number of threads, including the calling thread. They exist until the process ends (``team``)."""
+    """A number of threads, including the calling thread. The threads exist until the process ends (``team``)."""
 
     def __init__(self, threads: int) -> None:
         self.threads = threads

@@ -49,7 +49,7 @@ class BodyAccount:
 
     def book(self, impulse: Floats, stops: BodyStops) -> None:
         """Books half of the work of the impulses (b, 6) of contact and walls with the velocities before the impulses;
-        stores the half with the velocities after the impulses for the next step. Other changes of the motion, and
+        stores the half with the velocities after the impulses for the next step. All other changes of the motion, and
         driven walls, do work from outside.
         """
         bodies, rubbed, walls = self._bodies, stops.rubbed, stops.walls

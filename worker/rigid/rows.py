@@ -47,8 +47,8 @@ def weigh(words, active, slots, body, arms, owned, reach):  # type: ignore[no-un
 def norms(active, words, slots, body, arms, reach, lightness, yielding):  # type: ignore[no-untyped-def]
     """Sets row weights and mobilities of ``slots`` such that their products bound a row of the contact matrix: sum_i
     |n_i| Q_i along a normal n, Q for any direction across. ``words``: of all ranks, see ``weigh``; ``lightness`` (b,
-    3) one over the mass, 1/kg, and ``yielding`` (b, 3, 3) the inverse of the inertia in space, zero where the motion
-    is held.
+    3): reciprocal of the mass, 1/kg, and ``yielding`` (b, 3, 3) the inverse of the inertia in space, zero where the
+    motion is held.
     """
     sums, fixed, moment, along = active.row_weights, active.fixed, np.empty(3), np.empty(3)
     for k in range(len(slots)):

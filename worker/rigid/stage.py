@@ -105,7 +105,9 @@ class Rigid:
 
     @property
     def limit(self) -> float:
-        """One over the longest step, 1/s: no body turns by more than _TURN; rigid parts alone take RIGID_STEPS."""
+        """Reciprocal of the longest allowed step, 1/s: no body turns by more than _TURN in a step, and a run with rigid
+        parts only takes RIGID_STEPS.
+        """
         rate = self.bodies.rates(self.bodies.momentum)
         return max(float(np.sqrt(dot(rate, rate)).max(initial=0.0)) / _TURN, self._least)
 

@@ -1,9 +1,9 @@
 """``python -m conoid.worker.run.job FOLDER NAME``: one attempt of a run inside a job of a batch system.
 
-The script of the job becomes this process. It starts the ranks, passes on the signal of the batch system, and finds
-its cause: a cancel, which ends the run, or a preemption or a time limit, after which the same job is queued again
-and the run resumes from its checkpoint. If the cause is unknown the folder has a checkpoint and no outcome, and the
-server or command that submitted the job decides.
+The script of the job becomes this process. The program starts the ranks, sends the signal of the batch system to them,
+and finds the cause of the signal. A cancel ends the run. After a preemption or a time limit the same job is queued
+again, and the run resumes from its checkpoint. If the cause is unknown the folder has a checkpoint and no outcome, and
+the server or command that submitted the job decides.
 """
 
 import os

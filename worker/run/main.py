@@ -233,7 +233,7 @@ def _compute(
 def ready_kernels(comm: Comm, journal: Journal | None) -> None:
     """Makes all ranks use the same kernels: rank 0 hashes the sources and compiles missing kernels, the others wait.
 
-    Must come before numba is imported. Raises CompileError, StoppedError on all ranks.
+    This call must come before the import of numba. Raises CompileError, StoppedError on all ranks.
     """
     failure: ConoidError | None = None
     if comm.rank == 0:

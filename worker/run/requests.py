@@ -31,7 +31,7 @@ class Requests:
         self._active = True
         """Whether the last part of a reduction that this rank filled contained a request."""
         self._every_step = case.balance.policy == "outside"
-        """Whether the part is filled in every step. This is so if the number of outside nodes is compared with its
+        """Whether the part is filled in every step. Returns True if the number of outside nodes is compared with its
         limit in every step."""
         self._wall = self._time = 0.0
         """Wall time and simulated time before which no request can begin, s."""

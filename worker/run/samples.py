@@ -14,7 +14,7 @@ from ..simulation import Simulation
 
 
 class Samples:
-    """Takes samples and keeps the latest one."""
+    """Takes samples and stores the latest sample."""
 
     def __init__(self, sim: Simulation, history: History | None, number: int) -> None:
         """``history``: the file, None on all ranks except 0; ``number``: number of samples scheduled so far."""

@@ -1,4 +1,4 @@
-"""Overlaps between bodies at the start. They are refused, or removed by moving nodes."""
+"""Overlaps between bodies at the start. Overlaps are refused, or removed by moving nodes."""
 
 import numpy as np
 

@@ -1,5 +1,5 @@
-"""Side thread of a rank. It writes the shares of the rank to disk. On rank 0 it also sends tasks to the packer,
-which makes snapshots from the shares.
+"""Side thread of a rank. The courier thread writes the copied state of the rank to disk. On rank 0 it also sends tasks
+to the packer, which makes snapshots from the shares.
 """
 
 import contextlib

@@ -21,7 +21,7 @@ _LEAST = 8
 _SIMPLE = 8
 """Largest number of triangles of a fragment that stays unchanged. Chosen value."""
 _SIZES = 128
-"""Number of cell sizes. They decrease from the whole box to 2^-32 of the box."""
+"""Number of cell sizes. The sizes decrease from the whole box to 2^-32 of the box."""
 Fits = Callable[[Outline], bool]
 """Callback: whether an outline is within the budget."""
 
@@ -29,7 +29,7 @@ Fits = Callable[[Outline], bool]
 def to_budget(outline: Outline, mass: Floats, most: int, fits: Fits) -> Outline:
     """Return the finest outline within the budget.
 
-    ``mass`` (fragments,): mass of each fragment. At most ``most`` / 8 fragments are drawn, the heaviest ones.
+    ``mass`` (fragments,): mass of each fragment. At most ``most`` / 8 fragments are drawn: the heaviest fragments.
     """
     if fits(outline):
         return outline
@@ -61,7 +61,9 @@ def _fewest(outline: Outline, mass: Floats, fits: Fits) -> Outline:
 
 
 def _heaviest(mass: Floats, most: int) -> "np.ndarray":
-    """Return (fragments,) which fragments are among the heaviest. Of fragments of equal mass the first is chosen."""
+    """Return (fragments,) which fragments are among the heaviest. If several fragments have the same mass, the first of
+    them is chosen.
+    """
     chosen = np.zeros(len(mass), bool)
     chosen[np.argsort(-mass, kind="stable")[:most]] = True
     return chosen

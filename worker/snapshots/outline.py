@@ -34,8 +34,8 @@ class Outline:
 def find(model: Model, fragment: Ints) -> Outline:
     """Return the outline of a whole model; ``fragment`` (tets,): number of the fragment of each tet.
 
-    It contains the exposed faces, the faces between two fragments, and the sides of open cracks; a closed crack
-    within a fragment is not visible.
+    The surface contains the exposed faces, the faces between two fragments, and the sides of open cracks; a closed
+    crack within a fragment is not visible.
     """
     ids = np.concatenate([np.zeros(0, np.int64), *(block.id for block in model.blocks)])
     order = np.argsort(ids)

@@ -1,8 +1,9 @@
 """Process that makes snapshots of the shares of the ranks: ``python -m conoid.worker.snapshots.packer FOLDER``.
 
 A thread of the solver's process would hold the interpreter lock; this process uses idle cores, except for the last
-snapshot, for which the run waits. One task a line on standard input, one answer a line on standard output; it ends
-with its standard input. A snapshot is written under another name, flushed to disk and renamed.
+snapshot, for which the run waits. Each line on standard input is a task, and each line on standard output an answer.
+The process ends at the end of its standard input. A snapshot is written under another name, flushed to disk and
+renamed.
 """
 
 import hashlib
@@ -25,8 +26,8 @@ _NICE, _LOWEST = 10, 19
 """Decrease of the priority of this process, and the lowest priority. With the decrease of 10 a rank gets nine times
 the share of a core. Chosen value: the remaining share is sufficient."""
 _TETS = 256_000_000
-"""Approximate limit of the bytes of all tets in all snapshots of a run. Early snapshots leave room for later ones.
-Chosen value: a hundred snapshots of 150,000 tets in 2,900 fragments."""
+"""Approximate limit of the bytes of all tets in all snapshots of a run. Early snapshots use only a part of the limit,
+so that later snapshots fit too. Chosen value: a hundred snapshots of 150,000 tets in 2,900 fragments."""
 _PATIENCE = 60.0
 """Time within which the share of a rank must appear, s. Chosen value: many times the duration of writing on a slow
 disk."""
@@ -81,7 +82,7 @@ def _made(folder: Path, task: dict[str, Any], births: Births) -> dict[str, Any]:
 
 
 def _with_tets(folder: Path, task: dict[str, Any], tets: bytes) -> int:
-    """Write the tets of a snapshot if the limit leaves room for them; return the number of bytes.
+    """Write the tets of a snapshot if the limit of bytes allows it; return the number of bytes.
 
     A snapshot without tets has no sections.
     """
@@ -95,7 +96,7 @@ def _with_tets(folder: Path, task: dict[str, Any], tets: bytes) -> int:
 
 
 def _may_keep(folder: Path, task: dict[str, Any], size: int) -> bool:
-    """Return whether ``size`` bytes of tets leave room for the tets of later snapshots; True for the last snapshot."""
+    """Return whether the tets of later snapshots still fit after ``size`` bytes; True for the last snapshot."""
     if task["cause"] == "end":
         return True
     kept = sum(path.stat().st_size for path in (folder / layout.SNAPSHOTS).glob(f"*{layout.TETS_SUFFIX}"))

@@ -78,7 +78,7 @@ class Whole:
     """The model of all ranks, in the order of global ids, equal for any number of ranks."""
 
     model: Model
-    """Blocks by part. They have ids, tets, faces and bonds only."""
+    """Blocks by part. The restored blocks have ids, tets, faces and bonds only."""
     held: Ints
     """(m, 2) pairs of tets that a cohesive facet connects (``copied``)."""
     mass: Floats

@@ -45,7 +45,7 @@ class Snapshots:
         self._n: int = sim.comm.broadcast(journal.snapshots if journal is not None else 0)
         self._courier = Courier(folder, sim.comm.rank)
         self.next_time = math.inf
-        """Simulated time before which no snapshot is scheduled, s. This time does not limit requested snapshots."""
+        """Simulated time before which no snapshot is scheduled, s. Requested snapshots are not limited by this time."""
         self._wait(self._place(sim.clock) + 1)
         self._taken = self._took = self._packed = 0.0
         self._crowded = len(os.sched_getaffinity(0)) <= sim.comm.size

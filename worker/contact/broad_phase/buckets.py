@@ -1,9 +1,9 @@
 """Bucket sort with position codes (Oldenburg and Nilsson 1994): boxes near a box, without a grid in memory.
 
-The code of a cell is ix + nx (iy + ny iz) (the paper's eq. 10). Every box is entered under the codes of the cells
-that it touches, and the entries are sorted by a hash of their codes. The boxes near a given box are found under the
-codes of its own cells, each a short range of entries. Memory is proportional to the number of boxes, for any
-distance between them.
+The code of a cell is ix + nx (iy + ny iz) (the paper's eq. 10). Every box is entered under the codes of the cells that
+it touches, and the entries are sorted by a hash of their codes. To find the boxes near a given box, the search reads
+the entries with the codes of the cells of this box. The entries of one code are a short range. Memory is proportional
+to the number of boxes, for any distance between them.
 """
 
 from typing import NamedTuple
@@ -41,7 +41,7 @@ class Table(NamedTuple):
     code: Ints
     """(m,) code of each entry."""
     wide: Indices
-    """(w,) boxes without entries, which touch too many cells."""
+    """(w,) boxes that touch too many cells and therefore have no entries."""
 
 
 TABLE = types.NamedTuple(

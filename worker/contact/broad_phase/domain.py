@@ -33,7 +33,7 @@ def choose(kind: str, askers: Boxes, things: list[Boxes], edge: float, comm: Com
 
 
 def _touching(hull: Floats, hulls: Floats, comm: Comm) -> list[int]:
-    """Other ranks whose ``hulls`` (ranks, 6) touch this one."""
+    """Other ranks whose ``hulls`` (ranks, 6) touch the hull of this rank."""
     touch = np.all((hulls[:, :3] <= -hull[3:]) & (-hulls[:, 3:] >= hull[:3]), axis=1)
     touch[comm.rank] = False
     found: list[int] = np.flatnonzero(touch).tolist()

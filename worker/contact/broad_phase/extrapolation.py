@@ -2,8 +2,8 @@
 
 A node of a metal is extrapolated with its own velocity. Nodes of a body that breaks vibrate: a free tet has a period of
 some ten steps, and the release of 1 GPa in glass makes it vibrate with sigma / (rho c) = 75 m/s. Extrapolation to the
-next search with this velocity would be wrong by more than the motion of the node. Such a node therefore gets the
-velocity of a rigid body with the momentum and the angular momentum of its tets.
+next search with this velocity would be wrong by more than the motion of the node. Therefore a node whose tets may break
+gets the velocity of a rigid body with the momentum and the angular momentum of its tets.
 """
 
 import numpy as np

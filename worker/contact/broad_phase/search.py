@@ -230,7 +230,7 @@ def _ask(out, n, asked, table, small, large, part, allowed):  # type: ignore[no-
         |     |     |    |     3. The cell contains the lowest corner, x, of the intersection of the boxes: a pair is
         |     x-----+    |        found in one cell only.
         +-----+----------+     4. The small primitive has the lower rank.
-                               5. Their parts may be in contact, and they have no common corner.
+                               5. The parts of the two may be in contact, and they have no common corner.
     """
     few_low, few_high, box_low, box_high = small.low, small.high, large.low, large.high
     few, many, rank, order = small.corners, large.corners, small.rank, large.rank

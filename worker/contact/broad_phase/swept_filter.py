@@ -5,7 +5,8 @@ separates the two edges over the whole horizon. For a node and a face, the heigh
 its sides are computed at the beginning, middle and end of the horizon. Each of these distances is nearly a parabola in
 time: between two of these moments it deviates from the straight line by an eighth of its second difference; the filter
 allows for twice that deviation. A pair is removed only if a single measure excludes contact over the whole horizon,
-with the skin and the depth of contacts as margin. A pair that no measure excludes at the beginning is therefore kept.
+with the skin and the depth of contacts as margin. Therefore a pair that no measure excludes at the beginning of the
+step remains a candidate.
 """
 
 import numpy as np

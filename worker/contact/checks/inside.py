@@ -31,7 +31,7 @@ contact sweeps."""
 _WORDS = 5
 """Number of words of a node in a message."""
 _ROUNDING = 1e-9
-"""Tolerance of the volume coordinates. With it a node on the face between two tets is in both tets."""
+"""Tolerance of the volume coordinates. With this tolerance a node on the face between two tets is in both tets."""
 DEEP = 0.25
 """Depth over the typical size of a face above which there is a warning. Chosen value: about half of the altitude of
 a regular tet."""

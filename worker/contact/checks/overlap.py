@@ -27,8 +27,7 @@ this share of the size of the face from the plane of the face, on opposite sides
 from each side of the face than this share of the altitude on that side. Rims, and facets of two round bodies that
 fit, overlap by less. Chosen value."""
 _CRUSHED = 0.1
-"""Smallest volume of a tet after the move over its volume before; a tet with less has been compressed too much.
-Chosen value."""
+"""Smallest allowed volume of a tet after the move over its volume before the move. Chosen value."""
 
 
 @dataclass(frozen=True)

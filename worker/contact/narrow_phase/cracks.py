@@ -101,8 +101,8 @@ class Cracks:
     @classmethod
     def resume(cls, table: Table, root: Ints, blocks: list[Block], nodes: Nodes) -> "Cracks":
         """Builds cracks from the rows of a table, sorted by key. The row of the first side is used if present: a rank
-        that had only the second side may have the nodes in another order, which changes the last bit of a normal. Such
-        a rank has not computed the crack, so it has no stored impulses.
+        that had only the second side may have the nodes in another order, which changes the last bit of a normal. A
+        rank that gets a crack from another rank has not computed this crack, so it has no stored impulses of the crack.
         """
         table = once(table, table["faces"][:, 0])
         faces = np.array(table["faces"])

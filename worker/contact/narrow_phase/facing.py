@@ -21,10 +21,10 @@ _SOME = 0.25
 the cosines is below -_SOME, because then at least one face of the node faces the face. If no cosine is negative,
 mean minus deviation is at least (1 - sqrt(2)) / 2 = -0.207."""
 RIM = 0.01
-"""Share of the size of a face: a node that faces both faces of a convex edge, slides along one of the two, and is
-not deeper below that face than this share, is beside the edge. Chosen value: twice the penetration of a sharp edge
-that slides along another edge, 1e-3 to 4e-3, at the moment when the end of the edge reaches the other edge. This
-penetration occurs because edges have no contact at their ends."""
+"""Share of the size of a face: a node that faces both faces of a convex edge, slides along one of the two, and is not
+deeper below that face than this share, is beside the edge. Chosen value: twice the penetration of a sharp edge that
+slides along another edge, 1e-3 to 4e-3, at the moment when the end of the edge reaches the other edge. A node can be
+deeper than this below a face at a rim because edges have no contact at their ends."""
 _SLIDES = 2e-3
 """Share of the size of a face: a node that slides along a face approaches the face by less in a step. A faster node
 counts as beside the edge only up to the depth TOUCHING; otherwise the contact of a fast projectile would be detected
@@ -107,11 +107,11 @@ def outside(pairs, first, faces, x, part, p, depth, strayed, end):  # type: igno
     """Returns True if the node of pair ``p``, ``depth`` below its face, is nearer to the front of another face of that
     part.
 
-    Such a node is beside an acute edge and not inside the body: the nearest face decides on which side a node is. Only
-    faces are tested whose distance is below the share of their size that every candidate list covers. A face whose pair
-    is deactivated is further away and is not tested. ``strayed``: distance of the node from its line, infinite if the
-    pairs have no valid bounds; ``end``: of the step plus one more step, because another thread may have just measured a
-    pair at its end.
+    A node whose nearest face is another face is beside an acute edge and not inside the body: the nearest face decides
+    on which side of the surface a node is. Only faces at a distance below a fraction of their size are tested: all
+    candidate lists include faces up to this distance. A face whose pair is deactivated is further away and is not
+    tested. ``strayed``: distance of the node from its line, infinite if the pairs have no valid bounds; ``end``: of the
+    step plus one more step, because another thread may have just measured a pair at its end.
     """
     rows, corners, size = pairs.rows, faces.corners, faces.size
     s, body = rows[p, 0], part[corners[rows[p, 1], 0]]

@@ -30,8 +30,8 @@ FAST = 0.1
 """Pairs whose distance decreases in a step by less than this share of the typical size of a face limit the time step
 only when they are active. The altitude of a tet of that size is several times larger."""
 PUSH_OUT = 0.1
-"""Largest share of a penetration that is corrected in a step, and largest share of the closing speed that is
-returned for the correction. Both shares are 0 while contact has no energy to return (``account.Account``)."""
+"""Largest share of a penetration that is corrected in a step, and largest share of the closing speed that is returned
+for the correction. The two fractions are 0 while contact has no energy to return (``account.Account``)."""
 CRACK = -2
 """First number of pairs of nodes across a crack; these pairs have negative numbers from here downwards."""
 _FEWEST = 2
@@ -54,7 +54,7 @@ class ContactRows(NamedTuple):
     wanted: Floats
     """(room,) target: n . sum(w_k v_k) must not be below it, m/s."""
     friction: Floats
-    """(room,) Coulomb's coefficient."""
+    """(room,) coefficient of Coulomb friction."""
     pair: Indices
     """(room,) row of the candidate pair of node and face; CRACK - (3 c + k) for the pair of nodes k across crack c;
     -1 for others."""

@@ -57,7 +57,7 @@ class OwnSlots:
             self.far_ids = ids[order]
 
     def grow(self, nodes: int) -> None:
-        """Extends the map to ``nodes`` local nodes; the new ones have no slots yet."""
+        """Extends the map to ``nodes`` local nodes; the new nodes have no slots yet."""
         if nodes > len(self.place):
             self._by_node.append(self, nodes - len(self.place), place=-1)
 

@@ -1,8 +1,8 @@
 """Faces and edges by their corners. The table gives the rows of a scene that a split (node separation) can change,
 without a pass over the whole scene.
 
-A scene keeps its faces and edges from one search to the next. When nodes separate, corners are replaced by copies. The
-rows of a copy are therefore among the rows of the slot that was its original at the search.
+The faces and edges of a scene do not change between two searches. When nodes separate, corners are replaced by copies.
+The rows of a copy are therefore among the rows of the slot that was its original at the search.
 """
 
 import numpy as np

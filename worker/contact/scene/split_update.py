@@ -69,8 +69,8 @@ class SplitUpdate:
         cracks.arrange()
 
     def _across(self, cracks: Cracks, rows: Ints, apart: Flags) -> None:
-        """Finds the slots of some cracks. Their separated nodes, and the nodes that are ``apart`` (nodes,) from the
-        tets, may get impulses.
+        """Finds the slots of some cracks. The separated nodes of the cracks, and the nodes that are ``apart`` (nodes,)
+        from the tets, may get impulses.
         """
         scene = self._scene
         _place(cracks.places, scene.slots.pushes, rows, cracks.nodes, scene.own.place)

@@ -43,7 +43,7 @@ class ActiveContacts(NamedTuple):
     wanted: Floats
     """(room,) target normal velocity, m/s."""
     friction: Floats
-    """(room,) Coulomb's coefficient."""
+    """(room,) coefficient of Coulomb friction."""
     pair: Indices
     """(room,) row of the candidate pair, see tables.ContactRows."""
 

@@ -11,7 +11,7 @@ depends on the order of contacts or ranks. Node-face pairs and node pairs across
 the last step (warm start): with any number of sweeps, sticking contacts do not creep and the penetration of compressed
 contacts does not increase.
 
-Only contacts that have needed an impulse in the step are swept (loading.py).
+The sweeps include only contacts that have needed an impulse in this step (loading.py).
 
 Kernels call no kernel within a loop over contacts: numba counts a reference for each array of a record at each call.
 """

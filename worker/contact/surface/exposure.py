@@ -1,9 +1,9 @@
-"""Exposure of the faces behind tets that erode, without a search.
+"""Faces of the neighbours of eroded tets become surface without a search.
 
-A tet is near erosion when its strain or damage is above a share of its limit. A search includes the faces behind such
-tets, as it includes the sides of cracks: with their nodes, on all ranks near them, but without candidate pairs. When
-the tet erodes, the faces of its neighbours are exposed in the same step. A search of all ranks is needed only if a tet
-erodes that was not near erosion at the last search, for example by early inversion.
+A tet is near erosion when its strain or damage is above a share of its limit. A search therefore includes the inner
+faces of tets near erosion, in the same way as the sides of cracks: with their nodes, on all ranks near the faces, but
+without candidate pairs. When the tet erodes, the faces of its neighbours are exposed in the same step. A search of all
+ranks is needed only if a tet erodes that was not near erosion at the last search, for example by early inversion.
 """
 
 from typing import NamedTuple
@@ -19,8 +19,8 @@ from ...parallel.comm import Comm
 from ...parallel.ownership import Neighbour
 
 NEAR_EROSION = 0.5
-"""A tet is near erosion if its plastic strain or damage is above this share of the limit. Of the tets eroded in the
-case long_rod to 20 us, 1.6 to 5.7 % were below this share 50 to 200 steps before the erosion (counts of one run)."""
+"""A tet is near erosion if its plastic strain or damage is above this share of the limit. Counts of one run of the case
+long_rod to 20 us: 1.6 to 5.7 % of the eroded tets were below this fraction 50 to 200 steps before they eroded."""
 WORDS = 9
 """Number of words of a message about a tet that erodes: its id, the faces across (state.Block.across), and its
 nodes."""

@@ -2,7 +2,7 @@
 (facing.facing).
 
 The normals are recomputed at every ``EVERY``-th step and after erosion; a face that a crack exposes in between adds its
-contribution to its nodes. The normals therefore depend on the step number alone, not on the steps of searches.
+contribution to its nodes. Therefore the normals do not depend on the steps in which searches take place.
 """
 
 import numpy as np

@@ -3,7 +3,7 @@
 A half edge is an edge of one face, (a, b) of the face abc. Two half edges of opposite direction between the same nodes
 make an edge, except the two sides of one facet. An edge is sharp when its faces enclose an angle at the start, or when
 they do so and the edge is convex at a later check: every normals.EVERY steps, or every PRESSED steps, because plastic
-flow also makes sharp edges. Sharpness therefore depends on the step number alone, not on the steps of searches.
+flow also makes sharp edges. Therefore sharpness does not depend on the steps in which searches take place.
 """
 
 import math

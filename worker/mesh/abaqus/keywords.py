@@ -167,8 +167,8 @@ JOINING = {
         "TIE",
     )
 }
-"""Keywords of ``ANALYSIS``, as they are written, that join bodies, hold bodies together, move nodes of bodies to
-each other, crack bodies or remove bodies. These keywords have no effect here."""
+"""Keywords of ``ANALYSIS``, as they are written, that join bodies, hold bodies together, move nodes of bodies to each
+other, crack bodies or remove bodies. These keywords have no effect on the mesh."""
 
 
 def known(block: Block, in_step: bool = False) -> str:

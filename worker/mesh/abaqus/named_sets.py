@@ -21,7 +21,7 @@ _NONE = np.zeros(0, np.int64)
 def named_sets(model: Placed) -> tuple[list[Named], list[str]]:
     """Return the sets, and remarks on the sets that are not read.
 
-    A set of a part or an instance has the name ``Bar.CLAMP`` or ``Bar-1.CLAMP``. It also has the name ``CLAMP`` if
+    A set of a part or an instance has the name ``Bar.CLAMP`` or ``Bar-1.CLAMP``. The set also has the name ``CLAMP`` if
     the assembly has no set of this name.
     """
     remarks = nodes_of_elements(model.deck)

@@ -74,7 +74,7 @@ class Scope:
     solids: dict[ElementType, Rows] = field(default_factory=dict)
     """Volume elements, by type."""
     plates: dict[ElementType, Rows] = field(default_factory=dict)
-    """Surface elements by type. Their numbers are also in ``others``."""
+    """Surface elements by type. The numbers of elements without volume are also in ``others``."""
     others: "dict[ElementType, array[int]]" = field(default_factory=dict)
     """Numbers of the elements without volume, or of a type that is not read, by type."""
     sets: Labelled[ElementSet] = field(default_factory=Labelled)

@@ -23,7 +23,8 @@ REFUSED = (
 VOLUMES = ("ELEMENT_TSHELL", "ELEMENT_SPH", "ELEMENT_LANCING")
 """Keywords of volume elements, or particles, that are not read."""
 JOINING = ("CONSTRAINED", "CONTACT", "RIGIDWALL", "RIGID", "ELEMENT_MASS", "ELEMENT_INERTIA")
-"""Beginnings of keywords that join bodies, hold bodies, or give mass to bodies. These keywords have no effect here."""
+"""Beginnings of keywords that join bodies, hold bodies, or give mass to bodies. These keywords have no effect on the
+mesh."""
 FAMILIES = _words(
     """
     AIRBAG ALE BATTERY BOUNDARY CASE CHEMISTRY CESE COMMENT COMPONENT CONSTRAINED CONTACT CONTROL CPM DAMPING DATABASE

@@ -24,8 +24,8 @@ def read_keyword(path: Path, group: str | None, key: str) -> solid.Content:
     """Return the solid elements of a deck, all or the elements of ``group``, and the sets of nodes and segments of the
     deck.
 
-    ``group`` is a part, a ``*SET_PART`` or a ``*SET_SOLID``, by its title or id. A number alone is the id of a part,
-    if there is such a part. Raises MeshError, with the number of the line if there is one.
+    ``group`` is a part, a ``*SET_PART`` or a ``*SET_SOLID``, by its title or id. A group that is a number is the id of
+    a part, if a part with this id exists. Raises MeshError, with the number of the line if there is one.
     """
     try:
         deck = Deck(path)

@@ -122,7 +122,7 @@ class Numbers(ABC):
 
     @abstractmethod
     def close(self) -> None:
-        """Raise MeshError if numbers of the section are left."""
+        """Raise MeshError if the section has more numbers than its header gives."""
 
     def damaged(self, why: str) -> MeshError:
         """Return the error of a section whose contents do not agree with its counts."""
@@ -167,7 +167,7 @@ class Stored(Numbers):
     """Reader of numbers that are stored as in memory. In the format 2.2 the counts are text (``line``)."""
 
     def line(self) -> int:
-        """Read a count that is text, on a line of its own."""
+        """Read a count that is text on a separate line."""
         text, _, _ = self.content[self.at :].partition(b"\n")
         self.at += len(text) + 1
         if not text.strip().isdigit():

@@ -29,8 +29,8 @@ class Drawing:
     sources: Sources
 
     def solids(self, form: AnyForm, key: str) -> Solids:
-        """Draw the form at ``key`` of its case, with its rotation. Return its volumes, or no volume if nothing is
-        left.
+        """Draw the form at ``key`` of its case, with its rotation. Return the volumes of the result, or no volume if
+        the result is empty.
         """
         occ = self.gmsh.model.occ
         if isinstance(form, CombinedForm):

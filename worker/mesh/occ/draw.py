@@ -136,8 +136,8 @@ def _side(occ: Any, each: Segment, first: int, last: int, scale: float) -> int:
 
 
 def _in_thirds(occ: Any, sides: list[int]) -> Solids:
-    """Draw a body with a surface of three faces that meet in a tip. With one face gmsh makes two triangles on the
-    same three nodes where the tip is slender.
+    """Draw a body whose surface has three faces with a common tip. With one face gmsh makes two triangles on the same
+    three nodes where the tip is slender.
     """
     third = _swept(occ, sides, 0.0, ROUND[1] / 3.0)
     others = [occ.copy(third) for _ in range(2)]

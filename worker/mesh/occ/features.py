@@ -1,4 +1,5 @@
-"""Edges and rounds of a model that are smaller than its elements. They give equally small tets."""
+"""Edges and rounds of a model that are smaller than its elements. Such edges and radii lead to tets of the same small
+size."""
 
 from collections.abc import Iterator
 from typing import Any

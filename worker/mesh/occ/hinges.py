@@ -1,5 +1,5 @@
-"""Solids of one body that touch in edges or points only. They have common nodes at these edges and points, which
-carry no moment.
+"""Solids of one body that touch in edges or points only. The solids have common nodes at these edges and points, and
+such a joint carries no moment.
 """
 
 from collections.abc import Iterator

@@ -1,4 +1,4 @@
-"""Meshing of a drawn model whose element sizes are set. gmsh makes the tets. Their nodes are then moved to raise the
+"""Meshing of a drawn model whose element sizes are set. gmsh makes the tets. Then the nodes are moved to increase the
 smallest step lengths.
 """
 

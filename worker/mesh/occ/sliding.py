@@ -76,8 +76,8 @@ def _nearest(gmsh: Any, dimension: int, number: int) -> Nearest:
 
 
 def _flat(gmsh: Any, number: int) -> Nearest:
-    """Return the point at the middle of the parameters of a plane, and the normal of the plane. Other faces need a
-    search.
+    """Return the point at the middle of the parameters of a plane, and the normal of the plane. For other faces the
+    nearest point is searched.
     """
     low, high = gmsh.model.getParametrizationBounds(2, number)
     middle = 0.5 * (np.asarray(low) + np.asarray(high))

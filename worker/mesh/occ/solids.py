@@ -62,8 +62,7 @@ def draw_solid(gmsh: Any, mesh: Cad | Combination, frame: Frame, sources: Source
     """Draw a body in the ``frame`` of the model, which has the centre and the axis of the body. Return the volumes of
     its sector.
 
-    Solids that touch have common faces. Raises MeshError if nothing is left, or if the mesh would have too many
-    tets.
+    Solids that touch have common faces. Raises MeshError if no solid is left, or if the mesh would have too many tets.
     """
     occ = gmsh.model.occ
     solids = joined(occ, sector(occ, Drawing(gmsh, frame, sources).solids(mesh, key), mesh), key)

@@ -1,5 +1,5 @@
-"""STL files, text and binary: one closed surface. Its triangles face outwards and have only edges and corners in
-common.
+"""STL files, text and binary: one closed surface. The triangles of the surface face outwards and have only edges and
+corners in common.
 """
 
 import struct

@@ -16,8 +16,8 @@ _TRIANGLE = 2
 def enclose(gmsh: Any, surface: Surface, factor: float, edge_angle: float) -> None:
     """Put a surface, with lengths times ``factor``, into the current model.
 
-    The model gets smooth faces, cut at edges sharper than ``edge_angle``, rad, that gmsh can parametrise. It gets
-    one volume inside of each outer shell.
+    The model gets smooth faces, cut at edges sharper than ``edge_angle``, rad, that gmsh can parametrise. The model
+    gets one volume inside of each outer shell.
     """
     tags = np.arange(1, len(surface.points) + 1)
     gmsh.model.addDiscreteEntity(2, 1)

@@ -27,7 +27,7 @@ PLATES = ("SHELL", "SH3N", "BEAM", "TRUSS", "SPRING", "XELEM", "RIVET")
 REFUSED = ("TRANSFORM", "CNODE", "MERGE", "SUBMODEL", "ADMESH", "MADYMO", "XREF", "REFSTA", "EREF", "INISTA")
 """Keywords that make, move or join nodes and elements, or fetch their state, and are not supported."""
 JOINING = ("INTER", "RBODY", "RBE2", "RBE3", "RWALL", "RLINK", "MPC", "GJOINT", "CYL_JOINT", "BCS", "ADMAS", "LAG_MUL")
-"""Keywords that join bodies, hold bodies, or give mass to bodies. These keywords have no effect here."""
+"""Keywords that join bodies, hold bodies, or give mass to bodies. These keywords have no effect on the mesh."""
 GROUPS = ("GRNOD", "SURF")
 """First words of groups of nodes and of surfaces."""
 FAMILIES = _words(

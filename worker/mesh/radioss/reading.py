@@ -23,8 +23,8 @@ def read_radioss(path: Path, group: str | None, key: str) -> Content:
     """Return the volume elements of a starter deck, all or the elements of ``group``. The groups of nodes and the
     surfaces of the deck are returned as sets.
 
-    ``group`` is a part, or a subset with its inner subsets, by title or number. A number alone is the number of a
-    part, if there is such a part. Raises MeshError, with the number of the line if there is one.
+    ``group`` is a part, or a subset with its inner subsets, by title or number. A group that is a number is the number
+    of a part, if a part with this number exists. Raises MeshError, with the number of the line if there is one.
     """
     deck = Deck(path)
     numbers = np.array(deck.nodes, np.int64)

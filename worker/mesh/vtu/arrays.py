@@ -1,7 +1,7 @@
 """Arrays of a .vtu file: text, base64 or bytes, compressed or not.
 
-Layout: VTK user's guide, "XML file formats". An array is in its XML element or after ``_`` in ``AppendedData``. It
-follows a count of bytes or a table of compressed blocks.
+Layout: VTK user's guide, "XML file formats". An array is in its XML element or after ``_`` in ``AppendedData``. The
+data of an array follows a count of bytes or a table of compressed blocks.
 """
 
 import base64
@@ -28,7 +28,7 @@ _START, _END = b"<AppendedData", b"</AppendedData>"
 
 
 class Grid:
-    """One piece of an unstructured grid."""
+    """Content of one piece of an unstructured grid."""
 
     def __init__(self, path: Path) -> None:
         """Read the file. Raises MeshError for a file that is no .vtu file, is damaged, or has several pieces."""
