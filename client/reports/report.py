@@ -15,7 +15,7 @@ from ..result import Result
 from . import cards, pictures, replay3d
 
 _WEB = Path(__file__).parent.parent / "web"
-_SHEETS = ("style.css", "body.css")
+_SHEETS = ("style.css", "run.css", "body.css")
 _STYLE = """
 :root { color-scheme: light dark }
 main { max-width: 1880px; margin: 0 auto }

@@ -123,7 +123,7 @@ def search(session: Server, wanted: Search, book: Book, told: Reporter, say: Say
         tried = _counted(wanted, book, fresh)
         following, why = ([], _CANCELLED) if told.stop else _next(wanted, tried, len(fresh), many)
         if not following:
-            found = _found(wanted, list({each.x: each for each in tried}.values()), why, len(fresh))
+            found = _found(wanted, tried, why, len(fresh))
             _report(wanted, told, tried, over=True, why=found.unsettled)
             return found
         at(f"{counted(len(following), 'run')} at {', '.join(map(number, following))} {wanted.spans[0].unit}".strip())
@@ -135,15 +135,16 @@ def search(session: Server, wanted: Search, book: Book, told: Reporter, say: Say
 
 
 def _counted(wanted: Search, book: Book, fresh: Sequence[Tried]) -> list[Tried]:
-    """Returns the points of earlier commands and of this command within the range."""
-    return [each for each in (*book.good(), *fresh) if wanted.ends[0] <= each.x <= wanted.ends[1]]
+    """Returns the points of earlier commands and of this command within the range, each once."""
+    every = {each.x: each for each in (*book.good(), *fresh)}
+    return [each for x, each in every.items() if wanted.ends[0] <= x <= wanted.ends[1]]
 
 
 def _report(wanted: Search, told: Reporter, tried: Sequence[Tried], *, over: bool = False, why: str = "") -> None:
     ended = [each for each in tried if each.value is not None]
     made = bracket(_samples(ended))
     fit = None if made is None else _fit(wanted, ended, made)
-    told.tell(list({each.x: each for each in tried}.values()), made, fit, over=over, why=why)
+    told.tell(tried, made, fit, over=over, why=why)
 
 
 def _next(wanted: Search, tried: Sequence[Tried], spent: int, many: int) -> tuple[list[float], str]:

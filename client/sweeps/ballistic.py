@@ -18,6 +18,9 @@ _EXPONENT = 1.0, 6.0
 """Bounds of p. Chosen values: an energy balance has p = 2, long rods at high speed up to 5 (Lambert and Jonas 1976)."""
 _COURSE = 60
 """Number of points of a curve in a chart. Chosen value: a chart is some hundred pixels wide."""
+_AT_END = 1e-6
+"""Relative distance of a constant from an end of its range below which it is at that end. Chosen value: larger than
+the tolerance of the least squares."""
 _STOPPED = 0.2
 """Largest residual velocity below the limit over the largest residual velocity. Chosen value: a rebound has a few
 per cent."""
@@ -55,8 +58,8 @@ def residual_velocity(samples: Sequence[Sample], found: Bracket, threshold: floa
     projectile and plug).
 
     v is the impact velocity, v_r the residual velocity, v_bl the ballistic limit. Velocities may be negative:
-    magnitudes are fitted. ``scale`` is the unit of x in the unit of the result. Returns None for too few points or
-    without scipy.
+    magnitudes are fitted. ``scale`` is the unit of x in the unit of the result. Returns None for too few points,
+    without scipy, and for points that do not follow the law: a constant is then at an end of its range.
     """
     x, y = zip(*_sides(samples, found, threshold)[1], strict=True)
     if len(x) < _FIXED:
@@ -163,9 +166,20 @@ def _fitted(
             values, covariance = curve_fit(curve, np.array(x), np.array(y), p0=start, maxfev=20_000, **limits)
     except (RuntimeError, ValueError):
         return None
+    if bounds is not None and _at_end(values, bounds):
+        return None
     known = len(x) > len(values) and bool(np.isfinite(covariance).all())
     limit, factor, *more = map(float, values)
     return Fit(
         law=law, limit=limit, error=math.sqrt(abs(covariance[0][0])) if known else None, points=len(x), factor=factor,
         exponent=more[0] if more else exponent, covariance=tuple(map(tuple, covariance.tolist())) if known else (),
     )  # fmt: skip
+
+
+def _at_end(values: Any, bounds: tuple[Sequence[float], Sequence[float]]) -> bool:
+    """True if the fit has left a constant at an end of its range."""
+    return any(
+        math.isclose(v, end, rel_tol=_AT_END, abs_tol=_AT_END)
+        for ends in bounds
+        for v, end in zip(values, ends, strict=True)
+    )

@@ -37,7 +37,7 @@ const rule = () => ({ lineStyle: { color: colour("line") } });
 export const label = (formatter) => ({ color: colour("soft"), fontSize: FONT, hideOverlap: true, formatter });
 
 export const time = (end, more = {}) => ({
-  type: "value", min: 0, max: end, axisLine: rule(), splitLine: { show: false }, axisLabel: label(onAxis(end, "s")),
+  type: "value", min: 0, max: end, axisLine: { ...rule(), onZero: false }, splitLine: { show: false }, axisLabel: label(onAxis(end, "s")),
   axisPointer: { label: { show: false, formatter: ({ value }) => exact(Number(value), "s", 4) } }, ...more,
 });
 
@@ -45,7 +45,7 @@ export const time = (end, more = {}) => ({
 export function axis(unit, most, more = {}) {
   const scale = scaleOf(most, unit);
   return {
-    type: "value", splitNumber: 4, splitLine: rule(), axisLabel: label(scale.text), name: scale.unit, nameGap: 10,
+    type: "value", splitNumber: 4, axisLine: { onZero: false }, splitLine: rule(), axisLabel: label(scale.text), name: scale.unit, nameGap: 10,
     nameTextStyle: { color: colour("soft"), fontSize: FONT, align: "right", padding: [0, 6, 0, 0] }, ...more,
   };
 }

@@ -1,29 +1,26 @@
 // Card of the 3-D body: the view, its tools, a selected fragment, and the snapshots over time.
 
-import { binary, call } from "./api.js";
+import { call } from "./api.js";
 import { count, counted, h, si } from "./figures.js";
 import { act } from "./keys.js";
 import { three } from "./libraries.js";
 import { Picked, table } from "./picked.js";
+import { SectionPlane, symmetry } from "./plane.js";
 import { range } from "./ranges.js";
 import { film, picture } from "./saving.js";
-import { unpack, within } from "./section.js";
-import { colourings, decode, fragment, rowOf } from "./snapshot.js";
+import { colourings, fragment, rowOf } from "./snapshot.js";
+import { Snapshots } from "./snapshots.js";
 import { Tools } from "./tools.js";
 import { View3d } from "./view3d.js";
 
 const MOST_KEPT = 40; // Largest number of decoded snapshots, about 1 MB each.
-const MOST_VOLUMES = 8; // Largest number of snapshots with all tets, some MB each.
 const PLAY = 400; // ms for each snapshot.
-const HOLLOW = "this snapshot has no file of all tets, so its section is not filled";
 
 export class Body {
-  // `onShow` is called with the snapshot on the screen. `bare`: without tools and time line, for several bodies side by side;
-  // `ready` resolves to the View3d (share() of camera.js), at(t) shows a time.
-  constructor(run, onShow = () => {}, { bare = false } = {}) {
-    Object.assign(this, { run, onShow, bare, entries: [], kept: new Map(), volumes: new Map(), following: true, picked: null, wanted: null, planes: [] });
+  // `onShow` is called with the snapshot on the screen.
+  constructor(run, onShow = () => {}) {
+    Object.assign(this, { run, onShow, entries: [], snapshots: new Snapshots(run, MOST_KEPT), following: true, picked: null, wanted: null, planes: [] });
     this.path = `v1/runs/${encodeURIComponent(run)}`;
-    this.ready = new Promise((done) => { this.whenReady = done; });
     this.build();
   }
 
@@ -34,13 +31,14 @@ export class Body {
       follow: (text) => this.follow(text), set: (name, value) => this.set(name, value), opacities: () => this.view.set({ opacities: this.tools.opacities }),
       save: (kind) => this.save(kind), fragments: () => this.list(),
     });
+    this.plane = new SectionPlane(this.tools);
     this.card = new Picked(() => this.pick(-1), (id) => this.history(id));
     this.scrub = h("input", { type: "range", min: 0, step: 1, max: 0, value: 0, "aria-label": "snapshot" });
     this.playing = h("button.quiet", { type: "button" }, "Play");
     this.note = h("span.note");
     this.bar = h("div.scrub", {}, this.playing, this.scrub);
     this.element = h("section.card.body3d", { "aria-label": "the body", hidden: "" },
-      h("div.card-head", {}, h("h2", {}, "The body"), this.note), this.bare ? "" : this.tools.element, h("div.frame3d", {}, this.holder, h("div.aside3d", {}, this.tools.cutting, this.card.element)), this.bare ? "" : this.bar);
+      h("div.card-head", {}, h("h2", {}, "The body"), this.note), this.tools.element, h("div.frame3d", {}, this.holder, h("div.aside3d", {}, this.tools.cutting, this.card.element)), this.bar);
     this.listen();
   }
 
@@ -64,7 +62,8 @@ export class Body {
     try {
       const [modules, plan] = await Promise.all([three(), call(`${this.path}/files/case.resolved.json`).catch(() => null)]);
       if (this.closed) return;
-      this.cuts(plan);
+      this.planes = symmetry(plan);
+      this.tools.mirrorLine.hidden = !this.planes.length;
       this.view = new View3d(modules, (row) => this.pick(row));
       this.view.set({ cuts: this.planes });
       this.view.eye.onMode = () => { this.tools.frame.value = this.view.eye.mode === "part" ? `part ${this.view.eye.part}` : this.view.eye.mode; };
@@ -73,18 +72,10 @@ export class Body {
       this.view.canvas.setAttribute("aria-label", "the body in 3-D; arrow keys turn it, plus and minus zoom, more keys are listed under Camera");
       this.view.canvas.addEventListener("keydown", (event) => this.key(event));
       this.holder.append(this.view.element);
-      this.whenReady(this.view);
       if (this.snapshot) this.present(this.snapshot, this.volume);
     } catch (error) {
       this.holder.replaceChildren(h("p.hint", {}, `No 3-D: ${error.message}`));
     }
-  }
-
-  // The planes of symmetry on whose positive side all parts lie, one for each axis.
-  cuts(plan) {
-    const found = (plan?.boundaries ?? []).filter(({ kind, parts }) => kind === "symmetry" && !parts?.length);
-    this.planes = ["x", "y", "z"].map((name, axis) => ({ axis, at: found.find((one) => one.axis === name)?.at })).filter(({ at }) => at !== undefined);
-    this.tools.mirrorLine.hidden = !this.planes.length;
   }
 
   // Snapshots -----------------------------------------------------------------------------------------------------------
@@ -104,37 +95,13 @@ export class Body {
       while (this.wanted !== null) {
         const entry = this.entries[this.wanted];
         this.wanted = null;
-        const [snapshot, volume] = await Promise.all([this.read(entry), this.slicing ? this.readVolume(entry) : null]);
+        const [snapshot, volume] = await Promise.all([this.snapshots.read(entry), this.plane.on ? this.snapshots.volume(entry) : null]);
         this.entry = entry;
         if (!this.closed) this.present(snapshot, volume);
       }
     } catch (error) {
       this.note.textContent = error.message;
     }
-  }
-
-  // The last snapshot up to the time t, s, or the first one.
-  at(t) {
-    const place = Math.max(0, this.entries.findLastIndex((entry) => entry.t <= t * (1 + 1e-9)));
-    if (this.entries[place] !== this.entry) this.show(place);
-    this.following = false;
-  }
-
-  async read({ n }) {
-    return this.known(this.kept, n, MOST_KEPT, async () => decode(await binary(`${this.path}/snapshots/${n}`)));
-  }
-
-  // Returns null for a snapshot without all tets.
-  async readVolume({ n, tets }) {
-    return tets ? this.known(this.volumes, n, MOST_VOLUMES, async () => unpack(await binary(`${this.path}/snapshots/${n}/tets`))) : null;
-  }
-
-  async known(kept, n, most, read) {
-    const found = kept.get(n) ?? (await read());
-    kept.delete(n);
-    kept.set(n, found);
-    if (kept.size > most) kept.delete(kept.keys().next().value);
-    return found;
   }
 
   present(snapshot, volume) {
@@ -147,7 +114,7 @@ export class Body {
     if (!this.view) return;
     this.view.look.caption = si(header.t, "s");
     this.view.show(snapshot);
-    if (volume && this.slicing) this.view.fill(volume);
+    if (volume && this.plane.on) this.view.fill(volume);
     this.paint();
     this.tell();
     this.pick(this.picked === null ? -1 : rowOf(snapshot, this.picked), true);
@@ -159,6 +126,7 @@ export class Body {
     const { header, arrays } = this.snapshot;
     this.tools.offer(colourings(this.snapshot));
     this.tools.offerParts(header.parts);
+    this.tools.warnOfSize(header.tets);
     this.tools.edgeNote.textContent = header.surface_triangles > arrays.triangles.length / 3 ? `the surface is simplified: ${counted(header.surface_triangles, "face")} of the mesh` : "";
   }
 
@@ -170,40 +138,26 @@ export class Body {
     const field = this.snapshot.header.fields[by];
     if (!field) return this.view.colour(by);
     const told = this.entries.map(({ fields }) => fields?.[by]).filter(Boolean);
-    const ends = range(this.tools.choice, by, this.snapshot, told);
+    const ends = range(this.tools.choice, by, [this.snapshot], told);
     this.tools.ends(ends, field.unit);
     return this.view.colour(by, ends, this.tools.choice.bands);
   }
 
-  // Moves to another section plane through the middle of the frame; the side towards the camera is cut away.
   async choose() {
-    const name = this.tools.across.value;
-    this.slicing = name !== "none";
-    if (!this.slicing) {
-      this.tools.tell(null, "");
-      return this.view.slice(null);
-    }
-    const way = this.view.eye.back();
-    const axis = ["x", "y", "z"].indexOf(name);
-    this.normal = axis < 0 ? way : [0, 1, 2].map((i) => (i === axis ? 1 : 0));
-    this.tools.flipped = axis >= 0 && way[axis] < 0;
-    const along = this.view.eye.along(this.normal);
-    this.tools.slide(...along, within((along[0] + along[1]) / 2, this.snapshot.header.box, this.normal));
+    this.plane.choose(this.view.eye, this.snapshot.header.box);
     this.slice();
-    this.volume = await this.readVolume(this.entry).catch(() => null);
+    if (!this.plane.on) return;
+    this.volume = await this.snapshots.volume(this.entry).catch(() => null);
     if (this.volume && this.volume.header.n === this.snapshot.header.n) this.view.fill(this.volume);
-    return this.tell();
-  }
-
-  slice() {
-    const sign = this.tools.flipped ? -1 : 1;
-    this.view.slice({ normal: this.normal.map((part) => sign * part), at: sign * this.tools.at });
     this.tell();
   }
 
-  tell() {
-    if (this.slicing) this.tools.tell(this.tools.at, this.entry.tets || this.volume ? "" : HOLLOW);
+  slice() {
+    this.view.slice(this.plane.value);
+    this.tell();
   }
+
+  tell() { this.plane.tell(this.entry.tets || this.volume); }
 
   follow(text) {
     const [mode, part] = text.split(" ");
@@ -254,7 +208,7 @@ export class Body {
   }
 
   remembered(id) {
-    const rows = [...this.kept.values()].map((one) => [one.header.t, one, rowOf(one, id)]).filter(([, , row]) => row >= 0).sort((a, b) => a[0] - b[0]);
+    const rows = [...this.snapshots.shown.values()].map((one) => [one.header.t, one, rowOf(one, id)]).filter(([, , row]) => row >= 0).sort((a, b) => a[0] - b[0]);
     const each = rows.map(([, one, row]) => fragment(one, row));
     return { t: rows.map(([t]) => t), mass: each.map(({ mass }) => mass), speed: each.map(({ velocity }) => Math.hypot(...velocity)) };
   }

@@ -82,7 +82,7 @@ export class ComparePage {
     const broken = this.runs.some(({ snapshot }) => snapshot && fitted(snapshot).points.length > snapshot.header.parts.length);
     if (broken && !this.sizes.placed) this.grid.append(this.sizes.placed = this.card("Fragment sizes", this.sizes.tools, this.sizes.element));
     this.sizes.draw();
-    this.bodies.offer(this.runs.flatMap(({ id, snapshots }, line) => (snapshots?.length ? [{ id, snapshots, line, called: this.names[line] }] : [])));
+    this.bodies.offer(this.runs.flatMap(({ id, snapshots }, line) => (snapshots?.length ? [{ id, snapshots, line, called: this.names[line], plan: this.runs[line].plan }] : [])));
   }
 
   // Quantities -------------------------------------------------------------------------------------------------------

@@ -2,6 +2,7 @@
 
 import { Problem, call, send } from "./api.js";
 import { isJson, lineOf, valueOf, withKey } from "./casetext.js";
+import { asToml } from "./casetoml.js";
 import { Editor } from "./editor.js";
 import { counted, h } from "./figures.js";
 import { Outbox } from "./outbox.js";
@@ -53,7 +54,7 @@ export class NewPage {
     const chosen = h("input", { type: "file", multiple: "", "aria-label": "choose a case and its files", onchange: () => this.drop([...chosen.files]) });
     this.fields = FIELDS.map(([id, words, table, name]) => {
       const input = h("input", { type: table ? "number" : "text", min: 1, id: `new-${id}`, placeholder: table ? "1" : "", oninput: () => this.set(table, name, input) });
-      return { input, table, name, element: h(`label.row.of-${id}`, {}, h("span", {}, words), input) };
+      return { input, table, name, element: h(`label.form-row.of-${id}`, {}, h("span", {}, words), input) };
     });
     this.labels = h("input", { type: "text", placeholder: "study=speeds, mesh=fine" });
     this.startButton = h("button", { type: "button", disabled: "", onclick: () => this.start() }, "Start");
@@ -66,7 +67,7 @@ export class NewPage {
       h("div.bench", {},
         h("section.card.stage-editor", { "aria-label": "case" }, h("p.hint", {}, "Paste a case, drop it here with the files that it names, or start from a shipped one."), this.editor.element),
         h("aside.now", { "aria-label": "check and start" },
-          h("section.card.start", { "aria-label": "start" }, ...this.fields.map(({ element }) => element), h("label.row", {}, h("span", {}, "Labels"), this.labels),
+          h("section.card.start", { "aria-label": "start" }, ...this.fields.map(({ element }) => element), h("label.form-row", {}, h("span", {}, "Labels"), this.labels),
             h("div.actions", {}, this.startButton, h("span.hint", {}, "Ctrl+Enter")), this.said),
           h("section.card", { "aria-label": "check" }, h("h2", {}, "Check"), this.verdict),
           h("section.card", { "aria-label": "files of the case" }, h("h2", {}, "Files"), this.files))));
@@ -92,7 +93,7 @@ export class NewPage {
     const path = `v1/runs/${encodeURIComponent(this.from)}`;
     const info = await call(path, { signal });
     this.labels.value = Object.entries(info.labels ?? {}).filter(([name]) => !OWN.test(name)).map((pair) => pair.join("=")).join(", ");
-    this.show(await (await send(`${path}/files/${info.case_file}`, { signal })).text());
+    this.show(asToml(await (await send(`${path}/files/${info.case_file}`, { signal })).text()));
   }
 
   async read(name) {

@@ -19,7 +19,7 @@ export class Ranks {
     const rows = totals.slice(0, MOST_RANKS).flatMap((_, rank) => {
       const pieces = Object.entries(groups).map(([name, seconds]) =>
         h("i", { title: `${name} ${si(seconds[rank], "s")}`, style: { width: `${(100 * seconds[rank]) / longest}%`, background: `var(--${name})` } }));
-      return [h("span.who", {}, `rank ${rank}`), h("div.stack", {}, pieces), h("span.busy", {}, `${percent(share(rank), 0)} computes${rank in helped ? ` · other threads ${percent(helped[rank], 0)} busy` : ""}`)];
+      return [h("span.rank-name", {}, `rank ${rank}`), h("div.stack", {}, pieces), h("span.busy", {}, `${percent(share(rank), 0)} computes${rank in helped ? ` · other threads ${percent(helped[rank], 0)} busy` : ""}`)];
     });
     const more = totals.length - MOST_RANKS;
     this.note.textContent = more > 0 ? `${totals.length} ranks, the first ${MOST_RANKS} shown` : "";
@@ -70,7 +70,7 @@ function bars(title, values) {
   const mean = values.reduce((total, value) => total + value, 0) / (values.length || 1);
   const texts = alike(values, "s");
   return h("div", {}, h("h3", {}, `${title}: slowest over mean ${fixed(most / (mean || 1))}`),
-    h("div.ranks", {}, values.slice(0, MOST_RANKS).flatMap((value, rank) => [h("span.who", {}, `rank ${rank}`),
+    h("div.ranks", {}, values.slice(0, MOST_RANKS).flatMap((value, rank) => [h("span.rank-name", {}, `rank ${rank}`),
       h("div.stack", {}, h("i", { style: { width: `${(100 * value) / most}%`, background: "var(--compute)" } })), h("span.busy", {}, texts[rank])])));
 }
 

@@ -11,7 +11,7 @@ export class Picked {
   // `onClose` is called when it is closed, `history(id)` resolves to { t, mass, speed }.
   constructor(onClose, history) {
     this.history = history;
-    this.list = h("dl.facts.row");
+    this.list = h("dl.facts");
     this.course = h("div.course");
     const close = h("button.quiet.shut-picked", { type: "button", "aria-label": "close the fragment", onclick: onClose }, "×");
     this.element = h("div.picked", { hidden: "" }, close, this.list, this.course);

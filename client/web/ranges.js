@@ -5,13 +5,13 @@ import { rounded, scaleOf } from "./scales.js";
 const ALIKE = 1e-9; // Relative difference of values that is rounding only.
 const EXTREMES = [0.005, 0.995]; // Quantiles of the triangles, as in the message of a snapshot (docs/snapshots.md).
 
-// { low, high, number, uniform } for a field of a snapshot. `choice`: { how: "most" | "all" | "hand", over: "run" | "now", hand: [low, high] };
+// { low, high, number, uniform } for a field of the shown snapshots. `choice`: { how: "most" | "all" | "hand", over: "run" | "now", hand: [low, high] };
 // `told`: ranges of the field in the messages of all snapshots, [least, low, high, most] each.
-export function range(choice, name, snapshot, told) {
+export function range(choice, name, snapshots, told) {
   if (choice.how === "hand" && choice.hand) return { low: choice.hand[0], high: choice.hand[1], number: 5 };
   const all = choice.how === "all";
   const known = choice.over === "run" ? told.map(([least, low, high, most]) => (all ? [least, most] : [low, high])) : [];
-  const found = known.length ? known : [all ? extent(snapshot, name) : most(snapshot, name)];
+  const found = known.length ? known : snapshots.map((one) => (all ? extent(one, name) : most(one, name)));
   const [low, high] = [Math.min(...found.map(([least]) => least)), Math.max(...found.map(([, largest]) => largest))];
   if (high - low <= ALIKE * Math.max(Math.abs(low), Math.abs(high))) return { low, high, number: 1, uniform: true };
   return nice(low, high, scaleOf(name).centred);

@@ -29,7 +29,7 @@ export class ResultTable {
     const head = this.columns.map((column) => this.head(column));
     const focused = document.activeElement?.dataset?.sorts;
     this.place.replaceChildren(h("table.checks.outcomes", {}, h("thead", {}, h("tr", {}, h("th", { scope: "col" }, "run"), head)),
-      h("tbody", {}, order.map((i) => h("tr", {}, h("th.row", { scope: "row" }, swatch(rows[i].line), h("a", { href: rows[i].href }, rows[i].name), rows[i].state === "succeeded" ? "" : pill(rows[i].state)),
+      h("tbody", {}, order.map((i) => h("tr", {}, h("th.named", { scope: "row" }, swatch(rows[i].line), h("a", { href: rows[i].href }, rows[i].name), rows[i].state === "succeeded" ? "" : pill(rows[i].state)),
         this.columns.map(({ values, text, key }) => h(key ? "td.value" : `td.number${this.unsure(i) ? ".unsure" : ""}`, {}, text(values[i]))))))));
     if (focused) this.place.querySelector(`[data-sorts="${CSS.escape(focused)}"]`)?.focus();
   }

@@ -1,23 +1,20 @@
-// Bodies of several runs side by side: one camera, one clock, the nearest snapshot of each run.
+// Bodies of several runs side by side: one camera, one clock, one section and one colour scale.
 
-import { binary } from "./api.js";
 import { share } from "./camera.js";
-import { counted, h, si } from "./figures.js";
+import { h, si } from "./figures.js";
+import { act } from "./keys.js";
 import { three } from "./libraries.js";
 import { swatch } from "./linestyles.js";
+import { Pane } from "./pane.js";
+import { SectionPlane } from "./plane.js";
 import { range } from "./ranges.js";
-import { scaleOf } from "./scales.js";
-import { colourings, decode } from "./snapshot.js";
-import { View3d } from "./view3d.js";
+import { colourings } from "./snapshot.js";
+import { Tools } from "./tools.js";
 
 const MOST = 4;
 const AT_FIRST = 2;
 const PLAY = 400; // ms for each step of the clock.
 const STEPS = 100; // Steps of the clock.
-const MOST_KEPT = 24; // Largest number of decoded snapshots for each run.
-
-// The snapshot nearest to a time.
-export const nearestTo = (entries, t) => entries.reduce((best, one) => (Math.abs(one.t - t) < Math.abs(best.t - t) ? one : best));
 
 export class SideBySide {
   constructor() {
@@ -25,14 +22,19 @@ export class SideBySide {
     this.row = h("div.panes");
     this.clock = h("input", { type: "range", min: 0, max: STEPS, step: 1, value: STEPS, "aria-label": "simulated time", oninput: () => this.tick() });
     this.told = h("span.note");
-    this.by = h("select", { "aria-label": "colour by", onchange: () => this.paint() }, ["fragment", "part", "rank"].map((name) => h("option", { value: name }, name)));
+    this.tools = new Tools({
+      colour: () => this.paint(), section: () => this.choose(), slice: () => this.slice(), camera: (name) => this.view?.eye.view(name),
+      follow: (text) => this.follow(text), set: (name, value) => this.set(name, value), opacities: () => this.fade(),
+    }, ["Fragments", "Save"]);
+    this.plane = new SectionPlane(this.tools);
     this.playing = h("button.quiet", { type: "button", onclick: () => (this.player ? this.pause() : this.play()) }, "Play");
     this.choice = h("div.picks", { role: "group", "aria-label": "bodies that are shown, up to four" });
     this.element = h("section.card", { hidden: "", "aria-label": "bodies side by side" },
-      h("div.card-head", {}, h("h2", {}, "Bodies side by side"), this.told, h("span.beside", {}, h("label.field", {}, "Colour ", this.by))), this.choice, this.row, h("div.scrub", {}, this.playing, this.clock));
+      h("div.card-head", {}, h("h2", {}, "Bodies side by side"), this.told), this.choice, this.tools.element, this.tools.cutting, this.row, h("div.scrub", {}, this.playing, this.clock));
+    this.row.addEventListener("keydown", (event) => this.key(event));
   }
 
-  // Runs with snapshots, { id, snapshots, line, called }; the first two are shown.
+  // Runs with snapshots, { id, snapshots, line, called, plan }; the first two are shown.
   offer(runs) {
     this.runs = runs;
     this.element.hidden = !runs.length;
@@ -58,11 +60,11 @@ export class SideBySide {
   drawChoice() {
     this.choice.replaceChildren(...this.runs.map(({ id, line, called }) => {
       const on = this.chosen.includes(id);
-      return h("label.pick", {}, h("input", { type: "checkbox", value: id, checked: on ? "" : false, disabled: !on && this.chosen.length >= MOST ? "" : false, onchange: () => this.choose(id) }), swatch(line), called);
+      return h("label.pick", {}, h("input", { type: "checkbox", value: id, checked: on ? "" : false, disabled: !on && this.chosen.length >= MOST ? "" : false, onchange: () => this.toggle(id) }), swatch(line), called);
     }));
   }
 
-  choose(id) {
+  toggle(id) {
     this.chosen = this.chosen.includes(id) ? this.chosen.filter((one) => one !== id) : [...this.chosen, id];
     this.drawChoice();
     this.choice.querySelector(`[value="${CSS.escape(id)}"]`)?.focus();
@@ -76,26 +78,32 @@ export class SideBySide {
     if (this.closed) return;
     for (const [id, pane] of this.panes) if (!this.chosen.includes(id)) this.drop(id, pane);
     for (const id of this.chosen) if (!this.panes.has(id)) this.panes.set(id, this.pane(this.runs.find((run) => run.id === id), modules));
-    this.row.replaceChildren(...this.chosen.map((id) => this.panes.get(id).element));
+    this.row.replaceChildren(...this.shown.map(({ element }) => element));
+    this.tools.mirrorLine.hidden = !this.shown.some(({ planes }) => planes.length);
     await this.tick();
-    const views = this.chosen.map((id) => this.panes.get(id)?.view).filter(Boolean);
-    views.forEach((view, i) => view.set({ legend: i === 0 }));
-    share(views);
-  }
-
-  drop(id, { view }) {
-    view.close();
-    this.panes.delete(id);
+    this.shown.forEach(({ view }, i) => view.set({ ...this.looks(), legend: i === 0 && this.tools.legend.checked }));
+    this.shown.forEach((pane) => pane.set("mirror", this.tools.mirror.checked));
+    this.fade();
+    share(this.shown.map(({ view }) => view));
   }
 
   pane(run, modules) {
-    const view = new View3d(modules);
-    view.canvas.tabIndex = 0;
-    view.canvas.setAttribute("role", "application");
-    view.canvas.setAttribute("aria-label", `the body of ${run.called}; arrow keys turn all bodies, plus and minus zoom`);
-    const caption = h("figcaption", {});
-    return { run, view, kept: new Map(), caption, element: h("figure.pane", {}, h("div.who", {}, swatch(run.line), run.called), view.element, caption) };
+    const pane = new Pane(run, modules, () => this.plane.value);
+    pane.view.eye.onMode = () => { this.tools.frame.value = this.view.eye.mode === "part" ? `part ${this.view.eye.part}` : this.view.eye.mode; };
+    return pane;
   }
+
+  drop(id, pane) {
+    pane.close();
+    this.panes.delete(id);
+  }
+
+  // Panes in the order of their selection; the first has the legend and the frame of all.
+  get shown() { return this.chosen.map((id) => this.panes.get(id)).filter(Boolean); }
+
+  get view() { return this.shown[0]?.view; }
+
+  get planes() { return this.shown.flatMap(({ planes }) => planes); }
 
   get t() { return (Number(this.clock.value) / STEPS) * this.end; }
 
@@ -103,60 +111,86 @@ export class SideBySide {
     const { t } = this;
     this.told.textContent = si(t, "s");
     this.clock.setAttribute("aria-valuetext", si(t, "s"));
-    await Promise.all([...this.panes.values()].map((pane) => this.show(pane, t)));
-    this.offerColours();
+    await Promise.all(this.shown.map((pane) => pane.show(t)));
+    this.offerTools();
+    this.paint();
   }
 
-  // Only the last request is fetched when the clock is faster than the network.
-  async show(pane, t) {
-    pane.wanted = t;
-    if (pane.busy) return;
-    pane.busy = true;
-    try {
-      while (pane.wanted !== null) {
-        const entry = nearestTo(pane.run.snapshots, pane.wanted);
-        pane.wanted = null;
-        if (pane.shown === entry.n) continue;
-        const snapshot = await this.read(pane, entry);
-        if (this.closed || !this.panes.has(pane.run.id)) return;
-        Object.assign(pane, { shown: entry.n, snapshot });
-        pane.view.show(snapshot);
-        this.paintOne(pane);
-        pane.caption.textContent = `${si(entry.t, "s")} · ${counted(entry.fragments, "fragment")}`;
-      }
-    } catch (error) {
-      pane.caption.textContent = error.message;
-    } finally {
-      pane.busy = false;
-    }
+  // Colourings that all bodies have, and the parts of all.
+  offerTools() {
+    const snapshots = this.shown.map(({ snapshot }) => snapshot).filter(Boolean);
+    if (!snapshots.length) return;
+    const lists = snapshots.map(colourings);
+    this.tools.offer(lists[0].filter((name) => lists.every((list) => list.includes(name))));
+    this.tools.offerParts([...new Set(snapshots.flatMap(({ header }) => header.parts))]);
+    this.tools.warnOfSize(Math.max(...snapshots.map(({ header }) => header.tets)));
+    this.tools.edgeNote.textContent = snapshots.some(({ header, arrays }) => header.surface_triangles > arrays.triangles.length / 3) ? "the surface of a large body is simplified" : "";
+    this.tell();
   }
 
-  async read({ run, kept }, { n }) {
-    const found = kept.get(n) ?? decode(await binary(`v1/runs/${encodeURIComponent(run.id)}/snapshots/${n}`));
-    kept.set(n, found);
-    if (kept.size > MOST_KEPT) kept.delete(kept.keys().next().value);
-    return found;
-  }
-
-  offerColours() {
-    const lists = [...this.panes.values()].filter(({ snapshot }) => snapshot).map(({ snapshot }) => colourings(snapshot));
-    const names = (lists[0] ?? []).filter((name) => lists.every((list) => list.includes(name)));
-    if (!names.length || names.join() === [...this.by.options].map(({ value }) => value).join()) return;
-    const before = this.by.value;
-    this.by.replaceChildren(...names.map((name) => h("option", { value: name }, ["fragment", "part", "rank"].includes(name) ? name : scaleOf(name).label)));
-    this.by.value = names.includes(before) ? before : names[0];
-  }
-
-  // One colour scale for all shown bodies and all times.
-  paintOne({ view, snapshot }) {
-    const by = this.by.value;
-    if (!snapshot.header.fields[by]) return view.colour(by);
-    const told = this.chosen.flatMap((id) => this.panes.get(id)?.run.snapshots ?? []).map(({ fields }) => fields?.[by]).filter(Boolean);
-    return view.colour(by, range({ how: "most", over: "run" }, by, snapshot, told));
-  }
-
+  // One colour scale for all shown bodies, and for all times unless the user wants another one.
   paint() {
-    for (const pane of this.panes.values()) if (pane.snapshot) this.paintOne(pane);
+    const panes = this.shown.filter(({ snapshot }) => snapshot);
+    const { by: { value: by }, choice } = this.tools;
+    const field = panes[0]?.snapshot.header.fields[by];
+    const told = panes.flatMap(({ run }) => run.snapshots).map(({ fields }) => fields?.[by]).filter(Boolean);
+    const ends = field && range(choice, by, panes.map(({ snapshot }) => snapshot), told);
+    if (field) this.tools.ends(ends, field.unit);
+    for (const { view } of panes) view.colour(by, ends, field ? choice.bands : 0);
+  }
+
+  // Section, camera, display -----------------------------------------------------------------------------------------------
+
+  choose() {
+    const [first] = this.shown.filter(({ snapshot }) => snapshot);
+    if (!first) return;
+    this.plane.choose(first.view.eye, first.snapshot.header.box);
+    this.slice();
+  }
+
+  slice() {
+    for (const pane of this.shown) pane.slice();
+    this.tell();
+  }
+
+  tell() { this.plane.tell(this.shown.every(({ entry }) => !entry || entry.tets)); }
+
+  fade() {
+    const { opacities } = this.tools;
+    for (const pane of this.shown) pane.opacities(new Map(this.tools.partNames.map((name, i) => [name, opacities[i]])));
+  }
+
+  follow(text) {
+    const [mode, part] = text.split(" ");
+    this.view?.eye.follow(mode, part === undefined ? null : Number(part));
+  }
+
+  // Choices of the panel Show, which every new pane gets.
+  looks() {
+    const { tools } = this;
+    return { ...Object.fromEntries(["lines", "edges", "arrows", "axes", "bar"].map((name) => [name, tools[name].checked])), explode: Number(tools.explode.value) };
+  }
+
+  set(name, value) {
+    for (const pane of name === "legend" ? this.shown.slice(0, 1) : this.shown) pane.set(name, value);
+  }
+
+  flip(name) {
+    this.tools[name].checked = !this.tools[name].checked;
+    this.set(name, this.tools[name].checked);
+  }
+
+  key(event) {
+    if (event.ctrlKey || event.metaKey || event.altKey || !this.view || !act(this, event.key)) return;
+    event.preventDefault();
+  }
+
+  // Time ----------------------------------------------------------------------------------------------------------------
+
+  step(by) {
+    this.pause();
+    this.clock.value = Number(this.clock.value) + by;
+    this.tick();
   }
 
   play() {
@@ -179,6 +213,6 @@ export class SideBySide {
     this.closed = true;
     clearInterval(this.player);
     this.watch?.disconnect();
-    for (const { view } of this.panes.values()) view.close();
+    for (const pane of this.panes.values()) pane.close();
   }
 }

@@ -2,33 +2,36 @@
 
 import { named } from "./colours.js";
 import { VIEW_NAMES } from "./camera.js";
-import { h, si, words } from "./figures.js";
+import { count, h, si, words } from "./figures.js";
 import { hindrance } from "./saving.js";
 import { scaleOf } from "./scales.js";
 
 const CUTS = ["none", "x", "y", "z", "as seen"];
 const STEPS = 400; // Steps of the slider of a section.
+const FILLED = 400_000; // Largest number of tets of a snapshot with a file of all tets (MOST_TETS of worker/snapshots/volume.py).
 const SIGNS = { "+": "+", "-": "−" };
 const KEYS = "x y z: look from there, with Shift from the other side · i: isometric · f: fit · a: fit all · e: edges · o: outlines · "
   + "v: arrows · m: mirror · arrows: turn, with Shift move · + −: zoom · , .: snapshot · Space: play";
 
 export class Tools {
-  // `act` has the actions: colour(), slice(), camera(name), follow(text), set(changes), opacities(), save(kind), fragments().
-  constructor(act) {
-    Object.assign(this, { act, choice: { how: "most", over: "run", hand: null, bands: 0 }, flipped: false });
+  // `act` has the actions: colour(), slice(), camera(name), follow(text), set(changes), opacities(), save(kind), fragments();
+  // `without`: titles of panels that are left out.
+  constructor(act, without = []) {
+    Object.assign(this, { act, choice: { how: "most", over: "run", hand: null, bands: 0 }, flipped: false, partNames: [] });
     this.by = choice("colour by", ["fragment", "part"], () => act.colour());
     this.across = choice("section across", CUTS, () => act.section());
     this.place = h("input", { type: "range", "aria-label": "place of the section", min: 0, max: 1, step: "any", value: 0.5, oninput: () => act.slice() });
     this.told = h("output.place");
     this.flip = button("Flip", "cut away the other side", () => { this.flipped = !this.flipped; act.slice(); });
-    this.panels = [
-      panel("Camera", this.camera()), panel("Scale", this.scale()), panel("Parts", (this.parts = h("div.parts"))),
-      panel("Show", this.show()), panel("Fragments", (this.heaviest = h("div.scroll", { tabindex: 0, role: "region", "aria-label": "the heaviest fragments" }))), panel("Save", this.save()),
-    ];
-    this.fragments = this.panels[4];
+    this.parts = h("div.parts");
+    this.heaviest = h("div.scroll", { tabindex: 0, role: "region", "aria-label": "the heaviest fragments" });
+    this.fragments = panel("Fragments", this.heaviest);
     this.fragments.addEventListener("toggle", () => act.fragments());
+    const panels = { Camera: panel("Camera", this.camera()), Scale: panel("Scale", this.scale()), Parts: panel("Parts", this.parts), Show: panel("Show", this.show()), Fragments: this.fragments, Save: panel("Save", this.save()) };
+    this.panels = Object.entries(panels).filter(([title]) => !without.includes(title)).map(([, one]) => one);
+    this.limit = h("span.hint.limit", { role: "status" });
     this.cutting = h("span.cutting", { hidden: "" }, this.place, this.told, this.flip);
-    this.element = h("div.tools3d", { role: "toolbar", "aria-label": "tools of the body" }, field("Colour", this.by), field("Section", this.across), this.panels);
+    this.element = h("div.tools3d", { role: "toolbar", "aria-label": "tools of the body" }, field("Colour", this.by), field("Section", this.across), this.limit, this.panels);
     this.element.addEventListener("keydown", (event) => { if (event.key === "Escape") this.shut(); });
     for (const one of this.panels) one.addEventListener("toggle", () => { if (one.open) this.shut(one); });
   }
@@ -81,7 +84,8 @@ export class Tools {
   }
 
   offerParts(parts) {
-    if (this.parts.childElementCount === parts.length) return;
+    if (parts.join("\n") === this.partNames.join("\n")) return;
+    this.partNames = parts;
     this.shares = parts.map((name, i) => h("input", { type: "range", min: 0, max: 1, step: 0.05, value: 1, "aria-label": `opacity of ${name}`, oninput: () => this.act.opacities() }));
     this.parts.replaceChildren(...parts.map((name, i) => h("div.part", {},
       h("label", {}, h("input", { type: "checkbox", checked: "", "aria-label": `show ${name}`, onchange: ({ target }) => { this.shares[i].value = target.checked ? 1 : 0; this.act.opacities(); } }),
@@ -125,6 +129,11 @@ export class Tools {
     const before = this.by.value;
     this.by.replaceChildren(...list.map((name) => h("option", { value: name }, ["fragment", "part", "rank"].includes(name) ? name : scaleOf(name).label)));
     this.by.value = list.includes(before) ? before : "fragment";
+  }
+
+  // Writes beside the choice of a section that it is not filled, before one is chosen; `tets`: the largest number of a body.
+  warnOfSize(tets) {
+    this.limit.textContent = tets > FILLED ? `hollow: only bodies of up to ${count(FILLED)} tets have filled sections` : "";
   }
 
   // The slider goes from `low` to `high`, m; its value is `at`.

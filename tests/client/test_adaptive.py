@@ -205,11 +205,23 @@ def test_any_limit_of_any_curve_lies_in_its_bracket() -> None:
 
 def test_the_error_of_a_curve_through_points_that_scatter_is_what_they_scatter() -> None:
     law, chance = lambert_jonas(400.0, 0.9, 2.0), random.Random(1)
-    found = find(Firing(lambda v: law(v) + (chance.gauss(0, 8) if v > 400 else 0.0), 4), tolerance="1 m/s")
+    at = Firing(lambda v: law(v) + (chance.gauss(0, 8) if v > 400 else 0.0), 4)
+    found = find(at, tolerance="1 m/s")
     assert found.fit is not None
     assert found.fit.error is not None
     assert 0.1 < found.fit.error < 20.0
     assert abs(found.fit.limit - 400.0) < 4.0 * found.fit.error
+    assert at.told[-1].curve is not None
+    assert (at.told[-1].curve.limit, at.told[-1].curve.error) == (found.fit.limit, found.fit.error)
+
+
+def test_points_that_do_not_follow_the_law_have_no_curve() -> None:
+    """A free plate, which slow projectiles push along and only the fastest one perforates."""
+    left = {20: 3.3, 26.7: 4.9, 30: 5.8, 33.3: 6.6, 40: 8.4, 60: 13.3, 80: 17.7, 140: 30.7, 200: 127.9}
+    shots = [Sample(v, speed - 5.0) for v, speed in left.items()]
+    made = bracket(shots)
+    assert made is not None
+    assert residual_velocity(shots, made, 5.0) is None
 
 
 def test_a_result_that_goes_through_a_threshold_has_a_line() -> None:

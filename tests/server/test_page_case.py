@@ -13,7 +13,7 @@ from typing import Any
 
 import pytest
 
-from conoid.cases.load import shipped
+from conoid.cases.load import shipped, shipped_path
 from conoid.cases.reading.files import files_of
 
 WEB = Path(__file__).parents[2] / "client" / "web"
@@ -141,3 +141,22 @@ def test_the_hash_of_a_file_is_its_sha256_however_it_is_cut(tmp_path: Path) -> N
     })"""
     found = asked(tmp_path, "sha256.js", script, [base64.b64encode(body).decode() for body in bodies])
     assert found == [hashlib.sha256(body).hexdigest() for body in bodies]
+
+
+def test_a_case_in_json_is_the_same_case_in_toml(tmp_path: Path) -> None:
+    known = [case for name in shipped() for case in [tomllib.loads(shipped_path(name).read_text(encoding="utf-8"))]]
+    odd = {
+        "name": "o",
+        "odd key.": 'a "b" \\ \n\t\u0001',
+        "t": {},
+        "u": {"v": {"w": [[1, -2.5e-9], []]}},
+        "p": [{"q": [{"r": 1}]}, {}],
+    }
+    told = [json.dumps(case) for case in [*known, odd]]
+    found = asked(tmp_path, "casetoml.js", "data.map(page.asToml)", told)
+    assert [tomllib.loads(text) for text in found] == [*known, odd]
+    assert (
+        max(len(line) for text in found[: len(known)] for line in text.splitlines() if "description" not in line) < 200
+    )
+    left = ['{"a": null}', '{"seed": 12345678901234567}', "name = 1", "{ no json"]
+    assert asked(tmp_path, "casetoml.js", "data.map(page.asToml)", left) == left

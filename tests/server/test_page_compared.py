@@ -138,6 +138,13 @@ def test_bodies_share_camera_and_clock_and_everybody_can_use_it(
     page.wait("document.querySelectorAll('.pane').length === 3")
     page.slide("input[aria-label='simulated time']", 0)
     page.wait("document.querySelector('section[aria-label^=bodies] .note').innerText.startsWith('0 ')")
+    page.slide("select[aria-label='section across']", "y")
+    assert page.evaluate("[...document.querySelectorAll('.cutting input')].map((one) => one.max > one.min)") == [True]
+    page.slide("select[aria-label='colour by']", "speed")
+    page.focus(".pane:nth-child(2) canvas")
+    page.press("z")
+    page.press("e")
+    assert page.evaluate("document.querySelector('input[aria-label=\"edges of the mesh\"]').checked")
     assert violations(page) == []
     assert page.evaluate("document.documentElement.scrollWidth") <= width
     assert page.errors == []

@@ -88,7 +88,7 @@ def test_what_is_shown_is_what_the_files_say(site: Site, watched: tuple[str, Pag
     assert offered[:5] == [str(label) for _, label in masses[:5]]
     row = rows[masses[1][1]]
     page.evaluate("document.querySelectorAll('.heaviest button')[1].click()")
-    picked = facts(page, ".facts.row")
+    picked = facts(page, ".picked .facts")
     assert (picked["fragment"], number(picked["tets"])) == (row["label"], int(row["tets"]))
     assert picked["mass"] == page.evaluate(f"import('./figures.js').then((m) => m.si(1000 * {row['mass [kg]']}, 'g'))")
     assert picked["birth"] == "at the start"  # the largest piece of a bar has the number of the bar
@@ -116,7 +116,7 @@ def test_the_body_is_cut_pulled_apart_picked_and_played(watched: tuple[str, Page
     picked = {}
     for right, down in shares:
         page.click(".view3d canvas", right, down)
-        picked = facts(page, ".facts.row")
+        picked = facts(page, ".picked .facts")
         if picked and page.evaluate("!document.querySelector('.picked').hidden"):
             break
     assert {"fragment", "mass", "birth"} <= set(picked)

@@ -446,7 +446,7 @@ def test_the_ends_of_a_scale_are_those_that_are_chosen(ask: Ask, made: bytes) ->
         choice = json.dumps({"how": how, "over": over, "hand": [3.0, 4.0]})
         found = ask("ranges.js", f"page.range({choice}, 'speed', null, data)", told)
         assert (found["low"] <= ends[0], found["high"] >= ends[1] - 1e-9, found["high"]) == (True, True, ends[1])
-    one = ask("ranges.js", "page.range({ how: 'all', over: 'now' }, 'speed', data, [])", decoded(ask, made))
+    one = ask("ranges.js", "page.range({ how: 'all', over: 'now' }, 'speed', [data], [])", decoded(ask, made))
     assert one["low"] <= header.low
     assert one["high"] >= header.high
 

@@ -1,0 +1,44 @@
+// The plane of a section, chosen with the tools of the body: its direction, its place, the side that is cut away.
+
+import { within } from "./section.js";
+
+const AXES = ["x", "y", "z"];
+export const HOLLOW = "this snapshot has no file of all tets, so its section is not filled";
+
+export class SectionPlane {
+  constructor(tools) {
+    Object.assign(this, { tools, on: false });
+  }
+
+  // Moves the plane to the middle of the frame of a camera; `box` is that of the tets. The side towards the camera is cut away.
+  choose(eye, box) {
+    const { tools } = this;
+    const name = tools.across.value;
+    this.on = name !== "none";
+    if (!this.on) return tools.tell(null, "");
+    const way = eye.back();
+    const axis = AXES.indexOf(name);
+    this.normal = axis < 0 ? way : [0, 1, 2].map((i) => (i === axis ? 1 : 0));
+    tools.flipped = axis >= 0 && way[axis] < 0;
+    const along = eye.along(this.normal);
+    return tools.slide(...along, within((along[0] + along[1]) / 2, box, this.normal));
+  }
+
+  // { normal, at } of View3d.slice, or null.
+  get value() {
+    if (!this.on) return null;
+    const sign = this.tools.flipped ? -1 : 1;
+    return { normal: this.normal.map((part) => sign * part), at: sign * this.tools.at };
+  }
+
+  // Writes the place beside the slider; `filled`: whether all tets are known.
+  tell(filled) {
+    if (this.on) this.tools.tell(this.tools.at, filled ? "" : HOLLOW);
+  }
+}
+
+// The planes of symmetry on whose positive side all parts lie, { axis, at }, one for each axis.
+export function symmetry(plan) {
+  const found = (plan?.boundaries ?? []).filter(({ kind, parts }) => kind === "symmetry" && !parts?.length);
+  return AXES.map((name, axis) => ({ axis, at: found.find((one) => one.axis === name)?.at })).filter(({ at }) => at !== undefined);
+}
