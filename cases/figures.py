@@ -13,7 +13,7 @@ _Ladder = Sequence[tuple[float, str]]
 _UP: _Ladder = ((1e12, "T"), (1e9, "G"), (1e6, "M"), (1e3, "k"))
 _DOWN: _Ladder = ((1.0, ""), (1e-3, "m"), (1e-6, "µ"), (1e-9, "n"), (1e-12, "p"))
 _PREFIXED = ("m", "g", "J", "Pa", "N", "W", "B", "Hz", "m/s", "N s", "N m", "J/m^2", "B/s")
-"""Units that accept every SI prefix. Other units have a prefix already, or a power, or are no units."""
+"""Units that accept every SI prefix. All other units have a prefix already, or a power, or are no units."""
 _LADDERS: dict[str, _Ladder] = {
     **{unit: [(factor, prefix + unit) for factor, prefix in (*_UP, *_DOWN)] for unit in _PREFIXED},
     "s": [(factor, f"{prefix}s") for factor, prefix in _DOWN],
@@ -76,7 +76,9 @@ def vectors(rows: Iterable[Iterable[float | None]], unit: str = "", digits: int 
 
 
 def large(value: float | None) -> str:
-    """Returns a number without a unit, with k, M, G or T if large: ``1.24 M``. Never with a small prefix."""
+    """Returns a number without a unit, with k, M, G or T if large: ``1.24 M``. A small prefix (such as m) is never
+    used.
+    """
     known = math.nan if value is None else float(value)
     worth, name = _step(abs(known), (*_UP, (1.0, "")), 3)
     return _with(_number(known / worth, 3), name)

@@ -86,7 +86,7 @@ class Load(Message, frozen=True):
     bytes: list[int] = []
     """Bytes of the messages to single ranks."""
     collectives: list[int] = []
-    """Number of calls in which all ranks take part."""
+    """Number of collective calls."""
     collective_bytes: list[int] = []
     """Bytes that the rank contributes to calls of all ranks."""
     outside: list[int] = []
@@ -180,8 +180,9 @@ class Frame(Message, frozen=True):
 
 
 class Snapshot(Message, frozen=True):
-    """A snapshot of the fragments (cases/output/snapshot.py) is in the run's folder. ``step`` and ``t`` are those of
-    the snapshot."""
+    """A snapshot of the fragments (cases/output/snapshot.py) is in the run's folder. ``step`` and ``t`` are the step
+    and the time of the snapshot.
+    """
 
     channel: ClassVar[str] = "fragments"
     n: int

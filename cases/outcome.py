@@ -128,12 +128,13 @@ class Outcome(msgspec.Struct, kw_only=True, frozen=True):
     made: list[Made] = []
     """Energy created by ledger lines (``run.made_limit``), the largest first; only lines that have created any."""
     compressed: list[Compressed] = []
-    """Of each part that breaks in tension only and was compressed: the largest compression, the largest first."""
+    """Largest compression of each part that breaks in tension only and was compressed; the part with the largest value
+    comes first."""
     phases: dict[str, list[float]] = {}
     """CPU seconds per phase, one number per rank; only the first thread of the rank counts."""
     serial: dict[str, list[float]] = {}
-    """Serial wall time of each phase, s, one number per rank: work of a single thread of the rank, without waiting
-    for other ranks. It limits the gain of more threads. Other programs on the same cores increase it."""
+    """Serial wall time of each phase, s, one number per rank: work of a single thread of the rank, without waiting for
+    other ranks. This time limits the gain of more threads. Other programs on the same cores increase this time."""
     parallel: dict[str, list[float]] = {}
     """Parallel wall time of each phase, s: in regions, whose tasks the threads of a rank share; with one thread, the
     time that more threads could share."""

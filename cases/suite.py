@@ -20,7 +20,7 @@ rounded."""
 
 @dataclass(frozen=True)
 class Hard:
-    """One case of the suite."""
+    """A case of the suite."""
 
     name: str
     rows: tuple[str, ...]

@@ -84,7 +84,7 @@ such mass and speed is a finite number."""
 _WRITTEN = str.maketrans({
     "\N{GREEK SMALL LETTER MU}": "\N{MICRO SIGN}", "\N{SUPERSCRIPT TWO}": "^2", "\N{SUPERSCRIPT THREE}": "^3",
 })  # fmt: skip
-"""Other spellings that are accepted: the Greek mu for the micro sign, and raised exponents."""
+"""Two other spellings are accepted: the Greek mu for the micro sign, and raised exponents."""
 
 
 def parse_unit(text: str) -> tuple[Fraction, Dimension]:

@@ -1,7 +1,7 @@
 """The Python client: ``import conoid.client as c; c.connect().submit("taylor_copper").watch()``.
 
-It has the verbs of the command line: a session validates, submits and lists; a run is watched, cancelled, waited
-for, and has a result; a result is viewed.
+Its methods have the names of the commands: a session can validate, submit and list; a run can be watched, cancelled and
+waited for, and has a result; a result can be viewed.
 """
 
 from conoid.cases.reading.problems import CaseError, ConoidError

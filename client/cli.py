@@ -185,7 +185,7 @@ def demo(
 ) -> None:
     """Run the case glass_steel_demo on this machine, check its reference numbers and draw its last frame.
 
-    It takes some ten seconds and needs only this installation; the run is kept below runs/local.
+    The demo takes some ten seconds and needs only this installation; the run is stored below runs/local.
     """
     raise typer.Exit(run_once("glass_steel_demo", on_cores(ranks, None), Path("runs/local"), out, check=True))
 

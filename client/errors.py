@@ -28,7 +28,7 @@ _LONGEST = 1000
 
 
 class ClientError(ConoidError):
-    """An error for the user. Its text is one line; ``exit_code`` is that of the command line."""
+    """An error for the user. The text of the error is one line; ``exit_code`` is the exit code of the command."""
 
     exit_code = 1
 
@@ -37,7 +37,9 @@ class ServiceError(ClientError):
     """A refusal of the server. ``status`` is the HTTP status, ``problem`` the body of the answer."""
 
     def __init__(self, status: int, problem: Mapping[str, Any]) -> None:
-        """``problem`` has the members of RFC 9457 (title, detail) and those of Conoid (code, pointer, hint, errors)."""
+        """``problem`` has the members of RFC 9457 (title, detail) and members of Conoid (code, pointer, hint,
+        errors).
+        """
         self.status = status
         self.problem = dict(problem)
         super().__init__(_line(status, problem))

@@ -124,8 +124,8 @@ def grouped(
     phases: dict[str, list[float]], interval: float = 0.0, waiting: Sequence[float] = ()
 ) -> dict[str, list[float]]:
     """Sums the phases of the worker into PHASE_GROUPS, as the page does: ``elements``, ``nodes`` and others are
-    compute; ``waiting`` is the part of the exchange in which a rank waits for others. The rest of the ``interval``,
-    s, is descheduled.
+    compute; ``waiting`` is the part of the exchange in which a rank waits for others. In the rest of the ``interval``,
+    s, the rank had no core or slept.
     """
     sums: dict[str, list[float]] = {}
     for name, seconds in phases.items():

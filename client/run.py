@@ -82,7 +82,7 @@ class Run:
         return self.session.post(RunInfo, f"{self.path}:cancel")
 
     def purge(self) -> None:
-        """Removes the run with all its files from the server after its end. This cannot be undone."""
+        """Removes the run with all its files from the server after its end. A removal cannot be undone."""
         self.session.delete(self.path)
 
     def checkpoint(self) -> RunInfo:

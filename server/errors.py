@@ -75,7 +75,7 @@ class ServiceError(Exception):
 
 
 def invalid_case(problems: Sequence[Problem]) -> ServiceError:
-    """Returns 422 with every problem; ``detail`` and ``pointer`` are those of the first one."""
+    """Returns 422 with every problem; ``detail`` and ``pointer`` are the fields of the first problem."""
     more = f" (and {len(problems) - 1} more)" if len(problems) > 1 else ""
     first = problems[0]
     return ServiceError(
@@ -156,8 +156,9 @@ async def _storage(request: Request, error: Exception) -> Response:
 
 
 async def _database(request: Request, error: Exception) -> Response:
-    """Returns the error for a database that is locked by another process, full, or not reachable. The same request
-    may succeed later."""
+    """Returns the error for a database that is locked by another process, full, or not reachable. A repetition of the
+    request may succeed later.
+    """
     _log.error("%s %s: the database cannot be used: %s", request.method, request.url.path, error)
     return database_away(error).response()
 

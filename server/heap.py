@@ -9,8 +9,8 @@ _HEAPS = 2
 """Number of heaps for all threads. The value was chosen because Python runs one thread at a time, and the CPU time
 did not change."""
 _LARGE = 256 << 10
-"""Size in bytes from which a freed block returns to the system at once. The value was chosen because answers that
-grow with a run are larger. Without this setting glibc would raise the limit to the largest block so far.
+"""Size in bytes from which a freed block returns to the system at once. Chosen value: answers whose size grows with the
+run are larger. Without this setting glibc would raise the limit to the largest block so far.
 """
 
 

@@ -138,8 +138,9 @@ def _leave(_signal: int, _frame: FrameType | None) -> None:
 
 @contextmanager
 def _listening(settings: Settings) -> Iterator[socket.socket]:
-    """Creates the socket with protocol TCP explicitly. Only then asyncio disables Nagle's delay of 40 ms for an
-    answer."""
+    """Creates the socket with protocol TCP explicitly. Only with this setting asyncio disables Nagle's delay of 40 ms
+    for an answer.
+    """
     family = socket.AF_INET6 if ":" in settings.host else socket.AF_INET
     with socket.socket(family, socket.SOCK_STREAM, socket.IPPROTO_TCP) as listener:
         listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)

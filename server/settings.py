@@ -76,8 +76,8 @@ class Settings:
     grace: float = 30.0
     """Time in s between the request to stop a worker and the kill."""
     end_runs: bool = False
-    """Whether all runs are cancelled when the server stops. Otherwise the workers continue, and the next server
-    adopts them."""
+    """Whether all runs are cancelled when the server stops. Without this option the workers continue, and the next
+    server supervises them."""
     caps: Caps = field(default_factory=Caps)
     site: Site = field(default_factory=Site)
     """Site settings: launcher, and profiles of batch systems."""

@@ -1,9 +1,9 @@
 """The Zenoh router inside the server: workers publish to it, native clients subscribe to it.
 
-This is the only module that imports zenoh. Every token is a Zenoh user of its own and may subscribe to its owner's
-runs; every owner has one more user for the workers, which may publish there. Zenoh reads users and rules once, so
-the session is closed and opened again when the tokens change; clients reconnect by themselves and read missed
-messages from the journal.
+No other module of the server imports zenoh. Every token is a Zenoh user of its own and may subscribe to its owner's
+runs; every owner has one more user for the workers, which may publish there. Zenoh reads users and rules once, so the
+session is closed and opened again when the tokens change; clients reconnect by themselves and read missed messages from
+the journal.
 """
 
 import hashlib

@@ -41,7 +41,7 @@ NEEDED: dict[str, frozenset[str]] = {
     "penetration": frozenset({"part", "axis"}),
     "worst_residual": frozenset(),
 }
-"""Keys that each reference quantity needs. Other keys among part, probe and axis are refused."""
+"""Keys that each reference quantity needs. All other keys of part, probe and axis are refused."""
 
 Read = TypeVar("Read", bound=BaseModel)
 

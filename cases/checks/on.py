@@ -33,7 +33,9 @@ def named(spec: Prescribed | Rotation | Traction | Probe) -> tuple[str, ...]:
 
 
 def parts(case: Case, spec: Prescribed | Rotation | Traction | Probe) -> list[Part]:
-    """Returns the parts whose sets are meant: those that are named, otherwise all with a mesh from a file."""
+    """Returns the parts whose sets a boundary or probe selects: the named parts, or all parts with a mesh from a file
+    if no part is named.
+    """
     names = named(spec)
     return [part for part in case.parts if (part.name in names if names else isinstance(part.mesh, MeshFile))]
 

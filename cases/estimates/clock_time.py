@@ -1,7 +1,7 @@
 """Estimate of the wall time of a case on its ranks and threads, from the core time of its stages.
 
-The assumptions are part of the answer: the share of the threads, and the efficiency of ranks and threads. They were
-measured on few cores; on many, threads were only projected (docs/performance/scaling.md).
+The assumptions are part of the answer: the share of the threads, and the efficiency of ranks and threads. The constants
+were measured on few cores; for many cores the gain by threads was only projected (docs/performance/scaling.md).
 """
 
 from collections.abc import Mapping
@@ -11,7 +11,7 @@ from ..model.schema import Case
 from .stages import AVERAGED, STATE, STRENGTH, TETS
 
 SHARED = (TETS, AVERAGED, STRENGTH, STATE)
-"""Stages whose passes the threads of a rank share. The others are assumed to run on one of them."""
+"""Stages whose passes the threads of a rank share. All other parts of the program are assumed to run on one thread."""
 _RANKS = 0.4
 """Exponent of the speed of R ranks, R^p: 66 % efficient for 2, 44 % for 4, 19 % for 16. Measured wall time: 2 ranks
 62 to 72 % efficient, 4 54 %, 16 14 to 18 %, in scenes of 47,000 to 147,000 tets (docs/performance/scaling.md)."""

@@ -34,10 +34,10 @@ START = 2.0
 """Core seconds of a rank before its first step, with a warm kernel cache."""
 
 BROKEN_NANOSECONDS = 15_000.0
-"""Core time per tet and step of a body that has turned to dust whose pieces touch each other. Measured: 3 to 14 us
-in the ten hard cases that break without being driven (docs/verification/accuracy.md: CPU s less the estimate without
-dust, by steps and tets that can break), 10 to 20 us in a glass plate under an eroding cylinder, on aluminium, with
-friction. It is 7 us per broken facet; dust has two of them per tet."""
+"""Core time per tet and step of a body that has turned to dust whose pieces touch each other. Measured: 3 to 14 us in
+the ten hard cases that break without being driven (docs/verification/accuracy.md: CPU s less the estimate without dust,
+by steps and tets that can break), 10 to 20 us in a glass plate under an eroding cylinder, on aluminium, with friction.
+A broken facet costs 7 us, and completely fragmented material has two broken facets for each tet."""
 PRESSED_NANOSECONDS = 26_000.0
 """The cost of dust that is enclosed and pressed, where every tet is in contact on all sides and sweeps are many.
 Measured: a plug of glass under a ram (tests/bench/press.py) 17,000 to 20,000 on one rank; a block of 3,600 tets
@@ -95,8 +95,8 @@ class Estimate:
     clock: ClockTime | None
     """Wall time of the case on its ranks and threads."""
     costs: dict[str, float]
-    """Its share of each stage of the case (cases/estimates/stages.py), s; empty where unknown. Breakage costs more, by
-    an amount that cannot be estimated."""
+    """Core time of each stage of the case (cases/estimates/stages.py), s; empty if unknown. Breakage costs more, by an
+    amount that cannot be estimated."""
     breaking: float
     """Additional CPU time, s, if the parts that can fracture break as far as they can; 0 without fracture."""
     dust_bytes: int
@@ -141,7 +141,7 @@ def _at_most(case: Case, dt: float | None) -> float | None:
 
 
 def _size(part: Part, folder: Path | None, found: Surveyed | None) -> MeshSize | int | None:
-    """Returns what is known of a part's mesh: sizes, only the number of tets, or nothing."""
+    """Returns the known data of the mesh of a part: all sizes, only the number of tets, or None."""
     if found is not None:
         return MeshSize(found.elements, found.nodes, found.step_length)
     if not isinstance(part.mesh, Measured):

@@ -34,8 +34,8 @@ def wave_speed(made: Material) -> float:
 
 
 def impact_speeds(case: Case, walls: bool = True) -> list[float]:
-    """Returns the largest speed, m/s, at which each part can hit another part, or a wall if ``walls``. From the
-    bounds of the velocities, so up to sqrt(3) times too large where a body rotates.
+    """Returns the largest speed, m/s, at which each part can hit another part, or a wall if ``walls``. The result is
+    computed from the bounds of the velocities, and may be up to sqrt(3) times too large if a body rotates.
     """
     bounds = [velocities(case, part) for part in case.parts]
     there = Counter(bounds)

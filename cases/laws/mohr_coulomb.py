@@ -34,8 +34,8 @@ class MohrCoulomb(Law):
     friction_angle: Annotated[Angle, AfterValidator(_acute)]
     """Angle of internal friction, such as ``"55 deg"``; at least 0 and below 90 deg."""
     dilation_angle: Annotated[Angle, AfterValidator(_acute)] = 0.0
-    """Dilation angle psi: flow increases the volume by sin(psi) of the shear, until failure. 0: no volume change;
-    equal to ``friction_angle`` (the largest value): associated flow. Not with ``eos``."""
+    """Dilation angle psi: flow increases the volume by sin(psi) of the shear, until failure. 0: no volume change; equal
+    to ``friction_angle`` (the largest value): associated flow. Must not be combined with ``eos``."""
     strength_cap: Annotated[Stress, Positive] | None = None
     """Largest s1 - s3 at any pressure. Default: no limit."""
     failure_strain: Annotated[Ratio, Positive] | None = None

@@ -143,7 +143,7 @@ class Loose(Primitive):
     sector: Literal["full"] = "full"
     """Always the full body."""
     grading: None = None
-    """Not available for this shape."""
+    """This key is not available for this shape."""
 
 
 class TwoTets(Loose):
@@ -158,7 +158,8 @@ class TwoTets(Loose):
     axis: Axis = "z"
     """Normal of the common face."""
     lean: Annotated[Angle, Field(ge=0, le=1.1)] = 0.0
-    """Inclination of the tets, such as ``"30 deg"``. Their altitude stays the same; at 0 they are regular."""
+    """Inclination of the tets, such as ``"30 deg"``. The altitude of the tets stays the same; with 0 the tets are
+    regular."""
 
 
 class Shards(Loose):

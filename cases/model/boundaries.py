@@ -31,7 +31,7 @@ class Symmetry(Model):
 
 class Wall(Model):
     """A rigid wall that nodes cannot pass: a plane, a cylinder or a sphere; fixed, moving on a prescribed course, or
-    free with a ``mass``. It does not rotate, and does not limit the time step.
+    free with a ``mass``. The wall does not rotate, and does not limit the time step.
     """
 
     kind: Literal["wall"]
@@ -55,7 +55,8 @@ class Wall(Model):
     """Velocity of the wall. Without ``mass`` it is prescribed during the whole run, and its work is external work;
     with ``mass`` it is the initial velocity."""
     course: Course = ()
-    """Factor of ``velocity`` over time, as pairs of time and factor (see ``kind = "velocity"``). Not with ``mass``."""
+    """Factor of ``velocity`` over time, as pairs of time and factor (see ``kind = "velocity"``). Must not be combined
+    with ``mass``."""
     mass: Annotated[Mass, Field(gt=0)] | None = None
     """Mass of a free wall: only the impulses of the bodies change its velocity. Default: the velocity is prescribed."""
     parts: tuple[Name, ...] = ()
@@ -126,8 +127,8 @@ class Gravity(Model):
     """Factor of the acceleration over time, as pairs of time and factor (see ``kind = "velocity"``). Default:
     constant from the start, which makes bodies at rest vibrate; a ramp avoids that."""
     parts: tuple[Name, ...] = ()
-    """Names of the parts on which it acts; all parts when empty. Of a body that ``shared`` bonds join, either all
-    parts or none."""
+    """Names of the parts on which it acts; all parts when empty. If ``shared`` bonds join parts to one body, name
+    either all parts of this body or none."""
 
 
 class Around(Model):
@@ -162,8 +163,8 @@ class Traction(Model):
     stress: tuple[Stress, Stress, Stress] | None = None
     """Force per area along x, y, z; not zero."""
     pressure: Stress | None = None
-    """Force per area against the outward normal of each face; not zero. Area and normal are the initial ones, except
-    with ``follows``."""
+    """Force per area against the outward normal of each face; not zero. The load uses the initial area and normal,
+    except with ``follows``."""
     follows: bool = False
     """Whether ``pressure`` acts on the current area of each face, against its current normal, as a gas or a liquid
     does. On a closed surface its resultant force and moment are zero up to rounding."""

@@ -9,11 +9,11 @@ from .tables import Model, Positive
 
 
 class Erosion(Model):
-    """Erosion: tets that exceed a limit are deleted, and the surface behind them comes into contact. Not together with
-    ``fracture``.
+    """Erosion: tets that exceed a limit are deleted, and the free faces of their neighbours become contact surface.
+    Must not be combined with ``fracture``.
 
     A tet is deleted when it exceeds any of the limits: within ten time steps for strain and damage, at once for the
-    others. Its elastic energy is booked as eroded.
+    others. The elastic energy of a deleted tet is booked as eroded.
     """
 
     plastic_strain: Annotated[Ratio, Positive] | None = None

@@ -95,7 +95,7 @@ class ConeForm(Model):
     radius: Annotated[Length, Field(ge=0)]
     """Radius at ``base``; 0: the tip is there."""
     top_radius: Annotated[Length, Field(ge=0)] = 0.0
-    """Radius at the high end of ``axis``; 0: the tip is there. Not both radii are 0."""
+    """Radius at the high end of ``axis``; 0: the tip is there. At least one of the two radii is above 0."""
     length: Annotated[Length, Positive]
     """Height of the cone, along ``axis``."""
 
@@ -121,10 +121,10 @@ class OgiveForm(Model):
     """Length of the nose up to its sharp tip. At least one of ``crh`` and ``nose`` is required. With both, ``crh``
     must be at least that of the tangent ogive, (nose / D)^2 + 1/4."""
     tip_radius: Annotated[Length, Field(ge=0)] = 0.0
-    """Radius of a sphere that rounds the tip, tangent to the arc; it shortens the nose. 0: no rounding. Not together
-    with ``meplat``."""
+    """Radius of a sphere that rounds the tip, tangent to the arc; it shortens the nose. 0: no rounding. Must not be
+    combined with ``meplat``."""
     meplat: Annotated[Length, Field(ge=0)] = 0.0
-    """Diameter of a flat face that cuts off the tip (meplat); it shortens the nose. 0: none. Not together with
+    """Diameter of a flat face that cuts off the tip (meplat); it shortens the nose. 0: none. Must not be combined with
     ``tip_radius``."""
 
 

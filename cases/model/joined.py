@@ -41,8 +41,9 @@ def bodies(case: Joined) -> list[int]:
 
 
 def breakable(case: Joined) -> list[bool]:
-    """Returns an array (parts,): whether facets of the body of each part can break. They can break if a part of the
-    body, or a bond between two of its parts, can break."""
+    """Returns an array (parts,): whether facets of the body of each part can break. The facets of a body can break if a
+    part of the body, or a bond between two of its parts, can break.
+    """
     of = bodies(case)
     some = {of[i] for i, part in enumerate(case.parts) if part.fracture is not None}
     some |= {of[i] for _, bond, i, _ in shared_bonds(case) if bond.breaks}
@@ -56,9 +57,9 @@ def cohesive(case: Joined) -> set[int]:
 
 
 def meeting(case: Joined) -> list[bool]:
-    """Returns an array (parts,): whether parts of the same body can be in contact with each other. They can if the
-    body can break, or if one of its parts has self-contact. Parts of one body that cannot separate are not in
-    contact.
+    """Returns an array (parts,): whether parts of the same body can be in contact with each other. The parts of a body
+    can be in contact with each other if the body can break, or if one of its parts has self-contact. Parts of one body
+    that cannot separate are not in contact.
     """
     of, names = bodies(case), set(case.self_contact)
     some = {of[i] for i, part in enumerate(case.parts) if part.name in names}

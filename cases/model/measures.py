@@ -34,7 +34,7 @@ def kind(field: str) -> str:
 
 
 class Beyond(Model):
-    """One side of a fixed plane ``axis = at``."""
+    """A side of a fixed plane ``axis = at``."""
 
     axis: Axis
     """Normal of the plane."""
@@ -61,8 +61,8 @@ class Probe(Model):
     **Sums** over the nodes that start in the region, with ``beyond`` only those that are at present on that side of a
     plane: ``mass``, ``momentum_*``, ``kinetic_energy`` (from the velocities at the time of the line; the energy ledger
     uses products of two steps, which differ by the square of the time step), ``centre_*`` and ``centre_velocity_*``
-    (centre of mass). Free nodes count until they are deleted. Of a whole rigid part they are those of the body, with
-    its mass, centre and inertia.
+    (centre of mass). Free nodes count until they are deleted. For a whole rigid part the sums are computed from the
+    body, with its mass, centre and inertia.
 
     **Behind a target**: ``residual_mass`` is the mass of the part ``beyond`` a plane, ``residual_velocity`` its
     mass-weighted mean velocity along the normal, positive away from the plane, 0 without mass. ``fragment_mass`` and
@@ -97,8 +97,9 @@ class Probe(Model):
     high: Point | None = None
     """With means and sums: corner of the box with the highest coordinates; together with ``low``."""
     on: SetName | None = None
-    """With means and sums: name of a node set or a surface in the mesh file of the part (docs/howto/meshes.md).
-    Means use the tets that have a node in it, sums use its nodes. With a box: what is in both."""
+    """With means and sums: name of a node set or a surface in the mesh file of the part (docs/howto/meshes.md). Means
+    use the tets that have a node in it, sums use its nodes. Together with a box, the probe includes only the nodes in
+    both."""
     beyond: Beyond | None = None
     """With sums and fields behind a target: side of a plane, such as ``{ axis = "z", at = "8 mm" }``."""
     axis: Axis | None = None

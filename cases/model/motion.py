@@ -23,8 +23,9 @@ class Stretch(Model):
 
 
 class Turn(Model):
-    """Rotation of a body about the line along ``axis`` through ``centre``, right-handed. It is applied to the mesh
-    before all else: velocities and boundaries refer to the turned body."""
+    """Rotation of a body about the line along ``axis`` through ``centre``, right-handed. The rotation is applied to the
+    mesh first: velocities and boundaries refer to the turned body.
+    """
 
     axis: Axis
     """Direction of the axis of rotation."""

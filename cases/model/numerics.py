@@ -19,9 +19,9 @@ class Viscosity(Model):
     """
 
     linear: Annotated[Ratio, Field(ge=0)] = 0.06
-    """Coefficient of the linear term, which damps numerical ringing behind a wave front, and elastic waves too. A
-    velocity jump of some m/s rings at 0.06: the tension in the spall plane of a flyer plate is then a third too
-    high, at 0.3 a sixth."""
+    """Coefficient of the linear term, which damps numerical oscillations behind a wave front, and also elastic waves.
+    With 0.06 a velocity jump of some m/s is followed by oscillations: the tension in the spall plane of a flyer plate
+    is then a third too high. With 0.3 it is a sixth too high."""
     shock: Annotated[Ratio, Field(ge=0)] = 0.4
     """Increase of the linear coefficient in shocks: the front is spread over some tets and does not overshoot."""
     quadratic: Annotated[Ratio, Field(ge=0)] = 1.5
@@ -32,11 +32,11 @@ class Numerics(Model):
     """Numerical method: pressure, bulk viscosity and time step."""
 
     pressure: Literal["standard", "nodal", "split"] = "nodal"
-    """Pressure form of the tets. ``nodal``: average nodal pressure, for plastic flow and in general. ``standard``:
-    one pressure for each tet; cheaper, but it locks (is too stiff) in plastic flow. ``split``: operator split,
-    stabilised by pressure-gradient projection; it damps elastic motion (a free ball of 6,400 tets that vibrates
-    radially loses 15 % of its energy in ten periods, and none with the others). Tets whose smallest altitude at the
-    start is below a tenth of their longest edge keep a pressure of their own with ``nodal`` and ``split``."""
+    """Pressure form of the tets. ``nodal``: average nodal pressure, for plastic flow and in general. ``standard``: one
+    pressure for each tet; cheaper, but it locks (is too stiff) in plastic flow. ``split``: operator split, stabilised
+    by pressure-gradient projection; it damps elastic motion (a free ball of 6,400 tets that vibrates radially loses 15
+    % of its energy in ten periods, and none with the others). With ``nodal`` and ``split``, a tet whose smallest
+    altitude at the start is below a tenth of its longest edge has its own pressure, which is not averaged."""
     viscosity: Annotated[Viscosity | None, BeforeValidator(off), Switch()] = Viscosity()
     """Bulk viscosity; ``"none"`` switches it off."""
     dt_safety: Annotated[Ratio, Field(gt=0, le=1)] = 0.9

@@ -13,8 +13,8 @@ from .tables import Model, Point
 Tensor = tuple[Inertia, Inertia, Inertia, Inertia, Inertia, Inertia]
 """Names of the components of the inertia: xx, yy, zz, yz, zx, xy."""
 _ROUNDING = 1e-9
-"""Tolerance of the check of the inertia, relative to its trace. It is needed because a plate has one moment equal to
-the sum of the other two, and numbers in text are rounded."""
+"""Tolerance of the check of the inertia, relative to its trace. The tolerance is needed because a plate has one moment
+equal to the sum of the other two, and numbers in text are rounded."""
 
 
 class Rigid(Model):

@@ -19,7 +19,7 @@ class Run(Model):
     """Duration of the run, cores, output, and limits at which it stops."""
 
     end_time: Annotated[Time, Positive]
-    """Simulated time at which the run ends. It starts at 0."""
+    """Simulated time at which the run ends. The simulated time starts at 0."""
     ranks: Annotated[Count, Field(ge=1, le=MOST_RANKS)] = 1
     """Number of MPI processes. The answer does not depend on it."""
     threads: Annotated[Count, Field(ge=1, le=MOST_THREADS)] = 1
@@ -62,14 +62,14 @@ class Run(Model):
     """Wall time between checkpoints. A checkpoint is also written on request, when a user stops the run, and at
     ``max_wall_time``; with ``"none"`` only then."""
     residual_limit: Annotated[Ratio, Positive] = 0.05
-    """Largest energy residual over the largest energy so far; beyond it the run fails with cause ``energy``. The
-    same limit holds for kinetic energy that exceeds all energy that has entered."""
+    """Largest energy residual over the largest energy so far; beyond it the run fails with cause ``energy``. The run
+    also fails if the kinetic energy exceeds all supplied energy by more than this fraction."""
     made_limit: Annotated[Ratio, Positive] = 0.02
-    """Largest energy that a single line of the energy ledger may create, over the largest energy so far; beyond it
-    the run fails with cause ``energy``. It is exceeded where a dissipation decreases (``plastic``, ``viscous``,
-    ``friction``, ``fracture``), where a store releases more than it has absorbed (``contact``, ``averaging``,
-    ``eroded``, ``cohesive``), or where time steps of unequal length create or remove energy (``stepping``). 2 % of
-    an energy are 1 % of a speed."""
+    """Largest energy that a single line of the energy ledger may create, over the largest energy so far; beyond it the
+    run fails with cause ``energy``. A line creates energy if a dissipation decreases (``plastic``, ``viscous``,
+    ``friction``, ``fracture``), if a line releases more than it has absorbed (``contact``, ``averaging``, ``eroded``,
+    ``cohesive``), or if time steps of unequal length create or remove energy (``stepping``). A change of an energy by 2
+    % corresponds to 1 % of a speed."""
 
     @property
     def cores(self) -> int:

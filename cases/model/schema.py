@@ -43,8 +43,8 @@ class Part(Model):
     mesh: Mesh
     """Shape, place and element size of the body. ``shape`` selects one of the tables ``parts[].mesh`` below."""
     turn: Turn | None = None
-    """Rotation of the mesh before the run starts, for bodies that are inclined to the axes. Only with ``sector =
-    "full"``."""
+    """Rotation of the mesh before the run starts, for bodies that are inclined to the axes. Requires
+    ``sector = "full"``."""
     velocity: Velocity = (0.0, 0.0, 0.0)
     """Initial velocity of the whole body along x, y, z."""
     spin: Spin | None = None
@@ -57,17 +57,17 @@ class Part(Model):
     temperature: Annotated[Temperature, Field(ge=0)] = 293.15
     """Initial temperature. Used by ``strength`` with ``model = "johnson_cook"`` only."""
     erosion: Erosion | None = None
-    """Criteria for the deletion of tets. Without this table no tet of the part is deleted. Not together with
+    """Criteria for the deletion of tets. Without this table no tet of the part is deleted. Must not be combined with
     ``fracture``."""
     fracture: Fracture | None = None
     """Criteria for the fracture of facets between tets. Without this table the part does not fracture. Needs
     ``brittle`` in its material; not together with ``erosion``."""
     rigid: Annotated[Rigid | None, BeforeValidator(read_rigid), Flag()] = None
-    """Whether the part is rigid: ``true``, or a table with its mass, centre of mass and inertia. A rigid part has
-    six degrees of freedom and no stress; it costs only the contact of its surface and does not limit the time step.
-    Gravity acts on it. A plane of symmetry on which it has nodes, and a boundary that drives all of its nodes, leave
-    it the motions that they allow: with one velocity component prescribed it can still rotate about that axis, with
-    two or three it cannot rotate. A plane of symmetry that it does not touch at the start acts on it as a wall
+    """Whether the part is rigid: ``true``, or a table with its mass, centre of mass and inertia. A rigid part has six
+    degrees of freedom and no stress; it costs only the contact of its surface and does not limit the time step. Gravity
+    acts on it. A plane of symmetry on which the body has nodes, and a boundary that drives all of its nodes, restrict
+    the motion of the body. With one prescribed velocity component the body can still rotate about this axis; with two
+    or three components it cannot rotate. A plane of symmetry that it does not touch at the start acts on it as a wall
     without friction, with ``contact.restitution``."""
 
 

@@ -1,4 +1,5 @@
-"""The optional fields of frames that a case has: ``damage``, ``fragment``, and those of ``run.fields``."""
+"""The optional fields of frames that a case has: The fields are ``damage``, ``fragment``, and the fields of
+``run.fields``."""
 
 from ..model.joined import cohesive
 from ..model.schema import Case

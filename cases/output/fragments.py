@@ -26,10 +26,10 @@ COLUMNS: dict[str, str] = {
     **{f"high_{i}": "m" for i in _AXES},
     "extent": "m", "new_surface": "m^2",
 }  # fmt: skip
-"""Columns and their units. ``label``: number of the fragment, from 0: the largest piece of a fragment that breaks,
-by tets, keeps it, the others get new ones. Angular momentum and inertia are about the centre. Translation, rotation
-and deformation are shares of the kinetic energy. ``extent``: longest side of the box from low to high.
-``new_surface``: initial area of broken faces, both sides of a crack."""
+"""Columns and their units. ``label``: number of the fragment, from 0. When a fragment breaks, the piece with the most
+tets keeps the number, and the other pieces get new numbers. Angular momentum and inertia are about the centre.
+Translation, rotation and deformation are shares of the kinetic energy. ``extent``: longest side of the box from low to
+high. ``new_surface``: initial area of broken faces, both sides of a crack."""
 _WHOLE = ("label", "tets", "nodes")
 DUST = 10
 """Number of tets below which a fragment has no shape of its own and counts as dust."""

@@ -12,7 +12,7 @@ MOMENTA: dict[str, str] = {
 }  # fmt: skip
 """Columns of the momentum. The angular momentum is about the origin."""
 COLUMNS: dict[str, str] = {**CLOCK, **LEDGER, **MOMENTA}
-"""Columns and units of every run, followed by those of its parts and of its probes."""
+"""Columns and units of every run, followed by the columns of its parts and of its probes."""
 OF_PARTS = PartEnergy.__struct_fields__
 """Columns of the energies of each part, J."""
 _HEADER = re.compile(r"(.*?)(?: \[([^\]]*)\])?")

@@ -46,8 +46,8 @@ JOB_SCRIPT = "job.sh"
 ACCESS = ".telemetry.json"
 """Hidden file, readable by its owner only: address and token with which the ranks of a job publish."""
 STOP_REQUEST = "stop.request"
-"""Request to stop the run finally; the file stays. The server writes the cause into it, as a word. Without it the
-stop of a job is an interruption."""
+"""Request to stop the run finally; the file stays. The server writes the cause into it, as a word. If this file does
+not exist, the stop of a job is an interruption."""
 INTERRUPTED = "interrupted.json"
 """Preliminary outcome of a run that was interrupted and will continue."""
 ARRAYS = ".arrays"

@@ -1,6 +1,6 @@
 """The table of a sweep: one line per point, one column per changed key, property of the run or result.
 
-Values are numbers; the unit of a column stands beside its name. Server, client and page use the same table.
+Values are numbers; the header of a column has the name and the unit. Server, client and page use the same table.
 """
 
 import csv

@@ -1,4 +1,5 @@
-"""A run as one HTML file: made by a program of the client, kept in the run's folder by a server."""
+"""Report of a run as one HTML file: a program of the client makes the file, and a server stores it in the run's
+folder."""
 
 import importlib.util
 

@@ -1,4 +1,5 @@
-"""An adaptive sweep as its client reports it and a server shows it: what is looked for, the runs, what was found.
+"""Data of an adaptive sweep, which the client reports and the server shows: the searched threshold, the runs, and the
+result.
 
 The numbers are in SI units. A report has everything, so that one which was lost is made up for by the next one.
 """

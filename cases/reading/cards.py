@@ -29,7 +29,7 @@ _PARAMETER = re.compile(r"([IiRrCc])\s*([A-Za-z_][A-Za-z0-9_]*)", re.ASCII)
 
 
 class CardError(ConoidError, ValueError):
-    """Error in a deck. Its text is one line, which begins with the place of the error."""
+    """Error in a deck. The text of the error is one line, which begins with the place of the error."""
 
 
 class Card(NamedTuple):

@@ -20,7 +20,7 @@ characters, and programs that write a set in one line write some thousand."""
 
 
 class Included:
-    """The files of a deck: those that have been read, and those that are being read."""
+    """The files of a deck that have been read, and the files that are being read."""
 
     def __init__(self, path: Path) -> None:
         """``path``: path of the deck."""
@@ -97,7 +97,7 @@ def own(line: int) -> int:
 
 
 def flattened(deck: Included, named: Callable[[str], str | None], longest: int = LONGEST) -> Iterator[tuple[Line, str]]:
-    """Yields the lines of a deck, with those of included files in their places.
+    """Yields the lines of a deck; the lines of an included file replace the line that includes it.
 
     ``named``: returns the file that a line includes, None for any other line; ``longest``: largest number of
     characters of a line. Raises ValueError, OSError.

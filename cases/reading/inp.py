@@ -28,7 +28,7 @@ _UTF_8 = b"\xef\xbb\xbf"
 
 
 class InpError(ConoidError, ValueError):
-    """Error in an input file. Its text is one line, with the number of the line in the file."""
+    """Error in an input file. The text of the error is one line, with the number of the line in the file."""
 
 
 @dataclass(frozen=True)
@@ -80,8 +80,8 @@ class Source:
         return ((number, text) for number, text in self.data() if text.strip())
 
     def _useful(self, path: Path, name: str) -> Iterator[tuple[int, str]]:
-        """Yields lines that are not comments, those of included files in their places; ``name``: name of the file in
-        the deck, empty for the deck itself.
+        """Yields the lines that are not comments; the lines of an included file replace the line that includes it.
+        ``name``: name of the file in the deck, empty for the deck itself.
         """
         for line, text in _read(path, name):
             if (wanted := included_by(text)) is None:

@@ -39,7 +39,7 @@ def provenance(name: str) -> dict[str, tuple[str, str]]:
 
 @dataclass(frozen=True)
 class Constant:
-    """One number of the library as it is written there, such as ``7850 kg/m^3``."""
+    """A number of the library as its text, such as ``7850 kg/m^3``."""
 
     key: str
     value: str

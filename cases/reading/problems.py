@@ -23,7 +23,9 @@ _MOST = 100
 
 @dataclass(frozen=True)
 class Problem:
-    """One error: the key as the user wrote it, its value as text (empty if there is none), the allowed values."""
+    """An error of a case: the key as the user wrote it, its value as text (empty if the key has no value), the allowed
+    values.
+    """
 
     key: str
     value: str

@@ -8,8 +8,7 @@ _LONGEST = 80
 _CUTOFF, _MOST = 0.6, 3
 """Smallest similarity of a suggested name (default of difflib), and number of suggestions (chosen value)."""
 _PART = 3
-"""Shortest prefix, in letters, for which a name is suggested. The value was chosen because shorter prefixes are in
-too many names."""
+"""Shortest prefix, in letters, for which a name is suggested. Chosen value: shorter prefixes are in too many names."""
 
 
 def close(word: str, known: Iterable[str]) -> list[str]:

@@ -186,4 +186,5 @@ frames = 50
 max_wall_time = "8 h"
 """,
 }
-"""Pieces that change the smallest case, by the title of their section. Of a part that it has they give other keys."""
+"""Pieces that change the smallest case, by the title of their section. For a part that the example has, these lines set
+other keys of this part."""

@@ -73,8 +73,9 @@ def _reach(mesh: Plate | Cylinder | Tube | Revolved | RingSector) -> tuple[tuple
 
 
 def _two_tets(mesh: TwoTets, i: int, j: int) -> tuple[Vector, Vector]:
-    """Returns the lowest and highest coordinates of two tets, m. Their common face has a corner in the direction i,
-    and an edge across this direction."""
+    """Returns the lowest and highest coordinates of two tets, m. The common face of the two tets has a corner in the
+    direction i, and an edge across this direction.
+    """
     edge, low, high = mesh.element_size, [0.0, 0.0, 0.0], [0.0, 0.0, 0.0]
     off = altitude(mesh) * math.tan(mesh.lean)
     low[i], high[i] = min(-edge / math.sqrt(12.0), -off), max(edge / math.sqrt(3.0), off)

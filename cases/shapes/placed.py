@@ -30,7 +30,7 @@ class Placed:
         return _turned(point, self.turn)
 
     def bounds(self) -> tuple[Vector, Vector]:
-        """Lowest and highest coordinates, m; of a turned body those of its bounding box."""
+        """Lowest and highest coordinates, m; for a turned body the coordinates of its bounding box."""
         low, high = geometry.bounds(self.mesh) or ((0.0,) * 3, (0.0,) * 3)
         corners = [_turned((x, y, z), self.turn) for x, y, z in itertools.product(*zip(low, high, strict=True))]
         (a, b, c), (d, e, f) = ([pick(each) for each in zip(*corners, strict=True)] for pick in (min, max))

@@ -39,7 +39,7 @@ class Entry(NamedTuple):
     job: str
     state: str
     start: float
-    """Unix time of the start, s. It is an estimate for a pending job, and 0 if unknown."""
+    """Unix time of the start, s. For a pending job the time is an estimate; 0 if unknown."""
     name: str
     """Name of the job; for a task of an array with its index, as ``batch.key_of`` writes it."""
     reason: str

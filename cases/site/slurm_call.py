@@ -20,8 +20,8 @@ _REFUSALS = (
     "invalid", "not permitted", "unspecified", "violates", "not available", "unrecognized", "denied", "more processors",
     "not supported", "exceeds", "disabled", "limit", "unknown", "ambiguous", "too ",
 )  # fmt: skip
-"""Words of final refusals in the last line of sbatch. Other failures (connection, socket, munge) may be over in a
-minute."""
+"""Words of final refusals in the last line of sbatch. All other failures (connection, socket, munge) may be
+temporary."""
 _PASSING = (
     "submit limit", "submitjob", "not available now", "inactive", "is down", "drain", "temporarily", "try again",
     "standby", "maintenance", "i/o error writing", "maxjobs", "grpjobs", "perusers", "peruser", "peraccount",

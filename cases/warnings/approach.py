@@ -1,4 +1,5 @@
-"""Warnings about bodies that move at the start and meet nothing before the end, as after an error of a length unit."""
+"""Warnings about bodies that move at the start and have no contact before the end, for example after an error of a
+length unit."""
 
 import math
 from collections.abc import Iterator
@@ -13,7 +14,7 @@ Bounds = tuple[Vector, Vector]
 
 
 def strangers(case: Case) -> Iterator[Problem]:
-    """Yields a warning for each moving part that meets no other before ``run.end_time``.
+    """Yields a warning for each moving part that reaches no other part before ``run.end_time``.
 
     No warning for a case with mesh files, with bodies that turn or stretch, or with other boundaries than walls and
     planes of symmetry; nor for a part that can be hit by other parts which collide before the end.

@@ -1,5 +1,5 @@
-"""``conoid batch``: submits a run as a job of Slurm, without a server. Folder and result are those of a run on a
-server.
+"""``conoid batch``: submits a run as a job of Slurm, without a server. The folder and the result have the same content
+as for a run on a server.
 """
 
 import json
@@ -199,9 +199,9 @@ def _mpiexec() -> list[str]:
 def cancel_folder(folder: Path) -> str:
     """Cancels the run in a folder, and the waiting job of the run; returns one line about the result.
 
-    Slurm's commands are those of the site's file, or of PATH. The job number of the record is used only if a job of
-    this number has the name in the record. Raises UnfinishedError for a folder that is not a run's, ClientError,
-    OSError.
+    The Slurm commands are taken from the settings file of the site, or from PATH. The job number of the record is used
+    only if a job of this number has the name in the record. Raises UnfinishedError for a folder that is not a run's,
+    ClientError, OSError.
     """
     LocalFolder(folder).path(layout.JOURNAL)
     if (folder / layout.OUTCOME).exists():

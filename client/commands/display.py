@@ -203,8 +203,8 @@ def _helped(live: Live, rank: int) -> str:
 
 
 def _stacked(parts: dict[str, float], longest: float, cells: int) -> Text:
-    """Returns a bar of at most so many cells. Its pieces end at the cumulative sums, so that rounding errors do not
-    add up.
+    """Returns a bar of at most so many cells. The pieces of the bar end at the cumulative sums, so that rounding errors
+    do not add up.
     """
     edges, total = [0], 0.0
     for seconds in parts.values():

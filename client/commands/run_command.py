@@ -47,8 +47,8 @@ def run_once(
     check: bool = False,
     as_json: bool = False,
 ) -> int:
-    """Runs a case with a server of its own and returns the exit code. A case without ``run.threads`` runs on all
-    cores of this machine. Ctrl-C and SIGTERM cancel the run, wait for its end and stop the server. Raises CaseError,
+    """Runs a case with a separate server and returns the exit code. A case without ``run.threads`` runs on all cores of
+    this machine. Ctrl-C and SIGTERM cancel the run, wait for its end and stop the server. Raises CaseError,
     ClientError.
     """
     if field is not None and field not in FIELDS:
@@ -102,8 +102,8 @@ def _warn_of_cores(case: Case) -> None:
 
 
 def _follow(run: Run, case: Case, out: Console, plain: bool) -> tuple[RunInfo, set[str]]:
-    """Shows the run until its end. The first Ctrl-C cancels the run; a second Ctrl-C has no effect. Also returns the
-    log texts that were printed as lines: a panel shows only the last lines of the log.
+    """Shows the run until its end. The first Ctrl-C cancels the run; a second Ctrl-C has no effect. The function also
+    returns the log texts that were printed as lines, because a panel shows only the last lines of the log.
     """
     known, told = Live(run.id, title=case.title or case.name), set[str]()
     try:

@@ -133,7 +133,9 @@ def watch_run(
     token: Token = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print every message as one line of JSON.")] = False,
 ) -> None:
-    """Follow a run until it ends: 0 succeeded, 1 failed, 2 bad input, 4 cancelled. Ctrl-C leaves it running."""
+    """Follow a run until it ends: 0 succeeded, 1 failed, 2 bad input, 4 cancelled. Ctrl-C ends the command, not the
+    run.
+    """
     if (folder := folder_of(run)) is not None:
         LocalFolder(folder).path(layout.JOURNAL)
         followed = FolderRun(folder, slurm_of(None).bin)

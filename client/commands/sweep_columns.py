@@ -1,4 +1,4 @@
-"""The most informative columns of the table of a sweep. Its lines are mappings of titles to texts."""
+"""The most informative columns of the table of a sweep. The lines of the table are mappings of titles to texts."""
 
 from collections.abc import Mapping, Sequence
 from typing import TypeAlias
@@ -35,7 +35,7 @@ def known(rows: Sequence[Row], name: str) -> str:
 
 
 def telling(rows: Sequence[Row], titles: Sequence[str]) -> list[str]:
-    """Returns the columns of numbers that differ between the points, the most informative ones first."""
+    """Returns the columns of numbers that differ between the points; the most informative columns come first."""
 
     def differs(name: str) -> bool:
         found = {value for row in rows if (value := number_of(row[name])) is not None}

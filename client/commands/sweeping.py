@@ -112,7 +112,7 @@ def sweep(
 ) -> None:
     """Run a case at many points, or search for the point at which a result passes a value.
 
-    The same command continues an interrupted sweep: points that have succeeded are not run again.
+    If the same command is repeated, an interrupted sweep continues: points that have succeeded are not run again.
     """
     cores, place = on_cores(ranks, threads), Place(local, runs, url, token)
     if adaptive is not None:

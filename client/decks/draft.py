@@ -143,7 +143,8 @@ class Draft:
         entry.take("run.frames")
         return round(frames)
 
-    # The rest ---------------------------------------------------------------------------------------------------------
+    # Other keys
+    # --------------------------------------------------------------------------------------------------------
 
     def add_boundary(self, table: dict[str, Any], *entries: Entry) -> str:
         """Adds a boundary with the keywords of its origin; returns its index in the case."""

@@ -34,7 +34,7 @@ def hardening_of(young: float, tangent: float) -> float:
 
 def line_of(points: Sequence[tuple[float, float]]) -> tuple[float, float] | None:
     """Returns yield stress and hardening of (plastic strain, stress) points if all lie on one line that begins at
-    strain 0; None otherwise. One point is a constant flow stress.
+    strain 0; None otherwise. A table with one point means a constant flow stress.
     """
     if not points or points[0][0] != 0.0 or any(a[0] >= b[0] for a, b in pairwise(points)):
         return None

@@ -32,9 +32,9 @@ def draw(
 ) -> Drawn:
     """Draws frame files.
 
-    One frame is a PNG. Several frames are side by side in a PNG, or one after the other in a GIF or MP4. ``options``
-    are the fields of ``Look``. The default of ``out`` is a file in the current folder, named after ``name`` and the
-    field. Raises ViewError.
+    A picture of one frame is a PNG. Several frames are side by side in a PNG, or one after the other in a GIF or MP4.
+    ``options`` are the fields of ``Look``. The default of ``out`` is a file in the current folder, named after ``name``
+    and the field. Raises ViewError.
     """
     require_field(field)
     target = Path(out or f"{name}-{field}.png").resolve()

@@ -35,7 +35,7 @@ class Look(msgspec.Struct, kw_only=True, frozen=True):
     hide: list[str] = []
     """Parts that are not drawn."""
     opacity: dict[str, float] = {}
-    """Opacity of parts; 0.3 is glassy. Other parts are opaque."""
+    """Opacity of parts; 0.3 is glassy. Parts that are not named are opaque."""
     focus: list[str] = []
     """Parts that fill the picture, wherever other parts are; empty: all parts."""
     camera: str = ""

@@ -12,8 +12,8 @@ from ..errors import ClientError
 
 @contextmanager
 def whole(out: Path) -> Iterator[Path]:
-    """Yields a path to write to. At the end the file at this path replaces ``out``. Both have the same ending:
-    libraries choose the format by the ending.
+    """Yields a path to write to. At the end the file at this path replaces ``out``. The temporary name has the ending
+    of the final name, because libraries choose the format by the ending.
 
     A target that is not a regular file, such as /dev/stdout, is written directly. Raises ClientError with the name
     of ``out``.

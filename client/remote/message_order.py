@@ -1,5 +1,5 @@
-"""Messages in the order of ``seq``, each once. Missing messages are read from the journal. This module uses no
-network.
+"""Messages in the order of ``seq``, each once. Missing messages are read from the journal. The module makes no network
+requests.
 """
 
 import time

@@ -100,12 +100,12 @@ class Session(Http):
     ) -> Run:
         """Submits a case: a file, the name of a shipped case, or plain data.
 
-        Files that the case names are sent first if the server lacks them; relative paths are relative to the
-        ``folder`` of the case, for plain data to the working folder, unless it is given. ``overrides`` change keys:
-        ``["run.ranks=2"]``, ``{"run.ranks": 2}``. ``key`` is the Idempotency-Key; without one a random key is used,
-        so that a retry never makes a second run. ``labels`` are words to find runs again, ``profile`` is one of the
-        site's batch system; among a user's runs those with the higher ``priority`` start first. Raises CaseError,
-        ServiceError, UnreachableError.
+        Files that the case names are sent first if the server lacks them; relative paths are relative to the ``folder``
+        of the case, for plain data to the working folder, unless it is given. ``overrides`` change keys:
+        ``["run.ranks=2"]``, ``{"run.ranks": 2}``. ``key`` is the Idempotency-Key; without one a random key is used, so
+        that a retry never makes a second run. ``labels`` are words by which runs can be found, ``profile`` is a profile
+        of the site's batch system. Among the runs of a user, runs with a higher ``priority`` start first. Raises
+        CaseError, ServiceError, UnreachableError.
         """
         kind, body, more = self.outbox.body(case, overrides, folder)
         words = [("label", word) for word in words_of(labels)]

@@ -1,7 +1,7 @@
 """Live messages of a run: over Zenoh if the router can be reached, else over SSE. Missing messages are read over REST.
 
-This is the only module of the client that imports zenoh. A client subscribes first, then reads the past messages,
-then the stream: no message is missing, and no message comes twice.
+No other module of the client imports zenoh. A client subscribes first, then reads the past messages, then the stream:
+no message is missing, and no message comes twice.
 """
 
 import hashlib

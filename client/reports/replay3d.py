@@ -1,8 +1,8 @@
 """Replay in 3-D inside a report: the page's modules, three.js and the snapshots of a run in one file.
 
 The modules import each other by relative addresses, which a page without an address cannot resolve. In a report an
-import map has an entry ``conoid/NAME`` for each module. Modules that send requests to the server are replaced by
-small ones. Modules and snapshots are compressed by gzip, which browsers can decompress.
+import map has an entry ``conoid/NAME`` for each module. Modules that send requests to the server are replaced by small
+modules that read the embedded data. Modules and snapshots are compressed by gzip, which browsers can decompress.
 """
 
 import base64

@@ -6,9 +6,10 @@ report by report.
     T_P = sum over windows ( max over ranks (work) + max over ranks (messages * latency + bytes / bandwidth)
                              + collectives * 2 ceil(log2 P) * latency + bytes put into them by all / bandwidth )
 
-A window is the time between two reports of the worker; work is the CPU time of a rank without waiting. Within a
-window ranks are taken to wait for each other once, and no message is hidden behind work. Of a run whose tasks were
-timed one after the other (``--use project`` of the worker) work is the time of a rank with so many threads.
+A window is the time between two reports of the worker; work is the CPU time of a rank without waiting. The projection
+assumes that ranks wait for each other once in each window, and that messages do not overlap with work. For a run whose
+tasks were timed one after the other (``--use project`` of the worker), work is the projected time of a rank with the
+given number of threads.
 """
 
 import re

@@ -19,7 +19,7 @@ _FLOOR, _SHARE = 1e-6, 0.01
 
 @dataclass(frozen=True)
 class Number:
-    """One quantity of one run."""
+    """A quantity of a run."""
 
     name: str
     value: float

@@ -126,8 +126,9 @@ def _line(sizes: Sequence[float], values: Sequence[float], order: float) -> Fit:
 def limit(sizes: Sequence[float], values: Sequence[float], floor: float = 0.0, formal: float = FORMAL) -> Limit:
     """Returns the limit of the values of meshes of these sizes; differences up to ``floor`` are negligible.
 
-    Monotone with an order of at least 0.5: it converges, and the uncertainty is 1.25 times the sum of the distance
-    from the limit and the deviation of the curve. Otherwise it is three times the range of the values.
+    Monotone with an order of at least 0.5: it converges, and the uncertainty is 1.25 times the sum of the distance from
+    the limit and the deviation of the curve. If the values do not converge, the uncertainty is three times the range of
+    the values.
     """
     order = sorted(range(len(sizes)), key=lambda k: sizes[k])
     sizes, values = [sizes[k] for k in order], [values[k] for k in order]
@@ -146,8 +147,9 @@ def limit(sizes: Sequence[float], values: Sequence[float], floor: float = 0.0, f
 
 
 def _monotone(sizes: Sequence[float], values: Sequence[float], formal: float) -> Limit:
-    """Returns the limit of monotone values. An order above the formal one is reported, and the formal one
-    extrapolates. Beyond twice the formal order the meshes are too coarse or too similar: then with ``CAUTION``.
+    """Returns the limit of monotone values. An order above the formal one is reported, and the formal one extrapolates.
+    If the order is above twice the formal order, the meshes are too coarse or too similar, and the factor ``CAUTION``
+    is used.
     """
     free = fitted(sizes, values)
     if free.order < SLOWEST:

@@ -31,7 +31,7 @@ Layout = tuple[int, int]
 
 @dataclass(frozen=True)
 class Trial:
-    """One run of a study."""
+    """A run of a study."""
 
     ranks: int
     threads: int

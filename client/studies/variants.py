@@ -31,7 +31,7 @@ class Variant:
 
 @dataclass(frozen=True)
 class Point:
-    """One run: a variant on one mesh, and its number in the ensemble."""
+    """A run of the study: a variant on one mesh, and its number in the ensemble."""
 
     variant: Variant
     factor: float

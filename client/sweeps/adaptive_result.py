@@ -62,7 +62,7 @@ class Found(msgspec.Struct, kw_only=True, frozen=True):
     why: str = ""
     """Reason for an end before the tolerance was reached."""
     points: int
-    """Number of runs in the result, with those of earlier commands; ``failed`` runs have no result."""
+    """Number of runs in the result, including the runs of earlier commands; ``failed`` runs have no result."""
     fresh: int
     """Number of runs of this command."""
     failed: int

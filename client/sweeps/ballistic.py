@@ -28,7 +28,7 @@ per cent."""
 
 class Fit(msgspec.Struct, kw_only=True, frozen=True):
     """A fitted curve. ``limit`` is the velocity at which the curve begins, or the x at which a line passes the
-    threshold; ``error`` is its standard error. Both have the unit of x.
+    threshold; ``error`` is its standard error. The limit and its standard error have the unit of x.
     """
 
     law: str

@@ -1,7 +1,7 @@
 """Columns of history.csv for charts, reduced so that no peak is lost.
 
-Lines are gathered in groups of equal size. For each group the minimum and the maximum of each column are stored, in
-the order in which they occurred. When there are too many groups, pairs of groups are merged. This limits memory and
+Lines are gathered in groups of equal size. For each group the minimum and the maximum of each column are stored, in the
+order in which they occurred. When there are too many groups, pairs of groups are merged. The merging limits memory and
 the size of answers, and a file of any length is read once.
 """
 
@@ -19,7 +19,7 @@ from conoid.cases.reading import whole
 from ..runs.journal import Tail
 
 _GROUPS = 4096
-"""Largest number of groups of lines (chosen value). It is larger than the number of pixels across a screen."""
+"""Largest number of groups of lines (chosen value). The number is larger than the number of pixels across a screen."""
 _NUMBERS = 400_000
 """Largest product of groups and columns. The value was chosen because so many numbers need 6 MB."""
 _SENT = 200_000
@@ -27,8 +27,8 @@ _SENT = 200_000
 _BLOCK = 1 << 20
 """Number of bytes of one read (chosen value)."""
 _AT_ONCE = 32
-"""Largest number of blocks that are read for one answer (chosen value). So many blocks have some 100,000 lines and
-take half a second."""
+"""Largest number of blocks that are read for one answer (chosen value). This number of blocks has some 100,000 lines
+and takes half a second to read."""
 _MOST_COLUMNS = 4000
 """Largest number of columns that are read; further columns are ignored. The value was chosen because a case with a
 thousand probes has slightly more than a thousand columns."""

@@ -61,8 +61,8 @@ def open_inside(folder: Path, relative: str) -> BinaryIO:
     """Opens a regular file below ``folder``.
 
     Raises ServiceError 404 for any other path. Each part of the path is opened relative to the folder before it, and
-    links are not followed. Therefore neither ``..`` nor a link leads outside, even if the link is created during the
-    call.
+    links are not followed. Therefore neither ``..`` nor a link leads to a file outside of the folder, even if the link
+    is created during the call.
     """
     parts = relative.split("/")
     if any(part in {"", ".", ".."} or part.startswith(".") or "\0" in part for part in parts):
@@ -98,8 +98,9 @@ class Downloads:
     async def respond(self, request: Request, folder: Path, relative: str, ended: bool) -> Response:
         """Sends the present content of a file, with Range, If-Range and If-None-Match; Repr-Digest has its sha256.
 
-        Repr-Digest is left out for a large file of an open run: such a file may grow faster than it can be read. A
-        growing file is sent up to its size at the time of the request. Raises ServiceError 404, 416, 429, 503.
+        The header Repr-Digest is omitted for a large file of an open run, because such a file may grow faster than it
+        can be read. A growing file is sent up to its size at the time of the request. Raises ServiceError 404, 416,
+        429, 503.
         """
         file, state = await self._pool.run(_opened, folder, relative)
         try:

@@ -38,7 +38,7 @@ class Chosen:
     """Time, Unix s: the list has open runs, and runs that were submitted or ended at this time or later."""
 
     def where(self, owner: str) -> Iterator[sa.ColumnElement[bool]]:
-        """Yields the SQL conditions; all of them must hold."""
+        """Yields the SQL conditions; a run must fulfil all of them."""
         runs = RUNS.c
         yield runs.owner == owner
         if self.states:

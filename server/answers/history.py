@@ -139,7 +139,7 @@ _RARE = frozenset({b"stat", b"snap", b"bala"})
 
 
 class Histories:
-    """Cache of the most recently requested histories. It may be used from any thread."""
+    """Cache of the most recently requested histories. The object may be used from any thread."""
 
     def __init__(self) -> None:
         """Creates an empty cache."""

@@ -26,7 +26,7 @@ _LEFT = ".*report-*"
 
 
 def reporters() -> ThreadPool:
-    """Makes reports. One report at a time is made for all users."""
+    """Makes reports. The server makes one report at a time for all users."""
     return ThreadPool(each=1, waiting=_WAITING, patience=_PATIENCE, most=1)
 
 

@@ -74,7 +74,7 @@ class _Report(msgspec.Struct, frozen=True):
 
 
 def _read(sample: Sample) -> _Report | None:
-    """Decodes a report; None if its line with the load is damaged. Other damaged lines are omitted."""
+    """Decodes a report; None if its line with the load is damaged. All other damaged lines are omitted."""
     load = _sound(_load, sample.load)
     if load is None:
         return None

@@ -10,8 +10,8 @@ import sqlalchemy as sa
 from ..settings import StartError
 
 _BUSY = 2000
-"""Time in ms for which SQLite waits for a lock of another process (chosen value). It is longer than any transaction
-of this server, and shorter than the time limit of a request."""
+"""Time in ms for which SQLite waits for a lock of another process (chosen value). The time is longer than any
+transaction of this server, and shorter than the time limit of a request."""
 _TABLES = 1 << 16
 """Bytes of free disk space below which SQLite cannot open a database, because its log and its shared memory need
 space. Measured: 32 KiB."""

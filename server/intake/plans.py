@@ -40,8 +40,8 @@ class Plan(msgspec.Struct, kw_only=True, frozen=True):
     reported: float = 0.0
     """Time of the last report of an adaptive sweep, Unix s."""
     cancelled: float = 0.0
-    """Start time (``began``) of the command whose runs were cancelled on the server. This command must submit no
-    more runs."""
+    """Start time (``began``) of the command whose runs were cancelled on the server. The command that sent this report
+    must submit no more runs."""
 
     @property
     def whole(self) -> bool:

@@ -35,8 +35,9 @@ with files."""
 
 
 def pool(patience: float) -> ThreadPool:
-    """Returns a pool of threads that reads as many cases at a time as there are cores. One owner alone never uses
-    all threads."""
+    """Returns a pool of threads that reads as many cases at a time as there are cores. Therefore a single owner never
+    uses all threads.
+    """
     places = max(2, usable_cores())
     return ThreadPool(each=places - 1, waiting=_WAITING, patience=patience, most=places)
 
@@ -101,8 +102,9 @@ class Reader:
 
 
 class _Program:
-    """A running program that reads cases. It receives a connection for each case, and forks a process for each
-    connection."""
+    """A running program that reads cases. The program receives a connection for each case, and forks a process for each
+    connection.
+    """
 
     def __init__(self) -> None:
         """Starts the program. Raises OSError."""

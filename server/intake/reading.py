@@ -1,7 +1,7 @@
 """``python -m conoid.server.intake.reading``: reads cases, each in a process of its own with limits.
 
-The cost of reading a body is unknown beforehand. This program loads all modules once and forks for each case, so a
-case costs milliseconds, and a case that needs too much time or memory ends its own process. Standard input is a
+The cost of reading a body is unknown beforehand. The program loads all modules once and forks for each case. Therefore
+a case costs milliseconds, and a case that needs too much time or memory ends its own process only. Standard input is a
 socket that carries a connection for each case, and ends with the server. The program has one thread, since a fork
 copies one thread only.
 """
@@ -38,8 +38,7 @@ _NICE = 5
 """Increment of the nice value of the process (chosen value): its priority is below that of the server, so that the
 server can answer."""
 _SHIPPED = "demo"
-"""Name of a shipped case that is read before all others. This case was chosen because it is small and has a material
-of the library."""
+"""Name of a shipped case that is read before all others. Chosen case: it is small and has a material of the library."""
 _MOST_FILES = 1000
 """Largest number of files in the list of a case with problems (chosen value)."""
 _UNREAD = "was not read yet: its run reads it"
@@ -188,7 +187,7 @@ def _text(body: bytes) -> str:
 
 
 def main() -> int:
-    """Answers requests until standard input ends. One byte reports that the program is ready."""
+    """Answers requests until standard input ends. The program sends one byte when it is ready."""
     signal.signal(signal.SIGCHLD, signal.SIG_IGN)
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     os.nice(_NICE)

@@ -1,9 +1,9 @@
 """Receives uploaded files: streams them to disk, from the first missing byte, and verifies their sha256.
 
-A PUT with ``Content-Range: bytes FIRST-LAST/SIZE`` is a partial PUT of RFC 9110, 14.5. It continues at the end of
-the stored part, which ``Upload-Offset`` (draft-ietf-httpbis-resumable-upload) has in HEAD and in every answer. A PUT
-without the header sends the file from its first byte. Stored bytes are kept when a connection breaks or the server
-is killed.
+A PUT with ``Content-Range: bytes FIRST-LAST/SIZE`` is a partial PUT of RFC 9110, 14.5. A transfer continues at the end
+of the stored part; the header ``Upload-Offset`` (draft-ietf-httpbis-resumable-upload) of HEAD and of every answer gives
+this position. A PUT without the header sends the file from its first byte. Stored bytes are kept when a connection
+breaks or the server is killed.
 """
 
 import asyncio
@@ -48,7 +48,7 @@ class Span:
 
 @dataclass
 class _Transfer:
-    """One connection that sends bytes of a file."""
+    """A connection that sends bytes of a file."""
 
     heard: float = field(default_factory=time.monotonic)
     given_up: bool = False

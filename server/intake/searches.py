@@ -78,8 +78,9 @@ def _begun(owner: str, name: str, search: Search) -> Plan:
 
 
 def _reported(plan: Plan, search: Search) -> Plan:
-    """Returns the plan with the report. Its ``points`` and ``runs`` are those with an existing run, as for other
-    sweeps."""
+    """Returns the plan with the report. The lists ``points`` and ``runs`` contain only points with an existing run, as
+    for other sweeps.
+    """
     there = [point for point in search.points if point.run]
     return msgspec.structs.replace(
         plan, search=search, reported=time.time(), points=[dict(point.changed) for point in there],

@@ -1,9 +1,9 @@
 """Sweeps: one case at many points, each a run of its own. A sweep is one plain file, ``<runs>/sweeps/<id>.json``.
 
-The file is written before the first run is made, and the idempotency key of each run contains the id of the sweep
-and the number of the point. So an interrupted request is completed by sending it again, and no run is made twice. A
-server that was killed in the middle completes the sweep at its next start, or removes it if it has no key. No run
-starts before all runs are accepted.
+The file is written before the first run is made, and the idempotency key of each run contains the id of the sweep and
+the number of the point. Therefore a client can send an interrupted request again: the sweep is completed, and no run is
+made twice. A server that was killed in the middle completes the sweep at its next start, or removes it if it has no
+key. No run starts before all runs are accepted.
 """
 
 import hashlib
@@ -68,8 +68,9 @@ class Sweeps:
                 time.sleep(_AGAIN)
 
     def _completed(self, plan: Plan) -> bool:
-        """Completes a sweep; False if it must be tried again. A sweep that cannot be completed is removed. A sweep
-        without an idempotency key is removed too, because its sender got no answer and sends another sweep.
+        """Completes a sweep; False if it must be tried again. A sweep that cannot be completed is removed. An
+        incomplete sweep without an idempotency key is also removed, because its sender got no answer and will send
+        another sweep.
         """
         with self._locks.setdefault(plan.owner, threading.Lock()):
             there = self.plans.get(plan.id)
@@ -103,7 +104,9 @@ class Sweeps:
         return plan if plan is not None and plan.owner == owner else None
 
     def submit(self, owner: str, body: bytes, key: str | None) -> Plan:
-        """Accepts all runs of a sweep, or none. The same key and body give the same sweep. Raises ServiceError."""
+        """Accepts all runs of a sweep, or none. A request with the same key and body returns the same sweep. Raises
+        ServiceError.
+        """
         digest = hashlib.sha256(body).hexdigest()
         with self._locks.setdefault(owner, threading.Lock()):
             plan = self._earlier(owner, key, digest)

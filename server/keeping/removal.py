@@ -24,8 +24,8 @@ from .removed_runs import RemovedRuns
 
 _log = logging.getLogger("conoid.server")
 _PATIENCE = 5.0
-"""Time in s from the start of the server to the first pass over the folders (chosen value). It is also the shortest
-time between two passes that requests cause."""
+"""Time in s from the start of the server to the first pass over the folders (chosen value). Requests may cause further
+passes, but not sooner than this time after the last pass."""
 
 
 class Removal:

@@ -60,7 +60,7 @@ _record = msgspec.json.Decoder(RemovedRun)
 
 
 def of(run: Run, path: Path, why: str) -> RemovedRun:
-    """Returns the record of a run that has ended. It is made while the folder of the run exists."""
+    """Returns the record of a run that has ended. The record is made while the folder of the run exists."""
     ended = folder.outcome(path)
     results: dict[str, Any] = (
         {} if ended is None else {"steps": ended.steps, "time": known(ended.time), "digest": ended.digest}
@@ -74,8 +74,9 @@ def of(run: Run, path: Path, why: str) -> RemovedRun:
 
 
 class RemovedRuns:
-    """The records of all removed runs. Methods may be called from any thread. Only the offset of each line is in
-    memory."""
+    """The records of all removed runs. Methods may be called from any thread. The memory contains only the offset of
+    each line.
+    """
 
     def __init__(self, runs: Path) -> None:
         """Reads the file once; an incomplete last line is ignored. Raises OSError."""

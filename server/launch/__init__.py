@@ -60,7 +60,7 @@ class Exit:
     out_of_memory: bool
     last_words: str
     reading: Reading | None = None
-    """State, cause and message of the end from a batch system. They have priority over the exit code."""
+    """State, cause and message of the end from a batch system. These records have priority over the exit code."""
 
 
 class Worker(Protocol):

@@ -1,7 +1,7 @@
 """Runs of a sweep that start together are one job array of Slurm: one sbatch, one task for each run.
 
-The record of each run gets the name of the array and its index before sbatch is called. After a crash the records
-show which tasks to look for, and those that Slurm does not have are submitted again.
+The record of each run gets the name of the array and its index before sbatch is called. After a crash the server reads
+the tasks from the records, and submits the tasks that Slurm does not have again.
 """
 
 import logging

@@ -1,4 +1,4 @@
-"""Workers on this machine: ``mpiexec`` in a session of its own, so that workers continue after the end of the server
+"""Workers on this machine: Runs ``mpiexec`` in a separate session, so that workers continue after the end of the server
 that started them."""
 
 import os
@@ -85,7 +85,7 @@ class LocalLauncher:
         return Trace(worker if not rebooted and worker.alive() else None, True, rebooted)
 
     def _members(self, run: str) -> set[int]:
-        """Returns the processes of a run. One list of all processes is used for a thousand runs."""
+        """Returns the processes of a run. One list of all processes is read for all runs, also for a thousand runs."""
         if time.monotonic() > self._looked + _FRESH:
             self._living, self._looked = processes.of_all_runs(), time.monotonic()
         return self._living.get(run, set())

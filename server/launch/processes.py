@@ -8,8 +8,9 @@ from contextlib import suppress
 from pathlib import Path
 
 RUN_VARIABLE = "CONOID_RUN"
-"""Variable in the environment of every process of a run. MPI launchers put ranks into sessions of their own, so a
-process group does not hold a run together; this does, with helpers that a rank starts."""
+"""Variable in the environment of every process of a run. MPI launchers start ranks in separate sessions, so a process
+group does not contain all processes of a run. The variable identifies all processes of a run, including the processes
+that a rank starts."""
 
 _PROC = Path("/proc")
 _AFTER_NAME_STATE, _AFTER_NAME_PARENT, _AFTER_NAME_START = 0, 1, 19

@@ -27,8 +27,9 @@ _log = logging.getLogger("conoid.server")
 
 
 class SlurmLauncher:
-    """Launcher for Slurm. ``start`` writes the record of a job to disk. Then the thread submits exactly one job for
-    the record, and tries again after failures."""
+    """Launcher for Slurm. ``start`` writes the record of a job to disk. After the record is written, the thread submits
+    exactly one job for it, and tries again after failures.
+    """
 
     queues = True
 

@@ -22,8 +22,8 @@ _LAG = 5.0
 """Time in s after the end of a job in which the last files of the job may still arrive over a network file system
 (chosen value)."""
 _LATE = 10.0
-"""Time in s without new writes in a folder with an outcome (chosen value). After this time the outcome is the end of
-the run, whatever Slurm reports."""
+"""Time in s without new writes in a folder with an outcome (chosen value). After this time the run ends with its
+outcome, for any state that Slurm reports."""
 _MOST = 20
 """Largest number of jobs that are submitted for one run (chosen value). A further job is submitted only if the job
 before was lost."""
@@ -36,8 +36,9 @@ values)."""
 
 
 class SlurmWorker:
-    """One run as a job of Slurm. The methods before ``turn`` may be called from any thread and do not block;
-    ``turn`` is called from the launcher's thread."""
+    """A run as a job of Slurm. The methods before ``turn`` may be called from any thread and do not block; ``turn`` is
+    called from the launcher's thread.
+    """
 
     def __init__(
         self, folder: Path, job: Job, site: batch.Slurm, group: str = "", accounting: Accounting | None = None
@@ -129,7 +130,7 @@ class SlurmWorker:
 
     @property
     def over(self) -> bool:
-        """True when nothing is left to do with Slurm."""
+        """True when no further command of Slurm is needed for the run."""
         return self._exit is not None
 
     def silent(self, why: str) -> None:
@@ -202,7 +203,7 @@ class SlurmWorker:
         self._pause = min(2.0 * self._pause, _LONGEST_PAUSE)
 
     def leave_array(self) -> None:
-        """Submits the run alone, under a name of its own, after its array was refused. Raises OSError."""
+        """Submits the run as a single job with its own name, after its array was refused. Raises OSError."""
         job, self.group = self._job, ""
         profile = batch.profile_of(self._site, job.profile)
         fresh = batch.new_job(
@@ -261,7 +262,7 @@ class SlurmWorker:
         return any(number.partition("_")[0] == self._array_number for number in begun)
 
     def _end(self, entry: Entry) -> None:
-        """Handles the end of the job. The run's folder shows what the end means."""
+        """Handles the end of the job. The files in the run's folder give the cause of the end."""
         self._ended = self._ended or time.monotonic()
         there = (self._folder / layout.OUTCOME).exists()
         begun = bool(slurm.begun(self._folder, self._job))

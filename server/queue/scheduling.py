@@ -19,7 +19,7 @@ from conoid.cases.site.policy import Share
 from ..runs.events import Run
 
 _LEAST = 1.0
-"""Smallest number of core-seconds of a run in the order of the queue (chosen value). It replaces a smaller or
+"""Smallest number of core-seconds of a run in the order of the queue (chosen value). This value replaces a smaller or
 missing estimate."""
 
 
@@ -120,8 +120,8 @@ def plan(
 ) -> Plan:
     """Plans the starts at the Unix time ``now``; ``busy`` runs use a part of ``room``, ``queue`` is in its order.
 
-    ``blocked`` returns the reason for which a run may not start, given the runs that start before it. A blocked run
-    delays no other one; neither does a run that needs more than ``room``.
+    ``blocked`` returns the reason for which a run may not start, given the runs that start before it. A blocked run,
+    and a run that needs more than ``room``, delay no other run.
     """
     made, starts, holds, first = Plan(), list[Need](), list(busy), None
     waits = 0

@@ -32,8 +32,8 @@ class Held:
     now: Callable[[str], bool]
     """Whether the start of the run was delayed and its next try is later."""
     sweep: Callable[[Need, Iterable[Need]], str]
-    """Returns the reason for which a run waits for other runs of its sweep; empty if it does not wait. Its argument
-    is the list of the runs with cores."""
+    """Returns the reason for which a run waits for other runs of its sweep; empty if it does not wait. The argument is
+    the list of the runs with cores."""
 
 
 class Waitlist:
@@ -54,7 +54,7 @@ class Waitlist:
         self._due = 0.0
 
     def settled(self, before: Run | None, after: Run) -> None:
-        """Records the step of a run. Its use of cores is added when the run releases the cores."""
+        """Records the step of a run. The used core-seconds are added when the run releases its cores."""
         self._due = 0.0
         if before is not None and before.started and (after.state.final or not after.started):
             self.usage.add(Took(before.owner, before.cores, before.started, after.finished or time.time()))

@@ -24,7 +24,7 @@ READ = 30.0
 """Time in s within which a client must read part of a waiting answer. The value was chosen because a client that
 does not read for longer, such as a laptop in sleep, can send its request again."""
 _SHARE, _MOST = 4, 8192
-"""One of so many file descriptors may be a connection; and largest number of connections. The values were chosen
+"""Number of file descriptors for each allowed connection, and largest number of connections. The values were chosen
 because the remaining descriptors are needed for files."""
 _FILES = 65_536
 """Number of file descriptors that the server requests from the system. The value was chosen because the server uses
@@ -103,8 +103,8 @@ class Connection(H11Protocol):
 
     def data_received(self, data: bytes) -> None:
         """Handles received bytes. The time limit of a header begins with its first byte, and further bytes do not
-        extend the limit. A header in many pieces is parsed at intervals. After an answer, at most ``BODY`` bytes of
-        the rest of the request body are read.
+        extend the limit. A header in many pieces is parsed at intervals. After an answer, the server reads at most
+        ``BODY`` further bytes of the request body.
         """
         if self.conn.our_state is h11.DONE and self.conn.their_state is h11.SEND_BODY:
             self._useless += len(data)

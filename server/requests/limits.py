@@ -151,8 +151,9 @@ def _cores(case: Case, settings: Limits) -> Iterator[Problem]:
 
 
 def _files(case: Case) -> Iterator[Problem]:
-    """Returns problems of files without a hash. Their paths are valid on the machine on which the case was written,
-    not on the server."""
+    """Returns problems of files without a hash. The paths in a case are valid on the machine on which the case was
+    written, not on the server.
+    """
     for file in files_of(case.model_dump(include={"parts"})):
         if file.sha256 is None:
             message = "this key is missing: a server finds a file by its hash; conoid submit and its like fill it in"

@@ -18,7 +18,7 @@ class RequestOrder:
         self._called = False
 
     async def wait(self, who: str) -> None:
-        """Returns when the next request of ``who`` may begin."""
+        """Waits until the next request of the user ``who`` may begin."""
         loop = asyncio.get_running_loop()
         turn: asyncio.Future[None] = loop.create_future()
         self._lines.setdefault(who, deque()).append(turn)

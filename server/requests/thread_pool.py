@@ -1,8 +1,8 @@
 """Pool of threads for work that may block: disk, database, long computations.
 
 The number of threads is limited for each user. The event loop never waits for a disk. Work that takes too long is
-answered with 503. Its thread stays in use until the work ends, so a disk that hangs cannot take more threads than
-the limit.
+answered with 503. The thread of such work stays in use until the work ends. Therefore a disk that hangs blocks at most
+as many threads as the limit.
 """
 
 import asyncio
@@ -126,7 +126,7 @@ class ThreadPool:
 
 
 def busy(detail: str) -> ServiceError:
-    """Returns 429: too many requests of the same user are in progress."""
+    """Returns the error 429: too many requests of the same user are in progress."""
     return ServiceError(429, "busy", detail, retryable=True, headers={"Retry-After": "5"})
 
 

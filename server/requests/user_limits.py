@@ -40,8 +40,9 @@ class UserLimits:
     """Counts of requests by user. The class is used in the thread of the event loop."""
 
     def __init__(self, limits: Http, connections: int) -> None:
-        """Creates the counters. ``connections``: limit for all users. One user gets at most half of this limit for
-        waiting requests and long answers."""
+        """Creates the counters. ``connections``: limit for all users. A single user gets at most half of this limit for
+        waiting requests and long answers.
+        """
         self._requests = limits.requests
         self._waiting, self._streams = min(limits.waiting, connections // 4), min(limits.streams, connections // 4)
         self._turns: dict[str, asyncio.Semaphore] = {}

@@ -16,8 +16,9 @@ from .runs import OwnedRun
 
 
 class _AnyPath(PathConvertor):
-    """Convertor for the rest of an address. The rest may contain line feeds, because names of files may contain
-    them."""
+    """Convertor for the rest of an address. This part of the address may contain line feeds, because names of files may
+    contain line feeds.
+    """
 
     regex = "(?s:.*)"
 

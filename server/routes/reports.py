@@ -19,7 +19,8 @@ router = APIRouter()
 @router.post("/v1/runs/{run_id}:report")
 async def report(request: Request, run_id: str, service: ServiceOf, identity: Submitter) -> dict[str, Any]:
     """Makes the report of a run that has ended, one HTML file that needs no server, and answers when it is among the
-    run's files. It is made once; one report is made at a time, with limits of CPU time, memory and size.
+    run's files. The report is made once. The server makes one report at a time, with limits of CPU time, memory and
+    size.
     """
     run = await service.pool.run(find, service, identity, run_id)
     if not run.state.final:

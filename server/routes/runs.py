@@ -51,7 +51,9 @@ async def submit(
     profile: Annotated[str, Query(description="of the site's batch system; the site's default when empty")] = "",
     priority: Annotated[int, Query(ge=-PRIORITY, le=PRIORITY, description="among your own runs")] = 0,
 ) -> Response:
-    """Submits a case as TOML or JSON. The same Idempotency-Key and body give the same run and the same answer."""
+    """Submits a case as TOML or JSON. A request with the same Idempotency-Key and body returns the same run and the
+    same answer.
+    """
     wishes = Wishes(labels_of(label or ()), profile, priority)
     pool = service.surveyors if names_files(body) else service.readers
     receipt = await pool.run(service.desk.submit, identity.owner, body, content_type, idempotency_key, wishes)
@@ -164,7 +166,9 @@ async def show(
 @router.delete("/v1/runs/{run_id}", status_code=204)
 @blocking
 def purge(run_id: str, service: ServiceOf, identity: Submitter) -> Response:
-    """Removes a run that has ended, with all its files. Afterwards it is answered with 410. This cannot be undone."""
+    """Removes a run that has ended, with all its files. Afterwards it is answered with 410. A removal cannot be
+    undone.
+    """
     run = find(service, identity, run_id)
     if not run.state.final or service.supervisor.current(run.id) is not None:
         raise ServiceError(409, "not_ended", f"run {run.id} is {run.state.value}; a run that has ended can be removed")
@@ -232,8 +236,9 @@ async def restart(
     priority: Annotated[int, Query(ge=-PRIORITY, le=PRIORITY, description="among your own runs")] = 0,
 ) -> Response:
     """Starts a new run of the same case that continues from the newest checkpoint of this run, with the same final
-    answer. This run is not changed. A run that has reached run.max_steps needs a larger max_steps: without it the
-    answer is 409."""
+    answer. The old run is not changed. A run that has reached run.max_steps needs a larger max_steps: without it the
+    answer is 409.
+    """
     run = await service.pool.run(find, service, identity, run_id)
     wishes = Wishes({restarts.LABEL: run.id}, profile, priority, run.id)
     numbers = ranks, threads, max_steps

@@ -44,7 +44,9 @@ def listing(run: OwnedRun, service: ServiceOf, if_none_match: Known = "") -> Res
 async def content(
     request: Request, run: OwnedRun, service: ServiceOf, n: Number, if_none_match: Known = ""
 ) -> Response:
-    """Returns one snapshot in the form of docs/reference/snapshots.md. Its ETag is its sha256; it never changes."""
+    """Returns one snapshot in the form of docs/reference/snapshots.md. The ETag of a snapshot is its sha256; a snapshot
+    never changes.
+    """
     told = await service.pool.run(_told, service, run, n)
     return await _sent(request, service, run, told.path, told.bytes, told.sha256, if_none_match)
 

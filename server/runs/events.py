@@ -1,5 +1,5 @@
-"""The state of a run in the server, the events that change the state, and the resulting actions. This module has
-data only; the rules are in ``lifecycle``."""
+"""The state of a run in the server, the events that change the state, and the resulting actions. The module contains
+only data; the rules are in ``lifecycle``."""
 
 from dataclasses import dataclass
 from typing import Literal

@@ -53,8 +53,9 @@ class ExistingRuns:
         return run_id not in self._names and (run_id in self._gone or not self.there(run_id))
 
     def _refresh(self) -> None:
-        """Reads the list of folders again if it is old. One thread reads; other threads use the previous list,
-        however long the reading takes."""
+        """Reads the list of folders again if it is old. One thread reads the folder; until it has finished, other
+        threads use the previous list.
+        """
         if time.monotonic() < self._read + _FRESH or not self._reading.acquire(blocking=False):
             return
         try:
@@ -66,7 +67,8 @@ class ExistingRuns:
             self._reading.release()
 
     def _require(self) -> None:
-        """Raises FileNotFoundError if the folder of all runs lacks the server's file. Then it is another folder or
-        its disk is not mounted, and no run counts as removed."""
+        """Raises FileNotFoundError if the folder of all runs lacks the server's file. In this case the path has another
+        folder, or the disk is not mounted, and no run counts as removed.
+        """
         if not (self._runs / FILE).exists():
             raise FileNotFoundError(errno.ENOENT, "the folder of all runs is not there now", str(self._runs))

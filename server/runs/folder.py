@@ -99,8 +99,8 @@ _last_stamp, _stamping = 0, threading.Lock()
 
 
 def new_id() -> tuple[str, float]:
-    """An id of 22 letters and digits, and the Unix time in s. One half of each id is random. Ids sort in the order
-    of their creation, also when the clock is set back.
+    """An id of 22 letters and digits, and the Unix time in s. The second half of each id is random. Ids sort in the
+    order of their creation, also when the clock is set back.
     """
     global _last_stamp
     with _stamping:

@@ -1,5 +1,5 @@
-"""journal.jsonl: all events of a run, from which its state is read. One process at a time writes the file: the
-worker while it runs, the server before and after."""
+"""journal.jsonl: all events of a run, from which its state is read. Only one process at a time writes the file: the
+worker while it runs, the server before and after the worker."""
 
 import os
 from collections.abc import Iterator
@@ -37,7 +37,7 @@ _status = msgspec.json.Decoder(Status)
 
 @dataclass(frozen=True)
 class Line:
-    """One event as the bytes of its line in the journal, without the line feed."""
+    """An event as the bytes of its line in the journal, without the line feed."""
 
     seq: int
     type: str
@@ -45,8 +45,8 @@ class Line:
 
 
 class Tail:
-    """Reads a journal from its beginning while the file grows. Only complete lines are returned. A journal that does
-    not exist yet is empty.
+    """Reads a journal from its beginning while the file grows. The reader returns only complete lines. A journal that
+    does not exist yet is empty.
     """
 
     def __init__(self, path: Path, after: int = 0) -> None:

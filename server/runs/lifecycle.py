@@ -1,4 +1,5 @@
-"""The states of a run as a pure function: (run, event) -> (run, actions). It uses no clock, no file and no process."""
+"""The states of a run as a pure function: (run, event) -> (run, actions). The state machine uses no clock, no file and
+no process."""
 
 from dataclasses import replace
 
@@ -36,7 +37,7 @@ from .events import (
 Next = tuple[Run, tuple[Action, ...]]
 
 _SIGKILL, _SIGTERM = 9, 15
-"""Numbers of signals that are the same on every POSIX system. This module imports no module of the operating system."""
+"""Numbers of signals that are the same on every POSIX system. The module imports no module of the operating system."""
 
 
 def advance(run: Run, event: Event, now: float) -> Next:

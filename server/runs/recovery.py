@@ -101,8 +101,9 @@ def _launched(path: Path, trace: Trace) -> bool:
 
 
 def _stopping(run: Run, known: Run | None, path: Path, queues: bool) -> Run:
-    """Returns the state of a waiting job that reported a stop without a request. Such a job was preempted and
-    continues; after a request to stop, it has ended."""
+    """Returns the state of a waiting job that reported a stop without a request. A job without outcome was preempted
+    and continues; after a request to stop, the job has ended.
+    """
     why = folder.stop_asked(path) or (known.stopping_for if known is not None else None)
     if why is None and queues and run.state is State.STOPPING:
         return replace(run, state=State.RUNNING)

@@ -1,5 +1,5 @@
-"""The supervisor performs what ``lifecycle`` decides. One thread owns every open run, so events are processed one
-after the other."""
+"""The supervisor performs what ``lifecycle`` decides. A single thread processes the events of all open runs, one after
+the other."""
 
 import logging
 import queue
@@ -48,7 +48,7 @@ class _Cancel:
 
 
 class Supervisor:
-    """The supervisor of all open runs. Its public methods may be called from any thread."""
+    """The supervisor of all open runs. The public methods may be called from any thread."""
 
     def __init__(
         self,

@@ -17,8 +17,8 @@ from . import ends, folder, journal, launcher_log
 from .events import Event, GraceOver, OutputOver, WallTimeOver, WorkerExited, WorkerRuns, WorkerStarts, WorkerWaits
 
 _FAREWELL = 10.0
-"""Time in s in which a worker must exit after its last message. Its launcher may hang if a helper process of the
-launcher was killed from outside."""
+"""Time in s in which a worker must exit after its last message. The launcher of a run may hang if one of its helper
+processes was killed from outside."""
 _PATIENCE = 1.0
 """Time in s between two checks of a worker in the queue of a batch system (chosen value). There may be a thousand
 such workers."""

@@ -1,4 +1,5 @@
-"""A keyword of an Abaqus input file with its parameters and data lines. It records which parameters were read."""
+"""A keyword of an Abaqus input file with its parameters and data lines. The object records which parameters were
+read."""
 
 from dataclasses import dataclass, field
 

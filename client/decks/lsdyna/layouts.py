@@ -7,7 +7,7 @@ NUMBERS = {
     "MAT_110": "MAT_JOHNSON_HOLMQUIST_CERAMICS", "EOS_001": "EOS_LINEAR_POLYNOMIAL", "EOS_004": "EOS_GRUNEISEN",
     "MAT_JH2": "MAT_JOHNSON_HOLMQUIST_CERAMICS",
 }  # fmt: skip
-"""Other names of keywords."""
+"""Alternative names of keywords."""
 
 LAYOUTS: dict[str, tuple[str, ...]] = {
     "MAT_ELASTIC": ("MID RO E PR DA DB K",),

@@ -21,7 +21,7 @@ class NodeSet:
     nodes: set[int] = field(default_factory=set)
     parts: set[int] = field(default_factory=set)
     sets: set[int] = field(default_factory=set)
-    """Other sets of nodes (``_ADD``)."""
+    """Sets that a set with ``_ADD`` includes."""
     ranges: list[range] = field(default_factory=list)
     """Ranges of node numbers; nodes of some numbers may be missing."""
     everything: bool = False

@@ -13,7 +13,7 @@ from ..units import DENSITY, RATE, SPECIFIC_HEAT, SPEED, STRESS, TEMPERATURE, Sy
 from .text import Fields
 
 NAMES = {"ELAST": "LAW1", "PLAS_JOHNS": "LAW2", "HYD_JCOOK": "LAW4", "JOHN_HOLM": "LAW79"}
-"""Other names of laws."""
+"""Alternative names of laws."""
 
 LAYOUTS: dict[str, tuple[str, ...]] = {
     "LAW1": ("RHO_I RHO_0", "E NU"),
@@ -171,7 +171,7 @@ def _heat(fields: Fields, context: Context, heats: bool, room: float) -> dict[st
 
 
 def _limit(fields: Fields) -> dict[str, Any]:
-    """Reads a failure strain of the law: a tet keeps its pressure there, and is deleted here."""
+    """Reads a failure strain of the law. In Radioss a failed tet keeps its pressure; in Conoid the tet is deleted."""
     strain = fields.real("EPS_MAX")
     if not 0.0 < strain < 1e20:
         return {}

@@ -6,7 +6,7 @@ import msgspec
 
 
 class ProblemEntry(msgspec.Struct, kw_only=True):
-    """One error of a case."""
+    """An error of a case."""
 
     key: str
     value: str

@@ -10,8 +10,8 @@ from .cases import NamedFile
 
 
 class Receipt(msgspec.Struct, kw_only=True):
-    """Answer to a submission. Its estimate has the fields elements, nodes, dt, steps, memory_bytes, core_seconds,
-    and seconds of wall-clock time where known.
+    """Answer to a submission. The estimate of a run has the fields elements, nodes, dt, steps, memory_bytes,
+    core_seconds, and seconds of wall-clock time if known.
     """
 
     id: str
