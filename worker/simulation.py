@@ -214,7 +214,7 @@ def _assemble(
         erosion = Erosion(case, model, neighbours, contact, scene, comm, clock, extremes)
     bonds = None
     if tied_pairs(case):
-        bonds = Bonds(case, model, tied, scene, comm, clock, threads, extremes[0] * extremes[1])
+        bonds = Bonds(case, model, tied, scene, rigid, comm, clock, threads, extremes[0] * extremes[1])
     if contact is not None and bonds is not None:
         contact.detection.tied = Tied(bonds.ties)
     if case.boundaries_of(Symmetry):

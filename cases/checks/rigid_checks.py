@@ -3,6 +3,7 @@ their nodes."""
 
 from collections.abc import Iterator
 
+from ..model.bonds import SharedBond
 from ..model.rigid import tensor_problems
 from ..model.schema import Case, Part, Prescribed, Rotation, Traction
 from ..reading.problems import Location, Problem, problem
@@ -18,10 +19,23 @@ def check_rigid(case: Case) -> Iterator[Problem]:
             message = f"{part.name!r} is rigid and cannot have self-contact; remove it"
             yield problem(("contact", "self_contact"), part.name, message)
     yield from _boundaries(case)
+    yield from _bonds(case)
+
+
+def _bonds(case: Case) -> Iterator[Problem]:
+    """Yields a problem for a bond between two rigid parts, and for a rigid part with common nodes."""
     rigid = [case.parts[i].name for i in case.rigid]
     for k, bond in enumerate(case.bond):
-        for name in (name for name in bond.parts if name in rigid):
-            yield problem(("bond", k, "parts"), name, "is rigid; only deformable parts can be bonded")
+        held = [name for name in bond.parts if name in rigid]
+        if len(held) == 2 and held[0] != held[1]:
+            message = "both are rigid; make one rigid part of the two (a union, or a group that has both)"
+            yield problem(("bond", k, "parts"), ", ".join(bond.parts), message)
+        elif held and isinstance(bond, SharedBond):
+            message = (
+                f"{held[0]!r} is rigid, and its nodes cannot be those of another part; set kind = 'tied', also for "
+                "meshes that match"
+            )
+            yield problem(("bond", k, "kind"), "shared", message)
 
 
 def _part(part: Part, location: Location) -> Iterator[Problem]:

@@ -8,7 +8,7 @@ import pytest
 
 from conoid.cases.estimates.estimate import estimate
 from conoid.cases.load import CaseError, apply_overrides, parse_case
-from conoid.cases.model.bonds import TiedBond
+from conoid.cases.model.bonds import SharedBond
 from conoid.cases.shapes.placed import bulk
 from conoid.cases.warnings.plausible import oddities
 from conoid.cases.warnings.unstrained import Strained, could_be_rigid
@@ -72,7 +72,7 @@ INERTIA = "parts[0].rigid={{mass='4 g', inertia=[{}]}}"
             "acts on the rigid part 'ball', on which tractions are not allowed",
         ),
         ("boundaries=[{kind='velocity', x=0, low=[0, 0, 0], high=[1, 1, 1]}]", "drives a box of the rigid part 'ball'"),
-        ("bond=[{kind='tied', parts=['ball', 'pad']}]", "bond[0].parts = 'ball': is rigid"),
+        ("bond=[{kind='shared', parts=['ball', 'pad']}]", "bond[0].kind = 'shared': 'ball' is rigid, and its nodes"),
         ("boundaries=[{kind='wall', point=[0, 0, -1]}]", "boundaries[0].normal: this key is missing; a plane needs"),
         ("boundaries=[{kind='wall', shape='sphere', point=[0, 0, -1], normal=[0, 0, 1], radius=1}]", "has no normal"),
         (
@@ -121,7 +121,7 @@ def test_a_stiff_part_could_be_rigid() -> None:
 
 
 def test_a_part_that_stayed_elastic_could_have_been_rigid() -> None:
-    """Suggestions after the run: not for a part that has yielded, has much strain or energy, or has a bond."""
+    """Suggestions after the run: not for a part that has yielded, has much strain or energy, or has common nodes."""
     case = parse_case(scene("parts[0].rigid=false"))
     ball, block = Strained(600, 2e-4, 0.01, False), Strained(400, 0.05, 0.99, False)
     (line,) = could_be_rigid(case, [ball, block], "stability: tet 7 of ball")
@@ -132,5 +132,5 @@ def test_a_part_that_stayed_elastic_could_have_been_rigid() -> None:
     for other in (replace(ball, plastic=True), replace(ball, strain=2e-3), replace(ball, share=0.1)):
         assert not list(could_be_rigid(case, [other, block], ""))
     assert not list(could_be_rigid(parse_case(scene()), [ball, block], ""))
-    bonded = case.model_copy(update={"bond": (TiedBond(parts=("ball", case.parts[1].name), kind="tied"),)})
+    bonded = case.model_copy(update={"bond": (SharedBond(parts=("ball", case.parts[1].name), kind="shared"),)})
     assert not list(could_be_rigid(bonded, [ball, block], ""))

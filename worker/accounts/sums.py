@@ -25,7 +25,7 @@ from ..parallel.fixed_point import Columns, Grouped, Table, Tally, exact_sums, t
 from ..parallel.passes import Pass
 from ..parallel.team import Team
 from ..rigid.stage import Rigid
-from ..rigid.sums import add_undeformed, energy_of
+from ..rigid.sums import add_undeformed, energy_of, of_bonds
 from .making import STRAIN
 from .nodal import NODAL, OF_NODES, add_booked, of_nodes
 
@@ -112,7 +112,7 @@ class Sums:
             t=self._clock.t, nodal=sums[:NODAL], works=sums[NODAL : NODAL + len(WORKS)], kinetic=of_parts[:, 0],
             internal=of_parts[:, NODAL] + of_parts[:, NODAL + 1], eroded=self._eroded(booked),
             facets=cohesion.energies(booked["facets"], booked["gone"]) if cohesion is not None else (0.0, 0.0, 0.0),
-            bonds=booked["bonds"].tolist(), friction=self._friction(booked),
+            bonds=[*booked["bonds"].tolist(), *of_bonds(self._undeformed[0])], friction=self._friction(booked),
         )  # fmt: skip
 
     def _tables(self, before: Floats) -> dict[str, list[Columns]]:

@@ -1,6 +1,7 @@
 """Tied interface at the start: the nodes of one part that are tied to faces of another, and their weights.
 
-The nodes of the finer surface, the tied side, are tied to faces of the other surface, the mortar side. The velocities
+The nodes of the finer surface, the tied side, are tied to faces of the other surface, the mortar side; a rigid part is
+always the mortar side. The velocities
 v_i of the tied side and v_j of the mortar side fulfil
 
     D_i v_i = sum_j M_ij v_j,   D_i = int psi_i dA,   M_ij = int psi_i N_j dA,
@@ -107,7 +108,8 @@ def _bonded(
     reach = [_NEAR * (np.full(len(s.size), spec.gap) if spec.gap is not None else GAP * s.size) for s in sides]
     pairs = _near(x, sides[0], sides[1], reach[0], reach[1])
     sizes = [s.size[np.unique(column)].mean() if len(column) else 0.0 for s, column in zip(sides, pairs.T, strict=True)]
-    turned = sizes[0] < sizes[1]
+    one, two = (_rigid(case, name) for name in spec.parts)
+    turned = sizes[0] < sizes[1] if one == two else two
     if turned:
         sides, pairs = sides[::-1], np.ascontiguousarray(pairs[:, ::-1])
     master, slave = sides
@@ -120,6 +122,10 @@ def _bonded(
     if not len(pieces):
         raise InputError(_nothing(bond, spec, cut, limit))
     return pieces, warnings
+
+
+def _rigid(case: Case, name: str) -> bool:
+    return any(case.parts[index].name == name for index in case.rigid)
 
 
 def _near(x: Floats, one: _Faces, two: _Faces, reach: Floats, other: Floats) -> Indices:

@@ -8,13 +8,15 @@ planned once, when the rows change.
 """
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from ..model.state import Flags, Floats, Indices, Ints, Nodes
 from ..parallel.comm import Comm, Exchange
 from ..parallel.tags import Tag
+from ..rigid.points import Points
+from ..rigid.stage import Rigid
 from .records import BREAKS, KEPT, NORMAL, STATE, TiedNodes, TiedRows
 from .rows import Rows
 
@@ -45,6 +47,8 @@ class Layout:
     momentum: float
     """Nesterov's extrapolation factor of the impulses."""
     messages: "Messages"
+    rigid: Rigid | None
+    """Rigid bodies; None if no row, on any rank, is tied to a rigid body."""
 
 
 def momentum(least: float) -> tuple[float, int]:
@@ -59,11 +63,14 @@ def momentum(least: float) -> tuple[float, int]:
 
 
 def laid_out(
-    rows: Rows, states: Floats, laws: Floats, nodes: Nodes, mobility: Floats, planes: Flags, comm: Comm
+    rows: Rows, states: Floats, laws: Floats, nodes: Nodes, mobility: Floats, planes: Flags, rigid: Rigid | None,
+    scale: float, comm: Comm,
 ) -> Layout:  # fmt: skip
     """Returns the layout of ``rows`` with their ``states`` (r, KEPT); ``mobility`` (nodes, 3): 1/kg; ``planes``
-    (nodes, 3): components held by planes of symmetry. Collective.
+    (nodes, 3): components held by planes of symmetry; ``scale``: quanta per N s. Collective.
     """
+    points = rigid.points(rows.row, rows.master, rows.weight, nodes.id) if rigid is not None else Points.none()
+    rows = _at_points(rows, points)
     place = nodes.places(rows.node)
     mine = (place >= 0) & nodes.owned[place]
     entries, sides = mine[rows.row], mine[rows.side]
@@ -77,20 +84,45 @@ def laid_out(
     pushed = np.isin(ids, np.concatenate(own))
     messages = Messages.of(ids, pushed, local, nodes, comm)
     messages.copy(table, np.zeros((len(ids), 3)))
-    least, inverse = _norms(rows, mine, ids, table, planes[place[mine]], comm)
+    of_bodies = np.zeros(len(rows.node))
+    if rigid is not None:
+        of_bodies[points.row] = points.norms(rigid.bodies)
+    least, inverse = _norms(rows, mine, ids, table, planes[place[mine]], of_bodies[mine], comm)
     tied = _rows(rows, mine, ids, inverse, states, laws)
     share, sweeps = momentum(least)
+    if rigid is not None and len(points):
+        own = points.take(mine[points.row])
+        rigid.bonds.take_up(own, np.searchsorted(ids, _name(own.row)).astype(np.int32), scale)
     place = local[held].astype(np.int32)
-    return Layout(tied, _nodes(tied, ids, table), np.flatnonzero(mine), held, place, sweeps, share, messages)
+    return Layout(
+        tied, _nodes(tied, ids, table), np.flatnonzero(mine), held, place, sweeps, share, messages,
+        rigid if len(points) else None,
+    )  # fmt: skip
+
+
+def _name(row: Ints) -> Ints:
+    """Returns the id in the table of the point of a rigid body to which each row is tied; nodes have ids from 0."""
+    return -1 - row
+
+
+def _at_points(rows: Rows, points: Points) -> Rows:
+    """Returns the rows in which one point of a rigid body replaces all mortar nodes."""
+    others = ~np.isin(rows.row, points.row)
+    row = np.concatenate([rows.row[others], points.row])
+    order = np.argsort(row, kind="stable")
+    master = np.concatenate([rows.master[others], _name(points.row)])[order]
+    weight = np.concatenate([rows.weight[others], np.ones(len(points))])[order]
+    return replace(rows, row=row[order], master=master, weight=weight)
 
 
 def _norms(
-    rows: Rows, mine: Flags, ids: Ints, table: Floats, planes: Flags, comm: Comm
+    rows: Rows, mine: Flags, ids: Ints, table: Floats, planes: Flags, of_bodies: Floats, comm: Comm
 ) -> tuple[float, Floats]:  # fmt: skip
     """Returns a bound of the smallest eigenvalue of all rows over the largest, and (r, 3) one over the bounds of the l1
     norms of the rows of this rank, kg: sum_k |w_k| S_k / m_k, S_k the sum of |w_k| over all rows. The values are 0
-    where no node moves, and across ``planes`` (r, 3) of symmetry that contain the tied node, because the mirror image
-    of the mortar side keeps the node on the plane.
+    where nothing moves, and across ``planes`` (r, 3) of symmetry that contain the tied node, because the mirror image
+    of the mortar side keeps the node on the plane. ``of_bodies`` (r,): the parts of the norms that are due to rigid
+    bodies, 1/kg.
     """
     known = np.unique(np.concatenate([rows.node, rows.master]))
     sums = np.bincount(np.searchsorted(known, rows.master), np.abs(rows.weight), len(known))
@@ -102,7 +134,7 @@ def _norms(
     first, norm = table[node], np.empty((len(node), 3))
     for i in range(3):
         norm[:, i] = np.bincount(row, weight * table[at, i], len(node))
-    norm += first * sums[np.searchsorted(known, rows.node[mine])][:, None]
+    norm += first * sums[np.searchsorted(known, rows.node[mine])][:, None] + of_bodies[:, None]
     norm[planes] = 0.0
     moves = (norm > 0.0) & (first > 0.0)
     worst = np.where(moves, norm / np.where(first > 0.0, first, 1.0), 1.0).max(initial=1.0)

@@ -21,6 +21,7 @@ from ..parallel import fixed_point
 from ..parallel.comm import Comm
 from ..parallel.passes import Pass
 from ..parallel.team import Team
+from ..rigid.stage import Rigid
 from . import law, sweeps
 from .account import BondAccount
 from .layout import Layout, laid_out
@@ -33,12 +34,13 @@ class Bonds:
     """Tied bonds of a case on one rank."""
 
     def __init__(
-        self, case: Case, model: Model, pieces: Pieces, bounds: list[Boundary], comm: Comm, clock: Clock, team: Team,
-        impulse: float,
+        self, case: Case, model: Model, pieces: Pieces, bounds: list[Boundary], rigid: Rigid | None, comm: Comm,
+        clock: Clock, team: Team, impulse: float,
     ) -> None:  # fmt: skip
         """``pieces``: the pieces of all ranks; none for a run that resumes. ``impulse``: bound of the impulse on one
         node in a step, N s. Collective.
         """
+        self._rigid = rigid
         self._model, self._bounds, self._comm, self._clock = model, bounds, comm, clock
         self._laws, self._passes = _laws(case), _Passes(team)
         self.account = BondAccount(model.nodes.n, fixed_point.scale_for(impulse))
@@ -71,9 +73,13 @@ class Bonds:
         self._mean_dt = mean_dt
         layout.nodes.total[:] = 0
         self._gather(state)
+        if layout.rigid is not None:
+            layout.rigid.bonds.set_out(layout.nodes.v, self._clock.dt)
         sweeps.resume(layout.rows, layout.nodes, ratio, self.account.scale, 0, len(layout.rows.node))
-        self._passes.apply(layout, self.account.scale)
+        self._passes.apply(layout, self.account.scale, walls=False)
         state.v[layout.local] = layout.nodes.v[layout.held]
+        if layout.rigid is not None:
+            layout.rigid.tied(state)
 
     def solve(self, state: Nodes, *, touched: bool) -> None:
         """Solves for the impulses of the tied nodes in v(n+1/2); ``touched``: True if velocities have changed since
@@ -82,6 +88,8 @@ class Bonds:
         layout, clock = self._laid, self._clock
         if touched:
             self._gather(state)
+        if layout.rigid is not None:
+            layout.rigid.bonds.set_out(layout.nodes.v, clock.dt)
         self._passes.sweep(layout, clock.mean_dt, clock.dt, self.account.scale)
         failed = law.open_bonds(layout.rows, layout.nodes, clock.mean_dt, clock.dt, 0, len(layout.rows.node))
         self.apart = failed > 0
@@ -146,7 +154,9 @@ class Bonds:
         rows, states, nodes = self.ties.rows.take(alive), self.ties.states[alive], self._model.nodes
         planes, mobility = mirrored(nodes.n, self._bounds), mobilities(nodes, self._bounds)
         self.account.mobility = mobility
-        self._layout = laid_out(rows, states, self._laws, nodes, mobility, planes, self._comm)
+        self._layout = laid_out(
+            rows, states, self._laws, nodes, mobility, planes, self._rigid, self.account.scale, self._comm
+        )  # fmt: skip
         self._layout.number = np.flatnonzero(alive)[self._layout.number]
         self.apart = False
         self.ties.mark(rows)
@@ -165,21 +175,25 @@ class _Passes:
     def sweep(self, layout: Layout, mean_dt: float, dt: float, scale: float) -> None:
         """Runs all sweeps of a step; ``scale``: quanta per N s. Collective."""
         rows, nodes = layout.rows, layout.nodes
-        if layout.messages.alone and self._team.threads == 1:
+        if layout.messages.alone and self._team.threads == 1 and layout.rigid is None:
             sweeps.sweep_all(rows, nodes, layout.momentum, mean_dt, dt, scale, layout.sweeps)
             return
         for k in range(layout.sweeps):
             ahead = layout.momentum if k + 1 < layout.sweeps else 0.0
             self._act.run(len(rows.node), rows, nodes, ahead, mean_dt, dt, scale)
-            self.apply(layout, scale)
+            self.apply(layout, scale, walls=True)
 
-    def apply(self, layout: Layout, scale: float) -> None:
-        """Converts the changes of the impulses to velocities. Collective."""
+    def apply(self, layout: Layout, scale: float, *, walls: bool) -> None:
+        """Converts the changes of the impulses to velocities; ``walls``: True if walls stop the rigid bodies.
+        Collective.
+        """
         n = len(layout.nodes.v)
         self._give.run(n, layout.rows, layout.nodes, scale)
         if not layout.messages.alone:
             layout.messages.complete(layout.nodes.words)
         self._move.run(n, layout.nodes, scale)
+        if layout.rigid is not None:
+            layout.rigid.bonds.give(layout.nodes.v, layout.nodes.words, walls=walls)
 
 
 def _laws(case: Case) -> Floats:

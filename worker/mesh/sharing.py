@@ -5,6 +5,7 @@ from itertools import combinations
 
 import numpy as np
 
+from conoid.cases.model.bonds import TiedBond
 from conoid.cases.model.joined import bodies
 from conoid.cases.model.schema import Case
 
@@ -19,10 +20,14 @@ Placed = tuple[int, Origin, Floats]
 
 
 def shared_nodes(case: Case, parts: Sequence[Placed]) -> Iterator[str]:
-    """Return an error for every two parts of different bodies that share coincident nodes of a file."""
-    body = bodies(case)
+    """Return an error for every two parts of different bodies that share coincident nodes of a file. A tied bond of a
+    rigid and a deformable part joins such parts: each part has its own copy of the nodes.
+    """
+    body, tied = bodies(case), {frozenset(bond.parts) for bond in case.bond if isinstance(bond, TiedBond)}
     for (i, one, x), (j, other, y) in combinations(parts, 2):
-        if body[i] == body[j]:
+        pair = case.parts[i], case.parts[j]
+        rigid = any(part.rigid is not None for part in pair)
+        if body[i] == body[j] or (rigid and frozenset(part.name for part in pair) in tied):
             continue
         if many := len(same_places(one, x, other, y)[0]):
             yield _refusal(case, i, j, many)
@@ -41,8 +46,9 @@ def same_places(one: Origin, x: Floats, other: Origin, y: Floats) -> tuple[Ids, 
 
 def _refusal(case: Case, i: int, j: int, many: int) -> str:
     path, (one, other) = getattr(case.parts[i].mesh, "path", ""), (case.parts[k].name for k in (i, j))
+    kind = "tied" if case.parts[i].rigid is not None or case.parts[j].rigid is not None else "shared"
     return (
         f"parts: {one!r} and {other!r} share {many:,} nodes of {path!r}, but would be separate bodies that only touch: "
-        f"give them a [[bond]] with parts = [{one!r}, {other!r}] and kind = 'shared', make one part of a group that "
+        f"give them a [[bond]] with parts = [{one!r}, {other!r}] and kind = '{kind}', make one part of a group that "
         "has both, or, where bodies in contact are meant, give each of them nodes of its own"
     )

@@ -10,7 +10,7 @@ from .stops import BodyStops
 
 _KEPT = {
     "contact_loss": "contact_loss", "external_work": "external_work", "friction_loss": "friction_loss",
-    "_later": "later", "_before": "before",
+    "bond_loss": "bond_loss", "_later": "later", "_before": "before",
 }  # fmt: skip
 """Names of the sums in a checkpoint, and names of the attributes that hold the sums."""
 
@@ -22,11 +22,11 @@ class BodyAccount:
 
     def __init__(self, bodies: Bodies) -> None:
         self._bodies = bodies
-        self.contact_loss, self.external_work, self.friction_loss = np.zeros((3, bodies.n))
-        """(b,) energy lost by impact and friction, work from outside, and the part of the loss by friction on walls,
-        J."""
-        self.later = np.zeros((3, bodies.n))
-        """(3, b) second halves of the loss, the work from outside and the wall friction of the last step, J."""
+        self.contact_loss, self.external_work, self.friction_loss, self.bond_loss = np.zeros((4, bodies.n))
+        """(b,) energy lost by impact and friction, work from outside, the part of the loss by friction on walls, and
+        energy lost by tied bonds, J."""
+        self.later = np.zeros((4, bodies.n))
+        """(4, b) second halves of these four in the last step, J."""
         self.before = np.stack([bodies.speed, bodies.momentum])
         """(2, b, 3) v(n-1/2), m/s, and angular momentum at n-1/2, kg m^2/s."""
 
@@ -44,23 +44,25 @@ class BodyAccount:
         self.contact_loss += self.later[0]
         self.external_work += self.later[1]
         self.friction_loss += self.later[2]
+        self.bond_loss += self.later[3]
         self.later[:] = 0.0
         self.before[0], self.before[1] = self._bodies.speed, self._bodies.momentum
 
-    def book(self, impulse: Floats, stops: BodyStops) -> None:
-        """Books half of the work of the impulses (b, 6) of contact and walls with the velocities before the impulses;
-        stores the half with the velocities after the impulses for the next step. All other changes of the motion, and
-        driven walls, do work from outside.
+    def book(self, impulse: Floats, of_bonds: Floats, stops: BodyStops) -> None:
+        """Books half of the work of the impulses (b, 6) of contact and walls, and of the impulses ``of_bonds`` (b, 6),
+        with the velocities before the impulses; stores the half with the velocities after the impulses for the next
+        step. All other changes of the motion, and driven walls, do work from outside.
         """
         bodies, rubbed, walls = self._bodies, stops.rubbed, stops.walls
         speed, momentum = self.before
         change = [bodies.mass[:, None] * (bodies.speed - speed), bodies.momentum - momentum]
-        outside = np.concatenate(change, axis=1) - impulse
-        halves = np.zeros((2, 3, bodies.n))
+        outside = np.concatenate(change, axis=1) - impulse - of_bonds
+        halves = np.zeros((2, 4, bodies.n))
         times_n = (speed, momentum, walls.before), (bodies.speed, bodies.momentum, walls.speed)
         for k, (v, spin, of_walls) in enumerate(times_n):
             rate = bodies.rates(spin)
-            for m, (given, sign) in enumerate(((impulse, -0.5), (outside, 0.5), (rubbed, -0.5))):
+            parts = (impulse, -0.5), (outside, 0.5), (rubbed, -0.5), (of_bonds, -0.5)
+            for m, (given, sign) in enumerate(parts):
                 halves[k, m] = sign * (dot(given[:, :3], v) + dot(given[:, 3:], rate))
             for w in np.flatnonzero(~walls.plain).tolist():
                 moved = 0.5 * dot(stops.of_walls[w], of_walls[w][None])
@@ -70,6 +72,7 @@ class BodyAccount:
         self.contact_loss += halves[0, 0]
         self.external_work += halves[0, 1]
         self.friction_loss += halves[0, 2]
+        self.bond_loss += halves[0, 3]
         self.later = halves[1]
 
     def kinetic(self) -> Floats:

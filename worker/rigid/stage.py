@@ -17,12 +17,15 @@ from conoid.cases.shapes.region import GENERATED
 
 from ..boundaries.wall_shapes import Walls
 from ..errors import InputError
+from ..model.ids import places
 from ..model.state import Floats, Indices, Ints, Nodes
 from ..parallel.comm import Comm
 from . import rotation
 from .account import BodyAccount
 from .bodies import STATE, Bodies, dot, of_nodes, times
+from .bonded import BodyBonds
 from .contact import BodyContacts
+from .points import Points
 from .stopped import stopped
 from .stops import BodyStops
 
@@ -66,6 +69,8 @@ class Rigid:
             bodies, self.stops, self.of_part, self._start, self._rate, comm,
             reports="contact_pressure" in case.run.fields,
         )  # fmt: skip
+        self.bonds = BodyBonds(bodies, self.stops, self._start, self._rate, comm)
+        self._comm = comm
 
     def require_front(self, case: Case, size: float) -> None:
         """Raises InputError if a body starts behind a wall by more than rounding of the ``size``, m."""
@@ -128,6 +133,7 @@ class Rigid:
         for b, held in enumerate(bodies.held):
             bodies.speed[b] = held.kick(bodies.speed[b], bodies.centre[b], self.last_dt, dt, t)
         self.contacts.begin()
+        self.bonds.begin()
         self.last_dt = dt
         self._start[0], self._start[1] = bodies.speed, bodies.rates(bodies.momentum)
         self._rate[:] = self._start[1]
@@ -140,12 +146,12 @@ class Rigid:
         bodies, stops = self.bodies, self.stops
         stops.stop(bodies.speed, self._rate)
         stops.end(bodies.speed, self._rate, self.last_dt, t)
-        impulse = self.contacts.impulse + stops.impulse
-        given = impulse[:, 3:] * bodies.turns
+        impulse, of_bonds = self.contacts.impulse + stops.impulse, self.bonds.impulse
+        given = (impulse + of_bonds)[:, 3:] * bodies.turns
         bodies.momentum = bodies.momentum + given
         if impulse.any():
             self.last_push = t
-        self.account.book(impulse, stops)
+        self.account.book(impulse, of_bonds, stops)
         self._rate[:] = bodies.rates(bodies.momentum)
         self._carry(nodes)
 
@@ -167,6 +173,26 @@ class Rigid:
         self._rate[:] = bodies.rates(bodies.momentum)
         rotation.place(nodes.x, self.nodes, self._body, self._arms, bodies.rotation, bodies.centre)
         self._carry(nodes)
+
+    def tied(self, nodes: Nodes) -> None:
+        """After the warm start of the tied bonds: sets the motion from which contact starts, and the nodes."""
+        self.bonds.settle_start()
+        self._carry(nodes)
+
+    def points(self, rows: Ints, masters: Ints, weights: Floats, ids: Ints) -> Points:
+        """Returns the points of the bodies to which rows of tied bonds are tied: each weight of ``rows`` (e,) is that
+        of the node ``masters`` (e,), a global id; ``ids`` (nodes,): of the local nodes. Collective.
+        """
+        mine = np.isin(ids[self.nodes], masters)
+        words = np.column_stack([ids[self.nodes][mine], self._body[mine], self._arms[mine].view(np.int64)])
+        every = self._comm.join(words.reshape(-1)).reshape(-1, 5)
+        known, first = np.unique(every[:, 0], return_index=True)
+        at = places(known, masters)
+        row, of = rows[at >= 0], first[at[at >= 0]]
+        arms, many = np.ascontiguousarray(every[of, 2:]).view(np.float64), int(rows.max(initial=-1)) + 1
+        mean = np.column_stack([np.bincount(row, weights[at >= 0] * arms[:, i], many) for i in range(3)])
+        some, start = np.unique(row, return_index=True)
+        return Points(some, every[of[start], 1].astype(np.int32), np.ascontiguousarray(mean[some]))
 
     def of_walls(self, walls: list[int], part: int) -> Floats:
         """(3,) sum of the impulses of these walls so far on the rigid body of ``part``, N s; zero for a part that is

@@ -12,6 +12,11 @@ def energy_of(rigid: Rigid | None, walls: Walls) -> float:
     return walls.kinetic() + (float(rigid.account.kinetic().sum()) if rigid is not None else 0.0)
 
 
+def of_bonds(rigid: Rigid | None) -> list[float]:
+    """Returns the energy that tied bonds took from each rigid body, J."""
+    return rigid.account.bond_loss.tolist() if rigid is not None else []
+
+
 def add_undeformed(sums: Floats, of_parts: Floats, rigid: Rigid | None, walls: Walls) -> None:
     """Adds to ``sums`` (10,) over the nodes (accounts/nodal.py): kinetic energy, loss by contact and work from outside,
     J, momentum, kg m/s, the work of unequal steps (zero here), and angular momentum, kg m^2/s; adds the kinetic energy

@@ -1,0 +1,139 @@
+"""Rigid bodies in tied bonds: the points to which rows are tied, and the impulses of the rows on the bodies.
+
+In each sweep of the bonds (bonds/sweeps.py) the impulses of the rows on the points of a body, and their moments about
+the centre of the body, are summed as integers over the ranks. These sums change the motion of the body, and the
+velocities of the points are set to this motion. In a step a point moves along the chord of its arc. A row therefore
+uses arm and rotation vector of mid-step, V + (w + dt/2 w') x (r + dt/2 w x r), with w' = W (l x w) of a free rotation.
+"""
+
+import numpy as np
+
+from ..kernels.jit import njit, types
+from ..model.state import Floats, Indices, Ints
+from ..parallel.comm import Comm
+from .bodies import Bodies, times
+from .points import Points
+from .rotation import spatial
+from .rows import WORDS
+from .stops import BodyStops
+
+_F, _F1, _F2, _F3 = types.float64, types.float64[::1], types.float64[:, ::1], types.float64[:, :, ::1]
+_N1, _I2 = types.int32[::1], types.int64[:, ::1]
+
+
+class BodyBonds:
+    """Impulses of tied bonds on the rigid bodies of a case, equal on all ranks."""
+
+    def __init__(self, bodies: Bodies, stops: BodyStops, start: Floats, rate: Floats, comm: Comm) -> None:
+        """``start`` (2, b, 3): velocities and rotation vectors of the bodies before the impulses of the step; ``rate``
+        (b, 3): present rotation vectors, updated in place.
+        """
+        self._bodies, self._stops, self._start, self._rate, self._comm = bodies, stops, start, rate, comm
+        self._total: Ints = np.zeros((bodies.n, WORDS), np.int64)
+        """(b, WORDS) impulses of the bonds in the step, quanta."""
+        self._scale, self._half = 1.0, 0.0
+        """Quanta per N s; half of the time step, s."""
+        self._inertia, self._ahead = np.empty((bodies.n, 3, 3)), np.zeros((bodies.n, 3))
+        """(b, 3, 3) inertia in space, kg m^2; (b, 3) change of the rotation vector from n to mid-step, rad/s."""
+
+    def begin(self) -> None:
+        """Starts a step without impulses."""
+        self._total[:] = 0
+
+    def take_up(self, points: Points, places: Indices, scale: float) -> None:
+        """Registers the ``points`` of the rows of this rank, and their ``places`` in the table of nodes of the bonds;
+        ``scale``: quanta per N s.
+        """
+        self._points, self._places, self._scale = points, places, scale
+        self._arms = np.zeros((len(points), 3))
+        """(k, 3) arms at n, m."""
+
+    def set_out(self, v: Floats, dt: float) -> None:
+        """At the start of the sweeps: sets the velocities of the points in the table ``v`` (n, 3); ``dt``: time step,
+        s.
+        """
+        bodies, spin = self._bodies, self._rate
+        turned(self._arms, self._points.arm, self._points.body, bodies.rotation)
+        self._half = 0.5 * dt
+        spatial(self._inertia, bodies.rotation, bodies.inertia)
+        momentum = times(self._inertia, spin)
+        turning = np.stack(
+            [momentum[:, i] * spin[:, j] - momentum[:, j] * spin[:, i] for i, j in ((1, 2), (2, 0), (0, 1))], axis=1
+        )
+        self._ahead = self._half * times(bodies.yielding, turning)
+        self._spread(v)
+
+    def give(self, v: Floats, words: Ints, *, walls: bool) -> None:
+        """After a sweep with the impulses ``words`` (n, 3), quanta, on the nodes of the table: moves the bodies, and
+        the points in ``v`` (n, 3). ``walls``: True if walls stop the bodies. Collective.
+        """
+        bodies, sums = self._bodies, np.zeros((self._bodies.n, WORDS), np.int64)
+        gather(sums, words, self._places, self._points.body, self._arms, bodies.reach)
+        sums = self._comm.sum(sums) if self._comm.size > 1 else sums
+        self._total += sums
+        change = self._valued(sums)
+        bodies.speed = bodies.speed + bodies.lightness * change[:, :3]
+        self._rate += times(bodies.yielding, change[:, 3:])
+        if walls:
+            self._stops.stop(bodies.speed, self._rate)
+        self._spread(v)
+
+    def settle_start(self) -> None:
+        """After the warm start: the present motion is the motion from which contact starts."""
+        self._start[0], self._start[1] = self._bodies.speed, self._rate
+
+    @property
+    def impulse(self) -> Floats:
+        """(b, 6) impulse, N s, and moment, N m s, of the bonds in the step."""
+        return self._valued(self._total)
+
+    def _valued(self, words: Ints) -> Floats:
+        found = words / self._scale
+        found[:, 3:] *= self._bodies.reach[:, None]
+        return np.asarray(found)
+
+    def _spread(self, v: Floats) -> None:
+        rate = self._rate + self._ahead
+        spread(v, self._places, self._points.body, self._arms, self._bodies.speed, rate, self._half)
+
+
+@njit(types.void(_F2, _F2, _N1, _F3), cache=True)
+def turned(arms, start, body, rotation):  # type: ignore[no-untyped-def]
+    """Sets ``arms`` (k, 3) to the arms at the ``start``, turned with the bodies."""
+    for k in range(len(body)):
+        b = body[k]
+        for i in range(3):
+            arms[k, i] = (
+                rotation[b, i, 0] * start[k, 0] + rotation[b, i, 1] * start[k, 1] + rotation[b, i, 2] * start[k, 2]
+            )
+
+
+@njit(types.void(_I2, _I2, _N1, _N1, _F2, _F1), cache=True)
+def gather(sums, words, places, body, arms, reach):  # type: ignore[no-untyped-def]
+    """Adds the impulses ``words`` (n, 3) on the points at these ``places``, and their moments over the reach of the
+    body, to ``sums`` (b, WORDS).
+    """
+    for k in range(len(places)):
+        a, b = places[k], body[k]
+        p, q, r = words[a, 0], words[a, 1], words[a, 2]
+        x, y, z = arms[k, 0] / reach[b], arms[k, 1] / reach[b], arms[k, 2] / reach[b]
+        sums[b, 0] += p
+        sums[b, 1] += q
+        sums[b, 2] += r
+        sums[b, 3] += np.int64(np.rint(y * r - z * q))
+        sums[b, 4] += np.int64(np.rint(z * p - x * r))
+        sums[b, 5] += np.int64(np.rint(x * q - y * p))
+
+
+@njit(types.void(_F2, _N1, _N1, _F2, _F2, _F2, _F), cache=True)
+def spread(v, places, body, arms, speed, rate, half):  # type: ignore[no-untyped-def]
+    """Sets the velocities ``v`` (n, 3) at these ``places`` to the chords of the points: speed + w x (arm + half w x
+    arm), with the ``rate`` w (b, 3) and ``half`` of the time step, s.
+    """
+    for k in range(len(places)):
+        a, b = places[k], body[k]
+        p, q, r, x, y, z = rate[b, 0], rate[b, 1], rate[b, 2], arms[k, 0], arms[k, 1], arms[k, 2]
+        x, y, z = x + half * (q * z - r * y), y + half * (r * x - p * z), z + half * (p * y - q * x)
+        v[a, 0] = speed[b, 0] + (q * z - r * y)
+        v[a, 1] = speed[b, 1] + (r * x - p * z)
+        v[a, 2] = speed[b, 2] + (p * y - q * x)
