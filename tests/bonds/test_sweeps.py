@@ -35,7 +35,8 @@ def layout(seed: int, laws: Floats = _LAWS) -> Layout:
         np.zeros((0, 3), np.int64),
     )  # fmt: skip
     mobility = np.repeat(1.0 / mass[:, None], 3, axis=1)
-    found = laid_out(rows, np.zeros((n, KEPT)), laws, state, mobility, np.zeros((n + m, 3), bool), SerialComm())
+    free = np.zeros((n + m, 3), bool)
+    found = laid_out(rows, np.zeros((n, KEPT)), laws, state, mobility, free, None, 1.0, SerialComm())
     found.nodes.v[:] = rng.normal(size=(n + m, 3))
     return found
 

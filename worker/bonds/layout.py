@@ -91,8 +91,8 @@ def laid_out(
     tied = _rows(rows, mine, ids, inverse, states, laws)
     share, sweeps = momentum(least)
     if rigid is not None and len(points):
-        own = points.take(mine[points.row])
-        rigid.bonds.take_up(own, np.searchsorted(ids, _name(own.row)).astype(np.int32), scale)
+        held_points = points.take(mine[points.row])
+        rigid.bonds.take_up(held_points, np.searchsorted(ids, _name(held_points.row)).astype(np.int32), scale)
     place = local[held].astype(np.int32)
     return Layout(
         tied, _nodes(tied, ids, table), np.flatnonzero(mine), held, place, sweeps, share, messages,
