@@ -69,6 +69,8 @@ export class Chart {
     if (panels !== (this.panels ?? 1)) this.stretch(panels);
     const places = new Map(option.series.map(({ name, xAxisIndex = 0 }) => [name, xAxisIndex]));
     const moved = [...places].some(([name, place]) => (this.places?.get(name) ?? place) !== place) || panels !== (this.places?.panels ?? panels);
+    const gone = [...(this.places?.keys() ?? [])].some((name) => !places.has(name));
+    if (gone) this.chart.dispatchAction({ type: "hideTip", escapeConnect: true }); // ECharts fails when its cursor has the number of a removed series.
     this.places = Object.assign(places, { panels });
     const how = moved ? { notMerge: true } : { replaceMerge: ["series"] }; // ECharts fails when a line moves to another panel.
     this.chart.setOption(whole(this.alone, option), { ...how, lazyUpdate: false });
