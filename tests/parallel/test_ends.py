@@ -202,7 +202,7 @@ def test_a_folder_that_cannot_be_made_is_one_line() -> None:
     assert done.returncode == 5
     said = [line for line in done.stderr.splitlines() if "application called MPI_Abort" not in line]
     assert len(said) == 1, done.stderr
-    assert "gone or cannot be written: [Errno 2] No such file or directory: '/proc/none" in said[0]
+    assert "was removed or cannot be written: [Errno 2] No such file or directory: '/proc/none" in said[0]
 
 
 def test_a_case_that_is_not_there(tmp_path: Path) -> None:
