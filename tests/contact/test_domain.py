@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from conoid.worker.contact.broad_phase import domain
-from conoid.worker.contact.broad_phase.search import Boxes
+from conoid.worker.contact.broad_phase.boxes import Boxes
 from conoid.worker.contact.scene import layout
 from conoid.worker.contact.scene.near_surface import NearSurface, Rules
 

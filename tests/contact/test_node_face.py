@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from conoid.worker.contact.broad_phase import search
-from conoid.worker.contact.broad_phase.search import Primitives
+from conoid.worker.contact.broad_phase.boxes import Primitives
 from conoid.worker.contact.geometry import MARGIN
 from conoid.worker.contact.narrow_phase.facing import TOUCHING
 from conoid.worker.contact.narrow_phase.tables import DEEP, DEEP_SELF, NEAR, PUSH_OUT, ContactRows

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from conoid.worker.contact.broad_phase import registration
-from conoid.worker.contact.broad_phase.deviation import Deviation
+from conoid.worker.contact.broad_phase.registration import Registration
 from conoid.worker.contact.narrow_phase.tables import DEEP, DEEP_SELF
 from conoid.worker.contact.scene import layout
 from conoid.worker.contact.scene.near_surface import NearSurface, Rules
@@ -54,7 +54,7 @@ class World:
         self.deep = edge_depths(self.x, self.edges)
         self.here = self.draw.uniform(size=SHARDS) < 0.8
         self.shown = self.draw.uniform(size=SHARDS) < 0.6
-        self.deviation = Deviation(team(1))
+        self.passes = Registration(team(1))
         self.registered, self.carried, self.opened, self.near = 0, 0, 0, np.zeros(2, int)
         self.scene = self.search(None)
 
@@ -80,14 +80,14 @@ class World:
             self.carried += 1
         now.slots.on_surface[:] = np.repeat(self.shown, 4)[nodes]
         now.enliven(np.flatnonzero(now.faces.exposed).astype(np.int32))
-        registration.register_new(now)
+        self.passes.register_new(now)
         self.measure(now)
         return now
 
     def measure(self, now: Scene) -> None:
         """Measures the distances from the lines."""
         of, faces, edges = now.surface_nodes, now.faces.corners, now.edges.corners
-        self.deviation.measure(now.reference, of.x, of.v, faces, edges, now.slots.tracked)
+        self.passes.deviation.measure(now.reference, of.x, of.v, faces, edges, now.slots.tracked)
 
     @staticmethod
     def rows(shards: "np.ndarray", many: int) -> "np.ndarray":
@@ -131,7 +131,7 @@ class World:
         self.measure(now)
         due = now.reference.farthest(now.slots.tracked) > 0.5 * SKIN * (1.0 if self.registered % 3 else 0.6)
         if due or now.pending:
-            registration.renew(now, of.x, of.v, due, self.deviation)
+            self.passes.renew(now, of.x, of.v, due)
             self.registered += 1
 
     def step(self, number: int) -> None:
@@ -247,19 +247,19 @@ def fails() -> bool:
 def test_slots_that_are_searched_for_the_first_time_need_new_lines() -> None:
     """Proof that the check can fail: such slots have moved unmeasured, and the distance from their old lines is
     unknown."""
-    with patch.object(registration, "register_new", _blind(registration.register_new)):
+    with patch.object(Registration, "register_new", _blind(Registration.register_new)):
         assert fails()
-    with patch.object(registration, "renew", _blind(registration.renew)):
+    with patch.object(Registration, "renew", _blind(Registration.renew)):
         assert fails()
 
 
 def _blind(function: Any) -> Any:
     """Returns ``function`` with a scene in which no slots are new."""
 
-    def called(now: Scene, *rest: Any) -> None:
+    def called(passes: Registration, now: Scene, *rest: Any) -> None:
         settle = now.settle_live
         with patch.object(now, "settle_live", lambda: settle() & False):
-            function(now, *rest)
+            function(passes, now, *rest)
 
     return called
 

@@ -7,8 +7,10 @@ import numpy as np
 import pytest
 
 from conoid.worker.contact.broad_phase import buckets, search
-from conoid.worker.contact.broad_phase.buckets import Table
-from conoid.worker.contact.broad_phase.search import Primitives
+from conoid.worker.contact.broad_phase.boxes import Lines, Primitives
+from conoid.worker.contact.broad_phase.buckets import Buckets, Table
+from conoid.worker.contact.broad_phase.search import Finder
+from conoid.worker.parallel.team import team
 
 from ..worker.meshes import Floats
 from .bodies import Flags, Indices, sheet
@@ -151,6 +153,16 @@ def test_each_pair_is_found_once_where_all_meet_all() -> None:
     assert as_matrix(cloud.find(cloud.nodes, huge, allowed=np.ones((3, 3), bool)), n, n).all()
 
 
+def test_pairs_and_their_order_are_the_same_on_any_number_of_threads() -> None:
+    """With so many nodes and faces that every pass has several tasks; the second search has enough memory at once."""
+    cloud = Cloud(7, 3000)
+    lines, finder = Lines(cloud.x, cloud.v - cloud.v.mean(axis=0), cloud.horizon, cloud.part), Finder(team(3))
+    alone = cloud.find(cloud.nodes, cloud.faces)
+    assert len(alone) > 10_000
+    for _ in range(2):
+        assert np.array_equal(finder.find(cloud.nodes, cloud.faces, lines, NEVER_SELF), alone)
+
+
 def test_things_with_a_node_in_common_are_no_candidates() -> None:
     cloud = Cloud(3)
     nodes = Primitives(np.arange(len(cloud.x), dtype=np.int32)[:, None], np.full(len(cloud.x), 10.0))
@@ -231,6 +243,10 @@ def test_memory_does_not_follow_a_huge_thing(size: float) -> None:
     assert peak < 4e6
 
 
+def sorted_boxes(low: Floats, high: Floats, edge: float) -> Table:
+    return Buckets(team(1)).sort(low, high, np.stack([low.min(axis=0), high.max(axis=0)]), edge)
+
+
 def cells_of(table: Table, low: Floats, high: Floats) -> set[int]:
     """Codes of all cells that a box touches."""
     first, last = (
@@ -253,7 +269,7 @@ def test_position_codes_have_every_box_once_in_each_cell_that_it_touches(
         1.0 + 10.0 * (random.uniform(size=(400, 1)) < 0.1)
     )
     low[0] = high[0]
-    table = buckets.sort(low, high, edge)
+    table = sorted_boxes(low, high, edge)
     assert 1.0 / table.inverse >= edge * (1.0 - 1e-12)
     assert (table.shape <= 2**20 + 1).all()
     touched = {j: cells_of(table, low[j], high[j]) for j in range(400)}
@@ -275,6 +291,6 @@ def test_a_hash_holds_few_codes() -> None:
     """Largest number of entries of one hash, for the cells of a full cube, of a layer and of a line."""
     for shape in ((16, 16, 16), (64, 64, 1), (4096, 1, 1), (1, 1, 4096)):
         low: Floats = np.ascontiguousarray(np.argwhere(np.ones(shape)) + 0.25)
-        table = buckets.sort(low, low + 0.5, 1.0)
+        table = sorted_boxes(low, low + 0.5, 1.0)
         assert len(table.thing) == len(low)
         assert np.diff(table.start).max() <= 16

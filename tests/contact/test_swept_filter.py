@@ -3,10 +3,13 @@
 import numpy as np
 import pytest
 
-from conoid.worker.contact.broad_phase import swept_filter
+from conoid.worker.contact.broad_phase.boxes import Lines
+from conoid.worker.contact.broad_phase.swept_filter import SweptFilter
 from conoid.worker.contact.narrow_phase.tables import DEEP_SELF
+from conoid.worker.parallel.team import team
 
 from ..worker.meshes import Floats
+from .bodies import Flags, Indices
 from .distances import above, across
 
 PAIRS, SKIN, HORIZON = 10_000, 0.1, 1.0
@@ -27,6 +30,18 @@ def flights(seed: int, many: int, turn: float) -> tuple[Floats, Floats]:
     return shape - middle + away, flight + np.cross(spin, shape - middle)
 
 
+def lines(x: Floats, v: Floats, horizon: float) -> Lines:
+    """Extrapolation of nodes of one part."""
+    flat = x.reshape(-1, 3).copy()
+    return Lines(flat, v.reshape(-1, 3).copy(), horizon, np.zeros(len(flat), np.int32))
+
+
+def kept_edges(pairs: Indices, corners: Indices, deep: Floats, of: Lines, skin: float) -> Flags:
+    """(p,) pairs, no two with the same first edge, that the filter keeps."""
+    left = SweptFilter(team(1)).edges(pairs.copy(), corners, deep, of, skin)
+    return np.asarray(np.isin(pairs[:, 0], left[:, 0]))
+
+
 def wrong_edges(seed: int, turn: float) -> tuple[int, float]:
     """Number of removed pairs of edges that come nearer than half the skin, and the removed share."""
     x, v = flights(seed, 2, turn)
@@ -34,9 +49,7 @@ def wrong_edges(seed: int, turn: float) -> tuple[int, float]:
     pairs = np.arange(2 * PAIRS, dtype=np.int32).reshape(-1, 2)
     size = np.linalg.norm(x[:, :, 1] - x[:, :, 0], axis=2).reshape(-1)
     corners = np.column_stack([ends, ends]).astype(np.int32)
-    kept = swept_filter.edges(
-        pairs, corners, DEEP_SELF * size, x.reshape(-1, 3).copy(), v.reshape(-1, 3).copy(), SKIN, HORIZON
-    )
+    kept = kept_edges(pairs, corners, DEEP_SELF * size, lines(x, v, HORIZON), SKIN)
     x, v = x[~kept], v[~kept]
     ways = (x + t * v for t in TIMES)
     least = np.min([across(y[:, 0, 0], y[:, 0, 1], y[:, 1, 0], y[:, 1, 1]) for y in ways], axis=0)
@@ -57,8 +70,8 @@ def wrong_faces(seed: int, turn: float) -> tuple[int, float]:
     faces = np.column_stack([corners[:, 1], corners[:, 1, :1]]).astype(np.int32)
     pairs = np.column_stack([corners[:, 0, 0], np.arange(PAIRS)]).astype(np.int32)
     size = np.sqrt(np.linalg.norm(np.cross(x[:, 1, 1] - x[:, 1, 0], x[:, 1, 2] - x[:, 1, 0]), axis=1))
-    flat, flown = x.reshape(-1, 3).copy(), v.reshape(-1, 3).copy()
-    kept = swept_filter.faces(pairs, faces, size, flat, flown, np.zeros(len(flat), np.int32), SKIN, HORIZON)
+    left = SweptFilter(team(1)).faces(pairs.copy(), faces, size, lines(x, v, HORIZON), SKIN)
+    kept = np.isin(pairs[:, 1], left[:, 1])
     x, v = x[~kept], v[~kept]
     ways = (x + t * v for t in TIMES)
     least = np.min([above(y[:, 0, 0], y[:, 1, 0], y[:, 1, 1], y[:, 1, 2]) for y in ways], axis=0)
@@ -81,4 +94,4 @@ def test_edges_that_come_near_between_two_moments_are_not_removed() -> None:
     edges, pair = np.array([[0, 1, 0, 0], [2, 3, 0, 0]], np.int32), np.array([[0, 1]], np.int32)
     then = x + 0.125 * v
     assert across(*then) < 0.15
-    assert swept_filter.edges(pair, edges, DEEP_SELF * np.array([1.41, 1.0]), x, v, 0.2, 1.5).all()
+    assert kept_edges(pair, edges, DEEP_SELF * np.array([1.41, 1.0]), lines(x, v, 1.5), 0.2).all()

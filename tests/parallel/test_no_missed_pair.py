@@ -7,6 +7,7 @@ edge with every edge, instead of the candidate pairs.
 
 from collections import Counter
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 from unittest.mock import patch
@@ -18,15 +19,14 @@ from conoid.cases.load import apply_overrides, parse_case, read_data, shipped
 from conoid.cases.model.schema import Case
 from conoid.worker import simulation, step
 from conoid.worker.contact.broad_phase import domain, search
+from conoid.worker.contact.broad_phase.boxes import Primitives
 from conoid.worker.contact.broad_phase.pairs import PairTable
-from conoid.worker.contact.broad_phase.search import Primitives
 from conoid.worker.contact.narrow_phase.tables import ContactRows, Step
 from conoid.worker.contact.scene.near_surface import NearSurface
 from conoid.worker.contact.scene.scene import Scene
 from conoid.worker.contact.scene.surface_motion import SurfaceMotion
 from conoid.worker.contact.surface.normals import COLUMNS, means
 from conoid.worker.contact.surface.records import AGED, OPEN
-from conoid.worker.model.state import Ints
 from conoid.worker.parallel.comm import Comm, SerialComm
 from conoid.worker.simulation import Simulation
 
@@ -224,9 +224,9 @@ def test_a_search_without_foresight_is_found_out() -> None:
         part: Indices,
         allowed: Flags,
         horizon: float,
-        rank: Ints | None,
+        *rest: Any,
     ) -> Indices:
-        return find(small, large, x, v, part, allowed, 0.0, rank)
+        return find(small, large, x, v, part, allowed, 0.0, *rest)
 
     assert missed(case) == 0
     with patch.object(search, "find", blind):
@@ -238,7 +238,7 @@ def test_a_search_without_skin_is_found_out() -> None:
     case, find = case_of("hertz_spheres"), search.find
 
     def bare(small: Primitives, large: Primitives, *rest: Any) -> Indices:
-        one, other = (Primitives(each.corners, np.zeros_like(each.reach), each.some) for each in (small, large))
+        one, other = (replace(each, reach=np.zeros_like(each.reach)) for each in (small, large))
         return find(one, other, *rest)
 
     with patch.object(search, "find", bare):

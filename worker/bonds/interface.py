@@ -20,7 +20,7 @@ from conoid.cases.model.bonds import GAP, TiedBond
 from conoid.cases.model.schema import Case
 
 from ..contact.broad_phase import search
-from ..contact.broad_phase.search import Primitives
+from ..contact.broad_phase.boxes import Primitives
 from ..errors import InputError
 from ..mesh.faces import FACES
 from ..mesh.faces import areas as face_areas

@@ -26,6 +26,7 @@ from ..reduction import StepReduction
 from ..rigid.stage import Rigid
 from . import part_pairs
 from .books import Books
+from .broad_phase.registration import Registration
 from .broad_phase.searches import Searches
 from .effort import effort
 from .exterior import Exterior
@@ -70,14 +71,15 @@ class Contact:
         assert case.contact is not None
         self._fractures, self._comm, self._clock, self._timers = case.fractures, comm, clock, timers
         self.exterior = Exterior(model, neighbours, bounds, case.contact.edges, comm)
-        self.searches = Searches(case, model, neighbours, self.exterior, comm, clock)
+        registered = Registration(team)
+        self.searches = Searches(case, model, neighbours, self.exterior, comm, clock, registered)
         largest, speed = extremes
         mass = part_pairs.lighter(self.searches.mu, model.nodes, self.exterior.motion.mobility, comm, rigid) or largest
         self.books = Books(model.nodes.n, case, mass * speed, mass * speed * speed, team)
         bodies = rigid.contacts if rigid is not None else None
         self._active = ActiveSet(self.books.scale, Stops.of(case, model, comm), team, bodies)
         self._scheme, self.sweep_count = _Scheme.of(case), SweepCount(sweeps(case))
-        self.detection = Detection(team)
+        self.detection = Detection(team, registered)
         self.limit = 0.0
         """Inverse of the step in which no node of any rank passes more than half of a tet with which the node is in
         contact, 1/s."""

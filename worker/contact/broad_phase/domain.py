@@ -11,8 +11,8 @@ import numpy as np
 from ...kernels.jit import njit
 from ...model.state import Flags, Floats
 from ...parallel.comm import Comm
+from .boxes import Boxes
 from .buckets import bucket_at
-from .search import Boxes
 
 _NONE = np.zeros(0, np.int64)
 

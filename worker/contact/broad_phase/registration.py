@@ -7,67 +7,114 @@ search is a registration in which everything is changed. No bit of the answer de
 active.
 """
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from ...model.ids import places
 from ...model.state import Flags, Floats, Indices, Ints
+from ...parallel.team import Team
 from ..narrow_phase.tables import DEEP, DEEP_SELF
 from ..scene.scene import Scene
-from . import search, swept_filter
+from . import search
+from .boxes import Lines, Primitives
 from .deviation import Deviation
-from .search import Primitives
+from .swept_filter import SweptFilter
 
 _PARTLY = 0.5
 """Share of half the skin. When a slot has departed from its line by half the skin, all slots that have departed by
 more than this share of half the skin get new lines too."""
 
 
-@dataclass
-class _Flight:
-    """Lines of a scene from the beginning of the step on."""
+class Registration:
+    """Passes of a registration, on the threads of a team."""
 
-    x: Floats
-    """(slots, 3) positions, m."""
-    course: Floats
-    """(slots, 3) velocities less the mean, m/s."""
-    part: Indices
-    """(slots,) part of each slot."""
-    horizon: float
-    """Time to the end of the candidate list, s."""
+    def __init__(self, team: Team) -> None:
+        self.deviation = Deviation(team)
+        """Passes that measure the distances of slots from their lines."""
+        self._finder, self._filter = search.Finder(team), SweptFilter(team)
 
-    def find(self, small: Primitives, large: Primitives, allowed: Flags, rank: Ints | None) -> Indices:
-        """Calls search.find on the lines of the scene."""
-        return search.find(small, large, self.x, self.course, self.part, allowed, self.horizon, rank)
+    def register_new(self, scene: Scene) -> None:
+        """Registers all new nodes, faces and edges, before a step begins."""
+        scene.reference.begin_anew(scene.settle_live(), scene.surface_nodes.x)
+        self._register(scene)
 
+    def renew(self, scene: Scene, x: Floats, v: Floats, strayed: bool) -> None:
+        """Registers all new nodes, faces and edges and, with ``strayed``, begins new lines for the slots that have
+        departed from their lines.
 
-def register_new(scene: Scene) -> None:
-    """Registers all new nodes, faces and edges, before a step begins."""
-    scene.reference.begin_anew(scene.settle_live(), scene.surface_nodes.x)
-    _register(scene)
+        ``x``, ``v`` (slots, 3): at the beginning of the step, v before contact.
+        """
+        off = scene.settle_live()
+        if strayed:
+            off |= scene.slots.tracked & (scene.reference.searched.left > 0.5 * _PARTLY * scene.rules.skin)
+            scene.slots.new |= off
+            scene.faces.new |= off[scene.faces.corners[:, :3]].any(axis=1)
+            scene.edges.new |= off[scene.edges.corners[:, :2]].any(axis=1)
+        scene.reference.begin_anew(off, x)
+        measured = scene.reference, x, v, scene.faces.corners, scene.edges.corners, scene.slots.tracked
+        self.deviation.measure(*measured)
+        knocked = off & (scene.reference.searched.left > 0.5 * scene.rules.skin)
+        if knocked.any():
+            scene.reference.aim(knocked, x, v)
+            self.deviation.measure(*measured)
+        self._register(scene)
 
+    def _register(self, scene: Scene) -> None:
+        reference, pairs = scene.reference, scene.node_face
+        nodes, faces, edges = (some.new & some.live for some in (scene.slots, scene.faces, scene.edges))
+        course, horizon = reference.searched.course - reference.drift, reference.until - reference.t
+        lines = Lines(reference.positions(), course, horizon, scene.surface_nodes.part)
+        some = pairs.pushed
+        old, kept = pairs.rows[some], pairs.kept[some]
+        pairs.drop(nodes, faces)
+        scene.edge_edge.drop(edges, edges)
+        self._node_face(scene, nodes, faces, lines)
+        self._edge_edge(scene, edges, lines)
+        scene.chain()
+        pairs.recall(scene.slots.first, old, kept)
+        scene.slots.new[:], scene.faces.new[:], scene.edges.new[:] = False, False, False
 
-def renew(scene: Scene, x: Floats, v: Floats, strayed: bool, deviation: Deviation) -> None:
-    """Registers all new nodes, faces and edges and, with ``strayed``, begins new lines for the slots that have departed
-    from their lines.
+    def _node_face(self, scene: Scene, nodes: Flags, faces: Flags, lines: Lines) -> None:
+        """Adds pairs of slot and face: changed nodes with all faces, changed faces with the other nodes."""
+        half, size, n = 0.5 * scene.rules.skin, scene.faces.size, scene.surface_nodes.n
+        every = np.arange(n, dtype=np.int32)[:, None], np.full(n, half)
+        changed, others = (Primitives(*every, _rows(some)) for some in (nodes, scene.slots.live & ~nodes))
+        live, new, own = _rows(scene.faces.live), _rows(faces), np.eye(len(scene.rules.allowed), dtype=bool)
+        for deep, which in ((DEEP_SELF, own), (DEEP, ~own)):
+            if (allowed := scene.rules.allowed & which).any():
+                of = scene.faces.corners, half + deep * size
+                self._add_faces(scene, self._find(changed, Primitives(*of, live, 3), lines, allowed), lines)
+                found = self._find(Primitives(*of, new, 3), others, lines, allowed)
+                self._add_faces(scene, np.ascontiguousarray(found[:, ::-1]), lines)
 
-    ``x``, ``v`` (slots, 3): at the beginning of the step, v before contact; ``deviation``: measures the distances.
-    """
-    off = scene.settle_live()
-    if strayed:
-        off |= scene.slots.tracked & (scene.reference.searched.left > 0.5 * _PARTLY * scene.rules.skin)
-        scene.slots.new |= off
-        scene.faces.new |= off[scene.faces.corners[:, :3]].any(axis=1)
-        scene.edges.new |= off[scene.edges.corners[:, :2]].any(axis=1)
-    scene.reference.begin_anew(off, x)
-    measured = scene.reference, x, v, scene.faces.corners, scene.edges.corners, scene.slots.tracked
-    deviation.measure(*measured)
-    knocked = off & (scene.reference.searched.left > 0.5 * scene.rules.skin)
-    if knocked.any():
-        scene.reference.aim(knocked, x, v)
-        deviation.measure(*measured)
-    _register(scene)
+    def _add_faces(self, scene: Scene, pairs: Indices, lines: Lines) -> None:
+        """Adds those ``pairs`` (p, 2) of slot and face that may be in contact."""
+        faces = scene.faces
+        scene.node_face.add(self._filter.faces(pairs, faces.corners, faces.size, lines, scene.rules.skin))
+
+    def _edge_edge(self, scene: Scene, edges: Flags, lines: Lines) -> None:
+        """Adds pairs of edges of which at least one has changed. The edge of lower rank is first, and the pair is
+        computed on the rank that has this edge.
+        """
+        of = scene.edges.corners, 0.5 * (scene.rules.skin + scene.edges.deep)
+        allowed, rank = scene.rules.allowed, scene.edges.rank
+        changed, others = (Primitives(*of, _rows(some), 2) for some in (edges, scene.edges.live & ~edges))
+        self._add_edges(scene, self._find(changed, changed, lines, allowed, rank), lines)
+        found = self._find(changed, others, lines, allowed)
+        turned = rank[found[:, 0]] > rank[found[:, 1]]
+        found[turned] = found[turned, ::-1]
+        self._add_edges(scene, found, lines)
+
+    def _add_edges(self, scene: Scene, pairs: Indices, lines: Lines) -> None:
+        """Adds those ``pairs`` (p, 2) of edges that this rank computes and that may be in contact."""
+        edges = scene.edges
+        if not edges.own.all():
+            pairs = pairs[edges.own[pairs[:, 0]]]
+        scene.edge_edge.add(self._filter.edges(pairs, edges.corners, edges.deep, lines, scene.rules.skin))
+
+    def _find(
+        self, small: Primitives, large: Primitives, lines: Lines, allowed: Flags, rank: Ints | None = None
+    ) -> Indices:  # fmt: skip
+        return search.find(small, large, lines.x, lines.v, lines.part, allowed, lines.horizon, rank, self._finder)
 
 
 def carry(now: Scene, old: Scene) -> None:
@@ -101,64 +148,6 @@ def _numbers(now: Ints, old: Ints) -> Indices:
     order = np.argsort(now, kind="stable")
     at = places(now[order], old)
     return np.where(at >= 0, order[at], -1).astype(np.int32) if len(order) else at
-
-
-def _register(scene: Scene) -> None:
-    reference, pairs = scene.reference, scene.node_face
-    nodes, faces, edges = (some.new & some.live for some in (scene.slots, scene.faces, scene.edges))
-    flight = _Flight(
-        reference.positions(),
-        reference.searched.course - scene.reference.drift,
-        scene.surface_nodes.part,
-        scene.reference.until - reference.t,
-    )
-    some = pairs.pushed
-    old, kept = pairs.rows[some], pairs.kept[some]
-    pairs.drop(nodes, faces)
-    scene.edge_edge.drop(edges, edges)
-    pairs.add(_node_face(scene, nodes, faces, flight))
-    scene.edge_edge.add(_edge_edge(scene, edges, flight))
-    scene.chain()
-    pairs.recall(scene.slots.first, old, kept)
-    scene.slots.new[:], scene.faces.new[:], scene.edges.new[:] = False, False, False
-
-
-def _node_face(scene: Scene, nodes: Flags, faces: Flags, flight: _Flight) -> Indices:
-    """(p, 2) slot and face: changed nodes with all faces, changed faces with the other nodes."""
-    half, size = 0.5 * scene.rules.skin, scene.faces.size
-    every = np.arange(scene.surface_nodes.n, dtype=np.int32)[:, None], np.full(scene.surface_nodes.n, half)
-    changed, others = (Primitives(*every, _rows(some)) for some in (nodes, scene.slots.live & ~nodes))
-    corners, own = np.ascontiguousarray(scene.faces.corners[:, :3]), np.eye(len(scene.rules.allowed), dtype=bool)
-    found = [np.zeros((0, 2), np.int32)]
-    for deep, which in ((DEEP_SELF, own), (DEEP, ~own)):
-        if (allowed := scene.rules.allowed & which).any():
-            of = corners, half + deep * size
-            found.append(flight.find(changed, Primitives(*of, _rows(scene.faces.live)), allowed, None))
-            found.append(flight.find(Primitives(*of, _rows(faces)), others, allowed, None)[:, ::-1])
-    pairs = np.concatenate(found)
-    sifted = swept_filter.faces(
-        pairs, scene.faces.corners, size, flight.x, flight.course, flight.part, scene.rules.skin, flight.horizon
-    )  # fmt: skip
-    return np.asarray(pairs[sifted])
-
-
-def _edge_edge(scene: Scene, edges: Flags, flight: _Flight) -> Indices:
-    """Returns pairs of edges (p, 2) of which at least one has changed. The edge of lower rank is first, and the pair is
-    computed on the rank that has this edge.
-    """
-    of = np.ascontiguousarray(scene.edges.corners[:, :2]), 0.5 * (scene.rules.skin + scene.edges.deep)
-    allowed, rank = scene.rules.allowed, scene.edges.rank
-    changed, others = (Primitives(*of, _rows(some)) for some in (edges, scene.edges.live & ~edges))
-    one, two = flight.find(changed, changed, allowed, rank), flight.find(changed, others, allowed, None)
-    turned = rank[two[:, 0]] > rank[two[:, 1]]
-    two[turned] = two[turned, ::-1]
-    pairs = np.concatenate([one, two])
-    if not scene.edges.own.all():
-        pairs = pairs[scene.edges.own[pairs[:, 0]]]
-    sifted = swept_filter.edges(
-        pairs, scene.edges.corners, scene.edges.deep, flight.x, flight.course, scene.rules.skin, flight.horizon
-    )  # fmt: skip
-    return np.asarray(pairs[sifted])
 
 
 def _rows(flags: Flags) -> Indices:

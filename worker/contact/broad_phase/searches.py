@@ -23,8 +23,8 @@ from ..scene.scene import Scene
 from ..scene.split_update import SplitUpdate
 from ..scene.topology_updates import gather
 from ..surface import normals
-from . import registration
 from .extrapolation import courses
+from .registration import Registration, carry
 
 _SHORTEST = 10.0
 """Smallest horizon of a search, in steps. The horizon is also at most twice the number of steps since the last
@@ -45,11 +45,12 @@ class Searches:
     """Scene of a rank, and the searches that replace the scene."""
 
     def __init__(
-        self, case: Case, model: Model, neighbours: list[Neighbour], exterior: Exterior, comm: Comm, clock: Clock
-    ) -> None:
+        self, case: Case, model: Model, neighbours: list[Neighbour], exterior: Exterior, comm: Comm, clock: Clock,
+        registered: Registration,
+    ) -> None:  # fmt: skip
         """Creates the searches without a scene."""
         self._case, self._model, self._neighbours, self._exterior = case, model, neighbours, exterior
-        self._comm, self._clock = comm, clock
+        self._comm, self._clock, self._registered = comm, clock, registered
         self.mu = part_pairs.friction(case)
         """(parts, parts) Coulomb's coefficient, NaN where two parts may not be in contact."""
         self.scene: Scene | None = None
@@ -119,13 +120,13 @@ class Searches:
         goes_on = old is not None and self._clock.t + _LEAST * self._clock.dt <= motion.until
         now = self.scene = self._laid_out(nodes, goes_on)
         if old is not None and goes_on:
-            registration.carry(now, old)
+            carry(now, old)
         self._connect(now, nodes)
         now.store_before(nodes)
         exterior.show(now, now.own.local)
         now.enliven(np.flatnonzero(now.faces.exposed).astype(np.int32))
         self.foresee(anew=True)
-        registration.register_new(now)
+        self._registered.register_new(now)
         now.remember(*self._kept, nodes, self._comm)
         self.due = False
         self.many += 1

@@ -17,7 +17,7 @@ from ...model.state import Floats, Ints, Model
 from ...parallel.comm import Comm
 from ...parallel.fixed_point import exact_sums
 from ..broad_phase import search
-from ..broad_phase.search import Primitives
+from ..broad_phase.boxes import Primitives
 from ..geometry import at, cross, dot, minus
 from ..stage import Contact
 from .inside import outermost

@@ -21,7 +21,7 @@ from ...mesh.faces import FACES
 from ...model.state import INTACT, Block, Flags, Floats, Indices, Ints, Model
 from ...parallel.comm import Comm
 from ..broad_phase import search
-from ..broad_phase.search import Primitives
+from ..broad_phase.boxes import Primitives
 from ..stage import Contact
 from .overlap import to_borders
 

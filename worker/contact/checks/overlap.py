@@ -10,7 +10,7 @@ import numpy as np
 from ...mesh.faces import normals as face_normals
 from ...model.state import Flags, Floats, Indices
 from ..broad_phase import search
-from ..broad_phase.search import Primitives
+from ..broad_phase.boxes import Primitives
 from ..narrow_phase.facing import FACING
 
 _INSIDE = 1e-9

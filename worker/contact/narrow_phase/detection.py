@@ -9,8 +9,7 @@ from ...model.state import Block, Floats, Ints, Nodes
 from ...parallel.passes import Pass
 from ...parallel.team import Team
 from .. import tasks
-from ..broad_phase import registration
-from ..broad_phase.deviation import Deviation
+from ..broad_phase.registration import Registration
 from ..exterior import Exterior
 from ..scene.scene import Scene
 from ..surface.families import Corners
@@ -76,7 +75,8 @@ class Ahead:
 class Detection:
     """Finds the active contacts of a rank, on the threads of its ``team``."""
 
-    def __init__(self, team: Team) -> None:
+    def __init__(self, team: Team, registered: Registration) -> None:
+        self._registered = registered
         self.tied: Tied | None = None
         """Tied bonds of the slots of the scene."""
         self.found = Detected.nothing()
@@ -91,7 +91,6 @@ class Detection:
         self._across = Pass(team, tasks.across_cracks, *tasks.ACROSS, size=CRACKS_OF_A_TASK)
         self._entering = Pass(team, tasks.entering_nodes, *tasks.ENTERING, size=FAMILIES_OF_A_TASK)
         self._bound = Pass(team, tasks.bound, *tasks.BOUND, size=SLOTS_OF_A_TASK)
-        self._deviation = Deviation(team)
         self._scratch = StepRoom()
         self._rows_of_corner = 1
         """Number of rows reserved for each corner of a narrow side, on average over a task."""
@@ -152,12 +151,12 @@ class Detection:
         """
         of, reference = now.surface_nodes, now.reference
         most, before = 0.5 * now.rules.skin, reference.strayed
-        reference.strayed = self._deviation.measure(
+        reference.strayed = self._registered.deviation.measure(
             reference, of.x, of.v, now.faces.corners, now.edges.corners, now.slots.tracked
         )  # fmt: skip
         due = reference.strayed > (_JOIN if together else 1.0) * most
         if due or now.pending:
-            registration.renew(now, of.x, of.v, due, self._deviation)
+            self._registered.renew(now, of.x, of.v, due)
             before = reference.strayed = reference.farthest(now.slots.tracked)
         return 2.0 * reference.strayed - before > most
 

@@ -7,8 +7,8 @@ import numpy as np
 
 from ...model.state import Flags, Floats, Indices, Ints
 from ...parallel.comm import Comm
-from ..broad_phase import domain, search
-from ..broad_phase.search import Boxes, Primitives
+from ..broad_phase import boxes, domain
+from ..broad_phase.boxes import Boxes, Primitives
 from ..narrow_phase.tables import DEEP
 from ..surface.records import Edges, Faces, SurfaceNodes, merged
 from . import ghosts
@@ -66,7 +66,7 @@ class NearSurface:
         owned = Primitives(self.surface_nodes.places(self.owned[:, None]), np.full(len(self.owned), margin))
         faces = Primitives(np.ascontiguousarray(self.face_places[:, :3]), margin + DEEP * self.faces.size)
         edges = Primitives(np.ascontiguousarray(self.edge_places[:, :2]), margin + 0.5 * self.edges.deep)
-        return [search.swept(things, x, course, horizon) for things in (owned, faces, edges)]
+        return [boxes.swept(things, x, course, horizon) for things in (owned, faces, edges)]
 
 
 def with_ghosts(sides: NearSurface, rules: Rules, horizon: float, drift: Floats, comm: Comm) -> NearSurface:

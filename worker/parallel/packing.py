@@ -1,0 +1,59 @@
+"""Packing: the ranges that the tasks of a pass have written become one array without gaps.
+
+A task that does not know the number of its results writes them from a fixed row on. The results of all tasks are then
+in the order of the tasks, so the packed array is the same on any number of threads.
+"""
+
+from typing import Any
+
+import numpy as np
+
+from ..kernels.jit import njit, types
+from ..model.state import Ints
+from .arguments import reader
+from .passes import Pass
+from .team import TASK, Team
+
+_U1, _I1, _I = types.uint8[::1], types.int64[::1], types.int64
+_PACK = _U1, _U1, _I, _I1, _I1, _I, _I
+_pack = reader(*_PACK)
+
+
+@njit("int64(int64[::1], int64[::1])", cache=True)
+def offsets(begins, counts):  # type: ignore[no-untyped-def]
+    """Set ``begins`` to the sum of all ``counts`` before each one; return the sum of all."""
+    total = 0
+    for k in range(len(counts)):
+        begins[k] = total
+        total += counts[k]
+    return total
+
+
+@njit(TASK, cache=True)
+def _copy(table, first, stop, thread):  # type: ignore[no-untyped-def]
+    """Task: copy the rows of task ``first`` / ``size``, of ``width`` bytes each."""
+    out, source, width, begins, counts, size, spread = _pack(table)
+    k = first // size
+    to, fro = width * begins[k], width * spread * first
+    for i in range(width * counts[k]):
+        out[to + i] = source[fro + i]
+
+
+class Packing:
+    """Passes that pack the results of passes with tasks of one length."""
+
+    def __init__(self, team: Team, size: int) -> None:
+        """``size``: length of a task."""
+        self._size, self._pass = size, Pass(team, _copy, *_PACK, size=size)
+
+    def run(self, n: int, out: Any, source: Any, begins: Ints, counts: Ints, spread: int = 1) -> None:
+        """Copy the results of a pass over the range from 0 to ``n`` from ``source`` to ``out``, arrays of rows of one
+        type.
+
+        The task that begins at index f has written ``counts`` rows from row ``spread`` * f on, and they are copied to
+        row ``begins`` of the task.
+        """
+        if n:
+            width = source.dtype.itemsize * int(np.prod(source.shape[1:], dtype=np.int64))
+            flat = (array.reshape(-1).view(np.uint8) for array in (out, source))
+            self._pass.run(n, *flat, width, begins, counts, self._size, spread)
