@@ -10,12 +10,12 @@ import numpy as np
 import numpy.typing as npt
 
 from conoid.cases.model import schema
-from conoid.worker.contact.surface import surface
 from conoid.worker.contact.surface.records import CrackSides, SurfaceNodes
-from conoid.worker.contact.surface.surface import Surface
+from conoid.worker.contact.surface.surface import Surface, SurfaceBuilder
 from conoid.worker.mesh.model import TetMesh
 from conoid.worker.model.state import Model
 from conoid.worker.parallel.comm import Comm, SerialComm
+from conoid.worker.parallel.team import team
 from conoid.worker.scene import assembly, domain
 
 from ..worker.kernels import DUMMY, scene
@@ -63,7 +63,7 @@ def surface_of(
     on_planes = np.zeros((model.nodes.n, 0), bool) if planes is None else planes
     none = np.zeros((0, 3), np.int32)
     nothing = CrackSides(none, none), none
-    return surface.build(model, on_planes, piece.neighbours, comm or SerialComm(), edges, *nothing)
+    return SurfaceBuilder(team(1)).build(model, on_planes, piece.neighbours, comm or SerialComm(), edges, *nothing)
 
 
 def nodes_of(x: Floats, v: Floats | None = None, part: Indices | None = None) -> SurfaceNodes:

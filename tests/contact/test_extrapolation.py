@@ -3,9 +3,10 @@
 import numpy as np
 import pytest
 
-from conoid.worker.contact.broad_phase.extrapolation import courses
+from conoid.worker.contact.broad_phase.extrapolation import courses, rigid_motions
 from conoid.worker.model.state import Block, Floats, Nodes
 from conoid.worker.parallel.comm import SerialComm
+from conoid.worker.parallel.team import team
 
 TET = np.array([[0.0, 0.0, 0.0], [1.1, 0.1, 0.0], [0.2, 0.9, 0.1], [0.1, 0.2, 1.2]]) * 1e-3
 QUANTUM = 2.0**-16
@@ -19,7 +20,7 @@ def course(x: Floats, v: Floats, tets: list[list[int]], brittle: bool = True) ->
     nodes = Nodes(np.arange(n), one, one, np.ones(n, bool), x, x, v, np.ones(n), force, np.zeros(n))
     bond = np.zeros((len(tets) if brittle else 0, 4), np.uint8)
     block = Block(0, len(tets), corners, np.arange(len(tets)), np.zeros((0, 0, 0)), 0, 0, np.zeros(0), bond=bond)
-    return courses([block], nodes, [], SerialComm())
+    return courses([block], nodes, [], SerialComm(), rigid_motions(team(1)))
 
 
 def test_a_rigid_motion_is_kept() -> None:

@@ -10,6 +10,7 @@ from conoid.worker.contact.narrow_phase.facing import TOUCHING
 from conoid.worker.contact.narrow_phase.tables import DEEP, DEEP_SELF, NEAR, PUSH_OUT, ContactRows
 from conoid.worker.contact.surface import normals
 from conoid.worker.mesh.faces import FACES
+from conoid.worker.parallel.team import team
 
 from ..worker.meshes import Floats, block
 from .bodies import Indices, meeting_of, nodes_of, pieces_of, sheet, surface_of
@@ -189,7 +190,7 @@ def test_the_lowest_corner_of_a_flake_meets_what_it_enters(height: float, own: b
     sums, faces = np.zeros((8, normals.COLUMNS), np.int64), (FACES + 4).astype(np.int32)
     normals.add(sums, normals.shares(x, faces, SIZE), faces)
     part, every, means = np.array([0] * 4 + [0 if own else 1] * 4), np.arange(8, dtype=np.int32), np.zeros((8, 12))
-    normals.means(means, every, sums, every)
+    normals.MeanNormals(team(1)).means(means, every, sums, every)
     met = node_face(x, v, FACE, every_pair(np.array([4]), 1), 1.0, part, normals=means)
     assert many(met) == 1
 

@@ -25,9 +25,10 @@ from conoid.worker.contact.narrow_phase.tables import ContactRows, Step
 from conoid.worker.contact.scene.near_surface import NearSurface
 from conoid.worker.contact.scene.scene import Scene
 from conoid.worker.contact.scene.surface_motion import SurfaceMotion
-from conoid.worker.contact.surface.normals import COLUMNS, means
+from conoid.worker.contact.surface.normals import COLUMNS, MeanNormals
 from conoid.worker.contact.surface.records import AGED, OPEN
 from conoid.worker.parallel.comm import Comm, SerialComm
+from conoid.worker.parallel.team import team
 from conoid.worker.simulation import Simulation
 
 from ..contact.bodies import Flags, Indices
@@ -128,7 +129,9 @@ class Brute(Found):
         faces, local, owned = sides.face_places, sides.surface_nodes.local, sides.surface_nodes.places(sides.owned)
         exterior = self.contact.exterior
         mean, on_surface = np.zeros((len(local), COLUMNS)), exterior.surface.flags[local]
-        means(mean, np.arange(len(local), dtype=np.int32), exterior._moments, local.astype(np.int32))
+        MeanNormals(team(1)).means(
+            mean, np.arange(len(local), dtype=np.int32), exterior._moments, local.astype(np.int32)
+        )
         none = np.zeros(len(local))
         for pairs in self._pairs(sides, owned[:, None], faces[:, :3]):
             table, first = PairTable(), np.full(len(local), -1, np.int32)

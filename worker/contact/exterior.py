@@ -10,11 +10,12 @@ from ..model.state import Block, Flags, Floats, Indices, Ints, Model, Nodes, ext
 from ..model.topology import Split
 from ..parallel.comm import Comm
 from ..parallel.ownership import Neighbour
+from ..parallel.team import Team
 from .narrow_phase.cracks import Cracks
 from .scene.scene import Scene
 from .scene.surface_motion import SurfaceMotion, typical
 from .surface import exposure, normals, surface
-from .surface.families import Corners
+from .surface.families import CornerLists, Corners
 
 _WORDS = 9 + 2 * normals.SHARE
 """Number of columns of a row of ``Exterior.widened``, which describes a crack that opens."""
@@ -24,9 +25,11 @@ class Exterior:
     """Surface of the bodies of one rank: faces, edges, cracks and mean normals."""
 
     def __init__(
-        self, model: Model, neighbours: list[Neighbour], bounds: list[Boundary], edges: bool, comm: Comm
+        self, model: Model, neighbours: list[Neighbour], bounds: list[Boundary], edges: bool, comm: Comm, team: Team
     ) -> None:
         """``edges``: whether edge-edge contact is on. Collective."""
+        self._normals, self._corner_lists = normals.MeanNormals(team), CornerLists(team)
+        self._builder = surface.SurfaceBuilder(team)
         self._model, self._neighbours, self._comm, self._edges = model, neighbours, comm, edges
         self._bounds = bounds
         self.cracks = Cracks.none(model.nodes.id)
@@ -92,7 +95,7 @@ class Exterior:
         sides, covered = self.cracks.foresee(), np.zeros((0, 3), np.int32)
         if self._near_erosion is not None:
             covered = exposure.covered(model.blocks, self._near_erosion, neighbours, comm)
-        found = surface.build(model, self._planes, neighbours, comm, self._edges, sides, covered)
+        found = self._builder.build(model, self._planes, neighbours, comm, self._edges, sides, covered)
         found.flags[: len(flags)] |= flags
         found.sharpen(turned)
         return found
@@ -162,7 +165,7 @@ class Exterior:
 
     def turn(self) -> None:
         """Recomputes the mean normals of all nodes. Collective."""
-        self._moments = normals.moments(self._model, self._planes, self.size, self._neighbours, self._comm)
+        self._moments = self._normals.moments(self._model, self._planes, self.size, self._neighbours, self._comm)
 
     def show(self, scene: Scene, local: "np.ndarray") -> "np.ndarray":
         """Writes the mean normals of the nodes ``local`` of this rank, and whether they are on the surface, to the
@@ -170,7 +173,7 @@ class Exterior:
         """
         place = scene.own.place[local]
         local, place = local[place >= 0], place[place >= 0]
-        normals.means(scene.slots.normals, place, self._moments, local.astype(np.int32, copy=False))
+        self._normals.means(scene.slots.normals, place, self._moments, local.astype(np.int32, copy=False))
         scene.slots.on_surface[place] = self.surface.flags[local]
         return np.asarray(place)
 
@@ -218,7 +221,7 @@ class Exterior:
     def narrow(self) -> list[tuple[Block, Corners]]:
         """Blocks with broken facets, and the corners of their narrow sides; see corner_contact.py."""
         some = enumerate(self._model.blocks) if len(self.cracks.faces) else ()
-        return [(block, self.cracks.corners(b)) for b, block in some if len(block.bond)]
+        return [(block, self.cracks.corners(b, self._corner_lists)) for b, block in some if len(block.bond)]
 
     def separate(self, split: Split) -> None:
         """Updates the surface after nodes have separated on any rank."""

@@ -70,7 +70,7 @@ class Contact:
         """``extremes``: largest nodal mass, kg, and speed, m/s, of the scene; ``rigid``: the rigid bodies."""
         assert case.contact is not None
         self._fractures, self._comm, self._clock, self._timers = case.fractures, comm, clock, timers
-        self.exterior = Exterior(model, neighbours, bounds, case.contact.edges, comm)
+        self.exterior = Exterior(model, neighbours, bounds, case.contact.edges, comm, team)
         registered = Registration(team)
         self.searches = Searches(case, model, neighbours, self.exterior, comm, clock, registered)
         largest, speed = extremes

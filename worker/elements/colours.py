@@ -5,11 +5,14 @@ has. The colours stay valid until tets move from chunk to chunk; separation of n
 """
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
-from ..kernels.jit import njit
+from ..kernels.jit import Kernel, njit
 from ..model.state import CHUNK, Block, Ints
+from ..parallel.arguments import Arguments
+from ..parallel.team import Team
 
 _BITS = 63
 """Number of colours in a word of bits. A chunk for which no colour is free gets an additional colour of its own."""
@@ -61,3 +64,26 @@ def coloured(block: Block, begin: int, end: int, nodes: int) -> Coloured:
 def whole(begin: int, end: int) -> Coloured:
     """Returns the chunks as one task."""
     return Coloured(np.array([[begin, end]]), np.array([0, 1]))
+
+
+class TetPass:
+    """A kernel that adds to the sums of the nodes of tets, to be run over the chunks of blocks."""
+
+    def __init__(self, team: Team, kernel: Kernel, *kinds: Any) -> None:
+        """``kernel``: of the signature team.TASK, over chunks; ``kinds``: numba types of its arguments."""
+        self._team, self._kernel, self._arguments = team, kernel, Arguments(*kinds)
+        self._known: dict[int, tuple[Block, int, Coloured]] = {}
+
+    def run(self, block: Block, nodes: int, *values: Any) -> None:
+        """Runs over the chunks of a block of a rank with so many ``nodes``; ``values``: the arguments."""
+        if block.n:
+            some = self._tasks(block, nodes)
+            self._team.run(self._kernel, self._arguments.set(*values), some.tasks, some.starts)
+
+    def _tasks(self, block: Block, nodes: int) -> Coloured:
+        known, moved, some = self._known.get(block.part, (None, -1, None))
+        if some is None or known is not block or moved != block.moved:
+            alone = self._team.threads == 1
+            some = whole(0, block.chunks) if alone else coloured(block, 0, block.chunks, nodes)
+            self._known[block.part] = block, block.moved, some
+        return some

@@ -29,6 +29,22 @@ def offsets(begins, counts):  # type: ignore[no-untyped-def]
     return total
 
 
+@njit("int64(int64[::1], int64[:, ::1])", cache=True)
+def range_offsets(begins, counts):  # type: ignore[no-untyped-def]
+    """Begin of each range and task of a counting sort by ranges of keys.
+
+    Set ``begins`` (ranges + 1,) to the first item of each range, and each of ``counts`` (tasks, ranges) to the first
+    item of the task in the range; return the number of items.
+    """
+    total = 0
+    for r in range(counts.shape[1]):
+        begins[r] = total
+        for k in range(len(counts)):
+            counts[k, r], total = total, total + counts[k, r]
+    begins[counts.shape[1]] = total
+    return total
+
+
 @njit(TASK, cache=True)
 def _copy(table, first, stop, thread):  # type: ignore[no-untyped-def]
     """Task: copy the rows of task ``first`` / ``size``, of ``width`` bytes each."""

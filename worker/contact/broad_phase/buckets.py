@@ -14,6 +14,7 @@ from ...kernels.jit import njit, record, types
 from ...model.growing import Scratch
 from ...model.state import Floats, Indices, Ints
 from ...parallel.arguments import reader
+from ...parallel.packing import range_offsets
 from ...parallel.passes import Pass
 from ...parallel.team import TASK, Team
 
@@ -92,7 +93,7 @@ class Buckets:
         widths = np.empty(len(counts), np.int64)
         self._count.run(n, counts, widths, wide, cells, low, high)
         begins = np.empty(2**_LEAST_BITS + 1, np.int64)
-        total = int(_begin(begins, counts))
+        total = int(range_offsets(begins, counts))
         kept = wide[: _together(wide, widths)]
         bits = max(_LEAST_BITS, total.bit_length())
         codes, things = self._entries("mixed", total)
@@ -168,20 +169,6 @@ def _count(table, first, stop, thread):  # type: ignore[no-untyped-def]
                 for x in range(span[0, 0], span[1, 0] + 1):
                     counts[k, bucket_at(x + shape[0] * (y + shape[1] * z), _LEAST_BITS)] += 1
     widths[k] = n - first
-
-
-@njit("int64(int64[::1], int64[:, ::1])", cache=True)
-def _begin(begins, counts):  # type: ignore[no-untyped-def]
-    """Sets ``begins`` to the first entry of each range, and each of ``counts`` (tasks, ranges) to the first entry of
-    the task in the range; returns the number of entries.
-    """
-    total = 0
-    for r in range(counts.shape[1]):
-        begins[r] = total
-        for k in range(len(counts)):
-            counts[k, r], total = total, total + counts[k, r]
-    begins[counts.shape[1]] = total
-    return total
 
 
 @njit("int64(int32[::1], int64[::1])", cache=True)

@@ -8,11 +8,14 @@ gets the velocity of a rigid body with the momentum and the angular momentum of 
 
 import numpy as np
 
-from ...kernels.jit import njit
-from ...model.state import Block, Floats, Nodes
+from ...elements.colours import TetPass
+from ...kernels.jit import njit, types
+from ...model.state import CHUNK, Block, Floats, Nodes
+from ...parallel.arguments import reader
 from ...parallel.comm import Comm
 from ...parallel.ownership import Neighbour, complete
 from ...parallel.tags import Tag
+from ...parallel.team import TASK, Team
 
 _QUANTA = 2.0**16
 """Quanta per m/s; with this value sums up to 1e14 m/s do not overflow."""
@@ -20,17 +23,26 @@ _THIN = 1e-9
 """Smallest value, over the cube of its trace, of the determinant of the inertia of a tet for which the rotation of
 the tet is computed."""
 
+_F2 = types.float64[:, ::1]
+_RIGID = types.int64[:, ::1], types.uint32[:, ::1], _F2, _F2, types.float64
+_read = reader(*_RIGID)
 
-def courses(blocks: list[Block], nodes: Nodes, neighbours: list[Neighbour], comm: Comm) -> Floats:
+
+def courses(blocks: list[Block], nodes: Nodes, neighbours: list[Neighbour], comm: Comm, rigid: TetPass) -> Floats:
     """(nodes, 3) extrapolated velocities, m/s: at nodes of tets that may break, the mean of the rigid motions of
-    their tets. Collective."""
+    their tets. ``rigid``: see rigid_motions. Collective."""
     sums = np.zeros((nodes.n, 4), np.int64)
     for block in blocks:
         if len(block.bond):
-            _add_rigid(sums, block.tets, nodes.x, nodes.v, _QUANTA)
+            rigid.run(block, nodes.n, sums, block.tets, nodes.x, nodes.v, _QUANTA)
     complete(comm, neighbours, sums, Tag.COURSE)
     tets = sums[:, 3:]
     return np.asarray(np.where(tets > 0, sums[:, :3] / (_QUANTA * np.maximum(tets, 1)), nodes.v))
+
+
+def rigid_motions(team: Team) -> TetPass:
+    """Returns the pass that adds the rigid motions of the tets of a block at their nodes."""
+    return TetPass(team, _add_rigid, *_RIGID)
 
 
 @njit("float64(float64[::1], float64[::1], float64[::1])", cache=True)
@@ -39,15 +51,17 @@ def _det(a, b, c):  # type: ignore[no-untyped-def]
     return a[0] * (b[1] * c[2] - b[2] * c[1]) + a[1] * (b[2] * c[0] - b[0] * c[2]) + a[2] * (b[0] * c[1] - b[1] * c[0])
 
 
-@njit("void(int64[:, ::1], uint32[:, ::1], float64[:, ::1], float64[:, ::1], float64)", cache=True, error_model="numpy")
-def _add_rigid(sums, tets, x, v, quanta):  # type: ignore[no-untyped-def]
-    """Adds the rigid motion of each of ``tets`` (n, 4) at its corners, and the count one, to the ``sums`` (nodes, 4).
+@njit(TASK, cache=True, error_model="numpy", _nrt=True)
+def _add_rigid(table, first, stop, thread):  # type: ignore[no-untyped-def]
+    """Task: adds the rigid motion of each of ``tets`` (n, 4) of some chunks at its corners, and the count one, to the
+    ``sums`` (nodes, 4).
 
     The motion is that of four equal masses: u + omega x r with I omega = sum(r x v), solved by Cramer's rule.
     """
+    sums, tets, x, v, quanta = _read(table)
     r, u = np.empty((4, 3)), np.empty(3)
     inertia, spin, turn = np.empty((3, 3)), np.empty(3), np.empty(3)
-    for e in range(len(tets)):
+    for e in range(first * CHUNK, min(stop * CHUNK, len(tets))):
         spin[:] = 0.0
         inertia[:] = 0.0
         for i in range(3):

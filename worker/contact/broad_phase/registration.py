@@ -17,6 +17,7 @@ from ..scene.scene import Scene
 from . import search
 from .boxes import Lines, Primitives
 from .deviation import Deviation
+from .extrapolation import rigid_motions
 from .swept_filter import SweptFilter
 
 _PARTLY = 0.5
@@ -25,11 +26,13 @@ more than this share of half the skin get new lines too."""
 
 
 class Registration:
-    """Passes of a registration, on the threads of a team."""
+    """Passes of searches and registrations, on the threads of a team."""
 
     def __init__(self, team: Team) -> None:
         self.deviation = Deviation(team)
         """Passes that measure the distances of slots from their lines."""
+        self.rigid = rigid_motions(team)
+        """Pass that adds the rigid motions of tets (extrapolation.py)."""
         self._finder, self._filter = search.Finder(team), SweptFilter(team)
 
     def register_new(self, scene: Scene) -> None:

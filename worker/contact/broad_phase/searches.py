@@ -148,7 +148,7 @@ class Searches:
         """(nodes, 3) extrapolated velocities of the nodes. Collective."""
         if not self._case.fractures:
             return nodes.v
-        return courses(self._model.blocks, nodes, self._neighbours, self._comm)
+        return courses(self._model.blocks, nodes, self._neighbours, self._comm, self._registered.rigid)
 
     def _connect(self, found: Scene, nodes: Nodes) -> None:
         """Adds the cracks to a new scene, and exchanges the lists of shared nodes. Collective."""

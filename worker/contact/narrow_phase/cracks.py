@@ -17,7 +17,7 @@ from ...migration.parcel import Table, once
 from ...model.state import WIDE, Block, Flags, Floats, Indices, Ints, Nodes, extended
 from ...model.topology import Split
 from ..scene.split_pairs import touching
-from ..surface.families import Corners, Families, by_family
+from ..surface.families import CornerLists, Corners, Families
 from ..surface.records import CrackSides
 
 AGE, _YOUNG = 16, 0.3
@@ -75,11 +75,10 @@ class Cracks:
         self.kept = extended(self.kept, np.zeros((len(faces), _KEPT)))
         self._corners = {}
 
-    def corners(self, block: int) -> Corners:
+    def corners(self, block: int, lists: CornerLists) -> Corners:
         """Corners of the narrow sides of a block; see corner_contact.py."""
         if block not in self._corners:
-            families = self.families
-            self._corners[block] = by_family(self.nodes, self.sides, block, families.ring, families.leader)
+            self._corners[block] = lists.of(self.nodes, self.sides, block, self.families)
         return self._corners[block]
 
     def follow(self, split: Split, ids: Ints) -> None:

@@ -7,12 +7,16 @@ contribution to its nodes. Therefore the normals do not depend on the steps in w
 
 import numpy as np
 
-from ...kernels.jit import njit
+from ...elements.colours import TetPass
+from ...kernels.jit import njit, types
 from ...mesh.faces import FACES
-from ...model.state import WIDE, Flags, Floats, Indices, Ints, Model
+from ...model.state import CHUNK, WIDE, Flags, Floats, Indices, Ints, Model
+from ...parallel.arguments import reader
 from ...parallel.comm import Comm
 from ...parallel.ownership import Neighbour, complete
+from ...parallel.passes import Pass
 from ...parallel.tags import Tag
+from ...parallel.team import TASK, Team
 from ..solver.loading import SHARES
 
 EVERY = 16
@@ -22,26 +26,44 @@ COLUMNS, SHARE = 12, 18
 """Number of sums of a node, and number of words that a face adds to the sums of its three nodes."""
 _NOTHING = 1e-300
 """Least area, m^2: prevents a division by zero for a degenerate face."""
+_I2, _F2, _N1, _N2 = types.int64[:, ::1], types.float64[:, ::1], types.int32[::1], types.int32[:, ::1]
+_EXPOSED = (
+    _I2, _F2, types.uint32[:, ::1], _N2, types.uint8[:, ::1], types.boolean[:, ::1], types.float64,
+)  # fmt: skip
+_MEANS = _F2, _N1, _I2, _N1
+_read_exposed, _read_means = reader(*_EXPOSED), reader(*_MEANS)
 
 
-def moments(model: Model, planes: Flags, size: float, neighbours: list[Neighbour], comm: Comm) -> Ints:
-    """(nodes, COLUMNS) sums over the exposed faces of all ranks at each node, in quanta of ``size``^2 / SHARES m^2:
-    area times n, area times n n (xx, yy, zz, yz, zx, xy), and area times the unit vector from the node to the
-    midpoint of the opposite edge. ``planes``: see surface.build. Collective.
-    """
-    sums = np.zeros((model.nodes.n, COLUMNS), np.int64)
-    for block in model.blocks:
-        _add_exposed(sums, model.nodes.x, block.tets, block.across, block.bond, planes, SHARES / size**2)
-    complete(comm, neighbours, sums, Tag.NORMAL)
-    return sums
+class MeanNormals:
+    """Passes over tets and nodes, on the threads of a team."""
+
+    def __init__(self, team: Team) -> None:
+        self._exposed, self._means = TetPass(team, _add_exposed, *_EXPOSED), Pass(team, _mean, *_MEANS)
+
+    def moments(self, model: Model, planes: Flags, size: float, neighbours: list[Neighbour], comm: Comm) -> Ints:
+        """(nodes, COLUMNS) sums over the exposed faces of all ranks at each node, in quanta of ``size``^2 / SHARES
+        m^2: area times n, area times n n (xx, yy, zz, yz, zx, xy), and area times the unit vector from the node to the
+        midpoint of the opposite edge. ``planes``: see SurfaceBuilder.build. Collective.
+        """
+        nodes, scale = model.nodes, SHARES / size**2
+        sums = np.zeros((nodes.n, COLUMNS), np.int64)
+        for block in model.blocks:
+            self._exposed.run(block, nodes.n, sums, nodes.x, block.tets, block.across, block.bond, planes, scale)
+        complete(comm, neighbours, sums, Tag.NORMAL)
+        return sums
+
+    def means(self, out: Floats, place: Indices, sums: Ints, nodes: Indices) -> None:
+        """Sets ``out`` (slots, COLUMNS) at ``place`` (k,) to the area-weighted means of n, n n and the directions to
+        the faces of the ``nodes`` (k,), by their ``sums`` (nodes, COLUMNS); zero for a node without faces.
+        """
+        self._means.run(len(nodes), out, place, sums, nodes)
 
 
-@njit("void(float64[:, ::1], int32[::1], int64[:, ::1], int32[::1])", cache=True)
-def means(out, place, sums, nodes):  # type: ignore[no-untyped-def]
-    """Sets ``out`` (slots, COLUMNS) at ``place`` (k,) to the area-weighted means of n, n n and the directions to the
-    faces of the ``nodes`` (k,), by their ``sums`` (nodes, COLUMNS); zero for a node without faces.
-    """
-    for k in range(len(nodes)):
+@njit(TASK, cache=True)
+def _mean(table, first, stop, thread):  # type: ignore[no-untyped-def]
+    """Task: ``MeanNormals.means``."""
+    out, place, sums, nodes = _read_means(table)
+    for k in range(first, stop):
         a, s = nodes[k], place[k]
         area = sums[a, 3] + sums[a, 4] + sums[a, 5]
         area = area if area > 0 else 1
@@ -88,13 +110,12 @@ def _add(sums, node, share, corner):  # type: ignore[no-untyped-def]
         sums[node, 9 + i] += share[9 + 3 * corner + i]
 
 
-@njit(
-    "void(int64[:, ::1], float64[:, ::1], uint32[:, ::1], int32[:, ::1], uint8[:, ::1], boolean[:, ::1], float64)",
-    cache=True,
-)
-def _add_exposed(sums, x, tets, across, bond, planes, scale):  # type: ignore[no-untyped-def]
+@njit(TASK, cache=True)
+def _add_exposed(table, first, stop, thread):  # type: ignore[no-untyped-def]
+    """Task: adds the contributions of the exposed faces of some chunks."""
+    sums, x, tets, across, bond, planes, scale = _read_exposed(table)
     share = np.empty(SHARE, np.int64)
-    for e in range(len(tets)):
+    for e in range(first * CHUNK, min(stop * CHUNK, len(tets))):
         for k in range(4):
             if across[e, k] >= 0 and not (len(bond) > 0 and bond[e, k] == WIDE):
                 continue

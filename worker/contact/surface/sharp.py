@@ -10,14 +10,18 @@ import math
 
 import numpy as np
 
-from ...kernels.jit import njit
+from ...kernels.jit import njit, types
 from ...materials.turning import sine_and_cosine
 from ...model.ids import among
 from ...model.state import Bits, Flags, Floats, Indices, Ints, Model
+from ...parallel.arguments import reader
 from ...parallel.comm import Comm
 from ...parallel.ownership import Neighbour, ranks
-from ..geometry import at, cross, dot, lowest_height, minus
+from ...parallel.passes import Pass
+from ...parallel.team import TASK, Team
+from ..geometry import at, cross, dot, minus
 from ..narrow_phase.tables import DEEP, DEEP_SELF
+from .half_edges import HalfEdges
 from .records import Edges, Faces
 
 SHARP = sine_and_cosine(math.radians(25.0))[1]
@@ -33,6 +37,14 @@ _A, _B, _C, _D, _OWNER, _TOP, _FACE, _OPEN, _LENGTH, _LOW, _NORMAL = range(11)
 """Columns of a half edge that is sent: its nodes, the third node of its face and the opposite one, the owners of
 these two, the face, its state, initial length, m, lowest initial height of its tet, m, and the unit normal of the
 face; floats by their bits."""
+_EDGES = 1024
+"""Number of edges in a task. Chosen value: a task takes some 30 us, compared with 2 us to start a parallel region."""
+_I1, _I2, _U1, _U2, _N2, _F1, _F2 = (
+    types.int64[::1], types.int64[:, ::1], types.uint8[::1], types.uint8[:, ::1], types.int32[:, ::1],
+    types.float64[::1], types.float64[:, ::1],
+)  # fmt: skip
+_FILL = _I2, _I2, _F1, _F1, _U2, _N2, _N2, _I2, _I1, _U1, _F2, _F1
+_read_fill = reader(*_FILL)
 _HALF, _ROW = 13, 17
 """Number of columns of a half edge, and number of columns of an edge (``_matched``)."""
 
@@ -45,42 +57,44 @@ def none() -> tuple[Edges, Ints, Indices]:
     return edges, np.zeros(0, np.int64), np.zeros(0, np.int32)
 
 
-def find(
-    model: Model,
-    faces: Faces,
-    local: Indices,
-    units: Floats,
-    some: Flags,
-    opened: Bits,
-    neighbours: list[Neighbour],
-    comm: Comm,
-) -> tuple[Edges, Ints, Indices]:
-    """Returns the edges, sorted by the ids of their faces, and ids and owners of the nodes of edges that this rank does
-    not hold.
+class EdgeFinder:
+    """Passes over faces and edges, on the threads of a team."""
 
-    Of ``some`` (f,) of the faces, with the ``local`` nodes (f, 4) and unit normals (f, 3); ``opened`` (f,): see
-    Edges. Where other ranks may hold faces of an edge, the owner of the lower node matches them, and the rank of the
-    face of smaller id gets the edge.
-    """
-    half = np.repeat(some[:, None], 3, axis=1)
-    away = half & _common(local, model.nodes.n, neighbours) if neighbours else np.zeros_like(half)
-    pairs = _pairs(local, half & ~away, units, model.nodes.n, SHARP)
-    n, heights = len(pairs), _heights(local, model.nodes.x0)
-    nodes, sides, either = np.empty((n, 6), np.int64), np.empty((n, 2), np.int64), np.empty((n, 2), np.uint8)
-    size, low = np.empty((2, n))
-    _fill(nodes, sides, size, low, either, pairs, local, faces.nodes, faces.id, opened, model.nodes.x0, heights)
-    edges = Edges(nodes, sides, size, depths(size, low), either, pairs[:, 4] > 0)
-    if comm.size == 1:
-        return edges, *none()[1:]
-    rows = _elsewhere(model, faces, local, units, heights, away, opened, comm)
-    size, low = np.ascontiguousarray(rows[:, 12:14].T).view(np.float64)
-    far = Edges(rows[:, :6], rows[:, 10:12], size, depths(size, low), rows[:, 14:16].astype(np.uint8), rows[:, 16] > 0)
-    edges = Edges.joined([edges, far])
-    ends, owners = rows[:, 2:6].reshape(-1), rows[:, 6:10].reshape(-1)
-    absent = ~among(model.nodes.id, ends)
-    missing, first = np.unique(ends[absent], return_index=True)
-    edges = edges.take(np.lexsort((edges.sides[:, 1], edges.sides[:, 0])))
-    return edges, missing, owners[absent][first].astype(np.int32)
+    def __init__(self, team: Team) -> None:
+        self._halves, self._fill = HalfEdges(team), Pass(team, _fill, *_FILL, size=_EDGES)
+
+    def find(
+        self, model: Model, faces: Faces, local: Indices, units: Floats, heights: Floats, some: Flags, opened: Bits,
+        neighbours: list[Neighbour], comm: Comm,
+    ) -> tuple[Edges, Ints, Indices]:  # fmt: skip
+        """Returns the edges, sorted by the ids of their faces, and ids and owners of the nodes of edges that this rank
+        does not hold.
+
+        Of ``some`` (f,) of the faces, with the ``local`` nodes (f, 4), unit normals (f, 3) and the lowest ``heights``
+        (f,) of their tets, m; ``opened`` (f,): see Edges. Where other ranks may hold faces of an edge, the owner of
+        the lower node matches them, and the rank of the face of smaller id gets the edge.
+        """
+        half = np.repeat(some[:, None], 3, axis=1)
+        away = half & _common(local, model.nodes.n, neighbours) if neighbours else np.zeros_like(half)
+        pairs = self._halves.pairs(local, half & ~away, units, model.nodes.n, SHARP)
+        n = len(pairs)
+        nodes, sides, either = np.empty((n, 6), np.int64), np.empty((n, 2), np.int64), np.empty((n, 2), np.uint8)
+        size, low = np.empty((2, n))
+        self._fill.run(
+            n, nodes, sides, size, low, either, pairs, local, faces.nodes, faces.id, opened, model.nodes.x0, heights
+        )
+        edges = Edges(nodes, sides, size, depths(size, low), either, pairs[:, 4] > 0)
+        if comm.size == 1:
+            return edges, *none()[1:]
+        rows = _elsewhere(model, faces, local, units, heights, away, opened, comm, self._halves)
+        size, low = np.ascontiguousarray(rows[:, 12:14].T).view(np.float64)
+        states, is_sharp = rows[:, 14:16].astype(np.uint8), rows[:, 16] > 0
+        edges = Edges.joined([edges, Edges(rows[:, :6], rows[:, 10:12], size, depths(size, low), states, is_sharp)])
+        ends, owners = rows[:, 2:6].reshape(-1), rows[:, 6:10].reshape(-1)
+        absent = ~among(model.nodes.id, ends)
+        missing, first = np.unique(ends[absent], return_index=True)
+        edges = edges.take(np.lexsort((edges.sides[:, 1], edges.sides[:, 0])))
+        return edges, missing, owners[absent][first].astype(np.int32)
 
 
 def depths(size: Floats, low: Floats) -> Floats:
@@ -99,8 +113,9 @@ def _common(local: Indices, n: int, neighbours: list[Neighbour]) -> Flags:
 
 
 def _elsewhere(
-    model: Model, faces: Faces, local: Indices, units: Floats, heights: Floats, away: Flags, opened: Bits, comm: Comm
-) -> Ints:
+    model: Model, faces: Faces, local: Indices, units: Floats, heights: Floats, away: Flags, opened: Bits, comm: Comm,
+    matching: HalfEdges,
+) -> Ints:  # fmt: skip
     """Rows (``_matched``) of this rank's edges among the half edges ``away`` (f, 3); ``heights`` (f,): lowest
     heights of their tets, m. Collective.
     """
@@ -112,12 +127,12 @@ def _elsewhere(
     found = comm.swap({rank: halves[home == rank] for rank in ranks(home)})
     gathered = np.concatenate([halves[:0], *(words.reshape(-1, _HALF) for words in found.values())])
     sender = np.repeat(np.array(list(found), np.int64), [len(words) // _HALF for words in found.values()])
-    rows, target = _matched(gathered, sender)
+    rows, target = _matched(gathered, sender, matching)
     back = comm.swap({rank: rows[target == rank] for rank in ranks(target)})
     return np.concatenate([rows[:0], *(words.reshape(-1, _ROW) for words in back.values())])
 
 
-def _matched(halves: Ints, sender: Ints) -> tuple[Ints, Ints]:
+def _matched(halves: Ints, sender: Ints, matching: HalfEdges) -> tuple[Ints, Ints]:
     """Rows (nodes of records.Edges, owners of the last four, face abc, face bad, length, lowest height of either
     tet, states of either face, sharpness) of the edges of ``halves``, and the sender of the first face of each.
     """
@@ -127,7 +142,7 @@ def _matched(halves: Ints, sender: Ints) -> tuple[Ints, Ints]:
     half = np.zeros((len(halves), 3), bool)
     half[:, 0] = True
     units = np.ascontiguousarray(halves[:, _NORMAL:]).view(np.float64)
-    pairs = _pairs(corners.reshape(-1, 3).astype(np.int32), half, units, len(ids), SHARP)
+    pairs = matching.pairs(corners.reshape(-1, 3).astype(np.int32), half, units, len(ids), SHARP)
     one, two = halves[pairs[:, 0]], halves[pairs[:, 2]]
     others = (np.column_stack([one[:, k], two[:, k]]) for k in (_C, _D, _OWNER, _TOP, _FACE))
     opened = np.column_stack([one[:, _OPEN], two[:, _OPEN]])
@@ -136,71 +151,11 @@ def _matched(halves: Ints, sender: Ints) -> tuple[Ints, Ints]:
     return rows, sender[pairs[:, 0]]
 
 
-@njit("int32[:, ::1](int32[:, ::1], boolean[:, ::1], float64[:, ::1], int64, float64)", cache=True)
-def _pairs(corners, half, units, nodes, sharp):  # type: ignore[no-untyped-def]
-    """(p, 5) edges: a face, the number of its half edge, the same of the other face, and sharpness; by face, then by
-    other face.
-
-    ``corners`` (f, 3 or more) of faces by ascending id, below ``nodes``; ``half`` (f, 3): half edges to be matched,
-    k from corner k to the next; ``sharp``: cosine of the least angle between their ``units``.
-    """
-    begin = _by_lower_node(corners, half, nodes)
-    at, higher, which = begin[:-1].copy(), np.empty(begin[nodes], np.int32), np.empty(begin[nodes], np.int32)
-    for f in range(len(corners)):
-        for k in range(3):
-            if half[f, k]:
-                a, b = corners[f, k], corners[f, (k + 1) % 3]
-                higher[at[min(a, b)]], which[at[min(a, b)]] = max(a, b), 3 * f + k
-                at[min(a, b)] += 1
-    found, n = np.empty((len(which) // 2 + 1, 5), np.int32), 0
-    at[:] = begin[:-1]
-    for f in range(len(corners)):
-        first = n
-        for k in range(3):
-            if not half[f, k]:
-                continue
-            a, b, c = corners[f, k], corners[f, (k + 1) % 3], corners[f, (k + 2) % 3]
-            low, high = min(a, b), max(a, b)
-            at[low] += 1
-            for i in range(at[low], begin[low + 1]):
-                if higher[i] != high:
-                    continue
-                g, m = which[i] // 3, which[i] % 3
-                if corners[g, m] == a or corners[g, (m + 2) % 3] == c:
-                    continue
-                cosine = units[f, 0] * units[g, 0] + units[f, 1] * units[g, 1] + units[f, 2] * units[g, 2]
-                if n == len(found):
-                    found = np.concatenate((found, np.empty_like(found)))
-                j = n
-                while j > first and found[j - 1, 2] > g:
-                    found[j] = found[j - 1]
-                    j -= 1
-                found[j, 0], found[j, 1], found[j, 2], found[j, 3], found[j, 4] = f, k, g, m, cosine < sharp
-                n += 1
-    return found[:n].copy()
-
-
-@njit("int64[::1](int32[:, ::1], boolean[:, ::1], int64)", cache=True)
-def _by_lower_node(corners, half, nodes):  # type: ignore[no-untyped-def]
-    """(nodes + 1,) offsets of the half edges by their lower node."""
-    begin = np.zeros(nodes + 1, np.int64)
-    for f in range(len(corners)):
-        for k in range(3):
-            if half[f, k]:
-                begin[min(corners[f, k], corners[f, (k + 1) % 3]) + 1] += 1
-    for a in range(nodes):
-        begin[a + 1] += begin[a]
-    return begin
-
-
-@njit(
-    "void(int64[:, ::1], int64[:, ::1], float64[::1], float64[::1], uint8[:, ::1], int32[:, ::1], int32[:, ::1], "
-    "int64[:, ::1], int64[::1], uint8[::1], float64[:, ::1], float64[::1])",
-    cache=True,
-)
-def _fill(nodes, sides, size, low, opened, pairs, local, face_nodes, face_id, face_opened, x, heights):  # type: ignore[no-untyped-def]
-    """Writes the columns of the edges ``pairs``; ``low``: the lower of the ``heights`` (f,) of their tets."""
-    for p in range(len(pairs)):
+@njit(TASK, cache=True)
+def _fill(table, first, stop, thread):  # type: ignore[no-untyped-def]
+    """Task: writes the columns of the edges ``pairs``; ``low``: the lower of the ``heights`` (f,) of their tets."""
+    nodes, sides, size, low, opened, pairs, local, face_nodes, face_id, face_opened, x, heights = _read_fill(table)
+    for p in range(first, stop):
         f, k, g, m = pairs[p, 0], pairs[p, 1], pairs[p, 2], pairs[p, 3]
         for i in range(3):
             nodes[p, i] = face_nodes[f, (k + i) % 3]
@@ -210,15 +165,6 @@ def _fill(nodes, sides, size, low, opened, pairs, local, face_nodes, face_id, fa
         a, b = local[f, k], local[f, (k + 1) % 3]
         dx, dy, dz = x[b, 0] - x[a, 0], x[b, 1] - x[a, 1], x[b, 2] - x[a, 2]
         size[p], low[p] = np.sqrt(dx * dx + dy * dy + dz * dz), min(heights[f], heights[g])
-
-
-@njit("float64[::1](int32[:, ::1], float64[:, ::1])", cache=True)
-def _heights(local, x):  # type: ignore[no-untyped-def]
-    """(f,) lowest height of the tet of each face, of ``local`` nodes (f, 4), m."""
-    low = np.empty(len(local))
-    for f in range(len(local)):
-        low[f] = lowest_height(x, local[f, 0], local[f, 1], local[f, 2], local[f, 3])
-    return low
 
 
 @njit(

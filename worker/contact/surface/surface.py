@@ -4,19 +4,37 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from ...kernels.jit import njit
+from ...kernels.jit import njit, types
 from ...mesh.faces import FACES
 from ...model.ids import among
 from ...model.state import LAID_BARE, WIDE, Bits, Flags, Indices, Ints, Model
+from ...parallel.arguments import reader
 from ...parallel.comm import Comm
 from ...parallel.ownership import Neighbour, complete
+from ...parallel.packing import offsets
+from ...parallel.passes import Pass
 from ...parallel.tags import Tag
+from ...parallel.team import TASK, Team
+from ..geometry import lowest_height
 from . import sharp
 from .records import CrackSides, Edges, Faces
+from .sharp import EdgeFinder
 
 _UNSEEN, _COVERED, _YOUNG, _AGED, _EXPOSED, _BARE = range(6)
 """Numbers of the kinds of faces: not on the surface; exposed if a tet erodes; side of a crack that may open, without
 or with edge-edge contact; exposed; exposed by erosion."""
+
+_TETS, _FACES = 8192, 1024
+"""Number of tets in a task, and number of faces in a task. Chosen values: a task takes 10 to 50 us, compared with 2 us
+to start a parallel region."""
+_U1, _U2, _I1, _I2, _N2, _T2, _F1, _F2, _B1 = (
+    types.uint8[::1], types.uint8[:, ::1], types.int64[::1], types.int64[:, ::1], types.int32[:, ::1],
+    types.uint32[:, ::1], types.float64[::1], types.float64[:, ::1], types.boolean[::1],
+)  # fmt: skip
+_SORT = _U2, _I1, _T2, _N2, _U2, types.boolean[:, ::1]
+_LIST = _N2, _I1, _U1, _U2, _T2, _I1, _I1
+_MEASURE = _I2, _F1, _F2, _F1, _I2, _N2, _B1, _I1, _F2
+_read_sort, _read_list, _read_measure = reader(*_SORT), reader(*_LIST), reader(*_MEASURE)
 
 
 @dataclass
@@ -45,60 +63,75 @@ class Surface:
             self.turned, self.edges.sharp[among(names, own)] = np.intersect1d(own, names), True
 
 
-def build(
-    model: Model,
-    planes: Flags,
-    neighbours: list[Neighbour],
-    comm: Comm,
-    edges: bool,
-    cracks: CrackSides,
-    covered: Indices,
-) -> Surface:
-    """Builds the surface. Collective.
+class SurfaceBuilder:
+    """Passes over tets, faces and edges, on the threads of a team."""
 
-    ``planes`` (nodes, planes): membership of nodes in symmetry planes. A face with all three nodes on one plane is not
-    on the surface; a face of a body one tet thick, with nodes on two parallel planes, is. ``cracks``: sides that may
-    open before the next search; ``covered`` (m, 3): block, row and face of faces that erosion may expose. Faces exposed
-    by erosion are in contact with nodes; the edges of such faces are not in edge-edge contact, because nearly all of
-    them would be sharp.
+    def __init__(self, team: Team) -> None:
+        self._sort_out, self._list = Pass(team, _sort_out, *_SORT, size=_TETS), Pass(team, _list, *_LIST, size=_TETS)
+        self._measure, self._edges = Pass(team, _measure, *_MEASURE, size=_FACES), EdgeFinder(team)
+
+    def build(
+        self,
+        model: Model,
+        planes: Flags,
+        neighbours: list[Neighbour],
+        comm: Comm,
+        edges: bool,
+        cracks: CrackSides,
+        covered: Indices,
+    ) -> Surface:
+        """Builds the surface. Collective.
+
+        ``planes`` (nodes, planes): membership of nodes in symmetry planes. A face with all three nodes on one plane is
+        not on the surface; a face of a body one tet thick, with nodes on two parallel planes, is. ``cracks``: sides
+        that may open before the next search; ``covered`` (m, 3): block, row and face of faces that erosion may expose.
+        Faces exposed by erosion are in contact with nodes; the edges of such faces are not in edge-edge contact,
+        because nearly all of them would be sharp.
+        """
+        local, ids, kind = self._faces(model, planes, cracks, covered)
+        nodes, n = model.nodes, len(ids)
+        units, heights, counts = np.empty((n, 3)), np.empty(n), np.zeros((nodes.n, 2), np.int64)
+        faces = Faces(ids, np.empty((n, 4), np.int64), np.empty(n), kind >= _EXPOSED)
+        self._measure.run(n, faces.nodes, faces.size, units, heights, counts, local, faces.exposed, nodes.id, nodes.x0)
+        complete(comm, neighbours, counts, Tag.SURFACE)
+        some = ((kind == _YOUNG) | (kind == _AGED) | (kind == _EXPOSED)) & edges
+        opened = (kind >= _AGED).astype(np.uint8) + faces.exposed
+        of = model, faces, local, units, heights, some, opened, neighbours, comm
+        found = self._edges.find(*of) if edges else sharp.none()
+        return Surface(faces, found[0], counts[:, 0] > 0, counts[:, 1] > 0, *found[1:])
+
+    def _faces(self, model: Model, planes: Flags, cracks: CrackSides, covered: Indices) -> tuple[Indices, Ints, Bits]:
+        """(f, 4) local nodes of the exposed faces, the sides of ``cracks`` and the ``covered`` faces, the opposite node
+        last; their ids, ascending; and their kinds.
+        """
+        marked, begin = [], 0
+        for b, block in enumerate(model.blocks):
+            kind = np.zeros((block.n, 4), np.uint8)
+            for sides, what in ((covered, _COVERED), (cracks.young, _YOUNG), (cracks.aged, _AGED)):
+                some = sides[sides[:, 0] == b]
+                kind[some[:, 1], some[:, 2]] = what
+            begins, counts = np.empty((2, self._list.many(block.n)), np.int64)
+            self._sort_out.run(block.n, kind, counts, block.tets, block.across, block.bond, planes)
+            end = begin + int(offsets(begins, counts))
+            marked.append((block, kind, begin + begins))
+            begin = end
+        local, ids, kept = np.empty((begin, 4), np.int32), np.empty(begin, np.int64), np.empty(begin, np.uint8)
+        for block, kind, begins in marked:
+            self._list.run(block.n, local, ids, kept, kind, block.tets, block.id, begins)
+        if (ids[1:] > ids[:-1]).all():
+            return local, ids, kept
+        order = np.argsort(ids)
+        return local.take(order, axis=0), ids[order], kept[order]
+
+
+@njit(TASK, cache=True)
+def _sort_out(table, first, stop, thread):  # type: ignore[no-untyped-def]
+    """Task: completes the kinds ``kind`` (n, 4) of the faces of some tets, which mark the faces that may become surface
+    on entry, and counts the faces that are on the surface or may be.
     """
-    local, ids, kind = _faces(model, planes, cracks, covered)
-    nodes, n = model.nodes, len(ids)
-    units, counts = np.empty((n, 3)), np.zeros((nodes.n, 2), np.int64)
-    faces = Faces(ids, np.empty((n, 4), np.int64), np.empty(n), kind >= _EXPOSED)
-    _measure(faces.nodes, faces.size, units, counts, local, faces.exposed, nodes.id, nodes.x0)
-    complete(comm, neighbours, counts, Tag.SURFACE)
-    some = ((kind == _YOUNG) | (kind == _AGED) | (kind == _EXPOSED)) & edges
-    opened = (kind >= _AGED).astype(np.uint8) + faces.exposed
-    found = sharp.find(model, faces, local, units, some, opened, neighbours, comm) if edges else sharp.none()
-    return Surface(faces, found[0], counts[:, 0] > 0, counts[:, 1] > 0, *found[1:])
-
-
-def _faces(model: Model, planes: Flags, cracks: CrackSides, covered: Indices) -> tuple[Indices, Ints, Bits]:
-    """(f, 4) local nodes of the exposed faces, the sides of ``cracks`` and the ``covered`` faces, the opposite node
-    last; their ids, ascending; and their kinds.
-    """
-    kinds, counts = [np.zeros((block.n, 4), np.uint8) for block in model.blocks], []
-    for b, (block, kind) in enumerate(zip(model.blocks, kinds, strict=True)):
-        for sides, what in ((covered, _COVERED), (cracks.young, _YOUNG), (cracks.aged, _AGED)):
-            some = sides[sides[:, 0] == b]
-            kind[some[:, 1], some[:, 2]] = what
-        counts.append(_sort_out(kind, block.tets, block.across, block.bond, planes))
-    begin = np.cumsum([0, *counts])
-    local, ids, kept = np.empty((begin[-1], 4), np.int32), np.empty(begin[-1], np.int64), np.empty(begin[-1], np.uint8)
-    for block, kind, b, e in zip(model.blocks, kinds, begin, begin[1:], strict=False):
-        _list(local[b:e], ids[b:e], kept[b:e], kind, block.tets, block.id)
-    order = np.argsort(ids)
-    return local.take(order, axis=0), ids[order], kept[order]
-
-
-@njit("int64(uint8[:, ::1], uint32[:, ::1], int32[:, ::1], uint8[:, ::1], boolean[:, ::1])", cache=True)
-def _sort_out(kind, tets, across, bond, planes):  # type: ignore[no-untyped-def]
-    """Completes the kinds ``kind`` (n, 4) of the faces of a block, which marks the faces that may become surface on
-    entry; returns the number of faces that are on the surface or may be.
-    """
+    kind, counts, tets, across, bond, planes = _read_sort(table)
     n = 0
-    for e in range(len(tets)):
+    for e in range(first, stop):
         for k in range(4):
             if across[e, k] == LAID_BARE:
                 kind[e, k] = _BARE
@@ -111,14 +144,15 @@ def _sort_out(kind, tets, across, bond, planes):  # type: ignore[no-untyped-def]
                 if planes[a, i] and planes[b, i] and planes[c, i]:
                     kind[e, k] = _UNSEEN
             n += kind[e, k] != _UNSEEN
-    return n
+    counts[first // _TETS] = n
 
 
-@njit("void(int32[:, ::1], int64[::1], uint8[::1], uint8[:, ::1], uint32[:, ::1], int64[::1])", cache=True)
-def _list(local, ids, kept, kind, tets, tet_id):  # type: ignore[no-untyped-def]
-    """Lists the faces of a block that are on the surface or may be."""
-    n = 0
-    for e in range(len(tets)):
+@njit(TASK, cache=True)
+def _list(table, first, stop, thread):  # type: ignore[no-untyped-def]
+    """Task: lists the faces of some tets that are on the surface or may be."""
+    local, ids, kept, kind, tets, tet_id, begins = _read_list(table)
+    n = begins[first // _TETS]
+    for e in range(first, stop):
         for k in range(4):
             if kind[e, k] == _UNSEEN:
                 continue
@@ -128,24 +162,20 @@ def _list(local, ids, kept, kind, tets, tet_id):  # type: ignore[no-untyped-def]
             n += 1
 
 
-@njit(
-    "void(int64[:, ::1], float64[::1], float64[:, ::1], int64[:, ::1], int32[:, ::1], boolean[::1], int64[::1], "
-    "float64[:, ::1])",
-    cache=True,
-    error_model="numpy",
-)
-def _measure(nodes, size, units, counts, local, exposed, ids, x):  # type: ignore[no-untyped-def]
-    """Computes the global ``nodes`` (f, 4), sizes, m, and unit normals (f, 3) of faces with the ``local`` nodes, and
-    sets ``counts`` (nodes, 2) to one for the nodes of ``exposed`` faces, and of others.
+@njit(TASK, cache=True, error_model="numpy")
+def _measure(table, first, stop, thread):  # type: ignore[no-untyped-def]
+    """Task: computes the global ``nodes`` (f, 4), sizes, m, unit normals (f, 3) and lowest heights of the tets, m, of
+    faces with the ``local`` nodes, and sets ``counts`` (nodes, 2) to one for the nodes of ``exposed`` faces, and of
+    others.
     """
-    e, g = np.empty(3), np.empty(3)
-    for f in range(len(local)):
+    nodes, size, units, heights, counts, local, exposed, ids, x = _read_measure(table)
+    for f in range(first, stop):
         a, b, c = local[f, 0], local[f, 1], local[f, 2]
-        for i in range(3):
-            e[i], g[i] = x[b, i] - x[a, i], x[c, i] - x[a, i]
-        nx, ny, nz = e[1] * g[2] - e[2] * g[1], e[2] * g[0] - e[0] * g[2], e[0] * g[1] - e[1] * g[0]
+        ex, ey, ez = x[b, 0] - x[a, 0], x[b, 1] - x[a, 1], x[b, 2] - x[a, 2]
+        gx, gy, gz = x[c, 0] - x[a, 0], x[c, 1] - x[a, 1], x[c, 2] - x[a, 2]
+        nx, ny, nz = ey * gz - ez * gy, ez * gx - ex * gz, ex * gy - ey * gx
         twice = np.sqrt(nx * nx + ny * ny + nz * nz)
-        size[f] = np.sqrt(twice)
+        size[f], heights[f] = np.sqrt(twice), lowest_height(x, a, b, c, local[f, 3])
         units[f, 0], units[f, 1], units[f, 2] = nx / twice, ny / twice, nz / twice
         for i in range(4):
             nodes[f, i] = ids[local[f, i]]
