@@ -40,7 +40,7 @@ EXCEPTIONS: dict[str, dict[str, int]] = {
         "worker/contact/exterior.py: Exterior": 15,
         "worker/contact/broad_phase/searches.py: Searches": 13,
         "worker/contact/narrow_phase/detection.py: Detection": 14,
-        "worker/contact/scene/scene.py: Scene": 13,
+        "worker/contact/scene/scene.py: Scene": 14,
         "worker/contact/solver/solver.py: ActiveSet": 13,
         "worker/contact/stage.py: Contact": 14,
         "worker/rigid/stage.py: Rigid": 16,

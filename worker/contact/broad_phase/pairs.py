@@ -82,7 +82,7 @@ class PairTable:
     @property
     def pushed(self) -> Ints:
         """(k,) pairs with impulses in the last step."""
-        return np.flatnonzero(self.kept.any(axis=1))
+        return np.asarray(_with_impulses(self.kept))
 
     def recall(self, first: Indices, rows: Indices, kept: Floats) -> None:
         """Sets the stored impulses of the pairs ``rows`` (k, 2), of nodes and faces, to ``kept`` (k, 4); pairs that
@@ -109,6 +109,16 @@ class PairTable:
         if len(self._active) < len(self.rows):
             self._active = np.empty(2 * len(self.rows), np.int32)
         return Pairs(self.rows, self.until, self.speed, self.turned, self.next, self._active)
+
+
+@njit("int64[::1](float64[:, ::1])", cache=True)
+def _with_impulses(kept):  # type: ignore[no-untyped-def]
+    rows, n = np.empty(len(kept), np.int64), 0
+    for p in range(len(kept)):
+        if kept[p, 0] != 0.0 or kept[p, 1] != 0.0 or kept[p, 2] != 0.0 or kept[p, 3] != 0.0:
+            rows[n] = p
+            n += 1
+    return rows[:n].copy()
 
 
 @njit("void(float64[:, ::1], int32[::1], int32[::1], int32[:, ::1], int32[:, ::1], float64[:, ::1])", cache=True)

@@ -9,10 +9,12 @@ active.
 
 import numpy as np
 
+from ...kernels.jit import njit
 from ...model.ids import places
 from ...model.state import Flags, Floats, Indices, Ints
 from ...parallel.team import Team
 from ..narrow_phase.tables import DEEP, DEEP_SELF
+from ..scene.passes import ScenePasses
 from ..scene.scene import Scene
 from . import search
 from .boxes import Lines, Primitives
@@ -33,6 +35,8 @@ class Registration:
         """Passes that measure the distances of slots from their lines."""
         self.rigid = rigid_motions(team)
         """Pass that adds the rigid motions of tets (extrapolation.py)."""
+        self.scene = ScenePasses(team)
+        """Passes of the scenes."""
         self._finder, self._filter = search.Finder(team), SweptFilter(team)
 
     def register_new(self, scene: Scene) -> None:
@@ -49,9 +53,7 @@ class Registration:
         off = scene.settle_live()
         if strayed:
             off |= scene.slots.tracked & (scene.reference.searched.left > 0.5 * _PARTLY * scene.rules.skin)
-            scene.slots.new |= off
-            scene.faces.new |= off[scene.faces.corners[:, :3]].any(axis=1)
-            scene.edges.new |= off[scene.edges.corners[:, :2]].any(axis=1)
+            scene.renew_at(off)
         scene.reference.begin_anew(off, x)
         measured = scene.reference, x, v, scene.faces.corners, scene.edges.corners, scene.slots.tracked
         self.deviation.measure(*measured)
@@ -148,9 +150,22 @@ def carry(now: Scene, old: Scene) -> None:
 
 def _numbers(now: Ints, old: Ints) -> Indices:
     """Returns the row of each name of ``old`` in ``now``, -1 for a name that is missing."""
+    if (now[1:] > now[:-1]).all() and (old[1:] > old[:-1]).all():
+        return np.asarray(_merged(now, old))
     order = np.argsort(now, kind="stable")
     at = places(now[order], old)
     return np.where(at >= 0, order[at], -1).astype(np.int32) if len(order) else at
+
+
+@njit("int32[::1](int64[::1], int64[::1])", cache=True)
+def _merged(now, old):  # type: ignore[no-untyped-def]
+    """``_numbers`` of ascending names."""
+    rows, at = np.empty(len(old), np.int32), 0
+    for k in range(len(old)):
+        while at < len(now) and now[at] < old[k]:
+            at += 1
+        rows[k] = at if at < len(now) and now[at] == old[k] else -1
+    return rows
 
 
 def _rows(flags: Flags) -> Indices:

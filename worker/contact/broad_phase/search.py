@@ -18,6 +18,9 @@ from .overlaps import Overlaps
 _FEW, _SAMPLE = 8, 256
 """Ratio of the numbers of large and small primitives above which larger cells are faster; and size of the sample of
 boxes from which the size of the cells is computed."""
+_WORTHWHILE = 1024
+"""Number of primitives of the smaller set above which those far from the other set are removed before the search.
+Chosen value: one task of boxes.py."""
 _ANY = np.zeros(0, np.int64)
 """Rank of primitives whose pairs have any order."""
 
@@ -40,7 +43,7 @@ class Finder:
             first, second = second, first
         one, hull = self._one.of(first[0], lines, first[1], everywhere(len(allowed)))
         two, near = self._two.of(second[0], lines, second[1], hull)
-        if len(two.some) < len(second[0].searched):
+        if len(two.some) < len(second[0].searched) and len(one.some) > _WORTHWHILE:
             some = Primitives(first[0].corners, first[0].reach, one.some.copy(), first[0].columns)
             one, hull = self._one.of(some, lines, first[1], near)
         few, many, around = (one, two, hull) if first[0] is small else (two, one, near)

@@ -142,7 +142,8 @@ class Searches:
             longest = _LONGEST if self._case.fractures else steps
             horizon = max(min(steps, longest, 2.0 * (clock.step - self._last)), _SHORTEST) * clock.dt
             motion.until, self._last = clock.t + horizon, clock.step
-        return layout.build(motion.sides, self.rules, motion.until - clock.t, drift, nodes, self._comm)
+        passes = self._registered.scene
+        return layout.build(motion.sides, self.rules, motion.until - clock.t, drift, nodes, self._comm, passes)
 
     def _courses(self, nodes: Nodes) -> Floats:
         """(nodes, 3) extrapolated velocities of the nodes. Collective."""

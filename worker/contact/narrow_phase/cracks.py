@@ -154,7 +154,7 @@ class Cracks:
         """Sorts the cracks by the slots of their first nodes: neighbours in space become neighbours in memory."""
         order = np.argsort(self.places[:, 0], kind="stable")
         for column in self._columns().values():
-            column[:] = column[order]
+            column[:] = column.take(order, axis=0)
         self._corners = {}
 
     def open(self, faces: Ints, blocks: list[Block]) -> None:

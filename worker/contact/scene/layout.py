@@ -5,29 +5,34 @@ import numpy as np
 from ...model.ids import places
 from ...model.state import Floats, Nodes
 from ...parallel.comm import Comm
+from ...parallel.team import team
 from ..broad_phase import buckets
 from ..broad_phase.reference_motion import ReferenceMotion
 from .columns import OwnSlots, SceneEdges, SceneFaces, SceneSlots
 from .near_surface import NearSurface, Rules, with_ghosts
+from .passes import ScenePasses
 from .scene import Scene
 
 
-def build(sides: NearSurface, rules: Rules, horizon: float, drift: Floats, nodes: Nodes, comm: Comm) -> Scene:
+def build(
+    sides: NearSurface, rules: Rules, horizon: float, drift: Floats, nodes: Nodes, comm: Comm,
+    passes: ScenePasses | None = None,
+) -> Scene:  # fmt: skip
     """Returns the scene of ``sides`` for the next ``horizon``, s, without pairs; ``drift`` (3,), m/s, is equal on all
-    ranks. Collective.
+    ranks; ``passes`` of the scene, None for one thread. Collective.
 
     A SplitUpdate adds the lists of shared nodes.
     """
     seen = with_ghosts(sides, rules, horizon, drift, comm) if comm.size > 1 else sides
     order = np.argsort(buckets.curve(seen.surface_nodes.x, rules.cell))
     surface_nodes, faces, edges = seen.surface_nodes.take(order), seen.faces, seen.edges
-    slot = np.empty(surface_nodes.n, np.int32)
-    slot[order] = np.arange(surface_nodes.n)
-    corners, ends = slot[seen.face_places], slot[seen.edge_places]
+    passes = passes or ScenePasses(team(1))
+    corners, ends = (passes.located(surface_nodes.id, some.nodes) for some in (faces, edges))
     surface_nodes.local = nodes.places(surface_nodes.id)
     owned, pushes = np.zeros(surface_nodes.n, bool), np.zeros(surface_nodes.n, bool)
-    owned[slot[seen.surface_nodes.places(sides.owned)]] = True
-    pushes[corners[:, :3]] = pushes[ends[:, :2]] = True
+    owned[passes.located(surface_nodes.id, sides.owned)] = True
+    passes.flag_corners(pushes, corners, 3)
+    passes.flag_corners(pushes, ends, 2)
     rank = np.arange(edges.n)
     if edges.n > sides.edges.n:
         rank[np.lexsort((edges.sides[:, 1], edges.sides[:, 0]))] = np.arange(edges.n)
@@ -41,5 +46,5 @@ def build(sides: NearSurface, rules: Rules, horizon: float, drift: Floats, nodes
             edges.sharp.copy(), own, rank,
         ),
         rules=rules, reference=ReferenceMotion(surface_nodes.x, surface_nodes.course, faces.n, edges.n, drift, horizon),
-        cracks=np.zeros((0, 6), np.int32),
+        cracks=np.zeros((0, 6), np.int32), passes=passes,
     )  # fmt: skip

@@ -15,15 +15,15 @@ from ..broad_phase.pairs import PairTable
 from ..broad_phase.reference_motion import ReferenceMotion
 from ..narrow_phase.rows import ActiveRows
 from ..narrow_phase.tables import EdgeTable, FaceTable, SlotTable
-from ..solver import slot_numbers
 from ..solver.active import Kept
 from ..solver.shared_sums import SharedSums
 from ..surface import sharp
-from ..surface.records import AGED, OPEN, SurfaceNodes
+from ..surface.records import OPEN, SurfaceNodes
 from . import ghosts
 from .columns import OwnSlots, SceneEdges, SceneFaces, SceneSlots
 from .ghosts import Copies
 from .near_surface import Rules
+from .passes import ScenePasses
 
 
 @dataclass
@@ -56,6 +56,7 @@ class Scene:
     """(m, 6) slots of the nodes on either side of the cracks, -1 for a crack that this rank does not compute
     (narrow_phase/cracks.py).
     """
+    passes: ScenePasses
     node_face: PairTable = field(default_factory=PairTable)
     """Candidate node-face pairs: slot and face."""
     edge_edge: PairTable = field(default_factory=PairTable)
@@ -78,7 +79,8 @@ class Scene:
 
     def store_before(self, nodes: Nodes) -> None:
         """Stores v(n-1/2), before the kick."""
-        slot_numbers.gather(self.slots.before, nodes.v, self.own.slots, self.own.local)
+        own = self.own
+        self.passes.store.run(len(own.local), self.slots.before, nodes.v, own.slots, own.local)
         self.messages.copies.note(nodes)
 
     def stored(self, cracks: Floats) -> Kept:
@@ -128,7 +130,8 @@ class Scene:
             shown = among(np.sort(faces), edges.sides[far].reshape(-1)).reshape(-1, 2)
             edges.fresh[far] |= (shown & (edges.opened[far] < OPEN)).any(axis=1)
             edges.opened[far] = np.where(shown, np.uint8(OPEN), edges.opened[far])
-        _expose(edges.opened, edges.meets, edges.fresh, edges.faces, self.faces.exposed)
+        of = edges.opened, edges.meets, edges.fresh, edges.faces, self.faces.exposed
+        self.passes.expose.run(len(edges.meets), *of)
         self.enliven(rows)
 
     def uncover(self, gone: Ints, bare: Ints, removed: Indices) -> None:
@@ -145,9 +148,8 @@ class Scene:
         """Adds faces, with their nodes, to the broad phase."""
         self.faces.new[rows] |= ~self.faces.live[rows]
         self.faces.live[rows] = True
-        corners = np.unique(self.faces.corners[rows, :3])
-        corners = corners[self.slots.owned[corners] & ~self.slots.live[corners]]
-        self.slots.live[corners] = self.slots.new[corners] = True
+        slots = self.slots
+        _enliven(slots.live, slots.new, slots.owned, self.faces.corners, rows.astype(np.int32, copy=False))
 
     def settle_live(self) -> Flags:
         """Updates the nodes and edges in the broad phase, and the slots whose motion is measured; returns (slots,)
@@ -158,11 +160,18 @@ class Scene:
         self.slots.live |= nodes
         self.slots.new |= nodes
         edges = self.edges
-        _enliven(edges.live, edges.new, edges.corners, edges.faces, edges.opened, edges.sharp, self.faces.live)
+        of = edges.live, edges.new, edges.corners, edges.faces, edges.opened, edges.sharp, self.faces.live
+        self.passes.enliven.run(len(edges.live), *of)
         self.slots.tracked[:] = self.slots.live
-        self.slots.tracked[self.faces.corners[self.faces.live, :3]] = True
-        self.slots.tracked[self.edges.corners[self.edges.live, :2]] = True
+        _track(self.slots.tracked, self.faces.corners, 3, self.faces.live)
+        _track(self.slots.tracked, edges.corners, 2, edges.live)
         return self.slots.tracked & ~before
+
+    def renew_at(self, slots: Flags) -> None:
+        """Schedules the flagged ``slots`` (slots,), and the faces and edges at them, for registration."""
+        self.slots.new |= slots
+        self.passes.flag_faces.run(len(self.faces.new), self.faces.new, self.faces.corners, 3, slots)
+        self.passes.flag_edges.run(len(self.edges.new), self.edges.new, self.edges.corners, 2, slots)
 
     @property
     def pending(self) -> bool:
@@ -204,31 +213,20 @@ class Scene:
         self.messages.free()
 
 
-@njit("void(uint8[:, ::1], boolean[::1], boolean[::1], int32[:, ::1], boolean[::1])", cache=True)
-def _expose(opened, meets, fresh, faces, shown):  # type: ignore[no-untyped-def]
-    """Sets the state OPEN of edges whose ``faces`` (e, 2) are exposed, ``shown`` (f,), and updates ``meets``, True for
-    edges in edge-edge contact; see SceneEdges.
-    """
-    for e in range(len(opened)):
-        for k in range(2):
-            if faces[e, k] >= 0 and shown[faces[e, k]] and opened[e, k] < OPEN:
-                opened[e, k], fresh[e] = OPEN, True
-        meets[e] = min(opened[e, 0], opened[e, 1]) >= AGED and max(opened[e, 0], opened[e, 1]) == OPEN
+@njit("void(boolean[::1], boolean[::1], boolean[::1], int32[:, ::1], int32[::1])", cache=True)
+def _enliven(live, new, owned, corners, rows):  # type: ignore[no-untyped-def]
+    """Adds the ``owned`` (slots,) slots of the faces ``rows`` (k,) to the broad phase."""
+    for f in rows:
+        for k in range(3):
+            a = corners[f, k]
+            if owned[a] and not live[a]:
+                live[a] = new[a] = True
 
 
-@njit(
-    "void(boolean[::1], boolean[::1], int32[:, ::1], int32[:, ::1], uint8[:, ::1], boolean[::1], boolean[::1])",
-    cache=True,
-)
-def _enliven(live, new, edges, faces, opened, sharp, searched):  # type: ignore[no-untyped-def]
-    """Adds ``sharp`` edges to the broad phase. Condition: both ``faces`` (e, 2) of the edge are ``searched`` (f,); for
-    one of the two faces it is enough to be ``opened`` (e, 2). A face that this rank does not have is treated as
-    searched, because its exposure is unknown.
-    """
-    for e in range(len(live)):
-        one, both = False, sharp[e] and edges[e, 0] != edges[e, 1]
-        for k in range(2):
-            some = faces[e, k] < 0 or searched[faces[e, k]]
-            one, both = one or some, both and (some or opened[e, k] >= AGED)
-        new[e] |= both and one and not live[e]
-        live[e] = both and one
+@njit("void(boolean[::1], int32[:, ::1], int64, boolean[::1])", cache=True)
+def _track(tracked, corners, many, live):  # type: ignore[no-untyped-def]
+    """Flags the first ``many`` corners of the rows that are ``live`` (n,)."""
+    for f in range(len(live)):
+        if live[f]:
+            for k in range(many):
+                tracked[corners[f, k]] = True

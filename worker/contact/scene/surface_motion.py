@@ -113,7 +113,8 @@ class SurfaceMotion:
             return float(_HORIZONS[0]), np.zeros(3)
         drift = sums[:3] / sums[3]
         paths = np.linalg.norm(v - drift, axis=1)[:, None] * (dt / self._size) * _HORIZONS
-        swept = np.rint(np.minimum((1.0 + paths) ** 3, 2.0**30)).sum(axis=0)
+        cells = 1.0 + paths
+        swept = np.rint(np.minimum(cells * cells * cells, 2.0**30)).sum(axis=0)
         total = self._comm.sum(np.append(swept, len(v)).astype(np.int64))
         return float(_HORIZONS[total[:-1] <= _SWEPT * total[-1]].max(initial=_HORIZONS[0])), np.asarray(drift)
 

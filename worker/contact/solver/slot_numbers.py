@@ -22,15 +22,6 @@ _F1, _F2, _F, _I, _I1, _B1 = (
 )  # fmt: skip
 
 
-@njit(types.void(_F2, _F2, _N1, _N1), cache=True)
-def gather(out, v, held, local):  # type: ignore[no-untyped-def]
-    """Copies the velocities of the held nodes."""
-    for h in range(len(local)):
-        prefetch(v, 3 * local[min(h + _AHEAD, len(local) - 1)])
-        for i in range(3):
-            out[held[h], i] = v[local[h], i]
-
-
 @njit(types.void(_F2, _F2, _N1, _F2, _F2, _N1, _I, _I), cache=True)
 def take(x, v, held, node_x, node_v, local, first, stop):  # type: ignore[no-untyped-def]
     """Copies positions and velocities of the held nodes from ``first`` to ``stop``."""

@@ -46,7 +46,8 @@ class Rows:
 
     def take(self, chosen: "np.ndarray") -> Self:
         """Returns the ``chosen`` rows as a table."""
-        return type(self)(*(column[chosen] for column in self.columns()))
+        rows = np.flatnonzero(chosen) if chosen.dtype == bool else chosen
+        return type(self)(*(column.take(rows, axis=0) for column in self.columns()))
 
     @classmethod
     def joined(cls, tables: Sequence[Self]) -> Self:
@@ -133,5 +134,8 @@ class SurfaceNodes(Rows):
 
 def merged(groups: list[SurfaceNodes]) -> SurfaceNodes:
     """Returns all nodes once, by ascending id; a node in several groups has the row of the first."""
+    groups = [group for group in groups if group.n] or groups[:1]
+    if len(groups) == 1 and (groups[0].id[1:] > groups[0].id[:-1]).all():
+        return groups[0]
     every = SurfaceNodes.joined(groups)
     return every.take(np.unique(every.id, return_index=True)[1])
