@@ -4,7 +4,7 @@ from collections.abc import Iterator
 
 from ..model.bodies import MeshFile
 from ..model.boundaries import Prescribed, Rotation, Traction
-from ..model.measures import FRAGMENTS, PUSHES, SHAPES, Probe, kind
+from ..model.measures import WHOLE, Probe, kind
 from ..model.schema import Case, Part
 from ..reading.problems import Location, Problem, problem
 
@@ -52,11 +52,11 @@ def check_ons(case: Case) -> Iterator[Problem]:
             )
         elif not parts(case, spec):
             yield problem((*location, "on"), spec.on, "only meshes from files have sets; no part of the case has one")
-        if isinstance(spec, Probe) and kind(spec.field) in (*PUSHES, *FRAGMENTS, *SHAPES):
+        if isinstance(spec, Probe) and kind(spec.field) in WHOLE:
             yield problem(
                 (*location, "on"),
                 spec.on,
-                f"is allowed with means and sums only; remove on, or use another field than {spec.field!r}",
+                f"is allowed with means, peaks and sums only; remove on, or use another field than {spec.field!r}",
             )
     if len(bits(case)) > MOST:
         yield problem(("boundaries",), ..., f"boundaries and probes use {len(bits(case))} sets; allowed: up to {MOST}")

@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator
 
-from ..model.measures import BEYOND, PUSHES, SHAPES, SUMS, Probe, kind
+from ..model.measures import BEYOND, SHAPES, SUMS, WHOLE, Probe, kind
 from ..model.schema import Case, Part, Wall
 from ..output.fields import damageable
 from ..output.history import COLUMNS
@@ -58,8 +58,7 @@ def _keys(probe: Probe, location: Location) -> Iterator[Problem]:
     for key, fields in _NEEDED.items():
         if field in fields and getattr(probe, key) is None:
             yield problem((*location, key), ..., f"this key is missing; {field} needs it")
-    whole = (*PUSHES, *SHAPES, "fragment_velocity", "fragment_mass")
-    if field in whole and (probe.low is not None or probe.high is not None):
+    if field in WHOLE and (probe.low is not None or probe.high is not None):
         yield problem(location, ..., f"{field} is measured on the whole part; remove low and high")
 
 

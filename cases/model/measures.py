@@ -13,10 +13,13 @@ ProbeField = Literal[
     "wall_impulse_x", "wall_impulse_y", "wall_impulse_z", "mass", "momentum_x", "momentum_y", "momentum_z",
     "kinetic_energy", "centre_x", "centre_y", "centre_z", "centre_velocity_x", "centre_velocity_y",
     "centre_velocity_z", "residual_velocity", "residual_mass", "fragment_velocity", "fragment_mass", "penetration",
-    "hole_diameter", "hole_width", "cone_angle",
+    "hole_diameter", "hole_width", "cone_angle", "pressure_max", "pressure_min", "mises_max", "plastic_strain_max",
+    "damage_max", "temperature_max",
 ]  # fmt: skip
 SUMS = ("mass", "momentum", "kinetic_energy", "centre", "centre_velocity", "residual_velocity", "residual_mass")
 """Fields that are sums over nodes, without their components."""
+PEAKS = ("pressure_max", "pressure_min", "mises_max", "plastic_strain_max", "damage_max", "temperature_max")
+"""Fields that are the largest or smallest value over tets."""
 FRAGMENTS = ("fragment_velocity", "fragment_mass")
 """Fields of the heaviest fragment beyond a plane."""
 BEYOND = ("residual_velocity", "residual_mass", *FRAGMENTS)
@@ -25,6 +28,8 @@ SHAPES = ("penetration", "hole_diameter", "hole_width", "cone_angle")
 """Fields that are lengths and angles of a body, around or along a line."""
 PUSHES = ("contact_force", "contact_impulse", "wall_force", "wall_impulse")
 """Fields of forces and impulses on a part, without their components."""
+WHOLE = (*PUSHES, *SHAPES, *FRAGMENTS)
+"""Fields that are measured on whole parts: without ``low``, ``high`` and ``on``."""
 
 
 def kind(field: str) -> str:
@@ -52,6 +57,10 @@ class Probe(Model):
     ``pressure`` (compression positive), ``mises``, ``plastic_strain``, ``damage``, ``temperature``, ``density``,
     ``internal_energy`` (J/kg), ``velocity_*``. Tets and nodes up to a hundredth of the shortest edge of the part
     outside the box count as inside.
+
+    **Peaks**, largest and smallest values over the same tets: ``pressure_max``, ``pressure_min`` (negative: the largest
+    tension), ``mises_max``, ``plastic_strain_max``, ``damage_max``, ``temperature_max``. Of the tets that exist at the
+    time of the line: removed tets do not count.
 
     **Forces** on the whole part: ``contact_force_*``, of all other bodies or of the part ``by``, normal forces and
     friction, N, as a mean since the previous line; ``wall_force_*``, the same of walls. ``contact_impulse_*`` and
@@ -92,14 +101,14 @@ class Probe(Model):
     """With ``contact_force_*`` and ``contact_impulse_*``: name of the part that pushes; all other bodies when
     absent."""
     low: Point | None = None
-    """With means and sums: corner of the box with the lowest coordinates; together with ``high``. The whole part
+    """With means, peaks and sums: corner of the box with the lowest coordinates; together with ``high``. The whole part
     when absent."""
     high: Point | None = None
-    """With means and sums: corner of the box with the highest coordinates; together with ``low``."""
+    """With means, peaks and sums: corner of the box with the highest coordinates; together with ``low``."""
     on: SetName | None = None
-    """With means and sums: name of a node set or a surface in the mesh file of the part (docs/howto/meshes.md). Means
-    use the tets that have a node in it, sums use its nodes. Together with a box, the probe includes only the nodes in
-    both."""
+    """With means, peaks and sums: name of a node set or a surface in the mesh file of the part (docs/howto/meshes.md).
+    Means and peaks use the tets that have a node in it, sums use its nodes. Together with a box: only
+    what is in both."""
     beyond: Beyond | None = None
     """With sums and fields behind a target: side of a plane, such as ``{ axis = "z", at = "8 mm" }``."""
     axis: Axis | None = None

@@ -19,6 +19,8 @@ FIELD_UNITS: dict[str, str] = {
     "centre_x": "m", "centre_y": "m", "centre_z": "m", "centre_velocity_x": "m/s", "centre_velocity_y": "m/s",
     "centre_velocity_z": "m/s", "residual_velocity": "m/s", "residual_mass": "kg", "fragment_velocity": "m/s",
     "fragment_mass": "kg", "penetration": "m", "hole_diameter": "m", "hole_width": "m", "cone_angle": "",
+    "pressure_max": "Pa", "pressure_min": "Pa", "mises_max": "Pa", "plastic_strain_max": "", "damage_max": "",
+    "temperature_max": "K",
 }  # fmt: skip
 """Unit of every field of a probe."""
 

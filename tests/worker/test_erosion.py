@@ -13,7 +13,7 @@ from conoid.worker import step
 from conoid.worker.accounts import digest
 from conoid.worker.boundaries.mirrors import Mirrors
 from conoid.worker.gauges import reference
-from conoid.worker.gauges.probes import tet_volumes
+from conoid.worker.gauges.fields import tet_volumes
 from conoid.worker.mesh.faces import across, boundary_faces
 from conoid.worker.mesh.model import TetMesh
 from conoid.worker.model import rows, state
@@ -397,14 +397,15 @@ def test_probes_of_what_has_left_are_no_number() -> None:
     probes = (
         schema.Probe(name="top", part="body0", field="velocity_z", low=low, high=high),
         schema.Probe(name="all", part="body0", field="density"),
+        schema.Probe(name="peak", part="body0", field="temperature_max", low=low, high=high),
     )
     sim = alone(block((3, 3, 3), MM, shake=0.0), EROSION, (0, 0, 100), probes=probes)
     step.prepare(sim)
     part = sim.model.blocks[0]
     top = part.id[sim.model.nodes.x0[part.tets].mean(axis=1)[:, 2] > 2.0 * MM]
-    for gone, expected in ((None, 100.0), (top[::2], 100.0), (top, np.nan)):
+    for gone, *expected in ((None, 100.0, 293.15), (top[::2], 100.0, 293.15), (top, np.nan, np.nan)):
         tick(sim, gone)
-        assert sim.probes.measure() == pytest.approx([expected, 8930.0], rel=1e-9, nan_ok=True)
+        assert sim.probes.measure() == pytest.approx([expected[0], 8930.0, expected[1]], rel=1e-9, nan_ok=True)
     tick(sim, part.id.copy())
     assert np.isnan(sim.probes.measure()).all()
 

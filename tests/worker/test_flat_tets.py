@@ -9,7 +9,7 @@ from conoid.worker import step
 from conoid.worker.accounts import digest
 from conoid.worker.elements import rest
 from conoid.worker.elements.flat import THINNEST, flat_tets
-from conoid.worker.gauges.probes import tet_volumes
+from conoid.worker.gauges.fields import tet_volumes
 from conoid.worker.mesh.model import TetMesh
 from conoid.worker.model import rows
 from conoid.worker.simulation import Simulation

@@ -12,6 +12,7 @@ from conoid.cases.model import schema
 from conoid.worker import step
 from conoid.worker.gauges import rays
 from conoid.worker.mesh.model import TetMesh
+from conoid.worker.model import rows
 from conoid.worker.simulation import Simulation
 
 from ..contact.bodies import meeting_of, moved
@@ -91,6 +92,37 @@ def test_sums_of_any_ranks_are_the_same_bits() -> None:
     case = scene(STEEL, velocity=(3.0, 1.0, 2.0), jitter=5.0, probes=tuple(probe(field) for field in fields))
     found = [on(n, case, [MESH], lambda sim: bits(sim.probes.measure()))[0] for n in (1, 2, 4)]
     assert len(set(found)) == 1
+
+
+@pytest.mark.parametrize("ranks", [1, 3])
+def test_peaks_are_the_largest_values_of_the_tets(ranks: int) -> None:
+    """Of the part, and of the tets that start in a box; a body that jitters beyond its yield stress."""
+    fields = ("pressure_max", "pressure_min", "mises_max", "plastic_strain_max", "temperature_max", "damage_max")
+    box: dict[str, Any] = {"low": (-1.0, 1.5e-3, -1.0), "high": (1.0, 1.0, 1.0)}
+    probes = [probe(field) for field in fields] + [probe(field, f"box_{field}", **box) for field in fields]
+    case = scene(COPPER, end=1e-5, jitter=300.0, temperature=350.0, probes=tuple(probes))
+
+    def work(sim: Simulation) -> tuple[bytes, Floats, "np.ndarray", Floats]:
+        step.prepare(sim)
+        for _ in range(20):
+            tick(sim)
+        found, tets = sim.probes.measure(), sim.model.blocks[0]
+        pressure = tets.row(rows.PRESSURE) + tets.row(rows.VISCOUS)
+        s = np.array([tets.row(row) for row in range(rows.S_XX, rows.S_XY + 1)])
+        mises = np.sqrt(1.5 * ((s[:3] ** 2).sum(axis=0) + 2.0 * (s[3:] ** 2).sum(axis=0)))
+        values = np.array([pressure, -pressure, mises, tets.row(rows.PLASTIC_STRAIN)])
+        inside = sim.model.nodes.x0[tets.tets].mean(axis=1)[:, 1] >= 1.499e-3
+        sim.free()
+        return bits(found), found, inside, values
+
+    told = on(ranks, case, [MESH], work)
+    assert len({each[0] for each in told}) == 1
+    values, inside = np.concatenate([each[3] for each in told], axis=1), np.concatenate([each[2] for each in told])
+    assert (values.max(axis=1) > values[:, inside].max(axis=1)).any()
+    assert values[3].min() > 0.0
+    for found, some in ((told[0][1][:6], values), (told[0][1][6:], values[:, inside])):
+        expected = [*(some.max(axis=1) * (1.0, -1.0, 1.0, 1.0)), 350.0, 0.0]
+        assert found.tolist() == pytest.approx(expected, rel=1e-12)
 
 
 def _pushes(parts: int) -> tuple[schema.Probe, ...]:

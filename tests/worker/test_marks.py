@@ -109,6 +109,6 @@ def test_generated_parts_have_no_sets(tmp_path: Path) -> None:
         )
     assert str(raised.value).splitlines() == [
         "boundaries[0].on = 'CLAMP': only meshes from files have sets; the mesh of 'box' is generated",
-        "probes[0].on = 'TIP': is allowed with means and sums only; "
+        "probes[0].on = 'TIP': is allowed with means, peaks and sums only; "
         "remove on, or use another field than 'contact_force_x'",
     ]

@@ -288,7 +288,7 @@ def test_a_probe_has_the_centres_on_the_border_of_its_box(angle: int) -> None:
         sim = build(case, [structured(case.parts[0].mesh)])  # type: ignore[arg-type]
         heights = sim.model.nodes.x0[sim.model.blocks[0].tets].mean(axis=1)[:, 2]
         count = int((np.abs(heights - layer) < 1e-9).sum())
-        assert sum(len(ids) for ids in sim.probes._chosen[0]) == count > 0
+        assert sim.probes._tets[0].count(0) == count > 0
 
 
 @pytest.mark.parametrize("unit", [1e-3, 1e-6, 0.01, 0.0254, 0.3048, 1.0, 1e3, 0.0003])

@@ -16,7 +16,7 @@ from ..parallel.comm import Comm
 from ..parallel.fixed_point import exact_sums
 from ..simulation import Simulation
 from . import penetration
-from .probes import field
+from .fields import field
 
 _AXES = {"x": 0, "y": 1, "z": 2}
 _STRESSES = ("stress_xx", "stress_yy", "stress_zz", "stress_yz", "stress_zx", "stress_xy")

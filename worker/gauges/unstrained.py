@@ -12,7 +12,7 @@ from ..model.rows import PLASTIC_STRAIN
 from ..output.history import extremes
 from ..parallel.fixed_point import exact_sums
 from ..simulation import Simulation
-from .probes import tet_volumes
+from .fields import tet_volumes
 
 
 def found(sim: Simulation, folder: Path, eroded: int) -> Iterator[str]:

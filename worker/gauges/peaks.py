@@ -1,0 +1,50 @@
+"""Probes that are the largest or smallest value of a field over tets."""
+
+import math
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from conoid.cases.model.schema import Case
+
+from ..model.state import Floats
+from .chosen import ChosenTets
+from .fields import field
+from .gauge import Scene
+
+
+class Peaks:
+    """The probes of largest and smallest values on this rank; they have no state."""
+
+    def __init__(self, case: Case, scene: Scene, numbers: Sequence[int]) -> None:
+        """``numbers``: places of the probes in the case."""
+        self._fields = {k: case.probes[k].field for k in numbers}
+        self._model, self._comm = scene.model, scene.comm
+        self.tets = ChosenTets(case, scene.model, numbers)
+
+    def measure(self, v: Floats) -> dict[int, float]:
+        """Return the values; NaN if all tets of a probe were removed. Smallest values are maxima of the negative
+        field, so that one message has all of them.
+        """
+        self.tets.changed()
+        most = self._comm.maximum(np.array([self._own(k, name) for k, name in self._fields.items()])).tolist()
+        return {
+            k: math.nan if value == -math.inf else _sign(name) * value
+            for (k, name), value in zip(self._fields.items(), most, strict=True)
+        }
+
+    def keep(self) -> Any:
+        return None
+
+    def resume(self, known: Any) -> None:
+        pass
+
+    def _own(self, number: int, name: str) -> float:
+        """Return the value of this rank times its sign; minus infinity without tets."""
+        values = [_sign(name) * field(block, name[:-4], self._model, at) for block, at in self.tets.found(number)]
+        return max((float(each.max()) for each in values), default=-math.inf)
+
+
+def _sign(name: str) -> float:
+    return -1.0 if name.endswith("_min") else 1.0
