@@ -11,9 +11,11 @@ import pytest
 from conoid.cases.load import apply_overrides, parse_case, read_data
 from conoid.worker import simulation, step
 from conoid.worker.accounts.digest import digest
-from conoid.worker.contact.surface.sharp import SHARP, turned
+from conoid.worker.contact.scene.passes import ScenePasses
+from conoid.worker.contact.surface.sharp import SHARP
 from conoid.worker.mesh.model import TetMesh
 from conoid.worker.parallel.comm import Comm
+from conoid.worker.parallel.team import team
 
 from ..worker.kernels import HARD, build, run
 from ..worker.meshes import Floats, positive
@@ -92,6 +94,7 @@ def test_tets_that_flow_has_folded_do_not_pass_into_each_other() -> None:
 def test_an_edge_becomes_sharp_when_it_bulges_by_more_than_25_degrees(angle: float, found: bool) -> None:
     corners, one, meets = np.array([[0, 1, 2, 3]], np.int32), np.zeros(1, bool), np.ones(1, bool)
     part, least = np.ones(5, np.int32), np.array([-1.0, SHARP])
+    turned = ScenePasses(team(1)).turned
     assert turned(one, corners, meets, folded(angle), part, least).tolist() == [found]
     assert not turned(~one, corners, meets, folded(angle), part, least).any()
     assert not turned(one, corners, ~meets, folded(angle), part, least).any()

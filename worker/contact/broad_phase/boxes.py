@@ -9,7 +9,7 @@ from ...kernels.jit import njit, record, types
 from ...model.growing import Scratch
 from ...model.state import Flags, Floats, Indices
 from ...parallel.arguments import reader
-from ...parallel.packing import Packing, offsets
+from ...parallel.packing import offsets
 from ...parallel.passes import Pass
 from ...parallel.team import TASK, Team
 
@@ -98,7 +98,8 @@ SOUGHT = record(Sought, _F2, _F2, _N2, _I, _N1)
 LINES = record(Lines, _F2, _F2, _F, _N1)
 _BOX = SOUGHT, _F1, LINES, types.boolean[:, ::1], types.float64[:, :, ::1]
 _BOXED = *_BOX, types.float64[:, :, :, ::1], _I1, _N1
-_boxed = reader(*_BOXED)
+_PACK = SOUGHT, SOUGHT, _I1, _I1
+_boxed, _packed = reader(*_BOXED), reader(*_PACK)
 
 
 @njit("float64[::1](float64[:, ::1], float64[:, ::1])", cache=True)
@@ -169,6 +170,18 @@ def _boxes(table, first, stop, thread):  # type: ignore[no-untyped-def]
     counts[k] = _box(out, reach, lines, allowed, hull, own[k], some, first, stop)
 
 
+@njit(TASK, cache=True)
+def _pack(table, first, stop, thread):  # type: ignore[no-untyped-def]
+    """Task: copies the boxes of a task to their places."""
+    out, found, begins, counts = _packed(table)
+    k = first // _PRIMITIVES
+    for p in range(counts[k]):
+        to, fro = begins[k] + p, first + p
+        out.some[to] = found.some[fro]
+        for i in range(3):
+            out.low[to, i], out.high[to, i] = found.low[fro, i], found.high[fro, i]
+
+
 @njit("void(float64[:, :, ::1], float64[:, :, :, ::1])", cache=True)
 def _join(hull, own):  # type: ignore[no-untyped-def]
     """Sets the ``hull`` of each part from the hulls of all tasks."""
@@ -190,7 +203,7 @@ class Boxing:
 
     def __init__(self, team: Team) -> None:
         self._pass = Pass(team, _boxes, *_BOXED, size=_PRIMITIVES)
-        self._packing, self._scratch = [Packing(team, _PRIMITIVES) for _ in range(3)], Scratch()
+        self._pack, self._scratch = Pass(team, _pack, *_PACK, size=_PRIMITIVES), Scratch()
 
     def of(self, things: Primitives, lines: Lines, allowed: Flags, hull: Floats) -> tuple[Sought, Floats]:
         """Returns the primitives that touch the ``hull`` (parts, 2, 3) of a part with which the part of the primitive
@@ -207,17 +220,13 @@ class Boxing:
         if total == n:
             return out, mine
         packed = self._room(things, total, "packed")
-        for packing, into, column in zip(self._packing, self._columns(packed), self._columns(out), strict=True):
-            packing.run(n, into, column, begins, counts)
+        self._pack.run(n, packed, out, begins, counts)
         return packed, mine
 
     def _room(self, things: Primitives, n: int, name: str) -> Sought:
         of = self._scratch.of
         low, high = (of(f"{name} {side}", n, np.float64, 3) for side in ("low", "high"))
         return Sought(low, high, things.corners, things.many, of(f"{name} rows", n, np.int32))
-
-    def _columns(self, of: Sought) -> tuple[Floats, Floats, Indices]:
-        return of.low, of.high, of.some
 
 
 def swept(things: Primitives, x: Floats, v: Floats, horizon: float) -> Boxes:

@@ -115,24 +115,17 @@ def bucket_of(x, origin, inverse, n):  # type: ignore[no-untyped-def]
     return np.int64(min(max(np.floor((x - origin) * inverse), 0.0), n - 1.0))
 
 
-def curve(x: Floats, edge: float) -> Ints:
-    """(n,) position of each point (n, 3) on a space-filling curve (Morton 1966), by cells of ``edge``, m: neighbours
-    on the curve are neighbours in space.
+@njit(types.void(_I1, _F2, _F1, _F, _I, _I), cache=True)
+def interleaved(codes, x, origin, inverse, first, stop):  # type: ignore[no-untyped-def]
+    """Sets the codes of the points ``x`` (n, 3) from ``first`` to ``stop`` on a space-filling curve; see
+    ScenePasses.curve.
     """
-    if not len(x):
-        return np.zeros(0, np.int64)
-    return np.asarray(_interleaved(x, x.min(axis=0), 1.0 / edge))
-
-
-@njit("int64[::1](float64[:, ::1], float64[::1], float64)", cache=True)
-def _interleaved(x, origin, inverse):  # type: ignore[no-untyped-def]
-    codes = np.zeros(len(x), np.int64)
-    for a in range(len(x)):
+    for a in range(first, stop):
+        codes[a] = 0
         for i in range(3):
             cell = bucket_of(x[a, i], origin[i], inverse, 1 << _CURVE_BITS)
             for bit in range(_CURVE_BITS):
                 codes[a] |= ((cell >> bit) & 1) << (3 * bit + i)
-    return codes
 
 
 @njit("int64(int64, int64)", cache=True)

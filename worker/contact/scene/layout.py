@@ -2,11 +2,9 @@
 
 import numpy as np
 
-from ...model.ids import places
 from ...model.state import Floats, Nodes
 from ...parallel.comm import Comm
 from ...parallel.team import team
-from ..broad_phase import buckets
 from ..broad_phase.reference_motion import ReferenceMotion
 from .columns import OwnSlots, SceneEdges, SceneFaces, SceneSlots
 from .near_surface import NearSurface, Rules, with_ghosts
@@ -24,9 +22,9 @@ def build(
     A SplitUpdate adds the lists of shared nodes.
     """
     seen = with_ghosts(sides, rules, horizon, drift, comm) if comm.size > 1 else sides
-    order = np.argsort(buckets.curve(seen.surface_nodes.x, rules.cell))
-    surface_nodes, faces, edges = seen.surface_nodes.take(order), seen.faces, seen.edges
     passes = passes or ScenePasses(team(1))
+    order = np.argsort(passes.curve(seen.surface_nodes.x, rules.cell))
+    surface_nodes, faces, edges = seen.surface_nodes.take(order), seen.faces, seen.edges
     corners, ends = (passes.located(surface_nodes.id, some.nodes) for some in (faces, edges))
     surface_nodes.local = nodes.places(surface_nodes.id)
     owned, pushes = np.zeros(surface_nodes.n, bool), np.zeros(surface_nodes.n, bool)
@@ -36,13 +34,13 @@ def build(
     rank = np.arange(edges.n)
     if edges.n > sides.edges.n:
         rank[np.lexsort((edges.sides[:, 1], edges.sides[:, 0]))] = np.arange(edges.n)
-    own = np.arange(edges.n) < sides.edges.n
+    own, beside = np.arange(edges.n) < sides.edges.n, passes.located(faces.id, edges.sides)
     return Scene(
         surface_nodes=surface_nodes, own=OwnSlots.of(surface_nodes, nodes.n),
         slots=SceneSlots.at_rest(owned, pushes | owned),
         faces=SceneFaces.at_rest(corners, faces.id, faces.size, faces.exposed.copy()),
         edges=SceneEdges.at_rest(
-            ends, edges.sides, places(faces.id, edges.sides), np.stack([edges.size, edges.deep]), edges.opened.copy(),
+            ends, edges.sides, beside, np.stack([edges.size, edges.deep]), edges.opened.copy(),
             edges.sharp.copy(), own, rank,
         ),
         rules=rules, reference=ReferenceMotion(surface_nodes.x, surface_nodes.course, faces.n, edges.n, drift, horizon),

@@ -4,15 +4,18 @@ import numpy as np
 
 from ...kernels.jit import njit, prefetch, types
 from ...model.ids import IdIndex
-from ...model.state import Flags, Indices, Ints
+from ...model.state import Flags, Floats, Indices, Ints
 from ...parallel.arguments import reader
 from ...parallel.passes import Pass
 from ...parallel.team import TASK, Team
+from ..broad_phase import buckets
+from ..surface import sharp
 from ..surface.records import AGED, OPEN
+from ..surface.sharp import TURNED
 
-_SLOTS, _EDGES = 2048, 8192
-"""Number of slots in a task, and number of faces or edges in a task. Chosen values: a task takes 10 to 20 us, compared
-with 2 us to start a parallel region."""
+_SLOTS, _EDGES, _TURNED = 2048, 8192, 2048
+"""Number of slots in a task, of faces or edges, and of edges whose angle is computed. Chosen values: a task takes 10 to
+20 us, compared with 2 us to start a parallel region."""
 _AHEAD = 16
 """Prefetch distance of the data of nodes, in nodes."""
 _SPARSE = 32
@@ -28,6 +31,8 @@ _ENLIVEN = _B1, _B1, _N2, _N2, _U2, _B1, _B1
 _FLAG = _B1, _N2, _I, _B1
 _LOOK_UP = _N1, _I1, _N1
 _FLAG_CORNERS = _B1, _N2, _I
+_CURVE = _I1, _F2, types.float64[::1], types.float64
+_read_turn, _read_curve = reader(*TURNED), reader(*_CURVE)
 _read_look_up, _read_flag_corners = reader(*_LOOK_UP), reader(*_FLAG_CORNERS)
 _read_store, _read_expose, _read_enliven, _read_flag = (
     reader(*_STORE),
@@ -88,10 +93,24 @@ def _flag(table, first, stop, thread):  # type: ignore[no-untyped-def]
 
 @njit(TASK, cache=True)
 def _look_up(table, first, stop, thread):  # type: ignore[no-untyped-def]
-    """Task: sets ``out`` to the rows of ids by a table of all ids."""
+    """Task: sets ``out`` to the rows of ids by a table of all ids up to the largest."""
     out, ids, rows = _read_look_up(table)
     for k in range(first, stop):
-        out[k] = rows[ids[k]]
+        out[k] = rows[ids[k]] if ids[k] < len(rows) else -1
+
+
+@njit(TASK, cache=True)
+def _turn(table, first, stop, thread):  # type: ignore[no-untyped-def]
+    """Task: ``sharp.turned``."""
+    found, is_sharp, corners, meets, x, part, least = _read_turn(table)
+    sharp.turned(found, is_sharp, corners, meets, x, part, least, first, stop)
+
+
+@njit(TASK, cache=True)
+def _curve(table, first, stop, thread):  # type: ignore[no-untyped-def]
+    """Task: ``buckets.interleaved``."""
+    codes, x, origin, inverse = _read_curve(table)
+    buckets.interleaved(codes, x, origin, inverse, first, stop)
 
 
 @njit(TASK, cache=True)
@@ -115,16 +134,17 @@ class ScenePasses:
         """Adds edges to the broad phase."""
         self.flag_faces, self.flag_edges = (Pass(team, _flag, *_FLAG, size=_EDGES) for _ in range(2))
         """Flag the faces and the edges at flagged slots."""
+        self._turn, self._curve = Pass(team, _turn, *TURNED, size=_TURNED), Pass(team, _curve, *_CURVE, size=_SLOTS)
         self._look_up = Pass(team, _look_up, *_LOOK_UP, size=_EDGES)
         self._flag_corners = Pass(team, _flag_corners, *_FLAG_CORNERS, size=_EDGES)
 
     def located(self, known: Ints, wanted: Ints) -> Indices:
-        """Positions of ``wanted`` ids in ``known``, which may have any order, in the shape of ``wanted``. Every id must
-        be in ``known``.
+        """Positions of ``wanted`` ids in ``known``, which may have any order, in the shape of ``wanted``; -1 for ids
+        that are not in ``known``.
         """
         if _SPARSE * wanted.size < (largest := int(known.max(initial=-1))):
             return IdIndex(known).places(wanted)
-        out, rows = np.empty(wanted.shape, np.int32), np.empty(largest + 1, np.int32)
+        out, rows = np.empty(wanted.shape, np.int32), np.full(largest + 1, -1, np.int32)
         rows[known] = np.arange(len(known), dtype=np.int32)
         self._look_up.run(wanted.size, out.reshape(-1), wanted.reshape(-1), rows)
         return out
@@ -132,3 +152,18 @@ class ScenePasses:
     def flag_corners(self, out: Flags, corners: Indices, many: int) -> None:
         """Flags the slots, ``out`` (slots,), that are among the first ``many`` columns of ``corners`` (n, k)."""
         self._flag_corners.run(len(corners), out, corners, many)
+
+    def turned(self, sharp: Flags, corners: Indices, meets: Flags, x: Floats, part: Indices, least: Floats) -> Flags:
+        """(e,) edges that become sharp; see sharp.turned."""
+        found = np.empty(len(sharp), bool)
+        self._turn.run(len(sharp), found, sharp, corners, meets, x, part, least)
+        return found
+
+    def curve(self, x: Floats, edge: float) -> Ints:
+        """(n,) position of each point (n, 3) on a space-filling curve (Morton 1966), by cells of ``edge``, m:
+        neighbours on the curve are neighbours in space.
+        """
+        codes = np.empty(len(x), np.int64)
+        if len(x):
+            self._curve.run(len(x), codes, x, x.min(axis=0), 1.0 / edge)
+        return codes

@@ -17,7 +17,6 @@ from ..narrow_phase.rows import ActiveRows
 from ..narrow_phase.tables import EdgeTable, FaceTable, SlotTable
 from ..solver.active import Kept
 from ..solver.shared_sums import SharedSums
-from ..surface import sharp
 from ..surface.records import OPEN, SurfaceNodes
 from . import ghosts
 from .columns import OwnSlots, SceneEdges, SceneFaces, SceneSlots
@@ -181,9 +180,7 @@ class Scene:
     def sharpen(self, least: Floats) -> Flags:
         """(e,) edges that became sharp, by the cosines ``least`` (parts,); adds them to the broad phase."""
         edges, surface_nodes = self.edges, self.surface_nodes
-        turned: Flags = sharp.turned(
-            edges.sharp, edges.corners, edges.meets, surface_nodes.x, surface_nodes.part, least
-        )
+        turned = self.passes.turned(edges.sharp, edges.corners, edges.meets, surface_nodes.x, surface_nodes.part, least)
         edges.sharp |= turned
         edges.new |= turned
         return turned

@@ -124,14 +124,14 @@ class CornerLists:
         """
         m, nodes, ring = len(cracks), len(families.ring), families.ring
         shift = max(0, (nodes - 1).bit_length() - _BITS)
-        many, ranges = self._gather.many(m), 1 << _BITS
+        many, ranges, of = self._gather.many(m), 1 << _BITS, self._scratch.of
         code, leader, codes, leaders, heads = self._rooms(6 * m)
-        counts, by_range = np.empty(many, np.int64), np.empty((many, ranges), np.int64)
+        counts, by_range, begins = of("counts", many), of("by range", many, np.int64, ranges), of("begins", ranges + 1)
         self._gather.run(m, code, leader, counts, by_range, cracks, sides, block, ring, families.leader, shift)
-        begins = np.empty(ranges + 1, np.int64)
         n = int(range_offsets(begins, by_range))
         self._spread.run(m, codes, leaders, by_range, code, leader, counts, shift)
-        number, (some, all_members, first, first_member) = self._number(nodes), np.empty((4, ranges), np.int64)
+        some, all_members, first, first_member = (of(f"sizes {k}", ranges) for k in range(4))
+        number = of("number", nodes, np.int32)
         self._count.run(ranges, number, heads, some, all_members, leaders, begins, ring, shift)
         f, total = int(offsets(first, some)), int(offsets(first_member, all_members))
         found = self._found(block, total, f, nodes, n)
@@ -142,10 +142,6 @@ class CornerLists:
         """Working arrays of at least ``n`` items, the same ones while the number of corners grows little."""
         enough = -(-n // _SPARE) * _SPARE
         return [self._scratch.of(name, enough, np.int32) for name in ("code", "leader", "codes", "leaders", "heads")]
-
-    def _number(self, nodes: int) -> Indices:
-        number: Indices = self._scratch.of("number", nodes, np.int32)
-        return number
 
     def _found(self, block: int, members: int, families: int, nodes: int, corners: int) -> Corners:
         """Returns arrays for the result."""

@@ -44,6 +44,8 @@ _I1, _I2, _U1, _U2, _N2, _F1, _F2 = (
     types.float64[::1], types.float64[:, ::1],
 )  # fmt: skip
 _FILL = _I2, _I2, _F1, _F1, _U2, _N2, _N2, _I2, _I1, _U1, _F2, _F1
+_B1 = types.boolean[::1]
+TURNED = _B1, _B1, _N2, _B1, _F2, types.int32[::1], _F1
 _read_fill = reader(*_FILL)
 _HALF, _ROW = 13, 17
 """Number of columns of a half edge, and number of columns of an edge (``_matched``)."""
@@ -167,17 +169,14 @@ def _fill(table, first, stop, thread):  # type: ignore[no-untyped-def]
         size[p], low[p] = np.sqrt(dx * dx + dy * dy + dz * dz), min(heights[f], heights[g])
 
 
-@njit(
-    "boolean[::1](boolean[::1], int32[:, ::1], boolean[::1], float64[:, ::1], int32[::1], float64[::1])",
-    cache=True,
-)
-def turned(sharp, corners, meets, x, part, least):  # type: ignore[no-untyped-def]
-    """(e,) edges that become sharp: both faces allow contact, ``meets``, the edge is not ``sharp`` yet, is convex at
-    the positions ``x`` (slots, 3), m, and the cosine between its faces' normals is below the ``least`` (parts,) of
-    its ``part`` (slots,); ``corners`` (e, 6): see records.Edges.
+@njit(types.void(*TURNED, types.int64, types.int64), cache=True)
+def turned(found, sharp, corners, meets, x, part, least, first, stop):  # type: ignore[no-untyped-def]
+    """Sets ``found`` (e,) for edges from ``first`` to ``stop`` that become sharp: both faces allow contact, ``meets``,
+    the edge is not ``sharp`` yet, is convex at the positions ``x`` (slots, 3), m, and the cosine between its faces'
+    normals is below the ``least`` (parts,) of its ``part`` (slots,); ``corners`` (e, 6): see records.Edges.
     """
-    found = np.zeros(len(sharp), np.bool_)
-    for e in range(len(sharp)):
+    for e in range(first, stop):
+        found[e] = False
         a, b = corners[e, 0], corners[e, 1]
         if sharp[e] or a == b or not meets[e]:
             continue
@@ -186,4 +185,3 @@ def turned(sharp, corners, meets, x, part, least):  # type: ignore[no-untyped-de
         one, two = cross(u, to), cross(fro, u)
         cosine = dot(one, two) / np.sqrt(dot(one, one) * dot(two, two))
         found[e] = dot(one, fro) < 0.0 and cosine < least[part[a]]
-    return found
