@@ -29,7 +29,7 @@ def bits(case: Case) -> dict[str, int]:
 
 def named(spec: Prescribed | Rotation | Traction | Probe) -> tuple[str, ...]:
     """Returns the parts that a boundary or a probe names."""
-    return (spec.part,) if isinstance(spec, Probe) else spec.parts
+    return ((spec.part,) if spec.part else ()) if isinstance(spec, Probe) else spec.parts
 
 
 def parts(case: Case, spec: Prescribed | Rotation | Traction | Probe) -> list[Part]:

@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator
 
-from ..model.measures import BEYOND, SHAPES, SUMS, WHOLE, Probe, kind
+from ..model.measures import BEYOND, COURSES, SHAPES, SUMS, WHOLE, Probe, kind
 from ..model.schema import Case, Part, Wall
 from ..output.fields import damageable
 from ..output.history import COLUMNS
@@ -13,7 +13,7 @@ from .boundary_checks import ordered
 
 _HOLES = ("hole_diameter", "hole_width")
 _USED: dict[str, tuple[str, ...]] = {
-    "wall": ("wall_force", "wall_impulse"),
+    "wall": ("wall_force", "wall_impulse", *COURSES),
     "by": ("contact_force", "contact_impulse"),
     "beyond": (*SUMS, *BEYOND),
     "axis": SHAPES,
@@ -21,7 +21,7 @@ _USED: dict[str, tuple[str, ...]] = {
     "centre": (*_HOLES, "cone_angle"),
 }
 """Fields for which a key is allowed."""
-_NEEDED: dict[str, tuple[str, ...]] = {"beyond": BEYOND, "axis": SHAPES, "at": _HOLES}
+_NEEDED: dict[str, tuple[str, ...]] = {"wall": COURSES, "beyond": BEYOND, "axis": SHAPES, "at": _HOLES}
 """Fields for which a key is required."""
 
 
@@ -40,10 +40,10 @@ def check_probes(case: Case) -> Iterator[Problem]:
             yield problem(location, ..., "needs both low and high, or neither for the whole part")
         elif probe.low is not None and probe.high is not None:
             yield from ordered(probe.low, probe.high, location)
-        if probe.part not in parts:
-            yield problem((*location, "part"), probe.part, f"no part of this name; {nearest(probe.part, parts)}")
-            continue
+        yield from _part(probe, list(parts), location)
         yield from _pushes(case, i, probe)
+        if probe.part not in parts:
+            continue
         if probe.field == "cone_angle" and not (damageable(case) or case.erodes):
             yield problem((*location, "field"), probe.field, "the case has neither damage, fracture nor erosion")
         yield from _box(parts[probe.part], probe, location)
@@ -59,7 +59,23 @@ def _keys(probe: Probe, location: Location) -> Iterator[Problem]:
         if field in fields and getattr(probe, key) is None:
             yield problem((*location, key), ..., f"this key is missing; {field} needs it")
     if field in WHOLE and (probe.low is not None or probe.high is not None):
-        yield problem(location, ..., f"{field} is measured on the whole part; remove low and high")
+        yield problem(location, ..., f"{field} {_whole(field)}; remove low and high")
+
+
+def _whole(field: str) -> str:
+    return "is that of a wall" if field in COURSES else "is measured on the whole part"
+
+
+def _part(probe: Probe, parts: list[str], location: Location) -> Iterator[Problem]:
+    """Yields a problem for the part of a probe: absent, unknown, or given for a wall."""
+    if kind(probe.field) in COURSES:
+        if probe.part:
+            yield problem((*location, "part"), probe.part, f"{kind(probe.field)} is that of a wall; remove part")
+    elif not probe.part:
+        if not probe.field.startswith("wall_"):
+            yield problem((*location, "part"), ..., f"this key is missing; {probe.field} needs it")
+    elif probe.part not in parts:
+        yield problem((*location, "part"), probe.part, f"no part of this name; {nearest(probe.part, parts)}")
 
 
 def _pushes(case: Case, number: int, probe: Probe) -> Iterator[Problem]:

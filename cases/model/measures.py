@@ -10,7 +10,8 @@ ProbeField = Literal[
     "pressure", "mises", "plastic_strain", "damage", "temperature", "density", "internal_energy",
     "velocity_x", "velocity_y", "velocity_z", "contact_force_x", "contact_force_y", "contact_force_z",
     "wall_force_x", "wall_force_y", "wall_force_z", "contact_impulse_x", "contact_impulse_y", "contact_impulse_z",
-    "wall_impulse_x", "wall_impulse_y", "wall_impulse_z", "mass", "momentum_x", "momentum_y", "momentum_z",
+    "wall_impulse_x", "wall_impulse_y", "wall_impulse_z", "wall_position_x", "wall_position_y", "wall_position_z",
+    "wall_velocity_x", "wall_velocity_y", "wall_velocity_z", "mass", "momentum_x", "momentum_y", "momentum_z",
     "kinetic_energy", "centre_x", "centre_y", "centre_z", "centre_velocity_x", "centre_velocity_y",
     "centre_velocity_z", "residual_velocity", "residual_mass", "fragment_velocity", "fragment_mass", "penetration",
     "hole_diameter", "hole_width", "cone_angle", "pressure_max", "pressure_min", "mises_max", "plastic_strain_max",
@@ -28,14 +29,16 @@ SHAPES = ("penetration", "hole_diameter", "hole_width", "cone_angle")
 """Fields that are lengths and angles of a body, around or along a line."""
 PUSHES = ("contact_force", "contact_impulse", "wall_force", "wall_impulse")
 """Fields of forces and impulses on a part, without their components."""
-WHOLE = (*PUSHES, *SHAPES, *FRAGMENTS)
+COURSES = ("wall_position", "wall_velocity")
+"""Fields of the motion of a wall, without their components."""
+WHOLE = (*PUSHES, *COURSES, *SHAPES, *FRAGMENTS)
 """Fields that are measured on whole parts: without ``low``, ``high`` and ``on``."""
 
 
 def kind(field: str) -> str:
     """Returns the field without its component: ``momentum`` of ``momentum_x``."""
     bare = field[:-2] if field[-2:] in ("_x", "_y", "_z") else field
-    return bare if bare in (*SUMS, *PUSHES, "velocity") else field
+    return bare if bare in (*SUMS, *PUSHES, *COURSES, "velocity") else field
 
 
 class Beyond(Model):
@@ -67,6 +70,9 @@ class Probe(Model):
     ``wall_impulse_*``, N s, are the integrals since the start. They include the whole last time step, of which the
     velocities include half.
 
+    **Motion of a wall**: ``wall_position_*``, m, of its ``point``, and ``wall_velocity_*``, m/s, of the wall that
+    ``wall`` names; without ``part``. The force of the bodies on the wall is minus ``wall_force_*`` without ``part``.
+
     **Sums** over the nodes that start in the region, with ``beyond`` only those that are at present on that side of a
     plane: ``mass``, ``momentum_*``, ``kinetic_energy`` (from the velocities at the time of the line; the energy ledger
     uses products of two steps, which differ by the square of the time step), ``centre_*`` and ``centre_velocity_*``
@@ -91,12 +97,14 @@ class Probe(Model):
 
     name: Name
     """Name of the column. Columns that every run has (such as ``kinetic`` or ``dt``) cannot be used."""
-    part: Name
-    """Name of the part that is measured."""
+    part: Name = ""
+    """Name of the part that is measured. Absent with ``wall_position_*`` and ``wall_velocity_*``; with
+    ``wall_force_*`` and ``wall_impulse_*`` all parts when absent."""
     field: ProbeField
     """The measured field; the groups of fields are described above."""
     wall: Name | None = None
-    """With ``wall_force_*`` and ``wall_impulse_*``: name of the wall; all walls when absent."""
+    """Name of the wall: with ``wall_force_*`` and ``wall_impulse_*``, all walls when absent; with ``wall_position_*``
+    and ``wall_velocity_*``, required."""
     by: Name | None = None
     """With ``contact_force_*`` and ``contact_impulse_*``: name of the part that pushes; all other bodies when
     absent."""

@@ -43,6 +43,8 @@ def scant_probes(case: Case, expected: Estimate) -> Iterator[Problem]:
     """Yields a warning for each probe whose box is smaller than a tet; none for mesh files and graded meshes."""
     sizes = {part.name: (part, size) for part, size in zip(case.parts, expected.parts, strict=True)}
     for i, probe in enumerate(case.probes):
+        if not probe.part:
+            continue
         part, size = sizes[probe.part]
         if probe.low is None or probe.high is None or isinstance(part.mesh, Measured) or part.mesh.grading is not None:
             continue

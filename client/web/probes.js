@@ -104,7 +104,7 @@ export function pushes(live) {
   for (const { name, part, field, by, wall } of probes(live).filter((one) => PUSH.test(one.field) && isThere(live)(one.name))) {
     const [, kind, component] = PUSH.exec(field);
     const from = kind === "wall" ? `wall${wall ? ` ${wall}` : "s"}` : by ?? "all others";
-    (found[`${from} on ${part}`] ??= {})[component] = name;
+    (found[`${from} on ${part || "all parts"}`] ??= {})[component] = name;
   }
   return found;
 }

@@ -91,6 +91,30 @@ def test_a_driven_wall_works_from_outside() -> None:
     assert seen.momenta[-1][2] > 0.0
 
 
+def test_probes_measure_position_velocity_and_force_of_a_wall() -> None:
+    """A driven wall: the integral of its course and its course at the times of the lines; a free wall: the impulse on
+    all parts is what the wall has lost.
+    """
+    fields = ("wall_position_z", "wall_velocity_z", "wall_impulse_z")
+    probes = tuple(schema.Probe(name=name, field=name, wall="wall") for name in fields)  # type: ignore[arg-type]
+    walls = {
+        "driven": schema.Wall(**PLANE, velocity=(0.0, 0.0, 20.0), course=((0.0, 0.0), (4e-6, 1.0))),
+        "free": schema.Wall(**PLANE, velocity=(0.0, 0.0, 20.0), mass=0.3 * MASS),
+    }
+    for name, wall in walls.items():
+        case = scene(THIN, end=2e-6, boundaries=(wall,)).model_copy(update={"probes": probes})
+        lines = list[list[float]]()
+        sim = run(build(case, [BAR]), lambda sim, _, to=lines: to.append([sim.clock.t, *sim.probes.measure()]))
+        t, position, velocity, impulse = np.array(lines).T
+        assert position[-1] == pytest.approx(sim.walls.shapes.point[0, 2], rel=1e-12)
+        if name == "driven":
+            assert position == pytest.approx(20.0 * t * t / 8e-6, rel=1e-12, abs=1e-20)
+            assert velocity == pytest.approx(20.0 * t / 4e-6, rel=0.01, abs=1e-12)
+        else:
+            assert 0.3 * MASS * (20.0 - sim.walls.speed[0, 2]) == pytest.approx(impulse[-1], rel=1e-12)
+            assert sim.walls.before[0, 2] > velocity[-1] > sim.walls.speed[0, 2]
+
+
 def test_a_driven_wall_equals_a_fixed_one_in_a_moving_frame() -> None:
     """A bar at rest that a wall hits at 20 m/s, and one that hits a fixed wall at -20 m/s."""
     moving = Seen([schema.Wall(**PLANE, velocity=(0.0, 0.0, 20.0), friction=0.1)], 5e-6)

@@ -318,6 +318,10 @@ def test_the_heaviest_fragment_beyond_a_plane_is_found(ranks: int) -> None:
         ({"field": "cone_angle", "axis": "z"}, "probes[0].field", "the case has neither damage, fracture nor erosion"),
         ({"field": "penetration", "axis": "z", "low": [0, 0, 0], "high": [1, 1, 1]}, "probes[0]", "whole part"),
         ({"field": "wall_impulse_x"}, "probes[0].field", "the case has no wall"),
+        ({"field": "wall_position_x", "part": None, "wall": "w"}, "probes[0].field", "the case has no wall"),
+        ({"field": "wall_velocity_x", "part": None}, "probes[0].wall", "wall_velocity needs it"),
+        ({"field": "wall_velocity_x", "wall": "w"}, "probes[0].part", "is that of a wall; remove part"),
+        ({"field": "mass", "part": None}, "probes[0].part", "this key is missing; mass needs it"),
     ],
 )
 def test_keys_of_probes_are_checked(keys: dict[str, Any], key: str, says: str) -> None:
@@ -326,7 +330,7 @@ def test_keys_of_probes_are_checked(keys: dict[str, Any], key: str, says: str) -
     data = {
         "name": "x", "run": {"end_time": 1e-6}, "parts": [{"name": "bar", "material": "stone", "mesh": bar}],
         "materials": {"stone": stone},
-        "probes": [{"name": "p", "part": "bar", **keys}],
+        "probes": [{key: value for key, value in {"name": "p", "part": "bar", **keys}.items() if value is not None}],
     }  # fmt: skip
     with pytest.raises(CaseError) as error:
         parse_case(data)

@@ -3,6 +3,7 @@
 from typing import Any, NamedTuple, Protocol
 
 from ..boundaries.boundaries import Boundary
+from ..boundaries.wall_shapes import Walls
 from ..clock import Clock
 from ..contact.stage import Contact
 from ..erosion import Erosion
@@ -19,6 +20,7 @@ class Scene(NamedTuple):
     contact: Contact | None
     walls: tuple[Boundary, ...]
     rigid: Rigid | None
+    moving: Walls
     erosion: Erosion | None
     fracture: Fracture | None
     clock: Clock

@@ -6,11 +6,12 @@ from typing import Any
 
 import numpy as np
 
-from conoid.cases.model.measures import FRAGMENTS, PEAKS, PUSHES, SHAPES, SUMS, kind
+from conoid.cases.model.measures import COURSES, FRAGMENTS, PEAKS, PUSHES, SHAPES, SUMS, kind
 from conoid.cases.model.schema import Case
 
 from ..errors import InputError
 from ..model.state import Floats
+from .courses import Courses
 from .flying import Flying
 from .gauge import Gauge, Scene
 from .means import Means
@@ -22,7 +23,7 @@ from .sums import NodeSums
 log = logging.getLogger("conoid.worker")
 
 _OTHER: tuple[tuple[tuple[str, ...], Callable[[Case, Scene], Gauge]], ...] = (
-    (PUSHES, Pushes), (SUMS, NodeSums), (FRAGMENTS, Flying), (SHAPES, Shapes),
+    (PUSHES, Pushes), (COURSES, Courses), (SUMS, NodeSums), (FRAGMENTS, Flying), (SHAPES, Shapes),
 )  # fmt: skip
 """Fields that are not measured over tets, and the class that measures them."""
 

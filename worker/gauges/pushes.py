@@ -50,10 +50,11 @@ class Pushes:
         pairs = contact.books.between(self._scene.comm) if contact is not None and False in of else None
         walls, found = self._of_walls(), np.zeros(len(self._probes))
         for place, probe in enumerate(self._probes.values()):
-            axis, part = _AXES.index(probe.field[-1]), parts.index(probe.part)
             if not probe.field.startswith("contact_"):
                 found[place] = walls[place]
-            elif probe.by is None:
+                continue
+            axis, part = _AXES.index(probe.field[-1]), parts.index(probe.part)
+            if probe.by is None:
                 found[place] = every[part, axis] if every is not None else 0.0
             elif pairs is not None:
                 found[place] = pairs[part, parts.index(probe.by), axis]
@@ -67,8 +68,8 @@ class Pushes:
         found = exact_sums(self._scene.comm, np.concatenate(tables))
         for place, probe in enumerate(self._probes.values()):
             if self._scene.rigid is not None and probe.field.startswith("wall_"):
-                which, part = self._of(probe), self._scene.model.parts.index(probe.part)
-                found[place] += self._scene.rigid.of_walls(which, part)[_AXES.index(probe.field[-1])]
+                part = self._scene.model.parts.index(probe.part) if probe.part else None
+                found[place] += self._scene.rigid.of_walls(self._of(probe), part)[_AXES.index(probe.field[-1])]
         return found
 
     def _given_by(self, walls: Boundary) -> Floats:
@@ -76,9 +77,9 @@ class Pushes:
         nodes, columns = self._scene.model.nodes, np.zeros((len(walls.nodes), len(self._probes)))
         for place, probe in enumerate(self._probes.values()):
             if probe.field.startswith("wall_"):
-                part, axis = self._scene.model.parts.index(probe.part), _AXES.index(probe.field[-1])
-                mine = (nodes.owned * nodes.mass_of(part) / nodes.mass)[walls.nodes]
-                some = [3 * k + axis for k in self._of(probe)]
+                some = [3 * k + _AXES.index(probe.field[-1]) for k in self._of(probe)]
+                share = nodes.mass_of(self._scene.model.parts.index(probe.part)) if probe.part else nodes.mass
+                mine = (nodes.owned * share / nodes.mass)[walls.nodes]
                 assert walls.given is not None
                 columns[:, place] = walls.given[:, some].sum(axis=1) * mine
         return columns

@@ -194,10 +194,12 @@ class Rigid:
         some, start = np.unique(row, return_index=True)
         return Points(some, every[of[start], 1].astype(np.int32), np.ascontiguousarray(mean[some]))
 
-    def of_walls(self, walls: list[int], part: int) -> Floats:
-        """(3,) sum of the impulses of these walls so far on the rigid body of ``part``, N s; zero for a part that is
-        not rigid.
+    def of_walls(self, walls: list[int], part: int | None) -> Floats:
+        """(3,) sum of the impulses of these walls so far on the rigid body of ``part``, N s, or on all bodies; zero
+        for a part that is not rigid.
         """
+        if part is None:
+            return np.asarray(self.stops.given[walls].sum(axis=(0, 1)))
         body = int(self.of_part[part])
         return self.stops.given[walls, body].sum(axis=0) if body >= 0 else np.zeros(3)
 
