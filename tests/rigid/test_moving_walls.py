@@ -104,7 +104,11 @@ def test_probes_measure_position_velocity_and_force_of_a_wall() -> None:
     for name, wall in walls.items():
         case = scene(THIN, end=2e-6, boundaries=(wall,)).model_copy(update={"probes": probes})
         lines = list[list[float]]()
-        sim = run(build(case, [BAR]), lambda sim, _, to=lines: to.append([sim.clock.t, *sim.probes.measure()]))
+
+        def look(sim: Simulation, before: Floats, to: list[list[float]] = lines) -> None:
+            to.append([sim.clock.t, *sim.probes.measure()])
+
+        sim = run(build(case, [BAR]), look)
         t, position, velocity, impulse = np.array(lines).T
         assert position[-1] == pytest.approx(sim.walls.shapes.point[0, 2], rel=1e-12)
         if name == "driven":
