@@ -1,8 +1,7 @@
-"""Start of all tests.
-
-Numba is pointed to the worker's kernel cache before anything imports it: compiled once, not once a run. Ranks that wait
-leave their core to others, for there may be fewer cores than ranks. And what tests start can be interrupted: a shell
-without job control that runs them in the background has SIGINT ignored by all below.
+"""Setup of all tests. Numba gets the kernel cache of the worker before any module imports it, so that kernels are
+compiled once and not in every run. Ranks that wait leave their core to other processes, because there may be fewer
+cores than ranks. SIGINT is enabled: a shell without job control that runs the tests in the background would disable
+it for all their processes.
 """
 
 import os

@@ -1,4 +1,4 @@
-"""The borders between the houses, read off the source tree itself."""
+"""The borders between the houses, checked in the source tree."""
 
 import ast
 import re
@@ -19,7 +19,7 @@ HOUSES = ("cases", "client", "server", "worker")
 CONTRACT = {"pydantic", "pydantic_core", "msgspec"}
 WORKER_ONLY = {"numba", "mpi4py", "gmsh"}
 ONE_MODULE = {"mpi4py": "worker", "gmsh": "worker", "pyvista": "client", "numba": "worker"}
-"""Libraries that one module of one house imports, and no other."""
+"""Libraries that only one module of one house may import."""
 HEAVY = WORKER_ONLY | {"pyvista", "vtk", "vtkmodules"}
 """Libraries without which the contract, the client and the server run; only pictures need pyvista."""
 TESTS = sorted((ROOT / "tests").rglob("*.py"))
@@ -36,7 +36,7 @@ def tree(path: Path) -> ast.Module:
 
 
 def imported(nodes: Iterator[ast.AST]) -> set[str]:
-    """Absolute names that the nodes import."""
+    """Returns the absolute names that the nodes import."""
     names: set[str] = set()
     for node in nodes:
         if isinstance(node, ast.Import):
@@ -71,7 +71,7 @@ def test_relative_imports_stay_at_home() -> None:
 
 
 def test_helpers_of_tests_are_modules_of_their_own() -> None:
-    """Code that two tests need is in neither, and not in a conftest, which holds fixtures."""
+    """Code that two tests need is in a separate module, and not in a conftest, which contains fixtures."""
     for path in TESTS:
         for node in ast.walk(tree(path)):
             if isinstance(node, ast.ImportFrom):
@@ -89,7 +89,7 @@ def test_tests_mirror_the_houses() -> None:
 
 
 def relatives(path: Path, nodes: Iterable[ast.AST] | None = None) -> set[Path]:
-    """Files of its house that a file imports in the ``nodes``, or anywhere in it."""
+    """Returns the files of the same house that a file imports in the ``nodes``, or anywhere in the file."""
     found: set[Path] = set()
     for node in ast.walk(tree(path)) if nodes is None else nodes:
         if isinstance(node, ast.ImportFrom) and node.level:
@@ -101,7 +101,7 @@ def relatives(path: Path, nodes: Iterable[ast.AST] | None = None) -> set[Path]:
 
 @pytest.mark.parametrize("house", HOUSES)
 def test_no_imports_go_in_a_circle(house: str) -> None:
-    """Imports inside functions count, and those for types alone."""
+    """Imports inside functions, and imports of types only, count too."""
     left = {path: relatives(path) for path in SOURCES if name_of(path).startswith(f"{house}/")}
     while free := [path for path, needed in left.items() if not needed & left.keys()]:
         for path in free:
@@ -110,8 +110,8 @@ def test_no_imports_go_in_a_circle(house: str) -> None:
 
 
 def is_a_choice(value: ast.expr) -> bool:
-    """Whether a number stands there that could have been another one: no layout of arrays (also in the types of
-    kernels), numbering or ratio of integers.
+    """Returns whether a number was chosen: a number that is no layout of arrays (also in the types of kernels),
+    numbering or ratio of integers.
     """
     words = {node.id for node in ast.walk(value) if isinstance(node, ast.Name)}
     numbers = [n.value for n in ast.walk(value) if isinstance(n, ast.Constant) and isinstance(n.value, int | float)]
@@ -120,7 +120,8 @@ def is_a_choice(value: ast.expr) -> bool:
 
 
 def test_a_numeric_constant_says_where_it_comes_from() -> None:
-    """In a docstring below it or its group: its source, its measurement, or that it was chosen."""
+    """The docstring below the constant, or below its group, has its source, its measurement, or the remark that the
+    value was chosen."""
     for path in SOURCES:
         told, line = False, 0
         for node in reversed(tree(path).body):
@@ -141,7 +142,7 @@ PATTERNS = {"cases/laws/NAME.py", "worker/materials/NAME.py", "server/routes/NAM
 
 
 def prose(path: Path) -> Iterator[str]:
-    """Text of a page, or of the comments and docstrings of a module."""
+    """Returns the text of a page, or of the comments and docstrings of a module."""
     text = path.read_text(encoding="utf-8")
     if path.suffix == ".md":
         yield text
@@ -153,7 +154,7 @@ def prose(path: Path) -> Iterator[str]:
 
 
 def lost(text: str) -> list[str]:
-    """Files of the source tree that a text names, by the end of their path, and that are not there."""
+    """Returns files of the source tree that a text names, by the end of their path, and that do not exist."""
     words = {word.strip(".") for word in re.split(r"[\s`'\"()\[\],;:#]+", text) if ".py" in word}
     files = {word for word in words if word.endswith(".py") and re.fullmatch(r"\w[\w/.-]*", word)} - PATTERNS
     modules = {name for name in MODULE_IN_PROSE.findall(text) if not (ROOT / name).is_dir()}
@@ -217,7 +218,7 @@ def test_one_module_of_a_house_knows_zenoh(house: str) -> None:
 
 @pytest.mark.parametrize("house", ["cases", "client", "server"])
 def test_importing_a_house_loads_no_solver(house: str) -> None:
-    """The contract, the client and the server work where MPI, numba and VTK are not installed."""
+    """The contract, the client and the server work if MPI, numba and VTK are not installed."""
     light = [path for path in SOURCES if name_of(path).startswith(f"{house}/") and not is_heavy(path)]
     modules = [module_of(path) for path in light if path.name != "__main__.py"]
     code = f"""
@@ -233,7 +234,7 @@ for module in {modules!r}:
 
 @cache
 def is_heavy(path: Path) -> bool:
-    """Whether a module needs VTK or a library of the worker, or one beside it that does, when it is imported."""
+    """Returns whether the import of a module needs VTK or a library of the worker, or another module that needs one."""
     at_import = [node for node in tree(path).body if isinstance(node, ast.ImportFrom)]
     return bool(heads(path) & HEAVY) or any(is_heavy(file) for file in relatives(path, at_import))
 
@@ -269,7 +270,7 @@ def test_every_file_of_a_package_is_shipped() -> None:
 
 
 def requirements() -> dict[str, Requirement]:
-    """Direct dependencies of every extra but ``peers``, whose package is for comparison only."""
+    """Returns the direct dependencies of every extra except ``peers``, whose package is used for comparison only."""
     extras = project()["project"]["optional-dependencies"]
     texts = [*project()["project"]["dependencies"], *(t for name in extras if name != "peers" for t in extras[name])]
     found = {requirement.name: requirement for requirement in map(Requirement, texts)}
@@ -288,15 +289,15 @@ def test_a_direct_dependency_is_locked_and_has_its_reason(name: str) -> None:
     assert re.search(rf"\b{re.escape(name)}\b", (ROOT / "ARCHITECTURE.md").read_text(encoding="utf-8")), name
 
 
-# One answer on every processor
+# The same answer on every processor
 
 BLURRED = {
     "exp", "expm1", "log", "log1p", "log2", "log10", "pow", "power", "cbrt", "hypot", "sin", "cos", "tan", "arcsin",
     "arccos", "arctan", "arctan2", "asin", "acos", "atan", "atan2", "sinh", "cosh", "tanh", "einsum", "dot", "matmul",
     "inner", "tensordot", "inv", "det", "solve", "eigh", "eigvalsh", "svd",
 }  # fmt: skip
-"""Functions of numpy and math whose last bit depends on the processor or on the C library: exponentials and the like,
-and what fuses or reorders sums of products."""
+"""Functions of numpy and math whose last bit depends on the processor or on the C library: exponentials and similar
+functions, and functions that fuse or reorder sums of products."""
 TELLS = {
     "worker/contact/checks/common_volume.py", "worker/contact/checks/inside.py", "worker/contact/checks/overlap.py",
     "worker/fracture/fragments.py", "worker/gauges/penetration.py", "worker/gauges/reference.py",
@@ -304,14 +305,14 @@ TELLS = {
     "worker/output/frames.py", "worker/run/job.py", "worker/snapshots/decimate.py", "worker/snapshots/invariants.py",
     "worker/snapshots/table.py",
 }  # fmt: skip
-"""Files that report, refuse and balance; no answer depends on them, except for parts that are pushed apart at the start
-(docs/theory/sums.md)."""
+"""Files that report, refuse and balance. No answer depends on them, except for parts that are pushed apart at the
+start (docs/theory/sums.md)."""
 POWERS_OF_TWO, REFUSES, WINDS = "worker/mesh/occ/frame.py", "worker/mesh/frame.py", "worker/mesh/occ/shells.py"
-"""A scale that is rounded; a size in a message; how often a surface goes round a point, which is rounded."""
+"""Files with a rounded scale; with a size in a message; with the rounded winding number of a surface round a point."""
 
 
 def blurred(path: Path) -> set[str]:
-    """Lines that call such a function, multiply matrices, or raise to a power that is no integer."""
+    """Returns lines that call such a function, multiply matrices, or raise to a power that is no integer."""
     found = set()
     for node in ast.walk(tree(path)):
         if isinstance(node, ast.Call) and isinstance(node.func, ast.Attribute):
@@ -330,7 +331,7 @@ def blurred(path: Path) -> set[str]:
 
 
 def test_what_an_answer_depends_on_has_the_same_bits_on_every_processor() -> None:
-    """Use worker/materials/elementary.py and worker/materials/turning.py, and write sums of products out."""
+    """Use worker/materials/elementary.py and worker/materials/turning.py, and write sums of products as sums."""
     for path in (path for path in SOURCES if name_of(path).startswith("worker/")):
         if name_of(path) not in TELLS | {POWERS_OF_TWO, REFUSES, WINDS}:
             assert not blurred(path)

@@ -31,12 +31,12 @@ def called(*command: str | Path, folder: Path) -> str:
 
 
 def built(kind: str, source: Path, out: Path) -> Path:
-    """The file that setuptools makes of the folder ``source``: a ``wheel`` or an ``sdist``."""
+    """Returns the file that setuptools makes of the folder ``source``: a ``wheel`` or an ``sdist``."""
     return out / called(sys.executable, "-c", BUILD, f"build_{kind}", out, folder=source).splitlines()[-1]
 
 
 def checkout(folder: Path) -> Path:
-    """A copy of the sources, so that building leaves nothing in the repository."""
+    """Returns a copy of the sources, so that the build leaves no file in the repository."""
     folder.mkdir()
     for name in SHIPPED:
         if (ROOT / name).is_dir():
@@ -47,7 +47,7 @@ def checkout(folder: Path) -> Path:
 
 
 def installed(wheel: Path, folder: Path) -> Path:
-    """The programs of a new environment with the wheel; other packages are those of this environment."""
+    """Returns the programs of a new environment with the wheel; all other packages are those of this environment."""
     venv.create(folder, symlinks=True)
     python = folder / "bin" / "python"
     called(sys.executable, "-m", "pip", "--python", python, "install", "--no-index", "--no-deps", wheel, folder=folder)
@@ -57,7 +57,7 @@ def installed(wheel: Path, folder: Path) -> Path:
 
 
 @pytest.mark.slow
-@pytest.mark.timeout(1200)  # where no kernel is compiled yet
+@pytest.mark.timeout(1200)  # in an environment without compiled kernels
 def test_a_wheel_of_the_source_distribution_runs_in_an_empty_folder(tmp_path: Path) -> None:
     source = built("sdist", checkout(tmp_path / "checkout"), tmp_path)
     shutil.unpack_archive(source, tmp_path, filter="data")

@@ -1,4 +1,4 @@
-"""Tests of the checker of words: it finds what CONVENTIONS.md bans, and leaves code and plain prose alone."""
+"""Tests of the checker of words: it finds the words that CONVENTIONS.md bans, and ignores code and plain prose."""
 
 from collections import Counter
 

@@ -8,9 +8,9 @@ from pathlib import Path
 ROOT = Path(__file__).parents[1]
 HOUSES = ("cases", "client", "server", "worker")
 LONGEST_FILE, LONGEST_FUNCTION, LONGEST_KERNEL, MOST_ATTRIBUTES = 300, 50, 80, 15
-"""Chosen: a file that is read at one sitting; a function and an object that are understood at a glance."""
+"""Chosen values: a file can be read at one sitting, and a function and an object can be understood at a glance."""
 SMALL, FEWEST_ATTRIBUTES, MOST_PARAMETERS = ("worker/contact/", "worker/fracture/"), 12, 12
-"""Folders with stricter limits, since they were the largest once; chosen likewise."""
+"""Folders with stricter limits, because they were the largest before; chosen values."""
 EXCEPTIONS: dict[str, dict[str, int]] = {
     "a record: an attribute for each key, column or account that it holds": {
         "cases/laws/johnson_holmquist.py: JohnsonHolmquist": 18,
@@ -61,11 +61,12 @@ EXCEPTIONS: dict[str, dict[str, int]] = {
         "worker/contact/scene/columns.py: SceneSlots": 13,
     },
 }
-"""Larger ones by reason, and their sizes: the numbers are exact, so that they fall with the code and never rise."""
+"""Larger files, functions and classes with the reason and their exact sizes: when the code becomes smaller, the
+numbers must be lowered."""
 
 
 def attributes(cls: ast.ClassDef) -> int:
-    """Fields that a class declares, and attributes that its methods set."""
+    """Returns the fields that a class declares, and the attributes that its methods set."""
     declared = {n.target.id for n in cls.body if isinstance(n, ast.AnnAssign) and isinstance(n.target, ast.Name)}
     stored = (n for n in ast.walk(cls) if isinstance(n, ast.Attribute) and isinstance(n.ctx, ast.Store))
     return len(declared | {n.attr for n in stored if isinstance(n.value, ast.Name) and n.value.id == "self"})
@@ -77,7 +78,7 @@ def parameters(function: ast.FunctionDef | ast.AsyncFunctionDef) -> int:
 
 
 def excesses(name: str, source: str) -> Iterator[tuple[str, int]]:
-    """Excesses of a file: ``FILE``, ``FILE: CLASS``, ``FILE: FUNCTION`` or ``FILE: FUNCTION(...)``."""
+    """Returns the excesses of a file: ``FILE``, ``FILE: CLASS``, ``FILE: FUNCTION`` or ``FILE: FUNCTION(...)``."""
     small = name.startswith(SMALL)
     if (lines := len(source.splitlines())) > LONGEST_FILE:
         yield name, lines
@@ -95,7 +96,7 @@ def excesses(name: str, source: str) -> Iterator[tuple[str, int]]:
 
 @cache
 def found() -> dict[str, int]:
-    """Everything in the houses that exceeds a limit."""
+    """Returns all excesses of the houses."""
     every = [path for house in HOUSES for path in (ROOT / house).rglob("*") if path.suffix in (".py", ".js", ".css")]
     named = {path.relative_to(ROOT).as_posix(): path for path in sorted(every)}
     return dict(each for name, path in named.items() for each in excesses(name, path.read_text(encoding="utf-8")))

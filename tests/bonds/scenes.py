@@ -32,14 +32,14 @@ EVERYWHERE = "low = [-1, -1, {low}]\nhigh = [1, 1, {high}]\n"
 
 
 def start(end: float, poisson: float = 0.0) -> str:
-    """Steel, and the end of the run, s."""
+    """Returns steel, and the end time of the run, s."""
     return START.format(end=end, poisson=poisson)
 
 
 def block(
     name: str, low: tuple[float, float, float], high: tuple[float, float, float], size: float, more: str = ""
 ) -> str:
-    """A part of steel between two corners, mm, with tets of a ``size``, mm."""
+    """Returns a part of steel between two corners, mm, with tets of a ``size``, mm."""
     corners = [[1e-3 * c for c in corner] for corner in (low, high)]
     return f"""
 [[parts]]
@@ -81,6 +81,6 @@ def run(sim: Simulation, each: Callable[[], None] | None = None) -> Energy:
 
 
 def area(sim: Simulation) -> float:
-    """Of the bonds, m^2."""
+    """Returns the area of the bonds, m^2."""
     assert sim.bonds is not None
     return float(sim.bonds.ties.rows.area.sum())

@@ -22,7 +22,7 @@ from .scenes import BOND, built, start
 
 
 def turned(x: Floats, seed: int) -> Floats:
-    """Turned at random."""
+    """Returns the points with a random rotation."""
     q, r = np.linalg.qr(np.random.default_rng(seed).normal(size=(3, 3)))
     q *= np.sign(np.diag(r))
     return np.asarray(x @ (q * np.sign(np.linalg.det(q))).T)
@@ -30,14 +30,15 @@ def turned(x: Floats, seed: int) -> Floats:
 
 @pytest.mark.parametrize("seed", range(5))
 def test_the_pieces_of_a_face_add_up_to_it(seed: int) -> None:
-    """A plane of random triangles covers a random one: area, and integrals of products with any linear function."""
+    """A plane of random triangles covers a random triangle: the area, and the integrals of products with any linear
+    function, agree."""
     rng = np.random.default_rng(seed)
     plane = rng.uniform(-3.0, 3.0, (60, 2))
     plane[:4] = [[-9, -9], [9, -9], [9, 9], [-9, 9]]
     masters = Delaunay(plane).simplices.astype(np.int32)
     e, f = (plane[masters[:, k]] - plane[masters[:, 0]] for k in (1, 2))
     up = e[:, 0] * f[:, 1] - e[:, 1] * f[:, 0] > 0.0
-    masters[up] = masters[up][:, ::-1]  # they face each other
+    masters[up] = masters[up][:, ::-1]  # the two triangles are opposite to each other
     corners = rng.uniform(-1.5, 1.5, (3, 2))
     d = corners[1:] - corners[0]
     corners = corners if d[0, 0] * d[1, 1] - d[0, 1] * d[1, 0] > 0.0 else corners[::-1]
@@ -51,14 +52,14 @@ def test_the_pieces_of_a_face_add_up_to_it(seed: int) -> None:
     assert np.abs(far[area > 0.0]).max() < 1e-12
     mass = size / 12.0 * (1.0 + np.eye(3))
     np.testing.assert_allclose(own.sum(axis=0), mass, rtol=0.0, atol=1e-12 * size)
-    linear = points @ rng.normal(size=3)  # any linear function: the same through either triangle's corners
+    linear = points @ rng.normal(size=3)  # any linear function has the same value through the corners of each triangle
     np.testing.assert_allclose(
         np.einsum("pij,pj->i", both, linear[masters]), mass @ linear[slaves[0]], rtol=0.0, atol=1e-11 * size
     )
 
 
 def rows_of(one: TetMesh, other: TetMesh, bond: str = "") -> tuple[Rows, interface.Found, Floats, "np.ndarray"]:
-    """Rows of two blocks of which the second lies on the first, their points and tets."""
+    """Returns the rows of two blocks, the second on top of the first, and their points and tets."""
     case = load.parse_toml(
         scenes.start(1e-6) + scenes.block("below", (0, 0, 0), (1, 1, 1), 1)
         + scenes.block("above", (0, 0, 1), (1, 1, 2), 1) + scenes.BOND + bond
@@ -72,7 +73,7 @@ def rows_of(one: TetMesh, other: TetMesh, bond: str = "") -> tuple[Rows, interfa
 
 
 def on_top(cells: tuple[int, int, int], seed: int, gap: float = 0.0) -> TetMesh:
-    """A block of the size of one of four by four by two cells that lies on it, in other cells."""
+    """Returns a block on top of a block of four by four by two cells, with the same size and other cells."""
     mesh = block(cells, shake=0.25, seed=seed)
     points = mesh.points * np.array([4.0 / cells[0], 4.0 / cells[1], 1.0]) + [0.0, 0.0, 2.0 + gap]
     return TetMesh(points, mesh.tets)
@@ -80,8 +81,8 @@ def on_top(cells: tuple[int, int, int], seed: int, gap: float = 0.0) -> TetMesh:
 
 @pytest.mark.parametrize(("cells", "seed"), [((5, 7, 2), 1), ((3, 3, 1), 2), ((9, 4, 2), 3), ((4, 4, 2), 4)])
 def test_a_constant_stress_passes_between_any_two_meshes(cells: tuple[int, int, int], seed: int) -> None:
-    """Patch test: the forces of a unit traction on the tied nodes equal those on the faces of the mortar side, and a
-    linear motion has no relative velocity.
+    """Patch test: the forces of a unit traction on the tied nodes are equal to those on the faces of the mortar
+    side, and a linear motion has no relative velocity.
     """
     one, other = block((4, 4, 2), shake=0.25, seed=seed + 10), on_top(cells, seed)
     rows, found, x, tets = rows_of(one, other)
@@ -107,7 +108,7 @@ def test_the_finer_surface_lies_on_the_other_one() -> None:
 
 
 def test_overlaps_above_the_gap_are_refused_and_untied_nodes_counted() -> None:
-    """Facets of 2.5 mm cut 0.2 mm off the hole of a tube, which the finer facets of the rod in it resolve."""
+    """Facets of 2.5 mm cut 0.2 mm off the hole of a tube; the rod in the tube has finer facets."""
     below = scenes.block("below", (0, 0, -4), (8, 8, 0), 2)
     above = scenes.block("above", (0, 0, -0.3), (8, 8, 4), 1.3)
     with pytest.raises(InputError, match=r"^bond\[0\].gap = 0.000\d* m: 'below' and 'above' overlap by 0.0003 m or"):

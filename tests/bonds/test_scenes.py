@@ -16,7 +16,7 @@ HELD = moved(-1.1e-3, -0.9e-3, (0.0, 0.0, 0.0))
 
 
 def joint(more: str = "", below: str = "") -> str:
-    """Two blocks of a cubic millimetre, bonded."""
+    """Returns two bonded blocks of a cubic millimetre."""
     lower, upper = block("below", (0, 0, -1), (1, 1, 0), 1, below), block("above", (0, 0, 0), (1, 1, 1), 0.5)
     return start(2e-6) + lower + upper + BOND + more
 
@@ -48,7 +48,7 @@ def test_bonded_parts_of_two_velocities_are_reported(velocity: str, told: int) -
 
 @pytest.mark.parametrize("third", ["shared", "tied", ""])
 def test_three_parts_of_one_body_have_a_bond_at_each_interface(third: str) -> None:
-    """Two of them without a bond would separate there, without contact."""
+    """Without a bond two of the parts would separate at their interface, without contact."""
     corners = {"a": ((0, 0, 0), (2, 1, 1)), "b": ((0, 0, 1), (1, 1, 2)), "c": ((1, 0, 1), (2, 1, 2))}
     blocks = "".join(block(name, *both, 0.5) for name, both in corners.items())
     bonds = [("a", "b", "shared"), ("b", "c", "shared"), *([("a", "c", third)] if third else [])]

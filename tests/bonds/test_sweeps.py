@@ -17,7 +17,7 @@ _LAWS = np.zeros((1, 5))
 
 
 def layout(seed: int, laws: Floats = _LAWS) -> Layout:
-    """Twenty nodes tied to some of ten others, with masses and velocities at random."""
+    """Returns twenty nodes tied to some of ten other nodes, with random masses and velocities."""
     rng, n, m = np.random.default_rng(seed), 20, 10
     weight = rng.uniform(0.0, 1.0, (n, m)) * (rng.uniform(size=(n, m)) < 0.3) + 1e-3 * np.eye(n, m)
     weight[:, 0] += 0.1
@@ -42,7 +42,8 @@ def layout(seed: int, laws: Floats = _LAWS) -> Layout:
 
 
 def matrix(some: Layout) -> Floats:
-    """(rows, nodes) the relative velocities of the rows by the velocities of the nodes."""
+    """Returns (rows, nodes) the matrix that gives the relative velocities of the rows from the velocities of the
+    nodes."""
     found = np.zeros((len(some.rows.node), len(some.nodes.v)))
     for r, node in enumerate(some.rows.node):
         found[r, node] = 1.0
@@ -80,7 +81,7 @@ def test_the_order_of_tasks_changes_no_bit() -> None:
 def projected(
     push: Floats, speed: Floats, out: Floats, closed: float, play: float, limits: Floats, stiff: float
 ) -> Floats:
-    """law.project in plain numpy, with a step of 1 kg and 1 s."""
+    """Returns the result of law.project in plain numpy, with a step of 1 kg and 1 s."""
     along, opening = float(push @ out), -float(speed @ out)
     shear = push - along * out - (speed + opening * out)
     pulled, pressed = along + opening - play, along + opening + closed
@@ -108,8 +109,8 @@ def test_a_bond_carries_what_its_ellipse_allows() -> None:
 
 @pytest.mark.parametrize(("share", "pulls"), [(0.0, [1]), (0.3, [1]), (1.0, [1]), (0.0, 40 * [1] + 30 * [-1])])
 def test_a_bond_that_is_opened_takes_its_energy(share: float, pulls: list[int]) -> None:
-    """Opened at one velocity with the ``share`` of its square along the interface, it absorbs G per area in all;
-    closing and opening again in between takes and releases no energy.
+    """The bond is opened at one velocity, with the fraction ``share`` of its square along the interface. It absorbs
+    G per area in all; closing and opening again in between neither takes nor releases energy.
     """
     normal, shear, area, dt, energies = 3e6, 5e6, 2.0, 1e-3, (40.0, 90.0)
     some = layout(0, np.array([[normal, shear, *energies, 1.0]]))

@@ -23,14 +23,14 @@ Shape = Cone | Ogive | Hemisphere | SphericalCap | RingSector
 
 
 def revolved(name: str, **more: Any) -> Revolved:
-    """One of the bodies of revolution."""
+    """Returns a random body of revolution."""
     made = shape(name, **more)
     assert not isinstance(made, RingSector)
     return made
 
 
 def shape(name: str, **more: Any) -> Shape:
-    """One of the shapes, off the origin, with elements of 0.1 m."""
+    """Returns a random shape away from the origin, with elements of 0.1 m."""
     request = {"base": (0.1, 0.2, 0.3), "element_size": 0.1, **SHAPES[name], **more}
     made: Mesh = TypeAdapter[Mesh](Mesh).validate_python(request)
     assert isinstance(made, Shape)

@@ -1,7 +1,6 @@
-"""A rod of linear elements in one dimension whose joints break: what fracture cases should give, in plain numpy.
-
-Every element has its own two nodes, half of its mass each; a joint makes two nodes move as one until it breaks, and is
-a cohesive law and an inelastic contact from then on.
+"""A rod of linear elements in one dimension whose joints break: results that fracture cases should give, in plain
+numpy. Every element has its own two nodes with half of its mass each. A joint makes two nodes move together until it
+breaks; from then on it is a cohesive law and an inelastic contact.
 """
 
 from dataclasses import dataclass
@@ -14,7 +13,7 @@ Floats = npt.NDArray[np.float64]
 
 @dataclass
 class History:
-    """At each step: ``t``, s; velocity of the last element, m/s; mean stress, Pa; how many joints are open for good."""
+    """Values at each step: ``t``, s; velocity of the last element, m/s; mean stress, Pa; number of failed joints."""
 
     t: Floats
     end: Floats
@@ -26,11 +25,10 @@ def broken_rod(
     h: float, v: Floats, modulus: float, density: float, strength: Floats, energy: float, end: float,
     viscosity: tuple[float, float] = (0.0, 0.0), held: bool = False, step: float = 0.2,
 ) -> History:  # fmt: skip
-    """Elements of length ``h``, m; initial velocities ``v`` (n, 2) of their nodes; ``strength`` (n - 1,) of joints.
-
-    A joint breaks when the mean stress of its elements has its strength; the cohesive traction falls linearly until
-    ``energy``, J/m^2, is taken, and returns on the secant. ``viscosity``: linear and quadratic, in compression only.
-    ``held``: the ends keep their velocities.
+    """Returns the history of a rod: elements of length ``h``, m; initial velocities ``v`` (n, 2) of their nodes;
+    ``strength`` (n - 1,) of joints. A joint breaks when the mean stress of its elements reaches its strength. The
+    cohesive traction falls linearly until the energy ``energy``, J/m^2, is absorbed, and unloads along the secant.
+    ``viscosity``: linear and quadratic, in compression only. ``held``: the ends keep their velocities.
     """
     c, v, u = (modulus / density) ** 0.5, v.copy(), np.zeros_like(v)
     dt, half, ends = step * h / c, 0.5 * density * h, (v[0, 0], v[-1, 1])

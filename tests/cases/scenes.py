@@ -49,12 +49,12 @@ source = "None"
 
 
 def rod(*overrides: str) -> dict[str, Any]:
-    """The rod as plain data, with changes."""
+    """Returns the rod as plain data, with changes."""
     return apply_overrides(toml_data(ROD), overrides)
 
 
 def problems(*overrides: str) -> list[Problem]:
-    """The problems of the rod with changes that must make it invalid."""
+    """Returns the problems of the rod with changes that must make it invalid."""
     with pytest.raises(CaseError) as caught:
         parse_case(rod(*overrides))
     assert str(caught.value).splitlines() == [str(problem) for problem in caught.value.problems]
@@ -62,5 +62,5 @@ def problems(*overrides: str) -> list[Problem]:
 
 
 def said(*overrides: str) -> dict[str, str]:
-    """The problems of the rod with changes, by key."""
+    """Returns the problems of the rod with changes, by key."""
     return {problem.key: problem.message for problem in problems(*overrides)}

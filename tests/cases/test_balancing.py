@@ -6,7 +6,7 @@ from conoid.cases.estimates.balancing import Guard, Stretch, Trigger, imbalance,
 from conoid.cases.model.schema import Balance
 
 EVEN, ODD = [2.0, 2.0], [3.0, 1.0]
-"""Loads of two ranks, s a step."""
+"""Loads of two ranks, s in each step."""
 
 
 def test_what_is_lost_and_the_imbalance() -> None:
@@ -27,7 +27,8 @@ def test_measured_cuts_when_more_is_lost_than_a_cut_costs() -> None:
 
 
 def test_measured_begins_to_count_anew_after_a_cut() -> None:
-    """Loss before a decomposition is not counted again, loss that it leaves is: the next one may remove it."""
+    """A loss before a decomposition is not counted again; a loss after it is counted, because the next decomposition
+    may remove it."""
     trigger = Trigger(Balance(policy="measured"), 10.0)
     trigger.look(ODD, 50)
     trigger.settle(50, 4.0)
@@ -39,7 +40,7 @@ def test_measured_begins_to_count_anew_after_a_cut() -> None:
 
 
 def test_measured_does_not_count_what_ranks_lose_in_turn() -> None:
-    """First one rank has more work, then the other: no decomposition would help."""
+    """First one rank has more work, then the other rank: no decomposition would help."""
     trigger = Trigger(Balance(policy="measured"), 10.0)
     for step in range(0, 1000, 10):
         trigger.look(ODD if step % 20 else ODD[::-1], 10)
@@ -91,7 +92,8 @@ def test_cuts_that_do_not_pay_become_rare() -> None:
 
 
 def test_a_stretch_tells_its_beginning_from_its_end() -> None:
-    """Equal loads for 100 steps, then 1 s per step more on one rank: halves of 1 and 1.5, for any windows."""
+    """The loads are equal for 100 steps, then one rank has 1 s more in each step: the halves have 1 and 1.5, for any
+    windows."""
     for window in (1, 3, 10, 50):
         stretch = Stretch()
         for step in range(0, 200, window):

@@ -1,4 +1,4 @@
-"""Wall time of ranks and threads against computed values, with its assumptions in words."""
+"""Wall time of ranks and threads compared with computed values, and the assumptions in words."""
 
 import io
 

@@ -15,7 +15,7 @@ MM = 1e-3
 
 
 def shot(material: str = "alumina", speed: float = 800.0, **case: Any) -> dict[str, Any]:
-    """A rod of steel that meets a tile."""
+    """Returns a rod of steel that hits a tile."""
     return {
         "name": "shot", "run": {"end_time": 1e-5},
         "parts": [
@@ -30,14 +30,15 @@ def shot(material: str = "alumina", speed: float = 800.0, **case: Any) -> dict[s
 
 
 def crushed(data: dict[str, Any]) -> dict[str, str]:
-    """The warnings about compression, by key."""
+    """Returns the warnings about compression, by key."""
     case = parse_case(data)
     found = doubts(data, case, estimate(case))
     return {each.key: each.message for each in found if "crushed" in each.message}
 
 
 def test_griffith_of_a_plane_wave_is_on_his_parabola() -> None:
-    """(s1 - s3)^2 = 8 T (s1 + s3) with s3 = nu / (1 - nu) s1; near the elastic limit that is measured for alumina."""
+    """(s1 - s3)^2 = 8 T (s1 + s3) with s3 = nu / (1 - nu) s1; the value is near the measured elastic limit of
+    alumina."""
     made = library()["alumina"]
     assert made.brittle is not None
     s1 = griffith(made)
@@ -47,7 +48,7 @@ def test_griffith_of_a_plane_wave_is_on_his_parabola() -> None:
 
 
 def test_the_stress_of_an_impact_is_that_of_two_impedances() -> None:
-    """Two equal plates of glass at 100 m/s: Z v / 2 in both."""
+    """Two equal plates of glass collide at 100 m/s: the stress is Z v / 2 in both plates."""
     glass = library()["soda_lime"]
     z = math.sqrt(glass.density * (glass.elastic.bulk + 4.0 / 3.0 * glass.elastic.shear))
     data = shot("soda_lime", 100.0)

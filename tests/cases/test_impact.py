@@ -13,7 +13,7 @@ TOUGH = {**BRITTLE, "strength": {"model": "linear_hardening", "yield_stress": 20
 
 
 def meeting(speed: float, contact: dict[str, Any] | None = None, **other: Any) -> Case:
-    """A moving block of steel and one at rest, c = 5,917 m/s."""
+    """Returns a moving block of steel and a block at rest, c = 5,917 m/s."""
     cube = {"shape": "box", "low": [0, 0, 0], "high": [1e-3] * 3, "element_size": 5e-4}
     away = {**cube, "low": [0, 0, 2e-3], "high": [1e-3, 1e-3, 3e-3]}
     return parse_case(
@@ -42,12 +42,13 @@ def meeting(speed: float, contact: dict[str, Any] | None = None, **other: Any) -
     ],
 )
 def test_what_meets_fast_gets_more_sweeps(case: Case, least: int, most: int) -> None:
-    """Above a fifth of the wave speed."""
+    """The limit is a fifth of the wave speed."""
     assert sweeps(case) == (least, most)
 
 
 def test_what_is_driven_together_and_breaks_gets_more_sweeps() -> None:
-    """A motion or a traction presses for as long as it lasts; what holds does not, nor what moves one part alone."""
+    """A prescribed motion or a traction presses while it acts. Parts that cannot break, and a drive of a single
+    part, need no more sweeps."""
     ram = {"kind": "velocity", "parts": ["b"], "z": -1.0}
     slow = meeting(1.0, material="glass", fracture={})
     assert [sweeps(bounded(slow, boundary)).least for boundary in (ram, {**ram, "z": 0.0})] == [40, 5]
@@ -57,7 +58,7 @@ def test_what_is_driven_together_and_breaks_gets_more_sweeps() -> None:
 
 
 def test_a_traction_presses_what_is_at_rest() -> None:
-    """All nodes are at rest at the start, and all are driven later."""
+    """All nodes are at rest at the start, and all have a prescribed motion later."""
     rest = meeting(0.0, material="glass", fracture={})
     pushed = {"kind": "traction", "parts": ["b"], "pressure": 1e8}
     assert sweeps(bounded(rest, pushed)).least == 40
@@ -71,7 +72,8 @@ def test_bodies_are_pressed_together_at_a_tenth_of_the_speed_of_waves() -> None:
 
 
 def test_what_flows_is_pressed_where_the_impact_has_more_than_its_flow_stress() -> None:
-    """4340, 1.07 GPa at a tenth of strain, from 53 m/s on; what is elastic or breaks is not."""
+    """The limit for 4340 with a flow stress of 1.07 GPa at a strain of 0.1 is 53 m/s; elastic and breaking parts
+    have no such limit."""
     assert [pressed(meeting(speed, material="steel_4340")) for speed in (52.0, 55.0)] == [[False, False], [False, True]]
     assert pressed(meeting(100.0, material="tough")) == [False, True]
     assert pressed(meeting(100.0, material="tough", fracture={})) == [False, False]
@@ -100,12 +102,12 @@ def test_a_wall_is_met_at_the_speed_of_the_part() -> None:
     ],
 )
 def test_what_is_driven_comes_at_the_speed_of_its_drive(drive: dict[str, Any], speed: float) -> None:
-    """A box of a body besides what it flies with, a whole body instead."""
+    """The prescribed motion acts on a box of a body in addition to its velocity, or on a whole body instead of it."""
     assert impact_speeds(bounded(meeting(600.0), {"kind": "velocity", **drive})) == pytest.approx([speed] * 2)
 
 
 def test_what_turns_comes_at_the_speed_of_its_rim() -> None:
-    """A cube of 1 mm about its edge along z, at 1e6 rad/s: corners have up to 1,000 m/s along x and y."""
+    """A cube of 1 mm rotates about its edge along z at 1e6 rad/s: its corners have up to 1,000 m/s along x and y."""
     spin = {"centre": [0, 0, 0], "rate": [0, 0, 1e6]}
     case = meeting(0.0).model_dump(mode="json", exclude_none=True)
     case["parts"][0]["spin"] = spin

@@ -1,4 +1,4 @@
-"""Overlapping primitives are found before meshing, together with all other errors; touching ones are valid."""
+"""Overlapping primitives are found before meshing, together with all other errors; bodies that only touch are valid."""
 
 from pathlib import Path
 from typing import Any
@@ -18,13 +18,13 @@ TUBE = {"shape": "tube", "inner_radius": 2e-3, "radius": 4e-3, "length": 8e-3, "
 
 
 def scene(one: dict[str, Any], other: dict[str, Any], **more: Any) -> dict[str, Any]:
-    """Two parts of steel."""
+    """Returns two parts of steel."""
     parts = [{"name": name, "material": "steel", "mesh": mesh} for name, mesh in (("one", one), ("other", other))]
     return {"name": "two", "run": {"end_time": "1 us"}, "parts": parts, **more}
 
 
 def told(data: dict[str, Any]) -> list[str]:
-    """The problems of overlap."""
+    """Returns the problems of overlap."""
     try:
         parse_case(data)
     except CaseError as error:
@@ -50,7 +50,8 @@ def test_bodies_that_overlap(one: dict[str, Any], other: dict[str, Any], depth: 
 
 
 def test_tied_bodies_may_overlap_by_the_gap_of_their_bond() -> None:
-    """Of facets of 1 mm the default gap is 0.1 mm. A rod that fills a tube to which it is bonded does not graze it."""
+    """For facets of 1 mm the default gap is 0.1 mm. A rod that fills a tube and is bonded to it gives no warning
+    about contact."""
     upper = {**BLOCK, "low": [-5e-3, -5e-3, -5e-5], "high": [5e-3, 5e-3, 4e-3]}
     bond = {"parts": ["other", "one"], "kind": "tied"}
     assert len(told(scene(BLOCK, upper))) == 1
@@ -80,7 +81,7 @@ def test_tied_bodies_may_overlap_by_the_gap_of_their_bond() -> None:
     ],
 )
 def test_bodies_that_touch_or_are_cut_away_do_not(one: dict[str, Any], other: dict[str, Any]) -> None:
-    """Of the tube and the rod that is 0.04 mm too wide, facets of 1 mm may cut off 0.06 mm: the worker decides."""
+    """Facets of 1 mm may cut off 0.06 mm of the tube and of a rod that is 0.04 mm too wide: the worker decides."""
     assert told(scene(one, other)) == []
 
 
@@ -94,7 +95,7 @@ def test_turned_bodies_are_where_they_are_turned_to() -> None:
 
 @pytest.mark.parametrize("angle", [30, 45, 60, 90, 120, 150])
 def test_turned_bodies_that_touch_do_not(angle: int) -> None:
-    """At 30 degrees the points that are looked at lie on the common face to rounding."""
+    """At 30 degrees the tested points lie on the common face up to rounding."""
     turn = {"axis": "z", "angle": f"{angle} deg", "centre": ["0.7 mm", "0.3 mm", "0.1 mm"]}
     block = {**BLOCK, "low": [0, 0, 0], "high": [2e-3, 2e-3, 2e-3]}
     data = scene(block, {**block, "low": [2e-3, 0, 0], "high": [4e-3, 2e-3, 2e-3]})
@@ -146,7 +147,7 @@ def test_what_is_told_here_the_worker_refuses_as_well() -> None:
 
 
 def test_many_bodies_cost_little_time() -> None:
-    """Two hundred tubes inside each other: 20,000 pairs, of which the first are looked at."""
+    """Two hundred tubes are inside of each other: of 20,000 pairs only the first are tested."""
     shells = [{**TUBE, "inner_radius": 1e-3 * k + 1e-3, "radius": 1e-3 * k + 2e-3} for k in range(200)]
     parts = [{"name": f"shell_{k}", "material": "steel", "mesh": shell} for k, shell in enumerate(shells)]
     assert told({"name": "shells", "run": {"end_time": "1 us"}, "parts": parts}) == []

@@ -1,5 +1,5 @@
 """Warnings about probable errors of units: bare numbers, unusual constants, speeds, sizes and places; shipped cases
-have none."""
+have no such warning."""
 
 import math
 import time
@@ -39,7 +39,7 @@ element_size = "1 mm"
 
 
 def told(data: dict[str, Any]) -> dict[str, str]:
-    """The warnings, by key."""
+    """Returns the warnings, by key."""
     case = parse_case(data)
     odd = doubts(data, case, estimate(case))
     assert len({each.key for each in odd}) == len(odd)
@@ -47,7 +47,7 @@ def told(data: dict[str, Any]) -> dict[str, str]:
 
 
 def target(**changes: Any) -> dict[str, Any]:
-    """The ball and the plate; ``plate__mesh`` and the like are merged in."""
+    """Returns the ball and the plate; ``plate__mesh`` and the like are merged in."""
     data = toml_data(TARGET)
     for key, value in changes.items():
         part, _, table = key.partition("__")
@@ -57,11 +57,11 @@ def target(**changes: Any) -> dict[str, Any]:
 
 
 LINEAR = {"fast_fragment": [0, 1], "long_rod": [0, 1]}
-"""Parts of shipped cases that are met fast without an equation of state: the one is about contact alone, the paper of
-the other has none.
+"""Parts of shipped cases that are hit fast without an equation of state: one case tests contact only, and the paper
+of the other has no equation of state.
 """
 CRUSHED = {"glass_ball_cohesive", "glass_steel_bar", "glass_steel_demo"}
-"""Shipped cases whose glass may be compressed beyond Griffith's criterion: the paper's breaks in tension alone."""
+"""Shipped cases whose glass may be compressed beyond Griffith's criterion: in the paper it breaks in tension only."""
 
 
 @pytest.mark.parametrize("name", sorted(shipped()))
@@ -163,8 +163,8 @@ def test_what_is_odd(changes: dict[str, Any], key: str, message: str) -> None:
 
 
 def test_what_others_may_send_on_its_way_is_not_odd() -> None:
-    """A ball flies away from the plate, into which another one runs beside it: fragments may reach the first, but not
-    where it is a metre away.
+    """A ball flies away from the plate, and a second body beside the ball hits the plate: fragments may reach the
+    ball, but not if it is a metre away.
     """
     data = target(ball={"velocity": [0, 0, "5 m/s"]})
     assert "'ball' meets nothing at all" in told(data)["parts[0].velocity"]
@@ -183,7 +183,8 @@ EOS = {"model": "mie_gruneisen", "c0": "4600 m/s", "S": 1.49, "gamma0": 2}
     [(570.0, {}, None), (600.0, {}, "7 %"), (4000.0, {}, "33 %"), (4000.0, {"eos": EOS}, None)],
 )
 def test_an_impact_that_a_linear_pressure_misses_is_told(speed: float, more: dict[str, Any], low: str | None) -> None:
-    """Steel has waves of 5,856 m/s, c0 = 4,607 m/s: (1.5 - 1/4) u / (c0 + 1.5 u), u half the speed."""
+    """Steel has plane waves of 5,856 m/s and c0 = 4,607 m/s: the error is (1.5 - 1/4) u / (c0 + 1.5 u), with u half
+    of the speed."""
     own = {"density": "7850 kg/m^3", "elastic": {"young": "200 GPa", "poisson": 0.3}} | more
     motion = {"material": "own", "velocity": [0, 0, f"-{speed} m/s"]}
     found = told({**target(ball=motion, plate={"material": "own"}), "materials": {"own": own}})
@@ -192,7 +193,8 @@ def test_an_impact_that_a_linear_pressure_misses_is_told(speed: float, more: dic
 
 
 def test_a_linear_pressure_is_low_by_what_the_shock_relations_give() -> None:
-    """Behind a shock of U and u the volume is V0 (1 - u / U), momentum p = density U u: -K ln J solved for U."""
+    """Behind a shock of the speed U and the particle speed u the volume is V0 (1 - u / U), and by momentum p =
+    density U u: the reference is -K ln J solved for U."""
     c0, u = 4600.0, 300.0
     shock = c0
     for _ in range(50):
@@ -221,7 +223,8 @@ def warned(*boundaries: dict[str, Any]) -> dict[str, str]:
     ],
 )
 def test_a_drive_into_a_wall_is_told(drive: dict[str, Any], depth: str) -> None:
-    """The ball flies on along z, and no wall holds it as its x is prescribed: its lowest point goes from 1 mm to -4."""
+    """The ball moves along z. The wall does not act on it, because its x is prescribed: its lowest point moves from
+    1 mm to -4 mm."""
     part = drive["parts"][0]
     floor = FLOOR if part == "plate" else {**FLOOR, "point": [0, 0, "-3.5 mm"], "parts": ["ball"]}
     found = warned(floor, drive)["boundaries[1]"]
@@ -244,7 +247,7 @@ def test_a_drive_that_stays_before_a_wall_raises_no_doubt(drive: dict[str, Any])
 
 
 def test_many_drives_of_many_bodies_cost_little_time() -> None:
-    """Two hundred plates and as many drives of all of them: of 40,000 driven bodies the first are looked at."""
+    """Two hundred plates have as many prescribed motions each: of 40,000 driven bodies only the first are tested."""
     data = target()
     plate = data["parts"][1]
     bases = [[0, 0, f"{-10 * k - 5} mm"] for k in range(200)]
@@ -302,7 +305,8 @@ def test_what_a_part_brings_along() -> None:
 
 
 def test_a_body_that_spins_stretches_and_is_turned() -> None:
-    """A bar of 2 x 4 x 20 mm turned from z to x: energy I w^2 / 2 with I = m (b^2 + c^2) / 12, m k^2 a^2 / 24."""
+    """A bar of 2 x 4 x 20 mm is turned from z to x: the energies are I w^2 / 2 with I = m (b^2 + c^2) / 12, and m
+    k^2 a^2 / 24."""
     bar = {
         "shape": "box",
         "low": ["-1 mm", "-2 mm", "-10 mm"],
@@ -339,7 +343,7 @@ def test_velocity_is_that_of_the_worker() -> None:
 
 
 def test_a_plane_of_symmetry_through_a_body_is_told() -> None:
-    """On its surface, or off it, it is not."""
+    """A plane on the surface of the body, or outside of it, gives no warning."""
     plane = {"kind": "symmetry", "axis": "x"}
     assert told({**target(), "boundaries": [{**plane, "at": "1 mm", "parts": ["plate"]}]}) == {
         "boundaries[0].at": "'0.001 m': goes through part 'plate', which lies between -0.01 and 0.01 m: each side "
@@ -350,7 +354,7 @@ def test_a_plane_of_symmetry_through_a_body_is_told() -> None:
 
 @pytest.mark.parametrize(("side", "warned"), [(0.0, True), (0.3, True), (1.0, False)])
 def test_the_box_of_a_probe_that_has_no_room_for_a_tet_is_told(side: float, warned: bool) -> None:
-    """A tet of 1 mm has some 0.12 mm^3."""
+    """A tet of 1 mm has a volume of some 0.12 mm^3."""
     box = {"low": [0, 0, "-3 mm"], "high": [f"{side} mm", f"{side} mm", f"{side - 3.0} mm"]}
     probe = {"name": "p", "part": "plate", "field": "pressure", **box}
     odd = told({**target(), "probes": [probe]})
@@ -368,7 +372,7 @@ def test_the_box_of_a_probe_that_has_no_room_for_a_tet_is_told(side: float, warn
     ids=["elastic", "nodal", "flows"],
 )  # fmt: skip
 def test_the_form_split_is_named_where_a_part_may_stay_elastic(changes: dict[str, Any], named: bool) -> None:
-    """``split`` damps elastic motion, as tests/verification/test_pressure_modes.py measures."""
+    """``split`` damps elastic motion; tests/verification/test_pressure_modes.py measures this."""
     data = target() | {"numerics": changes["numerics"]}
     for part in data["parts"]:
         part["material"] = changes.get("material", part["material"])

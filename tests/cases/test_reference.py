@@ -23,7 +23,7 @@ CHECK = jsonschema.Draft202012Validator(SCHEMA)
 
 
 def keys(schema: dict[str, Any]) -> Iterator[tuple[str, dict[str, Any]]]:
-    """Every key of every table, with its schema."""
+    """Returns every key of every table, with its schema."""
     for name, table in {"Case": schema, **schema["$defs"]}.items():
         for key, each in table.get("properties", {}).items():
             yield f"{name}.{key}", each
@@ -44,7 +44,7 @@ def test_every_key_has_a_text(name: str) -> None:
 
 
 def test_every_table_and_key_stands_on_the_page() -> None:
-    """Below the heading of the table, or in the list of variants whose keys another table has, too."""
+    """A key is below the heading of its table, or in the list of variants if another table has the same keys."""
     text = page.page()
     for table in tables(SCHEMA):
         chapter = text.partition(f"### `{table.path}`\n" if table.path else "## The case\n")[2].partition("\n### ")[0]
@@ -94,7 +94,8 @@ def test_a_row_has_unit_range_default_and_meaning(section: str, row: str) -> Non
 
 
 def with_example(example: str) -> dict[str, Any]:
-    """The smallest case with an example: keys of a part that it has are replaced, entries of other lists are added."""
+    """Returns the smallest case with an example: keys of an existing part are replaced, entries of other lists are
+    added."""
     data, piece = toml_data(SMALLEST), toml_data(example)
     parts = {part["name"]: part for part in data["parts"]}
     for part in piece.pop("parts", []):

@@ -19,7 +19,7 @@ WALL = "boundaries=[{kind='wall', point=[0, 0, '-9 mm'], normal=[0, 0, 1]}]"
 
 
 def scene(*overrides: str) -> dict[str, Any]:
-    """A rigid ball above a pad of rubber, as plain data."""
+    """Returns a rigid ball above a pad of rubber, as plain data."""
     parts = [
         {"name": "ball", "material": "steel", "mesh": BALL, "rigid": True, "velocity": [0, 0, "-5 m/s"]},
         {"name": "pad", "material": "rubber", "mesh": PAD},
@@ -30,14 +30,14 @@ def scene(*overrides: str) -> dict[str, Any]:
 
 
 def test_a_mass_that_is_given_is_the_one_that_is_told() -> None:
-    """Momentum and energy, by which a user sees what hits, are those of that mass."""
+    """The printed momentum and energy are those of the given mass."""
     case = parse_case(scene("parts[0].rigid={mass='2 kg'}"))
     found = bulk(case.parts[0], case.parts[0].mesh, 7850.0)  # type: ignore[arg-type]
     assert (found.mass, found.momentum, found.energy) == (2.0, (0.0, 0.0, -10.0), 25.0)
 
 
 def test_a_given_inertia_is_the_one_whose_energy_is_told() -> None:
-    """1/2 M v^2 + 1/2 w . I w about the given centre, 2 mm beside the axis of the spin."""
+    """The energy is 1/2 M v^2 + 1/2 w . I w about the given centre, 2 mm away from the axis of the spin."""
     inertia = "[1e-7, 2e-7, 2.5e-7, 0.2e-7, 0.1e-7, -0.3e-7]"
     spin = "parts[0].spin={centre=[0, 0, 0], rate=[100, 200, 300]}"
     given = f"parts[0].rigid={{mass='4 g', centre=['2 mm', 0, 0], inertia={inertia}}}"
@@ -93,7 +93,7 @@ def test_a_slip_is_one_line(override: str, line: str) -> None:
 
 
 def test_a_plate_and_its_turned_tensor_are_bodies() -> None:
-    """A moment may be the sum of the other two, and a tensor may have products."""
+    """A moment may be equal to the sum of the other two, and a tensor may have products of inertia."""
     for six in ("1, 1, 2, 0, 0, 0", "1.5, 1.5, 1, 0, 0, 0.5"):
         assert parse_case(scene(INERTIA.format(six))).parts[0].rigid is not None
     assert parse_case(scene("parts[0].rigid=false")).parts[0].rigid is None
@@ -108,7 +108,7 @@ def test_a_rigid_part_costs_no_tets_and_no_steps_before_a_run() -> None:
 
 
 def test_a_stiff_part_could_be_rigid() -> None:
-    """Steel on rubber, not steel on steel; no suggestion for a rigid part."""
+    """Steel on rubber gives a suggestion; steel on steel and rigid parts give none."""
 
     def told(*overrides: str) -> list[str]:
         case = parse_case(scene(*overrides))
@@ -121,7 +121,9 @@ def test_a_stiff_part_could_be_rigid() -> None:
 
 
 def test_a_part_that_stayed_elastic_could_have_been_rigid() -> None:
-    """Suggestions after the run: not for a part that has yielded, has much strain or energy, or has common nodes."""
+    """The suggestion after the run is not made for a part that has yielded, has a large strain or energy, or has common
+    nodes with another part.
+    """
     case = parse_case(scene("parts[0].rigid=false"))
     ball, block = Strained(600, 2e-4, 0.01, False), Strained(400, 0.05, 0.99, False)
     (line,) = could_be_rigid(case, [ball, block], "stability: tet 7 of ball")

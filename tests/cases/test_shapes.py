@@ -21,7 +21,7 @@ SECTORS = ("full", "half", "quarter")
 
 
 def scene(**mesh: Any) -> dict[str, Any]:
-    """A case of one body."""
+    """Returns a case of one body."""
     return {
         "name": "one",
         "parts": [{"name": "body", "material": "steel", "mesh": {key: v for key, v in mesh.items() if v is not None}}],
@@ -87,7 +87,8 @@ def test_volume_and_area_of_a_revolved_body_are_its_integrals(name: str) -> None
 @pytest.mark.parametrize("sector", SECTORS)
 @pytest.mark.parametrize("name", SHAPES)
 def test_what_the_formulas_say_of_a_shape_agrees(name: str, sector: str) -> None:
-    """Volume by points at random that the body holds, surface and reach by the patches of its sheets."""
+    """The reference of the volume are random points inside of the body; the references of area and extent are the
+    patches of its surfaces."""
     body, chance = shape(name, sector=sector), random.Random(1)
     low, high = bounds(body) or ((), ())
     box, many = math.prod(b - a for a, b in zip(low, high, strict=True)), 4_000
@@ -106,7 +107,7 @@ def test_what_the_formulas_say_of_a_shape_agrees(name: str, sector: str) -> None
 
 
 def _area(body: Any, n: int = 40) -> float:
-    """Of all patches of the sheets, each of two triangles."""
+    """Returns the area of all patches of the surfaces, each with two triangles."""
     total = 0.0
     for at, _, _ in sheets(body):
         x = np.array([[at(i / n, j / n) for j in range(n + 1)] for i in range(n + 1)])

@@ -19,7 +19,7 @@ from .one_dimension import broken_rod
 
 NAMES = sorted(shipped())
 OF_FILES = ["imported_taylor"]
-"""Cases whose mesh is read from a file, which nothing of the contract opens."""
+"""Cases whose mesh is read from a file, which the contract does not open."""
 TAYLOR = ["demo", "taylor_42crmo4", "taylor_copper", "taylor_copper_split"]
 
 
@@ -28,7 +28,7 @@ def load(name: str) -> Case:
 
 
 def reference(name: str, quantity: str) -> Reference:
-    """The reference of a case by its quantity or its probe."""
+    """Returns the reference of a case by its quantity or its probe."""
     found = [entry for entry in load(name).reference if quantity in (entry.probe, entry.quantity)]
     assert len(found) == 1
     return found[0]
@@ -103,7 +103,7 @@ def test_the_confined_bar_pushes_sideways() -> None:
     assert reference("elastic_bar_confined", "lateral_stress").value == pytest.approx(sideways, rel=5e-4)
 
 
-# Bodies that meet -----------------------------------------------------------------------------------------------------
+# Colliding bodies -----------------------------------------------------------------------------------------------------
 
 
 def losses_stay_below_the_closing_of_the_end_layers(name: str, h: float) -> None:
@@ -134,7 +134,8 @@ def test_dissimilar_bars() -> None:
 
 
 def test_bonded_tile() -> None:
-    """The pulse is in the probes alone while it is averaged, and the bond is torn by its reflection at the free end."""
+    """While the mean is taken, only the incident pulse passes the probes; its reflection at the free end then breaks
+    the bond."""
     moduli = [young * (1 - nu) / ((1 + nu) * (1 - 2 * nu)) for young, nu in ((370e9, 0.22), (73e9, 0.33))]
     (c1, c2), (z1, z2) = zip(
         *((math.sqrt(m / rho), math.sqrt(m * rho)) for m, rho in zip(moduli, (3900.0, 2770.0), strict=True)),
@@ -215,7 +216,7 @@ def test_sliding_block() -> None:
 
 
 class Copper:
-    """The benchmark's copper: stress linear in logarithmic strain, J2 with linear hardening."""
+    """Copper of the benchmark: stress linear in logarithmic strain, J2 plasticity with linear hardening."""
 
     density, young, poisson, yielding = 8930.0, 117e9, 0.35, 0.4e9
     bulk = young / (3 * (1 - 2 * poisson))
@@ -223,13 +224,14 @@ class Copper:
 
 
 def jump(density: float, stress: tuple[float, float], stretch: tuple[float, float]) -> tuple[float, float]:
-    """Speeds of the shock and of the matter behind it, m/s, from the state ahead and behind (pressure positive)."""
+    """Returns the speeds of the shock and of the material behind it, m/s, from the states ahead and behind (pressure
+    positive)."""
     pressure, shortening = stress[1] - stress[0], stretch[0] - stretch[1]
     return math.sqrt(pressure / density / shortening), math.sqrt(pressure * shortening / density)
 
 
 def solve(f: Callable[[float], float], low: float, high: float) -> float:
-    """The root of a rising function by bisection."""
+    """Returns the root of a rising function by bisection."""
     for _ in range(200):
         middle = 0.5 * (low + high)
         low, high = (low, middle) if f(middle) > 0 else (middle, high)
@@ -274,7 +276,8 @@ def test_plastic_bar_wave() -> None:
         return Copper.young * e if e <= at_yield else Copper.yielding + tangent * (e - at_yield)
 
     def force(e: float) -> float:
-        """Over the initial area: the section swells by 2 nu of the elastic and by all of the plastic strain."""
+        """Returns the force over the initial area: the section grows by 2 nu of the elastic strain and by the whole
+        plastic strain."""
         elastic = stress(e) / Copper.young
         return stress(e) * math.exp(2 * Copper.poisson * elastic + (e - elastic))
 
@@ -296,8 +299,8 @@ def test_plastic_bar_wave() -> None:
 
 
 def test_triaxial_glass() -> None:
-    """The strength by Mohr's circles, and no cap below it; the tolerance is the effect of that of the lateral
-    pressure."""
+    """The strength follows from Mohr's circles and is below the cap; the tolerance is the effect of the tolerance of
+    the lateral pressure."""
     law = library()["soda_lime_mohr_coulomb"].strength
     assert isinstance(law, MohrCoulomb)
     sides = -reference("triaxial_glass", "lateral").value
@@ -339,7 +342,8 @@ def test_shocks(name: str, density: float, c0: float, slope: float, speed: float
 
 
 def test_two_tets_pass_on_a_third_of_their_stress() -> None:
-    """F = 1/3 A traction(stress); peak where F / A has the strength, area under F of energy A, both along the line."""
+    """The force is F = 1/3 A traction(stress). Its peak is reached when F / A is the strength, and the area under F
+    is energy times A, both along the line."""
     case = load("two_tets")
     soft, pair = case.materials["soft"], case.parts[0].mesh
     law = soft.brittle
@@ -362,7 +366,8 @@ def test_two_tets_pass_on_a_third_of_their_stress() -> None:
 
 
 def test_the_breathing_facet_breaks_and_holds() -> None:
-    """The corners bring more than it takes until the force has the strength, and a quarter of what opens the facet."""
+    """The initial velocities give more energy than the facet needs to reach its strength, and a quarter of the
+    energy to open the facet."""
     case = load("breathing_facet")
     made, pair, stretch = case.materials["metal"], case.parts[0].mesh, case.parts[0].stretch
     assert isinstance(pair, TwoTets)
@@ -401,8 +406,8 @@ def test_spall_glass() -> None:
 
 
 def test_a_spall_of_eighty_layers_in_one_dimension() -> None:
-    """The velocity of the rear falls by the pull-back, reduced by the mesh, at the theoretical time; not without
-    fracture."""
+    """The velocity of the rear face falls by the pull-back, reduced by the mesh, at the theoretical time; without
+    fracture it does not."""
     glass, flyer, layers = library()["soda_lime"], 5e-3, 80
     assert glass.brittle is not None
     c, h, v = wave_speed(glass), flyer / layers, np.zeros((3 * layers, 2))
@@ -419,7 +424,8 @@ def test_a_spall_of_eighty_layers_in_one_dimension() -> None:
 
 
 def test_the_stretched_bar_in_one_dimension() -> None:
-    """With elements of the case's size: peak of the mean stress; four fifths or more of the 40 pieces of the fit."""
+    """With the element size of the case the peak of the mean stress agrees, and the number of fragments is at least
+    four fifths of the 40 of the formula."""
     case = load("stretched_bar")
     made, n, rate = case.materials["ceramic"], 200, 35700.0
     assert made.brittle is not None
@@ -472,7 +478,7 @@ def test_branching_plate() -> None:
 
 
 def impedances(plane: bool) -> tuple[float, float]:
-    """Density times wave speed of steel and soda-lime glass: of plane waves, or of bars; kg/m^2/s."""
+    """Returns density times wave speed of steel and soda-lime glass, for plane waves or for bars, kg/m^2/s."""
     steel, glass = library()["steel"], library()["soda_lime"]
     if plane:
         return steel.density * wave_speed(steel), glass.density * wave_speed(glass)
@@ -519,7 +525,7 @@ def test_the_free_body_keeps_its_velocity() -> None:
 
 
 def flow_stress(name: str, strain: float, temperature: float) -> float:
-    """Johnson and Cook's flow stress of a material of the library at 1e4 1/s, Pa."""
+    """Returns Johnson and Cook's flow stress of a material of the library at 1e4 1/s, Pa."""
     law = library()[name].strength
     assert isinstance(law, JohnsonCook)
     heat = max(0.0, (temperature - law.reference_temperature) / (law.melt_temperature - law.reference_temperature))
@@ -527,9 +533,8 @@ def flow_stress(name: str, strain: float, temperature: float) -> float:
 
 
 def cavity_resistance(name: str) -> float:
-    """Pressure that opens a spherical cavity in an incompressible, adiabatic metal, Pa.
-
-    The integral of stress / (exp(3 strain / 2) - 1) over strain: for a perfectly plastic metal 2/3 Y (1 + ln(2E/3Y)).
+    """Returns the pressure that opens a spherical cavity in an incompressible, adiabatic metal, Pa: the integral of
+    stress / (exp(3 strain / 2) - 1) over strain; for a perfectly plastic metal 2/3 Y (1 + ln(2E/3Y)).
     """
     metal = library()[name]
     law = metal.strength
@@ -546,7 +551,8 @@ def cavity_resistance(name: str) -> float:
 
 
 def alekseevskii_tate(speed: float, strength: float, resistance: float, until: float = math.inf) -> float:
-    """Depth, m, that the long rod digs into steel by a time, s, or while it moves and erodes; stresses in Pa."""
+    """Returns the depth, m, of the hole that the long rod makes in steel until a time, s, or while it moves and
+    erodes; stresses in Pa."""
     rod, target = library()["wha"].density, library()["mild_steel"].density
     length, depth, t, dt = 0.075, 0.0, 0.0, 1e-8
     while t < until and length > 1e-5:
@@ -580,7 +586,7 @@ def test_the_depth_of_the_long_rod_is_that_of_a_rod_which_erodes() -> None:
 def test_what_the_theory_gives_beside_the_long_rod(
     strength: float, resistance: float, depths: tuple[float, ...]
 ) -> None:
-    """The numbers of docs/verification/long_rod.md, mm."""
+    """The numbers are those of docs/verification/long_rod.md, mm."""
     found = [1e3 * alekseevskii_tate(speed, strength, resistance) for speed in (1057.0, 1301.0, 1566.4)]
     assert found == pytest.approx(depths, abs=0.2)
 

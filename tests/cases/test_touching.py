@@ -1,4 +1,4 @@
-"""Generated bodies that touch without a gap: approximate area, and a warning where no force acts between them."""
+"""Generated bodies that touch without a gap: approximate area, and a warning if no force acts between them."""
 
 import math
 from typing import Any

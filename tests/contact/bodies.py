@@ -1,4 +1,5 @@
-"""Bodies for the tests of contact: cases of several blocks, their pieces on some ranks, tables of nodes and faces."""
+"""Bodies for the tests of contact: cases of several blocks, their pieces on several ranks, tables of nodes and
+faces."""
 
 from collections.abc import Sequence
 from itertools import product
@@ -26,14 +27,14 @@ Flags = npt.NDArray[np.bool_]
 
 
 def moved(mesh: TetMesh, by: Sequence[float], turn: Floats | None = None) -> TetMesh:
-    """The mesh turned about its middle, then moved by ``by``, m."""
+    """Returns the mesh turned about its middle, then moved by ``by``, m."""
     middle = 0.5 * (mesh.points.min(axis=0) + mesh.points.max(axis=0))
     turned = mesh.points if turn is None else middle + (mesh.points - middle) @ turn.T
     return TetMesh(turned + np.asarray(by), mesh.tets)
 
 
 def rotation(axis: Sequence[float], angle: float) -> Floats:
-    """(3, 3) rotation about ``axis`` by ``angle``, rad (Rodrigues)."""
+    """Returns the (3, 3) rotation matrix about ``axis`` by ``angle``, rad (Rodrigues)."""
     n = np.asarray(axis, float) / np.linalg.norm(axis)
     cross = np.cross(np.eye(3), -n)
     return np.asarray(np.eye(3) + np.sin(angle) * cross + (1.0 - np.cos(angle)) * cross @ cross)
@@ -67,7 +68,7 @@ def surface_of(
 
 
 def nodes_of(x: Floats, v: Floats | None = None, part: Indices | None = None) -> SurfaceNodes:
-    """Free nodes of 1 kg with ids 0, 1, ... at ``x``."""
+    """Returns free nodes of 1 kg with ids 0, 1, ... at ``x``."""
     n = len(x)
     flown = np.zeros((n, 3)) if v is None else v
     return SurfaceNodes(
@@ -77,7 +78,7 @@ def nodes_of(x: Floats, v: Floats | None = None, part: Indices | None = None) ->
 
 
 def sheet(cells: int, size: float) -> tuple[Floats, Indices]:
-    """Returns nodes and triangles, normals up, of a square sheet at z = 0."""
+    """Returns nodes and triangles of a square sheet at z = 0, with normals upwards."""
     grid = np.array(list(product(range(cells + 1), range(cells + 1))), float) * size
     a = (np.array(list(product(range(cells), range(cells)))) @ [cells + 1, 1])[:, None]
     faces = np.concatenate([a + np.array([0, cells + 1, cells + 2]), a + np.array([0, cells + 2, 1])])

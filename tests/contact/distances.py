@@ -6,7 +6,7 @@ from ..worker.meshes import Floats
 
 
 def _along(p: Floats, a: Floats, b: Floats) -> Floats:
-    """Distance of points from segments; all of one shape (..., 3)."""
+    """Returns distances of points from segments; all arrays have one shape (..., 3)."""
     along = b - a
     length = np.maximum((along * along).sum(axis=-1), 1e-300)
     share = np.clip(((p - a) * along).sum(axis=-1) / length, 0.0, 1.0)
@@ -14,7 +14,8 @@ def _along(p: Floats, a: Floats, b: Floats) -> Floats:
 
 
 def above(p: Floats, a: Floats, b: Floats, c: Floats) -> Floats:
-    """Distance of points from triangles abc, of one shape (..., 3): above one its height, else to its rim."""
+    """Returns distances of points from triangles abc, all of one shape (..., 3): the height above the triangle if
+    the foot of the point is inside, else the distance from its border."""
     rim = np.minimum(np.minimum(_along(p, a, b), _along(p, b, c)), _along(p, c, a))
     normal = np.cross(b - a, c - a)
     normal /= np.maximum(np.linalg.norm(normal, axis=-1), 1e-300)[..., None]
@@ -26,8 +27,8 @@ def above(p: Floats, a: Floats, b: Floats, c: Floats) -> Floats:
 
 
 def across(a: Floats, b: Floats, c: Floats, d: Floats) -> Floats:
-    """Distance of segments ab and cd, none parallel, all of one shape (..., 3): at an end of one, or along the common
-    normal.
+    """Returns distances between segments ab and cd that are not parallel, all of one shape (..., 3): at an end of a
+    segment, or along the common normal.
     """
     ends = np.minimum(np.minimum(_along(a, c, d), _along(b, c, d)), np.minimum(_along(c, a, b), _along(d, a, b)))
     u, w, r = b - a, d - c, c - a
@@ -40,13 +41,13 @@ def across(a: Floats, b: Floats, c: Floats, d: Floats) -> Floats:
 
 
 def point_triangle(points: Floats, triangles: Floats) -> Floats:
-    """(n, m) distances of points (n, 3) from triangles (m, 3, 3)."""
+    """Returns (n, m) distances of points (n, 3) from triangles (m, 3, 3)."""
     a, b, c = (triangles[None, :, k] for k in range(3))
     return above(points[:, None, :], a, b, c)
 
 
 def segment_segment(segments: Floats) -> Floats:
-    """(n, n) distances between segments (n, 2, 3), none parallel."""
+    """Returns (n, n) distances between segments (n, 2, 3), none of them parallel."""
     a, b = segments[:, None, 0], segments[:, None, 1]
     c, d = segments[None, :, 0], segments[None, :, 1]
     return across(a, b, c, d)

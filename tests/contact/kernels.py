@@ -1,4 +1,4 @@
-"""Calls of the contact kernels for the tests: a changed signature changes this file only."""
+"""Calls of the contact kernels for the tests: if the signature of a kernel changes, only this file changes."""
 
 from types import SimpleNamespace
 from typing import Any
@@ -34,24 +34,25 @@ from .bodies import Indices
 
 
 def every_pair(tested: "np.ndarray", things: int) -> Indices:
-    """(p, 2) every one of the nodes ``tested`` with every one of the ``things``, sorted by node, then by thing."""
+    """Returns (p, 2) all pairs of one of the nodes ``tested`` and one of the ``things``, sorted by node, then by
+    thing."""
     return np.column_stack([np.repeat(tested, things), np.tile(np.arange(things), len(tested))]).astype(np.int32)
 
 
 def face_sizes(x: Floats, faces: Indices) -> Floats:
-    """(f,) square root of twice the area, m."""
+    """Returns (f,) square roots of twice the areas, m."""
     a, b, c = (x[faces[:, k]] for k in range(3))
     return np.asarray(np.sqrt(np.linalg.norm(np.cross(b - a, c - a), axis=1)))
 
 
 def edge_sizes(x: Floats, edges: Indices) -> Floats:
-    """(e,) lengths, m."""
+    """Returns (e,) lengths, m."""
     return np.asarray(np.linalg.norm(x[edges[:, 1]] - x[edges[:, 0]], axis=1))
 
 
 def edge_depths(x: Floats, edges: Indices) -> Floats:
-    """(e,) greatest depth of a contact, m: DEEP of their length and of the lowest height of the tets of their faces,
-    at least DEEP_SELF of their length.
+    """Returns (e,) the largest depth of a contact, m: DEEP times the length of the edge or the lowest height of the
+    tets of its faces, at least DEEP_SELF times the length.
     """
     (a, b, c, d, e, f), size = edges.T, edge_sizes(x, edges)
     low = np.minimum(lowest_heights(x[np.stack([a, b, c, e], 1)]), lowest_heights(x[np.stack([a, b, d, f], 1)]))
@@ -59,7 +60,7 @@ def edge_depths(x: Floats, edges: Indices) -> Floats:
 
 
 def lowest_heights(tets: Floats) -> Floats:
-    """(n,) lowest heights of tets (n, 4, 3), m: three volumes over the largest face."""
+    """Returns (n,) lowest heights of tets (n, 4, 3), m: three volumes over the largest face."""
     volumes = np.abs(np.linalg.det(tets[:, 1:] - tets[:, :1])) / 6.0
     one, two, three = (tets[:, [[0, 0, 0, 1], [1, 1, 2, 2], [2, 3, 3, 3]][k]] for k in range(3))
     areas = 0.5 * np.linalg.norm(np.cross(two - one, three - one), axis=2)
@@ -67,7 +68,7 @@ def lowest_heights(tets: Floats) -> Floats:
 
 
 def many(met: ContactRows) -> int:
-    """Number of active contacts."""
+    """Returns the number of active contacts."""
     return len(met.nodes)
 
 
@@ -77,8 +78,8 @@ def taken(met: ContactRows, rows: "np.ndarray") -> ContactRows:
 
 
 def moments(out: Floats) -> Floats:
-    """(n, 12) means of n and of n n (xx, yy, zz, yz, zx, xy) of the normals (n, faces, 3) of nodes' faces, with zero
-    mean direction to the faces.
+    """Returns (n, 12) means of n and of n n (xx, yy, zz, yz, zx, xy) of the normals (n, faces, 3) of the faces of
+    nodes, with zero mean direction to the faces.
     """
     squares = np.einsum("nfi,nfj->nij", out, out) / out.shape[1]
     pairs = [squares[:, i, j] for i, j in ((0, 0), (1, 1), (2, 2), (1, 2), (2, 0), (0, 1))]
@@ -86,7 +87,7 @@ def moments(out: Floats) -> Floats:
 
 
 def step_of(x: Floats, v: Floats, part: "np.ndarray", dt: float, mu: Floats | None = None) -> Step:
-    """Returns the step ahead of slots at ``x`` with velocities ``v``; without ``mu`` (parts, parts) there is no
+    """Returns the step record of slots at ``x`` with velocities ``v``; without ``mu`` (parts, parts) there is no
     friction."""
     friction = np.zeros((9, 9)) if mu is None else mu
     return Step.of(x, v, part.astype(np.int32), friction, PUSH_OUT, dt)
@@ -141,7 +142,7 @@ def node_face(
     mu: Floats | None = None, out: Floats | None = None, normals: Floats | None = None,
 ) -> ContactRows:  # fmt: skip
     """Returns the contacts of nodes that pass a face; the nodes are of another part unless ``part`` is given.
-    ``out`` (n, faces, 3): unit normals of a node's faces, all of one area, zero for a node without faces; or
+    ``out`` (n, faces, 3): unit normals of the faces of a node, all of one area, zero for a node without faces; or
     ``normals`` (n, 12), see SlotTable.
     """
     own = np.where(np.isin(np.arange(len(x)), faces), 0, 1) if part is None else part
@@ -159,7 +160,7 @@ def node_face(
 def edge_edge(
     x: Floats, v: Floats, edges: Indices, pairs: Indices, dt: float, mu: Floats | None = None, *, never: int = 0
 ) -> ContactRows:  # fmt: skip
-    """Returns the contacts of edges that pass an edge; ``never``: number of pairs that are deactivated for good."""
+    """Returns the contacts of edges that pass an edge; ``never``: number of pairs that are deactivated permanently."""
     table = pair_table(pairs)
     of = edge_table(edges, edge_sizes(x, edges), edge_depths(x, edges), np.zeros(len(edges)))
     step = step_of(x, v, np.zeros(len(x)), dt, mu)
@@ -169,7 +170,7 @@ def edge_edge(
 
 
 def column(n: int) -> ContactRows:
-    """Returns ``n`` nodes in a row along x, each in touch with the next one."""
+    """Returns ``n`` nodes in a row along x; each node touches the next one."""
     nodes = np.column_stack([np.arange(1, n), np.arange(n - 1), np.arange(n - 1), np.arange(n - 1)]).astype(np.int32)
     weights, normals = np.tile([1.0, -1.0, 0.0, 0.0], (n - 1, 1)), np.tile([1.0, 0.0, 0.0], (n - 1, 1))
     none = np.full(n - 1, -1, np.int32)
@@ -177,7 +178,7 @@ def column(n: int) -> ContactRows:
 
 
 def unit(random: np.random.Generator, n: int) -> Floats:
-    """(n, 3) random directions."""
+    """Returns (n, 3) random directions."""
     directions = random.normal(size=(n, 3))
     return np.asarray(directions / np.linalg.norm(directions, axis=1)[:, None])
 
@@ -185,7 +186,8 @@ def unit(random: np.random.Generator, n: int) -> Floats:
 def network(
     seed: int, meetings: int = 30, nodes: int = 25, friction: float = 0.0, wanted: float = 0.0, one_normal: bool = False
 ) -> tuple[ContactRows, Floats, Floats]:
-    """Returns random contacts that share nodes, of nodes with faces and of edges; velocities, and masses of 1000:1."""
+    """Returns random contacts with common nodes, of nodes with faces and of edges; also velocities, and masses up to
+    1000:1."""
     random = np.random.default_rng(seed)
     rows = np.array([random.choice(nodes, 4, replace=False) for _ in range(meetings)], np.int32).reshape(-1, 4)
     share, s, t = random.dirichlet(np.ones(3), meetings), random.uniform(size=meetings), random.uniform(size=meetings)
@@ -206,8 +208,8 @@ class Solver:
         self, met: ContactRows, v: Floats, mobility: Floats, scale: float = 2.0**40, active: ActiveSet | None = None,
         stops: Stops | None = None,
     ) -> None:  # fmt: skip
-        """``active``: arrays of another step, to be used again; ``stops``: all nodes are at the origin, the first is
-        of part 0, the others of part 1.
+        """``active``: arrays of another step, to be used again; ``stops``: all nodes are at the origin, the first
+        node belongs to part 0, the others to part 1.
         """
         self.met, self.v, self.scale, n = met, v.copy(), scale, len(v)
         self.unsettled = np.zeros(2, np.int64)
@@ -221,7 +223,7 @@ class Solver:
         self.begin(np.zeros((n, 3)))
 
     def begin(self, x: Floats) -> None:
-        """Begins a step, with the nodes at ``x``."""
+        """Begins a step with the nodes at ``x``."""
         self._surface_nodes.x, met = x, self.met
         rows = ActiveRows(met, np.arange(many(met), dtype=np.int32), n=many(met))
         alone = SharedSums([], SerialComm()).agree(rows, self._surface_nodes.local)
@@ -230,7 +232,7 @@ class Solver:
 
     @property
     def push(self) -> Floats:
-        """(n, 4) impulses along the normal, and of friction, N s."""
+        """Returns (n, 4) impulses along the normal and of friction, N s."""
         push = np.zeros((many(self.met), 4))
         rows, push_of = self.active.pushes()
         push[rows] = push_of

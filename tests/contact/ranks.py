@@ -1,5 +1,5 @@
-"""Several ranks in one process: a thread each, with a communicator that implements the protocol of the worker. A
-rank that fails wakes all others, so that a test ends with the first error instead of a timeout.
+"""Several ranks in one process: each is a thread with a communicator that implements the protocol of the worker. A
+rank that fails wakes all other ranks, so that a test ends with the first error instead of a timeout.
 """
 
 import threading
@@ -18,7 +18,7 @@ Floats = npt.NDArray[np.float64]
 T = TypeVar("T")
 _TRADE_TAG = 91
 _PATIENCE = 60.0
-"""Timeout, s, of a rank that waits for another one."""
+"""Timeout, s, of a rank that waits for another rank."""
 
 
 class World:

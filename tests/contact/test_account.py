@@ -1,4 +1,4 @@
-"""Contact gives back no more energy than it has taken, for any step."""
+"""Contact gives back at most the energy that it has taken, for any step."""
 
 from pathlib import Path
 
@@ -27,8 +27,8 @@ SPHERES = (
 
 @pytest.mark.parametrize("safety", [1.0, 0.9, 0.5])
 def test_spheres_that_meet_get_no_energy_from_contact(safety: float) -> None:
-    """Before the account, nodes sank in under a small force and were pushed out under a large one, which added 9e-4
-    of the energy."""
+    """Before the account was introduced, nodes penetrated under a small force and were pushed out under a large
+    force, which added 9e-4 of the energy."""
     data = apply_overrides(read_data(shipped_path("hertz_spheres")), [*SPHERES, f"numerics.dt_safety={safety}"])
     sim, lines = simulation.build(parse_case(data), Path(), SerialComm()), list[float]()
 
@@ -44,9 +44,9 @@ def test_spheres_that_meet_get_no_energy_from_contact(safety: float) -> None:
 
 @pytest.mark.parametrize("mu", [0.1, 0.8])
 def test_the_ledger_has_the_same_half_of_friction_and_of_the_normal_impulse(mu: float) -> None:
-    """A block slides over another one and is pressed on it. The line of the first time has half of the work of the
-    first impulses, with the initial velocities: friction to contact as mu times the sliding speed to the closing
-    speed. After the second half of the last impulses all work is booked.
+    """A block slides over another block and is pressed on it. The line of the first time has half of the work of the
+    first impulses, with the initial velocities: the ratio of friction to contact is mu times the sliding speed over
+    the closing speed. After the second half of the last impulses all work is booked.
     """
     size, sliding, closing = 1e-3, 15.0, 5.0
     low, high = block((4, 4, 2), size, seed=1), block((3, 3, 2), size, seed=2)
@@ -87,7 +87,7 @@ def test_contact_that_makes_energy_ends_the_run() -> None:
 
 
 def test_the_cost_of_an_impulse_is_the_work_between_two_half_steps() -> None:
-    """Nodes of 1 and 3 kg and two without weight; the second contact has no impulse."""
+    """The contacts have nodes of 1 and 3 kg and two nodes of infinite mobility; the second contact has no impulse."""
     before, v = np.zeros((4, 3)), np.zeros((4, 3))
     before[:2, 0], v[:2, 0] = (2.0, -1.0), (-1.0, 0.0)
     loaded, active, account = Loaded.of(2, 1), ActiveNodes.of(4), Account(1.0)
@@ -108,7 +108,7 @@ def booked(account: Account, taken: float, early: float = 0.0) -> None:
 
 
 def test_contact_gives_back_no_energy_that_it_has_not_taken() -> None:
-    """Only while the balance is at least twice the largest energy given back in one step."""
+    """Contact gives back energy only while the balance is at least twice the largest energy given back in one step."""
     account = Account(1.0)
     assert account.settle(account.words)
     for taken, early, may in (

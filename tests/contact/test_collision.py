@@ -1,4 +1,4 @@
-"""Bodies that collide: momentum, energy, and one answer for any search, cut and frame of reference."""
+"""Bodies that collide: momentum, energy, and the same answer for any search, cut and frame of reference."""
 
 import math
 from collections.abc import Callable
@@ -29,7 +29,8 @@ MESHES = [
     block((3, 3, 3), SIZE, seed=1),
     moved(block((2, 3, 2), 1.2 * SIZE, seed=2), (3.89 * SIZE, 0.4 * SIZE, 0.6 * SIZE), rotation((1, 2, 3), 0.5)),
 ]
-"""Two blocks whose meshes do not match, the second one turned, a corner of it nearly on the face of the first."""
+"""Two blocks whose meshes do not match; the second block is turned, and one of its corners is nearly on the face of
+the first."""
 MOTIONS: list[dict[str, Any]] = [
     {"velocity": (60.0, 5.0, 0.0), "spin": {"centre": (1.5 * SIZE,) * 3, "rate": (3e3, 0.0, 1e4)}},
     {"velocity": (-70.0, 0.0, 10.0)},
@@ -52,7 +53,7 @@ def answer(case: schema.Case, watch: Watch | None = None) -> tuple[str | None, i
 
 
 def momenta(sim: Simulation) -> tuple[Floats, Floats]:
-    """Linear and angular, correctly rounded sums; the leapfrog conserves x(n) x m v(n+1/2)."""
+    """Returns linear and angular momentum as correctly rounded sums; the leapfrog conserves x(n) x m v(n+1/2)."""
     nodes = sim.model.nodes
     p = nodes.mass[:, None] * nodes.v
     columns = np.column_stack([p, np.cross(nodes.x, p)])
@@ -62,8 +63,8 @@ def momenta(sim: Simulation) -> tuple[Floats, Floats]:
 
 @pytest.mark.parametrize("friction", [0.0, 0.3])
 def test_a_collision_keeps_the_momentum(friction: float) -> None:
-    """Linear momentum to round-off; angular momentum up to the moment of the gaps over which impulses act, which is
-    zero along the normal."""
+    """Linear momentum is conserved to round-off. Angular momentum is conserved up to the moment of the gaps over
+    which impulses act, which is zero along the normal."""
     sim = build(case_of(friction=friction), MESHES)
     assert sim.contact is not None
     linear, angular = momenta(sim)
@@ -88,7 +89,7 @@ def test_the_ledger_closes_and_contact_only_loses(friction: float) -> None:
 
 
 FLAT = [block((3, 3, 3), SIZE, seed=1), moved(block((2, 2, 2), 1.3 * SIZE, seed=2), (3.02 * SIZE, 0.0, 0.0))]
-"""Two blocks a little apart along x, with two sides in common planes."""
+"""Two blocks a small distance apart along x, with two sides in common planes."""
 BOUNDARIES: dict[str, Any] = {
     "pusher": ({"kind": "velocity", "parts": ("body0",), "x": 50.0, "y": 0.0, "z": 0.0},),
     "guide": ({"kind": "velocity", "parts": ("body0",), "x": 50.0},),
@@ -101,7 +102,7 @@ BOUNDARIES: dict[str, Any] = {
 @pytest.mark.parametrize("friction", [0.0, 0.2])
 @pytest.mark.parametrize("kind", BOUNDARIES)
 def test_the_ledger_closes_where_boundaries_hold_what_contact_pushes(kind: str, friction: float) -> None:
-    """The supports of held nodes take the impulse; a node on a symmetry plane stays there, to the bit."""
+    """The supports of held nodes take the impulse; a node on a symmetry plane stays on it, to the bit."""
     motions: list[dict[str, Any]] = [{"velocity": (50.0, 0.0, 0.0)}, {}]
     sim = build(meeting_of(motions, {"friction": friction}, end=3e-6, boundaries=BOUNDARIES[kind]), FLAT)
     lines: list[Energy] = []
@@ -128,7 +129,7 @@ def test_equal_runs_have_equal_digests() -> None:
 
 
 def test_a_search_in_every_step_changes_no_bit() -> None:
-    """To the bit: the candidate list lacks no pair until the next search."""
+    """The bits are equal, because the candidate list contains every pair that becomes active before the next search."""
 
     def search(sim: Simulation, before: Floats) -> None:
         assert sim.contact is not None
@@ -169,8 +170,8 @@ def on_threads(ranks: int, case: schema.Case, work: Callable[[Simulation], Any],
 @pytest.mark.parametrize("kind", ["arbitrary", "box"])
 @pytest.mark.parametrize("ranks", [2, 3, 5])
 def test_any_number_of_ranks_gives_the_same_bits(ranks: int, kind: str) -> None:
-    """With friction and edges, for any faces that the ranks send each other. All search together; one rank searches
-    less often."""
+    """The scene has friction and edges; the result does not depend on the faces that the ranks send each other. All
+    ranks search together; one rank alone searches less often."""
     whole = answer(case_of(friction=0.3))
     case = case_of(friction=0.3, domain=kind)
     parts = on_threads(ranks, case, lambda sim: state_of(run(sim)), MESHES)
@@ -208,7 +209,7 @@ def test_bodies_that_never_meet_move_as_if_there_were_no_contact() -> None:
 
 
 def test_a_common_velocity_does_not_change_a_collision() -> None:
-    """A common velocity changes nothing, except the round-off of positions."""
+    """A common velocity has no effect, except the round-off of positions."""
     results = []
     drift = np.array([200.0, -300.0, 100.0])
     for flight in (0.0 * drift, drift):
@@ -219,7 +220,8 @@ def test_a_common_velocity_does_not_change_a_collision() -> None:
 
 
 def crossed(edges: bool) -> float:
-    """Mean velocity along z, m/s, of the upper of two bars that collide with an edge each, crosswise, 1e-5 s later."""
+    """Returns the mean velocity along z, m/s, of the upper of two crossed bars that collide with one edge each, 1e-5
+    s later."""
     bar = block((6, 2, 2), SIZE, 0.0)
     meshes = [moved(bar, (0.0, 0.0, 0.0), rotation((1, 0, 0), np.pi / 4))]
     turn = rotation((0, 0, 1), np.pi / 2) @ rotation((1, 0, 0), np.pi / 4)
@@ -236,14 +238,15 @@ def test_crossed_edges_bounce_and_pass_where_edges_are_off() -> None:
 
 
 SLABS = [block((3, 2, 1), SIZE, seed=1), moved(block((2, 3, 1), SIZE, seed=2), (3.01 * SIZE, -0.4 * SIZE, 0.0))]
-"""Two plates one tet thick, whose ends face each other along x."""
+"""Two plates one tet thick, whose ends are opposite to each other along x."""
 THIN = tuple({"kind": "symmetry", "axis": "z", "at": at} for at in (0.0, SIZE))
 """Plane strain: every node of the plates is on one of the two planes."""
 
 
 @pytest.mark.parametrize("ranks", [1, 3])
 def test_bodies_one_tet_thick_between_two_symmetry_planes_do_not_pass_each_other(ranks: int) -> None:
-    """At 20 m/s each they are in contact after 0.25 us; 8 us later they would overlap by 0.3 mm."""
+    """At 20 m/s each the plates are in contact after 0.25 us; without contact they would overlap by 0.3 mm 8 us
+    later."""
     case = meeting_of([{"velocity": (20.0, 0.0, 0.0)}, {"velocity": (-20.0, 0.0, 0.0)}], end=8e-6, boundaries=THIN)
 
     def ended(sim: Simulation) -> tuple[float, float, str | None]:
@@ -261,7 +264,8 @@ def test_bodies_one_tet_thick_between_two_symmetry_planes_do_not_pass_each_other
 
 
 def test_only_a_face_in_one_symmetry_plane_is_no_surface() -> None:
-    """A plate one tet thick has its sides, two faces a cell; a plate between planes across two axes its ends."""
+    """The surface of a plate one tet thick includes its sides, two faces for each cell; the surface of a plate
+    between planes normal to two axes includes its ends."""
     walls = (*THIN, *({"kind": "symmetry", "axis": "y", "at": at, "parts": ("body0",)} for at in (0.0, 2.0 * SIZE)))
     case = meeting_of([{}, {}], end=END, boundaries=walls)
     sim = build(case, SLABS)
@@ -273,7 +277,7 @@ def test_only_a_face_in_one_symmetry_plane_is_no_surface() -> None:
 
 @pytest.mark.parametrize(("parts", "named"), [(("body1",), "body1"), ((), "body0")])
 def test_a_part_whose_faces_all_lie_on_symmetry_planes_is_named(parts: tuple[str, ...], named: str) -> None:
-    """Also when no part has a face at all."""
+    """This includes the case in which no part has a face."""
     cube = block((2, 2, 2), SIZE, shake=0.0)
     planes = tuple(
         schema.Symmetry(kind="symmetry", axis=axis, at=at, parts=parts)
@@ -286,7 +290,7 @@ def test_a_part_whose_faces_all_lie_on_symmetry_planes_is_named(parts: tuple[str
 
 
 def collided(share: float) -> tuple[Simulation, list[Energy], Floats]:
-    """Two blocks that do not match collide; returns ledgers and drift of the momentum."""
+    """Returns energy balances and the drift of the momentum of two colliding blocks whose meshes do not match."""
     sim, lines = build(case_of(restitution=share), MESHES), []
     start = np.concatenate(momenta(sim))
     run(sim, lambda sim, before: lines.append(sim.ledger.close(before)))
@@ -294,7 +298,7 @@ def collided(share: float) -> tuple[Simulation, list[Energy], Floats]:
 
 
 def test_an_impact_with_restitution_1_takes_no_energy() -> None:
-    """Many nodes and edges at once; momentum is conserved, and the energy balance closes."""
+    """Many nodes and edges are in contact at once; momentum is conserved, and the energy balance closes."""
     taken = []
     for share in (0.0, 0.5, 1.0):
         sim, lines, drift = collided(share)
@@ -308,7 +312,8 @@ def test_an_impact_with_restitution_1_takes_no_energy() -> None:
 
 @pytest.mark.parametrize("gap", [0.0, 0.02])
 def test_the_force_of_contact_is_what_changes_the_momentum(gap: float) -> None:
-    """Force times time over all lines of the history, of blocks that touch from the start and of blocks that do not."""
+    """The sum of force times time over all lines of the history is the change of momentum, for blocks that touch
+    from the start and for blocks that do not."""
     case = meeting_of(
         [{}, {"velocity": (-80.0, 10.0, 0.0)}], end=1e-6,
         probes=tuple(
@@ -333,7 +338,7 @@ def test_the_force_of_contact_is_what_changes_the_momentum(gap: float) -> None:
 
 
 def _momenta_of_parts(sim: Simulation) -> Floats:
-    """(6,) momentum from v(n+1/2), of body0 and body1, kg m/s."""
+    """Returns (6,) momentum from v(n+1/2) of body0 and body1, kg m/s."""
     nodes = sim.model.nodes
     p = nodes.mass[:, None] * nodes.v
     return np.array([math.fsum(column) for part in range(2) for column in p[nodes.part == part].T])
@@ -349,7 +354,8 @@ def test_the_answer_with_restitution_is_the_same_on_three_ranks() -> None:
 
 @pytest.mark.parametrize(("gap", "restitution"), [(0.0, 0.0), (0.1, 0.0), (0.1, 1.0), (2.5, 0.0), (2.5, 1.0)])
 def test_the_step_in_which_fast_bodies_meet_first_is_short(gap: float, restitution: float) -> None:
-    """At 10 km/s, from a ``gap`` of so many edges: the impulse of contact moves a node by half of a tet at most."""
+    """The bodies move at 10 km/s from a ``gap`` in edge lengths: the impulse of contact moves a node by at most half
+    of a tet."""
     striker = moved(block((2, 2, 2), SIZE, seed=2), ((3.0 + gap) * SIZE, 0.4 * SIZE, 0.6 * SIZE))
     case = meeting_of([{}, {"velocity": (-1e4, 0.0, 0.0)}], {"restitution": restitution}, end=1e-6)
     sim = build(case, [block((3, 3, 3), SIZE, seed=1), striker])

@@ -1,4 +1,4 @@
-"""The common volume of bodies or fragments is measured, whether a node is inside of another body or not."""
+"""The common volume of bodies or fragments is measured, with and without nodes inside of another body."""
 
 import numpy as np
 import pytest
@@ -18,7 +18,7 @@ REGULAR = np.array([[1.0, 1.0, 1.0], [-1.0, 1.0, -1.0], [1.0, -1.0, -1.0], [-1.0
 
 
 def common(one: Floats, other: Floats) -> float:
-    """Common volume over the volume of the first tet."""
+    """Returns the common volume over the volume of the first tet."""
     rooms = np.empty((2, 81, 4, 3))
     whole = float(np.linalg.det(one[1:] - one[:1]))
     return float(intersection(rooms[0], rooms[1], np.ascontiguousarray(one), np.ascontiguousarray(other))) / whole
@@ -34,12 +34,13 @@ def common(one: Floats, other: Floats) -> float:
         (0.5 * CORNER, CORNER, 1.0),
         (CORNER, CORNER + np.array([1.0, 0.0, 0.0]), 0.0),
         (CORNER, CORNER + np.array([5.0, 0.0, 0.0]), 0.0),
-        (REGULAR, -REGULAR[[0, 1, 3, 2]], 0.5),  # the octahedron of Kepler's star
+        (REGULAR, -REGULAR[[0, 1, 3, 2]], 0.5),  # the octahedron that two tets of a stella octangula have in common
         (CORNER, np.array([[0.2, 0.2, -1.0], [0.25, 0.2, -1.0], [0.2, 0.25, -1.0], [0.2, 0.2, 9.0]]), None),
     ],
 )
 def test_what_two_tets_have_in_common(one: Floats, other: Floats, share: float | None) -> None:
-    """Without an expected value: counted by points on a fine grid. No node of either needs to be in the other."""
+    """If no value is given, the expected value is counted with points on a fine grid. No node of a tet needs to be
+    in the other tet."""
     both = (
         common(one, other),
         common(other, one) * np.linalg.det(other[1:] - other[:1]) / np.linalg.det(one[1:] - one[:1]),
@@ -51,7 +52,7 @@ def test_what_two_tets_have_in_common(one: Floats, other: Floats, share: float |
 
 
 def sampled(one: Floats, other: Floats) -> float:
-    """The same value from points of a grid."""
+    """Returns the common volume counted with the points of a grid."""
     low, high, n = other.min(axis=0), other.max(axis=0), 120
     low, high = np.maximum(low, one.min(axis=0)), np.minimum(high, one.max(axis=0))
     axes = [a + (np.arange(n) + 0.5) / n * (b - a) for a, b in zip(low, high, strict=True)]
@@ -71,7 +72,7 @@ def test_random_tets_by_points_of_a_grid() -> None:
 
 
 def turned(tet: Floats) -> Floats:
-    """Corners of a tet that is not inverted."""
+    """Returns the corners of a tet, in an order with positive volume."""
     return tet if np.linalg.det(tet[1:] - tet[:1]) > 0.0 else tet[[0, 2, 1, 3]]
 
 
@@ -80,7 +81,7 @@ LOWER, UPPER = block((4, 4, 4), 1e-3, shake=0.0), moved(block((2, 2, 2), 1e-3, s
 
 
 def sunk(sim: Simulation, depth: float) -> CommonVolume:
-    """Result for a block of 2 x 2 mm that has sunk ``depth``, m, into the top of one of 4 x 4 mm."""
+    """Returns the result for a block of 2 x 2 mm that penetrates the top of a block of 4 x 4 mm by ``depth``, m."""
     sim.model.nodes.x[sim.model.nodes.part == 1, 2] -= 0.5e-3 + depth
     return seen(sim)
 
@@ -92,7 +93,7 @@ def seen(sim: Simulation) -> CommonVolume:
 
 @pytest.mark.parametrize("depth", [-0.1e-3, 0.0, 0.02e-3, 0.3e-3, 0.9e-3])
 def test_a_block_that_has_sunk_into_another(depth: float) -> None:
-    """All of it is in tets with a corner on the surface, of either block: the volume counts twice."""
+    """The whole common volume is in tets with a corner on the surface, of both blocks: the volume counts twice."""
     found, deep = sunk(build(CASE, [LOWER, UPPER]), depth), max(depth, 0.0)
     whole = 4.0**3 - core() + 8.0
     assert found.share * whole == pytest.approx(2 * 4.0 * deep / 1e-3, rel=1e-6)
@@ -101,7 +102,7 @@ def test_a_block_that_has_sunk_into_another(depth: float) -> None:
 
 
 def core() -> float:
-    """Volume of the tets of the larger block without a corner on its surface, mm^3."""
+    """Returns the volume of the tets of the larger block without a corner on its surface, mm^3."""
     outer = np.any((LOWER.points < 1e-9) | (LOWER.points > 4e-3 - 1e-9), axis=1)
     return float((~np.asarray(outer)[LOWER.tets].any(axis=1)).sum()) / 6.0
 
@@ -125,7 +126,7 @@ def test_bars_that_cross_without_a_node_inside() -> None:
 
 
 def test_loose_tets_of_one_part_that_meets_itself() -> None:
-    """Without fracture there are no fragments: tets without a common node count."""
+    """Without fracture there are no fragments: the common volume of tets without a common node counts."""
     mesh = block((2, 1, 1), 1e-3, shake=0.0)
     loose = TetMesh(mesh.points[mesh.tets].reshape(-1, 3), np.arange(4 * len(mesh.tets), dtype=np.int32).reshape(-1, 4))
     centres = np.repeat(loose.points.reshape(-1, 4, 3).mean(axis=1), 4, axis=0)

@@ -13,7 +13,7 @@ from conoid.worker.model.topology import Split
 
 
 def cracks_of(n: int) -> Cracks:
-    """Returns ``n`` cracks, each with its number in all columns, with no side on this rank."""
+    """Returns ``n`` cracks that have their number in all columns and no side on this rank."""
     number = np.arange(n)
     found = Cracks.none(np.arange(0))
     tets, nodes = np.column_stack([2 * number, 2 * number + 1]), np.repeat(number[:, None], 3, axis=1)
@@ -44,8 +44,8 @@ def test_a_crack_that_comes_after_others_have_opened_stands_behind_those_that_ar
 
 
 def test_a_rank_with_both_sides_of_a_crack_has_the_row_of_the_first() -> None:
-    """Ranks with one side each begin with different nodes, on which the last bit of a normal depends; and the rank
-    of the first side has computed the crack."""
+    """Ranks with one side each begin with different nodes, and the last bit of a normal depends on the first node.
+    The rank of the first side has computed the crack."""
     ids, places, zeros = np.array([10, 11, 12]), np.zeros(3, np.int32), np.zeros((3, 3))
     none, force = np.zeros(3), zeros.astype(np.int64)
     nodes = Nodes(ids, places, places, np.ones(3, bool), zeros, zeros, zeros, none, force, none)
@@ -93,7 +93,7 @@ def test_a_family_has_the_first_and_the_last_copy_of_a_node() -> None:
 def test_edges_that_had_both_ends_in_common_are_a_pair_once_they_have_none(
     second: tuple[int, int], now: tuple[int, int]
 ) -> None:
-    """Edges of any direction: once there were two pairs if they were opposite."""
+    """The edges have any direction. In an earlier version edges of opposite directions were listed in two pairs."""
     family = Family(*families(np.array([[0, 3], [1, 4]], np.int32), 6))
     old = np.array([[0, 1, 2, 5], [*second, 2, 5]], np.int32)
     after = np.array([[0, 1, 2, 5], [*now, 2, 5]], np.int32)

@@ -1,5 +1,5 @@
-"""The contact domain: everything that touches another rank's boxes is sent; cells send no more than bounding boxes
-do."""
+"""The contact domain: all faces and edges that touch the boxes of another rank are sent; cells send at most as much
+as bounding boxes."""
 
 import numpy as np
 import pytest
@@ -17,7 +17,7 @@ KINDS = ("box", "arbitrary")
 
 
 class Share:
-    """Boxes of one rank: of its nodes and edges, of its faces, of its edges; some ranks have none of a kind."""
+    """Boxes of one rank: of its nodes and edges, of its faces, of its edges; some ranks have no box of a kind."""
 
     def __init__(self, rank: int, seed: int, ranks: int) -> None:
         random = np.random.default_rng([seed, rank])
@@ -40,7 +40,7 @@ def chosen(kind: str, shares: list[Share], edge: float) -> list[dict[int, list[F
 
 
 def touched(things: Boxes, askers: Boxes) -> Flags:
-    """(things,) which of them touch a box of the askers', by comparing all pairs."""
+    """Returns (things,) whether each thing touches a box of the requesting ranks, by comparison of all pairs."""
     low, high = askers.low[None], askers.high[None]
     touch = np.asarray(((things.low[:, None] <= high) & (things.high[:, None] >= low)).all(axis=2))
     return np.asarray(touch.any(axis=1))
@@ -89,7 +89,8 @@ def test_a_rank_that_needs_no_ghosts_is_left_out() -> None:
 
 
 def faces_received(kind: str, drift: float, ranks: int = 3) -> int:
-    """Number of ghost faces of all ranks for two blocks that approach at 10 m/s, and drift in x, y and z, m/s."""
+    """Returns the number of ghost faces of all ranks for two blocks that approach at 10 m/s, and move together in x,
+    y and z, m/s."""
     meshes = [
         block((4, 4, 4), 1e-3),
         moved(block((3, 3, 3), 1e-3), (1e-3, 1e-3, 4.5e-3), rotation((1, 2, 0), 0.2)),

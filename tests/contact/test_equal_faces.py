@@ -37,7 +37,8 @@ def tets(corners: list[Floats], heights: float) -> TetMesh:
 
 
 def common(one: Floats, two: Floats) -> float:
-    """Share of POINTS of a tet, corners (4, 3), that are inside of another one by more than 0.01 of it."""
+    """Returns the fraction of POINTS of a tet, corners (4, 3), that are inside of another tet by more than 0.01 of
+    it."""
     inside = np.linalg.solve((two[1:] - two[0]).T, (POINTS @ one - two[0]).T).T
     return float((np.column_stack([inside, 1.0 - inside.sum(axis=1)]).min(axis=1) > 0.01).mean())
 
@@ -47,7 +48,7 @@ def common(one: Floats, two: Floats) -> float:
     [(2.0, 0.0, 0.0), (2.0, 0.05, 0.0), (2.0, 0.2, 0.0), (1.41, 0.1, 3.0), (6.0, 0.1, 3.0), (0.5, 0.2, 180.0)],
 )
 def test_equal_faces_do_not_pass_each_other(height: float, shift: float, turn: float) -> None:
-    """Shifted by up to ``shift`` of their circumradius, and turned by up to ``turn`` degrees."""
+    """The faces are shifted by up to ``shift`` of their circumradius, and rotated by up to ``turn`` degrees."""
     random, upper, lower = np.random.default_rng(1), [], []
     for k in range(MANY):
         place = np.array([APART * (k % 5), APART * (k // 5), 0.0])

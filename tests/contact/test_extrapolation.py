@@ -1,4 +1,4 @@
-"""Extrapolated velocities of a search: rigid motions are kept, vibrations are removed."""
+"""Extrapolated velocities of a search: rigid motions are preserved, vibrations are removed."""
 
 import numpy as np
 import pytest
@@ -13,7 +13,7 @@ QUANTUM = 2.0**-16
 
 
 def course(x: Floats, v: Floats, tets: list[list[int]], brittle: bool = True) -> Floats:
-    """Nodes of 1 kg."""
+    """Returns the extrapolated velocities of nodes of 1 kg."""
     n, corners = len(x), np.array(tets, np.uint32)
     one = np.zeros(n, np.int32)
     force = np.zeros((n, 3), np.int64)
@@ -30,7 +30,7 @@ def test_a_rigid_motion_is_kept() -> None:
 
 @pytest.mark.parametrize("seed", range(3))
 def test_the_rigid_motion_has_the_momentum_and_spin_of_the_tet(seed: int) -> None:
-    """The rigid motion of least squares: the removed part has neither."""
+    """The rigid motion is that of least squares: the removed part has neither momentum nor spin."""
     v = np.random.default_rng(seed).normal(0.0, 100.0, (4, 3))
     left = v - course(TET, v, [[0, 1, 2, 3]])
     assert np.abs(left.sum(axis=0)).max() < 4 * QUANTUM
@@ -39,7 +39,7 @@ def test_the_rigid_motion_has_the_momentum_and_spin_of_the_tet(seed: int) -> Non
 
 
 def test_vibration_is_removed() -> None:
-    """A tet that changes its size is extrapolated with its centre."""
+    """A tet that changes its size is extrapolated with the velocity of its centre."""
     v = 1e5 * (TET - TET.mean(axis=0)) + np.array([50.0, 0.0, 0.0])
     assert np.abs(course(TET, v, [[0, 1, 2, 3]]) - [50.0, 0.0, 0.0]).max() < QUANTUM
 
@@ -54,7 +54,8 @@ def test_a_node_of_two_tets_has_the_mean_of_their_motions() -> None:
 
 
 def test_other_nodes_keep_their_velocities() -> None:
-    """Nodes of a metal, of no tet, and of a tet too flat for a spin keep their own or mean velocities."""
+    """Nodes of a metal, nodes without tets, and nodes of a tet too flat for a spin have their own or mean
+    velocities."""
     v = np.random.default_rng(2).normal(0.0, 100.0, (4, 3))
     assert np.array_equal(course(TET, v, [[0, 1, 2, 3]], brittle=False), v)
     assert np.array_equal(course(np.concatenate([TET, TET[:1]]), np.concatenate([v, v[:1]]), [[0, 1, 2, 3]])[4], v[0])

@@ -1,7 +1,6 @@
-"""Bodies that pass each other's free edges: flush, or nearer than the tolerance of a node on a face.
-
-A node beside a convex edge is in front of one of its two faces, and so not in the body, however little it is beyond
-the border of the other face.
+"""Bodies that pass the free edges of another body: flush, or nearer than the tolerance of a node on a face. A node
+beside a convex edge is in front of one of the two faces of the edge, and therefore outside of the body, also if it
+is only slightly beyond the border of the other face.
 """
 
 import numpy as np
@@ -21,18 +20,18 @@ LEAN = float(np.tan(np.radians(12.5)))
 
 
 def box(cells: tuple[int, int, int], size: float, low: tuple[float, float, float]) -> TetMesh:
-    """Cubes of ``size`` from ``low`` on, mm."""
+    """Returns cubes of ``size`` from ``low`` on, mm."""
     return moved(block(cells, MM * size, 0.0), [MM * value for value in low])
 
 
 def passed(*meshes: TetMesh) -> Simulation:
-    """The first body collides with the others along x, without friction."""
+    """Returns the result after the first body has moved along x towards the others, without friction."""
     motions = [{"velocity": (SPEED, 0.0, 0.0)}, *({} for _ in meshes[1:])]
     return run(build(meeting_of(motions, end=END), meshes))
 
 
 def speed(sim: Simulation, part: int = 0) -> float:
-    """Mean velocity of a part along x, m/s."""
+    """Returns the mean velocity of a part along x, m/s."""
     nodes = sim.model.nodes
     mass = nodes.mass * (nodes.part == part)
     return float(mass @ nodes.v[:, 0] / mass.sum())
@@ -60,14 +59,14 @@ def test_bars_fly_past_each_other_side_by_side() -> None:
 
 @pytest.mark.parametrize("depth", [0.0, 0.1, 1.0, 5.9])
 def test_what_is_lower_than_the_top_of_the_plate_meets_it(depth: float) -> None:
-    """Head-on with tops that are flush, and with a lower overlap, down to a tenth of a millimetre."""
+    """The plates collide head-on, with flush tops and with a smaller overlap, down to a tenth of a millimetre."""
     low = -6.0 + depth
     assert speed(passed(box((5, 5, 3), 2.0, (-4.0, -5.0, low)), PLATE)) < 0.9 * SPEED
 
 
 @pytest.mark.parametrize("above", [0.0, 0.001])
 def test_what_slides_on_a_floor_meets_the_wall_at_its_end(above: float) -> None:
-    """Of one body, concave: a node in front of the floor enters through the wall."""
+    """The body is concave: a node in front of the floor enters through the wall."""
     whole = box((12, 6, 6), 2.0, (-6.0, -6.0, -6.0))
     middles = whole.points[whole.tets].mean(axis=1)
     tets = whole.tets[(middles[:, 0] > 8.0 * MM) | (middles[:, 2] < 0.0)]
@@ -80,7 +79,8 @@ def test_what_slides_on_a_floor_meets_the_wall_at_its_end(above: float) -> None:
 
 
 def ridge(node: float) -> TetMesh:
-    """A bar of two layers whose sharp edge, in front, leans by 12.5 degrees; its middle ``node``, mm, is at y = 0."""
+    """Returns a bar of two layers whose sharp front edge is inclined by 12.5 degrees; its middle ``node``, mm, is at
+    y = 0."""
     mesh = block((2, 2, 2), 1.0, 0.0)
     across, along, up = (mesh.points / (2, 2, 1)).T
     z = np.interp(up, [0.0, 1.0, 2.0], [-1.0, node, 2.0])
@@ -91,9 +91,9 @@ def ridge(node: float) -> TetMesh:
 
 @pytest.mark.parametrize("node", [0.23, 0.26, 0.35, 0.44, 0.53])
 def test_a_leaning_ridge_slides_down_a_rim(node: float) -> None:
-    """A thin block is pressed against the ridge by its weight and yields to it. Where the top of the block caught a
-    node of the ridge some 1e-3 of a face behind the rim, the external work was 164, 9, 23 and 120 mJ instead of 0.7;
-    not at 0.26.
+    """A thin block is pressed against the ridge by its weight and moves back. In an earlier version the top of the
+    block stopped a node of the ridge some 1e-3 of a face behind the rim: the external work was 164, 9, 23 and 120 mJ
+    instead of 0.7 mJ, but not at 0.26.
     """
     drive = {"kind": "velocity", "parts": ("body0",), "x": 0.0, "y": 0.0, "z": -20.0}
     held = {"kind": "symmetry", "axis": "z", "at": -0.25 * MM, "parts": ("body1",)}

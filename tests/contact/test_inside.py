@@ -1,4 +1,4 @@
-"""Nodes inside of other bodies are found, with their depth."""
+"""Nodes inside of other bodies are found, and their depth is computed."""
 
 import numpy as np
 import pytest
@@ -15,7 +15,7 @@ SIZE = 1e-3
 
 
 def sunk(depth: float) -> Simulation:
-    """A small block that has sunk ``depth``, m, into the top of a larger one, between four nodes there."""
+    """Returns a small block that penetrates the top of a larger block by ``depth``, m, between four of its nodes."""
     lower, upper = block((4, 4, 4), SIZE, shake=0.0), block((2, 2, 2), 0.4 * SIZE, shake=0.0)
     case = meeting_of([{}, {}], end=2e-7)
     sim = build(case, [lower, moved(upper, (1.13 * SIZE, 1.08 * SIZE, 4.5 * SIZE))])
@@ -37,8 +37,8 @@ def test_what_is_apart_in_touch_or_hardly_deep_is_not_inside(depth: float) -> No
 
 @pytest.mark.parametrize("depth", [0.2 * SIZE, 0.3 * SIZE])
 def test_the_lower_nodes_of_a_block_are_as_deep_as_it_has_sunk(depth: float) -> None:
-    """Nine nodes; those in tets without a face on top count by their distance from the nearest face of the tet,
-    which may be small.
+    """Nine nodes are inside. For nodes in tets without a face on top the depth is the distance from the nearest face
+    of the tet, which may be small.
     """
     sim = sunk(depth)
     found = seen(sim)
@@ -50,7 +50,7 @@ def test_the_lower_nodes_of_a_block_are_as_deep_as_it_has_sunk(depth: float) -> 
 
 
 def test_what_has_gone_through_the_outermost_tets_is_buried() -> None:
-    """The middle of the larger block has tets without a corner on its surface."""
+    """The middle of the larger block consists of tets without a corner on its surface."""
     found = seen(sunk(2.0 * SIZE))
     assert found.nodes > 9
     assert found.buried > 0
@@ -61,7 +61,7 @@ def test_what_has_gone_through_the_outermost_tets_is_buried() -> None:
 
 @pytest.mark.parametrize(("depth", "buried"), [(0.025 * SIZE, False), (0.1 * SIZE, True)])
 def test_what_touches_a_surface_whose_tets_are_flat_is_not_inside(depth: float, buried: bool) -> None:
-    """The top layer of the larger block is a hundredth as thick as before: the tets below it have no corner on the
+    """The top layer of the larger block is compressed to a hundredth: the tets below it have no corner on the
     surface.
     """
     sim = sunk(depth)
@@ -73,7 +73,7 @@ def test_what_touches_a_surface_whose_tets_are_flat_is_not_inside(depth: float, 
 
 
 def test_fragments_of_one_part_are_treated_as_bodies() -> None:
-    """Two separate halves of a body; and an unbroken body is inside of nothing."""
+    """The body consists of two separate halves. An unbroken body has no nodes inside of itself."""
     sim = sunk(0.3 * SIZE)
     assert sim.contact is not None
     one = [np.zeros(b.n, np.int64) for b in sim.model.blocks]
@@ -90,8 +90,8 @@ def test_parts_that_do_not_meet_may_be_in_each_other() -> None:
 
 
 def test_nodes_on_faces_between_tets_are_inside() -> None:
-    """A cube that has sunk into an equal one: all nodes of either are on edges and faces of tets of the other, and
-    those in the middle of the two faces and of the body on these only.
+    """A cube penetrates an equal cube: all nodes of each cube are on edges and faces of tets of the other. The nodes
+    in the middle of the two faces and of the body are on edges and faces only.
     """
     cube = block((2, 2, 2), SIZE, shake=0.0)
     sim = build(meeting_of([{}, {}], end=2e-7), [cube, moved(cube, (0.0, 0.0, 2.0 * SIZE))])
@@ -103,7 +103,8 @@ def test_nodes_on_faces_between_tets_are_inside() -> None:
 
 
 def test_no_node_is_deeper_than_it_is_away_from_a_corner_on_the_surface() -> None:
-    """The only open face of a tet is far; at its other corner the surface belongs to the neighbours."""
+    """The only open face of the tet is far from the node; at the other corner of the tet the surface belongs to the
+    neighbours."""
     corners = np.vstack([np.zeros(3), np.eye(3)])[None]
     opened, outer = np.array([[True, False, False, False]]), np.array([[False, True, True, True]])
     near = np.full((1, 3), 0.1)
@@ -113,7 +114,8 @@ def test_no_node_is_deeper_than_it_is_away_from_a_corner_on_the_surface() -> Non
 
 
 def test_how_far_points_are_from_triangles() -> None:
-    """Over the middle, beyond an edge, behind a corner, and of a triangle of zero area."""
+    """The points are above the middle, beyond an edge, and behind a corner of a triangle, and near a triangle of
+    zero area."""
     triangle = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
     points = np.array([[0.2, 0.2, -0.3], [0.5, -0.4, 0.3], [-3.0, 0.0, 4.0], [0.5, 0.0, 2.0]])
     corners = np.array([triangle, triangle, triangle, triangle[[0, 1, 1]]])
@@ -121,7 +123,7 @@ def test_how_far_points_are_from_triangles() -> None:
 
 
 def test_a_node_on_an_edge_between_two_corners_on_the_surface_touches() -> None:
-    """The tet has an open face elsewhere, below which the node is deep."""
+    """The tet has an open face elsewhere, and the node is deep below this face."""
     corners, on = np.concatenate([np.zeros((1, 3)), np.eye(3)])[None], np.array([[0.4, 0.0, 0.0]])
     opened, outer = np.array([[False, True, False, False]]), np.ones((1, 4), bool)
     assert _depths(on, corners, opened, outer) == pytest.approx(0.4)

@@ -1,4 +1,4 @@
-"""Contacts of nodes and faces in the step ahead: which, where, and with which target velocity."""
+"""Contacts of nodes and faces in a step: their choice, their point, and their target velocity."""
 
 import numpy as np
 import pytest
@@ -23,21 +23,21 @@ SIZE = 1.0
 
 
 def height(x: Floats, corners: Floats) -> tuple[float, Floats]:
-    """Of a point over a face, and the face's unit normal."""
+    """Returns the height of a point over a face, and the unit normal of the face."""
     normal = np.cross(corners[1] - corners[0], corners[2] - corners[0])
     normal /= np.linalg.norm(normal)
     return float(normal @ (x - corners[0])), normal
 
 
 def foot(x: Floats, corners: Floats) -> Floats:
-    """Area coordinates of the point of a face's plane that is nearest to x."""
+    """Returns the area coordinates of the point in the plane of a face that is nearest to x."""
     sides = (corners[1:3] - corners[0]).T
     b = np.linalg.lstsq(sides, x - corners[0], rcond=None)[0]
     return np.array([1.0 - b.sum(), *b])
 
 
 class Expected:
-    """One contact by the formulas of the docstrings, or None."""
+    """Returns the contact by the formulas of the docstrings, or None."""
 
     def __init__(self, x: Floats, v: Floats, s: int, face: "np.ndarray", size: float, own: bool, dt: float) -> None:
         three, then = face[:3], x + dt * v
@@ -58,7 +58,7 @@ class Expected:
 
 
 def random_scene(seed: int, nodes: int = 40, faces: int = 12) -> tuple[Floats, Floats, Indices, "np.ndarray"]:
-    """Nodes around faces of sizes 10:1, all moving; a third of the nodes belongs to the faces' part."""
+    """Returns moving nodes around moving faces of sizes 10:1; a third of the nodes belongs to the part of the faces."""
     random = np.random.default_rng(seed)
     size = 10.0 ** random.uniform(-0.5, 0.5, (faces, 1, 1))
     tets = TRIANGLE[None] * size * random.uniform(0.5, 1.5, (faces, 1, 3)) + random.uniform(-0.3, 0.3, (faces, 1, 3))
@@ -72,8 +72,8 @@ def random_scene(seed: int, nodes: int = 40, faces: int = 12) -> tuple[Floats, F
 def expected(
     x: Floats, v: Floats, faces: Indices, part: "np.ndarray", tested: "np.ndarray", dt: float
 ) -> list[Expected]:
-    """Rows in order: by node, then by face; a node inside of several faces of a part has contact with the nearest of
-    these, and with none of a part to whose front it is nearer."""
+    """Returns the contacts sorted by node, then by face. A node inside of several faces of a part has contact with
+    the nearest face. It has no contact with a part if it is nearer to the front of another face of this part."""
     sizes, rows = face_sizes(x, faces), []
     for s in tested:
         mine = [Expected(x, v, s, f, sizes[i], part[s] == part[f[0]], dt) for i, f in enumerate(faces)]
@@ -88,7 +88,8 @@ def expected(
 
 
 def test_a_node_inside_of_two_parts_is_held_by_the_nearest_face_of_each() -> None:
-    """A corner of one body in two others: 0.05 and 0.1 below a face of the first, and 0.02 below one of the second."""
+    """A corner of a body is in two other bodies: 0.05 and 0.1 below two faces of the first, and 0.02 below a face of
+    the second."""
     steep = np.array([[0, 0, 0], [0, 1, 0], [0, 0, 1], [-1, 0.2, 0.2]], float)
     first, second = TRIANGLE + np.array([-0.3, -0.3, 0.05]), steep + np.array([0.02, -0.3, -0.3])
     x = np.concatenate([first, first + np.array([0.0, 0.0, 0.05]), second, np.zeros((1, 3))])
@@ -134,7 +135,7 @@ def test_the_target_velocity_ends_the_step_on_the_face_or_corrects_a_tenth_of_th
 
 
 def met_from(start: Floats, speed: Floats, dt: float = 1.0, own: bool = False, below: float = -1.0) -> ContactRows:
-    """Contacts of one node with the triangle, whose tet reaches down to ``below``."""
+    """Returns the contacts of one node with the triangle, whose tet reaches down to ``below``."""
     x = np.concatenate([TRIANGLE, start[None]])
     x[3, 2] = below
     v = np.concatenate([np.zeros((4, 3)), speed[None]])
@@ -150,7 +151,8 @@ def met_from(start: Floats, speed: Floats, dt: float = 1.0, own: bool = False, b
     ],
 )  # fmt: skip
 def test_a_node_deeper_than_the_limit_has_no_contact(gap: float, own: bool, below: float, meets: bool) -> None:
-    """A quarter of the face's size; a twentieth for one part; half the height of the tet behind it."""
+    """The limits are a quarter of the size of the face, a twentieth within one part, and half the height of the tet
+    of the face."""
     assert (many(met_from(np.array([0.3, 0.3, gap]), np.zeros(3), own=own, below=below)) == 1) == meets
 
 
@@ -169,8 +171,8 @@ def test_a_node_that_stays_near_is_watched(gap: float, meets: bool) -> None:
     ],
 )  # fmt: skip
 def test_a_node_is_in_contact_with_the_faces_that_it_faces(faces: list[tuple[float, ...]], meets: bool) -> None:
-    """Not the rim of a bar with the side of another of the same width, nor the surface below a block with its front;
-    a blunt edge and a sharp one do, and a node without faces.
+    """The rim of a bar has no contact with the side of another bar of the same width, and the surface below a block
+    has none with its front. A blunt and a sharp edge, and a node without faces, have contact.
     """
     x, v = np.concatenate([TRIANGLE, [[0.3, 0.3, -0.01]]]), np.zeros((5, 3))
     out = np.zeros((5, len(faces), 3))
@@ -179,12 +181,14 @@ def test_a_node_is_in_contact_with_the_faces_that_it_faces(faces: list[tuple[flo
 
 
 FLAKE = np.array([[0.0, 0.0, 0.0], [-0.9, 0.9, 0.3], [-0.2, -0.9, 0.4], [-0.8, -0.7, 0.9]])
-"""A tet whose first corner is its lowest; the cosines of its faces there, -0.82, 0.73 and 0.76, have a mean of 0.25."""
+"""A tet whose first corner is its lowest corner; the cosines of its faces at this corner, -0.82, 0.73 and 0.76, have
+a mean of 0.25."""
 
 
 @pytest.mark.parametrize(("height", "own"), [(0.01, True), (0.01, False), (-0.01, True), (-0.1, False)])
 def test_the_lowest_corner_of_a_flake_meets_what_it_enters(height: float, own: bool) -> None:
-    """Any mean of its normals, before it is inside and when it is."""
+    """The mean of the cosines may have any value, and the corner is tested before it is inside and when it is
+    inside."""
     x, v = np.concatenate([TRIANGLE, FLAKE + np.array([0.3, 0.3, height])]), np.zeros((8, 3))
     v[4:, 2] = -0.05
     sums, faces = np.zeros((8, normals.COLUMNS), np.int64), (FACES + 4).astype(np.int32)
@@ -197,7 +201,8 @@ def test_the_lowest_corner_of_a_flake_meets_what_it_enters(height: float, own: b
 
 @pytest.mark.parametrize(("height", "own", "meets"), [(0.01, False, True), (0.01, True, False), (-0.1, False, False)])
 def test_a_node_of_another_part_meets_what_it_passes_from_outside(height: float, own: bool, meets: bool) -> None:
-    """Some normal of the node faces the face, though their mean does not, and its faces do not rise."""
+    """At least one normal of the node is opposite to the face, although the mean normal is not, and the faces of the
+    node do not rise."""
     x, v, out = np.concatenate([TRIANGLE, [[0.3, 0.3, height]]]), np.zeros((5, 3)), np.zeros((5, 3, 3))
     v[4, 2], out[4] = -0.05, [(0.6, 0.0, 0.8), (-0.6, 0.0, 0.8), (0.0, 0.8, -0.6)]
     part = np.array([0] * 4 + [0 if own else 1])
@@ -205,7 +210,8 @@ def test_a_node_of_another_part_meets_what_it_passes_from_outside(height: float,
 
 
 def test_a_node_beside_an_acute_edge_is_not_inside() -> None:
-    """Below the plane of a face, with its foot on it, but in front of the face that meets it at an acute angle."""
+    """The node is below the plane of a face, with its foot on the face, but in front of another face that encloses
+    an acute angle with the first."""
     x = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.2, 0.9, -0.7], [0.45, 0.0, -0.1]])
     faces = np.array([[0, 1, 2, 3], [0, 3, 1, 2], [1, 3, 2, 0], [0, 2, 3, 1]], np.int32)
     x[4, 1] = 0.02
@@ -216,7 +222,8 @@ def test_a_node_beside_an_acute_edge_is_not_inside() -> None:
 
 
 def test_a_node_in_a_convex_corner_is_held_by_the_nearest_face() -> None:
-    """In the corner of a cube, three faces at one node: deep, or by less than the tolerance of a node on a face."""
+    """The node is in the corner of a cube, where three faces have a common node: deep, or by less than the tolerance
+    of a node on a face."""
     ((piece, model),) = pieces_of(meeting_of([{}], {"self_contact": ("body0",)}), [block((1, 1, 1), shake=0.0)])
     faces = surface_of(piece, model).faces.nodes.astype(np.int32)
     for depth in (np.array([0.03, 0.02, 0.04]), np.array([3e-4, 2e-4, 4e-4])):
@@ -228,7 +235,8 @@ def test_a_node_in_a_convex_corner_is_held_by_the_nearest_face() -> None:
 
 @pytest.mark.parametrize("gap", [0.0, 5e-4, -5e-4, -0.05])
 def test_a_sliding_node_changes_between_coplanar_facets(gap: float) -> None:
-    """Always in contact, at the point where it is; with one facet wherever it is inside of one, or deep."""
+    """The node is always in contact at its present position, and with one facet only if it is inside of one facet,
+    or deep."""
     x, faces = sheet(6, 1.0)
     faces = np.column_stack([faces, np.full(len(faces), len(x))]).astype(np.int32)
     random = np.random.default_rng(3)
@@ -256,7 +264,8 @@ def test_a_sliding_node_changes_between_coplanar_facets(gap: float) -> None:
 
 
 def crossings(start: Floats, path: Floats, corners: Floats) -> tuple["np.ndarray", Floats]:
-    """Exact: straight paths that pass triangles from the front, and the area coordinates (n, f, 3) there."""
+    """Returns exactly the straight paths that pass triangles from the front, and the area coordinates (n, f, 3) of
+    the crossing."""
     a, b, c = (corners[None, :, k] for k in range(3))
     normal = np.cross(b - a, c - a)
     before = ((start[:, None] - a) * normal).sum(axis=2)
@@ -272,9 +281,9 @@ def crossings(start: Floats, path: Floats, corners: Floats) -> tuple["np.ndarray
 
 @pytest.mark.parametrize("seed", range(10))
 def test_no_fast_node_passes_a_closed_surface_without_contact(seed: int) -> None:
-    """10^4 nodes each, any direction, speed and start outside of a moving body; paths longer than the body too.
-    Pairs come from the search. The first face that a node passes is among its contacts; a face that it passes beside
-    is not.
+    """10^4 nodes each start outside of a moving body, with any direction and speed, also with paths longer than the
+    body. The pairs are those of the search. The first face that a node passes is among its contacts; a face beside
+    the path is not.
     """
     random = np.random.default_rng(seed)
     ((piece, model),) = pieces_of(

@@ -1,4 +1,4 @@
-"""Bodies that overlap at the start are refused with place and depth, or moved apart without a stress."""
+"""Bodies that overlap at the start are refused with place and depth, or moved apart without stress."""
 
 from typing import Any
 
@@ -18,7 +18,7 @@ SLOPE = float(np.tan(np.radians(20.0)))
 
 
 def lowered(depth: float, across: float = 0.0) -> list[TetMesh]:
-    """A block of four cubes' height, and one on top of it that reaches ``depth``, m, into it."""
+    """Returns a block four cubes high, and a block on top of it that penetrates it by ``depth``, m."""
     upper = block((2, 2, 2), SIZE, seed=3)
     return [
         block((4, 4, 4), SIZE, seed=2),
@@ -43,7 +43,7 @@ def test_bodies_that_touch_do_not_overlap() -> None:
 
 
 def test_bodies_that_cross_each_other_are_refused() -> None:
-    """Two bars stuck through each other; no node of either is inside of the other."""
+    """The scene has two crossed bars that penetrate each other; no node of a bar is inside of the other bar."""
     one = block((8, 1, 1), SIZE, 0.0)
     turned = TetMesh(one.points[:, [2, 0, 1]] * [0.8, 1.0, 1.4], one.tets)
     other = moved(turned, [3.1 * SIZE, -3.5 * SIZE, -0.2 * SIZE])
@@ -88,7 +88,7 @@ WIDE = block((4, 4, 4), SIZE, shake=0.0)
 
 
 def test_bodies_that_are_one_cannot_be_pushed_apart() -> None:
-    """No node is inside the other body: each lies on a face of it."""
+    """No node is inside of the other body: each node lies on a face of it."""
     with pytest.raises(InputError, match=TOO_DEEP):
         pushed(WIDE, WIDE)
 
@@ -110,7 +110,7 @@ def test_bodies_that_overlap_by_elements_cannot_be_pushed_apart(depth: float, ac
 @pytest.mark.parametrize("cells", [1, 4])
 @pytest.mark.parametrize("depth", [0.01, 0.5])
 def test_the_rims_of_bodies_with_sides_in_one_plane_are_pushed_apart_too(cells: int, depth: float) -> None:
-    """The nodes lie on faces of the other body's sides, but sink in."""
+    """The nodes lie on faces of the sides of the other body, but penetrate it."""
     body = block((cells, cells, 4), SIZE, shake=0.0)
     sim = pushed(body, TetMesh(body.points + np.array([0.0, 0.0, (4.0 - depth) * SIZE]), body.tets))
     lower, upper = np.split(sim.model.nodes.x[:, 2], 2)
@@ -128,7 +128,8 @@ def test_what_flush_bodies_share_of_a_plane_is_no_overlap() -> None:
 
 
 def wedge(cells: int) -> TetMesh:
-    """4 mm high, 3 mm thick, of 40 degrees, its tip cut off 0.2 mm from where its sides meet, at the origin."""
+    """Returns a wedge 4 mm high and 3 mm thick with an angle of 40 degrees, whose tip is cut off 0.2 mm from the
+    line at which its sides would intersect, at the origin."""
     mesh = block((1, 1, cells), 1.0, shake=0.0)
     across, along, up = (mesh.points / (1, 1, cells)).T
     z = 0.2 + 4.0 * up
@@ -136,7 +137,7 @@ def wedge(cells: int) -> TetMesh:
 
 
 def beside_wedge(cells: int, moved: float = 0.0) -> TetMesh:
-    """A block 3.3 mm thick that touches all of the left side of the wedge, ``moved``, m, to the right."""
+    """Returns a block 3.3 mm thick that touches the whole left side of the wedge, ``moved``, m, to the right."""
     mesh = block((1, 1, cells), 1.0, shake=0.0)
     across, along, up = (mesh.points / (1, 1, cells)).T
     z = 0.2 + 4.0 * up
@@ -146,8 +147,8 @@ def beside_wedge(cells: int, moved: float = 0.0) -> TetMesh:
 
 @pytest.mark.parametrize("cells", [(6, 5), (1, 2), (5, 6), (7, 5), (3, 7), (11, 9)])
 def test_a_corner_on_the_rim_of_two_slanted_sides_touches(cells: tuple[int, int]) -> None:
-    """The corner may face neither side by the mean of its normals; a depth of 3.15 mm was reported, from the far
-    side."""
+    """The mean of the normals of the corner may be compatible with neither side. An earlier version reported a depth
+    of 3.15 mm, from the far side."""
     case = meeting_of([{}, {"velocity": (0.0, 0.0, 0.0)}], {}, end=1e-7)
     build(case, [wedge(cells[0]), beside_wedge(cells[1])])
     with pytest.raises(InputError, match=r"overlaps .* by 4\.7e-05 m"):

@@ -39,19 +39,19 @@ SHORT = 8
 
 
 def apart(one: "np.ndarray", two: "np.ndarray") -> Indices:
-    """(p, 2) all rows of ``one`` with all of ``two`` of another shard."""
+    """Returns (p, 2) all rows of ``one`` with all rows of ``two`` that belong to another shard."""
     pairs = np.stack(np.meshgrid(np.arange(len(one)), np.arange(len(two)), indexing="ij"), axis=-1).reshape(-1, 2)
     return np.asarray(pairs[one[pairs[:, 0]] != two[pairs[:, 1]]], np.int32)
 
 
 def wake(pairs: Pairs) -> Pairs:
-    """Sets all pairs to untested."""
+    """Marks all pairs as untested."""
     pairs.until[:], pairs.speed[:], pairs.turned[:] = -np.inf, np.nan, False
     return pairs
 
 
 def known_of(pairs: Pairs, one: Flags, two: Flags) -> Flags:
-    """(p,) pairs with valid bounds and without a change by the flags ``one`` and ``two``."""
+    """Returns (p,) pairs with valid bounds and without a change by the flags ``one`` and ``two``."""
     return np.asarray(~np.isneginf(pairs.until) & ~one[pairs.rows[:, 0]] & ~two[pairs.rows[:, 1]])
 
 
@@ -65,7 +65,7 @@ class Tables:
         """Pairs that were tested, and those of them with valid bounds."""
 
     def meet(self, shards: "Shards", dt: float) -> list[ContactRows]:
-        """The active contacts of a step, of either kind."""
+        """Returns the active contacts of a step, of nodes and of edges."""
         if self._every:
             wake(self.node_face.arrays())
             wake(self.edge_edge.arrays())
@@ -83,7 +83,8 @@ class Tables:
 
 class Shards:
     """Tets that move, rotate, get other velocities and break; some faces and nodes are not on the surface at first.
-    Nodes face outward from the corner of their tet, roughly, and one in four faces everything.
+    The normals of a node point approximately away from its tet, and one node in four has normals compatible with
+    every face.
     """
 
     def __init__(self, seed: int, violence: float) -> None:
@@ -110,19 +111,19 @@ class Shards:
         self.node_fresh = np.zeros(len(self.x), bool)
 
     def facing(self, outward: Floats) -> Floats:
-        """(n, 9) mean normals of nodes that face ``outward`` (n, 3), roughly."""
+        """Returns (n, 9) mean normals of nodes that are directed approximately along ``outward`` (n, 3)."""
         out = outward[:, None] + self.draw.normal(0.0, 0.3, (len(outward), 3, 3))
         out /= np.linalg.norm(out, axis=2, keepdims=True)
         out[self.draw.uniform(size=len(outward)) < 0.25] = 0.0
         return moments(out)
 
     def pairs(self) -> tuple[Indices, Indices]:
-        """All pairs of nodes and faces, and of edges, of different shards."""
+        """Returns all pairs of nodes and faces, and of edges, of different shards."""
         ridges = apart(np.repeat(np.arange(SHARDS), 6), np.repeat(np.arange(SHARDS), 6))
         return apart(self.shard, self.face_shard), ridges[ridges[:, 0] < ridges[:, 1]]
 
     def tables(self, first: Indices, dt: float) -> tuple[SlotTable, FaceTable, EdgeTable, Step]:
-        """Slots, faces, edges and the step, as records for kernels."""
+        """Returns slots, faces, edges and the step, as records for kernels."""
         reference, part = self.reference, self.shard % 3
         slots = slot_table(first, self.normals, reference.short.left, reference.short.course)
         slots = slots._replace(on_surface=self.on_surface, fresh=self.node_fresh)
@@ -132,7 +133,7 @@ class Shards:
         return slots, faces, edges, step_of(self.x, self.v, part, dt)
 
     def knock(self) -> None:
-        """One node in ten gets another velocity."""
+        """Gives one node in ten another velocity."""
         some = self.draw.uniform(size=(len(self.v), 1)) < 0.1
         self.v = self.v + self.violence * self.draw.normal(0.0, 1.0, self.v.shape) * some
 
@@ -147,7 +148,7 @@ class Shards:
         self.normals[nodes] = self.facing(self.draw.normal(size=(int(nodes.sum()), 3)))
 
     def split(self, *tables: Tables) -> None:
-        """Separates some corners: a copy leaves with half of the faces and edges; one edge vanishes."""
+        """Separates some corners: a copy gets half of the faces and edges of its parent; one edge vanishes."""
         n = len(self.x)
         some = self.draw.choice(n, 3, replace=False)
         copies = np.arange(n, n + 3, dtype=np.int32)
@@ -178,7 +179,7 @@ class Shards:
             table.node_face.add(again)
 
     def begin(self, dt: float, short: bool, *tables: Tables) -> None:
-        """Begins a step; ``short``: with new short lines."""
+        """Begins a step; ``short``: with new reference lines of the pairs."""
         self.reference.advance(dt)
         if short:
             self.reference.shorten(self.x)
@@ -191,15 +192,16 @@ class Shards:
 
 
 def equal(one: list[ContactRows], two: list[ContactRows]) -> bool:
-    """Contacts with all their columns, to the bit, in the same order."""
+    """Returns whether two sets of contacts are equal in all columns, to the bit, and in the same order."""
     columns = ContactRows._fields
     pairs = [(getattr(a, name), getattr(b, name)) for a, b in zip(one, two, strict=True) for name in columns]
     return all(np.array_equal(a, b) for a, b in pairs)
 
 
 def flown(seed: int, violence: float, blind: bool = False) -> tuple[int, int, float, float]:
-    """Number of steps whose contacts differ from those of all pairs, number of contacts, and shares of the pairs:
-    tested, and tested without a change; ``blind``: as if no slot ever left its line.
+    """Returns the number of steps whose contacts differ from those of all pairs, the number of contacts, and the
+    fractions of pairs that were tested, and tested without a change; ``blind``: the distance of slots from their
+    lines is treated as zero.
     """
     shards = Shards(seed, violence)
     some, every = (Tables(*shards.pairs(), every=flag) for flag in (False, True))
@@ -227,7 +229,8 @@ def flown(seed: int, violence: float, blind: bool = False) -> tuple[int, int, fl
 @pytest.mark.parametrize("seed", range(4))
 @pytest.mark.parametrize("violence", [0.0, 0.02, 0.5])
 def test_a_deactivated_pair_is_not_in_contact(seed: int, violence: float) -> None:
-    """In every step the same contacts, to the bit. Most tested pairs have changed, and few others are tested."""
+    """In every step the contacts are equal to the bit. Most tested pairs have changed, and few other pairs are
+    tested."""
     wrong, met, tested, unforced = flown(seed, violence)
     assert wrong == 0
     assert met > 20
@@ -236,7 +239,7 @@ def test_a_deactivated_pair_is_not_in_contact(seed: int, violence: float) -> Non
 
 
 def test_contacts_are_missed_where_leaving_a_line_does_not_count() -> None:
-    """Proof that the check above can fail."""
+    """Control: with the distance from the lines treated as zero, the check above fails."""
     assert sum(flown(seed, 0.5, blind=True)[0] for seed in range(4)) > 0
 
 
@@ -251,7 +254,7 @@ class Pair:
         self.face_fresh, self.node_fresh = np.zeros(1, bool), np.zeros(5, bool)
 
     def tested(self) -> int:
-        """Number of pairs that the next step tests."""
+        """Returns the number of pairs that the next step tests."""
         still = np.zeros_like(self.x)
         slots = slot_table(self.first, np.zeros((5, 9)), self.left, still)
         slots = slots._replace(fresh=self.node_fresh, on_surface=self.on_surface)
@@ -263,7 +266,8 @@ class Pair:
 
 @pytest.mark.parametrize("cause", ["corners", "normals", "lines", "stray"])
 def test_a_pair_is_tested_again_when_something_has_changed(cause: str) -> None:
-    """New corners of its face, new mean normals of its node, new lines for all, or a node that has left its line."""
+    """The changes are: new corners of the face, new mean normals of the node, new lines of all slots, or a node that
+    has departed from its line."""
     pair = Pair()
     assert [pair.tested() for _ in range(3)] == [1, 0, 0]
     pair.face_fresh[0], pair.node_fresh[0] = cause == "corners", cause == "normals"
@@ -282,7 +286,7 @@ def test_a_pair_stays_deactivated_while_its_node_departs_by_less_than_the_slack(
 
 @pytest.mark.parametrize("kind", ["face", "node"])
 def test_a_pair_that_is_no_surface_is_tested_when_it_becomes_some(kind: str) -> None:
-    """New lines do not change that; the flag does."""
+    """New lines do not activate the pair; the surface flag does."""
     pair = Pair()
     flags, fresh = (pair.exposed, pair.face_fresh) if kind == "face" else (pair.on_surface, pair.node_fresh)
     flags[0] = False
@@ -294,12 +298,12 @@ def test_a_pair_that_is_no_surface_is_tested_when_it_becomes_some(kind: str) -> 
 
 
 def columns_of(table: PairTable) -> Floats:
-    """(p, 9) all columns of each pair."""
+    """Returns (p, 9) all columns of each pair."""
     return np.column_stack([table.rows, table.until, table.speed, table.turned, table.kept])
 
 
 def random_table(seed: int) -> PairTable:
-    """Pairs of 20 things with 15, each different in all columns."""
+    """Returns pairs of 20 things with 15 things, which differ in all columns."""
     draw = np.random.default_rng(seed)
     rows = draw.permutation(np.stack(np.meshgrid(np.arange(20), np.arange(15)), axis=-1).reshape(-1, 2))[:200]
     table = pair_table(rows)
@@ -337,7 +341,7 @@ def test_pairs_are_carried_over_to_other_numbers_in_the_order_of_the_first_with_
 
 
 def test_the_chains_of_pairs_hold_each_pair_of_a_node_once() -> None:
-    """Also of pairs that were added behind others."""
+    """This includes pairs that were appended to the table."""
     table, first = random_table(1), np.full(20, -1, np.int32)
     table.hang(first, 0)
     table.add(np.array([[3, 16], [3, 17], [4, 16]], np.int32))
@@ -376,7 +380,7 @@ def test_how_far_a_slot_leaves_its_line_is_the_larger_of_the_steps_beginning_and
 
 
 def test_lines_are_taken_over_by_other_slots() -> None:
-    """New slots begin at their positions; the others keep their lines, at any time."""
+    """New slots begin at their positions; the other slots keep their lines, at any time."""
     draw = np.random.default_rng(4)
     old = Lines(draw.normal(size=(4, 3)), draw.normal(size=(4, 3)))
     old.begin_anew(np.arange(4) < 2, draw.normal(size=(4, 3)), 1.0)
@@ -393,7 +397,7 @@ def test_lines_are_taken_over_by_other_slots() -> None:
 
 
 def test_a_body_that_breaks_comes_to_the_same_when_every_pair_is_tested(monkeypatch: pytest.MonkeyPatch) -> None:
-    """To the bit, including pairs of copies and of faces with new corners."""
+    """The results are equal to the bit, including pairs of copies and of faces with new corners."""
     case = parse_case(read_data(Path(__file__).parents[1] / "parallel" / "breaking.toml"))
     arrays = PairTable.arrays
 

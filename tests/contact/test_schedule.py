@@ -1,4 +1,5 @@
-"""No answer depends on the steps of searches, nor on what they include besides active contacts."""
+"""The answer does not depend on the steps of searches, nor on the pairs that a search includes in addition to active
+contacts."""
 
 from collections.abc import Iterator
 from functools import cache
@@ -25,7 +26,7 @@ CRUSHED = "../../cases/hard/crush_cohesive"
 
 
 def stepping(name: str, steps: int, comm: Comm, every: int = 0, *changes: str) -> Iterator[Simulation]:
-    """A scene after each of its first ``steps``; ``every``: a search at least every so many steps."""
+    """Returns a scene after each of its first ``steps``; ``every``: a search at least after this number of steps."""
     case = parse_case(apply_overrides(read_data(SCENES / f"{name}.toml"), ["run.frames=0", *changes]))
     sim = simulation.build(case, Path(), comm)
     assert sim.contact is not None
@@ -39,7 +40,7 @@ def stepping(name: str, steps: int, comm: Comm, every: int = 0, *changes: str) -
 
 
 def ran(name: str, comm: Comm, every: int = 0, *changes: str) -> tuple[str | None, int]:
-    """Digest and number of searches at the end."""
+    """Returns the digest and the number of searches at the end."""
     *_, sim = stepping(name, STEPS[name], comm, every, *changes)
     assert sim.contact is not None
     return digest(sim.model, comm, []), sim.contact.searches.many
@@ -67,7 +68,7 @@ def test_no_answer_depends_on_how_often_is_searched(name: str) -> None:
 
 
 def doubled(sim: Simulation) -> int:
-    """Number of candidate pairs of a rank that are in their tables more than once."""
+    """Returns the number of candidate pairs of a rank that are in their tables more than once."""
     assert sim.contact is not None
     scene = sim.contact.searches.scene
     assert scene is not None
@@ -77,8 +78,8 @@ def doubled(sim: Simulation) -> int:
 
 @pytest.mark.parametrize("ranks", [1, 3])
 def test_no_pair_is_listed_twice(ranks: int) -> None:
-    """Such a pair would have two impulses, until a search; edges of opposite direction between two separated nodes
-    did."""
+    """A pair listed twice would have two impulses until the next search. In an earlier version edges of opposite
+    direction between two separated nodes were listed twice."""
     found = on_ranks(ranks, lambda comm: [doubled(sim) for sim in stepping(CRUSHED, 40, comm)])
     assert found == [[0] * 40] * ranks
 
@@ -95,7 +96,8 @@ def test_no_answer_depends_on_which_cracks_a_search_foresees(monkeypatch: pytest
 def test_no_answer_depends_on_which_tets_a_search_expects_to_leave(
     monkeypatch: pytest.MonkeyPatch, ranks: int, share: float
 ) -> None:
-    """All, few or none: faces exposed by a tet that was not expected to erode are added by a search."""
+    """The search includes the inner faces of all tets, few tets or no tet: faces exposed by a tet that was not
+    expected to erode are added by a search."""
     usual, many = exposure.NEAR_EROSION, on_ranks(ranks, lambda comm: ran("eroding", comm))[0][1]
     monkeypatch.setattr(exposure, "NEAR_EROSION", share)
     other, more = on_ranks(ranks, lambda comm: ran("eroding", comm))[0]
@@ -118,7 +120,7 @@ def test_no_answer_on_several_ranks_depends_on_the_skin_or_the_domain(ranks: int
 
 
 def test_a_horizon_ends_with_one_search(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Not with one that keeps the end, a step or two away, and another one after it."""
+    """At the end of a horizon there is one search, and not a second search one or two steps later."""
     monkeypatch.setattr(surface_motion, "_HORIZONS", surface_motion._HORIZONS[:1])
     good_for = surface_motion._HORIZONS[0] - searches._AHEAD
     assert ran("colliding", SerialComm())[1] <= 1 + STEPS["colliding"] / good_for

@@ -23,7 +23,8 @@ NEVER_SELF = ~np.eye(3, dtype=bool)
 
 
 class Cloud:
-    """Random things: nodes, faces and edges of sizes up to 100:1, in three parts that move; some far away and fast."""
+    """Random things: nodes, faces and edges of sizes up to 100:1, in three moving parts; some things are far away
+    and fast."""
 
     def __init__(self, seed: int, n: int = 36) -> None:
         random = np.random.default_rng(seed)
@@ -48,7 +49,7 @@ class Cloud:
         return Primitives(corners.astype(np.int32), 10.0 ** random.uniform(-2.0, 0.0, len(corners)))
 
     def at(self, things: Primitives, share: float) -> Floats:
-        """(n, k, 3) corners after a share of the horizon."""
+        """Returns (n, k, 3) corners after a fraction of the horizon."""
         return np.asarray((self.x + share * self.horizon * self.v)[things.corners])
 
     def find(
@@ -63,14 +64,15 @@ def clouds() -> Iterator[Cloud]:
 
 
 def reached(cloud: Cloud, small: Primitives, large: Primitives, distance: Floats) -> Flags:
-    """(small, large) pairs of parts in contact that come within reach, by their distances at the times TIMES."""
+    """Returns (small, large) pairs of parts in contact that come within reach, by their distances at the times
+    TIMES."""
     near = distance.min(axis=0) < small.reach[:, None] + large.reach[None, :]
     of = [cloud.part[things.corners[:, 0]] for things in (small, large)]
     return np.asarray(near & NEVER_SELF[of[0][:, None], of[1][None, :]])
 
 
 def as_matrix(pairs: Indices, rows: int, columns: int) -> Flags:
-    """The pairs as flags; none may be in the list twice."""
+    """Returns the pairs as flags; no pair may be in the list twice."""
     counts = np.zeros((rows, columns), int)
     np.add.at(counts, tuple(pairs.T), 1)
     assert counts.max(initial=0) <= 1
@@ -108,7 +110,7 @@ def test_no_edge_that_comes_near_an_edge_is_missed_and_each_pair_is_found_once()
 
 @pytest.mark.parametrize("seed", range(20))
 def test_two_ranks_that_see_each_others_edges_find_every_pair_once_between_them(seed: int) -> None:
-    """Each has its own edges first, then copies of the other's, in any order."""
+    """Each rank has its own edges first, then copies of the edges of the other rank, in any order."""
     cloud, n = Cloud(seed), 36
     half = np.random.default_rng(seed).permutation(n)
     total = np.zeros((n, n), int)
@@ -128,7 +130,7 @@ def test_two_ranks_that_see_each_others_edges_find_every_pair_once_between_them(
 
 
 def test_candidates_are_the_boxes_that_touch() -> None:
-    """No list is much longer than necessary: boxes around the paths, in a moving frame."""
+    """The list is not much longer than necessary: it contains boxes around the paths, in a moving frame."""
     for seed in range(50):
         cloud = Cloud(seed)
         frame = cloud.v.mean(axis=0)
@@ -146,7 +148,7 @@ def test_candidates_are_the_boxes_that_touch() -> None:
 
 
 def test_each_pair_is_found_once_where_all_meet_all() -> None:
-    """Ten times as many pairs as there is room for at first: the search is interrupted and continued."""
+    """There are ten times as many pairs as rows at first: the search is interrupted and continued."""
     n = 120
     cloud = Cloud(5, n)
     huge = Primitives(cloud.faces.corners, np.full(n, 1e5))
@@ -192,8 +194,8 @@ def test_without_primitives_there_are_no_candidates(empty: str) -> None:
 
 
 def peak_of(away: float, coarse: int = 40) -> tuple[int, int]:
-    """Bytes that the search needs for two sheets, of which a hundredth of the nodes is ``away``, and the pairs it
-    finds."""
+    """Returns the bytes that the search needs for two sheets, of which a hundredth of the nodes is ``away``, and the
+    number of pairs."""
     (x0, _), (x1, faces1) = sheet(40, 1.0), sheet(coarse, 40.0 / coarse)
     x1, faces1 = x1 + np.array([0.0, 0.0, 0.1]), faces1 + np.int32(len(x0))
     x = np.concatenate([x0, x1])
@@ -220,7 +222,8 @@ def test_memory_does_not_follow_the_extent() -> None:
 
 @pytest.mark.parametrize("coarse", [4, 400])
 def test_memory_stays_with_the_number_of_things_where_sizes_differ_tenfold(coarse: int) -> None:
-    """Faces ten times as large, or as small, as their partners: bytes per candidate or thing as with equal ones."""
+    """Faces are ten times as large, or as small, as their partners: the bytes for each candidate or thing are the
+    same as for equal sizes."""
     equal, pairs = peak_of(0.0)
     other, their_pairs = peak_of(0.0, coarse)
     assert other / (their_pairs + 2 * coarse * coarse) < 4.0 * equal / (pairs + 2 * 40 * 40)
@@ -228,7 +231,8 @@ def test_memory_stays_with_the_number_of_things_where_sizes_differ_tenfold(coars
 
 @pytest.mark.parametrize("size", [1e2, 1e3, 1e4])
 def test_memory_does_not_follow_a_huge_thing(size: float) -> None:
-    """A long edge across two sheets of short ones: memory is not filled with cells of the others' distance."""
+    """A long edge lies across two sheets of short edges: the number of cells of this edge does not depend on the
+    distance of other things."""
     (x0, faces), (x1, _) = sheet(20, 1.0), sheet(20, 1.0)
     short = faces[:, :2]
     x = np.concatenate([x0, x1 + np.array([0.0, 0.0, 0.1]), [[-size, -size, -size], [size, size, size]]])
@@ -248,7 +252,7 @@ def sorted_boxes(low: Floats, high: Floats, edge: float) -> Table:
 
 
 def cells_of(table: Table, low: Floats, high: Floats) -> set[int]:
-    """Codes of all cells that a box touches."""
+    """Returns the codes of all cells that a box touches."""
     first, last = (
         np.clip(np.floor((corner - table.origin) * table.inverse), 0, table.shape - 1).astype(np.int64)
         for corner in (low, high)
@@ -262,7 +266,7 @@ def cells_of(table: Table, low: Floats, high: Floats) -> set[int]:
 def test_position_codes_have_every_box_once_in_each_cell_that_it_touches(
     spread: tuple[float, ...], edge: float
 ) -> None:
-    """The entries of a hash are contiguous. Some boxes are wide, one is a point."""
+    """The entries of a hash are contiguous. Some boxes are wide, and one box is a point."""
     random = np.random.default_rng(2)
     low: Floats = random.uniform(0.0, 1.0, (400, 3)) * np.array(spread)
     high: Floats = low + edge * random.uniform(0.0, 3.0, (400, 3)) * (
@@ -288,7 +292,7 @@ def test_position_codes_have_every_box_once_in_each_cell_that_it_touches(
 
 
 def test_a_hash_holds_few_codes() -> None:
-    """Largest number of entries of one hash, for the cells of a full cube, of a layer and of a line."""
+    """Returns the largest number of entries of one hash, for the cells of a full cube, of a layer and of a line."""
     for shape in ((16, 16, 16), (64, 64, 1), (4096, 1, 1), (1, 1, 4096)):
         low: Floats = np.ascontiguousarray(np.argwhere(np.ones(shape)) + 0.25)
         table = sorted_boxes(low, low + 0.5, 1.0)

@@ -1,4 +1,4 @@
-"""Kernels of the impulse solver compared with plain Python that reads like the formula, to the last bit."""
+"""Kernels of the impulse solver compared with plain Python that follows the formulas, to the last bit."""
 
 import numpy as np
 import pytest
@@ -14,8 +14,8 @@ _QUANTA, _SCALE = 2.0**30, 2.0**40
 
 
 def scene(seed: int) -> tuple[ContactRows, Floats, Floats]:
-    """Nodes on faces, edges and cracks, most without friction and some held, in a cloud that hardly closes: half of
-    the contacts are idle at first, and some of them are loaded later.
+    """Returns contacts of nodes on faces, edges and cracks in a cloud that closes slowly, most of them without
+    friction and some with held nodes: half of the contacts are idle at first, and some of these are loaded later.
     """
     random = np.random.default_rng(seed)
     rows = np.array([random.choice(NODES, 4, replace=False) for _ in range(CONTACTS)], np.int32)
@@ -34,7 +34,7 @@ def scene(seed: int) -> tuple[ContactRows, Floats, Floats]:
 
 
 class Plain:
-    """Sweeps of every contact."""
+    """Sweeps over all contacts in plain Python."""
 
     def __init__(self, met: ContactRows, v: Floats, mobility: Floats) -> None:
         self.met, self.v, self.mobility = met, v.copy(), mobility
@@ -48,7 +48,7 @@ class Plain:
         self.norms = np.array([self._norms(p, sums) for p in range(CONTACTS)])
 
     def _norms(self, p: int, sums: "np.ndarray") -> tuple[float, float]:
-        """Row norms along the normal and across."""
+        """Returns the row norms along the normal and across it."""
         met, along, across = self.met, 0.0, 0.0
         for k in range(4):
             a, weight = met.nodes[p, k], abs(met.weights[p, k]) / _QUANTA
@@ -58,7 +58,7 @@ class Plain:
         return along or np.inf, across or np.inf
 
     def give(self, changes: Floats) -> None:
-        """Turns changes (contacts, 3) of the contacts' impulses into velocities."""
+        """Applies changes (contacts, 3) of the impulses of contacts to the velocities."""
         impulse, met = np.zeros((NODES, 3), np.int64), self.met
         for p in range(CONTACTS):
             parts = [np.rint(met.weights[p, k] * changes[p] * _SCALE).astype(np.int64) for k in (1, 2, 3)]
@@ -80,7 +80,7 @@ class Plain:
         self.give(changes)
 
     def sweep(self, ahead: float = 0.0) -> None:
-        """One sweep; the changes along the normals are extrapolated by the factor ``ahead``."""
+        """Makes one sweep; the changes along the normals are extrapolated by the factor ``ahead``."""
         self.give(np.array([self.change(p, ahead) for p in range(CONTACTS)]))
 
     def change(self, p: int, ahead: float) -> Floats:
@@ -104,14 +104,14 @@ class Plain:
 
 
 def _dot(a: Floats, b: Floats) -> float:
-    """In the order of the kernels."""
+    """Returns a dot product with the order of operations of the kernels."""
     return float(0.0 + a[0] * b[0] + a[1] * b[1] + a[2] * b[2])
 
 
 @pytest.mark.parametrize("resumed", [False, True])
 @pytest.mark.parametrize("seed", range(12))
 def test_kernels_have_the_bits_of_the_formula(seed: int, resumed: bool) -> None:
-    """Idle contacts are skipped and cracks have two nodes: without a change of any bit."""
+    """Idle contacts are skipped and cracks have two nodes; no bit of the result differs."""
     met, v, mobility = scene(seed)
     plain, solver = Plain(met, v, mobility), Solver(met, v, mobility, _SCALE)
     if resumed:
@@ -130,7 +130,7 @@ def test_kernels_have_the_bits_of_the_formula(seed: int, resumed: bool) -> None:
 
 @pytest.mark.parametrize("seed", range(12))
 def test_a_step_has_the_bits_of_sweeps_with_momentum(seed: int) -> None:
-    """Nesterov's k / (k + 3), and a last sweep without."""
+    """The factor is Nesterov's k / (k + 3), and the last sweep has no extrapolation."""
     met, v, mobility = scene(seed)
     for many in (1, 2, 5, 20):
         plain, solver = Plain(met, v, mobility), Solver(met, v, mobility, _SCALE)
@@ -141,14 +141,14 @@ def test_a_step_has_the_bits_of_sweeps_with_momentum(seed: int) -> None:
 
 
 def test_idle_contacts_are_skipped_until_others_load_them() -> None:
-    """The scenes of the test above have both."""
+    """The scenes of the test above contain idle contacts and contacts that are loaded later."""
     idle = np.array([[CONTACTS - len(rows) for rows in loaded(seed)] for seed in range(12)])
     assert (idle[:, -1] > 0).all()
     assert (idle[:, -1] < idle[:, 0]).any()
 
 
 def loaded(seed: int) -> list["np.ndarray"]:
-    """Contacts that have asked for an impulse, after every sweep."""
+    """Returns the contacts that have needed an impulse, after every sweep."""
     solver, rows = Solver(*scene(seed), _SCALE), []
     for _ in range(SWEEPS):
         solver.sweep()
@@ -157,7 +157,7 @@ def loaded(seed: int) -> list["np.ndarray"]:
 
 
 def test_slots_are_used_again() -> None:
-    """A second step with the same arrays, and other nodes, gives the result of new arrays."""
+    """A second step with the same arrays and other nodes has the same result as with new arrays."""
     first, second = scene(1), scene(2)
     alone, solver = Solver(*second, _SCALE), Solver(*first, _SCALE)
     solver.sweep(SWEEPS)

@@ -1,4 +1,4 @@
-"""Walls and planes of symmetry within the sweeps: nodes that they hold do not yield."""
+"""Walls and planes of symmetry within the sweeps: nodes that they stop do not move into them."""
 
 import numpy as np
 import pytest
@@ -16,13 +16,13 @@ CUBE = block((1, 1, 1), 1.0)
 
 
 def wall(normal: Floats, side: float = 1.0, at: float = 0.0, friction: float = 0.0) -> Stops:
-    """Of the first node alone."""
+    """Returns a wall that acts on the first node only."""
     unit = np.array([normal]) / np.linalg.norm(normal)
     return Stops(np.array([[at, 0.0, 0.0]]), unit, np.array([[side, 0.0]]), np.array([friction]), np.zeros(1, bool))
 
 
 def pressed(stops: Stops, speed: float = 1.0, n: int = 3, mobility: Floats | None = None) -> Solver:
-    """A row of nodes in touch along x; the last one moves towards the first, which is at the wall."""
+    """Returns a row of touching nodes along x; the last node moves towards the first node, which is at the wall."""
     v = np.zeros((n, 3))
     v[-1, 0] = -speed
     solver = Solver(column(n), v, np.ones((n, 3)) if mobility is None else mobility, stops=stops)
@@ -32,7 +32,8 @@ def pressed(stops: Stops, speed: float = 1.0, n: int = 3, mobility: Floats | Non
 
 @pytest.mark.parametrize("stops", [wall(np.array([2.0, 0.0, 0.0])), wall(np.array([-1.0, 0.0, 0.0]), side=-1.0)])
 def test_a_node_between_a_wall_and_a_body_does_not_yield(stops: Stops) -> None:
-    """The impulse of the last passes through all of them into the wall, which returns it to the first afterwards."""
+    """The impulse of the last node passes through all nodes to the wall; the wall returns it to the first node
+    afterwards."""
     v = pressed(stops).v
     assert v[:, 0] == pytest.approx([-1.0, 0.0, 0.0], abs=5e-3)
     assert (v[:, 1:] == 0.0).all()
@@ -44,14 +45,14 @@ def test_without_a_wall_they_share_the_impulse() -> None:
 
 
 def test_a_wall_does_not_pull() -> None:
-    """A node that moves away from it, or is further from it than its motion in the step, is not changed."""
+    """A node that moves away from the wall, or is farther from it than its motion in the step, is not changed."""
     assert pressed(wall(np.array([1.0, 0.0, 0.0])), speed=-1.0).v[:, 0].tolist() == [0.0, 0.0, 1.0]
     away = wall(np.array([1.0, 0.0, 0.0]), at=-0.2)
     assert pressed(away, speed=0.3).v[:, 0] == pytest.approx([-0.1] * 3, abs=1e-4)
 
 
 def test_a_slanted_wall_stops_along_what_is_free() -> None:
-    """A node that a plane of symmetry holds along y gets an impulse along x only: it stops there."""
+    """A plane of symmetry holds the node along y, so the wall stops it by an impulse along x only."""
     mobility = np.ones((3, 3))
     mobility[0, 1] = 0.0
     v = pressed(wall(np.array([1.0, 1.0, 0.0])), mobility=mobility).v
@@ -73,8 +74,8 @@ def test_a_stop_reduces_an_impulse_that_was_too_large() -> None:
 
 @pytest.mark.parametrize(("friction", "left"), [(0.0, 0.5), (0.2, 0.4), (0.6, 0.2), (2.0, 0.0)])
 def test_friction_at_a_wall_takes_what_its_push_allows(friction: float, left: float) -> None:
-    """A node that another presses on the wall, both with 0.5 m/s along it; the other sticks to it, so that its
-    velocity shows the friction."""
+    """Another node presses the node on the wall, both with 0.5 m/s along the wall. The second node sticks to the
+    first, so that its velocity shows the friction."""
     v = np.array([[0.0, 0.5, 0.0], [-1.0, 0.5, 0.0]])
     met = column(2)._replace(friction=np.full(1, 10.0))
     solver = Solver(met, v, np.ones((2, 3)), stops=wall(np.array([1.0, 0.0, 0.0]), friction=friction))
@@ -82,7 +83,8 @@ def test_friction_at_a_wall_takes_what_its_push_allows(friction: float, left: fl
 
 
 def test_walls_and_planes_hold_the_parts_that_they_name_on_their_side() -> None:
-    """Bodies above and below a plane, and one in two pieces on both sides of it, which is left to the boundary."""
+    """The scene has bodies above and below a plane, and a body in two pieces on both sides of the plane, on which
+    only the boundary acts."""
     both = TetMesh(
         np.concatenate([CUBE.points, CUBE.points - [0.0, 0.0, 3.0]]),
         np.concatenate([CUBE.tets, CUBE.tets + len(CUBE.points)]),

@@ -1,4 +1,5 @@
-"""The surface: every exposed face once, outward; every edge, and the sharp ones: where faces enclose an angle."""
+"""The surface: every exposed face once, directed outward; every edge, and the sharp edges, at which faces enclose an
+angle."""
 
 from collections import Counter
 from typing import NamedTuple
@@ -20,18 +21,18 @@ CELLS = (2, 3, 4)
 SIZE = 1e-3
 BOX = SIZE * np.array(CELLS)
 CUBES = {1: [(0, 0, 0)], 2: [(0, 0, 0), (1, 1, 0)], 3: [(0, 0, 0), (1, 0, 0), (0, 1, 0)]}
-"""Corners of unit cubes: one; two that share an edge only; three that make an L."""
+"""Corners of unit cubes: one cube; two cubes with a common edge only; three cubes in the form of an L."""
 
 
 class Cut(NamedTuple):
-    """A rank's surface, and the model that it belongs to."""
+    """The surface of a rank, and the model of the rank."""
 
     found: Surface
     model: Model
 
 
 def shuffled(mesh: TetMesh, seed: int) -> TetMesh:
-    """The same body with its nodes and tets in another order."""
+    """Returns the same body with its nodes and tets in another order."""
     random = np.random.default_rng(seed)
     place = random.permutation(len(mesh.points))
     tets = np.argsort(place)[mesh.tets[random.permutation(len(mesh.tets))]]
@@ -39,7 +40,7 @@ def shuffled(mesh: TetMesh, seed: int) -> TetMesh:
 
 
 def whole(mesh: TetMesh, planes: list[int] | None = None, edges: bool = True) -> Cut:
-    """The surface of a body on one rank; ``planes``: axes whose zero is a symmetry plane."""
+    """Returns the surface of a body on one rank; ``planes``: axes whose plane at zero is a symmetry plane."""
     ((piece, model),) = pieces_of(meeting_of([{}], {"self_contact": ("body0",)}), [mesh])
     on_plane = np.zeros((model.nodes.n, 3), bool)
     for axis in planes or []:
@@ -48,7 +49,7 @@ def whole(mesh: TetMesh, planes: list[int] | None = None, edges: bool = True) ->
 
 
 def cubes(corners: list[tuple[int, int, int]]) -> TetMesh:
-    """Unit cubes at the corners, welded where they touch."""
+    """Returns unit cubes at the corners, with common nodes where they touch."""
     unit = block((1, 1, 1), 1.0, 0.0)
     points = np.concatenate([unit.points + np.array(corner) for corner in corners])
     tets = np.concatenate([unit.tets + i * len(unit.points) for i in range(len(corners))])
@@ -57,7 +58,7 @@ def cubes(corners: list[tuple[int, int, int]]) -> TetMesh:
 
 
 def table(edges: Edges) -> "np.ndarray":
-    """(n, 8) words: ids of the two faces, nodes, the bits of the length, and whether it is sharp."""
+    """Returns (n, 8) words: ids of the two faces, nodes, the bits of the length, and whether the edge is sharp."""
     return np.column_stack([edges.sides, edges.nodes, edges.size.view(np.int64), edges.sharp])
 
 
@@ -117,7 +118,7 @@ def test_nodes_of_the_skin_and_no_others_are_flagged() -> None:
 
 
 def test_sharp_edges_of_a_box_are_its_twelve_edges() -> None:
-    """Subdivided by the mesh; diagonals of its flat faces are not sharp."""
+    """The mesh divides the twelve edges; diagonals of the flat faces are not sharp."""
     found, model = whole(shuffled(block(CELLS, SIZE), 4))
     x, edges = model.nodes.x0, sharp_ones(found)
     assert found.edges.n == 1.5 * found.faces.n
@@ -144,7 +145,7 @@ def test_the_two_faces_of_an_edge_look_outward_too() -> None:
 
 @pytest.mark.parametrize(("angle", "sharp"), [(20.0, False), (30.0, True)])
 def test_an_edge_is_sharp_when_its_faces_turn_by_more_than_25_degrees(angle: float, sharp: bool) -> None:
-    """A roof: a box whose upper nodes are lifted in the middle."""
+    """The body is a roof: a box whose upper nodes are lifted in the middle."""
     mesh = block((2, 1, 1), shake=0.0)
     slope = np.tan(np.radians(0.5 * angle))
     mesh.points[:, 2] += np.where(mesh.points[:, 2] > 0.5, slope * (1.0 - np.abs(mesh.points[:, 0] - 1.0)), 0.0)
@@ -199,7 +200,7 @@ def test_far_nodes_are_those_of_its_edges_that_a_rank_does_not_hold(ranks: int) 
 
 
 def test_concave_edges_belong_to_the_list_too() -> None:
-    """Concave edges are sharp; whether an edge is convex is tested by the narrow phase."""
+    """Concave edges are sharp; the narrow phase tests whether an edge is convex."""
     found, model = whole(cubes(CUBES[3]))
     edges = sharp_ones(found)
     inner = (model.nodes.x0[edges.nodes[:, :2]][..., :2] == 1.0).all(axis=(1, 2))
@@ -220,7 +221,8 @@ def test_an_edge_with_four_faces_is_treated_alike_on_any_number_of_ranks(ranks: 
 
 
 def test_where_four_faces_meet_every_two_that_run_against_each_other_make_an_edge() -> None:
-    """The two cubes' own edges, and the two gaps between them, which are not convex unless they are closed."""
+    """The edges are those of the two cubes, and those of the two gaps between the cubes, which are convex only if
+    the gaps are closed."""
     found, model = whole(cubes(CUBES[2]))
     x = model.nodes.x0[found.edges.nodes[:, :2]]
     common = (x[..., :2] == 1.0).all(axis=(1, 2))

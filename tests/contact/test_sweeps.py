@@ -1,4 +1,5 @@
-"""Sweeps: exact for one contact, no overshoot for many, independent of their order, and no impulse is lost or added."""
+"""Sweeps: exact for one contact, without overshoot for many contacts, independent of their order, and without loss
+of impulse."""
 
 import numpy as np
 import pytest
@@ -13,23 +14,23 @@ SEEDS = range(40)
 
 
 def energy(v: Floats, mobility: Floats) -> float:
-    """Kinetic energy, J, of the components that can move."""
+    """Returns the kinetic energy, J, of the components that can move."""
     mass = np.divide(1.0, mobility, out=np.zeros_like(mobility), where=mobility > 0.0)
     return float(0.5 * (mass * v * v).sum())
 
 
 def rates(met: ContactRows, v: Floats) -> Floats:
-    """(n, 3) relative velocity at each contact."""
+    """Returns (n, 3) the relative velocity at each contact."""
     return np.asarray(np.einsum("pk,pki->pi", met.weights, v[met.nodes]))
 
 
 def speeds(met: ContactRows, v: Floats) -> Floats:
-    """(n,) relative velocity along the normals."""
+    """Returns (n,) the relative velocity along the normals."""
     return np.asarray((rates(met, v) * met.normals).sum(axis=1))
 
 
 def rows_of(met: ContactRows, nodes: int) -> Floats:
-    """(n, 3 nodes) the matrix that takes velocities to normal speeds."""
+    """Returns (n, 3 nodes) the matrix that gives normal speeds from velocities."""
     rows = np.zeros((many(met), nodes, 3))
     for p in range(many(met)):
         rows[p, met.nodes[p]] += met.weights[p][:, None] * met.normals[p]
@@ -37,7 +38,7 @@ def rows_of(met: ContactRows, nodes: int) -> Floats:
 
 
 def dense(met: ContactRows, v: Floats, mobility: Floats) -> Floats:
-    """Velocities of the exact solution of the frictionless problem, by projected Gauss-Seidel."""
+    """Returns the velocities of the exact solution of the frictionless problem, by projected Gauss-Seidel."""
     J, inverse = rows_of(met, len(v)), mobility.reshape(-1)
     A, rest = J * inverse @ J.T, J @ v.reshape(-1) - met.wanted
     push = np.zeros(many(met))
@@ -51,7 +52,7 @@ def dense(met: ContactRows, v: Floats, mobility: Floats) -> Floats:
 
 
 def alone(seed: int, friction: float = 0.0) -> tuple[ContactRows, Floats, Floats]:
-    """One contact of a random network, oriented so that it needs an impulse."""
+    """Returns one contact of a random network, oriented so that it needs an impulse."""
     met, v, mobility = network(seed, 1, 4, friction)
     v *= np.sign(-speeds(met, v)[0])
     return met, v, mobility
@@ -59,7 +60,7 @@ def alone(seed: int, friction: float = 0.0) -> tuple[ContactRows, Floats, Floats
 
 @pytest.mark.parametrize("seed", SEEDS)
 def test_one_contact_is_solved_in_one_sweep(seed: int) -> None:
-    """Any masses and weights; some components held."""
+    """The contact has any masses and weights, and some held components."""
     met, v, mobility = alone(seed)
     random = np.random.default_rng(seed)
     met.wanted[:] = random.uniform(0.0, 5.0)
@@ -84,7 +85,7 @@ def test_impulses_add_up_to_exactly_nothing_and_act_along_the_normals(seed: int)
 
 @pytest.mark.parametrize("seed", SEEDS)
 def test_a_contact_never_pulls(seed: int) -> None:
-    """After any sweep; and a contact that opens by itself is not changed, to the bit."""
+    """This holds after any sweep. A contact that opens without an impulse is not changed, to the bit."""
     met, v, mobility = network(seed, wanted=20.0, friction=0.4)
     solver = Solver(met, v, mobility)
     for _ in range(20):
@@ -96,8 +97,8 @@ def test_a_contact_never_pulls(seed: int) -> None:
 
 @pytest.mark.parametrize("seed", SEEDS)
 def test_an_impulse_that_was_too_large_is_reduced(seed: int) -> None:
-    """The sum over the sweeps cannot be negative, the change of a sweep can: at the end no open contact has an
-    impulse."""
+    """The sum over the sweeps cannot be negative, but the change in one sweep can be negative: at the end no open
+    contact has an impulse."""
     met, v, mobility = network(seed)
     solver = Solver(met, v, mobility)
     solver.sweep(4000)
@@ -109,8 +110,8 @@ def test_an_impulse_that_was_too_large_is_reduced(seed: int) -> None:
 @pytest.mark.parametrize("wanted", [0.0, 10.0])
 @pytest.mark.parametrize("seed", SEEDS)
 def test_kinetic_energy_never_rises_where_nothing_overlaps(seed: int, wanted: float) -> None:
-    """After any number of sweeps; also with components held at rest. Where nothing is prescribed to move, from sweep
-    to sweep."""
+    """This holds after any number of sweeps, also with held components. Without prescribed motions the energy does
+    not rise from sweep to sweep."""
     met, v, mobility = network(seed, wanted=wanted)
     mobility *= np.random.default_rng(seed).uniform(size=mobility.shape) > 0.1
     v[mobility == 0.0] = 0.0
@@ -127,7 +128,7 @@ def test_kinetic_energy_never_rises_where_nothing_overlaps(seed: int, wanted: fl
 @pytest.mark.parametrize("held", [0.0, 0.2])
 @pytest.mark.parametrize("friction", [0.1, 0.5, 2.0])
 def test_kinetic_energy_never_rises_with_friction(friction: float, held: float, along_axes: bool) -> None:
-    """Also where the friction of one contact acts along the normal of the next."""
+    """This includes friction of one contact along the normal of another contact."""
     worst = 0.0
     for seed in range(60):
         met, v, mobility = network(seed, friction=friction)
@@ -142,7 +143,7 @@ def test_kinetic_energy_never_rises_with_friction(friction: float, held: float, 
 
 @pytest.mark.parametrize("friction", [0.0, 0.1, 0.5, 2.0])
 def test_kinetic_energy_never_rises_in_a_step(friction: float) -> None:
-    """Any number of sweeps, with momentum."""
+    """This holds for any number of sweeps with extrapolation."""
     worst = 0.0
     for seed in range(40):
         met, v, mobility = network(seed, friction=friction, wanted=5.0 if seed % 2 else 0.0)
@@ -155,7 +156,7 @@ def test_kinetic_energy_never_rises_in_a_step(friction: float) -> None:
 
 @pytest.mark.parametrize(("many", "plain"), [(10, 20), (20, 60)])
 def test_momentum_does_what_many_more_plain_sweeps_do(many: int, plain: int) -> None:
-    """Ten contacts at a node: the remaining error, in the norm of the kinetic energy."""
+    """Ten contacts have a common node; the error is measured in the norm of the kinetic energy."""
     left = np.zeros(2)
     for seed in range(10):
         met, v, mobility = network(seed, meetings=60)
@@ -211,7 +212,7 @@ def test_sweeps_converge_to_the_solution_of_the_dense_problem(seed: int) -> None
 
 @pytest.mark.parametrize("seed", range(10))
 def test_the_error_falls_with_every_sweep(seed: int) -> None:
-    """In the norm of the kinetic energy, from the first sweep on."""
+    """The error is measured in the norm of the kinetic energy, from the first sweep on."""
     met, v, mobility = network(seed, one_normal=seed % 2 == 0)
     exact, mass = dense(met, v, mobility), 1.0 / mobility
     solver, errors = Solver(met, v, mobility), []
@@ -240,7 +241,8 @@ def test_friction_is_bounded_by_mu_times_the_normal_impulse(mu: float) -> None:
 
 @pytest.mark.parametrize("seed", SEEDS)
 def test_one_contact_sticks_when_it_can_and_slides_when_it_must(seed: int) -> None:
-    """Sticks: no relative velocity remains. Slides: against the motion, with mu times the normal impulse."""
+    """If the contact sticks, no relative velocity remains. If it slides, friction acts against the motion, with mu
+    times the normal impulse."""
     met, v, mobility = alone(seed)
     met.friction[:] = 1e3
     assert np.abs(rates(met, Solver(met, v, mobility).sweep(1))).max() < 1e-7
@@ -256,7 +258,7 @@ def test_one_contact_sticks_when_it_can_and_slides_when_it_must(seed: int) -> No
 
 @pytest.mark.parametrize("seed", range(10))
 def test_friction_is_isotropic(seed: int) -> None:
-    """Rotated as a whole, nodes get the rotated impulses."""
+    """If the whole scene is rotated, the impulses of the nodes are rotated in the same way."""
     met, v, mobility = alone(seed, friction=0.4)
     turn = rotation(unit(np.random.default_rng(seed), 1)[0], 1.0)
     before = Solver(met, v, mobility).sweep(3)
@@ -267,7 +269,7 @@ def test_friction_is_isotropic(seed: int) -> None:
 @pytest.mark.parametrize("mu", [0.0, 0.2, 50.0])
 @pytest.mark.parametrize("seed", SEEDS)
 def test_energy_lost_is_friction_heat_and_the_work_of_the_normal_impulse(seed: int, mu: float) -> None:
-    """Of one contact: -1/2 push (speed before + speed after), and neither is negative."""
+    """The energy of one contact is -1/2 push (speed before + speed after); heat and work are never negative."""
     met, v, mobility = alone(seed, friction=mu)
     solver = Solver(met, v, mobility)
     after = solver.sweep(4)
@@ -282,7 +284,8 @@ def test_energy_lost_is_friction_heat_and_the_work_of_the_normal_impulse(seed: i
 
 @pytest.mark.parametrize(("cracks", "share"), [(False, 0.8), (True, 1.0)])
 def test_a_step_begins_with_the_impulses_of_the_one_before(cracks: bool, share: float) -> None:
-    """Friction whole, across the present normal, and the normal impulse in part, or for cracks whole."""
+    """The start values are the whole friction impulse, across the present normal, and a part of the normal impulse,
+    or for cracks the whole normal impulse."""
     met, v, mobility = network(7, friction=0.4)
     if cracks:
         met.nodes[:, 2:], met.weights[:] = met.nodes[:, 1:2], (1.0, -1.0, 0.0, 0.0)
@@ -297,7 +300,8 @@ def test_a_step_begins_with_the_impulses_of_the_one_before(cracks: bool, share: 
 
 
 def test_a_node_that_has_become_lighter_begins_with_less() -> None:
-    """With the same speed as before: an eighth of the mass on either side, an eighth of the impulse."""
+    """The start value has the same speed as before: with an eighth of the mass on each side it is an eighth of the
+    impulse."""
     met, v, mobility = network(7, friction=0.4)
     heavy, same, light = Solver(met, v, mobility), Solver(met, v, mobility), Solver(met, v, 8.0 * mobility)
     heavy.sweep(2000)

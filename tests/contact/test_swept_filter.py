@@ -17,8 +17,8 @@ TIMES = np.linspace(0.0, HORIZON, 41)
 
 
 def flights(seed: int, many: int, turn: float) -> tuple[Floats, Floats]:
-    """(pairs, 2, many, 3) positions and velocities of two things of ``many`` corners about 1 m long: each moves by
-    about its length and rotates by about ``turn``, rad.
+    """Returns (pairs, 2, many, 3) positions and velocities of two things of ``many`` corners about 1 m long: each
+    moves by about its length and rotates by about ``turn``, rad.
     """
     draw = np.random.default_rng(seed)
     shape = draw.normal(size=(PAIRS, 2, many, 3))
@@ -43,7 +43,8 @@ def kept_edges(pairs: Indices, corners: Indices, deep: Floats, of: Lines, skin: 
 
 
 def wrong_edges(seed: int, turn: float) -> tuple[int, float]:
-    """Number of removed pairs of edges that come nearer than half the skin, and the removed share."""
+    """Returns the number of removed pairs of edges that come nearer than half the skin, and the fraction of removed
+    pairs."""
     x, v = flights(seed, 2, turn)
     ends = np.arange(4 * PAIRS, dtype=np.int32).reshape(-1, 2)
     pairs = np.arange(2 * PAIRS, dtype=np.int32).reshape(-1, 2)
@@ -64,7 +65,7 @@ def test_no_edges_are_removed_that_come_near(turn: float) -> None:
 
 
 def wrong_faces(seed: int, turn: float) -> tuple[int, float]:
-    """The same for nodes and faces."""
+    """Returns the same numbers for nodes and faces."""
     x, v = flights(seed, 3, turn)
     corners = np.arange(6 * PAIRS, dtype=np.int32).reshape(PAIRS, 2, 3)
     faces = np.column_stack([corners[:, 1], corners[:, 1, :1]]).astype(np.int32)
@@ -86,8 +87,8 @@ def test_no_node_is_removed_that_comes_near_a_face(turn: float) -> None:
 
 
 def test_edges_that_come_near_between_two_moments_are_not_removed() -> None:
-    """The edges are 0.13 m apart after a twelfth of the horizon; the crossing is beyond an end at beginning, middle
-    and end.
+    """The edges are 0.13 m apart after a twelfth of the horizon. At the beginning, the middle and the end the
+    crossing is beyond an end of an edge.
     """
     x = np.array([[-1.0, 1.175, -1.896], [-0.046, 0.775, -0.536], [0.263, 1.232, -0.359], [-0.201, 1.28, -0.777]])
     v = np.array([[-0.677, 2.596, -0.252], [0.334, 2.861, 0.613], [-0.615, 0.038, -1.033], [-0.528, 0.628, -0.385]])

@@ -1,5 +1,5 @@
-"""Zones of the surface nodes: boxes with about as many nodes; and a step on many threads equals that on one, to the
-bit."""
+"""Zones of the surface nodes: boxes with about equal numbers of nodes; a step on many threads equals a step on one
+thread, to the bit."""
 
 from itertools import pairwise
 from types import SimpleNamespace
@@ -17,7 +17,7 @@ from .kernels import Solver, network
 
 
 def nodes_of(x: "np.ndarray") -> Any:
-    """Surface nodes as zones read them."""
+    """Returns surface nodes in the form that zones read."""
     return SimpleNamespace(x=x, n=len(x))
 
 
@@ -51,7 +51,7 @@ def test_one_thread_has_one_zone() -> None:
 
 
 def test_sets_of_one_colour_share_no_node() -> None:
-    """Every contact is of one set, and most are of those of the zones."""
+    """Every contact belongs to one set, and most contacts belong to a set within a zone."""
     draw, nodes = np.random.default_rng(3), 600
     x = np.sort(draw.uniform(size=(nodes, 3)), axis=0)
     zones = Zones(2)
@@ -71,7 +71,7 @@ def test_sets_of_one_colour_share_no_node() -> None:
 @pytest.mark.parametrize("threads", [2, 5])
 @pytest.mark.parametrize("seed", range(3))
 def test_impulses_of_many_threads_are_those_of_one(threads: int, seed: int) -> None:
-    """Of contacts within zones and across them, with friction and with stored impulses."""
+    """The contacts are within zones and across zones, with friction and with stored impulses."""
     met, v, mobility = network(seed, friction=0.3)
     ends = []
     for many in (1, threads):

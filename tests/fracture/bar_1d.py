@@ -29,7 +29,7 @@ Floats = npt.NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Bar:
-    """SI; the material of the literature's ceramic."""
+    """Material and mesh of the bar in SI; the ceramic of the literature."""
 
     length: float = 0.05
     elements: int = 4000
@@ -37,37 +37,37 @@ class Bar:
     density: float = 2750.0
     strength: float = 300e6
     toughness: float = 100.0
-    """G_c, J/m^2."""
+    """Fracture energy G_c, J/m^2."""
     scatter: float = 0.01
-    """Strengths are uniform from ``strength`` to this share above it."""
+    """Strengths are uniformly distributed from ``strength`` to this fraction above it."""
     modulus: float = 0.0
-    """Weibull's modulus of the strengths, whose scale is ``strength``; 0: they are uniform."""
+    """Weibull modulus of the strengths, whose scale is ``strength``; 0: the strengths are uniformly distributed."""
     courant: float = 0.2
-    """dt c / h."""
+    """Time step times c / h."""
     seed: int = 1
 
     @property
     def c(self) -> float:
-        """Speed of waves, m/s."""
+        """Returns the wave speed, m/s."""
         return float(np.sqrt(self.young / self.density))
 
     @property
     def s_0(self) -> float:
-        """E G_c / strength^2, m."""
+        """Returns E G_c / strength^2, m."""
         return self.young * self.toughness / self.strength**2
 
     @property
     def t_0(self) -> float:
-        """s_0 / c, s."""
+        """Returns s_0 / c, s."""
         return self.s_0 / self.c
 
     @property
     def rate_0(self) -> float:
-        """strength / (E t_0), 1/s."""
+        """Returns strength / (E t_0), 1/s."""
         return self.strength / (self.young * self.t_0)
 
     def strengths(self) -> Floats:
-        """(elements - 1,) of the interfaces, Pa."""
+        """Returns (elements - 1,) strengths of the interfaces, Pa."""
         random, n = np.random.default_rng(self.seed), self.elements - 1
         if self.modulus > 0.0:
             drawn: Floats = (-np.log(1.0 - random.uniform(size=n))) ** (1.0 / self.modulus)
@@ -126,22 +126,22 @@ class Run:
 
     @property
     def stress(self) -> Floats:
-        """(elements,) Pa."""
+        """Returns (elements,) stresses, Pa."""
         return np.asarray(self.bar.young / self.h * (self.u[:, 1] - self.u[:, 0]))
 
     @property
     def opening(self) -> Floats:
-        """(elements - 1,) m."""
+        """Returns (elements - 1,) openings, m."""
         return _apart(self.u)
 
     @property
     def failed(self) -> int:
-        """Interfaces that have failed."""
+        """Returns the interfaces that have failed."""
         return int((self.largest >= self.critical).sum())
 
     @property
     def size(self) -> float:
-        """Mean size of the fragments in s_0; the pieces at the two ends count as halves."""
+        """Returns the mean size of the fragments in s_0; the pieces at the two ends count as halves."""
         return self.bar.length / max(self.failed, 1) / self.bar.s_0
 
     @property
@@ -150,12 +150,12 @@ class Run:
 
     @property
     def _power(self) -> float:
-        """Power of the driven ends, W/m^2."""
+        """Returns the power of the driven ends, W/m^2."""
         stress = self.stress
         return float(stress[-1] * self.v[-1, 1] - stress[0] * self.v[0, 0])
 
     def kick(self) -> None:
-        """v(n-1/2) -> v(n+1/2)."""
+        """Computes v(n-1/2) -> v(n+1/2)."""
         opening, stress, impulse = self.opening, self.stress, self.dt / self.mass
         self.largest = np.maximum(self.largest, opening)
         v = self.v.copy()
@@ -173,14 +173,14 @@ class Run:
         self._contact += 0.5 * self.dt * float(self.push @ (_apart(self._before) + _apart(v)))
 
     def move(self) -> None:
-        """u(n) -> u(n+1)."""
+        """Computes u(n) -> u(n+1)."""
         self.u = self.u + self.dt * self.v
         self.t += self.dt
         self.deepest = max(self.deepest, float(-self.opening.min()))
 
     def energies(self) -> Energies:
-        """Energies at time n, between ``kick`` and ``move``: only the first half of the impulses of this step has
-        done work.
+        """Returns the energies at time n, between ``kick`` and ``move``: only the first half of the impulses of this
+        step has done work.
         """
         left = self.strength * np.maximum(1.0 - self.largest / self.critical, 0.0)
         opened = np.maximum(self.opening, 0.0)
@@ -197,12 +197,12 @@ class Run:
 
 
 def _apart(values: Floats) -> Floats:
-    """(elements - 1,) right side less left side of every interface."""
+    """Returns (elements - 1,) the value on the right minus the value on the left of every interface."""
     return np.asarray(values[1:, 0] - values[:-1, 1])
 
 
 def law(opening: Floats, without: Floats, largest: Floats, left: Floats, a: float) -> Floats:
-    """(n,) T of d, o, D, S and a, Pa."""
+    """Returns (n,) T of d, o, D, S and a, Pa."""
     explicit = left * np.divide(opening, largest, out=np.zeros_like(left), where=largest > 0.0)
     ahead = np.maximum(without, 0.0) * left
     implicit = np.minimum(left, np.divide(ahead, largest + a * left, out=np.zeros_like(left), where=left > 0.0))
@@ -210,21 +210,19 @@ def law(opening: Floats, without: Floats, largest: Floats, left: Floats, a: floa
 
 
 def even(x: float) -> float:
-    """Mean size in s_0 at x times rate_0, of a ring or bar whose strength is the same everywhere.
-
-    4.5 / (1 + 0.77 x^(1/4) + 5.4 x^(3/4)): Zhou, Molinari and Ramesh 2006 (Appl. Phys. Lett. 88, 261918), an expanding
-    ring in one dimension. As remembered; the programs of DynFrag1D (github.com/raquel-dantas/DynFrag1D) have the same
-    formula under their names, with the same units. The bar of this module agrees within 10 % for 0.1 <= x <= 1 where
-    strengths scatter by 1e-5 or less.
+    """Returns the mean size in s_0 at x times rate_0 of a ring or bar of uniform strength: 4.5 / (1 + 0.77 x^(1/4) +
+    5.4 x^(3/4)), Zhou, Molinari and Ramesh 2006 (Appl. Phys. Lett. 88, 261918), an expanding ring in one dimension;
+    quoted from memory. The programs of DynFrag1D (github.com/raquel-dantas/DynFrag1D) have the same formula with the
+    same authors and units. The bar of this module agrees within 10 % for 0.1 <= x <= 1 if strengths scatter by 1e-5
+    or less.
     """
     return float(4.5 / (1.0 + 0.77 * x**0.25 + 5.4 * x**0.75))
 
 
 def scattered(x: float) -> float:
-    """Mean size in s_0 at x times rate_0, of a bar whose strengths scatter by about 1 %.
-
-    4.5 / (1 + 4.5 x^(2/3)): attributed to Zhou, Molinari and Ramesh 2006 (Int. J. Fracture 139, 169), as remembered;
-    no copy of the paper was at hand. The bar of this module agrees within 5 % for 0.3 <= x <= 10 with strengths that
-    scatter evenly by 1 %; at x = 0.1 it has 16 to 19 % more fragments.
+    """Returns the mean size in s_0 at x times rate_0 of a bar whose strengths scatter by about 1 %: 4.5 / (1 + 4.5
+    x^(2/3)), attributed to Zhou, Molinari and Ramesh 2006 (Int. J. Fracture 139, 169), quoted from memory; no copy
+    of the paper was found. The bar of this module agrees within 5 % for 0.3 <= x <= 10 with strengths that are
+    uniformly distributed over 1 %; at x = 0.1 it has 16 to 19 % more fragments.
     """
     return float(4.5 / (1.0 + 4.5 * x ** (2.0 / 3.0)))

@@ -130,7 +130,7 @@ frames = 0
 
 
 def cube(safety: float, half: float = 2e-3, across: float = 0.0, scatter: str = "", end: float = 8e-6) -> str:
-    """``half``: half of its edge."""
+    """Returns the scene; ``half``: half of the edge of the cube."""
     gap, plate = 1e-5, 2e-3
     face = half + gap
     return CUBE.format(
@@ -172,7 +172,7 @@ class Account:
 
 
 def account(text: str) -> Account:
-    """The ledger of every step."""
+    """Returns the energy balance of every step."""
     sim, found = simulation.build(load.parse_toml(text), Path(), SerialComm()), Account()
 
     def look(sim: Simulation, before: Floats) -> None:
@@ -196,7 +196,7 @@ def account(text: str) -> Account:
     ],
 )
 def test_closing_facets_release_no_more_than_they_absorbed(name: str, safety: float) -> None:
-    """The rest is due to pairs that contact pushed back differently than in the step before."""
+    """The remaining energy is due to pairs that contact pushed back differently than in the step before."""
     found = account(SCENES[name](safety))
     print(f"{name} {safety}: {found}")
     assert found.facets > 100

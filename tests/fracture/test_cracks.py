@@ -42,7 +42,7 @@ def only_the_plane_breaks() -> Iterator[None]:
 
 
 def mesh_of() -> TetMesh:
-    """A block of 3 x 3 x 4 mm, with a plane of facets in the middle."""
+    """Returns a block of 3 x 3 x 4 mm, with a plane of facets in the middle."""
     return block((3, 3, 4), MM, shake=0.0)
 
 
@@ -52,7 +52,7 @@ def case_of(friction: float = 0.0, **fracture: object) -> schema.Case:
 
 
 def sides(sim: Simulation) -> Flags:
-    """(nodes,) which nodes belong to tets above the plane."""
+    """Returns (nodes,) whether a node belongs to tets above the plane."""
     above = np.zeros(sim.model.nodes.n, bool)
     for b in sim.model.blocks:
         above[b.tets[sim.model.nodes.x0[b.tets].mean(axis=1)[:, 2] > HEIGHT]] = True
@@ -60,7 +60,8 @@ def sides(sim: Simulation) -> Flags:
 
 
 def at_rest(sim: Simulation) -> Simulation:
-    """The block just after the whole plane has broken at a stress of a few Pa: without stress, force and motion."""
+    """Returns the block just after the whole plane has broken at a stress of a few Pa: without stress, force and
+    motion."""
     nodes = sim.model.nodes
     step.prepare(sim)
     first = sim.model.nodes_global
@@ -73,7 +74,7 @@ def at_rest(sim: Simulation) -> Simulation:
             break
     assert sim.model.nodes_global == first + 16
     nodes.x[:], nodes.v[:] = nodes.x0, 0.0
-    step.prepare(sim)  # the volumes that tets keep
+    step.prepare(sim)  # volumes that the pass over the tets stores
     nodes.force[:] = 0
     for b in sim.model.blocks:
         b.state[:, : rows.VISCOUS + 1, :] = 0.0
@@ -81,7 +82,7 @@ def at_rest(sim: Simulation) -> Simulation:
 
 
 def gaps(sim: Simulation) -> Floats:
-    """(16,) distance across the crack, m; one rank."""
+    """Returns (16,) the distance across the crack, m, on one rank."""
     nodes, above = sim.model.nodes, sides(sim)
     plane_nodes = np.flatnonzero(np.abs(nodes.x0[:, 2] - HEIGHT) < 1e-9)
     order = plane_nodes[np.lexsort((above[plane_nodes], nodes.x0[plane_nodes, 1], nodes.x0[plane_nodes, 0]))]
@@ -104,7 +105,7 @@ def ticks(sim: Simulation, steps: int, look: Callable[[], None] = lambda: None) 
 
 @pytest.mark.parametrize("searched", [False, True])
 def test_a_new_crack_makes_no_impulse(searched: bool) -> None:
-    """The gap is zero, to the bit, and a body at rest stays at rest."""
+    """The gap is zero to the bit, and a body at rest stays at rest."""
     sim = cracked()
     assert sim.contact is not None
     assert (gaps(sim) == 0.0).all()
@@ -117,7 +118,7 @@ def test_a_new_crack_makes_no_impulse(searched: bool) -> None:
 
 @pytest.mark.parametrize("searched", [False, True])
 def test_sides_that_close_stop(searched: bool) -> None:
-    """Stopped in the same step, with conserved momentum; the gap is never negative."""
+    """The sides stop in the same step, with conserved momentum; the gap is never negative."""
     sim = cracked()
     assert sim.contact is not None
     nodes, above = sim.model.nodes, sides(sim)
@@ -132,8 +133,8 @@ def test_sides_that_close_stop(searched: bool) -> None:
 
 
 def test_a_crack_that_closes_acts_as_two_bodies_do() -> None:
-    """The same two halves as separate parts, in contact by nodes and faces from the start: the same motion while
-    they touch, and the same momentum of each.
+    """The reference has the same two halves as separate parts, in contact by nodes and faces from the start: the
+    motion while they touch and the momentum of each are equal.
     """
     sim = cracked()
     above = sides(sim)
@@ -158,7 +159,7 @@ def test_a_crack_that_closes_acts_as_two_bodies_do() -> None:
 
 @pytest.mark.parametrize("friction", [0.0, 0.3])
 def test_sides_that_slide_rub(friction: float) -> None:
-    """Pressed and sheared, the sides lose mu times the normal impulse, and without friction only the part by the
+    """Pressed and sheared sides lose mu times the normal impulse. Without friction they lose only the part by the
     rotation of faces by the strain, v / c = 2e-4.
     """
     sim = cracked(friction=friction)
@@ -176,7 +177,7 @@ def test_sides_that_slide_rub(friction: float) -> None:
 
 @pytest.mark.parametrize("friction", [0.0, 0.2])
 def test_cracks_close_alike_on_any_number_of_ranks(friction: float) -> None:
-    """Closing and sliding, with broad phases in between: bit-identical."""
+    """The cracks close and slide, with broad phases in between; the results are bit-identical."""
 
     def work(sim: Simulation) -> tuple[list[float], int]:
         at_rest(sim)

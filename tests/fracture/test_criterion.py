@@ -36,18 +36,18 @@ ROWS = np.array([[0, 5, 4], [5, 1, 3], [4, 3, 2]])
 
 
 def effective(traction: Floats, normal: Floats, weight: float, friction: float) -> Floats:
-    """Camacho and Ortiz 1996, of tractions and unit normals (n, 3)."""
+    """Returns the effective traction of Camacho and Ortiz (1996) for tractions and unit normals (n, 3)."""
     along = (traction * normal).sum(axis=1)
     across = np.linalg.norm(traction - along[:, None] * normal, axis=1)
     pressed = math.sqrt(weight) * np.maximum(across + friction * np.minimum(along, 0.0), 0.0)
     return np.asarray(np.where(along >= 0.0, np.hypot(along, math.sqrt(weight) * across), pressed))
 
 
-# The cheap test
+# Inexpensive test before the criterion
 
 
 def marks(corners: Floats, rows: Floats, weakest: Floats, weight: float) -> Ints:
-    """(n, 4) result of ``mark_hot`` for tets ``corners`` (n, 4, 3) under ``rows`` (n, 7) of stress."""
+    """Returns (n, 4) the result of ``mark_hot`` for tets ``corners`` (n, 4, 3) under ``rows`` (n, 7) of stress."""
     n = len(corners)
     out = np.zeros((n, 4), np.int64)
     for start in range(0, n, CHUNK):
@@ -66,7 +66,7 @@ def marks(corners: Floats, rows: Floats, weakest: Floats, weight: float) -> Ints
 
 
 def stresses(rows: Floats) -> Floats:
-    """(n, 3, 3) of rows (n, 7): deviator and pressure."""
+    """Returns (n, 3, 3) stresses of rows (n, 7): deviator and pressure."""
     return np.asarray(rows[:, ROWS] - rows[:, PRESSURE, None, None] * np.eye(3))
 
 
@@ -104,7 +104,8 @@ def test_a_facet_that_passes_is_overstressed_on_one_side_at_least(weight: float)
 
 
 def loaded_sim(sim: Simulation) -> Simulation:
-    """Random stresses, by the id of the tet; every face is marked, and all tractions are below the strength."""
+    """Returns a simulation with random stresses by the id of the tet; every face is marked, and all tractions are
+    below the strength."""
     step.prepare(sim)
     for b in sim.model.blocks:
         for row in (*range(S_XX, S_XY + 1), PRESSURE, VISCOUS):
@@ -143,8 +144,8 @@ def case_of(**fracture: Any) -> schema.Case:
 
 @pytest.mark.parametrize("source", ["tets", "nodes"])
 def test_tractions_are_those_of_numpy_and_the_same_on_any_number_of_ranks(source: str) -> None:
-    """The mean of both sides, or of the three nodes by volume, without the viscous part, on the outward normal of
-    the tet of smaller id, once for each facet.
+    """The traction is the mean of the two sides, or of the three nodes by volume, without the viscous part, on the
+    outward normal of the tet of smaller id, once for each facet.
     """
     mesh, case = block((3, 3, 2), 1e-3, seed=2), case_of(delay=0.0, shear_weight=0.7, friction=0.4, traction=source)
     sim = loaded_sim(build(case, [mesh]))
@@ -183,7 +184,7 @@ def test_tractions_are_those_of_numpy_and_the_same_on_any_number_of_ranks(source
 
 
 def test_facets_below_their_strength_are_no_candidates() -> None:
-    """On any number of ranks."""
+    """The result is the same on any number of ranks."""
     mesh, case = block((3, 3, 2), 1e-3, seed=2), case_of(delay=0.0, shear_weight=0.7, friction=0.4)
 
     def strengthened(sim: Simulation) -> Simulation:
@@ -212,7 +213,7 @@ def test_the_effective_traction_is_that_of_camacho_and_ortiz() -> None:
 
 
 def test_a_facet_that_is_only_pressed_never_breaks() -> None:
-    """Hydrostatic pressure of any size; the paper's eq. (1) squares the normal traction."""
+    """The facet is under hydrostatic pressure of any size; eq. (1) of the paper squares the normal traction."""
     corners = np.repeat(REGULAR[None], 5, axis=0)
     rows = np.zeros((5, 7))
     rows[:, PRESSURE] = 10.0 ** np.arange(5.0)
@@ -232,7 +233,7 @@ def tough(**changes: object) -> Toughness:
 
 
 def test_a_tiny_modulus_makes_facets_that_never_break() -> None:
-    """Others break at once, without a warning of numpy."""
+    """All other facets break at once, without a warning of numpy."""
     found = tough(modulus=1e-3).strengths(np.arange(100), np.ones(100))
     assert 0.0 < found.min() < 1e-200
     assert np.inf in found
@@ -286,11 +287,12 @@ def test_strengths_are_independent_of_order_and_ranks() -> None:
             assert part.items() <= one.items()
 
 
-# The delay
+# Delay of the criterion
 
 
 def required(made: Toughness, strength: Floats, since: Floats) -> Floats:
-    """(n,) traction, Pa, that breaks facets by the times ``since`` after they first passed their strength."""
+    """Returns (n,) the traction, Pa, that breaks facets at the times ``since`` after they first passed their
+    strength."""
     return np.array([required_traction(s, t, made.delay) for s, t in zip(strength, since, strict=True)])
 
 

@@ -1,5 +1,5 @@
-"""Pieces that share only an edge or a node: they do not pass each other there while the cracks round it are narrow,
-and pass where their faces would not touch.
+"""Pieces with only a common edge or node: they do not pass each other at it while the cracks round it are narrow,
+and they pass if their faces would not touch.
 """
 
 from collections.abc import Iterator, Sequence
@@ -33,7 +33,8 @@ MIDDLE = 2.0 * MM
 
 
 def mesh_of(height: int = 2) -> TetMesh:
-    """A block of 4 x 2 x 4 mm, with planes of facets x and z = 2 mm that cross in its middle; ``height``: in y, mm."""
+    """Returns a block of 4 x 2 x 4 mm, with planes of facets at x and z = 2 mm that cross in its middle; ``height``:
+    in y, mm."""
     return block((4, height, 4), MM, shake=0.0)
 
 
@@ -53,7 +54,8 @@ def planes_that_break(mesh: TetMesh, axes: list[int]) -> Iterator[None]:
 
 @pytest.fixture
 def columns_come_apart() -> Iterator[None]:
-    """Four columns remain, each beside two others and opposite one across the edge in the middle."""
+    """Breaks the block into four columns; each column has two neighbours and is opposite to one column across the
+    edge in the middle."""
     with planes_that_break(mesh_of(), [0, 2]):
         yield
 
@@ -63,7 +65,7 @@ def case_of() -> schema.Case:
 
 
 def columns(sim: Simulation) -> Ints:
-    """(nodes,) which column each node belongs to: 1 for x, 2 for z beyond the middle; all ranks take part."""
+    """Returns (nodes,) the column of each node: 1 for x, plus 2 for z beyond the middle. Collective."""
     sim.count_nodes()
     nodes = sim.model.nodes
     found = np.zeros(sim.model.nodes_global)
@@ -74,8 +76,8 @@ def columns(sim: Simulation) -> Ints:
 
 
 def at_rest(sim: Simulation, axes: Sequence[int] = (0, 2)) -> Simulation:
-    """The block just after the planes of these ``axes`` have broken at a stress of a few Pa: without stress, force
-    and motion.
+    """Returns the block just after the planes of these ``axes`` have broken at a stress of a few Pa: without stress,
+    force and motion.
     """
     nodes = sim.model.nodes
     step.prepare(sim)
@@ -96,14 +98,15 @@ def at_rest(sim: Simulation, axes: Sequence[int] = (0, 2)) -> Simulation:
 
 
 def meeting(sim: Simulation) -> Ints:
-    """Two columns that share the edge collide there at 4 m/s, the two others move away."""
+    """Returns a scene in which two columns with the common edge collide at this edge at 4 m/s, and the two other
+    columns move away."""
     which, speed = columns(sim), np.array([[1.0, 0.0, 1.0], [1.2, 0.0, -1.2], [-1.2, 0.0, 1.2], [-1.0, 0.0, -1.0]])
     sim.model.nodes.v[:] = speed[which] * 2.0
     return which
 
 
 def depth(sim: Simulation, which: Ints) -> float:
-    """Penetration of the edge of one column into the opposite one, m; one rank."""
+    """Returns the penetration of the edge of one column into the opposite column, m, on one rank."""
     nodes = sim.model.nodes
     edge = (nodes.x0[:, [0, 2]] == MIDDLE).all(axis=1)
     low, high = (nodes.x[edge & (which == k)][:, [0, 2]] for k in (0, 3))
@@ -114,7 +117,8 @@ def depth(sim: Simulation, which: Ints) -> float:
 @pytest.mark.usefixtures("columns_come_apart")
 @pytest.mark.parametrize("searched", [False, True])
 def test_pieces_that_share_an_edge_do_not_pass_there(searched: bool) -> None:
-    """To a twentieth of the free penetration, which five sweeps leave; momentum is exact."""
+    """The penetration is at most a twentieth of the penetration without contact, the error of five sweeps; momentum
+    is exact."""
     sim = at_rest(build(case_of(), [mesh_of()]))
     assert sim.contact is not None
     which, nodes = meeting(sim), sim.model.nodes
@@ -130,8 +134,8 @@ def test_pieces_that_share_an_edge_do_not_pass_there(searched: bool) -> None:
 
 
 def test_a_piece_that_passes_behind_a_node_is_free() -> None:
-    """Eight octants share a node. One moves past its corner, below the plane of a side of the opposite one but
-    behind all of its tets, while the others move apart: no contact, and no velocity changes.
+    """Eight octants have a common node. One octant moves past its corner, below the plane of a side of the opposite
+    octant but behind all of its tets, while the other octants move apart: no contact acts, and no velocity changes.
     """
     mesh = mesh_of(4)
     with planes_that_break(mesh, [0, 1, 2]):
@@ -151,7 +155,7 @@ def test_a_piece_that_passes_behind_a_node_is_free() -> None:
 
 @pytest.mark.usefixtures("columns_come_apart")
 def test_contact_at_a_shared_edge_is_equal_on_any_number_of_ranks() -> None:
-    """With broad phases in between: bit-identical."""
+    """Broad phases occur in between; the results are bit-identical."""
 
     def work(sim: Simulation) -> list[float]:
         at_rest(sim)

@@ -1,4 +1,4 @@
-"""Fragments: connectivity as by scipy, mass and motion of the nodes, independence of the number of ranks."""
+"""Fragments: connectivity compared with scipy, mass and motion of the nodes, independence of the number of ranks."""
 
 import itertools
 import math
@@ -76,7 +76,7 @@ class Body:
         return made
 
     def labels(self) -> Ints:
-        """(n,) by scipy."""
+        """Returns (n,) labels computed by scipy."""
         whole = (self.across >= 0) & ((self.bond == 0) | (self.part == self.bare)[:, None])
         tet, face = np.nonzero(whole)
         pairs = np.vstack([np.column_stack([tet, self.across[tet, face] // 4]), self.held])
@@ -89,8 +89,8 @@ class Body:
 
 
 def body(seed: int, cells: tuple[int, int, int] = (5, 4, 3), broken: float = 0.6, parts: int = 1) -> Body:
-    """Blocks of 1 mm cells side by side, 1 m from the origin, with randomly broken faces; a tenth of these are held
-    by a cohesive facet.
+    """Returns adjacent blocks of 1 mm cells, 1 m from the origin, with randomly broken faces; a tenth of these faces
+    have a cohesive facet.
     """
     random = np.random.default_rng(seed)
     x0, tets, part = np.zeros((0, 3)), np.zeros((0, 4), np.int64), np.zeros(0, np.int64)
@@ -114,7 +114,7 @@ def body(seed: int, cells: tuple[int, int, int] = (5, 4, 3), broken: float = 0.6
 
 
 def owners(b: Body, ranks: int, seed: int) -> Ints:
-    """Returns the tets distributed at random; with five ranks one has none."""
+    """Returns a random distribution of the tets; with five ranks one rank has no tets."""
     return np.random.default_rng(seed).integers(0, ranks - (ranks == 5), len(b.tets))
 
 
@@ -188,7 +188,8 @@ def test_eroded_tets_join_no_fragments() -> None:
 
 
 def test_chains_are_found_in_any_order_of_their_numbers() -> None:
-    """Paths whose ids are shuffled, ascending or descending, or branch from the largest: slow cases for union-find."""
+    """The chains have ids that are shuffled, ascending or descending, or branch from the largest: slow cases for
+    union-find."""
     n = 3000
     random = np.random.default_rng(0)
     comb = np.concatenate([np.arange(n // 2), np.arange(n // 2, n)[::-1]]).reshape(2, -1).T.reshape(-1)
@@ -201,7 +202,7 @@ def test_chains_are_found_in_any_order_of_their_numbers() -> None:
 
 
 def test_the_table_is_that_of_plain_sums() -> None:
-    """Fragment by fragment and corner by corner, with the same lumped masses."""
+    """The reference is computed for each fragment and each corner, with the same lumped masses."""
     b = body(5)
     labels, rows = b.labels(), table_of(b)
     assert (rows["label"] == np.unique(labels)).all()
@@ -234,7 +235,7 @@ def test_the_table_is_that_of_plain_sums() -> None:
 
 
 def test_fragments_have_the_mass_and_motion_of_the_nodes() -> None:
-    """Their totals to 1e-12 of the sum of magnitudes, 1 m from the origin."""
+    """The totals agree to 1e-12 of the sum of magnitudes, 1 m from the origin."""
     b = body(7, cells=(8, 6, 5))
     rows = table_of(b, 3)
     mass = np.bincount(b.tets.reshape(-1), np.repeat(b.mass / 4.0, 4), len(b.x))
@@ -278,7 +279,8 @@ def test_plain_sums_would_not_have_the_same_bits() -> None:
 
 
 def test_a_small_fragment_keeps_its_digits_beside_a_large_one() -> None:
-    """A fragment of 1e-5 of the size, with 1e-25 of the inertia of the other, has the same digits as alone."""
+    """A fragment of 1e-5 of the size, with 1e-25 of the inertia of the other, has the same digits as without the
+    large fragment."""
     large, small = body(1, cells=(3, 3, 3), broken=0.0), body(2, cells=(1, 1, 1), broken=0.0)
     place = np.array([0.3, 1.0, -0.7])
     for points in (small.x0, small.x):
@@ -297,8 +299,9 @@ def test_a_small_fragment_keeps_its_digits_beside_a_large_one() -> None:
 
 
 def test_a_spinning_block_has_the_momentum_and_energy_of_its_lumped_masses() -> None:
-    """Cubes of edge h, six tets each: the four nodes on a side of a cube have half of its mass, so that of m h^2 / 12
-    becomes m h^2 / 4, and four thirds of the corners' share lie along the diagonal, so the product is m h^2 / 12.
+    """The block has cubes of edge h with six tets each. The four nodes on a side of a cube have half of its mass, so
+    m h^2 / 12 of a solid cube becomes m h^2 / 4. Four thirds of the mass of a corner lie along the diagonal, so the
+    product of inertia is m h^2 / 12.
     """
     n, h, rho = (6, 4, 2), 2e-3, 2500.0
     mesh = block(n, h, shake=0.0)
@@ -328,7 +331,7 @@ def test_a_spinning_block_has_the_momentum_and_energy_of_its_lumped_masses() -> 
 
 
 def test_the_largest_piece_of_a_fragment_keeps_its_number() -> None:
-    """Faces break and tets erode, four times: against a plain search, and alike for any number of ranks."""
+    """Faces break and tets erode, four times. The result is that of a plain search, for any number of ranks."""
     b, random, gone = body(17, broken=0.3), np.random.default_rng(1), np.zeros(0, np.int64)
     known, following = np.full(len(b.tets), numbers.UNKNOWN), 0
     for _ in range(4):
@@ -377,7 +380,8 @@ def plainly_numbered(before: Ints, labels: Ints, following: int) -> tuple[Ints, 
 
 @pytest.mark.parametrize("ranks", [1, 3])
 def test_the_part_of_a_fragment_does_not_follow_from_its_number(ranks: int) -> None:
-    """A persistent number does not determine tets: here the numbers decrease while those of the tets increase."""
+    """The number of a fragment does not determine the part: here the numbers decrease while the ids of the tets
+    increase."""
     b = body(5, parts=3)
     of_tet, last = b.labels(), len(b.tets) + 1000
 

@@ -1,4 +1,4 @@
-"""Node separation: pieces of stars as by scipy, and copies numbered alike for any number of ranks."""
+"""Node separation: pieces of stars compared with scipy, and the same numbers of copies for any number of ranks."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -81,7 +81,7 @@ def test_pieces_are_those_of_scipy(seed: int) -> None:
 
 @dataclass
 class Cracked:
-    """Whole mesh after some events."""
+    """The whole mesh after some events."""
 
     tets: Ints
     """(n, 4) global nodes."""
@@ -133,7 +133,7 @@ def case_of(**fracture: object) -> schema.Case:
 
 
 def arranged(model: Model) -> None:
-    """Velocities that distinguish nodes, and bonds."""
+    """Sets velocities that distinguish nodes, and bonds."""
     model.nodes.v[:] = np.sin(model.nodes.id[:, None] + np.arange(3.0))
     for b in model.blocks:
         b.bond = np.full((b.n, 4), INTACT, np.uint8)
@@ -157,11 +157,11 @@ def break_on(model: Model, separation: Separation, facets: Ints, comm: Comm) -> 
         len(column) == nodes.n for column in (nodes.x, nodes.v, nodes.mass, nodes.owner, nodes.part, nodes.force)
     )
     assert (nodes.id[split.first :] == split.copies.id).all()
-    model.nodes_global = int(comm.maximum(np.array([float(model.nodes_global)]))[0])  # as the next reduction would
+    model.nodes_global = int(comm.maximum(np.array([float(model.nodes_global)]))[0])  # as the next reduction does
 
 
 def cracked(mesh: TetMesh, events: Sequence[Ints], ranks: int) -> Cracked:
-    """Returns the mesh after some events, put together from the ranks; copies of a node must agree."""
+    """Returns the mesh after some events, combined from the ranks; copies of a node must agree."""
     pieces = pieces_of(case_of(), [mesh], ranks)
 
     def work(comm: Comm) -> tuple[Model, list[Ints]]:
@@ -199,7 +199,7 @@ def cracked(mesh: TetMesh, events: Sequence[Ints], ranks: int) -> Cracked:
 
 
 def random_events(mesh: TetMesh, seed: int, shares: Sequence[float]) -> list[Ints]:
-    """Shares of all facets that break in one event after the other."""
+    """Returns fractions of all facets that break in one event after the other."""
     facets = np.random.default_rng(seed).permutation(inner(mesh))
     ends = np.cumsum([0, *(int(share * len(facets)) for share in shares)])
     return [facets[a:b] for a, b in pairwise(ends)]
@@ -208,7 +208,7 @@ def random_events(mesh: TetMesh, seed: int, shares: Sequence[float]) -> list[Int
 @pytest.mark.parametrize("ranks", RANKS)
 @pytest.mark.parametrize("seed", [1, 2])
 def test_nodes_separate_as_in_a_plain_search_on_any_number_of_ranks(seed: int, ranks: int) -> None:
-    """Five events: nodes that separate again, copies that separate, and finally no intact facet."""
+    """Five events include nodes that separate again, copies that separate, and at the end no intact facet."""
     mesh = block((3, 2, 2), seed=seed)
     events = random_events(mesh, seed, (0.35, 0.2, 0.15, 0.1, 0.1))
     events.append(inner(mesh)[~np.isin(inner(mesh)[:, 0], np.concatenate(events)[:, 0])])
@@ -275,7 +275,7 @@ def test_a_sheet_through_the_body_cuts_it_in_two(ranks: int) -> None:
 
 @pytest.mark.parametrize("ranks", [1, 2, 3])
 def test_hinges_separate(ranks: int) -> None:
-    """Two tets joined by a facet, and two more connected to them by a node and by an edge only."""
+    """Two tets have a common facet; two more tets are connected to them by a node and by an edge only."""
     points = np.array(
         [(0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1), (0, 0, -1),
          (-1, 0, 0), (-1, -1, 0), (-1, 0, 1), (2, 1, 0), (2, 0, 1)], float,
@@ -292,8 +292,8 @@ def test_hinges_separate(ranks: int) -> None:
 
 
 def test_a_rank_without_touched_nodes_does_not_communicate() -> None:
-    """A facet breaks at one end of a bar: the rank at the other end sends and receives nothing; the maximum of three
-    words before, and that of one after, are part of the reductions of this step and of the next.
+    """A facet breaks at one end of a bar: the rank at the other end sends and receives nothing. The maximum of three
+    words before the break, and of one word after it, are part of the reductions of this step and of the next step.
     """
     mesh, ranks = block((2, 2, 12), shake=0.0), 3
     pieces, facets = pieces_of(case_of(), [mesh], ranks), plane(mesh, 1.0)
@@ -312,11 +312,11 @@ def test_a_rank_without_touched_nodes_does_not_communicate() -> None:
     assert sent == {"messages": 0, "bytes": 0, "collectives": 2, "collective_bytes": 8 * ranks + 8}
 
 
-# In the time step
+# Separation in the time step
 
 
 def pulled(**fracture: object) -> schema.Case:
-    """A bar that is stretched and sheared by its own inertia until it breaks."""
+    """Returns a bar that is stretched and sheared by its own inertia until it breaks."""
     part = {"stretch": schema.Stretch(rate=(0.0, 0.0, 3e4), centre=(0.0, 0.0, 2e-3)), "jitter": 3.0,
             "fracture": schema.Fracture(**fracture)}  # type: ignore[arg-type]  # fmt: skip
     return meeting_of([part], material=BRITTLE, end=1.0)
@@ -385,7 +385,8 @@ def test_a_break_costs_no_collective_of_its_own() -> None:
 
 
 def test_a_parcel_between_two_steps_has_all_nodes() -> None:
-    """Including nodes that separated far from rank 0 in the last step, which no reduction has contained yet."""
+    """The parcel includes nodes that separated far from rank 0 in the last step, which no reduction has contained
+    yet."""
     case = pulled(delay=0.2).model_copy(update={"contact": None})
 
     def work(sim: Simulation) -> tuple[bool, int]:
@@ -408,7 +409,8 @@ def test_a_parcel_between_two_steps_has_all_nodes() -> None:
 @pytest.mark.parametrize("model", ["instant", "cohesive"])
 @pytest.mark.parametrize("form", ["standard", "split"])
 def test_forces_are_those_of_the_tets_after_every_event(model: str, form: str) -> None:
-    """In integers, on one, two and three ranks; momentum to round-off; and all ranks break the same facets."""
+    """Forces are equal in integers on one, two and three ranks, momentum to round-off, and all ranks break the same
+    facets."""
     mesh = block((2, 2, 4), 1e-3, seed=5)
     case = pulled(model=model, delay=0.2)
     case = case.model_copy(update={"numerics": case.numerics.model_copy(update={"pressure": form})})
@@ -445,7 +447,7 @@ def test_forces_are_those_of_the_tets_after_every_event(model: str, form: str) -
 
 
 def test_ranks_without_a_part_of_nodal_tractions_take_part_in_them() -> None:
-    """Two bars side by side, one with nodal tractions: of five ranks some have only the other one."""
+    """Two adjacent bars, one of them with nodal tractions: with five ranks some ranks have only the other bar."""
     motion = {"stretch": schema.Stretch(rate=(0.0, 0.0, 3e4), centre=(0.0, 0.0, 2e-3)), "jitter": 3.0}
     specs = [schema.Fracture(delay=0.2, traction=traction) for traction in ("nodes", "tets")]
     case = meeting_of([{**motion, "fracture": spec} for spec in specs], material=BRITTLE, end=1.0)

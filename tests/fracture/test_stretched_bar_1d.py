@@ -1,4 +1,4 @@
-"""Stretched bar in one dimension: its crack against a closed form, its energy balance, and the sizes of its
+"""Stretched bar in one dimension: its crack compared with a closed form, its energy balance, and the sizes of its
 fragments.
 """
 
@@ -9,11 +9,11 @@ from scipy.optimize import brentq
 from .bar_1d import Bar, Run, even, law, scattered
 
 ENOUGH = 20.0
-"""t_0: from here to 25 t_0 fewer than 1 % of all cracks were added in any of the bars below."""
+"""Time in t_0: from here to 25 t_0 fewer than 1 % of all cracks were added in any of the bars below."""
 
 
 def stretched(bar: Bar, x: float, end: float) -> Run:
-    """A bar at x times rate_0, after ``end`` t_0; its energy balance is checked in every step."""
+    """Returns a bar at x times rate_0 after ``end`` t_0; its energy balance is checked in every step."""
     run = Run(bar, x * bar.rate_0)
     worst = 0.0
     while run.t < end * bar.t_0:
@@ -34,7 +34,7 @@ def test_units_are_those_of_the_literature() -> None:
 
 def test_the_law_is_linear_and_comes_back_on_the_secant() -> None:
     def at(opening: float, largest: float, without: float | None = None) -> float:
-        """Of strength 3 and critical opening 2; a = 0.01."""
+        """Returns the traction of an interface with strength 3, critical opening 2 and a = 0.01."""
         o = opening if without is None else without
         left = 3.0 * max(1.0 - largest / 2.0, 0.0)
         return float(law(np.array([opening]), np.array([o]), np.array([largest]), np.array([left]), 0.01)[0])
@@ -47,9 +47,8 @@ def test_the_law_is_linear_and_comes_back_on_the_secant() -> None:
 
 
 def test_a_single_crack_opens_as_in_closed_form() -> None:
-    """The stress far away rises as E rate t, and d / dt = 2 (stress far away - T) / (rho c), so that
-
-    d = 2 c rate t_0^2 (exp(t / t_0) - 1 - t / t_0) and the interface fails when exp(tau) - 1 - tau = 1 / x.
+    """The far stress rises as E rate t, and d / dt = 2 (far stress - T) / (rho c). Therefore d = 2 c rate t_0^2
+    (exp(t / t_0) - 1 - t / t_0), and the interface fails when exp(tau) - 1 - tau = 1 / x.
     """
     bar, x, middle = Bar(length=2.5e-3, elements=400, scatter=0.0), 1.0, 199
     run = Run(bar, x * bar.rate_0, share=1.0)
@@ -73,7 +72,8 @@ def test_a_single_crack_opens_as_in_closed_form() -> None:
 
 
 def test_fragments_that_meet_do_not_overlap() -> None:
-    """Two halves collide at 1 m/s each: the stress becomes rho c v, and closing takes the energy of the two nodes."""
+    """Two halves collide at 1 m/s each: the stress becomes rho c v, and the collision takes the energy of the two
+    nodes."""
     bar = Bar(length=2.5e-3, elements=200)
     run = Run(bar, 0.0, share=0.0)
     run.largest[99] = run.critical[99]
@@ -99,7 +99,8 @@ def test_a_bar_breaks_into_fragments_of_the_published_size(x: float) -> None:
 
 @pytest.mark.parametrize("x", [0.1, 0.3, 1.0])
 def test_a_bar_of_even_strength_breaks_into_the_smaller_fragments_of_the_ring_of_the_literature(x: float) -> None:
-    """The other fit, for a ring of uniform strength, has 21 to 30 % more fragments than that for a scatter of 1 %."""
+    """The formula for a ring of uniform strength has 21 to 30 % more fragments than the formula for a scatter of 1
+    %."""
     length = 60.0
     bar = Bar(length=length * Bar().s_0, elements=24 * 60, scatter=1e-5)
     size = stretched(bar, x, 35.0 if x < 0.2 else 20.0).size
@@ -111,7 +112,7 @@ def test_a_bar_of_even_strength_breaks_into_the_smaller_fragments_of_the_ring_of
 @pytest.mark.slow
 @pytest.mark.parametrize("x", [0.3, 1.0, 3.0, 10.0])
 def test_bars_break_into_fragments_of_the_published_size(x: float) -> None:
-    """Mean of five bars: the number of fragments in one of them scatters by 4 % at the lowest rate."""
+    """The value is the mean of five bars: the number of fragments in one bar scatters by 4 % at the lowest rate."""
     cracks = [stretched(Bar(seed=seed), x, ENOUGH).failed for seed in range(1, 6)]
     bar = Bar()
     size = bar.length / float(np.mean(cracks)) / bar.s_0

@@ -28,17 +28,18 @@ AREA = 0.5 * float(np.linalg.norm(np.cross(*EDGES)))
 NORMAL = np.cross(*EDGES) / (2.0 * AREA)
 ALONG = EDGES[0] / np.linalg.norm(EDGES[0])
 ANGLES = [0.0, 20.0, 45.0, 70.0, 90.0]
-"""Between the traction at insertion and the normal, degrees."""
+"""Angles between the traction at insertion and the normal, degrees."""
 
 
 def direction(angle: float, turn: float = 0.4) -> Floats:
-    """A unit vector at ``angle``, rad, to the normal; ``turn``, rad: of its shear in the plane of the facet."""
+    """Returns a unit vector at ``angle``, rad, to the normal; ``turn``, rad: direction of its shear in the plane of
+    the facet."""
     shear = math.cos(turn) * ALONG + math.sin(turn) * np.cross(NORMAL, ALONG)
     return np.asarray(math.cos(angle) * NORMAL + math.sin(angle) * shear)
 
 
 class Facet:
-    """One facet, inserted under ``traction`` (3,), Pa, and opened by displacements of the far side."""
+    """A facet that is inserted under ``traction`` (3,), Pa, and opened by displacements of the far side."""
 
     def __init__(
         self, traction: Floats, weight: float = 1.0, effective: float = STRENGTH, stiffness: float = STIFFNESS
@@ -66,21 +67,21 @@ class Facet:
 
     @property
     def pull(self) -> Floats:
-        """(3,) traction on the first side, Pa."""
+        """Returns the (3,) traction on the first side, Pa."""
         return np.asarray(self.facets.state.pull[0].sum(axis=0) / AREA)
 
     @property
     def work(self) -> float:
-        """Work done so far, J."""
+        """Returns the work done so far, J."""
         return sum(self.energies()[:2])
 
     def energies(self) -> tuple[float, float, float]:
-        """Dissipated, recoverable and fracture energy, J."""
+        """Returns dissipated, recoverable and fracture energy, J."""
         sums = exact_sums(SerialComm(), self.cohesion.columns())
         return self.cohesion.energies(sums, self.cohesion.gone.total(SerialComm()))
 
     def open(self, u: Floats, turned: Floats | None = None) -> None:
-        """Moves the far side by ``u`` (3,), m, from the first; ``turned`` (3, 3): rotation of everything."""
+        """Moves the far side away from the first side by ``u`` (3,), m; ``turned`` (3, 3): rotation of both sides."""
         x = self.x0.copy()
         x[3:] += u
         self.cohesion.open(x if turned is None else np.ascontiguousarray(x @ turned.T))
@@ -97,7 +98,7 @@ def tear(facet: Facet, way: Floats, steps: int = 4000, turned: bool = False) -> 
 
 
 def rotation(angle: float) -> Floats:
-    """About the z axis."""
+    """Returns the rotation about the z axis."""
     c, s = math.cos(angle), math.sin(angle)
     return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
 
@@ -118,7 +119,7 @@ def test_the_traction_at_insertion_is_that_before(angle: float, weight: float) -
 @pytest.mark.parametrize("insertion", [0.0, 45.0, 90.0])
 @pytest.mark.parametrize("angle", ANGLES)
 def test_failure_absorbs_the_fracture_energy_in_any_direction(angle: float, insertion: float, weight: float) -> None:
-    """Also along another direction than that of the traction at insertion."""
+    """The direction of opening may differ from that of the traction at insertion."""
     mixed = direction(math.radians(insertion))
     size = math.sqrt((mixed @ NORMAL) ** 2 + weight * (1.0 - (mixed @ NORMAL) ** 2))
     facet = Facet(STRENGTH * mixed / size, weight)
@@ -159,9 +160,9 @@ def test_a_facet_unloads_along_the_secant_and_releases_the_energy_under_it(angle
 
 
 def test_dissipated_energy_never_decreases() -> None:
-    """A random walk of the opening, including closing beyond the start. A step that closes a facet further than
-    allowed releases half of its traction times the step; one across the bracket <d_n>, where the mean of two forces
-    is not exact, stiffness times step^2 / 8.
+    """The opening makes a random walk, including closing beyond the start. A step that closes a facet further than
+    allowed releases half of its traction times the step. A step across the bracket <d_n>, where the mean of two
+    forces is not exact, releases stiffness times step^2 / 8.
     """
     random, u, lost, largest = np.random.default_rng(3), np.zeros(3), [0.0], 0.0
     facet = Facet(STRENGTH * direction(0.7), weight=0.5)
@@ -184,7 +185,8 @@ def test_dissipated_energy_never_decreases() -> None:
 
 @pytest.mark.parametrize("angle", ANGLES)
 def test_a_facet_that_closes_beyond_its_start_is_unloaded(angle: float) -> None:
-    """In one step, far shorter than the offset: it releases half of the traction times the step, once; then nothing."""
+    """The facet closes in one step, far shorter than the offset: it releases half of the traction times the step
+    once, and then nothing."""
     way, facet = direction(math.radians(angle)), Facet(STRENGTH * direction(math.radians(angle)))
     step = 1e-3 * facet.offset
     facet.open(-step * way)
@@ -205,9 +207,7 @@ def test_a_facet_that_closes_beyond_its_start_is_unloaded(angle: float) -> None:
 @pytest.mark.parametrize("opened", [0.0, 0.3])
 @pytest.mark.parametrize("angle", ANGLES)
 def test_an_unloaded_facet_absorbs_the_rest_of_the_energy(angle: float, opened: float, stiffness: float) -> None:
-    """Also if the offset is so long that stiffness and strength would require more energy: then the strength is
-    lowered.
-    """
+    """If the offset is so long that stiffness and strength would require more energy, the strength is lowered."""
     way = direction(math.radians(angle))
     facet = Facet(STRENGTH * way, stiffness=stiffness)
     for share in [*np.linspace(0.0, opened, 301), *np.linspace(opened, -1e-3, 301)]:
@@ -225,7 +225,8 @@ def test_a_facet_that_turns_with_its_bodies_takes_the_same() -> None:
 
 
 def test_an_offset_across_the_opening_does_no_more_work_when_a_facet_turns_than_its_size_allows() -> None:
-    """Traction and opening are not collinear then: rotation by an angle adds at most strength offset angle."""
+    """Traction and opening are not collinear then: a rotation by an angle adds at most strength times offset times
+    angle."""
     facet = Facet(STRENGTH * direction(0.0))
     tear(facet, direction(math.pi / 2), turned=True)
     assert abs(facet.work - ENERGY * AREA) < STRENGTH * facet.offset * AREA
@@ -251,7 +252,8 @@ def test_a_facet_that_broke_under_pressure_holds_the_shear_that_friction_leaves(
 
 
 def test_one_pair_fails_after_the_other() -> None:
-    """Opened as a hinge about the first edge: only one of three pairs opens, and absorbs a third of the energy."""
+    """The facet is opened as a hinge about its first edge: only one of three pairs opens, and absorbs a third of the
+    energy."""
     facet = Facet(STRENGTH * NORMAL)
     x = facet.x0.copy()
     steps = 4000

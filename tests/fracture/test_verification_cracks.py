@@ -15,18 +15,18 @@ from ..bench import cracks
 from ..bench.cracks import FINE, Crack, Plan
 
 STEP = 20e-3 / math.sqrt(32e9 / (1 - 0.2**2) / 2450)
-"""s that the waves take to the crack of the branching benchmark."""
+"""Travel time of the waves to the crack of the branching benchmark, s."""
 
 
 def facets(x: list[float], y: list[float], times: list[float]) -> Crack:
-    """A crack of facets of 1 m^2, in elements of 1 m, from x = 0 to 40 m."""
+    """Returns a crack of facets of 1 m^2, in elements of 1 m, from x = 0 to 40 m."""
     n = len(x)
     centre = np.column_stack([x, y, np.zeros(n)]).astype(float)
     return Crack(1.0, 0.0, 40.0, np.arange(n), centre, np.ones(n), np.array(times, float))
 
 
 def test_the_speed_of_surface_waves() -> None:
-    """Of the benchmark, and 0.9194 c_s where nu = 1/4: z = 2 - 2 / sqrt(3)."""
+    """The speed is that of the benchmark; for nu = 1/4 it is 0.9194 c_s, z = 2 - 2 / sqrt(3)."""
     glass = load.parse_case(load.read_data(load.shipped_path("branching_plate"))).materials["glass"]
     assert cracks.rayleigh(glass) == pytest.approx(2125.0, abs=1.0)
     quarter = glass.model_copy(update={"elastic": glass.elastic.model_copy(update={"poisson": 0.25})})
@@ -49,7 +49,7 @@ def test_a_tip_that_moves_evenly_has_its_speed_everywhere() -> None:
 
 
 def test_two_ways_with_solid_between_them_are_branches() -> None:
-    """From x = 16 on at 45 deg to either side; a deviation in one place only is no branch."""
+    """From x = 16 on there are two paths at 45 degrees to either side; a deviation at one place only is no branch."""
     x = [*np.arange(0.5, 16.0), *np.arange(16.5, 40.0), *np.arange(16.5, 40.0), 8.5]
     y = [*np.zeros(16), *(np.arange(24) + 2.0), *(-np.arange(24) - 2.0), 9.0]
     crack = facets(x, y, x)
@@ -59,7 +59,7 @@ def test_two_ways_with_solid_between_them_are_branches() -> None:
 
 
 def test_facets_that_open_aside_and_ahead_of_the_tip_are_no_length() -> None:
-    """A crack that is straight has the area of a line, including openings ahead of its tip."""
+    """The area of a straight crack is the area of a line, including openings ahead of its tip."""
     x = [*np.arange(0.5, 29.0), 31.5]
     crack = facets(x, [*np.zeros(29), 4.0], x)
     assert crack.straight > 1.1 * crack.area.sum()
@@ -70,7 +70,7 @@ def test_facets_that_open_aside_and_ahead_of_the_tip_are_no_length() -> None:
 @pytest.mark.parametrize("hole", [(10.5,), (10.5, 11.5), (10.5, 11.5, 12.5)])
 @pytest.mark.parametrize("end", [32.0, 40.0])
 def test_intact_facets_behind_the_tip_are_not_counted(hole: tuple[float, ...], end: float) -> None:
-    """In a complete crack, and in an incomplete one; also where a whole bin is intact."""
+    """The crack is complete or incomplete, and may have a bin without open facets."""
     x = [at for at in np.arange(0.5, end) if at not in hole]
     crack = facets(x, np.zeros(len(x)).tolist(), x)
     length = end if end == 40.0 else 18.0
@@ -105,12 +105,12 @@ def _nearest(points: "np.ndarray", size: float) -> "np.ndarray":
 
 @pytest.fixture(scope="module")
 def coarse() -> cracks.Run:
-    """The strip in elements of 1 mm, 4,800 tets."""
+    """Returns the strip with elements of 1 mm, 4,800 tets."""
     return cracks.watch(Plan("strip", 1e-3))
 
 
 def test_a_crack_in_a_strip_is_slower_than_surface_waves(coarse: cracks.Run) -> None:
-    """At any load: four times G_c at the end."""
+    """This holds for any load, up to four times G_c at the end."""
     where, speed = coarse.crack.speeds()
     assert len(speed) >= 5
     assert 0.3 * cracks.rayleigh(coarse.made) < speed.max() < cracks.rayleigh(coarse.made)
@@ -118,7 +118,7 @@ def test_a_crack_in_a_strip_is_slower_than_surface_waves(coarse: cracks.Run) -> 
 
 
 def test_a_crack_in_a_strip_does_not_run_below_its_toughness(coarse: cracks.Run) -> None:
-    """E strain^2 H / 2 = G_c after 16.1 us."""
+    """The energy E strain^2 H / 2 is equal to G_c after 16.1 us."""
     assert coarse.crack.start > math.sqrt(2 * 3.0 / 32e9 / 20e-3) / 6.0
     assert coarse.worst < 1e-3
 
@@ -140,8 +140,8 @@ def test_a_random_mesh_has_no_direction_and_no_flat_tets() -> None:
 
 @pytest.fixture(scope="module")
 def plates() -> list[cracks.Run]:
-    """Five meshes without preferred directions: which of them branch is random, so they are judged together. A step
-    shorter by a hundredth moves the branches of one by 9 mm and 11 us (docs/performance/bench.md, Cracks).
+    """Returns five meshes without preferred directions: which of them branch is random, so they are tested together.
+    A time step shorter by 1 % moves the branches of one mesh by 9 mm and 11 us (docs/performance/bench.md, Cracks).
     """
     return [cracks.watch(plan) for plan in cracks.RANDOM]
 
@@ -149,11 +149,10 @@ def plates() -> list[cracks.Run]:
 @pytest.mark.slow
 @pytest.mark.timeout(1200)
 def test_branching_plates_start_and_branch_as_published(plates: list[cracks.Run]) -> None:
-    """All start in time, some branch.
-
-    It cannot start before K = 2 s / (1 - m) sqrt(c t (1 - 2 m) / pi) = sqrt(E G) (Freund 1990) for crack faces with the
-    sudden pressure s = 2 MPa that makes them free of stress, in plane stress, m = nu / (1 + nu). A fully open facet is
-    the far end of a cohesive zone, which has to form first: later than the published 11 to 14 us.
+    """All plates start in time, and some branch. A crack cannot start before K = 2 s / (1 - m) sqrt(c t (1 - 2 m) /
+    pi) = sqrt(E G) (Freund 1990), for crack faces with the sudden pressure s = 2 MPa that makes them free of stress,
+    in plane stress, m = nu / (1 + nu). A fully open facet is the far end of a cohesive zone, which has to form
+    first; this is later than the published 11 to 14 us.
     """
     m = 0.2 / 1.2
     wait = math.pi * 32e9 * 3.0 * (1 - m) ** 2 / (4 * 4e12 * 3689.0 * (1 - 2 * m))
@@ -177,7 +176,7 @@ def test_branching_plates_are_no_faster_than_published(plates: list[cracks.Run])
 @pytest.mark.timeout(1200)
 @pytest.mark.xfail(strict=False, reason="by chance: fourteen of fifteen runs are at the edge after 74.3 +- 1.8 us")
 def test_branching_plates_are_at_the_edge_as_published(plates: list[cracks.Run]) -> None:
-    """On average after 75 to 80 us, with a deviation of no more than that."""
+    """The mean time is 75 to 80 us, and the deviation is not larger than this range."""
     edge = np.array([run.crack.passed(run.crack.end - 1.5 * FINE) for run in plates])
     print(f"at the edge after {edge.mean():.4g} s, standard deviation {edge.std():.2g} s")
     assert edge.std() < 5e-6
@@ -199,8 +198,8 @@ def test_no_crack_is_faster_than_surface_waves(plan: Plan) -> None:
 @pytest.mark.timeout(1200)
 @pytest.mark.parametrize("plans", cracks.ROWS, ids=lambda plans: plans[0].name)
 def test_no_crack_along_rows_of_facets_is_faster_than_surface_waves(plans: tuple[Plan, ...]) -> None:
-    """The same for the structured plates, for any row of the crack: the bound of the speed holds for each of seven
-    steps, that of the length for their mean, since one of them varies by a tenth of it.
+    """The same bounds hold for the structured plates, for any row of the crack. The bound of the speed holds for
+    each of seven steps, and the bound of the length for their mean, because one of them varies by a tenth of it.
     """
     runs = [cracks.watch(plan) for plan in plans]
     inflation = np.array([run.inflation for run in runs])
@@ -213,7 +212,7 @@ def test_no_crack_along_rows_of_facets_is_faster_than_surface_waves(plans: tuple
 @pytest.mark.slow
 @pytest.mark.timeout(600)
 def test_the_energy_of_fragmentation_converges() -> None:
-    """Against s_0 / 16, errors shrink with the element."""
+    """The errors relative to s_0 / 16 decrease with the element size."""
     work = {n: cracks.watch(Plan("bar", 7.64e-5 / n)).taken for n in (1, 2, 3, 4)}
     errors = [abs(work[n] / work[4] - 1.0) for n in (1, 2, 3)]
     print(errors)

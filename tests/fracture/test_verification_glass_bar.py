@@ -1,5 +1,5 @@
-"""The paper's glass bar, with larger elements: unbroken, its stress is that of bar theory; broken, it fails behind a
-front.
+"""The glass bar of the paper with larger elements: without fracture its stress is that of bar theory; with fracture
+it fails behind a front.
 """
 
 from pathlib import Path
@@ -20,7 +20,7 @@ SIZE = "1.8 mm"
 
 
 def bar(end: str, breaks: bool) -> Simulation:
-    """The shipped case with larger elements."""
+    """Returns the shipped case with larger elements."""
     given = [f"parts[{k}].mesh.element_size={SIZE}" for k in range(2)] + [f"run.end_time={end}", "run.frames=0"]
     data = load.apply_overrides(load.read_data(load.shipped_path("glass_steel_bar")), [*given, "reference=[]"])
     if not breaks:
@@ -30,8 +30,8 @@ def bar(end: str, breaks: bool) -> Simulation:
 
 @pytest.mark.slow
 def test_unbroken_glass_has_the_stress_of_bar_theory() -> None:
-    """v Zs Zg / (Zs + Zg) and v Zs / (Zs + Zg) with the impedances of bars, 2.10 GPa and 156.9 m/s: in the mean behind
-    the front, within 2 %.
+    """The values are v Zs Zg / (Zs + Zg) and v Zs / (Zs + Zg) with the impedances of bars, 2.10 GPa and 156.9 m/s;
+    the means behind the wave front are within 2 %.
     """
     sim = bar("38 us", breaks=False)
     names, seen = [probe.name for probe in sim.case.probes], list[Floats]()
@@ -52,8 +52,8 @@ def test_unbroken_glass_has_the_stress_of_bar_theory() -> None:
 
 @pytest.mark.slow
 def test_the_front_of_failure_follows_the_wave_slows_down_and_the_glass_behind_swells() -> None:
-    """Between 0.4 and 1.0 of the wave speed in the first half of the bar, never backwards, then slower; the glass
-    behind it moves outwards.
+    """The speed of the front is between 0.4 and 1.0 of the wave speed in the first half of the bar, never negative,
+    then lower; the glass behind the front moves outwards.
     """
     sim = bar("32 us", breaks=True)
     glass = sim.model.parts.index("glass")

@@ -27,7 +27,7 @@ def shipped(name: str, *overrides: str) -> Simulation:
 
 
 def torn(lean: float, *overrides: str) -> Simulation:
-    """The shipped pair, pulled apart along a line inclined by ``lean``, rad."""
+    """Returns the shipped pair of tets, pulled apart along a line inclined by ``lean``, rad."""
     x, z = SPEED * math.sin(lean), SPEED * math.cos(lean)
     pull = [f"boundaries[{i}].{c}={s * v!r}" for i, s in ((0, 1.0), (1, -1.0)) for c, v in (("x", x), ("z", z))]
     stretch = f"parts[0].stretch.rate=[0,0,{z / HEIGHT!r}]"
@@ -38,8 +38,8 @@ def torn(lean: float, *overrides: str) -> Simulation:
     "lean", [0.0, 60.0, *(pytest.param(lean, marks=pytest.mark.slow) for lean in (15.0, 30.0, 45.0, 63.0))]
 )
 def test_tearing_two_tets_takes_the_fracture_energy(lean: float) -> None:
-    """From pure opening to mostly shear, by the ledger: with the area at which the facet broke, which is that of the
-    mesh except elastic strain.
+    """The test has pure opening to mostly shear; the energy from the balance uses the area at which the facet broke,
+    which is that of the mesh except elastic strain.
     """
     sim, area = torn(math.radians(lean)), 0.0
     energies: list[Energy] = []
@@ -64,8 +64,8 @@ def test_tearing_two_tets_takes_the_fracture_energy(lean: float) -> None:
 
 @pytest.mark.parametrize("back", [0.0, 0.005, 0.02])
 def test_energy_released_without_work_is_reported(back: float) -> None:
-    """A part of its energy is subtracted from its work halfway; the last message reports how much, above a
-    hundredth.
+    """Halfway, a part of the energy is subtracted from the work; the last message reports the difference if it is
+    above a hundredth.
     """
     sim, taken, area = torn(0.0), False, 0.0
 
@@ -146,8 +146,8 @@ def breathing(end: str, *sets: str) -> tuple[int, float, float]:
     [("false", "0.3 ms", 30), pytest.param("false", "2 ms", 40, marks=pytest.mark.slow), ("true", "0.3 ms", 15)],
 )
 def test_a_facet_that_opens_and_closes_gains_no_energy(edges: str, end: str, least: int) -> None:
-    """Contact has dissipated all but a thousandth in about fifty closings, 0.1 ms, or in half of them if the edges
-    of the two tets, which also hold each other, touch; no growth from the rest.
+    """Contact has dissipated all but 0.001 of the energy after about fifty closings, 0.1 ms, or after half of them
+    if the edges of the two tets also touch. The remaining energy does not grow.
     """
     cycles, growth, residual = breathing(end, f"contact.edges={edges}")
     print(f"{cycles} cycles, growth {growth:.2e}, residual {residual:.2e}")
@@ -157,7 +157,7 @@ def test_a_facet_that_opens_and_closes_gains_no_energy(edges: str, end: str, lea
 
 
 def rings(count: str, steps: int) -> tuple[float, float]:
-    """Largest growth of kinetic and elastic energy of free tets, and the drift of their time average."""
+    """Returns the largest growth of kinetic and elastic energy of free tets, and the drift of its mean over time."""
     sim = shipped("free_tets", f"parts[0].mesh.count={count}", "run.end_time=1")
     totals: list[float] = []
     every = max(steps // 1000, 1)

@@ -1,4 +1,4 @@
-"""One mesh cache for the tests of this folder, away from the user's."""
+"""A mesh cache for the tests of this folder, separate from the cache of the user."""
 
 import pytest
 
@@ -7,7 +7,8 @@ from conoid.worker.kernels.store import cache_folder
 
 @pytest.fixture(autouse=True, scope="package")
 def mesh_cache(tmp_path_factory: pytest.TempPathFactory) -> object:
-    """Points ``CONOID_CACHE_DIR`` to a folder without meshes while these tests run; kernels are where they are."""
+    """Sets ``CONOID_CACHE_DIR`` to a folder without meshes while these tests run; the folder of the kernels does not
+    change."""
     folder, kernels = tmp_path_factory.mktemp("cache"), cache_folder().parent
     (folder / kernels.name).symlink_to(kernels)
     with pytest.MonkeyPatch.context() as patch:

@@ -1,7 +1,6 @@
-"""Writes .msh and .inp files with gmsh in random options: ``python gmsh_files.py FOLDER SEED COUNT``.
-
-A process of its own, since gmsh is GPL. ``truth.json`` contains the members of each group of each file,
-from gmsh's own model.
+"""Writes .msh and .inp files with gmsh in random options: ``python gmsh_files.py FOLDER SEED COUNT``. This is a
+separate process, because gmsh has the licence GPL. ``truth.json`` contains the members of each group of each file,
+from the model of gmsh.
 """
 
 import itertools
@@ -16,7 +15,8 @@ import numpy as np
 
 
 def main(folder: Path, seed: int, count: int) -> None:
-    """One model after the other, each in a process of its own: gmsh crashes on some (SIGSEGV), which are left out."""
+    """Writes one model after the other, each in a separate process: gmsh crashes on some models (SIGSEGV), which are
+    omitted."""
     import gmsh  # noqa: F401  once, for all
 
     truth: dict[str, dict[str, list[float]]] = {}
@@ -38,7 +38,7 @@ def main(folder: Path, seed: int, count: int) -> None:
 
 
 def _write(folder: Path, seed: int, index: int) -> None:
-    """One model, and what it holds in one.json."""
+    """Writes one model, and its contents into one.json."""
     import gmsh
 
     gmsh.initialize(readConfigFiles=False)
@@ -54,7 +54,7 @@ def _model(gmsh: Any, chance: random.Random, folder: Path, index: int) -> tuple[
     groups = _groups(gmsh, chance, volumes)
     gmsh.option.setNumber("Mesh.MeshSizeMax", chance.choice((0.5, 0.7, 1.0)))
     flat = all(gmsh.model.getType(2, tag) == "Plane" for _, tag in gmsh.model.getEntities(2))
-    if flat and chance.random() < 0.5:  # faces of four corners that are not flat have no volume of their own
+    if flat and chance.random() < 0.5:  # the volume of faces of four corners that are not flat is not defined
         gmsh.option.setNumber("Mesh.RecombineAll", 1)
     gmsh.model.mesh.generate(3)
     second = chance.random() < 0.07
@@ -86,7 +86,7 @@ def _model(gmsh: Any, chance: random.Random, folder: Path, index: int) -> tuple[
 
 
 def _bodies(gmsh: Any, chance: random.Random) -> list[int]:
-    """One to three bodies, with common faces where they touch or overlap."""
+    """Returns one to three bodies, with common faces where they touch or overlap."""
     occ = gmsh.model.occ
     for i in range(chance.randint(1, 3)):
         kind, x = chance.randrange(4), 1.2 * i
@@ -108,7 +108,7 @@ def _bodies(gmsh: Any, chance: random.Random) -> list[int]:
 
 
 def _groups(gmsh: Any, chance: random.Random, volumes: list[int]) -> dict[str, list[int]]:
-    """Physical groups of volumes, some of which overlap or leave bodies out, and one of a surface."""
+    """Returns physical groups of volumes, which may overlap or omit bodies, and one group of a surface."""
     found: dict[str, list[int]] = {}
     for i in range(chance.choice((0, 1, 2, 2, 3))):
         name = chance.choice(("steel", "Körper 1", "a b", "x")) + str(i) if chance.random() < 0.85 else ""
@@ -123,7 +123,7 @@ def _groups(gmsh: Any, chance: random.Random, volumes: list[int]) -> dict[str, l
 def _measured(
     gmsh: Any, volumes: list[int], groups: dict[str, list[int]], options: dict[str, Any], inp: bool
 ) -> dict[str, list[float]]:
-    """Volume and first moments by group; the empty name is the whole file."""
+    """Returns volume and first moments of each group; the empty name is the whole file."""
     tags, coordinates, _ = gmsh.model.mesh.getNodes()
     order = np.argsort(tags)
     points, tags = coordinates.reshape(-1, 3)[order], tags[order]
@@ -145,9 +145,9 @@ def _measured(
 
     saved = volumes if options["SaveAll"] else [v for v in volumes if any(v in members for members in groups.values())]
     truth = {"": of(saved)}
-    if inp:  # gmsh writes blanks of names as _, and a name of its own for a group without one
+    if inp:  # gmsh writes blanks of names as _, and its own name for a group without a name
         groups = {name.replace(" ", "_"): members for name, members in groups.items() if not name.isdigit()}
-    lost = not inp and options["SaveAll"] and options["MshFileVersion"] == 2.2  # gmsh leaves the groups out there
+    lost = not inp and options["SaveAll"] and options["MshFileVersion"] == 2.2  # gmsh omits the groups in this format
     if not truth[""][0]:
         return {}
     return truth if lost else truth | {name: of(members) for name, members in groups.items()}
@@ -156,7 +156,7 @@ def _measured(
 def _renamed(
     chance: random.Random, file: Path, truth: dict[str, list[float]], groups: dict[str, list[int]]
 ) -> dict[str, list[float]]:
-    """Gives two groups the name of the first, where they have no body in common."""
+    """Gives two groups without a common body the name of the first group."""
     names = [name for name in groups if not name.isdigit()]
     for one, other in itertools.combinations(names, 2):
         if other in truth and not set(groups[one]) & set(groups[other]):

@@ -1,4 +1,4 @@
-"""Meshes of hexahedra, wedges and pyramids made at random, and what their tets must be by the rule alone."""
+"""Random meshes of hexahedra, wedges and pyramids, and the tets that the rule of cutting gives."""
 
 import math
 import random
@@ -18,7 +18,7 @@ FACES = {
     PYRAMID5: ((0, 3, 2, 1), (0, 1, 4), (1, 2, 4), (2, 3, 4), (3, 0, 4)),
 }
 DEGENERATE = {WEDGE6: (1, 0, 3, 4, 2, 2, 5, 5), PYRAMID5: (0, 1, 2, 3, 4, 4, 4, 4)}
-"""Elements as LS-DYNA writes them: the wedge lies on a face of four corners."""
+"""Elements in the form of LS-DYNA: the wedge lies on a face of four corners."""
 
 
 @dataclass
@@ -29,11 +29,11 @@ class Mixture:
     elements: dict[int, Element]
 
     def content(self, degenerate: bool = False) -> Content:
-        """Elements as a reader returns them."""
+        """Returns the elements in the form of a reader."""
         return Content(np.arange(len(self.points)), self.points, list(self.cells(degenerate)))
 
     def cells(self, degenerate: bool = False) -> list[Cells]:
-        """By kind; wedges and pyramids as hexahedra that repeat nodes where ``degenerate`` is set."""
+        """Returns the elements by kind; with ``degenerate``, wedges and pyramids are hexahedra that repeat nodes."""
         rows: dict[Kind, list[tuple[int, tuple[int, ...]]]] = {}
         for number, (kind, nodes) in self.elements.items():
             if degenerate and kind in DEGENERATE:
@@ -46,14 +46,15 @@ class Mixture:
         ]
 
     def surface(self) -> set[tuple[int, ...]]:
-        """The triangles of the faces that one element alone has, each from its smallest node on, outward."""
+        """Returns the triangles of the faces that belong to one element only, each beginning with its smallest node,
+        directed outward."""
         faces = [[nodes[k] for k in face] for kind, nodes in self.elements.values() for face in FACES[kind]]
         times = Counter(frozenset(face) for face in faces)
         outer = [face for face in faces if times[frozenset(face)] == 1]
         return {turned(triangle) for face in outer for triangle in halves(face)}
 
     def volumes(self) -> dict[int, float]:
-        """Of the polyhedron of each element whose faces are cut by their smallest node."""
+        """Returns the volumes of the polyhedra of the elements, whose faces are cut through their smallest node."""
         return {number: self._volume(element) for number, element in self.elements.items()}
 
     def _volume(self, element: Element) -> float:
@@ -67,20 +68,21 @@ class Mixture:
 
 
 def halves(face: list[int]) -> list[list[int]]:
-    """The triangles of a face, by the diagonal through its smallest node."""
+    """Returns the triangles of a face, cut by the diagonal through its smallest node."""
     first = face.index(min(face))
     a, b, c, *d = face[first:] + face[:first]
     return [[a, b, c], [a, c, *d]] if d else [[a, b, c]]
 
 
 def turned(face: list[int]) -> tuple[int, ...]:
-    """From the smallest node on."""
+    """Returns the nodes in the same cyclic order, beginning with the smallest node."""
     first = face.index(min(face))
     return tuple(face[first:] + face[:first])
 
 
 def mixture(seed: int, jitter: float = 0.12) -> Mixture:
-    """A grid whose nodes are moved and numbered at random: cells are hexahedra, two wedges or six pyramids each."""
+    """Returns a grid whose nodes are moved and numbered at random; each cell is a hexahedron, two wedges or six
+    pyramids."""
     chance = random.Random(seed)
     shape = [chance.randint(1, 4) for _ in range(3)]
     stretch = [chance.uniform(0.3, 3.0) for _ in range(3)]

@@ -19,18 +19,18 @@ class Quality:
 
     @property
     def ratio(self) -> float:
-        """Worst over mean; 1 for a mesh of equal tets."""
+        """Returns worst over mean; 1 for a mesh of equal tets."""
         return self.worst / self.mean
 
 
 def quality(mesh: TetMesh) -> Quality:
-    """Worst and mean step length of a mesh with at least one tet."""
+    """Returns worst and mean step length of a mesh with at least one tet."""
     steps = mesh.step_lengths()
     worst = int(steps.argmin())
     return Quality(float(steps[worst]), float(steps.mean()), worst)
 
 
 def face_counts(tets: Ints) -> NDArray[np.int64]:
-    """(k,) how many tets share each distinct face: 1 on the boundary, 2 inside, more only in a broken mesh."""
+    """Returns (k,) the number of tets at each distinct face: 1 on the boundary, 2 inside, more only in a wrong mesh."""
     faces = np.sort(tets[:, FACES].reshape(-1, 3), axis=1)
     return np.asarray(np.unique(faces, axis=0, return_counts=True)[1])

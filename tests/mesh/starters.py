@@ -9,7 +9,8 @@ from .mixtures import Mixture
 
 
 def starter(truth: Mixture, split: Split, random: Random) -> str:
-    """HyperMesh or the examples of OpenRadioss: columns of names as comments, wedges as /PENTA6 or as bricks."""
+    """Returns a deck in the style of HyperMesh or of the examples of OpenRadioss: columns of names as comments,
+    wedges as /PENTA6 or as bricks."""
     text = [
         "#RADIOSS STARTER",
         "/BEGIN",

@@ -1,6 +1,5 @@
-"""Writes small Abaqus input files as Abaqus/CAE, HyperMesh, FreeCAD and PrePoMax do, in random numbering and spelling.
-
-Each writer returns what every group of its file holds, from the arrays that it wrote.
+"""Writes small Abaqus input files in the styles of Abaqus/CAE, HyperMesh, FreeCAD and PrePoMax, with random
+numbering and spelling. Each writer returns the content of every group of its file, from the arrays that it wrote.
 """
 
 import itertools
@@ -16,12 +15,12 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
 KUHN = np.array([[0, 1, 3, 7], [0, 3, 2, 7], [0, 2, 6, 7], [0, 6, 4, 7], [0, 4, 5, 7], [0, 5, 1, 7]])
-"""Six tets of a cube whose corner i has the coordinates of the bits of i."""
+"""Six tets of a cube; corner i has the bits of i as coordinates."""
 
 
 @dataclass
 class Block:
-    """A box of tets with numbers of its own: ``nodes`` (n,), ``points`` (n, 3), ``tets`` (m,), ``corners`` (m, 4)."""
+    """A box of tets with its own numbers: ``nodes`` (n,), ``points`` (n, 3), ``tets`` (m,), ``corners`` (m, 4)."""
 
     nodes: Ints
     points: Floats
@@ -29,20 +28,21 @@ class Block:
     corners: Ints
 
     def measured(self, some: Iterable[int] | None = None) -> Floats:
-        """Volume and first moments, (4,), of some tets by their numbers, of all when None."""
+        """Returns volume and first moments, (4,), of the tets with these numbers, or of all tets for None."""
         keep = np.ones(len(self.tets), bool) if some is None else np.isin(self.tets, list(some))
         return measured(self.points, np.searchsorted(self.nodes, self.corners[keep]))
 
 
 def measured(points: Floats, tets: NDArray[np.integer]) -> Floats:
-    """Volume and first moments, (4,), of tets given by indices."""
+    """Returns volume and first moments, (4,), of tets given by indices."""
     x = points[tets]
     volumes = np.abs(np.einsum("ij,ij->i", x[:, 1] - x[:, 0], np.cross(x[:, 2] - x[:, 0], x[:, 3] - x[:, 0]))) / 6.0
     return np.concatenate([[volumes.sum()], (volumes[:, None] * x.mean(axis=1)).sum(axis=0)])
 
 
 def block(random: Random) -> Block:
-    """A box of 1 to 3 cells a direction, anywhere, whose nodes and tets have increasing numbers with gaps."""
+    """Returns a box of 1 to 3 cells in each direction at a random place, whose nodes and tets have increasing
+    numbers with gaps."""
     cells = [random.randint(1, 3) for _ in range(3)]
     grid = list(itertools.product(*(range(n + 1) for n in cells)))
     place = {point: i for i, point in enumerate(grid)}
@@ -71,14 +71,14 @@ def _short(value: float) -> str:
 
 @dataclass
 class Text:
-    """A file in the making, in one random spelling."""
+    """The text of a file in one random spelling."""
 
     random: Random
     lines: list[str] = field(default_factory=list)
     case: Callable[[str], str] = str
 
     def keyword(self, word: str, *parameters: str, abbreviate: bool = False) -> None:
-        """A keyword line; parameters as ``NAME=value`` or a word alone."""
+        """Writes a keyword line with parameters ``NAME=value`` or single words."""
         said = [f"*{self.case(word)}"]
         for each in parameters:
             name, equals, value = each.partition("=")
@@ -92,7 +92,7 @@ class Text:
             self.lines.append(comma.join(said))
 
     def nodes(self, body: Block) -> None:
-        """The data lines of *NODE."""
+        """Writes the data lines of *NODE."""
         style = self.random.randrange(4)
         for number, point in zip(body.nodes, body.points, strict=True):
             texts = [_coordinate(value, style) for value in point]
@@ -100,7 +100,7 @@ class Text:
             self._noise()
 
     def tets(self, numbers: Ints, corners: Ints) -> None:
-        """The data lines of *ELEMENT."""
+        """Writes the data lines of *ELEMENT."""
         two = self.random.random() < 0.15
         for number, corner in zip(numbers, corners, strict=True):
             texts = [str(each) for each in (number, *corner)]
@@ -111,7 +111,7 @@ class Text:
             self._noise()
 
     def listed(self, numbers: Iterable[object], per_line: int) -> None:
-        """The data lines of a set."""
+        """Writes the data lines of a set."""
         texts = [str(number) for number in numbers]
         comma = self.random.choice((", ", ","))
         for start in range(0, len(texts), per_line):
@@ -119,7 +119,7 @@ class Text:
             self.lines.append(comma.join(texts[start : start + per_line]) + more)
 
     def elset(self, name: str, numbers: Ints, *more: str) -> None:
-        """A set of elements: as a range where it is one."""
+        """Writes a set of elements, as a range if it is one."""
         steps = np.diff(numbers)
         if len(numbers) > 1 and (steps == steps[0]).all() and self.random.random() < 0.7:
             self.keyword("Elset", f"elset={name}", *more, "generate", abbreviate=self.random.random() < 0.5)
@@ -129,7 +129,7 @@ class Text:
             self.listed(numbers, self.random.choice((8, 16)))
 
     def extra(self, number: int, nodes: Ints) -> None:
-        """An element without volume."""
+        """Writes an element without volume."""
         kind, n = self.random.choice((("S3", 3), ("T3D2", 2), ("CONN3D2", 2), ("SPRINGA", 2), ("MASS", 1), ("M3D3", 3),
                                       ("S6", 6), ("B31", 2), ("CPS3", 3), ("COH3D6", 6), ("DASHPOTA", 2)))  # fmt: skip
         self.keyword("Element", f"type={kind}", f"elset=extra{number}")
@@ -140,7 +140,7 @@ class Text:
             self.lines.append(self.random.choice(("** a comment, *with* signs", "", "**", "   ")))
 
     def bytes(self) -> bytes:
-        """The file."""
+        """Returns the bytes of the file."""
         end = self.random.choice(("\n", "\n", "\r\n"))
         mark = b"\xef\xbb\xbf" if self.random.random() < 0.1 else b""
         return mark + (end.join(self.lines) + end).encode()
@@ -160,13 +160,13 @@ Groups = dict[str | None, Floats]
 
 
 def _parted(random: Random, body: Block) -> tuple[Ints, Ints]:
-    """The tets of a body in two."""
+    """Returns the tets of a body in two sets."""
     cut = random.randint(1, len(body.tets) - 1)
     return body.tets[:cut], body.tets[cut:]
 
 
 def cae(random: Random) -> tuple[bytes, Groups]:
-    """Parts, instances that are moved and turned, sets of parts and of the assembly with the same names."""
+    """Writes parts, instances that are moved and turned, and sets of parts and of the assembly with the same names."""
     text = Text(random, case=random.choice((str, str.upper)))
     text.keyword("Heading")
     text.lines += ["** Job name: Job-1 Model name: Model-1", "** Generated by: Abaqus/CAE 2022"]
@@ -212,7 +212,7 @@ def cae(random: Random) -> tuple[bytes, Groups]:
 
 
 def _placed(text: Text, random: Random, body: Block) -> Block:
-    """Writes the data lines of an instance; the body where it is then."""
+    """Writes the data lines of an instance; returns the body at the place of the instance."""
     move, axis, angle = np.zeros(3), random.randrange(3), 0.0
     kind = random.randrange(4)
     if kind & 1:
@@ -235,7 +235,7 @@ def _placed(text: Text, random: Random, body: Block) -> Block:
 
 
 def hypermesh(random: Random) -> tuple[bytes, Groups]:
-    """Components as sets of *ELEMENT, one after the other; comments for HyperMesh itself."""
+    """Writes components as sets of *ELEMENT, one after the other, and comments of HyperMesh."""
     text = Text(random, case=str.upper)
     text.lines += [
         "**",
@@ -266,13 +266,13 @@ def hypermesh(random: Random) -> tuple[bytes, Groups]:
 
 
 def _strange(text: Text, body: Block, number: int) -> None:
-    """A volume that is not read, in a component of its own."""
+    """Writes a volume element that the reader does not support, in a separate component."""
     text.keyword("ELEMENT", "TYPE=SC8R", "ELSET=hexes")
     text.lines.append(", ".join(str(each) for each in (number, *body.nodes[:8])))
 
 
 def freecad(random: Random) -> tuple[bytes, Groups]:
-    """One body; sets of sets and node sets; the steps of CalculiX."""
+    """Writes one body; sets of sets and node sets; the steps of CalculiX."""
     text = Text(random)
     text.lines += ["** written by FreeCAD inp file writer for CalculiX,Abaqus meshes", "** all mesh elements.", ""]
     body = block(random)
@@ -297,7 +297,7 @@ def freecad(random: Random) -> tuple[bytes, Groups]:
 
 
 def prepomax(random: Random) -> tuple[bytes, Groups]:
-    """Several parts as sets of *ELEMENT, each with nodes of its own."""
+    """Writes several parts as sets of *ELEMENT, each with its own nodes."""
     text = Text(random, case=random.choice((str, str.title)))
     text.lines += ["************************************************************", "**", "** Heading"]
     text.keyword("Heading")
@@ -325,7 +325,7 @@ def prepomax(random: Random) -> tuple[bytes, Groups]:
 
 
 def _analysis(text: Text) -> None:
-    """Materials, loads and a step, which are passed over."""
+    """Writes materials, loads and a step, which the reader skips."""
     text.keyword("Material", "name=Steel")
     text.keyword("Density")
     text.lines.append("7.85e-09,")
@@ -350,4 +350,4 @@ POISONS: tuple[Callable[[Random, list[bytes]], None], ...] = (
     lambda random, lines: lines.append(b"*NODE\n1, 0, zero, 0"),
     lambda random, lines: lines.insert(0, b"1, 2, 3"),
 )
-"""Changes that make any of the files one that must be refused."""
+"""Changes after which a file must be refused."""

@@ -1,4 +1,4 @@
-"""The reader of Abaqus input files, in this process: parts, instances, sets, and what it refuses with a line number."""
+"""The reader of Abaqus input files, in this process: parts, instances, sets, and refusals with a line number."""
 
 from pathlib import Path
 
@@ -137,7 +137,7 @@ Lower,
      ("Rod 2.Lower", 8, [2])],
 )  # fmt: skip
 def test_members_and_sets_of_instances_are_told_apart(group: str, low: float, tets: list[int], tmp_path: Path) -> None:
-    """A set of the assembly hides those of the same name in parts; each is of its own scope."""
+    """A set of the assembly hides sets of the same name in parts; each set belongs to its own scope."""
     found = read(PART + QUALIFIED, tmp_path, group)
     assert found.names.tets.tolist() == tets
     assert found.mesh.points[:, 2].min() == low
@@ -181,7 +181,7 @@ def test_a_set_holds_what_another_one_held_where_it_is_named(tmp_path: Path) -> 
 
 
 def test_names_that_are_no_ascii_are_kept_apart(tmp_path: Path) -> None:
-    """In UTF-8 and in Latin-1; a file in UTF-16 is refused."""
+    """The file is in UTF-8 or in Latin-1; a file in UTF-16 is refused."""
     text = f"{FLAT}*ELSET, ELSET=Körper\n1\n*ELSET, ELSET=Kärper\n2\n"
     for encoding in ("utf-8", "latin-1"):
         (tmp_path / "case.inp").write_bytes(text.encode(encoding))
@@ -219,7 +219,7 @@ def test_an_element_may_take_several_lines(row: str, tmp_path: Path) -> None:
     assert found.mesh.volumes() == pytest.approx([1 / 6, 1 / 6])
 
 
-# Elements that are no tets --------------------------------------------------------------------------------------------
+# Elements other than tets ---------------------------------------------------------------------------------------------
 
 EMPTY = ["CONN3D2", "SPRINGA", "DASHPOTA", "MASS", "S6", "S4R", "S8R5", "STRI65", "M3D3", "SFM3D4R", "COH3D6", "T3D2",
          "B31OS", "R3D3", "RB3D2", "ROTARYI", "CPS3", "DCOUP3D", "GAPUNI", "PIPE31H"]  # fmt: skip
@@ -266,7 +266,7 @@ def test_a_part_without_an_instance_is_told(tmp_path: Path) -> None:
     assert "parts without an instance are left out: 'Spare' (2 elements)" in read(PART + spare + TWO, tmp_path).notes
 
 
-# What is refused ------------------------------------------------------------------------------------------------------
+# Refused files --------------------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(
@@ -396,7 +396,7 @@ U, V
 
 
 def test_what_would_join_or_remove_bodies_is_counted(tmp_path: Path) -> None:
-    """In the model, in the assembly and in a step, shortened too."""
+    """The keywords are in the model, in the assembly and in a step, also shortened."""
     assert keywords.JOINING.keys() <= keywords.ANALYSIS
     joined = "*TIE, NAME=t\na, b\n*Tie, name=u\nb, c\n*Embedded Element\nx\n*END ASSEMBLY"
     later = "*EQUA\n2\n1, 1, 1., 2, 1, -1.\n*STEP\n*MODEL CHANGE, REMOVE\nx\n"

@@ -1,4 +1,5 @@
-"""The way in: the cache, the same bits every time, the child's limits, clear refusals."""
+"""Making and reading of meshes: the cache, the same bits every time, the limits of the child process, clear
+refusals."""
 
 import hashlib
 import os
@@ -148,7 +149,7 @@ def test_a_child_that_wants_too_much_memory_is_stopped(tmp_path: Path) -> None:
 
 
 def test_a_child_that_is_told_to_stop_has_not_failed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """A launcher passes a cancel on to every process of a rank."""
+    """A launcher sends a cancel to every process of a rank."""
     monkeypatch.setenv("PYTHONPATH", str(tmp_path))
     (tmp_path / "sitecustomize.py").write_text("import os; os.kill(os.getpid(), 15)")
     with pytest.raises(StoppedError, match="stopped on request") as raised:
@@ -157,7 +158,7 @@ def test_a_child_that_is_told_to_stop_has_not_failed(tmp_path: Path, monkeypatch
 
 
 def test_the_child_gets_no_secrets(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Its environment is chosen name by name; what it would print of ours is not there."""
+    """The variables of its environment are selected by name; the child prints no other variable of this process."""
     monkeypatch.setenv("CONOID_ZENOH_PASSWORD", "hunter2")
     monkeypatch.setenv("PYTHONPATH", str(tmp_path))
     (tmp_path / "sitecustomize.py").write_text(
@@ -192,7 +193,8 @@ except MeshError as error:
 
 @pytest.mark.parametrize(("memory", "says"), [(3 * 2**30, "True"), (200 * 2**20, "0.195 GiB")])
 def test_a_child_asks_for_no_more_than_is_allowed(memory: int, says: str, cache: Path) -> None:
-    """Under hard limits, as of ``ulimit -v`` and ``ulimit -t`` or of a batch system, which no user can raise."""
+    """The test uses hard limits, as set by ``ulimit -v`` and ``ulimit -t`` or by a batch system, which no user can
+    raise."""
     command = [sys.executable, "-c", UNDER_LIMITS, str(memory), "200"]
     ended = subprocess.run(command, capture_output=True, text=True, timeout=120, check=True)
     assert says in ended.stdout

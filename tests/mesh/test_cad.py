@@ -41,7 +41,7 @@ def cad(path: Path, **more: Any) -> Any:
 
 
 def made(path: Path, data: str | bytes, **more: Any) -> TetMesh:
-    """In this process: no time for a child of each."""
+    """Returns the mesh, made in this process to save the time of a child process."""
     path.write_bytes(data.encode() if isinstance(data, str) else data)
     return check(measured(cad(path, **more), {"mesh": path}, "mesh"))
 
@@ -52,7 +52,7 @@ def made(path: Path, data: str | bytes, **more: Any) -> TetMesh:
     ids=["mm", "m", "inch"],
 )
 def test_a_file_says_its_unit(folder: Path, step: str, change: Any, unit: float, written_unit: str) -> None:
-    """The key may say the same, and nothing else."""
+    """The key ``unit`` may have the same unit, and no other."""
     path = folder / "unit.step"
     for given in (None, written_unit):
         mesh = made(path, change(step), element_size=2.0 * unit, unit=given)
@@ -75,7 +75,7 @@ def test_solids_are_chosen_by_name_and_number(folder: Path, step: str, solids: l
 
 
 def test_solids_that_touch_are_one_body(folder: Path, step: str) -> None:
-    """The cube and the plate on it have nodes in common on the face between them."""
+    """The cube and the plate on it have common nodes on their common face."""
     mesh = made(folder / "two.step", step, solids=["Core", "Jacket"])
     between = np.flatnonzero(np.abs(mesh.points[:, 0] - 0.01) < 1e-9)
     sides = mesh.points[mesh.tets].mean(axis=1)[:, 0] > 0.01
@@ -95,7 +95,7 @@ def test_a_quarter_of_a_solid_is_a_quarter(folder: Path, step: str) -> None:
 
 
 def test_a_solid_of_a_file_is_an_operand(folder: Path, step: str) -> None:
-    """A hole in the cube of the file: its place and turn are those of the file."""
+    """The body is a hole in the cube of the file: the place and the rotation of its operands are those of the file."""
     path = folder / "operand.step"
     path.write_text(step)
     hole = {"shape": "cylinder", "base": ["5 mm", "5 mm", "-1 mm"], "radius": "2 mm", "length": "20 mm"}
@@ -118,7 +118,8 @@ def test_a_brep_file_needs_a_unit(folder: Path, brep: bytes) -> None:
 
 
 def test_the_bytes_of_a_file_decide_its_mesh(folder: Path, step: str) -> None:
-    """Made in a child process; another file under the same name is another mesh, the same one is found again."""
+    """The mesh is made in a child process. Another file under the same name gives another mesh; the same file is
+    found in the cache."""
     path, made_again = folder / "child.step", []
     path.write_text(step)
     body = cad(path, solids=[1])
@@ -133,14 +134,14 @@ def test_the_bytes_of_a_file_decide_its_mesh(folder: Path, step: str) -> None:
 
 
 def _without(step: str, begin: str) -> str:
-    """Without the first statement that has ``begin`` in it."""
+    """Returns the file without the first statement that contains ``begin``."""
     lines = step.split(";\n")
     lines.remove(next(line for line in lines if begin in line))
     return ";\n".join(lines)
 
 
 def _open(step: str) -> str:
-    """Without one face of a shell."""
+    """Returns the file without one face of a shell."""
     head = step.index("CLOSED_SHELL('',(") + len("CLOSED_SHELL('',(")
     return step[:head] + step[step.index(",", head) + 1 :]
 
@@ -168,7 +169,7 @@ def test_a_damaged_file_is_refused_in_one_line(folder: Path, step: str, damage: 
 
 
 def test_brep_files_that_are_cut_off_and_huge_files_are_refused(folder: Path, brep: bytes) -> None:
-    """OpenCASCADE reads such a BREP file for ever."""
+    """OpenCASCADE would read such a BREP file without end."""
     for share in (0.1, 0.5, 0.9, 0.99):
         with pytest.raises(MeshError, match="the BREP file is cut off"):
             made(folder / "cut.brep", brep[: int(share * len(brep))], unit="1 mm")

@@ -33,7 +33,7 @@ def combination(request: dict[str, Any], **more: Any) -> Combination:
 
 
 def made(body: Combination) -> TetMesh:
-    """In this process: no time for a child of each."""
+    """Returns the mesh, made in this process to save the time of a child process."""
     return check(measured(body, {}, "mesh"))
 
 
@@ -88,7 +88,7 @@ def test_inclusion_and_exclusion() -> None:
 
 
 def test_a_jacket_round_a_core_and_its_sectors() -> None:
-    """The cavity is there; a quarter is a quarter, with nodes exactly on its planes."""
+    """The cavity exists; a quarter has a quarter of the volume, with nodes exactly on its planes."""
     shape = {"shape": "difference", "of": [JACKET, CORE]}
     whole, quarter = (made(combination(shape, element_size=0.08, sector=each)) for each in ("full", "quarter"))
     nose = {radius: _ogive(radius) for radius in (0.5, 0.3)}
@@ -102,14 +102,14 @@ def test_a_jacket_round_a_core_and_its_sectors() -> None:
 
 
 def _ogive(radius: float) -> float:
-    """Volume of a tangent nose of calibre radius head 3, m^3, by the integral of its outline."""
+    """Returns the volume of a tangent nose of calibre radius head 3, m^3, by the integral of its outline."""
     rho, length = 6.0 * radius, 2.0 * radius * math.sqrt(2.75)
     z = np.linspace(0.0, length, 100_001)
     return float(np.trapezoid(math.pi * (np.sqrt(rho**2 - z**2) - (rho - radius)) ** 2, z))
 
 
 def test_a_solid_turned_or_elsewhere_is_the_same_solid() -> None:
-    """Operands carry their own turns, a combination within as a whole."""
+    """Operands have their own rotations, and a combination inside of another is rotated as a whole."""
     hole = {"shape": "cylinder", "radius": 0.2, "length": 2.0, "base": [0.0, 0.0, -1.0]}
     block = {"shape": "box", "low": [-0.5, -0.4, -0.3], "high": [0.5, 0.4, 0.3]}
     turn = {"axis": "y", "angle": 0.7, "centre": [0.3, 0.0, 0.1]}
@@ -190,7 +190,7 @@ def test_a_combination_that_is_wrong_is_refused_under_its_key(mesh: dict[str, An
 
 
 def _written(mesh: Any) -> Any:
-    """Without the keys that are None."""
+    """Returns the keys whose values are not None."""
     if isinstance(mesh, dict):
         return {key: _written(value) for key, value in mesh.items() if value is not None}
     return [_written(each) for each in mesh] if isinstance(mesh, list) else mesh

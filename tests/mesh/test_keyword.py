@@ -1,4 +1,4 @@
-"""The reader of LS-DYNA keyword decks: styles of pre-processors, parts and sets, and what it refuses."""
+"""The reader of LS-DYNA keyword decks: styles of pre-processors, parts and sets, and refusals."""
 
 import math
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""The reader of gmsh's .msh files, in this process: what gmsh writes in every option, and what it would pass over."""
+"""The reader of .msh files, in this process: files that gmsh writes in every option, and damaged files."""
 
 import itertools
 import subprocess
@@ -50,7 +50,7 @@ DIALECTS = [f"{version}-{binary}" for version, binary in itertools.product((2.2,
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Two boxes of 20 m^3 that share a face, with the groups lower, upper and all, which has both."""
+    """Two boxes of 20 m^3 with a common face, with the groups lower, upper and all, which contains both."""
     place = tmp_path_factory.mktemp("msh")
     subprocess.run([sys.executable, "-c", WRITER], cwd=place, check=True, timeout=120)
     return place
@@ -67,10 +67,9 @@ def volume(found: NamedMesh) -> float:
 @pytest.mark.parametrize("dialect", DIALECTS)
 @pytest.mark.parametrize("kind", ["plain", "SaveAll", "SaveParametric", "ghosts"])
 def test_each_group_has_its_own_tets_once(kind: str, dialect: str, folder: Path) -> None:
-    """Also where a tet is in two groups, for each of which it stands in a file of the format 2.2, and where there are
-    ghost cells."""
+    """This includes tets in two groups, which a file of the format 2.2 lists once for each group, and ghost cells."""
     path = folder / f"{kind}-{dialect}.msh"
-    if kind == "SaveAll" and dialect.startswith("2.2"):  # gmsh leaves the groups out of such a file
+    if kind == "SaveAll" and dialect.startswith("2.2"):  # gmsh omits the groups in such a file
         assert len(read_msh(path, "lower", "mesh").mesh.tets) == 0
         assert volume(read_msh(path, None, "mesh")) == pytest.approx(40.0)
         return

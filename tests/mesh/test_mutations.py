@@ -1,5 +1,5 @@
-"""Text files of all formats that are cut off, or have lines removed, repeated or swapped: refused in one line, or read
-as what they are then."""
+"""Text files of all formats that are truncated, or have lines removed, repeated or swapped: each is refused in one
+line, or read with its present content."""
 
 import math
 from collections.abc import Callable
@@ -51,7 +51,7 @@ CHANGES: tuple[Callable[[Lines, Random], None], ...] = (cut_off, removed, repeat
 
 
 def outcome(path: Path) -> TetMesh | None:
-    """The mesh; None where the file is refused in one line. Anything else fails."""
+    """Returns the mesh, or None if the file is refused in one line; any other result is an error."""
     try:
         return read(MeshFile(shape="file", path=path.name, unit=1.0), path, "mesh")
     except MeshError as error:

@@ -1,6 +1,5 @@
-"""Mesh files made at random: each group holds what its maker and meshio say, or the file is refused in one line.
-
-``CONOID_SEED`` chooses another seed; the seed is printed, and is part of every message.
+"""Random mesh files: each group has the content that its writer and meshio give, or the file is refused in one line.
+``CONOID_SEED`` sets another seed; the seed is printed and is part of every message.
 """
 
 import contextlib
@@ -26,11 +25,11 @@ from .styles import POISONS, STYLES, Floats, block, measured
 
 SEED = int(os.environ.get("CONOID_SEED", "20260801"))
 FEW, MANY = 10, 100
-"""Files of each of the two makers."""
+"""Numbers of files of each of the two writers."""
 
 
 def held(path: Path, group: str | None, unit: float = 1.0) -> Floats:
-    """Volume and first moments, (4,), of what a case takes from a file."""
+    """Returns volume and first moments, (4,), of the mesh that a case reads from a file."""
     file = MeshFile(shape="file", path=path.name, unit=unit, group=group, second_order="corners")
     mesh = read(file, path, "mesh")
     return measured(mesh.points, mesh.tets)
@@ -42,7 +41,8 @@ def close(found: Floats, expected: Floats, where: str) -> None:
 
 
 def of_meshio(path: Path) -> Floats | None:
-    """Volume and first moments of the whole file by meshio, each tet once; None where it cannot read it."""
+    """Returns volume and first moments of the whole file by meshio, each tet once; None if meshio cannot read the
+    file."""
     try:
         with contextlib.redirect_stdout(io.StringIO()), contextlib.redirect_stderr(io.StringIO()):
             found = meshio.read(path)
@@ -68,14 +68,14 @@ def refused(path: Path, group: str | None, where: str) -> None:
 
 
 def cut_off(path: Path, chance: Random, where: str) -> None:
-    """A file that is cut off in its last third before its last word is refused."""
+    """Checks that a file that is truncated in its last third before its last word is refused."""
     content = path.read_bytes()
     path.write_bytes(content[: chance.randint(len(content) * 2 // 3, len(content) - 30)])
     refused(path, None, where)
 
 
 def check_gmsh(folder: Path, seed: int, count: int) -> int:
-    """Number of files that meshio could read, too."""
+    """Checks files of gmsh; returns the number of files that meshio could read too."""
     command = [sys.executable, str(Path(__file__).with_name("gmsh_files.py")), str(folder), str(seed), str(count)]
     subprocess.run(command, check=True, timeout=600)
     both = 0
@@ -101,7 +101,7 @@ def check_gmsh(folder: Path, seed: int, count: int) -> int:
 
 
 def check_abaqus(folder: Path, seed: int, count: int) -> int:
-    """The same of small Abaqus files, and of files that meshio writes."""
+    """Checks small Abaqus files, and files that meshio writes."""
     both = 0
     for index in range(count):
         chance, path = Random(f"{seed}/{index}"), folder / f"a{index:03d}.inp"

@@ -1,4 +1,4 @@
-"""The reader of Radioss starter decks: two styles, parts and subsets, groups and surfaces, and what it refuses."""
+"""The reader of Radioss starter decks: two styles, parts and subsets, groups and surfaces, and refusals."""
 
 import math
 from pathlib import Path

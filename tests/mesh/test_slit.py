@@ -1,4 +1,5 @@
-"""A slit: both of its sides are exposed, its inner border holds the body together, nothing else changes."""
+"""A slit: its two sides are exposed, its border inside of the body is connected, and nothing else of the mesh
+changes."""
 
 from typing import Any
 
@@ -28,7 +29,7 @@ def body(written: dict[str, Any], **more: Any) -> Box | Plate:
 
 
 def crack(made: Box | Plate, mesh: TetMesh) -> tuple[Floats, Floats]:
-    """Centres (k, 3) and normals (k, 3) of the exposed faces that lie in the plane of the slit, inside the body."""
+    """Returns centres (k, 3) and normals (k, 3) of the exposed faces in the plane of the slit, inside of the body."""
     assert made.slit is not None
     faces = boundary_faces(mesh.tets)
     flat = np.abs(mesh.points[faces][:, :, index(made.slit.axis)] - made.slit.at).max(axis=1) < 1e-9
@@ -39,7 +40,8 @@ def crack(made: Box | Plate, mesh: TetMesh) -> tuple[Floats, Floats]:
 @pytest.mark.parametrize("axis", ["x", "y", "z"])
 @pytest.mark.parametrize("written", [FROM_ONE_SIDE, INSIDE], ids=["edge", "inside"])
 def test_both_sides_are_exposed(written: dict[str, Any], axis: str, split: int) -> None:
-    """Each side has the area of the rectangle and faces the other; except corner faces with all nodes on the border."""
+    """Each side has the area of the rectangle, and the sides are opposite to each other, except corner faces with
+    all nodes on the border."""
     shift = "xyz".index(axis) - "xyz".index(written["slit"]["axis"])
     turned = {
         key: tuple(np.roll(value, shift).tolist()) if key in ("low", "high") else value
@@ -72,7 +74,8 @@ def test_the_surface_is_that_of_the_block_and_the_slit() -> None:
 
 
 def test_the_border_inside_the_body_holds_it_together() -> None:
-    """Nodes at the tip stay single, all others of the slit come twice; the halves touch beyond the tip only."""
+    """Nodes at the tip are not duplicated; all other nodes of the slit exist twice. The halves have common nodes
+    only beyond the tip."""
     made = body(FROM_ONE_SIDE)
     mesh = structured(made)
     on = np.abs(mesh.points[:, 1] - 0.2) < 1e-9

@@ -1,4 +1,4 @@
-"""Hexahedra, wedges and pyramids as tets that meet face to face; tets of ten nodes; degenerate hexahedra."""
+"""Hexahedra, wedges and pyramids cut into tets with matching faces; tets of ten nodes; degenerate hexahedra."""
 
 import math
 
@@ -19,7 +19,8 @@ SEEDS = range(100)
 
 
 def judge(made: NamedMesh, truth: Mixture) -> None:
-    """Every element has its volume, every inner face two tets, and the surface is that of the elements."""
+    """Checks that the tets of every element have its volume, every inner face has two tets, and the surface is that
+    of the elements."""
     mesh = check(made.mesh, made.names)
     volumes = mesh.volumes()
     for number, expected in truth.volumes().items():
@@ -91,7 +92,7 @@ def one(nodes: list[int], points: np.ndarray = CUBE, line: int = 0) -> NamedMesh
     ],
 )
 def test_a_hexahedron_may_repeat_nodes(nodes: list[int], volume: float | None, tets: int) -> None:
-    """A hexahedron as a wedge in two ways, a pyramid, a flat tet, a tet in two ways, and with one edge gone."""
+    """The hexahedron is a wedge in two ways, a pyramid, a flat tet, a tet in two ways, or lacks one edge."""
     if volume is None:
         with pytest.raises(MeshError, match="hexahedron 7 is flat"):
             one(nodes)
@@ -118,8 +119,9 @@ def test_an_element_without_a_proper_volume_is_refused_with_its_line(nodes: list
 
 @pytest.mark.parametrize(("raised", "share"), [(4, 1 / 3), (5, 1 / 6)])
 def test_warped_faces_are_told_by_what_they_lose(raised: int, share: float) -> None:
-    """A corner of the unit cube is raised by h: below a bilinear top is h / 4 more, below the triangles h / 3 where the
-    diagonal ends at that corner, as at the smallest number, else h / 6."""
+    """A corner of the unit cube is raised by h. The volume below a bilinear top is larger by h / 4. The volume below
+    the triangles is larger by h / 3 if the diagonal ends at this corner, as it does at the smallest number, else by
+    h / 6."""
     points = CUBE.copy()
     points[raised, 2] += 0.3
     found = one(list(range(8)), points)
@@ -131,7 +133,7 @@ def test_warped_faces_are_told_by_what_they_lose(raised: int, share: float) -> N
 
 @pytest.mark.parametrize("other", [False, True])
 def test_a_quadrilateral_beside_two_tets_takes_their_diagonal(other: bool) -> None:
-    """Half a cube as a wedge, and two tets on its face 0 2 6 4 that have either diagonal of it."""
+    """Half a cube is a wedge, and two tets with either diagonal are on its face 0 2 6 4."""
     wedge = cells(HEX8, np.array([1]), np.array([[0, 1, 2, 2, 4, 5, 6, 6]]))
     rows = [(2, 4, 6, 8), (2, 0, 4, 8)] if other else [(0, 6, 2, 8), (0, 4, 6, 8)]
     points = np.concatenate([CUBE, [[0.1, 0.9, 0.5]]])
@@ -147,7 +149,7 @@ EDGES = TET10.edges
 
 
 def ball(bulge: float) -> Content:
-    """Two tets of ten nodes, those in the middle of edges moved outwards by a share of the edges."""
+    """Returns two tets of ten nodes whose midside nodes are moved outwards by a fraction of the edges."""
     corners = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1], [1, 1, 1]])
     rows = [(0, 1, 2, 3), (1, 2, 3, 4)]
     points, middles, nodes = corners.tolist(), dict[tuple[int, int], int](), []
@@ -184,8 +186,8 @@ def test_tets_of_ten_nodes_become_eight_or_their_corners() -> None:
 
 
 def test_the_volume_that_corners_lose_is_that_of_the_quadratic_element() -> None:
-    """Three edges of the unit tet are bent by h along -z: A h / 3 each below, and for one of them as much less at the
-    slanted face (the integral of the shape function of such a node over a triangle is a third of its area)."""
+    """Three edges of the unit tet are bent by h along -z. Each adds A h / 3 below, and one of them removes as much
+    at the slanted face (the integral of the shape function of such a node over a triangle is a third of its area)."""
     corners = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]])
     middles = np.array([(corners[a] + corners[b]) / 2 for a, b in EDGES])
     middles[:3, 2] -= 0.01
@@ -216,7 +218,7 @@ def test_what_eight_tets_cannot_match_is_refused() -> None:
 
 
 def test_hexahedra_of_twenty_nodes_are_taken_by_their_corners() -> None:
-    """The four upper edges of a cube are bent outwards by h along z: A h / 3 each on the top face."""
+    """The four upper edges of a cube are bent outwards by h along z: each adds A h / 3 on the top face."""
     middles = np.array([(CUBE[a] + CUBE[b]) / 2 for a, b in HEX20.edges])
     middles[4:8, 2] += 0.03
     points = np.concatenate([CUBE, middles])

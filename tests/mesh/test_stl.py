@@ -31,7 +31,7 @@ def made(folder: Path, data: bytes | str, **more: Any) -> TetMesh:
 
 
 def inside(facets: Any) -> float:
-    """Volume within facets, m^3, of a file in mm."""
+    """Returns the volume within facets, m^3, of a file in mm."""
     a, b, c = facets.transpose(1, 0, 2)
     return float((a * np.cross(b, c)).sum() / 6.0 * 1e-9)
 
@@ -47,7 +47,7 @@ def inside(facets: Any) -> float:
 def test_text_and_binary_are_the_same_body_with_elements_of_the_size_asked_for(
     tmp_path: Path, facets: Any, share: float
 ) -> None:
-    """However large or small the triangles of the file are: those of the box are the largest that it can have."""
+    """This holds for any size of the triangles of the file: the triangles of the box are the largest possible."""
     meshes = [made(tmp_path, data) for data in (text(facets), binary(facets))]
     for mesh in meshes:
         assert mesh.volumes().sum() == pytest.approx(inside(facets), rel=share)
@@ -77,7 +77,7 @@ def _flipped() -> Any:
 
 
 def _folded() -> Any:
-    """One corner is pushed out through the other side."""
+    """Returns a box with one corner pushed out through the opposite side."""
     facets = BALL.copy()
     corner = facets[40][0].copy()
     facets[(np.abs(facets - corner) < 1e-9).all(axis=2)] = -1.3 * corner
@@ -113,8 +113,8 @@ def test_a_surface_that_is_wrong_is_refused_in_one_line(tmp_path: Path, data: by
 
 
 def test_triangles_that_cross_are_those_that_edges_pierce() -> None:
-    """Pairs at random, against the sign of volumes: an edge of one has its ends on both sides of the other, and passes
-    within its edges."""
+    """Random pairs are compared with the signs of volumes: the ends of an edge of one triangle are on both sides of
+    the other, and the edge passes through the inside of the other."""
     chance = np.random.default_rng(5)
     corners = chance.uniform(0.0, 1.0, (400, 1, 3)) + chance.uniform(-0.15, 0.15, (400, 3, 3))
     faces = np.arange(1200).reshape(-1, 3)

@@ -1,4 +1,4 @@
-"""The regular meshes: exact volumes, conforming, whole sectors, and the Taylor bar's family."""
+"""Regular meshes: exact volumes, matching faces, complete sectors, and the meshes of the Taylor bar."""
 
 import math
 import time
@@ -36,7 +36,7 @@ def body(shape: str, **more: Any) -> Generated:
 
 
 def polygon_share(steps: int) -> float:
-    """Area of the polygon with ``steps`` corners a quarter, over that of its circle."""
+    """Returns the area of the polygon with ``steps`` corners in each quarter over that of its circle."""
     return steps * math.sin(math.pi / 2 / steps) / (math.pi / 2)
 
 
@@ -57,7 +57,8 @@ def test_a_regular_mesh_fills_its_body(shape: str, axis: str, sector: str, split
 
 
 def assert_planes_are_exact(made: Generated, mesh: TetMesh) -> None:
-    """The cut faces lie on their planes to the last bit, whole: area of section times number of divisions."""
+    """Checks that the cut faces lie on their planes to the last bit and are complete: area of section times number
+    of divisions."""
     start = np.array(centre(made))
     faces = boundary_faces(mesh.tets)
     for direction in cut_directions(made, made.axis):

@@ -1,4 +1,4 @@
-"""Shapes meshed together: each has its volume, and their interface one mesh."""
+"""Shapes meshed together: each has its volume, and their interface has one mesh."""
 
 from pathlib import Path
 from typing import Any
@@ -36,7 +36,7 @@ def joined(one: dict[str, Any], other: dict[str, Any], planes: str = "", folder:
 
 
 def interface(whole: Whole) -> float:
-    """Area, m^2, of the faces that two parts have in common."""
+    """Returns the area, m^2, of the common faces of two parts."""
     behind = across(whole.tets)
     tet, face = np.nonzero(behind >= 0)
     between = whole.tet_part[tet] < whole.tet_part[behind[tet, face] // 4]
@@ -60,7 +60,7 @@ def test_a_small_plate_on_a_large_one(axis: str) -> None:
 
 
 def test_a_rod_that_fills_a_tube() -> None:
-    """Facets of one mesh: no gap and no overlap between the two."""
+    """The facets of rod and tube are those of one mesh: no gap and no overlap between the two."""
     whole = joined(ROD, TUBE)
     lateral = 2.0 * np.pi * 4e-3 * 10e-3
     assert interface(whole) == pytest.approx(lateral, rel=0.1)
@@ -90,7 +90,8 @@ def test_shapes_with_a_gap_and_shapes_that_overlap_are_refused() -> None:
 
 @pytest.mark.parametrize("axis", ["x", "y", "z"])
 def test_a_core_that_fills_a_jacket(axis: str) -> None:
-    """An ogive in what is left of a larger one: a quarter, whose nodes are exactly on the planes at which it is cut."""
+    """An ogive is inside of a larger ogive with a cavity: a quarter, whose nodes are exactly on the planes of the
+    cut."""
     base: list[Any] = [0, 0, 0]
     base["xyz".index(axis)] = "2 mm"
     core = {"shape": "ogive", "radius": "3 mm", "crh": 3, "shank": "6 mm", "axis": axis, "base": base}
@@ -108,7 +109,8 @@ def test_a_core_that_fills_a_jacket(axis: str) -> None:
 
 
 def test_solids_of_a_step_file_are_two_parts_of_one_body(tmp_path: Path) -> None:
-    """The run has the numbers that ``validate`` finds; a part of the body without a file is meshed with them."""
+    """The run has the numbers that ``validate`` gives; a part of the body without a file is meshed together with the
+    solids."""
     (tmp_path / "s.step").write_text(written(tmp_path)[0])
     core, jacket = (
         {"shape": "cad", "path": "s.step", "solids": [name], "element_size": "2 mm"} for name in ("Core", "Jacket")

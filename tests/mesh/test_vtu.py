@@ -36,7 +36,7 @@ def array_of(values: np.ndarray) -> Any:
 
 
 def grid(truth: Mixture, mirrored: bool) -> vtkUnstructuredGrid:
-    """The elements by number, with an array of parts, one of nodes, and two faces as cells of their own."""
+    """Returns the elements by number, with an array of parts, an array of nodes, and two faces as cells."""
     made, points, numbers = vtkUnstructuredGrid(), vtkPoints(), list(truth.elements)
     points.SetData(array_of(truth.points))
     made.SetPoints(points)
@@ -116,7 +116,7 @@ def test_files_of_meshio_are_read(tmp_path: Path) -> None:
 
 
 def test_a_damaged_file_is_refused_or_has_the_right_mesh(tmp_path: Path) -> None:
-    """Cut off, with a byte changed, or with a part that is there twice or gone."""
+    """The file is truncated, has a changed byte, or a part that is repeated or missing."""
     path, bad = tmp_path / "good.vtu", tmp_path / "bad.vtu"
     refusals = 0
     for seed in range(60):
@@ -135,7 +135,7 @@ def test_a_damaged_file_is_refused_or_has_the_right_mesh(tmp_path: Path) -> None
 
 
 def reads(path: Path) -> bool:
-    """Whether a file is read; any other end than a refusal in one line fails."""
+    """Returns whether a file is read; any other result than a refusal in one line is an error."""
     try:
         taken(path)
     except MeshError as error:

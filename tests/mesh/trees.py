@@ -1,4 +1,4 @@
-"""Combinations of shapes made at random, as a case asks for them."""
+"""Random combinations of shapes, in the form of a case."""
 
 import random
 from typing import Any
@@ -8,7 +8,8 @@ _COMBINED = ("union", "difference", "intersection")
 
 
 def tree(seed: int) -> dict[str, Any]:
-    """A combination of two or three shapes or combinations of these, near the origin, sizes about 1 m."""
+    """Returns a combination of two or three shapes, or of combinations of these, near the origin, with sizes of
+    about 1 m."""
     chance = random.Random(seed)
     return {"shape": chance.choice(_COMBINED), "of": [_operand(chance, 1) for _ in range(chance.randint(2, 3))]}
 

@@ -1,4 +1,5 @@
-"""Under mpiexec: a worker one rank of which raises in its tenth step. The first argument is that rank."""
+"""Program under mpiexec: a worker in which one rank raises an error in its tenth step. The first argument is this
+rank."""
 
 import itertools
 import sys

@@ -1,4 +1,5 @@
-"""Runs of the scene that breaks which several modules compare: each is done once in a session, when first asked for."""
+"""Runs of the scene with fracture that several modules compare: each run is made once in a session, at its first
+use."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -13,9 +14,8 @@ from .scenes import FAST, SCENES, arguments
 
 @pytest.fixture(scope="session")
 def breaking(tmp_path_factory: pytest.TempPathFactory) -> Callable[[int, str], Path]:
-    """The folder of an uninterrupted run by the number of ranks and the scene; done together with its like.
-
-    On more than one rank it is asked for a checkpoint by a file before it begins.
+    """Returns the folder of an uninterrupted run by the number of ranks and the scene; runs with the same number of
+    ranks are made together. On more than one rank a file requests a checkpoint before the run begins.
     """
     root = tmp_path_factory.mktemp("breaking")
 
@@ -35,7 +35,7 @@ def breaking(tmp_path_factory: pytest.TempPathFactory) -> Callable[[int, str], P
 
 @pytest.fixture(scope="session")
 def moving(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The folder of a run of the scene on three ranks, among which it is cut anew every five steps."""
+    """Returns the folder of a run of the scene on three ranks, with a new cut every five steps."""
     root = tmp_path_factory.mktemp("moving")
     words = [word for change in ("balance.policy=every", "balance.every=5") for word in ("--set", change)]
     together(3, root, [[*arguments(FAST, root, root), *words]])

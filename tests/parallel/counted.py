@@ -1,4 +1,4 @@
-"""A kernel of tasks that can be checked: it counts what it goes over."""
+"""A kernel of tasks for tests: it counts the numbers of its range."""
 
 from conoid.worker.kernels.jit import njit, types
 from conoid.worker.parallel.arguments import reader

@@ -1,4 +1,4 @@
-"""Real workers under the real mpiexec, started and awaited with a limit; nothing outlives a test."""
+"""Real workers under the real mpiexec, started and awaited with a time limit; no process continues after a test."""
 
 import json
 import os
@@ -16,13 +16,13 @@ _PROCESS = re.compile(r"rank \d+ of \d+, process (\d+)")
 
 
 def command(ranks: int, *arguments: str, module: Sequence[str] = ("-m", "conoid.worker")) -> list[str]:
-    """The command line of a worker; ``module`` may be another program that runs it."""
+    """Returns the command line of a worker; ``module`` may be another program that runs the worker."""
     return [str(MPIEXEC), "-n", str(ranks), sys.executable, "-m", "mpi4py", *module, *arguments]
 
 
 @contextmanager
 def started(words: list[str]) -> Iterator[subprocess.Popen[str]]:
-    """A launcher under way, in a process group of its own; ended by force when the block is left."""
+    """Starts a launcher in a separate process group, and kills it at the end of the block."""
     with subprocess.Popen(
         words, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True
     ) as launcher:
@@ -38,15 +38,15 @@ def started(words: list[str]) -> Iterator[subprocess.Popen[str]]:
 
 
 def ended(words: list[str]) -> subprocess.CompletedProcess[str]:
-    """The launcher after its end."""
+    """Returns the launcher after its end."""
     with started(words) as launcher:
         out, err = launcher.communicate(timeout=PATIENCE)
     return subprocess.CompletedProcess(words, launcher.returncode, out, err)
 
 
 def together(ranks: int, place: Path, runs: Sequence[Sequence[str]]) -> None:
-    """Many runs, by the arguments of their workers, one after the other in one program of ``ranks`` ranks; ``place`` is
-    made for them.
+    """Runs several cases, given by the arguments of their workers, one after the other in one program of ``ranks``
+    ranks; ``place`` is a folder for them.
     """
     place.mkdir(exist_ok=True)
     (place / "runs.json").write_text(json.dumps(runs), encoding="utf-8")
@@ -56,14 +56,14 @@ def together(ranks: int, place: Path, runs: Sequence[Sequence[str]]) -> None:
 
 
 def processes(folder: Path) -> list[int]:
-    """Process ids that the ranks of a run wrote into their logs."""
+    """Returns the process ids that the ranks of a run wrote into their logs."""
     return [
         int(number) for log in sorted(folder.glob("log/rank-*.log")) for number in _PROCESS.findall(log.read_text())
     ]
 
 
 def wait_until_gone(numbers: list[int], seconds: float = 20.0) -> list[int]:
-    """Waits for processes to end; those that have not."""
+    """Waits for processes to end; returns the processes that have not ended."""
     limit = time.monotonic() + seconds
     while (left := [n for n in numbers if _lives(n)]) and time.monotonic() < limit:
         time.sleep(0.05)
@@ -78,7 +78,7 @@ def _lives(number: int) -> bool:
 
 
 def wait_for(path: Path, text: str, launcher: subprocess.Popen[str], seconds: float = 90.0) -> None:
-    """Waits until a file holds a text; fails when the launcher ends or time is up."""
+    """Waits until a file contains a text; fails if the launcher ends or the time is over."""
     limit = time.monotonic() + seconds
     while not path.exists() or text not in path.read_text(encoding="utf-8"):
         assert launcher.poll() is None, "the worker ended before it wrote that"

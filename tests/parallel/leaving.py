@@ -1,4 +1,4 @@
-"""Under mpiexec: ranks that leave at once with the exit code that is the only argument."""
+"""Program under mpiexec: ranks that end at once with the exit code of the only argument."""
 
 import sys
 

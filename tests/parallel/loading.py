@@ -1,4 +1,5 @@
-"""Under mpiexec: a worker that prints what kernels it loads once steps have begun. Arguments: those of the worker."""
+"""Program under mpiexec: a worker that prints the kernels that it loads after the first step. The arguments are
+those of the worker."""
 
 import sys
 

@@ -1,6 +1,5 @@
-"""Under mpiexec: runs several cases one after the other in the same ranks, so that the start is paid once.
-
-The arguments of the runs stand in a JSON file, a list of lists as the worker's command line takes them.
+"""Program under mpiexec: runs several cases one after the other in the same ranks, which start only once. The
+arguments of the runs are in a JSON file: a list of lists of arguments of the worker.
 """
 
 import json

@@ -1,10 +1,11 @@
-"""The scene that breaks, and its variants."""
+"""The scene with fracture, and its variants."""
 
 from pathlib import Path
 
 CASE = Path(__file__).with_name("breaking.toml")
-"""A cohesive plate of stone, held at one edge, and a brittle block that hits it and the wall below; a metal rod erodes
-on top. Gravity, a symmetry plane, friction, scatter of strength with and without area."""
+"""A cohesive plate of stone, held at one edge, and a brittle block that hits the plate and the wall below; a metal
+rod above them erodes. The scene has gravity, a symmetry plane, friction, and scatter of strength with and without
+area."""
 SCENES = {
     "nodal": [],
     "standard": ["numerics.pressure=standard"],
@@ -20,7 +21,7 @@ SCENES = {
     "pressure": [],
 }
 FAST = "nodal"
-"""The scene that is compared in seconds, on two ranks."""
+"""The variant of the scene that is compared in the fast tests, on two ranks."""
 TRACTION = """
 [[boundaries]]
 kind = "traction"
@@ -42,7 +43,7 @@ _LOADS = {"traction": TRACTION, "pressure": PRESSURE}
 
 
 def arguments(name: str, root: Path, folder: Path) -> list[str]:
-    """The worker's; the case of the scene lies in ``root``."""
+    """Returns the arguments of the worker; the case of the scene is in ``root``."""
     case = root / f"{name}.toml"
     case.write_text(CASE.read_text(encoding="utf-8") + _LOADS.get(name, ""), encoding="utf-8")
     return [str(case), *(word for change in SCENES[name] for word in ("--set", change)), "--out", str(folder / name)]

@@ -1,4 +1,5 @@
-"""Under mpiexec: one of each kind of communication, of known size; what each rank counted, as JSON."""
+"""Program under mpiexec: makes one communication of each kind, of known size, and prints the counts of each rank as
+JSON."""
 
 import json
 from collections.abc import Callable

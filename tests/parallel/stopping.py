@@ -1,4 +1,5 @@
-"""Under mpiexec: a worker that gets a stop request before a step. Arguments: the step, then those of the worker."""
+"""Program under mpiexec: a worker that gets a stop request before a step. Arguments: the step, then the arguments of
+the worker."""
 
 import sys
 

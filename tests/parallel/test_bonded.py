@@ -1,4 +1,5 @@
-"""One answer with tied bonds: a tile that fractures on a plate that erodes; any ranks, cuts, a restart."""
+"""One answer with tied bonds: a tile that fractures on a plate that erodes, for any number of ranks, cuts, and a
+restart."""
 
 from pathlib import Path
 

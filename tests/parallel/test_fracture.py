@@ -80,8 +80,8 @@ def test_the_scenes_break_thoroughly(name: str, breaking: Answers) -> None:
 
 
 def shared(sim: Simulation) -> dict[str, Any]:
-    """Of the scene of a rank, as ids in their order: what it holds, pushes and has copies of; by the other rank, what
-    it sums with it, sends to it and receives from it.
+    """Returns the tables of the scene of a rank as ids in their order: the nodes that it has, may push and has as
+    copies, and, for each other rank, the nodes that it sums with, sends to and receives from this rank.
     """
     assert sim.contact is not None
     now, nodes = sim.contact.searches.scene, sim.model.nodes
@@ -97,8 +97,8 @@ def shared(sim: Simulation) -> dict[str, Any]:
 
 
 def test_all_ranks_know_who_shares_what_separates() -> None:
-    """After every split: the lists of two ranks are the same, in the same order, each node once; all ranks that push
-    or hold a node that any rank pushes take part in its sum; a rank receives each node that it lacks once.
+    """After every split the lists of two ranks are the same, in the same order, with each node once. If any rank may
+    push a node, all ranks that push or have the node take part in its sum. A rank receives each ghost node once.
     """
     case, ranks = parse_case(read_data(CASE)), 3
 

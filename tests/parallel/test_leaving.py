@@ -1,4 +1,4 @@
-"""End of ranks: each signs off at the launcher, so that no process is killed at the end of a successful run."""
+"""End of ranks: each rank deregisters at the launcher, so that no process is killed at the end of a successful run."""
 
 from pathlib import Path
 
@@ -9,6 +9,6 @@ from .launching import command, ended
 
 @pytest.mark.parametrize("code", [0, 4])
 def test_many_ranks_end_with_their_own_code(code: int) -> None:
-    """Without the sign-off (``os._exit``) Hydra kills the other ranks: exit code 9 in most of these runs."""
+    """Without the deregistration (``os._exit``) Hydra kills the other ranks: exit code 9 in most of these runs."""
     done = ended(command(7, str(code), module=[str(Path(__file__).with_name("leaving.py"))]))
     assert (done.returncode, done.stderr) == (code, ""), done.stdout

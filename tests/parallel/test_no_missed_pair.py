@@ -1,8 +1,7 @@
-"""No missed pair: any number of ranks finds every active contact that all pairs of the whole surface give, once.
-
-The ranks are threads. The active contacts of a step are recorded, each with its nodes and, to the bit, its weights,
-its normal and its target, before restitution. On one rank the same kernels get every node with every face, and every
-edge with every edge, instead of the candidate pairs.
+"""No missed pair: for any number of ranks the run finds every active contact of the whole surface once. The ranks
+are threads. The active contacts of a step are recorded, each with its nodes and, to the bit, its weights, its normal
+and its target before restitution. On one rank the same kernels get all pairs of nodes and faces, and of edges,
+instead of the candidate pairs.
 """
 
 from collections import Counter
@@ -38,19 +37,19 @@ from ..worker.meshes import Floats
 
 RANKS = (1, 2, 3, 4, 7)
 STEPS, EVERY = 60, 3
-"""Length of a run, and every how many steps all pairs are looked at."""
+"""Number of steps of a run, and interval in steps at which all pairs are tested."""
 CLOSER = {
     "crossed_bars": ("parts[0].velocity[2]=100", "parts[1].velocity[2]=-100"),
     "hertz_spheres": ("parts[0].velocity[2]=100", "parts[1].velocity[2]=-100"),
     "colliding": ("parts[0].velocity[2]=800", "parts[2].velocity[2]=-800"),
 }
-"""Speeds at which some bodies touch, or much of them, in so few steps."""
+"""Speeds at which bodies, or large parts of their surfaces, touch within this number of steps."""
 OURS = ("colliding", "eroding")
 """Scenes of this folder."""
 QUICK = ("eroding", "crossed_bars", "sliding_block")
-"""Some of seconds: what is laid bare, edges, and steps without energy to give back."""
+"""Cases for the fast tests: surface exposed by erosion, edges, and steps without energy to give back."""
 _MOST = 1_000_000
-"""Pairs that are given to a kernel at once."""
+"""Largest number of pairs in one call of a kernel."""
 
 Met = Counter[tuple[bytes, ...]]
 
@@ -62,7 +61,7 @@ def case_of(name: str, *changes: str) -> Case:
 
 CASES = {name: case_of(name) for name in sorted(shipped())}
 NAMES = [*OURS, *(name for name, case in CASES.items() if case.in_contact and not case.fractures)]
-"""Scenes without separation: the surface of all pairs is made again in each test, without the cracks of the search."""
+"""Scenes without separation: the test makes the whole surface again, without the cracks of the search."""
 
 
 def written(met: ContactRows, ids: "np.ndarray") -> Met:
@@ -86,7 +85,7 @@ class Found:
         )
 
     def run(self) -> dict[int, Met]:
-        """Take some steps and record the active contacts that this rank computed; boundaries and forces act as
+        """Make some steps and record the active contacts that this rank computed; boundaries and forces act as
         usual.
         """
         step.prepare(self.sim)
@@ -114,7 +113,7 @@ class Brute(Found):
         super().meet(now, give, dt)
 
     def _sides(self) -> NearSurface:
-        """The whole surface as it is now: what has been laid bare since the last search, without what has left."""
+        """Return the whole present surface: with the faces exposed since the last search, without removed faces."""
         exterior = self.contact.exterior
         found = exterior._build(exterior.surface.flags, exterior.surface.turned)
         return SurfaceMotion(found, self.sim.model.nodes, exterior.motion.mobility, exterior.size, self.sim.comm).sides
@@ -160,7 +159,8 @@ class Brute(Found):
         return met
 
     def _pairs(self, sides: NearSurface, small: Indices, large: Indices) -> Iterator[Indices]:
-        """(p, 2) all small things with all large ones that their part meets and that have no corner in common."""
+        """Return (p, 2) all pairs of small and large things whose parts may be in contact and that have no common
+        corner."""
         part, allowed = sides.surface_nodes.part, ~np.isnan(self.contact.searches.mu)
         for begin in range(0, len(small), max(_MOST // max(len(large), 1), 1)):
             some = small[begin : begin + max(_MOST // max(len(large), 1), 1)]
@@ -172,7 +172,7 @@ class Brute(Found):
 
 
 def brute(case: Case) -> Brute:
-    """One rank that has taken its steps."""
+    """Return one rank after its steps."""
     ran = Brute(simulation.build(case, Path(), SerialComm()))
     ran.run()
     return ran
@@ -195,7 +195,7 @@ def found(case: Case, ranks: int) -> dict[int, Met]:
     "name", [name if name in QUICK else pytest.param(name, marks=pytest.mark.slow) for name in NAMES]
 )
 def test_every_pair_that_meets_is_found_once_on_any_number_of_ranks(name: str) -> None:
-    """The contacts that one rank finds in the steps between are found by all of them, too."""
+    """This includes the contacts that one rank finds in the steps in between."""
     case = case_of(name)
     whole = brute(case)
     assert sum(map(bool, whole.all.values())) > len(whole.all) // 3
@@ -214,8 +214,8 @@ def missed(case: Case) -> int:
 
 
 def test_a_search_without_foresight_is_found_out() -> None:
-    """The check can fail: candidates that are near now, not those that will be. With a skin so small that it does not
-    hold what flies until the next search.
+    """Control: the check can fail. The candidates are pairs that are near at present, without the predicted motion,
+    and the skin is too small for the motion until the next search.
     """
     case, find = case_of("fast_fragment", "contact.skin=0.1"), search.find
 

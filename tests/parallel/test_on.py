@@ -1,4 +1,5 @@
-"""Boundaries and probes that are on sets of a mesh file: as boxes that hold the same, on any number of ranks."""
+"""Boundaries and probes on sets of a mesh file have the same effect as boxes with the same nodes, on any number of
+ranks."""
 
 from pathlib import Path
 from random import Random
@@ -81,7 +82,7 @@ y = 0.0
 
 
 def case(place: Path, name: str, words: dict[str, str], turning: bool) -> str:
-    """A case file; a box cannot turn nodes, so that it is compared without the rotation."""
+    """Returns a case file. A box cannot rotate nodes, so it is compared without the rotation."""
     text = CASE if turning else CASE.replace('kind = "rotation"\nCLAMP\nspin', 'kind = "gravity"\n#')
     text = text.replace("#", 'acceleration = ["1 m/s^2", 0, 0]\n#')
     if turning:

@@ -1,4 +1,4 @@
-"""No rank waits for another one that loads kernels at its first crack or contact."""
+"""No rank waits for another rank that loads kernels at its first crack or contact."""
 
 from pathlib import Path
 

@@ -1,4 +1,4 @@
-"""Estimate of the time of a team: the greedy list schedule in plain Python, and the tasks of regions that are timed."""
+"""Estimate of the time of a team: the greedy list schedule in plain Python, and the timed tasks of regions."""
 
 import numpy as np
 import pytest
@@ -28,7 +28,7 @@ def test_tasks_go_to_the_thread_that_is_free_first(asleep: bool) -> None:
     projecting._ready(asleep, np.array([3, 11, 20]), crews, free)
     for each in took:
         projecting._give(each, crews, free)
-    woken = [11, *[20] * 2, *[40] * 4, *[60] * 8, 80]  # two are woken by the first, and two by each of these
+    woken = [11, *[20] * 2, *[40] * 4, *[60] * 8, 80]  # each thread wakes two more
     begins = woken if asleep else [0] * 16
     assert [int(free[c, n]) for c, n in enumerate(crews)] == [schedule(took, int(n), begins) for n in crews]
 

@@ -19,7 +19,7 @@ CASE = Path(__file__).with_name("breaking.toml")
 
 @pytest.fixture(scope="module")
 def run(tmp_path_factory: pytest.TempPathFactory) -> Callable[[int], Path]:
-    """The folder of a run of some dozens of steps by the number of ranks, among which it is cut anew every 8 steps."""
+    """Returns the folder of a run of some dozens of steps by the number of ranks, with a new cut every 8 steps."""
     root = tmp_path_factory.mktemp("recorded")
 
     @cache

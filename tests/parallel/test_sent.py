@@ -1,4 +1,5 @@
-"""Counts of the messages of ranks, against communications of known size; equal under MPI and in threads."""
+"""Counts of the messages of ranks, compared with communications of known size; the counts are equal under MPI and in
+threads."""
 
 import json
 import pickle
@@ -25,8 +26,8 @@ KNOWN = {
     "begin_maximum": (0, 0, 1, 72),
     "begin_sum": (0, 0, 1, 72),
 }
-"""Messages, their bytes, collectives and what a rank gives to them; nothing is sent to itself; an empty message
-is sent by ``trade`` alone."""
+"""Messages, bytes, collectives and bytes given to collectives of each operation. A rank sends nothing to itself, and
+only ``trade`` sends an empty message."""
 OBJECTS = {"share": (0, 0, 2, len(pickle.dumps(bytes(1000), pickle.HIGHEST_PROTOCOL))), "barrier": (0, 0, 1, 0)}
 
 
@@ -52,9 +53,9 @@ def test_one_rank_sends_nothing() -> None:
 
 @pytest.mark.parametrize(("form", "words"), [("standard", 3), ("nodal", 5), ("split", 8)])
 def test_a_shared_node_costs_these_words_a_step(form: str, words: int) -> None:
-    """Both holders of a node send forces (3), the nodal form the volumes besides (2), split the gradients (3).
-
-    Forces that outgrow their quantum are sent again: the least of some steps counts.
+    """The two ranks with a node send the forces (3 words), in the nodal form also the volumes (2), and in the split
+    form also the gradients (3). Forces that overflow their quantum are sent again, so the smallest count of some
+    steps is used.
     """
     data = apply_overrides(read_data(shipped()["elastic_bar_wall"]), [f"numerics.pressure={form}", "run.frames=0"])
     case = parse_case(data)

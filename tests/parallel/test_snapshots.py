@@ -1,4 +1,4 @@
-"""Snapshots of a run agree with its tables, on any number of ranks; those in the journal of a killed run are
+"""Snapshots of a run agree with its tables on any number of ranks; the snapshots in the journal of a killed run are
 complete.
 """
 
@@ -27,7 +27,7 @@ STOPPING = Path(__file__).with_name("stopping.py")
 
 
 def told(folder: Path) -> list[Snapshot]:
-    """The snapshots of the journal; a line that a kill has torn is none."""
+    """Returns the snapshots of the journal; an incomplete line after a kill is ignored."""
     lines = (folder / layout.JOURNAL).read_bytes().splitlines(keepends=True)
     found = [from_json(line) for line in lines if line.endswith(b"\n")]
     return [message for message in found if isinstance(message, Snapshot)]
@@ -79,7 +79,7 @@ def test_any_number_of_ranks_sees_the_same(cause: str, breaking: Callable[[int, 
 
 @pytest.mark.parametrize("ranks", [1, 2])
 def test_the_last_snapshot_says_what_the_tables_say(ranks: int, breaking: Callable[[int, str], Path]) -> None:
-    """Momentum that is not in its rows is that of nodes whose tets have been eroded."""
+    """Momentum that is not in the rows of the snapshot belongs to nodes whose tets have eroded."""
     folder = breaking(ranks, FAST)
     data = of_cause(folder, "end")
     got, header = arrays(data), snapshot.header_of(data)
@@ -127,7 +127,7 @@ def test_births_are_those_of_the_genealogy(breaking: Callable[[int, str], Path])
 
 
 def test_a_fragment_keeps_its_number_from_frame_to_frame(breaking: Callable[[int, str], Path]) -> None:
-    """Of the tets that had a number in a frame, most have it in the next one, and no number is used again."""
+    """Most tets with a number in a frame have it in the next frame, and no number is used again."""
     frames, used, kept = sorted((breaking(2, FAST) / layout.FRAMES).glob("*.vtkhdf")), set[int](), 0
     before: dict[int, int] = {}
     for path in frames:

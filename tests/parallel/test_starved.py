@@ -44,7 +44,7 @@ z = 0
 end_time = END
 frames = 0
 """
-"""All nodes are driven: flat at 1 ms."""
+"""All nodes have a prescribed motion: the body is flat at 1 ms."""
 
 
 def outcome(tmp_path: Path, end: str, ranks: int, *words: str) -> Outcome:
@@ -55,7 +55,7 @@ def outcome(tmp_path: Path, end: str, ranks: int, *words: str) -> Outcome:
 
 
 def told(end: Outcome) -> list[str]:
-    """Its warnings; the numbers of the case have no units."""
+    """Returns the warnings of a run; the numbers of the case have no units."""
     return [text for text in end.warnings if "no unit, taken for" not in text]
 
 
@@ -77,7 +77,7 @@ def test_flat_is(tmp_path: Path, ranks: int) -> None:
 
 @pytest.mark.parametrize("ranks", [pytest.param(1, marks=pytest.mark.slow), 2])
 def test_what_is_used_up_says_how_short_the_steps_were(tmp_path: Path, ranks: int) -> None:
-    """A fifth of its height is left."""
+    """At the end of the run a fifth of the height of the body is left."""
     end = outcome(tmp_path, "1.1 ms", ranks, "--set", "run.max_steps=300")
     assert (end.state, end.cause, end.steps, told(end)) == ("timed_out", "steps", 300, [])
     assert end.message.startswith("run.max_steps is used up before run.end_time, at 0.0008")

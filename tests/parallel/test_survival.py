@@ -1,4 +1,4 @@
-"""A run survives anything: cut anew in mid-flight, stopped and gone on with on other ranks, killed; the same bits."""
+"""A run gives the same bits after new cuts, after stops and restarts on other numbers of ranks, and after kills."""
 
 import contextlib
 import itertools
@@ -21,16 +21,16 @@ from .scenes import FAST, SCENES, arguments
 
 STOPPING = Path(__file__).with_name("stopping.py")
 STEPS = 54
-"""Of the breaking scene."""
+"""Number of steps of the scene with fracture."""
 ERODING = Path(__file__).with_name("eroding.toml")
 SEED = int(os.environ.get("CONOID_FUZZ", time.strftime("%Y%m%d")))
-"""Of the day's sample; the tests name it, and it can be asked for again."""
+"""Seed of the sample of the day; it is part of the names of the tests and can be set again."""
 Made = Callable[[str], Path]
 
 
 @pytest.fixture(scope="module")
 def whole(tmp_path_factory: pytest.TempPathFactory, breaking: Callable[[int, str], Path]) -> Made:
-    """The folder of an uninterrupted run on one rank, by its scene."""
+    """Returns the folder of an uninterrupted run on one rank, by its scene."""
     root = tmp_path_factory.mktemp("whole")
 
     def folder(name: str) -> Path:
@@ -44,7 +44,7 @@ def whole(tmp_path_factory: pytest.TempPathFactory, breaking: Callable[[int, str
 
 
 def case(name: str, root: Path, folder: Path) -> list[str]:
-    """The arguments of a worker."""
+    """Returns the arguments of a worker."""
     if name == "eroding":
         return [str(ERODING), "--out", str(folder / name)]
     return arguments(name, root, folder)
@@ -59,7 +59,7 @@ def journal(folder: Path) -> list[object]:
 
 
 def must_be_one(whole: Path, other: Path) -> None:
-    """The same answer, and output without a repeated or a missing piece."""
+    """Checks that the answer is the same, and that no piece of the output is repeated or missing."""
     one, two = outcome(whole), outcome(other)
     assert two.state == "succeeded"
     assert two.digest == one.digest
@@ -80,11 +80,11 @@ def must_be_one(whole: Path, other: Path) -> None:
 
 
 Leg = tuple[int, int, int]
-"""Ranks, threads, and the step before which to stop."""
+"""Numbers of ranks and of threads, and the step before which the run stops."""
 
 
 def go(words: Sequence[str], legs: Sequence[Leg]) -> None:
-    """Runs a case in legs; the last one should reach the end."""
+    """Runs a case in several parts; the last part must reach the end."""
     for k, (ranks, threads, last) in enumerate(legs):
         more = ["--threads", str(threads), "--use", "all", *(["--restart"] if k else [])]
         launched = ended(command(ranks, str(last), *words, *more, module=[str(STOPPING)]))
@@ -92,7 +92,7 @@ def go(words: Sequence[str], legs: Sequence[Leg]) -> None:
 
 
 def sample(seed: int, legs: int, steps: int) -> list[Leg]:
-    """Random ranks, threads and steps."""
+    """Returns random numbers of ranks, of threads and of steps."""
     draw = random.Random(seed)
     stops = sorted(draw.sample(range(2, steps), legs - 1))
     return [(draw.choice([1, 2, 3, 4, 7]), draw.choice([1, 2, 3]), stop) for stop in [*stops, 10**9]]
@@ -116,7 +116,7 @@ def test_moving_tets_every_five_steps_changes_no_bit(whole: Made, moving: Path) 
 
 
 def must_have_moved(whole: Path, other: Path) -> None:
-    """The same answer, and tets that went from rank to rank."""
+    """Checks that the answer is the same, and that tets were moved between ranks."""
     must_be_one(whole, other)
     moved = [message for message in journal(other) if isinstance(message, Balance)]
     assert len(moved) == (outcome(other).rebalances or 0) > 0
@@ -155,7 +155,8 @@ def test_a_run_goes_on_on_other_ranks(name: str, legs: list[Leg], whole: Made, t
 
 @pytest.mark.parametrize("kills", [2, pytest.param(50, marks=[pytest.mark.slow, pytest.mark.timeout(1200)])])
 def test_a_run_survives_being_killed(kills: int, whole: Made, tmp_path: Path) -> None:
-    """With a checkpoint in every step, killed at any moment, in the midst of writing one too; in one run or in many."""
+    """The run writes a checkpoint in every step and is killed at random moments, also while it writes a checkpoint;
+    on one rank or on several."""
     draw, killed, runs = random.Random(SEED), 0, itertools.count()
     while killed < kills:
         root = tmp_path / str(next(runs))
@@ -218,7 +219,7 @@ def test_what_cannot_go_on_says_why(tmp_path: Path) -> None:
 
 
 def test_a_run_that_has_succeeded_stays_as_it_is(tmp_path: Path) -> None:
-    """The attempt to resume it would otherwise replace the outcome by a failure."""
+    """Otherwise an attempt to resume the run would replace its outcome by a failure."""
     words = ["two_tets", "--out", str(tmp_path / "run"), "--set", "run.end_time=1 us", "--set", "run.frames=0"]
     assert ended(command(1, *words)).returncode == 0
     before = {path: path.read_bytes() for path in (tmp_path / "run").iterdir() if path.is_file()}

@@ -1,4 +1,4 @@
-"""Threads of a rank: tasks are done once each, colour after colour, and kernels get their arguments from a table."""
+"""Threads of a rank: each task is done once, colour after colour, and kernels get their arguments from a table."""
 
 import threading
 import time
@@ -68,7 +68,7 @@ def test_every_task_is_done_once_in_each_of_many_passes(threads: int) -> None:
     for k in range(2000):
         team(threads).run(count, table.set(done, who), tasks, starts)
         if k % 500 == 0:
-            time.sleep(0.01)  # helpers fall asleep, and wake up for the next pass
+            time.sleep(0.01)  # helper threads fall asleep, and wake up for the next pass
     assert (done == 2000).all()
     assert who.min() >= 0
     assert who.max() < threads
@@ -76,7 +76,7 @@ def test_every_task_is_done_once_in_each_of_many_passes(threads: int) -> None:
 
 @njit(TASK, cache=False)
 def gather(table, first, end, thread):  # type: ignore[no-untyped-def]
-    """Adds to each number of its range how often the next one has been counted."""
+    """Adds to each number of its range the count of the next number."""
     done, who = _counts(table)
     for k in range(first, end):
         who[k] += done[(k + 1) % len(done)]
@@ -95,7 +95,7 @@ def test_the_stages_of_a_program_come_one_after_the_other_in_every_round(threads
     for _ in range(20):
         team(threads).repeat(stages, 10)
     assert (done == 200).all()
-    assert (seen == 200 * 201 // 2).all()  # every pass of the second stage has seen all of the first, and no more
+    assert (seen == 200 * 201 // 2).all()  # each has the counts of the first stage only
 
 
 def test_helpers_take_part_and_are_there_once() -> None:

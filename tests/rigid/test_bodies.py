@@ -33,7 +33,7 @@ RIGID = schema.Rigid()
 def rigid_case(
     motions: Sequence[dict[str, Any]], boundaries: Sequence[schema.Boundary] = (), **keys: Any
 ) -> schema.Case:
-    """A case of bodies in contact, with these keys of parts, and boundaries."""
+    """Returns a case of bodies in contact, with these keys of parts, and boundaries."""
     contact = keys.pop("contact", {})
     case = meeting_of(motions, contact, **keys)
     return case.model_copy(update={"boundaries": tuple(boundaries)})
@@ -61,18 +61,18 @@ class Seen:
 
     @property
     def worst(self) -> float:
-        """Largest residual of the energy."""
+        """Returns the largest residual of the energy."""
         return max(energy.residual for energy in self.energies)
 
     @property
     def drift(self) -> float:
-        """Largest change of the linear momentum, over its size."""
+        """Returns the largest change of the linear momentum, over its size."""
         p: Floats = np.array(self.momenta)[:, :3]
         return float(np.ptp(p, axis=0).max()) / float(np.abs(p).max())
 
 
 def test_energy_and_momentum_at_the_start_are_those_of_the_mesh() -> None:
-    """Sums over the nodes of a deformable body of the same motion."""
+    """The reference are sums over the nodes of a deformable body with the same motion."""
     motion = {"velocity": (30.0, -20.0, 50.0), "spin": schema.Spin(centre=(1e-3, 0.0, 2e-3), rate=(3e3, 9e3, -5e3))}
     seen = [Seen(rigid_case([{**motion, **how}], contact=None), [TILTED], 1) for how in ({}, {"rigid": RIGID})]
     energy, momenta = ([getattr(each, name)[0] for each in seen] for name in ("energies", "momenta"))
@@ -82,7 +82,8 @@ def test_energy_and_momentum_at_the_start_are_those_of_the_mesh() -> None:
 
 @pytest.mark.parametrize(("mesh", "friction"), [(BOX, 0.0), (TILTED, 0.3)])
 def test_a_rigid_box_hits_a_plate(mesh: TetMesh, friction: float) -> None:
-    """Momentum to round-off, the impulses of both parts to the bit; energy as accurate as without a rigid body."""
+    """Momentum is conserved to round-off, and the impulses of the two parts are opposite to the bit; the energy is
+    as accurate as without a rigid body."""
     motions: list[dict[str, Any]] = [{}, {"rigid": RIGID, "velocity": (0.0, 0.0, -100.0)}]
     seen = Seen(rigid_case(motions, contact={"friction": friction}, end=6e-6), [PLATE, mesh])
     assert seen.sim.contact is not None
@@ -120,7 +121,8 @@ def test_rigid_bodies_rebound_by_newtons_law() -> None:
 
 
 def test_a_rigid_box_lands_flat_and_slides_to_rest() -> None:
-    """On a wall, with friction and gravity: no rotation, no bounce, the way of Coulomb's law: v^2 / (2 mu g)."""
+    """The box lands on a wall, with friction and gravity: no rotation, no rebound, and the sliding distance of
+    Coulomb's law, v^2 / (2 mu g)."""
     gravity = schema.Gravity(kind="gravity", acceleration=(0.0, 0.0, -1e4))
     case = rigid_case([{"rigid": RIGID, "velocity": (2.0, 0.0, 0.0)}], [GROUND, gravity], contact=None, end=1e-3)
     seen = Seen(case, [block((3, 3, 3), 1e-3)])
@@ -134,7 +136,8 @@ def test_a_rigid_box_lands_flat_and_slides_to_rest() -> None:
 
 
 def test_a_rigid_body_between_a_wall_and_another_one_is_no_spring() -> None:
-    """A block that falls on a light rigid plate on a wall, and on one of 1000 t without: to 1 % of its speed."""
+    """A block falls on a light rigid plate on a wall, and on a plate of 1000 t without a wall: the speeds agree to 1
+    %."""
     falling, plate = moved(block((3, 3, 3), 1e-3), (0.0, 0.0, 1e-3)), block((3, 3, 1), 1e-3)
     ends = []
     for how, walls in ((RIGID, [GROUND]), (schema.Rigid(mass=1e6), [])):
@@ -147,7 +150,8 @@ def test_a_rigid_body_between_a_wall_and_another_one_is_no_spring() -> None:
 
 
 def test_planes_of_symmetry_leave_a_quarter_its_motions() -> None:
-    """A quarter of a box between two planes moves only along their line, and does not turn; half of one turns."""
+    """A quarter of a box between two planes moves only along their intersection and does not rotate; half of a box
+    rotates."""
     planes = [schema.Symmetry(kind="symmetry", axis=axis) for axis in ("x", "y")]
     motion = {"rigid": RIGID, "velocity": (0.0, 0.0, -5.0)}
     seen = Seen(rigid_case([motion], [*planes, GROUND], contact=None, end=1e-4), [moved(BOX, (-2.1e-3, -2.3e-3, 0.0))])
@@ -161,7 +165,8 @@ def test_planes_of_symmetry_leave_a_quarter_its_motions() -> None:
 
 @pytest.mark.parametrize("restitution", [0.0, 0.5])
 def test_a_body_beside_a_plane_of_symmetry_meets_its_image(restitution: float) -> None:
-    """The plane does not hold it before; a corner hits the plane, and rebounds with that share of its velocity."""
+    """The plane does not act on the body before the impact. A corner hits the plane and rebounds with the given
+    fraction of its velocity."""
     plane = schema.Symmetry(kind="symmetry", axis="x")
     motion = {"rigid": RIGID, "velocity": (-30.0, 5.0, 0.0)}
     case = rigid_case([motion], [plane], contact={"restitution": restitution}, end=8e-5)
@@ -188,7 +193,8 @@ def test_walls_that_close_on_a_rigid_body_end_the_run() -> None:
 
 
 def test_a_driven_punch_works_from_outside() -> None:
-    """A rigid punch penetrates a plate on a wall: the work is in the ledger, the motion follows the course."""
+    """A rigid punch penetrates a plate on a wall: its work is in the energy balance, and its motion is the
+    prescribed one."""
     ramp = ((0.0, 0.0), (0.5e-6, 1.0))
     drive = schema.Prescribed(kind="velocity", parts=("body1",), x=0.0, y=0.0, z=-50.0, course=ramp)
     ground = GROUND.model_copy(update={"parts": ("body0",)})
@@ -242,7 +248,7 @@ def test_any_number_of_ranks_gives_one_answer(ranks: int) -> None:
 
 
 def test_two_threads_give_the_answer_of_one() -> None:
-    """On one rank and on two."""
+    """The test runs on one rank and on two ranks."""
     threaded = SCENE.model_copy(update={"run": SCENE.run.model_copy(update={"threads": 2})})
     (alone,) = on(1, SCENE, MESHES, stepped)
     assert on(1, threaded, MESHES, stepped) == [alone]
@@ -250,7 +256,7 @@ def test_two_threads_give_the_answer_of_one() -> None:
 
 
 def test_probes_of_a_whole_body_have_its_inertia_and_centre() -> None:
-    """1/2 M V^2 + 1/2 w I w, M V, c and V; those of some of its nodes are sums over these."""
+    """The values are 1/2 M V^2 + 1/2 w I w, M V, c and V; the values of some of its nodes are sums over these nodes."""
     fields = ["kinetic_energy", "momentum_y", "centre_z", "centre_velocity_x", "mass"]
     probes = [schema.Probe(name=field, part="body0", field=field) for field in fields]  # type: ignore[arg-type]
     everywhere = {"low": (-1.0, -1.0, -1.0), "high": (1.0, 1.0, 1.0)}
@@ -268,7 +274,7 @@ def test_probes_of_a_whole_body_have_its_inertia_and_centre() -> None:
 
 
 def test_a_resumed_run_ends_with_the_same_bits(tmp_path: Path) -> None:
-    """From a checkpoint in the middle of an impact, of two ranks."""
+    """The checkpoint is written in the middle of an impact, on two ranks."""
 
     def halves(sim: Simulation) -> tuple[str | None, list[list[float]]]:
         stepped(sim, 70)

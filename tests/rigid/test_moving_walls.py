@@ -19,7 +19,7 @@ from ..worker.simulations import on
 Floats = npt.NDArray[np.float64]
 DENSITY, YOUNG, SIZE = 8000.0, 200e9, (3e-3, 3e-3, 12e-3)
 THIN = Material(density=DENSITY, elastic=Elastic(young=YOUNG, poisson=0.0))
-"""A bar of it has plane waves of the speed sqrt(E / density)."""
+"""Material in which plane waves have the speed sqrt(E / density)."""
 BAR = block((3, 3, 12), 1e-3)
 MASS = DENSITY * SIZE[0] * SIZE[1] * SIZE[2]
 PLANE: dict[str, Any] = {"kind": "wall", "point": (0.0, 0.0, 0.0), "normal": (0.0, 0.0, 1.0)}
@@ -50,8 +50,9 @@ class Seen:
 
 
 def test_a_wall_with_a_mass_is_stopped_by_a_bar() -> None:
-    """Its speed falls as exp(-Z A t / M) until the wave comes back (Goldsmith 1960, Impact, chapter 3, on rigid masses
-    that hit rods); momentum to round-off, and the wall's own to the bit of its quanta.
+    """The speed of the wall falls as exp(-Z A t / M) until the wave returns (Goldsmith 1960, Impact, chapter 3, on
+    rigid masses that hit rods). Momentum is conserved to round-off, and the momentum of the wall to the bit of its
+    quanta.
     """
     mass, speed, wave = 0.3 * MASS, 20.0, float(np.sqrt(YOUNG / DENSITY))
     seen = Seen([schema.Wall(**PLANE, velocity=(0.0, 0.0, speed), mass=mass)], 4e-6)
@@ -70,8 +71,8 @@ def test_a_wall_with_a_mass_is_stopped_by_a_bar() -> None:
 
 @pytest.mark.parametrize("friction", [0.0, 0.2])
 def test_a_light_wall_is_stable(friction: float) -> None:
-    """A thousandth of the mass of the nodes that it hits: the wall ends with their velocity, and no energy is
-    created.
+    """The wall has a thousandth of the mass of the nodes that it hits: the wall ends with their velocity, and no
+    energy is created.
     """
     wall = schema.Wall(**PLANE, velocity=(3.0, 0.0, 20.0), mass=1e-3 * MASS / 13, friction=friction)
     seen = Seen([wall], 2e-6)
@@ -81,7 +82,8 @@ def test_a_light_wall_is_stable(friction: float) -> None:
 
 
 def test_a_driven_wall_works_from_outside() -> None:
-    """The wall follows its course exactly, its impulses are external work; started at rest, it loses no energy."""
+    """The wall follows its prescribed motion exactly, and its work is external work. A wall that starts at rest
+    causes no loss of energy."""
     course = ((0.0, 0.0), (5e-6, 1.0), (10e-6, 0.0))
     seen = Seen([schema.Wall(**PLANE, velocity=(0.0, 0.0, 20.0), course=course)], 12e-6)
     assert seen.sim.walls.shapes.point[0] == pytest.approx([0.0, 0.0, 100e-6], abs=1e-15)
@@ -120,7 +122,7 @@ def test_probes_measure_position_velocity_and_force_of_a_wall() -> None:
 
 
 def test_a_driven_wall_equals_a_fixed_one_in_a_moving_frame() -> None:
-    """A bar at rest that a wall hits at 20 m/s, and one that hits a fixed wall at -20 m/s."""
+    """A wall hits a bar at rest at 20 m/s, and a second bar hits a fixed wall at -20 m/s."""
     moving = Seen([schema.Wall(**PLANE, velocity=(0.0, 0.0, 20.0), friction=0.1)], 5e-6)
     fixed = Seen([schema.Wall(**PLANE, friction=0.1)], 5e-6, (0.0, 0.0, -20.0))
     shift = np.array([0.0, 0.0, 20.0 * 5e-6])
@@ -145,7 +147,8 @@ ROUND = {
 
 @pytest.mark.parametrize("name", ROUND)
 def test_no_node_ends_behind_a_round_wall(name: str) -> None:
-    """After each step, up to the curvature of the surface along the motion of a step; the energy balance closes."""
+    """After each step no node is deeper than the curvature of the surface along the motion of the step; the energy
+    balance closes."""
     wall = ROUND[name]
     seen = Seen([wall], 8e-6, (0.0, 0.0, -50.0))
     radius, side = wall.radius or 0.0, 1.0 if wall.side == "outside" else -1.0

@@ -1,4 +1,4 @@
-"""Free rotation: conserved quantities, and its period against elliptic integrals."""
+"""Free rotation: conserved quantities, and its period compared with elliptic integrals."""
 
 import math
 
@@ -30,7 +30,7 @@ class Top:
 
     @property
     def body(self) -> np.ndarray:
-        """(3,) angular momentum in the body."""
+        """Returns (3,) the angular momentum in the frame of the body."""
         return np.asarray(self.rotation[0].T @ self.momentum[0])
 
     @property
@@ -39,7 +39,7 @@ class Top:
 
 
 def flips(top: Top, dt: float, steps: int) -> list[float]:
-    """Times, s, at which the rate about the middle axis changes its sign."""
+    """Returns the times, s, at which the rate about the middle axis changes its sign."""
     found, last = [], top.body[1]
     for k in range(1, steps + 1):
         top.turn(dt)
@@ -51,8 +51,9 @@ def flips(top: Top, dt: float, steps: int) -> list[float]:
 
 
 def half_period(rate: tuple[float, float, float], moments: np.ndarray = INERTIA) -> float:
-    """Time between two flips, s: 2 K(m) over the rate of the phase (Landau and Lifshitz, Mechanics, section 37), for
-    twice the energy above the square of the angular momentum over the middle moment, else with the axes swapped.
+    """Returns the time between two flips, s: 2 K(m) over the rate of the phase (Landau and Lifshitz, Mechanics,
+    section 37). The axes are swapped if twice the energy is below the square of the angular momentum over the middle
+    moment.
     """
     a, b, c = moments
     w = np.array(rate)
@@ -65,7 +66,8 @@ def half_period(rate: tuple[float, float, float], moments: np.ndarray = INERTIA)
 
 
 def test_a_free_top_keeps_angular_momentum_and_energy() -> None:
-    """Momentum to 1e-12, energy to 1e-9 over 100,000 steps, about the unstable axis; the matrix remains a rotation."""
+    """Angular momentum is constant to 1e-12 and energy to 1e-9 over 100,000 steps, about the unstable axis; the
+    matrix remains a rotation."""
     top = Top((1e-3, 5.0, 2e-3))
     start, before, worst = top.momentum.copy(), top.energy, 0.0
     for k in range(STEPS):
@@ -79,7 +81,7 @@ def test_a_free_top_keeps_angular_momentum_and_energy() -> None:
 
 @pytest.mark.parametrize("rate", [(0.05, 5.0, 0.0), (0.0, 5.0, 0.1), (0.5, 3.0, 1.0)])
 def test_a_top_flips_with_the_period_of_elliptic_integrals(rate: tuple[float, float, float]) -> None:
-    """Dzhanibekov's: the period to 1e-4, and an error that falls with the square of the step."""
+    """The period agrees to 1e-4, and the error is proportional to the square of the step."""
     exact, errors = half_period(rate), []
     for dt in (0.008, 0.004):
         times = flips(Top(rate), dt, int(6.2 * exact / dt))

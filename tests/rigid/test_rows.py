@@ -1,4 +1,4 @@
-"""Rigid bodies in the sweeps, against plain numpy: bounds of rows, sums of impulses and moments."""
+"""Rigid bodies in the sweeps, compared with plain numpy: bounds of rows, sums of impulses and moments."""
 
 import numpy as np
 import numpy.typing as npt
@@ -13,7 +13,7 @@ REACH = np.array([4.0, 0.5])
 
 
 class Bodies:
-    """Two bodies and contacts of their nodes with nodes of deformable ones, at random."""
+    """Two bodies, and random contacts of their nodes with nodes of deformable bodies."""
 
     def __init__(self, seed: int, contacts: int = 40) -> None:
         draw = np.random.default_rng(seed)
@@ -34,7 +34,8 @@ class Bodies:
 
     @property
     def matrix(self) -> Floats:
-        """(contacts, contacts) of the contacts, of the bodies' part: w n . (w' n' / M + W (r' x w' n') x r)."""
+        """Returns (contacts, contacts) the part of the bodies in the contact matrix: w n . (w' n' / M + W (r' x w'
+        n') x r)."""
         n = len(self.body)
         found = np.zeros((n, n))
         pushes = self.weights[:, None] * self.normals
@@ -46,7 +47,8 @@ class Bodies:
         return found
 
     def norms(self) -> tuple[Floats, Floats]:
-        """(contacts,) bounds along the normals, and of any direction, as the sweeps make them of the slots."""
+        """Returns (contacts,) bounds along the normals, and of any direction, computed from the slots as in the
+        sweeps."""
         words, every = np.zeros((2, rows.WEIGHTS), np.int64), np.ones(len(self.body), bool)
         rows.weigh(words, self.active, self.slots, self.body, self.arms, every, REACH)
         rows.norms(self.active, words, self.slots, self.body, self.arms, REACH, self.lightness, self.yielding)
@@ -57,7 +59,7 @@ class Bodies:
 
 @pytest.mark.parametrize("seed", range(5))
 def test_the_norm_of_a_row_is_a_bound(seed: int) -> None:
-    """At least the l1 norm of the row, and of any direction."""
+    """The norm is at least the l1 norm of the row, along the normal and in any direction."""
     bodies = Bodies(seed)
     along, across = bodies.norms()
     exact = np.abs(bodies.matrix).sum(axis=1)
@@ -75,7 +77,7 @@ def test_contacts_through_the_centre_along_one_normal_are_exact(contacts: int) -
 
 
 def test_impulses_add_up_as_integers_and_moments_to_a_quantum() -> None:
-    """Sums over owned slots only; all slots are cleared."""
+    """The sums include owned slots only; all slots are set to zero."""
     bodies, draw = Bodies(3), np.random.default_rng(4)
     given = draw.integers(-(2**40), 2**40, (len(bodies.body), 3))
     bodies.active.moving_words[:, IMPULSE : IMPULSE + 3] = given

@@ -1,4 +1,4 @@
-"""A block that has shattered into random fragments, as the shares of any number of ranks."""
+"""A block that has shattered into random fragments, distributed over any number of ranks."""
 
 from dataclasses import dataclass
 
@@ -16,7 +16,7 @@ PARTS = ["one", "other"]
 
 @dataclass
 class Shattered:
-    """Fragments have nodes of their own and lie a little apart; the other half of the tets is another part."""
+    """The fragments have their own nodes and are a small distance apart; the other half of the tets is another part."""
 
     x: Floats
     v: Floats
@@ -27,23 +27,23 @@ class Shattered:
     bond: "np.ndarray"
     strain: Floats
     seeds: "np.ndarray"
-    """(tets,) which fragment each tet was meant for; they may fall into several pieces."""
+    """(tets,) the intended fragment of each tet; an intended fragment may consist of several pieces."""
 
     def shares(self, ranks: int) -> list[Share]:
-        """The share of each of some ranks, with tets scattered among them and in any order."""
+        """Returns the state of each of several ranks, with the tets distributed at random and in any order."""
         random = np.random.default_rng(ranks)
         owner = random.integers(0, ranks, len(self.tets))
         owner[random.permutation(len(self.tets))[:ranks]] = np.arange(ranks)
         return [self._share(np.flatnonzero(owner == rank), random) for rank in range(ranks)]
 
     def whole(self, ranks: int) -> Whole:
-        """The same joined again."""
+        """Returns the state of all ranks combined."""
         return joined(self.shares(ranks), PARTS)
 
     def _share(self, mine: "np.ndarray", random: np.random.Generator) -> Share:
         ids = np.unique(self.tets[mine])
         share = {"nodes": ids, "x": self.x[ids], "v": self.v[ids], "held": np.zeros((0, 2), np.int64)}
-        share["numbers"] = np.array([1, 0])  # a record of fragments is kept, and has none yet
+        share["numbers"] = np.array([1, 0])  # fragments are recorded, but no record exists yet
         for k, part in enumerate(np.unique(self.part[mine])):
             some = random.permutation(mine[self.part[mine] == part])
             share |= {
@@ -57,7 +57,7 @@ class Shattered:
 
 
 def shattered(cells: int, fragments: int, seed: int = 1) -> Shattered:
-    """A cube of ``cells``^3 times six tets in about so many fragments."""
+    """Returns a cube of six times ``cells``^3 tets in about this number of fragments."""
     random = np.random.default_rng(seed)
     mesh = block((cells, cells, cells), size=1e-3)
     centres = mesh.points[mesh.tets].mean(axis=1)

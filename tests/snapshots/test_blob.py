@@ -1,4 +1,4 @@
-"""Snapshots say what the model is: read back here with numpy alone, from the layout in cases/output/snapshot.py."""
+"""Snapshots contain the model: the test reads them with numpy only, by the layout in cases/output/snapshot.py."""
 
 from dataclasses import replace
 
@@ -17,13 +17,14 @@ from .unpacked import TOLD, arrays, made
 
 
 def places(data: bytes) -> np.ndarray:
-    """Positions of the vertices, m."""
+    """Returns the positions of the vertices, m."""
     low, high = np.array(snapshot.header_of(data).box)
     return np.asarray(low + arrays(data)["positions"] / 65535.0 * (high - low))
 
 
 def pieces(body: Shattered) -> np.ndarray:
-    """(tets,) the number of the fragment of each, by scipy: in the order of their smallest tets."""
+    """Returns (tets,) the number of the fragment of each tet, computed by scipy, in the order of their smallest
+    tets."""
     tet, face = np.nonzero((body.across >= 0) & (body.bond == 0))
     graph = coo_array((np.ones(len(tet)), (tet, body.across[tet, face] // 4)), shape=(len(body.tets),) * 2)
     _, of = connected_components(graph)
@@ -57,7 +58,7 @@ def test_the_table_is_what_numpy_sums() -> None:
 
 
 def test_the_outline_of_every_fragment_is_closed_and_its_own() -> None:
-    """Each edge has a twin that runs the other way; the volume inside is that of the tets."""
+    """Each edge has a second edge with the opposite direction; the volume inside is that of the tets."""
     body = shattered(5, 8)
     data, label = made(body).data, pieces(body)
     got, at = arrays(data), places(data)
@@ -209,7 +210,8 @@ def test_views_need_no_numpy() -> None:
 
 
 def test_where_erosion_alone_parts_bodies_the_largest_piece_is_the_part() -> None:
-    """The piece keeps its number when others come and go; these have the number of their first tet."""
+    """The largest piece keeps the number of the part when other pieces separate or vanish; each other piece has the
+    number of its first tet."""
     body = shattered(5, 9)
     label, whole = pieces(body), replace(body.whole(1), initial=0)
     data = blob.made(whole, {**TOLD, "ranks": 1}, lambda numbers: np.zeros(len(numbers)), Budget()).data

@@ -1,4 +1,4 @@
-"""The share of a rank becomes a snapshot in a process of its own; no failure there delays the solver."""
+"""A separate process makes a snapshot of the state of a rank; its failures do not delay the solver."""
 
 import hashlib
 import io
@@ -86,7 +86,8 @@ def test_a_folder_that_is_removed_costs_one_snapshot(courier: Courier, tmp_path:
 
 
 def test_a_disk_that_fills_under_the_packer_costs_one_snapshot(courier: Courier, tmp_path: Path) -> None:
-    """No file of it grows: the snapshot is named with the reason, and nothing of it is left to fill the disk."""
+    """No file of the process can grow: a warning names the snapshot and the reason, and no part of it remains on the
+    disk."""
     (mine,) = shattered(2, 2).shares(1)
     courier.send(task(0), mine)
     answer(courier)
@@ -114,7 +115,7 @@ def test_a_packer_that_dies_costs_one_snapshot(courier: Courier) -> None:
 
 
 def test_a_request_to_stop_the_run_leaves_the_packer_for_the_last_snapshot(courier: Courier) -> None:
-    """A launcher sends it to every process of a rank."""
+    """A launcher sends the request to every process of a rank."""
     (mine,) = shattered(2, 2).shares(1)
     courier.send(task(0), mine)
     answer(courier)

@@ -1,4 +1,4 @@
-"""The share of a rank: the rows that a material has."""
+"""The state of a rank for a snapshot: the rows that a material has."""
 
 import numpy as np
 
@@ -8,7 +8,8 @@ from conoid.worker.snapshots.share import copied
 
 
 def model_of(rows: int) -> Model:
-    """Two parts of a tet each, with so many rows of state; the damage of part k is (k + 1) / 4."""
+    """Returns two parts of one tet each, with the given number of rows of state; the damage of part k is (k + 1) /
+    4."""
     n, x = 4, np.zeros((4, 3))
     nodes = Nodes(
         np.arange(n), np.zeros(n, np.int32), np.zeros(n, np.int32), np.ones(n, bool), x, x, x, np.ones(n),
@@ -24,7 +25,7 @@ def model_of(rows: int) -> Model:
 
 
 def test_damage_is_given_away_of_parts_whose_law_counts_it() -> None:
-    """A part may have the row because of another one behind it, such as that of pores: that is no damage."""
+    """A part may have this row because it has a later row, such as that of pores: then the row is no damage."""
     held = np.zeros((0, 2), np.int64)
     share = copied(model_of(DAMAGE + 2), held, {1})
     assert "0.damage" not in share

@@ -1,4 +1,4 @@
-"""All tets of a snapshot in few bytes: read back here with numpy alone, they are the model."""
+"""All tets of a snapshot in few bytes: the test reads them with numpy only and compares them with the model."""
 
 import gzip
 
@@ -18,7 +18,7 @@ def tets_of(body: Shattered, ranks: int = 1) -> bytes:
 
 
 def corners(data: bytes) -> np.ndarray:
-    """(n, 4) nodes of the tets."""
+    """Returns (n, 4) the nodes of the tets."""
     planes = arrays(data)["tet_steps"].astype(np.uint32)
     change = (planes[0] | planes[1] << 8 | planes[2] << 16 | planes[3] << 24).astype(np.int32).T.astype(np.int64)
     change[:, 0] = np.cumsum(change[:, 0])

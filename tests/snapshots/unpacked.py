@@ -1,4 +1,4 @@
-"""A snapshot of a shattered body, and its arrays as numpy reads them."""
+"""A snapshot of a shattered body, and its arrays read with numpy."""
 
 import numpy as np
 

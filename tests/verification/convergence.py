@@ -1,4 +1,4 @@
-"""Orders of convergence: measured here, expected in rates.toml."""
+"""Orders of convergence: measured values, compared with the expected values of rates.toml."""
 
 import math
 import tomllib
@@ -10,8 +10,8 @@ RATES = tomllib.loads(Path(__file__).with_name("rates.toml").read_text(encoding=
 
 
 def assert_converges(name: str, errors: Sequence[float]) -> None:
-    """The errors, each at half the size of the one before, fall with the order of the table, as far as it
-    goes.
+    """Checks that the errors, each at half the size of the one before, decrease with the order of the table, as far
+    as the convergence goes.
     """
     rate = RATES[name]
     orders = [math.log2(coarse / fine) for coarse, fine in pairwise(errors)]

@@ -1,4 +1,4 @@
-"""H12, H14, H15, H16: contact where it is hard, and the shock that an impact sends out."""
+"""H12, H14, H15, H16: difficult contacts, and the shock of an impact."""
 
 from pathlib import Path
 from typing import Any
@@ -29,7 +29,7 @@ SIZE = 1e-3
 
 
 def depth(sim: Simulation) -> float:
-    """Depth of the deepest node inside another part below its surface, m; of two parts on one rank."""
+    """Returns the depth of the deepest node inside another part below its surface, m; of two parts on one rank."""
     assert sim.contact is not None
     x, part = sim.model.nodes.x, sim.model.nodes.part
     faces = sim.contact.exterior.motion.sides.faces.nodes[:, :3]
@@ -52,7 +52,8 @@ CELLS = 8
 
 
 def facets(shake: float, fold: float = 0.0) -> tuple[Floats, "np.ndarray"]:
-    """A sheet of irregular facets of 1 m, and their faces; beyond its middle it rises with the slope ``fold``."""
+    """Returns a sheet of irregular facets of 1 m, and their faces; beyond its middle it rises with the slope
+    ``fold``."""
     x, faces = sheet(CELLS, 1.0)
     inner = ((x[:, :2] > 0.0) & (x[:, :2] < CELLS)).all(axis=1) & (x[:, 0] != CELLS / 2)
     x[inner, :2] += np.random.default_rng(5).uniform(-shake, shake, (int(inner.sum()), 2))
@@ -72,11 +73,11 @@ class Slide:
 
     @property
     def nodes(self) -> tuple[Floats, Floats]:
-        """Their positions and velocities."""
+        """Positions and velocities of the nodes."""
         return self.x[self.first :], self.v[self.first :]
 
     def step(self, load: float, friction: float = 0.0) -> Floats:
-        """(n, 3) the impulses of contact, N s."""
+        """Returns (n, 3) the impulses of contact, N s."""
         self.v[self.first :, 2] -= load
         before = self.v.copy()
         tested = np.arange(self.first, len(self.x))
@@ -89,7 +90,7 @@ class Slide:
 
 
 def travellers(n: int, speed: float) -> tuple[Floats, Floats]:
-    """Starts on the sheet and velocities; some run along edges and through the sheet's nodes."""
+    """Returns starts on the sheet and velocities; some nodes move along edges and through the nodes of the sheet."""
     random = np.random.default_rng(2)
     start, angle = random.uniform(2.5, CELLS - 2.5, (n, 2)), random.uniform(0.0, 2.0 * np.pi, n)
     start[: n // 2] = np.round(start[: n // 2])
@@ -101,7 +102,7 @@ def travellers(n: int, speed: float) -> tuple[Floats, Floats]:
 @pytest.mark.parametrize("shake", [0.0, 0.2])
 @pytest.mark.parametrize("speed", [0.037, 0.41])
 def test_a_node_slides_over_edges_and_vertices_as_on_a_plane(speed: float, shake: float) -> None:
-    """The node is neither lost nor held twice: every step returns the load, to round-off, and no force along the
+    """The node always has exactly one contact: every step returns the load, to round-off, and no force along the
     plane.
     """
     load = 1e-3 * speed
@@ -115,7 +116,8 @@ def test_a_node_slides_over_edges_and_vertices_as_on_a_plane(speed: float, shake
 
 
 def test_friction_slows_it_down_evenly() -> None:
-    """By mu N / m in every step, whatever facets it passes; it never turns back."""
+    """The deceleration is mu N / m in every step, for all facets that the node passes; the velocity never changes
+    its sign."""
     speed, load, mu = 0.1, 1e-2, 0.3
     slide = Slide(*facets(0.2), *travellers(120, speed))
     way = slide.nodes[1] / speed
@@ -130,8 +132,8 @@ def test_friction_slows_it_down_evenly() -> None:
 
 @pytest.mark.parametrize("slope", [0.3, -0.3])
 def test_where_the_ground_rises_only_the_normal_part_is_lost_and_where_it_falls_nothing(slope: float) -> None:
-    """No load: into a fold the node loses v . n, less the tenth that contact may give back for a depth; over a ridge
-    it flies on, and nothing holds it."""
+    """Without a load: in a fold the node loses v . n, except the tenth that contact may give back for a penetration.
+    Over a ridge the node continues along a straight line, without a contact force."""
     start, v = travellers(120, 0.2)
     start[:, 0], v[:, 0] = CELLS / 2 - 0.5, np.abs(v[:, 0]) + 0.05
     slide = Slide(*facets(0.0, slope), start, v)
@@ -147,7 +149,7 @@ def test_where_the_ground_rises_only_the_normal_part_is_lost_and_where_it_falls_
     assert pushes.max() == 0.0 or slope > 0.0
 
 
-# H14: heavy on light, fine on coarse ----------------------------------------------------------------------------------
+# H14: heavy on light bodies, fine on coarse meshes --------------------------------------------------------------------
 
 HEAVY = materials.Material(density=17300.0, elastic=materials.Elastic(young=360e9, poisson=0.28))
 LIGHT = materials.Material(density=2500.0, elastic=materials.Elastic(young=72e9, poisson=0.22))
@@ -156,7 +158,8 @@ LIGHT = materials.Material(density=2500.0, elastic=materials.Elastic(young=72e9,
 @pytest.mark.parametrize("tilt", [0.0, 0.2])
 @pytest.mark.parametrize("heavy_is_fine", [True, False])
 def test_nothing_sinks_in_where_masses_differ_by_a_factor_of_fifty(heavy_is_fine: bool, tilt: float) -> None:
-    """Tungsten alloy and glass, elements 1:2, 100 m/s, flat and corner first: under 1 % of the smaller element."""
+    """Tungsten alloy hits glass, with elements 1:2, at 100 m/s, flat and with a corner: the penetration is below 1 %
+    of the smaller element."""
     coarse = block((5, 5, 4), SIZE, seed=2)
     fine = moved(block((6, 6, 6), SIZE / 2, seed=1), (0.0, 0.0, 0.0), rotation((1, 2, 0), tilt))
     fine = moved(fine, (0.9 * SIZE, 1.1 * SIZE, 4.001 * SIZE - fine.points[:, 2].min()))
@@ -179,11 +182,12 @@ def test_nothing_sinks_in_where_masses_differ_by_a_factor_of_fifty(heavy_is_fine
     assert sim.ledger.worst < 1e-3
 
 
-# H15: what is fast ----------------------------------------------------------------------------------------------------
+# H15: fast bodies -----------------------------------------------------------------------------------------------------
 
 
 def test_a_fragment_of_five_kilometres_a_second_sinks_in_little() -> None:
-    """The shipped case, step by step: impulse and momentum agree, and no node is deeper than 1 % of an element."""
+    """The shipped case is checked step by step: impulse and momentum agree, and no node is deeper than 1 % of an
+    element."""
     case = parse_case(apply_overrides(read_data(shipped()["fast_fragment"]), ["run.frames=0"]))
     sim = simulation.build(case, Path(), SerialComm())
     assert sim.contact is not None
@@ -208,7 +212,7 @@ PLATE = np.array([4.0, 4.0, 1.0]) * SIZE
 
 
 class Shot:
-    """A tet of any size and direction, at 1 to 50 km/s past or into a plate of one layer of tets."""
+    """A tet of any size and direction that moves at 1 to 50 km/s past or into a plate of one layer of tets."""
 
     def __init__(self, seed: int) -> None:
         random = np.random.default_rng(seed)
@@ -222,9 +226,9 @@ class Shot:
         self.meshes = [block((4, 4, 1), SIZE, seed=seed), TetMesh(corners + start, np.array([[0, 1, 2, 3]], np.int32))]
 
     def way_in(self, larger: float = 1.0) -> float | None:
-        """Exact: how far the tet flies, m, until it touches the plate, both taken as ``larger`` times as large.
-
-        It does where the ray from the origin enters the hull of all differences of their corners.
+        """Returns the exact distance, m, that the tet moves until it touches the plate, with both bodies scaled by
+        ``larger``. The bodies touch where the ray from the origin enters the hull of all differences of their
+        corners.
         """
         box = np.stack(np.meshgrid(*np.column_stack([np.zeros(3), PLATE]), indexing="ij"), axis=-1).reshape(-1, 3)
         middle, centre = PLATE / 2, self.meshes[1].points.mean(axis=0)
@@ -236,7 +240,8 @@ class Shot:
         return float(begin) * SIZE if begin < end else None
 
     def fly(self) -> tuple[float, float] | None:
-        """Distance that the tet has flown, m, at the step that pushes it first, and after it; None when none does."""
+        """Returns the distance that the tet has moved, m, at the step in which it first gets an impulse, and after
+        this step; None without an impulse."""
         motions: list[dict[str, Any]] = [
             {"velocity": tuple(self.drift + v)} for v in (0.0 * self.way, self.way * self.speed)
         ]
@@ -252,11 +257,9 @@ class Shot:
 
 
 def misjudged(seeds: range) -> tuple[int, list[int]]:
-    """Number of shots that hit, and the seeds of those that were pushed too early, too late or at all; grazing ones may
-    be.
-
-    A shot is grazing if half a per cent more or less of either body's size decides; a hundredth of a face is near
-    enough.
+    """Returns the number of shots that hit, and the seeds of shots that got an impulse too early, too late or
+    wrongly; grazing shots are excluded. A shot is grazing if half a per cent more or less of the size of a body
+    decides; an error of a hundredth of a face is allowed.
     """
     hits, wrong = 0, []
     for seed in seeds:
@@ -285,7 +288,8 @@ def test_no_shot_of_a_thousand_misses_what_its_ray_hits() -> None:
 
 
 def test_a_fast_fragment_makes_no_searches_for_others() -> None:
-    """Two bodies meet slowly, alone with one search in 200 steps; a tet flies by at 5 km/s: one in 50 at most."""
+    """Two bodies collide slowly, with one search in 200 steps without the tet; with a tet that passes at 5 km/s
+    there is at most one search in 50 steps."""
     lower, upper = block((12, 12, 12), SIZE, seed=1), block((11, 11, 11), SIZE, seed=2)
     away = TetMesh(REGULAR * SIZE + np.array([-20.0, 16.0, 3.0]) * SIZE, np.array([[0, 1, 2, 3]], np.int32))
     meshes = [lower, moved(upper, (0.4 * SIZE, 0.3 * SIZE, 12.001 * SIZE)), away]
@@ -301,7 +305,7 @@ def test_a_fast_fragment_makes_no_searches_for_others() -> None:
 
 
 def volume_in_common(case: Case) -> common_volume.CommonVolume:
-    """At the end, after contact."""
+    """Returns the common volume at the end, after contact."""
     sim = run(simulation.build(case, Path(), SerialComm()))
     assert sim.contact is not None
     return common_volume.measure(sim.contact, sim.model, None, sim.comm)
@@ -309,8 +313,8 @@ def volume_in_common(case: Case) -> common_volume.CommonVolume:
 
 @pytest.mark.slow
 def test_crossed_blades_do_not_cut_into_each_other() -> None:
-    """The blades are one tet thick, edge on edge. If edges between two tets were released at 0.05 of their length,
-    34 tets ended with more than a tenth in the other blade, 4.9e-3 of all at the surface.
+    """The blades are one tet thick and collide edge on edge. If contacts of edges between two tets ended at 0.05 of
+    their length, 34 tets would end with more than a tenth in the other blade, 4.9e-3 of all at the surface.
     """
     blade = {"shape": "box", "element_size": 0.5e-3, "generator": "structured"}
     upper = {"low": [-4.8e-3, -0.15e-3, 0.05e-3], "high": [5.2e-3, 0.35e-3, 5.05e-3]}
@@ -332,15 +336,16 @@ def test_crossed_blades_do_not_cut_into_each_other() -> None:
 
 
 def test_a_fine_plate_does_not_fold_into_the_rim_of_a_coarse_punch() -> None:
-    """Edges of the plate that it bends by 5 to 25 degrees are the only ones in the way of the rim. When they met none
-    54 tets ended with more than a tenth in the punch, 4.8e-4 of all at the surface, and 7 nodes 0.22 of a face deep.
+    """The only sharp edges in front of the rim are those of the plate that the rim bends by 5 to 25 degrees. Without
+    contact of these edges 54 tets ended with more than a tenth in the punch, 4.8e-4 of all at the surface, and 7
+    nodes were 0.22 of a face deep.
     """
     round_ = {"shape": "cylinder", "axis": "z", "sector": "quarter"}
     punch = {"base": [0, 0, 0.01e-3], "radius": 2e-3, "length": 6e-3, "element_size": 0.6e-3}
     plate = {"base": [0, 0, -1.5e-3], "radius": 8e-3, "length": 1.5e-3, "element_size": 0.22e-3}
     graded = {"grading": {"axis": "z", "near": 2.6e-3, "far": 8e-3, "far_size": 0.9e-3}}
     plate_steel = library()["weldox_460e"].model_dump()
-    plate_steel["strength"]["damage"]["softening"] = 0.0  # strong to the end, so that the rim presses on it
+    plate_steel["strength"]["damage"]["softening"] = 0.0  # full strength: the rim presses on the plate
     case = parse_case(
         {
             "name": "rim", "run": {"end_time": 1.7e-6, "frames": 0},
@@ -370,10 +375,10 @@ def test_a_fine_plate_does_not_fold_into_the_rim_of_a_coarse_punch() -> None:
     ],
 )
 def test_columns_of_metal_hold_each_other_under_a_shock(metal: str, speed: float) -> None:
-    """Between planes of symmetry, irregular tets, averaged pressure: behind the shock nothing is faster than it was.
-
-    Nodes of the interface ran away, at more than the speed of the columns, and tets were crushed: where ridges of faces
-    that were flat crossed, and at 4 km/s with five sweeps as well.
+    """The columns are between planes of symmetry, with irregular tets and averaged pressure: behind the shock no
+    node is faster than before the impact. In an earlier version nodes of the interface became faster than the
+    columns, and tets were crushed, at ridges of faces that were flat at the start, and at 4 km/s also with five
+    sweeps.
     """
     cube = {"shape": "box", "element_size": 0.5e-3, "generator": "gmsh"}
     case = parse_case(
@@ -401,9 +406,9 @@ def test_columns_of_metal_hold_each_other_under_a_shock(metal: str, speed: float
 
 
 def test_irregular_plates_keep_the_pressure_of_their_impact() -> None:
-    """Copper on copper at 1 km/s: rho0 (c0 + S u) u, u = 500 m/s, behind the shock and at the interface.
-
-    Ridges of faces that were flat crossed, and what overlaps has no pressure: the interface had lost a quarter of it.
+    """Copper hits copper at 1 km/s: the pressure is rho0 (c0 + S u) u with u = 500 m/s, behind the shock and at the
+    interface. In an earlier version ridges of faces that were flat at the start penetrated each other; overlapping
+    material has no pressure, and the interface lost a quarter of its pressure.
     """
     copper = library()["copper_ofhc"]
     assert copper.eos is not None
@@ -440,10 +445,10 @@ def test_irregular_plates_keep_the_pressure_of_their_impact() -> None:
 def test_what_is_brittle_keeps_the_pressure_of_its_impact(
     name: str, speed: float, sweeps: int | None, share: tuple[float, float]
 ) -> None:
-    """The pressure is between that of broken and of intact bodies (1.38 as much), near the former if all has broken.
-    Faster than a tenth of the speed of waves 0.56 of it is lost with two sweeps, so that the check can fail. Of the
-    lower one 0.6 are left at 200 m/s if cracks begin from nothing in every step, and 0.72 in glass if edges of which
-    one face is closed have no contact with others.
+    """The pressure is between that of broken and of intact bodies (1.38 times as large), and near that of broken
+    bodies if everything has broken. Above a tenth of the wave speed only 0.44 of the pressure is left with two
+    sweeps, so the check can fail. At 200 m/s 0.6 of the lower pressure is left if contacts at cracks start from zero
+    in every step. In glass 0.72 is left if edges with one face at a closed crack have no contact with other edges.
     """
     low, high = share
     found = dust.measure(dust.flyer(name, speed, sweeps, wide=0.3e-3, long=(1.5e-3, 1.5e-3), end=0.15e-6), 0.07e-6)
@@ -451,11 +456,12 @@ def test_what_is_brittle_keeps_the_pressure_of_its_impact(
     assert low < found.pressure / broken < high
 
 
-# H16: the shock that an impact sends out ------------------------------------------------------------------------------
+# H16: the shock of an impact ------------------------------------------------------------------------------------------
 
 
 def shocked(name: str, viscosity: dict[str, float]) -> Floats:
-    """Pressure, over that of the theory, of the layers of a row of 100 cubes when the shock has passed seventy."""
+    """Returns the pressure over that of theory in the layers of a row of 100 cubes, when the shock has passed
+    seventy layers."""
     shipped_case = parse_case(read_data(shipped()[name]))
     (metal,), speed = shipped_case.materials.values(), -shipped_case.parts[0].velocity[2]
     assert metal.eos is not None
@@ -476,16 +482,16 @@ def shocked(name: str, viscosity: dict[str, float]) -> Floats:
 
 
 def where(profile: Floats, level: float) -> float:
-    """The layer, between two of them, at which the front has a level."""
+    """Returns the interpolated layer at which the front has a level."""
     k = int(np.flatnonzero(profile > level)[-1])
     return k + float((profile[k] - level) / (profile[k] - profile[k + 1]))
 
 
 @pytest.mark.parametrize("name", ["shock_copper", "shock_tungsten"])
 def test_a_shock_of_few_elements_does_not_overshoot(name: str) -> None:
-    """Under 5 % of the jump, at most five layers from 5 to 95 % of it, with the default viscosity (standard form).
-
-    A tet of a cube cut in six has half the length of the cube, so that 0.06 and 1.5 are 0.03 and 0.4 of a layer.
+    """The overshoot is below 5 % of the jump, and at most five layers lie between 5 and 95 % of it, with the default
+    viscosity (standard form). A tet of a cube cut in six has half the length of the cube, so that 0.06 and 1.5 are
+    0.03 and 0.4 of a layer.
     """
     profile = shocked(name, {})
     assert profile[5:].max() < 1.05
@@ -495,5 +501,5 @@ def test_a_shock_of_few_elements_does_not_overshoot(name: str) -> None:
 
 @pytest.mark.parametrize("name", ["shock_copper", "shock_tungsten"])
 def test_with_the_usual_two_terms_it_overshoots(name: str) -> None:
-    """The check above can fail: with 0.06 and 1.5 alone."""
+    """Control: the check above fails with the coefficients 0.06 and 1.5 only."""
     assert shocked(name, {"shock": 0.0})[5:].max() > 1.15

@@ -1,9 +1,8 @@
-"""V18: Hertz's impact of two equal steel spheres; how force and duration grow with the speed.
-
-Theory: with R* = R / 2, E* = E / (2 (1 - nu^2)), m* = m / 2 and k = 4/3 E* sqrt(R*) the deepest approach is
-d = (5 m* v^2 / (4 k))^(2/5), the force k d^(3/2) ~ v^(6/5), the duration 2.9432 d / v ~ v^(-1/5), and the circle of
-contact has the radius sqrt(R* d). It takes the balls for half-spaces: measured exponents come nearer to it as the
-circle becomes small beside the ball.
+"""V18: impact of two equal steel spheres compared with Hertz: force and duration over the speed. Theory: with R* = R
+/ 2, E* = E / (2 (1 - nu^2)), m* = m / 2 and k = 4/3 E* sqrt(R*) the largest approach is d = (5 m* v^2 / (4
+k))^(2/5), the force is k d^(3/2) ~ v^(6/5), the duration is 2.9432 d / v ~ v^(-1/5), and the circle of contact has
+the radius sqrt(R* d). The theory treats the balls as half-spaces: measured exponents are closer to it if the circle
+is small compared with the ball.
 """
 
 import csv
@@ -25,26 +24,26 @@ RADIUS, YOUNG, POISSON, DENSITY = 10e-3, 200e9, 0.3, 7850.0
 STIFFNESS = 4 / 3 * YOUNG / (2 * (1 - POISSON**2)) * math.sqrt(RADIUS / 2)
 MASS = DENSITY * 4 / 3 * math.pi * RADIUS**3 / 2
 FINE, COARSE = (0.08e-3, 0.5e-3), (0.1e-3, 0.7e-3)
-"""Size of the elements at the point of contact, and how far it reaches, m."""
+"""Element size at the point of contact, and radius of the region with this size, m."""
 
 
 def approach(closing: float) -> float:
-    """Deepest, m, at a speed of closing, m/s."""
+    """Returns the largest approach, m, at a closing speed, m/s."""
     return float((5 * MASS * closing**2 / (4 * STIFFNESS)) ** 0.4)
 
 
 def force(closing: float) -> float:
-    """Largest, N."""
+    """Returns the largest force, N."""
     return float(STIFFNESS * approach(closing) ** 1.5)
 
 
 def duration(closing: float) -> float:
-    """s."""
+    """Returns the duration, s."""
     return 2.9432 * approach(closing) / closing
 
 
 def elements_across(closing: float, size: float) -> float:
-    """The circle of contact at its largest."""
+    """Returns the number of elements across the largest circle of contact."""
     return 2.0 * math.sqrt(RADIUS / 2 * approach(closing)) / size
 
 
@@ -53,11 +52,11 @@ class Impact:
     """Measurements of the run of an impact."""
 
     force: float
-    """N, of whole spheres."""
+    """Force, N, of whole spheres."""
     time: float
-    """s."""
+    """Duration, s."""
     restitution: float
-    """Speed of parting over that of closing."""
+    """Speed after the impact over the closing speed."""
     residual: float
 
 
@@ -66,7 +65,7 @@ Impacts = Callable[[float, tuple[float, float]], Impact]
 
 @pytest.fixture(scope="module")
 def impacts(tmp_path_factory: pytest.TempPathFactory) -> Impacts:
-    """The shipped spheres at a speed of closing, m/s, and a mesh; each is run once."""
+    """Returns the shipped spheres at a closing speed, m/s, and a mesh; each is run once."""
     root, done = tmp_path_factory.mktemp("hertz"), dict[tuple[float, tuple[float, float]], Impact]()
 
     def impact(closing: float, mesh: tuple[float, float]) -> Impact:
@@ -78,7 +77,7 @@ def impacts(tmp_path_factory: pytest.TempPathFactory) -> Impacts:
 
 
 def _run(folder: Path, closing: float, mesh: tuple[float, float]) -> Impact:
-    """200 samples of the mean force between them: the peak of a half wave is lowered by less than 1e-4."""
+    """Runs the case with 200 samples of the mean force: the peak of a half wave is lowered by less than 1e-4."""
     changes = [f"run.end_time={1.1 * duration(closing)}", "run.frames=0"]
     for part, way in ((0, 1), (1, -1)):
         changes += [
@@ -97,8 +96,8 @@ def _run(folder: Path, closing: float, mesh: tuple[float, float]) -> Impact:
 
 
 def _parting(folder: Path, upper: float, closing: float) -> float:
-    """The speed of parting over that of closing: the spheres' meshes differ in mass by 6e-5, and the momentum at the
-    start gives the speed of the lower one.
+    """Returns the speed after the impact over the closing speed: the meshes of the spheres differ in mass by 6e-5,
+    and the initial momentum gives the speed of the lower sphere.
     """
     with (folder / layout.HISTORY).open() as lines:
         first = next(csv.DictReader(lines))
@@ -108,13 +107,14 @@ def _parting(folder: Path, upper: float, closing: float) -> float:
 
 
 def exponent(values: tuple[float, float], speeds: tuple[float, float]) -> float:
-    """Of the power law through two points."""
+    """Returns the exponent of the power law through two points."""
     return math.log(values[1] / values[0]) / math.log(speeds[1] / speeds[0])
 
 
 @pytest.mark.timeout(660)
 def test_at_low_speeds_the_exponents_are_those_of_the_law(impacts: Impacts) -> None:
-    """6/5 and -1/5 to 2 % each of itself, from 1 and 2 m/s; force to 5 %, duration to 3 %."""
+    """From 1 to 2 m/s the exponents are 6/5 and -1/5 within 2 % of each, the force within 5 %, and the duration
+    within 3 %."""
     speeds = (1.0, 2.0)
     assert elements_across(speeds[0], FINE[0]) > 8.0
     slow, fast = (impacts(speed, FINE) for speed in speeds)

@@ -27,20 +27,21 @@ PATHS = {
     "pure shear": np.array([[0.0, 1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 0.0]]) * 3.0**0.5 / 2.0,
     "simple shear": np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 0.0], [0.0, 0.0, 0.0]]) * 3.0**0.5,
 }
-"""Velocity gradients of an equivalent deviatoric rate of about one."""
+"""Velocity gradients with an equivalent deviatoric rate of about one."""
 
 
 def plastic_rate(q: float, strain: float, temperature: float) -> float:
-    """The rate at which the law gives the stress q; none below the flow stress at the reference rate."""
+    """Returns the plastic rate at which the law gives the stress q; zero below the flow stress at the reference
+    rate."""
     soft = 1.0 - max((temperature - LAW.reference_temperature) / SPAN, 0.0) ** LAW.m
     over = q / ((LAW.A + LAW.B * max(strain, 0.0) ** LAW.n) * soft) - 1.0
     return float(LAW.reference_rate * np.exp(min(over / LAW.C, 30.0))) if over > 0.0 else 0.0
 
 
 def integrated(L: Floats, time: float) -> tuple[float, float, float]:
-    """Mises stress, plastic strain, temperature after ``time``: s' = 2 G (dev D - 3/2 e' s / q) + W s - s W.
-
-    Unknowns are of order one: s in GPa, the strain, the temperature in 1000 K. First to yield, then on from there.
+    """Returns Mises stress, plastic strain and temperature after ``time``: s' = 2 G (dev D - 3/2 e' s / q) + W s - s
+    W. The unknowns are of order one: s in GPa, the strain, the temperature in 1000 K. The integration stops at first
+    yield and continues from there.
     """
     rate, spin = formulas.deviator(L[None])[0], 0.5 * (L - L.T)
 
@@ -77,7 +78,7 @@ def point(L: Floats, time: float, steps: int) -> tuple[float, float, float]:
 
 @pytest.mark.parametrize(("path", "rate"), [*((path, 1e4) for path in PATHS), ("uniaxial strain", 1e6)])
 def test_one_tet_follows_the_differential_equation(path: str, rate: float) -> None:
-    """To a strain of 0.5 in 4,000 steps: stress, plastic strain and temperature within 1e-4."""
+    """For a strain of 0.5 in 4,000 steps stress, plastic strain and temperature agree within 1e-4."""
     L, time = PATHS[path] * rate, 0.5 / rate
     stress, strain, temperature = point(L, time, 4000)
     expected = integrated(L, time)

@@ -1,4 +1,5 @@
-"""V9 to V11: patch test, rigid rotation, simple shear; elastic materials and those with a strength, not reached."""
+"""V9 to V11: patch test, rigid rotation and simple shear, for elastic materials and for materials below their
+strength."""
 
 from itertools import pairwise
 
@@ -18,7 +19,7 @@ DT = 1e-8
 
 
 def carry(patch: Patch, maps: list[Floats]) -> None:
-    """Moves every node by linear maps of its initial place, (3, 3) one after the other, a step of ``DT`` each."""
+    """Moves every node by linear maps of its initial position, (3, 3) one after the other, in a step of ``DT`` each."""
     for old, new in pairwise(maps):
         start, end = MESH.points @ old.T, MESH.points @ new.T
         patch.nodes.v[:] = (end - start) / DT
@@ -27,14 +28,14 @@ def carry(patch: Patch, maps: list[Floats]) -> None:
 
 
 def turn(angle: float, axis: tuple[float, float, float] = (0.0, 0.0, 1.0)) -> Floats:
-    """(3, 3) rotation about a unit vector."""
+    """Returns the (3, 3) rotation about a unit vector."""
     a = np.array([[0.0, -axis[2], axis[1]], [axis[2], 0.0, -axis[0]], [-axis[1], axis[0], 0.0]])
     return np.asarray(np.eye(3) + np.sin(angle) * a + (1.0 - np.cos(angle)) * a @ a)
 
 
 @pytest.mark.parametrize("form", FORMS)
 def test_patch_of_irregular_tets_has_uniform_stress(form: Form) -> None:
-    """V9: a displacement linear in space strains every tet alike, to 1e-12, and inner nodes are in balance."""
+    """V9: a linear displacement gives every tet the same strain, to 1e-12, and inner nodes are in equilibrium."""
     patch = Patch(MESH, STEEL, form)
     slope = np.array([[0.10, 0.07, -0.03], [0.02, -0.05, 0.04], [-0.06, 0.01, 0.08]])
     carry(patch, [np.eye(3) + s * slope for s in np.linspace(0.0, 1.0, 21)])
@@ -48,7 +49,8 @@ def test_patch_of_irregular_tets_has_uniform_stress(form: Form) -> None:
 
 
 def test_pure_stretch_gives_logarithmic_strain() -> None:
-    """V9: stretched along the axes, p = -K ln J and s = 2 G dev ln F, to second order in the step; with a strength."""
+    """V9: in a stretch along the axes, p = -K ln J and s = 2 G dev ln F to second order in the step, with a
+    strength."""
     wrong = []
     for steps in (10, 20):
         patch = Patch(MESH, HARD)
@@ -63,7 +65,7 @@ def test_pure_stretch_gives_logarithmic_strain() -> None:
 
 @pytest.mark.parametrize("form", FORMS)
 def test_a_hundred_turns_leave_no_stress(form: Form) -> None:
-    """V10: rotated rigidly about a skew axis, 100 turns of 40 steps: below 1e-10 of Young's modulus."""
+    """V10: after 100 rigid turns of 40 steps about a skew axis the stress is below 1e-10 of Young's modulus."""
     patch = Patch(MESH, STEEL, form)
     axis = (2.0 / 7.0, 3.0 / 7.0, 6.0 / 7.0)
     carry(patch, [turn(2.0 * np.pi * n / 40.0, axis) for n in range(4001)])
@@ -71,7 +73,7 @@ def test_a_hundred_turns_leave_no_stress(form: Form) -> None:
 
 
 def test_stress_turns_with_the_body() -> None:
-    """V10: a stress along x stands along y after a quarter turn, and is back after 25 turns."""
+    """V10: a stress along x is along y after a quarter turn, and along x again after 25 turns."""
     patch = Patch(MESH, HARD)
     patch.put(S_XX, 2e8)
     patch.put(S_YY, -1e8)
@@ -86,7 +88,7 @@ def test_stress_turns_with_the_body() -> None:
 
 
 def test_a_gradient_at_the_start_of_the_step_would_strain_the_body() -> None:
-    """The control of V10: with gradients at the start a turn of N steps strains by 2 pi^2 / N."""
+    """Control of V10: with gradients at the start of the step, a turn of N steps strains the body by 2 pi^2 / N."""
     steps = 1000
     strain = 0.0
     for n in range(steps):
@@ -98,7 +100,7 @@ def test_a_gradient_at_the_start_of_the_step_would_strain_the_body() -> None:
 
 
 def shear_errors(steps: int) -> float:
-    """Largest error of the stress on the way to a shear of 10, over G: s_xy = G sin, s_xx = -s_yy = G (1 - cos)."""
+    """Returns the largest error of the stress up to a shear of 10, over G: s_xy = G sin, s_xx = -s_yy = G (1 - cos)."""
     patch = Patch(MESH, HARD)
     worst = 0.0
     shear = np.linspace(0.0, 10.0, steps + 1)
@@ -111,14 +113,14 @@ def shear_errors(steps: int) -> float:
 
 
 def test_simple_shear_follows_the_jaumann_rate() -> None:
-    """V11: to a shear of 10 the stress of a material with a strength turns by the rate; the error is the shear of
-    one step, times G."""
+    """V11: up to a shear of 10 the stress of a material with a strength follows the Jaumann rate; the error is the
+    shear of one step times G."""
     errors = [shear_errors(steps) for steps in (250, 500, 1000, 2000)]
     assert_converges("simple_shear", errors)
 
 
 def test_an_elastic_body_in_simple_shear_follows_its_potential() -> None:
-    """V11, elastic: s_xy = G g, to a shear of 10, in steps of any size; nothing turns it back."""
+    """V11, elastic: s_xy = G g up to a shear of 10, in steps of any size, without the decrease of the Jaumann rate."""
     patch = Patch(MESH)
     for g in (0.1, 1.0, 10.0):
         carry(patch, [np.eye(3), np.array([[1.0, g, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]])])

@@ -1,7 +1,6 @@
-"""V13: a thick tube of nu = 0.4999 swells, a beam bends: what averaged pressures cure, and what they do not.
-
-Walls move slowly, by amounts at which strains stay small, and stop; then the forces on them are averaged over a few
-swings and compared with those of linear elasticity at rest.
+"""V13: a thick tube of nu = 0.4999 is expanded, and a beam is bent: the effect of averaged pressures on locking, and
+its limits. Walls move slowly, by amounts at which strains stay small, and stop. Then the forces on the walls are
+averaged over a few oscillations and compared with static linear elasticity.
 """
 
 from dataclasses import dataclass
@@ -25,7 +24,7 @@ DENSITY = 1000.0
 
 @dataclass(frozen=True)
 class Metal:
-    """Linear elasticity, Pa."""
+    """Constants of linear elasticity, Pa."""
 
     young: float
     poisson: float
@@ -44,14 +43,15 @@ class Metal:
 
 
 class Drive(PrescribedVelocity):
-    """Moves nodes by ``travel`` (n, 3), m, NaN where free, smoothly within ``ramp`` s, and holds them there."""
+    """Moves nodes by ``travel`` (n, 3), m, NaN for free components, smoothly within ``ramp`` s, and holds them at
+    the end position."""
 
     def __init__(self, nodes: Indices, travel: Floats, ramp: float) -> None:
         super().__init__(nodes, np.where(np.isnan(travel), np.nan, 0.0), Course())
         self._travel, self._ramp = travel, ramp
 
     def apply(self, state: Nodes, dt: float, t: float) -> None:
-        """The mean velocity of the step ahead."""
+        """Sets the mean velocity of the next step."""
         if dt > 0.0:
             self._velocity = self._travel * (self._reached(t + dt) - self._reached(t)) / dt
         super().apply(state, dt, t)
@@ -62,7 +62,8 @@ class Drive(PrescribedVelocity):
 
 
 def held_force(sim: Simulation, drive: Drive, ramp: float, direction: Floats) -> float:
-    """The force that holds the driven nodes, along ``direction`` (n, 3) and summed, N: mean over the rest."""
+    """Returns the force that holds the driven nodes, summed along ``direction`` (n, 3), N: the mean over the time
+    after the motion."""
     seen: list[float] = []
 
     def look(sim: Simulation, before: Floats) -> None:
@@ -79,7 +80,7 @@ INNER, OUTER = 10e-3, 20e-3
 
 
 def ring(cells: int) -> TetMesh:
-    """A quarter of the tube, ``cells`` through the wall, two along z."""
+    """Returns a quarter of the tube, with ``cells`` through the wall and two along z."""
     size = (OUTER - INNER) / cells
     flat = block((cells, round(0.5 * np.pi * 1.4 * INNER / size), 2), 1.0, shake=0.0)
     radius = INNER + flat.points[:, 0] * size
@@ -89,10 +90,9 @@ def ring(cells: int) -> TetMesh:
 
 
 def swollen(form: Form, cells: int = 4) -> float:
-    """Pressure on the inner wall over the exact one.
-
-    Plane strain, outer wall free (Lame): u = A r + B / r, s_rr = 2 (lambda + mu) A - 2 mu B / r^2, so that
-    A = mu B / ((lambda + mu) b^2) and the pressure at a is 2 mu B (1 / a^2 - 1 / b^2). u(a) = 1e-3 a is prescribed.
+    """Returns the pressure on the inner wall over the exact pressure. Plane strain, outer wall free (Lame): u = A r
+    + B / r, s_rr = 2 (lambda + mu) A - 2 mu B / r^2, so that A = mu B / ((lambda + mu) b^2) and the pressure at a is
+    2 mu B (1 / a^2 - 1 / b^2). u(a) = 1e-3 a is prescribed.
     """
     mesh = ring(cells)
     thick = float(mesh.points[:, 2].max())
@@ -111,9 +111,8 @@ def swollen(form: Form, cells: int = 4) -> float:
 
 
 def test_averaged_pressures_let_a_tube_keep_its_volume() -> None:
-    """Four elements through the wall: within some per cent; a pressure of each tet's own resists twenty times too much.
-
-    Measured 22.8, 1.057 and 1.016.
+    """With four elements through the wall the error is some per cent; with a separate pressure of each tet the
+    resistance is twenty times too large. Measured 22.8, 1.057 and 1.016.
     """
     standard, nodal, split = (swollen(form) for form in FORMS)
     assert standard > 10.0
@@ -126,7 +125,8 @@ LENGTH, HEIGHT = 40e-3, 4e-3
 
 
 def bent(form: Form, cells: int) -> float:
-    """Moment over E I kappa, ``cells`` through the height of a beam whose ends turn against each other."""
+    """Returns the moment over E I kappa of a beam with ``cells`` through its height whose ends rotate in opposite
+    directions."""
     size = HEIGHT / cells
     mesh = block((round(LENGTH / size), cells, cells), size, shake=0.0)
     swing = 4.0 * LENGTH / np.sqrt(STEEL.young / DENSITY) * LENGTH / HEIGHT
@@ -146,10 +146,9 @@ def bent(form: Form, cells: int) -> float:
 
 @pytest.mark.parametrize("form", FORMS)
 def test_no_form_bends_well_on_few_tets(form: Form) -> None:
-    """A limit of linear tets that averaging the pressure does not lift: their strains are constant, bending is not.
-
-    With two elements through the height a beam is 2.0 times (standard) or 1.5 times (nodal, split) too stiff, with four
-    1.26 or 1.13 times: the error falls with the square of the size, so take six and more where bending matters.
+    """Linear tets have constant strains, so averaging of the pressure does not improve bending. With two elements
+    through the height a beam is 2.0 times (standard) or 1.5 times (nodal, split) too stiff, with four 1.26 or 1.13
+    times: the error is proportional to the square of the size. Use six or more elements if bending matters.
     """
     coarse, fine = (bent(form, cells) - 1.0 for cells in (2, 4))
     assert 0.4 < coarse < 1.2

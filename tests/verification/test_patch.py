@@ -1,7 +1,7 @@
 """V21: the contact patch test. Blocks whose meshes do not match carry a uniform pressure through their interface.
-
-Nodes on faces from both sides do not pass it exactly: where nodes of one mesh lie between those of the other, impulses
-go to whole nodes, not to the areas round them. The gate is 5 % of the pressure, for the worst tet.
+Contacts of nodes with faces from both sides do not pass it exactly: if nodes of one mesh lie between nodes of the
+other, impulses act on whole nodes and not on the areas round them. The limit is an error of 5 % of the pressure in
+the worst tet.
 """
 
 from pathlib import Path
@@ -59,7 +59,7 @@ element_size = SIZE
 
 
 def pressed(poisson: float, sizes: tuple[float, float]) -> Simulation:
-    """Two blocks that are pressed slowly, so that the pressure is uniform, at the end."""
+    """Returns two blocks at the end of a slow compression, so that the pressure is uniform."""
     text = SCENE.replace("POISSON", str(poisson)) + "".join(PLANE.replace("AXIS", axis) for axis in "xyz")
     for k, (name, size) in enumerate(zip(("lower", "upper"), sizes, strict=True)):
         block = BLOCK.replace("NAME", name).replace("SIZE", str(size))
@@ -68,7 +68,7 @@ def pressed(poisson: float, sizes: tuple[float, float]) -> Simulation:
 
 
 def stress(sim: Simulation, part: str) -> tuple[Floats, "np.ndarray"]:
-    """(tets,) stress across the interface, Pa, and which tets have a node on it."""
+    """Returns (tets,) the stress normal to the interface, Pa, and which tets have a node on it."""
     blocks = [block for block in sim.model.blocks if sim.model.parts[block.part] == part]
     values = np.concatenate([block.row(S_ZZ) - block.row(PRESSURE) for block in blocks])
     z = sim.model.nodes.x0[np.concatenate([block.tets for block in blocks]), 2]
@@ -76,7 +76,8 @@ def stress(sim: Simulation, part: str) -> tuple[Floats, "np.ndarray"]:
 
 
 def under_pressure(poisson: float, stretch: float) -> float:
-    """Stress of a free bar of this length over its first, Pa: sides without stress, p = -K ln J."""
+    """Returns the stress of a free bar of this length over its initial length, Pa: sides without stress, p = -K ln
+    J."""
     bulk, shear = YOUNG / (3.0 * (1.0 - 2.0 * poisson)), YOUNG / (2.0 * (1.0 + poisson))
 
     def sides(width: float) -> Floats:

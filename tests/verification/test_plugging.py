@@ -7,9 +7,9 @@ import pytest
 from ..bench import plugging
 
 SIZES = (0.6, 0.4)
-"""mm."""
+"""Element sizes, mm."""
 OPEN = {399.6: 0.03, 285.4: 0.10, 244.2: 0.33}
-"""Error of tets of 0.4 mm, as a share of the published speed: 0, 8 and 31 % as measured
+"""Allowed error with tets of 0.4 mm, as a fraction of the published speed: 0, 8 and 31 % were measured
 (docs/verification/plugging.md).
 """
 
@@ -18,7 +18,8 @@ OPEN = {399.6: 0.03, 285.4: 0.10, 244.2: 0.33}
 @pytest.mark.timeout(3000)
 @pytest.mark.parametrize("speed", plugging.PUBLISHED)
 def test_the_published_speed_is_as_near_as_the_size_of_tets_allows(speed: float, tmp_path: Path) -> None:
-    """No further from that of the finer mesh than a band of no width is, and the finer mesh is nearer to that."""
+    """The published speed is no further from the result of the finer mesh than the extrapolated speed is, and the
+    finer mesh is nearer to the published speed than the coarser mesh."""
     left = {}
     for size in SIZES:
         folder = tmp_path / f"{size:g}"
@@ -36,7 +37,7 @@ def test_the_published_speed_is_as_near_as_the_size_of_tets_allows(speed: float,
 
 
 def test_a_loss_that_is_linear_in_the_size_is_extrapolated_exactly() -> None:
-    """A band of width h takes 4e4 h + 2e4, in m^2/s^2 of the square of the speed and mm."""
+    """The square of the speed in m^2/s^2 is 4e4 h + 2e4 for a band of width h in mm."""
     left = {size: (300.0**2 - 2e4 - 4e4 * size) ** 0.5 for size in SIZES}
     end = plugging.extrapolated(300.0, *((size, left[size]) for size in SIZES))
     assert end == pytest.approx((300.0**2 - 2e4) ** 0.5)

@@ -1,4 +1,4 @@
-"""H1 to H3: locking, pressure modes, and what the stabilisation of the split form does to the energy."""
+"""H1 to H3: locking, pressure modes, and the effect of the stabilisation of the split form on the energy."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -20,7 +20,7 @@ RUBBERY = materials.Material(density=7850.0, elastic=materials.Elastic(young=10e
 
 
 def roughness(sim: Simulation) -> float:
-    """Root mean square of the pressure less its mean round each tet, over that of the pressure."""
+    """Returns the root mean square of the pressure minus its mean round each tet, over that of the pressure."""
     block_ = sim.model.blocks[0]
     tets, pressure = np.asarray(block_.tets, np.int64), block_.row(PRESSURE)
     volume, _ = formulas.gradients(sim.model.nodes.x[tets])
@@ -33,7 +33,8 @@ def roughness(sim: Simulation) -> float:
 
 
 def noisy_wave(form: Form) -> float:
-    """Roughness after eight periods of a smooth standing wave, nu = 0.49, that started with random noise of a third."""
+    """Returns the roughness after eight periods of a smooth standing wave, nu = 0.49, that started with random noise
+    of a third."""
     length, side = 20e-3, 2e-3
     speed = float(np.sqrt((10e9 / 0.06 + 4.0 / 3.0 * 10e9 / 2.98) / 7850.0))
     faces = tuple(
@@ -54,7 +55,8 @@ def noisy_wave(form: Form) -> float:
 
 
 def test_the_split_form_calms_the_checkerboard() -> None:
-    """H2: below 5 % on a smooth field; nodal averaging keeps the noise, each tet alone is nothing but noise."""
+    """H2: the roughness is below 5 % on a smooth field. Nodal averaging keeps the noise, and the standard form has
+    only noise."""
     standard, nodal, split = (noisy_wave(form) for form in FORMS)
     assert split < 0.03
     assert nodal > 2.0 * split
@@ -62,7 +64,7 @@ def test_the_split_form_calms_the_checkerboard() -> None:
 
 
 def stored(sim: Simulation) -> float:
-    """Elastic energy of the present stress, J: a state, not a sum over the path as the ledger's."""
+    """Returns the elastic energy of the present stress, J; the energy balance has the sum over the path instead."""
     block_ = sim.model.blocks[0]
     volume, _ = formulas.gradients(sim.model.nodes.x[np.asarray(block_.tets, np.int64)])
     s = np.array([block_.row(row) for row in range(S_XX, S_XY + 1)])
@@ -72,20 +74,21 @@ def stored(sim: Simulation) -> float:
 
 @dataclass(frozen=True)
 class Bar:
-    """The end of a Taylor bar; lengths in mm."""
+    """Results of a Taylor bar at its end; lengths in mm."""
 
     length: float
     radius: float
     strain: float
-    """The largest plastic strain."""
+    """Largest plastic strain."""
     residual: float
-    """The worst of the ledger."""
+    """Worst residual of the energy balance."""
     whole: list[float]
-    """Kinetic, stored, plastic and viscous energy and what the wall took, over the first energy, in time."""
+    """Kinetic, stored, plastic and viscous energy and the energy taken by the wall, over the initial energy, in
+    time."""
 
 
 def taylor(form: Form, split: int = 6) -> Bar:
-    """V15 on a coarse mesh."""
+    """Returns the results of V15 on a coarse mesh."""
     mesh = structured(
         bodies.Cylinder(
             shape="cylinder", radius=3.2e-3, length=32.4e-3, sector="quarter", element_size=1.07e-3,
@@ -115,7 +118,8 @@ def taylor(form: Form, split: int = 6) -> Bar:
 
 @pytest.mark.parametrize(("form", "split"), [("nodal", 6), ("split", 6), ("split", 5)])
 def test_averaged_pressures_do_not_lock_and_close(form: Form, split: int) -> None:
-    """H1, H3: 1,620 tets come within a few per cent of the published shape; books close to 1e-3, no energy is made."""
+    """H1, H3: with 1,620 tets the shape is within a few per cent of the published shape; the balance closes to 1e-3,
+    and no energy is created."""
     bar = taylor(form, split)
     assert bar.length == pytest.approx(21.6, abs=0.15)
     assert bar.radius == pytest.approx(7.15, abs=0.2)
@@ -126,7 +130,7 @@ def test_averaged_pressures_do_not_lock_and_close(form: Form, split: int) -> Non
 
 
 def test_the_standard_form_locks() -> None:
-    """H1, the control: with its own pressure each tet is too stiff, and the foot stays narrow."""
+    """H1, control: with its own pressure each tet is too stiff, and the foot stays narrow."""
     bar = taylor("standard")
     assert bar.radius < 6.0
     assert bar.residual < 1e-3
@@ -136,9 +140,9 @@ def test_the_standard_form_locks() -> None:
 @pytest.mark.parametrize("poisson", [0.3, 0.45, 0.499])
 @pytest.mark.parametrize("form", FORMS)
 def test_forms_are_stable_at_the_whole_bound(form: Form, poisson: float) -> None:
-    """Random noise on cubes of five tets, the step at the element bound itself: no energy appears in 400 steps.
-
-    With the whole step in place of half of it in the stabilisation, nu = 0.45 and 0.499 blow up within 120 steps.
+    """The mesh has cubes of five tets with random noise, and the step is the element bound: no energy is created in
+    400 steps. With the factor dt instead of dt/2 in the stabilisation, runs with nu = 0.45 and 0.499 diverge within
+    120 steps.
     """
     cube = bodies.Box(
         shape="box", low=(0.0, 0.0, 0.0), high=(6e-3, 6e-3, 6e-3), element_size=1e-3, generator="structured", split=5
@@ -158,7 +162,8 @@ def test_forms_are_stable_at_the_whole_bound(form: Form, poisson: float) -> None
 
 
 def breathing(form: Form) -> float:
-    """Share of its energy that averaging takes of a ball that breathes, by four of its periods."""
+    """Returns the fraction of the energy of a ball in its breathing mode that averaging takes, for each of four
+    periods."""
     ball = bodies.Sphere(shape="sphere", radius=10e-3, element_size=2e-3)
     steel = RUBBERY.model_copy(update={"elastic": materials.Elastic(young=200e9, poisson=0.3)})
     sim = build(scene(steel, form, end=16e-6, stretch={"rate": (100.0, 100.0, 100.0)}), [build_mesh(ball, Path())])
@@ -168,7 +173,7 @@ def breathing(form: Form) -> float:
 
 
 def test_the_split_form_damps_elastic_motion_and_nodal_does_not() -> None:
-    """Texts of validate, converge and the reference about it (cases/warnings/damping.py); that of 6,400 tets is in
-    docs/theory/elements.md."""
+    """The texts of validate, converge and the reference describe this (cases/warnings/damping.py); the value for
+    6,400 tets is in docs/theory/elements.md."""
     assert breathing("split") > 0.08
     assert 0.0 <= breathing("nodal") < 0.03, "differences within a tet are stored, and come back"

@@ -1,4 +1,5 @@
-"""Contact holds rubble that is pressed through a narrower hole, with the sweeps that it gets (tests/bench/press.py)."""
+"""Contact resists rubble that is pressed through a narrower hole, with the adaptive number of sweeps
+(tests/bench/press.py)."""
 
 from pathlib import Path
 from typing import Any
@@ -16,7 +17,7 @@ from ..bench.press import FLYING, GLASS, measure, press
 
 @pytest.mark.slow
 def test_what_is_driven_is_as_stiff_as_with_many_more_sweeps() -> None:
-    """Five sweeps have a third, so that the check can fail."""
+    """With five sweeps the work is a third, so the check can fail."""
     converged, own, few = (measure(press(sweeps)).work for sweeps in (120, None, 5))
     print(converged, own, few)
     assert 0.8 < own / converged < 1.25
@@ -25,7 +26,7 @@ def test_what_is_driven_is_as_stiff_as_with_many_more_sweeps() -> None:
 
 @pytest.mark.slow
 def test_what_flies_rebounds_as_with_many_more_sweeps() -> None:
-    """From 200 m/s with 112; with five sweeps 40, so that the check can fail."""
+    """A ram of 200 m/s rebounds with 112 m/s, and with 40 m/s with five sweeps, so the check can fail."""
     converged, own, few = (measure(press(sweeps, FLYING)).speed for sweeps in (80, None, 5))
     print(converged, own, few)
     assert 0.85 < own / converged < 1.15
@@ -33,7 +34,7 @@ def test_what_flies_rebounds_as_with_many_more_sweeps() -> None:
 
 
 def pen(friction: float) -> Case:
-    """A block of steel that breaks a cube of glass between rigid walls, for 20 us."""
+    """Returns a block of steel that breaks a cube of glass between rigid walls, for 20 us."""
 
     def box(half: float, low: float, high: float, **of: Any) -> dict[str, Any]:
         corners = {"low": [-half, -half, low], "high": [half, half, high]}
@@ -56,7 +57,7 @@ def pen(friction: float) -> Case:
 
 
 def outcome(case: Case) -> Energy:
-    """The account at the end."""
+    """Returns the energy balance at the end."""
     sim = simulation.build(case, Path(), SerialComm())
     step.prepare(sim)
     while True:
@@ -69,8 +70,8 @@ def outcome(case: Case) -> Energy:
 
 @pytest.mark.parametrize("friction", [0.0, 0.3])
 def test_contact_makes_no_energy_where_walls_press_back(friction: float) -> None:
-    """By sweeps that know nothing of walls it takes 0.33 of it without friction and makes 0.033 with (2026-11-28, no
-    script).
+    """If the sweeps did not include walls, contact would take 0.33 of the energy without friction and create 0.033
+    with friction (2026-11-28, no script).
     """
     found = outcome(pen(friction))
     print(found)

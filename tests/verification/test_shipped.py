@@ -1,4 +1,4 @@
-"""Every shipped case, run whole by the worker's command line, reproduces each number that it carries."""
+"""Every shipped case, run to its end by the command line of the worker, reproduces each of its reference values."""
 
 import json
 import subprocess
@@ -17,7 +17,7 @@ HEAVY = {
     "branching_plate", "breathing_facet", "demo", "free_tets", "glass_steel_bar", "glass_steel_demo", "hertz_spheres",
     "long_rod", "plugging_weldox", "taylor_42crmo4", "taylor_copper", "taylor_copper_split",
 }  # fmt: skip
-"""Half a minute and more."""
+"""Cases that take half a minute or more."""
 MANY = Path(__file__).parents[1] / "parallel" / "many.py"
 NAMES = [pytest.param(name, marks=[pytest.mark.slow] * (name in HEAVY)) for name in sorted(load.shipped())]
 
@@ -27,7 +27,8 @@ Outcomes = Callable[[str], Outcome]
 
 @pytest.fixture(scope="module")
 def outcomes(tmp_path_factory: pytest.TempPathFactory) -> Outcomes:
-    """The outcome of a case; the light ones are run one after the other in one process, which pays the start once."""
+    """Returns the outcome of a case; the light cases are run one after the other in one process, which starts only
+    once."""
     root = tmp_path_factory.mktemp("shipped")
 
     def outcome(name: str) -> Outcome:
@@ -45,7 +46,7 @@ def outcomes(tmp_path_factory: pytest.TempPathFactory) -> Outcomes:
 @pytest.mark.timeout(660)
 @pytest.mark.parametrize("name", NAMES)
 def test_a_shipped_case_reproduces_its_references(name: str, outcomes: Outcomes) -> None:
-    """The books close to 1 %, those of elastic bodies to 0.1 %."""
+    """The energy balance closes to 1 %, and for elastic bodies to 0.1 %."""
     case = load.read_case(load.shipped_path(name))
     end = outcomes(name)
     assert end.state == "succeeded", end.message

@@ -1,4 +1,5 @@
-"""V19, V20, H13, H25: bodies that slide, lie in a stack or are struck in it. Loads come on at once, and ring."""
+"""V19, V20, H13, H25: bodies that slide, are stacked, or are struck in a stack. Loads act from the start, so the
+bodies oscillate."""
 
 from collections.abc import Callable
 from itertools import pairwise
@@ -27,14 +28,15 @@ def shipped(name: str, *overrides: str) -> Simulation:
 
 
 def mean(sim: Simulation, part: str, values: Floats) -> Floats:
-    """(3,) mean of nodal values over the mass of a part."""
+    """Returns (3,) mass-weighted means of nodal values of a part."""
     nodes = sim.model.nodes
     mine = nodes.part == sim.model.parts.index(part)
     return np.asarray(np.average(values[mine], axis=0, weights=nodes.mass[mine]))
 
 
 class Watch:
-    """Every step of a part: the time, position and velocity (3,) of its middle, impulse (3,) and ledger."""
+    """Values of a part in every step: time, position and velocity (3,) of its middle, impulse (3,) and energy
+    balance."""
 
     def __init__(self, part: str) -> None:
         self.part, self.lines = part, list[Energy]()
@@ -50,7 +52,7 @@ class Watch:
 
     @property
     def table(self) -> tuple[Floats, Floats, Floats, Floats]:
-        """(steps,) times, and (steps, 3) positions, velocities and forces of contact, without the last step."""
+        """Returns (steps,) times, and (steps, 3) positions, velocities and contact forces, without the last step."""
         rows = np.array(self._rows[:-1])
         return rows[:, 0], rows[:, 2:5], rows[:, 5:8], rows[:, 8:11] / rows[:, 1:2]
 
@@ -65,7 +67,8 @@ WEIGHT = 1000.0 * 0.046 * 0.046 * 0.008 * G
 
 
 def test_sliding_without_friction_changes_no_velocity_and_facets_are_not_felt() -> None:
-    """25 mm over facets of 10 mm, by 49 nodes of the block and 25 of the plate at a time."""
+    """The block slides 25 mm over facets of 10 mm, with contacts of 49 nodes of the block and 25 nodes of the plate
+    at a time."""
     t, x, v, force = slid("contact.friction=0", "run.end_time=50 ms").table
     assert x[-1, 0] - x[0, 0] > 0.024
     assert np.abs(v[:, :2] - [0.5, 0.0]).max() < 1e-6 * 0.5
@@ -77,7 +80,7 @@ def test_sliding_without_friction_changes_no_velocity_and_facets_are_not_felt() 
 
 
 def tilted(slope: float) -> list[str]:
-    """The plate becomes an incline; the block starts at rest."""
+    """Returns the scene with the plate as an incline; the block starts at rest."""
     across = G / np.hypot(1.0, slope)
     return [
         f"boundaries[0].acceleration=[{slope * across}, 0, {-across}]",
@@ -99,7 +102,8 @@ def test_a_block_on_a_steep_incline_slides_with_what_friction_leaves() -> None:
 
 @pytest.mark.slow
 def test_a_block_on_a_gentle_incline_stays() -> None:
-    """A slope of 0.25 below mu = 0.3: less than 1e-6 of a tet's edge in 1000 steps, and nothing gains energy."""
+    """The slope is 0.25 with mu = 0.3: the block moves by less than 1e-6 of the edge of a tet in 1000 steps, and no
+    energy is created."""
     watch = slid(*tilted(0.25), "run.end_time=120 ms")
     _, x, _, force = watch.table
     before, after = x[-2000:-1000].mean(axis=0), x[-1000:].mean(axis=0)
@@ -120,7 +124,8 @@ SMALL_AND_FAST = [
 
 
 def heights(sim: Simulation, part: str, top: bool) -> tuple[Floats, Callable[[Floats], Floats]]:
-    """(k, 3) nodes of a part's top or bottom, and the height of that surface over points (m, 3); NaN beside it."""
+    """Returns (k, 3) nodes of the top or bottom of a part, and the height of this surface at points (m, 3); NaN
+    outside of it."""
     nodes = sim.model.nodes
     mine = nodes.part == sim.model.parts.index(part)
     z = np.where(mine, nodes.x0[:, 2], -np.inf if top else np.inf)
@@ -131,8 +136,8 @@ def heights(sim: Simulation, part: str, top: bool) -> tuple[Floats, Callable[[Fl
 
 @pytest.mark.parametrize("friction", [0.0, 0.3])
 def test_no_node_of_a_stack_that_is_struck_comes_to_the_far_side_of_a_plate(friction: float) -> None:
-    """A small block strikes the stack beside its middle and bends the plates. Nodes of a plate come no deeper into its
-    neighbours than 2 % of their thickness, 2 mm.
+    """A small block hits the stack beside its middle and bends the plates. Nodes of a plate penetrate its neighbours
+    by at most 2 % of their thickness, 2 mm.
     """
     sim = shipped("plate_stack", *SMALL_AND_FAST, f"contact.friction={friction}")
     deepest: list[float] = []
@@ -193,7 +198,7 @@ element_size = SIZE
 
 
 def resting(friction: float) -> Simulation:
-    """Three blocks of 8 mm whose meshes do not match, on a wall."""
+    """Returns three stacked blocks of 8 mm on a wall, whose meshes do not match."""
     text = RESTING.replace("FRICTION", str(friction))
     for k, (name, size, width) in enumerate((("low", 8e-3, 20e-3), ("middle", 5e-3, 18e-3), ("top", 6e-3, 15e-3))):
         values = {"NAME": name, "SIZE": size, "WIDTH": width, "LOW": 8e-3 * k, "HIGH": 8e-3 * (k + 1)}
@@ -206,7 +211,8 @@ def resting(friction: float) -> Simulation:
 
 @pytest.mark.parametrize("friction", [0.0, 0.3])
 def test_blocks_in_a_stack_at_rest_do_not_drift(friction: float) -> None:
-    """Less than a thousandth of a tet's edge, as they sink by their weight or wander sideways; and none bounces."""
+    """The blocks move by less than a thousandth of the edge of a tet, vertically by their weight or horizontally,
+    and no block rebounds."""
     sim = resting(friction)
     places: list[Floats] = []
     lines: list[Energy] = []

@@ -1,4 +1,4 @@
-"""H9, V17: a bar without hardening, the hardest on its tets, comes out the same with half the time step."""
+"""H9, V17: a bar without hardening, which deforms its tets most, has the same result with half the time step."""
 
 import numpy as np
 import pytest
@@ -15,11 +15,12 @@ SOFT = materials.Material(
     density=8970.0, elastic=materials.Elastic(young=110e9, poisson=0.3),
     strength=materials.LinearHardening(model="linear_hardening", yield_stress=314e6, hardening=0.0),
 )  # fmt: skip
-"""Copper that is perfectly plastic."""
+"""Copper with perfect plasticity."""
 
 
 def bar(safety: float) -> tuple[float, float, float]:
-    """Length and radius, mm, and the worst residual, of a quarter of a rod of 3,840 tets, 227 m/s against a wall."""
+    """Returns length and radius, mm, and the worst residual, of a quarter of a rod of 3,840 tets that hits a wall at
+    227 m/s."""
     mesh = structured(
         bodies.Cylinder(
             shape="cylinder", radius=3.2e-3, length=32.4e-3, sector="quarter", element_size=0.8e-3,
@@ -47,10 +48,8 @@ def bar(safety: float) -> tuple[float, float, float]:
 
 
 def test_half_the_step_gives_the_same_shape() -> None:
-    """Strains of five and more invert tets where the step is too long.
-
-    The bound of the element keeps to the shape that shorter steps give, to half a per cent; an independent prototype
-    with short steps has 19.32 and 9.17 mm on this mesh.
+    """At strains of five and more tets invert if the step is too long. With the element bound the shape agrees with
+    that of shorter steps to 0.5 %; an independent prototype with short steps has 19.32 and 9.17 mm on this mesh.
     """
     length, radius, residual = bar(0.9)
     half_length, half_radius, half_residual = bar(0.45)

@@ -1,4 +1,4 @@
-"""V8: a plane P-wave stands between rollers; its frequency converges with the square of the element size."""
+"""V8: a standing plane P-wave between rollers; its frequency converges with the square of the element size."""
 
 import numpy as np
 import pytest
@@ -12,16 +12,15 @@ from ..worker.meshes import Floats, block
 from .convergence import assert_converges
 
 LENGTH, SPEED = 40e-3, 5856.3822
-"""m, one wavelength; c_P of STEEL, m/s."""
+"""Wavelength, m, and c_P of STEEL, m/s."""
 START = np.array([1.0, 1.0, 0.0])
 
 
 def ring(
     cells: int, form: Form = "standard", periods: float = 4.0, mirrored: bool = False
 ) -> tuple[Simulation, Floats, Floats]:
-    """v_z = sin(2 pi z / L) at the start; times and modal amplitudes of the velocity, energies of the lines.
-
-    ``mirrored``: the mesh goes on behind the rollers as its mirror image, so that this is a wave in a wide body.
+    """Runs a bar with v_z = sin(2 pi z / L) at the start; returns times, modal amplitudes of the velocity, and the
+    energy balance. ``mirrored``: the mesh is symmetric about the rollers, so that the wave is one in a wide body.
     """
     size = LENGTH / cells
     faces = tuple(
@@ -48,7 +47,8 @@ def ring(
 
 
 def fitted(seen: Floats, first: Floats = START) -> Floats:
-    """Frequency over the exact one, amplitude, phase of a cosine through the modal amplitudes; ``first``: a guess."""
+    """Returns the frequency over the exact one, and the amplitude and phase of a cosine fitted to the modal
+    amplitudes; ``first``: a guess."""
     omega = 2.0 * np.pi * SPEED / LENGTH
 
     def missed(guess: Floats) -> Floats:
@@ -59,7 +59,7 @@ def fitted(seen: Floats, first: Floats = START) -> Floats:
 
 
 def loss(seen: Floats) -> float:
-    """Loss of amplitude in one wavelength, from the two halves of eight."""
+    """Returns the loss of amplitude in one wavelength, from the two halves of eight wavelengths."""
     half = len(seen) // 2
     early = fitted(seen[:half])
     return float(1.0 - fitted(seen[half:], early)[1] / early[1]) / 4.0
@@ -73,10 +73,8 @@ def test_phase_error_falls_with_the_square_of_the_size(form: Form) -> None:
 
 @pytest.mark.parametrize("form", FORMS)
 def test_a_wave_of_twenty_elements_keeps_its_height(form: Form) -> None:
-    """Loss of amplitude a wavelength without viscosity: none, except the energy that the split form spends on its
-    pressure modes.
-
-    The ledger closes in any case.
+    """Without viscosity the amplitude does not decrease, except for the energy that the split form dissipates in its
+    pressure modes. The energy balance closes in all forms.
     """
     _, seen, energies = ring(20, form, periods=8.0, mirrored=True)
     assert -1e-5 < loss(seen) < (1.6e-3 if form == "split" else 1e-5)
@@ -84,5 +82,6 @@ def test_a_wave_of_twenty_elements_keeps_its_height(form: Form) -> None:
 
 
 def test_what_the_split_form_spends_falls_fast() -> None:
-    """The stabilisation acts on fourth differences of the pressure, over a time step: order three in the size."""
+    """The stabilisation acts on fourth differences of the pressure, over a time step: the loss is of third order in
+    the size."""
     assert_converges("split_loss", [loss(ring(cells, "split", 8.0, mirrored=True)[1]) for cells in (10, 20, 40)])

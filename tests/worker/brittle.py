@@ -1,4 +1,4 @@
-"""Glass by Mohr and Coulomb, random stresses of it, and steps about the mesh of the start."""
+"""Glass with the Mohr-Coulomb law for the tests, its random stresses, and time steps centred on the initial mesh."""
 
 import math
 from typing import Any
@@ -19,13 +19,13 @@ C, PHI = 0.158e9, math.radians(54.9)
 
 
 def brittle(cohesion: float = C, angle: float = PHI, **keys: Any) -> materials.Material:
-    """Glass with this strength."""
+    """Returns glass with the given strength."""
     law = materials.MohrCoulomb(model="mohr_coulomb", cohesion=cohesion, friction_angle=angle, **keys)
     return materials.Material(density=2500.0, elastic=GLASS.elastic, strength=law)
 
 
 def free(n: int, material: materials.Material, s: Floats, pressure: Floats | float) -> Patch:
-    """``n`` regular tets at rest with deviators (n, 3, 3) and pressures, Pa."""
+    """Returns ``n`` regular tets at rest with deviators (n, 3, 3) and pressures, Pa."""
     points = np.tile(REGULAR, (n, 1))
     patch = Patch(TetMesh(points, np.arange(4 * n, dtype=np.int32).reshape(n, 4)), material)
     patch.deviator = s
@@ -38,9 +38,9 @@ def rotations(n: int, random: np.random.Generator) -> Floats:
 
 
 def random_deviators(n: int, random: np.random.Generator) -> Floats:
-    """Von Mises stresses from 10 MPa to 100 GPa, any directions.
-
-    Every third has two equal principal values, every fifth two nearly equal ones, every seventh lies along the axes.
+    """Returns deviators in random directions with von Mises stresses from 10 MPa to 100 GPa. Every third deviator
+    has two equal principal values, every fifth has two nearly equal principal values, and every seventh has the axes
+    as principal directions.
     """
     values = random.normal(size=(n, 3))
     third, fifth = np.arange(n) % 3 == 0, np.arange(n) % 5 == 0
@@ -53,7 +53,7 @@ def random_deviators(n: int, random: np.random.Generator) -> Floats:
 
 
 def stretched(patch: Patch, L: Floats, dt: float = DT) -> None:
-    """A step with the velocity gradient L (3, 3), 1/s, about the mesh as it was at the start."""
+    """Makes a step with the velocity gradient L (3, 3), 1/s; the initial mesh is the mesh in the middle of the step."""
     patch.nodes.x[:] = patch.sim.model.nodes.x0
     patch.strain(L, dt)
     patch.advance(dt)

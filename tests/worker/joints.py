@@ -1,4 +1,4 @@
-"""Bodies of two materials for the tests: one block of tets as two parts that share nodes, or as one part."""
+"""Bodies of two materials for the tests: one block of tets as two parts with common nodes, or as one part."""
 
 from typing import Any
 
@@ -11,12 +11,12 @@ from conoid.worker.mesh.model import Origin, TetMesh
 from .meshes import block
 
 FILE = {"shape": "file", "path": "joint.inp", "unit": "1 mm"}
-"""Stands in a case for a mesh that the test hands over itself."""
+"""Mesh key of a case whose mesh is given directly by the test."""
 
 
 def halves(whole: TetMesh, second: "np.ndarray") -> list[TetMesh]:
-    """Two parts of one mesh, as a reader of files gives them: the tets that are not ``second`` (m,), and those that
-    are.
+    """Returns two parts of one mesh in the form of a mesh reader: first the tets that are not ``second`` (m,), then
+    the tets that are.
     """
     made = []
     for chosen in (~second, second):
@@ -26,9 +26,8 @@ def halves(whole: TetMesh, second: "np.ndarray") -> list[TetMesh]:
 
 
 def bar(cells: tuple[int, int, int], size: float, at: float, shake: float = 0.1) -> tuple[TetMesh, list[TetMesh]]:
-    """A bar along z as one mesh, whose tets are in the order of its halves, and as its halves below and above ``at``.
-
-    ``at`` is a plane of nodes.
+    """Returns a bar along z as one mesh, whose tets are in the order of its two halves, and as the halves below and
+    above ``at``. ``at`` is a plane of nodes.
     """
     mesh = block(cells, size, shake)
     points = mesh.points.copy()
@@ -44,8 +43,8 @@ def bar(cells: tuple[int, int, int], size: float, at: float, shake: float = 0.1)
 
 
 def joint(materials: tuple[str, str], bond: dict[str, Any] | None = None, **keys: Any) -> Case:
-    """Two parts ``lower`` and ``upper`` with a bond, of files; ``keys`` of the case, ``own`` materials, and ``lower``,
-    ``upper``: of the parts.
+    """Returns a case of two parts ``lower`` and ``upper`` from files, joined by a bond; ``keys`` of the case,
+    ``own`` materials; ``lower``, ``upper``: keys of the parts.
     """
     own = keys.pop("own", {})
     parts = [
@@ -58,7 +57,7 @@ def joint(materials: tuple[str, str], bond: dict[str, Any] | None = None, **keys
 
 
 def one_part(material: str, **keys: Any) -> Case:
-    """The same as one part."""
+    """Returns the case of ``joint`` with one part instead of two."""
     run = {"end_time": "1 us", "frames": 0, **keys.pop("run", {})}
     part = {"name": "bar", "material": material, "mesh": FILE, **keys.pop("bar", {})}
     return parse_case({"name": "joint", "parts": [part], "run": run, **keys})

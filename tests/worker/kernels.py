@@ -1,7 +1,6 @@
-"""Adapter between the tests and the kernels of the worker: a changed signature changes this file.
-
-A ``Patch`` is a built simulation of one part on one rank, with plain arrays in and out; ``run`` takes its time
-steps.
+"""Adapter between the tests and the kernels of the worker: if the signature of a kernel changes, only this file
+changes. A ``Patch`` is a simulation of one part on one rank with plain arrays as input and output; ``run`` makes its
+time steps.
 """
 
 import math
@@ -34,7 +33,7 @@ STEEL = materials.Material(density=7850.0, elastic=materials.Elastic(young=200e9
 HARD = STEEL.model_copy(
     update={"strength": materials.LinearHardening(model="linear_hardening", yield_stress=1e15)}
 )  # fmt: skip
-"""Steel with a yield stress that nothing reaches: the hypoelastic law of materials with a strength."""
+"""Steel with a yield stress that no test reaches, so that the hypoelastic law of materials with a strength is used."""
 COPPER = materials.Material(
     density=8930.0, elastic=materials.Elastic(young=117e9, poisson=0.35),
     strength=materials.LinearHardening(model="linear_hardening", yield_stress=0.4e9, hardening=0.1e9),
@@ -62,14 +61,15 @@ GLASS = materials.Material(
         failure_strain=0.05,
     ),
 )  # fmt: skip
-"""Soda-lime glass that crumbles to a residual friction angle of 30 deg."""
+"""Soda-lime glass; failed glass has a residual friction angle of 30 degrees."""
 
 DUMMY = bodies.Box(shape="box", low=(0.0, 0.0, 0.0), high=(1.0, 1.0, 1.0), element_size=1.0)
-"""Stands in a case for a mesh that the test hands over itself."""
+"""Mesh key of a case whose mesh is given directly by the test."""
 
 
 def scene(material: materials.Material = STEEL, form: Form = "standard", end: float = 1.0, **keys: Any) -> schema.Case:
-    """A case of one part ``body``, without viscosity; ``keys`` are those of the part, of ``numerics``, of the case."""
+    """Returns a case of one part ``body``, without viscosity; ``keys``: keys of the part, of ``numerics`` or of the
+    case."""
     own = ("velocity", "spin", "stretch", "jitter", "temperature", "erosion")
     of_part = {key: keys.pop(key) for key in own if key in keys}
     numerics = {key: keys.pop(key) for key in ("dt_safety", "dt_growth") if key in keys}
@@ -83,25 +83,26 @@ def scene(material: materials.Material = STEEL, form: Form = "standard", end: fl
 
 
 def build(case: schema.Case, meshes: Iterable[TetMesh]) -> Simulation:
-    """The simulation of a case whose parts have these meshes, on one rank; ``simulations.on`` has several."""
+    """Returns the simulation of a case whose parts have these meshes, on one rank; ``simulations.on`` uses several
+    ranks."""
     ready = iter(meshes)
     with patch.object(assembly, "build_mesh", lambda *_, **__: next(ready)):
         return simulation.build(case, Path(), SerialComm())
 
 
 def whole_of(mesh: TetMesh, case: schema.Case | None = None) -> assembly.Whole:
-    """The whole mesh as rank 0 has it before the cut."""
+    """Returns the whole mesh of rank 0 before the cut."""
     with patch.object(assembly, "build_mesh", lambda *_, **__: mesh):
         return assembly.assemble(case or scene(), Path())
 
 
 def pieces_of(pieces: list[domain.Piece], case: schema.Case | None = None) -> list[tuple[domain.Piece, state.Model]]:
-    """Each piece with the model that its rank makes of it."""
+    """Returns each piece of the cut with the model that its rank makes of the piece."""
     return [(piece, domain._model(case or scene(), piece)) for piece in pieces]
 
 
 class Patch:
-    """The tets of one material on one rank, and passes over them outside of any time step."""
+    """The tets of one material on one rank, and passes over these tets without a time step of the run."""
 
     def __init__(
         self,
@@ -117,10 +118,11 @@ class Patch:
         self.block = self.sim.model.blocks[0]
         self.tets = np.asarray(self.block.tets, np.int64)
         self.scale = scale
-        """Quanta per newton; 0: chosen for the forces at hand, as the step does."""
+        """``quanta`` per newton; 0: chosen for the present forces, as in a run."""
 
     def advance(self, dt: float) -> None:
-        """One pass: x(n+1) and v(n+1/2) stand in ``nodes``; stress and forces become those of n+1."""
+        """Makes one pass over the tets: ``nodes`` contain x(n+1) and v(n+1/2); afterwards stress and forces are at
+        n+1."""
         if self.block.params[law.ORDER] == law.FROM_SHAPE:
             self.put(rows.TET_VOLUME, formulas.volumes(self.corners(self.nodes.x - dt * self.nodes.v)))
         self._used = self.scale or self.sim.next_scale()
@@ -134,31 +136,31 @@ class Patch:
             self.elements.finish()
 
     def corners(self, values: Floats | None = None) -> Floats:
-        """(n, 4, 3) nodal values (positions when absent) of the tets."""
+        """Returns (n, 4, 3) nodal values of the tets (by default positions)."""
         return np.asarray((self.nodes.x if values is None else values)[self.tets])
 
     def strain(self, L: Floats, dt: float) -> None:
-        """Free tets under velocity gradients L, (3, 3) or (n, 3, 3), 1/s, about the origin.
-
-        The present positions become those of mid-step; those of the end of the step, ``dt`` s, are set.
+        """Deforms free tets with velocity gradients L, (3, 3) or (n, 3, 3), 1/s, about the origin. The present
+        positions are used as those of the middle of the step; the positions of the end of the step, ``dt`` s, are
+        set.
         """
         middle = self.corners()
         self.nodes.v[self.tets] = np.einsum("ij,naj->nai" if L.ndim == 2 else "nij,naj->nai", L, middle)
         self.nodes.x += 0.5 * dt * self.nodes.v
 
     def get(self, row: int) -> Floats:
-        """(n,) a row of the element state."""
+        """Returns (n,) a row of the element state."""
         return self.block.row(row)
 
     def put(self, row: int, values: Floats | float) -> None:
-        """Sets a row of the element state, a number or (n,)."""
+        """Sets a row of the element state to a number or to (n,) values."""
         flat = self.block.state[:, row, :].reshape(-1)
         flat[: self.block.n] = values
         self.block.state[:, row, :] = flat.reshape(self.block.state[:, row, :].shape)
 
     @property
     def deviator(self) -> Floats:
-        """(n, 3, 3) deviatoric stress, Pa."""
+        """Returns the (n, 3, 3) deviatoric stress, Pa."""
         xx, yy, zz, yz, zx, xy = (self.get(row) for row in range(rows.S_XX, rows.S_XY + 1))
         return np.stack([xx, xy, zx, xy, yy, yz, zx, yz, zz], axis=1).reshape(-1, 3, 3)
 
@@ -170,30 +172,30 @@ class Patch:
 
     @property
     def stress(self) -> Floats:
-        """(n, 3, 3) Cauchy stress, the viscous part included, Pa."""
+        """Returns the (n, 3, 3) Cauchy stress including the viscous stress, Pa."""
         pressure = self.get(rows.PRESSURE) + self.get(rows.VISCOUS)
         return np.asarray(self.deviator - pressure[:, None, None] * np.eye(3))
 
     @property
     def force(self) -> Floats:
-        """(nodes, 3) sums of the internal forces, N."""
+        """Returns the (nodes, 3) sums of the internal forces, N."""
         return np.asarray(self.nodes.force / self._used)
 
     @property
     def quantum(self) -> float:
-        """N: what one unit of the integer forces stands for."""
+        """Returns the force of one unit of the integer forces, N."""
         return 1.0 / self._used
 
     @property
     def limit(self) -> float:
-        """The largest one-over-stable-step of the last pass, 1/s."""
+        """Returns the largest reciprocal stable step of the last pass, 1/s."""
         return self.elements.limit
 
 
 def drive(material: materials.Material, L: Floats, dt: float, steps: int, **keys: Any) -> Patch:
-    """One regular tet of 1 m under a constant velocity gradient L (3, 3), 1/s: a material point.
-
-    The positions are put so that the middle of every step is the same tet: the volume stays, L is exact.
+    """Deforms one regular tet of 1 m with a constant velocity gradient L (3, 3), 1/s, as a material point. The
+    positions are set in every step so that the tet in the middle of the step is always the same: the volume stays
+    constant and L is exact.
     """
     from .meshes import REGULAR
 
@@ -208,7 +210,7 @@ Watch = Callable[[Simulation, Floats], None]
 
 
 def around(boundary: Boundary, look: Callable[[Floats, Floats], None]) -> None:
-    """Lets ``look`` see the velocities (nodes, 3) before and after each time that a boundary is applied."""
+    """Calls ``look`` with the velocities (nodes, 3) before and after each application of a boundary."""
     apply = boundary.apply
 
     def applied(model: state.Nodes, *rest: Any) -> None:
@@ -220,7 +222,7 @@ def around(boundary: Boundary, look: Callable[[Floats, Floats], None]) -> None:
 
 
 def run(sim: Simulation, watch: Watch | None = None, steps: int = -1) -> Simulation:
-    """Take steps to the end time, or ``steps`` steps; ``watch`` is called at each time n with v(n-1/2)."""
+    """Makes steps to the end time, or ``steps`` steps; ``watch`` is called at each time n with v(n-1/2)."""
     step.prepare(sim)
     while True:
         before = sim.model.nodes.v.copy()

@@ -1,4 +1,4 @@
-"""Irregular tets for the tests: blocks with shaken nodes, heaps of free tets of every size and shape."""
+"""Irregular tets for the tests: blocks with randomly moved nodes, and sets of free tets of all sizes and shapes."""
 
 import itertools
 
@@ -18,10 +18,10 @@ REGULAR = np.array(
 def block(
     cells: tuple[int, int, int], size: float = 1.0, shake: float = 0.2, seed: int = 1, mirrored: bool = False
 ) -> TetMesh:
-    """A block of cubes of edge ``size``, m, each cut into six tets; nodes moved by up to ``shake`` of the edge.
-
-    Nodes on a face stay in its plane, so that the block keeps its shape. ``mirrored``: every cube is cut as the mirror
-    image of its neighbours, and so goes on behind planes of symmetry.
+    """Returns a block of cubes of edge ``size``, m, each cut into six tets, whose nodes are moved by up to ``shake``
+    of the edge. Nodes on a face of the block stay in its plane, so that the block keeps its shape. ``mirrored``:
+    every cube is cut as the mirror image of its neighbours; the block is then symmetric about its planes of
+    symmetry.
     """
     steps = [np.arange(n + 1) for n in cells]
     grid = np.stack(np.meshgrid(*steps, indexing="ij"), axis=-1).reshape(-1, 3).astype(float)
@@ -37,7 +37,7 @@ def block(
 
 
 def ring(radial: int, around: int, inner: float, outer: float, width: float) -> TetMesh:
-    """A quarter of a ring round z: a block of cubes that is bent; one layer along z."""
+    """Returns a quarter of a ring round z: a bent block of cubes with one layer along z."""
     flat = block((radial, around, 1), shake=0.0)
     r = inner + (outer - inner) * flat.points[:, 0] / radial
     angle = 0.5 * np.pi * flat.points[:, 1] / around
@@ -48,7 +48,8 @@ def ring(radial: int, around: int, inner: float, outer: float, width: float) -> 
 
 
 def _paths(ways: npt.NDArray[np.int64]) -> list[npt.NDArray[np.int64]]:
-    """(cubes, 4) from a cube's first corner to that across, six times; ``ways`` (cubes, 3) are its edges as strides."""
+    """Returns (cubes, 4) six paths from the first corner of a cube to the opposite corner; ``ways`` (cubes, 3):
+    strides of the edges of the cube."""
     start, end = np.zeros(len(ways), np.int64), ways.sum(axis=1)
     return [
         np.stack([start, ways[:, a], ways[:, a] + ways[:, b], end], axis=1)
@@ -57,7 +58,7 @@ def _paths(ways: npt.NDArray[np.int64]) -> list[npt.NDArray[np.int64]]:
 
 
 def positive(points: Floats, tets: npt.NDArray[np.integer]) -> npt.NDArray[np.int32]:
-    """The tets with two nodes exchanged where the volume was negative."""
+    """Returns the tets with two nodes exchanged where the volume was negative."""
     edges = points[tets[:, 1:]] - points[tets[:, :1]]
     wrong = np.linalg.det(edges) < 0.0
     turned = tets.astype(np.int32)
@@ -66,9 +67,9 @@ def positive(points: Floats, tets: npt.NDArray[np.integer]) -> npt.NDArray[np.in
 
 
 def free_tets(n: int, seed: int, flattest: float = 0.05) -> TetMesh:
-    """``n`` tets that share no node, edges from 0.1 to 10 mm, any direction; none flatter than ``flattest``.
-
-    Flatness is volume over that of a regular tet with the same root mean square of the edges.
+    """Returns ``n`` tets without common nodes, with edges from 0.1 to 10 mm in random directions and a flatness of
+    at least ``flattest``. Flatness is the volume over that of a regular tet with the same root mean square of the
+    edges.
     """
     random = np.random.default_rng(seed)
     kept: list[Floats] = []

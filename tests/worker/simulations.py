@@ -1,4 +1,5 @@
-"""Simulations on several ranks of this process: steps that begin with a removal, runs that go on from a checkpoint."""
+"""Simulations on several ranks of one process: steps that begin with a removal of tets, and runs that continue from
+a checkpoint."""
 
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -23,7 +24,7 @@ T = TypeVar("T")
 
 
 def wear_out(sim: Simulation, gone: "np.ndarray") -> None:
-    """The tets of these ids are to leave in the next step."""
+    """Marks the tets with these ids for removal in the next step."""
     assert sim.erosion is not None
     for part in sim.model.blocks:
         if len(part.worn):
@@ -32,7 +33,7 @@ def wear_out(sim: Simulation, gone: "np.ndarray") -> None:
 
 
 def tick(sim: Simulation, gone: "np.ndarray | None" = None) -> float:
-    """A step that begins with the loss of these tets; its residual."""
+    """Makes a step that begins with the removal of these tets; returns its residual."""
     if gone is not None:
         wear_out(sim, gone)
     before = sim.model.nodes.v.copy()
@@ -50,7 +51,7 @@ def on(ranks: int, case: schema.Case, meshes: Sequence[TetMesh], work: Callable[
 
 
 def kept_again(sim: Simulation, case: schema.Case, folder: Path) -> Simulation:
-    """Goes on from a checkpoint, with another case where that is allowed."""
+    """Returns the simulation after a restart from a checkpoint; the case may differ in keys that a restart allows."""
     checkpoint.write(simulation.keep(sim), sim.case, folder, sim.clock.step, sim.clock.t, sim.comm)
     sim.free()
     place, manifest, _ = checkpoint.latest(folder)

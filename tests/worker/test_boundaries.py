@@ -1,4 +1,5 @@
-"""Walls push and never pull, planes hold, prescribed motion and free fall are exact; what they do is booked."""
+"""Walls, planes of symmetry, prescribed motions, gravity and tractions: their effect on velocities, and the booking
+of their work."""
 
 import math
 from pathlib import Path
@@ -38,21 +39,22 @@ def with_boundary(spec: dict[str, Any], end: float = 1e-6, **keys: Any) -> Simul
 
 
 def wall(gap: float, normal: tuple[float, float, float] = TILTED) -> dict[str, Any]:
-    """A wall across ``normal`` at a distance of ``gap`` before the body's first node."""
+    """Returns a wall normal to ``normal`` at a distance of ``gap`` from the first node of the body."""
     n = np.array(normal) / np.linalg.norm(normal)
     first = (MESH.points @ n).min()
     return {"kind": "wall", "point": tuple((n * (first - gap)).tolist()), "normal": normal}
 
 
 def heights(sim: Simulation, gap: float) -> Floats:
-    """(nodes,) distances from the tilted wall, m."""
+    """Returns (nodes,) distances from the tilted wall, m."""
     n = np.array(TILTED) / np.linalg.norm(TILTED)
     return np.asarray(sim.model.nodes.x @ n - (MESH.points @ n).min() + gap)
 
 
 @pytest.mark.parametrize("form", FORMS)
 def test_a_quarter_between_planes_of_symmetry_is_a_quarter_of_the_whole(form: Form) -> None:
-    """Every line of the ledger, to rounding: cells cut into five tets, which mirror each other."""
+    """All terms of the energy balance agree up to rounding. The cubes are cut into five tets, and neighbouring cubes
+    are mirror images."""
     cube = {"shape": "box", "high": [2e-3] * 3, "element_size": 1e-3, "generator": "structured", "split": 5}
     data = {
         "name": "cube", "numerics": {"pressure": form}, "run": {"end_time": 2e-6, "frames": 0},
@@ -90,7 +92,8 @@ def test_no_node_ends_behind_the_wall(gap: float) -> None:
 @pytest.mark.parametrize("gap", [1e-5, 0.0])
 @pytest.mark.parametrize("name", ["floor", None])
 def test_the_force_of_walls_is_what_changes_the_momentum(name: str | None, gap: float) -> None:
-    """Force times time over all lines of the history, of one of two walls or of both, touched from the start or not."""
+    """The force of one of two walls, and of both walls, times time, summed over all lines of the history, is the
+    change of momentum, with and without contact at the start."""
     walls = [
         {**wall(gap), "name": "floor"},
         {"kind": "wall", "name": "x", "point": (-gap, 0, 0), "normal": (1, 0, 0)},
@@ -117,7 +120,8 @@ def test_the_force_of_walls_is_what_changes_the_momentum(name: str | None, gap: 
 
 
 def test_the_wall_pushes_only() -> None:
-    """Each impulse is along the normal and outward; where no node would pass, velocities keep every bit."""
+    """Each impulse acts along the normal and away from the wall. Where no node would pass the wall, all velocities
+    are unchanged to the bit."""
     n = np.array(TILTED) / np.linalg.norm(TILTED)
     sim = with_boundary(wall(1e-5), velocity=tuple((-100.0 * n).tolist()))
     pushes = []
@@ -135,8 +139,8 @@ def test_the_wall_pushes_only() -> None:
 
 
 def test_impulses_of_the_wall_are_booked() -> None:
-    """A cube flies into a wall: the books show impulse times mean velocity, summed over steps and nodes, and of the
-    last impulse the half with the velocity before it.
+    """A cube hits a wall. The booked work is impulse times mean velocity, summed over steps and nodes; for the last
+    impulse only the half with the velocity before it is booked.
     """
     sim = with_boundary(wall(2e-6, (0.0, 0.0, 1.0)), end=3e-7, velocity=(0.0, 0.0, -100.0))
     impulses: list[Floats] = []
@@ -163,7 +167,7 @@ def test_a_body_at_rest_on_a_wall_stays_there() -> None:
 
 
 def test_a_body_that_is_pressed_on_a_wall_is_at_rest_there_at_the_end() -> None:
-    """The last velocities contain the impulses of the wall, as at all times before."""
+    """The last velocities of a run include the impulses of the wall, as the velocities at all earlier times do."""
     floor, load = wall(0.0, (0.0, 0.0, 1.0)), {**PULL, "stress": (0.0, 0.0, -1e8), **TOP}
     sim = build(scene(STEEL, end=2e-6, boundaries=(floor, load)), [MESH])
     run(sim)
@@ -187,7 +191,7 @@ def test_nodes_on_a_symmetry_plane_stay_on_it(axis: str, at: float) -> None:
 
 
 def test_a_body_through_a_symmetry_plane_is_refused() -> None:
-    """The body would be inside of its own mirror image."""
+    """Such a body would overlap its own mirror image."""
     even = block((2, 2, 2), 1e-3)
     for at in (0.4e-3, 1.3e-3):
         message = (
@@ -217,7 +221,7 @@ def test_motion_across_a_symmetry_plane_is_refused(drive: dict[str, Any]) -> Non
 
 
 def test_a_body_may_fly_at_a_symmetry_plane() -> None:
-    """The plane gives a warning, since no node starts on it; nodes that reach it are reflected."""
+    """No node starts on the plane, which gives a warning. Nodes that reach the plane are reflected."""
     plane = {"kind": "symmetry", "axis": "z", "at": -1e-5}
     sim = with_boundary(plane, velocity=(0.0, 0.0, -100.0), end=1.5e-6)
     assert sim.warnings[-1] == (
@@ -238,8 +242,9 @@ def test_motion_that_a_symmetry_plane_stops_at_the_start_is_told() -> None:
 
 @pytest.mark.parametrize("order", [1, -1], ids=["plane first", "wall first"])
 def test_a_wall_across_a_symmetry_plane_pushes_along_it(order: int) -> None:
-    """Half a block falls on a wall at 37 degrees to its plane: nodes stay on the plane and before the wall, the
-    ledger closes, and without the plane the same wall pushes the same nodes off it.
+    """Half a block falls on a wall whose normal is at 37 degrees to the plane of symmetry. Its nodes stay on the
+    plane and in front of the wall, and the energy balance closes. Without the plane the same wall moves the nodes
+    away from it.
     """
     slope = math.radians(37.0)
     low = MESH.points.min(axis=0)
@@ -261,7 +266,8 @@ def test_a_wall_across_a_symmetry_plane_pushes_along_it(order: int) -> None:
 
 
 def test_a_wall_along_a_symmetry_plane_cannot_push_what_is_on_it() -> None:
-    """The plane holds the nodes, and their velocities along it keep every bit of what forces make of them."""
+    """The plane of symmetry holds the nodes. Their velocities along the plane agree to the bit with those that the
+    forces give."""
     bounds = ({"kind": "symmetry", "axis": "z", "at": 0.0}, wall(0.0, (0.0, 0.0, 1.0)))
     sims = [build(scene(STEEL, end=1e-6, velocity=(3.0, 0.0, 9.0), boundaries=bounds[:n]), [MESH]) for n in (1, 2)]
     for sim in sims:
@@ -270,7 +276,8 @@ def test_a_wall_along_a_symmetry_plane_cannot_push_what_is_on_it() -> None:
 
 
 def test_prescribed_velocity_and_its_work() -> None:
-    """One end of a block is pulled: given components are met to the bit, others are free, the work becomes energy."""
+    """One end of a block is pulled. Prescribed velocity components are equal to the given values to the bit, the
+    other components are free, and the work is in the external energy."""
     spec = {"kind": "velocity", "low": (0.0, 0.0, 2.9e-3), "high": (1.0, 1.0, 1.0), "z": 20.0}
     sim = with_boundary(spec, end=1e-5)
     top = MESH.points[:, 2] > 2.9e-3
@@ -286,7 +293,7 @@ def test_prescribed_velocity_and_its_work() -> None:
 
 
 def test_prescribed_rotation_is_exact() -> None:
-    """After any number of steps of any size every node is where the rotation puts it."""
+    """After any number of steps of any size each node is at the position of the prescribed rotation."""
     rate, centre = np.array([2e5, -1e5, 3e5]), np.array([1e-3, 0.0, 2e-3])
     spec = {"kind": "rotation", "spin": {"centre": tuple(centre.tolist()), "rate": tuple(rate.tolist())}}
     sim = with_boundary(spec, end=1e-4)
@@ -300,7 +307,7 @@ def test_prescribed_rotation_is_exact() -> None:
 
 
 def test_the_last_boundary_has_the_last_word() -> None:
-    """A node that a wall would push and a motion is prescribed for moves as prescribed."""
+    """A node that has a prescribed motion and would be stopped by a wall follows the prescribed motion."""
     push = wall(0.0, (0.0, 0.0, 1.0))
     pull = {"kind": "velocity", "z": -5.0}
     sim = build(scene(STEEL, end=1e-7, boundaries=(pull, push)), [MESH])
@@ -310,7 +317,7 @@ def test_the_last_boundary_has_the_last_word() -> None:
 
 
 def uneven(watch: Watch) -> Watch:
-    """Makes every step another share of the stable one."""
+    """Gives every step another fraction of the stable step."""
     random = np.random.default_rng(4)
 
     def look(sim: Simulation, before: Floats) -> None:
@@ -321,7 +328,8 @@ def uneven(watch: Watch) -> Watch:
 
 
 def test_free_fall_is_exact_at_every_time() -> None:
-    """x(n) and v(n+1/2) of the centre of mass, of a body that rings, with steps of any size; the momentum is booked."""
+    """For an oscillating body and steps of any size, x(n) and v(n+1/2) of the centre of mass are exact, and the
+    momentum is booked."""
     sim = with_boundary(GRAVITY, velocity=(30.0, 0.0, -5.0), dt_growth=2.0)
     nodes, g, flight = sim.model.nodes, np.array(FALL), np.array([30.0, 0.0, -5.0])
     noise = np.random.default_rng(3).normal(size=nodes.v.shape) * 20.0
@@ -341,7 +349,8 @@ def test_free_fall_is_exact_at_every_time() -> None:
 
 
 def test_gravity_follows_its_course() -> None:
-    """Of a body that flies free while gravity grows for 0.4 us: velocities at n+1/2 are its integral, exactly."""
+    """A free body is accelerated by gravity that grows for 0.4 us: the velocities at n+1/2 are exactly the integral
+    of gravity."""
     grown, g = 4e-7, np.array(FALL)
     sim = with_boundary({**GRAVITY, "course": ((0.0, 0.0), (grown, 1.0))}, dt_growth=2.0)
 
@@ -356,7 +365,7 @@ def test_gravity_follows_its_course() -> None:
 
 
 def test_the_ledger_of_a_free_fall_closes_to_round_off() -> None:
-    """Whatever the steps are; gravity has done 1/2 m v(n-1/2) . v(n+1/2), the kinetic energy of the ledger."""
+    """For steps of any size the work of gravity is 1/2 m v(n-1/2) . v(n+1/2), the kinetic energy of the balance."""
     sim = with_boundary(GRAVITY, dt_growth=2.0)
     energy = 0.5 * float(sim.model.nodes.mass.sum()) * float(np.dot(FALL, FALL))
     steps = set()
@@ -384,7 +393,8 @@ def test_the_ledger_of_a_free_fall_closes_to_round_off() -> None:
     ids=["plane", "prescribed"],
 )  # fmt: skip
 def test_gravity_does_not_move_what_is_held(hold: dict[str, Any], rows: Flags, axes: list[int]) -> None:
-    """Whichever comes first in the case; the ledger closes with the work of both."""
+    """The result does not depend on the order of the two boundaries in the case, and the energy balance closes with
+    the work of both."""
     sim = build(scene(STEEL, end=5e-6, boundaries=(hold, GRAVITY)), [MESH])
     held = [hold.get("xyz"[axis], 0.0) for axis in axes]
 
@@ -428,7 +438,7 @@ def booked(sim: Simulation, before: Floats) -> None:
 
 
 def test_a_traction_loads_the_faces_in_its_box() -> None:
-    """Each node by a third of the faces of the top round it: the sum is stress times area."""
+    """Each node gets a third of the force on each loaded face at the node: the sum is stress times area."""
     sim = with_boundary({**PULL, **TOP})
     load, top = pushed(sim), np.flatnonzero(MESH.points[:, 2] > 2.9e-3)
     assert load.nodes.tolist() == top.tolist()
@@ -470,8 +480,8 @@ def test_a_traction_without_a_face_is_refused() -> None:
 
 @pytest.mark.parametrize("ranks", [1, 3])
 def test_a_traction_leaves_with_the_tets_of_its_faces(ranks: int) -> None:
-    """The nodes of removed tets move on; with a remaining force they would accelerate for ever, since their mass is
-    tiny.
+    """Nodes of removed tets get no force of the traction any more. With a remaining force they would be accelerated
+    without limit, because their mass is tiny.
     """
     top = {frozenset(face.tolist()) for face in boundary_faces(MESH.tets) if (MESH.points[face][:, 2] > 2.9e-3).all()}
     loaded = {e: [c for c in top if c <= set(tet.tolist())] for e, tet in enumerate(MESH.tets)}
@@ -494,7 +504,8 @@ def test_a_traction_leaves_with_the_tets_of_its_faces(ranks: int) -> None:
 
 
 def test_a_cylinder_and_a_box_have_what_is_in_both() -> None:
-    """The top of the cube, and of it the faces of which all nodes are within 1.5 mm of a line through a corner."""
+    """The selection is the top of the cube, and of these faces only those with all nodes within 1.5 mm of a line
+    through a corner."""
     near = {"cylinder": {"base": (3e-3, 3e-3, 0.0), "radius": 1.5e-3}}
     load = pushed(with_boundary({**PULL, **TOP, **near}))
     x, y, z = MESH.points.T
@@ -507,7 +518,8 @@ def test_a_cylinder_and_a_box_have_what_is_in_both() -> None:
 
 
 def test_a_free_body_under_traction_is_accelerated_exactly() -> None:
-    """x(n) and v(n+1/2) of the centre of mass, with steps of any size; the books of its work close."""
+    """For steps of any size x(n) and v(n+1/2) of the centre of mass are exact, and the work of the traction closes
+    the energy balance."""
     sim = with_boundary({**PULL, **TOP}, end=3e-6, velocity=(3.0, 0.0, -5.0), dt_growth=2.0)
     nodes, flight = sim.model.nodes, np.array([3.0, 0.0, -5.0])
     a = 9e-6 * np.array(PULL["stress"]) / (7850.0 * 27e-9)
@@ -531,7 +543,7 @@ RAMP = ((1e-6, 0.0), (2e-6, 1.0), (3e-6, -0.5))
 
 
 def ramped(t: float) -> tuple[float, float]:
-    """The factor of RAMP and its integral from 0 on, piece by piece."""
+    """Returns the factor of RAMP and its integral from 0 on, piece by piece."""
     if t <= 1e-6:
         return 0.0, 0.0
     if t <= 2e-6:
@@ -543,8 +555,8 @@ def ramped(t: float) -> tuple[float, float]:
 
 @pytest.mark.parametrize("steps", ["even", "uneven"])
 def test_a_velocity_over_time_leads_nodes_along_its_integral(steps: str) -> None:
-    """The position is exact at every n, with steps of any size; the ledger closes, except for the cost of changing
-    steps.
+    """For steps of any size the positions at every n are exact, and the energy balance closes except for the energy
+    of unequal steps.
     """
     spec = {"kind": "velocity", "low": (0.0, 0.0, 2.9e-3), "high": (1.0, 1.0, 1.0), "z": 7.0, "course": RAMP}
     sim = build(scene(STEEL, end=3e-6, boundaries=(spec,), dt_growth=2.0), [MESH])
@@ -561,7 +573,7 @@ def test_a_velocity_over_time_leads_nodes_along_its_integral(steps: str) -> None
 
 
 def test_a_traction_over_time_gives_its_integral_as_impulse() -> None:
-    """Momentum at n+1/2 is force times the integral of the course, with steps of any size."""
+    """For steps of any size the momentum at n+1/2 is the force times the integral of its factor over time."""
     sim = with_boundary({**PULL, **TOP, "course": RAMP}, end=3e-6, dt_growth=2.0)
     nodes, force = sim.model.nodes, 9e-6 * np.array(PULL["stress"])
 
@@ -574,14 +586,16 @@ def test_a_traction_over_time_gives_its_integral_as_impulse() -> None:
 
 
 def test_a_pressure_pushes_against_the_faces() -> None:
-    """On the whole surface it is no force in sum, and each node gets a third of its faces' against their normals."""
+    """On the whole surface the sum of the forces is zero, and each node gets a third of the force of each of its
+    faces, against their normals."""
     assert np.abs(pushed(with_boundary({"kind": "traction", "pressure": 1e8})).force.sum(axis=0)).max() < 1e-8
     load = pushed(with_boundary({"kind": "traction", "pressure": 1e8, **TOP}))
     assert load.force.sum(axis=0) == pytest.approx([0.0, 0.0, -900.0], abs=1e-9)
 
 
 def pulled(length: float, end: float, **keys: Any) -> Simulation:
-    """A bar of 2 x 2 mm and ``length`` m that begins at a symmetry plane; 100 MPa pull at its free end."""
+    """Returns a bar of 2 x 2 mm and ``length`` m that begins at a symmetry plane and is pulled at its free end by
+    100 MPa."""
     load = {"kind": "traction", "stress": (0.0, 0.0, 1e8), "low": (0.0, 0.0, length), "high": (1.0, 1.0, length)}
     planes = ({"kind": "symmetry", "axis": axis} for axis in "xyz")
     mesh = block((2, 2, round(length / 1e-3)), 1e-3, shake=0.0)
@@ -589,7 +603,7 @@ def pulled(length: float, end: float, **keys: Any) -> Simulation:
 
 
 def test_a_bar_carries_the_traction_at_its_end() -> None:
-    """Damped until it rests: the stress in every tet is the traction."""
+    """The bar is damped until it is at rest: the stress in every tet is then the traction."""
     sim = pulled(4e-3, 1e-4, viscosity={"linear": 1.0})
     run(sim)
     stress = sim.model.blocks[0].row(S_ZZ) - sim.model.blocks[0].row(PRESSURE)
@@ -597,7 +611,8 @@ def test_a_bar_carries_the_traction_at_its_end() -> None:
 
 
 def test_a_traction_does_the_work_of_the_wave_that_it_sends() -> None:
-    """Until the wave is back the end moves at stress / (rho c): so much force times way is in the books."""
+    """Until the reflected wave arrives, the end moves at stress / (rho c): the booked work is force times this
+    distance."""
     sim = pulled(16e-3, 5e-6)
     run(sim, booked)
     speed = 1e8 / math.sqrt(200e9 * 7850.0)
@@ -625,7 +640,8 @@ def test_gravity_acts_on_its_parts_only() -> None:
 
 
 def test_a_body_on_a_wall_carries_its_weight() -> None:
-    """Damped until it rests: the stress in the middle of each layer of tets is the weight above it."""
+    """The block is damped until it is at rest: the stress in the middle of each layer of tets is then the weight
+    above it per area."""
     down = {"kind": "gravity", "acceleration": (0.0, 0.0, -1e6)}
     boundaries = (
         wall(0.0, (0.0, 0.0, 1.0)),

@@ -1,4 +1,5 @@
-"""Time: output times are met, no step is a sliver, growth is limited, the sum of the steps is exact."""
+"""Clock of the run: output times are reached exactly, no step is much shorter than necessary, the growth of the step
+is limited, and the sum of the steps is exact."""
 
 import math
 from itertools import pairwise
@@ -10,8 +11,8 @@ from conoid.worker.clock import Clock
 
 
 def steps_of(clock: Clock, limits: list[float]) -> list[tuple[float, float, bool]]:
-    """Run the clock to its end as the loop does; return time, step ahead and whether a frame is scheduled, at each
-    n.
+    """Run the clock to its end in the same way as the loop; return the time, the next step and whether a frame is
+    scheduled, at each n.
     """
     seen = []
     n = 0
@@ -42,7 +43,7 @@ def test_frames_are_met_exactly_and_without_slivers(frames: int, seed: int) -> N
 
 
 def test_no_step_is_a_sliver() -> None:
-    """Before an output time the step is at least half of what stability allows, unless the way itself is shorter."""
+    """Before an output time the step is at least half of the stable step, unless the whole interval is shorter."""
     end, stable = 1e-4, 0.9 / 1e7
     for frames in (0, 3, 17, 100):
         seen = steps_of(Clock(end, 0.9, 2.0, frames), [1e7])
@@ -75,7 +76,8 @@ def test_steps_to_an_output_time_are_equal_and_as_few_as_are_stable() -> None:
 
 
 def test_time_is_compensated_over_a_million_steps() -> None:
-    """A million unequal steps: the time is the exact sum of the steps to its last bits; a plain sum is not."""
+    """After a million unequal steps the time is the exact sum of the steps to its last bits; a plain sum has larger
+    errors."""
     random = np.random.default_rng(1)
     limits = (1e7 * random.uniform(0.5, 2.0, 997)).tolist()
     clock, plain, steps = Clock(1e9, 0.9, 2.0, 0), 0.0, []
@@ -91,7 +93,7 @@ def test_time_is_compensated_over_a_million_steps() -> None:
 
 
 def test_at_the_end_stands_the_step_that_would_follow() -> None:
-    """The next step is as long as the last one, if that is stable."""
+    """The next step is equal to the last step, if the last step is still stable."""
     for limits in ([3e7], [3e7] * 30 + [6e7] * 100):
         clock = Clock(1e-6, 0.9, 1.05, 2)
         steps = [dt for _, dt, _ in steps_of(clock, limits)]
@@ -100,7 +102,8 @@ def test_at_the_end_stands_the_step_that_would_follow() -> None:
 
 
 def test_time_goes_on_when_no_tet_is_left_however_many_frames_are_wanted() -> None:
-    """Without a limit the stable step grows from step to step, in the end beyond all numbers."""
+    """Without a limit the stable step grows from step to step, in the end beyond the range of floating-point
+    numbers."""
     clock = Clock(1e-3, 0.9, 2.0, 2000)
     clock.choose(1e7)
     clock.advance()

@@ -1,4 +1,5 @@
-"""Fragments between frames: their sizes are those of the tables on any number of ranks, and they take their share."""
+"""Counts of fragments between frames: the sizes are those of the tables on any number of ranks, and the search of
+fragments uses only a limited fraction of the time."""
 
 from pathlib import Path
 from types import SimpleNamespace
@@ -38,7 +39,7 @@ def test_sizes_are_those_of_a_snapshot_on_any_number_of_ranks(ranks: int) -> Non
 
 
 class Clock:
-    """Seconds that pass when fragments are looked for."""
+    """Clock that the test advances by the cost of each search of fragments, s."""
 
     def __init__(self) -> None:
         self.now = 100.0
@@ -55,7 +56,7 @@ def clock(monkeypatch: pytest.MonkeyPatch) -> Clock:
 
 
 def breaking(clock: Clock, cost: float) -> Any:
-    """Return the parts of a simulation that the counter reads, in which finding fragments takes ``cost``, s."""
+    """Return the parts of a simulation that the counter reads; a search of fragments takes ``cost``, s."""
     model = SimpleNamespace(elements_global=10, nodes_global=5, parts=["one"], blocks=[], nodes=None)
 
     def look() -> None:
@@ -123,7 +124,7 @@ ERODING = {
 
 @pytest.mark.parametrize("ranks", [1, 2])
 def test_what_erosion_cuts_off_is_a_fragment(ranks: int) -> None:
-    """A layer of tets in the middle of one of two bars is removed."""
+    """A layer of tets in the middle of one of two bars is removed, so that the bar consists of two fragments."""
 
     def work(comm: Comm) -> list[int]:
         sim, counter, found = simulation.build(parse_case(ERODING), Path(), comm), Counter(), []

@@ -1,4 +1,4 @@
-"""The Cowper-Symonds return against halved brackets, and against the closed form of steady flow."""
+"""The Cowper-Symonds return compared with bisection, and with the closed form of steady flow."""
 
 import numpy as np
 import pytest
@@ -21,7 +21,8 @@ N = 500
 
 
 def roots(over: Floats, static: Floats, shear: float, hardening: float, fast: float, q: float) -> Floats:
-    """Increments d with ``over + static`` - 3 G d = (static + H d) (1 + (d / fast)^(1/q)), by halving of ln d."""
+    """Returns increments d with ``over + static`` - 3 G d = (static + H d) (1 + (d / fast)^(1/q)), computed by
+    bisection in ln d."""
     high = np.log(over / (3.0 * shear + hardening))
     low = high - 1000.0
     for _ in range(70):
@@ -33,7 +34,7 @@ def roots(over: Floats, static: Floats, shear: float, hardening: float, fast: fl
 
 @pytest.mark.parametrize("dt", [1e-10, 1e-7, 1e-5])
 def test_the_return_of_random_states(dt: float) -> None:
-    """The stress is the flow stress at the rate of the step, for strain increments from 1e-4 to 0.1."""
+    """For strain increments from 1e-4 to 0.1 the stress is the flow stress at the rate of the step."""
     random = np.random.default_rng(5)
     patch = Patch(free_tets(N, 5), MILD_STEEL)
     old = formulas.deviator(random.normal(size=(N, 3, 3)))
@@ -62,7 +63,7 @@ def test_the_return_of_random_states(dt: float) -> None:
 
 
 def solved(over: Floats, static: Floats, material: tuple[float, float, float], fast: float) -> tuple[Floats, int]:
-    """Increments by the kernel, and its number of iterations; ``material``: G, H and q."""
+    """Returns the increments of the kernel, and its number of iterations; ``material``: G, H and q."""
     w, params, n = np.zeros(SCRATCH), np.zeros(SIZE), len(over)
     w[OVER : OVER + n], w[STATIC : STATIC + n] = over, static
     params[SHEAR], params[FIRST], params[FIRST + 2] = material
@@ -71,7 +72,7 @@ def solved(over: Floats, static: Floats, material: tuple[float, float, float], f
 
 @pytest.mark.parametrize("q", [1.0, 4.0, 5.0, 20.0, 100.0])
 def test_increments_of_any_constants_equal_halved_brackets(q: float) -> None:
-    """Overstress 1e-12 to 1e3 of the strength, D dt 1e-14 to 1e3, hardening 0 or 1e-6 to 100 times G."""
+    """Overstress from 1e-12 to 1e3 of the strength, D dt from 1e-14 to 1e3, hardening 0 or 1e-6 to 100 times G."""
     random, most = np.random.default_rng(int(q)), 0
     for _ in range(200):
         static, shear = 10.0 ** random.uniform(6.0, 10.0, CHUNK), 10.0 ** random.uniform(9.0, 11.5)
@@ -96,15 +97,15 @@ def test_an_increment_does_not_depend_on_the_other_tets() -> None:
 
 
 def test_a_step_without_time_does_not_flow() -> None:
-    """Stresses above the static flow stress stay in the first pass of a run, which has no length."""
+    """In the first pass of a run, whose time step is zero, stresses above the static flow stress do not change."""
     for q in (1.0, 5.0, 100.0):
         assert solved(np.array([1e3, 1e9, 1e12]), np.full(3, 250e6), (G, 1e9, q), 0.0)[0].tolist() == [0.0, 0.0, 0.0]
 
 
 @pytest.mark.parametrize("rate", [1.0, 40.4, 1e4])
 def test_steady_flow_has_the_flow_stress_of_the_formula(rate: float) -> None:
-    """In isochoric tension at a constant rate the plastic rate is rate - (d sigma/dt) / 3 G; at D it doubles the
-    stress of slow flow.
+    """In isochoric tension at a constant rate the plastic rate is rate - (d sigma/dt) / 3 G. At the rate D the
+    stress is twice that of slow flow.
     """
     point = drive(MILD_STEEL, np.diag([1.0, -0.5, -0.5]) * rate, 0.1 / rate / 2000, 2000)
     strain, stress = point.get(PLASTIC_STRAIN), formulas.mises(point.deviator)

@@ -1,4 +1,4 @@
-"""The compression that brittle matter without a law of compressive failure meets."""
+"""Largest compression of brittle materials without a law of compressive failure, by Griffith's criterion."""
 
 from pathlib import Path
 
@@ -28,7 +28,7 @@ DEVIATOR = (S_XX, S_YY, S_ZZ, S_YZ, S_ZX, S_XY)
 
 
 def chunks(stress: Floats) -> Floats:
-    """The state of tets with these stresses (n, 3, 3), Pa, positive in tension."""
+    """Returns the state of tets with these stresses (n, 3, 3), Pa, positive in tension."""
     n, s = len(stress), formulas.deviator(stress)
     state = np.zeros((-(-n // CHUNK), PRESSURE + 1, CHUNK))
     rows = [s[:, 0, 0], s[:, 1, 1], s[:, 2, 2], s[:, 1, 2], s[:, 2, 0], s[:, 0, 1]]
@@ -40,14 +40,15 @@ def chunks(stress: Floats) -> Floats:
 
 
 def stresses(n: int) -> Floats:
-    """All kinds: two equal principal values, nearly equal ones, tension and compression from all sides."""
+    """Returns stresses of all kinds: two equal or nearly equal principal values, tension and compression from all
+    sides."""
     random = np.random.default_rng(5)
     s = random_deviators(n, random)
     return s - (random.normal(size=n) * formulas.mises(s))[:, None, None] * np.eye(3)
 
 
 def beyond(stress: Floats) -> Floats:
-    """(n,) times Griffith's criterion, by numpy's eigenvalues."""
+    """Returns (n,) values of Griffith's criterion, computed with the eigenvalues of numpy."""
     pressures = -np.linalg.eigvalsh(stress)
     s1, s3 = pressures[:, 0], np.maximum(pressures[:, 2], 0.0)
     times: Floats = np.divide((s1 - s3) ** 2, 8.0 * STRENGTH * (s1 + s3), out=np.zeros(len(s1)), where=s1 > 0.0)
@@ -55,7 +56,8 @@ def beyond(stress: Floats) -> Floats:
 
 
 def test_principal_pressures_are_those_of_numpy() -> None:
-    """To the root of round-off where two are equal, for they are double roots."""
+    """If two principal values are equal, the tolerance is the square root of round-off, because they are a double
+    root."""
     stress = stresses(2000)
     state, known = chunks(stress), -np.linalg.eigvalsh(stress)
     found = np.array([principal(state[i // CHUNK].reshape(-1), i % CHUNK) for i in range(len(stress))])
@@ -67,7 +69,8 @@ def test_no_stress_has_none() -> None:
 
 
 def test_the_hardest_is_that_of_all_tets() -> None:
-    """The bounds pass over no tet that counts: whatever is known already, and wherever the hardest stands."""
+    """The bounds exclude no tet that has the largest value, for any largest value so far and any position of this
+    tet."""
     stress = stresses(1500)
     for last in (1500, 700, 300, 40, 5, 1):
         expected, of = beyond(stress[:last]), (0, -(-last // CHUNK))
@@ -85,7 +88,7 @@ def test_of_equal_tets_the_smallest_id_is_named() -> None:
 
 
 def test_a_plane_wave_and_a_bar_meet_the_criterion_where_the_warning_says() -> None:
-    """griffith(), from which on ``conoid validate`` warns, and 8 T of a bar."""
+    """The value is griffith() in a plane wave, from which on ``conoid validate`` gives a warning, and 8 T in a bar."""
     k = 0.22 / 0.78
     wave = griffith(BRITTLE) * np.diag([-1.0, -k, -k])
     bar = 8.0 * STRENGTH * np.diag([-1.0, 0.0, 0.0])
@@ -97,7 +100,7 @@ def test_a_plane_wave_and_a_bar_meet_the_criterion_where_the_warning_says() -> N
     ([1e9, 1e9, 1e9], 0.0), ([3e9, 1e9, 0.0], 0.0), ([-1e9, -1e9, -1e9], 0.0), ([5e9, -8e8, 0.0], 1e8 / STRENGTH),
 ])  # fmt: skip
 def test_tension_and_equal_pressures_crush_nothing(stress: list[float], times: float) -> None:
-    """Tension beside a pressure changes nothing: the tensile law answers for it."""
+    """Tension in another direction than the pressure has no effect, because the tensile law covers it."""
     assert hardest(chunks(np.diag(stress)[None]), np.arange(1), 1, STRENGTH, 0.0, 0, 1)[1] == pytest.approx(
         times, abs=1e-9
     )
@@ -110,7 +113,7 @@ STEPS = 12
 
 
 def met(sim: Simulation, steps: int = STEPS) -> list[Compressed]:
-    """After so many steps."""
+    """Returns the largest values after the given number of steps."""
     if sim.clock.step == 0:
         step.prepare(sim)
     assert sim.crushing is not None
@@ -128,7 +131,7 @@ def alone() -> Compressed:
 
 
 def test_what_hits_a_wall_meets_the_stress_of_the_wave(alone: Compressed) -> None:
-    """Density times wave speed times speed, 5.4 GPa, in front of the wall; a coarse mesh overshoots."""
+    """In front of the wall the stress is density times wave speed times speed, 5.4 GPa; a coarse mesh overshoots."""
     wave = 2500.0 * 400.0 * (72e9 * 0.78 / (1.22 * 0.56) / 2500.0) ** 0.5
     assert 0.9 * wave < alone.most < 1.5 * wave
     assert alone.x < 2e-3
@@ -146,7 +149,7 @@ def test_all_ranks_say_what_one_alone_says(ranks: int, alone: Compressed) -> Non
 
 
 def test_a_run_that_goes_on_remembers(tmp_path: Path, alone: Compressed) -> None:
-    """Also where the hardest was met before the checkpoint."""
+    """The restarted run reports the largest value also if it occurred before the checkpoint."""
 
     def work(sim: Simulation) -> list[Compressed]:
         met(sim, STEPS)

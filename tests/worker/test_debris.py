@@ -1,4 +1,4 @@
-"""Nodes without tets meet the part that they come from."""
+"""Contact of nodes without tets with the part to which their tets belonged."""
 
 from typing import Any
 
@@ -24,7 +24,8 @@ EROSION = schema.Erosion()
 def fallen(
     contact: dict[str, Any], until: float = 7e-6, erosion: schema.Erosion = EROSION
 ) -> tuple[Simulation, int]:  # fmt: skip
-    """A block of 4 x 4 x 4 mm whose upper middle node has lost its tets and flies down and aside, and that node."""
+    """Returns a simulation of a block of 4 x 4 x 4 mm whose upper middle node has lost its tets and moves down and
+    to the side, and this node."""
     beside = moved(block((1, 1, 1), MM), (9 * MM, 0.0, 0.0))
     case = meeting_of([{"erosion": erosion}, {}], contact, material=STEEL)
     sim = build(case, [block((4, 4, 4), MM, shake=0.0), beside])
@@ -39,7 +40,7 @@ def fallen(
 
 
 def test_a_node_without_tets_stays_outside_of_the_part_that_it_comes_from() -> None:
-    """The node falls into the pit of the removed tets and comes to rest on its bottom."""
+    """The node moves into the hole of the removed tets and comes to rest on the bottom of the hole."""
     sim, node = fallen({})
     assert sim.contact is not None
     assert sim.model.nodes.x[node, 2] > 2.9 * MM
@@ -54,7 +55,8 @@ def test_a_node_without_tets_stays_outside_of_the_part_that_it_comes_from() -> N
     ids=["in flight", "after it has struck", "for ever"],
 )
 def test_a_node_without_tets_leaves_after_it_has_struck(nodes: Any, until: float, leaves: bool) -> None:
-    """The slope that it strikes has most of its momentum; what it leaves with, along the slope, is in the ledger."""
+    """The slope that the node hits gets most of its momentum. The rest, along the slope, is booked when the node is
+    removed."""
     sim, node = fallen({}, until, schema.Erosion(nodes=nodes))
     state, erosion = sim.model.nodes, sim.erosion
     assert erosion is not None
@@ -88,7 +90,8 @@ def test_without_self_contact_it_passes_and_is_counted() -> None:
     ],
 )  # fmt: skip
 def test_what_erodes_or_fractures_meets_itself(contact: dict[str, Any] | None, meet: tuple[str, ...]) -> None:
-    """By default; a list takes the place of what erodes, and what fractures always does."""
+    """This is the default for eroding parts; a list of parts replaces it. Parts that fracture always have
+    self-contact."""
     case = meeting_of([{"erosion": EROSION}, {"fracture": schema.Fracture()}, {}])
     named = zip(case.parts, ("wears", "breaks", "stays"), strict=True)
     parts = tuple(part.model_copy(update={"name": name}) for part, name in named)

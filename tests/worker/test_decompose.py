@@ -1,4 +1,5 @@
-"""Recursive bisection: even, compact, the same again, for any number of parts."""
+"""Recursive bisection: equal weights, compact parts, and the same result for any distribution of the points, for any
+number of parts."""
 
 import numpy as np
 import pytest
@@ -23,7 +24,7 @@ def cloud(n: int, seed: int) -> Floats:
 
 @pytest.mark.parametrize("parts", PARTS)
 def test_equal_weights_are_shared_evenly(parts: int) -> None:
-    """Each cut is off by less than one point, so a part is off by less than two."""
+    """Each cut has an error below the weight of one point, so a part has an error below two."""
     owner = bisect(cloud(1000, 1), np.ones(1000), parts)
     counts = np.bincount(owner, minlength=parts)
     assert len(counts) == parts
@@ -49,7 +50,7 @@ def test_the_same_arguments_give_the_same_parts(parts: int) -> None:
 
 
 def test_ties_are_told_apart_by_their_ids() -> None:
-    """All points in one place: the cut follows the ids."""
+    """If all points are at one position, the cut follows the ids."""
     owner = bisect(np.zeros((40, 3)), np.ones(40), 4)
     assert owner.tolist() == sorted(owner.tolist())
     assert len(set(owner.tolist())) == 4
@@ -73,7 +74,7 @@ def test_more_parts_than_points(parts: int) -> None:
 @pytest.mark.parametrize("parts", [2, 5, 16])
 @pytest.mark.parametrize("ranks", [2, 3])
 def test_parts_do_not_depend_on_who_holds_the_points(parts: int, ranks: int) -> None:
-    """Ties among them: many points lie in planes across the axes."""
+    """Many points have equal coordinates, because they lie in planes normal to the axes."""
     points = np.round(cloud(600, 8), 1)
     weights, ids = np.random.default_rng(9).uniform(0.5, 2.0, 600), np.arange(600)
     one, cuts = decompose.bisect(points, ids, weights, parts, SerialComm())
@@ -103,14 +104,16 @@ def test_directions_are_unit_normals_that_differ() -> None:
 
 
 def nosed(n: int, tip: float) -> tuple[Floats, Floats]:
-    """A bar along z, every point of which costs 1 in the first phase, and 3 in the second below ``tip`` times x."""
+    """Returns a bar along z; each point has the weight 1 in the first phase, and a weight of 3 in the second phase
+    below ``tip`` times x."""
     points = np.random.default_rng(12).uniform(size=(n, 3)) * [1.0, 1.0, 3.0]
     return points, np.column_stack([np.ones(n), 3.0 * (points[:, 2] < 1.0 + tip * (points[:, 0] - 0.5))])
 
 
 @pytest.mark.parametrize("parts", [2, 3, 4])
 def test_every_phase_is_shared_evenly(parts: int) -> None:
-    """One phase is at one end, as contact is: a cut across the axis would give one part all of it."""
+    """The weight of one phase is at one end, as that of contact: a cut normal to the axis would give all of it to
+    one part."""
     points, weights = nosed(20_000, 0.5)
     owner, _ = decompose.bisect(points, np.arange(len(points)), weights, parts, SerialComm())
     shares = np.array([np.bincount(owner, w, parts) for w in weights.T])
@@ -128,7 +131,7 @@ def test_one_phase_alone_is_cut_across_the_longest_side() -> None:
 
 
 def test_of_cuts_as_even_the_smaller_one_is_made() -> None:
-    """Both phases are the same everywhere: nothing is gained by a cut aslant."""
+    """The two phases have the same distribution, so an oblique cut has no advantage."""
     points = cloud(20_000, 13)
     _, cuts = decompose.bisect(points, np.arange(len(points)), np.ones((20_000, 2)), 2, SerialComm())
     assert [cut.direction for cut in cuts] == [0]
@@ -149,7 +152,7 @@ def test_even_phases_do_not_depend_on_who_holds_the_points() -> None:
 
 
 def test_weights_beyond_the_integers_of_a_float_are_counted_exactly() -> None:
-    """A cut goes where the integers say, whatever the order of the points."""
+    """The position of the cut follows from integer sums, for any order of the points."""
     keys, quanta = np.array([1, 1, 1, 2]) << 40, np.array([2**54, 1, 1, 2**54])
     found = []
     for order in ([0, 1, 2, 3], [1, 2, 0, 3]):

@@ -1,4 +1,4 @@
-"""The digest sees every bit of the state, in the order of the ids, and speaks the same language on every rank."""
+"""The digest depends on every bit of the state in the order of the ids, and is the same for any number of ranks."""
 
 import numpy as np
 import numpy.typing as npt
@@ -13,7 +13,8 @@ from .meshes import block
 
 
 class Strict(SerialComm):
-    """Takes what the interface allows: a maximum is over float64. MPI would mix up the bits of other types."""
+    """Communicator that accepts only what the interface allows: a maximum is over float64. With other types MPI
+    would mix up the bits."""
 
     def maximum(self, values: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
         assert values.dtype == np.float64

@@ -1,4 +1,4 @@
-"""Mohr-Coulomb's flow with dilation: the return against its conditions, the triaxial path against closed forms."""
+"""Mohr-Coulomb flow with dilation: the return compared with its conditions, and the triaxial path with closed forms."""
 
 import math
 from pathlib import Path
@@ -23,14 +23,14 @@ ANGLES = (math.radians(20.0), PHI)
 
 
 def glass(psi: float, **keys: float) -> materials.Material:
-    """Glass that dilates."""
+    """Returns glass with dilation."""
     return brittle(C, PHI, dilation_angle=psi, **keys)
 
 
 def multipliers(flow: Floats, apart: "np.ndarray", psi: float) -> Floats:
-    """(n, 2) of each plastic strain (n, 3), the largest first: how much flow there was in each of two mechanisms.
-
-    (1 + sin psi, 0, sin psi - 1) and its neighbour across the edge that the stress is on, ``apart`` (n, 2).
+    """Returns (n, 2) the amounts of flow of two mechanisms in each plastic strain (n, 3), sorted with the largest
+    first. The mechanisms are (1 + sin psi, 0, sin psi - 1) and the mechanism on the other side of the edge of the
+    yield surface on which the stress is, ``apart`` (n, 2).
     """
     s = math.sin(psi)
     one, low, high = np.array([[1 + s, 0, s - 1], [0, 1 + s, s - 1], [1 + s, s - 1, 0]])
@@ -46,7 +46,8 @@ def multipliers(flow: Floats, apart: "np.ndarray", psi: float) -> Floats:
 
 @pytest.mark.parametrize("psi", ANGLES)
 def test_a_return_is_on_the_surface_by_flow_along_the_potential(psi: float) -> None:
-    """Plane and edges, each with flow that is forwards; 0.2 to 200 times the strength."""
+    """Returns to the plane and to the edges have positive amounts of flow, for stresses of 0.2 to 200 times the
+    strength."""
     n, random = 4_000, np.random.default_rng(7)
     trial = random_deviators(n, random)
     q = formulas.mises(trial)
@@ -73,7 +74,7 @@ def test_a_return_is_on_the_surface_by_flow_along_the_potential(psi: float) -> N
 
 
 def elastic_work(patch: Patch, form: Form) -> Floats:
-    """(tets,) what is left of the work, J."""
+    """Returns (tets,) the elastic part of the work, J."""
     averaged = 0.0 if form == "standard" else patch.get(WORK_AVERAGED)
     return patch.get(WORK) - patch.get(WORK_PLASTIC) - averaged
 
@@ -81,11 +82,10 @@ def elastic_work(patch: Patch, form: Form) -> Floats:
 @pytest.mark.parametrize("form", FORMS)
 @pytest.mark.parametrize("psi", ANGLES)
 def test_the_triaxial_path(form: Form, psi: float) -> None:
-    """A block under a lateral pressure s, shortened along z: elastic to f + s (1 + sin phi) / (1 - sin phi).
-
-    From there on no stress changes if the volume grows by 2 sin psi / (1 - sin psi) of the shortening, half of it
-    and half of the shortening at each side. The work is that of the stress. What it stores is p^2 / 2K + q^2 / 6G of a
-    volume, and grows as the volume does; the rest is plastic.
+    """A block under the lateral pressure s is shortened along z. It is elastic up to the stress f + s (1 + sin phi)
+    / (1 - sin phi). After that no stress changes if the volume grows by 2 sin psi / (1 - sin psi) of the shortening,
+    half of it on each lateral axis. The work is that of the stress. The stored energy is p^2 / 2K + q^2 / 6G per
+    present volume; the rest of the work is plastic.
     """
     patch, lateral, steps = Patch(block((2, 2, 2)), glass(psi), form), 100e6, 200
     patch.put(PRESSURE, lateral)
@@ -111,7 +111,8 @@ def test_the_triaxial_path(form: Form, psi: float) -> None:
 
 
 def test_the_apex_takes_the_deviator_and_lets_no_strength_come_back() -> None:
-    """Far beyond the apex nothing is left of the deviator; the pressure rises by no more than that flow allows."""
+    """For a pressure far beyond the apex the deviator becomes zero, and the pressure rises at most by the amount of
+    this flow."""
     trial = random_deviators(500, np.random.default_rng(3))
     patch = free(500, glass(ANGLES[0]), trial, -1e12)
     patch.advance(DT)
@@ -123,7 +124,7 @@ def test_the_apex_takes_the_deviator_and_lets_no_strength_come_back() -> None:
 
 
 def test_what_has_failed_keeps_its_volume() -> None:
-    """Sheared at a constant volume the pressure rises until the failure strain, and no more."""
+    """In shear at constant volume the pressure rises until the failure strain is reached, and not afterwards."""
     law = glass(ANGLES[0], failure_strain=0.02)
     patch = Patch(TetMesh(REGULAR, np.array([[0, 1, 2, 3]], np.int32)), law)
     patch.put(PRESSURE, 0.5e9)
@@ -141,7 +142,7 @@ def test_what_has_failed_keeps_its_volume() -> None:
 
 
 def plastic(sim: simulation.Simulation) -> tuple[float, float]:
-    """Logarithmic volume and height of the cube less what its mean stress makes of them."""
+    """Returns logarithmic volume and height of the cube minus their elastic parts from the mean stress."""
     nodes, (tets,) = sim.model.nodes, sim.model.blocks
     volume = TetMesh(nodes.x, tets.tets.astype(np.int32)).volumes()
     p, s = (float(tets.row(row) @ volume / volume.sum()) for row in (PRESSURE, S_ZZ))
@@ -151,7 +152,8 @@ def plastic(sim: simulation.Simulation) -> tuple[float, float]:
 
 @pytest.mark.parametrize("form", FORMS)
 def test_a_cube_swells_as_it_should_and_keeps_its_energy(form: Form) -> None:
-    """The shipped triaxial test with a dilation angle of 20 degrees: plastic volume over plastic height in the flow."""
+    """The shipped triaxial test with a dilation angle of 20 degrees: the ratio of plastic volume to plastic height
+    in the flow agrees with the formula."""
     data = load.read_data(load.shipped_path("triaxial_glass"))
     made = library()["soda_lime_mohr_coulomb"].model_dump(exclude_none=True)
     made["strength"]["dilation_angle"] = ANGLES[0]

@@ -1,4 +1,5 @@
-"""The cut of the mesh: every tet once, every shared node known to all its holders and owned once; complete sums."""
+"""The cut of the mesh: each tet is on one rank, each shared node is listed on all its ranks and owned by one, and
+shared sums are complete."""
 
 import contextlib
 from itertools import product
@@ -67,7 +68,8 @@ def test_every_node_is_owned_once_by_the_rank_of_its_first_tet(ranks: int) -> No
 
 @pytest.mark.parametrize("ranks", RANKS)
 def test_holders_of_a_node_know_each_other(ranks: int) -> None:
-    """Each pair of ranks lists the nodes that both hold, in one order; masses and positions are those of the whole."""
+    """Each pair of ranks lists their common nodes in the same order; masses and positions are those of the whole
+    mesh."""
     whole, pieces = cut(ranks)
     for (a, one), (b, other) in product(enumerate(pieces), repeat=2):
         if a == b:
@@ -108,7 +110,8 @@ def test_mass_is_shared_by_quarters() -> None:
 
 
 class Postbox:
-    """A communicator whose ranks take turns in one process: ``begin`` of all before ``finish`` of any."""
+    """A communicator whose ranks run one after the other in one process: ``begin`` of all ranks comes before
+    ``finish`` of any rank."""
 
     def __init__(self) -> None:
         self.letters: dict[tuple[int, int, int], Ints] = {}
@@ -143,7 +146,8 @@ class Round:
 
 @pytest.mark.parametrize("ranks", RANKS)
 def test_shared_sums_are_those_of_one_rank(ranks: int) -> None:
-    """Random integers of each tet at its nodes: with the neighbours' added, every holder has the whole's sum."""
+    """The nodal sums are random integers of each tet. After the sums of the neighbours were added, every rank has
+    the sum of the whole mesh."""
     whole, pieces = cut(ranks)
     words = np.random.default_rng(7).integers(-(2**52), 2**52, (len(whole.tets), 4, 3))
     total = np.zeros((len(whole.points), 3), np.int64)
@@ -185,7 +189,7 @@ TWO_TETS = """*NODE
 *ELEMENT, TYPE=C3D4
 1, 1, 2, 3, 4
 """
-"""Nodes 6 to 8 coincide with 1 to 3."""
+"""Nodes 6 to 8 have the positions of nodes 1 to 3."""
 
 
 @pytest.mark.parametrize(
@@ -214,7 +218,7 @@ def test_pieces_of_a_part_that_do_not_meet_are_told(second: str, more: str, told
     ],
 )
 def test_pieces_of_a_part_that_meets_itself_may_not_overlap(overlap: str, told: str | None, tmp_path: Path) -> None:
-    """The upper tet stands on the lower one and reaches 0.1 mm into it."""
+    """The upper tet is on top of the lower tet and penetrates it by 0.1 mm."""
     deeper = TWO_TETS.replace("5, 0, 0, -1", "5, 0, 0, -1.1")
     for node in ("6, 0, 0", "7, 1, 0", "8, 0, 1"):
         deeper = deeper.replace(f"{node}, 0", f"{node}, 0.1")
@@ -227,7 +231,7 @@ def test_pieces_of_a_part_that_meets_itself_may_not_overlap(overlap: str, told: 
 
 
 def test_the_start_says_what_it_is_at(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Meshes that are kept are read without a word."""
+    """Cached meshes are read without a progress message."""
     monkeypatch.setenv("CONOID_CACHE_DIR", str(tmp_path))
     case = parse_toml(TWO_BOXES)
     heard: list[list[str]] = []

@@ -1,4 +1,4 @@
-"""Our logarithm and exponential: close to the true ones, alike in a vector lane and in a scalar."""
+"""The logarithm and the exponential of the worker are accurate, and equal in vector code and in scalar code."""
 
 import numpy as np
 import pytest
@@ -27,7 +27,7 @@ def powers(x: Floats) -> Floats:
 
 @pytest.mark.parametrize("reach", REACHES)
 def test_they_are_right_to_the_last_bits(reach: tuple[float, float]) -> None:
-    """In the 80 bits of a long double."""
+    """The reference has the 80 bits of a long double."""
     random = np.random.default_rng(1)
     for _ in range(100):
         y = random.uniform(*reach, CHUNK)

@@ -1,4 +1,4 @@
-"""Linear and Mie-Grueneisen pressure, the energy that goes with it, the speed of sound."""
+"""Linear and Mie-Grueneisen pressure, their energy, and the speed of sound."""
 
 import math
 from itertools import pairwise
@@ -25,15 +25,15 @@ DT = 1e-8
 
 
 def cold(ratio: Floats | float) -> Floats:
-    """The part of the pressure that does not depend on the energy; ``ratio`` is V / V0."""
+    """Returns the part of the pressure that does not depend on the energy; ``ratio`` is V / V0."""
     chi = 1.0 - ratio
     hugoniot = DENSITY * GAS.c0**2 * chi / (1.0 - GAS.S * np.maximum(chi, 0.0)) ** 2
     return np.asarray(hugoniot * (1.0 - 0.5 * GAS.gamma0 * np.maximum(chi, 0.0)))
 
 
 def compressed(seed: int, rate: float) -> tuple[Patch, Floats, Floats]:
-    """Copper tets in random states, without shear stress, swelling or shrinking alike in all directions; their strains
-    and mean volumes in the step.
+    """Returns copper tets in random states, without shear stress, that expand or shrink equally in all directions;
+    also their strains and mean volumes in the step.
     """
     patch = Patch(free_tets(N, seed), COPPER_GAS)
     random = np.random.default_rng(seed)
@@ -49,7 +49,7 @@ def compressed(seed: int, rate: float) -> tuple[Patch, Floats, Floats]:
 
 
 def test_linear_pressure_is_logarithmic() -> None:
-    """p = -K ln(V / V0), its work K V0 times what a logarithmic spring stores, to second order in the step."""
+    """p = -K ln(V / V0); to second order in the step its work is K V0 times the energy of a logarithmic spring."""
     wrong = []
     for steps in (20, 40):
         tet = free_tets(1, 3)
@@ -69,7 +69,8 @@ def test_linear_pressure_is_logarithmic() -> None:
 
 
 def test_mie_gruneisen_solves_the_energy_equation() -> None:
-    """The new pressure is the law at the new energy, with the work of the mean pressure: exactly, not iterated."""
+    """The new pressure is the equation of state at the new energy, which includes the work of the mean pressure. The
+    equation is solved exactly, without iteration."""
     patch, strain, volume = compressed(1, 0.05)
     old, work, ratio = patch.get(PRESSURE), patch.get(WORK), patch.get(VOLUME_RATIO)
     viscous = patch.get(WORK_VISCOUS)
@@ -99,7 +100,7 @@ def test_the_law_gives_the_hugoniot(speed: float) -> None:
 
 
 def test_an_adiabat_of_many_steps() -> None:
-    """Compression by a fifth in small steps against the integrated equation de/dchi = p / rho0, to second order."""
+    """A compression by a fifth in small steps agrees to second order with the integral of de/dchi = p / rho0."""
     from scipy.integrate import solve_ivp
 
     def heated(chi: float, energy: Floats) -> Floats:
@@ -120,7 +121,7 @@ def test_an_adiabat_of_many_steps() -> None:
 
 
 def speed_of_sound(patch: Patch) -> float:
-    """c from the step limit of one tet: the limit is c sqrt(sum |grad N|^2)."""
+    """Returns the speed of sound c from the step limit of one tet, which is c sqrt(sum |grad N|^2)."""
     _, grad = formulas.gradients(patch.corners())
     return patch.limit / float(formulas.inverse_length(grad)[0])
 
@@ -128,7 +129,8 @@ def speed_of_sound(patch: Patch) -> float:
 @pytest.mark.parametrize("ratio", [1.05, 1.0, 0.95, 0.8, 0.72])
 @pytest.mark.parametrize("energy", [0.0, 3e5])
 def test_speed_of_sound_is_the_slope_of_the_adiabat(ratio: float, energy: float) -> None:
-    """rho c^2 = dp / dln(rho) at constant entropy + 4/3 G / J, the slope by a small adiabatic step each way."""
+    """rho c^2 = dp / dln(rho) at constant entropy + 4/3 G / J; the slope is computed from a small adiabatic step in
+    each direction."""
     pressures, strain = [], 1e-5
     for sign in (-1.0, 0.0, 1.0):
         patch = Patch(free_tets(1, 6), COPPER_GAS)
@@ -153,7 +155,8 @@ def test_speed_of_sound_of_a_linear_solid() -> None:
 
 
 def test_there_is_no_pressure_beyond_the_pole() -> None:
-    """p_H is infinite at the compression 1 / S; what lies beyond has no pressure, not a finite one that falls again."""
+    """p_H is infinite at the compression 1 / S. Beyond it the law returns no pressure, instead of a finite pressure
+    that decreases."""
     for ratio, finite in ((1.0 - 0.99 / GAS.S, True), (1.0 - 1.01 / GAS.S, False), (-0.1, False)):
         patch = Patch(free_tets(1, 5), COPPER_GAS)
         patch.put(VOLUME_RATIO, ratio)
@@ -165,7 +168,8 @@ def test_there_is_no_pressure_beyond_the_pole() -> None:
 @pytest.mark.parametrize("spall", [None, 1e9])
 @pytest.mark.parametrize("form", FORMS)
 def test_a_tet_that_passes_the_pole_ends_the_run(form: Form, spall: float | None) -> None:
-    """The message names the tet and its compression; without it the run would go on with a meaningless pressure."""
+    """The message names the tet and its compression. Without this check the run would continue with a meaningless
+    pressure."""
     case = scene(COPPER_GAS.model_copy(update={"spall": spall}), form)
     sim = build(case, [free_tets(1, 5)])
     step.prepare(sim)

@@ -1,4 +1,4 @@
-"""Erosion: accounts that close whatever leaves, a surface that follows, particles, parts and ranks without tets."""
+"""Erosion: energy, mass and momentum balances, update of the surface, particles, and parts and ranks without tets."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -34,23 +34,23 @@ REMOVE = schema.Erosion(nodes="remove")
 def alone(
     mesh: TetMesh, erosion: schema.Erosion = EROSION, velocity: Sequence[float] = (0, 0, 0), **keys: Any
 ) -> Simulation:
-    """A copper body that wears, by itself and without contact."""
+    """Returns a case of a single copper body with erosion and without contact."""
     case = meeting_of([{"erosion": erosion, "velocity": velocity}], **{"material": COPPER, **keys})
     return build(case.model_copy(update={"contact": None}), [mesh])
 
 
-# Accounts
+# Balances of energy, mass and momentum
 
 
 def crash(erosion: schema.Erosion, form: Form, speed: float = 600.0) -> Simulation:
-    """Two copper blocks that hit each other and wear out where they do."""
+    """Returns two copper blocks that collide and erode at the impact."""
     meshes = [block((4, 4, 4), MM, seed=3), moved(block((5, 5, 3), MM, seed=4), (-0.5 * MM, -0.5 * MM, 4.01 * MM))]
     motions: list[dict[str, Any]] = [{"velocity": (0.0, 0.0, speed), "erosion": erosion}, {"erosion": erosion}]
     return build(meeting_of(motions, material=COPPER, form=form, end=1.5e-6, viscosity={}), meshes)
 
 
 def nodes_of_tets(sim: Simulation) -> "np.ndarray":
-    """(nodes,) whether a node has tets."""
+    """Returns (nodes,) whether a node has tets."""
     has = np.zeros(sim.model.nodes.n, bool)
     for part in sim.model.blocks:
         has[part.tets] = True
@@ -60,7 +60,7 @@ def nodes_of_tets(sim: Simulation) -> "np.ndarray":
 @pytest.mark.parametrize("nodes", ["strike", "particles", "remove"])
 @pytest.mark.parametrize("form", FORMS)
 def test_the_accounts_close_while_tets_leave(form: Form, nodes: Any) -> None:
-    """Energy as well as without erosion, momentum to round-off, mass to the last bits (H11)."""
+    """The energy balance closes as well as without erosion, momentum to round-off and mass to the last bits (H11)."""
     sim = crash(schema.Erosion(plastic_strain=0.3, nodes=nodes), form)
     mass, first, elements = sim.model.nodes.mass.copy(), sim.model.nodes.v.copy(), sim.model.elements_global
     momentum = (mass[:, None] * first).sum(axis=0)
@@ -84,11 +84,11 @@ def test_the_accounts_close_while_tets_leave(form: Form, nodes: Any) -> None:
     assert not removed.any() if nodes == "particles" else (removed == here).all() or nodes == "strike"
     assert sim.erosion.particles == (here & ~removed).sum()
     assert not sim.model.nodes.v[removed].any()
-    assert not sim.model.nodes.force[bare[-2]].any()  # what is bare since the last step still has that step's
+    assert not sim.model.nodes.force[bare[-2]].any()  # new faces have the time of the last step
 
 
 def pulled(sim: Simulation, rounds: int = 4) -> tuple[list[float], Simulation]:
-    """Tets leave one time after another, from the top; the residuals."""
+    """Returns the residuals of a run in which tets are removed one after the other, from the top."""
     step.prepare(sim)
     found = []
     for k in range(4 * rounds):
@@ -104,7 +104,8 @@ SPIN = {"centre": (1.5 * MM, 1.5 * MM, 1.5 * MM), "rate": (4e4, 0.0, 5e4)}
 @pytest.mark.parametrize("nodes", ["particles", "remove"])
 @pytest.mark.parametrize("form", FORMS)
 def test_the_accounts_close_for_a_spinning_body_without_contact(form: Form, nodes: Any) -> None:
-    """A copper cube that turns at its elastic limit: work, kinetic energy and momentum leave at once."""
+    """A copper cube that spins at its elastic limit: removed tets take their work, kinetic energy and momentum with
+    them."""
     case = meeting_of([{"erosion": schema.Erosion(nodes=nodes), "spin": SPIN}], material=COPPER, form=form)
     sim = build(case.model_copy(update={"contact": None}), [block((3, 3, 3), MM)])
     momentum = (sim.model.nodes.mass[:, None] * sim.model.nodes.v).sum(axis=0)
@@ -120,7 +121,8 @@ def test_the_accounts_close_for_a_spinning_body_without_contact(form: Form, node
 
 @pytest.mark.parametrize("material", [COPPER_GAS, COPPER, STEEL_42CRMO4])
 def test_the_heat_of_what_leaves_is_counted_where_its_pressure_sees_heat(material: Material) -> None:
-    """Lower bound of the line ``eroded``: 2 J of viscosity in each tet, zero for a pressure without heat."""
+    """The lower bound of the line ``eroded`` is minus 2 J of viscous heat for each tet, and zero for a pressure
+    without heat."""
     sim = alone(block((2, 2, 2), MM), material=material)
     part = sim.model.blocks[0]
     part.state[:, rows.WORK_VISCOUS] = 2.0
@@ -143,7 +145,8 @@ WALL = {"kind": "wall", "point": (0.0, 0.0, 0.0), "normal": (0.0, 0.0, 1.0)}
     ids=["gravity", "driven", "mirror", "wall"],
 )
 def test_what_has_left_is_not_moved_any_more(bounds: tuple[Any, ...]) -> None:
-    """Neither gravity nor a prescribed motion, and it stays in the accounts as it left."""
+    """Neither gravity nor a prescribed motion moves removed nodes, and their momentum and energy stay as at the time
+    of removal."""
     residuals, sim = pulled(alone(block((3, 3, 3), MM), REMOVE, (0, 0, 100), boundaries=bounds))
     assert sim.erosion is not None
     assert sim.erosion.removed.any()
@@ -157,7 +160,8 @@ def test_what_has_left_is_not_moved_any_more(bounds: tuple[Any, ...]) -> None:
 def test_a_tet_that_turns_inside_out_books_no_work_that_it_has_not_done(
     material: Material, far: float, form: Form
 ) -> None:
-    """A node passes the tets beside it in one step; their stress at the end of it has never acted on a node."""
+    """A node passes the adjacent tets in one step; the stress of these tets at the end of the step has never acted
+    on a node."""
     sim = alone(block((3, 3, 3), MM), form=form, material=material)
     nodes = sim.model.nodes
     node = np.argmin(np.abs(nodes.x0 - 0.9 * MM).sum(axis=1))
@@ -167,13 +171,14 @@ def test_a_tet_that_turns_inside_out_books_no_work_that_it_has_not_done(
     tick(sim)
     volumes = tet_volumes(sim.model.blocks[0].tets, nodes.x)
     assert (volumes < 0.0).sum() > 3
-    assert max(tick(sim) for _ in range(3)) < 0.006  # others have strained by more than one in that step
+    assert max(tick(sim) for _ in range(3)) < 0.006  # other tets have strains above one in that step
 
 
 @pytest.mark.parametrize("form", ["standard", "nodal"])
 @pytest.mark.parametrize("material", [STEEL, COPPER, COPPER_GAS], ids=["elastic", "copper", "gas"])
 def test_the_first_step_knows_how_fast_nodes_come(material: Material, form: Form) -> None:
-    """One node of a cube starts at 10 km/s: without a bound by its motion 20 to 209 % of its energy was wrong."""
+    """One node of a cube starts at 10 km/s. Without a bound of the step by the motion 20 to 209 % of the energy was
+    wrong."""
     sim = alone(block((3, 3, 3), MM), form=form, material=material, viscosity={})
     nodes = sim.model.nodes
     node = np.argmin(np.abs(nodes.x0 - 0.9 * MM).sum(axis=1))
@@ -183,7 +188,7 @@ def test_the_first_step_knows_how_fast_nodes_come(material: Material, form: Form
     assert max(tick(sim) for _ in range(20)) < 0.01
 
 
-# The surface
+# Surface of the eroding body
 
 
 def scene_of_two() -> tuple[schema.Case, list[TetMesh]]:
@@ -194,13 +199,13 @@ def scene_of_two() -> tuple[schema.Case, list[TetMesh]]:
 
 
 def wearing(case: schema.Case, erosion: schema.Erosion) -> schema.Case:
-    """The same, and all parts wear."""
+    """Returns the same scene with erosion in all parts."""
     parts = tuple(part.model_copy(update={"erosion": erosion}) for part in case.parts)
     return case.model_copy(update={"parts": parts})
 
 
 def plan(meshes: Sequence[TetMesh], seed: int, rounds: int) -> list[Ints]:
-    """Ids of tets that leave in each round: here and there, and a whole corner."""
+    """Returns the ids of the tets that are removed in each round: single tets, and a whole corner."""
     random = np.random.default_rng(seed)
     tets = sum(len(mesh.tets) for mesh in meshes)
     left, rows = np.arange(tets), []
@@ -214,7 +219,7 @@ def plan(meshes: Sequence[TetMesh], seed: int, rounds: int) -> list[Ints]:
 
 @pytest.mark.parametrize("ranks", [1, 3, 4])
 def test_the_surface_follows_what_is_left(ranks: int) -> None:
-    """The surface after each of many removals equals the one computed from the remaining tets."""
+    """After each of many removals the surface is equal to the surface computed from the remaining tets."""
     case, meshes = scene_of_two()
     offset = len(meshes[0].points)
     tets = np.concatenate([meshes[0].tets, meshes[1].tets + np.int32(offset)])
@@ -251,7 +256,7 @@ def test_the_surface_follows_what_is_left(ranks: int) -> None:
 
 
 def test_a_node_that_loses_all_its_tets_at_once_meets_others() -> None:
-    """Also one from within the body, which had never been on the surface."""
+    """This includes a node inside of the body that was never on the surface before."""
     case, meshes = scene_of_two()
     sim = build(wearing(case, EROSION), meshes)
     step.prepare(sim)
@@ -265,7 +270,8 @@ def test_a_node_that_loses_all_its_tets_at_once_meets_others() -> None:
 
 
 def test_what_is_laid_bare_meets_in_the_same_step() -> None:
-    """The search of the step in which a tet leaves has its inner faces as candidates of the nodes above it."""
+    """The search in the step of the removal includes the inner faces of the removed tet as candidates of the nodes
+    above it."""
     case, meshes = scene_of_two()
     sim = build(case, meshes)
     step.prepare(sim)
@@ -321,7 +327,8 @@ def test_what_a_tiring_tet_covers_comes_to_the_surface_without_a_search() -> Non
 
 
 def test_what_loses_its_support_is_held_by_what_lies_below() -> None:
-    """A driven tip is about to land when the tet under it leaves: in that step it lands on the slope behind."""
+    """A driven tip is about to touch a tet when this tet is removed: in the same step the tip is in contact with the
+    slope behind it."""
     speed, aside = 1000.0, 3e-3
     points = np.array([[2.0 - aside, 1.5, 2.14], [1.5, 1.0, 3.0], [2.5, 1.0, 3.0], [2.0, 2.2, 3.0]]) * MM
     ground, tip = block((3, 3, 2), MM, shake=0.0), TetMesh(points, positive(points, np.arange(4)[None, :]))
@@ -344,17 +351,17 @@ def test_what_loses_its_support_is_held_by_what_lies_below() -> None:
 
 
 def node_at(sim: Simulation, place: Sequence[float]) -> int:
-    """The node that started there, in mm."""
+    """Returns the node that started at this position, mm."""
     return int(np.abs(sim.model.nodes.x0 - np.array(place) * MM).sum(axis=1).argmin())
 
 
-# Whole parts and ranks
+# Parts and ranks that lose all their tets
 
 
 @pytest.mark.parametrize("form", FORMS)
 @pytest.mark.parametrize("ranks", [2, 3])
 def test_a_rank_that_has_lost_all_its_tets_goes_on(ranks: int, form: Form) -> None:
-    """To the same answer as one rank."""
+    """The answer is that of one rank."""
     case, meshes = scene_of_two()
     case = case.model_copy(update={"numerics": case.numerics.model_copy(update={"pressure": form})})
     lost = on(ranks, case, meshes, lambda sim: np.concatenate([part.id for part in sim.model.blocks]))[1]
@@ -372,7 +379,7 @@ def test_a_rank_that_has_lost_all_its_tets_goes_on(ranks: int, form: Form) -> No
 @pytest.mark.parametrize("erosion", [EROSION, REMOVE], ids=["particles", "remove"])
 @pytest.mark.parametrize("left", [1, 0], ids=["one part", "all parts"])
 def test_a_run_outlives_its_tets(left: int, erosion: schema.Erosion) -> None:
-    """The accounts close, better than to first order of the step, although a loaded face loses its load at once."""
+    """The balances close to better than first order in the step, although a loaded face loses its load at once."""
     worst = []
     for safety in (0.8, 0.2):
         case, meshes = scene_of_two()
@@ -412,7 +419,7 @@ def test_probes_of_what_has_left_are_no_number() -> None:
 
 @pytest.mark.parametrize("erosion", [EROSION, REMOVE], ids=["particles", "remove"])
 def test_no_reference_of_what_has_left_is_met(erosion: schema.Erosion) -> None:
-    """No reference is met, however wide its tolerance; particles have a speed."""
+    """No reference of a part without tets passes, for any tolerance; particles still have a speed."""
     quantities: tuple[Any, ...] = ("plastic_strain_max", "stress_max", "extent", "radius", "speed_mean")
     wide: dict[str, Any] = {"part": "body0", "value": 0.0, "tolerance": 1e9, "source": "-"}
     specs = [schema.Reference(quantity=q, axis="z" if q in quantities[2:] else None, **wide) for q in quantities]
@@ -427,11 +434,12 @@ def test_no_reference_of_what_has_left_is_met(erosion: schema.Erosion) -> None:
     assert met == [False, False, False, False, erosion is EROSION]
 
 
-# Symmetry planes
+# Planes of symmetry
 
 
 def flying(velocity: float, side: float) -> Simulation:
-    """A cube on one side of the plane x = 0 and beside it, and a steady one far away that keeps the step."""
+    """Returns a cube on one side of the plane x = 0, and a second body at rest far away that determines the time
+    step."""
     plane = {"kind": "symmetry", "axis": "x", "parts": ["body0"]}
     motions = [{"velocity": (velocity, 0.0, 0.0), "erosion": EROSION}, {}]
     case = meeting_of(motions, material=STEEL, boundaries=(plane,))
@@ -443,7 +451,8 @@ def flying(velocity: float, side: float) -> Simulation:
 
 @pytest.mark.parametrize("side", [1.0, -1.0])
 def test_a_particle_turns_round_at_a_symmetry_plane(side: float) -> None:
-    """With all of its energy; what starts on the plane is held there first, and has none."""
+    """The particle keeps all of its energy. A node that starts on the plane is held on it before its tets are
+    removed, and has no energy across the plane."""
     sim = flying(-side * 2000.0, side)
     nodes, part = sim.model.nodes, sim.model.blocks[0]
     mine, kinetic = nodes.part == 0, sim.ledger.initial
@@ -464,7 +473,8 @@ def test_mirrors_hold_what_starts_off_the_plane_or_may_leave_it() -> None:
 
 @pytest.mark.parametrize("ranks", [1, 2])
 def test_damage_that_takes_no_tet_is_told(ranks: int) -> None:
-    """The band of damage is narrower than a tet; little damage gives no warning, nor does any after a removal."""
+    """The damage is in a band narrower than a tet. A small damage gives no warning, and there is no warning after a
+    removal."""
     damaged = materials.JohnsonCookDamage(D1=0.05, D2=3.44, D3=-2.12, D4=0.002, D5=0.61)
     assert STEEL_42CRMO4.strength is not None
     law = STEEL_42CRMO4.strength.model_copy(update={"damage": damaged})

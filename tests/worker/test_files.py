@@ -1,4 +1,4 @@
-"""Frames and histories as files: fields, units, times."""
+"""Files of frames and histories: fields, units, times."""
 
 import csv
 import math
@@ -101,7 +101,7 @@ def test_what_is_removed_while_a_run_goes_on_is_told_once(tmp_path: Path) -> Non
 
 
 def test_a_journal_and_a_history_that_are_removed_take_no_more_lines(tmp_path: Path) -> None:
-    """Lines written to an open file without a name would be lost, and the run would end as if they existed."""
+    """Lines written to an open file that was removed would be lost, and the run would end as if they existed."""
     journal, table = Journal(tmp_path, "r"), History(tmp_path, {})
     journal.starting("at first")
     (tmp_path / layout.JOURNAL).unlink()
@@ -135,14 +135,16 @@ def test_parquet_has_the_same_numbers_and_the_units(tmp_path: Path) -> None:
 
 
 def without_tets(nodes: int) -> Model:
-    """Return the model of a rank without tets, because of other ranks or erosion; ``nodes`` of all ranks."""
+    """Return the model of a rank without tets, because other ranks have all tets or all have eroded; ``nodes`` of
+    all ranks."""
     none, points, force, no = np.zeros(0, np.int32), np.zeros((0, 3)), np.zeros((0, 3), np.int64), np.zeros(0)
     mine = Nodes(np.zeros(0, np.int64), none, none, np.zeros(0, bool), points, points, points, no, force, no)
     return Model(mine, nodes_global=nodes)
 
 
 def test_a_frame_may_come_from_ranks_without_tets(tmp_path: Path) -> None:
-    """Rank 0 names the columns: it had none, and the run broke off; nor had a run of which all tets had eroded."""
+    """Rank 0 writes the names of the columns. In an earlier version a run failed if rank 0 had no tets, or if all
+    tets had eroded."""
     model = Patch(free_tets(3, 1)).sim.model
     labels, damage = [np.arange(3)], [np.ones(3)]
 
@@ -161,13 +163,14 @@ def test_a_frame_may_come_from_ranks_without_tets(tmp_path: Path) -> None:
 
 
 def test_principal_stresses() -> None:
-    """Of pure shear in yz, of compression along x with a tension along z, and of a pressure."""
+    """The stresses are pure shear in yz, compression along x with tension along z, and a pressure."""
     stresses = np.array([[0, 0, 0, 0, 5.0, 0], [-3.0, 0, 2.0, 0, 0, 0], [-1.0, -1.0, -1.0, 0, 0, 0]])
     assert principal(stresses) == pytest.approx([5.0, 2.0, -1.0])
 
 
 def test_a_facet_is_damaged_by_the_energy_that_it_has_spent() -> None:
-    """Whole; opened to half of the critical opening (a quarter of the area is left); at its end."""
+    """The facet is whole; opened to half of the critical opening (a quarter of the area under the law is left); and
+    failed."""
     m, strength, critical, knee = 3, 2.0, 6.0, 1.0
     three, nine = np.zeros((m, 3)), np.zeros((m, 3, 3))
     tops = np.repeat([[knee], [knee + 0.5 * critical], [knee + critical]], 3, axis=1)

@@ -1,4 +1,5 @@
-"""Sums that do not depend on their order, and the quantum of the forces: chosen, outgrown, repeated."""
+"""Sums that do not depend on the order of their terms, and the quantum of the forces: its choice, its overflow, and
+the repetition of a sum."""
 
 import math
 from fractions import Fraction
@@ -29,7 +30,7 @@ from .meshes import Floats, block
 
 
 def values(n: int, seed: int) -> Floats:
-    """Columns of one size, of sizes over 30 decades, of numbers that almost cancel, of zeros."""
+    """Returns columns of equal size, of sizes over 30 decades, of numbers that nearly cancel, and of zeros."""
     random = np.random.default_rng(seed)
     even = random.normal(size=n)
     mixed = random.normal(size=n) * 10.0 ** random.uniform(-20.0, 10.0, n)
@@ -58,7 +59,7 @@ def test_sums_do_not_depend_on_the_order() -> None:
 
 
 def test_plain_sums_do_depend_on_it() -> None:
-    """The control: without the limbs the same shuffles give other bits."""
+    """Control of the test: plain sums of the same shuffled terms differ in their bits."""
     columns = values(5000, 2)
     sums = {columns[np.random.default_rng(seed).permutation(5000), 1].cumsum()[-1] for seed in range(5)}
     assert len(sums) > 1
@@ -71,7 +72,8 @@ def test_sums_of_nothing_and_of_one() -> None:
 
 @pytest.mark.parametrize("largest", [1e-9, 0.75, 1.0, 3.0, 1e5, 2.0**40, 1e300])
 def test_scale_leaves_the_stated_headroom(largest: float) -> None:
-    """A power of two; the largest contribution uses all bits but the headroom, and may grow 32-fold."""
+    """The scale is a power of two. The largest contribution uses all bits except the headroom, so it may grow
+    32-fold."""
     scale = scale_for(largest)
     assert math.frexp(scale)[0] == 0.5
     bits = CONTRIBUTION_BITS - HEADROOM_BITS
@@ -83,7 +85,8 @@ def test_scale_leaves_the_stated_headroom(largest: float) -> None:
 
 
 def test_contributions_are_rounded_to_the_nearest_even_integer() -> None:
-    """Up to the last bit of the largest: halves, their neighbours, and numbers of all sizes."""
+    """The rounding is checked up to the last bit of the largest contribution: halves, their neighbours, and numbers
+    of all sizes."""
     edge = 2.0**CONTRIBUTION_BITS
     halves = np.concatenate([np.arange(-9.5, 10.0), [0.0, edge - 0.5, edge - 1.0, 0.5 - edge, 1.0 - edge]])
     sizes = np.random.default_rng(2).normal(size=999) * 2.0 ** np.linspace(-60.0, CONTRIBUTION_BITS - 3.0, 999)
@@ -94,9 +97,8 @@ def test_contributions_are_rounded_to_the_nearest_even_integer() -> None:
 
 
 def collision(form: Form, floor: float) -> tuple[Simulation, int]:
-    """A copper cube that flies free, without stress, and then hits a wall; and how many sums were repeated.
-
-    ``floor`` is the force, N, up to which no quantum is refined.
+    """Returns a copper cube without stress that flies and then hits a wall, and the number of repeated sums.
+    ``floor``: force, N, below which the quantum is not refined.
     """
     wall = {"kind": "wall", "point": (0.0, 0.0, -1e-4), "normal": (0.0, 0.0, 1.0)}
     case = scene(COPPER, form, end=1.5e-6, velocity=(0.0, 0.0, -200.0), boundaries=(wall,))
@@ -119,7 +121,8 @@ def collision(form: Form, floor: float) -> tuple[Simulation, int]:
 
 @pytest.mark.parametrize("form", FORMS)
 def test_a_sum_that_outgrows_its_quantum_is_repeated(form: Form) -> None:
-    """Forces grow far beyond 64-fold at the impact: repeated sums give what a coarse quantum gives from the start."""
+    """Forces grow more than 64-fold at the impact. Repeated sums are equal to the sums with a coarse quantum from
+    the start."""
     fine, repeats = collision(form, 0.0)
     coarse, none = collision(form, 1e4)
     assert 1 <= repeats <= 4
@@ -144,7 +147,8 @@ def test_groups_have_their_own_sums_and_do_not_change_those_of_all() -> None:
 
 @pytest.mark.parametrize("odd", [math.nan, math.inf, -math.inf])
 def test_a_sum_with_a_value_that_is_not_finite_is_not_a_number(odd: float) -> None:
-    """Of that column alone, in all and in each group, whether the value comes first or last."""
+    """Only the sum of this column is not a number, in the whole and in each group, for a value at the beginning or
+    at the end."""
     for row in (0, 4999):
         columns = values(5000, 5)
         whole = exact_sums(SerialComm(), columns)
@@ -158,7 +162,8 @@ def test_a_sum_with_a_value_that_is_not_finite_is_not_a_number(odd: float) -> No
 
 @pytest.mark.parametrize("share", [0.49, -0.49])
 def test_the_low_limb_of_a_tally_does_not_grow(share: float) -> None:
-    """Values far below a quantum of the high limb are in the low one alone, where 2^34 of them would wrap."""
+    """Values far below a quantum of the high limb are in the low limb only; without a carry, 2^34 such values would
+    overflow it."""
     tally, small = Tally(np.array([1.0])), share * 2.0**-29
     for _ in range(50):
         tally.add(np.full((20, 1), small))
@@ -167,7 +172,7 @@ def test_the_low_limb_of_a_tally_does_not_grow(share: float) -> None:
 
 
 def test_where_a_tally_carries_over_changes_no_bit() -> None:
-    """One sum in many additions, or of many ranks, of which each has carried over what it had."""
+    """A sum in many additions, or over many ranks that have each carried before, has the same bits."""
     columns = values(5000, 3)[:, :2]
     whole, parts = Tally(np.array([10.0, 1e9])), [Tally(np.array([10.0, 1e9])) for _ in range(3)]
     whole.add(columns)
@@ -178,14 +183,15 @@ def test_where_a_tally_carries_over_changes_no_bit() -> None:
 
 
 def limbs_before(values: Floats, scale: float) -> tuple[int, int]:
-    """The two sums by numpy's own rounding."""
+    """Returns the two sums with the rounding of numpy."""
     scaled = values * scale
     high = np.rint(scaled)
     return int(high.astype(np.int64).sum()), int(np.rint((scaled - high) * 2.0**30).astype(np.int64).sum())
 
 
 def odd_values() -> list[Floats]:
-    """Columns of all sizes up to the largest float, halves of a quantum of either limb, their neighbours, and zeros."""
+    """Returns columns of all sizes up to the largest float, halves of a quantum of each limb, their neighbours, and
+    zeros."""
     random = np.random.default_rng(6)
     sizes = random.normal(size=999) * 2.0 ** random.integers(-300, 300, 999)
     halves = np.concatenate([np.arange(-9.5, 10.0), np.arange(-9.5, 10.0) * 2.0**-30, [2.0**29 + 0.5, 0.5 - 2.0**30]])
@@ -199,7 +205,7 @@ def odd_values() -> list[Floats]:
 
 @pytest.mark.parametrize("values", odd_values())
 def test_limbs_are_those_of_numpys_rounding(values: Floats) -> None:
-    """To the integer, of values of any size below the scale's bound and of any number of them."""
+    """The limbs agree exactly for values of any size below the bound of the scale, and for any number of values."""
     largest = float(np.abs(values).max(initial=0.0))
     assert fixed_point.magnitude(fixed_point.most(values)) == largest
     scale = math.ldexp(1.0, 30 - max(math.frexp(largest)[1], -993))
@@ -214,13 +220,13 @@ def test_what_is_not_finite_is_above_all_that_is(odd: float) -> None:
 
 
 def test_the_smallest_floats_have_sums() -> None:
-    """Their quantum is that of 2^-993: what is below it rounds away."""
+    """The quantum of these sums is that of 2^-993; smaller values are rounded to zero."""
     tiny = np.array([[2.0**-1000, 5e-324], [2.0**-1001, 0.0]])
     assert exact_sums(SerialComm(), tiny).tolist() == [1.5 * 2.0**-1000, 0.0]
 
 
 def test_sums_of_limbs_are_rounded_once() -> None:
-    """Those below 2^53, and greater ones, as Python's integers are; of each sign, halves to even."""
+    """Sums below and above 2^53, of either sign, are rounded in the same way as Python's integers: halves to even."""
     random = np.random.default_rng(7)
     for bits in (10, 50, 53, 54, 62):
         high = random.integers(-(2**bits), 2**bits, 200)
@@ -232,7 +238,7 @@ def test_sums_of_limbs_are_rounded_once() -> None:
 
 
 def test_ragged_columns_and_integers_go_along() -> None:
-    """Columns of any lengths have the sums that each has alone, in every group beside others."""
+    """Columns of different lengths have the same sums as each column by itself, in every group."""
     columns = [values(300, 8)[:, 0], np.zeros(0), values(70, 9)[:, 1]]
     ragged = Ragged(np.concatenate(columns), np.array([0, 300, 300, 370]), 2)
     group = (np.arange(40) % 2).astype(np.int32)

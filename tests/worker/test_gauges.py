@@ -1,4 +1,5 @@
-"""Gauges against plain numpy, on any ranks the same bits: sums, pushes of parts, fragments, holes, cones."""
+"""Gauges compared with plain numpy, with the same bits on any number of ranks: sums, contact forces of parts,
+fragments, holes, cones."""
 
 import math
 from pathlib import Path
@@ -49,7 +50,8 @@ def bits(values: Floats) -> bytes:
 
 @pytest.mark.parametrize("ranks", [1, 3])
 def test_sums_are_those_of_the_nodes(ranks: int) -> None:
-    """Of the part, of what starts in a box, and of what is beyond a plane by now; a body that spins and flies."""
+    """The sums include the whole part, the nodes that start in a box, and the nodes that are beyond a plane at
+    present; the body spins and moves."""
     box: dict[str, Any] = {"low": (-1.0, -1.0, -1.0), "high": (1.0, 1.5e-3, 1.0)}
     probes = [probe(field) for field in FIELDS]
     probes += [probe(field, f"box_{field}", **box) for field in FIELDS]
@@ -146,7 +148,8 @@ def _three() -> tuple[schema.Case, list[TetMesh]]:
 
 @pytest.mark.parametrize("ranks", [1, 3])
 def test_what_parts_push_each_other_with_is_the_change_of_their_momentum(ranks: int, tmp_path: Path) -> None:
-    """Action equals reaction, to the bit; the sum over all partners is the change of momentum; through a checkpoint."""
+    """The impulses of two parts are equal and opposite to the bit, and the sum over all partners is the change of
+    momentum, also after a checkpoint."""
     case, meshes = _three()
 
     def momenta(sim: Simulation) -> Floats:
@@ -209,7 +212,7 @@ def test_nothing_is_booked_by_pairs_that_nobody_asks_for() -> None:
 
 @pytest.mark.parametrize("ranks", [1, 2])
 def test_a_hole_is_as_wide_as_what_the_rays_are_free_to_go(ranks: int) -> None:
-    """A quarter of a ring, of which the rays of the other three are left out, that is stretched to an ellipse."""
+    """The hole is a quarter of a ring that is stretched to an ellipse; rays in the other three quarters are omitted."""
     line: dict[str, Any] = {"axis": "z", "at": 0.4e-3}
     case = scene(COPPER, probes=(probe("hole_width", **line), probe("hole_diameter", **line)))
     mesh = ring(2, 24, 10e-3, 14e-3, 1e-3)
@@ -224,7 +227,7 @@ def test_a_hole_is_as_wide_as_what_the_rays_are_free_to_go(ranks: int) -> None:
     told = on(ranks, case, [mesh], work)
     assert len({bits(each) for each in told}) == 1
     flat = np.cos(np.pi / 96.0)
-    area = 24.0 * 0.5 * np.sin(np.pi / 48.0)  # of the polygon, of a quarter of the circle of radius 1
+    area = 24.0 * 0.5 * np.sin(np.pi / 48.0)  # area of the polygon, for a quarter of the circle of radius 1
     width, diameter = 20e-3, 20e-3 * math.sqrt(area / (np.pi / 4.0))
     assert told[0][0] == pytest.approx([width * flat, diameter], rel=1e-3)
     assert told[0][1] == pytest.approx([width, diameter * math.sqrt(1.4)], rel=2e-3)
@@ -232,7 +235,8 @@ def test_a_hole_is_as_wide_as_what_the_rays_are_free_to_go(ranks: int) -> None:
 
 
 def test_rays_are_as_long_as_the_way_to_the_first_tet() -> None:
-    """By points on each ray, and whether they lie in a tet, of a turned block that the line is in, and beside."""
+    """The lengths are compared with points on each ray that lie in a tet, for a rotated block and for lines that
+    pass it."""
     mesh = moved(block((4, 4, 2), SIZE, seed=7), (1e-3, -2e-3, 0.0))
     for origin in (np.array([0.0, 0.0, 0.7e-3]), np.array([3e-3, 0.1e-3, 1.0e-3]), np.array([2e-3, 0.0, 5e-3])):
         found = rays.reach(mesh.points, mesh.tets.astype(np.uint32), origin, 2)
@@ -274,12 +278,12 @@ def test_a_cone_has_the_angle_of_the_areas_that_have_left(ranks: int) -> None:
         on_face = (np.abs(plate.points[plate.tets][:, :, 2] - height) < 1e-9).sum(axis=1) == 3
         radii.append(math.sqrt(np.isin(np.flatnonzero(on_face), gone).sum() * 0.125e-6 / math.pi))
     assert told[0][1] == pytest.approx(2.0 * math.atan((radii[1] - radii[0]) / 2e-3), rel=1e-12)
-    assert math.degrees(told[0][1]) == pytest.approx(70.0, abs=8.0)  # half a cube of four through the plate
+    assert math.degrees(told[0][1]) == pytest.approx(70.0, abs=8.0)  # half a cube, with four cubes through the plate
 
 
 @pytest.mark.parametrize("ranks", [1, 2])
 def test_the_heaviest_fragment_beyond_a_plane_is_found(ranks: int) -> None:
-    """A bar that loses two layers: three pieces, of which the plane has the two last."""
+    """A bar that loses two layers consists of three pieces; the last two are beyond the plane."""
     bar = block((12, 2, 2), SIZE, shake=0.0)
     centre = bar.points[bar.tets].mean(axis=1)[:, 0] / SIZE
     gone = np.flatnonzero(((centre > 4.0) & (centre < 5.0)) | ((centre > 6.0) & (centre < 7.0)))

@@ -1,4 +1,4 @@
-"""Records of the groups of a run, and the costs of tets, candidates and ranks."""
+"""Records of the groups of a run, and the costs of tets, candidate pairs and ranks."""
 
 from typing import Any
 
@@ -55,7 +55,7 @@ def test_a_mesh_of_few_tets_has_a_group_for_each() -> None:
     assert sorted(piece.tet_group) == list(range(12))
 
 
-# What is counted
+# Contents of a record
 
 
 BRITTLE = materials.Material(
@@ -64,11 +64,11 @@ BRITTLE = materials.Material(
 )  # fmt: skip
 MESHES = [block((4, 4, 4), MM, seed=3), moved(block((5, 5, 3), MM, seed=4), (-0.5 * MM, -0.5 * MM, 4.01 * MM))]
 TETS = Costs(np.array([1e-9, 1e-6]), 0.0, 0.0, 0.0)
-"""1 ns for a tet of the first body, 1 us for one of the second."""
+"""1 ns for a tet of the first body, 1 us for a tet of the second body."""
 
 
 def breaking() -> schema.Case:
-    """A brittle block hits another that wears out."""
+    """Returns a brittle block that hits an eroding block."""
     motions: list[dict[str, Any]] = [
         {"velocity": (0.0, 0.0, 150.0), "fracture": schema.Fracture(delay=0.0)}, {"erosion": schema.Erosion()},
     ]  # fmt: skip
@@ -76,7 +76,8 @@ def breaking() -> schema.Case:
 
 
 def course(sim: Simulation) -> tuple[list[dict[str, Any]], Simulation]:
-    """Records of a run in which nodes separate, tets leave twice, and all is cut anew between."""
+    """Returns the records of a run in which nodes separate, tets are removed twice, and the mesh is cut again in
+    between."""
     balance = Balance.of(sim)
     groups = Groups(sim, 1.5)
     step.prepare(sim)
@@ -90,7 +91,8 @@ def course(sim: Simulation) -> tuple[list[dict[str, Any]], Simulation]:
 
 
 def test_groups_are_recorded_alike_on_any_number_of_ranks(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Of the same tets and nodes, moved or not; what has left is in none, and copies are where their parents were."""
+    """Each group contains the same tets and nodes for any number of ranks, also after motion. Removed nodes are in
+    no group, and copies are in the group of their parents."""
     case = breaking()
     monkeypatch.setattr(Meter, "costs", lambda *_: TETS)
     (first, last), sim = on(1, case, MESHES, course)[0]
@@ -119,11 +121,11 @@ def test_a_record_is_due_at_times_of_the_run_and_costs_little_of_it() -> None:
     ]  # fmt: skip
 
 
-# What it costs
+# Costs of groups and ranks
 
 
 def test_costs_add_up_to_the_work_of_all_ranks() -> None:
-    """Groups and ranks have all of what was measured."""
+    """The costs of groups and of ranks together are all measured work."""
     case = breaking()
 
     def measured(sim: Simulation) -> tuple[float, float]:
@@ -143,7 +145,7 @@ def test_costs_add_up_to_the_work_of_all_ranks() -> None:
 
 
 def test_a_cut_that_one_look_calls_for_is_weighed_by_what_was_measured_before_it() -> None:
-    """All of the loss that calls for it is seen at once."""
+    """The whole loss that causes the cut occurs between two reports."""
 
     def predicted(sim: Simulation) -> tuple[str | None, float]:
         balance = Balance.of(sim)
@@ -161,7 +163,8 @@ def test_a_cut_that_one_look_calls_for_is_weighed_by_what_was_measured_before_it
 
 
 def test_candidates_cost_what_they_have_cost_where_they_are() -> None:
-    """The cost is within a factor of four of the mean: a rank with few candidates measures mostly noise."""
+    """The cost of a candidate is within a factor of four of the mean, because a rank with few candidates measures
+    mostly noise."""
     assert _candidates(np.array([4.0, 1.0]), np.array([10.0, 10.0])) == pytest.approx([2.5, 10.0])
     assert _candidates(np.array([4.0, 4.0]), np.array([8.0, 12.0])) == pytest.approx([2.0, 3.0])
     assert _candidates(np.array([100.0, 0.0]), np.array([10.0, 10.0])) == pytest.approx([0.1, 0.8])

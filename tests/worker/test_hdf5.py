@@ -1,4 +1,4 @@
-"""Failed writes of HDF5 files: an error names the file, and the process survives."""
+"""Failed writes of HDF5 files: an error names the file, and the process continues."""
 
 import subprocess
 import sys
@@ -27,7 +27,7 @@ try:
 except OSError as error:
     print(storage.failed(error), error.filename)
 """
-"""Eight tables of 45 kB as they are packed."""
+"""Eight tables with 45 kB each after compression."""
 
 
 @pytest.mark.parametrize("room", [0, 100, 3000, 60_000, 300_000, 370_000])

@@ -1,4 +1,4 @@
-"""Arrays that grow and are made anew leave no holes in the memory of a rank."""
+"""Arrays that grow and are allocated again leave no unused memory in the heap of a rank."""
 
 import platform
 import subprocess
@@ -24,7 +24,7 @@ for n in range(200):
     del table
 print(resident() - before)
 """
-"""A table of 1 to 10 MB is made anew 200 times, and beside each time 8 kB stay."""
+"""A table of 1 to 10 MB is allocated again 200 times, and after each allocation 8 kB remain in use."""
 
 
 @pytest.mark.skipif(platform.libc_ver()[0] != "glibc", reason="only glibc raises its bound")

@@ -1,4 +1,4 @@
-"""Averaged pressures with an equation of state that sees heat, which is a mean over nodes, too."""
+"""Averaged pressures with an equation of state that depends on heat: heat is averaged over nodes too."""
 
 import numpy as np
 import pytest
@@ -30,7 +30,8 @@ def test_a_free_tet_has_its_own_heat(form: Form) -> None:
 
 
 def test_heat_is_a_mean_over_nodes() -> None:
-    """Of hot and cold tets side by side, by volume; then over the four nodes."""
+    """Hot and cold tets are adjacent: heat is averaged by volume at the nodes, and then over the four nodes of a
+    tet."""
     mesh = block((4, 4, 4), MM)
     patch = Patch(mesh, COPPER_GAS, "nodal")
     own = np.random.default_rng(1).uniform(0.0, 1e5, len(mesh.tets))
@@ -45,7 +46,7 @@ def test_heat_is_a_mean_over_nodes() -> None:
 
 @pytest.mark.parametrize("form", ["nodal", "split"])
 def test_a_bar_that_is_pulled_keeps_its_elastic_energy(form: Form) -> None:
-    """Dissipation is no more than the work that was done: the elastic part of the ledger does not fall below zero."""
+    """The dissipation is at most the work done: the term ``elastic`` does not fall below zero."""
     low, high = {"low": (-1.0,) * 3, "high": (1.0, 1.0, 0.1 * MM)}, {"low": (-1.0, -1.0, 5.9 * MM), "high": (1.0,) * 3}
     held = [{"kind": "velocity", "x": 0.0, "y": 0.0, "z": z, **box} for z, box in ((-150.0, low), (150.0, high))]
     case = scene(STEEL_4340, form, end=15e-6, boundaries=held, velocity=(0.0, 0.0, 0.0), viscosity={})

@@ -1,4 +1,4 @@
-"""The elastic law with a potential: its stress against the formulas, its energy, its stable step."""
+"""The elastic law with a potential: its stress compared with the formulas, its energy, and its stable step."""
 
 import math
 from typing import Any
@@ -21,7 +21,7 @@ N = 400
 
 
 def deformed(seed: int, size: float) -> tuple[Patch, Floats]:
-    """Free tets with random displacement gradients of this size, and their deformation gradients (n, 3, 3)."""
+    """Returns free tets with random displacement gradients of this size, and their deformation gradients (n, 3, 3)."""
     patch = Patch(free_tets(N, seed))
     F = np.eye(3) + size * np.random.default_rng(seed).uniform(-1.0, 1.0, (N, 3, 3))
     assert (np.linalg.det(F) > 0.05).all()
@@ -30,7 +30,7 @@ def deformed(seed: int, size: float) -> tuple[Patch, Floats]:
 
 
 def carry(patch: Patch, F: Floats) -> None:
-    """To the deformation gradients F in one pass without velocity."""
+    """Deforms the tets to the deformation gradients F in one pass without velocity."""
     patch.nodes.x[patch.tets] = np.einsum("nij,naj->nai", F, patch.corners(patch.nodes.x0))
     patch.advance(0.0)
 
@@ -41,7 +41,7 @@ def volumes(patch: Patch) -> Floats:
 
 @pytest.mark.parametrize("power", [-24.0, -8.0, -2.0, -1.0, -0.1, 0.0, 1e-3, 0.15, 0.5, 1.0, 2.0, 4.0, 8.0, 24.0])
 def test_sixth_root(power: float) -> None:
-    """Also where a volume has changed by a factor of 10^12."""
+    """The accuracy holds also if a volume has changed by a factor of 10^12."""
     u = 10.0**power
     assert math.isclose(inverse_sixth_root(u), u ** (-1.0 / 6.0), rel_tol=1e-15)
 
@@ -68,7 +68,7 @@ def test_stress_and_energy_are_those_of_the_formulas(size: float) -> None:
 
 
 def test_stress_is_the_slope_of_the_energy() -> None:
-    """Central differences of the energy along random displacements, against the forces on the nodes."""
+    """Central differences of the energy along random displacements are compared with the nodal forces."""
     patch, _ = deformed(2, 0.2)
     patch.put(PRESSURE, 0.0)
     patch.advance(0.0)
@@ -87,7 +87,7 @@ def test_stress_is_the_slope_of_the_energy() -> None:
 
 
 def test_small_strains_keep_their_digits() -> None:
-    """At a strain of 1e-9, 2 G dev E and G V E : E to what the positions allow."""
+    """At a strain E of 1e-9 the stress is 2 G dev E and the energy G V E : E, to the accuracy of the positions."""
     patch, F = deformed(4, 1e-9)
     strain = formulas.deviator(F - np.eye(3))
     stress = 2.0 * SHEAR * strain
@@ -97,7 +97,7 @@ def test_small_strains_keep_their_digits() -> None:
 
 
 def test_the_law_is_henckys_to_the_third_order() -> None:
-    """The difference of J s and 2 G dev ln V falls to an eighth at half of the strain."""
+    """The difference between J s and 2 G dev ln V is eight times smaller at half of the strain."""
     wrong = []
     for size in (0.2, 0.1, 0.05):
         _, F = deformed(5, size)
@@ -109,7 +109,7 @@ def test_the_law_is_henckys_to_the_third_order() -> None:
 
 
 def test_a_cycle_leaves_nothing() -> None:
-    """Out and back on another way: a rate form is left with a stress, a potential is not."""
+    """After a strain and a return along another path, a rate form has a residual stress, but the potential has none."""
     patch = Patch(free_tets(N, 6))
     random = np.random.default_rng(6)
     for _ in range(20):
@@ -123,7 +123,8 @@ def test_a_cycle_leaves_nothing() -> None:
 
 
 def frequency(patch: Patch) -> float:
-    """The highest of one tet, 1/s: differences of the forces, with the pressure of its volume."""
+    """Returns the highest frequency of one tet, 1/s, from differences of the forces, with the pressure of its
+    volume."""
     middle = patch.nodes.x.copy()
     size = float(np.cbrt(volumes(patch)[0]))
 
@@ -146,8 +147,8 @@ def frequency(patch: Patch) -> float:
 
 @pytest.mark.parametrize("size", [0.02, 0.1, 0.2])
 def test_bound_of_strained_tets_is_near_the_exact_limit(size: float) -> None:
-    """Tangent stiffness of strained tets of many shapes. What the stress itself adds is not in the bound: 2.5 % of the
-    step at strains of 0.2, for which the default ``dt_safety`` has room four times over.
+    """Tangent stiffness of strained tets of many shapes. The bound does not include the geometric stiffness of the
+    stress: 2.5 % of the step at strains of 0.2, a quarter of the margin of the default ``dt_safety``.
     """
     random, shares = np.random.default_rng(7), []
     heap = free_tets(60, 7)
@@ -162,7 +163,7 @@ def test_bound_of_strained_tets_is_near_the_exact_limit(size: float) -> None:
 
 
 def test_a_stretched_regular_tet_is_stiffer() -> None:
-    """The bound follows the shear modulus of the strained state: (G + 2 W) / J a volume."""
+    """The bound follows the shear modulus of the strained state, (G + 2 W) / J per volume."""
     patch = Patch(TetMesh(REGULAR, np.array([[0, 1, 2, 3]], np.int32)))
     F = np.diag([1.3, 0.9, 0.95])[None]
     carry(patch, F)
@@ -185,8 +186,8 @@ def test_a_tet_keeps_the_volume_of_its_positions(form: Form, material: Material)
 
 
 def rung(material: Material) -> tuple[float, float]:
-    """Energy, kinetic and of the shape, of free tets of a millimetre whose nodes began with up to 30 m/s, over that of
-    the start: the largest of the last of 10,000 steps; and how far p / K is from -ln J.
+    """Returns kinetic plus elastic energy of free tets of 1 mm, whose nodes started with up to 30 m/s, over the
+    initial energy: the largest value of the last of 10,000 steps; and the difference between p / K and -ln J.
     """
     heap = free_tets(60, 8)
     mesh = TetMesh(heap.points / np.repeat(np.cbrt(heap.volumes()), 4)[:, None] * 1e-3, heap.tets)
@@ -211,7 +212,7 @@ def rung(material: Material) -> tuple[float, float]:
 
 @pytest.mark.parametrize("material", [STEEL, HARD], ids=["from the shape", "by rates"])
 def test_what_rings_keeps_its_energy(material: Material) -> None:
-    """The pressure, which is summed, stays the function of the volume."""
+    """The pressure, which is a sum of increments, remains a function of the volume."""
     energy, apart = rung(material)
     print(f"energy {energy:.6f}; pressure {apart:.1e}")
     assert energy == pytest.approx(1.0, abs=1e-3)

@@ -1,4 +1,4 @@
-"""Look-ups by global id: the table and the bisection find the same."""
+"""Look-ups by global id: the table and the bisection give the same result."""
 
 import numpy as np
 import pytest

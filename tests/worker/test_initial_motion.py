@@ -15,19 +15,20 @@ MESH = block((4, 3, 3), 1e-3, seed=5)
 
 
 def started(**keys: Any) -> Floats:
-    """(n, 3) the velocities of the start, m/s."""
+    """Returns (n, 3) the initial velocities, m/s."""
     return whole_of(MESH, scene(**keys)).velocity
 
 
 def test_the_sequence_is_splitmix64() -> None:
-    """The first five numbers for the seed 1234567 of the reference implementation."""
+    """The first five numbers for the seed 1234567 are those of the reference implementation."""
     assert splitmix64(np.arange(5), 1234567).tolist() == [
         6457827717110365317, 3203168211198807973, 9817491932198370423, 4593380528125082431, 16408922859458223821,
     ]  # fmt: skip
 
 
 def test_uniform_is_uniform() -> None:
-    """A million numbers: mean, variance, correlation of neighbours within four standard errors; no bias in 64 bins."""
+    """For a million numbers the mean, the variance and the correlation of neighbours are within four standard
+    errors, and 64 bins show no bias."""
     u = uniform(np.arange(1_000_000), 7)
     assert 0.0 <= u.min() < 1e-5
     assert 1.0 - 1e-5 < u.max() < 1.0

@@ -1,4 +1,5 @@
-"""Johnson and Cook's damage: the strain to fracture of a tet is that of the formula; erosion takes what is done for."""
+"""Damage of Johnson and Cook: the fracture strain of a tet is that of the formula, and erosion removes fully damaged
+tets."""
 
 import math
 
@@ -28,14 +29,15 @@ RATE, DT, TEMPERATURE = 2e4, 1e-8, 600.0
 
 
 def fracture_strain(tension: float, rate: float) -> float:
-    """(D1 + D2 e^(D3 t)) (1 + D4 ln rate) (1 + D5 T*)."""
+    """Returns (D1 + D2 e^(D3 t)) (1 + D4 ln rate) (1 + D5 T*)."""
     hot = (TEMPERATURE - LAW.reference_temperature) / (LAW.melt_temperature - LAW.reference_temperature)
     shape = DAMAGED.D1 + DAMAGED.D2 * math.exp(DAMAGED.D3 * min(tension, 1.5))
     return shape * (1.0 + DAMAGED.D4 * math.log(rate)) * (1.0 + DAMAGED.D5 * hot)
 
 
 def sheared(tension: float, steps: int, material: Material = STEEL) -> Patch:
-    """A tet that flows at a constant rate, in pure shear, under a mean stress of ``tension`` times its strength."""
+    """Returns a tet that flows at a constant rate in pure shear, under a mean stress of ``tension`` times its
+    strength."""
     point = Patch(TetMesh(REGULAR, np.array([[0, 1, 2, 3]], np.int32)), material, temperature=TEMPERATURE)
     hot = (TEMPERATURE - LAW.reference_temperature) / (LAW.melt_temperature - LAW.reference_temperature)
     point.put(PRESSURE, -tension * LAW.A * (1.0 - hot**LAW.m))
@@ -49,7 +51,8 @@ def sheared(tension: float, steps: int, material: Material = STEEL) -> Patch:
 
 @pytest.mark.parametrize("tension", [1.0 / 3.0, 0.0, -1.0 / 3.0, 1.4, 3.0, -5.0])
 def test_the_fracture_strain_is_that_of_the_formula(tension: float) -> None:
-    """In tension, in shear, under pressure, and where the tension is cut."""
+    """The fracture strain is checked in tension, in shear, under pressure, and at the upper limit of the tension
+    ratio."""
     one, two = sheared(tension, 60), sheared(tension, 80)
     strain = two.get(PLASTIC_STRAIN)[0] - one.get(PLASTIC_STRAIN)[0]
     grown = two.get(DAMAGE)[0] - one.get(DAMAGE)[0]
@@ -65,13 +68,14 @@ def test_damage_ends_at_one_and_takes_no_strength_by_default() -> None:
 
 
 def softened(softening: float, **keys: float) -> Material:
-    """The steel, whose damage takes this share of its flow stress; with other constants of its strength."""
+    """Returns the steel with ``softening`` and other constants of its strength."""
     damage = DAMAGED.model_copy(update={"softening": softening})
     return STEEL.model_copy(update={"strength": LAW.model_copy(update={"damage": damage, **keys})})
 
 
 def test_damage_takes_its_share_of_the_flow_stress() -> None:
-    """Of a metal that does not harden: A (1 - T*^m) (1 - s D), with the D of the beginning of the step."""
+    """A metal without hardening has the flow stress A (1 - T*^m) (1 - s D), with the damage D at the beginning of
+    the step."""
     before, after = (sheared(1.4, steps, softened(0.3)) for steps in (600, 601))
     damage = before.get(DAMAGE)[0]
     hot = (TEMPERATURE - LAW.reference_temperature) / (LAW.melt_temperature - LAW.reference_temperature)
@@ -82,7 +86,8 @@ def test_damage_takes_its_share_of_the_flow_stress() -> None:
 
 
 def test_a_metal_that_hardens_heats_and_softens_follows_an_integration_of_its_law() -> None:
-    """Plain integration of (A + B e^n)(1 + C ln rate)(1 - T*^m)(1 - s D) over the strain, by 20,000 midpoints."""
+    """The reference is the integral of (A + B e^n)(1 + C ln rate)(1 - T*^m)(1 - s D) over the strain, with 20,000
+    midpoints."""
     constants = {"B": 600e6, "C": 0.01, "m": 1.0, "taylor_quinney": 0.9}
     law = LAW.model_copy(update=constants)
     point = sheared(0.0, 3000, softened(0.3, **constants))
@@ -102,8 +107,8 @@ def test_a_metal_that_hardens_heats_and_softens_follows_an_integration_of_its_la
 
 
 def fast_shear(softening: float) -> tuple[float, float]:
-    """Plastic strains at which the adiabatic flow stress of weldox_460e is largest, and at which it breaks: shear at
-    RATE without pressure, by plain integration.
+    """Returns the plastic strain at which the adiabatic flow stress of weldox_460e is largest, and the strain at
+    which it breaks, in shear at RATE without pressure, by numerical integration.
     """
     metal = library()["weldox_460e"]
     law = metal.strength
@@ -122,7 +127,7 @@ def fast_shear(softening: float) -> tuple[float, float]:
 
 
 def test_weldox_loses_strength_before_it_breaks_in_fast_shear_by_its_damage_alone() -> None:
-    """A shear band does not narrow while the flow stress rises: no localisation without softening."""
+    """A shear band does not become narrower while the flow stress rises: without softening no localisation occurs."""
     (plain, fracture), (softer, _) = fast_shear(0.0), fast_shear(0.3)
     print(f"largest flow stress at {plain:.2f}, with softening at {softer:.2f}; fracture at {fracture:.2f}")
     assert plain > 1.1 * fracture

@@ -1,4 +1,4 @@
-"""Johnson-Holmquist 2 against an independent integration: single tets in uniaxial strain and in tension."""
+"""Johnson-Holmquist 2 compared with an independent integration: single tets in uniaxial strain and in tension."""
 
 import math
 from itertools import pairwise
@@ -19,11 +19,11 @@ from .meshes import Floats, block, free_tets
 NAMES = ("float_glass_jh2", "alumina_995_jh2", "boron_carbide_jh2", "silicon_carbide_jh2")
 RATE = 1e5
 SOFT = 2e-6
-"""Overstress of the reference, over 3 G: a Maxwell element, so that one ODE is the solution."""
+"""Overstress of the reference over 3 G. The reference is a Maxwell element, so that one ODE gives the solution."""
 
 
 def constants(name: str) -> tuple[Material, JohnsonHolmquist, float, float]:
-    """A material with its law, bulk and shear modulus, Pa."""
+    """Returns a material with its law, and its bulk and shear modulus, Pa."""
     made = library()[name]
     assert isinstance(made.strength, JohnsonHolmquist)
     young, poisson = made.elastic.young, made.elastic.poisson
@@ -31,7 +31,7 @@ def constants(name: str) -> tuple[Material, JohnsonHolmquist, float, float]:
 
 
 def strengths(law: JohnsonHolmquist, p: float, rate: float) -> tuple[float, float]:
-    """Intact and fractured, Pa, as they are published."""
+    """Returns the published intact and fractured strength, Pa."""
     fast = 1.0 + law.C * math.log(max(rate / law.reference_rate, 1.0))
     star, tension = p / law.pressure_hel, law.tension / law.pressure_hel
     intact = law.A * max(star + tension, 0.0) ** law.N * fast
@@ -41,9 +41,8 @@ def strengths(law: JohnsonHolmquist, p: float, rate: float) -> tuple[float, floa
 
 
 def reference(name: str, strain: float) -> tuple[Floats, Floats]:
-    """Times, and (5, n) deviator along z, bulking, damage, plastic strain, pressure: the law as an ODE, by scipy.
-
-    A tet is shortened to e^-strain and then released by a quarter of that.
+    """Returns times, and (5, n) deviator along z, bulking, damage, plastic strain and pressure: the law as an ODE,
+    solved by scipy. A tet is shortened to e^-strain and then released by a quarter of this strain.
     """
     _, law, bulk, shear = constants(name)
 
@@ -94,7 +93,8 @@ def reference(name: str, strain: float) -> tuple[Floats, Floats]:
 
 
 def driven(name: str, strain: float, every: int) -> tuple[Floats, Patch]:
-    """The same of a tet of the worker, ``every`` steps for each of the 500 times; and the tet at the end."""
+    """Returns the same quantities of a tet of the worker, with ``every`` steps for each of the 500 times, and the
+    tet at the end."""
     made, *_ = constants(name)
     mesh = free_tets(1, 3)
     patch = Patch(mesh, made)
@@ -112,10 +112,9 @@ def driven(name: str, strain: float, every: int) -> tuple[Floats, Patch]:
 
 @pytest.mark.parametrize("name", [name for name in NAMES if not name.startswith("boron")])
 def test_uniaxial_strain_follows_an_independent_integration(name: str) -> None:
-    """Twice as far as the elastic limit, and a quarter of the way back.
-
-    Boron carbide collapses at its limit within a few steps, whatever the step (its fracture strain is a tenth of the
-    elastic strain that is set free): the pressure does not follow its bulking in between, as that of the ODE does.
+    """The strain is twice the elastic limit, followed by a release of a quarter. Boron carbide fails at its elastic
+    limit within a few steps of any size, because its fracture strain is a tenth of the released elastic strain.
+    During this failure its pressure does not follow the bulking as in the ODE.
     """
     _, law, bulk, shear = constants(name)
     strain = 2.0 * law.hel / (bulk + 4.0 / 3.0 * shear)
@@ -130,7 +129,7 @@ def test_uniaxial_strain_follows_an_independent_integration(name: str) -> None:
 
 @pytest.mark.parametrize("name", NAMES)
 def test_what_becomes_bulking_is_not_booked_as_plastic_work(name: str) -> None:
-    """Without pressure only the deviator holds energy, V s : s / 4 G: the work less the plastic work."""
+    """Without pressure only the deviator stores energy, V s : s / 4 G, which is the work minus the plastic work."""
     made, law, bulk, shear = constants(name)
     mesh = free_tets(1, 3)
     patch, dt, new = Patch(mesh, made), 1e-9, 1.0
@@ -195,9 +194,8 @@ def test_the_answer_of_a_tet_does_not_depend_on_its_chunk() -> None:
 
 @pytest.mark.parametrize("form", ["nodal", "split"])
 def test_a_block_that_crumbles_keeps_its_elastic_energy(form: Form) -> None:
-    """Alumina thrown against a wall: where tension ends at each node what is left of the work is not negative.
-
-    With the end of the mean instead, the elastic energy of 11 J of impact came to -1.0 J and a tet was crushed.
+    """Alumina hits a wall. With a tensile cut-off at each node the elastic energy is never negative. With a cut-off
+    at the mean strain the elastic energy reached -1.0 J of 11 J, and a tet was crushed.
     """
     wall = [{"kind": "wall", "point": (0.0, 0.0, 0.0), "normal": (0.0, 0.0, 1.0)}]
     case = scene(

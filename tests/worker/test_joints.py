@@ -29,13 +29,13 @@ PULLED = [
     {"kind": "velocity", "z": "-5 m/s", "low": [-1, -1, -1], "high": [1, 1, "0.1 mm"]},
     {"kind": "velocity", "z": "5 m/s", "low": [-1, -1, "11.9 mm"], "high": [1, 1, 1]},
 ]
-"""The ends of a bar of 12 mm."""
+"""Prescribed motion of the ends of a bar of 12 mm."""
 WHOLE, PARTS = bar((3, 3, 12), 1e-3, 6e-3)
 STEPS = 60
 
 
 def state(sim: Simulation) -> tuple[str | None, Any, float]:
-    """Digest, energies of the parts and worst residual after some steps."""
+    """Returns digest, energies of the parts and worst residual after some steps."""
     step.prepare(sim)
     residual = max(tick(sim) for _ in range(STEPS))
     return digest.digest(sim.model, sim.comm, sim.elements.nodal), sim.ledger.parts, residual
@@ -78,7 +78,8 @@ def test_ranks_and_a_restart_change_no_bit_of_a_body_of_two_materials(form: Form
 
 @pytest.mark.parametrize("form", FORMS)
 def test_a_stress_that_two_materials_have_in_common_is_uniform_in_both(form: Form) -> None:
-    """Uniaxial strain, in each material that which gives the same stress: no mean takes strain from the other one."""
+    """The strain of each material is the strain that gives the same uniaxial stress: the mean over a node of the
+    interface does not mix the two materials."""
     stress, (low, high) = 1e6, (_confined(library()[name]) for name in ("alumina", "steel"))
 
     def stretched(sim: Simulation) -> list[Floats]:
@@ -94,7 +95,7 @@ def test_a_stress_that_two_materials_have_in_common_is_uniform_in_both(form: For
     case = joint(("alumina", "steel"), numerics={"pressure": form, "viscosity": "none"})
     (found,) = on(1, case, PARTS, stretched)
     for each in found:
-        assert each == pytest.approx(stress, rel=1e-5)  # the strain, 4e-6, to the second order
+        assert each == pytest.approx(stress, rel=1e-5)  # second order in the strain, 4e-6
         assert np.ptp(each) < 1e-8 * stress
 
 
@@ -104,7 +105,8 @@ def _confined(material: Any) -> float:
 
 @pytest.mark.parametrize("form", FORMS)
 def test_a_wave_is_reflected_and_goes_through_as_the_impedances_have_it(form: Form) -> None:
-    """A confined bar whose end moves at v: stress z1 v, from the interface on 2 z1 z2 / (z1 + z2) v (Kolsky 1953)."""
+    """The end of a confined bar moves at v: the stress is z1 v, and from the interface on 2 z1 z2 / (z1 + z2) v
+    (Kolsky 1953)."""
     mesh = block((1, 1, 160), 0.1e-3, 0.0)
     second = mesh.points[mesh.tets, 2].mean(axis=1) > 8e-3
     materials = [library()[name] for name in ("aluminium_2024", "steel")]
@@ -140,7 +142,7 @@ def test_a_wave_is_reflected_and_goes_through_as_the_impedances_have_it(form: Fo
 
 
 def _mean(sim: Simulation, part: int, low: float, high: float) -> float:
-    """Mean axial stress of the tets of a part between two heights."""
+    """Return the mean axial stress of the tets of a part between two heights."""
     of = sim.model.blocks[part]
     z = sim.model.nodes.x0[of.tets, 2].mean(axis=1)
     stress = of.row(S_ZZ) - of.row(PRESSURE) - of.row(VISCOUS)
@@ -180,7 +182,8 @@ def test_pressure_on_all_sides_of_two_parts_leaves_their_interface_alone() -> No
 
 
 def test_nodes_of_two_parts_are_of_both() -> None:
-    """Selections by part find the nodes in both parts; mass, motion and energy of each part are those of its tets."""
+    """Selections by part find the common nodes in both parts; mass, momentum and energy of each part are those of
+    its tets."""
     moved = {"kind": "velocity", "parts": ["upper"], "z": "7 m/s", "low": [-1, -1, -1], "high": [1, 1, 1]}
     case = joint(("alumina", "steel"), boundaries=[moved], lower={"velocity": [0, 0, "3 m/s"]},
                  upper={"velocity": [0, 0, "3 m/s"]})  # fmt: skip

@@ -1,6 +1,5 @@
-"""A run that is kept, resumed, kept again and resumed: every line of its ledger is that of the uninterrupted run.
-
-Between the two times it takes no step, or some; the schedule and the halo of its searches may differ after each.
+"""A run that is stored and restored twice: every line of its history is that of the uninterrupted run. Between the
+two times the run makes no step or some steps; the schedule and the halo of its searches may differ afterwards.
 """
 
 import json
@@ -25,7 +24,8 @@ from .simulations import kept_again
 
 BREAKING = Path(__file__).parents[1] / "parallel" / "breaking.toml"
 STEPS = 32
-"""Of the 54 of the scene; when they are over, contact has taken energy, facets have broken and cohesive ones pull."""
+"""Number of steps, of the 54 of the scene. After these steps contact has taken energy, facets have broken, and
+cohesive facets carry traction."""
 OTHER = ("contact.skin=0.08", "contact.domain=box")
 
 
@@ -33,7 +33,7 @@ class Course(NamedTuple):
     """History of a run."""
 
     lines: list[Energy]
-    """Of the ledger, a step each."""
+    """Lines of the energy balance, one for each step."""
     impulses: list[float]
     """Impulses of contact on each part, N s."""
     digest: str | None
@@ -45,7 +45,8 @@ def case_of(*changes: str) -> schema.Case:
 
 
 def course(comm: Comm, folder: Path, cases: Sequence[schema.Case], stops: Sequence[int]) -> Course:
-    """Of a run on one rank that is kept and resumed before each of the ``stops``, with the next of the ``cases``."""
+    """Returns the history of a run on one rank that is stored and restored before each of the ``stops``, with the
+    next of the ``cases``."""
     sim, lines = simulation.build(cases[0], Path(), comm), list[Energy]()
     step.prepare(sim)
     for number in range(STEPS):

@@ -1,4 +1,4 @@
-"""Kernels: what names their cache folder, when they are loaded, and how they are compiled ahead."""
+"""Kernels: the name of their cache folder, their loading, and their compilation before a run."""
 
 import ast
 import fcntl
@@ -52,7 +52,7 @@ def total(values):
 
 @pytest.fixture
 def tree(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """A package ``tiny`` that child processes can import: three kernels in two modules."""
+    """Writes a package ``tiny`` that child processes can import: three kernels in two modules."""
     root = tmp_path / "tiny"
     root.mkdir()
     files = {"above": ABOVE, "below": BELOW, "numbers": "FACTOR = 2.0\n", "beside": "from .above import scale\n"}
@@ -62,7 +62,7 @@ def tree(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return root
 
 
-# The hash -------------------------------------------------------------------------------------------------------------
+# Hash of the sources --------------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(("edited", "another"), [("above", True), ("numbers", True), ("beside", False)])
@@ -76,7 +76,7 @@ def test_an_edited_source_of_a_kernel_names_another_folder(tree: Path, edited: s
 
 
 def test_words_about_a_kernel_leave_its_folder_and_its_compiled_code(tree: Path, tmp_path: Path) -> None:
-    """A docstring or a comment moves the lines of a kernel, and numba finds it all the same."""
+    """A docstring or a comment moves the lines of a kernel, but numba still finds the compiled kernel."""
     before, folder = store.source_hash(tree), tmp_path / "kernels"
     ahead.compile_all(folder, lambda *_: None, tree, "tiny")
     text = (tree / "above.py").read_text()
@@ -125,7 +125,7 @@ def test_ranks_but_the_first_hash_nothing(monkeypatch: pytest.MonkeyPatch) -> No
     assert os.environ[store.VARIABLE] == str(store.cache_folder("0" * 64))
 
 
-# The loading ----------------------------------------------------------------------------------------------------------
+# Loading --------------------------------------------------------------------------------------------------------------
 
 
 @jit.njit("float64(float64[::1], int64)", cache=False)
@@ -167,7 +167,7 @@ def used(n):  # type: ignore[no-untyped-def]
 
 
 def test_only_kernels_that_make_arrays_or_are_handed_some_count_who_uses_them() -> None:
-    """Arrays that one of them makes are freed, whichever kernel has read them."""
+    """Arrays that a kernel allocates are freed, for any kernel that has read them."""
     pages, many = Path("/proc/self/statm"), 1_000_000
     assert used(10) == 20.0
     assert [kernel.targetoptions["_nrt"] for kernel in (made, read, used)] == [True, False, True]
@@ -200,7 +200,7 @@ def test_a_kernel_takes_no_other_arguments_not_even_at_its_first_call(values: An
     assert len(first.overloads) == 1
 
 
-# Compiled ahead -------------------------------------------------------------------------------------------------------
+# Compilation before a run ---------------------------------------------------------------------------------------------
 
 
 def compiled(folder: Path) -> set[str]:
@@ -218,7 +218,7 @@ def test_all_kernels_are_compiled_and_the_progress_is_told(tree: Path, tmp_path:
 
 
 def test_modules_that_have_not_changed_are_linked_from_an_earlier_folder(tree: Path, tmp_path: Path) -> None:
-    """A process that uses the folder loads them from there."""
+    """A process that uses the new folder loads these modules from the old folder."""
     folders = [tmp_path / "cache" / name for name in ("first", "second", "third")]
     text = "import numpy as np; from tiny.above import scale; x = np.ones(2); scale(x); "
     text += "print(x, sum(scale.stats.cache_hits.values()))"
@@ -279,7 +279,7 @@ def test_a_child_that_fails_ends_in_one_line(tree: Path, tmp_path: Path, wrong: 
 
 
 def test_a_child_that_is_told_to_stop_has_not_failed(tree: Path, tmp_path: Path) -> None:
-    """A launcher passes a cancel on to every process of a rank."""
+    """A launcher sends a cancel to every process of a rank."""
     with (tree / "above.py").open("a") as file:
         file.write("\n\nimport os, signal\nos.kill(os.getpid(), signal.SIGTERM)\n")
     with pytest.raises(StoppedError, match="stopped on request"):
@@ -333,7 +333,7 @@ def test_the_worker_tells_what_it_waits_for(monkeypatch: pytest.MonkeyPatch, tmp
 
 
 def test_numba_is_not_imported_before_its_cache_has_a_name() -> None:
-    """Else it keeps kernels beside their sources, where an edited callee goes unseen."""
+    """Otherwise numba would store kernels beside their sources, and would not detect an edited callee."""
     text = "import sys, conoid.worker.run.main; assert 'numba' not in sys.modules"
     subprocess.run([sys.executable, "-c", text], check=True)
     text = "import numba; from conoid.worker.kernels import store; store.use_cache()"

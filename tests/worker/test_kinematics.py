@@ -1,4 +1,4 @@
-"""Gradients, velocity gradient, rotation: seen through the stress and the forces that a pass leaves."""
+"""Gradients, velocity gradient and rotation, tested by the stress and the forces after a pass."""
 
 import numpy as np
 import pytest
@@ -12,12 +12,12 @@ from .kernels import HARD, STEEL, Patch
 from .meshes import REGULAR, Floats, block, free_tets
 
 BULK, SHEAR = 200e9 / (3 * (1 - 0.6)), 200e9 / 2.6
-"""Of STEEL, Pa."""
+"""Moduli of STEEL, Pa."""
 DT = 1e-7
 
 
 def moving(seed: int, rate: float = 1e5) -> Patch:
-    """Free tets at the end of a step of ``DT`` in random motion, all flying along."""
+    """Returns free tets at the end of a step of ``DT`` in random motion, with a common velocity."""
     patch = Patch(free_tets(600, seed), HARD)
     random = np.random.default_rng(seed)
     patch.strain(random.normal(size=(600, 3, 3)) * rate, DT)
@@ -28,19 +28,20 @@ def moving(seed: int, rate: float = 1e5) -> Patch:
 
 
 def mid_gradient(patch: Patch) -> tuple[Floats, Floats]:
-    """Volume and velocity gradient at mid-step by the formulas."""
+    """Returns volume and velocity gradient in the middle of the step, from the formulas."""
     volume, grad = formulas.gradients(patch.corners() - 0.5 * DT * patch.corners(patch.nodes.v))
     return volume, formulas.velocity_gradient(patch.corners(patch.nodes.v), grad)
 
 
 def relative(found: Floats, expected: Floats) -> float:
-    """Largest difference over the largest magnitude, tet by tet."""
+    """Returns the largest difference of each tet over its largest magnitude."""
     axes = tuple(range(1, found.ndim))
     return float((np.abs(found - expected).max(axis=axes) / np.abs(expected).max(axis=axes)).max())
 
 
 def test_rate_of_deformation_at_mid_step() -> None:
-    """From no stress, one step leaves s = 2 G dt dev D, turned to the end of the step, and p = -K dt tr D."""
+    """From a state without stress, one step gives s = 2 G dt dev D, rotated to the end of the step, and p = -K dt tr
+    D."""
     patch = moving(1)
     patch.advance(DT)
     _, L = mid_gradient(patch)
@@ -60,7 +61,8 @@ def test_rotation_is_the_cayley_transform() -> None:
 
 @pytest.mark.parametrize("rate", [1e3, 1e6, 1e7])
 def test_rotation_changes_no_invariant(rate: float) -> None:
-    """A rigid spin of up to a radian a step: s turns, its magnitude and determinant stay to round-off."""
+    """In a rigid rotation of up to a radian in a step, s rotates, and its magnitude and determinant are constant up
+    to round-off."""
     patch = Patch(free_tets(300, 4), HARD)
     before = formulas.deviator(np.random.default_rng(5).normal(size=(300, 3, 3)) * 1e9)
     patch.deviator = before
@@ -78,8 +80,8 @@ def test_rotation_changes_no_invariant(rate: float) -> None:
 
 
 def turned_and_stretched(steps: int) -> float:
-    """Error, over the shear modulus, of the stress of a tet that turns by a radian and stretches along axes that turn
-    with it: 2 G times the logarithm of the stretch, turned.
+    """Returns the error of the stress over the shear modulus, for a tet that turns by a radian and stretches along
+    axes that turn with it. The exact stress is 2 G times the logarithm of the stretch, rotated.
     """
     patch = Patch(TetMesh(REGULAR, np.array([[0, 1, 2, 3]], np.int32)), HARD)
     axis, along, start = np.array([0.36, 0.48, 0.8]), np.diag([0.2, -0.15, -0.05]), patch.nodes.x.copy()
@@ -95,7 +97,8 @@ def turned_and_stretched(steps: int) -> float:
 
 
 def test_strain_is_added_where_it_is_after_half_of_the_turn() -> None:
-    """Half the step makes a quarter of the error; strain that is added as it was in the middle makes half of it."""
+    """With half the step the error is a quarter. If the strain of the middle of the step were added without
+    rotation, the error would be a half."""
     errors = [turned_and_stretched(steps) for steps in (10, 20, 40)]
     assert errors[1] / errors[0] == pytest.approx(0.25, abs=0.02)
     assert errors[2] / errors[1] == pytest.approx(0.25, abs=0.02)
@@ -103,7 +106,7 @@ def test_strain_is_added_where_it_is_after_half_of_the_turn() -> None:
 
 
 def rotation(axis: Floats, angle: float) -> Floats:
-    """Rodrigues: the rotation by ``angle`` about the unit vector ``axis``."""
+    """Returns Rodrigues' matrix: the rotation by ``angle`` about the unit vector ``axis``."""
     cross = np.array([[0.0, -axis[2], axis[1]], [axis[2], 0.0, -axis[0]], [-axis[1], axis[0], 0.0]])
     return np.asarray(np.eye(3) + np.sin(angle) * cross + (1.0 - np.cos(angle)) * cross @ cross)
 
@@ -134,7 +137,7 @@ def test_forces_add_to_zero_as_integers() -> None:
 
 @pytest.mark.parametrize("material", [STEEL, HARD], ids=["elastic", "strong"])
 def test_a_part_that_only_flies_has_no_stress(material: Material) -> None:
-    """Velocities that are equal cancel exactly; what is elastic feels the rounding of its positions, G eps x / h."""
+    """Equal velocities cancel exactly; elastic materials have the rounding error of the positions, G eps x / h."""
     patch = Patch(block((3, 3, 3), 1e-3), material)
     patch.nodes.v[:] = [1234.5, -678.9, 1e4]
     patch.nodes.x += 1e-8 * patch.nodes.v
@@ -146,7 +149,7 @@ def test_a_part_that_only_flies_has_no_stress(material: Material) -> None:
 
 
 def test_a_part_at_rest_has_no_stress() -> None:
-    """Not one bit, though the law of elastic materials starts from the shape."""
+    """No bit of the stress is set, also with the law of elastic materials, which computes the stress from the shape."""
     patch = Patch(block((3, 3, 3), 1e-3, shake=0.2), STEEL)
     patch.advance(1e-8)
     assert not patch.stress.any()

@@ -1,4 +1,5 @@
-"""Every law of strength and equation of state: in the case, in the registry, and in the kernel that picks a block's."""
+"""Every strength law and equation of state: in the case, in the registry, and in the kernel that calls the law of a
+block."""
 
 from typing import get_args
 
@@ -20,12 +21,12 @@ N = 300
 
 
 def named(model: str) -> Material:
-    """Some material with that law."""
+    """Returns a material with this law."""
     return next(m for m in MATERIALS if ("" if m.strength is None else m.strength.model) == model)
 
 
 def chunk(made: Material, seed: int) -> tuple["np.ndarray", "np.ndarray", "np.ndarray"]:
-    """Scratch, state and constants of tets under large trial stresses: whatever law it is has something to do."""
+    """Returns scratch, state and constants of tets under large trial stresses, which every law changes."""
     random = np.random.default_rng(seed)
     w = random.uniform(0.5, 1.0, scratch.SCRATCH)
     s = np.zeros((models.rows_of(made, "nodal"), state.CHUNK))
@@ -38,7 +39,7 @@ def chunk(made: Material, seed: int) -> tuple["np.ndarray", "np.ndarray", "np.nd
 
 @pytest.mark.parametrize("number", range(len(models.LAWS)))
 def test_the_kernel_of_a_law_is_the_one_that_is_called(number: int) -> None:
-    """A law without a branch in ``strengthen`` would leave the chunk as it is."""
+    """If a law had no branch in ``strengthen``, the chunk would not change."""
     (w, s, params), (w1, s1, _), (_, before, _) = (chunk(named(models.LAWS[number].model), number) for _ in range(3))
     models.strengthen(number, w, s, params, N, 1e-8)
     models.LAWS[number].kernel(w1, s1, params, N, 1e-8)

@@ -1,4 +1,4 @@
-"""The ledger: every line closes, whatever the step does and whatever pushes."""
+"""The energy balance closes for any change of the step and for all boundaries and contacts."""
 
 import math
 from collections.abc import Callable
@@ -25,7 +25,7 @@ PULL: dict[str, Any] = {
 
 
 def lines(sim: Simulation) -> list[Energy]:
-    """The ledger of every step."""
+    """Returns the energy balance of every step."""
     found: list[Energy] = []
     run(sim, lambda sim, before: found.append(sim.ledger.close(before)))
     return found
@@ -49,14 +49,16 @@ def test_an_impact_closes_to_a_percent(material: materials.Material, form: Form)
 @pytest.mark.parametrize("frames", [0, 20])
 @pytest.mark.parametrize("keys", [FLIGHT, PULL], ids=["wall", "pull"])
 def test_every_line_closes_to_second_order(keys: dict[str, Any], frames: int) -> None:
-    """Elastic, also where the step changes to meet a frame, where the run ends, and where a wall stops a whole face."""
+    """Elastic bodies, also if the step changes before a frame or at the end of the run, and if a wall stops a whole
+    face."""
     assert worst(STEEL, "standard", frames=frames, **keys) < 1e-3
 
 
 @pytest.mark.parametrize("material", [STEEL, HARD], ids=["from the shape", "by rates"])
 @pytest.mark.parametrize(("speed", "steps", "share"), [(800.0, 500, 0.005), (80.0, 2000, 0.001)])
 def test_what_rings_gains_no_energy(material: materials.Material, speed: float, steps: int, share: float) -> None:
-    """A cube of random velocities rings without viscosity; its strains are those of the plastic flow of an impact."""
+    """A cube with random velocities oscillates without viscosity; its strains are as large as those of the plastic
+    flow of an impact."""
     sim = build(scene(material, "standard", jitter=speed), [block((6, 6, 6), 1e-3)])
     found = []
 
@@ -69,7 +71,8 @@ def test_what_rings_gains_no_energy(material: materials.Material, speed: float, 
 
 
 def test_what_unequal_steps_take_has_its_line() -> None:
-    """A cube that rings at steps of random lengths: what is derived node by node, in plain numpy; the rest closes."""
+    """A cube oscillates with steps of random lengths. The term derived for each node is computed in plain numpy; the
+    other terms close the balance."""
     sim = build(scene(STEEL, "standard", jitter=20.0, end=4e-6, dt_growth=2.0), [block((6, 6, 6), 1e-3)])
     random, taken, seen = np.random.default_rng(4), [0.0], []
 
@@ -121,7 +124,8 @@ def test_a_free_body_keeps_its_momentum_in_the_ledger() -> None:
 
 
 def test_the_parts_are_what_the_ledger_sums_up() -> None:
-    """Two plastic bodies without contact: one moves freely, the other hits the wall; a single part has no row."""
+    """Two plastic bodies without contact: one moves freely, the other hits a wall. A single part has no line of its
+    own."""
     one = scene(COPPER, "standard", end=4e-6, viscosity={}, **FLIGHT)
     part = one.parts[0]
     slow = part.model_copy(update={"name": "slow", "velocity": (0.0, 0.0, 40.0)})
@@ -140,7 +144,7 @@ def test_the_parts_are_what_the_ledger_sums_up() -> None:
 
 @pytest.mark.parametrize("row", [WORK, WORK_VISCOUS])
 def test_a_work_that_is_not_a_number_is_no_residual_of_nothing(row: int) -> None:
-    """Also where no energy was there to begin with: the run ends by its limit."""
+    """This includes a run without initial energy: the run ends by its limit of the residual."""
     sim = build(scene(STEEL, end=1e-6, viscosity={}), [MESH])
     run(sim)
     assert sim.ledger.close(sim.model.nodes.v).residual == 0.0
@@ -149,7 +153,8 @@ def test_a_work_that_is_not_a_number_is_no_residual_of_nothing(row: int) -> None
 
 
 def test_motion_that_nobody_has_paid_for_ends_the_run() -> None:
-    """Whatever line is below zero for it: here plastic work is taken back, and the sum closes."""
+    """The line that is below zero does not matter: here plastic work is subtracted again, and the sum of all lines
+    closes."""
     sim = build(scene(COPPER, end=4e-6, **FLIGHT), [MESH])
     ran = False
 
@@ -175,7 +180,8 @@ def test_motion_that_nobody_has_paid_for_ends_the_run() -> None:
 
 
 def test_errors_are_shares_of_the_largest_energy_there_has_been() -> None:
-    """A pressure that comes at once and gives back all its work: the share is that of what it has done at most."""
+    """A pressure acts from the start and gets all its work back: the error is a fraction of the largest work that
+    the pressure has done."""
     push = {"kind": "traction", "pressure": 1e6}
     sim = build(scene(STEEL, end=10e-6, boundaries=(push,), viscosity={}), [block((1, 1, 1), 1e-3)])
     most, biggest, worst, shares = 0.0, 0.0, 0.0, list[float]()
@@ -196,7 +202,7 @@ def test_errors_are_shares_of_the_largest_energy_there_has_been() -> None:
 
 
 def named_safety(sim: Simulation) -> float:
-    """Return dt_safety as named in the warning of ``stepping``; 0 if there is no warning."""
+    """Return the dt_safety named in the warning about ``stepping``; 0 if there is no warning."""
     for text in sim.ledger.warnings(sim.case.numerics.dt_safety):
         if text.startswith("the line stepping"):
             return float(text.partition("numerics.dt_safety = ")[2].split()[0])
@@ -204,18 +210,19 @@ def named_safety(sim: Simulation) -> float:
 
 
 def shattered(form: Form, safety: float) -> Simulation:
-    """A cube of steel that rings from random velocities of its nodes: its step falls for good."""
+    """Returns a cube of steel that oscillates from random velocities of its nodes: its time step falls and does not
+    recover."""
     return build(scene(STEEL, form, end=6e-6, jitter=800.0, dt_safety=safety), [block((4, 4, 4), 0.75e-3, shake=0.0)])
 
 
 def crushed(form: Form, safety: float) -> Simulation:
-    """A bar without viscosity that a wall shortens: its step falls with its shock and recovers."""
+    """Returns a bar without viscosity that a wall shortens: its time step falls with the shock and recovers."""
     part = {"velocity": (0.0, 0.0, -900.0), "boundaries": (WALL,)}
     return build(scene(STEEL, form, end=4e-6, dt_safety=safety, **part), [MESH])
 
 
 def rebounding(form: Form, safety: float) -> Simulation:
-    """The same between walls, some growth of the step with each rebound: it falls and recovers."""
+    """Returns the same bar between walls, with several rebounds: the time step falls and recovers."""
     box = [{"kind": "wall", "point": (at,) * 3, "normal": normal} for at, normal in (
         (-1e-5, (0.0, 0.0, 1.0)), (3.01e-3, (0.0, 0.0, -1.0)),
     )]  # fmt: skip
@@ -226,7 +233,7 @@ def rebounding(form: Form, safety: float) -> Simulation:
 @pytest.mark.parametrize("made", [shattered, rebounding])
 @pytest.mark.parametrize("form", ["standard", "nodal"])
 def test_what_is_advised_against_unequal_steps_helps(made: Callable[[Form, float], Simulation], form: Form) -> None:
-    """At the safety that the warning names the line is within half of its limit."""
+    """With the safety factor that the warning names, the line ``stepping`` is within half of its limit."""
     sim = made(form, 0.9)
     lines(sim)
     safety = named_safety(sim)
@@ -239,7 +246,7 @@ def test_what_is_advised_against_unequal_steps_helps(made: Callable[[Form, float
 
 
 def test_nothing_is_advised_where_steps_fall_and_cost_nothing() -> None:
-    """In the shock of a wall they fall by a third."""
+    """In the shock at a wall the time step falls by a third."""
     sim = crushed("standard", 0.9)
     lines(sim)
     assert sim.ledger.making.worst["stepping"].share < 0.01

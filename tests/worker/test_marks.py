@@ -1,4 +1,4 @@
-"""Sets of mesh files that a case is on: what they hold before a run, and what is refused in one line."""
+"""Sets of mesh files that a case selects with ``on``: their content before a run, and errors of one line."""
 
 from collections.abc import Mapping
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""Matter at the nodes: a mean of pressures that are not linear makes no energy, whatever tears and closes."""
+"""Material state at the nodes: the mean of nonlinear pressures creates no energy when pores open and close."""
 
 from typing import Any
 
@@ -19,12 +19,12 @@ TORN = COPPER.model_copy(update={"spall": 1e9})
 
 
 def rollers(size: float, *axes: str) -> tuple[dict[str, Any], ...]:
-    """Planes of symmetry on both sides."""
+    """Returns planes of symmetry on both sides."""
     return tuple({"kind": "symmetry", "axis": axis, "at": at} for axis in axes for at in (0.0, size))
 
 
 def to_and_fro(material: materials.Material, form: Form) -> Simulation:
-    """A bar whose ends go apart and together four times: pores open and close."""
+    """Returns a bar whose ends move apart and together four times, so that pores open and close."""
     course = [(k * 1e-6, 1 - 2 * (k % 2)) for k in range(0, 9)]
     ends = [
         {"kind": "velocity", "low": low, "high": high, "x": x, "course": [(2 * t, f) for t, f in course]}
@@ -35,7 +35,7 @@ def to_and_fro(material: materials.Material, form: Form) -> Simulation:
 
 
 def averaging(sim: Simulation) -> float:
-    """The largest magnitude of the line, over the largest energy."""
+    """Returns the largest magnitude of the line ``averaging`` over the largest energy."""
     worst, largest = 0.0, 0.0
 
     def look(sim: Simulation, before: Floats) -> None:
@@ -50,14 +50,14 @@ def averaging(sim: Simulation) -> float:
 
 
 def test_pores_that_open_and_close_make_no_energy() -> None:
-    """With the pressure of the mean strain they made 7 % in twice the time."""
+    """With the pressure of the mean strain, pores created 7 % of the energy in twice the time."""
     sim = to_and_fro(TORN, "nodal")
     assert averaging(sim) < 1e-4
     assert sim.ledger.making.worst.get("plastic", (0.0, 0.0))[0] < 1e-3
 
 
 def test_the_pressure_of_a_tet_is_the_mean_of_four_nodes() -> None:
-    """Each with its own pores."""
+    """Each node has its own pores."""
     sim = to_and_fro(TORN, "nodal")
     run(sim, steps=60)
     assert isinstance(sim.elements, AveragedElements)

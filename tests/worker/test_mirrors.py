@@ -1,4 +1,4 @@
-"""A body that flies at a symmetry plane meets its mirror image there."""
+"""A body that moves towards a symmetry plane collides with its mirror image."""
 
 import numpy as np
 import pytest
@@ -19,17 +19,17 @@ SPEED, GAP = 100.0, 0.02 * MM
 
 
 def above() -> TetMesh:
-    """A cube of 2 mm above the plane y = 0, which it does not touch."""
+    """Returns a cube of 2 mm above the plane y = 0, which it does not touch."""
     return moved(block((4, 4, 4), 0.5 * MM, shake=0.1), (0.0, GAP, 0.0))
 
 
 def image(mesh: TetMesh) -> TetMesh:
-    """The mesh below the plane."""
+    """Returns the mirrored mesh below the plane."""
     return TetMesh(mesh.points * [1.0, -1.0, 1.0], np.ascontiguousarray(mesh.tets[:, [0, 2, 1, 3]]))
 
 
 def mean(sim: Simulation, part: int) -> float:
-    """Velocity of a part across the plane, m/s."""
+    """Returns the velocity of a part across the plane, m/s."""
     nodes = sim.model.nodes
     mine = nodes.part == part
     return float((nodes.mass[mine] @ nodes.v[mine, 1]) / nodes.mass[mine].sum())
@@ -37,8 +37,8 @@ def mean(sim: Simulation, part: int) -> float:
 
 @pytest.mark.parametrize(("back", "apart"), [(0.0, 1e-6), (0.6, 0.01)])
 def test_half_a_collision_is_half_of_the_whole(back: float, apart: float) -> None:
-    """Contact stops facing nodes of equal masses in the middle, which is the plane; with restitution nodes fall
-    back several times, in the half at other moments, and 0.6 % are between the two with any number of sweeps.
+    """Contact stops opposite nodes of equal masses in the middle, which is the plane. With restitution nodes rebound
+    several times; in the half model at other times, so that the results differ by 0.6 % for any number of sweeps.
     """
     contact = {"restitution": back}
     down, up = {"velocity": (0.0, -SPEED, 0.0)}, {"velocity": (0.0, SPEED, 0.0)}
@@ -57,7 +57,8 @@ def test_half_a_collision_is_half_of_the_whole(back: float, apart: float) -> Non
 
 
 def test_nodes_on_the_plane_stay_there_and_driven_ones_are_let_through() -> None:
-    """A body with nodes on the plane and on both of its sides; and a driven one, which the drive moves."""
+    """The scene has a body with nodes on the plane and on both sides of it, and a driven body that passes through
+    the plane."""
     both = moved(block((2, 2, 2), MM, shake=0.0), (0.0, -1.0 * MM, 0.0))
     drive = {"kind": "velocity", "parts": ["body1"], "y": -SPEED}
     case = meeting_of([{}, {}], material=STEEL, end=1.0, boundaries=(PLANE, drive))

@@ -1,4 +1,4 @@
-"""The Mohr-Coulomb return against its conditions, closed forms and strengths (H19 of the hard cases)."""
+"""The Mohr-Coulomb return compared with its conditions, closed forms and strengths (H19 of the hard cases)."""
 
 import math
 
@@ -24,7 +24,7 @@ LAWS = {
 
 
 def excess(s: Floats, pressure: Floats | float, law: materials.MohrCoulomb) -> Floats:
-    """The larger of f and s1 - s3 - cap, Pa; f of the apex where the pressure is beyond it."""
+    """Returns the larger of f and s1 - s3 - cap, Pa; f of the apex if the pressure is beyond it."""
     d = np.linalg.eigvalsh(s)
     sine, cosine = math.sin(law.friction_angle), math.cos(law.friction_angle)
     most = np.maximum(2.0 * law.cohesion * cosine + 2.0 * sine * np.asarray(pressure), 0.0)
@@ -34,7 +34,8 @@ def excess(s: Floats, pressure: Floats | float, law: materials.MohrCoulomb) -> F
 
 @pytest.mark.parametrize("name", LAWS)
 def test_a_hundred_thousand_random_stresses(name: str) -> None:
-    """On the surface, in the same directions, by flow along (1, 0, -1) or its neighbours; what is lost is booked."""
+    """The new stress is on the yield surface, has the same principal directions, and results from flow along (1, 0,
+    -1) or an adjacent direction. The lost energy is booked as plastic work."""
     n, random, law = 25_000, np.random.default_rng(len(name)), LAWS[name].strength
     assert isinstance(law, materials.MohrCoulomb)
     trial, pressure = random_deviators(n, random), random.normal(size=n) * 10.0 ** random.uniform(7.0, 10.0, n)
@@ -86,7 +87,7 @@ def test_a_hundred_thousand_random_stresses(name: str) -> None:
     ],
 )
 def test_plane_edges_apex_and_cap(values: tuple[float, ...], pressure: float, expected: str | None) -> None:
-    """The closed forms of docs/theory/materials.md."""
+    """The closed forms are those of docs/theory/materials.md."""
     sine = math.sin(PHI)
     most = 2.0 * (C * math.cos(PHI) + pressure * sine)
     a, b = most / (3.0 - sine), most / (3.0 + sine)
@@ -107,7 +108,7 @@ def test_plane_edges_apex_and_cap(values: tuple[float, ...], pressure: float, ex
 
 @pytest.mark.parametrize("length", [1, 7, CHUNK - 1, CHUNK])
 def test_a_stress_gives_the_same_bits_in_any_place(length: int) -> None:
-    """Whatever stands beside it in the chunk, and in the last chunk, which is ``length`` tets long."""
+    """The result does not depend on the other tets of the chunk, nor on the last chunk, which has ``length`` tets."""
     random, kinds = np.random.default_rng(3), 40
     few, pressure = random_deviators(kinds, random), random.normal(size=kinds) * 1e9
     chosen = random.integers(0, kinds, 2 * CHUNK + length)
@@ -122,9 +123,8 @@ def test_a_stress_gives_the_same_bits_in_any_place(length: int) -> None:
 @pytest.mark.parametrize("form", FORMS)
 @pytest.mark.parametrize("axial", [-1.0, 1.0])
 def test_uniaxial_strength(form: Form, axial: float) -> None:
-    """A block with free sides bears 2 c cos(phi) / (1 -+ sin(phi)) in compression and in tension.
-
-    The sides move so that their stress stays at zero; every tet of the block strains alike.
+    """A block with free sides has the strength 2 c cos(phi) / (1 -+ sin(phi)) in compression and in tension. The
+    sides move so that their stress stays at zero; every tet of the block has the same strain.
     """
     patch = Patch(block((2, 2, 2)), LAWS["glass"], form)
     side, before, steps = 0.0, 0.0, 400
@@ -141,7 +141,8 @@ def test_uniaxial_strength(form: Form, axial: float) -> None:
 
 
 def test_failed_glass_keeps_the_residual_strength() -> None:
-    """Sheared at a constant pressure: 2 (c cos(phi) + p sin(phi)) until the limit, then 2 p sin(30 deg)."""
+    """In shear at a constant pressure the strength is 2 (c cos(phi) + p sin(phi)) until the failure strain, then 2 p
+    sin(30 deg)."""
     patch = Patch(TetMesh(REGULAR, np.array([[0, 1, 2, 3]], np.int32)), GLASS)
     patch.put(PRESSURE, 0.5e9)
     rate = 1e4
@@ -159,7 +160,7 @@ def test_failed_glass_keeps_the_residual_strength() -> None:
 
 @pytest.mark.parametrize("end", ["failure", "release"])
 def test_no_elastic_energy_is_left_behind_when_the_strength_falls(end: str) -> None:
-    """Work less plastic work is the elastic energy of the stress, V s : s / 4 G, also after the strength has gone."""
+    """Work minus plastic work is the elastic energy of the stress, V s : s / 4 G, also after the loss of strength."""
     patch = Patch(TetMesh(REGULAR, np.array([[0, 1, 2, 3]], np.int32)), GLASS if end == "failure" else LAWS["glass"])
     patch.put(PRESSURE, 1e9)
     volume = float(np.linalg.det(REGULAR[1:] - REGULAR[0])) / 6.0

@@ -1,4 +1,4 @@
-"""Parcels travel unchanged, as messages and as files."""
+"""Parcels (state of tets and nodes in a message or checkpoint) arrive unchanged, as messages and as files."""
 
 import hashlib
 import json
@@ -82,19 +82,19 @@ HARMS: dict[str, Callable[[Path], Any]] = {
 
 
 def put(path: Path, make: Callable[[Path], None]) -> None:
-    """Something else in the place of a file."""
+    """Replaces a file by other data."""
     path.unlink()
     make(path)
 
 
 def emptied(place: Path) -> None:
-    """A folder without its files."""
+    """Removes the files of a folder."""
     for path in place.iterdir():
         path.unlink()
 
 
 def flipped(path: Path, old: bytes = b"", new: bytes = b"") -> None:
-    """One byte differs, or ``old`` has become ``new``."""
+    """Changes one byte, or replaces ``old`` by ``new``."""
     content = path.read_bytes()
     assert old in content
     middle = len(content) // 2
@@ -103,7 +103,7 @@ def flipped(path: Path, old: bytes = b"", new: bytes = b"") -> None:
 
 
 def resealed(place: Path, text: bytes) -> None:
-    """Another manifest, with the sha256 that belongs to it."""
+    """Writes another manifest with the matching sha256."""
     (place / MANIFEST).write_bytes(text)
     (place / SEAL).write_text(hashlib.sha256(text).hexdigest())
 

@@ -1,4 +1,4 @@
-"""Penetration: what lines pass of the tets that are left, and how deep the hole goes that begins at the mouth."""
+"""Penetration: the length of lines inside of the remaining tets, and the depth of the hole that begins at the mouth."""
 
 from pathlib import Path
 from unittest.mock import patch
@@ -44,20 +44,21 @@ def test_a_line_through_a_box_is_as_long_as_the_box(axis: int) -> None:
 
 @pytest.mark.parametrize("shares", [(0.1, 0.1), (0.3, 0.3), (1.0 / 3.0, 0.5), (2.0 / 3.0, 0.5)])
 def test_a_line_in_the_faces_or_edges_of_tets_is_counted_once(shares: tuple[float, float]) -> None:
-    """The diagonals of the cubes of a structured mesh lie in the plane of a penetration's lines."""
+    """The diagonals of the cubes of a structured mesh lie in the plane of the lines of a penetration probe."""
     mesh = block((3, 3, 5), MM, shake=0.0)
     assert length(mesh, 2, (3 * MM * shares[0], 3 * MM * shares[1])) == pytest.approx(5 * MM, rel=1e-9)
 
 
-# How deep the hole goes
+# Depth of the hole
 
 PLATES = ((0.0, 22.0), (22.0, 44.0), (44.0, 66.0))
-"""Three plates on each other, from where to where."""
+"""Three plates on each other: start and end of each, mm."""
 RADIUS = 3.5
 
 
 def rows_of(left: dict[int, list[tuple[int, float, float]]]) -> Floats:
-    """A made-up state: for some lines what is left of the plates (plate, from, to); other lines have the last's."""
+    """Returns an artificial state: for some lines the remaining pieces of the plates (plate, from, to); the other
+    lines have the pieces of the last line."""
     table, last = [], left[0]
     for line in range(len(LINES)):
         last = left.get(line, last)
@@ -79,12 +80,12 @@ def test_whole_plates_have_no_hole_and_no_plates_are_pierced() -> None:
 
 
 def test_a_cavity_ahead_of_the_hole_does_not_count() -> None:
-    """53.9 mm of a hole and 11 mm of a cavity behind 2 mm of plate: not 64.9 mm."""
+    """A hole of 53.9 mm and a cavity of 11 mm behind 2 mm of plate do not give 64.9 mm."""
     assert depth_of({0: [(2, 53.9, 55.0), (2, 65.0, 66.0)]}) == pytest.approx(53.9)
 
 
 def test_a_cavity_that_the_hole_has_joined_beside_the_line_counts() -> None:
-    """On the second line nothing is left between the two."""
+    """On the second line no material is left between hole and cavity."""
     joined = {0: [(2, 53.9, 55.0), (2, 65.0, 66.0)], 1: [(2, 65.0, 66.0)], 2: [(2, 53.9, 55.0), (2, 65.0, 66.0)]}
     assert depth_of(joined) == pytest.approx(65.0)
 
@@ -95,7 +96,7 @@ def test_a_flake_in_the_hole_does_not_end_it() -> None:
 
 
 def test_plates_that_part_ahead_of_the_hole_are_whole() -> None:
-    """The second plate has gone on by 3 mm, the third by 5 mm and has a cavity of 4 mm."""
+    """The second plate has moved by 3 mm; the third plate has moved by 5 mm and has a cavity of 4 mm."""
     assert depth_of({0: [(0, 10.0, 22.0), (1, 25.0, 47.0), (2, 49.0, 60.0), (2, 64.0, 71.0)]}) == pytest.approx(10.0)
 
 
@@ -104,13 +105,13 @@ def test_a_plate_that_is_pushed_along_is_not_pierced_by_that() -> None:
 
 
 def test_a_hole_through_the_last_plate_beside_the_line_is_not_one_on_it() -> None:
-    """The free space behind the plates joins nothing."""
+    """The free space behind the plates does not connect hole and cavity."""
     assert depth_of({0: [(2, 60.0, 66.0)], 6: []}) == pytest.approx(60.0)
     assert np.isinf(bottoms(rows_of({0: [(2, 60.0, 66.0)], 6: []}), 1e-6)[6:]).all()
 
 
 def test_the_depth_is_the_mean_of_three_lines() -> None:
-    """The hole ends at 2, 6 and 13 mm on these lines, at 30 mm on the others."""
+    """The hole ends at 2, 6 and 13 mm on these lines, and at 30 mm on the other lines."""
     ends = dict(zip(MEASURED, (2.0, 6.0, 13.0), strict=True))
     left = {line: [(0, ends[line], 22.0)] if line in ends else [(1, 30.0, 44.0)] for line in range(len(LINES))}
     solid = {line: [*some, (1, 22.0, 44.0), (2, 44.0, 66.0)] if line in ends else [*some, (2, 44.0, 66.0)]
@@ -121,10 +122,9 @@ def test_the_depth_is_the_mean_of_three_lines() -> None:
 @pytest.mark.parametrize("ranks", [1, 3])
 @pytest.mark.parametrize("way", [1.0, -1.0])
 def test_a_state_without_the_tets_of_a_cavity_and_of_a_hole(way: float, ranks: int) -> None:
-    """Two plates of 4 mm, hit from below or from above: a hole of 2 mm and, 1 mm deeper, a narrow cavity of 2 mm that
-    has taken the rear of the one and the front of the other.
-
-    Tets leave by their centres, and are points then; layers of the mesh are 1 mm thick.
+    """Two plates of 4 mm are hit from below or from above. They have a hole of 2 mm and, 1 mm deeper, a narrow
+    cavity of 2 mm at the rear of the first plate and the front of the second. Tets are removed by the position of
+    their centres; layers of the mesh are 1 mm thick.
     """
     plate = block((8, 8, 4), MM, shake=0.0)
     meshes = [block((4, 4, 2), MM, shake=0.0), plate, moved(plate, (0.0, 0.0, 4 * MM))]

@@ -1,4 +1,5 @@
-"""A rod through a plate at three speeds: residual velocity and mass by probes, against the nodes behind the plate."""
+"""A rod perforates a plate at three speeds: residual velocity and mass of the probes, compared with the nodes behind
+the plate."""
 
 from pathlib import Path
 

@@ -1,4 +1,4 @@
-"""Work of the stress and the return with linear hardening, against the formulas."""
+"""Work of the stress and the return with linear hardening, compared with the formulas."""
 
 import numpy as np
 
@@ -16,7 +16,7 @@ DT = 1e-7
 
 
 def strained(seed: int, rate: float) -> tuple[Patch, Floats]:
-    """Copper tets with random stress inside the yield surface and a random volume-keeping velocity gradient."""
+    """Returns copper tets with random stress inside the yield surface and a random isochoric velocity gradient."""
     patch = Patch(free_tets(N, seed), COPPER)
     random = np.random.default_rng(seed)
     L = random.normal(size=(N, 3, 3)) * rate
@@ -41,7 +41,7 @@ def test_work_below_the_yield_stress_is_trapezoidal() -> None:
 
 
 def test_linear_hardening_return() -> None:
-    """The increment (q - Y) / (3 G + H), the stress scaled back to the new yield stress, the work booked."""
+    """The increment is (q - Y) / (3 G + H), the stress is scaled to the new yield stress, and the work is booked."""
     patch, L = strained(2, 2e4)
     old, start = patch.deviator, np.random.default_rng(3).uniform(0.0, 2.0, N)
     patch.put(PLASTIC_STRAIN, start)
@@ -76,7 +76,7 @@ def test_the_return_is_idempotent() -> None:
 
 
 def test_work_is_elastic_energy_plus_plastic_work() -> None:
-    """Also where a step goes far beyond the yield stress, the work less the plastic work is V s : s / 4 G."""
+    """This also holds if a step goes far beyond the yield stress: the work minus the plastic work is V s : s / 4 G."""
     L = np.diag([1.0, -0.5, -0.5]) * 1e3
     for steps in (20, 200):
         point = drive(COPPER, L, 1e-4 / steps, steps)

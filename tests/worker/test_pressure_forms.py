@@ -15,17 +15,18 @@ from .meshes import Floats, block
 BULK, SHEAR, DENSITY = 200e9 / 1.2, 200e9 / 2.6, 7850.0
 DT = 1e-8
 QUANTUM = 2e-15
-"""Volume strain: what a nodal sum in quanta of 2^-52 may be off by."""
+"""Largest error of a volume strain from a nodal sum in quanta of 2^-52."""
 MESH = block((4, 3, 3), 1e-3, shake=0.25, seed=1)
 
 
 def quarter_sums(patch: Patch, values: Floats) -> Floats:
-    """(nodes,) a quarter of each tet's value at each of its nodes."""
+    """Returns (nodes,) sums of a quarter of the value of each tet at each of its nodes."""
     return formulas.at_nodes(patch.tets, np.repeat(values[:, None] / 4.0, 4, axis=1), patch.nodes.n)
 
 
 def shaken(form: Form, seed: int) -> tuple[Patch, Floats, Floats]:
-    """A block at the end of a step with random velocities; mean volumes of the step and rates of volume strain."""
+    """Returns a block at the end of a step with random velocities, the mean volumes of the step, and the rates of
+    volume strain."""
     patch = Patch(MESH, STEEL, form)
     patch.nodes.v[:] = np.random.default_rng(seed).normal(size=patch.nodes.v.shape) * 100.0
     way = 0.5 * DT * patch.nodes.v
@@ -36,7 +37,7 @@ def shaken(form: Form, seed: int) -> tuple[Patch, Floats, Floats]:
 
 @pytest.mark.parametrize("form", FORMS[1:])
 def test_pressure_follows_the_mean_of_the_nodes(form: Form) -> None:
-    """Each node has the volume-weighted mean strain of the tets round it, each tet the mean of its four nodes."""
+    """Each node has the volume-weighted mean strain of its tets, and each tet has the mean of its four nodes."""
     patch, volume, rate = shaken(form, 2)
     patch.advance(DT)
     nodal = quarter_sums(patch, volume * rate * DT) / quarter_sums(patch, volume)
@@ -46,7 +47,7 @@ def test_pressure_follows_the_mean_of_the_nodes(form: Form) -> None:
 
 @pytest.mark.parametrize("form", FORMS[1:])
 def test_averaging_keeps_the_change_of_volume(form: Form) -> None:
-    """The strain that the pressures see, times the volumes, adds up to the change of the body's volume."""
+    """The averaged strains times the volumes add up to the change of volume of the body."""
     patch, volume, rate = shaken(form, 3)
     patch.advance(DT)
     seen = -patch.get(PRESSURE) / BULK
@@ -67,7 +68,8 @@ def test_uniform_strain_gives_every_form_the_same_pressure(form: Form) -> None:
 
 @pytest.mark.parametrize("form", FORMS)
 def test_work_is_that_of_the_nodal_forces(form: Form) -> None:
-    """Averaged or not, the pressure works on each tet's own change of volume: the sum is force times way."""
+    """With and without averaging, the pressure works on each tet's own change of volume: the sum is force times
+    displacement."""
     patch, volume, rate = shaken(form, 4)
     patch.advance(DT)
     pressure = patch.get(PRESSURE)
@@ -80,7 +82,8 @@ def test_work_is_that_of_the_nodal_forces(form: Form) -> None:
 
 
 def stabilised(pressure: Floats) -> tuple[Patch, Floats]:
-    """A resting block with a nodal pressure after one step of the split form, and what the step made of it."""
+    """Returns a block at rest with a nodal pressure after one step of the split form, and the change of pressure in
+    the step."""
     patch = Patch(MESH, STEEL, "split")
     patch.elements.pressure[:] = pressure
     patch.advance(0.0)
@@ -96,7 +99,7 @@ def test_a_linear_pressure_is_left_alone() -> None:
 
 
 def test_stabilisation_against_the_formula() -> None:
-    """K dt^2/2 / V_a sum of V / rho grad N_a . (grad p - mean projected grad p), and nothing in sum."""
+    """The change is K dt^2/2 / V_a sum of V / rho grad N_a . (grad p - mean projected grad p), and its sum is zero."""
     pressure = np.random.default_rng(5).normal(size=len(MESH.points)) * 1e9
     patch, change = stabilised(pressure)
     volume, grad = formulas.gradients(patch.corners())
@@ -111,7 +114,7 @@ def test_stabilisation_against_the_formula() -> None:
 
 
 def test_a_checkerboard_is_damped() -> None:
-    """An alternating pressure loses energy in each step, and never turns round within the stable step."""
+    """An alternating pressure loses energy in each step, and does not change its sign within the stable step."""
     grid = np.rint(block((4, 3, 3), 1.0, shake=0.0).points).sum(axis=1)
     sign = np.where(grid % 2 == 0, 1.0, -1.0)
     patch, _ = stabilised(sign * 1e9)
@@ -126,7 +129,7 @@ def test_a_checkerboard_is_damped() -> None:
 
 
 def test_a_lone_tet_is_not_stabilised() -> None:
-    """Its nodes share its gradient: whatever their pressures, nothing is in excess."""
+    """The nodes of a single tet have its gradient, so the difference of gradients is zero for any pressures."""
     lone = block((1, 1, 1), 1e-3, shake=0.0)
     patch = Patch(type(lone)(lone.points[lone.tets[0]], np.array([[0, 1, 2, 3]], np.int32)), STEEL, "split")
     patch.elements.pressure[:] = [1e9, -2e9, 3e9, 5e8]

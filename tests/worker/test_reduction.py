@@ -1,4 +1,5 @@
-"""The record of the step's reduction: every field keeps what it is given, and a maximum of words is right for each."""
+"""The record of the step reduction: every field returns the value that was set, and the maximum of words is correct
+for each field."""
 
 import math
 import struct

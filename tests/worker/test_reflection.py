@@ -1,4 +1,5 @@
-"""A node without tets passes its image at a plane of symmetry and is reflected: in plain numpy, and in a scene."""
+"""A node without tets that passes a plane of symmetry is replaced by its mirror image: compared with plain numpy,
+and in a scene."""
 
 from pathlib import Path
 from types import SimpleNamespace
@@ -25,7 +26,7 @@ PLANES: tuple[Any, ...] = ({"kind": "symmetry", "axis": "x"}, {"kind": "symmetry
 
 
 def flight(x: Floats, v: Floats, axes: list[int], at: list[float], sides: Floats, steps: int, dt: float) -> Any:
-    """Nodes without tets in free flight beside planes: the state after some steps, and the boundary."""
+    """Returns nodes without tets in free flight beside planes: the state after some steps, and the boundary."""
     n = len(x)
     state: Any = SimpleNamespace(x=x.copy(), v=v.copy(), mass=1.0 + np.arange(n))
     mirrors = Mirrors(np.arange(n, dtype=np.int32), np.array(axes), np.array(at), sides)
@@ -47,7 +48,8 @@ def folded(x: Floats, low: float, high: float) -> Floats:
 
 
 def test_at_one_plane_the_image_comes_in() -> None:
-    """Positions and speeds are those of free flight and its image; no energy is taken, of momentum twice what came."""
+    """Positions and speeds are those of free flight and its image. No energy is lost, and the plane takes twice the
+    normal momentum."""
     random = np.random.default_rng(1)
     x, v = random.uniform(0.0, 1.0, (40, 3)), random.uniform(-1.0, 1.0, (40, 3))
     x[:, 1] += 2.0
@@ -64,7 +66,8 @@ def test_at_one_plane_the_image_comes_in() -> None:
 
 
 def test_on_the_axis_both_components_turn_round() -> None:
-    """A node on the axis, one that comes there aslant, and one that starts on a plane and stays in it."""
+    """The nodes are: a node on the axis, a node that arrives there obliquely, and a node that starts on a plane and
+    stays in it."""
     x = np.array([[0.0, 0.0, 0.0], [0.3, 0.1, 0.0], [0.0, 0.5, 0.0]])
     v = np.array([[0.0, 0.0, 1.0], [-1.0, -1.0, 1.0], [0.0, -1.0, 1.0]])
     state, _ = flight(x, v, [0, 1], [0.0, 0.0], np.ones((3, 2)), 8, 0.1)
@@ -74,7 +77,7 @@ def test_on_the_axis_both_components_turn_round() -> None:
 
 @pytest.mark.parametrize("speed", [0.3, 7.0, 40.0])
 def test_between_two_planes_it_is_seen_in_both_mirrors(speed: float) -> None:
-    """Also where it passes several widths of the column in a step."""
+    """This also holds for a node that passes several widths of the column in a step."""
     x, v = np.linspace(-0.4, 0.6, 11)[:, None] * [1.0, 0.0, 0.0], np.tile([speed, 0.0, 2.0], (11, 1))
     sides = np.tile([1.0, -1.0], (11, 1))
     state, mirrors = flight(x, v, [0, 0], [-0.5, 0.7], sides, 13, 0.1)
@@ -93,11 +96,11 @@ def test_what_has_tets_is_stopped_beside_what_has_none() -> None:
     assert mirrors.contact_loss[0] > 0.0
 
 
-# In a scene
+# Reflection in a scene
 
 
 def corner(velocity: tuple[float, float, float], at: float = 0.0) -> tuple[schema.Case, list[TetMesh]]:
-    """A cube in the corner of two planes of symmetry at ``at`` that wears, above a block that wears, too."""
+    """Returns an eroding cube in the corner of two planes of symmetry at ``at``, above an eroding block."""
     planes = tuple({**plane, "at": at} for plane in PLANES)
     case = meeting_of([{"velocity": velocity, "erosion": EROSION}, {"erosion": EROSION}], boundaries=planes)
     cube, ground = block((3, 3, 3), MM, shake=0.0), block((3, 3, 2), MM, shake=0.0)
@@ -105,7 +108,8 @@ def corner(velocity: tuple[float, float, float], at: float = 0.0) -> tuple[schem
 
 
 def flown(sim: Simulation, until: float, limit: float = 1e-10) -> Simulation:
-    """All tets of the cube leave in the first step; the residuals stay below a ``limit``."""
+    """Runs a scene in which all tets of the cube are removed in the first step; the residuals must be below
+    ``limit``."""
     step.prepare(sim)
     tick(sim, sim.model.blocks[0].id.copy())
     while sim.clock.t < until:
@@ -115,7 +119,8 @@ def flown(sim: Simulation, until: float, limit: float = 1e-10) -> Simulation:
 
 @pytest.mark.parametrize("at", [0.0, 7 * MM])
 def test_debris_keeps_its_energy_at_planes(at: float) -> None:
-    """Upward and into the corner: it comes out again, with the speed that it had; what started on a plane is free."""
+    """Debris that moves upwards and into the corner leaves it with the same speed. Nodes that start on a plane are
+    free."""
     case, meshes = corner((-2000.0, -1500.0, 500.0), at)
     sim = build(case, meshes)
     nodes = sim.model.nodes
@@ -133,10 +138,10 @@ def test_debris_keeps_its_energy_at_planes(at: float) -> None:
 
 
 def test_what_starts_on_the_axis_may_leave_it() -> None:
-    """Debris on the axis that falls on a slope is pushed aside: a plane holds it no more than its images do."""
+    """Debris on the axis that falls on a slope is pushed to the side: the plane does not hold a node without tets."""
     case, meshes = corner((0.0, 0.0, -800.0))
     points = meshes[1].points
-    points[:, 2] *= 1.0 - 0.2 * points[:, 0] / MM  # it slopes down from the plane x = 0
+    points[:, 2] *= 1.0 - 0.2 * points[:, 0] / MM  # the slope descends from the plane x = 0
     sim = build(case, [meshes[0], TetMesh(points, meshes[1].tets)])
     nodes = sim.model.nodes
     axis = np.flatnonzero((nodes.part == 0) & (np.abs(nodes.x0[:, :2]).max(axis=1) == 0.0))

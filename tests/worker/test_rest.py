@@ -1,4 +1,5 @@
-"""Chunks at rest are passed over, and no bit differs: until a wave comes, in each form, with each kind of law."""
+"""Chunks at rest are omitted without any change of a bit, until a wave arrives, in each pressure form and with each
+kind of law."""
 
 import numpy as np
 import pytest
@@ -20,7 +21,8 @@ STEPS = 14
 
 
 def struck(material: Material, form: Form, skip: bool) -> tuple[Simulation, list[int]]:
-    """A bar whose lower end has been pushed, after some steps; and how many chunks were noted after each."""
+    """Returns a bar whose lower end has been pushed, after some steps, and the number of chunks at rest after each
+    step."""
     viscosity, mesh = {"linear": 0.06, "shock": 0.4, "quadratic": 1.5}, block((3, 3, 36), MM)
     along = np.argsort(mesh.points[mesh.tets].mean(axis=1)[:, 2])
     sim = build(scene(material, form, viscosity=viscosity), [TetMesh(mesh.points, mesh.tets[along])])
@@ -50,7 +52,7 @@ def test_no_bit_differs(law: str, form: Form) -> None:
 
 
 def test_a_wave_ends_the_rest() -> None:
-    """Its chunks are noted no more, and what has not been reached still is."""
+    """Chunks that the wave has reached are not at rest any more; the other chunks still are."""
     sim, noted = struck(STEEL, "standard", skip=True)
     (bar,) = sim.model.blocks
     moving = np.asarray((sim.model.nodes.v != 0.0).sum(axis=1)[bar.tets].sum(axis=1) > 0)

@@ -1,4 +1,4 @@
-"""Targets of the boxes of a new cut: the rank that has most of the box."""
+"""Ranks of the boxes of a new cut: a box goes to the rank that already has most of the box."""
 
 import numpy as np
 import pytest
@@ -11,11 +11,11 @@ from ..contact.ranks import on_ranks
 
 TETS = 240
 ALONG = (1.0, 0.01, 0.01)
-"""Cut across x."""
+"""Scale of space with which cuts are normal to x."""
 
 
 def parcel(mine: list[int]) -> Parcel:
-    """Separate tets in a row, with the ids ``mine``; all weigh the same."""
+    """Returns separate tets in a row, with the ids ``mine`` and equal weights."""
     ids = np.array(mine, np.int64)
     corners = 4 * ids[:, None] + np.arange(4)
     nodes = corners.reshape(-1)
@@ -27,7 +27,8 @@ def parcel(mine: list[int]) -> Parcel:
 @pytest.mark.parametrize("ranks", [2, 3, 5])
 @pytest.mark.parametrize("shift", [0, 1, 7])
 def test_what_is_even_already_stays(ranks: int, shift: int) -> None:
-    """Whoever has which slab of the row; of slabs that are off by some tets these alone are moved."""
+    """No tets move, for any assignment of the slabs of the row to ranks. If slabs are wrong by some tets, only these
+    tets are moved."""
     order = np.random.default_rng(3).permutation(ranks)
     slab = np.minimum((np.arange(TETS) + shift) * ranks // TETS, ranks - 1)
 

@@ -1,4 +1,4 @@
-"""Selections of regions in meshes that are turned, moved, scaled and rounded, against counts in integers."""
+"""Selections of regions in meshes that are turned, moved, scaled and rounded, compared with counts in integers."""
 
 import random
 from decimal import Decimal
@@ -55,7 +55,8 @@ def faces(whole: Whole, number: int = 0) -> int:
 
 
 class Scene:
-    """A block of cubes somewhere, turned by quarters, and a box from plane to plane of its nodes; mm, exact."""
+    """A block of cubes at any position, turned by quarter turns, and a box whose sides are planes of its nodes; mm,
+    exact."""
 
     def __init__(self, seed: int) -> None:
         rng = random.Random(seed)
@@ -69,7 +70,7 @@ class Scene:
         self.first = [rng.randint(0, n) for n in self.cells]
         self.last = [rng.randint(a, n) for a, n in zip(self.first, self.cells, strict=True)]
         thin = rng.randrange(3)
-        if rng.random() < 0.5:  # a layer of no thickness, on the surface
+        if rng.random() < 0.5:  # a layer without thickness, on the surface
             self.first[thin] = self.last[thin] = rng.choice([0, self.cells[thin]])
 
     def written(self, point: list[Decimal]) -> list[str]:
@@ -113,7 +114,7 @@ class Scene:
         return case_of(mesh, *boundaries, turn=turn)
 
     def file(self, rounded: Any) -> TetMesh:
-        """The mesh as a file has it: coordinates in its unit, rounded."""
+        """Returns the mesh in the form of a file: coordinates in its unit, rounded."""
         made = structured(self.case().parts[0].mesh)  # type: ignore[arg-type]
         numbers = [[x * PER_MM[self.unit] for x in point] for point in self._points(made)]
         return TetMesh(scaled(rounded(np.array(numbers, float)), 1e-3 / float(PER_MM[self.unit])), made.tets)
@@ -126,7 +127,8 @@ class Scene:
 
 @pytest.mark.parametrize("seed", range(60))
 def test_a_box_from_plane_to_plane_has_all_nodes_and_faces_between_them(seed: int) -> None:
-    """The same in the mesh as in what ``validate`` expects, wherever the body is and in whatever unit it is written."""
+    """The selection in the mesh is equal to that of ``validate``, for any position of the body and any unit of the
+    file."""
     made = Scene(seed)
     boundaries = [{**PUSH, **made.box}, *([{**PRESSURE, **made.box}] if made.faces else [])]
     case = made.case(*boundaries)
@@ -187,7 +189,7 @@ def test_a_turned_bar_is_pressed_on_its_whole_end() -> None:
 
 
 def test_a_mesh_that_disagrees_with_what_is_expected_is_told(caplog: pytest.LogCaptureFixture) -> None:
-    """A whole end, where the mesh that is made ends a third of an element before it."""
+    """A whole end is expected, but the mesh ends a third of an element before it."""
     caplog.set_level("INFO", "conoid.worker")
     bar = {"shape": "box", "low": [0, 0, 0], "high": [2e-3, 2e-3, 4e-3], "element_size": 5e-4}
     region = {"low": [0, 0, 3.9e-3], "high": [2e-3, 2e-3, 4.1e-3]}
@@ -196,7 +198,7 @@ def test_a_mesh_that_disagrees_with_what_is_expected_is_told(caplog: pytest.LogC
     assert right.warnings == []
     assert "boundaries[0] drives 25 nodes; expected: 25 nodes" in caplog.text
     shorter = TetMesh(made.points * [1.0, 1.0, 0.975], made.tets)
-    shorter.points[:, 0] += (shorter.points[:, 1] > 1.9e-3) * 2e-5  # one node of the layer leaves the box
+    shorter.points[:, 0] += (shorter.points[:, 1] > 1.9e-3) * 2e-5  # one node of the layer is outside of the box
     (told,) = whole_of(case, shorter).warnings
     assert told.startswith("boundaries[0]: drives 24 nodes, where validate expects 25 nodes; check its box")
 
@@ -246,8 +248,8 @@ BAR = {"shape": "box", "low": [0, 0, 0], "high": [2e-3, 2e-3, 2e-3], "element_si
 
 
 def beside_a_plane(points: Any, at: str) -> tuple[int, tuple[str, ...]]:
-    """Return the number of nodes of a bar from a file, given from its points, m, that start on a plane across x, and
-    the warnings.
+    """Return the number of nodes of a bar from a file, given by its points, m, that start on a plane normal to x,
+    and the warnings.
     """
     made = structured(case_of(BAR).parts[0].mesh)  # type: ignore[arg-type]
     plane = {"kind": "symmetry", "axis": "x", "at": at}
@@ -266,14 +268,14 @@ def test_nodes_just_off_a_plane_of_symmetry_are_told() -> None:
 
 
 def test_a_file_whose_digits_are_few_lies_on_its_plane_of_symmetry() -> None:
-    """A face at x = 1/3 of a metre, in six digits of a millimetre, and a plane written with more."""
+    """A face at x = 1/3 m is written with six digits of a millimetre, and the plane with more digits."""
     shift = np.array([1000.0 / 3.0, 0.0, 0.0])
     assert beside_a_plane(lambda x: scaled(SIX_DIGITS(1e3 * x + shift), 1e-3), "333.333333 mm") == (25, ())
 
 
 @pytest.mark.parametrize("angle", [0, 90, 180, 270])
 def test_a_probe_has_the_centres_on_the_border_of_its_box(angle: int) -> None:
-    """The tets whose centres lie on a plane, wherever a turn has rounded it to."""
+    """The tets whose centres lie on a plane are selected, for any rounding by a rotation."""
     bar = {
         "shape": "box",
         "low": [0, 0, 0],

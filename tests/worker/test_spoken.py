@@ -15,7 +15,7 @@ ENERGY = messages.Energy(
 
 
 def said(capsys: pytest.CaptureFixture[str]) -> list[str]:
-    """The lines without the time of day."""
+    """Returns the lines without the time of day."""
     return [line.split("  ", 1)[-1] for line in capsys.readouterr().out.splitlines()]
 
 

@@ -1,4 +1,4 @@
-"""The stable step against exact frequencies of single tets, with and without bulk viscosity."""
+"""The stable step compared with exact frequencies of single tets, with and without bulk viscosity."""
 
 import math
 from typing import Any
@@ -26,14 +26,14 @@ def moduli(poisson: float) -> tuple[float, float]:
 
 
 def one(mesh: TetMesh, i: int, poisson: float, **keys: Any) -> Patch:
-    """Tet ``i`` of a heap alone: with it alone, the limit of a pass is its own."""
+    """Returns tet ``i`` of a set as a separate patch, so that the limit of a pass is the limit of this tet."""
     points = mesh.points[mesh.tets[i]]
     metal = STEEL.model_copy(update={"elastic": STEEL.elastic.model_copy(update={"poisson": poisson})})
     return Patch(TetMesh(points, np.array([[0, 1, 2, 3]], np.int32)), metal, **keys)
 
 
 def exact_step(patch: Patch, poisson: float) -> float:
-    """2 / omega_max of the tet with a quarter of its mass at each node, s."""
+    """Returns 2 / omega_max of the tet with a quarter of its mass at each node, s."""
     volume, grad = formulas.gradients(patch.corners())
     stiffness = formulas.stiffness(float(volume[0]), grad[0], *moduli(poisson))
     return 2.0 / math.sqrt(np.linalg.eigvalsh(stiffness)[-1] / (DENSITY * volume[0] / 4.0))
@@ -41,7 +41,7 @@ def exact_step(patch: Patch, poisson: float) -> float:
 
 @pytest.mark.parametrize("poisson", [0.0, 0.22, 0.3, 0.49])
 def test_bound_is_never_above_the_exact_limit(poisson: float) -> None:
-    """Over tets of every shape, down to slivers, the bound is at most the exact limit and at least 0.57 of it."""
+    """For tets of all shapes, including slivers, the bound is at most the exact limit and at least 0.57 of it."""
     mesh = free_tets(300, 1, flattest=1e-3)
     shares = []
     for i in range(300):
@@ -53,8 +53,9 @@ def test_bound_is_never_above_the_exact_limit(poisson: float) -> None:
 
 
 def test_bound_of_the_regular_tet() -> None:
-    """Edge 1 m, nu = 0.3, derived: |grad N|^2 = 3/2 at each node, so the bound is 1 / (c sqrt 6). The fastest mode
-    is volumetric: strain energy 9/2 K V e^2, kinetic energy 3/16 rho V (de/dt)^2, with r^2 = 3/8.
+    """For an edge of 1 m and nu = 0.3 the bound is derived: |grad N|^2 = 3/2 at each node, so it is 1 / (c sqrt 6).
+    The fastest mode is volumetric, with the strain energy 9/2 K V e^2 and the kinetic energy 3/16 rho V (de/dt)^2,
+    r^2 = 3/8.
     """
     patch = one(TetMesh(REGULAR, np.array([[0, 1, 2, 3]], np.int32)), 0, 0.3)
     patch.advance(0.0)
@@ -73,7 +74,7 @@ def test_length_factor_makes_the_length_of_a_regular_tet_its_cube_root() -> None
 
 
 def squeezed(i: int, mesh: TetMesh, rate: float, poisson: float = 0.3) -> Patch:
-    """Tet ``i`` at the end of a step of ``DT`` in which its volume changed at ``rate``, 1/s, with viscosity."""
+    """Returns tet ``i`` at the end of a step of ``DT`` in which its volume changed at ``rate``, 1/s, with viscosity."""
     patch = one(mesh, i, poisson, viscosity={"linear": LINEAR, "shock": SHOCK, "quadratic": QUADRATIC})
     patch.strain(rate / 3.0 * np.eye(3), DT)
     patch.advance(DT)
@@ -81,8 +82,7 @@ def squeezed(i: int, mesh: TetMesh, rate: float, poisson: float = 0.3) -> Patch:
 
 
 def viscous_law(patch: Patch, poisson: float = 0.3) -> tuple[float, float]:
-    """q and its slope by the rate of compression, from the formulas, at the end of the step.
-
+    """Returns q and its slope with respect to the rate of compression, from the formulas, at the end of the step.
     The pass divides the change of volume by the volume at the end of the step.
     """
     bulk, shear = moduli(poisson)
@@ -98,13 +98,13 @@ def viscous_law(patch: Patch, poisson: float = 0.3) -> tuple[float, float]:
 
 
 def growth(patch: Patch) -> float:
-    """Change of volume in the step, m^3."""
+    """Returns the change of volume in the step, m^3."""
     old = formulas.volumes(patch.corners() - DT * patch.corners(patch.nodes.v))
     return float(formulas.volumes(patch.corners())[0] - old[0])
 
 
 def free_volume(patch: Patch) -> float:
-    """Initial volume, m^3."""
+    """Returns the initial volume, m^3."""
     return float(patch.nodes.mass.sum()) / DENSITY
 
 
@@ -121,7 +121,7 @@ def test_bulk_viscosity(rate: float) -> None:
 
 @pytest.mark.parametrize("rate", [-1e8, -1e7, -1e5, 1e6])
 def test_viscous_bound_is_never_above_the_exact_limit(rate: float) -> None:
-    """A leapfrog whose damping C is of the step before is stable while M - dt/2 C - dt^2/4 K is positive."""
+    """A leapfrog scheme with the damping C of the step before is stable while M - dt/2 C - dt^2/4 K is positive."""
     mesh = free_tets(40, 3, flattest=0.01)
     for i in range(40):
         patch = squeezed(i, mesh, rate)
@@ -135,7 +135,8 @@ def test_viscous_bound_is_never_above_the_exact_limit(rate: float) -> None:
 
 
 def test_what_may_break_is_bounded_in_tension_as_if_it_were_let_go() -> None:
-    """By the viscosity at the speed |p| / (density c); in a part that does not fracture by the linear term alone."""
+    """In a part that can break, the bound includes the viscosity at the speed |p| / (density c); otherwise only the
+    linear term."""
     mesh, found = free_tets(1, 4), []
     for breaks in (False, True):
         patch = one(mesh, 0, 0.3, viscosity={"linear": LINEAR, "shock": SHOCK, "quadratic": QUADRATIC})
@@ -166,8 +167,8 @@ def test_viscous_bound_shrinks_with_the_rate() -> None:
 @pytest.mark.parametrize("form", FORMS)
 @pytest.mark.parametrize("rate", [-1e9, 1e9])
 def test_no_tet_changes_its_volume_by_more_than_a_quarter_in_a_step(rate: float, form: Form) -> None:
-    """The limit holds from the first step, since the first pass, of zero time, has the rate; a slow motion does not
-    change the step.
+    """The limit also holds in the first step, because the first pass, of zero time, computes the rate. A slow motion
+    does not change the step.
     """
     tet = TetMesh(1e-3 * REGULAR, np.array([[0, 1, 2, 3]], np.int32))
     limits = []
@@ -182,7 +183,7 @@ def test_no_tet_changes_its_volume_by_more_than_a_quarter_in_a_step(rate: float,
 
 @pytest.mark.parametrize("poisson", [0.22, 0.49])
 def test_free_tets_keep_their_energy_at_the_bound(poisson: float) -> None:
-    """Two thousand free tets of one size ring for 3,000 steps at the whole bound: none gains energy (H8)."""
+    """Two thousand free tets of one size oscillate for 3,000 steps at the full bound: no tet gains energy (H8)."""
     heap = free_tets(2000, 5)
     size = np.cbrt(heap.volumes())
     mesh = TetMesh(heap.points / np.repeat(size, 4)[:, None] * 1e-3, heap.tets)

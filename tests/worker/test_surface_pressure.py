@@ -1,4 +1,5 @@
-"""A pressure that follows the surface: forces, work and moments against plain numpy, a ring against its equilibrium."""
+"""A pressure that follows the surface: forces, work and moments compared with plain numpy, and a ring with its
+equilibrium."""
 
 import math
 from pathlib import Path
@@ -36,7 +37,7 @@ def pressed(sim: Simulation) -> SurfacePressure:
 
 
 def expected(x: Floats, faces: "np.ndarray", pressure: float) -> Floats:
-    """(nodes, 3) a third of the force of each face for each of its nodes."""
+    """Returns (nodes, 3) a third of the force of each face for each of its nodes."""
     a, b, c = (x[faces[:, k]] for k in range(3))
     force = np.zeros_like(x)
     for k in range(3):
@@ -51,7 +52,7 @@ def moments(x: Floats, v: Floats, mass: Floats) -> tuple[Floats, Floats]:
 
 @pytest.mark.parametrize("ranks", [1, 2, 5])
 def test_the_force_is_that_of_the_present_area_against_the_present_normal(ranks: int) -> None:
-    """Of a block that is stretched and turned; every rank has the whole force of its nodes, to the bit."""
+    """The block is stretched and turned; every rank has the whole force of its nodes, to the bit."""
     random = np.random.default_rng(5)
     change = random.normal(size=(3, 3)) + 2.0 * np.eye(3)
     faces = boundary_faces(MESH.tets)
@@ -76,7 +77,7 @@ def test_the_force_is_that_of_the_present_area_against_the_present_normal(ranks:
 
 
 def test_a_closed_surface_has_no_force_and_no_moment() -> None:
-    """A box turns by two radians while a rising pressure acts on all of it; the account of the energy closes."""
+    """A box turns by two radians while a rising pressure acts on its whole surface; the energy balance closes."""
     spin = {"rate": (1e4, -1.3e4, 3e4), "centre": (1.5e-3, 1.5e-3, 1.5e-3)}
     gas = {**GAS, "course": ((0.0, 0.0), (1e-5, 1.0))}
     sim = build(scene(STEEL, end=6e-5, boundaries=(gas,), spin=spin, velocity=(50.0, 20.0, -70.0)), [MESH])
@@ -101,7 +102,7 @@ def test_a_closed_surface_has_no_force_and_no_moment() -> None:
 
 
 def test_a_pressure_on_one_face_turns_with_the_body() -> None:
-    """The change of momentum is the integral of -p A n(t), n being the normal of the turning face."""
+    """The change of momentum is the integral of -p A n(t), with the normal n of the turning face."""
     spin = {"rate": (0.0, 6e4, 0.0), "centre": (1.5e-3, 1.5e-3, 1.5e-3)}
     small = {**GAS, **TOP, "pressure": 1e5}
     sim = build(scene(STEEL, end=3e-5, boundaries=(small,), spin=spin), [MESH])
@@ -124,8 +125,9 @@ def test_a_pressure_on_one_face_turns_with_the_body() -> None:
 
 
 def test_a_ring_carries_the_pressure_on_its_present_radius() -> None:
-    """Damped until it rests, stretched by a fifth: hoop stress times thickness is pressure times present inner radius,
-    by equilibrium for any material; and what the pressure has done is the integral of p over the swept volume.
+    """The ring is damped until it is at rest, stretched by a fifth. Hoop stress times thickness is pressure times
+    present inner radius, by equilibrium for any material, and the work of the pressure is the integral of p over the
+    swept volume.
     """
     inner, outer, width, pressure, end = 10e-3, 11e-3, 1e-3, 0.4e6, 4e-3
     bore = {"cylinder": {"axis": "z", "radius": inner}}

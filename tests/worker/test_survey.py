@@ -34,7 +34,8 @@ TWO = """*NODE
 
 @pytest.fixture
 def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """Two tets of 18 mm^3 with a common face. Files are read in this process, which takes a tenth of the time."""
+    """Two tets of 18 mm^3 with a common face. Files are read in this process, which takes a tenth of the time of a
+    child process."""
     monkeypatch.setenv("CONOID_CACHE_DIR", str(tmp_path))
 
     def read(mesh: Mesh, sources: Sources, target: Path, key: str, limits: Limits) -> None:
@@ -90,7 +91,8 @@ SHARED = r"parts: 'part0' and 'part1' share 3 nodes of 'two.inp', but would be s
 
 @pytest.mark.parametrize("contact", ["none", {}])
 def test_two_parts_that_share_nodes_of_a_file_are_refused(contact: object, folder: Path) -> None:
-    """Before the run, and by the run. A copy of the file under another name is the same file."""
+    """The parts are refused before the run and by the run. A copy of the file under another name counts as the same
+    file."""
     (folder / "copy.inp").write_text(TWO)
     made = case(part("Upper"), part("Lower", "copy.inp"), contact=contact)
     assert surveyed(made, folder).refused[0].startswith(SHARED)
@@ -112,7 +114,8 @@ def test_a_survey_is_read_as_it_was_written(folder: Path) -> None:
 
 
 def test_surfaces_that_coincide_are_measured(folder: Path) -> None:
-    """A face of two meshes, and what of a mesh lies on a plate; not where there is a gap."""
+    """The scene has a common face of two meshes, and faces of a mesh on a plate; surfaces with a gap are not
+    counted."""
     (folder / "apart.inp").write_text(TWO.replace("2, 1, 3, 2, 5", "2, 6, 8, 7, 5").replace("*ELEMENT", (
         "6, 0, 0, 0\n7, 6, 0, 0\n8, 0, 6, 0\n*ELEMENT"), 1))  # fmt: skip
     files = surveyed(case(part("Upper", "apart.inp"), part("Lower", "apart.inp")), folder).touching
@@ -155,6 +158,7 @@ def test_a_box_in_which_a_file_has_nothing_is_refused(folder: Path) -> None:
 
 
 def test_the_program_names_the_cache_of_kernels_before_numba_is_imported() -> None:
-    """Numba asks for it when it is imported; what the program imports at its head must not import it."""
+    """Numba reads the name of its cache when it is imported; therefore the program must not import numba at its
+    beginning."""
     asked = "import sys, conoid.worker.scene.survey; sys.exit('numba' in sys.modules)"
     assert subprocess.run([sys.executable, "-c", asked], check=False).returncode == 0

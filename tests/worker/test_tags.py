@@ -11,7 +11,7 @@ from conoid.worker.parallel.tags import Tag
 HOUSE = Path(str(conoid.worker.__file__)).parent
 SOURCES = sorted(path for path in HOUSE.rglob("*.py") if path.name != "tags.py")
 AT = {"send": 2, "Isend": 2, "Send_init": 2, "recv": 2, "Irecv": 2, "Recv_init": 2, "Improbe": 1}
-"""Calls of mpi4py that take a tag, and at which place."""
+"""Calls of mpi4py that take a tag, and the position of this argument."""
 
 
 def test_no_two_tags_are_equal() -> None:
@@ -30,7 +30,8 @@ def test_every_tag_has_a_meaning() -> None:
 
 @pytest.mark.parametrize("path", SOURCES, ids=lambda path: path.relative_to(HOUSE).as_posix())
 def test_no_tag_is_made_elsewhere(path: Path) -> None:
-    """mypy holds every parameter ``tag`` to the type Tag; here none is assigned, and none hides from that type."""
+    """mypy checks that every parameter ``tag`` has the type Tag; this test checks that no other code assigns a tag
+    or removes its type."""
     for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
         if isinstance(node, ast.Assign):
             names = [n.id for target in node.targets for n in ast.walk(target) if isinstance(n, ast.Name)]
@@ -41,7 +42,7 @@ def test_no_tag_is_made_elsewhere(path: Path) -> None:
 
 
 def test_mpi_is_given_tags_of_the_registry_only() -> None:
-    """The calls of mpi4py have no types, so mypy does not see their tags."""
+    """The calls of mpi4py have no types, so mypy cannot check their tags."""
     calls = set[str]()
     for node in ast.walk(ast.parse((HOUSE / "parallel" / "mpi.py").read_text(encoding="utf-8"))):
         if not (isinstance(node, ast.Call) and isinstance(node.func, ast.Attribute) and node.func.attr in AT):

@@ -1,4 +1,5 @@
-"""Tension of the pressure: the modulus of Mie-Grueneisen stays positive, and a cut-off opens pores that close again."""
+"""Tension of the pressure: the modulus of the Mie-Grueneisen equation stays positive, and pores that open at a
+cut-off close again."""
 
 import math
 from itertools import pairwise
@@ -26,7 +27,7 @@ COPPER = library()["copper_ofhc"]
 
 
 def stretched(material: Material, path: Floats) -> dict[str, Floats]:
-    """Pressure, pores, work and plastic work, and the limit of the step, of a tet along scales of its edges."""
+    """Returns pressure, pores, work, plastic work and step limit of a tet, for a sequence of scales of its edges."""
     mesh = free_tets(1, 3)
     patch, rows = Patch(mesh, material), []
     for old, new in pairwise(path):
@@ -43,12 +44,13 @@ def stretched(material: Material, path: Floats) -> dict[str, Floats]:
 
 
 def there_and_back(top: float, n: int = 400) -> Floats:
-    """Scales of the edges: from 1 to ``top``, back, and on to 0.99."""
+    """Returns scales of the edges: from 1 to ``top``, back, and on to 0.99."""
     return np.concatenate([np.linspace(1.0, top, n), np.linspace(top, 0.99, n)[1:]])
 
 
 def test_the_modulus_stays_positive_however_far_copper_is_stretched() -> None:
-    """The tangent of the law vanishes at 1.5 times the volume; the step was not a number from 1.73 on."""
+    """The tangent of the law is zero at 1.5 times the volume. In an earlier version the step was not a number from
+    1.73 times on."""
     found = stretched(COPPER_GAS, np.linspace(1.0, 2.0, 600))
     assert np.isfinite(found["limit"]).all()
     assert (found["limit"] > 0.0).all()
@@ -56,7 +58,7 @@ def test_the_modulus_stays_positive_however_far_copper_is_stretched() -> None:
 
 
 def test_a_cut_off_of_a_linear_pressure_is_elastic_and_plastic_in_volume() -> None:
-    """p = -K (ln J - pores) between -spall and, while there are pores, 0: integrated here on its own."""
+    """p = -K (ln J - pores) between -spall and, while pores exist, 0; the test integrates this law independently."""
     material = STEEL.model_copy(update={"spall": SPALL, "strength": COPPER.strength})
     path = there_and_back(1.02)
     found = stretched(material, path)
@@ -79,7 +81,8 @@ def test_a_cut_off_of_a_linear_pressure_is_elastic_and_plastic_in_volume() -> No
 
 
 def test_a_cut_off_of_mie_gruneisen_keeps_the_energy_equation() -> None:
-    """The pressure is always the law at the ratio of the matter and its energy; the volume is theirs with pores."""
+    """The pressure is always that of the law at the volume ratio of the material and its energy; the volume of the
+    tet includes the pores."""
     material = COPPER_GAS.model_copy(update={"spall": SPALL})
     path = there_and_back(1.02)
     found = stretched(material, path)
@@ -97,12 +100,12 @@ def test_a_cut_off_of_mie_gruneisen_keeps_the_energy_equation() -> None:
     assert found["p"][-1] > 3e9
     volume = found["mass"][0] / 8930.0
     opened = volume * (found["ratio"] * found["pores"]).max()
-    stored = SPALL**2 / (2.0 * 8930.0 * eos.c0**2)  # comes back from more volume than it went into
+    stored = SPALL**2 / (2.0 * 8930.0 * eos.c0**2)  # returns from a larger volume than before
     assert found["plastic"][-1] == pytest.approx((SPALL - stored) * opened, rel=0.002)
 
 
 def ball(spall: float | None) -> simulation.Simulation:
-    """A copper sphere of 5 mm that flies apart in all directions at 3e5 1/s; tets may leave."""
+    """Returns a copper sphere of 5 mm that expands in all directions at 3e5 1/s; tets may be removed."""
     made = COPPER.model_copy(update={"spall": spall})
     part = schema.Part(
         name="ball", material="made", mesh=Sphere(shape="sphere", radius=5e-3, element_size=1.3e-3),
@@ -116,8 +119,8 @@ def ball(spall: float | None) -> simulation.Simulation:
 
 @pytest.mark.parametrize("spall", [None, SPALL])
 def test_a_copper_sphere_that_is_torn_apart_keeps_its_energy_and_its_tets(spall: float | None) -> None:
-    """An earlier version lost 12 % of the energy and a ninth of the tets by 1 us. Without a cut-off single tets still
-    swell until erosion removes them by their volume, but the energy is kept.
+    """An earlier version lost 12 % of the energy and a ninth of the tets in 1 us. Without a cut-off single tets
+    still expand until erosion removes them by their volume, but the energy is conserved.
     """
     sim = ball(spall)
     residuals: list[float] = []

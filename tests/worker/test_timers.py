@@ -82,7 +82,7 @@ def test_waiting_for_other_ranks_is_exchange_and_is_not_serial(clocks: Clocks) -
 
 @njit(TASK, cache=False)
 def count(table, first, end, thread):  # type: ignore[no-untyped-def]
-    """Some work."""
+    """Does some work."""
     total = 0
     for k in range(first, end):
         total += k % 7

@@ -1,4 +1,4 @@
-"""Bulk viscosity where the pressure is averaged: it resists what the pressure sees."""
+"""Bulk viscosity of the averaged pressure forms: it acts on the averaged rate of the volume."""
 
 import pytest
 
@@ -12,17 +12,17 @@ from .meshes import block
 @pytest.mark.parametrize(
     ("own", "mean", "kept", "squeezed", "rate"),
     [
-        (3.0, 1.0, 1.0, 0.0, 1.0),  # what is beyond the mean is noise
+        (3.0, 1.0, 1.0, 0.0, 1.0),  # the part of the rate beyond the mean is noise
         (3.0, 1.0, 1.2, -0.3, 1.0),
-        (3.0, 1.0, 0.6, 0.0, 1.8),  # but not where the tet has lost volume to its neighbours
+        (3.0, 1.0, 0.6, 0.0, 1.8),  # except if the tet has lost volume to its neighbours
         (3.0, 1.0, 0.0, 0.0, 3.0),
         (3.0, 1.0, -0.5, 0.0, 3.0),
-        (3.0, 1.0, 1.0, 0.05, 2.0),  # nor under a pressure to which its strength is nothing
+        (3.0, 1.0, 1.0, 0.05, 2.0),  # or under a pressure far above its strength
         (3.0, 1.0, 0.8, 0.05, 2.4),
         (3.0, 1.0, 1.0, 0.4, 3.0),
         (3.0, -1.0, 1.0, 0.0, 0.0),
         (3.0, -1.0, 0.5, 0.0, 1.5),
-        (-3.0, 1.0, 0.5, 0.2, 1.0),  # it grows again: no less than the mean
+        (-3.0, 1.0, 0.5, 0.2, 1.0),  # in expansion the rate is at least the mean
         (-3.0, -1.0, 0.5, 0.2, 0.0),
     ],
 )
@@ -33,8 +33,8 @@ def test_what_is_resisted_lies_between_the_mean_and_the_own_rate(
 
 
 def test_averaged_forms_lose_no_more_to_viscosity_than_the_standard_one() -> None:
-    """A copper block of 3 x 3 x 6 cubes flows against a wall at 100 m/s. With each tet's own rate it lost 3.8 and 3.6 %
-    of its energy with the averaged forms, 2.9 % with the standard one.
+    """A copper block of 3 x 3 x 6 cubes hits a wall at 100 m/s. With each tet's own rate it lost 3.8 and 3.6 % of
+    its energy in the averaged forms, and 2.9 % in the standard form.
     """
 
     def lost(form: Form) -> float:
@@ -50,8 +50,8 @@ def test_averaged_forms_lose_no_more_to_viscosity_than_the_standard_one() -> Non
 
 
 def test_few_tets_that_ring_are_computed_in_steps_that_do_not_ring_with_them() -> None:
-    """A cube of steel that is pushed apart on a wall. Where tets at rest, or that expand, were bounded without
-    viscosity, the step went with each oscillation by the 6 % of the linear term, which took 1 % of the energy at once.
+    """A cube of steel expands on a wall. With a bound without viscosity for tets at rest or in expansion, the step
+    changed with each oscillation by the 6 % of the linear term, and one such change took 1 % of the energy.
     """
     wall = {"kind": "wall", "point": (0.0, 0.0, 0.0), "normal": (0.0, 0.0, 1.0)}
     case = scene(STEEL, "standard", viscosity={}, boundaries=(wall,), frames=0)

@@ -1,4 +1,4 @@
-"""``validate`` and a run give the same warnings and refuse the same, where both know the meshes."""
+"""``validate`` and a run give the same warnings and the same errors if both read the meshes."""
 
 import json
 import subprocess
@@ -32,7 +32,7 @@ GLASS = {
 
 
 def case(*boundaries: dict[str, Any], material: dict[str, Any] | None = None, **more: Any) -> dict[str, Any]:
-    """A bar from a file over a block that is generated."""
+    """Returns a bar from a file above a generated block."""
     below = {**BLOCK, "low": [0, 0, "-3 mm"], "high": ["2 mm", "2 mm", "-1 mm"]}
     mesh = {"shape": "file", "path": "bar.inp", "unit": "1 mm"}
     return {
@@ -47,8 +47,8 @@ def case(*boundaries: dict[str, Any], material: dict[str, Any] | None = None, **
 
 
 def write(path: Path, *shifts: tuple[float, float, float], bent: float = 0.0) -> None:
-    """A file of blocks at some places, in mm, with nodes of their own; ``bent``: mm by which the nodes of the plane
-    x = 0 are off it.
+    """Writes a file of blocks at the given positions, mm, each with its own nodes; ``bent``: distance in mm of the
+    nodes of the plane x = 0 from this plane.
     """
     made = structured(parse_case({**case(), "parts": case()["parts"][1:]}).parts[0].mesh)  # type: ignore[arg-type]
     nodes, tets = [], []
@@ -63,7 +63,7 @@ def write(path: Path, *shifts: tuple[float, float, float], bent: float = 0.0) ->
 
 @pytest.fixture
 def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """Files are read in this process, which takes a tenth of the time."""
+    """Files are read in this process, which takes a tenth of the time of a child process."""
     monkeypatch.setenv("CONOID_CACHE_DIR", str(tmp_path / "cache"))
 
     def read(mesh: Mesh, sources: Sources, target: Path, key: str, limits: Limits) -> None:
@@ -76,8 +76,8 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 def both(data: dict[str, Any], folder: Path) -> tuple[list[str], list[str]]:
-    """The warnings of an examination and those of a run up to its first step, bare numbers left out: the run finds
-    them where it reads the case."""
+    """Returns the warnings of an examination and those of a run up to its first step, without bare numbers, which
+    the run reports when it reads the case."""
     told = [str(each) for each in examine(data, folder).odd]
     begun = simulation.build(parse_case(data), folder, SerialComm())
     return [each for each in told if "no unit, taken for" not in each], list(begun.warnings)
@@ -131,8 +131,8 @@ def test_both_refuse_the_same(data: Any, words: str, folder: Path) -> None:
 @pytest.mark.parametrize("shift", [(0, 0, 0), (1, 0, 0), (0.13, 0.21, 0.4), (1.2, 1.3, 1.1)])
 @pytest.mark.parametrize("contact", ["none", {}])
 def test_what_is_there_twice_is_refused_by_both(shift: Any, contact: Any, folder: Path) -> None:
-    """The common volume is the part of 8 mm^3 that the shift leaves: exact if the tets coincide, else off by half a
-    layer of tets.
+    """The common volume is the part of 8 mm^3 that the shift leaves. It is exact if the tets coincide; otherwise the
+    error is half a layer of tets.
     """
     write(folder / "bar.inp", (0, 0, 0), shift)
     made = parse_case(case() | {"contact": contact})
@@ -147,7 +147,8 @@ def test_what_is_there_twice_is_refused_by_both(shift: Any, contact: Any, folder
 
 
 def test_a_process_of_each_warns_of_the_same(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """The bare density, the notes of the file, its pieces, the law of tension alone, the linear pressure."""
+    """The warnings are: a bare density, the notes of the file, its pieces, the law of tension only, and the linear
+    pressure."""
     write(tmp_path / "bar.inp", (0, 0, 0), (0, 0, 3))
     data = case({**PLANE, "parts": ["bar"]}, material={**GLASS, "density": 2500}, velocity=[0, 0, "-2 km/s"])
     (tmp_path / "case.json").write_text(json.dumps(data))

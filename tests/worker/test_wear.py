@@ -1,4 +1,4 @@
-"""Wear: which tets leave, that all else stays as it was, and sums of a whole run."""
+"""Marks of worn tets, unchanged state of all other tets, and sums of a whole run."""
 
 from fractions import Fraction
 from functools import partial
@@ -20,7 +20,7 @@ from .kernels import build
 from .meshes import Floats, block
 
 MM = 1e-3
-# Which tets leave
+# Marked tets
 
 
 LIFE = np.array([0.5, 0.2, 3.0, 2e6, 1.0])
@@ -33,7 +33,7 @@ def differ(one: Floats, two: Floats) -> "np.ndarray":
 
 
 class Chunk:
-    """Seven sound tets as the pass over the elements has them; the one in the middle is spoiled."""
+    """Seven intact tets after the pass over the elements; the tet in the middle is damaged."""
 
     def __init__(self, count: int = rows.TEMPERATURE + 1) -> None:
         self.n, self.rows = 7, count
@@ -53,7 +53,7 @@ class Chunk:
         return int(wear.mark_worn(self.worn, self.w, s, self.params, LIFE, self.rows, self.n))
 
     def changed(self) -> tuple[list[int], list[tuple[int, int]]]:
-        """Places of the scratch, and (row, tet) of the state, that the call has changed."""
+        """Returns the places of the scratch, and (row, tet) of the state, that the call has changed."""
         w = np.flatnonzero(differ(self.w, self.w_then))
         places, tets = np.nonzero(differ(self.s, self.s_then))
         return w.tolist(), list(zip(places.tolist(), tets.tolist(), strict=True))
@@ -110,7 +110,7 @@ def test_a_tet_inside_out_acts_on_nobody(value: float, count: int) -> None:
     ("row", "value"), [*((row, np.nan) for row in range(8)), (6, -np.inf), (rows.WORK, np.nan), (-1, np.nan)]
 )
 def test_what_is_not_a_number_stays_so_and_ends_the_run(row: int, value: float, volume: float) -> None:
-    """The limit of the step becomes NaN: step.py stops there and names the tet. No NaN is turned into a zero."""
+    """The limit of the step becomes NaN: step.py then stops and names the tet. No NaN is replaced by zero."""
     chunk = Chunk()
     chunk.w[scratch.VOLUME + 3] = volume * VOLUME if row >= 0 else np.nan
     if row >= 0:
@@ -140,7 +140,7 @@ def test_a_part_lives_as_its_case_says() -> None:
     assert wear.life(schema.Erosion())[wear.STRAIN] == np.inf
 
 
-# Blocks that lose tets
+# Removal of tets from blocks
 
 
 def random_block(n: int, random: np.random.Generator, contact: bool = True) -> Block:
@@ -181,7 +181,7 @@ def test_a_block_keeps_exactly_the_tets_that_stay(seed: int, contact: bool) -> N
 
 
 def tallied(largest: Floats, rows: Floats, comm: Comm) -> Floats:
-    """The sums over all ranks, each row added by itself on one of them."""
+    """Returns the sums over all ranks; each row is added separately on one rank."""
     tally = Tally(largest)
     for row in rows[comm.rank :: comm.size]:
         tally.add(row[None, :])
