@@ -63,7 +63,7 @@ def _parser() -> argparse.ArgumentParser:
     add("--mpiexec", default=os.environ.get("CONOID_MPIEXEC", ""), help="the site's own launcher [CONOID_MPIEXEC]")
     add("--worker", default=os.environ.get("CONOID_WORKER"), help="command of the worker [CONOID_WORKER]")
     add("--grace", type=float, default=30.0, help="seconds between the request to stop and the kill (default 30)")
-    add("--end-runs", action="store_true", help="cancel all runs when the server stops (default: workers go on)")
+    add("--end-runs", action="store_true", help="cancel all runs when the server stops (default: workers continue)")
     for name, kind, text in _CAPS:
         add(f"--max-{name.replace('_', '-')}", type=kind, help=text)
     _token_commands(parser)

@@ -232,7 +232,7 @@ def _read_secret(runs: Path) -> bytes:
     for a file that is too short or that others can read, and OSError if the secret cannot be made.
     """
     path = runs / _SECRET
-    remedy = "remove it, and the server makes a new one; whoever watches a run asks for a new password by himself"
+    remedy = "remove it, and the server makes a new one; clients that watch a run request a new password automatically"
     if not os.path.lexists(path):
         durable.write(path, secrets.token_bytes(_SECRET_BYTES), mode=0o600)
     try:

@@ -70,6 +70,11 @@ def test_commit_subjects_name_an_area_and_what_changed(subject: str, good: bool)
     assert plain_words.is_subject(subject) is good
 
 
+def test_paragraphs_of_a_page_begin_with_a_noun() -> None:
+    source = "It is here.\nThey follow.\n\n- Both of them\n- An item\n\n```\nThose\n```\n"
+    assert [number for number, _, _ in plain_words.of_paragraphs(source)] == [1, 4]
+
+
 def test_more_findings_than_a_folder_may_have_are_reported(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(plain_words, "NOT_YET", {"cases": 2})
     counts = Counter({"cases": 3, "docs": 1})

@@ -178,7 +178,7 @@ def build(case: Case, folder: Path, comm: Comm, say: Say = quiet) -> Simulation:
     """Meshes the case, partitions and distributes the mesh, and builds the stages; rank 0 calls ``say`` with its
     progress.
 
-    Raises InputError on every rank alike.
+    Raises the same InputError on every rank.
     """
     model, piece = domain.build(case, folder, comm, say)
     say("setting up the first step")

@@ -179,7 +179,7 @@ class Deck:
             elif block.name in ("PARAMETER", "PARAMETER_GLOBAL"):
                 self._define(block)
             elif block.name.startswith(("INCLUDE_", "PARAMETER_")):
-                raise block.error(None, f"*{block.name} is not followed; write out what it stands for")
+                raise block.error(None, f"*{block.name} is not supported; write its contents into the deck")
             elif block.name != "COMMENT":
                 yield block
 

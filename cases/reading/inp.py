@@ -1,8 +1,8 @@
 """The text of an Abaqus input file: keyword lines with their parameters, and data lines.
 
 Rules of the Analysis User's Guide, "Input syntax rules": a line that begins with ``*`` is a keyword line, one that
-begins with ``**`` a comment; case and blanks mean nothing outside of quotation marks; a keyword line that ends with a
-comma goes on in the next line; a number may have a D for its exponent, an empty field is 0.
+begins with ``**`` a comment; case and blanks have no meaning outside of quotation marks; a keyword line that ends with
+a comma continues in the next line; the exponent of a number may begin with D; an empty field is 0.
 """
 
 import math

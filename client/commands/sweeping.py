@@ -186,7 +186,7 @@ def _waited(made: Sweep) -> SweepInfo:
             return made.wait(say=say)
     except KeyboardInterrupt:
         complain(
-            f"the same command goes on; conoid sweep-table {made.id} shows the runs, conoid sweep-cancel {made.id} "
+            f"the same command continues; conoid sweep-table {made.id} shows the runs, conoid sweep-cancel {made.id} "
             "stops them"
         )
         raise

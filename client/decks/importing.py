@@ -20,7 +20,7 @@ from .toml import bare, toml
 
 _ERODING = (
     "parts that erode lose tets by volume and by time step as well, with the defaults of parts[].erosion, and nodes "
-    "without tets go on as particles until they strike"
+    "without tets remain as particles until their first contact"
 )
 
 

@@ -173,7 +173,7 @@ def told(materials: Iterable[Weighed]) -> tuple[System, str]:
     densities = ", ".join(f"{one.name} {one.density:g}" for one in every[:5]) or "none"
     raise UsageError(
         f"--units is needed: no material has the density of steel in a usual system (densities: {densities}); "
-        'write --units "mm,t,s", or whatever the deck is in'
+        'write --units "mm,t,s", or the units of the deck'
     )
 
 

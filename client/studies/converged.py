@@ -75,7 +75,7 @@ class Book:
         """The advice in one line."""
         name = self.leading(wanted)
         if name is None and wanted is not None:
-            return f"Nothing that is called {wanted!r} converges on these meshes."
+            return f"No quantity named {wanted!r} converges on these meshes."
         if name is None:
             return self._nothing()
         each, goal = self.goals()[name]

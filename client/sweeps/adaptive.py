@@ -172,7 +172,7 @@ def _next(wanted: Search, tried: Sequence[Tried], spent: int, many: int) -> tupl
 
 
 _USED_UP = "as many runs as are allowed have been made"
-_CANCELLED = "it was cancelled on the server; the same command goes on with it"
+_CANCELLED = "it was cancelled on the server; the same command continues it"
 
 
 def _samples(tried: Sequence[Tried]) -> list[Sample]:

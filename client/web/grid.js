@@ -85,10 +85,10 @@ export class Grid {
     if (column.id === "state") return h("td.state", {}, state(row));
     const text = column.text(row);
     const tone = column.id === "references" && row.references ? (row.missed.length ? ".bad" : ".good") : "";
-    const told = column.id === "references" ? row.missed.join(", ") : column.number ? exact(column.value(row) ?? NaN) : text;
+    const title = column.id === "references" ? row.missed.join(", ") : column.number ? exact(column.value(row) ?? NaN) : text;
     const unsure = Boolean(text && column.unsure?.(row));
     const words = column.unit ? `${column.title}, ${column.unit}` : column.title;
-    return h(`td${column.number ? ".right" : ""}${tone}${text ? "" : ".none"}${unsure ? ".unsure" : ""}`, { "data-name": words, title: text ? `${told}${unsure ? `, ${row.state.replaceAll("_", " ")}` : ""}` : false }, text);
+    return h(`td${column.number ? ".right" : ""}${tone}${text ? "" : ".none"}${unsure ? ".unsure" : ""}`, { "data-name": words, title: text ? `${title}${unsure ? `, ${row.state.replaceAll("_", " ")}` : ""}` : false }, text);
   }
 
   groupRow({ key, title, brief = "", href, note, varied, rows, open }) {

@@ -86,8 +86,8 @@ function ofSnapshot(snapshot) {
   if (best) {
     const [low, high] = [points[0][0], points.at(-1)[0]];
     const curve = Array.from({ length: CURVE }, (_, i) => low * (high / low) ** (i / (CURVE - 1))).map((size) => [size, points.length * best.longer(size)]);
-    const told = best.law === "power" ? `exponent ${fixed(best.parameter)}` : si(best.parameter, "m");
-    list.push({ ...series({ name: `${best.law} law, ${told}`, colour: "bad", data: curve.filter(([, number]) => number >= LEAST), text: (value) => fixed(value, 1) }), lineStyle: { type: "dashed" } });
+    const parameter = best.law === "power" ? `exponent ${fixed(best.parameter)}` : si(best.parameter, "m");
+    list.push({ ...series({ name: `${best.law} law, ${parameter}`, colour: "bad", data: curve.filter(([, number]) => number >= LEAST), text: (value) => fixed(value, 1) }), lineStyle: { type: "dashed" } });
   }
   return list;
 }

@@ -68,13 +68,13 @@ export function matrix(points, down, across, result) {
   return { rows, columns, cells };
 }
 
-const TELLING = [/residual_velocity/, /penetration/, /^result:probe\.[^.]*$/, /^result:reference\.(?!worst_residual)/, /^result:fragments$/, /^result:energy\.kinetic$/];
+const INFORMATIVE = [/residual_velocity/, /penetration/, /^result:probe\.[^.]*$/, /^result:reference\.(?!worst_residual)/, /^result:fragments$/, /^result:energy\.kinetic$/];
 
-// The most informative result: one that differs between the points, in the order of TELLING.
+// The most informative result: the first kind of INFORMATIVE with values that differ between the points.
 export function telling(points, results) {
   const differs = (column) => new Set(points.map(({ row }) => measured(row, column)).filter(number)).size > 1;
   const there = results.filter(differs);
-  for (const kind of TELLING) {
+  for (const kind of INFORMATIVE) {
     const found = there.find(({ id }) => kind.test(id));
     if (found) return found;
   }

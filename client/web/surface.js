@@ -150,7 +150,7 @@ export class Surface {
     this.tintCaps();
   }
 
-  // Section of each image, at the position of the body itself; images that are cut alike share it.
+  // Section of each image, at the position of the body itself; images with equal sections use one section.
   images() {
     const known = new Map();
     return Array.from({ length: 2 ** this.planes.length }, (_, image) => {

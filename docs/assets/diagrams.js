@@ -1,4 +1,4 @@
-// Draws the mermaid diagrams of the site, anew for light and dark colours; without JavaScript they stay text.
+// Draws the mermaid diagrams of the site, again after a change between light and dark colours; without JavaScript they stay text.
 import { mermaid } from "./mermaid/index.js";
 
 const diagrams = [...document.querySelectorAll("pre.diagram")].map((place) => ({ place, text: place.textContent }));

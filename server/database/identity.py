@@ -75,7 +75,7 @@ def _look(runs: Path, store: Store) -> Pair:
         folder = None
     except (OSError, msgspec.MsgspecError, UnicodeDecodeError, RecursionError) as error:
         raise IdentityError(
-            f"--runs {runs}: {FILE} cannot be read ({error}); python -m conoid.server --runs {runs} adopt makes it anew"
+            f"--runs {runs}: {FILE} cannot be read ({error}); python -m conoid.server --runs {runs} adopt rewrites it"
         ) from None
     return Pair(place, folder, store.bond())
 

@@ -80,7 +80,7 @@ class Reader:
                 program = self._running()
                 connection, pid = program.begun()
             except OSError as raised:
-                _log.error("the program that reads cases is started anew: %s", raised)
+                _log.error("the program that reads cases is started again: %s", raised)
                 error = raised
                 self.close()
             else:

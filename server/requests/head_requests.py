@@ -5,8 +5,9 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 
 class HeadRequests:
-    """Middleware that handles HEAD: it calls the app with GET and ends the answer after the headers, whatever the
-    length of the body."""
+    """Middleware that handles HEAD: it calls the app with GET and ends the answer after the headers, for any length of
+    the body.
+    """
 
     def __init__(self, app: ASGIApp) -> None:
         self._app = app

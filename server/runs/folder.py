@@ -109,7 +109,7 @@ def new_id() -> tuple[str, float]:
 
 
 def begin_after(run_id: str) -> None:
-    """Makes later ids sort after this id, whatever the time of the clock."""
+    """Makes later ids sort after this id, for any time of the clock."""
     global _last_stamp
     stamp = 0
     for letter in run_id[:11]:

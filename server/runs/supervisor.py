@@ -160,7 +160,7 @@ class Supervisor:
             try:
                 self._turn()
             except Exception:
-                _log.exception("the supervisor goes on in %g s", _AGAIN)
+                _log.exception("the supervisor continues in %g s", _AGAIN)
                 time.sleep(_AGAIN)
 
     def _turn(self) -> None:

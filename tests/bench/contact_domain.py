@@ -2,7 +2,8 @@
 prints as JSON the work of every rank.
 
 If there are fewer cores than ranks, wall time is useless; the CPU time is that of the thread, without waiting. The
-order is box, arbitrary, arbitrary, box, so that a drift affects both kinds alike. The partition is not changed.
+order is box, arbitrary, arbitrary, box, so that a drift affects both kinds in the same way. The partition is not
+changed.
 """
 
 import json

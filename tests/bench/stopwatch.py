@@ -1,4 +1,4 @@
-"""CPU times of programs that run in alternation, A B A B, so that other load affects them alike."""
+"""CPU times of programs that run in alternation, A B A B, so that other load affects both programs in the same way."""
 
 import statistics
 from collections.abc import Callable, Mapping

@@ -1,9 +1,9 @@
 """Cost of telemetry per step, measured within one run: telemetry is switched on and off every quarter of a second.
 
 Two processes with the same work differ by more than the cost of telemetry, for example by the addresses of their
-memory. So both states are compared within one process: each Progress message ends a block of steps and begins the
-next one, with or without telemetry. Blocks come in pairs, in random order within a pair; a slow drift and the
-properties of the process affect both blocks alike.
+memory. So both states are compared within one process: each Progress message ends a block of steps and begins the next
+one, with or without telemetry. Blocks come in pairs, in random order within a pair; a slow drift and the properties of
+the process affect both blocks in the same way.
 """
 
 import math

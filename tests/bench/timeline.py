@@ -70,7 +70,7 @@ class Timeline:
                 if next(steps, None) is None:
                     del under_way[rank]
             if before == (len(under_way), self._progress()):
-                raise DeadlockError(f"ranks {sorted(under_way)} wait for what nobody sends")
+                raise DeadlockError(f"ranks {sorted(under_way)} wait for a message that no rank sends")
         return max(self.now)
 
     def _progress(self) -> tuple[float, int]:

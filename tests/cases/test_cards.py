@@ -42,7 +42,7 @@ def row(block: Block, place: int = 0) -> tuple[int, float, float]:
 def test_a_deck_is_its_keywords_with_their_cards_up_to_its_end(tmp_path: Path) -> None:
     text = (
         "\ufeff*keyword\r\n$ a remark\r\n*Set_Node_List_Title\r\nclamp, left\r\n         1\r\n\r\n*COMMENT\r\nx\r\n"
-        "*ELEMENT_SOLID (ten nodes format)\r\n*END\r\nwhatever\r\n"
+        "*ELEMENT_SOLID (ten nodes format)\r\n*END\r\nrest\r\n"
     )
     keyword, nodes, solid = deck(tmp_path, text)
     assert (keyword.name, nodes.name, nodes.number) == ("KEYWORD", "SET_NODE_LIST_TITLE", 3)
@@ -86,8 +86,8 @@ def test_a_card_says_the_same_in_every_format(tmp_path: Path, keyword: str, card
         ("*NODE\n" + " " * 75 + "7\n", "line 2: '7' stands behind the last field, beyond column 72"),
         ("*NODE\n      &n\n", "line 2: the parameter '&n' is not defined above; known: none"),
         ("*PARAMETER\nR a, 1\nR a, 2\n", "line 3: the parameter 'a' has another value above"),
-        ("*PARAMETER_EXPRESSION\nR a, 1+1\n", "line 1: *PARAMETER_EXPRESSION is not followed"),
-        ("*INCLUDE_TRANSFORM\na.k\n", "line 1: *INCLUDE_TRANSFORM is not followed"),
+        ("*PARAMETER_EXPRESSION\nR a, 1+1\n", "line 1: *PARAMETER_EXPRESSION is not supported"),
+        ("*INCLUDE_TRANSFORM\na.k\n", "line 1: *INCLUDE_TRANSFORM is not supported"),
         ("*NODE extra\n", "line 1: 'extra' stands behind *NODE"),
         ("*\n", "line 1: '*' is no keyword"),
         ("*KEYWORD LONG=X\n", "line 1: *KEYWORD LONG=X: expected"),

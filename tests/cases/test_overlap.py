@@ -50,7 +50,7 @@ def test_bodies_that_overlap(one: dict[str, Any], other: dict[str, Any], depth: 
 
 
 def test_tied_bodies_may_overlap_by_the_gap_of_their_bond() -> None:
-    """For facets of 1 mm the default gap is 0.1 mm. A rod that fills a tube and is bonded to it gives no warning
+    """The default gap is 0.1 mm for facets of 1 mm. A rod that fills a tube and is bonded to it gives no warning
     about contact."""
     upper = {**BLOCK, "low": [-5e-3, -5e-3, -5e-5], "high": [5e-3, 5e-3, 4e-3]}
     bond = {"parts": ["other", "one"], "kind": "tied"}

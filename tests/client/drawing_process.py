@@ -17,8 +17,8 @@ _LOOP = """
 import sys
 from conoid.client.drawing import render
 for line in sys.stdin.buffer:
-    code, told = render.told(line)
-    print(f"{code}{told}", flush=True)
+    code, answer = render.told(line)
+    print(f"{code}{answer}", flush=True)
 """
 
 

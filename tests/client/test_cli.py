@@ -167,7 +167,7 @@ def test_submit_show_ls_get(user: Path) -> None:
     shown = conoid("show", "last")
     assert run in shown.stdout
     assert "succeeded" in shown.stdout
-    assert "FAIL" in shown.stdout, "a reference number that is missed is told"
+    assert "FAIL" in shown.stdout, "a missed reference value is printed"
     told = read(conoid("runs", "--json"))[0]
     assert told["id"] == run
     assert told["results"]["steps"] == 2

@@ -80,7 +80,7 @@ FILES: dict[str, tuple[bytes, str]] = {
     "utf16.k": ("*KEYWORD\n".encode("utf-16"), "UTF-16"),
     "loop.k": (b"*KEYWORD\n*INCLUDE\nloop.k\n", "the file 'loop.k' includes itself"),
     "away.k": (b"*KEYWORD\n*INCLUDE\n../../../../etc/passwd\n", "is not below the folder of the deck"),
-    "moved.k": (b"*KEYWORD\n*INCLUDE_TRANSFORM\na.k\n", "*INCLUDE_TRANSFORM is not followed"),
+    "moved.k": (b"*KEYWORD\n*INCLUDE_TRANSFORM\na.k\n", "*INCLUDE_TRANSFORM is not supported"),
     "tabs.k": (lsdyna("*MAT_ELASTIC", "1\t7.85E-9\t2.1E5\t0.3").encode(), "a tab in a card of fixed widths"),
     "generate.k": (lsdyna("*MAT_ELASTIC", row(1, "7.85E-9", 2.1e5, 0.3), "*SET_NODE_LIST_GENERATE", row(1),
                           row(9, 1)).encode(), "no numbers lead from 9 to 1"),

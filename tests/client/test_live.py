@@ -253,7 +253,7 @@ def test_a_server_that_is_gone_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
     assert any(line.endswith("it was running at its last message") for line in lines)
     assert "no server answers" not in rendered(known), "it has come back"
     known.away = run_messages.START
-    assert "no server answers" in rendered(known), "the panel tells it too"
+    assert "no server answers" in rendered(known), "the panel shows it too"
 
 
 class Nothing:
@@ -285,4 +285,4 @@ def test_what_a_run_in_the_queue_waits_for_is_told(monkeypatch: pytest.MonkeyPat
     assert all("still queued" in line for line in lines)
     assert run.reason not in rendered(known)
     known.state = State.QUEUED
-    assert run.reason in rendered(known), "the panel tells it too"
+    assert run.reason in rendered(known), "the panel shows it too"

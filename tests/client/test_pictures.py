@@ -128,7 +128,7 @@ def test_what_has_one_value_is_one_colour_and_a_line(frame: Path, tmp_path: Path
     green = pixels[..., 1] > pixels[..., 2] + 0.05
     assert green[: int(0.7 * SIZE[1])].sum() == 0, "no colour of the scale"
     given = drawn(same, "mises", tmp_path / "b.png", limits=(0, 4))
-    assert given.limits == (0.0, 4.0), "who gives a range sees the value in it"
+    assert given.limits == (0.0, 4.0), "a given range is used unchanged"
 
 
 @pytest.mark.usefixtures("warm")
@@ -215,7 +215,7 @@ def test_no_text_is_cut_off_at_any_size(size: tuple[int, int]) -> None:
     font = picture_layout.font(size)
     right, above, towards = np.linalg.qr(np.random.default_rng(sum(size)).normal(size=(3, 3)))[0]
     eye = Camera(np.zeros(3), towards, right, above, half=0.05, deep=0.1)
-    parts = ["a part whose name is as long as nobody would write it", *map(str, range(60))]
+    parts = ["a part with a much longer name than usual in a case", *map(str, range(60))]
     for name, field in FIELDS.items():
         scale = (
             None

@@ -87,7 +87,7 @@ def test_a_late_joiner_reads_history_then_stream_without_gap_or_repeat(broker: B
         broker.publish(message)
     thread.join(10)
     assert told == list(range(1, 16))
-    assert journal.reads == 1, "the stream itself told the rest"
+    assert journal.reads == 1, "the other messages came from the stream"
 
 
 def test_a_gap_is_refilled_from_the_journal(broker: Broker) -> None:

@@ -39,7 +39,7 @@ def common(one: Floats, other: Floats) -> float:
     ],
 )
 def test_what_two_tets_have_in_common(one: Floats, other: Floats, share: float | None) -> None:
-    """If no value is given, the expected value is counted with points on a fine grid. No node of a tet needs to be
+    """The expected value, if it is not given, is counted with points on a fine grid. No node of a tet needs to be
     in the other tet."""
     both = (
         common(one, other),

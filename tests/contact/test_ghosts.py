@@ -114,8 +114,9 @@ def test_a_fetched_node_is_its_owners(ranks: int) -> None:
 @pytest.mark.parametrize("ranks", [1, 2, 3, 5, 8])
 @pytest.mark.parametrize("share", [0.0, 0.05, 0.5])
 def test_all_ranks_of_a_node_have_the_same_lists(ranks: int, share: float) -> None:
-    """For a node with a contact on any rank, the owner, the ranks with the node and the ranks with contacts have
-    lists, and each pair of these ranks has the same ids."""
+    """The lists of a node with a contact on any rank are on its owner, on the ranks with the node and on the ranks with
+    contacts; each pair of these ranks has the same ids.
+    """
     models, neighbours = models_of(ranks)
     random = np.random.default_rng([ranks, int(100 * share)])
     owner = {int(i): int(o) for m in models for i, o in zip(m.nodes.id, m.nodes.owner, strict=True)}

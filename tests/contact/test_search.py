@@ -148,7 +148,7 @@ def test_candidates_are_the_boxes_that_touch() -> None:
 
 
 def test_each_pair_is_found_once_where_all_meet_all() -> None:
-    """There are ten times as many pairs as rows at first: the search is interrupted and continued."""
+    """The table has a tenth of the needed rows at first: the search is interrupted and continued."""
     n = 120
     cloud = Cloud(5, n)
     huge = Primitives(cloud.faces.corners, np.full(n, 1e5))

@@ -241,8 +241,9 @@ def test_friction_is_bounded_by_mu_times_the_normal_impulse(mu: float) -> None:
 
 @pytest.mark.parametrize("seed", SEEDS)
 def test_one_contact_sticks_when_it_can_and_slides_when_it_must(seed: int) -> None:
-    """If the contact sticks, no relative velocity remains. If it slides, friction acts against the motion, with mu
-    times the normal impulse."""
+    """A contact that sticks has no relative velocity afterwards. In a contact that slides, friction acts against the
+    motion, with mu times the normal impulse.
+    """
     met, v, mobility = alone(seed)
     met.friction[:] = 1e3
     assert np.abs(rates(met, Solver(met, v, mobility).sweep(1))).max() < 1e-7
@@ -258,7 +259,7 @@ def test_one_contact_sticks_when_it_can_and_slides_when_it_must(seed: int) -> No
 
 @pytest.mark.parametrize("seed", range(10))
 def test_friction_is_isotropic(seed: int) -> None:
-    """If the whole scene is rotated, the impulses of the nodes are rotated in the same way."""
+    """A rotation of the whole scene rotates the impulses of the nodes in the same way."""
     met, v, mobility = alone(seed, friction=0.4)
     turn = rotation(unit(np.random.default_rng(seed), 1)[0], 1.0)
     before = Solver(met, v, mobility).sweep(3)

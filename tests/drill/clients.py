@@ -72,7 +72,7 @@ ANSWERS: dict[str, Answer] = {
     "JSON of something else": said({"version": 7, "items": []}),
     "JSON that is nested too deeply": said(b"[" * 100_000),
     "half of an answer": lambda: [head(200, 5000), b'{"runs": ['],
-    "more than was said": lambda: [head(200, 2), b'{"runs": []' * 1000],
+    "more bytes than the header gives": lambda: [head(200, 2), b'{"runs": []' * 1000],
     "no answer at all": lambda: [],
     "an answer without end": partial(endless, head(200, None), b" " * 65536),
     "a head without end": partial(endless, b"HTTP/1.1 200 X\r\n", b"X-A: b\r\n" * 999),

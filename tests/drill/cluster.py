@@ -35,7 +35,7 @@ _COMMAND = """#!/bin/sh
 case "$(cat {order} 2>/dev/null)" in
     garbage) printf '\\377{{|||\\n7|\\n<html>502 Bad Gateway</html>\\n\\0\\n' ;;
     nothing) ;;
-    half) told=$({real} "$@"); printf '%s' "$told" | head -c $(( ${{#told}} / 2 )) ;;
+    half) answer=$({real} "$@"); printf '%s' "$answer" | head -c $(( ${{#answer}} / 2 )) ;;
     fails) echo "slurm_load_jobs error: Unable to contact slurm controller (connect failure)" >&2; exit 1 ;;
     hangs) exec sleep 60 ;;
     mute) {real} "$@" >/dev/null ;;
@@ -45,7 +45,7 @@ esac
 """
 ANSWERS = {
     "garbage": "answers garbage", "nothing": "answers nothing", "half": "breaks off in the middle",
-    "fails": "does not reach the controller", "hangs": "hangs", "mute": "does its work and says nothing",
+    "fails": "does not reach the controller", "hangs": "hangs", "mute": "does its work and prints nothing",
     "unheard": "does its work and fails",
 }  # fmt: skip
 ALL_BUT_KILLED = tuple(life for life in situations.ALL if life is not situations.is_killed_meanwhile)

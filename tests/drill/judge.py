@@ -99,11 +99,11 @@ def _folder(stand: Stand, truth: Truth, seen: str) -> str:
     path, state = stand.runs / truth.run, seen.partition("/")[0]
     told, ended = journal.statuses(path / layout.JOURNAL), folder.outcome(path)
     if not told or told[-1].state != state:
-        return f"lie: the journal says {told[-1].state if told else 'nothing'}, not {state}"
+        return f"lie: the journal has {told[-1].state if told else 'nothing'}, not {state}"
     if ended is None or ended.state != state:
-        return f"lie: the outcome says {ended.state if ended else 'nothing'}, not {state}"
+        return f"lie: the outcome has {ended.state if ended else 'nothing'}, not {state}"
     listed = {run["id"]: run["state"] for run in stand.ask("GET", "/v1/runs?limit=500")[1]["runs"]}
-    return "" if listed.get(truth.run) == state else f"lie: the list says {listed.get(truth.run)}"
+    return "" if listed.get(truth.run) == state else f"lie: the list has {listed.get(truth.run)}"
 
 
 def reads(stand: Stand, run: str) -> None:

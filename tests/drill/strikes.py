@@ -359,7 +359,7 @@ def kills() -> Iterator[Strike]:
     """Yields the faults of processes: of the server and of its reader of cases."""
     yield Strike("the server killed", "kill", killed, started)
     yield Strike("the server killed three times", "kill", killed_often, started)
-    yield Strike("the server told to stop", "kill", stopped, started)
+    yield Strike("the server stopped by a signal", "kill", stopped, started)
     yield Strike("the server paused for 3 s", "kill", paused, goes_on, hold=0.0, waits=1.0)
     yield Strike("the reader of cases killed", "kill", partial(reader_gets, number=signal.SIGKILL), nothing)
     stop, go = partial(reader_gets, number=signal.SIGSTOP), partial(reader_gets, number=signal.SIGCONT)

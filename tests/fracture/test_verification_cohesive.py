@@ -207,7 +207,7 @@ def test_a_facet_that_closes_beyond_its_start_is_unloaded(angle: float) -> None:
 @pytest.mark.parametrize("opened", [0.0, 0.3])
 @pytest.mark.parametrize("angle", ANGLES)
 def test_an_unloaded_facet_absorbs_the_rest_of_the_energy(angle: float, opened: float, stiffness: float) -> None:
-    """If the offset is so long that stiffness and strength would require more energy, the strength is lowered."""
+    """The strength is lowered if the offset is so long that stiffness and strength would require more energy."""
     way = direction(math.radians(angle))
     facet = Facet(STRENGTH * way, stiffness=stiffness)
     for share in [*np.linspace(0.0, opened, 301), *np.linspace(opened, -1e-3, 301)]:

@@ -11,7 +11,7 @@ from conoid.worker.mesh.model import Ints, TetMesh
 
 @dataclass(frozen=True)
 class Quality:
-    """Step lengths, m: ``worst`` limits the time step, ``mean`` would limit it if all tets were alike."""
+    """Step lengths, m: ``worst`` limits the time step, ``mean`` would limit it if all tets were equal."""
 
     worst: float
     mean: float

@@ -102,7 +102,7 @@ def test_tets_are_read_in_one_line_and_in_two(tmp_path: Path) -> None:
         (TWO.replace("        12", "        13", 1), r"hexahedron 20 \(line 17\) uses node 12, which is not defined"),
         (TWO.replace("/NODE\n", "/NODE/3\n"), "line 1: /NODE/3: nodes in a unit of their own are not read"),
         (f"#include mesh.inc\n{TWO}", "line 1: the included file 'mesh.inc' is no file there"),
-        (f"{TWO}/TRANSFORM/TRA/1\n", "line 29: /TRANSFORM is not followed"),
+        (f"{TWO}/TRANSFORM/TRA/1\n", "line 29: /TRANSFORM is not supported"),
         (f"{TWO}/NODES\n", "line 29: the keyword /NODES is not known; it could change the mesh"),
         (f"{TWO}/PART/1\n", "line 29: /PART/1 is defined twice"),
         (f"{TWO}/SPHCEL/1\n{row(30, 1)}", "1 lines of /SPHCEL, whose elements are not read"),

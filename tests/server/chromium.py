@@ -208,7 +208,7 @@ class Page:
         until = time.monotonic() + seconds
         while (value := self.evaluate(script)) in _NOTHING:
             if time.monotonic() > until:
-                raise PageError(f"not in {seconds:g} s: {script}; the page says: {self.text()[:400]!r}")
+                raise PageError(f"not in {seconds:g} s: {script}; the page shows: {self.text()[:400]!r}")
             time.sleep(0.05)
         return value
 

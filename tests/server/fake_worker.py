@@ -35,7 +35,7 @@ def main() -> int:
     parser.add_argument("--restart", action="store_true")
     options = parser.parse_args()
     rank = int(os.environ.get("PMI_RANK", "0"))
-    (options.out / layout.LOGS / f"rank-{rank}.log").write_text(f"rank {rank} says hello\n")
+    (options.out / layout.LOGS / f"rank-{rank}.log").write_text(f"rank {rank} greets\n")
     if rank:
         return 0
     with (options.out / layout.LOCK).open("a") as lock:

@@ -14,7 +14,8 @@ from pathlib import Path
 NEEDED = ("slurmctld", "slurmd", "munged", "sbatch")
 PACKAGES = "slurm-wlm munge"
 CORES = 8
-"""Number of cores in the node's configuration, whatever the machine has: that many small runs can run at a time."""
+"""Number of cores in the configuration of the node, independent of the machine: this number of small runs can run at
+the same time."""
 _PATIENCE = 60.0
 
 _CONF = """

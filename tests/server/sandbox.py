@@ -58,7 +58,7 @@ def enter(unit: Unit, state: Path) -> None:
         raise SystemExit(f"sandbox: settings that it does not have: {', '.join(sorted(unknown))}")
     _check(_LIBC.unshare(_NEW_MOUNTS), "unshare")
     _mount("none", "/", _PRIVATE | _RECURSIVE)
-    os.umask(0o022)  # systemd makes mount points with this mask, whatever the caller's mask is
+    os.umask(0o022)  # systemd makes mount points with this mask, for any mask of the caller
     _install(state)
     for name, protect in _MOUNTS.items():
         if name in unit:

@@ -120,7 +120,7 @@ def test_the_shipped_profile_and_script_belong_together() -> None:
 
 def test_an_mpiexec_is_looked_for_only_where_the_profile_needs_one() -> None:
     def none() -> list[str]:
-        raise AssertionError("nobody asked for it")
+        raise AssertionError("the request was not sent")
 
     words = ["srun", "--mpi=pmi2", "--ntasks=4", "--cpus-per-task=2", "--cpu-bind=cores"]
     assert batch.starter(batch.Profile(mpi="srun"), 4, none, 2) == words

@@ -54,7 +54,7 @@ def test_a_journal_that_nobody_can_write_ends_its_run(tmp_path: Path, when: str)
     if when == "no server is there":
         house.supervisor = house.begin()
     for puppet in house.puppets.made:
-        assert turned(house, run, State.RUNNING).state is State.RUNNING, "who lives is not ended"
+        assert turned(house, run, State.RUNNING).state is State.RUNNING, "a living worker is not ended"
         puppet.alive = False
     ended = turned(house, run)
     assert (ended.state, ended.cause) == (State.LOST, "storage")
@@ -94,7 +94,7 @@ def test_what_was_not_accepted_is_not_run(server: Running, tmp_path: Path) -> No
         ended = server.ann.wait_for(run)
         assert (ended["state"], ended["cause"]) == ("failed", "storage"), ended["message"]
         assert "running" not in server.ann.states(run)
-    assert server.ann.wait_for(runs[3])["state"] == "succeeded", "a folder of logs is made anew"
+    assert server.ann.wait_for(runs[3])["state"] == "succeeded", "a folder of logs is made again"
 
 
 def test_answers_about_a_damaged_run_do_not_fail(server: Running) -> None:
@@ -218,7 +218,7 @@ def test_an_end_that_the_database_has_missed_twice_is_told_once_it_can_be_writte
         house.supervisor = house.begin()
         seen = house.supervisor.current(run.id)
         assert seen is not None
-        assert seen.state is State.SUCCEEDED, "the database says that it waits"
+        assert seen.state is State.SUCCEEDED, "the database still has the state of a waiting run"
     monkeypatch.setattr(index, "_REST", 0.0)
     house.supervisor._tidy()
     told = house.store.get(run.id)

@@ -135,7 +135,7 @@ def test_events_pass_through_nginx_when_they_happen(process: MakeProcess, tmp_pa
     ):
         assert stream.headers["content-type"].startswith("text/event-stream")
         lines = stream.iter_lines()
-        assert any('"running"' in line for line in lines), "told while the run goes on"
+        assert any('"running"' in line for line in lines), "the event arrives while the run continues"
         (tmp_path / "go").touch()
         assert any('"succeeded"' in line for line in lines)
         assert ann.wait_for(run)["state"] == "succeeded"
@@ -162,7 +162,7 @@ def test_a_silent_log_passes_through_nginx(process: MakeProcess, tmp_path: Path)
         threading.Timer(100.0, (tmp_path / "go").touch).start()
         text = b"".join(log.iter_raw())
     assert text.count(b"\0") >= 5
-    assert text.replace(b"\0", b"") == b"rank 0 says hello\n"
+    assert text.replace(b"\0", b"") == b"rank 0 greets\n"
 
 
 def test_a_backup_taken_beside_the_server_brings_tokens_and_runs_back(process: MakeProcess, tmp_path: Path) -> None:

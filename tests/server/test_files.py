@@ -181,7 +181,7 @@ def test_logs(server: Running, run: str) -> None:
     assert server.ann.http.get(f"/v1/runs/{run}/logs/2", params={"follow": True}).status_code == 404
     assert server.ann.http.get(f"/v1/runs/{run}/logs/%2e%2e").status_code == 400
     assert server.ann.http.get(f"/v1/runs/{run}/logs/x").status_code == 400
-    assert server.ann.http.get(f"/v1/runs/{run}/logs/0", params={"follow": True}).text == "rank 0 says hello\n"
+    assert server.ann.http.get(f"/v1/runs/{run}/logs/0", params={"follow": True}).text == "rank 0 greets\n"
 
 
 ODD = [
@@ -261,5 +261,5 @@ def test_a_silent_log_that_is_followed_says_that_it_is_there(
         file.write(b"a\0b\n")
     answer = server.ann.http.get(f"/v1/runs/{run}/logs/0", params={"follow": True, "seconds": 1.5})
     assert answer.content.count(b"\0") >= 2
-    assert answer.content.replace(b"\0", b"") == b"rank 0 says hello\nab\n"
+    assert answer.content.replace(b"\0", b"") == b"rank 0 greets\nab\n"
     (tmp_path / "go").touch()

@@ -246,7 +246,7 @@ def test_no_error_ends_the_looks(server: Running, monkeypatch: pytest.MonkeyPatc
     def fails(self: Removal) -> None:
         left[0] -= 1
         if left[0] >= 0:
-            raise KeyError("something that nobody has thought of")
+            raise KeyError("an unexpected error")
         looked.set()
 
     monkeypatch.setattr(Removal, "look", fails)

@@ -231,7 +231,7 @@ def test_the_keeper_removes_what_nobody_needs_without_being_asked(server: Runnin
 
 
 def test_a_file_counts_once_for_each_user(server: Running, quick: list[Path]) -> None:
-    """A file counts once, whatever the number of runs with it. The limit of a run's output does not include its
+    """A file counts once, for any number of runs with this file. The limit of a run's output does not include its
     files.
     """
     data = MESH + b"**" + b" " * 100_000

@@ -47,7 +47,7 @@ def test_a_node_publishes_with_tls_and_only_with_the_authority(tmp_path: Path, m
     monkeypatch.setenv("CONOID_ZENOH_USER", access.user)
     monkeypatch.setenv("CONOID_ZENOH_PASSWORD", access.password)
     stranger = worker.Telemetry(listen, access.prefix)
-    assert stranger._open() is None, "a router that nobody vouches for"
+    assert stranger._open() is None, "a router without a trusted certificate"
     stranger.close()
     monkeypatch.setenv("CONOID_ZENOH_AUTHORITY", authority)
     heard = threading.Event()

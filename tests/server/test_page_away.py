@@ -102,8 +102,8 @@ def test_runs_are_compared_when_the_server_comes_back(web: Path) -> None:
         await pause(300);
         const after = text(page.element);
         page.close();
-        const told = ["3 runs", "Add a chart", "Values that differ"].every((words) => after.includes(words));
-        return [before.includes("away"), told];
+        const shown = ["3 runs", "Add a chart", "Values that differ"].every((words) => after.includes(words));
+        return [before.includes("away"), shown];
     """
     assert played(web, script % json.dumps(RUN)) == [True, True]
 
@@ -172,8 +172,8 @@ ENDED = {
 
 
 def test_a_run_that_has_ended_says_why_and_what_it_was_warned_of(web: Path) -> None:
-    """The warnings are those of the whole log and of the outcome. Each is shown once, at whatever time the page is
-    opened.
+    """The warnings are those of the whole log and of the outcome. Each warning is shown once, for any time at which the
+    page is opened.
     """
     log = [{"type": "log", "seq": 1, "level": "warning", "text": each, "wall": 1.0} for each in "aba"]
     history = {"series": {}, "snapshots": [], "log": log, "warnings": log[:2], "last": 3, "state": "failed"}
@@ -186,9 +186,9 @@ def test_a_run_that_has_ended_says_why_and_what_it_was_warned_of(web: Path) -> N
         state.served = (path) => answers[path] ?? 404;
         const page = new RunPage("a");
         await pause(300);
-        const told = [page.situation.element, page.warnings.list, page.logs.lines, page.files.list].map(text);
+        const shown = [page.situation.element, page.warnings.list, page.logs.lines, page.files.list].map(text);
         page.close();
-        return told;
+        return shown;
     """
     told, warnings, log_shown, files = played(web, script % json.dumps([ENDED, history]))
     assert "Failed: one of its processes or machines has failed" in told
@@ -281,10 +281,10 @@ def test_a_file_that_two_parts_name_is_one_file(web: Path) -> None:
             files: ["a", "b"].map((key) => ({ key, path: "bullet.step", sha256: "" })) };
         page.checked = page.editor.text;
         page.draw();
-        const told = [text(page.startButton), text(page.files).split("bullet.step").length - 1,
+        const shown = [text(page.startButton), text(page.files).split("bullet.step").length - 1,
             page.problems(page.told.files).length];
         page.close();
-        return told;
+        return shown;
     """
     assert played(web, script) == ["Waits for 1 file", 1, 0]
 
@@ -360,14 +360,14 @@ def test_a_case_is_checked_when_nobody_types_and_started_once(web: Path) -> None
         const after = page.startButton.disabled;
         away = true;
         await page.start();
-        const said = text(page.said);
+        const message = text(page.said);
         away = false;
         await page.start();
         await page.start();
         type("abcd");
         await page.start();
         page.close();
-        return [checks, before, after, said, new Set(keys).size, keys.length, location.hash];
+        return [checks, before, after, message, new Set(keys).size, keys.length, location.hash];
     """
     checks, before, after, said, keys, starts, place = played(web, script)
     assert (checks, before, after) == (["abc"], True, False)
@@ -382,7 +382,7 @@ def test_a_file_goes_on_where_the_connection_broke(web: Path) -> None:
         const file = new Blob([new Uint8Array(3 * 2 ** 20).fill(7)]);
         const soon = globalThis.setTimeout;
         globalThis.setTimeout = (work, ms) => soon(work, Math.min(ms, 5));
-        const [spans, heard] = [[], []];
+        const [spans, sizes] = [[], []];
         let there = 0;
         state.served = (path, { method, headers }) => {
             if (method !== "PUT") return { files: there ? [{ sha256: "ab", offset: there, whole: false }] : [] };
@@ -396,8 +396,8 @@ def test_a_file_goes_on_where_the_connection_broke(web: Path) -> None:
             there = last + 1;
             return { offset: there, whole: there === file.size };
         };
-        await sendFile(file, "ab", (bytes) => heard.push(bytes));
-        return [spans, there, heard.at(-1)];
+        await sendFile(file, "ab", (bytes) => sizes.push(bytes));
+        return [spans, there, sizes.at(-1)];
     """
     piece = 2**20
     starts = [0, piece, piece + 1000, piece + 1000, 2 * piece + 1000]

@@ -133,7 +133,7 @@ def test_bodies_share_camera_and_clock_and_everybody_can_use_it(
     page.wait("document.querySelector('.picks input')")
     page.place(".panes")
     page.wait("document.querySelectorAll('.pane canvas').length >= 2")
-    page.wait("[...document.querySelectorAll('.pane figcaption')].every((told) => told.innerText.includes('fragment'))")
+    page.wait("[...document.querySelectorAll('.pane figcaption')].every((it) => it.innerText.includes('fragment'))")
     page.click(".picks .pick:nth-child(3) input")
     page.wait("document.querySelectorAll('.pane').length === 3")
     page.slide("input[aria-label='simulated time']", 0)

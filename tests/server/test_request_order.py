@@ -115,7 +115,7 @@ def entered(service: Service, flood: dict[str, str], late: dict[str, str]) -> in
         lambda token: {"from": "192.0.2.1", "path": ALIVE},
         lambda token: {"from": "192.0.2.1", "token": "conoid_guessed"},
     ],
-    ids=["a user", "an address without a token", "who asks for health", "who guesses tokens"],
+    ids=["a user", "an address without a token", "requests of health", "guessed tokens"],
 )
 def test_a_request_begins_after_one_of_a_flood_and_not_after_all(
     service: Service, flood: Callable[[str], dict[str, str]]

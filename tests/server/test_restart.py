@@ -131,7 +131,7 @@ def test_a_worker_that_finished_meanwhile_is_read_from_its_outcome(after: Afterm
     ended = after.show("finishes")
     assert ended["state"] == "succeeded"
     assert after.states("finishes")[-1] == "succeeded"
-    assert ended["finished"] == after.last_words("finishes"), "when the worker said so, not when a server came back"
+    assert ended["finished"] == after.last_words("finishes"), "the time of the worker, not that of the next server"
 
 
 @pytest.mark.parametrize(("name", "cause"), [("dies", "service"), ("rebooted", "node"), ("replaced", "service")])
@@ -141,7 +141,7 @@ def test_a_worker_that_died_meanwhile_is_lost(after: Aftermath, name: str, cause
     assert after.states(name)[-1] == "lost"
     assert ended["finished"] == after.last_words(name)
     assert ended["outcome"]["elapsed"] == pytest.approx(ended["finished"] - ended["started"])
-    assert (ended["outcome"]["elements"], ended["outcome"]["steps"]) == (5, None), "it was told, and was not"
+    assert (ended["outcome"]["elements"], ended["outcome"]["steps"]) == (5, None), "reported, and not reported"
 
 
 def test_everything_acknowledged_runs_once(after: Aftermath) -> None:

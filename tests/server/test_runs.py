@@ -35,7 +35,7 @@ def test_the_folder_is_complete(server: Running) -> None:
     assert (folder / "case.toml").read_text() == text
     assert json.loads((folder / layout.RESOLVED_CASE).read_text())["run"]["end_time"] == 1e-6
     assert json.loads((folder / layout.SUBMISSION).read_text())["owner"] == "ann"
-    assert (folder / "log" / "rank-1.log").read_text() == "rank 1 says hello\n"
+    assert (folder / "log" / "rank-1.log").read_text() == "rank 1 greets\n"
 
 
 def test_the_worker_runs_with_one_thread_and_without_the_servers_secrets(

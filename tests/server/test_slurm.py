@@ -128,7 +128,7 @@ def test_a_controller_that_is_away_is_no_state_of_a_run(site: Site, tmp_path: Pa
             time.sleep(0.2)
         assert seen["state"] == "running"
         (tmp_path / "go").touch()
-        assert site.ended(run)["state"] == "succeeded", "the folder has the end, whoever answers"
+        assert site.ended(run)["state"] == "succeeded", "the folder has the end of the run, for any answer"
     finally:
         site.cluster.start()
         site.cluster.await_node()

@@ -59,7 +59,7 @@ def test_a_run_waits_for_a_partition_and_is_told_why(site: Site, state: str) -> 
     finally:
         site.cluster.command("scontrol", "update", f"PartitionName={name}", "State=UP")
     assert site.ended(run, 90.0)["state"] == "succeeded"
-    assert site.tail(run) != "no log", "in its folder, whatever the name of that"
+    assert site.tail(run) != "no log", "in its folder, for any name of the folder"
 
 
 def test_a_job_of_an_odd_name_blinds_nobody(site: Site, tmp_path: Path) -> None:

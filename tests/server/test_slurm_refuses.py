@@ -62,15 +62,15 @@ def worker_of(place: Path, name: str = "run", accounting: Accounting | None = No
     return made
 
 
-def says(place: Path, text: str, code: int = 1) -> None:
+def answers(place: Path, text: str, code: int = 1) -> None:
     """Sets the answer of sbatch."""
-    (place / "said").write_text(f"{text}\n")
-    commands(place, f"cat said >&2; exit {code}")
+    (place / "answer").write_text(f"{text}\n")
+    commands(place, f"cat answer >&2; exit {code}")
 
 
 @pytest.mark.parametrize("said", PASSING)
 def test_a_run_waits_for_a_refusal_that_passes(place: Path, said: str) -> None:
-    says(place, said)
+    answers(place, said)
     worker = worker_of(place)
     worker.turn([])
     assert worker.exited() is None
@@ -87,7 +87,7 @@ def test_a_run_waits_for_a_refusal_that_passes(place: Path, said: str) -> None:
 
 @pytest.mark.parametrize("said", LASTING)
 def test_a_refusal_that_lasts_fails_the_run(place: Path, said: str) -> None:
-    says(place, said)
+    answers(place, said)
     worker = worker_of(place)
     worker.turn([])
     ended = worker.exited()
@@ -99,13 +99,13 @@ def test_a_refusal_that_lasts_fails_the_run(place: Path, said: str) -> None:
 
 @pytest.mark.parametrize("said", AWAY)
 def test_a_controller_that_is_away_has_refused_nothing(place: Path, said: str) -> None:
-    says(place, said)
+    answers(place, said)
     with pytest.raises(slurm_call.AwayError):
         worker_of(place).turn([])
 
 
 def test_a_run_that_waits_so_can_be_cancelled(place: Path) -> None:
-    says(place, PASSING[0])
+    answers(place, PASSING[0])
     worker = worker_of(place)
     worker.turn([])
     worker.stop()

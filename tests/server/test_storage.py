@@ -85,7 +85,7 @@ def test_a_kill_is_want_of_memory_only_if_the_kernel_says_so(
 ) -> None:
     seen = memory.Kills()
     monkeypatch.setattr(memory, "logged", lambda: {11})
-    assert not seen.ended(11), "the kernel has ended nobody since"
+    assert not seen.ended(11), "the kernel has killed no process since"
     counted["kills"] += 1
     assert seen.ended(11)
     assert not seen.ended(12), "another one"

@@ -100,7 +100,7 @@ def test_a_log_is_followed_to_the_end_of_the_run(ann: User, tmp_path: Path) -> N
     ann.wait_for(run, State.RUNNING)
     with ann.http.stream("GET", f"/v1/runs/{run}/logs/0", params={"follow": True}) as answer:
         chunks = answer.iter_text()
-        assert next(chunks) == "rank 0 says hello\n"
+        assert next(chunks) == "rank 0 greets\n"
         with (ann.runs / run / "log" / "rank-0.log").open("a") as log:
             log.write("and goodbye\n")
         assert next(chunks) == "and goodbye\n"

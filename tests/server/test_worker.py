@@ -104,7 +104,7 @@ def test_from_http_to_a_result_live(ann: User) -> None:
     assert [event["seq"] for event in events] == list(range(1, len(events) + 1))
     assert {"started", "progress", "load", "frame", "finished", "status"} <= {event["type"] for event in events}
     states = ["accepted", "queued", "starting", "running", "succeeded"]
-    assert list(dict.fromkeys(ann.states(run))) == states, "a cold start tells more than once what it is at"
+    assert list(dict.fromkeys(ann.states(run))) == states, "a cold start reports its progress more than once"
     assert {message.seq for message in heard} <= set(range(1, len(events) + 1))
     assert {type(message).__name__ for message in heard} >= {"Started", "Progress", "Load", "Finished"}
     assert len(seen["outcome"]["digest"]) == 64

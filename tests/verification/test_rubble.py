@@ -70,8 +70,8 @@ def outcome(case: Case) -> Energy:
 
 @pytest.mark.parametrize("friction", [0.0, 0.3])
 def test_contact_makes_no_energy_where_walls_press_back(friction: float) -> None:
-    """If the sweeps did not include walls, contact would take 0.33 of the energy without friction and create 0.033
-    with friction (2026-11-28, no script).
+    """With sweeps that do not include walls, contact takes 0.33 of the energy without friction and creates 0.033 with
+    friction (2026-11-28, no script).
     """
     found = outcome(pen(friction))
     print(found)

@@ -191,7 +191,7 @@ def test_nodes_on_a_symmetry_plane_stay_on_it(axis: str, at: float) -> None:
 
 
 def test_a_body_through_a_symmetry_plane_is_refused() -> None:
-    """Such a body would overlap its own mirror image."""
+    """The body would overlap its own mirror image."""
     even = block((2, 2, 2), 1e-3)
     for at in (0.4e-3, 1.3e-3):
         message = (
@@ -328,8 +328,9 @@ def uneven(watch: Watch) -> Watch:
 
 
 def test_free_fall_is_exact_at_every_time() -> None:
-    """For an oscillating body and steps of any size, x(n) and v(n+1/2) of the centre of mass are exact, and the
-    momentum is booked."""
+    """The positions x(n) and velocities v(n+1/2) of the centre of mass of an oscillating body are exact for steps of
+    any size, and the momentum is booked.
+    """
     sim = with_boundary(GRAVITY, velocity=(30.0, 0.0, -5.0), dt_growth=2.0)
     nodes, g, flight = sim.model.nodes, np.array(FALL), np.array([30.0, 0.0, -5.0])
     noise = np.random.default_rng(3).normal(size=nodes.v.shape) * 20.0
@@ -365,7 +366,9 @@ def test_gravity_follows_its_course() -> None:
 
 
 def test_the_ledger_of_a_free_fall_closes_to_round_off() -> None:
-    """For steps of any size the work of gravity is 1/2 m v(n-1/2) . v(n+1/2), the kinetic energy of the balance."""
+    """The work of gravity is 1/2 m v(n-1/2) . v(n+1/2) for steps of any size. This is the kinetic energy of the
+    balance.
+    """
     sim = with_boundary(GRAVITY, dt_growth=2.0)
     energy = 0.5 * float(sim.model.nodes.mass.sum()) * float(np.dot(FALL, FALL))
     steps = set()
@@ -518,8 +521,9 @@ def test_a_cylinder_and_a_box_have_what_is_in_both() -> None:
 
 
 def test_a_free_body_under_traction_is_accelerated_exactly() -> None:
-    """For steps of any size x(n) and v(n+1/2) of the centre of mass are exact, and the work of the traction closes
-    the energy balance."""
+    """The positions x(n) and velocities v(n+1/2) of the centre of mass are exact for steps of any size, and the work of
+    the traction closes the energy balance.
+    """
     sim = with_boundary({**PULL, **TOP}, end=3e-6, velocity=(3.0, 0.0, -5.0), dt_growth=2.0)
     nodes, flight = sim.model.nodes, np.array([3.0, 0.0, -5.0])
     a = 9e-6 * np.array(PULL["stress"]) / (7850.0 * 27e-9)
@@ -555,8 +559,8 @@ def ramped(t: float) -> tuple[float, float]:
 
 @pytest.mark.parametrize("steps", ["even", "uneven"])
 def test_a_velocity_over_time_leads_nodes_along_its_integral(steps: str) -> None:
-    """For steps of any size the positions at every n are exact, and the energy balance closes except for the energy
-    of unequal steps.
+    """The positions at every n are exact for steps of any size, and the energy balance closes except for the energy of
+    unequal steps.
     """
     spec = {"kind": "velocity", "low": (0.0, 0.0, 2.9e-3), "high": (1.0, 1.0, 1.0), "z": 7.0, "course": RAMP}
     sim = build(scene(STEEL, end=3e-6, boundaries=(spec,), dt_growth=2.0), [MESH])
@@ -573,7 +577,7 @@ def test_a_velocity_over_time_leads_nodes_along_its_integral(steps: str) -> None
 
 
 def test_a_traction_over_time_gives_its_integral_as_impulse() -> None:
-    """For steps of any size the momentum at n+1/2 is the force times the integral of its factor over time."""
+    """The momentum at n+1/2 is the force times the integral of its factor over time, for steps of any size."""
     sim = with_boundary({**PULL, **TOP, "course": RAMP}, end=3e-6, dt_growth=2.0)
     nodes, force = sim.model.nodes, 9e-6 * np.array(PULL["stress"])
 

@@ -34,7 +34,7 @@ def roots(over: Floats, static: Floats, shear: float, hardening: float, fast: fl
 
 @pytest.mark.parametrize("dt", [1e-10, 1e-7, 1e-5])
 def test_the_return_of_random_states(dt: float) -> None:
-    """For strain increments from 1e-4 to 0.1 the stress is the flow stress at the rate of the step."""
+    """The stress is the flow stress at the rate of the step, for strain increments from 1e-4 to 0.1."""
     random = np.random.default_rng(5)
     patch = Patch(free_tets(N, 5), MILD_STEEL)
     old = formulas.deviator(random.normal(size=(N, 3, 3)))

@@ -56,8 +56,7 @@ def beyond(stress: Floats) -> Floats:
 
 
 def test_principal_pressures_are_those_of_numpy() -> None:
-    """If two principal values are equal, the tolerance is the square root of round-off, because they are a double
-    root."""
+    """The tolerance for two equal principal values is the square root of round-off, because they are a double root."""
     stress = stresses(2000)
     state, known = chunks(stress), -np.linalg.eigvalsh(stress)
     found = np.array([principal(state[i // CHUNK].reshape(-1), i % CHUNK) for i in range(len(stress))])

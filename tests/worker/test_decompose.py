@@ -50,7 +50,7 @@ def test_the_same_arguments_give_the_same_parts(parts: int) -> None:
 
 
 def test_ties_are_told_apart_by_their_ids() -> None:
-    """If all points are at one position, the cut follows the ids."""
+    """The cut of points at one position follows the ids."""
     owner = bisect(np.zeros((40, 3)), np.ones(40), 4)
     assert owner.tolist() == sorted(owner.tolist())
     assert len(set(owner.tolist())) == 4

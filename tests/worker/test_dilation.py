@@ -111,8 +111,9 @@ def test_the_triaxial_path(form: Form, psi: float) -> None:
 
 
 def test_the_apex_takes_the_deviator_and_lets_no_strength_come_back() -> None:
-    """For a pressure far beyond the apex the deviator becomes zero, and the pressure rises at most by the amount of
-    this flow."""
+    """The deviator becomes zero for a pressure far beyond the apex, and the pressure rises at most by the amount of
+    this flow.
+    """
     trial = random_deviators(500, np.random.default_rng(3))
     patch = free(500, glass(ANGLES[0]), trial, -1e12)
     patch.advance(DT)

@@ -27,8 +27,9 @@ def test_the_sequence_is_splitmix64() -> None:
 
 
 def test_uniform_is_uniform() -> None:
-    """For a million numbers the mean, the variance and the correlation of neighbours are within four standard
-    errors, and 64 bins show no bias."""
+    """The mean, the variance and the correlation of neighbours of a million numbers are within four standard errors,
+    and 64 bins show no bias.
+    """
     u = uniform(np.arange(1_000_000), 7)
     assert 0.0 <= u.min() < 1e-5
     assert 1.0 - 1e-5 < u.max() < 1.0

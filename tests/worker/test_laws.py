@@ -39,7 +39,7 @@ def chunk(made: Material, seed: int) -> tuple["np.ndarray", "np.ndarray", "np.nd
 
 @pytest.mark.parametrize("number", range(len(models.LAWS)))
 def test_the_kernel_of_a_law_is_the_one_that_is_called(number: int) -> None:
-    """If a law had no branch in ``strengthen``, the chunk would not change."""
+    """Without a branch for the law in ``strengthen`` the chunk would not change."""
     (w, s, params), (w1, s1, _), (_, before, _) = (chunk(named(models.LAWS[number].model), number) for _ in range(3))
     models.strengthen(number, w, s, params, N, 1e-8)
     models.LAWS[number].kernel(w1, s1, params, N, 1e-8)

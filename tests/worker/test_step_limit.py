@@ -41,7 +41,7 @@ def exact_step(patch: Patch, poisson: float) -> float:
 
 @pytest.mark.parametrize("poisson", [0.0, 0.22, 0.3, 0.49])
 def test_bound_is_never_above_the_exact_limit(poisson: float) -> None:
-    """For tets of all shapes, including slivers, the bound is at most the exact limit and at least 0.57 of it."""
+    """The bound is at most the exact limit and at least 0.57 of it, for tets of all shapes, including slivers."""
     mesh = free_tets(300, 1, flattest=1e-3)
     shares = []
     for i in range(300):
@@ -53,9 +53,9 @@ def test_bound_is_never_above_the_exact_limit(poisson: float) -> None:
 
 
 def test_bound_of_the_regular_tet() -> None:
-    """For an edge of 1 m and nu = 0.3 the bound is derived: |grad N|^2 = 3/2 at each node, so it is 1 / (c sqrt 6).
-    The fastest mode is volumetric, with the strain energy 9/2 K V e^2 and the kinetic energy 3/16 rho V (de/dt)^2,
-    r^2 = 3/8.
+    """The bound for an edge of 1 m and nu = 0.3 is derived: |grad N|^2 = 3/2 at each node, so it is 1 / (c sqrt 6). The
+    fastest mode is volumetric, with the strain energy 9/2 K V e^2 and the kinetic energy 3/16 rho V (de/dt)^2, r^2 =
+    3/8.
     """
     patch = one(TetMesh(REGULAR, np.array([[0, 1, 2, 3]], np.int32)), 0, 0.3)
     patch.advance(0.0)

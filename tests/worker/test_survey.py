@@ -82,7 +82,7 @@ def test_every_refusal_is_told_at_once(folder: Path) -> None:
     assert [each.part for each in found.parts] == [1]
     assert found.refused == [
         "parts[0].mesh.group = 'ice': no such element set, instance or part; known: Lower, Skin, Upper",
-        "parts[2].mesh.path = 'bad.inp': line 13: *NGEN is not followed; write the nodes and elements out",
+        "parts[2].mesh.path = 'bad.inp': line 13: *NGEN is not supported; write the nodes and elements out",
     ]
 
 

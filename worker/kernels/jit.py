@@ -1,8 +1,8 @@
 """Kernels: functions that numba compiles for their declared signature, at their first call.
 
 ``numba.njit`` compiles a function with a signature at its declaration, or loads it from the cache: every rank would
-load every kernel of the worker at its start, whatever its scene. ``njit`` of this module, the only one that imports
-numba, does the same at the first call, from Python or from another kernel.
+load every kernel of the worker at its start, for any scene. ``njit`` of this module, the only one that imports numba,
+does the same at the first call, from Python or from another kernel.
 
 numba counts references to every array of every record that one kernel passes to another, with atomic operations. A
 kernel that makes no array needs no counts and has none: they were three quarters of the time of the narrow phase of
@@ -131,8 +131,8 @@ class Kernel(CPUDispatcher):
         return self._address
 
     def compile(self, sig: Any) -> Any:
-        """Returns the entry point of this kernel when numba compiles a call of it from another kernel. The entry
-        point is for the declared signature, whatever ``sig`` is.
+        """Returns the entry point of this kernel when numba compiles a call of it from another kernel. The entry point
+        is that of the declared signature, for any ``sig``.
         """
         self.load()
         (compiled,) = self.overloads.values()

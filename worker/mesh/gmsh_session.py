@@ -46,7 +46,7 @@ def session(options: Mapping[str, float]) -> Iterator[Any]:
     except MeshError:
         raise
     except Exception as error:
-        raise MeshError(f"gmsh: {first_error(gmsh) or str(error) or 'it gave up without a word'}") from error
+        raise MeshError(f"gmsh: {first_error(gmsh) or str(error) or 'it failed without a message'}") from error
     finally:
         gmsh.logger.stop()
         gmsh.finalize()

@@ -15,7 +15,7 @@ def notes(passed: Counter[str], volumes: Counter[str], joining: Counter[str], ma
     for counts, said in (
         (passed, "elements that carry no volume are skipped"),
         (volumes, "elements that cannot be read are outside of the group"),
-        (joining, "keywords that join, hold or load bodies are passed over"),
+        (joining, "keywords that join, hold or load bodies are ignored"),
     ):
         if counts:
             yield f"{said}: {', '.join(f'{many} {mark}{name}' for name, many in sorted(counts.items()))}"

@@ -19,7 +19,7 @@ def rigid_of(
     case: Case, model: Model, walls: Walls, comm: Comm, known: dict[str, Any] | None = None
 ) -> Rigid | None:  # fmt: skip
     """Returns the rigid bodies of a case, or None: at the start, or with the state ``known`` of a parcel (a checkpoint
-    or migration message). Collective. Raises InputError, on every rank alike, where a body starts behind a wall.
+    or migration message). Collective. Raises the same InputError on every rank if a body starts behind a wall.
     """
     if not case.rigid:
         return None

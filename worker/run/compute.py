@@ -120,7 +120,7 @@ def _resumed(case: Case, folder: Path, comm: Comm, journal: Journal | None) -> t
     timers = Timers(comm, team(case.run.threads))
     sim = simulation.resume(case, route(parcel, case.run.cut_scale, comm), comm, timers)
     sim.reduction.begin_again()
-    log.info("goes on from %s, step %d, t %.6g s", place.name, sim.clock.step, sim.clock.t)
+    log.info("continues from %s, step %d, t %.6g s", place.name, sim.clock.step, sim.clock.t)
     return sim, replace(Start(**parcel.known["start"]), resumed=True)
 
 

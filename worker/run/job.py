@@ -172,10 +172,10 @@ def _interrupted(folder: Path, job: Job, number: str, further: bool) -> int | No
         end(folder, job, _so_far(folder, State.TIMED_OUT, Cause.WALLTIME, message))
         return ExitCode.INTERRUPTED
     if verdict == "unknown":
-        _report(folder, job, State.QUEUED, f"job {number} was interrupted; the next job goes on from its checkpoint")
+        _report(folder, job, State.QUEUED, f"job {number} was interrupted; the next job continues from its checkpoint")
         return None
     why = "the time limit is near" if verdict == "time limit" else "preempted"
-    _report(folder, job, State.QUEUED, f"{why}; job {number} is queued again and goes on from its checkpoint")
+    _report(folder, job, State.QUEUED, f"{why}; job {number} is queued again and continues from its checkpoint")
     return _requeue(job.bin, number) if verdict != "requeued" else 0
 
 

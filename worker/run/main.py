@@ -148,7 +148,7 @@ def _parse(arguments: list[str]) -> argparse.Namespace:
     parser.add_argument("case", help="a .toml or .json file, or the name of a shipped case")
     parser.add_argument("--out", type=Path, required=True, help="the run folder")
     parser.add_argument("--set", action="append", default=[], metavar="KEY=VALUE", help="override a key of the case")
-    parser.add_argument("--restart", action="store_true", help="go on from the latest checkpoint in the run folder")
+    parser.add_argument("--restart", action="store_true", help="continue from the latest checkpoint in the run folder")
     parser.add_argument("--run", help="the run's id; the folder's name when absent")
     parser.add_argument("--telemetry", metavar="ENDPOINT", help="a Zenoh router, such as tcp/127.0.0.1:7447")
     parser.add_argument("--ranks", type=int, help="end at once when MPI has started another number of ranks")
@@ -160,7 +160,7 @@ def _parse(arguments: list[str]) -> argparse.Namespace:
     )  # fmt: skip
     parser.add_argument(
         "--interruptible", action="store_true",
-        help=f"a stop that {layout.STOP_REQUEST} does not ask for leaves a checkpoint and no outcome: the run goes on",
+        help=f"a stop that {layout.STOP_REQUEST} does not request leaves a checkpoint and no outcome",
     )  # fmt: skip
     parser.add_argument("--prefix", help="key prefix of the run, conoid/v1/<owner>/<run>")
     options = parser.parse_args(arguments)

@@ -121,8 +121,8 @@ class Material:
         if found[1]:
             law["hardening"] = self._stress(found[1])
             last = points[-1][0]
-            plastic.entry.remark("differs", f"plastic strain {last:g}", "beyond the last row the flow stress stays; "
-                                 "here it goes on to rise")  # fmt: skip
+            plastic.entry.remark("differs", f"plastic strain {last:g}", "in Abaqus constant beyond the last row; "
+                                 "in Conoid it continues to rise")  # fmt: skip
         return law
 
     def _johnson_cook(self, plastic: Keyword) -> tuple[dict[str, Any], str | float]:

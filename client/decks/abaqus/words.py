@@ -51,7 +51,7 @@ REFUSED: dict[str, str] = {
     "PARAMETER": "values that are computed; write them out",
     **dict.fromkeys(
         ("NGEN", "NFILL", "NCOPY", "NMAP", "ELGEN", "ELCOPY", "SYSTEM", "IMPERFECTION"),
-        "makes or moves nodes and elements in a way that is not followed; write them out",
+        "makes or moves nodes and elements in a way that is not supported; write them out",
     ),
     "STATIC": "no step of *DYNAMIC, EXPLICIT", "HEAT TRANSFER": "no step of *DYNAMIC, EXPLICIT",
     "FREQUENCY": "no step of *DYNAMIC, EXPLICIT", "ANNEAL": "no step of *DYNAMIC, EXPLICIT",

@@ -94,7 +94,7 @@ class Numbered:
             return frozenset({str(number)}) & every
         if kind in (0, 4):
             return self._of_nodes(number, kind, entry)
-        raise ValueError(f"a surface of the type {kind} is not followed; 0, 2, 3, 4 and 5 are")
+        raise ValueError(f"a surface of the type {kind} is not supported; 0, 2, 3, 4 and 5 are")
 
     def _of_nodes(self, number: int, kind: int, entry: Entry) -> frozenset[str]:
         found = self.segments.get(number) if kind == 0 else self._node_set(number, entry)

@@ -125,7 +125,7 @@ class LsDyna:
             number = once(self._numbered.part_sets, Fields(block, entry, cards, ("SID",)).whole("SID"), "part set")
             self._numbered.part_sets[number] = set(numbers(block, cards[1:], "pid")), entry
         else:
-            entry.refuse(f"*{block.name} is not followed")
+            entry.refuse(f"*{block.name} is not supported")
 
     def _parts(self, block: Block, entry: Entry) -> None:
         cards, step = list(block.cards), 3 if block.name == "PART_CONTACT" else 2

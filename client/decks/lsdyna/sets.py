@@ -54,7 +54,7 @@ def node_set(block: Block, options: frozenset[str], entry: Entry) -> NodeSet:
     elif "ADD" in options and not options - {"TITLE", "ADD"}:
         found.sets.update(numbers(block, rest, "sid"))
     elif options - {"TITLE", "LIST"}:
-        found.odd = f"*{block.name} is not followed"
+        found.odd = f"*{block.name} is not supported"
     else:
         found.nodes.update(numbers(block, rest, "nid"))
     return found
@@ -71,7 +71,7 @@ def _general(found: NodeSet, block: Block, cards: list[Card]) -> None:
         elif word.upper() == "PART":
             found.parts.update(values)
         else:
-            found.odd = f"{word} in *{block.name} is not followed"
+            found.odd = f"{word} in *{block.name} is not supported"
 
 
 def segment_set(block: Block, options: frozenset[str], entry: Entry) -> NodeSet:
@@ -79,7 +79,7 @@ def segment_set(block: Block, options: frozenset[str], entry: Entry) -> NodeSet:
     title, cards = titled(block, options)
     found = NodeSet(Fields(block, entry, cards, ("SID",)).whole("SID"), title, entry)
     if options - {"TITLE"}:
-        found.odd = f"*{block.name} is not followed"
+        found.odd = f"*{block.name} is not supported"
         return found
     for card in cards[1:]:
         found.nodes.update(block.whole(card, item, "n") for item in block.fields(card, *(10,) * 8)[:4] if item)

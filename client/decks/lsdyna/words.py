@@ -59,7 +59,7 @@ REFUSED: dict[str, str] = {
     "SECTION": "no section of solids",
     "MAT": "Conoid has no such material law",
     "EOS": "Conoid has no such equation of state",
-    "INCLUDE": "includes that move or change what they bring are not followed",
+    "INCLUDE": "includes that move or change what they bring are not supported",
 }
 """Keywords that change the answer, identified by their first words."""
 

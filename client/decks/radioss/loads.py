@@ -55,7 +55,7 @@ def _restraint(scene: Scene, option: Option, entry: Entry) -> None:
         speeds = {axis: 0.0 for axis, held in zip("xyz", code[0], strict=True) if held == "1"}
         if chosen.bodies and chosen.bodies & scene.rigid:
             if code[1:] != ["111"] or not speeds:
-                raise ValueError("a rigid body that is held along some axes and turns is not followed (111)")
+                raise ValueError("a rigid body that is held along some axes and turns is not supported (111)")
         elif len(code) > 1 and "1" in code[1]:
             entry.remark("left", f"rotations {code[1]}", "nodes of solids have none")
         if speeds:

@@ -269,7 +269,7 @@ class Radioss:
         own.take(f"of {entry.keyword}, {entry.place}")
         items = numbers(option.rows[1:], "node")
         if any(item < 0 for item in items):
-            raise ValueError(f"the group of nodes {number} takes some away by numbers below 0, which is not followed")
+            raise ValueError(f"the group of nodes {number} takes some away by numbers below 0, which is not supported")
         if kind == "PART":
             return Chosen(what, bodies=frozenset(map(str, items)))
         if kind == "NODE" and items and set(items) <= self._mains.keys():

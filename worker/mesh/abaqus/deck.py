@@ -48,7 +48,7 @@ class Deck:
             self._step = word == "STEP"
         if word in REFUSED or (word in MESH and "INPUT" in dict(block.parameters)):
             extra = "" if word in REFUSED else ", INPUT"
-            raise MeshError(f"line {block.line}: *{word}{extra} is not followed; write the nodes and elements out")
+            raise MeshError(f"line {block.line}: *{word}{extra} is not supported; write the nodes and elements out")
         if word in JOINING:
             self.joining[word] += 1
         if word == SURFACE:

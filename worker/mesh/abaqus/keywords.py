@@ -213,7 +213,7 @@ def _parameter(block: Block, word: str, written: str) -> str:
     if written in allowed or len(alike) == 1:
         return written if written in allowed else alike[0]
     names = ", ".join(allowed) or "none"
-    raise MeshError(f"line {block.line}: *{word}: the parameter {written} is not followed; read are: {names}")
+    raise MeshError(f"line {block.line}: *{word}: the parameter {written} is not supported; supported are: {names}")
 
 
 def needed(block: Block, found: dict[str, str], word: str, name: str) -> str:

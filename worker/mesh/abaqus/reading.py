@@ -117,7 +117,7 @@ def _notes(deck: Deck, pieces: list[Piece], group: str | None) -> Iterator[str]:
         yield f"elements that cannot be read are outside of the group: {solid}"
     if deck.joining:
         words = ", ".join(f"{n} *{JOINING[word]}" for word, n in sorted(deck.joining.items()))
-        yield f"keywords that join, hold or remove bodies are passed over: {words}"
+        yield f"keywords that join, hold or remove bodies are ignored: {words}"
     if deck.unread:
         yield f"surfaces that are not lists of elements or nodes are not read: {', '.join(map(repr, deck.unread))}"
     placed = {id(piece.mesh) for piece in pieces}

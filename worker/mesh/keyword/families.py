@@ -41,6 +41,6 @@ def refuse(block: Block, read: Container[str]) -> None:
     if block.name in read:
         return
     if block.name.startswith(REFUSED):
-        raise MeshError(f"{block.place()}: *{block.name} is not followed; write the nodes and elements out")
+        raise MeshError(f"{block.place()}: *{block.name} is not supported; write the nodes and elements out")
     if block.name.partition("_")[0] not in FAMILIES:
         raise MeshError(f"{block.place()}: the keyword *{block.name} is not known; it could change the mesh")

@@ -105,5 +105,5 @@ def _notes(deck: Deck, chosen: list[Cells]) -> Iterator[str]:
     """Return remarks on contents of the deck that are not in the mesh or are interpreted in an unexpected way."""
     yield from omitted.notes(deck.passed, deck.volumes, deck.joining, "*")
     if deck.held:
-        yield f"constraints of nodes (TC, RC of *NODE) are passed over: {deck.held} nodes"
+        yield f"constraints of nodes (TC, RC of *NODE) are ignored: {deck.held} nodes"
     yield from omitted.by_corners(chosen)

@@ -65,14 +65,14 @@ def _step(one: Set, block: Block, card: Card, kind: str, options: frozenset[str]
     if "GENERAL" in options:
         word, items = items[0].upper(), items[1:]
         if word not in _GENERAL[kind]:
-            one.unread = f"{block.place(card.number)}: the option {word!r} is not followed"
+            one.unread = f"{block.place(card.number)}: the option {word!r} is not supported"
             return
     elif "ADD" in options:
         word = "SET"
     elif kind == "SEGMENT":
         word, items = "SEG", items[:4]
         if "GENERATE" in options:
-            one.unread = f"{block.place(card.number)}: *{block.name} is not followed"
+            one.unread = f"{block.place(card.number)}: *{block.name} is not supported"
             return
     else:
         word = "RANGE" if "GENERATE" in options else "MEMBER"

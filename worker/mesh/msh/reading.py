@@ -120,4 +120,4 @@ def _notes(file: Sections, content: Read, wanted: frozenset[int] | None, group: 
         listed = ", ".join(f"{n} of the {name}" for name, n in sorted(left.items()))
         yield f"elements that cannot be read are outside of the group: {listed}"
     if strange := sorted(set(file.parts) - _LISTED):
-        yield f"sections that are not known are passed over: {', '.join(f'${name}' for name in strange)}"
+        yield f"unknown sections are ignored: {', '.join(f'${name}' for name in strange)}"

@@ -102,7 +102,7 @@ class Deck:
         elif word in JOINING:
             self.joining[word] += 1
         elif word in REFUSED:
-            raise MeshError(f"line {block.line}: /{word} is not followed; write the nodes and elements out")
+            raise MeshError(f"line {block.line}: /{word} is not supported; write the nodes and elements out")
         elif word not in FAMILIES:
             raise MeshError(f"line {block.line}: the keyword /{word} is not known; it could change the mesh")
 

@@ -114,7 +114,7 @@ class _Reader:
         if group is None or depth > _DEEPEST:
             raise MeshError(f"/{word} {number} {'is not defined' if group is None else 'is within itself'}")
         if group.kind not in KNOWN:
-            raise MeshError(f"/{group.kind}/{number} is a kind that is not followed")
+            raise MeshError(f"/{group.kind}/{number} is a kind that is not supported")
         return group
 
     def _nodes(self, number: int, depth: int = 0) -> Ids:
@@ -151,7 +151,7 @@ class _Reader:
             return [placed(self.tags, corners, lambda k: f"line {rows[k][0]}: a segment")]
         for each in (each for _, row in group.rows for each in row if each):
             if each < 0:
-                raise MeshError(f"/{group.kind}/{number} takes a part away, which is not followed")
+                raise MeshError(f"/{group.kind}/{number} takes a part away, which is not supported")
             if group.kind == "SURF/SURF":
                 found += self._faces(each, depth + 1)
                 continue

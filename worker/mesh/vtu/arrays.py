@@ -34,7 +34,7 @@ class Grid:
         """Read the file. Raises MeshError for a file that is no .vtu file, is damaged, or has several pieces."""
         text, self._appended, self._encoding = _divided(path.read_bytes())
         if b"<!DOCTYPE" in text or b"<!ENTITY" in text:
-            raise MeshError("the file defines XML entities, which are not followed")
+            raise MeshError("the file defines XML entities, which are not supported")
         try:
             root = ElementTree.fromstring(text)
         except ElementTree.ParseError as error:
