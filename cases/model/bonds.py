@@ -65,8 +65,8 @@ class SharedBond(Bonded):
 class TiedBond(Bonded):
     """A bond of two parts whose meshes do not match at the interface: the nodes of the part with the smaller faces
     there are tied to faces of the other, and moved onto them at the start. One of the parts may be rigid: the nodes of
-    the other part are then tied to its faces, whatever their size, and follow its motion. Meshes that match may be tied
-    as well, such as two groups of one file with common nodes of which one is rigid.
+    the other part are then tied to its faces of any size, and follow its motion. Meshes that match may be tied as well,
+    such as two groups of one file with common nodes of which one is rigid.
 
     After the interface has broken, the fracture energy G of mixed tension and shear is given by ``1 / G = (1 - B) /
     energy + B / shear_energy``, B the share of the work done in shear. An open interface closes without resistance,

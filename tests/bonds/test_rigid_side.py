@@ -113,7 +113,8 @@ def ended(sim: Simulation, many: int) -> tuple[str | None, int]:
 
 
 def test_a_bond_that_breaks_at_an_impact_gives_one_answer(tmp_path: Path) -> None:
-    """Of 1, 2, 3 and 7 ranks, and from a checkpoint; the body slides along the wall while it comes off."""
+    """The answer is the same on 1, 2, 3 and 7 ranks, and from a checkpoint; the body slides along the wall while the
+    bond breaks."""
     case = load.parse_toml(STRUCK)
 
     def stepped(sim: Simulation, many: int = 120) -> tuple[str | None, int]:

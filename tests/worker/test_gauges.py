@@ -98,7 +98,8 @@ def test_sums_of_any_ranks_are_the_same_bits() -> None:
 
 @pytest.mark.parametrize("ranks", [1, 3])
 def test_peaks_are_the_largest_values_of_the_tets(ranks: int) -> None:
-    """Of the part, and of the tets that start in a box; a body that jitters beyond its yield stress."""
+    """The tets are those of the part, or those that start in a box. The body starts with random velocities that exceed
+    its yield stress."""
     fields = ("pressure_max", "pressure_min", "mises_max", "plastic_strain_max", "temperature_max", "damage_max")
     box: dict[str, Any] = {"low": (-1.0, 1.5e-3, -1.0), "high": (1.0, 1.0, 1.0)}
     probes = [probe(field) for field in fields] + [probe(field, f"box_{field}", **box) for field in fields]
