@@ -16,7 +16,7 @@ def starter(truth: Mixture, split: Split, random: Random) -> str:
         "/BEGIN",
         "lump",
         "      2022         0",
-        " " * 18 + "kg" + " " * 18 + "mm",
+        " " * 18 + "kg" + " " * 19 + "m",
         "/UNIT/1",
         "unit",
     ]

@@ -261,6 +261,16 @@ def test_elements_of_the_assembly_and_of_other_parts_are_counted(tmp_path: Path)
     assert found.notes == ("elements that carry no volume are skipped: 1 S3, 1 SPRINGA",)
 
 
+def test_a_node_set_with_undefined_nodes_is_reported(tmp_path: Path) -> None:
+    """A set of the assembly names nodes of an instance; reference points of the assembly are no nodes of a body."""
+    inner = PART.replace("*END PART", "*NSET, NSET=Grip\n1, 2, 98, 99\n*END PART")
+    outer = "*NODE\n1, 9., 9., 9.\n*NSET, NSET=Point\n1\n*NSET, NSET=Base, INSTANCE=Left\n5, 77\n*END ASSEMBLY"
+    notes = read(inner + TWO.replace("*END ASSEMBLY", outer), tmp_path).notes
+    found = [note for note in notes if "do not" in note or "does not define" in note]
+    said = "sets have members that the file does not define, and are smaller: "
+    assert found == [f"{said}the node set 'Base' (1, such as 77), the node set 'Grip' (2, such as 98)"]
+
+
 def test_a_part_without_an_instance_is_told(tmp_path: Path) -> None:
     spare = PART.replace("*HEADING\n a comment line, with, commas\n", "").replace("NAME=Rod", "NAME=Spare")
     assert "parts without an instance are left out: 'Spare' (2 elements)" in read(PART + spare + TWO, tmp_path).notes

@@ -1,6 +1,7 @@
 """The reader of LS-DYNA keyword decks: styles of pre-processors, parts and sets, and refusals."""
 
 import math
+import re
 from pathlib import Path
 from random import Random
 
@@ -153,6 +154,32 @@ def test_what_is_not_in_the_mesh_is_told(tmp_path: Path) -> None:
         "a set is not read: the set 3 of *SET_NODE line 29: the option 'BOX' is not supported",
         "2 hexahedra are cut into 12 tets of 4 nodes that meet face to face",
     )
+
+
+@pytest.mark.parametrize(
+    ("more", "said"),
+    [
+        ("*SET_NODE_LIST_TITLE\ngrip\n1\n1,2,98,99\n", r"\*SET_NODE grip \(2, such as 98\)"),
+        (
+            "*SET_SOLID\n2\n20,99\n*SET_PART\n3\n1,9\n",
+            r"\*SET_PART 3 \(1, such as 9\), \*SET_SOLID 2 \(1, such as 99\)",
+        ),
+        ("*SET_SOLID_GENERAL\n3\nALL\nDELEM,99\n", None),
+    ],
+)
+def test_sets_with_undefined_members_are_reported(more: str, said: str | None, tmp_path: Path) -> None:
+    volume(tmp_path, TWO + more)
+    origin = taken(tmp_path / "two.key").origin
+    assert origin is not None
+    found = [note for note in origin.notes if "members that the file does not define, and are smaller" in note]
+    assert len(found) == (said is not None)
+    assert said is None or re.search(f": {said}$", found[0])
+
+
+def test_another_unit_than_that_of_the_deck_is_refused(tmp_path: Path) -> None:
+    assert volume(tmp_path, TWO.replace("*NODE", "*CONTROL_UNITS\n         m         s        kg\n*NODE", 1)) == 2.0
+    with pytest.raises(MeshError, match=r"mesh.unit = 1.00 m, but the file is in mm; mend the key or the file"):
+        volume(tmp_path, TWO.replace("*NODE", "*CONTROL_UNITS\n        mm        ms        kg\n*NODE", 1))
 
 
 def test_a_deck_is_read_again_when_a_file_that_it_includes_has_changed(tmp_path: Path) -> None:

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from conoid.cases.model.bodies import MeshFile
+from conoid.cases.units import parse_quantity
 from conoid.worker.errors import MeshError
 from conoid.worker.mesh.lookup import meant
 from conoid.worker.mesh.model import TetMesh
@@ -73,6 +74,24 @@ def test_groups_and_surfaces_are_read(more: str, name: str, many: int, faces: in
     found = meant(taken(tmp_path / "two_0000.rad").sets, name)
     assert found is not None
     assert (len(found.nodes), found.faces if found.faces is None else len(found.faces)) == (many, faces)
+
+
+@pytest.mark.parametrize("length", ["mm", "cm", "in"])
+def test_another_unit_than_that_of_the_deck_is_refused(length: str, tmp_path: Path) -> None:
+    path = tmp_path / "two_0000.rad"
+    path.write_text(f"/BEGIN\ntwo\n      2022         0\n{'kg':>20}{length:>20}{'ms':>20}\n{TWO}")
+    with pytest.raises(MeshError, match=f"mesh.unit = 1.00 m, but the file is in {length}; mend the key or the file"):
+        taken(path)
+    unit = parse_quantity(f"1 {length}", "m")
+    made = read(MeshFile(shape="file", path=path.name, unit=unit), path, "mesh")
+    assert made.volumes().sum() == pytest.approx(2.0 * unit**3, rel=1e-12)
+
+
+def test_a_group_with_undefined_nodes_is_reported(tmp_path: Path) -> None:
+    (tmp_path / "two_0000.rad").write_text(f"{TWO}/GRNOD/NODE/1\ngrip\n{row(1, 2, 98, -99)}")
+    origin = taken(tmp_path / "two_0000.rad").origin
+    assert origin is not None
+    assert "the file does not define, and are smaller: /GRNOD grip (2, such as 98)" in " ".join(origin.notes)
 
 
 @pytest.mark.parametrize(

@@ -88,6 +88,7 @@ def both(data: dict[str, Any], folder: Path) -> tuple[list[str], list[str]]:
     [
         (case(), [(0, 0, 0), (0, 0, 3)], 0.0, "2 pieces that share no node"),
         (case(), [(0, 0, 0), (0, 0, 2)], 0.0, "2 pieces that share no node"),
+        (case(), [(1e11, 0, 0)], 0.0, "from the origin, with tets of"),
         (case({**PLANE, "parts": ["bar"]}), [(0, 0, 0)], 1e-3, "off this plane of symmetry"),
         (case({**GRIP, "z": 0, "high": ["2 mm", "2 mm", "0.47 mm"]}), [(0, 0, 0)], 0.0, "less than a tenth of an edge"),
         (case(velocity=[0, 0, "-2 km/s"]), [(0, 0, 0)], 0.0, "without eos"),
@@ -128,7 +129,9 @@ def test_both_refuse_the_same(data: Any, words: str, folder: Path) -> None:
     assert refused == [str(error.value)]
 
 
-@pytest.mark.parametrize("shift", [(0, 0, 0), (1, 0, 0), (0.13, 0.21, 0.4), (1.2, 1.3, 1.1)])
+@pytest.mark.parametrize(
+    "shift", [(0, 0, 0), (1, 0, 0), (0.13, 0.21, 0.4), (1.2, 1.3, 1.1), (0, 0, 1.5), (0.5, 0, 0), (0.5, 0.5, 1.5)]
+)
 @pytest.mark.parametrize("contact", ["none", {}])
 def test_what_is_there_twice_is_refused_by_both(shift: Any, contact: Any, folder: Path) -> None:
     """The common volume is the part of 8 mm^3 that the shift leaves. It is exact if the tets coincide; otherwise the
@@ -143,7 +146,7 @@ def test_what_is_there_twice_is_refused_by_both(shift: Any, contact: Any, folder
     twice = float(str(error.value).split("about ")[1].split()[0])
     common = float(np.prod([2.0 - each for each in shift]))
     aligned = all(each in {0, 1} for each in shift)
-    assert 1e9 * twice == pytest.approx(common, rel=1e-3 if aligned else 0.3)
+    assert 1e9 * twice == pytest.approx(common, rel=1e-3 if aligned else 0.5)
 
 
 def test_a_process_of_each_warns_of_the_same(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -1,9 +1,15 @@
 """Notes about contents of a deck that are not in its mesh or are interpreted in an unexpected way."""
 
 from collections import Counter
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
+
+import numpy as np
 
 from .cells import Cells
+from .model import Ids
+
+_SHOWN = 5
+"""Largest number of sets in a note. Chosen value: a line of a terminal or two."""
 
 
 def notes(passed: Counter[str], volumes: Counter[str], joining: Counter[str], mark: str) -> Iterator[str]:
@@ -26,3 +32,14 @@ def by_corners(chosen: Iterable[Cells]) -> Iterator[str]:
     for each in chosen:
         if each.kind.nodes > 10 and len(each.numbers):
             yield f"{len(each.numbers):,} hexahedra of {each.kind.nodes} nodes are taken by their corners"
+
+
+def undefined(lost: Mapping[str, Ids]) -> Iterator[str]:
+    """Return a note about sets with members that the file does not define; ``lost``: these members, by what and name of
+    the set.
+    """
+    some = {name: np.unique(numbers) for name, numbers in lost.items() if len(numbers)}
+    if some:
+        words = [f"{name} ({len(numbers)}, such as {numbers[0]})" for name, numbers in list(some.items())[:_SHOWN]]
+        more = ["..."] if len(some) > _SHOWN else []
+        yield f"sets have members that the file does not define, and are smaller: {', '.join([*words, *more])}"

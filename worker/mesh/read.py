@@ -10,7 +10,9 @@ import hashlib
 from collections.abc import Callable
 from pathlib import Path
 
+from conoid.cases.figures import si
 from conoid.cases.model.bodies import MeshFile
+from conoid.cases.units import parse_unit
 
 from ..errors import MeshError
 from .abaqus.reading import read_inp
@@ -41,6 +43,7 @@ def read(file: MeshFile, path: Path, key: str = "mesh") -> TetMesh:
         content = readers[path.suffix.lower()](path, file.group, key)
         if file.group is not None and not any(len(each.numbers) for each in content.cells):
             raise MeshError(f"{key}.group = {file.group!r}: no element with a volume is in it")
+        _refuse_unit(file, content.length, key)
         found = solid(content, None if file.second_order == "auto" else file.second_order)
         digests = [_digest(each) for each in (path, *content.included)]
         whole = digests[0] if len(digests) == 1 else hashlib.sha256("".join(digests).encode()).hexdigest()
@@ -57,6 +60,18 @@ def read(file: MeshFile, path: Path, key: str = "mesh") -> TetMesh:
     except MeshError as error:
         text = str(error)
         raise MeshError(text if text.startswith(key) else f"{key}.path = {file.path!r}: {text}") from error
+
+
+def _refuse_unit(file: MeshFile, stated: str, key: str) -> None:
+    """Raise MeshError if the file states another unit of lengths than the case. A unit that the file states by a number
+    or by an unknown word is not compared.
+    """
+    try:
+        factor, dimension = parse_unit(stated)
+    except ValueError:
+        return
+    if dimension == parse_unit("m")[1] and abs(float(factor) - file.unit) > 1e-9 * file.unit:
+        raise MeshError(f"{key}.unit = {si(file.unit, 'm')}, but the file is in {stated}; mend the key or the file")
 
 
 def _digest(path: Path) -> str:

@@ -31,6 +31,8 @@ class Content:
     notes: tuple[str, ...] = ()
     included: tuple[Path, ...] = ()
     """Further files that were read for the mesh."""
+    length: str = ""
+    """Unit of lengths that the file states; empty if it states none."""
 
 
 @dataclass(frozen=True, eq=False)

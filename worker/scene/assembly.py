@@ -32,6 +32,7 @@ from .marks import marks
 from .motion import initial_velocities, parted
 from .overlapping import apart
 from .pieces import UNSEEN
+from .remote import remote
 from .selection import Nearness
 from .stacking import Stacked, stacked
 
@@ -136,7 +137,8 @@ def assembled(case: schema.Case, meshes: Iterable[tuple[int, TetMesh]], overlaps
         node_volume=_quarters(t, volumes, len(x)), mass=_weighed(case, _quarters(t, masses, len(x)), part_of_node),
         velocity=velocity, loads=loads, tied=tied, near=near, marks=marked.nodes,
         warnings=[
-            *warnings, *marked.warnings, *missed, *more, *selection.off_planes(case, x, members, near, known),
+            *warnings, *remote(case, x, t, part_of_tet, volumes), *marked.warnings, *missed, *more,
+            *selection.off_planes(case, x, members, near, known),
             *selection.compared(case, [*found, *driven]), *mixed,
         ],
         survey=Survey(),

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ...mesh.faces import across
 from ...mesh.faces import normals as face_normals
 from ...model.state import Flags, Floats, Indices
 from ..broad_phase import search
@@ -118,13 +119,16 @@ def nested(points: Floats, tets: Indices, part: Indices, surface: Surface, allow
     places = np.arange(len(points), len(every), dtype=np.int32)
     small, large = (Primitives(of_them, np.zeros(len(of_them))) for of_them in (places[:, None], tets))
     pairs = search.find(small, large, every, np.zeros_like(every), of, others, 0.0, None)
-    inside = (_shares(centres[pairs[:, 0]], points[tets[pairs[:, 1]]]) > _ROUNDING).all(axis=1)
+    inside = (_shares(centres[pairs[:, 0]], points[tets[pairs[:, 1]]]) >= -_INSIDE).all(axis=1)
     return np.column_stack([outer[pairs[inside, 0]], pairs[inside, 1]])
 
 
 def within(points: Floats, tets: Indices, body: Indices) -> tuple[Indices, Indices]:
-    """Nodes, and tets by their centres, that lie inside a tet of another body, surfaces excluded; ``body`` (n,) of
-    the nodes.
+    """Nodes, and tets by their centres, that lie inside another body; ``body`` (n,) of the nodes.
+
+    A node on the surface of a body does not lie inside it, a node on a face between two of its tets does: meshes of one
+    grid that are shifted by half a cell have all nodes on such faces. A centre lies in its own tet, so a tet whose
+    centre is on any face of another body has volume in common with that body.
     """
     every = np.concatenate([points, points[tets].mean(axis=1)])
     of = np.concatenate([body, body[tets[:, 0]]])
@@ -134,8 +138,12 @@ def within(points: Floats, tets: Indices, body: Indices) -> tuple[Indices, Indic
     )
     others = ~np.eye(int(body.max(initial=0)) + 1, dtype=bool)
     pairs = search.find(small, large, every, np.zeros_like(every), of, others, 0.0, None)
-    inside = (_shares(every[pairs[:, 0]], points[tets[pairs[:, 1]]]) > _ROUNDING).all(axis=1)
-    found = np.unique(pairs[inside, 0])
+    shares = _shares(every[pairs[:, 0]], points[tets[pairs[:, 1]]])
+    inside = np.asarray((shares >= -_INSIDE).all(axis=1))
+    outer = across(tets)[pairs[:, 1]] < 0
+    on_surface = (inside[:, None] & (shares < _ROUNDING) & outer).any(axis=1)
+    resting = np.intersect1d(pairs[on_surface, 0], np.arange(len(points)))
+    found = np.setdiff1d(pairs[inside, 0], resting)
     return found[found < len(points)], found[found >= len(points)] - len(points)
 
 

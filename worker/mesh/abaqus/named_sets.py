@@ -9,6 +9,7 @@ from conoid.cases.reading.inp import is_whole
 
 from ...errors import MeshError
 from ..model import Ids
+from ..omitted import undefined
 from ..sets import Named, joined, surface
 from .deck import Deck
 from .labels import label
@@ -24,15 +25,15 @@ def named_sets(model: Placed) -> tuple[list[Named], list[str]]:
     A set of a part or an instance has the name ``Bar.CLAMP`` or ``Bar-1.CLAMP``. The set also has the name ``CLAMP`` if
     the assembly has no set of this name.
     """
-    remarks = nodes_of_elements(model.deck)
-    found = list(_sets(model, model.deck.root, None, remarks))
+    remarks, lost = nodes_of_elements(model.deck), dict[str, Ids]()
+    found = list(_sets(model, model.deck.root, None, remarks, lost))
     outer = {each.names[0].casefold() for each in found}
     of_parts: dict[tuple[int, str, bool], list[Named]] = {}
     for place, piece in enumerate(model.pieces):
         scope = piece.scope
         owners: list[Scope] = [] if not scope.line else [scope, scope.part] if isinstance(scope, Instance) else [scope]
         for owner in owners:
-            for each in _sets(model, owner, place, remarks):
+            for each in _sets(model, owner, place, remarks, lost):
                 name = each.names[0]
                 of_parts.setdefault((id(owner), f"{owner.name.text}.{name}", each.faces is None), []).append(each)
                 if owner is not scope:
@@ -40,15 +41,19 @@ def named_sets(model: Placed) -> tuple[list[Named], list[str]]:
     for (_, name, _), several in of_parts.items():
         alone = several[0].names[0]
         found.append(joined((name, *([] if alone.casefold() in outer else [alone])), several))
-    return found, list(dict.fromkeys(remarks))
+    return found, [*dict.fromkeys(remarks), *undefined(lost)]
 
 
-def _sets(model: Placed, scope: Scope, place: int | None, remarks: list[str]) -> Iterator[Named]:
+def _sets(model: Placed, scope: Scope, place: int | None, remarks: list[str], lost: dict[str, Ids]) -> Iterator[Named]:
     """Yield the sets of a scope for the piece ``place``. ``place`` is None for the model outside of parts, or for
-    the assembly.
+    the assembly. ``lost`` gets the members that are not defined.
     """
     for name, one in scope.node_sets:
-        nodes = [model.nodes(at, _ids(one, owner)) for owner, at in _owners(model, scope, one, place)]
+        owners = list(_owners(model, scope, one, place))
+        nodes = [model.nodes(at, _ids(one, owner)) for owner, at in owners]
+        lost[f"the node set {name.text!r}"] = np.concatenate(
+            [_NONE, *(model.undefined(at, _ids(one, owner)) for owner, at in owners)]
+        )
         yield Named((name.text,), np.unique(np.concatenate([_NONE, *nodes])))
     for each in scope.surfaces:
         try:

@@ -67,6 +67,10 @@ class Placed:
         there = tags.numbers[np.isin(tags.numbers, numbers)]
         return np.asarray(np.searchsorted(tags.numbers, there) + tags.first, np.int64)
 
+    def undefined(self, place: int, numbers: Ids) -> Ids:
+        """Return the numbers that no node of a piece has."""
+        return np.setdiff1d(numbers, self.tags[place].numbers)
+
 
 def _called(kind: ElementType, numbers: Ids) -> Callable[[int], str]:
     return lambda k: f"{kind.name} {numbers[k]}"

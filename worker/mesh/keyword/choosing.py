@@ -41,6 +41,18 @@ class Content:
             found = found & ~np.isin(every, some) if word != bare else found | np.isin(every, some)
         return every[found]
 
+    def undefined(self) -> dict[str, Ids]:
+        """Return the members of sets that are no defined nodes, parts or solid elements, by the set."""
+        known = {"NODE": self.tags, "PART": self._parts(), "ELEM": self.numbers}
+        found = dict[str, Ids]()
+        for kind, own in (("NODE", "NODE"), ("PART", "PART"), ("SOLID", "ELEM")):
+            for number, one in self.deck.sets.found[kind].items():
+                steps = [(own if word == "MEMBER" else word, numbers) for word, numbers in one.steps]
+                lost = [np.setdiff1d(numbers, known[word]) for word, numbers in steps if word in known]
+                some = np.concatenate([np.zeros(0, np.int64), *lost])
+                found[f"*SET_{kind} {one.title or number}"] = some[some > 0]
+        return found
+
     def _step(self, kind: str, word: str, numbers: Ids, every: Ids, depth: int) -> Ids:
         if word == "ALL":
             return every

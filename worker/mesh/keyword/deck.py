@@ -49,6 +49,8 @@ class Deck:
         """Counts, by keyword, of cards of elements that are not read, and of keywords that join bodies."""
         self.held = 0
         """Number of nodes with constraints on the card of the node."""
+        self.length = ""
+        """Unit of lengths that the deck states (the manual, "*CONTROL_UNITS"); empty if it states none."""
         deck = cards.Deck(path)
         for block in deck.blocks():
             self._take(block)
@@ -62,6 +64,8 @@ class Deck:
             self._solid(block, block.name[14:])
         elif name == "PART":
             self._part(block, bool(options))
+        elif block.name == "CONTROL_UNITS":
+            self.length = next((block.fields(card, *_EIGHT)[0].strip() for card in block.filled()), "")
         elif not self.sets.take(block):
             refuse(block, ())
             self._count(block)

@@ -45,7 +45,8 @@ def read_keyword(path: Path, group: str | None, key: str) -> solid.Content:
         name, many = deck.volumes.most_common(1)[0]
         raise MeshError(f"{many} cards of *{name}, whose elements are not read; choose a part without them by group")
     named, remarks = _named(content)
-    return solid.Content(tags, points, chosen, named, (*_notes(deck, chosen), *remarks), tuple(deck.files[1:]))
+    notes = (*_notes(deck, chosen), *remarks, *omitted.undefined(content.undefined()))
+    return solid.Content(tags, points, chosen, named, notes, tuple(deck.files[1:]), deck.length)
 
 
 def _cells(rows: Solids, many: int, tags: Ids) -> Cells:

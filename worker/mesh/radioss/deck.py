@@ -8,7 +8,7 @@ from pathlib import Path
 from conoid.cases.reading.included import Included, own
 
 from ...errors import MeshError
-from .lines import Block, blocks, number, point, wholes
+from .lines import REAL, Block, blocks, number, point, wholes
 
 
 def _words(text: str) -> frozenset[str]:
@@ -84,6 +84,8 @@ class Deck:
         """Counts, by first word, of lines of elements that are not read, and of keywords that join bodies."""
         self.included = Included(path)
         """The deck, and the files that it includes."""
+        self.length = ""
+        """Unit of lengths that ``/BEGIN`` states; empty if it states none."""
         for block in blocks(self.included):
             self._take(block)
 
@@ -93,6 +95,8 @@ class Deck:
             self._solid(block, word)
         elif word == "NODE":
             self._node(block)
+        elif word == "BEGIN":
+            self._begin(block)
         elif word in ("PART", "SUBSET"):
             self._part(block, word)
         elif word in GROUPS:
@@ -113,6 +117,11 @@ class Deck:
             if text.strip():
                 self.nodes.append(number(line, text, "a node"))
                 self.points.extend(point(line, text))
+
+    def _begin(self, block: Block) -> None:
+        """Read the unit of input: a title, the version, and mass, length and time in fields of 20 columns."""
+        filled = [text for _, text in block.rows if text.strip()]
+        self.length = filled[2][REAL : 2 * REAL].strip() if len(filled) > 2 else ""
 
     def _solid(self, block: Block, word: str) -> None:
         rows, made, part = self.solids.setdefault(word, Solids()), SOLIDS[word], block.id

@@ -39,8 +39,8 @@ def read_radioss(path: Path, group: str | None, key: str) -> Content:
         raise MeshError(f"{many} lines of /{word}, whose elements are not read; choose a part without them by group")
     named, remarks = reader.named()
     points = np.array(deck.points).reshape(-1, 3)[order]
-    notes = (*_notes(deck, chosen), *remarks)
-    return Content(reader.tags, points, chosen, named, notes, tuple(deck.included.files[1:]))
+    notes = (*_notes(deck, chosen), *remarks, *omitted.undefined(reader.lost))
+    return Content(reader.tags, points, chosen, named, notes, tuple(deck.included.files[1:]), deck.length)
 
 
 _NONE = np.zeros(0, np.int64)
@@ -53,6 +53,8 @@ class _Reader:
         self.deck, self.tags = deck, tags
         self.cells = [self._cells(word) for word in deck.solids]
         self.of = [np.array(rows.parts, np.int64) for rows in deck.solids.values()]
+        self.lost = dict[str, Ids]()
+        """Members of groups of nodes that are no defined nodes, by the group."""
 
     def _cells(self, word: str) -> Cells:
         rows = self.deck.solids[word]
@@ -125,6 +127,10 @@ class _Reader:
                 for first, last in zip(row[::2], row[1::2], strict=False):
                     found |= (self.tags >= first) & (self.tags <= last) & (first > 0)
                 continue
+            if group.kind in ("GRNOD/NODE", "GRNOD/NODENS"):
+                name = f"/GRNOD {group.title or number}"
+                some = np.setdiff1d(np.abs(row), np.append(self.tags, 0))
+                self.lost[name] = np.union1d(self.lost.get(name, _NONE), some)
             for each in filter(None, row):
                 found[self._some(group.kind.partition("/")[2], abs(each), depth)] = each > 0
         return np.flatnonzero(found).astype(np.int64)
