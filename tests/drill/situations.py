@@ -29,6 +29,8 @@ Life = Generator[None, None, Truth]
 Situation = Callable[[Stand, frozenset[str]], Life]
 SUCCEEDED, CANCELLED = frozenset({"succeeded"}), frozenset({"cancelled/cancelled"})
 STORAGE = frozenset({"failed/storage", "lost/storage"})
+UNWRITTEN = frozenset({"failed/storage"})
+"""State of a cancelled run whose worker could not write its files, where the fault affects these files."""
 
 
 def is_running(stand: Stand, unsaid: frozenset[str]) -> Life:
@@ -56,7 +58,7 @@ def is_cancelled_meanwhile(stand: Stand, unsaid: frozenset[str]) -> Life:
     answer = stand.cancel(run)
     yield
     again = cancel_until(stand, run)
-    return Truth(run, CANCELLED, f"cancel {answer}, then {again}")
+    return Truth(run, CANCELLED | (unsaid & UNWRITTEN), f"cancel {answer}, then {again}")
 
 
 def is_killed_meanwhile(stand: Stand, unsaid: frozenset[str]) -> Life:
@@ -86,7 +88,7 @@ def waits_and_is_cancelled(stand: Stand, unsaid: frozenset[str]) -> Life:
     answer = stand.cancel(run)
     yield
     again = cancel_until(stand, run)
-    return Truth(run, CANCELLED, f"cancel {answer}, then {again}", launches=8)
+    return Truth(run, CANCELLED | (unsaid & UNWRITTEN), f"cancel {answer}, then {again}", launches=8)
 
 
 def is_submitted_meanwhile(stand: Stand, unsaid: frozenset[str]) -> Life:
