@@ -119,6 +119,9 @@ class Searches:
         exterior.take_up()
         goes_on = old is not None and self._clock.t + _LEAST * self._clock.dt <= motion.until
         now = self.scene = self._laid_out(nodes, goes_on)
+        if old is not None:
+            now.active = old.active
+            now.active.begin()
         if old is not None and goes_on:
             carry(now, old)
         self._connect(now, nodes)

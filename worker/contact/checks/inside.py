@@ -30,6 +30,8 @@ SLIGHT = 0.05
 contact sweeps."""
 _WORDS = 5
 """Number of words of a node in a message."""
+_AT_ONCE = 1 << 14
+"""Number of pairs of a node and a tet that are tested at a time, so that their arrays stay small."""
 _ROUNDING = 1e-9
 """Tolerance of the volume coordinates. With this tolerance a node on the face between two tets is in both tets."""
 DEEP = 0.25
@@ -86,12 +88,15 @@ def look(contact: Contact, model: Model, labels: list[Ints] | None, comm: Comm) 
         other = Primitives(np.ascontiguousarray(block.tets, np.int32), np.zeros(block.n))
         pairs = search.find(one, other, points, np.zeros_like(points), part, may, 0.0, None)
         pairs = pairs[seen.fragment[pairs[:, 0]] != fragment[pairs[:, 1]]]
-        tets, opened = block.tets[pairs[:, 1]], _open(block, contact, outer)[pairs[:, 1]]
-        places, corners = x[pairs[:, 0]], model.nodes.x[tets]
-        depth = _depths(places, corners, opened, outer[tets])
-        some = (depth > SLIGHT * size) & (_from_edges(places, corners, outer[tets]) > SLIGHT * size)
-        which = np.column_stack([pairs[some, 0], depth[some] / size, fragment[pairs[some, 1]]])
-        found.append(np.column_stack([which, np.full(len(which), float(block.part))]))
+        opened = _open(block, contact, outer)
+        for first in range(0, len(pairs), _AT_ONCE):
+            node, tet = pairs[first : first + _AT_ONCE].T
+            tets, places = block.tets[tet], x[node]
+            corners = model.nodes.x[tets]
+            depth = _depths(places, corners, opened[tet], outer[tets])
+            some = (depth > SLIGHT * size) & (_from_edges(places, corners, outer[tets]) > SLIGHT * size)
+            which = np.column_stack([node[some], depth[some] / size, fragment[tet[some]]])
+            found.append(np.column_stack([which, np.full(len(which), float(block.part))]))
     everywhere = np.concatenate(comm.share(np.concatenate(found)))
     buried = np.isinf(everywhere[:, 1])
     row, of = everywhere[buried][:, [0, 2]].astype(np.int64).T

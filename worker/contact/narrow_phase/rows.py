@@ -8,8 +8,9 @@ from ...model.state import Floats, Indices, Ints
 from ..tasks import collected
 from .tables import ContactRows
 
-_SPARE = 2
-"""Ratio of allocated rows to needed rows."""
+_SPARE = 4
+"""Needed rows per spare row. Rows are reserved for all candidate pairs, twenty times as many as become active: more
+spare rows take memory, fewer are allocated again more often."""
 
 
 @dataclass
@@ -56,15 +57,15 @@ class ActiveRows:
         -1.
         """
         if len(self._holder) < slots:
-            self._holder = np.full(_SPARE * slots, -1, np.int32)
+            self._holder = np.full(slots + slots // _SPARE, -1, np.int32)
         return self._holder[:slots]
 
     def _reserve(self, most: int) -> None:
-        known = len(self.found)
-        if most > known:
-            old, self.room = self.room, ContactRows.room(_SPARE * most)
-            for name in old._fields:
-                getattr(self.room, name)[:known] = getattr(old, name)
-            more = _SPARE * most - known
-            self.found = np.concatenate([self.found, np.empty(more, np.int32)])
-            self.depth = np.concatenate([self.depth, np.empty(more)])
+        """Allocates at least ``most`` rows; copies only rows with active contacts."""
+        if most > len(self.found):
+            found, room, depth, many = self.found[: self.n], self.room, self.depth, most + most // _SPARE
+            self.room, self.depth, self.found = ContactRows.room(many), np.empty(many), np.empty(many, np.int32)
+            for name in room._fields:
+                getattr(self.room, name)[found] = getattr(room, name)[found]
+            self.depth[found] = depth[found]
+            self.found[: self.n] = found
