@@ -22,9 +22,10 @@ _I, _B2, _N1, _N2, _I1 = (
     types.int64, types.boolean[:, ::1], types.int32[::1], types.int32[:, ::1], types.int64[::1],
 )  # fmt: skip
 _FOUND = TABLE, SOUGHT, SOUGHT, _I1, _N1, _B2
-_FIND = _N2, _I, _I1, *_FOUND
-_PACK = _N2, _I1, *_FIND
-_read_find, _read_pack = reader(*_FIND), reader(*_PACK)
+_PAIRS = _N2, _I1, _N2, _I, _I1, *_FOUND
+_read = reader(*_PAIRS)
+_NO_PAIRS, _NOWHERE = np.zeros((0, 2), np.int32), np.zeros(0, np.int64)
+"""Result and places of the tasks in the first pass, which has none."""
 
 
 @njit("boolean(int32[:, ::1], int64, int32[:, ::1], int64, int64, int64)", cache=True)
@@ -109,46 +110,42 @@ def _ask(out, n, end, table, small, large, rank, part, allowed, asked, stop):  #
 
 
 @njit(TASK, cache=True)
-def _find(arguments, first, stop, thread):  # type: ignore[no-untyped-def]
-    """Task: ``_ask``, with rows for ``each`` pairs of a large primitive."""
-    out, each, counts, table, small, large, rank, part, allowed = _read_find(arguments)
-    begin, end = each * first, each * stop
-    counts[first // _LARGE] = _ask(out, begin, end, table, small, large, rank, part, allowed, first, stop)
+def _pairs(arguments, first, stop, thread):  # type: ignore[no-untyped-def]
+    """Task: ``_ask``, in two passes.
 
-
-@njit(TASK, cache=True)
-def _pack(arguments, first, stop, thread):  # type: ignore[no-untyped-def]
-    """Task: copies the pairs of a task to their places in ``out``, or finds them again if the task had too few rows."""
-    out, begins, found, each, counts, table, small, large, rank, part, allowed = _read_pack(arguments)
-    k = first // _LARGE
+    The first, without places in ``out``, writes the pairs to ``found``, which has rows for ``each`` pairs of a large
+    primitive, and counts them. The second copies the pairs of a task to their places, which begin at ``begins``, or
+    finds them again if the task had too few rows.
+    """
+    out, begins, found, each, counts, table, small, large, rank, part, allowed = _read(arguments)
+    k, room = first // _LARGE, each * first
+    if len(begins) == 0:
+        counts[k] = _ask(found, room, each * stop, table, small, large, rank, part, allowed, first, stop)
+        return
     begin, end = begins[k], begins[k] + counts[k]
     if counts[k] > each * (stop - first):
         _ask(out, begin, end, table, small, large, rank, part, allowed, first, stop)
         return
     for p in range(counts[k]):
-        out[begin + p, 0], out[begin + p, 1] = found[each * first + p, 0], found[each * first + p, 1]
+        out[begin + p, 0], out[begin + p, 1] = found[room + p, 0], found[room + p, 1]
 
 
 class Overlaps:
     """Passes over the large primitives of a search."""
 
     def __init__(self, team: Team) -> None:
-        self._find, self._pack = (
-            Pass(team, _find, *_FIND, size=_LARGE),
-            Pass(team, _pack, *_PACK, size=_LARGE),
-        )
-        self._scratch, self._each = Scratch(), _EACH
+        self._pass, self._scratch, self._each = Pass(team, _pairs, *_PAIRS, size=_LARGE), Scratch(), _EACH
 
     def of(self, table: Table, small: Sought, large: Sought, rank: Ints, part: Indices, allowed: Flags) -> Indices:
         """(pairs, 2) primitives whose boxes overlap: row of a small primitive and of a large one; see search.find.
         The small primitives are in the ``table``.
         """
-        n, each, of = len(large.some), self._each, (table, small, large, rank, part, allowed)
-        begins, counts = np.empty((2, self._find.many(n)), np.int64)
-        found = self._scratch.of("pairs", each * n, np.int32, 2)
-        self._find.run(n, found, each, counts, *of)
+        n, each = len(large.some), self._each
+        begins, counts = np.empty((2, self._pass.many(n)), np.int64)
+        rest = self._scratch.of("pairs", each * n, np.int32, 2), each, counts, table, small, large, rank, part, allowed
+        self._pass.run(n, _NO_PAIRS, _NOWHERE, *rest)
         total = int(offsets(begins, counts))
         out = np.empty((total, 2), np.int32)
-        self._pack.run(n, out, begins, found, each, counts, *of)
+        self._pass.run(n, out, begins, *rest)
         self._each = min(max(each, -(-2 * total // n)), _MOST)
         return out

@@ -45,9 +45,7 @@ class Lines:
         """
         self.x -= t * self.course
         self.since[:] = t
-        there, here = np.flatnonzero(slots >= 0), slots[slots >= 0]
-        for name in ("x", "course", "since"):
-            getattr(self, name)[here] = getattr(old, name)[there]
+        _take_over(self.x, self.course, self.since, slots, old.x, old.course, old.since)
 
     def begin_anew(self, some: "np.ndarray", x: Floats, t: float) -> None:
         """Begins new lines for ``some`` (slots,), from ``x`` (slots, 3) at time ``t`` on."""
@@ -152,6 +150,16 @@ def largest(out, corners, many, left, first, stop):  # type: ignore[no-untyped-d
         for k in range(many):
             most = max(most, left[corners[f, k]])
         out[f] = most
+
+
+@njit(f"void({_V2}, {_V2}, {_V1}, int32[::1], {_V2}, {_V2}, {_V1})", cache=True)
+def _take_over(line, course, since, slots, old_line, old_course, old_since):  # type: ignore[no-untyped-def]
+    for k in range(len(slots)):
+        a = slots[k]
+        if a >= 0:
+            since[a] = old_since[k]
+            for i in range(3):
+                line[a, i], course[a, i] = old_line[k, i], old_course[k, i]
 
 
 @njit(f"void(boolean[::1], {_V2}, {_V2}, {_V1}, {_V2}, float64)", cache=True)

@@ -127,8 +127,8 @@ def carry(now: Scene, old: Scene) -> None:
     pairs that still exist. The pairs of a copied node were on the rank of its parent, and are from now on on the rank
     that owns the copy.
     """
-    slots, faces = _numbers(now.surface_nodes.id, old.surface_nodes.id), _numbers(now.faces.id, old.faces.id)
-    edges = _numbers(now.edges.names, old.edges.names)
+    slots = now.passes.located(now.surface_nodes.id, old.surface_nodes.id)
+    faces, edges = _numbers(now.faces.id, old.faces.id), _numbers(now.edges.names, old.edges.names)
     now.reference.take_over(slots, old.reference)
     now.slots.tracked[slots[slots >= 0]] = old.slots.tracked[slots >= 0]
     now.reference.until = old.reference.until

@@ -3,8 +3,7 @@
 import numpy as np
 
 from ...kernels.jit import njit
-from ...model.ids import located
-from ...model.state import Flags, Floats, Indices, Ints, Nodes, extended
+from ...model.state import Flags, Floats, Ints, Nodes, extended
 from ...parallel.comm import Comm
 from ...parallel.fixed_point import exact_sums
 from ..surface.records import SurfaceNodes, merged
@@ -40,7 +39,7 @@ class SurfaceMotion:
         self.found = found
         """Returns the surface of this rank."""
         self._watched = found.flags | found.waiting
-        self.sides = self._whole(nodes, located(nodes.id, found.faces.nodes))
+        self.sides = self._whole(nodes)
         """Returns faces, edges and nodes of the surface."""
 
     def forget(self, removed: Flags) -> None:
@@ -75,13 +74,16 @@ class SurfaceMotion:
         every = np.arange(nodes.n, dtype=np.int32)
         return SurfaceNodes(nodes.id, every, nodes.owner, nodes.part, self.mobility, nodes.x, nodes.v, self._course)
 
-    def _whole(self, nodes: Nodes, local: Indices) -> NearSurface:
-        """Returns the faces, edges and nodes of the surface; ``local`` (f, 4): nodes of the faces. The tet of an edge
-        may be on another rank although the opposite node of the tet is on this rank.
+    def _whole(self, nodes: Nodes) -> NearSurface:
+        """Returns the faces, edges and nodes of the surface. With several ranks, the tet of an edge may be on another
+        rank although the opposite node of the tet is on this rank.
         """
         found, here = self.found, self.here(nodes)
-        used, opposite = self._watched.copy(), nodes.places(found.edges.nodes[:, 4:])
-        used[local] = used[opposite[opposite >= 0]] = True
+        used = self._watched.copy()
+        used[found.corners.reshape(-1)] = True
+        if self._comm.size > 1:
+            opposite = nodes.places(found.edges.nodes[:, 4:])
+            used[opposite[opposite >= 0]] = True
         far = ghosts.fetch(found.far, found.far_owner, here, self._comm)
         owned = nodes.id[self._watched & nodes.owned]
         return NearSurface(found.faces, found.edges, merged([here.take(used), far]), owned)

@@ -53,6 +53,8 @@ class Surface:
     """(k,) ids of nodes of ``edges`` that this rank does not hold."""
     far_owner: Indices
     """(k,) owners of the nodes of ``edges`` that this rank does not hold."""
+    corners: Indices
+    """(f, 4) local nodes of ``faces``, by the numbers of the nodes when the surface was built."""
     turned: Ints = field(default_factory=lambda: np.zeros(0, np.int64))
     """(t,) names of the ``edges`` that became sharp during the run, ascending."""
 
@@ -98,7 +100,7 @@ class SurfaceBuilder:
         opened = (kind >= _AGED).astype(np.uint8) + faces.exposed
         of = model, faces, local, units, heights, some, opened, neighbours, comm
         found = self._edges.find(*of) if edges else sharp.none()
-        return Surface(faces, found[0], counts[:, 0] > 0, counts[:, 1] > 0, *found[1:])
+        return Surface(faces, found[0], counts[:, 0] > 0, counts[:, 1] > 0, *found[1:], local)
 
     def _faces(self, model: Model, planes: Flags, cracks: CrackSides, covered: Indices) -> tuple[Indices, Ints, Bits]:
         """(f, 4) local nodes of the exposed faces, the sides of ``cracks`` and the ``covered`` faces, the opposite node
