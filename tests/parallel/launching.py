@@ -11,7 +11,8 @@ from contextlib import contextmanager
 from pathlib import Path
 
 MPIEXEC = Path(sys.executable).with_name("mpiexec")
-PATIENCE = 180.0
+PATIENCE, EACH = 180.0, 30.0
+"""Time limits in s: of a launcher, and in addition of each run that ``together`` starts in one program."""
 _PROCESS = re.compile(r"rank \d+ of \d+, process (\d+)")
 
 
@@ -37,10 +38,10 @@ def started(words: list[str]) -> Iterator[subprocess.Popen[str]]:
                     os.killpg(launcher.pid, 9)
 
 
-def ended(words: list[str]) -> subprocess.CompletedProcess[str]:
-    """Returns the launcher after its end."""
+def ended(words: list[str], patience: float = PATIENCE) -> subprocess.CompletedProcess[str]:
+    """Returns the launcher after its end, which comes within ``patience`` s."""
     with started(words) as launcher:
-        out, err = launcher.communicate(timeout=PATIENCE)
+        out, err = launcher.communicate(timeout=patience)
     return subprocess.CompletedProcess(words, launcher.returncode, out, err)
 
 
@@ -51,7 +52,8 @@ def together(ranks: int, place: Path, runs: Sequence[Sequence[str]]) -> None:
     place.mkdir(exist_ok=True)
     (place / "runs.json").write_text(json.dumps(runs), encoding="utf-8")
     program = Path(__file__).with_name("many.py")
-    finished = ended(command(ranks, str(place / "runs.json"), module=[str(program)]))
+    words = command(ranks, str(place / "runs.json"), module=[str(program)])
+    finished = ended(words, PATIENCE + EACH * len(runs))
     assert finished.returncode == 0, finished.stdout + finished.stderr
 
 
