@@ -226,7 +226,7 @@ def _assemble(
     fracture = None
     if case.fractures:
         by_node: list[KeptByNode] = [*scene, *(stage for stage in (erosion, contact, bonds) if stage is not None)]
-        fracture = Fracture(case, model, neighbours, elements, by_node, contact, comm, clock)
+        fracture = Fracture(case, model, neighbours, elements, by_node, contact, comm, clock, threads)
     stopping = tuple(bound for bound in scene if bound.given is not None)
     probes = Probes(case, Scene(model, contact, stopping, rigid, moving, erosion, fracture, clock, comm))
     sums = Sums(model, scene, contact, bonds, erosion, fracture, (rigid, moving), comm, clock, threads)

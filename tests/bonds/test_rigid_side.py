@@ -31,7 +31,7 @@ def gap(sim: Simulation) -> float:
     assert sim.bonds is not None
     assert sim.rigid is not None
     rows, bodies, nodes = sim.bonds.ties.rows, sim.rigid.bodies, sim.model.nodes
-    points = sim.rigid.points(rows.row, rows.master, rows.weight, nodes.id)
+    points = sim.rigid.points(rows.row, rows.master, rows.weight, nodes.id, sim.comm)
     arm = (bodies.rotation[points.body] @ points.arm[:, :, None])[:, :, 0]
     return float(np.abs(nodes.x[nodes.places(rows.node)] - bodies.centre[points.body] - arm).max())
 

@@ -69,7 +69,7 @@ def laid_out(
     """Returns the layout of ``rows`` with their ``states`` (r, KEPT); ``mobility`` (nodes, 3): 1/kg; ``planes``
     (nodes, 3): components held by planes of symmetry; ``scale``: quanta per N s. Collective.
     """
-    points = rigid.points(rows.row, rows.master, rows.weight, nodes.id) if rigid is not None else Points.none()
+    points = rigid.points(rows.row, rows.master, rows.weight, nodes.id, comm) if rigid is not None else Points.none()
     rows = _at_points(rows, points)
     place = nodes.places(rows.node)
     mine = (place >= 0) & nodes.owned[place]

@@ -6,7 +6,7 @@ Each task writes its rows from its own offset on, and the number of its rows int
 from ..kernels.jit import njit, types
 from ..parallel.arguments import reader
 from ..parallel.team import TASK
-from .narrow_phase import closing_speed, corner_contact, crack_contact, edge_edge, node_face
+from .narrow_phase import closing_speed, corner_contact, crack_contact, edge_edge, node_face, tables
 from .narrow_phase.corner_contact import NARROW
 from .narrow_phase.tables import CONTACT_ROWS, EDGES, FACES, PAIRS, SLOTS, STEP
 from .solver import impulse_work, loading, restitution, slot_numbers, stops, sweeps
@@ -46,13 +46,13 @@ COST = types.int64[:, :, ::1], LOADED, NODES, _F2, _N1, _F, types.boolean
 LEAVE = _F2, types.int64[:, :, ::1], _I2, _I2, NODES, _N1, _N1, _N1, types.boolean[::1]
 BOOK = _F1, _F1, _N1, _N1, _F2, _I2, _F2, _F
 TAKE = _F2, _F2, _N1, _F2, _F2, _N1
-BOUND = _F2, _F2
+AHEAD = _F2, _F2, _F2, _F2, _F
 _due_faces, _node_face, _edge_edge = reader(*DUE_FACES), reader(*NODE_FACE), reader(*EDGE_EDGE)
 _across, _entering, _approach = reader(*ACROSS), reader(*ENTERING), reader(*APPROACH)
 _rebound, _mark, _sort, _load, _weigh = reader(*REBOUND), reader(*MARK), reader(*SORT), reader(*LOAD), reader(*WEIGH)
 _resume, _sweep, _give, _store, _cost = reader(*RESUME), reader(*SWEEP), reader(*GIVE), reader(*STORE), reader(*COST)
 _brace, _leave, _book, _take = reader(*BRACE), reader(*LEAVE), reader(*BOOK), reader(*TAKE)
-_bound = reader(*BOUND)
+_ahead = reader(*AHEAD)
 
 
 @njit(TASK, cache=True)
@@ -216,9 +216,10 @@ def take(table, first, stop, thread):  # type: ignore[no-untyped-def]
 
 
 @njit(TASK, cache=True)
-def bound(table, first, stop, thread):  # type: ignore[no-untyped-def]
-    """Task: ``closing_speed.bound``."""
-    box, v = _bound(table)
+def ahead(table, first, stop, thread):  # type: ignore[no-untyped-def]
+    """Task: ``tables.place`` and ``closing_speed.bound``."""
+    places, box, x, v, dt = _ahead(table)
+    tables.place(places, x, v, dt, first, stop)
     closing_speed.bound(box, first // SLOTS_OF_A_TASK, v, first, stop)
 
 

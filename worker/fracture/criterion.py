@@ -92,10 +92,10 @@ def effective(t, normal, weight, friction):  # type: ignore[no-untyped-def]
     return np.sqrt(weight) * max(np.sqrt(across) + friction * along, 0.0)
 
 
-@njit(types.int64(CANDIDATES, types.int64, types.int64, types.uint8[::1], MESH), cache=True)
-def _of_tet(out, n, e, hot, mesh):  # type: ignore[no-untyped-def]
-    """Appends the overstressed facets of tet ``e`` to the ``n`` facets of ``out`` while ``out`` has free rows; a facet
-    with two overstressed sides is appended once, from its first side. Returns the new number.
+@njit(types.int64(CANDIDATES, types.int64, types.int64, types.int64, types.uint8[::1], MESH), cache=True)
+def _of_tet(out, n, end, e, hot, mesh):  # type: ignore[no-untyped-def]
+    """Writes the overstressed facets of tet ``e`` to the rows of ``out`` from ``n`` on, below ``end``; a facet with two
+    overstressed sides is written once, from its first side. Returns the next row, also beyond ``end``.
     """
     for k in range(4):
         if not (hot[e] & mesh.intact[e]) >> k & 1:
@@ -104,36 +104,37 @@ def _of_tet(out, n, e, hot, mesh):  # type: ignore[no-untyped-def]
         first = mesh.id[e] < mesh.id[other]
         if not first and (hot[other] >> far) & 1:
             continue
-        if n < len(out.place):
+        if n < end:
             out.place[n], out.face[n], out.shared[n] = (e, k, -1) if first else (other, far, -1)
         n += 1
     return n
 
 
-@njit(types.int64(CANDIDATES, types.uint8[::1], MESH), cache=True)
-def _overstressed(out, hot, mesh):  # type: ignore[no-untyped-def]
-    """Fills ``out`` with the overstressed facets within this rank; returns the number of these facets, even if it is
-    larger than the number of rows. ``hot`` (tets,): bit k for an overstressed face k, read eight tets at a time.
+@njit(types.int64(CANDIDATES, types.int64, types.int64, types.uint8[::1], MESH, types.int64, types.int64), cache=True)
+def overstressed(out, begin, end, hot, mesh, first, stop):  # type: ignore[no-untyped-def]
+    """Writes the overstressed facets within this rank, of the tets from ``first`` to ``stop``, to the rows of ``out``
+    from ``begin`` to ``end``; returns the number of these facets, even if it is larger than the number of rows.
+    ``hot`` (tets,): bit k for an overstressed face k, read eight tets at a time.
     """
-    n, words = 0, len(hot) // 8
-    one, two = hot[: 8 * words].view(np.uint64), mesh.intact[: 8 * words].view(np.uint64)
+    n, words = begin, (stop - first) // 8
+    one, two = hot[first : first + 8 * words].view(np.uint64), mesh.intact[first : first + 8 * words].view(np.uint64)
     for w in range(words + 1):
         if w == words or one[w] & two[w]:
-            for e in range(8 * w, min(8 * w + 8, len(hot))):
+            for e in range(first + 8 * w, min(first + 8 * w + 8, stop)):
                 if hot[e] & mesh.intact[e]:
-                    n = _of_tet(out, n, e, hot, mesh)
-    return n
+                    n = _of_tet(out, n, end, e, hot, mesh)
+    return n - begin
 
 
-@njit(types.int64(CANDIDATES, types.int64, MESH, TABLE, POINTS, LAW), cache=True)
-def within(out, n, mesh, table, x, law):  # type: ignore[no-untyped-def]
-    """Moves the candidates among the ``n`` facets of ``out`` to the front; returns their number. The stresses of
-    several facets are read in one loop, so that many reads of memory overlap.
+@njit(types.int64(CANDIDATES, MESH, TABLE, POINTS, LAW, types.int64, types.int64), cache=True)
+def within(out, mesh, table, x, law, first, stop):  # type: ignore[no-untyped-def]
+    """Moves the candidates among the facets of ``out`` from ``first`` to ``stop`` to the front of this range; returns
+    their number. The stresses of several facets are read in one loop, so that many reads of memory overlap.
     """
-    normal, one, two, m = np.empty(3), np.empty(3), np.empty(3), 0
+    normal, one, two, m = np.empty(3), np.empty(3), np.empty(3), first
     near, far = np.empty((_TOGETHER, 6)), np.empty((_TOGETHER, 6))
-    for begin in range(0, n, _TOGETHER):
-        some = min(_TOGETHER, n - begin)
+    for begin in range(first, stop, _TOGETHER):
+        some = min(_TOGETHER, stop - begin)
         for i in range(some):
             a, face = out.place[begin + i], out.face[begin + i]
             _stress(near[i], mesh, a)
@@ -148,13 +149,31 @@ def within(out, n, mesh, table, x, law):  # type: ignore[no-untyped-def]
             size = effective(one, normal, law.weight, law.friction)
             if size >= table.strength[a, face]:
                 out.place[m], out.face[m], out.shared[m] = a, face, -1
-                out.traction[m, 0], out.traction[m, 1], out.traction[m, 2], out.traction[m, 3] = (
-                    one[0],
-                    one[1],
-                    one[2],
-                    size,
-                )
+                for k in range(3):
+                    out.traction[m, k] = one[k]
+                out.traction[m, 3] = size
                 m += 1
+    return m - first
+
+
+@njit("void(int64[::1], int64[::1], int64[::1], float64[:, ::1], int64, int64)", cache=True)
+def _copy(place, face, shared, traction, m, i):  # type: ignore[no-untyped-def]
+    """Copies row ``i`` of candidates to row ``m``."""
+    place[m], face[m], shared[m] = place[i], face[i], shared[i]
+    for k in range(4):
+        traction[m, k] = traction[i, k]
+
+
+@njit(types.int64(CANDIDATES, _I1, types.int64), cache=True)
+def _joined(out, counts, size):  # type: ignore[no-untyped-def]
+    """Moves the first ``counts[k]`` rows of each range of ``size`` rows of ``out`` to the front of ``out``; returns the
+    number of these rows.
+    """
+    m = 0
+    for k in range(len(counts)):
+        for i in range(k * size, k * size + counts[k]):
+            _copy(out.place, out.face, out.shared, out.traction, m, i)
+            m += 1
     return m
 
 
@@ -186,7 +205,7 @@ def own_tractions(shared, chosen, mesh, x):  # type: ignore[no-untyped-def]
 
 
 @njit(types.int64(CANDIDATES, types.int64, INTERFACE, _I1, MESH, TABLE, POINTS, LAW), cache=True)
-def across(out, n, shared, chosen, mesh, table, x, law):  # type: ignore[no-untyped-def]
+def _across(out, n, shared, chosen, mesh, table, x, law):  # type: ignore[no-untyped-def]
     """Appends the candidates among the ``chosen`` shared facets, of one body, to the ``n`` of ``out``, by the mean
     of the tractions of both ranks. Returns the new number.
     """
@@ -230,26 +249,21 @@ def clock(found, n, table, law, step, t):  # type: ignore[no-untyped-def]
                 table.since[place, face] = t
             table.seen[place, face] = step
             if found.traction[i, 3] >= required(strength, t - table.since[place, face], law.delay):
-                found.place[m], found.face[m], found.shared[m] = place, face, found.shared[i]
-                for k in range(4):
-                    found.traction[m, k] = found.traction[i, k]
+                _copy(found.place, found.face, found.shared, found.traction, m, i)
                 m += 1
     return m
 
 
 @njit(
     types.int64(
-        CANDIDATES, types.uint8[::1], INTERFACE, _I1, MESH, TABLE, POINTS, LAW, types.int64, types.float64
+        CANDIDATES, _I1, types.int64, INTERFACE, _I1, MESH, TABLE, POINTS, LAW, types.int64, types.float64
     ),
     cache=True,
 )  # fmt: skip
-def search(out, hot, shared, chosen, mesh, table, x, law, step, t):  # type: ignore[no-untyped-def]
-    """Finds the candidates of a body that break by their clocks in step number ``step``; all candidates if it is 0.
-    Returns their number, or, if ``out`` has too few rows, an upper bound of the number of rows that are needed.
+def breaking(out, counts, size, shared, chosen, mesh, table, x, law, step, t):  # type: ignore[no-untyped-def]
+    """Moves the facets that break by their clocks in step number ``step`` to the front of ``out``; all candidates if
+    the number is 0. ``out``: candidates within the rank, the first ``counts[k]`` rows of each range of ``size`` rows;
+    ``chosen``: rows of the ``shared`` facets of the body. Returns the number of these facets.
     """
-    n = _overstressed(out, hot, mesh)
-    if n + len(chosen) <= len(out.place):
-        n = within(out, n, mesh, table, x, law)
-        n = across(out, n, shared, chosen, mesh, table, x, law)
-        return clock(out, n, table, law, step, t) if step > 0 else n
-    return n + len(chosen)
+    n = _across(out, _joined(out, counts, size), shared, chosen, mesh, table, x, law)
+    return clock(out, n, table, law, step, t) if step > 0 else n

@@ -11,8 +11,10 @@ from ..model.state import Flags, Model
 from ..model.topology import Split
 from ..parallel.comm import Comm
 from ..parallel.ownership import Neighbour
+from ..parallel.team import Team
 from . import criterion, facets, nodal
 from .breaking import Breaking, gathered
+from .candidates import CandidateSearch
 from .facets import Body
 from .interface import Interface
 from .order import strongest
@@ -25,10 +27,10 @@ class Initiation:
 
     def __init__(
         self, model: Model, bodies: list[Body], specs: dict[int, Fracture], stars: dict[int, Stars],
-        neighbours: list[Neighbour], comm: Comm, clock: Clock,
+        neighbours: list[Neighbour], comm: Comm, clock: Clock, team: Team,
     ) -> None:  # fmt: skip
         """``specs``: of all parts that fracture, by number, also of parts that have no tet on this rank; ``stars``:
-        by index of the block. Collective.
+        by index of the block; ``team``: threads of the rank. Collective.
         """
         self._model, self._neighbours, self._comm, self._clock = model, neighbours, comm, clock
         self.bodies = bodies
@@ -38,13 +40,12 @@ class Initiation:
         self.one_by_one = any(spec.order == "local_maximum" for spec in specs.values())
         self._stars = stars
         self.interface = Interface(bodies, neighbours, comm)
+        self._search = CandidateSearch(len(bodies), self.interface, team)
         heaviest = np.zeros(len(model.parts))
         for body in bodies:
             heaviest[body.block.part] = body.block.row(MASS).max(initial=0.0)
         self._heaviest = comm.maximum(heaviest)
         """(parts,) mass of the heaviest tet of all ranks, kg; 0 for a part that does not fracture."""
-        self._rooms = [Candidates.of(1 + len(rows)) for rows in self.interface.of_body]
-        """Arrays for the candidates of each body; the content is valid until the next step."""
         self._step = 1
         """Number of the step, as stored with the clocks; the first step has number 1."""
 
@@ -71,7 +72,10 @@ class Initiation:
         collective as ``breaking``.
         """
         self.interface.exchange(self._model.nodes.x)
-        found = [(body, self._candidates(k, body)) for k, body in enumerate(self.bodies)]
+        x, t = self._model.nodes.x, self._clock.t
+        # With nodal tractions, _of_nodes applies the delayed criterion later.
+        steps = [self._step if body.spec.traction == "tets" else 0 for body in self.bodies]
+        found = [(body, self._search.find(k, body, x, steps[k], t)) for k, body in enumerate(self.bodies)]
         if self.smooth:
             found = self._smoothed(found)
         return [(body, some) for body, some in found if len(some.place)]
@@ -112,19 +116,6 @@ class Initiation:
     def free(self) -> None:
         """Frees the persistent MPI messages."""
         self.interface.free()
-
-    def _candidates(self, k: int, body: Body) -> Candidates:
-        """Returns the candidates of a body, after the delayed criterion; with nodal tractions, the delayed criterion is
-        applied later.
-        """
-        room, rows = self._rooms[k], self.interface.of_body[k]
-        step = self._step if body.spec.traction == "tets" else 0
-        where = body.hot, self.interface.facets, rows, body.mesh, body.facets, self._model.nodes.x, body.law
-        n = criterion.search(room, *where, step, self._clock.t)
-        if n > len(room.place):
-            room = self._rooms[k] = Candidates.of(2 * n)
-            n = criterion.search(room, *where, step, self._clock.t)
-        return room.first(n)
 
     def _smoothed(self, found: list[tuple[Body, Candidates]]) -> list[tuple[Body, Candidates]]:
         """Replaces the tractions by tractions from nodal stress, in parts that use nodal tractions. Collective."""

@@ -24,6 +24,7 @@ from ..model.state import Ints, Model
 from ..model.topology import KeptByNode
 from ..parallel.comm import Comm
 from ..parallel.ownership import Neighbour
+from ..parallel.team import Team
 from . import facets
 from .breaking import Breaking
 from .cohesive import Cohesion
@@ -46,15 +47,15 @@ class Fracture:
 
     def __init__(
         self, case: Case, model: Model, neighbours: list[Neighbour], elements: Elements, by_node: list[KeptByNode],
-        contact: Contact | None, comm: Comm, clock: Clock,
+        contact: Contact | None, comm: Comm, clock: Clock, team: Team,
     ) -> None:  # fmt: skip
-        """``by_node``: objects with arrays by node, except the elements. Collective."""
+        """``by_node``: objects with arrays by node, except the elements; ``team``: threads of the rank. Collective."""
         self._model, self._elements, self._clock, self._comm = model, elements, clock, comm
         bodies, work, self.warnings = self._bodies(case)
         meshes = {body.index: body.mesh for body in bodies}
         self.separation = Separation(model, neighbours, meshes, comm)
         specs = {i: part.fracture for i, part in enumerate(case.parts) if part.fracture is not None}
-        self.initiation = Initiation(model, bodies, specs, self.separation.stars, neighbours, comm, clock)
+        self.initiation = Initiation(model, bodies, specs, self.separation.stars, neighbours, comm, clock, team)
         handover = Handover(model, meshes, neighbours, comm)
         self._update = TopologyUpdate(model, elements, self.initiation, by_node, handover, contact)
         self._insertion = Insertion(case.numerics.dt_safety)

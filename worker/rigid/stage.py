@@ -70,7 +70,6 @@ class Rigid:
             reports="contact_pressure" in case.run.fields,
         )  # fmt: skip
         self.bonds = BodyBonds(bodies, self.stops, self._start, self._rate, comm)
-        self._comm = comm
 
     def require_front(self, case: Case, size: float) -> None:
         """Raises InputError if a body starts behind a wall by more than rounding of the ``size``, m."""
@@ -179,13 +178,13 @@ class Rigid:
         self.bonds.settle_start()
         self._carry(nodes)
 
-    def points(self, rows: Ints, masters: Ints, weights: Floats, ids: Ints) -> Points:
+    def points(self, rows: Ints, masters: Ints, weights: Floats, ids: Ints, comm: Comm) -> Points:
         """Returns the points of the bodies to which rows of tied bonds are tied: each weight of ``rows`` (e,) is that
         of the node ``masters`` (e,), a global id; ``ids`` (nodes,): of the local nodes. Collective.
         """
         mine = np.isin(ids[self.nodes], masters)
         words = np.column_stack([ids[self.nodes][mine], self._body[mine], self._arms[mine].view(np.int64)])
-        every = self._comm.join(words.reshape(-1)).reshape(-1, 5)
+        every = comm.join(words.reshape(-1)).reshape(-1, 5)
         known, first = np.unique(every[:, 0], return_index=True)
         at = places(known, masters)
         row, of = rows[at >= 0], first[at[at >= 0]]

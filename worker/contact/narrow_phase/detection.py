@@ -14,7 +14,7 @@ from ..exterior import Exterior
 from ..scene.scene import Scene
 from ..surface.families import Corners
 from ..tasks import CONTACTS_OF_A_TASK, CRACKS_OF_A_TASK, FAMILIES_OF_A_TASK, PAIRS_OF_A_TASK, SLOTS_OF_A_TASK
-from .closing_speed import spread
+from . import closing_speed
 from .corner_contact import NarrowSides
 from .cracks import Cracks
 from .node_face import nearest
@@ -90,7 +90,7 @@ class Detection:
         self._approach = Pass(team, tasks.approach, *tasks.APPROACH, size=some)
         self._across = Pass(team, tasks.across_cracks, *tasks.ACROSS, size=CRACKS_OF_A_TASK)
         self._entering = Pass(team, tasks.entering_nodes, *tasks.ENTERING, size=FAMILIES_OF_A_TASK)
-        self._bound = Pass(team, tasks.bound, *tasks.BOUND, size=SLOTS_OF_A_TASK)
+        self._ahead = Pass(team, tasks.ahead, *tasks.AHEAD, size=SLOTS_OF_A_TASK)
         self._scratch = StepRoom()
         self._rows_of_corner = 1
         """Number of rows reserved for each corner of a narrow side, on average over a task."""
@@ -118,14 +118,15 @@ class Detection:
         True if any rank registers departed slots in this step.
         """
         surface_nodes, reference = now.surface_nodes, now.reference
-        beyond = ahead.beyond(self._spread(surface_nodes.v))
+        begin, end, spread = self._moved(surface_nodes.x, surface_nodes.v, ahead.dt)
+        beyond = ahead.beyond(spread)
         reference.advance(ahead.dt, beyond)
         if redraw:
             reference.shorten(surface_nodes.x)
             now.node_face.wake()
             now.edge_edge.wake()
         stray = self._renewed(now, together)
-        step = Step.of(surface_nodes.x, surface_nodes.v, surface_nodes.part, mu, give, ahead.dt, self._scratch)
+        step = Step.between(begin, end, surface_nodes.v, surface_nodes.part, mu, give, ahead.dt)
         step = step.followed(beyond, FAST * ahead.size, ahead.rebound, now.face_table(), self._scratch)
         if self.tied is not None:
             step = step._replace(tied=self.tied.bits(surface_nodes))
@@ -139,11 +140,14 @@ class Detection:
         self.found = Detected(_KINEMATIC * limit, opening, stray)
         return self.found
 
-    def _spread(self, v: Floats) -> float:
-        """Upper bound of the difference of any two of the velocities ``v`` (slots, 3), m/s."""
-        boxes = self._scratch.of("boxes", self._bound.many(len(v)), np.float64, 6)
-        self._bound.run(len(v), boxes, v)
-        return spread(boxes)
+    def _moved(self, x: Floats, v: Floats, dt: float) -> tuple[Floats, Floats, float]:
+        """Returns the positions of the slots at the beginning and at the end of a step ``dt``, s, without contact (see
+        Step), and an upper bound of the difference of any two of their velocities, m/s; ``x``, ``v`` (slots, 3).
+        """
+        places, begin, end = self._scratch.lines(len(x))
+        boxes = self._scratch.of("boxes", self._ahead.many(len(v)), np.float64, 6)
+        self._ahead.run(len(x), places, boxes, x, v, dt)
+        return begin, end, closing_speed.spread(boxes)
 
     def _renewed(self, now: Scene, together: bool) -> bool:
         """Registers the slots that must be registered; returns True if a slot will depart too far in the next step, by

@@ -126,12 +126,17 @@ class Step(NamedTuple):
     (tied.py)."""
 
     @classmethod
-    def of(
-        cls, x: Floats, v: Floats, part: Indices, mu: Floats, give: float, dt: float, room: StepRoom | None = None
-    ) -> "Step":  # fmt: skip
+    def of(cls, x: Floats, v: Floats, part: Indices, mu: Floats, give: float, dt: float) -> "Step":
         """Returns the record of a step ``dt`` from ``x`` on."""
-        places, begin, end = (room or StepRoom()).lines(len(x))
-        _place(places, x, v, dt)
+        places, begin, end = StepRoom().lines(len(x))
+        place(places, x, v, dt, 0, len(x))
+        return cls.between(begin, end, v, part, mu, give, dt)
+
+    @classmethod
+    def between(
+        cls, begin: Floats, end: Floats, v: Floats, part: Indices, mu: Floats, give: float, dt: float
+    ) -> "Step":  # fmt: skip
+        """Returns the record of a step ``dt`` from the positions ``begin`` to ``end`` (StepRoom.lines)."""
         return cls(begin, v, end, part, mu, give, dt, 0.0, 0.0, 1.0, _NONE, NOTHING)
 
     def followed(self, beyond: float, fast: float, rebound: float, faces: "FaceTable", room: StepRoom) -> "Step":
@@ -240,10 +245,10 @@ def bonded(step, a, b, c, d):  # type: ignore[no-untyped-def]
     return tied[a] & tied[b] & tied[c] & tied[d] != 0 and not part[a] == part[b] == part[c] == part[d]
 
 
-@njit("void(float64[:, ::1], float64[:, ::1], float64[:, ::1], float64)", cache=True)
-def _place(places, x, v, dt):  # type: ignore[no-untyped-def]
-    """Writes positions now and after ``dt``, side by side."""
-    for a in range(len(x)):
+@njit("void(float64[:, ::1], float64[:, ::1], float64[:, ::1], float64, int64, int64)", cache=True)
+def place(places, x, v, dt, first, stop):  # type: ignore[no-untyped-def]
+    """Writes the positions now and after ``dt`` of the slots from ``first`` to ``stop``, side by side."""
+    for a in range(first, stop):
         for i in range(3):
             places[a, i], places[a, 3 + i] = x[a, i], x[a, i] + dt * v[a, i]
 
