@@ -43,7 +43,6 @@ EXCEPTIONS: dict[str, dict[str, int]] = {
         "worker/contact/scene/scene.py: Scene": 14,
         "worker/contact/solver/solver.py: ActiveSet": 13,
         "worker/contact/stage.py: Contact": 14,
-        "worker/rigid/stage.py: Rigid": 16,
         "worker/simulation.py: Simulation": 24,
     },
     "a part of the server: it wires others that are made once": {
