@@ -3,7 +3,7 @@
 from collections.abc import Iterator
 
 from ..model.bodies import Mesh, MeshFile, Primitive
-from ..model.operands import CadForm, CombinedForm, Place, leaves
+from ..model.operands import CadForm, CombinedForm, FileForm, Place, StlForm, leaves
 from ..model.solids import Cad, Measured, Meshed, Stl
 from ..reading.problems import Location, Problem, problem
 from .form_checks import check_form
@@ -12,7 +12,7 @@ _DEEPEST, _MOST = 8, 200
 """Largest depth of nested combinations, and largest number of shapes in a combination. The values were chosen larger
 than any user needs."""
 
-File = MeshFile | CadForm | Stl
+File = MeshFile | FileForm | Stl
 """Models that name a file by ``path`` and ``sha256``."""
 
 
@@ -21,7 +21,7 @@ def files_in(mesh: Mesh) -> Iterator[tuple[Place, File]]:
     if isinstance(mesh, File):
         yield (), mesh
     elif isinstance(mesh, CombinedForm):
-        yield from ((place, each) for place, _, each in leaves(mesh) if isinstance(each, CadForm))
+        yield from ((place, each) for place, _, each in leaves(mesh) if isinstance(each, FileForm))
 
 
 def check_measured(mesh: Measured, location: Location) -> Iterator[Problem]:
@@ -49,6 +49,8 @@ def _combination(mesh: CombinedForm, location: Location) -> Iterator[Problem]:
     for place, _, each in found:
         if isinstance(each, CadForm):
             yield from _path(each, "a STEP or BREP file", (*location, *place))
+        elif isinstance(each, StlForm):
+            yield from _path(each, "an STL file", (*location, *place))
         else:
             yield from check_form(each, (*location, *place))
 

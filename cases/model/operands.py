@@ -41,6 +41,19 @@ class CadForm(Model):
     """SHA-256 hash of the file, 64 hexadecimal digits. A file with another hash is refused. Default: not checked."""
 
 
+class StlForm(Model):
+    """The interior of a closed surface of triangles (STL)."""
+
+    shape: Literal["stl"]
+    """Selects an STL file."""
+    path: str
+    """Path of the file, text or binary, relative to the folder of the case."""
+    unit: Annotated[Length, Positive]
+    """Length unit of the coordinates in the file, such as ``"1 mm"``."""
+    sha256: Sha256 | None = None
+    """SHA-256 hash of the file, 64 hexadecimal digits. A file with another hash is refused. Default: not checked."""
+
+
 class UnionForm(Model):
     """The union of bodies: all that lies in at least one of them."""
 
@@ -119,6 +132,11 @@ class CadOperand(CadForm, Turned):
     """Solids of a STEP or BREP file."""
 
 
+class StlOperand(StlForm, Turned):
+    """The interior of a closed surface of triangles (STL). Each triangle stays a face of the body: elements are not
+    larger than triangles. At most 1,500 triangles."""
+
+
 class UnionOperand(UnionForm, Turned):
     """The union of bodies: all that lies in at least one of them."""
 
@@ -143,6 +161,7 @@ Operand = Annotated[
     | SphericalCapOperand
     | RingSectorOperand
     | CadOperand
+    | StlOperand
     | UnionOperand
     | DifferenceOperand
     | IntersectionOperand,
@@ -151,6 +170,8 @@ Operand = Annotated[
 for _form in (UnionForm, DifferenceForm, IntersectionForm, UnionOperand, DifferenceOperand, IntersectionOperand):
     _form.model_rebuild()
 
+FileForm = CadForm | StlForm
+"""Forms that are read from a file; their dimensions are known only then."""
 CombinedForm = UnionForm | DifferenceForm | IntersectionForm
 
 Place = tuple[int | str, ...]

@@ -18,7 +18,7 @@ from ..estimates.mesh_size import (
 )
 from ..model.bodies import Box, Cone, Cylinder, Hemisphere, Ogive, Plate, RingSector, Sphere, SphericalCap, Tube
 from ..model.grading import Grading
-from ..model.operands import CadForm, CombinedForm, DifferenceForm, Operand, UnionForm
+from ..model.operands import CombinedForm, DifferenceForm, FileForm, Operand, UnionForm
 from ..model.solids import Combination
 from ..model.tables import Axis, Model
 from .geometry import Vector, across, index
@@ -42,9 +42,9 @@ _BODIES: dict[str, type[Model]] = {
 
 
 def box_of(form: CombinedForm | Operand) -> Bounds | None:
-    """Returns the corners of a bounding box of a form, m: of an operand before it is turned; None for a CAD file.
+    """Returns the corners of a bounding box of a form, m: of an operand before it is turned; None for a file.
     The low corner of an empty intersection can be above the high one."""
-    if isinstance(form, CadForm):
+    if isinstance(form, FileForm):
         return None
     if not isinstance(form, CombinedForm):
         return _placed(form).bounds()
@@ -75,8 +75,8 @@ def _placed(form: Operand) -> Placed:
 
 
 def inside(form: CombinedForm | Operand) -> Inside | None:
-    """Returns the test whether a point, m, lies in a form; built once for many points. None for a CAD file."""
-    if isinstance(form, CadForm):
+    """Returns the test whether a point, m, lies in a form; built once for many points. None for a file."""
+    if isinstance(form, FileForm):
         return None
     if not isinstance(form, CombinedForm):
         return _placed(form).holds
@@ -119,7 +119,7 @@ def cut_by(sector: str, axis: Axis) -> tuple[int, ...]:
 
 @lru_cache(maxsize=256)
 def combined_size(mesh: Combination) -> MeshSize | None:
-    """Returns the approximate size of the mesh of a combination; None for a CAD file, or for an empty combination."""
+    """Returns the approximate size of the mesh of a combination; None for a file, or for an empty combination."""
     box, holds = modelled(mesh), inside(mesh)
     if box is None or holds is None or any(a >= b for a, b in zip(*box, strict=True)):
         return None

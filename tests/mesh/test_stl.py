@@ -138,3 +138,28 @@ def _pierces(one: Any, other: Any) -> bool:
             if len(signs) == 1:
                 return True
     return False
+
+
+def test_a_surface_is_an_operand_and_has_sectors_in_a_combination(tmp_path: Path) -> None:
+    """A quarter of a ball, and of a block without the ball: plane faces only, so the volume is that of the facets."""
+    facets = ball(8)
+    (tmp_path / "a.stl").write_bytes(binary(facets))
+    block = {"shape": "box", "low": [-6e-3] * 3, "high": [6e-3] * 3}
+    body = {"shape": "stl", "path": "a.stl", "unit": "1 mm"}
+    for shape, of, expected in (
+        ("intersection", [body, block], inside(facets) / 4.0),
+        ("difference", [block, body], (12e-3**3 - inside(facets)) / 4.0),
+    ):
+        data = {"shape": shape, "of": of, "sector": "quarter", "element_size": 3e-3}
+        mesh = check(build(TypeAdapter[Mesh](Mesh).validate_python(data), tmp_path))
+        assert mesh.volumes().sum() == pytest.approx(expected, rel=1e-6)
+        assert mesh.points[:, :2].min() == 0.0
+
+
+def test_too_many_facets_of_an_operand_are_refused_in_one_line(tmp_path: Path) -> None:
+    (tmp_path / "a.stl").write_bytes(binary(ball(48)))
+    body = {"shape": "stl", "path": "a.stl", "unit": "1 mm"}
+    box_ = {"shape": "box", "low": [0, 0, 0], "high": [6e-3] * 3}
+    data = {"shape": "intersection", "of": [body, box_], "element_size": 3e-3}
+    with pytest.raises(MeshError, match=r"of\[0\].path = 'a.stl': .* facets are too many for a combination; allowed"):
+        build(TypeAdapter[Mesh](Mesh).validate_python(data), tmp_path)

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from typing import Any
 
-from conoid.cases.model.operands import CadForm, CombinedForm, DifferenceForm, Operand, UnionForm
+from conoid.cases.model.operands import CadForm, CombinedForm, DifferenceForm, Operand, StlForm, UnionForm
 from conoid.cases.shapes.combined import box_of
 
 from ...errors import MeshError
@@ -11,6 +11,7 @@ from ..sources import Sources
 from . import draw
 from .cad import imported, size_of
 from .draw import Solids
+from .facets import extent_of, faceted
 from .frame import Frame
 
 AnyForm = Operand | CadForm | CombinedForm
@@ -37,6 +38,8 @@ class Drawing:
             made = self._combined(form, key)
         elif isinstance(form, CadForm):
             made = imported(self.gmsh, form, self.sources[key], self.frame, f"{key}.path = {form.path!r}")
+        elif isinstance(form, StlForm):
+            made = faceted(self.gmsh, form, self.sources[key], self.frame, f"{key}.path = {form.path!r}")
         else:
             made = draw.drawn(occ, form, self.frame)
         draw.turn(occ, made, getattr(form, "turn", None), self.frame)
@@ -69,6 +72,8 @@ def extent(gmsh: Any, form: AnyForm, sources: Sources, key: str) -> float:
     """Return an upper estimate of the largest extent of a form, m. The extent is the scale of lengths."""
     if isinstance(form, CadForm):
         return size_of(gmsh, form, sources[key], f"{key}.path = {form.path!r}")
+    if isinstance(form, StlForm):
+        return extent_of(form, sources[key], f"{key}.path = {form.path!r}")
     if isinstance(form, CombinedForm):
         found = [extent(gmsh, each, sources, f"{key}.of[{n}]") for n, each in enumerate(form.of)]
         if isinstance(form, DifferenceForm):
