@@ -14,7 +14,7 @@ from .answers.cards import Cards
 from .answers.download import Downloads
 from .answers.history import Histories
 from .answers.metrics import Metrics, Timed
-from .answers.reports import reporters
+from .answers.reports import Reporters
 from .database import identity
 from .database.store import Store
 from .intake import reader
@@ -122,7 +122,7 @@ def opened(settings: Settings) -> Iterator[Service]:
             readers=reader.pool(reader.CASE),
             surveyors=reader.surveyors(),
             sweepers=reader.pool(reader.SWEEP),
-            reporters=reporters(),
+            reporters=Reporters(),
             sweeps=sweeps,
             searches=Searches(sweeps.plans, store),
             uploads=uploads,

@@ -8,6 +8,7 @@ from fastapi import Depends, Request
 from .answers.cards import Cards
 from .answers.download import Downloads
 from .answers.history import Histories
+from .answers.reports import Reporters
 from .database.store import Store
 from .intake.receiving import Receiver
 from .intake.searches import Searches
@@ -51,7 +52,7 @@ class Service:
     sweepers: ThreadPool
     """Pool of threads for sweeps, whose reading takes seconds. Submissions of single runs do not wait for these
     threads."""
-    reporters: ThreadPool
+    reporters: Reporters
     """Pool of threads for reports of runs, which take minutes."""
     sweeps: Sweeps
     searches: Searches

@@ -182,12 +182,17 @@ def cancel(place: str, job: str) -> None:
         call(place, ["scancel", job])
 
 
-def notify(place: str, job: str) -> None:
-    """Ends the job if it is pending, otherwise sends TERM to its script. Raises AwayError."""
+def notify(place: str, entry: Entry) -> None:
+    """Ends a job that is pending in squeue's list, otherwise sends TERM to its script. Raises AwayError.
+
+    scancel is not given the state: with ``--state=PENDING`` and one task of an array it ends all pending tasks of the
+    array.
+    """
+    if entry.state in PENDING:
+        cancel(place, entry.job)
+        return
     with suppress(RefusedError):
-        call(place, ["scancel", "--state=PENDING", job])
-    with suppress(RefusedError):
-        call(place, ["scancel", "--batch", "--signal=TERM", job])
+        call(place, ["scancel", "--batch", "--signal=TERM", entry.job])
 
 
 def kill(place: str, job: str) -> None:

@@ -214,9 +214,10 @@ def cancel_folder(folder: Path) -> str:
         return f"{folder} is requested to stop"
     place = slurm_of(None).bin
     try:
-        if not any((entry.job, entry.name) == (job.job, job.key) for entry in slurm.jobs(place, job.name)):
+        listed = [one for one in slurm.jobs(place, job.name) if (one.job, one.name) == (job.job, job.key)]
+        if not listed:
             return f"{folder} is requested to stop; Slurm has no job {job.job} of the name {job.name}"
-        slurm.notify(place, job.job)
+        slurm.notify(place, listed[0])
     except slurm_call.SlurmError as error:
         return f"{folder} is requested to stop; Slurm does not answer: {error}"
     return f"{folder} is requested to stop, job {job.job}"

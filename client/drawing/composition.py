@@ -6,7 +6,7 @@ from typing import Any, Self
 import numpy as np
 from PIL import Image
 
-from conoid.cases.figures import counted, exact
+from conoid.cases.figures import count, counted, exact
 
 from . import arrows, captions, outlines, picture_layout
 from .captions import Painter
@@ -142,7 +142,7 @@ def _present(picture: Picture, shots: Sequence[Shot]) -> list[int]:
 def _counted(shots: Sequence[Shot]) -> str:
     """Returns the number of fragments that are visible in the shots of an image."""
     most = [len(np.unique(shot.shown)) for shot in shots]
-    return counted(most[0], "fragment") if len(most) == 1 else f"{most[0]} to {counted(most[-1], 'fragment')}"
+    return counted(most[0], "fragment") if len(most) == 1 else f"{count(most[0])} to {counted(most[-1], 'fragment')}"
 
 
 def _smaller(layers: Any, fine: int, clear: bool) -> Any:

@@ -12,7 +12,7 @@ import { filesTable, verdict } from "./validation.js";
 const IDLE = 500; // ms without a key after which the case is checked.
 const AGAIN = 3000; // ms after which a request without an answer is repeated.
 const DRAFT = 200000; // Largest number of characters of a case that the browser stores.
-const OWN = /^(restart|keep|sweep.*)$/; // Labels that belong to a single run.
+const OWN = /^(restart|keep|sweep.*|point)$/; // Labels that belong to a single run.
 const FIELDS = [["title", "Title", "", "title"], ["ranks", "Ranks", "run", "ranks"], ["threads", "Threads", "run", "threads"]];
 
 export class NewPage {

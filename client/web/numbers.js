@@ -1,6 +1,6 @@
 // Numbers of a run: the five most important ones, and all others.
 
-import { alike, count, duration, fixed, h, large, moment, rough, si } from "./figures.js";
+import { alike, count, duration, fixed, h, large, moment, rough, si, vector } from "./figures.js";
 import { FINAL } from "./live.js";
 import { fold } from "./storage.js";
 
@@ -37,12 +37,14 @@ function five(live, outcome) {
 
 function others(live, info, outcome) {
   const { progress, counts, started } = live;
+  const crack = firstCrack(live);
   return [
     entry("elapsed", duration(live.elapsed)),
     entry("step", count(ended(progress, outcome).step)),
     entry("updates a second", large(progress?.updates_per_second)),
     entry("elements", count(counts?.elements ?? started?.elements)),
     entry("nodes", count(counts?.nodes ?? started?.nodes)),
+    crack ? entry("first broken facet", crack) : "",
     entry("shared nodes", count(counts?.shared)),
     counts?.particles ? entry("particles", count(counts.particles)) : "",
     entry("ranks × threads", info.ranks ? `${info.ranks} × ${info.threads ?? 1}` : "–"),
@@ -50,6 +52,13 @@ function others(live, info, outcome) {
     info.finished ? entry("ended", moment(info.finished)) : "",
     ...Object.entries(info.labels ?? {}).map(([name, value]) => entry(name, value)),
   ].filter(Boolean);
+}
+
+// Time of the first broken facet, known by the reports: between the last one without and the first one with a broken facet.
+export function firstCrack({ sizes }) {
+  const at = sizes.findIndex(({ facets }) => facets > 0);
+  if (at < 0) return "";
+  return at ? vector([sizes[at - 1].t, sizes[at].t], "s", 3, " to ") : `up to ${si(sizes[at].t, "s")}`;
 }
 
 // Present state of a run: from its outcome, else from its newest report. `residual`: [value, whether it is above the limit].

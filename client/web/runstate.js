@@ -2,7 +2,7 @@
 // and what the user can do next.
 
 import { call, tail } from "./api.js";
-import { h, percent, si, words } from "./figures.js";
+import { h, rough, si, words } from "./figures.js";
 import { ended } from "./numbers.js";
 
 const LINES = 12; // Number of lines of the log.
@@ -87,7 +87,7 @@ export const sentence = ({ state, cause }) => `${{ failed: "Failed", lost: "Lost
 
 function advice(cause, outcome) {
   const made = cause === "energy" ? outcome?.made?.[0] : null;
-  const most = made ? `The largest contribution to the residual is from ${words(made.line)}: ${percent(made.share)} of the energy, at ${si(made.time, "s")}.` : "";
+  const most = made ? `The line that has made the most energy is ${words(made.line)}: ${rough(made.share)} of the largest energy, at ${si(made.time, "s")}.` : "";
   return HELP[cause] || most ? h("p", {}, [HELP[cause], most].filter(Boolean).join(" ")) : "";
 }
 

@@ -2,8 +2,10 @@
 folder."""
 
 import logging
+import math
 import os
 import tempfile
+import time
 import uuid
 from pathlib import Path
 
@@ -21,13 +23,42 @@ _BOUNDS = Bounds(cpu=300, wall=300, memory=8 << 30, file=64 << 20)
 takes 40 s and 2 GB, and has a size of 5 MB."""
 _PATIENCE, _WAITING = 900.0, 8
 """Longest time in s that a user waits for a report, and largest number of waiting reports (chosen values)."""
+_AGAIN = 600.0
+"""Time in s for which the reason of a failed report is the answer, without another attempt (chosen value)."""
+_MOST_FAILED = 1000
+"""Largest number of failed reports that are stored (chosen value)."""
 _LEFT = ".*report-*"
 """Pattern of the names of temporary files of reports in progress. A killed server leaves such files."""
 
 
-def reporters() -> ThreadPool:
+class Reporters(ThreadPool):
     """Makes reports. The server makes one report at a time for all users."""
-    return ThreadPool(each=1, waiting=_WAITING, patience=_PATIENCE, most=1)
+
+    def __init__(self) -> None:
+        """Creates the pool."""
+        super().__init__(each=1, waiting=_WAITING, patience=_PATIENCE, most=1)
+        self._failed: dict[Path, tuple[float, ServiceError]] = {}
+        """Failed reports: time and reason of the attempt, by folder of the run."""
+
+    async def size_of(self, path: Path) -> int:
+        """Returns the size of the report of the run in ``path``, as ``made``. A report that has failed is not
+        attempted again for ten minutes.
+        """
+        return await self.run(self._once, path)
+
+    def _once(self, path: Path) -> int:
+        began, reason = self._failed.get(path, (-math.inf, None))
+        if reason is not None and time.monotonic() < began + _AGAIN:
+            raise reason.with_traceback(None)
+        self._failed.pop(path, None)
+        try:
+            return made(path)
+        except ServiceError as error:
+            if error.status == 500:
+                self._failed[path] = time.monotonic(), error
+                while len(self._failed) > _MOST_FAILED:
+                    del self._failed[next(iter(self._failed))]
+            raise
 
 
 def made(path: Path) -> int:
@@ -65,4 +96,6 @@ def _make(path: Path, out: Path) -> None:
         )  # fmt: skip
     if ended.code or not out.is_file():
         _log.warning("the report of run %s was not made: %s", path.name, ended.why)
-        raise ServiceError(500, "no_report", f"the report was not made: {ended.why[:300]}")
+        raise ServiceError(
+            500, "no_report", f"the report was not made: {ended.why[:300]}", hint=f"conoid report {path.name}"
+        )

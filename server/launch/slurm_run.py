@@ -165,7 +165,7 @@ class SlurmWorker:
         elif self._kill:
             slurm.kill(self._site.bin, entry.job)
         elif self._stop and self._told != entry.state:
-            slurm.notify(self._site.bin, entry.job)
+            slurm.notify(self._site.bin, entry)
             self._told = entry.state
 
     def _launch_again(self, entry: Entry) -> None:

@@ -6,7 +6,6 @@ from fastapi import APIRouter, Request
 
 from conoid.cases.output import report as form
 
-from ..answers import reports
 from ..errors import ServiceError
 from ..requests.auth import Submitter
 from ..requests.user_limits import place_of
@@ -20,12 +19,12 @@ router = APIRouter()
 async def report(request: Request, run_id: str, service: ServiceOf, identity: Submitter) -> dict[str, Any]:
     """Makes the report of a run that has ended, one HTML file that needs no server, and answers when it is among the
     run's files. The report is made once. The server makes one report at a time, with limits of CPU time, memory and
-    size.
+    size. If the report cannot be made, the reason is the answer for the next ten minutes, without another attempt.
     """
     run = await service.pool.run(find, service, identity, run_id)
     if not run.state.final:
         raise ServiceError(409, "not_ended", f"run {run.id} is {run.state.value}; a run that has ended has a report")
     service.desk.check_output(run.owner)
     place_of(request).lengthen()
-    size = await service.reporters.run(reports.made, service.settings.runs / run.id)
+    size = await service.reporters.size_of(service.settings.runs / run.id)
     return {"path": form.NAME, "size": size, "url": f"/v1/runs/{run.id}/files/{form.NAME}"}

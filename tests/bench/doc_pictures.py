@@ -43,6 +43,11 @@ PICTURES = {
     "long_rod": Shown(
         "pictures/long_rod.png", "long_rod", "plastic_strain", {"size": (1600, 700)}, takes="a quarter of an hour"
     ),
+    "plugging": Shown(
+        "pictures/plugging.png", "plugging_weldox", "plastic_strain",
+        {"mirror": "y", "section": "x=0.0001", "camera": "x", "time": ["20 us", "40 us", "60 us"], "size": (1500, 800)},
+        takes="some minutes",
+    ),
     "glass_bar": Shown("pictures/glass_bar.png", "glass_steel_bar", "fragment", _THREE, takes="an hour"),
     "glass_bar_speed": Shown("pictures/glass_bar_speed.png", "glass_steel_bar", "speed", _THREE, takes="an hour"),
 }  # fmt: skip

@@ -81,11 +81,16 @@ class Site:
 
 def sweep_of(site: Site, number: int, **plan: Any) -> list[str]:
     """Submits a sweep and returns its runs in the order of its points."""
+    return [point["run"]["id"] for point in sweep_and_body(site, number, **plan)[0]["points"]]
+
+
+def sweep_and_body(site: Site, number: int, **plan: Any) -> tuple[dict[str, Any], str]:
+    """Submits a sweep and returns the answer and the request."""
     points = [{"run.end_time": f"{1 + n} us"} for n in range(number)]
     body = json.dumps({"case": tomllib.loads(case_text(**plan)), "points": points})
     answer = site.ann.http.post("/v1/sweeps", content=body, headers={"Content-Type": "application/json"})
     assert answer.status_code == 202, answer.text
-    return [point["run"]["id"] for point in answer.json()["points"]]
+    return answer.json(), body
 
 
 def job_of(site: Site, run: str) -> Job:

@@ -2,6 +2,7 @@
 
 import importlib.util
 import os
+import time
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
@@ -65,6 +66,9 @@ def test_what_takes_too_much_is_ended_and_said_in_one_line(server: Running, does
     assert (answer.status_code, answer.json()["code"]) == (500, "no_report")
     assert says in answer.json()["detail"]
     assert "\n" not in answer.json()["detail"]
+    began = time.monotonic()
+    assert server.ann.http.post(f"/v1/runs/{run}:report").json() == answer.json()
+    assert does != "hangs" or time.monotonic() - began < 4.0, "a failed report is not attempted at each request"
     again = [path.name for path in (server.ann.runs / run).iterdir() if "report" in path.name]
     assert [name for name in again if not name.endswith(".part")] == []
 

@@ -22,7 +22,7 @@ from ..parallel.launching import command, ended
 from . import real_slurm
 from .real_slurm import Cluster
 from .running import TOML, case_text, processes
-from .slurm_site import SITE, Site, job_of, processes_of, sweep_of
+from .slurm_site import SITE, Site, job_of, processes_of, sweep_and_body, sweep_of
 
 pytestmark = pytest.mark.skipif(bool(real_slurm.missing()), reason=real_slurm.missing() or "Slurm is there")
 
@@ -158,10 +158,11 @@ def test_twelve_runs_at_a_time(site: Site) -> None:
 
 @pytest.mark.slow
 def test_a_sweep_is_one_array_with_a_job_for_each_run(site: Site, tmp_path: Path) -> None:
-    """Twelve runs are one sbatch. One run is cancelled, one is requeued by command, and the server is killed
-    meanwhile.
+    """Twelve runs are one sbatch. One run is cancelled, and the server is killed meanwhile; when the sweep is repeated,
+    the cancelled run alone has another job.
     """
-    runs = sweep_of(site, 12, wait=str(tmp_path / "go"))
+    sweep, body = sweep_and_body(site, 12, wait=str(tmp_path / "go"))
+    runs = [point["run"]["id"] for point in sweep["points"]]
     jobs = [job_of(site, run) for run in runs]
     assert len({job.name for job in jobs}) == 1
     assert len({job.job.partition("_")[0] for job in jobs}) == 1, "one number"
@@ -175,7 +176,14 @@ def test_a_sweep_is_one_array_with_a_job_for_each_run(site: Site, tmp_path: Path
         assert site.ended(run, 120.0)["state"] == "succeeded", site.tail(run)
         assert site.ann.states(run).count("running") == 1
     found = site.cluster.jobs(jobs[0].name)
-    assert sorted(state for _, state in found) == ["CANCELLED"] + ["COMPLETED"] * 11
+    assert [state for _, state in found if state != "CANCELLED"] == ["COMPLETED"] * 11
+    kind = {"Content-Type": "application/json"}
+    repeated = [site.ann.http.post(f"{sweep['url']}:again", content=body, headers=kind) for _ in range(2)]
+    assert [answer.status_code for answer in repeated] == [202, 202], repeated[0].text
+    *others, last = [point["run"]["id"] for point in repeated[1].json()["points"]]
+    assert (others, last in runs) == (runs[:11], False)
+    assert site.ended(last, 120.0)["state"] == "succeeded", site.tail(last)
+    assert len(site.cluster.jobs(job_of(site, last).name)) == 1
 
 
 @pytest.mark.slow

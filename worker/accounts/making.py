@@ -110,8 +110,10 @@ class Making:
 def _cure(name: str, share: float, safety: float) -> str:
     """Return the remedy, if one is derived and measured in docs/theory/energy.md, "Energy that a line makes"."""
     if name == STEPPING:
-        wanted = safety * math.sqrt(0.5 * WARNED / share)
-        return f"; it falls with the square of the step: numerics.dt_safety = {wanted:.2g} would leave half a per cent"
+        left = 0.5 * min(WARNED, share)
+        wanted = safety * math.sqrt(left / share)
+        rest = f"numerics.dt_safety = {wanted:.2g} would leave {100.0 * left:.2g} %"
+        return f"; it falls with the square of the step: {rest}"
     if name == "averaging":
         return "; with numerics.pressure = 'standard' there is none, but tets lock where they flow"
     return ""
