@@ -153,9 +153,9 @@ class Traction(Model):
 
     The load is a force per initial area with a constant direction; a pressure that ``follows`` acts on the deformed
     surface. A face is loaded until its tet is deleted; with ``follows`` also until its tet has separated from all
-    others. Faces that become free later are not loaded. Nodes up to a hundredth of the shortest edge of their part
-    outside the region count as inside. ``conoid validate`` prints the approximate loaded area; the run warns where
-    the mesh has another one.
+    others. Faces that become free later are not loaded, nor faces on a plane of symmetry. Nodes up to a hundredth of
+    the shortest edge of their part outside the region count as inside. ``conoid validate`` prints the approximate
+    loaded area; the run warns where the mesh has another one.
     """
 
     kind: Literal["traction"]

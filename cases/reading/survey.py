@@ -8,7 +8,7 @@ from typing import Any
 import msgspec
 
 from ..shapes.geometry import Vector
-from ..shapes.loaded import Load
+from ..shapes.load import Load
 from ..shapes.placed import Bulk
 from ..warnings.touching import Touch
 

@@ -4,14 +4,14 @@ is a mesh."""
 import itertools
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 from ..estimates.mesh_size import FACES_PER_SURFACE, grid, mesh_size, surface_faces
 from ..model.bodies import Box, Cylinder, Loose, MeshFile, Plate, RingSector, Sphere, Tube
-from ..model.boundaries import Prescribed, Traction
+from ..model.boundaries import Prescribed, Symmetry, Traction
 from ..model.schema import Case, Part
 from ..model.solids import Measured
 from .geometry import Generated, Vector, surface, volume
+from .load import Load
 from .placed import Placed, lattice
 from .profile import Revolved, profile
 from .region import Region, slack
@@ -34,47 +34,6 @@ of a cylinder: a sixth of it squared), plus the second; flat faces: the third. C
 _CORNERS = 4.0
 """Area of the faces of curved and unstructured meshes that can be in a region without any patch, over the square of
 the element size (chosen value)."""
-_FACTOR, _NODES = 3.0, 10
-"""Ratio of an estimated number of nodes to the real number, and additional nodes. The values were chosen because a
-layer of an unstructured mesh has a third to three times as many nodes as its volume suggests."""
-
-
-@dataclass(frozen=True)
-class Load:
-    """The approximate load of a boundary: faces of a traction, nodes of a prescribed velocity. None with a mesh file
-    or loose tets, and for the other kind of boundary.
-    """
-
-    boundary: int
-    """Index of the boundary."""
-    area: float | None = None
-    """Loaded area, m^2."""
-    faces: int | None = None
-    spread: float = 0.0
-    """Uncertainty of the estimated area of the mesh's faces, m^2."""
-    nodes: int | None = None
-    fewest: int = 0
-    """Nodes in a box that is not widened by half an element on all sides."""
-    exact: bool = False
-    """Whether nodes, or faces of a mesh file, are counted and not estimated."""
-
-    def agrees(self, nodes: int, faces: int, area: float) -> bool:
-        """Whether a mesh has approximately this load: ``nodes`` that are driven, or ``faces`` with an ``area``, m^2."""
-        if self.area is not None and faces:
-            return abs(area - self.area) <= self.spread
-        if self.nodes is None or faces:
-            return True
-        if self.exact:
-            return nodes == self.nodes
-        return self.fewest <= _FACTOR * nodes + _NODES and nodes <= _FACTOR * self.nodes + _NODES
-
-    def words(self) -> str:
-        """The load in words: ``about 32 faces, 4 mm^2``."""
-        if self.area is not None:
-            return f"{'' if self.exact else 'about '}{self.faces} faces, {1e6 * self.area:.6g} mm^2"
-        if self.nodes is not None:
-            return f"{self.nodes} nodes" if self.exact else f"about {self.nodes} nodes"
-        return "not known before there is a mesh"
 
 
 def loads(case: Case, counted: Sequence[Load] = ()) -> list[Load]:
@@ -115,11 +74,11 @@ def _meets(region: Region, body: Placed) -> bool:
 # Faces ----------------------------------------------------------------------------------------------------------------
 
 
-def _reached(case: Case, spec: Traction | Prescribed) -> list[Placed] | None:
-    """Returns the bodies of a boundary that reach into its box; None with a mesh file, loose tets or too many
-    bodies.
+def _reached(case: Case, spec: Traction | Prescribed) -> list[tuple[str, Placed]] | None:
+    """Returns the names and bodies of the parts of a boundary that reach into its box; None with a mesh file, loose
+    tets or too many bodies.
     """
-    region, found = Region.of(spec), list[Placed]()
+    region, found = Region.of(spec), list[tuple[str, Placed]]()
     for part in parts_of(case, spec):
         if isinstance(part.mesh, Measured):
             return None
@@ -129,7 +88,7 @@ def _reached(case: Case, spec: Traction | Prescribed) -> list[Placed] | None:
                 continue
             if isinstance(part.mesh, Loose) or len(found) == _MOST:
                 return None
-        found.append(body)
+        found.append((part.name, body))
     return found
 
 
@@ -137,9 +96,22 @@ def _acted_on(case: Case, number: int, spec: Traction) -> Load:
     bodies = _reached(case, spec)
     if bodies is None:
         return Load(number)
-    found = [_faces(body, Region.of(spec)) for body in bodies]
+    found = [_free_faces(case, name, body, Region.of(spec)) for name, body in bodies]
     area, faces, spread = (sum(column) for column in zip(*found, strict=True)) if found else (0.0, 0.0, 0.0)
     return Load(number, area, round(faces), spread)
+
+
+def _free_faces(case: Case, name: str, body: Placed, region: Region) -> tuple[float, float, float]:
+    """Returns the same as ``_faces`` without the faces on the planes of symmetry of the part ``name``, which are cuts
+    and no surface.
+    """
+    area, faces, spread = _faces(body, region)
+    for _, plane in case.boundaries_of(Symmetry):
+        cut = region.on_plane(plane, body.bounds(), near(body)) if not plane.parts or name in plane.parts else None
+        if cut is not None:
+            less, fewer, more = _faces(body, cut)
+            area, faces, spread = max(area - less, 0.0), max(faces - fewer, 0.0), spread + more
+    return area, faces, spread
 
 
 def _faces(body: Placed, region: Region) -> tuple[float, float, float]:
@@ -240,7 +212,7 @@ def _held(case: Case, number: int, spec: Prescribed) -> Load:
     bodies = _reached(case, spec)
     if bodies is None:
         return Load(number)
-    found = [_nodes(body, Region.of(spec)) for body in bodies]
+    found = [_nodes(body, Region.of(spec)) for _, body in bodies]
     fewest, nodes = (sum(each[k] for each in found) for k in (0, 1))
     return Load(number, nodes=nodes, fewest=fewest, exact=all(exact for _, _, exact in found))
 

@@ -8,7 +8,7 @@ from collections.abc import Iterable
 from typing import Any, NamedTuple
 
 from ..model.bodies import Mesh
-from ..model.boundaries import Around, Prescribed, Traction
+from ..model.boundaries import Around, Prescribed, Symmetry, Traction
 from ..model.measures import Probe
 from ..model.solids import Measured
 from ..model.tables import Point
@@ -55,6 +55,18 @@ class Region(NamedTuple):
     def everything(self) -> bool:
         """Whether the region is the whole space."""
         return self == Region()
+
+    def on_plane(self, plane: Symmetry, bounds: tuple[Point, Point], slack: float) -> "Region | None":
+        """Returns the part of the region on a plane, within the box ``bounds``; None if the plane passes more than
+        ``slack``, m, beside it.
+        """
+        low = [max(pair) for pair in zip(bounds[0], self.low or bounds[0], strict=True)]
+        high = [min(pair) for pair in zip(bounds[1], self.high or bounds[1], strict=True)]
+        d = "xyz".index(plane.axis)
+        if not low[d] - slack <= plane.at <= high[d] + slack:
+            return None
+        low[d] = high[d] = plane.at
+        return self._replace(low=(low[0], low[1], low[2]), high=(high[0], high[1], high[2]))
 
     def holds(self, point: Iterable[Any], slack: Any) -> Any:
         """Whether a point, m, lies in the region, or at most ``slack``, m, outside; for arrays (3, n) an array (n,),

@@ -13,7 +13,7 @@ from conoid.cases.model.schema import Boundary, Case, Traction
 from conoid.cases.model.solids import Cad
 from conoid.cases.reading.library import material
 from conoid.cases.reading.survey import Survey
-from conoid.cases.shapes.loaded import Load
+from conoid.cases.shapes.load import Load
 from conoid.cases.shapes.placed import Bulk
 from conoid.cases.warnings.touching import Touch
 

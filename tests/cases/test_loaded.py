@@ -44,7 +44,7 @@ def pressed(mesh: dict[str, Any], region: dict[str, Any], **part: Any) -> Case:
         (TUBE, {"cylinder": {"inner_radius": 8e-3, "radius": 9e-3}}, math.pi * 16 * 20),
         (TUBE, slab(20e-3, 20e-3), math.pi * 39),
         ({**TUBE, "sector": "quarter"}, BORE, math.pi * 10 * 20 / 4),
-        ({**TUBE, "sector": "half"}, {"low": [0, -1, -1], "high": [0, 1, 1]}, 2 * 3 * 20),
+        ({**TUBE, "sector": "half"}, slab(20e-3, 20e-3), math.pi * 39 / 2),
         (BALL, slab(0, 1), 2 * math.pi * 25),
         (BLOCK, slab(2e-3, 2e-3), 16),
         (BLOCK, {}, 16 * 2 + 8 * 4),

@@ -188,6 +188,42 @@ def test_a_turned_bar_is_pressed_on_its_whole_end() -> None:
     assert force == pytest.approx([-400.0, 0.0, 0.0], abs=1e-9)
 
 
+BOX = {"shape": "box", "low": [0, 0, 0], "high": [2e-3, 2e-3, 1e-3], "element_size": 1e-3, "generator": "structured"}
+SHEAR = {"kind": "traction", "stress": [0, 0, 1e8]}
+CUTS = [{"kind": "symmetry", "axis": axis} for axis in "xy"]
+
+
+@pytest.mark.parametrize(
+    ("sector", "more", "expected"),
+    [
+        ("half", {}, 14.0),
+        ("quarter", {}, 12.0),
+        ("quarter", {"low": [0, 0, 0], "high": [2e-3, 1e-3, 1e-3]}, 5.0),
+        ("half", {"low": [0, 0, 0], "high": [0, 2e-3, 1e-3]}, 0.0),
+    ],
+)
+def test_no_traction_loads_the_cut_of_a_sector(sector: str, more: dict[str, Any], expected: float) -> None:
+    """The surface of a box of 2 x 2 x 1 mm without its faces on planes of symmetry, mm^2."""
+    planes = CUTS[: 1 if sector == "half" else 2]
+    case = case_of({**BOX, "sector": sector}, {**SHEAR, **more}, *planes)
+    assert loads(case)[0].area == pytest.approx(1e-6 * expected, abs=1e-15)
+    if not expected:
+        with pytest.raises(InputError, match=r"acts on no face; .*; faces on a plane of symmetry carry no load$"):
+            whole_of(case)
+        return
+    whole = whole_of(case)
+    load = whole.loads[0]
+    assert isinstance(load, Load)
+    assert load.force.sum(axis=0) == pytest.approx([0.0, 0.0, 1e2 * expected], rel=1e-12)
+    assert not whole.warnings
+
+
+def test_the_surface_of_a_quarter_cylinder_is_estimated_without_its_cuts() -> None:
+    round_body = {"shape": "cylinder", "radius": 2e-3, "length": 3e-3, "element_size": 0.5e-3, "sector": "quarter"}
+    load = loads(case_of(round_body, SHEAR, *CUTS))[0]
+    assert load.area == pytest.approx(1e-6 * (3.0 + 2.0) * np.pi, abs=load.spread)
+
+
 def test_a_mesh_that_disagrees_with_what_is_expected_is_told(caplog: pytest.LogCaptureFixture) -> None:
     """A whole end is expected, but the mesh ends a third of an element before it."""
     caplog.set_level("INFO", "conoid.worker")

@@ -7,8 +7,8 @@ from collections.abc import Iterator, Mapping
 import numpy as np
 
 from conoid.cases.model.joined import bodies
-from conoid.cases.model.schema import Case, Prescribed, Traction
-from conoid.cases.shapes.loaded import Load
+from conoid.cases.model.schema import Case, Prescribed, Symmetry, Traction
+from conoid.cases.shapes.load import Load
 
 from ..mesh.faces import FACES, across
 from ..mesh.joining import Placed, joined
@@ -60,7 +60,9 @@ def _load(case: Case, number: int, meshes: Meshes) -> Load:
 
 def empty(case: Case, found: list[Load]) -> Iterator[str]:
     """Yield an error message for each boundary that selects no node or face."""
+    planes = case.boundaries_of(Symmetry)
     for load in found:
         if not (load.faces or load.nodes):
             what = "face" if isinstance(case.boundaries[load.boundary], Traction) else "node"
-            yield f"boundaries[{load.boundary}]: no {what} of the meshes that it is for lies in its region"
+            cut = "; faces on a plane of symmetry carry no load" if what == "face" and planes else ""
+            yield f"boundaries[{load.boundary}]: no {what} of the meshes that it is for lies in its region{cut}"

@@ -44,7 +44,8 @@ def loads(
         if not len(loaded):
             where = "its box and its parts" if spec.cylinder is None else "its cylinder, its box and its parts"
             where = where if spec.on is None else f"whether the faces of {spec.on!r} are on the surface, and its box"
-            raise InputError(f"boundaries[{index}]: acts on no face; check {where}")
+            cut = "; faces on a plane of symmetry carry no load" if case.boundaries_of(schema.Symmetry) else ""
+            raise InputError(f"boundaries[{index}]: acts on no face; check {where}{cut}")
         found.append(selected)
         took = np.isin(np.arange(len(case.parts)), tet_part[tet[chosen]])
         warnings += selection.missed(case, index, x, members, near, took)

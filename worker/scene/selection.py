@@ -182,11 +182,23 @@ def counted(
     nodes, (corners, of) = int(found.sum()), faces
     if isinstance(spec, schema.Prescribed):
         return Selected(number, nodes), found
-    chosen: Flags = np.asarray(found[corners].all(axis=1) & meant(case, spec)[of])
+    chosen: Flags = np.asarray(found[corners].all(axis=1) & meant(case, spec)[of] & ~_cut(case, x, faces, near))
     if bit is not None:
         chosen &= marked.chosen(bit, corners, of)
     area = float(0.5 * np.linalg.norm(normals(x, corners[chosen]), axis=1).sum())
     return Selected(number, nodes, int(chosen.sum()), area), chosen
+
+
+def _cut(case: schema.Case, x: Floats, faces: tuple[Indices, Indices], near: Nearness) -> Flags:
+    """Return (m,) which exposed faces, (m, 3) with their parts (m,), lie on a plane of symmetry: a cut through the
+    whole body, which no traction loads.
+    """
+    (corners, of), names = faces, [each.name for each in case.parts]
+    found = np.zeros(len(corners), bool)
+    for _, plane in case.boundaries_of(schema.Symmetry):
+        away = np.abs(x[corners, "xyz".index(plane.axis)] - plane.at).max(axis=1)
+        found |= named(plane, names)[of] & (away <= near.rounding[of])
+    return found
 
 
 NO_FACES = np.zeros((0, 3), np.int32), np.zeros(0, np.int32)
