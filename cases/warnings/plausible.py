@@ -19,6 +19,7 @@ from ..reference.json_schema import Schema, definition, shipped_schema, variants
 from ..units import QUANTITY
 from .approach import strangers
 from .compression import crushed
+from .contradicted import contradicted
 from .damping import damped
 from .driven import passing
 from .idle import unloaded
@@ -72,6 +73,7 @@ def oddities(case: Case, expected: Estimate) -> list[Problem]:
         *grazes(case),
         *strangers(case),
         *passing(case),
+        *contradicted(case),
         *unloaded(case),
         *cut_bodies(case),
         *stiff(case, expected),
