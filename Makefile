@@ -4,7 +4,7 @@
 # make bench      speed, and speed against error: tables in build/bench, 15 minutes (BENCH=quick: 2, BENCH=long: 60)
 # make accuracy   docs/verification/accuracy.md: the verification catalogue, measured here (ACCURACY=quick: no studies)
 # make reference  docs/reference/case.md, docs/reference/http.md and the JSON schema of cases, from the sources
-# make docs       the documentation site: build/site/index.html; a broken link is an error
+# make docs       the documentation site in build/site; a broken link is an error
 # make drill      the long tests: 800 faults (table in build/drill; continues an earlier drill; DRILL="--shard 1/4"),
 #                 then studies of minutes; as root on Debian it installs Slurm, libfaketime and systemd
 #
@@ -74,7 +74,7 @@ reference: $(READY)
 docs: $(READY)
 	@$(PIP) --no-deps -r docs/requirements.lock
 	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --quiet
-	@echo "build/site/index.html"
+	@echo "to read it: $(BIN)/python -m http.server --bind 127.0.0.1 --directory build/site 8760, then http://127.0.0.1:8760"
 
 drill: $(READY)
 	@if [ "$$(id -u)" = 0 ] && command -v apt-get >/dev/null && ! { command -v slurmctld && command -v faketime && command -v systemd-analyze; } >/dev/null; then \

@@ -1,4 +1,5 @@
-"""Hooks of the documentation site: pages of notebooks and of the repository's root, links, mermaid, check of search."""
+"""Hooks of the documentation site: pages of notebooks and of the repository's root, links, mermaid, checks of the built
+site."""
 
 import json
 import re
@@ -10,6 +11,12 @@ from mkdocs.exceptions import PluginError
 from mkdocs.structure.files import File, Files
 
 _OUTSIDE = re.compile(r"\[([^\]]+)\]\((?:\.\./)+(?:deploy|cases|tests|client|server|worker)[^)]*\)")
+_LOADED = re.compile(
+    r'<(?:script|img|iframe)\b[^>]*\bsrc="?(?:https?:)?//[^>]*>'
+    r'|<link\b[^>]*\brel="?stylesheet[^>]*href="?(?:https?:)?//[^>]*>'
+)
+"""Element that loads from another site; a link that the reader follows is none."""
+_KEYS_PAGE = "reference/case.html"
 _ROOT = Path(__file__).parents[1]
 _ROOT_PAGES = ("ARCHITECTURE.md", "CONVENTIONS.md", "CONTRIBUTING.md", "CHANGELOG.md")
 _SCHEMA = _ROOT / "cases" / "case.schema.json"
@@ -53,12 +60,16 @@ def on_page_markdown(markdown: str, **_: Any) -> str:
 
 
 def on_post_build(*, config: Any) -> None:
-    """Fails the build when the search index lacks a key of a case."""
-    index = json.loads((Path(config["site_dir"]) / "search" / "search_index.json").read_text(encoding="utf-8"))
-    text = " ".join(f"{page['title']} {page['text']}" for page in index["docs"])
-    words = set(re.findall(r"\w+", re.sub(r"<[^>]*>", " ", text)))
-    if missing := sorted(_keys(json.loads(_SCHEMA.read_text(encoding="utf-8"))) - words):
+    """Fails the build if the search does not find a key of a case on its page, or if a page asks another site."""
+    site = Path(config["site_dir"])
+    index = json.loads((site / "search" / "search_index.json").read_text(encoding="utf-8"))
+    pages = [page for page in index["docs"] if page["location"].startswith(_KEYS_PAGE)]
+    text = re.sub(r"<[^>]*>", " ", " ".join(f"{page['title']} {page['text']}" for page in pages))
+    if missing := sorted(_keys(json.loads(_SCHEMA.read_text(encoding="utf-8"))) - set(re.findall(r"\w+", text))):
         raise PluginError(f"the search of the site does not find these keys of a case: {', '.join(missing)}")
+    for page in sorted(site.rglob("*.html")):
+        if found := _LOADED.search(page.read_text(encoding="utf-8")):
+            raise PluginError(f"{page.relative_to(site)} loads from another site: {found[0]}")
 
 
 def _keys(schema: object) -> set[str]:
