@@ -87,7 +87,7 @@ def serve(ctx: typer.Context) -> None:
     """Start the job server; takes the options of the server (conoid serve --help)."""
     page = Path(__file__).parent / "web"
     web = [] if "token" in ctx.args else ["--web", str(page)]
-    command = [sys.executable, "-m", "conoid.server", *web, *ctx.args]
+    command = [sys.executable, "-P", "-m", "conoid.server", *web, *ctx.args]
     sys.stdout.flush()
     os.execv(command[0], command)
 

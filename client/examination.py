@@ -75,7 +75,7 @@ def _survey(case: Case, folder: Path) -> tuple[Survey, list[Problem]]:
         cure = "was not read: the solver is not installed here (pip install 'conoid[worker]')"
         return Survey(), [problem(*_named(i, mesh), cure) for i, mesh in files]
     asked = survey.question(case.model_dump(mode="json"), folder)
-    ended = subprocess.run([sys.executable, "-m", survey.PROGRAM], input=asked, capture_output=True, check=False)
+    ended = subprocess.run([sys.executable, "-P", "-m", survey.PROGRAM], input=asked, capture_output=True, check=False)
     try:
         if ended.returncode:
             raise ValueError

@@ -12,7 +12,7 @@ from sqlalchemy import URL
 from conoid.cases.estimates.cores import usable_cores
 from conoid.cases.site.batch import Site, SiteError, read_site
 
-WORKER = (sys.executable, "-m", "mpi4py", "-m", "conoid.worker")
+WORKER = (sys.executable, "-P", "-m", "mpi4py", "-m", "conoid.worker")
 """Command of the worker after ``mpiexec -n N``. With ``-m mpi4py`` an exception of one rank ends all ranks."""
 
 

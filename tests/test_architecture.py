@@ -62,6 +62,17 @@ def test_a_house_knows_only_itself_and_the_contract() -> None:
                 assert parts[1] in allowed, f"{name_of(path)}: {house} may not import {name}"
 
 
+def test_no_process_imports_modules_from_its_working_folder() -> None:
+    """Such folders are the user's, and may have a queue.py or a checkout named conoid: with -P Python ignores them."""
+    started = re.compile(r'(?:executable,|\{python\}|bin/python) *"?(-\w+)')
+    found = [(name_of(path), match[1]) for path in SOURCES for match in started.finditer(path.read_text("utf-8"))]
+    found += [
+        ("deploy/job.sh", match[1]) for match in started.finditer((ROOT / "deploy" / "job.sh").read_text("utf-8"))
+    ]
+    assert len(found) > 10
+    assert [name for name, option in found if option != "-P"] == []
+
+
 def test_relative_imports_stay_at_home() -> None:
     for path in SOURCES:
         depth = len(path.relative_to(ROOT).parts) - 1

@@ -153,7 +153,7 @@ class Access(msgspec.Struct, kw_only=True, frozen=True):
 _job, _access = msgspec.json.Decoder(Job), msgspec.json.Decoder(Access)
 _TEMPLATE = """#!/bin/bash
 # One attempt of a run, written by Conoid: $1 is its folder or that of its array, $2 the job's name. See job.json there.
-{lines}exec {python} -m conoid.worker.run.job "$1" "$2"
+{lines}exec {python} -P -m conoid.worker.run.job "$1" "$2"
 """
 
 

@@ -176,7 +176,7 @@ def _command(folder: Path, ranks: int, threads: int, profile: batch.Profile) -> 
     """Returns the command that starts the ranks. The command is made again for every job: a record in a folder must
     not choose a program.
     """
-    worker = [sys.executable, "-m", "mpi4py", "-m", "conoid.worker", str(folder / _CASE), "--out", str(folder)]
+    worker = [sys.executable, "-P", "-m", "mpi4py", "-m", "conoid.worker", str(folder / _CASE), "--out", str(folder)]
     words = ["--run", folder.name, "--ranks", str(ranks), "--interruptible"]
     return [*batch.starter(profile, ranks, _mpiexec, threads), *worker, *words]
 

@@ -37,7 +37,7 @@ def child(picture: Picture) -> tuple[int, bytes, str]:
     """Returns the exit code, the last line of standard output, and standard error. Raises ViewError for a process
     that hangs.
     """
-    command = [sys.executable, "-m", "conoid.client.drawing.render"]
+    command = [sys.executable, "-P", "-m", "conoid.client.drawing.render"]
     seconds = _SECONDS * max(1, len(picture.frames))
     try:
         done = subprocess.run(

@@ -98,7 +98,7 @@ class LocalServer:
             self._process.wait(_STOP_SECONDS)
 
 
-_SERVER = [sys.executable, "-m", "conoid.server"]
+_SERVER = [sys.executable, "-P", "-m", "conoid.server"]
 _TETHER = """
 import ctypes, os, runpy, signal, sys
 parent = int(sys.argv.pop(1))
@@ -109,7 +109,7 @@ if sys.platform == "linux":
         sys.exit(1)
 runpy.run_module("conoid.server", run_name="__main__", alter_sys=True)
 """
-_TETHERED = [sys.executable, "-c", _TETHER]
+_TETHERED = [sys.executable, "-P", "-c", _TETHER]
 """Command of the server. The kernel sends SIGTERM to the server when the process of the first argument dies."""
 
 

@@ -117,7 +117,8 @@ def _succeeded(folder: Path) -> bool:
 
 def _run(case: Path, trial: Trial, overrides: Sequence[str], folder: Path, seconds: float | None) -> None:
     (folder / layout.LOGS).mkdir(parents=True)
-    command = [*mpiexec(), "-n", str(trial.ranks), sys.executable, "-m", "mpi4py", "-m", "conoid.worker", str(case)]
+    worker = [sys.executable, "-P", "-m", "mpi4py", "-m", "conoid.worker"]
+    command = [*mpiexec(), "-n", str(trial.ranks), *worker, str(case)]
     words = [word for change in trial.changes(overrides) for word in ("--set", change)]
     words += ["--use", "project" if trial.by_tasks else "all"]
     crowded = {"MPIR_CVAR_ENABLE_HEAVY_YIELD": "1"} if trial.ranks > CORES else {}

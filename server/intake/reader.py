@@ -110,7 +110,7 @@ class _Program:
         """Starts the program. Raises OSError."""
         self._control, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
         with theirs:
-            command = [sys.executable, "-m", "conoid.server.intake.reading"]
+            command = [sys.executable, "-P", "-m", "conoid.server.intake.reading"]
             self._child = subprocess.Popen(command, stdin=theirs.fileno(), stdout=subprocess.DEVNULL)
         self._control.settimeout(_LOAD)
         try:

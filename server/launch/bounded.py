@@ -59,8 +59,8 @@ def run(
     env = {name: value for name, value in os.environ.items() if name not in _SECRET} | more
     pipe = subprocess.PIPE
     with subprocess.Popen(
-        [sys.executable, "-c", _BOUND % program, *limits, *arguments], stdin=pipe, stdout=pipe, stderr=pipe, env=env,
-        cwd=folder, start_new_session=True,
+        [sys.executable, "-P", "-c", _BOUND % program, *limits, *arguments],
+        stdin=pipe, stdout=pipe, stderr=pipe, env=env, cwd=folder, start_new_session=True,
     ) as child:  # fmt: skip
         try:
             told, said = child.communicate(question, timeout=bounds.wall)

@@ -237,7 +237,7 @@ class _Child:
 @contextmanager
 def _child(folder: Path) -> Iterator[_Child]:
     """Starts a child that compiles into ``folder``. The child ends with the block, and when this process dies."""
-    command = [sys.executable, "-m", "conoid.worker.kernels.compile", "--child"]
+    command = [sys.executable, "-P", "-m", "conoid.worker.kernels.compile", "--child"]
     environment = os.environ | {store.VARIABLE: str(folder), "NUMBA_NUM_THREADS": "1"}
     pipe = subprocess.PIPE
     with (

@@ -83,7 +83,7 @@ def run_child(mesh: Mesh | Mapping[str, Mesh], sources: Sources, target: Path, k
         "limits": asdict(limits),
     }
     environment = {name: os.environ[name] for name in _PASSED_ON if name in os.environ} | {"OMP_NUM_THREADS": "1"}
-    command = [sys.executable, "-m", "conoid.worker.mesh.child"]
+    command = [sys.executable, "-P", "-m", "conoid.worker.mesh.child"]
     with tempfile.TemporaryDirectory(prefix="conoid-mesh-") as folder:
         pipe = subprocess.PIPE
         with subprocess.Popen(command, stdin=pipe, stdout=pipe, stderr=pipe, cwd=folder, env=environment) as child:

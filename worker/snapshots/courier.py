@@ -111,5 +111,5 @@ class Courier:
 def _started(folder: Path) -> "subprocess.Popen[str]":
     environment = {name: value for name, value in os.environ.items() if name not in _SECRETS}
     environment["OMP_NUM_THREADS"] = environment["OPENBLAS_NUM_THREADS"] = "1"
-    words = [sys.executable, "-m", "conoid.worker.snapshots.packer", str(folder.resolve())]
+    words = [sys.executable, "-P", "-m", "conoid.worker.snapshots.packer", str(folder.resolve())]
     return subprocess.Popen(words, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, env=environment)
