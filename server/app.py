@@ -34,7 +34,21 @@ from .requests.admission import Admission
 from .requests.head_requests import HeadRequests
 from .requests.thread_pool import ThreadPool
 from .requests.user_limits import UserLimits
-from .routes import cases, events, files, health, history, logs, me, reports, runs, snapshots, table, uploads
+from .routes import (
+    cases,
+    events,
+    files,
+    health,
+    history,
+    logs,
+    materials,
+    me,
+    reports,
+    runs,
+    snapshots,
+    table,
+    uploads,
+)
 from .routes import sweeps as sweep_routes
 from .runs.existing import ExistingRuns
 from .runs.supervisor import Supervisor
@@ -45,6 +59,7 @@ from .telemetry import Telemetry
 
 ROUTERS = (
     cases.router,
+    materials.router,
     runs.router,
     table.router,
     events.router,

@@ -60,6 +60,7 @@ ANSWERS: dict[tuple[str, str], dict[int, tuple[str, str]]] = {
     ("get", "/v1/cases"): {200: (_JSON, "Gallery")},
     ("get", "/v1/cases/{name}"): {200: ("application/toml", "")},
     ("get", "/v1/cases/{name}/files/{file}"): {200: (_BYTES, "")},
+    ("get", "/v1/materials"): {200: (_JSON, "Materials")},
     ("post", "/v1/runs"): {202: (_JSON, "Receipt")},
     ("get", "/v1/runs"): {200: (_JSON, "RunPage")},
     ("get", "/v1/table"): {200: (_JSON, "Table"), 304: ("", "")},

@@ -21,8 +21,8 @@ the routes; `GET /openapi.json` of a server returns the same content with the sc
 - A header `Idempotency-Key` makes a request safe to repeat: the same key and body give the same run.
 """
 _TITLES = (
-    ("Cases", ("/v1/cases", "/v1/case.schema.json")), ("Runs", ("/v1/runs", "/v1/table")), ("Sweeps", ("/v1/sweeps",)),
-    ("Files that cases name", ("/v1/files",)), ("The server", ("/",)),
+    ("Cases", ("/v1/cases", "/v1/case.schema.json", "/v1/materials")), ("Runs", ("/v1/runs", "/v1/table")),
+    ("Sweeps", ("/v1/sweeps",)), ("Files that cases name", ("/v1/files",)), ("The server", ("/",)),
 )  # fmt: skip
 """Title of each section and the beginnings of its paths. A route belongs to the first section with a beginning of
 its path."""

@@ -16,6 +16,7 @@ from starlette.requests import Request
 from starlette.testclient import TestClient
 
 from conoid.cases.load import shipped_path
+from conoid.cases.reading.library import library
 from conoid.cases.reference.json_schema import json_schema
 from conoid.server.answers import reference
 from conoid.server.answers.schemas import ALL
@@ -425,6 +426,16 @@ def test_the_gallery(server: Running) -> None:
     assert deck.content == shipped_path("imported_taylor").with_suffix(".inp").read_bytes()
     for file in ("imported_taylor.toml", "taylor_copper.toml", "..%2F..%2Fpyproject.toml"):
         assert server.ann.http.get(f"/v1/cases/imported_taylor/files/{file}").status_code == 404
+
+
+def test_the_material_library(server: Running) -> None:
+    listed = server.ann.http.get("/v1/materials").json()["materials"]
+    assert [each["name"] for each in listed] == list(library())
+    made = next(each for each in listed if each["name"] == "mild_steel_cowper_symonds")
+    assert made["law"] == "cowper_symonds"
+    rate = next(one for one in made["constants"] if one["key"] == "strength.D")
+    assert (rate["value"], rate["confidence"]) == ("40.4 1/s", "memory")
+    assert "Cowper and Symonds 1957" in rate["source"]
 
 
 def test_validate_gives_the_estimate_and_every_default(server: Running) -> None:

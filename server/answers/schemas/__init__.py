@@ -6,6 +6,7 @@ from conoid.cases.output.search import Search
 from .cases import Gallery, Validation
 from .files import Files, Report, SentFile, SentFiles
 from .history import EventPage, FragmentCourse, History, Snapshots
+from .materials import Materials
 from .problems import Problem
 from .runs import Receipt, RunPage, RunStatus
 from .site import Health, Me
@@ -13,8 +14,8 @@ from .sweeps import Reported, Sweep, SweepPage, Wish
 from .table import Table
 
 ALL = (
-    Problem, Receipt, RunPage, RunStatus, Table, Validation, Gallery, EventPage, Files, SentFile, SentFiles, Snapshots,
-    FragmentCourse, History, Me, Health, Wish, SweepPage, Sweep, Search, Reported,
+    Problem, Receipt, RunPage, RunStatus, Table, Validation, Gallery, Materials, EventPage, Files, SentFile, SentFiles,
+    Snapshots, FragmentCourse, History, Me, Health, Wish, SweepPage, Sweep, Search, Reported,
     Report,
 )  # fmt: skip
 """Schemas of complete answers and of requests."""
