@@ -40,7 +40,7 @@ UNKNOWN = "–"
 
 def si(value: float | None, unit: str = "", digits: int = 3) -> str:
     """Returns ``value`` with ``digits`` significant digits and its unit, with a fitting SI prefix if the unit
-    accepts one; a number without a unit has no prefix. A dash for an unknown value.
+    accepts one; a number without a unit has no prefix. An unknown value is shown as a dash.
     """
     return alike([value], unit, digits)[0]
 

@@ -135,8 +135,8 @@ class Run:
         return watch(self, live)
 
     def history(self, points: int = 1000) -> dict[str, Any]:
-        """Returns the history of the run with at most so many reports: ``series``, ``ranks``, ``balance``,
-        ``snapshots``, ``last``.
+        """Returns the history of the run with at most ``points`` reports; the keys are ``series``, ``ranks``,
+        ``balance``, ``snapshots``, ``last``.
         """
         return self.session.get(dict[str, Any], f"{self.path}/history", points=points)
 

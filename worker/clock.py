@@ -88,7 +88,7 @@ class Clock:
 
     @property
     def longest(self) -> float:
-        """Largest time step allowed after ``dt``, s."""
+        """Largest allowed next time step, s: ``dt`` times the growth factor."""
         return self._growth * self.dt
 
     def choose_again(self, limit: float) -> float:

@@ -117,7 +117,7 @@ class Simulation:
 
     @property
     def pushing(self) -> "list[Boundary | Contact | Rigid]":
-        """All objects with an attribute ``last_push``, the time of the last impulse."""
+        """All objects that apply impulses to nodes; each has ``last_push``, the time of its last impulse."""
         return [*self.boundaries, *(each for each in (self.contact, self.rigid) if each is not None)]
 
     @property

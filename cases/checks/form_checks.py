@@ -43,7 +43,7 @@ def _slips(form: Model, location: Location) -> Iterator[Problem]:
 
 
 def _ogive(form: OgiveForm, location: Location) -> Iterator[Problem]:
-    """Yields the first error of an ogive."""
+    """Yields at most one problem: the first wrong key of an ogive."""
     for key, value, message in (*_nose(form), *_tip(form)):
         yield problem((*location, key), value, message)
         return

@@ -181,7 +181,7 @@ class Shards(Loose):
 
     @property
     def axis(self) -> Axis:
-        """A direction, as every body has one; it has no effect."""
+        """Axis of the shape. All shapes have this attribute; it has no effect here."""
         return "z"
 
 

@@ -77,7 +77,7 @@ class Survey(msgspec.Struct, kw_only=True, frozen=True):
 
 
 def question(case: dict[str, Any], folder: Path) -> bytes:
-    """Returns the standard input of the program."""
+    """Returns the bytes for the standard input of the survey process (worker/scene/survey.py)."""
     return msgspec.json.encode(Question(case=case, folder=str(folder.resolve())))
 
 

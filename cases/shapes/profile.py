@@ -217,7 +217,8 @@ def arc_of(mesh: OgiveForm) -> Arc:
 
 
 def tangent(nose: float, radius: float) -> float:
-    """Calibre radius head of the tangent ogive of this length on a shank of this ``radius``, both m."""
+    """Returns the calibre radius head (radius of the arc over the diameter) of a tangent ogive of length ``nose``, m,
+    on a shank of ``radius``, m."""
     return (nose / (2.0 * radius)) ** 2 + 0.25
 
 

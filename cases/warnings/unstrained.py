@@ -8,8 +8,8 @@ from ..model.rigid import Rigid
 from ..model.schema import Case
 
 STRAIN = 1e-3
-"""Largest strain of a part that could be rigid: half of the yield strain of a hard steel (chosen value). With this
-strain the surface moves by the same fraction of the size of the part."""
+"""Largest strain of a part that could be rigid: half of the yield strain of a hard steel (chosen value). At this
+strain the surface moves by a thousandth of the size of the part, which a rigid part would not show."""
 SHARE = 0.05
 """Largest share of such a part in the energies of all parts. The value was chosen equal to the share of the stiffer
 of two bodies with an impedance ratio of stiff.STIFF."""

@@ -131,7 +131,7 @@ def to_markdown(ended: Sequence[Verdict]) -> str:
     ]  # fmt: skip
     bad = [f"- **{verdict.hard.name}**: {'; '.join(verdict.faults)}" for verdict in ended if verdict.faults]
     spent = sum(v.outcome.cpu for v in ended if not math.isnan(v.outcome.cpu))
-    said = f"{len(ended) - len(bad)} of {len(ended)} ended well, in {duration(spent)} of CPU time."
+    said = f"{len(ended) - len(bad)} of {len(ended)} passed, in {duration(spent)} of CPU time."
     return "\n\n".join(filter(None, [table(head, rows), said, "\n".join(bad)])) + "\n"
 
 

@@ -88,7 +88,7 @@ def copy_case(
     named = {file.path: target.with_name(file.path) for file in files.files_of(load.toml_data(text))}
     for each in (target, *named.values()):
         if each.exists():
-            raise ClientError(f"{each} is there already; name another file with --out")
+            raise ClientError(f"{each} already exists; name another file with --out")
     save_text(
         target, text.replace(f"{json_schema.LINE} ../{json_schema.FILE}", f"{json_schema.LINE} ./{json_schema.FILE}", 1)
     )

@@ -116,7 +116,7 @@ class Account:
         """Refuses the import for keywords that have not been decided."""
         for each in self.entries:
             if not each.decided:
-                each.refuse("this keyword is not known here; it may change the answer")
+                each.refuse("unknown keyword, which may change the result")
 
     def without(self, solid: Iterable[str], parts: Collection[str]) -> None:
         """Numbers of parts that have solid elements, and of defined parts: other solids are in no body."""

@@ -39,7 +39,8 @@ def import_deck(
     ] = None,
     out: Annotated[Path | None, typer.Option("--out", help="The case file; DECK with .toml if not given.")] = None,
     anyway: Annotated[
-        bool, typer.Option("--anyway", help="Write the case in spite of what it lacks; the lack stands in it.")
+        bool,
+        typer.Option("--anyway", help="Write the case without the untranslated keywords, and list them."),
     ] = False,
     as_data: Json = False,
 ) -> None:
@@ -56,7 +57,7 @@ def import_deck(
     if target.suffix != ".toml":
         raise UsageError(f"--out = {str(target)!r}: the name of a case file ends in .toml")
     if target.exists():
-        raise ClientError(f"{target} is there already; name another file with --out")
+        raise ClientError(f"{target} already exists; name another file with --out")
     with aloud(f"reading {deck.name}"):
         found = _placed(read_deck(deck, units, kind), target)
     written = anyway or not found.refusals
@@ -93,9 +94,9 @@ def _end(found: Imported, target: Path, written: bool) -> None:
         return
     many = counted(len(found.refusals), "thing")
     if written:
-        complain(f"warning: {target.name} lacks {many} without which it may answer wrong; they stand at its head")
+        complain(f"warning: {target.name} is without {many} and may give wrong results; its first lines list them")
         return
     complain(*found.refusals[:_SHOWN])
     more = f" ({len(found.refusals) - _SHOWN} more in the list)" if len(found.refusals) > _SHOWN else ""
-    complain(f"no case was written: without {many} it may answer wrong{more}; --anyway writes it")
+    complain(f"no case was written: without {many} it may give wrong results{more}; --anyway writes it")
     raise typer.Exit(ExitCode.BAD_INPUT)

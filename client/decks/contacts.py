@@ -36,7 +36,7 @@ def meet(draft: Draft, bodies: Sequence[Body], meetings: Sequence[Meeting]) -> N
     """Returns the table ``contact``; "none" for a deck without contact."""
     for each in meetings:
         if not each.meets:
-            each.entry.leave("one of its surfaces has no part of the case: nothing meets")
+            each.entry.leave("one of its surfaces has no part of the case")
     meetings = [each for each in meetings if each.meets]
     if not meetings:
         if len(bodies) > 1:
@@ -75,8 +75,8 @@ def _frictions(meetings: Sequence[Meeting]) -> dict[tuple[str, str], float]:
 def _more(
     meetings: Sequence[Meeting], met: dict[tuple[str, str], float], inside: list[str], names: dict[str, str]
 ) -> None:
-    """Returns a note on pairs that are in contact here and not in the deck."""
+    """Returns a note on pairs that are in contact in the case but not in the deck."""
     extra = [(a, b) for a, b in itertools.combinations(sorted(inside), 2) if (a, b) not in met]
     if extra:
         shown = ", ".join(f"{names[a]} and {names[b]}" for a, b in extra[:3]) + (" ..." if len(extra) > 3 else "")
-        meetings[0].entry.remark("differs", "pairs", f"{shown} meet here as well; the deck lets them pass through")
+        meetings[0].entry.remark("differs", "pairs", f"{shown} are in contact in Conoid, but not in the deck")

@@ -71,7 +71,7 @@ class Fields(Generic[Place]):
         """Reports all fields that are not 0 and were not read."""
         self._tell(kind, [name for name in self._found if name not in self._read], why)
         if self.extra:
-            self.entry.remark(kind, f"line {self.extra[0]}", "a line that is not read here")
+            self.entry.remark(kind, f"line {self.extra[0]}", "a line that is not read")
 
     def _tell(self, kind: Remark, names: list[str], why: str) -> None:
         for name in names:

@@ -118,7 +118,7 @@ class Holding:
                 names = ", ".join(sorted(self._names[key] for key in stopped))
                 hold.entry.remark(
                     "refused", hold.chosen.what,
-                    f"its nodes slide, and a rigid wall stops {names}: walls do not hold nodes that are driven here",
+                    f"its nodes slide, and a rigid wall stops {names}: in Conoid walls do not stop moved nodes",
                 )  # fmt: skip
         table |= self._parts([*full, *some])
         table |= {axis: self._draft.quantity(hold.speeds[axis], SPEED) for axis in AXES if axis in hold.open}
@@ -155,9 +155,9 @@ def displacement_speed(curve: Course, end: float) -> float:
     beyond = [(time, value) for time, value in curve if time > end][:1]
     points = [*inside, *beyond]
     if len(points) < 2 or points[0] != (0.0, 0.0):
-        raise ValueError("displacements are translated that begin at 0 at the time 0")
+        raise ValueError("a displacement must begin at 0 at the time 0")
     speed = points[-1][1] / points[-1][0]
     most = max(abs(value) for _, value in points)
     if any(abs(speed * time - value) > 1e-6 * most for time, value in points):
-        raise ValueError("displacements are translated that grow evenly alone: their velocity jumps; give velocities")
+        raise ValueError("only displacements that are linear in time are translated; give velocities")
     return speed

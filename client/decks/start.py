@@ -31,7 +31,7 @@ def begin(draft: Draft, topology: Topology, bodies: Sequence[Body], starts: Sequ
         full, some = topology.whole(each.chosen)
         if some:
             names = ", ".join(by_key[key].name for key in some)
-            each.entry.refuse(f"{each.chosen.what} has some nodes of {names} alone; here whole parts have a velocity")
+            each.entry.refuse(f"{each.chosen.what} has only some nodes of {names}; only whole parts have a velocity")
             continue
         if not full:
             each.entry.leave(f"{each.chosen.what} has no node of a part of the case")
@@ -44,7 +44,7 @@ def begin(draft: Draft, topology: Topology, bodies: Sequence[Body], starts: Sequ
 
 def _give(draft: Draft, body: Body, start: Start) -> None:
     if body.spin or (any(start.rate) and body.velocity is not None):
-        why = f"{body.name} has a velocity from before; which of them holds where one turns is not translated"
+        why = f"{body.name} has a velocity already; two initial velocities, one of which rotates, are not translated"
         start.entry.remark("refused", start.chosen.what, why)
     old = body.velocity or (0.0, 0.0, 0.0)
     x, y, z = (start.velocity.get(axis, old[axis]) for axis in range(3))

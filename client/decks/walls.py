@@ -29,7 +29,7 @@ def stand(draft: Draft, topology: Topology, bodies: Sequence[Body], stops: Seque
             each.entry.leave(f"{each.chosen.what} has no node of a part of the case")
             continue
         if some:
-            why = "it stops some nodes of their parts there, here all of them"
+            why = "in the deck it stops only some nodes of their parts, in Conoid all nodes"
             each.entry.remark("differs", each.chosen.what, why)
         table = {**each.table, "name": "wall" if not keys else f"wall_{len(keys) + 1}"}
         if len(stopped) < len(names):

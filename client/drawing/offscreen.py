@@ -102,7 +102,7 @@ class Studio:
         return red + (green << 8) + (blue << 16), depth
 
     def _lit(self, pieces: Sequence[Piece], eye: Camera, arrows: Any | None) -> tuple[Any, Any]:
-        """Returns the colours, and True where a wall is drawn."""
+        """Returns the colour of each pixel, and an array that is True for pixels of walls."""
         plotter, picture = self._plotter, self._picture
         for position, intensity in _LIGHTS:
             plotter.add_light(vtk.light(position, intensity))

@@ -166,8 +166,8 @@ def text_rows(text: str) -> list[dict[str, str]]:
 
 
 def points_of(words: Iterable[str], *, grid: bool = False) -> list[Point]:
-    """Returns the points of ``key=a,b,c``. All keys change together from point to point; with ``grid``, each value
-    is combined with each. A key with one value has this value at every point. Raises CaseError.
+    """Returns the points of ``key=a,b,c``. All keys change together from point to point; with ``grid``, all values
+    of all keys are combined. A key with one value has this value at every point. Raises CaseError.
     """
     return points_along(axes_of(words), grid=grid, named="--set")
 

@@ -26,7 +26,7 @@ _ONE_THREAD = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NU
 _NOT_FOR_WORKERS = ("CONOID_DATABASE", "CONOID_TOKEN")
 _CROWDED = 4
 """Number of ranks per core from which waiting ranks of MPICH sleep instead of polling."""
-_BURIAL = 1.0
+_KILL_WAIT = 1.0
 """Time in s to wait for a killed launcher, so that no zombie process stays. The value was chosen because the end
 takes milliseconds."""
 _FRESH = 1.0
@@ -209,4 +209,4 @@ class LocalWorker:
         processes.end_run(self._run)
         if self._child is not None:
             with suppress(subprocess.TimeoutExpired):
-                self._child.wait(_BURIAL)
+                self._child.wait(_KILL_WAIT)

@@ -53,7 +53,7 @@ async def report(service: ServiceOf, identity: Submitter, name: str, body: Body)
 def page(
     service: ServiceOf,
     identity: Reader,
-    before: Annotated[str, Query(description="the id of a sweep: those older than it")] = "",
+    before: Annotated[str, Query(description="the id of a sweep; the answer has older sweeps only")] = "",
     limit: Annotated[int, Query(ge=1, le=500)] = 50,
 ) -> dict[str, Any]:
     """Returns the user's sweeps, newest first. ``next``: parameter ``before`` of the next page, null on the last

@@ -31,8 +31,8 @@ SIZE = 0.1e-3
 """Element size, m."""
 _WIDE, _FLYER, _TARGET = 0.4e-3, 2e-3, 4e-3
 _FROM, _TO = 0.1e-6, 0.25e-6
-"""Period in which the pressure is measured, s after the impact. Until then only the wave of the impact has passed
-the bodies."""
+"""Period in which the pressure is measured, s after the impact. In this period the wave of the
+impact has passed the bodies, and no other wave has arrived."""
 
 
 @dataclass(frozen=True)

@@ -118,7 +118,7 @@ def test_the_case_and_the_list_stand_beside_the_deck(tmp_path: Path) -> None:
     assert "# Of bar.k, LS-DYNA keyword deck, in mm, t, s" in case
     again = conoid("import", tmp_path / "bar.k")
     assert (again.exit_code, (tmp_path / "bar.toml").read_text()) == (1, case)
-    assert "is there already; name another file with --out" in again.stderr
+    assert "already exists; name another file with --out" in again.stderr
 
 
 def test_the_mesh_is_found_from_the_folder_of_the_case(tmp_path: Path) -> None:

@@ -64,10 +64,10 @@ def test_walls_of_radioss(tmp_path: Path, what: str) -> None:
 @pytest.mark.parametrize(
     ("cards", "told"),
     [
-        (("*RIGIDWALL_PLANAR_FINITE", row(0), row(0, 0, -1, 0, 0, 1), row(1, 0, 0, 9, 9)), "a rigid wall that ends"),
+        (("*RIGIDWALL_PLANAR_FINITE", row(0), row(0, 0, -1, 0, 0, 1), row(1, 0, 0, 9, 9)), "a finite rigid wall"),
         (("*RIGIDWALL_PLANAR_MOVING", row(0), row(0, 0, -1, 0, 0, 1), row(0, 40.0)), "V0 = 40.0: a speed without MASS"),
         (("*RIGIDWALL_GEOMETRIC_CYLINDER", row(0), row(0, 0, 0, 0, 0, 1), row(2, 9.0)), "LENCYL = 9.0: the cylinder"),
-        (("*RIGIDWALL_GEOMETRIC_PRISM", row(0), row(0, 0, 0, 0, 0, 1), row(1, 0, 0, 9)), "a rigid wall that ends"),
+        (("*RIGIDWALL_GEOMETRIC_PRISM", row(0), row(0, 0, 0, 0, 0, 1), row(1, 0, 0, 9)), "a finite rigid wall"),
         (("*CONSTRAINED_NODAL_RIGID_BODY", row(1, 0, 3)), "a rigid body of nodes; parts[].rigid makes a whole part"),
     ],
 )

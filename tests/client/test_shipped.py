@@ -46,7 +46,7 @@ def test_a_copy_is_the_case_and_names_the_schema_beside_it(quiet_home: Path) -> 
     assert (quiet_home / "case.schema.json").read_text() == json_schema.schema_text()
     copy.write_text("mine")
     again = conoid("cases", "copy", "demo")
-    assert (again.exit_code, again.stderr) == (1, "conoid: demo.toml is there already; name another file with --out\n")
+    assert (again.exit_code, again.stderr) == (1, "conoid: demo.toml already exists; name another file with --out\n")
     assert copy.read_text() == "mine"
     assert conoid("cases", "copy", "demo", "--out", "other.toml").exit_code == 0
 

@@ -266,7 +266,8 @@ def _blind(function: Any) -> Any:
 
 
 def test_a_new_scene_has_to_copy_the_tracked_slots() -> None:
-    """Control: the check can fail. If lines begin again without a search, they differ from the lines of the pairs."""
+    """Control: the check can fail. If lines of slots begin again without a search of pairs, they differ from the lines
+    of the pairs."""
     carry = registration.carry
 
     def forgetful(now: Scene, old: Scene) -> None:

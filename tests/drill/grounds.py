@@ -1,4 +1,5 @@
-"""Stands of the drill by kind. A stand is made at its first use; all stands are closed at the end."""
+"""Servers under test (stands) of the drill, by kind. A stand is made at its first use; all stands are closed at the
+end."""
 
 import os
 import shutil

@@ -94,8 +94,8 @@ def test_a_driven_wall_works_from_outside() -> None:
 
 
 def test_probes_measure_position_velocity_and_force_of_a_wall() -> None:
-    """A driven wall: the integral of its course and its course at the times of the lines; a free wall: the impulse on
-    all parts is what the wall has lost.
+    """The position of a driven wall is the integral of its prescribed velocity. A free wall loses the impulse that acts
+    on all parts.
     """
     fields = ("wall_position_z", "wall_velocity_z", "wall_impulse_z")
     probes = tuple(schema.Probe(name=name, field=name, wall="wall") for name in fields)  # type: ignore[arg-type]

@@ -109,7 +109,7 @@ def test_runs_are_compared_when_the_server_comes_back(web: Path) -> None:
 
 
 def told(*runs: str) -> str:
-    """Returns an answer of the table."""
+    """Returns the JSON of an answer of GET /v1/table with these runs."""
     return f"{{ runs: [{', '.join(runs)}], cases: [], pending: 0, next: null }}"
 
 

@@ -13,7 +13,7 @@ from conoid.worker.snapshots.blob import Budget
 from conoid.worker.snapshots.share import joined
 
 from .shattered import PARTS, Shattered, shattered
-from .unpacked import TOLD, arrays, made
+from .unpacked import STAMP, arrays, made
 
 
 def places(data: bytes) -> np.ndarray:
@@ -187,7 +187,7 @@ def test_no_tets_are_a_snapshot_too() -> None:
     share = body.shares(1)[0]
     for name, values in share.items():
         share[name] = values[:0] if not name.endswith(".part") and name != "numbers" else values
-    data = blob.made(joined([share], PARTS), {**TOLD, "ranks": 1}, lambda labels: np.zeros(len(labels)), Budget()).data
+    data = blob.made(joined([share], PARTS), {**STAMP, "ranks": 1}, lambda labels: np.zeros(len(labels)), Budget()).data
     assert snapshot.header_of(data).fragments_total == 0
     assert len(arrays(data)["triangles"]) == 0
 
@@ -214,7 +214,7 @@ def test_where_erosion_alone_parts_bodies_the_largest_piece_is_the_part() -> Non
     number of its first tet."""
     body = shattered(5, 9)
     label, whole = pieces(body), replace(body.whole(1), initial=0)
-    data = blob.made(whole, {**TOLD, "ranks": 1}, lambda numbers: np.zeros(len(numbers)), Budget()).data
+    data = blob.made(whole, {**STAMP, "ranks": 1}, lambda numbers: np.zeros(len(numbers)), Budget()).data
     got = arrays(data)
     expected = set()
     for part in (0, 1):

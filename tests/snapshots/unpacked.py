@@ -8,12 +8,12 @@ from conoid.worker.snapshots.blob import Budget, Made
 
 from .shattered import Shattered
 
-TOLD = {"n": 7, "step": 1200, "t": 2.5e-5}
+STAMP = {"n": 7, "step": 1200, "t": 2.5e-5}
 
 
 def made(body: Shattered, ranks: int = 1, budget: Budget | None = None) -> Made:
-    told = {**TOLD, "ranks": ranks}
-    return blob.made(body.whole(ranks), told, lambda labels: np.asarray(1e-6 * labels), budget or Budget())
+    stamp = {**STAMP, "ranks": ranks}
+    return blob.made(body.whole(ranks), stamp, lambda labels: np.asarray(1e-6 * labels), budget or Budget())
 
 
 def arrays(data: bytes) -> dict[str, np.ndarray]:

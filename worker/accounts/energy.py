@@ -41,8 +41,8 @@ class Ledger:
         """Residual at the last call: difference of the lines, divided by the largest energy. The largest energy is
         the maximum of the energy received so far, the work of the stress and the kinetic energy."""
         self.beyond = 0.0
-        """Kinetic energy in excess of all received energy at the last call, divided by the same largest energy. The
-        sum of the other lines is then negative."""
+        """Kinetic energy in excess of all received energy at the last call, divided by the same largest energy. Such an
+        excess means that the sum of all other lines of the energy is negative."""
         self.unpaid = 0.0
         """Largest decrease of the energy lost to fracture so far, divided by the energy that all broken facets
         absorb. A decrease means that facets released more energy than they had absorbed."""

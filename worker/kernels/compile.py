@@ -55,12 +55,12 @@ def compile_all(folder: Path, tell: Tell, root: Path = store.ROOT, package: str 
         return False
     counts = {path: path.read_text(encoding="utf-8").count(store.DECLARATION) for path in store.kernel_files(root)}
     total = sum(counts.values())
-    said = _Saying(tell, folder, total)
-    with _alone(folder, said):
+    progress = _Saying(tell, folder, total)
+    with _alone(folder, progress):
         if not (folder / COMPLETE).exists():
             modules = {path: _Module.of(path, root, package) for path in counts}
             kept = {path for path, module in modules.items() if module.take_over(folder)}
-            _in_parallel(_order(set(counts) - kept), folder, said, modules)
+            _in_parallel(_order(set(counts) - kept), folder, progress, modules)
             (folder / COMPLETE).touch()
     tell(total, total)
     return True
@@ -80,7 +80,7 @@ class _Saying:
 
 
 @contextmanager
-def _alone(folder: Path, said: _Saying) -> Iterator[None]:
+def _alone(folder: Path, progress: _Saying) -> Iterator[None]:
     """Holds the lock of the folder, so that no other program compiles into it; the lock ends with the process."""
     try:
         folder.mkdir(parents=True, exist_ok=True)
@@ -93,7 +93,7 @@ def _alone(folder: Path, said: _Saying) -> Iterator[None]:
                 fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
                 break
             except BlockingIOError:
-                said()
+                progress()
                 time.sleep(_LOOK)
         yield
 
@@ -169,7 +169,7 @@ def _needed(path: Path, files: set[Path]) -> set[Path]:
     return (store.reached([path]) & files) - {path}
 
 
-def _in_parallel(needs: dict[Path, set[Path]], folder: Path, said: _Saying, modules: dict[Path, _Module]) -> None:
+def _in_parallel(needs: dict[Path, set[Path]], folder: Path, progress: _Saying, modules: dict[Path, _Module]) -> None:
     """Compiles the files of ``needs``, each after the files that it needs, with as many children as there are cores."""
     children: queue.SimpleQueue[_Child] = queue.SimpleQueue()
     number = min(_MOST, len(os.sched_getaffinity(0)), len(needs))
@@ -180,7 +180,7 @@ def _in_parallel(needs: dict[Path, set[Path]], folder: Path, said: _Saying, modu
         for _ in range(number):
             children.put(ended.enter_context(_child(folder)))
         while waiting or running:
-            said()
+            progress()
             ready = [path for path in waiting if needs[path] <= done][: number - len(running)]
             for path in ready:
                 waiting.remove(path)

@@ -18,13 +18,13 @@ def notes(passed: Counter[str], volumes: Counter[str], joining: Counter[str], ma
     The notes give the number of omitted elements without volume (``passed``), the number of ``volumes`` that cannot
     be read, and the keywords that are ``joining`` bodies, with the ``mark`` of the deck before their names.
     """
-    for counts, said in (
+    for counts, reason in (
         (passed, "elements that carry no volume are skipped"),
         (volumes, "elements that cannot be read are outside of the group"),
         (joining, "keywords that join, hold or load bodies are ignored"),
     ):
         if counts:
-            yield f"{said}: {', '.join(f'{many} {mark}{name}' for name, many in sorted(counts.items()))}"
+            yield f"{reason}: {', '.join(f'{many} {mark}{name}' for name, many in sorted(counts.items()))}"
 
 
 def by_corners(chosen: Iterable[Cells]) -> Iterator[str]:

@@ -57,7 +57,7 @@ def outgrown(largest: float, scale: float) -> bool:
 
 @njit("float64(int64)", cache=True)
 def magnitude(bits):  # type: ignore[no-untyped-def]
-    """Return the float64 from the bits returned by ``most``; infinite if some value is not finite."""
+    """Return the float64 with the given ``bits``, the result of ``most``; infinity if a value was not finite."""
     return np.int64(bits).view(np.float64) if bits < _INFINITE else math.inf
 
 

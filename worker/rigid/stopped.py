@@ -19,10 +19,10 @@ def stopped(case: Case, nodes: Nodes, bodies: Bodies, beside: Ints, comm: Comm) 
     of = of_nodes(case, nodes)
     some = np.asarray(held.any(axis=0))[of] & (of >= 0) & nodes.owned
     mine = np.column_stack([nodes.id[some], of[some], nodes.x0[some].view(np.int64)])
-    told = comm.join(mine.reshape(-1)).reshape(-1, 5)
-    told = told[np.argsort(told[:, 0])]
-    body = np.ascontiguousarray(told[:, 1].astype(np.int32))
-    arms = np.ascontiguousarray(told[:, 2:]).view(np.float64) - bodies.origin[body]
+    gathered = comm.join(mine.reshape(-1)).reshape(-1, 5)
+    gathered = gathered[np.argsort(gathered[:, 0])]
+    body = np.ascontiguousarray(gathered[:, 1].astype(np.int32))
+    arms = np.ascontiguousarray(gathered[:, 2:]).view(np.float64) - bodies.origin[body]
     return held, np.ascontiguousarray(arms), body
 
 

@@ -90,11 +90,11 @@ def _built(case: schema.Case, folder: Path, say: Say, facts: Facts) -> Iterator[
     """Yield the mesh of each part with its number, and measure the meshes from files."""
     joint = dict[int, TetMesh]()
     for index, part in enumerate(case.parts):
-        said = partial(say, f"meshing {part.name}, part {index + 1} of {len(case.parts)}")
+        announce = partial(say, f"meshing {part.name}, part {index + 1} of {len(case.parts)}")
         key = f"parts[{index}].mesh"
         if index not in joint and len(group := grouped(case, index)) > 1:
-            joint |= built_together(case, group, folder, said)
-        mesh = joint.get(index) or build_mesh(asked(part), folder, key=key, made=said)
+            joint |= built_together(case, group, folder, announce)
+        mesh = joint.get(index) or build_mesh(asked(part), folder, key=key, made=announce)
         if isinstance(part.mesh, Measured):
             facts.take(index, mesh)
         yield index, mesh

@@ -28,8 +28,9 @@ def grouped(case: Case, index: int) -> list[int]:
 
 
 def built_together(
-    case: Case, group: list[int], folder: Path, said: Callable[[], None] = lambda: None
+    case: Case, group: list[int], folder: Path, before: Callable[[], None] = lambda: None
 ) -> dict[int, TetMesh]:
-    """Return the meshes of the parts of a ``group`` by their numbers. ``said`` is called before the meshes are made."""
+    """Return the meshes of the parts of a ``group`` by their numbers. ``before`` is called before the meshes are
+    made."""
     meshes = {f"parts[{i}].mesh": asked(case.parts[i]) for i in group}
-    return dict(zip(group, build_together(meshes, folder, made=said), strict=True))
+    return dict(zip(group, build_together(meshes, folder, made=before), strict=True))

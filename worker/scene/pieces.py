@@ -38,15 +38,15 @@ def pieces(case: Case, index: int, mesh: TetMesh, overlaps: bool) -> tuple[Indic
     sides = np.concatenate([mesh.tets[:, [0, k]] for k in (1, 2, 3)])
     first, of = np.unique(components(len(mesh.points), sides), return_inverse=True)
     piece: Indices = np.asarray(of.reshape(-1), np.int32)
-    many, said = len(first), f"parts[{index}].mesh: {len(first)} pieces that share no node"
+    many, found = len(first), f"parts[{index}].mesh: {len(first)} pieces that share no node"
     if many == 1:
         return whole, []
     if many > _MANY:
-        return whole, [f"{said}: overlaps between them at the start are checked for {_MANY} pieces at most"]
+        return whole, [f"{found}: overlaps between them at the start are checked for {_MANY} pieces at most"]
     if case.contact is not None and not np.isnan(part_pairs.friction(case)[index, index]):
         return piece, []
     warnings = [
-        f"{said}, without contact between them: merge coincident nodes, or give the part contact with itself "
+        f"{found}, without contact between them: merge coincident nodes, or give the part contact with itself "
         "(contact.self_contact)"
     ]
     return whole, [*warnings, *(_doubled(case, index, mesh, piece) if overlaps else [f"parts[{index}].mesh: {UNSEEN}"])]

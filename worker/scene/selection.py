@@ -47,7 +47,8 @@ class Nearness:
 
 
 def nearness(case: schema.Case, x: Floats, members: Members, tets: Indices, tet_part: Indices) -> Nearness:
-    """Return the distances for all parts. Arguments: nodes (n, 3), tets (m, 4), and the parts of both."""
+    """Return the object that gives the distances of nodes to all parts. Arguments: nodes (n, 3), tets (m, 4), and the
+    parts of both."""
     nodes, part = members
     n = len(case.parts)
     squared, reach = np.full(n, np.inf), np.zeros(n)

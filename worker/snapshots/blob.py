@@ -62,8 +62,8 @@ Births = Callable[[Ints], Floats]
 """Callback that returns (g,) times of birth, s, of the fragments with these numbers."""
 
 
-def made(whole: Whole, told: dict[str, Any], births: Births, budget: Budget) -> Made:
-    """Return the snapshot of a model. ``told``: n, step, t and ranks for the header."""
+def made(whole: Whole, stamp: dict[str, Any], births: Births, budget: Budget) -> Made:
+    """Return the snapshot of a model. ``stamp``: n, step, t and ranks for the header."""
     labels = np.concatenate([np.zeros(0, np.int64), *connectivity.labels(whole.model, whole.held, SerialComm())])
     every = table.measured(whole, _numbers(whole, labels))
     columns, row = table.columns(every, births(every.label))
@@ -81,7 +81,7 @@ def made(whole: Whole, told: dict[str, Any], births: Births, budget: Budget) -> 
     corners = np.concatenate([np.zeros((0, 4), np.int64), *(b.tets.astype(np.int64) for b in whole.model.blocks)])
     box = _box(whole.model.nodes.x[corners.reshape(-1)])
     header = Header(
-        **told, box=box, parts=whole.model.parts, tets=whole.model.elements_global, fields=fields,
+        **stamp, box=box, parts=whole.model.parts, tets=whole.model.elements_global, fields=fields,
         surface_triangles=len(seen.tet), fragments_total=len(every.label),
         fragments_listed=min(len(every.label), table.MOST_ROWS),
     )  # fmt: skip

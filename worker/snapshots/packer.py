@@ -67,9 +67,9 @@ def _made(folder: Path, task: dict[str, Any], births: Births) -> dict[str, Any]:
         for path in paths:
             path.unlink(missing_ok=True)
     initial = whole.initial or len(task["parts"])
-    told = {name: task[name] for name in ("n", "step", "t", "ranks")}
+    header = {name: task[name] for name in ("n", "step", "t", "ranks")}
     made = blob.made(
-        whole, told, lambda numbers: births.at(task["t"], numbers, initial, kept=whole.initial > 0), blob.Budget()
+        whole, header, lambda numbers: births.at(task["t"], numbers, initial, kept=whole.initial > 0), blob.Budget()
     )
     place = layout.snapshot(folder, task["n"])
     whole_file.write(place, made.data)

@@ -102,9 +102,9 @@ class Snapshots:
                 self._journal.write(messages.Log, answer["step"], answer["t"], level="warning", text=text)
                 continue
             self._packed = answer["cpu"]
-            told = {name: answer[name] for name in messages.Snapshot.__struct_fields__ if name in answer}
-            told.update(step=answer["step"], t=answer["t"], blob=data)
-            self._journal.write(messages.Snapshot, **told)
+            values = {name: answer[name] for name in messages.Snapshot.__struct_fields__ if name in answer}
+            values.update(step=answer["step"], t=answer["t"], blob=data)
+            self._journal.write(messages.Snapshot, **values)
 
     def close(self) -> None:
         """Wait for the last snapshot and write its message.

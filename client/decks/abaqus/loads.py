@@ -53,7 +53,7 @@ class Loads:
 
     def _dynamic(self, each: Keyword) -> float:
         if not each.has("EXPLICIT"):
-            raise InpError(f"line {each.line}: *DYNAMIC without EXPLICIT is an implicit analysis; here it is explicit")
+            raise InpError(f"line {each.line}: *DYNAMIC without EXPLICIT is an implicit analysis; Conoid is explicit")
         self.adiabatic = each.has("ADIABATIC")
         scale = each.get("SCALE FACTOR")
         each.forgive(
@@ -89,7 +89,7 @@ class Loads:
         if each.key("OP") == "NEW":
             raise InpError("OP=NEW takes earlier restraints away")
         course = self._course(each.get("AMPLITUDE"), each.entry)
-        each.forgive("LOAD CASE, REGION TYPE", "of no meaning here")
+        each.forgive("LOAD CASE, REGION TYPE", "no meaning in Conoid")
         each.rest()
         speeds: dict[str, dict[str, tuple[float, Course]]] = {}
         for line, items in each.lists():
@@ -190,7 +190,7 @@ class Loads:
         for chosen, value, entry in self._temperatures:
             full, some = topology.whole(chosen)
             if some:
-                entry.refuse(f"{chosen.what} are some nodes of a part; here whole parts have a temperature")
+                entry.refuse(f"{chosen.what} are some nodes of a part; in Conoid whole parts have a temperature")
                 continue
             for index, body in enumerate(bodies):
                 if body.key in full:

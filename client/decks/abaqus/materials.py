@@ -112,7 +112,7 @@ class Material:
 
     def _linear(self, plastic: Keyword) -> dict[str, Any]:
         if plastic.has("RATE") and float(plastic.get("RATE") or 0.0):
-            raise InpError(f"line {plastic.line}: RATE: the flow stress depends on the rate there, not here")
+            raise InpError(f"line {plastic.line}: RATE: a table of the flow stress by the rate is not translated")
         points = [(strain, stress) for stress, strain in plastic.table(2)]
         found = line_of(points)
         if found is None or found[1] < 0.0:
@@ -138,7 +138,7 @@ class Material:
         else:
             law["C"] = 0.0
         if m == 0.0 or melt <= room:
-            plastic.entry.remark("differs", "m", "no melting temperature: nothing softens here (taylor_quinney = 0); "
+            plastic.entry.remark("differs", "m", "no melting temperature: no thermal softening (taylor_quinney = 0); "
                                  "melt_temperature and specific_heat have no meaning")  # fmt: skip
             cold = self._system.quantity(max(self._kelvin(room), 0.0), TEMPERATURE)
             return law | _cold(cold), cold
@@ -160,7 +160,7 @@ class Material:
     # Failure ----------------------------------------------------------------------------------------------------------
 
     def _damage(self, law: dict[str, Any]) -> dict[str, Any]:
-        """Reads ``*DAMAGE INITIATION, CRITERION=JOHNSON COOK``: d3 has the opposite sign there (exp(-d3
+        """Reads ``*DAMAGE INITIATION, CRITERION=JOHNSON COOK``: d3 has the opposite sign in Abaqus (exp(-d3
         triaxiality)).
         """
         found = self._below.get("DAMAGE INITIATION")
@@ -172,7 +172,7 @@ class Material:
         self._same(found, law, melt, room, rate)
         law["damage"] = {"D1": d[0], "D2": d[1], "D3": -d[2] + 0.0, "D4": d[3], "D5": d[4]}
         if d[2]:
-            found.entry.remark("differs", f"d3 = {d[2]:g}", "D3 has the other sign: exp(-d3 t) there, exp(D3 t) here")
+            found.entry.remark("differs", f"d3 = {d[2]:g}", "other sign of D3: Abaqus exp(-d3 t), Conoid exp(D3 t)")
         return self._evolution(found)
 
     def _same(self, found: Keyword, law: dict[str, Any], melt: float, room: float, rate: float) -> None:
@@ -184,20 +184,20 @@ class Material:
         }  # fmt: skip
         for key, value in wanted.items():
             if value is not None and law.setdefault(key, value) != value:
-                found.entry.remark("refused", f"{value}", f"damage and strength have one {key} here, {law[key]}")
+                found.entry.remark("refused", f"{value}", f"in Conoid damage and strength have one {key}, {law[key]}")
 
     def _evolution(self, found: Keyword) -> dict[str, Any]:
         """Reads the damage evolution: tets are deleted at once if no displacement or energy is given."""
         evolution = self._take("DAMAGE EVOLUTION")
         if evolution is None:
-            found.entry.remark("differs", "no *DAMAGE EVOLUTION", "damage is counted and nothing fails, as here")
+            found.entry.remark("differs", "no *DAMAGE EVOLUTION", "damage is computed without effect, as in Conoid")
             return {}
         for name in ("TYPE", "SOFTENING", "DEGRADATION"):
             evolution.get(name)
         if any(any(row) for row in evolution.table(8)):
             evolution.entry.remark(
-                "refused", "evolution", "strength falls by a displacement or an energy there; here a tet leaves at "
-                "damage 1",
+                "refused", "evolution", "in Abaqus the strength falls with a displacement or an energy; "
+                "in Conoid a tet is deleted at damage 1",
             )  # fmt: skip
         return {"damage": 1.0}
 
@@ -208,13 +208,13 @@ class Material:
         if shear is not None and (shear.key("TYPE") or "TABULAR") == "TABULAR":
             row = shear.single(1)
             self._take("SHEAR FAILURE")
-            shear.forgive("ELEMENT DELETION", "tets leave here")
+            shear.forgive("ELEMENT DELETION", "in Conoid tets are deleted")
             found["plastic_strain"] = row[0]
         if tensile is not None:
             self._take("TENSILE FAILURE")
             tensile.entry.remark(
-                "refused", "failure", "matter that has failed has no strength or leaves; here the pressure is cut off "
-                "at it (spall)",
+                "refused", "failure", "in Abaqus failed material loses its strength or is deleted; in Conoid "
+                "the pressure is cut off at this value (spall)",
             )  # fmt: skip
             material["spall"] = self._stress(tensile.single(1)[0])
         return found

@@ -173,7 +173,7 @@ class Abaqus:
             if not found:
                 each.entry.refuse(REFUSED["RIGID BODY"])
                 continue
-            each.forgive("REF NODE, POSITION", "its own centre of mass moves here, no reference node")
+            each.forgive("REF NODE, POSITION", "Conoid uses the centre of mass, no reference node")
             each.rest()
             for body in found:
                 body.rigid = True
@@ -209,7 +209,7 @@ class Abaqus:
             elif why := REFUSED.get(each.word):
                 each.entry.refuse(why)
             elif each.word in MATERIAL:
-                each.entry.refuse("it stands outside of a material that is translated")
+                each.entry.refuse("it is not below a translated material")
 
     # What keywords name -----------------------------------------------------------------------------------------------
 

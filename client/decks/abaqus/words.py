@@ -3,7 +3,7 @@ keywords are read.
 """
 
 _OUTPUT = "output: a run writes frames, history.csv and probes"
-_END = "the end of what stands before it"
+_END = "the end of the part, instance, assembly or step"
 _USED = "not used by any translated keyword"
 
 LEFT: dict[str, str] = {
@@ -15,18 +15,18 @@ LEFT: dict[str, str] = {
     "END PART": _END, "END INSTANCE": _END, "END ASSEMBLY": _END, "END STEP": _END,
     "SECTION CONTROLS": "how elements are integrated and how they are deleted: parts[].erosion",
     "HOURGLASS STIFFNESS": "tets have no hourglass modes",
-    "BULK VISCOSITY": "numerics.viscosity has the values of this solver",
-    "FIXED MASS SCALING": "mass is not scaled here: the steps are those of the true mass",
-    "VARIABLE MASS SCALING": "mass is not scaled here: the steps are those of the true mass",
+    "BULK VISCOSITY": "Conoid uses its own values (numerics.viscosity)",
+    "FIXED MASS SCALING": "Conoid does not scale masses to lengthen the time step",
+    "VARIABLE MASS SCALING": "Conoid does not scale masses to lengthen the time step",
     "CONTACT CONTROLS": "how the other code computes contact",
     "CONTACT CONTROLS ASSIGNMENT": "how the other code computes contact",
     "CONTACT FORMULATION": "how the other code computes contact",
     "CONTACT INITIALIZATION ASSIGNMENT": "bodies that overlap are refused, or pushed apart: contact.overlap",
     "CONTACT INITIALIZATION DATA": "bodies that overlap are refused, or pushed apart: contact.overlap",
     "SURFACE PROPERTY ASSIGNMENT": "thickness of shells, of no meaning for solids",
-    "SURFACE BEHAVIOR": "bodies push each other by impulses here, no stiffness",
-    "PHYSICAL CONSTANTS": "the zero of temperatures, if it names one; no other constant has a meaning here",
-    "CONDUCTIVITY": "heat stays where work was done",
+    "SURFACE BEHAVIOR": "contact in Conoid has no stiffness",
+    "PHYSICAL CONSTANTS": "only the zero of temperatures is read",
+    "CONDUCTIVITY": "Conoid computes no conduction of heat",
     "DEPVAR": "of a subroutine of the user",
     "ORIENTATION": _USED, "TRANSFORM": "directions of output; restraints with it are refused",
     "AMPLITUDE": _USED, "NSET": _USED, "ELSET": _USED, "SURFACE": _USED, "SURFACE INTERACTION": _USED,
@@ -34,28 +34,28 @@ LEFT: dict[str, str] = {
 }  # fmt: skip
 
 REFUSED: dict[str, str] = {
-    "SHELL SECTION": "shells: here all bodies are solids", "MEMBRANE SECTION": "membranes: here all bodies are solids",
-    "BEAM SECTION": "beams: here all bodies are solids", "COHESIVE SECTION": "cohesive elements: give [[bond]]",
-    "CONNECTOR SECTION": "connectors: there are none here", "MASS": "masses of nodes: there are none here",
-    "ROTARY INERTIA": "masses of nodes: there are none here", "SPRING": "springs: there are none here",
-    "DASHPOT": "dashpots: there are none here", "COUPLING": "joins nodes in a way that is not translated",
+    "SHELL SECTION": "shells: Conoid has solids only", "MEMBRANE SECTION": "membranes: Conoid has solids only",
+    "BEAM SECTION": "beams: Conoid has solids only", "COHESIVE SECTION": "cohesive elements: give [[bond]]",
+    "CONNECTOR SECTION": "connectors: Conoid has none", "MASS": "masses of nodes: Conoid has none",
+    "ROTARY INERTIA": "masses of nodes: Conoid has none", "SPRING": "springs: Conoid has none",
+    "DASHPOT": "dashpots: Conoid has none", "COUPLING": "joins nodes in a way that is not translated",
     "KINEMATIC": "joins nodes in a way that is not translated", "MPC": "joins nodes in a way that is not translated",
-    "EQUATION": "joins nodes in a way that is not translated", "EMBEDDED ELEMENT": "embedded bodies: there are none",
+    "EQUATION": "joins nodes in a way that is not translated", "EMBEDDED ELEMENT": "embedded bodies: Conoid has none",
     "RIGID BODY": "a rigid body that is not a whole section of solids",
-    "CONTACT EXCLUSIONS": "pairs that do not meet; here all parts of contact.parts meet each other",
+    "CONTACT EXCLUSIONS": "pairs without contact; in Conoid all parts of contact.parts are in contact",
     "DSLOAD": "a load on surfaces that is not translated: [[boundaries]] kind = \"traction\"",
     "CLOAD": "forces on nodes: [[boundaries]] kind = \"traction\" acts on faces",
-    "TEMPERATURE": "temperatures that are given; here work becomes heat where it is done",
-    "FIELD": "fields that are given", "IMPORT": "a state of another analysis",
+    "TEMPERATURE": "prescribed temperatures",
+    "FIELD": "prescribed fields", "IMPORT": "a state of another analysis",
     "INCLUDE": "it names no file by INPUT",
-    "PARAMETER": "values that are computed; write them out",
+    "PARAMETER": "computed values; write numbers",
     **dict.fromkeys(
         ("NGEN", "NFILL", "NCOPY", "NMAP", "ELGEN", "ELCOPY", "SYSTEM", "IMPERFECTION"),
-        "makes or moves nodes and elements in a way that is not supported; write them out",
+        "makes or moves nodes and elements in a way that is not supported; write the nodes and elements",
     ),
     "STATIC": "no step of *DYNAMIC, EXPLICIT", "HEAT TRANSFER": "no step of *DYNAMIC, EXPLICIT",
     "FREQUENCY": "no step of *DYNAMIC, EXPLICIT", "ANNEAL": "no step of *DYNAMIC, EXPLICIT",
-    "DAMPING": "damping of bodies: there is none here",
+    "DAMPING": "damping of bodies: Conoid has none",
 }  # fmt: skip
 
 MATERIAL = {

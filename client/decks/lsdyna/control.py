@@ -33,16 +33,16 @@ def contact(block: Block, name: str, options: frozenset[str], entry: Entry, surf
     fields = Fields(block, entry, _behind(block, options, entry), _LAYOUT)
     fields.forgive("SPR MPR PENCHK VC VDC SFS SFM SST MST SFST SFMT VSF", "stiffness and output of the penalty method")
     fields.refuse("SBOXID MBOXID", "boxes are not translated")
-    fields.refuse("BT", "the contact begins later; here it is there from the start on")
+    fields.refuse("BT", "the contact begins later; in Conoid it acts from the start")
     if 0.0 < fields.real("DT") < 1e19:
-        fields.refuse("DT", "the contact ends; here it lasts")
+        fields.refuse("DT", "the contact ends; in Conoid it lasts to the end")
     scale = fields.nonzero("FSF", 1.0)
     if scale != 1.0:
         fields.refuse("FSF", "friction is scaled")
     still, sliding, decay = fields.real("FS"), fields.real("FD"), fields.real("DC")
     if still < 0.0 or (decay and still != sliding):
-        entry.remark("refused", f"FS = {still:g}, FD = {sliding:g}", "friction depends on the speed or the part; here "
-                     "it is one number, FS with --anyway")  # fmt: skip
+        entry.remark("refused", f"FS = {still:g}, FD = {sliding:g}", "friction depends on the speed or the part; "
+                     "in Conoid it is one number, FS with --anyway")  # fmt: skip
     elif sliding != still and sliding:
         entry.remark("left", f"FD = {sliding:g}", "without DC friction is FS at any speed")
     one = surface(fields.whole("SSID"), fields.whole("SSTYP"), entry)
@@ -86,13 +86,13 @@ def time_step(draft: Draft, block: Block, entry: Entry) -> None:
     safety = fields.real("TSSFAC")
     if 0.0 < safety <= 1.0:
         draft.numerics["dt_safety"] = safety
-        fields.differ("TSSFAC", "of the bound of this solver, which is below that by the smallest altitude")
+        fields.differ("TSSFAC", "a fraction of Conoid's stable step, which is less than that of the smallest altitude")
         entry.take("numerics.dt_safety")
     else:
         entry.leave("no TSSFAC: numerics.dt_safety is 0.9")
-    fields.forgive("DT2MS", "mass is not scaled here: the steps are those of the true mass")
+    fields.forgive("DT2MS", "Conoid does not scale masses to lengthen the time step")
     fields.forgive("DTINIT TSLIMT ISDO LCTM", "limits of the step")
-    fields.forgive("ERODE MS1ST", "what becomes of elements with small steps")
+    fields.forgive("ERODE MS1ST", "treatment of elements with small time steps")
     fields.rest("left")
 
 

@@ -51,13 +51,13 @@ def with_eos(fields: Fields, context: Context, shear: float) -> dict[str, Any]:
         bulk = eos.real("C1")
         if bulk <= 0.0:
             raise ValueError(f"C1 = {bulk:g} of its equation of state is not above 0")
-        eos.differ("C1", "p = C1 (V0/V - 1) there, C1 ln(V0/V) here: 1 % less at 2 % of compression, 5 % at 10 %")
+        eos.differ("C1", "p = C1 (V0/V - 1) in LS-DYNA, C1 ln(V0/V) in Conoid: 1 % less at 2 % compression")
     if eos.real("V0") == 1.0:
         eos.entry.remark("left", "V0 = 1", "the volume at the start is the reference")
     else:
-        eos.refuse("V0", "matter starts compressed or stretched there, at rest here")
-    eos.refuse("E0", "matter starts with heat there, without here")
-    eos.rest("refused", "this term of the pressure has no key here")
+        eos.refuse("V0", "the material starts compressed or stretched in the deck, unstrained in Conoid")
+    eos.refuse("E0", "the material starts with an internal energy in the deck, with none in Conoid")
+    eos.rest("refused", "Conoid does not have this term of the pressure")
     young, poisson = young_of(bulk, shear)
     return {**material, "elastic": {"young": context.stress(young), "poisson": poisson}}
 
@@ -66,14 +66,14 @@ def cut_off(fields: Fields, material: dict[str, Any], context: Context, pressure
     """Returns ``spall`` of a cut-off of the pressure below 0; none for one that cannot be reached."""
     if -1e10 < context.system.si(pressure, STRESS) * 1e-9 < 0.0:
         material["spall"] = context.stress(-pressure)
-        fields.differ(name, "no pressure is below it; beyond it pores open here, which take up the work")
+        fields.differ(name, "the pressure is cut off; in Conoid pores open at this value and absorb the work")
 
 
 def linear(young: float, strength: tuple[float, float], context: Context) -> dict[str, Any]:
     """Returns ``strength`` of a yield stress and a hardening. Raises ValueError for softening."""
     law: dict[str, Any] = {"model": "linear_hardening", "yield_stress": context.stress(strength[0])}
     if strength[1] < 0.0:
-        raise ValueError("the flow stress falls with the plastic strain; allowed here: one that rises or stays")
+        raise ValueError("the flow stress falls with the plastic strain; allowed: one that rises or is constant")
     if strength[1]:
         law["hardening"] = context.stress(strength[1])
     return law

@@ -16,9 +16,9 @@ def _flow(fields: Fields, context: Context) -> dict[str, Any]:
         raise ValueError("EPSO, the reference rate, is not above 0")
     if rate == 1.0 and context.system.time != "s" and fields.real("C"):
         shown = context.system.quantity(rate, RATE)
-        fields.differ("EPSO", f"taken as it stands: {shown}. Tables of constants mean 1/s: is it that here?")
+        fields.differ("EPSO", f"taken as {shown}. Published constants are usually for 1/s; check the deck")
     if fields.real("C") and fields.real("VP") == 0.0:
-        fields.differ("VP", "the rate of the whole strain there, with VP = 0; here that of the plastic strain")
+        fields.differ("VP", "rate of the total strain in LS-DYNA with VP = 0, of the plastic strain in Conoid")
     return {
         "model": "johnson_cook", "A": context.stress(fields.real("A")), "B": context.stress(fields.real("B")),
         "n": fields.nonzero("N", 1.0), "C": fields.real("C"), "m": fields.nonzero("M", 1.0),
@@ -30,12 +30,12 @@ def simplified(fields: Fields, context: Context) -> Made:
     """Reads ``*MAT_SIMPLIFIED_JOHNSON_COOK``."""
     for name in ("SIGMAX", "SIGSAT"):
         if fields.real(name) < 1e20:
-            fields.refuse(name, "the flow stress ends there, not here")
+            fields.refuse(name, "Conoid has no limit of the flow stress")
     law = _flow(fields, context) | {
         "m": 1.0, "melt_temperature": "2000 K", "specific_heat": "1000 J/kg/K", "taylor_quinney": 0.0,
     }  # fmt: skip
     fields.entry.remark(
-        "differs", "no heat", "the law there has no temperature: no work becomes heat here (taylor_quinney = 0), so "
+        "differs", "no heat", "the law has no temperature: no work becomes heat (taylor_quinney = 0), so "
         "that melt_temperature and specific_heat have no meaning",
     )  # fmt: skip
     return Made({**elastic(fields, context), "strength": law}, failing(fields.real("PSFAIL")))
@@ -45,7 +45,7 @@ def johnson_cook(fields: Fields, context: Context) -> Made:
     """Reads ``*MAT_JOHNSON_COOK``."""
     shear = fields.real("G") or shear_of(fields.real("E"), fields.real("PR"))
     fields.forgive("E PR", "of shells; solids have G and the equation of state")
-    fields.forgive("DTF", "elements leave at a small step there; parts[].erosion.time_step does that here")
+    fields.forgive("DTF", "deletion of elements with a small time step: in Conoid parts[].erosion.time_step")
     fields.forgive("IT NUMINT", "how shells are computed")
     material = with_eos(fields, context, shear)
     law = _flow(fields, context)
@@ -57,8 +57,8 @@ def johnson_cook(fields: Fields, context: Context) -> Made:
     law["specific_heat"] = context.system.quantity(heat, SPECIFIC_HEAT)
     law["taylor_quinney"] = 1.0
     fields.entry.remark(
-        "differs", "taylor_quinney = 1", "the deck has no share of the plastic work that becomes heat: all of it does "
-        "there; 0.9 is usual here",
+        "differs", "taylor_quinney = 1", "in LS-DYNA the whole plastic work becomes heat; "
+        "in Conoid a fraction of 0.9 is usual",
     )  # fmt: skip
     _spall(fields, material, context)
     erosion = _damage(fields, law)
@@ -70,7 +70,7 @@ def _spall(fields: Fields, material: dict[str, Any], context: Context) -> None:
     pressure = fields.real("PC")
     if pressure and kind != 1.0:
         fields.entry.remark(
-            "refused", f"SPALL = {kind:g}", "matter that spalls is rubble without tension there; here the pressure is "
+            "refused", f"SPALL = {kind:g}", "in LS-DYNA spalled material carries no tension; in Conoid the pressure is "
             "cut off at PC, as with SPALL = 1",
         )  # fmt: skip
     cut_off(fields, material, context, -abs(pressure), "PC")
@@ -81,12 +81,12 @@ def _damage(fields: Fields, law: dict[str, Any]) -> dict[str, Any]:
     values = {f"D{i}": fields.real(f"D{i}") for i in range(1, 6)}
     stays = fields.real("EROD")
     if fields.real("EFMIN") > 1e-6:
-        fields.refuse("EFMIN", "least strain of failure, 1e-6 here")
+        fields.refuse("EFMIN", "smallest failure strain, 1e-6 in Conoid")
     if not any(values.values()):
         return {}
     law["damage"] = values
     if stays:
-        fields.refuse("EROD", "what has failed stays without strength there; here it leaves, or keeps its strength")
+        fields.refuse("EROD", "a failed element has no strength in LS-DYNA; in Conoid it is deleted or unchanged")
         return {}
     return {"damage": 1.0}
 
@@ -108,12 +108,12 @@ def holmquist(fields: Fields, context: Context) -> Made:
     if rate > 0.0:
         law["reference_rate"] = context.system.quantity(rate, RATE)
     if fields.real("T") < 0.0:
-        fields.differ("T", "taken without its sign: it is a tension here")
+        fields.differ("T", "taken without its sign: T is a tension in Conoid")
     if 0.0 < fields.real("SFMAX") < 1e10:
         law["largest_fractured"] = fields.real("SFMAX")
     failure = fields.real("FS")
     if failure < 0.0:
-        fields.refuse("FS", "elements leave by tension there (p* + T* below 0)")
+        fields.refuse("FS", "deletion of elements in tension (p* + T* below 0)")
     material: dict[str, Any] = {"density": context.system.quantity(fields.real("RO"), DENSITY)}
     material |= {"elastic": {"young": context.stress(young), "poisson": poisson}, "strength": law}
     return Made(material, failing(failure))

@@ -74,7 +74,7 @@ def _axis(fields: Fields) -> tuple[tuple[float, float, float], tuple[float, floa
     along = [fields.real(name) for name in ("NX", "NY", "NZ")]
     length = math.sqrt(sum(value * value for value in along))
     if turn and (length == 0.0 or along[0] == -999.0):
-        raise ValueError("OMEGA turns about an axis that is no direction")
+        raise ValueError("the axis of OMEGA has no direction")
     x, y, z = (turn * value / length if turn else 0.0 for value in along)
     return (x, y, z), centre
 
@@ -83,7 +83,7 @@ def velocity_rigid(scene: Scene, block: Block, options: frozenset[str], entry: E
     """Reads ``*INITIAL_VELOCITY_RIGID_BODY``."""
     for card in block.filled():
         fields = Fields(block, entry, [card], ("PID VX VY VZ VXR VYR VZR ICID",))
-        fields.refuse("VXR VYR VZR ICID", "the spin is about the centre of mass there; give parts[].spin here")
+        fields.refuse("VXR VYR VZR ICID", "the spin is about the centre of mass; give parts[].spin")
         speed = {axis: fields.real(f"V{'XYZ'[axis]}") for axis in range(3)}
         scene.starts.append(Start(scene.part(fields.whole("PID")), entry, speed))
 
@@ -135,8 +135,8 @@ def motion(scene: Scene, block: Block, options: frozenset[str], entry: Entry) ->
         scale, kind = fields.nonzero("SF", 1.0), fields.whole("VAD")
         curve = tuple((time, scale * value) for time, value in scene.lasting(fields.whole("LCID")))
         if 0.0 < fields.real("DEATH") < scene.end:
-            fields.refuse("DEATH", "the motion ends before the run does; here it lasts")
-        fields.refuse("BIRTH", "the motion begins later; here it is from the start on")
+            fields.refuse("DEATH", "the motion ends before the run; in Conoid it lasts to the end")
+        fields.refuse("BIRTH", "the motion begins later; in Conoid it begins at the start")
         fields.forgive("VID", "a direction of DOF = 4")
         if kind == 0:
             speed, course = velocity_course(curve, scene.end)

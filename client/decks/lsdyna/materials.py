@@ -54,13 +54,13 @@ def erode(fields: Fields | None, made: Made) -> None:
     fields.whole("MID")
     fields.forgive("EXCL NUMFIP NCS", "how many points of an element fail")
     if "strength" not in made.material:
-        fields.rest("refused", "its material is elastic here and has no plastic strain by which a tet could leave")
+        fields.rest("refused", "its material is elastic in Conoid: there is no plastic strain that could delete a tet")
     elif fields.real("EFFEPS") > 0.0:
         made.erosion["plastic_strain"] = fields.real("EFFEPS")
-        fields.differ("EFFEPS", "a strain of the whole deformation; erosion.plastic_strain is that of the plastic one")
+        fields.differ("EFFEPS", "a total strain; erosion.plastic_strain is the plastic strain")
     elif fields.real("MXEPS") > 0.0:
         made.erosion["plastic_strain"] = fields.real("MXEPS")
-        fields.refuse("MXEPS", "the largest principal strain: equal to erosion.plastic_strain in simple tension alone")
+        fields.refuse("MXEPS", "the largest principal strain: equal to erosion.plastic_strain only in simple tension")
     if "plastic_strain" in made.erosion:
         fields.entry.take("parts[].erosion")
     fields.rest("refused", "a criterion of failure that is not translated")
@@ -77,9 +77,9 @@ def _mat_elastic(fields: Fields, context: Context) -> Made:
 def _mat_plastic_kinematic(fields: Fields, context: Context) -> Made:
     tangent, young = fields.real("ETAN"), fields.real("E")
     if tangent and fields.real("BETA") != 1.0:
-        fields.refuse("BETA", "kinematic hardening in part; here it is isotropic, BETA = 1")
+        fields.refuse("BETA", "partly kinematic hardening; Conoid has isotropic hardening, BETA = 1")
         if not fields.given("BETA") or fields.real("BETA") == 0.0:
-            fields.entry.remark("refused", "BETA = 0", "kinematic hardening; here it is isotropic, BETA = 1")
+            fields.entry.remark("refused", "BETA = 0", "kinematic hardening; Conoid has isotropic hardening, BETA = 1")
     else:
         fields.real("BETA")
     law = linear(young, (fields.real("SIGY"), hardening_of(young, tangent)), context)
@@ -89,14 +89,14 @@ def _mat_plastic_kinematic(fields: Fields, context: Context) -> Made:
 
 def _mat_piecewise(fields: Fields, context: Context) -> Made:
     fields.refuse("LCSR", "a curve of the flow stress by the rate; C and P are translated")
-    fields.forgive("TDEL", "elements leave at a small step there; parts[].erosion.time_step does that here")
+    fields.forgive("TDEL", "deletion of elements with a small time step: in Conoid parts[].erosion.time_step")
     failure = fields.real("FAIL")
     if failure < 0.0:
         fields.refuse("FAIL", "failure by a subroutine of the user")
     law = linear(fields.real("E"), _hardening_curve(fields, context), context)
     law = with_rate(law, fields, context, ("C", "P"))
     if law["model"] == "cowper_symonds" and "hardening" in law and fields.real("VP") == 1.0:
-        fields.refuse("VP", "the rate adds SIGY (rate/C)^(1/P) there; here it multiplies the hardening as well")
+        fields.refuse("VP", "in LS-DYNA the rate adds SIGY (rate/C)^(1/P); in Conoid it also multiplies the hardening")
     return Made({**elastic(fields, context), "strength": law}, failing(failure))
 
 
@@ -126,7 +126,7 @@ def _straight(curve: Curve, what: str) -> tuple[float, float]:
 
 def _mat_hydro(fields: Fields, context: Context) -> Made:
     material = with_eos(fields, context, fields.real("G"))
-    fields.forgive("CHARL", "a length of elements that break there")
+    fields.forgive("CHARL", "a length of elements for fracture")
     cut_off(fields, material, context, fields.real("PC"), "PC")
     law = linear(0.0, (fields.real("SIGY"), fields.real("EH")), context)
     return Made({**material, "strength": law}, failing(fields.real("FS")))

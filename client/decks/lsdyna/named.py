@@ -101,6 +101,6 @@ class Numbered:
         if found is None or found.odd:
             raise ValueError(f"the set {number}: {found.odd if found else 'it is not defined'}")
         found.entry.take(f"of {entry.keyword}, {entry.place}")
-        entry.remark("differs", f"set {number}", "whole surfaces of the parts meet here, not those of the set alone")
+        entry.remark("differs", f"set {number}", "the whole surfaces of the parts are in contact, not only the set")
         members = self._members(found)
         return frozenset(key for key in self.topology.bodies if not self.topology.of[key].isdisjoint(members))

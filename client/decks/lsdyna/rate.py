@@ -19,5 +19,5 @@ def with_rate(law: dict[str, Any], fields: Fields, context: Context, names: tupl
     if rate <= 0.0 or exponent <= 0.0:
         raise ValueError(f"{names[0]} = {rate:g} and {names[1]} = {exponent:g} are not both above 0")
     if fields.real("VP") == 0.0:
-        fields.differ("VP", "the rate of the whole strain there, with VP = 0; here that of the plastic strain")
+        fields.differ("VP", "rate of the total strain in LS-DYNA with VP = 0, of the plastic strain in Conoid")
     return {**law, "model": "cowper_symonds", "D": context.system.quantity(rate, RATE), "q": exponent}

@@ -135,7 +135,7 @@ class LsDyna:
             fields = Fields(block, entry, [card], ("PID SECID MID EOSID HGID GRAV ADPOPT TMID",))
             number = str(fields.whole("PID"))
             fields.forgive("SECID HGID ADPOPT", "how elements are integrated")
-            fields.refuse("GRAV TMID", "gravity that is there from before, and conduction of heat")
+            fields.refuse("GRAV TMID", "preloaded gravity, and conduction of heat")
             eos = fields.whole("EOSID")
             if number not in self._solid:
                 fields.whole("MID")

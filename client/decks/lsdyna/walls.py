@@ -81,7 +81,7 @@ def _moving(scene: Scene, fields: Fields, table: dict[str, Any]) -> None:
     if mass > 0.0:
         table["mass"] = scene.draft.quantity(mass, MASS)
         if fields.real("FRIC"):
-            fields.differ("FRIC", "the wall moves along its normal alone there; here friction drags it along as well")
+            fields.differ("FRIC", "in LS-DYNA the wall moves only along its normal; in Conoid friction moves it, too")
     elif speed:
         fields.refuse("V0", "a speed without MASS; give the wall a mass, or velocity and course")
 
@@ -105,10 +105,10 @@ def _stand(scene: Scene, fields: Fields, table: dict[str, Any]) -> None:
     """Adds a wall, and reads the fields that all kinds of walls have: stopped nodes, times, and friction."""
     fields.refuse("NSIDEX BOXID BIRTH", "exceptions, boxes and times are not translated")
     if 0.0 < fields.real("DEATH") < scene.end:
-        fields.refuse("DEATH", "the wall goes before the run ends; here it stays")
+        fields.refuse("DEATH", "the wall is removed before the run ends; in Conoid it stays")
     friction = fields.real("FRIC")
     if not 0.0 <= friction < 1.0:
-        fields.refuse("FRIC", "nodes stick to the wall there; here friction is Coulomb's")
+        fields.refuse("FRIC", "in the deck nodes stick to the wall; Conoid has Coulomb friction")
     elif friction:
         table["friction"] = friction
     scene.walls.append(Stop(scene.nodes(fields.whole("NSID"), fields.entry), table, fields.entry))

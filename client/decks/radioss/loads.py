@@ -75,7 +75,7 @@ def _motion(scene: Scene, option: Option, entry: Entry) -> None:
     fields = Fields(option, entry, option.rows[1:], layout)
     fields.refuse("SKEW SENS FRAME ICOOR TSTART", "local axes, sensors and later starts are not translated")
     if 0.0 < fields.real("TSTOP") < scene.end:
-        fields.refuse("TSTOP", "the motion ends before the run does; here it lasts")
+        fields.refuse("TSTOP", "the motion ends before the run; in Conoid it lasts to the end")
     axis = fields.text("DIR").lower()
     if axis not in ("x", "y", "z"):
         raise ValueError(f"Dir = {axis!r} is not X, Y or Z")
@@ -124,7 +124,7 @@ def _step(scene: Scene, option: Option, entry: Entry) -> None:
     """Reads ``/DT``: the factor of the stable step; ``/DT/...`` are limits of elements and nodes."""
     values = _values(option) if len(option.words) == 1 else []
     if len(option.words) > 1 or not values or not 0.0 < values[0] <= 1.0:
-        entry.leave("limits of the step: mass is not scaled here, and tets leave by parts[].erosion alone")
+        entry.leave("limits of the time step: Conoid does not scale masses, and only parts[].erosion deletes tets")
         return
     scene.draft.numerics["dt_safety"] = values[0]
     entry.remark("differs", f"{values[0]:g}", "of the bound of this solver: numerics.dt_safety")

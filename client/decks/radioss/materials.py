@@ -61,7 +61,7 @@ def translated(law: str, fields: Fields, context: Context) -> Made | None:
         fields.entry.refuse(f"its constants cannot be used: {error}")
         return None
     if fields.real("RHO_0") not in (0.0, fields.real("RHO_I")):
-        fields.refuse("RHO_0", "matter starts compressed or stretched there, at rest here")
+        fields.refuse("RHO_0", "the material starts compressed or stretched in the deck, unstrained in Conoid")
     fields.rest()
     return made
 
@@ -84,7 +84,7 @@ def _equation(context: Context) -> dict[str, Any]:
     eos = context.eos
     if eos is None:
         return {}
-    eos.refuse("S2 S3 ALPHA E0", "this term of the pressure has no key here")
+    eos.refuse("S2 S3 ALPHA E0", "Conoid does not have this term of the pressure")
     eos.forgive("RHO_0", "the density of the material")
     law = {
         "model": "mie_gruneisen", "c0": context.system.quantity(eos.real("C"), SPEED), "S": eos.real("S1"),
@@ -101,7 +101,7 @@ def _law1(fields: Fields, context: Context) -> Made:
 def _law2(fields: Fields, context: Context) -> Made:
     if fields.whole("IFLAG"):
         raise ValueError("IFLAG = 1: give A, B and N, not yield and ultimate stress")
-    fields.refuse("CHARD", "kinematic hardening in part; here it is isotropic")
+    fields.refuse("CHARD", "partly kinematic hardening; Conoid has isotropic hardening")
     fields.forgive("ICC FSMOOTH FCUT", "how the rate is filtered")
     return _plastic(fields, context, 298.0, "LAW2")
 
@@ -110,20 +110,20 @@ def _law4(fields: Fields, context: Context) -> Made:
     fields.forgive("TMAX", "a temperature from which on nothing changes") if fields.real("TMAX") >= 1e9 else None
     if context.eos is None:
         fields.entry.remark(
-            "differs", "no /EOS", "p = K (V0/V - 1) there, K ln(V0/V) here: 1 % less at 2 % of compression"
+            "differs", "no /EOS", "p = K (V0/V - 1) in Radioss, K ln(V0/V) in Conoid: 1 % less at 2 % compression"
         )
     made = _plastic(fields, context, 300.0, "LAW4")
     pressure = fields.real("PMIN")
     if -1e20 < pressure < 0.0:
         made.material["spall"] = context.stress(-pressure)
-        fields.differ("PMIN", "no pressure is below it; beyond it pores open here, which take up the work")
+        fields.differ("PMIN", "the pressure is cut off; in Conoid pores open at this value and absorb the work")
     return made
 
 
 def _plastic(fields: Fields, context: Context, room: float, kind: str) -> Made:
     """Reads Johnson-Cook's law; linear hardening if it has neither rate nor heat and n is 1."""
     if 0.0 < fields.real("SIG_MAX") < 1e20:
-        fields.refuse("SIG_MAX", "the flow stress ends there, not here")
+        fields.refuse("SIG_MAX", "Conoid has no limit of the flow stress")
     material = _elastic(fields, context, kind)
     A, B, n, C = (fields.real("A"), fields.real("B"), fields.nonzero("N", 1.0), fields.real("C"))
     heats = fields.real("M") > 0.0 and fields.real("RHOCP") > 0.0
@@ -145,7 +145,7 @@ def _rate(fields: Fields, context: Context) -> dict[str, Any]:
         raise ValueError("EPS_DOT_0, the reference rate, is not above 0")
     if not fields.real("C"):
         return {}
-    fields.differ("C", "the rate of the whole strain there; here that of the plastic strain")
+    fields.differ("C", "rate of the total strain in Radioss, of the plastic strain in Conoid")
     return {"reference_rate": context.system.quantity(rate, RATE)}
 
 
@@ -153,15 +153,15 @@ def _heat(fields: Fields, context: Context, heats: bool, room: float) -> dict[st
     """Reads thermal softening; no heating if the heat capacity or the exponent is 0."""
     cold = context.system.quantity(fields.nonzero("TR", room), TEMPERATURE)
     if not fields.real("TR") and heats:
-        fields.differ("TR", f"{room:g} K, as there where it is empty")
+        fields.differ("TR", f"{room:g} K, the default of Radioss")
     if not heats:
         fields.forgive("M TMELT RHOCP", "of no meaning without both M and RHOCP")
         fields.entry.remark("differs", "no heat", "no work becomes heat (taylor_quinney = 0): melt_temperature and "
                             "specific_heat have no meaning")  # fmt: skip
         return {"m": 1.0, "reference_temperature": cold, "melt_temperature": "2000 K", "specific_heat": "1000 J/kg/K",
                 "taylor_quinney": 0.0}  # fmt: skip
-    fields.entry.remark("differs", "taylor_quinney = 1", "all of the internal energy heats there, elastic and of "
-                        "pressure as well; here all of the plastic work does")  # fmt: skip
+    fields.entry.remark("differs", "taylor_quinney = 1", "in Radioss the whole internal energy becomes heat, "
+                        "in Conoid the whole plastic work")  # fmt: skip
     heat = fields.real("RHOCP") / fields.real("RHO_I")
     return {
         "m": fields.real("M"), "reference_temperature": cold,
@@ -175,12 +175,12 @@ def _limit(fields: Fields) -> dict[str, Any]:
     strain = fields.real("EPS_MAX")
     if not 0.0 < strain < 1e20:
         return {}
-    fields.refuse("EPS_MAX", "beyond it a solid has no strength and stays there; here its tet leaves")
+    fields.refuse("EPS_MAX", "in Radioss the element keeps its pressure without strength; in Conoid the tet is deleted")
     return {"plastic_strain": strain}
 
 
 def _damage(law: dict[str, Any], context: Context) -> dict[str, Any]:
-    """Reads ``/FAIL/JOHNSON``: D3 has the same sign as here."""
+    """Reads ``/FAIL/JOHNSON``: D3 has the same sign as in Conoid."""
     found = context.failure
     if found is None:
         return {}
@@ -189,10 +189,10 @@ def _damage(law: dict[str, Any], context: Context) -> dict[str, Any]:
     if rate > 0.0:
         wanted = context.system.quantity(rate, RATE)
         if law.setdefault("reference_rate", wanted) != wanted:
-            found.refuse("EPS_DOT_0", f"damage and strength have one reference rate here, {law['reference_rate']}")
+            found.refuse("EPS_DOT_0", f"in Conoid damage and strength have one reference rate, {law['reference_rate']}")
     found.forgive("IFAIL_SH IXFEM DADV", "of shells")
     if found.whole("IFAIL_SO") not in (0, 1):
-        found.refuse("IFAIL_SO", "what has failed stays without strength there; here its tet leaves")
+        found.refuse("IFAIL_SO", "in Radioss a failed element keeps no strength; in Conoid its tet is deleted")
     found.rest()
     return {"damage": 1.0}
 
@@ -207,7 +207,7 @@ def _law79(fields: Fields, context: Context) -> Made:
     }  # fmt: skip
     law["reference_rate"] = context.system.quantity(fields.nonzero("EPS_DOT_0", 1.0), RATE)
     if fields.real("T") < 0.0:
-        fields.differ("T", "taken without its sign: it is a tension here")
+        fields.differ("T", "taken without its sign: T is a tension in Conoid")
     if 0.0 < fields.real("SIG_FMAX") < 1e19:
         law["largest_fractured"] = fields.real("SIG_FMAX")
     fields.forgive("FCUT", "how the rate is filtered")

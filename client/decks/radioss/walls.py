@@ -27,14 +27,14 @@ def wall(scene: Scene, option: Option, entry: Entry) -> None:
     if shape != "plane":
         table |= {"shape": shape, "radius": scene.draft.quantity(0.5 * fields.real("DIAMETER"), LENGTH)}
     else:
-        fields.forgive("DIAMETER", "of no meaning for a plane")
+        fields.forgive("DIAMETER", "without meaning for a plane")
     if shape != "sphere":
         table["normal" if shape == "plane" else "axis"] = _direction(fields, start)
     if moves:
         _moving(scene, fields, table)
     slide, friction = fields.whole("SLIDE"), fields.real("FRIC")
     if slide == 1:
-        fields.refuse("SLIDE", "nodes stick to the wall there; here friction is Coulomb's")
+        fields.refuse("SLIDE", "in the deck nodes stick to the wall; Conoid has Coulomb friction")
     if slide == 2 and friction:
         table["friction"] = friction
     scene.walls.append(Stop(scene.nodes(_group(fields), entry), table, entry))
@@ -64,7 +64,7 @@ def _moving(scene: Scene, fields: Fields, table: dict[str, Any]) -> None:
         table["velocity"] = scene.draft.vector(speed, SPEED)
     if mass > 0.0:
         table["mass"] = scene.draft.quantity(mass, MASS)
-        fields.differ("NODE", "the wall moves with the mass of the option, and by nothing else that acts on its node")
+        fields.differ("NODE", "the wall moves with the mass of the option; other loads on its node are ignored")
     else:
         fields.refuse("NODE", "a wall that moves with its node; give it a mass, or velocity and course")
 

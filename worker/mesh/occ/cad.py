@@ -17,7 +17,7 @@ from conoid.cases.reading.similar import choices
 from ...errors import MeshError
 from .draw import Solids
 from .frame import Frame
-from .printed import said
+from .printed import captured
 from .step import length_units, solids_in
 
 MOST_BYTES = 256 * 2**20
@@ -89,7 +89,7 @@ def _read(gmsh: Any, form: CadForm, path: Path, head: str) -> tuple[Solids, Frac
     gmsh.option.setNumber("Geometry.OCCImportLabels", 1)
     try:
         signal.alarm(_READING)
-        with said() as text:
+        with captured() as text:
             found = gmsh.model.occ.importShapes(str(copy), highestDimOnly=True, format=kind)
     except Exception as error:
         raise MeshError(f"{head}: OpenCASCADE cannot read the {kind.upper()} file ({error})") from error
@@ -119,9 +119,9 @@ def _bytes(path: Path, head: str) -> bytes:
 
 def _step_unit(form: CadForm, data: bytes, head: str) -> Fraction:
     """Return the unit of the coordinates. OpenCASCADE converts the units of the file into the requested unit."""
-    said = length_units(data, head)
-    if form.unit is not None and any(abs(float(unit) - form.unit) > 1e-9 * form.unit for unit in said):
-        units = choices(sorted(si(float(unit), "m") for unit in said))
+    declared = length_units(data, head)
+    if form.unit is not None and any(abs(float(unit) - form.unit) > 1e-9 * form.unit for unit in declared):
+        units = choices(sorted(si(float(unit), "m") for unit in declared))
         raise MeshError(f"{head}: unit = {si(form.unit, 'm')}, but the STEP file is in {units}; remove or mend the key")
 
     return _MILLIMETRE

@@ -7,7 +7,7 @@ from contextlib import contextmanager
 
 
 @contextmanager
-def said() -> Iterator[bytearray]:
+def captured() -> Iterator[bytearray]:
     """Collect the bytes that this process prints within the block. The bytes are available after the block."""
     text = bytearray()
     with tempfile.TemporaryFile() as file:
