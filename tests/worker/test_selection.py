@@ -218,6 +218,21 @@ def test_no_traction_loads_the_cut_of_a_sector(sector: str, more: dict[str, Any]
     assert not whole.warnings
 
 
+def test_a_traction_on_a_bonded_interface_is_reported(tmp_path: Path) -> None:
+    """Two boxes of 2 x 2 x 1 mm: their interface is loaded on both sides, 2 x 4 mm^2."""
+    upper = {**BOX, "low": [0, 0, 1e-3], "high": [2e-3, 2e-3, 2e-3], "element_size": 5e-4}
+    data = {
+        "name": "two", "materials": {"m": METAL}, "run": {"end_time": "1 us"}, "boundaries": [SHEAR],
+        "parts": [{"name": name, "material": "m", "mesh": mesh} for name, mesh in (("a", BOX), ("b", upper))],
+        "bond": [{"kind": "tied", "parts": ["a", "b"]}],
+    }  # fmt: skip
+    said = "boundaries[0]: 8 mm^2 of its faces are bonded to another part"
+    whole = assembly.assemble(parse_case(data), tmp_path)
+    assert [each.startswith(said) for each in whole.warnings] == [True]
+    side = {**SHEAR, "low": [0, 0, 0], "high": [0, 2e-3, 2e-3]}
+    assert not assembly.assemble(parse_case({**data, "boundaries": [side]}), tmp_path).warnings
+
+
 def test_the_surface_of_a_quarter_cylinder_is_estimated_without_its_cuts() -> None:
     round_body = {"shape": "cylinder", "radius": 2e-3, "length": 3e-3, "element_size": 0.5e-3, "sector": "quarter"}
     load = loads(case_of(round_body, SHEAR, *CUTS))[0]

@@ -127,7 +127,7 @@ def assembled(case: schema.Case, meshes: Iterable[tuple[int, TetMesh]], overlaps
     near = selection.nearness(case, x, members, t, part_of_tet)
     known = selection.settled(case, made.part_of_body)
     marked = marks(case, made.read, len(x))
-    loads, found, missed = loading.loads(case, x, members, (t, part_of_tet), near, known, marked)
+    loads, found, missed = loading.loads(case, x, members, (t, part_of_tet), near, known, marked, tied)
     driven, more = loading.driven(case, x, members, near, known, marked)
     velocity, mixed = initial_velocities(case, x, part_of_node, shares)
     mixed += parted(case, x, t, tied)

@@ -4,6 +4,7 @@ import numpy as np
 
 from conoid.cases.model import schema
 
+from ..bonds.pieces import Pieces
 from ..boundaries import surface_pressure
 from ..errors import InputError
 from ..mesh.faces import FACES, across, normals
@@ -22,6 +23,7 @@ def loads(
     near: Nearness,
     known: list[bool],
     marked: Marks,
+    tied: Pieces,
 ) -> tuple[list[Load | LoadedFaces], list[Selected], list[str]]:
     """Return the loads of the tractions of a case, the selection of each traction, and warnings.
 
@@ -49,8 +51,23 @@ def loads(
         found.append(selected)
         took = np.isin(np.arange(len(case.parts)), tet_part[tet[chosen]])
         warnings += selection.missed(case, index, x, members, near, took)
+        warnings += _bonded(index, 4 * tet[chosen].astype(np.int64) + face[chosen], tied)
         loads.append(_load(spec, tet[chosen].astype(np.int64), loaded.astype(np.int64), 0.5 * normals(x, loaded)))
     return loads, found, warnings
+
+
+def _bonded(index: int, faces: Ints, tied: Pieces) -> list[str]:
+    """Return a warning for a traction on bonded interfaces, which are no free surface. ``faces``: (m,) numbers of its
+    faces, 4 * tet + local face.
+    """
+    areas = tied.weights.sum(axis=1)
+    area = float(areas[np.isin(tied.slave, faces)].sum() + areas[np.isin(tied.master, faces)].sum())
+    if not area > 0.0:
+        return []
+    return [
+        f"boundaries[{index}]: {1e6 * area:.6g} mm^2 of its faces are bonded to another part and carry the load, too; "
+        "leave them out by its box, its cylinder or its parts"
+    ]
 
 
 def _load(spec: schema.Traction, tets: Ints, faces: Ints, outward: Floats) -> Load | LoadedFaces:
