@@ -63,7 +63,7 @@ def test_a_house_knows_only_itself_and_the_contract() -> None:
 
 
 def test_no_process_imports_modules_from_its_working_folder() -> None:
-    """Such folders are the user's, and may have a module ``queue`` or ``conoid``: with -P Python ignores both."""
+    """Working folders are the user's, and may have a module ``queue`` or ``conoid``: with -P Python ignores both."""
     started = re.compile(r'(?:executable,|\{python\}|bin/python) *"?(-\w+)')
     found = [(name_of(path), match[1]) for path in SOURCES for match in started.finditer(path.read_text("utf-8"))]
     found += [

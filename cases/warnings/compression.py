@@ -41,8 +41,8 @@ def griffith(made: Material) -> float:
 
 
 def impact_stresses(case: Case) -> list[float]:
-    """Returns the largest stress, Pa, of the plane wave of an impact in each part: Z1 Z2 / (Z1 + Z2) times its speed
-    (impact.impact_speeds), Z1 times it for a wall.
+    """Returns the largest stress, Pa, of the plane wave of an impact in each part. The stress is the impact speed
+    (impact.impact_speeds) times Z1 Z2 / (Z1 + Z2), with the impedances Z1 and Z2 of both parts, or times Z1 for a wall.
     """
     bounds = [velocities(case, part) for part in case.parts]
     weights = [_impedance(material(case, part.material)) for part in case.parts]

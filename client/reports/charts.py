@@ -106,7 +106,7 @@ def _outside(axes: Axes, told: Course) -> None:
         axes.plot(*zip(*points, strict=True), linewidth=1.5 if rank in named else 0.7, **style)
     axes.set(xlabel="time, µs", ylabel="outside nodes", ylim=(0, None), xlim=(0, None))
     told_of = f"surface nodes: {counted(len(told.cuts), 'cut')} on {counted(ranks, 'rank')}"
-    axes.set_title(told_of if ranks else "nothing is in contact")
+    axes.set_title(told_of if ranks else "no parts in contact")
     if axes.get_legend_handles_labels()[0]:
         axes.legend(fontsize=8, frameon=False)
 

@@ -98,7 +98,7 @@ def _ended(point: Point, case: Case, run: Run) -> Done:
 
 
 def series(done: Sequence[Done]) -> list[Series]:
-    """Returns the points in their variants and meshes. Raises ClientError if none has succeeded."""
+    """Returns the points in their variants and meshes. Raises ClientError if no run has succeeded."""
     good = [each for each in done if not each.problem]
     if not good:
         raise ClientError(f"no run has succeeded; the first: {done[0].problem if done else 'there is none'}")

@@ -28,7 +28,7 @@ _SHARE, _MOST = 4, 8192
 because the remaining descriptors are needed for files."""
 _FILES = 65_536
 """Number of file descriptors that the server requests from the system. The value was chosen because the server uses
-fewer."""
+fewer descriptors."""
 _SOME = 64
 """Number of oldest idle connections among which the connection to close is selected. The value was chosen because
 this selection takes 0.1 ms."""

@@ -36,7 +36,7 @@ its conclusion."""
 
 def compared(study: Study) -> str:
     """Returns the published speed-ups beside the projected ones, as Markdown. Raises KeyError for a case without
-    published ones."""
+    a published speed-up."""
     paper = PAPER[study.case]
     projected = {run.ranks: study.speed_up(run) for run in study.runs if run.threads == 1 and not run.by_tasks}
     rows = []

@@ -141,7 +141,8 @@ def test_alpha_and_every_go_into_the_policy() -> None:
 
 @pytest.mark.parametrize("ranks", [2, 3, 5, 8, 16])
 def test_the_division_is_that_of_the_worker(ranks: int) -> None:
-    """Each cut of the replay divides a point, and the worker moves it as a whole. The longest axis is unambiguous."""
+    """Differences are at most one point for each cut: the replay divides the point at a cut, and the worker gives the
+    whole point to one side. The longest axis is unambiguous."""
     random = np.random.default_rng(ranks)
     points = random.uniform(size=(400, 3)) * [16.0, 3.0, 0.5]
     weights = random.uniform(0.1, 1.0, 400)

@@ -161,8 +161,8 @@ def test_a_facet_unloads_along_the_secant_and_releases_the_energy_under_it(angle
 
 def test_dissipated_energy_never_decreases() -> None:
     """The opening makes a random walk, including closing beyond the start. A step that closes a facet further than
-    allowed releases half of its traction times the step. A step across the bracket <d_n>, where the mean of two
-    forces is not exact, releases stiffness times step^2 / 8.
+    allowed releases half of its traction times the step. A step in which the normal opening changes its sign
+    (<d_n> is its positive part), so that the mean of two forces is not exact, releases stiffness times step^2 / 8.
     """
     random, u, lost, largest = np.random.default_rng(3), np.zeros(3), [0.0], 0.0
     facet = Facet(STRENGTH * direction(0.7), weight=0.5)

@@ -125,10 +125,10 @@ def _newton(w, params, m, dt, halve):  # type: ignore[no-untyped-def]
 
     1. Residual and slope at d.
     2. New bracket.
-    3. Newton step in d. It is one in ln d, to second order, where the flow stress increases more steeply than the trial
-       stress decreases (as the logarithm or a power of d: by the rate, or on first yield), and where a step in d would
-       cross the kink at which the rate term begins: steps in d would alternate between 1e-9 and 1e-5. A step that
-       crosses the kink in ln d as well ends there.
+    3. Newton step in d. The step is in ln d instead, to second order, where the flow stress increases more steeply
+       than the trial stress decreases (as the logarithm or a power of d: by the rate, or on first yield), and where a
+       step in d would cross the kink at which the rate term begins: steps in d would alternate between 1e-9 and 1e-5.
+       A step that crosses the kink in ln d as well ends there.
     4. Halving instead, if the step leaves the bracket, and always with ``halve``.
     5. Convergence, by the step or by the width of the bracket.
     """
