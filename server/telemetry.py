@@ -155,7 +155,9 @@ class Telemetry:
         try:
             return zenoh.open(config)
         except zenoh.ZError as error:
-            raise TelemetryError(f"the Zenoh router cannot listen on port {self.port}: {_reason(error)}") from None
+            raise TelemetryError(
+                f"the Zenoh router cannot listen on port {self.port}: {_reason(error)}; --zenoh-port 0 takes a free one"
+            ) from None
         finally:
             users.unlink(missing_ok=True)
 

@@ -22,7 +22,7 @@ SHORT = {
     "taylor_copper": "3 us", "triaxial_glass": "2 us", "free_tets": "5 us",
 }  # fmt: skip
 """Shipped cases whose meshes are made without gmsh, and their end times in this test."""
-GIVEN = ("breaking", "eroding", "colliding")
+GIVEN = ("breaking", "eroding", "colliding", "holding")
 """Scenes of this folder that run to their ends."""
 EVERYWHERE = [*SHORT, *GIVEN, *(f"shattering_{form}" for form in ("standard", "nodal", "split"))]
 PLAIN = "-AVX2,-FMA,-AVX2_Usable,-FMA_Usable"
