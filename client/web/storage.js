@@ -19,7 +19,8 @@ function stored(key) {
   }
 }
 
-// Whether a value has the type of an example: an object the types of its fields, a list only texts; null accepts any type.
+// Whether a stored value has the type of the example. Objects are compared field by field, a list must contain texts
+// only, and an example null accepts any type.
 function alike(value, example) {
   if (example === null || example === undefined) return true;
   if (Array.isArray(example)) return Array.isArray(value) && value.every((one) => typeof one === "string");

@@ -1,7 +1,7 @@
 """Facet tractions from nodal stress: mean over the stars of the three nodes, smoother than the mean of the two tets.
 
-The stress of a node is the mean over its tets, weighted with their initial volumes; The sums are sums of integers, so
-that both sides of a facet compute the same traction on any ranks. A facet must pass the criterion of its two tets as
+The stress of a node is the mean over its tets, weighted with their initial volumes. Integers are summed, so that both
+sides of a facet compute the same traction on any ranks. A facet must pass the criterion of its two tets as
 well: only such facets are candidates (criterion.py).
 """
 

@@ -95,8 +95,8 @@ def _numbers(whole: Whole, labels: Ints) -> Ints:
     """Return (tets,) the number of the fragment of each tet.
 
     If bodies are separated by erosion only, there is no record of fragments. In that case the largest piece of each
-    part has the number of the part. Every other piece has the number of its first tet, counted above the numbers of
-    the parts.
+    part has the number of the part. The number of every other piece is the number of parts plus the index of the
+    first tet of the piece.
     """
     if whole.initial:
         return numbered(whole.numbers, labels, whole.next, SerialComm())[0]

@@ -49,9 +49,9 @@ class Deviation:
     def measure(
         self, motion: ReferenceMotion, x: Floats, v: Floats, faces: Indices, edges: Indices, tracked: Flags
     ) -> float:  # fmt: skip
-        """Sets the distances of the slots at ``x`` (slots, 3), with velocities before contact ``v`` (slots, 3), and of
-        the faces and edges at them, from their lines in the step and ``motion.beyond``. Returns the largest distance of
-        the ``tracked`` (slots,) slots from their search lines, m.
+        """Sets the distances of slots, faces and edges from their lines, over the step and the time ``motion.beyond``
+        after it. ``x``, ``v`` (slots, 3): positions, and velocities before contact. Returns the largest distance of the
+        ``tracked`` (slots,) slots from their search lines, m.
         """
         n, dt, searched, short = len(x), motion.end - motion.t + motion.beyond, motion.searched, motion.short
         most = self._scratch.of("most", self._slots.many(n), np.float64)

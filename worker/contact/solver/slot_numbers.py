@@ -35,8 +35,8 @@ def take(x, v, held, node_x, node_v, local, first, stop):  # type: ignore[no-unt
 
 @njit(types.void(_U1, _N1, _N2, _N1, _N1, _U1, _I2, _I, _I, _I), cache=True)
 def mark(touched, set_of, nodes, found, zone, shared, many, task, first, stop):  # type: ignore[no-untyped-def]
-    """Writes the set of each contact ``found`` from ``first`` to ``stop``, and the number ``many`` (tasks, sets) of
-    this task in each set.
+    """Task: writes the number of the set of each contact in ``found[first:stop]`` to ``set_of``, and counts the
+    contacts of this task in each set (``many``, (tasks, sets)).
 
     A contact belongs to the smallest box (zones.py) with all its nodes; ``zone`` (surface_nodes,): of each node. There
     are two groups of sets: first the sets of contacts with a ``shared`` (surface_nodes,) node, then the sets of
