@@ -39,7 +39,7 @@ class Placed:
     def points(self) -> list[Vector]:
         """Points that fill the body evenly; its centre if it is too thin for the lattice."""
         low, high = geometry.bounds(self.mesh) or ((0.0,) * 3, (0.0,) * 3)
-        inside = [point for point in lattice(low, high, LATTICE) if geometry.holds(self.mesh, point)]
+        inside = list(filter(geometry.round_part(self.mesh), lattice(low, high, LATTICE)))
         return [_turned(point, self.turn) for point in inside or [geometry.centre(self.mesh)]]
 
 
@@ -112,11 +112,12 @@ def bulk(part: Part, mesh: Generated, density: float) -> Bulk:
     given = part.rigid.mass if part.rigid is not None else None
     body, mass = Placed(mesh, part.turn), given or density * geometry.volume(mesh)
     moving = part.spin is not None or part.stretch is not None
-    speeds = [velocity(part, point) for point in body.points()] if moving else [part.velocity]
+    points = body.points() if moving else []
+    speeds = [velocity(part, point) for point in points] or [part.velocity]
     squares = [math.fsum(c * c for c in v) for v in speeds]
     x, y, z = (mass * math.fsum(each) / len(speeds) for each in zip(*speeds, strict=True))
     energy = 0.5 * mass * math.fsum(squares) / len(squares)
-    middle = [math.fsum(each) / len(speeds) for each in zip(*body.points(), strict=True)] if moving else part.velocity
+    middle = [math.fsum(each) / len(speeds) for each in zip(*points, strict=True)] if moving else part.velocity
     momentum, energy = with_inertia(part, mass, (middle[0], middle[1], middle[2])) or ((x, y, z), energy)
     return Bulk(mass, *body.bounds(), momentum, energy, math.sqrt(max(squares)))
 
