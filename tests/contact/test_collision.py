@@ -13,6 +13,8 @@ from conoid.cases.messages import Energy
 from conoid.cases.model import schema
 from conoid.worker import simulation, step
 from conoid.worker.accounts.digest import digest
+from conoid.worker.contact.narrow_phase.rows import ActiveRows
+from conoid.worker.contact.solver.solver import ActiveSet
 from conoid.worker.errors import InputError
 from conoid.worker.mesh.model import TetMesh
 from conoid.worker.parallel.comm import Comm, SerialComm
@@ -75,6 +77,22 @@ def test_a_collision_keeps_the_momentum(friction: float) -> None:
     end_linear, end_angular = momenta(sim)
     assert np.abs(end_linear - linear).max() < 1e-12 * pushed
     assert np.abs(end_angular - angular).max() < (1e-6 if friction == 0.0 else 1e-4) * size
+
+
+@pytest.mark.parametrize("friction", [0.0, 0.3])
+def test_a_step_without_impulses_needs_no_solver(friction: float) -> None:
+    """The solver leaves all velocities as they are in the steps that are found to rest: the answers are equal."""
+    case, rest, found = case_of(friction=friction), ActiveSet.rest, list[tuple[bool, bool]]()
+
+    def noted(active: ActiveSet, rows: ActiveRows, *others: Any) -> bool:
+        found.append((quiet := rest(active, rows, *others), rows.n > 0))
+        return quiet
+
+    with patch.object(ActiveSet, "rest", noted):
+        one = answer(case)
+    with patch.object(ActiveSet, "rest", lambda *_: False):
+        assert answer(case) == one
+    assert {(True, False), (True, True), (False, True)} <= set(found)
 
 
 @pytest.mark.parametrize("friction", [0.0, 0.3])

@@ -33,6 +33,7 @@ from .exterior import Exterior
 from .narrow_phase.detection import Ahead, Detected, Detection
 from .narrow_phase.tables import PUSH_OUT
 from .scene.scene import Scene
+from .solver.active import Kept
 from .solver.solver import ActiveSet
 from .solver.stops import Stops
 from .solver.sweep_count import SweepCount
@@ -130,9 +131,7 @@ class Contact:
         return self.exterior.owned
 
     def effort(self) -> Floats:
-        """(nodes, 2) cost of contact by node on this rank, in units of 50 ns: of searches, and of the narrow phase
-        and solver.
-        """
+        """(nodes, 2) cost of contact by node on this rank, in units of 50 ns: see ``effort.effort``."""
         return effort(self.searches.scene, self.on_surface)
 
     def impulses(self) -> Floats:
@@ -180,9 +179,7 @@ class Contact:
 
     @property
     def stray(self) -> bool:
-        """True if a slot will depart so far from its reference motion in the next step that the slot must be registered
-        again.
-        """
+        """True if a slot must be registered again, since it will depart too far from its reference motion."""
         return self.found.stray
 
     @property
@@ -250,26 +247,32 @@ class Contact:
                 self._push(now, state, dt, t)
 
     def _push(self, now: Scene, state: Nodes, dt: float, t: float) -> None:
-        surface_nodes, books, active = now.surface_nodes, self.books, self._active
+        surface_nodes = now.surface_nodes
         now.messages.copies.begin(state)
         self.detection.take(now, state)
         now.messages.copies.finish(surface_nodes.x, surface_nodes.v, now.slots.before)
-        give = PUSH_OUT if books.account.settle(books.agreed) else 0.0
+        give = PUSH_OUT if self.books.account.settle(self.books.agreed) else 0.0
         self._meet(now, give, dt)
         self.detection.retarget(now, self._scheme.restitution, give)
         shared = now.messages.company.agree(now.active, surface_nodes.local)
-        active.begin(now.active, surface_nodes, self.exterior.motion.loose, shared, self.exterior.size, dt)
+        kept, ratio, loose = now.stored(self.exterior.cracks.kept), self._resume(give), self.exterior.motion.loose
+        if not self._active.rest(now.active, surface_nodes, kept, loose, shared, dt):
+            self._active.begin(now.active, surface_nodes, loose, shared, self.exterior.size, dt)
+            self._settle(now, state, kept, ratio, t)
+        shared.free()
+
+    def _settle(self, now: Scene, state: Nodes, kept: Kept, ratio: float, t: float) -> None:
+        """Computes the impulses of the active contacts, and books them; ``ratio``: see ``_resume``."""
+        books, active = self.books, self._active
         active.weigh()
-        kept = now.stored(self.exterior.cracks.kept)
-        active.resume(kept, self._resume(give))
+        active.resume(kept, ratio)
         active.sweep(self.sweep_count.sweeps)
         active.store(kept)
         if self.searches.rubs:
             active.heat(books.friction, now.slots.before)
-        active.cost(books, now.slots.before, surface_nodes.part)
-        if active.leave(surface_nodes, now.slots.total, state, books.parts, self.sweep_count.unsettled):
+        active.cost(books, now.slots.before, now.surface_nodes.part)
+        if active.leave(now.surface_nodes, now.slots.total, state, books.parts, self.sweep_count.unsettled):
             self.last_push = t
-        shared.free()
         books.book(now, active.places, fresh=True)
         active.press(books.pressed)
 

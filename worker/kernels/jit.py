@@ -14,6 +14,7 @@ import os
 import sys
 import time
 from collections.abc import Callable
+from functools import cached_property
 from types import ModuleType
 from typing import Any
 
@@ -98,7 +99,6 @@ class Kernel(CPUDispatcher):
 
     signature: Any = ""
     """Signature as declared, in numba's notation, or a signature made from ``types``."""
-    _address: int | None = None
 
     @property
     def result(self) -> Any:
@@ -121,14 +121,12 @@ class Kernel(CPUDispatcher):
                 super().compile(self.signature)
             self.disable_compile()
 
-    @property
+    @cached_property
     def address(self) -> int:
         """Address of the machine code of the kernel, for calls with the calling convention of C."""
-        if self._address is None:
-            self.load()
-            compiled: Any = next(iter(self.overloads.values()))
-            self._address = compiled.library.get_pointer_to_function(compiled.fndesc.llvm_cfunc_wrapper_name)
-        return self._address
+        self.load()
+        compiled: Any = next(iter(self.overloads.values()))
+        return int(compiled.library.get_pointer_to_function(compiled.fndesc.llvm_cfunc_wrapper_name))
 
     def compile(self, sig: Any) -> Any:
         """Returns the entry point of this kernel when numba compiles a call of it from another kernel. The entry point

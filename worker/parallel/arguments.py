@@ -56,12 +56,17 @@ class Arguments:
         if len(values) != len(self._values):
             sizes = [len(value) if isinstance(value, tuple) else 1 for value in values]
             self._begins, self._values = np.cumsum([0, *sizes])[:-1].tolist(), [None] * len(values)
-        kept = self._kept
+        kept, is_real, reals, places = self._kept, self._is_real, self._reals, self._places
         for k, value in compress(zip(self._begins, values, strict=True), map(is_not, values, self._values)):
-            for at, leaf in enumerate(value if isinstance(value, tuple) else (value,), k):
-                if leaf is not kept[at]:
-                    self._put(at, leaf)
-                    kept[at] = leaf
+            if isinstance(value, tuple):
+                for at, leaf in enumerate(value, k):
+                    if leaf is not kept[at]:
+                        self._put(at, leaf)
+                        kept[at] = leaf
+            elif is_real[k]:
+                reals[places[k]] = value
+            else:
+                self._put(k, value)
         self._values[:] = values
         return self.address
 

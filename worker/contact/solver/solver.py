@@ -14,6 +14,7 @@ from ..narrow_phase.rows import ActiveRows
 from ..surface.records import SurfaceNodes
 from . import impulse_work, slot_numbers, stops, zones
 from .active import IMPULSE, PUSH, PUSH_T, ActiveContacts, ActiveNodes, Kept, Loaded
+from .quiet import Quiet
 from .sets import Sets, Slots
 from .shared_sums import ActiveSum
 from .stops import Braced, Stops
@@ -25,6 +26,8 @@ _SPARE = 1.25
 """Allocated rows over the present number of nodes and contacts. While a body breaks, these numbers increase in
 nearly every step, and each new allocation costs time because the operating system clears new pages. Chosen value: a
 bar of glass has a quarter more rows after 400 steps."""
+
+_NONE: Indices = np.zeros(0, np.int32)
 
 
 class Bodies(Protocol):
@@ -67,13 +70,27 @@ class ActiveSet:
         """(slots,) rows in the scene of the nodes that were slots in the last step."""
         self._zones, self._passes = Zones(team.threads), Slots(team)
         self._sets, self._room = Sets(team, self._zones.many), _Room(0, 0, 0, self._zones.many)
-        self._scratch = Scratch()
+        self._scratch, self._quiet = Scratch(), Quiet(team)
         self._turn = np.zeros(2, np.int64)
         """Number of the present sweep, and number of sweeps in the step."""
 
     def go_on(self, scale: float, sides: Floats) -> None:
         """Sets the scale, and the ``sides`` of the stops, after a restart or a repartition."""
         self.scale, self.stops = scale, self.stops._replace(sides=sides.reshape(self.stops.sides.shape))
+
+    def rest(
+        self, rows: ActiveRows, surface_nodes: SurfaceNodes, kept: Kept, loose: Flags, shared: ActiveSum, dt: float
+    ) -> bool:  # fmt: skip
+        """Tests whether the contacts ``rows`` need no impulse in a step ``dt``, s; then no other method has to be
+        called in the step. False if other ranks or rigid bodies may take part. ``kept``: stored impulses, set to zero
+        in a step without impulses; for the other arguments see ``begin``.
+        """
+        alone = not len(shared.shared) and self._bodies is None
+        if not (alone and self._quiet.holds(rows, surface_nodes, kept, self.stops, loose, dt)):
+            return False
+        self.places, self._room.loaded.many[:] = _NONE, 0
+        kept.pairs[:], kept.cracks[:] = 0.0, 0.0
+        return True
 
     def begin(
         self, rows: ActiveRows, surface_nodes: SurfaceNodes, loose: Flags, shared: ActiveSum, size: float, dt: float
