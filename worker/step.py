@@ -192,6 +192,7 @@ def _offer_contact(sim: Simulation) -> None:
     contact, own = sim.contact, sim.reduction.own
     if contact is None:
         return
+    sim.timers.switch("contact")
     own.search, own.approach, own.opening = contact.spent(sim.model.nodes), contact.approach, contact.opening
     own.stray = contact.stray
     own.costs[:], own.unsettled[:] = contact.costs, contact.sweep_count.unsettled

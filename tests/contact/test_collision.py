@@ -13,7 +13,9 @@ from conoid.cases.messages import Energy
 from conoid.cases.model import schema
 from conoid.worker import simulation, step
 from conoid.worker.accounts.digest import digest
+from conoid.worker.contact.narrow_phase.detection import Detection
 from conoid.worker.contact.narrow_phase.rows import ActiveRows
+from conoid.worker.contact.scene.scene import Scene
 from conoid.worker.contact.solver.solver import ActiveSet
 from conoid.worker.errors import InputError
 from conoid.worker.mesh.model import TetMesh
@@ -93,6 +95,24 @@ def test_a_step_without_impulses_needs_no_solver(friction: float) -> None:
     with patch.object(ActiveSet, "rest", lambda *_: False):
         assert answer(case) == one
     assert {(True, False), (True, True), (False, True)} <= set(found)
+
+
+def test_pairs_are_not_tested_before_they_can_be_active() -> None:
+    """Two blocks that approach each other have the same answer if all pairs are visited in every step."""
+    meshes, holds, far = [MESHES[0], moved(MESHES[1], (SIZE, 0.0, 0.0))], Detection._far, list[bool]()
+
+    def noted(of: Detection, now: Scene, together: bool) -> bool:
+        far.append(holds(of, now, together))
+        return far[-1]
+
+    case = meeting_of(MOTIONS, {}, end=3.0 * END)
+    with patch.object(Detection, "_far", noted):
+        sim = run(build(case, meshes))
+    with patch.object(Detection, "_far", lambda *_: False):
+        assert state_of(run(build(case, meshes))) == state_of(sim)
+    assert sim.contact is not None
+    assert sim.contact.last_push > 0.0
+    assert sum(far) > 10
 
 
 @pytest.mark.parametrize("friction", [0.0, 0.3])

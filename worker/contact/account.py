@@ -21,6 +21,8 @@ class Account:
         """``energy``: order of magnitude of the energy that one contact takes in a step, J."""
         self._tally = Tally(np.full(2, energy))
         self._taken, self._early, self._most = 0.0, 0.0, 0.0
+        self._settled = b""
+        """Words of the last call of ``settle``."""
 
     @property
     def words(self) -> Ints:
@@ -43,10 +45,11 @@ class Account:
         Correction is allowed while the energy taken from the bodies is at least ``_AHEAD`` times the largest energy
         returned in one step.
         """
-        taken, early = (float(v) for v in self._tally.valued(words))
-        self._most = max(self._most, self._taken - taken, early - self._early)
-        self._taken, self._early = taken, early
-        return taken >= _AHEAD * self._most
+        if (settled := words.tobytes()) != self._settled:
+            taken, early = (float(v) for v in self._tally.valued(words))
+            self._most = max(self._most, self._taken - taken, early - self._early)
+            self._taken, self._early, self._settled = taken, early, settled
+        return self._taken >= _AHEAD * self._most
 
     def known(self) -> tuple[float, float, float, float]:
         """Returns the values of the account other than the words, for a parcel (a checkpoint or migration message);

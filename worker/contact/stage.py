@@ -80,7 +80,7 @@ class Contact:
         bodies = rigid.contacts if rigid is not None else None
         self._active = ActiveSet(self.books.scale, Stops.of(case, model, comm), team, bodies)
         self._scheme, self.sweep_count = _Scheme.of(case), SweepCount(sweeps(case))
-        self.detection = Detection(team, registered)
+        self.detection = Detection(team, registered, lasting=not (case.fractures or case.erodes))
         self.limit = 0.0
         """Inverse of the step in which no node of any rank passes more than half of a tet with which the node is in
         contact, 1/s."""
@@ -90,9 +90,8 @@ class Contact:
         """Mean time step (duration of the kick) at the last step with a scene, s."""
 
     def keep(self, parcel: Parcel) -> None:
-        """Adds everything except the candidate pairs to the ``parcel`` (a checkpoint or migration message): a search
-        finds these again.
-        """
+        """Adds everything except the candidate pairs, which a search finds again, to the ``parcel`` of a checkpoint or
+        migration message."""
         books = self.books
         parcel.known["contact"] = (
             books.scale, books.friction.scale, self.limit, self.searches.many, self._mean_dt, self.exterior.size,
@@ -221,13 +220,13 @@ class Contact:
 
     def search_if_due(self, state: Nodes) -> None:
         """Finds the candidate pairs of the next steps, if a search is scheduled. Collective."""
-        with self._timers.phase("contact"):
-            self.searches.begin(state)
+        if self.searches.scheduled:
+            with self._timers.phase("contact"):
+                self.searches.begin(state)
 
     def spent(self, state: Nodes) -> bool:
         """Returns True if a surface node will depart in one step more than the last search allows."""
-        with self._timers.phase("contact"):
-            return self.searches.spent(state)
+        return self.searches.spent(state)
 
     def look_ahead(self, state: Nodes) -> bool:
         """Bounds the first step by the pairs that approach each other; returns whether there are any. Collective."""
@@ -294,6 +293,7 @@ class Contact:
         redraw = step % normals.EVERY == 0
         if step % self._scheme.interval == 0:
             self.exterior.sharpen(now, self._scheme.sharp)
+            self.detection.clearance.clear()
         ahead = Ahead(dt, self._clock.longest, self.exterior.size, 1.0 + self._scheme.restitution)
         self.detection.detect(now, self.exterior, self.searches.mu, give, ahead, redraw, self.found.stray)
 

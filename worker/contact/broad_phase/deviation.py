@@ -53,10 +53,15 @@ class Deviation:
         after it. ``x``, ``v`` (slots, 3): positions, and velocities before contact. Returns the largest distance of the
         ``tracked`` (slots,) slots from their search lines, m.
         """
+        strayed = self.of_slots(motion, x, v, tracked)
+        self._faces.run(len(faces), motion.faces, faces, 3, motion.short.left)
+        self._edges.run(len(edges), motion.edges, edges, 2, motion.short.left)
+        return strayed
+
+    def of_slots(self, motion: ReferenceMotion, x: Floats, v: Floats, tracked: Flags) -> float:
+        """Sets the distances of the slots alone; see ``measure``."""
         n, dt, searched, short = len(x), motion.end - motion.t + motion.beyond, motion.searched, motion.short
         most = self._scratch.of("most", self._slots.many(n), np.float64)
         lines = searched.left, searched.x, searched.course, short.left, short.x, short.course
         self._slots.run(n, *lines, x, v, motion.t, dt, tracked, most)
-        self._faces.run(len(faces), motion.faces, faces, 3, short.left)
-        self._edges.run(len(edges), motion.edges, edges, 2, short.left)
         return float(most.max(initial=0.0))

@@ -50,7 +50,7 @@ class Searches:
     ) -> None:  # fmt: skip
         """Creates the searches without a scene."""
         self._case, self._model, self._neighbours, self._exterior = case, model, neighbours, exterior
-        self._comm, self._clock, self._registered = comm, clock, registered
+        self._comm, self._clock, self._registered, self._fractures = comm, clock, registered, case.fractures
         self.mu = part_pairs.friction(case)
         """(parts, parts) Coulomb's coefficient, NaN where two parts may not be in contact."""
         self.scene: Scene | None = None
@@ -99,13 +99,23 @@ class Searches:
         """Returns True if a surface node will depart, within _AHEAD steps, more than the last search allows."""
         return self._exterior.motion.spent(nodes, self._clock.t, _AHEAD * self._clock.dt)
 
+    @property
+    def scheduled(self) -> bool:
+        """True if ``begin`` must be called before the step."""
+        return self.due or self.scene is None or self._clock.step % normals.EVERY == 0 or self._ages
+
+    @property
+    def _ages(self) -> bool:
+        """True if the ages of cracks are tested before the step."""
+        return self._fractures and self._clock.step % AGE == 0
+
     def begin(self, nodes: Nodes) -> None:
         """Before a step: recomputes mean normals every EVERY steps, and searches if scheduled. Collective."""
         if self._clock.step % normals.EVERY == 0:
             self._exterior.turn()
             if self.scene is not None:
                 self._exterior.show(self.scene, self.scene.own.local)
-        if self._case.fractures and self._clock.step % AGE == 0:
+        if self._ages:
             self.due |= self._exterior.age()
         if self.due or self.scene is None:
             self._search(nodes)
@@ -142,7 +152,7 @@ class Searches:
         self._exterior.refresh(self._courses(nodes), clock.t)
         steps, drift = motion.foresight(clock.dt)
         if not goes_on:
-            longest = _LONGEST if self._case.fractures else steps
+            longest = _LONGEST if self._fractures else steps
             horizon = max(min(steps, longest, 2.0 * (clock.step - self._last)), _SHORTEST) * clock.dt
             motion.until, self._last = clock.t + horizon, clock.step
         passes = self._registered.scene
@@ -150,14 +160,14 @@ class Searches:
 
     def _courses(self, nodes: Nodes) -> Floats:
         """(nodes, 3) extrapolated velocities of the nodes. Collective."""
-        if not self._case.fractures:
+        if not self._fractures:
             return nodes.v
         return courses(self._model.blocks, nodes, self._neighbours, self._comm, self._registered.rigid)
 
     def _connect(self, found: Scene, nodes: Nodes) -> None:
         """Adds the cracks to a new scene, and exchanges the lists of shared nodes. Collective."""
         follower = SplitUpdate(found, self._exterior.motion.here(nodes), nodes)
-        if self._case.fractures:
+        if self._fractures:
             follower.cracks(self._exterior.cracks, self._model.blocks)
         follower.settle(self._neighbours, self._comm)
 
@@ -166,7 +176,7 @@ class Searches:
         after a search, when the faces that were already in the broad phase are added again. Collective.
         """
         now, cracks = self.scene, self._exterior.cracks
-        if now is None or not self._case.fractures:
+        if now is None or not self._fractures:
             return
         rows = widening(now.cracks, now.surface_nodes.x, self._exterior.size)
         faces = cracks.faces[rows[cracks.foreseen[rows]]]

@@ -15,6 +15,7 @@ from ..scene.scene import Scene
 from ..surface.families import Corners
 from ..tasks import CONTACTS_OF_A_TASK, CRACKS_OF_A_TASK, FAMILIES_OF_A_TASK, PAIRS_OF_A_TASK, SLOTS_OF_A_TASK
 from . import closing_speed
+from .clearance import Clearance
 from .corner_contact import NarrowSides
 from .cracks import Cracks
 from .node_face import nearest
@@ -30,6 +31,8 @@ _JOIN = 0.6
 """Share of the distance from its line at which a slot must be registered again. In a step in which one rank has to
 register slots, all other ranks register their slots beyond this share too, so that the ranks register in the same
 step and wait for each other only once. No bit of the answer depends on this share."""
+
+_NONE: Ints = np.zeros(0, np.int64)
 
 
 @dataclass
@@ -75,8 +78,9 @@ class Ahead:
 class Detection:
     """Finds the active contacts of a rank, on the threads of its ``team``."""
 
-    def __init__(self, team: Team, registered: Registration) -> None:
-        self._registered = registered
+    def __init__(self, team: Team, registered: Registration, *, lasting: bool = False) -> None:
+        """``lasting``: True if the surface of the bodies does not change in the run."""
+        self._registered, self._lasting, self.clearance = registered, lasting, Clearance()
         self.tied: Tied | None = None
         """Tied bonds of the slots of the scene."""
         self.found = Detected.nothing()
@@ -118,9 +122,11 @@ class Detection:
         True if any rank registers departed slots in this step.
         """
         surface_nodes, reference = now.surface_nodes, now.reference
+        reference.advance(ahead.dt, ahead.most)
+        if not redraw and self.clearance.holds(now) and self._far(now, together):
+            return self.found
         begin, end, spread = self._moved(surface_nodes.x, surface_nodes.v, ahead.dt)
-        beyond = ahead.beyond(spread)
-        reference.advance(ahead.dt, beyond)
+        reference.beyond = beyond = ahead.beyond(spread)
         if redraw:
             reference.shorten(surface_nodes.x)
             now.node_face.wake()
@@ -138,6 +144,10 @@ class Detection:
         self._edges(now, step)
         now.faces.fresh[:], now.edges.fresh[:], now.slots.fresh[:] = False, False, False
         self.found = Detected(_KINEMATIC * limit, opening, stray)
+        if self._lasting and not now.active.n:
+            self.clearance.measure(now, ahead.most, ahead.size)
+        else:
+            self.clearance.clear()
         return self.found
 
     def _moved(self, x: Floats, v: Floats, dt: float) -> tuple[Floats, Floats, float]:
@@ -148,6 +158,18 @@ class Detection:
         boxes = self._scratch.of("boxes", self._ahead.many(len(v)), np.float64, 6)
         self._ahead.run(len(x), places, boxes, x, v, dt)
         return begin, end, closing_speed.spread(boxes)
+
+    def _far(self, now: Scene, together: bool) -> bool:
+        """Measures the slots only; returns True if no pair has to be tested and no slot registered, so that there is no
+        active contact.
+        """
+        of, reference, most = now.surface_nodes, now.reference, 0.5 * now.rules.skin
+        strayed = self._registered.deviation.of_slots(reference, of.x, of.v, now.slots.tracked)
+        if strayed > (_JOIN if together else 1.0) * most or not self.clearance.exceeds(reference):
+            return False
+        before, reference.strayed = reference.strayed, strayed
+        self.found = Detected(0.0, self.found.opening, 2.0 * strayed - before > most)
+        return True
 
     def _renewed(self, now: Scene, together: bool) -> bool:
         """Registers the slots that must be registered; returns True if a slot will depart too far in the next step, by
@@ -201,6 +223,8 @@ class Detection:
     def _cracks(self, now: Scene, size: float, step: Step) -> Ints:
         """Adds contacts across cracks; returns the cracks that open."""
         rows, n = now.active, len(now.cracks)
+        if not n:
+            return _NONE
         many, scratch = self._across.many(n), self._scratch
         counts, wide, opening = scratch.of("across", many), scratch.of("wide", many), scratch.of("opening", n)
         self._across.run(n, rows.room, rows.begins(_CRACKS), opening, now.cracks, size, step, counts, wide)

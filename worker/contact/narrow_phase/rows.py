@@ -1,6 +1,7 @@
 """Rows of the active contacts of a step: the ranges in which passes write them, and the numbers of the active ones."""
 
 from dataclasses import dataclass, field
+from itertools import accumulate
 
 import numpy as np
 
@@ -30,7 +31,7 @@ class ActiveRows:
 
     def begin(self, *many: int) -> None:
         """Begins a step without contacts; reserves ``many`` rows for each kind."""
-        self._ends, self.n = [0, *np.cumsum(many).tolist()], 0
+        self._ends, self.n = [0, *accumulate(many)], 0
         self._reserve(self._ends[-1])
 
     def more(self, many: int) -> int:
