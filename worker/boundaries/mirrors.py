@@ -11,10 +11,13 @@ import numpy as np
 
 from conoid.cases.model.schema import Case, Symmetry
 
-from ..kernels.jit import njit
+from ..kernels.jit import njit, types
 from ..migration.parcel import Parcel
+from ..model.growing import Scratch
 from ..model.state import Bits, Flags, Floats, Indices, Ints, Model, Nodes, extended
+from ..parallel.arguments import Arguments, reader
 from ..parallel.comm import Comm
+from ..parallel.team import TASK
 from ..rigid.bodies import of_nodes
 from ..scene.conditions import AXES, part_sides, sides
 from .boundaries import Boundary, driven, free
@@ -25,6 +28,12 @@ only if at least one node would end beyond the plane."""
 _TURNS = 1000
 """Largest number of planes that a node without tets may pass in a step. The limit ends the loop if the velocity is
 not finite."""
+
+
+_F, _F1, _F2, _I1 = types.float64, types.float64[::1], types.float64[:, ::1], types.int64[::1]
+_TAKE = _F2, _F2, types.int32[::1]
+_STOP = _I1, _I1, types.int64, _F2, _F2, _F2, _F2, _F1, types.int32[::1], _I1, _F1, _F2, _F, _F
+_of_take, _of_stop = reader(*_TAKE), reader(*_STOP)
 
 
 class Mirrors(Boundary):
@@ -54,6 +63,7 @@ class Mirrors(Boundary):
         self._aside = np.zeros((0, 3))
         """Places of the nodes that are reflected in this step, and the vectors from the new positions of the nodes
         to the positions of their images, m."""
+        self._takes, self._stops, self._scratch = Arguments(*_TAKE), Arguments(*_STOP), Scratch()
 
     @classmethod
     def of(cls, case: Case, model: Model, bounds: list[Boundary], comm: Comm) -> Self:
@@ -86,22 +96,29 @@ class Mirrors(Boundary):
         self._stopped = np.flatnonzero(self._impulse.any(axis=1))
 
     def note(self, state: Nodes) -> None:
-        np.take(state.v, self.nodes, axis=0, out=self._before, mode="clip")
-        _book(self.contact_loss, self._impulse, self._before, self._stopped)
-        self._impulse[self._stopped] = 0.0
+        self.over.run(_take, self._takes.set(self._before, state.v, self.nodes), len(self.nodes))
+        if len(self._stopped):
+            _book(self.contact_loss, self._impulse, self._before, self._stopped)
+            self._impulse[self._stopped] = 0.0
 
     def apply(self, state: Nodes, dt: float, t: float) -> None:
-        self._stopped = _stop(
-            state.x, state.v, self._before, self._impulse, state.mass, self.nodes, self._axes, self._at,
-            self._sides, self._restitution, dt,
+        n = len(self.nodes)
+        found, counts = self._scratch.of("found", n), self._scratch.of("counts", self.over.many(n))
+        table = self._stops.set(
+            found, counts, self.over.size, state.x, state.v, self._before, self._impulse, state.mass, self.nodes,
+            self._axes, self._at, self._sides, self._restitution, dt,
         )  # fmt: skip
+        self.over.run(_stop, table, n)
+        ranges = zip(range(0, n, self.over.size), counts.tolist(), strict=True)
+        self._stopped = np.concatenate([found[:0], *(found[k : k + many] for k, many in ranges if many)])
         if len(self._loose):
             self._reflected, self._aside = _reflect(
                 state.x, state.v, self._impulse, state.mass, self.nodes, self._loose, self._axes, self._at,
                 self._loose_sides, dt,
             )  # fmt: skip
             self._stopped = np.concatenate([self._stopped, self._reflected])
-        _book(self.contact_loss, self._impulse, self._before, self._stopped)
+        if len(self._stopped):
+            _book(self.contact_loss, self._impulse, self._before, self._stopped)
 
     def after_move(self, state: Nodes) -> None:
         if len(self._reflected):
@@ -117,20 +134,25 @@ def _book(loss, impulse, before, rows):  # type: ignore[no-untyped-def]
             loss[j] -= 0.5 * impulse[j, i] * before[j, i]
 
 
-@njit(
-    "int64[::1](float64[:, ::1], float64[:, ::1], float64[:, ::1], float64[:, ::1], float64[::1], int32[::1], "
-    "int64[::1], float64[::1], float64[:, ::1], float64, float64)",
-    cache=True,
-    error_model="numpy",
-)
-def _stop(x, v, before, impulse, mass, nodes, axes, at, sides, restitution, dt):  # type: ignore[no-untyped-def]
-    """Stops nodes with tets that would end beyond a plane: the velocity ends on the plane, or is the rebound
-    velocity if there is ``restitution`` of that ``before`` (n, 3): v(n-1/2). Adds to ``impulse``; returns the places
-    of the stopped nodes.
+@njit(TASK, cache=True)
+def _take(table, begin, end, thread):  # type: ignore[no-untyped-def]
+    """Task: stores v(n-1/2)."""
+    before, v, nodes = _of_take(table)
+    for j in range(begin, end):
+        for i in range(3):
+            before[j, i] = v[nodes[j], i]
+
+
+@njit(TASK, cache=True, error_model="numpy")
+def _stop(table, begin, end, thread):  # type: ignore[no-untyped-def]
+    """Task: stops nodes with tets that would end beyond a plane: the velocity ends on the plane, or is the rebound
+    velocity if there is ``restitution`` of that ``before`` (n, 3): v(n-1/2). Adds to ``impulse``; writes the places
+    of the stopped nodes into ``found`` from ``begin`` on, and their number into ``counts``; ``size``: length of a task.
     """
-    stopped, n = np.empty(len(nodes), np.int64), 0
-    for first in range(0, len(nodes), _TOGETHER):
-        last, met = min(first + _TOGETHER, len(nodes)), 0
+    found, counts, size, x, v, before, impulse, mass, nodes, axes, at, sides, restitution, dt = _of_stop(table)
+    n = begin
+    for first in range(begin, end, _TOGETHER):
+        last, met = min(first + _TOGETHER, end), 0
         for k in range(len(axes)):
             i, plane = axes[k], at[k]
             for j in range(first, last):
@@ -148,10 +170,10 @@ def _stop(x, v, before, impulse, mass, nodes, axes, at, sides, restitution, dt):
                     change = side * (max(-height / dt, back if back > 0.0 else -np.inf) - speed)
                     v[a, i] += change
                     impulse[j, i] += mass[a] * change
-            if impulse[j].any():
-                stopped[n] = j
+            if impulse[j, 0] != 0.0 or impulse[j, 1] != 0.0 or impulse[j, 2] != 0.0:
+                found[n] = j
                 n += 1
-    return stopped[:n].copy()
+    counts[begin // size] = n - begin
 
 
 @njit(

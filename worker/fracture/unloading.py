@@ -9,11 +9,23 @@ requires. The second pass completely unloads the pairs that still close too far.
 import numpy as np
 
 from ..clock import Clock
-from ..model.state import Nodes
+from ..kernels.jit import njit
+from ..model.state import Ints, Nodes
 from ..parallel.comm import Comm
 from ..parallel.ownership import Neighbour, SharedSum
 from ..parallel.tags import Tag
 from .cohesive import Cohesion
+
+
+@njit("void(int64[:, ::1], int64[:, ::1], int32[::1])", cache=True)
+def _move(force, change, rows):  # type: ignore[no-untyped-def]
+    """Adds the ``change`` of the nodes ``rows`` (k,) to their forces, and sets it to zero. A node may occur several
+    times.
+    """
+    for a in rows:
+        for i in range(3):
+            force[a, i] += change[a, i]
+            change[a, i] = 0
 
 
 class Unloading:
@@ -22,17 +34,24 @@ class Unloading:
     def __init__(self, cohesion: Cohesion, nodes: Nodes, neighbours: list[Neighbour], comm: Comm) -> None:
         self._cohesion, self._nodes, self._neighbours, self._comm = cohesion, nodes, neighbours, comm
         self._shared: SharedSum | None = None
+        self._room: Ints = np.zeros((0, 3), np.int64)
+        """(room, 3) changes of the nodal forces in a pass, quanta; zero between passes."""
 
     def apply(self, clock: Clock) -> None:
         """Corrects the present nodal forces. Collective."""
+        sides = self._cohesion.facets.nodes
+        if not len(sides) and not self._neighbours:
+            return
         nodes, steps = self._nodes, np.array([clock.last_dt, clock.mean_dt, clock.dt])
+        if nodes.n > len(self._room):
+            self._room = np.zeros((nodes.n + nodes.n // 2, 3), np.int64)
+        change, shared = self._room[: nodes.n], self._exchange()
         for whole in (False, True):
-            change = np.zeros_like(nodes.force)
             self._cohesion.unload(change, nodes, steps, whole)
-            shared = self._exchange()
             shared.begin(change)
             shared.finish(change)
-            nodes.force += change
+            for some in (sides.reshape(-1), *(other.nodes for other in self._neighbours)):
+                _move(nodes.force, change, some)
         self._cohesion.foresee(nodes, clock.mean_dt)
 
     def free(self) -> None:

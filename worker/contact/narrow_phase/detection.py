@@ -2,6 +2,7 @@
 pairs."""
 
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 
@@ -197,7 +198,7 @@ class Detection:
         self._due_faces.run(n, pairs, slots, faces, end + step.beyond, due)
         some = rows.room, depth, rows.begins(_FACES), pairs, slots, faces, step, end
         self._node_face.run(n, *some, due, counts, coming)
-        begins = PAIRS_OF_A_TASK * np.arange(len(due))
+        begins = _offsets(len(due))
         table.take_tested(pairs.active, begins, due)
         before = rows.n
         rows.collect(_FACES, begins, counts)
@@ -216,7 +217,7 @@ class Detection:
         due, counts = self._scratch.of("tested", many), self._scratch.of("on edges", many)
         some = rows.room, rows.begins(_EDGES), pairs, now.edge_table(), step, reference.short.course, reference.end
         self._edge_edge.run(n, *some, due, counts)
-        begins = PAIRS_OF_A_TASK * np.arange(len(due))
+        begins = _offsets(len(due))
         table.take_tested(pairs.active, begins, due)
         rows.collect(_EDGES, begins, counts)
 
@@ -248,3 +249,9 @@ class Detection:
                 break
             self._rows_of_corner *= 2
         now.active.collect(kind, each * begins, counts)
+
+
+@cache
+def _offsets(many: int) -> Ints:
+    """(many,) first pair of each task."""
+    return PAIRS_OF_A_TASK * np.arange(many)

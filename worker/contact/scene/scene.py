@@ -63,6 +63,8 @@ class Scene:
     """Active contacts of the last step."""
     messages: Messages = field(init=False)
     _stored: Kept | None = field(default=None, init=False)
+    _cracks: Floats | None = field(default=None, init=False)
+    """Argument of the last call of ``stored``."""
 
     def connect(self, company: list[Neighbour], nodes: Nodes, comm: Comm) -> None:
         """Sets up the messages: sums over the shared nodes ``company``, and copies of the ghosts. Collective."""
@@ -86,7 +88,10 @@ class Scene:
         """Stored impulses of the pairs and of the ``cracks`` (m, 12); it is the same object while the arrays use the
         same memory.
         """
-        before, pairs, rows = self._stored, self.node_face.kept, cracks.reshape(-1, 4)
+        before, pairs = self._stored, self.node_face.kept
+        if before is not None and before.pairs is pairs and cracks is self._cracks:
+            return before
+        rows, self._cracks = cracks.reshape(-1, 4), cracks
         if before is None or before.pairs is not pairs or not same_memory(before.cracks, rows):
             self._stored = before = Kept(pairs, rows)
         return before
