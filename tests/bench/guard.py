@@ -1,4 +1,4 @@
-"""Cost of a change: six scenes, computed in alternation with the sources of this commit and of an earlier one.
+"""Cost of a change: seven scenes, computed in alternation with the sources of this commit and of an earlier one.
 
 ``python -m tests.bench.guard [COMMIT] [--only SCENE ...]``; the default commit is ``BASE``. The earlier sources are
 checked out below build/guard and use the same Python and libraries; each run has one rank. The printed ratio is the
@@ -42,14 +42,16 @@ class Scene:
 
 _FRAMES = "run.frames=0", "run.snapshots=0", "reference=[]"
 _COARSE = tuple(f"parts[{k}].mesh.element_size=1 mm" for k in range(4))
-_APART = 'contact="none"', "run.end_time=400 us", "run.samples=10"
+_LONG = "run.end_time=400 us", "run.samples=10"
+_SLOW = tuple(f"parts[{k}].velocity=['0 m/s', '0 m/s', '{speed} mm/s']" for k, speed in enumerate((1, -1)))
 SCENES = (
     Scene("shattering bar", "guard_shattering_bar.toml", _FRAMES, 3),
     Scene("glass bar to 40 us", "glass_steel_bar", (*_FRAMES, "run.end_time=40 us", "numerics.dt_safety=0.9"), 1),
     Scene("long rod to 20 us", "long_rod", (*_FRAMES, "run.end_time=20 us"), 2),
     Scene("cradle, fixed costs", "newton_cradle", (*_FRAMES, *_COARSE, "run.end_time=300 us"), 3),
     Scene("two tets", "two_tets", (*_FRAMES, "run.samples=10"), 5),
-    Scene("crossed bars without contact", "crossed_bars", (*_FRAMES, *_APART), 5),
+    Scene("crossed bars without contact", "crossed_bars", (*_FRAMES, *_LONG, 'contact="none"'), 5),
+    Scene("crossed bars before contact", "crossed_bars", (*_FRAMES, *_LONG, *_SLOW), 5),
 )
 QUICK = SCENES[0], SCENES[3]
 
@@ -145,7 +147,7 @@ def _answer(there: Paid, here: Paid) -> str:
 
 def main(arguments: Sequence[str]) -> int:
     """Prints the table; returns 2 for an unknown commit or scene."""
-    parser = argparse.ArgumentParser(prog="tests.bench.guard", description="CPU time of six scenes here and there.")
+    parser = argparse.ArgumentParser(prog="tests.bench.guard", description="CPU time of seven scenes here and there.")
     parser.add_argument("commit", nargs="?", default=BASE)
     parser.add_argument("--only", action="append", metavar="SCENE", help="a scene by how its name begins")
     asked = parser.parse_args(arguments)
