@@ -194,9 +194,7 @@ class Contact:
             self.searches.due |= self.exterior.open(received, self.searches.scene)
 
     def separate(self, split: Split) -> None:
-        """Updates contact after the separation of nodes; called on all ranks, see topology_updates.py for the ranks
-        that exchange messages.
-        """
+        """Updates contact after the separation of nodes; called on all ranks, see topology_updates.py."""
         self.exterior.separate(split)
         self.searches.separate(split)
 
