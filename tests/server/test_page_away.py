@@ -307,7 +307,7 @@ def test_what_stands_beside_a_failure_is_of_the_outcome(web: Path) -> None:
     """
     told, numbers = played(web, script)
     assert "511 ns of 1.00 µs, step 20" in told
-    assert "from contact: 25" in told
+    assert "contact: 2.5e-1 of the largest energy" in told
     assert "dt_safety" not in told
     assert "511" in numbers
     assert "1.0e-6" in numbers
