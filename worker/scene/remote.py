@@ -19,7 +19,9 @@ def remote(case: Case, x: Floats, tets: Indices, part: Indices, volumes: Floats)
     """
     warnings = []
     for index in np.unique(part).tolist():
-        some = part == index
+        some = (part == index) & (volumes > 0.0)  # inverted and flat tets have their own messages
+        if not some.any():
+            continue
         far = float(np.abs(x[tets[some]]).max())
         edge = power(6.0 * float(volumes[some].min()), 1.0 / 3.0)
         strain = 2.0**-53 * far / edge
