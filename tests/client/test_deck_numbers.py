@@ -106,7 +106,7 @@ def test_groups_within_themselves_and_that_take_away_refuse(tmp_path: Path) -> N
 
 def starter(points: list[str]) -> str:
     """Returns a Radioss deck of two tets; the part 1 has the title 2, and the part 2 has the title 1."""
-    units = r20("Mg", "mm", "s")
+    units = r20("kg", "m", "s")
     return "\n".join((
         "#RADIOSS STARTER", "/BEGIN", "b", row(2021, 0), units, units, "/PART/1", "2", row(1, 1), "/PART/2", "1",
         row(1, 1), "/NODE", *points, "/TETRA4/1", row(1, 1, 2, 3, 4), "/TETRA4/2", row(2, 5, 6, 7, 8), "/END", "",
