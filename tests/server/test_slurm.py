@@ -176,7 +176,9 @@ def test_a_sweep_is_one_array_with_a_job_for_each_run(site: Site, tmp_path: Path
         assert site.ended(run, 120.0)["state"] == "succeeded", site.tail(run)
         assert site.ann.states(run).count("running") == 1
     found = site.cluster.jobs(jobs[0].name)
-    assert [state for _, state in found if state != "CANCELLED"] == ["COMPLETED"] * 11
+    states = sorted(state for _, state in found)
+    assert states[-11:] == ["COMPLETED"] * 11
+    assert states[:-11] in ([], ["CANCELLED"]), "the controller may have forgotten the cancelled job"
     kind = {"Content-Type": "application/json"}
     repeated = [site.ann.http.post(f"{sweep['url']}:again", content=body, headers=kind) for _ in range(2)]
     assert [answer.status_code for answer in repeated] == [202, 202], repeated[0].text

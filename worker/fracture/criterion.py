@@ -164,14 +164,14 @@ def _copy(place, face, shared, traction, m, i):  # type: ignore[no-untyped-def]
         traction[m, k] = traction[i, k]
 
 
-@njit(types.int64(CANDIDATES, _I1, types.int64), cache=True)
-def _joined(out, counts, size):  # type: ignore[no-untyped-def]
-    """Moves the first ``counts[k]`` rows of each range of ``size`` rows of ``out`` to the front of ``out``; returns the
-    number of these rows.
+@njit(types.int64(CANDIDATES, _I1, _I1), cache=True)
+def _joined(out, begins, counts):  # type: ignore[no-untyped-def]
+    """Moves the ``counts[k]`` rows of ``out`` from each of ``begins`` on to the front of ``out``; returns the number of
+    these rows.
     """
     m = 0
     for k in range(len(counts)):
-        for i in range(k * size, k * size + counts[k]):
+        for i in range(begins[k], begins[k] + counts[k]):
             _copy(out.place, out.face, out.shared, out.traction, m, i)
             m += 1
     return m
@@ -256,14 +256,14 @@ def clock(found, n, table, law, step, t):  # type: ignore[no-untyped-def]
 
 @njit(
     types.int64(
-        CANDIDATES, _I1, types.int64, INTERFACE, _I1, MESH, TABLE, POINTS, LAW, types.int64, types.float64
+        CANDIDATES, _I1, _I1, INTERFACE, _I1, MESH, TABLE, POINTS, LAW, types.int64, types.float64
     ),
     cache=True,
 )  # fmt: skip
-def breaking(out, counts, size, shared, chosen, mesh, table, x, law, step, t):  # type: ignore[no-untyped-def]
+def breaking(out, begins, counts, shared, chosen, mesh, table, x, law, step, t):  # type: ignore[no-untyped-def]
     """Moves the facets that break by their clocks in step number ``step`` to the front of ``out``; all candidates if
-    the number is 0. ``out``: candidates within the rank, the first ``counts[k]`` rows of each range of ``size`` rows;
+    the number is 0. ``out``: candidates within the rank, ``counts[k]`` rows from each of ``begins`` on;
     ``chosen``: rows of the ``shared`` facets of the body. Returns the number of these facets.
     """
-    n = _across(out, _joined(out, counts, size), shared, chosen, mesh, table, x, law)
+    n = _across(out, _joined(out, begins, counts), shared, chosen, mesh, table, x, law)
     return clock(out, n, table, law, step, t) if step > 0 else n

@@ -8,17 +8,27 @@ from .records import CANDIDATES, LAW, MESH, POINTS, TABLE
 
 TETS_OF_A_TASK = 4096
 """Number of tets in a task. Chosen value: a task takes 5 us where no facet is overstressed."""
-_I, _I1 = types.int64, types.int64[::1]
-SEARCH = CANDIDATES, _I, types.uint8[::1], MESH, TABLE, POINTS, LAW, _I1, _I1
-_search = reader(*SEARCH)
+_I1, _U1 = types.int64[::1], types.uint8[::1]
+COUNT = CANDIDATES, _U1, MESH, _I1
+SEARCH = CANDIDATES, _I1, _I1, _U1, MESH, TABLE, POINTS, LAW
+_count, _search = reader(*COUNT), reader(*SEARCH)
+
+
+@njit(TASK, cache=True)
+def count(table, first, stop, thread):  # type: ignore[no-untyped-def]
+    """Task: writes the number of overstressed facets to ``counts`` (tasks,)."""
+    out, hot, mesh, counts = _count(table)
+    counts[first // TETS_OF_A_TASK] = criterion.overstressed(out, 0, 0, hot, mesh, first, stop)
 
 
 @njit(TASK, cache=True)
 def search(table, first, stop, thread):  # type: ignore[no-untyped-def]
-    """Task: ``criterion.overstressed`` and ``criterion.within``, in ``each`` rows of ``out`` for each task; writes the
-    numbers of overstressed facets to ``needed`` (tasks,), and of candidates to ``counts`` (tasks,).
+    """Task: ``criterion.overstressed`` and ``criterion.within``, in the ``counts`` (tasks,) rows of ``out`` from
+    ``begins`` (tasks,) on; replaces the count by the number of candidates.
     """
-    out, each, hot, mesh, facets, x, law, needed, counts = _search(table)
+    out, begins, counts, hot, mesh, facets, x, law = _search(table)
     k = first // TETS_OF_A_TASK
-    needed[k] = criterion.overstressed(out, k * each, (k + 1) * each, hot, mesh, first, stop)
-    counts[k] = criterion.within(out, mesh, facets, x, law, k * each, k * each + min(needed[k], each))
+    begin, end = begins[k], begins[k] + counts[k]
+    if end > begin:
+        criterion.overstressed(out, begin, end, hot, mesh, first, stop)
+        counts[k] = criterion.within(out, mesh, facets, x, law, begin, end)

@@ -13,11 +13,11 @@ from ..model.state import Floats, Indices, Ints
 from ..parallel.comm import Comm
 from .bodies import Bodies, times
 from .points import Points
-from .rotation import spatial
-from .rows import WORDS
+from .rotation import place, spatial
+from .rows import WORDS, add_impulse
 from .stops import BodyStops
 
-_F, _F1, _F2, _F3 = types.float64, types.float64[::1], types.float64[:, ::1], types.float64[:, :, ::1]
+_F, _F1, _F2 = types.float64, types.float64[::1], types.float64[:, ::1]
 _N1, _I2 = types.int32[::1], types.int64[:, ::1]
 
 
@@ -33,6 +33,7 @@ class BodyBonds:
         """(b, WORDS) impulses of the bonds in the step, quanta."""
         self._scale, self._half = 1.0, 0.0
         """Quanta per N s; half of the time step, s."""
+        self._origins = np.zeros((bodies.n, 3))
         self._inertia, self._ahead = np.empty((bodies.n, 3, 3)), np.zeros((bodies.n, 3))
         """(b, 3, 3) inertia in space, kg m^2; (b, 3) change of the rotation vector from n to mid-step, rad/s."""
 
@@ -47,13 +48,14 @@ class BodyBonds:
         self._points, self._places, self._scale = points, places, scale
         self._arms = np.zeros((len(points), 3))
         """(k, 3) arms at n, m."""
+        self._every = np.arange(len(points), dtype=np.int32)
 
     def set_out(self, v: Floats, dt: float) -> None:
         """At the start of the sweeps: sets the velocities of the points in the table ``v`` (n, 3); ``dt``: time step,
         s.
         """
         bodies, spin = self._bodies, self._rate
-        turned(self._arms, self._points.arm, self._points.body, bodies.rotation)
+        place(self._arms, self._every, self._points.body, self._points.arm, bodies.rotation, self._origins)
         self._half = 0.5 * dt
         spatial(self._inertia, bodies.rotation, bodies.inertia)
         momentum = times(self._inertia, spin)
@@ -97,17 +99,6 @@ class BodyBonds:
         spread(v, self._places, self._points.body, self._arms, self._bodies.speed, rate, self._half)
 
 
-@njit(types.void(_F2, _F2, _N1, _F3), cache=True)
-def turned(arms, start, body, rotation):  # type: ignore[no-untyped-def]
-    """Sets ``arms`` (k, 3) to the arms at the ``start``, turned with the bodies."""
-    for k in range(len(body)):
-        b = body[k]
-        for i in range(3):
-            arms[k, i] = (
-                rotation[b, i, 0] * start[k, 0] + rotation[b, i, 1] * start[k, 1] + rotation[b, i, 2] * start[k, 2]
-            )
-
-
 @njit(types.void(_I2, _I2, _N1, _N1, _F2, _F1), cache=True)
 def gather(sums, words, places, body, arms, reach):  # type: ignore[no-untyped-def]
     """Adds the impulses ``words`` (n, 3) on the points at these ``places``, and their moments over the reach of the
@@ -115,14 +106,7 @@ def gather(sums, words, places, body, arms, reach):  # type: ignore[no-untyped-d
     """
     for k in range(len(places)):
         a, b = places[k], body[k]
-        p, q, r = words[a, 0], words[a, 1], words[a, 2]
-        x, y, z = arms[k, 0] / reach[b], arms[k, 1] / reach[b], arms[k, 2] / reach[b]
-        sums[b, 0] += p
-        sums[b, 1] += q
-        sums[b, 2] += r
-        sums[b, 3] += np.int64(np.rint(y * r - z * q))
-        sums[b, 4] += np.int64(np.rint(z * p - x * r))
-        sums[b, 5] += np.int64(np.rint(x * q - y * p))
+        add_impulse(sums, b, words[a, 0], words[a, 1], words[a, 2], arms, k, reach[b])
 
 
 @njit(types.void(_F2, _N1, _N1, _F2, _F2, _F2, _F), cache=True)

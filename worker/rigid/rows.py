@@ -71,6 +71,20 @@ def norms(active, words, slots, body, arms, reach, lightness, yielding):  # type
         sums[s, 3] = np.int64(SHARES)
 
 
+@njit("void(int64[:, ::1], int64, int64, int64, int64, float64[:, ::1], int64, float64)", cache=True, forceinline=True)
+def add_impulse(words, b, p, q, r, arms, k, reach):  # type: ignore[no-untyped-def]
+    """Adds the impulse p, q, r, quanta, at the arm ``k`` of ``arms`` (n, 3), and its moment over the ``reach`` of the
+    body ``b``, to ``words`` (b, WORDS).
+    """
+    x, y, z = arms[k, 0] / reach, arms[k, 1] / reach, arms[k, 2] / reach
+    words[b, 0] += p
+    words[b, 1] += q
+    words[b, 2] += r
+    words[b, 3] += np.int64(np.rint(y * r - z * q))
+    words[b, 4] += np.int64(np.rint(z * p - x * r))
+    words[b, 5] += np.int64(np.rint(x * q - y * p))
+
+
 @njit(types.void(_I2, NODES, _N1, _N1, _F2, _B1, _F1), cache=True)
 def gather(words, active, slots, body, arms, owned, reach):  # type: ignore[no-untyped-def]
     """Moves the impulses of a sweep from ``slots`` to their bodies: adds the impulses of ``owned`` slots to ``words``
@@ -83,13 +97,7 @@ def gather(words, active, slots, body, arms, owned, reach):  # type: ignore[no-u
         for i in range(3):
             moving[s, IMPULSE + i] = 0
         if owned[k] and p | q | r:
-            x, y, z = arms[k, 0] / reach[b], arms[k, 1] / reach[b], arms[k, 2] / reach[b]
-            words[b, 0] += p
-            words[b, 1] += q
-            words[b, 2] += r
-            words[b, 3] += np.int64(np.rint(y * r - z * q))
-            words[b, 4] += np.int64(np.rint(z * p - x * r))
-            words[b, 5] += np.int64(np.rint(x * q - y * p))
+            add_impulse(words, b, p, q, r, arms, k, reach[b])
 
 
 @njit(types.void(NODES, _N1, _N1, _F2, _F2, _F2), cache=True)
