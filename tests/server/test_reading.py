@@ -27,41 +27,51 @@ QUESTION = Question(
     body=case_text().encode(), json=False,
     limits=Limits(slots=2, elements=None, steps=None, memory=None, core_seconds=None, wall_time=None),
 )  # fmt: skip
-LOADED = """
-import os, sys, msgspec
+FIRST = """
+import functools, gc, os, sys, msgspec
 from conoid.server.intake import reading
 
-def loaded(question):
-    before = set(sys.modules)
+def made():
+    caches = [each for each in gc.get_objects() if isinstance(each, functools._lru_cache_wrapper)]
+    return sum(each.cache_info().misses for each in caches if each.__module__.startswith("conoid."))
+
+def first(question):
+    modules, before = set(sys.modules), made()
     reading.read(msgspec.msgpack.decode(question, type=reading.Question))
-    return len(set(sys.modules) - before)
+    return f"{len(set(sys.modules) - modules)} {made() - before}"
 
 def child(connection):
-    connection.sendall(str(loaded(reading._received(connection))).encode())
+    connection.sendall(first(reading._received(connection)).encode())
     os._exit(0)
 
 reading._child = child
-sys.exit(reading.main())
+if len(sys.argv) > 1:
+    sys.exit(reading.main())
+print(first(sys.stdin.buffer.read()))
 """
 
 
 def test_a_case_finds_everything_loaded() -> None:
-    """A fork loads no module: the program has loaded all modules before it is ready."""
+    """A fork loads no module and makes nothing that is kept for all cases; the first case of a program of its own makes
+    some of it.
+    """
     question = msgspec.msgpack.encode(QUESTION)
+    alone = subprocess.run([sys.executable, "-c", FIRST], input=question, capture_output=True, check=True)
     control, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
     connection, its = socket.socketpair()
-    program = subprocess.Popen([sys.executable, "-c", LOADED], stdin=theirs.fileno())
+    program = subprocess.Popen([sys.executable, "-c", FIRST, "forks"], stdin=theirs.fileno())
     with program, control, theirs, connection, its:
         assert control.recv(1) == b"r"
         socket.send_fds(control, [b"c"], [its.fileno()])
         its.close()
         connection.sendall(question)
         connection.shutdown(socket.SHUT_WR)
-        modules = int(connection.recv(100))
+        modules, made = connection.recv(100).split()
         control.close()
         theirs.close()
         assert program.wait(PATIENCE) == 0
-    assert modules == 0
+    assert (int(modules), int(made)) == (0, 0)
+    assert int(alone.stdout.split()[1]) > 0
 
 
 def test_each_point_of_a_sweep_is_read_once(server: Running, monkeypatch: pytest.MonkeyPatch) -> None:
