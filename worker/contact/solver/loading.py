@@ -71,6 +71,25 @@ def _due(due, contacts, path, first, end):  # type: ignore[no-untyped-def]
     return n
 
 
+@njit(
+    "float64(float64[:, ::1], float64[:, ::1], int64, float64[:, ::1], int64, int64, int64, int64, int64, boolean)",
+    cache=True, forceinline=True,
+)  # fmt: skip
+def normal_speed(normals, weights, p, v, column, a, b, c, d, two):  # type: ignore[no-untyped-def]
+    """Returns n . sum(w_k v_k) of contact ``p``, m/s, with the nodes a and b, or a to d if not ``two``; the velocities
+    are the columns of ``v`` from ``column`` on.
+    """
+    speed = 0.0
+    for i in range(column, column + 3):
+        if two:
+            rate = 0.0 + v[a, i] - v[b, i]
+        else:
+            rate = 0.0 + weights[p, 0] * v[a, i] + weights[p, 1] * v[b, i]
+            rate = rate + weights[p, 2] * v[c, i] + weights[p, 3] * v[d, i]
+        speed += normals[p, i - column] * rate
+    return speed
+
+
 @njit(types.void(LOADED, CONTACTS, NODES, _F, _I), cache=True, error_model="numpy")
 def load(loaded, contacts, active, fastest, k):  # type: ignore[no-untyped-def]
     """Adds the idle contacts of set ``k`` that close faster than allowed to the loaded contacts.
@@ -87,14 +106,8 @@ def load(loaded, contacts, active, fastest, k):  # type: ignore[no-untyped-def]
     for q in range(_due(row, contacts, path, first, end)):
         each = row[q]
         a, b, c, d = slots[each, 0], slots[each, 1], slots[each, 2], slots[each, 3]
-        p, speed, most, paths, two = contacts.row[each], 0.0, 1.0, path[a] + path[b], c < 0
-        for i in range(3):
-            if two:
-                rate = 0.0 + moving[a, V + i] - moving[b, V + i]
-            else:
-                rate = 0.0 + weights[p, 0] * moving[a, V + i] + weights[p, 1] * moving[b, V + i]
-                rate = rate + weights[p, 2] * moving[c, V + i] + weights[p, 3] * moving[d, V + i]
-            speed += normals[p, i] * rate
+        p, most, paths, two = contacts.row[each], 1.0, path[a] + path[b], c < 0
+        speed = normal_speed(normals, weights, p, moving, V, a, b, c, d, two)
         if wanted[p] > speed:
             row[n], reach[each] = each, np.inf
             n += 1

@@ -17,6 +17,7 @@ from ..narrow_phase.rows import ActiveRows
 from ..narrow_phase.tables import CONTACT_ROWS, CRACK
 from ..surface.records import SurfaceNodes
 from .active import KEPT, Kept
+from .loading import normal_speed
 from .stops import STOPS, Stops
 
 _CONTACTS = 1024
@@ -51,18 +52,12 @@ def _task(table, first, stop, thread):  # type: ignore[no-untyped-def]
     out[first // _CONTACTS] = 1
     for q in range(first, stop):
         p = found[q]
-        j, speed = rows.pair[p], 0.0
+        j = rows.pair[p]
         if (j >= 0 and kept.pairs[j, 0] > 0.0) or (j <= CRACK and kept.cracks[CRACK - j, 0] > 0.0):
             return
         a, b, c, d = rows.nodes[p, 0], rows.nodes[p, 1], rows.nodes[p, 2], rows.nodes[p, 3]
         two = b == c
-        for i in range(3):  # the sums of loading.load, to the bit
-            if two:
-                rate = 0.0 + v[a, i] - v[b, i]
-            else:
-                rate = 0.0 + rows.weights[p, 0] * v[a, i] + rows.weights[p, 1] * v[b, i]
-                rate = rate + rows.weights[p, 2] * v[c, i] + rows.weights[p, 3] * v[d, i]
-            speed += rows.normals[p, i] * rate
+        speed = normal_speed(rows.normals, rows.weights, p, v, 0, a, b, c, d, two)
         if not speed >= rows.wanted[p]:
             return
         for k in range(2 if two else 4):
