@@ -52,9 +52,7 @@ print(first(sys.stdin.buffer.read()))
 
 
 def test_a_case_finds_everything_loaded() -> None:
-    """A fork loads no module and makes nothing that is kept for all cases; the first case of a program of its own makes
-    some of it.
-    """
+    """A fork loads no module and fills no cache that all cases share; the first case of a program of its own does both."""
     question = msgspec.msgpack.encode(QUESTION)
     alone = subprocess.run([sys.executable, "-c", FIRST], input=question, capture_output=True, check=True)
     control, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
