@@ -235,7 +235,7 @@ def _assemble(
         case=case, comm=comm, model=model, elements=elements, leapfrog=Leapfrog(threads), boundaries=scene,
         contact=contact, bonds=bonds, erosion=erosion, fracture=fracture, rigid=rigid, walls=moving,
         clock=clock, ledger=ledger, probes=probes, timers=timers,
-        record=Record(model, fracture, comm) if fracture is not None else None,
+        record=Record(model, fracture, comm, threads) if fracture is not None else None,
         crushing=Crushing.of(case, model, comm, clock, threads),
         neighbours=neighbours, floor=scales.force_floor(model, comm),
         reduction=StepReduction(comm.size, fractures=case.fractures, contact=contact is not None),

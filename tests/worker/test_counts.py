@@ -14,6 +14,7 @@ from conoid.worker.fracture import connectivity
 from conoid.worker.output import counts
 from conoid.worker.output.counts import Counter
 from conoid.worker.parallel.comm import Comm, SerialComm
+from conoid.worker.parallel.team import team
 from conoid.worker.snapshots import share, table
 
 from ..contact.ranks import on_ranks
@@ -23,12 +24,12 @@ from .simulations import tick
 
 @pytest.mark.parametrize("ranks", [1, 3])
 def test_sizes_are_those_of_a_snapshot_on_any_number_of_ranks(ranks: int) -> None:
-    body = shattered(6, 60)
+    body, threads = shattered(6, 60), team(2 if ranks == 1 else 1)
     shares = body.shares(ranks)
 
     def work(comm: Comm) -> tuple[int, list[int]]:
         mine = share.joined([shares[comm.rank]], PARTS)
-        return counts.sizes(mine.model, connectivity.labels(mine.model, mine.held, comm), comm)
+        return counts.sizes(mine.model, connectivity.labels(mine.model, mine.held, comm), comm, threads)
 
     found = on_ranks(ranks, work)
     whole = body.whole(1)
@@ -63,6 +64,7 @@ def breaking(clock: Clock, cost: float) -> Any:
         clock.now += cost
 
     return SimpleNamespace(
+        case=SimpleNamespace(run=SimpleNamespace(threads=1)),
         model=model, fracture=SimpleNamespace(broken=0), erosion=None, contact=None, comm=SerialComm(),
         shared_nodes=lambda: 0,
         record=SimpleNamespace(update=look, labels=[], count=3), clock=SimpleNamespace(step=0),

@@ -6,33 +6,97 @@ merged while they are walked (Patwary, Blair and Manne, Experiments on union-fin
 
 import numpy as np
 
-from ..kernels.jit import njit
+from ..kernels.jit import njit, types
+from ..model.growing import Scratch
 from ..model.ids import IdIndex, located, places, unique
 from ..model.state import Block, Indices, Ints, Model
+from ..parallel.arguments import reader
 from ..parallel.comm import Comm
+from ..parallel.passes import Pass
+from ..parallel.team import TASK, Team, team
 
 _PART = 1 << 62
 """Offset above all tet ids. The offset plus the number of a part is the name of a node of the graph that connects
 all tets of a part without facets."""
+_TETS = 4096
+"""Number of tets in a task. Chosen value: 7 % of the facets of a bar of 55,000 tets are between tets of two tasks; one
+thread joins these tets."""
+_NOWHERE, _ELSEWHERE = -1, -2
+"""Places of no tet and of a tet on another rank."""
+_I, _I1, _N1, _N2 = types.int64, types.int64[::1], types.int32[::1], types.int32[:, ::1]
+_BIND = _N1, _I1, _N1, _I1, _N2, _N2, types.uint8[:, ::1], _I
+_NAME = _I1, _N1, _I1
+_read_bind, _read_name = reader(*_BIND), reader(*_NAME)
+
+
+class Connectivity:
+    """Connectivity of the tets of one rank, as passes of the threads. It keeps the places of the tets behind all faces
+    while the tets of the rank stay the same.
+    """
+
+    def __init__(self, model: Model, comm: Comm, threads: Team) -> None:
+        self._model, self._comm = model, comm
+        self._bind = Pass(threads, _bind_range, *_BIND, size=_TETS)
+        self._name = Pass(threads, _name_range, *_NAME, size=_TETS)
+        self._scratch, self._of = Scratch(), [(-1, -1)]
+
+    def labels(self, held: Ints) -> list[Ints]:
+        """Labels of fragments, (n,) for each block, a label for each tet: the smallest global id of its tets.
+        Collective.
+
+        Tets are connected through faces whose bond is intact, and through ``held``, (m, 2) global ids of tets of
+        cohesive facets; a pair is given on a rank that has at least one of the two tets. A block without the array
+        ``across`` is one piece.
+        """
+        blocks = self._model.blocks
+        self._look_up()
+        root, first, borders = np.arange(len(self._ids), dtype=np.int32), 0, list[Ints]()
+        for block, beside in zip(blocks, self._beside, strict=True):
+            borders.append(self._bind_block(root, block, beside, first))
+            first += block.n
+        borders.append(_bind_held(root, self._ids, self._where, held.reshape(-1, 2)))
+        names = np.empty(len(root), np.int64)
+        self._name.run(len(root), names, root, self._ids)
+        names = _joined(np.concatenate(borders), names, root, self._ids, self._where, self._comm)
+        return np.split(names, np.cumsum([block.n for block in blocks])[:-1]) if blocks else []
+
+    def _look_up(self) -> None:
+        """Finds the places of the tets behind all faces, if the tets of the rank have changed."""
+        blocks = self._model.blocks
+        if self._of == (now := [(block.n, block.moved) for block in blocks]):
+            return
+        self._of = now
+        self._ids = np.concatenate([np.zeros(0, np.int64), *(block.id for block in blocks)])
+        self._where = IdIndex(self._ids)
+        self._beside = [_beside(self._where, block) for block in blocks]
+
+    def _bind_block(self, root: Indices, block: Block, beside: Indices, first: int) -> Ints:
+        """Joins the tets of a block, whose places begin at ``first``, through their intact faces; returns (k, 2) as
+        ``_bind_held``.
+        """
+        if not block.n:
+            return np.zeros((0, 2), np.int64)
+        if not len(block.across):
+            here = np.arange(first, first + block.n)
+            _bind(root, np.column_stack([here[:-1], here[1:]]), self._ids)
+            return np.array([[int(self._ids[first]), _PART + block.part]])
+        outer = self._scratch.of("outer", 4 * block.n, np.int32)
+        counts = self._scratch.of("counts", self._bind.many(block.n))
+        self._bind.run(block.n, root, self._ids, outer, counts, beside, block.across, block.bond, first)
+        rest = _bind_outer(root, self._ids, outer, counts, beside, first)
+        outer = outer[:rest]
+        return np.column_stack([self._ids[first + (outer >> 2)], block.across.reshape(-1)[outer] >> 2])
 
 
 def labels(model: Model, held: Ints, comm: Comm) -> list[Ints]:
-    """Labels of fragments, (n,) for each block, a label for each tet: the smallest global id of its tets. Collective.
+    """Labels of fragments of one model, by one thread; see ``Connectivity.labels``. Collective."""
+    return Connectivity(model, comm, team(1)).labels(held)
 
-    Tets are connected through faces whose bond is intact, and through ``held``, (m, 2) global ids of tets of cohesive
-    facets; a pair is given on a rank that has at least one of the two tets. A block without the array ``across`` is one
-    piece.
-    """
-    ids = np.concatenate([np.zeros(0, np.int64), *(block.id for block in model.blocks)])
-    where, root, first = IdIndex(ids), np.arange(len(ids), dtype=np.int32), 0
-    borders = [_bind_held(root, ids, where, held.reshape(-1, 2))]
-    for block in model.blocks:
-        borders.append(_bind_block(root, ids, where, block, first))
-        first += block.n
-    _settle(root)
-    own, theirs = np.concatenate(borders).T
-    names = _joined(np.column_stack([ids[root[own]], theirs]), root, ids, where, comm)
-    return np.split(names, np.cumsum([block.n for block in model.blocks])[:-1]) if model.blocks else []
+
+def _beside(where: IdIndex, block: Block) -> Indices:
+    """(n, 4) places of the tets behind the faces of a block."""
+    at = where.places(block.across >> 2)
+    return np.where(block.across < 0, np.int32(_NOWHERE), np.where(at < 0, np.int32(_ELSEWHERE), at))
 
 
 def count(model: Model, labels: list[Ints], comm: Comm) -> int:
@@ -52,93 +116,108 @@ def components(n: int, edges: Ints | Indices) -> Ints:
 
 
 def _bind_held(root: Indices, ids: Ints, where: IdIndex, pairs: Ints) -> Ints:
-    """Joins pairs of tets (m, 2); returns, for pairs across ranks, (k, 2) the place of the tet on this rank and the id
-    of the other tet.
+    """Joins pairs of tets (m, 2); returns, for pairs across ranks, (k, 2) the ids of the tet on this rank and of the
+    other tet.
     """
+    if not len(pairs):
+        return np.zeros((0, 2), np.int64)
     at = where.places(pairs)
     here = at >= 0
     _bind(root, at[here.all(axis=1)].astype(np.int64), ids)
     outer = np.flatnonzero(here[:, 0] != here[:, 1])
     inside = np.where(here[outer, 0], 0, 1)
-    return np.column_stack([at[outer, inside].astype(np.int64), pairs[outer, 1 - inside]])
+    return np.column_stack([pairs[outer, inside], pairs[outer, 1 - inside]])
 
 
-def _bind_block(root: Indices, ids: Ints, where: IdIndex, block: Block, first: int) -> Ints:
-    """Joins the tets of a block, whose places begin at ``first``, through their intact faces; returns (k, 2) as
-    ``_bind_held``.
-    """
-    if not block.n:
-        return np.zeros((0, 2), np.int64)
-    if not len(block.across):
-        here = np.arange(first, first + block.n)
-        _bind(root, np.column_stack([here[:-1], here[1:]]), ids)
-        return np.array([[first, _PART + block.part]])
-    pairs, outer = np.empty((block.across.size, 2), np.int64), np.empty(block.across.size, np.int64)
-    inner, rest = _across_faces(pairs, outer, where.places(block.across >> 2), block.across, block.bond, first)
-    _bind(root, pairs[:inner], ids)
-    outer = outer[:rest]
-    return np.column_stack([first + (outer >> 2), block.across.reshape(-1)[outer] >> 2])
-
-
-def _joined(border: Ints, root: Indices, ids: Ints, where: IdIndex, comm: Comm) -> Ints:
+def _joined(border: Ints, names: Ints, root: Indices, ids: Ints, where: IdIndex, comm: Comm) -> Ints:
     """(n,) labels of all tets, after the pieces of all ranks have been joined.
 
-    ``border`` (k, 2): labels of pieces of this rank, and ids of the tets of other ranks that they are connected
-    with. Collective.
+    ``border`` (k, 2): ids of tets of this rank, and ids of the tets of other ranks that they are connected with;
+    ``names`` (n,): labels of the pieces of this rank. Collective.
     """
-    asking, asked = comm.join(border).reshape(-1, 2).T
+    asking, asked = comm.join(np.column_stack([names[where.places(border[:, 0])], border[:, 1]])).reshape(-1, 2).T
+    if not len(asked):
+        return names
     at = where.places(asked)
-    named = ids[root]
     mine = np.flatnonzero(at >= 0)
     answers = np.zeros(len(asked), np.int64)
-    answers[mine] = 1 + named[at[mine]]
+    answers[mine] = 1 + names[at[mine]]
     answers = comm.sum(answers) - 1
     answers[asked >= _PART] = asked[asked >= _PART]
     edges = np.column_stack([asking, answers])[answers >= 0]
     if not len(edges):
-        return np.asarray(named)
-    names = unique(edges)
-    one = names[components(len(names), located(names, edges))]
-    pieces = np.flatnonzero(root == np.arange(len(root)))
-    at = places(names, ids[pieces])
-    joined = ids.copy()
-    joined[pieces] = np.where(at >= 0, one[at], ids[pieces])
-    return np.asarray(joined[root])
+        return names
+    known = unique(edges)
+    one = known[components(len(known), located(known, edges))]
+    at = places(known, names)
+    return np.where(at >= 0, one[at], names)
+
+
+@njit("void(int32[::1], int64[::1], int64, int64)", cache=True)
+def _unite(root, ids, a, b):  # type: ignore[no-untyped-def]
+    """Joins the trees ``root`` (n,) of two places of tets."""
+    while root[a] != root[b]:
+        if ids[root[a]] < ids[root[b]]:
+            a, b = b, a
+        above = root[a]
+        root[a] = root[b]
+        if above == a:
+            break
+        a = above
 
 
 @njit("void(int32[::1], int64[:, ::1], int64[::1])", cache=True)
 def _bind(root, pairs, ids):  # type: ignore[no-untyped-def]
     """Joins the trees ``root`` (n,) of pairs (m, 2) of places of tets."""
     for m in range(len(pairs)):
-        a, b = pairs[m, 0], pairs[m, 1]
-        while root[a] != root[b]:
-            if ids[root[a]] < ids[root[b]]:
-                a, b = b, a
-            above = root[a]
-            root[a] = root[b]
-            if above == a:
-                break
-            a = above
+        _unite(root, ids, pairs[m, 0], pairs[m, 1])
 
 
-@njit("UniTuple(int64, 2)(int64[:, ::1], int64[::1], int32[:, ::1], int32[:, ::1], uint8[:, ::1], int64)", cache=True)
-def _across_faces(pairs, outer, behind, across, bond, first):  # type: ignore[no-untyped-def]
-    """Fills ``pairs`` with the places of tets of a block and of the tets ``behind`` their intact faces, and ``outer``
-    with the faces, 4 * tet + face, whose other tet is on another rank; returns the number of pairs and the number of
-    faces.
+@njit(TASK, cache=True)
+def _bind_range(table, first, stop, thread):  # type: ignore[no-untyped-def]
+    """Task: joins the tets of a range of a block through the intact faces between them, and lists in ``outer`` the
+    faces, 4 * tet + face, whose other tet is beyond the range. Of the two faces between two tets of a block it uses the
+    first one; two blocks may differ in the state of a facet.
     """
-    inner, rest = 0, 0
-    for tet in range(len(behind)):
+    root, ids, outer, counts, beside, across, bond, begin = _read_bind(table)
+    n = 4 * first
+    for tet in range(first, stop):
         for face in range(4):
-            if across[tet, face] < 0 or (len(bond) and bond[tet, face] != 0):
+            b = beside[tet, face]
+            if across[tet, face] < 0 or (begin <= b < begin + tet) or (len(bond) and bond[tet, face] != 0):
                 continue
-            if behind[tet, face] < 0:
-                outer[rest] = 4 * tet + face
-                rest += 1
+            if begin <= b < begin + stop:
+                _unite(root, ids, begin + tet, b)
             else:
-                pairs[inner, 0], pairs[inner, 1] = first + tet, behind[tet, face]
-                inner += 1
-    return inner, rest
+                outer[n], n = 4 * tet + face, n + 1
+    counts[first // _TETS] = n - 4 * first
+
+
+@njit("int64(int32[::1], int64[::1], int32[::1], int64[::1], int32[:, ::1], int64)", cache=True)
+def _bind_outer(root, ids, outer, counts, beside, begin):  # type: ignore[no-untyped-def]
+    """Joins the tets of the listed faces; writes the faces whose other tet is on another rank to the begin of
+    ``outer``, and returns their number.
+    """
+    rest = 0
+    for k in range(len(counts)):
+        for i in range(4 * _TETS * k, 4 * _TETS * k + counts[k]):
+            tet, face = outer[i] >> 2, outer[i] & 3
+            if beside[tet, face] >= 0:
+                _unite(root, ids, begin + tet, beside[tet, face])
+            else:
+                outer[rest], rest = outer[i], rest + 1
+    return rest
+
+
+@njit(TASK, cache=True)
+def _name_range(table, first, stop, thread):  # type: ignore[no-untyped-def]
+    """Task: sets the ``names`` of tets to the ids of their roots."""
+    names, root, ids = _read_name(table)
+    for a in range(first, stop):
+        b = root[a]
+        while root[b] != b:
+            b = root[b]
+        names[a] = ids[b]
 
 
 @njit("void(int32[::1])", cache=True)

@@ -11,7 +11,9 @@ from ..migration.parcel import Parcel, length
 from ..model.ids import places
 from ..model.state import Ints, Model
 from ..parallel.comm import Comm
-from . import connectivity, fragments
+from ..parallel.team import Team
+from . import fragments
+from .connectivity import Connectivity, count
 from .numbers import UNKNOWN, numbered
 from .stage import Fracture
 
@@ -19,7 +21,8 @@ from .stage import Fracture
 class Record:
     """The fragments of a run, from frame to frame. All methods are collective."""
 
-    def __init__(self, model: Model, fracture: Fracture, comm: Comm) -> None:
+    def __init__(self, model: Model, fracture: Fracture, comm: Comm, threads: Team) -> None:
+        self._connectivity = Connectivity(model, comm, threads)
         self._model, self._fracture, self._comm = model, fracture, comm
         self.labels: list[Ints] = []
         """Label of the fragment of each tet (``connectivity``), (n,) for each block, of the last ``update``."""
@@ -52,8 +55,8 @@ class Record:
         """Finds the present fragments."""
         cohesion = self._fracture.cohesion
         held = cohesion.facets.tets if cohesion is not None else np.zeros((0, 2), np.int64)
-        self.labels = connectivity.labels(self._model, held, self._comm)
-        self.count = connectivity.count(self._model, self.labels, self._comm)
+        self.labels = self._connectivity.labels(held)
+        self.count = count(self._model, self.labels, self._comm)
 
     def number(self) -> None:
         """Numbers the fragments of the last ``update``. Called at the start and at frames only. Frames are at the same

@@ -16,16 +16,26 @@ import numpy as np
 from conoid.cases.model.joined import bodies
 
 from ..fracture import connectivity
-from ..kernels.jit import njit
+from ..kernels.jit import njit, types
 from ..model.ids import located, unique
 from ..model.state import Floats, Ints, Model
+from ..parallel.arguments import reader
 from ..parallel.comm import Comm
+from ..parallel.passes import Pass
+from ..parallel.team import TASK, Team, team
 from ..simulation import Simulation
 from ..snapshots.table import by_size
 
 SHARE = 1.0 / 50.0
 """Share of the wall time for finding fragments between frames. Chosen value: a run of a minute takes one second
 longer."""
+_TETS = 4096
+"""Number of tets in a task. Chosen value: a task takes some 20 us."""
+_MEASURE = (
+    types.int64[::1], types.float64[:, ::1], types.int64[::1], types.int64[::1], types.uint32[:, ::1],
+    types.float64[:, ::1],
+)  # fmt: skip
+_read_measure = reader(*_MEASURE)
 
 
 class Counter:
@@ -58,7 +68,7 @@ class Counter:
             return
         began, first = time.monotonic(), self._step < 0
         self._fragments, labels = fragments(sim)
-        self._smallest, self._sizes = sizes(sim.model, labels, sim.comm)
+        self._smallest, self._sizes = sizes(sim.model, labels, sim.comm, team(sim.case.run.threads))
         self._found, self._step, ended = _state(sim), sim.clock.step, time.monotonic()
         self._again = ended if first else ended + (ended - began) / SHARE
 
@@ -123,19 +133,30 @@ def _state(sim: Simulation) -> tuple[int, int]:
     return sim.fracture.broken if sim.fracture is not None else 0, sim.model.elements_global
 
 
-def sizes(model: Model, labels: list[Ints], comm: Comm) -> tuple[int, list[int]]:
+def sizes(model: Model, labels: list[Ints], comm: Comm, threads: Team) -> tuple[int, list[int]]:
     """Return the number of fragments of each size (snapshots/table.by_size) on rank 0, (0, []) on the others.
     Collective.
 
     ``labels``: for each block (n,) the fragment of each tet.
     """
-    here = unique(np.concatenate([np.zeros(0, np.int64), *labels]))
-    reach = np.full((len(here), 6), -np.inf)
+    boxes, bounds = [np.zeros(0, np.int64)], [np.zeros((0, 6))]
+    measure = Pass(threads, _measure, *_MEASURE, size=_TETS)
     for block, of in zip(model.blocks, labels, strict=True):
-        last = np.full(model.nodes.n, -1, np.int32)
-        _reach(reach, last, located(here, of), block.tets, model.nodes.x)
-    pieces = comm.gather((here, reach))
+        label, reach, counts = np.empty(block.n, np.int64), np.empty((block.n, 6)), np.zeros(measure.many(block.n), int)
+        measure.run(block.n, label, reach, counts, of, block.tets, model.nodes.x)
+        for k, n in enumerate(counts.tolist()):
+            boxes.append(label[_TETS * k : _TETS * k + n])
+            bounds.append(reach[_TETS * k : _TETS * k + n])
+    pieces = comm.gather(_merged(np.concatenate(boxes), np.concatenate(bounds)))
     return by_size(_extents(pieces)) if pieces is not None else (0, [])
+
+
+def _merged(labels: Ints, bounds: Floats) -> tuple[Ints, Floats]:
+    """Return the distinct labels, and the bounds (g, 6) of each one: the maxima of the rows with this label."""
+    here = unique(labels)
+    reach = np.full((len(here), 6), -np.inf)
+    _raise(reach, located(here, labels), bounds)
+    return here, reach
 
 
 def _extents(pieces: list[tuple[Ints, Floats]]) -> Floats:
@@ -148,20 +169,30 @@ def _extents(pieces: list[tuple[Ints, Floats]]) -> Floats:
     return np.asarray((whole[:, :3] + whole[:, 3:]).max(axis=1, initial=0.0))
 
 
-@njit("void(float64[:, ::1], int32[::1], int32[::1], uint32[:, ::1], float64[:, ::1])", cache=True)
-def _reach(reach, last, of, tets, x):  # type: ignore[no-untyped-def]
-    """Raise ``reach`` (g, 6), upper corners and negative lower corners, to the nodes of tets of group ``of`` (n,).
-
-    ``last`` (nodes,): the group for which each node was last used.
+@njit(TASK, cache=True)
+def _measure(table, first, stop, thread):  # type: ignore[no-untyped-def]
+    """Task: list the fragments of a range of tets, and their ``reach``: upper corners and negative lower corners of
+    their bounding boxes. Successive tets of one fragment have one row.
     """
-    for tet in range(len(tets)):
-        group = of[tet]
+    labels, reach, counts, of, tets, x = _read_measure(table)
+    n = first - 1
+    for tet in range(first, stop):
+        if n < first or labels[n] != of[tet]:
+            n += 1
+            labels[n] = of[tet]
+            for i in range(6):
+                reach[n, i] = -np.inf
         for corner in range(4):
             node = tets[tet, corner]
-            if last[node] == group:
-                continue
-            last[node] = group
             for i in range(3):
-                place = x[node, i]
-                reach[group, i] = max(reach[group, i], place)
-                reach[group, 3 + i] = max(reach[group, 3 + i], -place)
+                reach[n, i] = max(reach[n, i], x[node, i])
+                reach[n, 3 + i] = max(reach[n, 3 + i], -x[node, i])
+    counts[first // _TETS] = n + 1 - first
+
+
+@njit("void(float64[:, ::1], int32[::1], float64[:, ::1])", cache=True)
+def _raise(reach, of, rows):  # type: ignore[no-untyped-def]
+    """Raise ``reach`` (g, 6) to the ``rows`` (k, 6) of the groups ``of`` (k,)."""
+    for k in range(len(rows)):
+        for i in range(6):
+            reach[of[k], i] = max(reach[of[k], i], rows[k, i])
