@@ -89,9 +89,10 @@ function away(error) {
 async function start() {
   clearTimeout(again);
   try {
-    const { auth } = await offer();
+    const asked = token.get() ? call("v1/me") : null;
+    const [{ auth }, known] = await Promise.all([offer(), asked]);
     if (auth && !token.get()) return signIn();
-    const me = await call("v1/me");
+    const me = known ?? await call("v1/me");
     who.textContent = me.owner;
     leave.hidden = !token.get();
     route();

@@ -20,8 +20,10 @@ export class Body {
   // `onShow` is called with the snapshot on the screen.
   constructor(run, onShow = () => {}) {
     Object.assign(this, { run, onShow, entries: [], snapshots: new Snapshots(run, MOST_KEPT), following: true, picked: null, wanted: null, planes: [] });
+    this.drawn = new Promise((done) => { this.ready = done; }); // Fulfilled when the first snapshot is drawn, or none can be.
     this.path = `v1/runs/${encodeURIComponent(run)}`;
     this.build();
+    three().catch(() => {}); // start() reports an error.
   }
 
   build() {
@@ -49,7 +51,7 @@ export class Body {
 
   // All snapshots of the run so far, from its messages. The newest is shown, unless the user has chosen an earlier one.
   update(entries) {
-    if (entries.length === this.entries.length) return;
+    if (entries.length <= this.entries.length) return;
     const first = !this.entries.length;
     this.entries = [...entries];
     this.element.hidden = false;
@@ -75,6 +77,7 @@ export class Body {
       if (this.snapshot) this.present(this.snapshot, this.volume);
     } catch (error) {
       this.holder.replaceChildren(h("p.hint", {}, `No 3-D: ${error.message}`));
+      this.ready();
     }
   }
 
@@ -101,6 +104,7 @@ export class Body {
       }
     } catch (error) {
       this.note.textContent = error.message;
+      this.ready();
     }
   }
 
@@ -120,6 +124,7 @@ export class Body {
     this.pick(this.picked === null ? -1 : rowOf(snapshot, this.picked), true);
     this.list();
     this.element.dataset.shown = header.n;
+    requestAnimationFrame(() => setTimeout(this.ready)); // After the frame that draws it.
   }
 
   offer() {

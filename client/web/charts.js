@@ -9,16 +9,18 @@ import { save, tableOf, toCsv } from "./tables.js";
 const GROUP = "run";
 const NEAR = "100px"; // Distance to the window: a chart farther off is drawn when the browser is idle, and again when it comes near.
 const PICTURE = { width: 960, height: 420 }; // px of a saved picture.
-const whenIdle = globalThis.requestIdleCallback ?? ((work) => setTimeout(work, 200)); // Some browsers lack it.
+const IDLE = 2000; // ms after which a chart out of view is drawn by a browser that is never idle.
+const whenIdle = (work) => globalThis.requestIdleCallback?.(work, { timeout: IDLE }) ?? setTimeout(work, 200); // Some browsers lack it.
 
 // A chart of `height` px. `option()` returns an option of ECharts, or null without data.
 // `unit` is that of its x axis; only charts over time share the cursor. Enter calls `onEnter` with the index of the cursor in the first series; `table()` resolves to
-// the saved table, { head, rows }, instead of the drawn points; `name()` is the beginning of its file names.
+// the saved table, { head, rows }, instead of the drawn points; `name()` is the beginning of its file names. The chart
+// is drawn after `before`, a promise. `missing()` returns the text of a chart without data.
 export class Chart {
-  constructor(height, label, option, { alone = false, unit = "s", onClick, onEnter, table, name = () => "chart" } = {}) {
+  constructor(height, label, option, { alone = false, unit = "s", onClick, onEnter, table, before, missing = () => "", name = () => "chart" } = {}) {
     this.element = h("div.plot", { tabindex: 0, role: "img", "aria-label": `${label}; arrow keys move the cursor${onEnter ? ", Enter opens the nearest marker" : ""}`, style: { height: `${height}px` } },
-      h("p.hint", {}, "waiting for the first numbers"));
-    Object.assign(this, { height, label, option, alone, unit, onClick, onEnter, table, name, at: 0, seen: false });
+      this.hint = h("p.hint"));
+    Object.assign(this, { height, label, option, alone, unit, onClick, onEnter, table, missing, name, at: 0, seen: false });
     const button = (kind, act) => h("button.tab", { type: "button", title: `save as ${kind}`, "aria-label": `save as ${kind}: ${label}`, onclick: act }, kind);
     this.tools = h("span.save", { hidden: "" }, button("CSV", () => this.saveTable()), button("SVG", () => this.savePicture()));
     this.eye = new IntersectionObserver((entries) => this.look(entries.at(-1).isIntersecting), { rootMargin: NEAR });
@@ -31,12 +33,12 @@ export class Chart {
     this.element.addEventListener("pointermove", ({ clientX, clientY }) => { this.pointer = [clientX, clientY]; });
     this.element.addEventListener("pointerleave", () => this.leave());
     this.element.addEventListener("blur", () => this.leave());
-    this.open();
+    this.open(before);
   }
 
-  async open() {
+  async open(before) {
     try {
-      this.kit = await echarts();
+      [this.kit] = await Promise.all([echarts(), before]);
       this.draw();
     } catch (error) {
       this.element.replaceChildren(h("p.hint", {}, `No charts: ${error.message}`));
@@ -63,7 +65,10 @@ export class Chart {
   paint() {
     const option = this.kit && this.element.clientWidth ? this.option() : null;
     this.tools.hidden = !option;
-    if (!option) return;
+    if (!option) {
+      if (this.kit) this.hint.textContent = this.missing();
+      return;
+    }
     this.chart ??= this.init();
     const panels = option.grid?.length ?? 1;
     if (panels !== (this.panels ?? 1)) this.stretch(panels);

@@ -15,10 +15,11 @@ const pause = (ms, signal) => new Promise((resolve) => {
   signal.addEventListener("abort", () => { clearTimeout(timer); resolve(); }, { once: true });
 });
 
-// `info`: the run from the server, `plan`: its case with all defaults, null while missing.
-export async function fill(live, info, plan, signal) {
+// `info`: the run from the server. The case with all defaults is null while missing.
+export async function fill(live, info, signal) {
   const columns = readColumns(live.run, undefined, undefined, signal).catch(() => live.columns);
-  take(live, await call(`${path(live.run)}/history?points=${POINTS}`, { signal }), info, plan);
+  const [history, plan] = await Promise.all([call(`${path(live.run)}/history?points=${POINTS}`, { signal }), readPlan(live.run, signal)]);
+  take(live, history, info, plan);
   live.columns = await columns;
 }
 

@@ -24,7 +24,7 @@ export class Ranks {
     const more = totals.length - MOST_RANKS;
     this.note.textContent = more > 0 ? `${totals.length} ranks, the first ${MOST_RANKS} shown` : "";
     this.element.replaceChildren(
-      totals.length ? h("div.ranks", {}, rows) : h("p.hint", {}, "waiting for the first numbers"),
+      totals.length ? h("div.ranks", {}, rows) : h("p.hint", {}, "Waiting for the first numbers."),
       totals.length ? legend(GROUPS.filter((name) => groups[name]).map((name) => [SPENT[name] ?? name, name])) : "");
   }
 }

@@ -5,7 +5,7 @@ import { Chart } from "./charts.js";
 import { VIEWS, end, names, ofEnergy, ofResidual } from "./energies.js";
 import { count, exact, fixed, h, si } from "./figures.js";
 import { everyLine, everyReport } from "./history.js";
-import { Live } from "./live.js";
+import { FINAL, Live } from "./live.js";
 import { nearest, ofImbalance, ofSpent, ofWork, workTable } from "./loads.js";
 import { Chooser, columnsOf, ofForces, ofProbes } from "./probes.js";
 import { recall, remember } from "./storage.js";
@@ -18,7 +18,8 @@ const CURVE = 60; // Number of points of the curve of a fitted law.
 const LEAST = 1; // Smallest number of fragments on the axis.
 
 // { name: [chart, title, element beside the title] }; `onBalance` is called with the index of a balance event in live.balances.
-export function plots(live, onBalance) {
+// The charts are drawn after `before`, a promise.
+export function plots(live, onBalance, before) {
   const title = h("span", {}, "Energy");
   const by = h("select", { "aria-label": "energy by", onchange: () => {
     remember("energy.by", by.value);
@@ -32,7 +33,7 @@ export function plots(live, onBalance) {
   const lines = (of) => async () => (live.columns.lines ? everyLine(live.run, of()) : undefined);
   const reports = (of) => async () => tableOf(of(await everyReport(live, (run) => new Live(run))));
   const add = (name, label, titled, beside, option, more) => {
-    const chart = new Chart(TALL, label, option, { ...more, name: () => `${live.plan?.name ?? live.run}_${name}` });
+    const chart = new Chart(TALL, label, option, { ...more, before, missing: () => (FINAL.has(live.state) ? "This run has no such numbers." : "Waiting for the first numbers."), name: () => `${live.plan?.name ?? live.run}_${name}` });
     return [chart, titled, [...beside, chart.tools]];
   };
   const made = {

@@ -6,7 +6,7 @@ import { Cards } from "./cards.js";
 import { counted, fixed, h, percent, words } from "./figures.js";
 import { Files } from "./files.js";
 import { Headline } from "./headline.js";
-import { fill, followColumns, readPlan } from "./history.js";
+import { fill, followColumns } from "./history.js";
 import { FINAL, Live } from "./live.js";
 import { Logs, Warnings } from "./logs.js";
 import { Numbers, ended, residual } from "./numbers.js";
@@ -14,6 +14,7 @@ import { Balances, Ranks, checksTable } from "./panels.js";
 import { nothing, plots } from "./plots.js";
 import { RunState } from "./runstate.js";
 
+const FIRST = 3000; // ms; the charts are drawn after the body, or after this time.
 const CHARTS_EVERY = 500; // ms; the head and the bars are drawn with every message.
 const QUEUE_EVERY = 3; // s after which the place in the queue is requested again.
 const STAGES = { "": "No data of this run has been read yet.", accepted: "The server accepts this run.", queued: "This run waits in the queue.", starting: "This run starts: the mesh is made and the solver is loaded." };
@@ -45,11 +46,11 @@ export class RunPage {
     this.warnings = new Warnings();
     this.files = new Files(live.run);
     this.situation = new RunState(live.run, () => this.files.read());
-    this.charts = plots(live, (place) => this.balances.open(place));
     this.body = new Body(live.run, (snapshot) => {
       this.charts.snapshot = snapshot;
       this.charts.sizes[0].draw(true);
     });
+    this.charts = plots(live, (place) => this.balances.open(place), Promise.race([this.body.drawn, pause(FIRST)]));
     this.empty = h("section.card.empty-stage", { "aria-label": "the body" });
     this.fillCards();
     this.element = h("div.work", {}, this.head.element, this.situation.element,
@@ -83,13 +84,14 @@ export class RunPage {
   async follow() {
     const { live } = this;
     let wait = 500;
+    this.readBody();
     await this.readInfo();
     let filled = false;
     while (!this.abort.signal.aborted) {
       let away = false;
       try {
         if (!filled) {
-          await fill(live, this.info, await readPlan(live.run, this.abort.signal), this.abort.signal);
+          await fill(live, this.info, this.abort.signal);
           followColumns(live, this.abort.signal, () => this.drawCharts());
         }
         filled = true;
@@ -117,6 +119,14 @@ export class RunPage {
     this.connection = ["", "ended"];
     await this.readInfo();
     this.readOutcome();
+    this.later();
+  }
+
+  // The body is drawn before the history has been read.
+  async readBody() {
+    const { snapshots } = await call(`${this.path}/snapshots`, { signal: this.abort.signal }).catch(() => ({ snapshots: [] }));
+    if (!snapshots.length) this.body.ready();
+    if (this.live.snapshots.length < snapshots.length) this.live.snapshots = snapshots;
     this.later();
   }
 

@@ -2,9 +2,9 @@
 
 A browser with software rendering opens two runs without a solver: one with a snapshot of 50,000 triangles and a few
 events, one with 200,000 triangles and a million events. Printed are the time of the first paint, the time of the
-history of a million events (first and second request), the time of its page, script time and draw calls per frame,
-frames per second, and CPU time per frame of all processes of the browser. Other load on the machine affects the CPU
-time less than the other numbers.
+history of a million events (first and second request), the time of its page, the time from an address to the first
+picture of the body, script time and draw calls per frame, frames per second, and CPU time per frame of all processes of
+the browser. Other load on the machine affects the CPU time less than the other numbers.
 """
 
 import argparse
@@ -94,6 +94,8 @@ def _page(browser: Browser, site: Site, ids: dict[int, str]) -> None:
         page.go(f"{site.url}#/runs/{run}")
         page.wait(SHOWN)
         print(f"page of the run, until its body and charts stand: {time.perf_counter() - start:.2f} s")
+        page.go(f"{site.url}?{triangles}#/runs/{run}")
+        print(f"first picture: {page.wait('window.seen?.frames[0]')[0]:.0f} ms after the address was opened")
         before = _cpu(browser)
         seconds, drawn = page.evaluate(_TURN)
         frames = page.evaluate("seen.frames")

@@ -2,6 +2,7 @@
 
 import gzip
 import hashlib
+import re
 import sys
 from collections.abc import Iterator
 from importlib import metadata
@@ -64,6 +65,18 @@ def test_a_browser_asks_whether_the_page_is_still_the_same(client: TestClient) -
         assert (answer.status_code, answer.headers["cache-control"]) == (200, "no-cache"), address
         again = client.get(address, headers={"If-None-Match": answer.headers["etag"]})
         assert (again.status_code, again.headers["cache-control"]) == (304, "no-cache")
+
+
+def test_files_named_by_the_page_never_change_and_all_scripts_are_among_them(client: TestClient) -> None:
+    named = set(re.findall(r'(?:href|src)="(page/[^"]*)"', client.get("/").text))
+    written = {path.name for path in WEB.iterdir() if path.suffix in {".js", ".css"}}
+    assert {Path(address).name for address in named} == written
+    assert len({Path(address).parent for address in named}) == 1
+    for address in named:
+        answer = client.get(f"/{address}")
+        assert answer.text == (WEB / Path(address).name).read_text(encoding="utf-8")
+        assert "immutable" in answer.headers["cache-control"], address
+    assert client.get("/page/0000000000000000/app.js").status_code == 404
 
 
 def test_the_page_does_not_take_unknown_addresses_for_its_own(client: TestClient) -> None:
