@@ -26,7 +26,7 @@ function show(next) {
 
 // Sign in --------------------------------------------------------------------------------------------------------------
 
-function signIn(told = "") {
+function signIn(reason = "") {
   who.textContent = "";
   leave.hidden = true;
   const field = h("input#token", { type: "password", autocomplete: "current-password", "aria-label": "token", placeholder: "token", required: "" });
@@ -41,7 +41,7 @@ function signIn(told = "") {
     h("p.hint", {}, "Paste the token that the server gave you. This tab keeps it until you close it."),
     field,
     h("label.check", {}, remembered, h("span", {}, "Remember it in this browser, until I sign out")),
-    told ? h("p.problem", { role: "alert" }, told) : "",
+    reason ? h("p.problem", { role: "alert" }, reason) : "",
     h("div", {}, h("button", {}, "Sign in")));
   show({ element: form, signsIn: true });
   field.focus();
@@ -98,9 +98,9 @@ async function start() {
     route();
   } catch (error) {
     if (error instanceof Problem && (error.status === 401 || error.status === 403)) {
-      const told = token.get() ? "This token is not valid on the server." : "";
+      const reason = token.get() ? "This token is not valid on the server." : "";
       token.clear();
-      return signIn(told);
+      return signIn(reason);
     }
     away(error);
   }

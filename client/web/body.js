@@ -142,8 +142,8 @@ export class Body {
     const by = this.tools.by.value;
     const field = this.snapshot.header.fields[by];
     if (!field) return this.view.colour(by);
-    const told = this.entries.map(({ fields }) => fields?.[by]).filter(Boolean);
-    const ends = range(this.tools.choice, by, [this.snapshot], told);
+    const ranges = this.entries.map(({ fields }) => fields?.[by]).filter(Boolean);
+    const ends = range(this.tools.choice, by, [this.snapshot], ranges);
     this.tools.ends(ends, field.unit);
     return this.view.colour(by, ends, this.tools.choice.bands);
   }
@@ -245,7 +245,7 @@ export class Body {
     this.pause();
     this.following = false;
     this.filmed = new AbortController();
-    await this.tools.whileFilming((told) => film(this.view, name, this.entries.length, (i) => this.show(i), (i) => told(`snapshot ${i + 1} of ${this.entries.length}`), this.filmed.signal));
+    await this.tools.whileFilming((report) => film(this.view, name, this.entries.length, (i) => this.show(i), (i) => report(`snapshot ${i + 1} of ${this.entries.length}`), this.filmed.signal));
     return (this.filmed = null);
   }
 

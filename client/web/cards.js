@@ -24,7 +24,7 @@ export class Cards {
   // Adds a card with its title, an element beside the title, and its content; `name` is the card's key in the storage.
   add(name, title, beside, ...content) {
     const words = typeof title === "string" ? title : title.textContent;
-    const tool = (what, told, act) => h(`button.tool.${what}`, { type: "button", title: told, "aria-label": `${told}: ${words}`, onclick: act });
+    const tool = (what, tip, act) => h(`button.tool.${what}`, { type: "button", title: tip, "aria-label": `${tip}: ${words}`, onclick: act });
     const move = tool("move", "move beside the body, or back to the grid", () => this.move(name));
     const close = tool("shut", "close", () => this.close(name));
     const element = h("section.card", { "data-card": name, tabindex: -1, "aria-label": words },

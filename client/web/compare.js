@@ -235,8 +235,8 @@ function points({ curves }, name) {
 }
 
 async function readReports(run, signal) {
-  const { series: { t, ...told } } = await call(`v1/runs/${encodeURIComponent(run.id)}/history?points=${REPORTS}`, { signal });
-  for (const name of Object.keys(JOURNAL)) run.curves[name] = { t, values: told[name] ?? [] };
+  const { series: { t, ...series } } = await call(`v1/runs/${encodeURIComponent(run.id)}/history?points=${REPORTS}`, { signal });
+  for (const name of Object.keys(JOURNAL)) run.curves[name] = { t, values: series[name] ?? [] };
 }
 
 async function readRun(id, signal) {

@@ -21,12 +21,12 @@ export function nearestTo(data, x) {
 // Returns [{ name, value, colour, dash, text }] of series at x, sorted by value, the largest first; a stack from its top.
 export function worth(list, x) {
   const known = list.filter(({ data, aside, tooltip }) => data?.length && !aside && tooltip);
-  const told = known.flatMap(({ name, data, color, lineStyle, tooltip: { valueFormatter }, stack }) => {
+  const entries = known.flatMap(({ name, data, color, lineStyle, tooltip: { valueFormatter }, stack }) => {
     const point = data[nearestTo(data, x)];
     const [, value] = point.value ?? point;
     return Number.isFinite(value) ? [{ name, value, color, dash: lineStyle?.type, stack, text: valueFormatter(value, point) }] : [];
   });
-  return told.some(({ stack }) => stack) ? told.reverse() : told.sort((a, b) => b.value - a.value);
+  return entries.some(({ stack }) => stack) ? entries.reverse() : entries.sort((a, b) => b.value - a.value);
 }
 
 // One box for the whole page, which the active chart uses.

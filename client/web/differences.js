@@ -26,12 +26,12 @@ export function differences(plans) {
 // Words for a key: "steel velocity z" for "parts[0].velocity[2]".
 export function about(key, plan) {
   let at = plan;
-  const told = key.split(/[.[\]]+/).filter(Boolean).map((word) => {
+  const parts = key.split(/[.[\]]+/).filter(Boolean).map((word) => {
     const list = Array.isArray(at) ? at : null;
     at = at?.[word];
     return list ? (list.length === AXES.length && typeof list[0] === "number" ? AXES[word] : list[word]?.name ?? word) : word;
   });
-  return told.filter((word) => !PLACES.has(word)).map(words).join(" ");
+  return parts.filter((word) => !PLACES.has(word)).map(words).join(" ");
 }
 
 export function shown(value) {
@@ -51,9 +51,9 @@ export function shortened(ids) {
 export function called(runs, differing, units = {}) {
   const names = runs.map(({ info }) => info.name || info.id);
   const ids = shortened(runs.map(({ info }) => info.id));
-  const by = differing.length && differing.length <= FEW ? runs.map((_, i) => differing.map((told) => keyed(told, i, runs, units)).join(", ")) : ids;
-  const told = names.map((name, i) => (names.filter((other) => other === name).length < 2 ? name : names.every((other) => other === name) ? by[i] : `${name}, ${by[i]}`));
-  return told.map((name, i) => (told.filter((other) => other === name).length < 2 ? name : `${name} (${ids[i]})`));
+  const by = differing.length && differing.length <= FEW ? runs.map((_, i) => differing.map((change) => keyed(change, i, runs, units)).join(", ")) : ids;
+  const labels = names.map((name, i) => (names.filter((other) => other === name).length < 2 ? name : names.every((other) => other === name) ? by[i] : `${name}, ${by[i]}`));
+  return labels.map((name, i) => (labels.filter((other) => other === name).length < 2 ? name : `${name} (${ids[i]})`));
 }
 
 const keyed = ([key, ...values], i, runs, units) => `${about(key, runs[0].plan)} ${typeof values[i] === "number" ? exact(values[i], units[key] ?? "") : shown(values[i])}`;

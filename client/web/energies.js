@@ -11,8 +11,8 @@ const RESIDUAL = 1e-2; // Limit of the residual.
 
 export const end = ({ plan, progress, columns, ledger }) => plan?.run?.end_time ?? progress?.end_time ?? columns.values.t.at(-1) ?? ledger.at(-1)?.t ?? 1;
 export const parts = ({ ledger, columns }) => {
-  const told = Object.keys(columns.values).filter((name) => name.startsWith("kinetic.")).map((name) => name.slice(8));
-  return told.length ? told : Object.keys(ledger.at(-1)?.parts ?? {});
+  const names = Object.keys(columns.values).filter((name) => name.startsWith("kinetic.")).map((name) => name.slice(8));
+  return names.length ? names : Object.keys(ledger.at(-1)?.parts ?? {});
 };
 
 // [[t, value]] of a column of the history; without a history, of the reports.

@@ -39,11 +39,11 @@ export class Grid {
   }
 
   drawHead(columns, sort) {
-    const told = JSON.stringify([columns.map(({ id, title, unit }) => [id, title, unit]), sort]);
+    const stamp = JSON.stringify([columns.map(({ id, title, unit }) => [id, title, unit]), sort]);
     const boxes = this.all.filter(({ id }) => this.marked.has(id)).length;
     if (this.everything) Object.assign(this.everything, { checked: boxes > 0 && boxes === this.all.length, indeterminate: boxes > 0 && boxes < this.all.length });
-    if (told === this.told) return;
-    this.told = told;
+    if (stamp === this.stamp) return;
+    this.stamp = stamp;
     const focus = document.activeElement?.dataset?.column;
     this.everything = h("input", { type: "checkbox", "aria-label": "mark all runs that are shown", onchange: ({ target }) => this.on.markAll(this.all, target.checked) });
     this.head.replaceChildren(h("tr", { "aria-rowindex": 1 }, h("th.mark", { scope: "col" }, this.everything), columns.map((column) => this.title(column, sort))));
@@ -97,7 +97,7 @@ export class Grid {
     Object.assign(box, { checked: marked === rows.length, indeterminate: marked > 0 && marked < rows.length });
     return h("tr.group", {}, h("td.mark", {}, box), h("td.first", { colspan: this.columns.length },
       h("button.turn", { type: "button", "aria-expanded": String(open), "aria-label": `${open ? "close" : "open"} ${title}`, onclick: () => this.on.toggle(key) }, open ? "▾" : "▸"),
-      href ? h("a.name", { href }, title) : h("b.name", {}, title), h("span.id", {}, brief), h("span.said", {}, note || counted(rows.length, "run")), varied ? h("span.said", {}, varied) : ""));
+      href ? h("a.name", { href }, title) : h("b.name", {}, title), h("span.id", {}, brief), h("span.note", {}, note || counted(rows.length, "run")), varied ? h("span.note", {}, varied) : ""));
   }
 }
 
@@ -113,7 +113,7 @@ const heading = ({ title, unit }) => 0.9 * title.length + (unit ? 1 + 0.9 * unit
 function state(row) {
   const going = row.progress && !FINAL.has(row.state);
   const note = going ? percent(share(row), 0) : row.state === "succeeded" ? "" : row.message || row.reason || row.cause || "";
-  const said = note.startsWith(row.state) ? "" : note;
+  const text = note.startsWith(row.state) ? "" : note;
   return [pill(row.state), going ? h("span.bar", {}, meter(row.state, share(row))) : "",
-    h("span.said", { title: going && row.progress.eta > 0 ? `${duration(row.progress.eta)} left` : said }, said)];
+    h("span.note", { title: going && row.progress.eta > 0 ? `${duration(row.progress.eta)} left` : text }, text)];
 }

@@ -12,7 +12,7 @@ export class Headline {
     this.sub = h("div.sub");
     this.link = h("span.link", { role: "status" });
     this.state = h("span");
-    this.told = h("p.told", { hidden: "" });
+    this.message = h("p.message", { hidden: "" });
     this.progress = h("div.progress");
     this.buttons = ["checkpoint", "snapshot", "cancel"].map((verb) =>
       h(verb === "cancel" ? "button.stop" : "button.quiet", { type: "button", "data-verb": verb, onclick: () => ask(verb) }, verb[0].toUpperCase() + verb.slice(1)));
@@ -20,7 +20,7 @@ export class Headline {
     this.again = h("a.button", { href: `#/new?from=${encodeURIComponent(run)}` }, "Open the case");
     this.element = h("header.head", {},
       h("div.run-head", {}, h("div.titles", {}, this.title, this.sub), h("div.side", {}, this.link, this.state, this.buttons, this.report, this.again)),
-      this.progress, this.told);
+      this.progress, this.message);
   }
 
   // `connection` is [kind, words]; `busy` has the names of the requests in progress.
@@ -33,9 +33,9 @@ export class Headline {
     this.link.className = `link ${kind || "over"}`;
     if (this.shown !== state) this.state.replaceChildren((this.shown = state) ? pill(state) : "");
     this.progress.replaceChildren(...(live.state ? [meter(state, live.fraction), h("b", {}, percent(live.fraction))] : []));
-    const told = [!over && live.message, live.state === "queued" && info.reason, notice].filter(Boolean).join(" · ");
-    say(this.told, told);
-    this.told.hidden = !told;
+    const text = [!over && live.message, live.state === "queued" && info.reason, notice].filter(Boolean).join(" · ");
+    say(this.message, text);
+    this.message.hidden = !text;
     this.report.hidden = !over;
     this.report.disabled = busy.has("report");
     for (const button of this.buttons) {
@@ -47,5 +47,5 @@ export class Headline {
 
 // An unchanged text is not set again: this would clear a selection.
 function say(element, text) {
-  if (element.said !== text) element.textContent = element.said = text;
+  if (element.printed !== text) element.textContent = element.printed = text;
 }

@@ -26,10 +26,10 @@ export async function fill(live, info, signal) {
 // The named columns of history.csv; without names all: { units, values, lines, extremes }.
 export async function readColumns(run, names = ["*"], points = POINTS, signal = undefined) {
   const words = [...names.map((name) => `name=${encodeURIComponent(name)}`), `points=${points}`];
-  let told = await call(`${path(run)}/columns?${words.join("&")}`, { signal });
-  while (told.behind) told = await call(`${path(run)}/columns?${words.join("&")}`, { signal });
-  const units = Object.fromEntries(Object.entries(told.columns).map(([name, { unit }]) => [name, unit]));
-  return { units, values: { t: [], ...told.values }, lines: told.lines, extremes: told.columns };
+  let answer = await call(`${path(run)}/columns?${words.join("&")}`, { signal });
+  while (answer.behind) answer = await call(`${path(run)}/columns?${words.join("&")}`, { signal });
+  const units = Object.fromEntries(Object.entries(answer.columns).map(([name, { unit }]) => [name, unit]));
+  return { units, values: { t: [], ...answer.values }, lines: answer.lines, extremes: answer.columns };
 }
 
 // Updates the columns of an open run until its end; calls `onNews` after a change.
@@ -96,8 +96,8 @@ export function take(live, history, info = {}, plan = null) {
 function latest(live, row, ranks, progress, plan) {
   const ledger = live.ledger.at(-1);
   const end = plan?.run?.end_time ?? progress?.end_time ?? row.t;
-  const told = { ...row, limiter: ledger?.limiter ?? "", dt: ledger?.dt ?? 0, energy: ledger?.energy };
-  if (ledger) live.progress = progress ?? { ...told, end_time: end };
+  const newest = { ...row, limiter: ledger?.limiter ?? "", dt: ledger?.dt ?? 0, energy: ledger?.energy };
+  if (ledger) live.progress = progress ?? { ...newest, end_time: end };
   if (Number.isFinite(row.nodes)) live.counts = row;
   const [phases, waiting] = phasesAt(ranks, (ranks.t?.length ?? 0) - 1);
   const groups = grouped({ phases, waiting }, 0);

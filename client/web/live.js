@@ -59,8 +59,8 @@ export class Live {
   follow({ sampled, energy, parts = {}, probes = {} }) {
     const { values } = this.columns;
     if (!(sampled > (values.t.at(-1) ?? Infinity))) return;
-    const told = { t: sampled, ...energy, ...probes, ...Object.fromEntries(Object.entries(parts).flatMap(([part, one]) => Object.entries(one).map(([name, value]) => [`${name}.${part}`, value]))) };
-    for (const [name, column] of Object.entries(values)) column.push(told[name] ?? null);
+    const sample = { t: sampled, ...energy, ...probes, ...Object.fromEntries(Object.entries(parts).flatMap(([part, one]) => Object.entries(one).map(([name, value]) => [`${name}.${part}`, value]))) };
+    for (const [name, column] of Object.entries(values)) column.push(sample[name] ?? null);
     if (values.t.length > 2 * MOST_POINTS) for (const [name, column] of Object.entries(values)) values[name] = column.filter((_, i) => i % 2 === 0);
   }
 
@@ -164,7 +164,7 @@ const sum = (values = []) => values.reduce((total, value) => total + value, 0);
 export function compared(groups) {
   const work = totals(Object.fromEntries(["compute", "contact", "output"].filter((name) => groups[name]).map((name) => [name, groups[name]])));
   const most = Math.max(...work, 1e-300);
-  const told = Object.entries(groups).filter(([name]) => name !== "descheduled").map(([name, seconds]) => [name, sum(seconds)]);
-  const all = sum(told.map(([, seconds]) => seconds));
-  return { shares: work.map((value) => value / most), by: Object.fromEntries(told.map(([name, seconds]) => [name, all > 0 ? seconds / all : 0])) };
+  const parts = Object.entries(groups).filter(([name]) => name !== "descheduled").map(([name, seconds]) => [name, sum(seconds)]);
+  const all = sum(parts.map(([, seconds]) => seconds));
+  return { shares: work.map((value) => value / most), by: Object.fromEntries(parts.map(([name, seconds]) => [name, all > 0 ? seconds / all : 0])) };
 }

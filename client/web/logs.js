@@ -38,9 +38,9 @@ export class Logs {
     this.tabs.querySelector("[aria-selected=true]")?.focus();
     this.logged = "";
     if (tab === "messages") return this.draw();
-    const told = await tail(this.live.run, tab).catch((error) => error.message);
+    const lines = await tail(this.live.run, tab).catch((error) => error.message);
     if (this.tab !== tab) return;
-    this.lines.replaceChildren(told || h("span.hint", {}, "nothing yet"));
+    this.lines.replaceChildren(lines || h("span.hint", {}, "nothing yet"));
     this.lines.scrollTop = this.lines.scrollHeight;
   }
 

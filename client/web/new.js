@@ -18,7 +18,7 @@ const FIELDS = [["title", "Title", "", "title"], ["ranks", "Ranks", "run", "rank
 export class NewPage {
   // `query` may have a run whose case is loaded (`from`), or a shipped case (`case`).
   constructor(query, onRefused) {
-    Object.assign(this, { from: query.get("from") ?? "", onRefused, told: null, checked: null, abort: new AbortController(), key: fresh() });
+    Object.assign(this, { from: query.get("from") ?? "", onRefused, checks: null, checked: null, abort: new AbortController(), key: fresh() });
     this.outbox = new Outbox(this.from, () => this.news());
     this.build();
     this.listen();
@@ -58,7 +58,7 @@ export class NewPage {
     });
     this.labels = h("input", { type: "text", placeholder: "study=speeds, mesh=fine" });
     this.startButton = h("button", { type: "button", disabled: "", onclick: () => this.start() }, "Start");
-    this.said = h("p", { role: "status" });
+    this.status = h("p", { role: "status" });
     this.verdict = h("div");
     this.files = h("div");
     const file = h("label.button", {}, "Choose files", chosen);
@@ -68,7 +68,7 @@ export class NewPage {
         h("section.card.stage-editor", { "aria-label": "case" }, h("p.hint", {}, "Paste a case, drop it here with the files that it names, or start from a shipped one."), this.editor.element),
         h("aside.now", { "aria-label": "check and start" },
           h("section.card.start", { "aria-label": "start" }, ...this.fields.map(({ element }) => element), h("label.form-row", {}, h("span", {}, "Labels"), this.labels),
-            h("div.actions", {}, this.startButton, h("span.hint", {}, "Ctrl+Enter")), this.said),
+            h("div.actions", {}, this.startButton, h("span.hint", {}, "Ctrl+Enter")), this.status),
           h("section.card", { "aria-label": "check" }, h("h2", {}, "Check"), this.verdict),
           h("section.card", { "aria-label": "files of the case" }, h("h2", {}, "Files"), this.files))));
   }
@@ -170,8 +170,8 @@ export class NewPage {
     return (await send(path, { method: "POST", headers: { "Content-Type": type, ...headers }, body: text, signal: this.abort.signal })).json();
   }
 
-  judged(text, told) {
-    Object.assign(this, { checked: text, told });
+  judged(text, checks) {
+    Object.assign(this, { checked: text, checks });
     this.say("");
     this.news();
   }
@@ -179,7 +179,7 @@ export class NewPage {
   // Writes known hashes into the case; a new file requires a new check.
   news() {
     if (this.abort.signal.aborted) return;
-    const named = this.told?.files ?? [];
+    const named = this.checks?.files ?? [];
     if (this.checked === this.editor.text) {
       const text = this.outbox.ready(this.editor.text, named);
       const here = named.every((file) => this.outbox.stateOf(file).state === "sent");
@@ -215,29 +215,29 @@ export class NewPage {
     else this.say(error instanceof Problem ? error.message : `No answer from the server: ${error.message}`);
   }
 
-  say(text) { this.said.replaceChildren(text ? h("span.problem", {}, text) : ""); }
+  say(text) { this.status.replaceChildren(text ? h("span.problem", {}, text) : ""); }
 
   // Problems of the case; missing files are shown in the list of files.
   problems(named) {
     const wanted = new Set(named.filter((file) => !file.sha256 || this.outbox.stateOf(file).state !== "sent").map(({ key }) => `${key}.sha256`));
-    return (this.told?.problems ?? []).filter(({ key }) => !wanted.has(key));
+    return (this.checks?.problems ?? []).filter(({ key }) => !wanted.has(key));
   }
 
   draw() {
     const { text } = this.editor;
     const current = this.checked === text;
-    const named = once(this.told?.files ?? []);
+    const named = once(this.checks?.files ?? []);
     const waits = named.filter((file) => this.outbox.stateOf(file).state !== "sent").length;
-    this.startButton.disabled = !(current && this.told?.valid && !waits && !this.starting);
+    this.startButton.disabled = !(current && this.checks?.valid && !waits && !this.starting);
     this.startButton.textContent = this.starting ? "Starting …" : waits ? `Waits for ${counted(waits, "file")}` : "Start";
     for (const { input, table, name } of this.fields) if (document.activeElement !== input) input.value = valueOf(text, table, name);
-    const problems = this.problems(this.told?.files ?? []);
+    const problems = this.problems(this.checks?.files ?? []);
     const lines = problems.map((one) => place(text, one));
     const state = `${text.length} ${current} ${this.checking} ${waits} ${lines}`;
-    if (this.seen !== state || this.shown !== this.told) {
-      [this.seen, this.shown] = [state, this.told];
+    if (this.seen !== state || this.shown !== this.checks) {
+      [this.seen, this.shown] = [state, this.checks];
       this.editor.mark(lines.filter((line) => line >= 0));
-      this.verdict.replaceChildren(verdict(text, current ? "" : named.length ? "checking, and reading its files …" : "checking …", this.told && { ...this.told, problems }, lines, (line) => this.editor.goTo(line)));
+      this.verdict.replaceChildren(verdict(text, current ? "" : named.length ? "checking, and reading its files …" : "checking …", this.checks && { ...this.checks, problems }, lines, (line) => this.editor.goTo(line)));
     }
     this.files.replaceChildren(filesTable(named, this.outbox));
   }
@@ -245,9 +245,9 @@ export class NewPage {
 
 // Line of a problem: that of its key, or the one that its message names.
 function place(text, { key, message }) {
-  const told = /at line (\d+)/.exec(message);
+  const line = /at line (\d+)/.exec(message);
   const named = key || /^([a-z][\w.[\]]*) = /.exec(message)?.[1];
-  return told ? Number(told[1]) - 1 : named ? lineOf(text, named) : -1;
+  return line ? Number(line[1]) - 1 : named ? lineOf(text, named) : -1;
 }
 
 // A file that several parts name is listed once.

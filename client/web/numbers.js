@@ -25,11 +25,11 @@ function five(live, outcome) {
   const { progress, load, counts, state } = live;
   const over = FINAL.has(state);
   const left = over ? `took ${duration(live.elapsed)}` : Number.isFinite(progress?.eta) ? `${duration(progress.eta)} left` : "";
-  const { t, residual: told } = ended(progress, outcome);
+  const { t, residual: worst } = ended(progress, outcome);
   return [
     entry("time", progress ? timed(t, progress.end_time) : "–", left),
     entry("dt", si(progress?.dt || live.ledger.findLast(({ dt }) => dt > 0)?.dt, "s"), progress?.limiter && `held by ${progress.limiter}`),
-    entry("energy residual", told ? residual(...told) : "–"),
+    entry("energy residual", worst ? residual(...worst) : "–"),
     entry("fragments", count(counts?.fragments)),
     entry("imbalance", load ? fixed(load.imbalance) : "–"),
   ];

@@ -21,8 +21,8 @@ export class Outbox {
     const entry = { file, sha256: "", state: "hashing", done: 0, error: "" };
     this.files.set(file.name, entry);
     await this.attempt(entry, async () => {
-      const sha256 = await hashed(file, (done) => this.told(entry, { done }), this.abort.signal);
-      this.told(entry, { sha256, state: "ready" });
+      const sha256 = await hashed(file, (done) => this.update(entry, { done }), this.abort.signal);
+      this.update(entry, { sha256, state: "ready" });
     });
   }
 
@@ -31,7 +31,7 @@ export class Outbox {
     this.onChange();
   }
 
-  told(entry, news) {
+  update(entry, news) {
     Object.assign(entry, news);
     this.onChange();
   }
@@ -40,7 +40,7 @@ export class Outbox {
     try {
       await work();
     } catch (error) {
-      if (!this.abort.signal.aborted) this.told(entry, { state: "failed", error: error.message });
+      if (!this.abort.signal.aborted) this.update(entry, { state: "failed", error: error.message });
     }
   }
 
@@ -58,11 +58,11 @@ export class Outbox {
   }
 
   send(entry) {
-    this.told(entry, { state: "sending", done: 0 });
+    this.update(entry, { state: "sending", done: 0 });
     return this.attempt(entry, async () => {
-      await sendFile(entry.file, entry.sha256, (done) => this.told(entry, { done }), this.abort.signal);
+      await sendFile(entry.file, entry.sha256, (done) => this.update(entry, { done }), this.abort.signal);
       this.known.set(entry.sha256, { whole: true });
-      this.told(entry, { state: "sent" });
+      this.update(entry, { state: "sent" });
     });
   }
 

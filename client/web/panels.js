@@ -56,7 +56,7 @@ export class Balances {
     this.title.textContent = `Balance ${place + 1} of ${balances.length}`;
     this.beside.replaceChildren(step("Earlier", place - 1), " ", step("Later", place + 1));
     this.element.replaceChildren(
-      h("p.told", {}, event.cause),
+      h("p.message", {}, event.cause),
       h("dl.facts", {}, entry("time", si(event.t, "s")), entry("tets moved", count(event.tets)), entry("nodes moved", count(event.nodes)),
         entry("this cut took", si(event.cost, "s")), entry("earlier cuts saved", si(event.saved, "s"))),
       bars("Work of each rank before, a step", summed(event.before)), bars("Work expected after", event.predicted));

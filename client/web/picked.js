@@ -28,19 +28,19 @@ export class Picked {
   }
 
   async read(id) {
-    this.told = null;
+    this.data = null;
     this.course.replaceChildren();
     if (id < 0n) return;
-    const told = await this.history(id).catch(() => null);
-    if (this.id !== id || !told || told.t.length < 2) return;
-    this.told = told;
-    this.course.replaceChildren(...[["mass", told.mass, "kg"], ["speed", told.speed, "m/s"]].map(([name, values, unit]) => small(name, told.t, values, unit)));
+    const data = await this.history(id).catch(() => null);
+    if (this.id !== id || !data || data.t.length < 2) return;
+    this.data = data;
+    this.course.replaceChildren(...[["mass", data.mass, "kg"], ["speed", data.speed, "m/s"]].map(([name, values, unit]) => small(name, data.t, values, unit)));
   }
 
   // Draws a line at the present time.
   place(t) {
-    if (!this.told) return;
-    const x = across(this.told.t)(t);
+    if (!this.data) return;
+    const x = across(this.data.t)(t);
     for (const line of this.course.querySelectorAll("line")) ["x1", "x2"].forEach((name) => line.setAttribute(name, x));
   }
 }

@@ -14,8 +14,8 @@ const isThere = ({ columns }) => (name) => name in columns.values;
 
 // Names that can be selected: probes of the case in their order, then momenta.
 export function choices(live) {
-  const told = probes(live).map(({ name }) => name);
-  return { probes: told.filter(isThere(live)), momenta: Object.keys(live.columns.values).filter((name) => MOMENTA.test(name) && !told.includes(name)) };
+  const names = probes(live).map(({ name }) => name);
+  return { probes: names.filter(isThere(live)), momenta: Object.keys(live.columns.values).filter((name) => MOMENTA.test(name) && !names.includes(name)) };
 }
 
 // A list of check boxes below its button; the selection is stored by the name of the case.
@@ -31,9 +31,9 @@ export class Chooser {
   get key() { return `probes.${this.live.plan?.name ?? ""}`; }
 
   get chosen() {
-    const { probes: told, momenta } = choices(this.live);
-    const kept = [recall(this.key, null)].find(Array.isArray)?.filter((name) => told.includes(name) || momenta.includes(name));
-    return kept ?? told.slice(0, MOST_AT_FIRST);
+    const { probes: names, momenta } = choices(this.live);
+    const kept = [recall(this.key, null)].find(Array.isArray)?.filter((name) => names.includes(name) || momenta.includes(name));
+    return kept ?? names.slice(0, MOST_AT_FIRST);
   }
 
   shut() {
@@ -42,14 +42,14 @@ export class Chooser {
   }
 
   draw() {
-    const { probes: told, momenta } = choices(this.live);
-    this.element.hidden = !told.length && !momenta.length;
-    this.summary.textContent = `${this.chosen.length} of ${told.length + momenta.length}`;
-    const state = [...told, "", ...momenta].join("/");
+    const { probes: names, momenta } = choices(this.live);
+    this.element.hidden = !names.length && !momenta.length;
+    this.summary.textContent = `${this.chosen.length} of ${names.length + momenta.length}`;
+    const state = [...names, "", ...momenta].join("/");
     if (this.drawn === state) return;
     this.drawn = state;
     const box = (name) => h("label", {}, h("input", { type: "checkbox", value: name, checked: this.chosen.includes(name) ? "" : false, onchange: () => this.take() }), " ", name);
-    this.list.replaceChildren(...told.map(box), ...(momenta.length ? [h("b", {}, "of the whole"), ...momenta.map(box)] : []));
+    this.list.replaceChildren(...names.map(box), ...(momenta.length ? [h("b", {}, "of the whole"), ...momenta.map(box)] : []));
   }
 
   take() {
@@ -60,8 +60,8 @@ export class Chooser {
 
 // Expected value of a probe, and its time interval.
 function references({ plan }, name, last) {
-  const told = (plan?.reference ?? []).filter(({ probe, quantity }) => probe === name && quantity.startsWith("probe_"));
-  return told.map(({ quantity, value, tolerance, since, until }) => ({ value, tolerance, until: until ?? last, since: quantity === "probe_last" ? 0.97 * last : since ?? 0 }));
+  const own = (plan?.reference ?? []).filter(({ probe, quantity }) => probe === name && quantity.startsWith("probe_"));
+  return own.map(({ quantity, value, tolerance, since, until }) => ({ value, tolerance, until: until ?? last, since: quantity === "probe_last" ? 0.97 * last : since ?? 0 }));
 }
 
 // One panel for each unit, with a common time axis.
@@ -115,9 +115,9 @@ export const columnsOf = (live) => Object.values(pushes(live)).flatMap(Object.va
 // to different times.
 export function ofForces(live) {
   const { columns: { values, lines } } = live;
-  const list = Object.entries(pushes(live)).flatMap(([who, told]) => {
-    const each = Object.entries(told).sort().map(([component, name]) => [`${who}, ${component}`, values[name]]);
-    const whole = ["x", "y", "z"].map((component) => values[told[component]]);
+  const list = Object.entries(pushes(live)).flatMap(([who, columns]) => {
+    const each = Object.entries(columns).sort().map(([component, name]) => [`${who}, ${component}`, values[name]]);
+    const whole = ["x", "y", "z"].map((component) => values[columns[component]]);
     if (whole.every(Boolean) && lines <= values.t.length) each.unshift([`${who}, magnitude`, values.t.map((_, i) => Math.hypot(...whole.map((column) => column[i])))]);
     return each;
   });

@@ -6,11 +6,11 @@ const ALIKE = 1e-9; // Relative difference of values that is rounding only.
 const EXTREMES = [0.005, 0.995]; // Quantiles of the triangles, as in the message of a snapshot (docs/snapshots.md).
 
 // { low, high, number, uniform } for a field of the shown snapshots. `choice`: { how: "most" | "all" | "hand", over: "run" | "now", hand: [low, high] };
-// `told`: ranges of the field in the messages of all snapshots, [least, low, high, most] each.
-export function range(choice, name, snapshots, told) {
+// `inRun`: ranges of the field in the messages of all snapshots, [least, low, high, most] each.
+export function range(choice, name, snapshots, inRun) {
   if (choice.how === "hand" && choice.hand) return { low: choice.hand[0], high: choice.hand[1], number: 5 };
   const all = choice.how === "all";
-  const known = choice.over === "run" ? told.map(([least, low, high, most]) => (all ? [least, most] : [low, high])) : [];
+  const known = choice.over === "run" ? inRun.map(([least, low, high, most]) => (all ? [least, most] : [low, high])) : [];
   const found = known.length ? known : snapshots.map((one) => (all ? extent(one, name) : most(one, name)));
   const [low, high] = [Math.min(...found.map(([least]) => least)), Math.max(...found.map(([, largest]) => largest))];
   if (high - low <= ALIKE * Math.max(Math.abs(low), Math.abs(high))) return { low, high, number: 1, uniform: true };

@@ -26,7 +26,7 @@ const kept = { text: "", state: "", days: "", open: new Set(), marked: new Set()
 export class RunsPage {
   // `onRefused` is called when the token is no longer valid.
   constructor(onRefused) {
-    Object.assign(this, { onRefused, told: new RunTable(), sweeps: new Map(), abort: new AbortController(), cache: {} });
+    Object.assign(this, { onRefused, table: new RunTable(), sweeps: new Map(), abort: new AbortController(), cache: {} });
     this.build();
     document.title = "Runs · Conoid";
     this.start();
@@ -72,7 +72,7 @@ export class RunsPage {
   async turn() {
     if (document.hidden && this.read) return;
     try {
-      const anew = !this.read || Date.now() - this.read > ANEW || this.told.pending > 0;
+      const anew = !this.read || Date.now() - this.read > ANEW || this.table.pending > 0;
       await (anew ? this.readWhole() : this.readChanged());
       this.failed = false;
     } catch (error) {
@@ -80,10 +80,10 @@ export class RunsPage {
       if (error instanceof Problem && error.status === 401) return this.onRefused();
       this.fail(error);
     }
-    this.next(this.told.pending ? 200 : this.open ? SOON : LATER);
+    this.next(this.table.pending ? 200 : this.open ? SOON : LATER);
   }
 
-  get open() { return [...this.told.rows.values()].some(({ state }) => !FINAL.has(state)); }
+  get open() { return [...this.table.rows.values()].some(({ state }) => !FINAL.has(state)); }
 
   ask(query) { return call(`v1/table?${new URLSearchParams(query)}`, { signal: this.abort.signal }); }
 
@@ -95,30 +95,30 @@ export class RunsPage {
     const all = [];
     do {
       const answer = await this.ask({ limit: next ? PAGE : FIRST, ...(next ? { cursor: next } : {}) });
-      this.told.take(answer);
+      this.table.take(answer);
       pending += answer.pending;
       all.push(...answer.runs);
       next = answer.next;
       if (all.length === answer.runs.length) { await listed; this.draw(); }
     } while (next && all.length < MOST);
-    this.told.keepOnly(all, !next);
-    Object.assign(this.told, { pending });
+    this.table.keepOnly(all, !next);
+    Object.assign(this.table, { pending });
     this.more = Boolean(next);
     this.read = Date.now();
     this.draw();
   }
 
   async readChanged() {
-    const before = this.told.version;
-    let query = { limit: PAGE, changed: this.told.latest - SLACK };
+    const before = this.table.version;
+    let query = { limit: PAGE, changed: this.table.latest - SLACK };
     for (;;) {
       const answer = await this.ask(query);
-      if (answer.runs.some(({ labels, id }) => labels.sweep && !this.told.rows.has(id))) await this.readSweeps().catch(() => {});
-      this.told.take(answer);
+      if (answer.runs.some(({ labels, id }) => labels.sweep && !this.table.rows.has(id))) await this.readSweeps().catch(() => {});
+      this.table.take(answer);
       if (!answer.next) break;
       query = { ...query, cursor: answer.next };
     }
-    if (this.told.version !== before || this.failed) this.draw();
+    if (this.table.version !== before || this.failed) this.draw();
   }
 
   async readSweeps() {
@@ -142,8 +142,8 @@ export class RunsPage {
 
   // Columns of all runs whose values differ between the shown runs, and the rows.
   pick() {
-    const { told } = this;
-    const all = [...told.rows.values()];
+    const { table } = this;
+    const all = [...table.rows.values()];
     const since = kept.days ? Date.now() / 1000 - 86400 * kept.days : 0;
     const rough = all.filter((row) => (!kept.state || row.state === kept.state) && row.submitted >= since);
     const every = this.columns(rough, "every");
@@ -152,8 +152,8 @@ export class RunsPage {
   }
 
   columns(rows, name) {
-    const stamp = `${this.told.version} ${rows.length} ${rows[0]?.id} ${rows.at(-1)?.id} ${kept.text} ${kept.state} ${kept.days}`;
-    if (this.cache[name]?.stamp !== stamp) this.cache[name] = { stamp, columns: columnsOf(rows, differing(rows, MOST_VALUES), this.told.units) };
+    const stamp = `${this.table.version} ${rows.length} ${rows[0]?.id} ${rows.at(-1)?.id} ${kept.text} ${kept.state} ${kept.days}`;
+    if (this.cache[name]?.stamp !== stamp) this.cache[name] = { stamp, columns: columnsOf(rows, differing(rows, MOST_VALUES), this.table.units) };
     return this.cache[name].columns;
   }
 
@@ -165,13 +165,13 @@ export class RunsPage {
     const shown = columns.filter(({ id, shown: asIs }) => id === "run" || (choice[id] ?? asIs));
     const column = columns.find(({ id }) => id === this.sort.id) ?? columns.find(({ id }) => id === NEWEST.id);
     const all = sorted(rows, column, column.id === this.sort.id ? this.sort.down : NEWEST.down);
-    for (const id of [...kept.marked]) if (!this.told.rows.has(id) && this.read) kept.marked.delete(id);
-    this.shorts = this.told.version === this.shortsOf ? this.shorts : shorts(this.told.rows.keys());
-    this.shortsOf = this.told.version;
+    for (const id of [...kept.marked]) if (!this.table.rows.has(id) && this.read) kept.marked.delete(id);
+    this.shorts = this.table.version === this.shortsOf ? this.shorts : shorts(this.table.rows.keys());
+    this.shortsOf = this.table.version;
     this.rows = all;
     this.grid.region.hidden = !all.length;
-    this.grid.draw({ columns: shown, sort: { id: column.id, down: this.sort.down }, items: this.items(all, columns), all, marked: kept.marked, shorts: this.shorts, stamp: `${this.told.version} ${all.length}` });
-    this.tools.draw({ columns, choice, sort: this.sort, rows: this.told.rows.values() });
+    this.grid.draw({ columns: shown, sort: { id: column.id, down: this.sort.down }, items: this.items(all, columns), all, marked: kept.marked, shorts: this.shorts, stamp: `${this.table.version} ${all.length}` });
+    this.tools.draw({ columns, choice, sort: this.sort, rows: this.table.rows.values() });
     this.drawHead(all);
     this.tell(all);
     if (kept.top) { this.grid.region.scrollTop = kept.top; kept.top = 0; }
@@ -180,14 +180,14 @@ export class RunsPage {
 
   items(rows, columns) {
     const by = recall("runs.group", "");
-    if (!by) return rows.map((row) => ({ key: row.id, told: row.told, row }));
+    if (!by) return rows.map((row) => ({ key: row.id, content: row.content, row }));
     const groups = grouped(rows, by);
     return groups.flatMap(({ key, rows: own }) => {
       const open = kept.open.has(`${by} ${key}`);
       const varied = key && groups.length <= MOST_TOLD ? ranges(own, columns) : "";
       const group = { ...this.heading(by, key, own), key: `${by} ${key}`, varied, rows: own, open };
-      const told = JSON.stringify([group.title, group.note, varied, own.length, open]);
-      return [{ key: `${by} ${key}`, told, group }, ...(open ? own.map((row) => ({ key: row.id, told: row.told, row })) : [])];
+      const content = JSON.stringify([group.title, group.note, varied, own.length, open]);
+      return [{ key: `${by} ${key}`, content, group }, ...(open ? own.map((row) => ({ key: row.id, content: row.content, row })) : [])];
     });
   }
 
@@ -199,21 +199,21 @@ export class RunsPage {
     const brief = shorts(this.sweeps.keys()).get(key) ?? key;
     const failed = rows.filter(({ state }) => FINAL.has(state) && state !== "succeeded").length;
     if (sweep?.search) return { title: `${sweep.name}, adaptive`, brief, href: `#/sweeps/${encodeURIComponent(key)}`, note: soughtFor(sweep.search) };
-    const told = `${done} of ${count(sweep?.total ?? rows.length)} done${failed ? `, ${count(failed)} without a result` : ""}`;
-    return { title: sweep?.name ?? rows[0].name, brief, href: `#/sweeps/${encodeURIComponent(key)}`, note: told };
+    const note = `${done} of ${count(sweep?.total ?? rows.length)} done${failed ? `, ${count(failed)} without a result` : ""}`;
+    return { title: sweep?.name ?? rows[0].name, brief, href: `#/sweeps/${encodeURIComponent(key)}`, note };
   }
 
   drawHead(rows) {
-    const total = this.told.rows.size;
-    const reading = this.told.pending ? `, results of ${count(this.told.pending)} are being read` : "";
+    const total = this.table.rows.size;
+    const reading = this.table.pending ? `, results of ${count(this.table.pending)} are being read` : "";
     this.number.textContent = (rows.length === total ? counted(total, "run") : `${count(rows.length)} of ${counted(total, "run")}`) + reading;
     this.tools.element.hidden = !total;
   }
 
   tell(rows) {
-    if (!this.told.rows.size) return this.say(beginning());
+    if (!this.table.rows.size) return this.say(beginning());
     if (!rows.length) return this.say("No run matches. ", h("button.quiet", { type: "button", onclick: () => this.showAll() }, "Show all runs"));
-    if (this.more) return this.say(`The newest ${count(this.told.rows.size)} are shown; `, h("code", {}, "conoid runs --until DATE"), " finds older ones.");
+    if (this.more) return this.say(`The newest ${count(this.table.rows.size)} are shown; `, h("code", {}, "conoid runs --until DATE"), " finds older ones.");
     return this.say();
   }
 

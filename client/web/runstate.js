@@ -26,7 +26,7 @@ const BAD = new Set(["failed", "lost", "timed_out", "cancelled"]);
 export class RunState {
   // `files()` resolves to the files of the run, null if unknown.
   constructor(run, files) {
-    Object.assign(this, { run, files, told: "" });
+    Object.assign(this, { run, files, keyShown: "" });
     this.path = `v1/runs/${encodeURIComponent(run)}`;
     this.element = h("section.card.situation", { "aria-label": "what has happened", hidden: "" });
   }
@@ -35,8 +35,8 @@ export class RunState {
     const state = BAD.has(live.state) ? live.state : "";
     const key = `${state} ${live.cause} ${live.message} ${Boolean(outcome)}`;
     this.element.hidden = !state;
-    if (!state || this.told === key) return;
-    this.told = key;
+    if (!state || this.keyShown === key) return;
+    this.keyShown = key;
     this.element.className = `card situation ${state}`;
     this.fill(live, outcome);
   }

@@ -23,10 +23,10 @@ export class RunTable {
 
   // False for an unchanged row.
   put(run, one, kind) {
-    const told = JSON.stringify([run, one?.results.length]);
-    if (this.rows.get(run.id)?.told === told) return false;
+    const content = JSON.stringify([run, one?.results.length]);
+    if (this.rows.get(run.id)?.content === content) return false;
     const results = new Map((run.results ?? []).map((value, i) => [one.results[i].name, value]));
-    this.rows.set(run.id, { ...run, told, kind, base: one?.values ?? {}, results: run.results && results, hay: hay(run) });
+    this.rows.set(run.id, { ...run, content, kind, base: one?.values ?? {}, results: run.results && results, hay: hay(run) });
     return true;
   }
 

@@ -29,8 +29,8 @@ export function hindrance() {
   return KINDS.some((kind) => MediaRecorder.isTypeSupported(kind)) ? "" : "This browser cannot record films in WebM.";
 }
 
-// Records a film; returns its data. `show(i)` shows snapshot i and resolves when it is drawn; `told(i)` is called before each; `signal` stops it.
-export async function film(view, name, number, show, told, signal) {
+// Records a film; returns its data. `show(i)` shows snapshot i and resolves when it is drawn; `report(i)` is called before each; `signal` stops it.
+export async function film(view, name, number, show, report, signal) {
   const canvas = composed(view);
   const stream = canvas.captureStream(RATE);
   const recorder = new MediaRecorder(stream, { mimeType: KINDS.find((kind) => MediaRecorder.isTypeSupported(kind)), videoBitsPerSecond: BITS });
@@ -40,7 +40,7 @@ export async function film(view, name, number, show, told, signal) {
   recorder.start();
   recorder.pause();
   for (let i = 0; i < number && !signal.aborted; i += 1) {
-    told(i);
+    report(i);
     await show(i);
     composed(view, canvas);
     recorder.resume();

@@ -35,16 +35,16 @@ export class Answer {
     this.element.hidden = false;
     const x = (values, between = " and ") => vector(values, search.unit, 4, between);
     const y = (value) => exact(value, search.result_unit, 4);
-    const told = new Map(search.points.map((point) => [point.x, point.value]));
+    const results = new Map(search.points.map((point) => [point.x, point.value]));
     const { bracket, curve } = search;
     this.state.textContent = search.over ? "" : goesOn(info) ? "goes on" : `no report since ${moment(info.reported)}: the command that selects the points has ended or lost its connection; the same command continues the sweep`;
     this.found.textContent = bracket ? x([(bracket[0] + bracket[1]) / 2, (bracket[1] - bracket[0]) / 2], " ± ") : search.over ? "not found" : "not bracketed yet";
     this.sought.textContent = `${search.key}${search.more.length ? ` and ${counted(search.more.length, "key")} with it` : ""}, where ${search.result} = ${y(search.threshold)}`;
     const without = search.points.filter(({ problem }) => problem).length;
-    const ends = (bracket ?? [search.low, search.high]).filter((end) => typeof told.get(end) === "number");
+    const ends = (bracket ?? [search.low, search.high]).filter((end) => typeof results.get(end) === "number");
     const facts = [
       [bracket ? "bracket" : "range", x(bracket ?? [search.low, search.high], " to ")],
-      ["result there", ends.length ? vector(ends.map((end) => told.get(end)), search.result_unit, 4, " to ") : ""],
+      ["result there", ends.length ? vector(ends.map((end) => results.get(end)), search.result_unit, 4, " to ") : ""],
       ["asked for", `bracket of ${exact(search.tolerance, search.unit, 4)}`],
       ["curve", curve ? `${curve.law}: ${curve.error === null ? exact(curve.limit, search.unit, 4) : x([curve.limit, curve.error], " ± ")}` : ""],
       ["constants", curve ? constants(curve) : ""],

@@ -21,7 +21,7 @@ export class SideBySide {
     Object.assign(this, { runs: [], chosen: null, panes: new Map(), time: 1 });
     this.row = h("div.panes");
     this.clock = h("input", { type: "range", min: 0, max: STEPS, step: 1, value: STEPS, "aria-label": "simulated time", oninput: () => this.tick() });
-    this.told = h("span.note");
+    this.clockText = h("span.note");
     this.tools = new Tools({
       colour: () => this.paint(), section: () => this.choose(), slice: () => this.slice(), camera: (name) => this.view?.eye.view(name),
       follow: (text) => this.follow(text), set: (name, value) => this.set(name, value), opacities: () => this.fade(),
@@ -30,7 +30,7 @@ export class SideBySide {
     this.playing = h("button.quiet", { type: "button", onclick: () => (this.player ? this.pause() : this.play()) }, "Play");
     this.choice = h("div.picks", { role: "group", "aria-label": "bodies that are shown, up to four" });
     this.element = h("section.card", { hidden: "", "aria-label": "bodies side by side" },
-      h("div.card-head", {}, h("h2", {}, "Bodies side by side"), this.told), this.choice, this.tools.element, this.tools.cutting, this.row, h("div.scrub", {}, this.playing, this.clock));
+      h("div.card-head", {}, h("h2", {}, "Bodies side by side"), this.clockText), this.choice, this.tools.element, this.tools.cutting, this.row, h("div.scrub", {}, this.playing, this.clock));
     this.row.addEventListener("keydown", (event) => this.key(event));
   }
 
@@ -109,7 +109,7 @@ export class SideBySide {
 
   async tick() {
     const { t } = this;
-    this.told.textContent = si(t, "s");
+    this.clockText.textContent = si(t, "s");
     this.clock.setAttribute("aria-valuetext", si(t, "s"));
     await Promise.all(this.shown.map((pane) => pane.show(t)));
     this.offerTools();
@@ -133,8 +133,8 @@ export class SideBySide {
     const panes = this.shown.filter(({ snapshot }) => snapshot);
     const { by: { value: by }, choice } = this.tools;
     const field = panes[0]?.snapshot.header.fields[by];
-    const told = panes.flatMap(({ run }) => run.snapshots).map(({ fields }) => fields?.[by]).filter(Boolean);
-    const ends = field && range(choice, by, panes.map(({ snapshot }) => snapshot), told);
+    const ranges = panes.flatMap(({ run }) => run.snapshots).map(({ fields }) => fields?.[by]).filter(Boolean);
+    const ends = field && range(choice, by, panes.map(({ snapshot }) => snapshot), ranges);
     if (field) this.tools.ends(ends, field.unit);
     for (const { view } of panes) view.colour(by, ends, field ? choice.bands : 0);
   }

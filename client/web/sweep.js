@@ -23,7 +23,7 @@ const BRIEF = 9; // Characters of the id that are shown.
 export class SweepPage {
   // `onRefused` is called when the token is no longer valid.
   constructor(id, onRefused) {
-    Object.assign(this, { id, onRefused, told: new RunTable(), abort: new AbortController(), marked: new Set(), points: [], columns: [], sort: { id: "point", down: false } });
+    Object.assign(this, { id, onRefused, table: new RunTable(), abort: new AbortController(), marked: new Set(), points: [], columns: [], sort: { id: "point", down: false } });
     this.path = `v1/sweeps/${encodeURIComponent(id)}`;
     this.build();
     document.title = "Sweep · Conoid";
@@ -75,7 +75,7 @@ export class SweepPage {
       let pending = 0;
       for (;;) {
         const answer = await call(`v1/table?${new URLSearchParams(query)}`, { signal });
-        this.told.take(answer);
+        this.table.take(answer);
         pending += answer.pending;
         if (!answer.next) break;
         query = { ...query, cursor: answer.next };
@@ -106,13 +106,13 @@ export class SweepPage {
   }
 
   draw() {
-    const { info, told } = this;
-    const there = info.points.filter(({ run }) => told.rows.has(run.id));
-    this.points = there.map(({ values, run }, n) => ({ n, values, row: { ...told.rows.get(run.id), values: { ...told.rows.get(run.id).values } } }));
+    const { info, table } = this;
+    const there = info.points.filter(({ run }) => table.rows.has(run.id));
+    this.points = there.map(({ values, run }, n) => ({ n, values, row: { ...table.rows.get(run.id), values: { ...table.rows.get(run.id).values } } }));
     const rows = this.points.map(({ row }) => row);
     this.place = new Map(this.points.map(({ n, row }) => [row.id, n]));
-    this.keys = keyColumns(this.points, told.units);
-    const others = columnsOf(rows, [], told.units).filter(({ id }) => !["run", "labels", "title", "submitted", "message"].includes(id));
+    this.keys = keyColumns(this.points, table.units);
+    const others = columnsOf(rows, [], table.units).filter(({ id }) => !["run", "labels", "title", "submitted", "message"].includes(id));
     this.groups = together(this.points, this.keys);
     this.results = others.filter(({ id }) => id.startsWith("result:"));
     const point = { id: "run", title: "point", value: (row) => this.place.get(row.id), text: (row) => String(1 + this.place.get(row.id)), width: 16 };
@@ -155,7 +155,7 @@ export class SweepPage {
     const all = sorted(rows, column, this.sort.down);
     this.all = all;
     this.grid.region.hidden = !all.length;
-    this.grid.draw({ columns: this.columns, sort: { ...this.sort, id: column.id }, items: all.map((row) => ({ key: row.id, told: row.told, row })), all, marked: this.marked, shorts: shorts(rows.map(({ id }) => id)), stamp: this.told.version });
+    this.grid.draw({ columns: this.columns, sort: { ...this.sort, id: column.id }, items: all.map((row) => ({ key: row.id, content: row.content, row })), all, marked: this.marked, shorts: shorts(rows.map(({ id }) => id)), stamp: this.table.version });
     this.compare.disabled = this.marked.size < 2;
     this.compare.textContent = this.marked.size > 1 ? `Compare ${this.marked.size}` : "Compare";
     this.compare.title = this.marked.size > 1 ? "" : "mark two points or more";

@@ -71,9 +71,9 @@ export class Toolbar {
   }
 
   drawChoices(columns, choice) {
-    const told = JSON.stringify([choice, columns.map(({ id, title, shown }) => [id, title, shown])]);
-    if (told === this.told) return;
-    this.told = told;
+    const stamp = JSON.stringify([choice, columns.map(({ id, title, shown }) => [id, title, shown])]);
+    if (stamp === this.stamp) return;
+    this.stamp = stamp;
     const focus = document.activeElement?.dataset?.choice;
     const box = ({ id, title, full, shown }) => h("label", { title: full ?? title }, h("input", {
       type: "checkbox", "data-choice": id, checked: (choice[id] ?? shown) && "", onchange: ({ target }) => this.choose(id, target.checked, shown) }), title);
@@ -93,8 +93,8 @@ export class Toolbar {
 // Options of a list, made again only after a change: an open list would close. An unknown value selects
 // the first option.
 export function fill(element, choices, value) {
-  const told = JSON.stringify(choices);
-  if (element.told !== told) element.replaceChildren(...choices.map(([name, shown]) => h("option", { value: name }, shown)));
-  element.told = told;
+  const stamp = JSON.stringify(choices);
+  if (element.stamp !== stamp) element.replaceChildren(...choices.map(([name, shown]) => h("option", { value: name }, shown)));
+  element.stamp = stamp;
   element.value = choices.some(([name]) => name === value) ? value : choices[0]?.[0] ?? "";
 }

@@ -21,7 +21,7 @@ export class Tools {
     this.by = choice("colour by", ["fragment", "part"], () => act.colour());
     this.across = choice("section across", CUTS, () => act.section());
     this.place = h("input", { type: "range", "aria-label": "place of the section", min: 0, max: 1, step: "any", value: 0.5, oninput: () => act.slice() });
-    this.told = h("output.place");
+    this.position = h("output.place");
     this.flip = button("Flip", "cut away the other side", () => { this.flipped = !this.flipped; act.slice(); });
     this.parts = h("div.parts");
     this.heaviest = h("div.scroll", { tabindex: 0, role: "region", "aria-label": "the heaviest fragments" });
@@ -30,7 +30,7 @@ export class Tools {
     const panels = { Camera: panel("Camera", this.camera()), Scale: panel("Scale", this.scale()), Parts: panel("Parts", this.parts), Show: panel("Show", this.show()), Fragments: this.fragments, Save: panel("Save", this.save()) };
     this.panels = Object.entries(panels).filter(([title]) => !without.includes(title)).map(([, one]) => one);
     this.limit = h("span.hint.limit", { role: "status" });
-    this.cutting = h("span.cutting", { hidden: "" }, this.place, this.told, this.flip);
+    this.cutting = h("span.cutting", { hidden: "" }, this.place, this.position, this.flip);
     this.element = h("div.tools3d", { role: "toolbar", "aria-label": "tools of the body" }, field("Colour", this.by), field("Section", this.across), this.limit, this.panels);
     this.element.addEventListener("keydown", (event) => { if (event.key === "Escape") this.shut(); });
     for (const one of this.panels) one.addEventListener("toggle", () => { if (one.open) this.shut(one); });
@@ -151,8 +151,8 @@ export class Tools {
 
   // Text beside the slider.
   tell(at, hollow) {
-    this.told.textContent = at === null ? "" : `${si(at, "m")}${hollow ? ", hollow" : ""}`;
-    this.told.title = hollow;
+    this.position.textContent = at === null ? "" : `${si(at, "m")}${hollow ? ", hollow" : ""}`;
+    this.position.title = hollow;
     this.cutting.hidden = at === null;
   }
 }

@@ -5,10 +5,10 @@ import { count, counted, duration, h, percent, si, size } from "./figures.js";
 const MOST = 50; // Largest number of problems that are listed.
 
 // `lines`: line of each problem in the text, -1 if unknown; `onLine` is called with the selected one.
-export function verdict(text, busy, told, lines, onLine) {
+export function verdict(text, busy, checks, lines, onLine) {
   if (!text.trim()) return h("p.hint", {}, "Nothing to check yet.");
-  if (!told) return h("p.hint", {}, busy || "not checked yet");
-  const { valid, problems, warnings = [], estimate = {} } = told;
+  if (!checks) return h("p.hint", {}, busy || "not checked yet");
+  const { valid, problems, warnings = [], estimate = {} } = checks;
   const head = valid ? h("p.good", {}, h("b", {}, "This case can be run.")) : problems.length ? h("p.bad", {}, h("b", {}, counted(problems.length, "problem")))
     : h("p.warn", {}, h("b", {}, "Files are missing."));
   return h("div", {}, h("div.verdict", {}, head, h("span.hint", {}, busy)), valid ? expected(estimate) : "",

@@ -19,7 +19,7 @@ export class Windowed {
 
   close() { this.watch.disconnect(); }
 
-  // Items have a unique `key`, and a `told` that changes with their look.
+  // Items have a unique `key`, and a `content` that changes with what they show.
   set(items, version) {
     Object.assign(this, { items, version });
     this.draw();
@@ -42,7 +42,7 @@ export class Windowed {
   }
 
   row(item, n, before) {
-    const stamp = `${this.version} ${item.told}`;
+    const stamp = `${this.version} ${item.content}`;
     const known = before.get(item.key);
     const element = known?.stamp === stamp ? known.element : this.make(item, n);
     element.setAttribute("aria-rowindex", n + 2);

@@ -11,5 +11,5 @@ const found = { ...await import(first) };
 for (const other of others) Object.assign(found, await import(other));
 const bytes = data?.base64 ? new Uint8Array(Buffer.from(data.base64, "base64")).buffer : data;
 const answer = new Function("page", "data", `return (${script});`)(found, bytes);
-const told = (_, value) => (typeof value === "bigint" ? Number(value) : ArrayBuffer.isView(value) ? Array.from(value, Number) : value);
-process.stdout.write(JSON.stringify(answer ?? null, told));
+const plain = (_, value) => (typeof value === "bigint" ? Number(value) : ArrayBuffer.isView(value) ? Array.from(value, Number) : value);
+process.stdout.write(JSON.stringify(answer ?? null, plain));

@@ -53,9 +53,9 @@ export const state = { served: () => { throw new Error("away"); }, asked: [] };
 globalThis.fetch = async (url, options = {}) => {
   const path = new URL(url).pathname.slice(1);
   state.asked.push(path);
-  const told = state.served(path, options);
-  const status = typeof told === "number" ? told : 200;
-  return { ok: status < 300, status, headers: new Map(), json: async () => told };
+  const answer = state.served(path, options);
+  const status = typeof answer === "number" ? answer : 200;
+  return { ok: status < 300, status, headers: new Map(), json: async () => answer };
 };
 
 const text = (element) => (element instanceof Element ? element.children.map(text).join(" ") : String(element));

@@ -40,9 +40,9 @@ def web(tmp_path: Path) -> Path:
 
 def played(web: Path, script: str) -> Any:
     """Runs a script and returns its result."""
-    told = json.dumps({"module": str(web / "app.js"), "script": script})
+    question = json.dumps({"module": str(web / "app.js"), "script": script})
     command = [str(NODE), str(Path(__file__).with_name("stage.mjs"))]
-    done = subprocess.run(command, input=told, capture_output=True, text=True, timeout=60, check=False)
+    done = subprocess.run(command, input=question, capture_output=True, text=True, timeout=60, check=False)
     assert done.returncode == 0, done.stderr
     return json.loads(done.stdout)
 
@@ -108,23 +108,23 @@ def test_runs_are_compared_when_the_server_comes_back(web: Path) -> None:
     assert played(web, script % json.dumps(RUN)) == [True, True]
 
 
-def told(*runs: str) -> str:
+def listing(*runs: str) -> str:
     """Returns the JSON of an answer of GET /v1/table with these runs."""
     return f"{{ runs: [{', '.join(runs)}], cases: [], pending: 0, next: null }}"
 
 
 def test_a_list_without_runs_says_how_to_begin(web: Path) -> None:
-    assert "conoid submit taylor_copper" in played(web, LIST.replace("answer", told()))
-    shown = played(web, LIST.replace("answer", told("run")))
+    assert "conoid submit taylor_copper" in played(web, LIST.replace("answer", listing()))
+    shown = played(web, LIST.replace("answer", listing("run")))
     assert "conoid submit" not in shown
     assert "1 run" in shown
     assert "bar" in shown
 
 
 def test_a_refusal_is_no_silence(web: Path) -> None:
-    told = played(web, LIST.replace("answer", "403"))
-    assert "the server answered 403" in told
-    assert "No answer" not in told
+    problem = played(web, LIST.replace("answer", "403"))
+    assert "the server answered 403" in problem
+    assert "No answer" not in problem
 
 
 def test_a_page_whose_server_is_away_comes_back_by_itself(web: Path) -> None:
@@ -147,17 +147,17 @@ def test_a_token_lasts_for_the_tab_or_until_the_user_signs_out(web: Path) -> Non
         [globalThis.sessionStorage, globalThis.localStorage] = [store(), store()];
         const { token } = await load("token.js");
         const seen = () => [token.get(), sessionStorage.kept.size, localStorage.kept.size];
-        const told = [];
+        const views = [];
         token.set("one");
-        told.push(seen());
+        views.push(seen());
         token.set("two", true);
-        told.push(seen());
+        views.push(seen());
         token.clear();
-        told.push(seen());
+        views.push(seen());
         for (const name of ["localStorage", "sessionStorage"])
             Object.defineProperty(globalThis, name, { get() { throw new Error("refused"); } });
         token.set("three", true);
-        return [...told, token.get()];
+        return [...views, token.get()];
     """
     assert played(web, script) == [["one", 1, 0], ["two", 1, 1], ["", 0, 0], "three"]
 
@@ -190,10 +190,10 @@ def test_a_run_that_has_ended_says_why_and_what_it_was_warned_of(web: Path) -> N
         page.close();
         return shown;
     """
-    told, warnings, log_shown, files = played(web, script % json.dumps([ENDED, history]))
-    assert "Failed: one of its processes or machines has failed" in told
-    assert "tet 7 is inside out" in told
-    assert "Continue from step 120" in told
+    situation, warnings, log_shown, files = played(web, script % json.dumps([ENDED, history]))
+    assert "Failed: one of its processes or machines has failed" in situation
+    assert "tet 7 is inside out" in situation
+    assert "Continue from step 120" in situation
     assert warnings.split() == ["a", "b", "c"]
     assert log_shown.split()[1::2] == ["a", "b", "a"]
     assert "2.00 MB" in files
@@ -214,8 +214,8 @@ def test_a_run_that_has_used_up_its_steps_goes_on_with_more(web: Path) -> None:
         await button.onclick?.();
         return [text(shown.element), text(button), asked.at(-1)];
     """
-    told, button, asked = played(web, script)
-    assert button in told
+    cause, button, asked = played(web, script)
+    assert button in cause
     assert button == "Continue from step 500 with run.max_steps = 1000"
     assert asked == "?max_steps=1000"
 
@@ -276,13 +276,13 @@ def test_a_file_that_two_parts_name_is_one_file(web: Path) -> None:
         const { NewPage } = await load("new.js");
         const page = new NewPage(new URLSearchParams(), () => {});
         page.editor.text = "x";
-        page.told = { valid: false, problems: ["a", "b"].map((part) => ({ key: `${part}.sha256`,
+        page.checks = { valid: false, problems: ["a", "b"].map((part) => ({ key: `${part}.sha256`,
             message: "lacks it" })),
             files: ["a", "b"].map((key) => ({ key, path: "bullet.step", sha256: "" })) };
         page.checked = page.editor.text;
         page.draw();
         const shown = [text(page.startButton), text(page.files).split("bullet.step").length - 1,
-            page.problems(page.told.files).length];
+            page.problems(page.checks.files).length];
         page.close();
         return shown;
     """
@@ -305,10 +305,10 @@ def test_what_stands_beside_a_failure_is_of_the_outcome(web: Path) -> None:
         await pause(50);
         return [text(shown.element), text(numbers.element)];
     """
-    told, numbers = played(web, script)
-    assert "511 ns of 1.00 µs, step 20" in told
-    assert "contact: 2.5e-1 of the largest energy" in told
-    assert "dt_safety" not in told
+    cause, numbers = played(web, script)
+    assert "511 ns of 1.00 µs, step 20" in cause
+    assert "contact: 2.5e-1 of the largest energy" in cause
+    assert "dt_safety" not in cause
     assert "511" in numbers
     assert "1.0e-6" in numbers
     assert "6.4e-8" not in numbers
@@ -360,7 +360,7 @@ def test_a_case_is_checked_when_nobody_types_and_started_once(web: Path) -> None
         const after = page.startButton.disabled;
         away = true;
         await page.start();
-        const message = text(page.said);
+        const message = text(page.status);
         away = false;
         await page.start();
         await page.start();
@@ -369,9 +369,9 @@ def test_a_case_is_checked_when_nobody_types_and_started_once(web: Path) -> None
         page.close();
         return [checks, before, after, message, new Set(keys).size, keys.length, location.hash];
     """
-    checks, before, after, said, keys, starts, place = played(web, script)
+    checks, before, after, status, keys, starts, place = played(web, script)
     assert (checks, before, after) == (["abc"], True, False)
-    assert "No answer from the server" in said
+    assert "No answer from the server" in status
     assert (keys, starts) == (2, 3), "the same case has the same key, another one another"
     assert place == "#/runs/b"
 
@@ -418,13 +418,13 @@ def test_a_closed_chart_and_the_one_beside_the_body_are_the_same_at_the_next_vis
         const names = (place) => place.children.map((card) => card["data-card"]).join();
         const seen = ({ beside, grid, shelf }) => [names(beside), names(grid), text(shelf)];
         const first = made();
-        const told = [seen(first)];
+        const views = [seen(first)];
         first.close("dt");
         first.move("counts");
-        told.push(seen(made()));
+        views.push(seen(made()));
         globalThis.localStorage = null;
         first.close("counts");
-        return [...told, seen(first)];
+        return [...views, seen(first)];
     """
     assert played(web, script) == [
         ["energy", "dt,counts", "Closed"], ["counts", "energy", "Closed + dt"], ["", "energy", "Closed + dt + counts"],

@@ -27,9 +27,9 @@ def asked(tmp_path: Path, module: str, script: str, data: Any) -> Any:
     for path in WEB.glob("*.js"):
         shutil.copy(path, tmp_path)
     (tmp_path / "package.json").write_text('{"type": "module"}')
-    told = json.dumps({"module": str(tmp_path / module), "script": script, "data": data})
+    question = json.dumps({"module": str(tmp_path / module), "script": script, "data": data})
     command = [str(NODE), str(Path(__file__).with_name("scripts.mjs"))]
-    done = subprocess.run(command, input=told, capture_output=True, text=True, timeout=60, check=False)
+    done = subprocess.run(command, input=question, capture_output=True, text=True, timeout=60, check=False)
     assert done.returncode == 0, done.stderr
     return json.loads(done.stdout)
 
@@ -152,8 +152,8 @@ def test_a_case_in_json_is_the_same_case_in_toml(tmp_path: Path) -> None:
         "u": {"v": {"w": [[1, -2.5e-9], []]}},
         "p": [{"q": [{"r": 1}]}, {}],
     }
-    told = [json.dumps(case) for case in [*known, odd]]
-    found = asked(tmp_path, "casetoml.js", "data.map(page.asToml)", told)
+    sources = [json.dumps(case) for case in [*known, odd]]
+    found = asked(tmp_path, "casetoml.js", "data.map(page.asToml)", sources)
     assert [tomllib.loads(text) for text in found] == [*known, odd]
     assert (
         max(len(line) for text in found[: len(known)] for line in text.splitlines() if "description" not in line) < 200

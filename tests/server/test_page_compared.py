@@ -114,8 +114,8 @@ def test_twelve_runs_are_told_apart(site: tuple[Site, list[str]], browser: Brows
     page.focus(".plot")
     page.press("ArrowRight")
     page.wait("document.querySelectorAll('.readout .number').length === 11")
-    told = list(csv.reader(io.StringIO(page.evaluate(SAVED % ".charts .save button"))))
-    assert {row[0] for row in told[1:]} == set(runs)
+    rows = list(csv.reader(io.StringIO(page.evaluate(SAVED % ".charts .save button"))))
+    assert {row[0] for row in rows[1:]} == set(runs)
     assert page.errors == []
     page.close()
 

@@ -32,7 +32,7 @@ def watched(site: Site, browser: Browser) -> tuple[str, Page]:
     page = browser.page()
     page.go(site.url)
     page.wait("document.querySelector('form.sign-in')")
-    assert (page.errors, [told for told in page.answers if told[0] >= 400]) == ([], [])
+    assert (page.errors, [answer for answer in page.answers if answer[0] >= 400]) == ([], [])
     sign_in(page, site)
     page.evaluate("localStorage.setItem('conoid.fold.numbers', 'true')")
     run = site.submit(demo(ranks="2"))
@@ -69,8 +69,8 @@ def test_what_is_shown_is_what_the_files_say(site: Site, watched: tuple[str, Pag
     folder = site.runs / run
     last = sorted((folder / "fragments").glob("fragments_*.csv"))[-1]
     rows = {int(row["label"]): row for row in csv.DictReader(last.read_text().splitlines())}
-    told = list(csv.reader((folder / layout.HISTORY).read_text().splitlines()))
-    line = dict(zip([history.split(name)[0] for name in told[0]], told[-1], strict=True))
+    table = list(csv.reader((folder / layout.HISTORY).read_text().splitlines()))
+    line = dict(zip([history.split(name)[0] for name in table[0]], table[-1], strict=True))
     shown = facts(page)
     page.wait("[...document.querySelectorAll('.plot')].every((plot) => plot.querySelector('canvas'))")
     assert number(shown["fragments"]) == len(rows)
@@ -79,8 +79,8 @@ def test_what_is_shown_is_what_the_files_say(site: Site, watched: tuple[str, Pag
     course = (
         "fetch(`v1/runs/%s/columns?name=kinetic`, { headers: { Authorization: `Bearer %s` } }).then((a) => a.json())"
     )
-    told = page.evaluate(course % (run, site.token))
-    assert told["columns"]["kinetic"]["last"] == told["values"]["kinetic"][-1] == float(line["kinetic"])
+    columns = page.evaluate(course % (run, site.token))
+    assert columns["columns"]["kinetic"]["last"] == columns["values"]["kinetic"][-1] == float(line["kinetic"])
     masses = sorted(((float(row["mass [kg]"]), label) for label, row in rows.items()), reverse=True)
     page.evaluate("[...document.querySelectorAll('.panel summary')].find((e) => e.innerText === 'Fragments').click()")
     page.wait("document.querySelector('.heaviest button')")
@@ -170,7 +170,7 @@ def test_buttons_the_age_of_numbers_and_two_runs(site: Site, watched: tuple[str,
     page.wait("document.querySelector('.pill.running') && document.querySelector('.ranks .stack')", DEMO)
     for verb in ("Checkpoint", "Snapshot"):
         page.evaluate(f"[...document.querySelectorAll('.side button')].find((b) => b.innerText === '{verb}').click()")
-        page.wait(f"document.querySelector('.told')?.innerText.includes('{verb.lower()} asked for')")
+        page.wait(f"document.querySelector('.message')?.innerText.includes('{verb.lower()} asked for')")
     page.wait(f"Number({SHOWN}) > 0", DEMO)
     assert page.errors == []
     port = int(site.url.rsplit(":", 1)[1].strip("/"))
@@ -218,7 +218,7 @@ def test_a_report_needs_no_server(site: Site, browser: Browser, watched: tuple[s
     asks.go(f"{site.url}#/runs/{run}")
     asks.wait("document.querySelector('.run-head .pill.succeeded')")
     asks.evaluate(press)
-    asks.wait("document.querySelector('.told').innerText === 'The report is saved.'", 300.0)
+    asks.wait("document.querySelector('.message').innerText === 'The report is saved.'", 300.0)
     out = tmp_path / "report.html"
     out.write_bytes((site.runs / run / form.NAME).read_bytes())
     site.kill()

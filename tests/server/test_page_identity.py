@@ -100,9 +100,9 @@ def test_page_and_pictures_give_each_fragment_one_colour_at_all_times(seen: list
     for one in seen[:: max(1, len(seen) // 10)]:
         pairs = sorted(parts_of(one).items())
         script = "data.map(([id, part]) => page.ofFragment(BigInt(id), part, 2))"
-        told = json.dumps({"module": str(tmp_path / "colours.js"), "script": script, "data": pairs})
+        question = json.dumps({"module": str(tmp_path / "colours.js"), "script": script, "data": pairs})
         command = [str(NODE), str(Path(__file__).with_name("scripts.mjs"))]
-        drawn = json.loads(subprocess.run(command, input=told, capture_output=True, text=True, check=True).stdout)
+        drawn = json.loads(subprocess.run(command, input=question, capture_output=True, text=True, check=True).stdout)
         numbers, parts = zip(*pairs, strict=True)
         assert drawn == part_colours.of_fragments(numbers, parts, 2).tolist()
         for (label, _), colour in zip(pairs, drawn, strict=True):

@@ -40,8 +40,8 @@ def test_parts_and_fragments_have_the_colours_of_pictures(ask: Ask) -> None:
 
 @pytest.fixture(scope="module")
 def made() -> bytes:
-    told = {"n": 7, "step": 1200, "t": 2.5e-5, "ranks": 2}
-    return blob.made(shattered(5, 40).whole(2), told, lambda labels: np.asarray(1e-6 * labels), blob.Budget()).data
+    head = {"n": 7, "step": 1200, "t": 2.5e-5, "ranks": 2}
+    return blob.made(shattered(5, 40).whole(2), head, lambda labels: np.asarray(1e-6 * labels), blob.Budget()).data
 
 
 def sent(data: bytes) -> dict[str, str]:
@@ -112,11 +112,11 @@ def test_waiting_is_told_from_not_being_run(ask: Ask) -> None:
 
 def test_the_other_threads_of_a_rank_are_busy_by_the_time_of_their_tasks(ask: Ask) -> None:
     first = {"type": "load", "seq": 1, "wall": 4.0, "t": 0.0, "imbalance": 1.0, "phases": {"elements": [1.0]}}
-    told = [first, {**first, "seq": 2, "wall": 6.0, "threads": 3, "helped": [1.0]}]
+    loads = [first, {**first, "seq": 2, "wall": 6.0, "threads": 3, "helped": [1.0]}]
     script = (
         "(() => { const live = new page.Live('r'); data.forEach((m) => live.take(m)); return live.load.helped; })()"
     )
-    assert ask("live.js", script, told) == [0.25]
+    assert ask("live.js", script, loads) == [0.25]
     assert ask("live.js", script, [first, {**first, "seq": 2, "wall": 6.0}]) == []
 
 
@@ -177,11 +177,11 @@ def test_a_column_of_results_has_one_unit(ask: Ask) -> None:
 
 
 def test_what_is_drawn_is_a_table(ask: Ask) -> None:
-    told = [
+    charts = [
         {"name": "a", "unit": "Pa", "data": [[0, 1.5], [2, None]]},
         {"name": "b, c", "data": [{"value": [1, 2]}, [2, 3]]}, {"name": "pins", "aside": True, "data": [[5, 5]]},
     ]  # fmt: skip
-    table = ask("tables.js", "page.tableOf({ series: data })", told)
+    table = ask("tables.js", "page.tableOf({ series: data })", charts)
     assert table == {"head": ["t [s]", "a [Pa]", "b, c"], "rows": [[0, 1.5, None], [1, None, 2], [2, None, 3]]}
     csv = ask("tables.js", "page.toCsv(data.head, data.rows)", table)
     assert csv == 't [s],a [Pa],"b, c"\n0,1.5,\n1,,2\n2,,3\n'
@@ -261,8 +261,8 @@ def test_forces_go_by_who_pushes_whom_and_a_magnitude_needs_all_components(ask: 
 
 def test_the_page_writes_numbers_as_python_does(ask: Ask) -> None:
     table = json.loads((HERE.parents[1] / "figures.json").read_text(encoding="utf-8"))
-    told = ask("figures.js", "data.map(([name, given]) => page[name](...given))", table)
-    assert json.loads(json.dumps(told, ensure_ascii=False).replace("\u202f", " ")) == [text for _, _, text in table]
+    written = ask("figures.js", "data.map(([name, given]) => page[name](...given))", table)
+    assert json.loads(json.dumps(written, ensure_ascii=False).replace("\u202f", " ")) == [text for _, _, text in table]
 
 
 def test_no_module_of_the_page_writes_numbers_on_its_own() -> None:
@@ -282,22 +282,22 @@ def test_energies_of_parts_come_from_the_history_and_from_messages_alike(ask: As
         "rod": {"kinetic": [3.0, 2.0], "internal": [0.0, 1.5]},
         "ball": {"kinetic": [1.0, 1.0], "internal": [0.0, 0.5]},
     }
-    told = {"series": {"t": [0.0, 1e-6], "dt": [1e-9] * 2}, "parts": parts, "last": 5}
+    history = {"series": {"t": [0.0, 1e-6], "dt": [1e-9] * 2}, "parts": parts, "last": 5}
     newest = {name: {"kinetic": 1.0, "internal": 2.0} for name in parts}
     message = {"type": "progress", "seq": 6, "t": 2e-6, "dt": 1e-9, "limiter": "", "energy": {}, "parts": newest}
     script = """(() => {
         const live = { ledger: [] };
-        page.take(live, data.told);
+        page.take(live, data.history);
         live.ledger.push(data.message);
         return live.ledger.map(({ parts }) => [parts.rod.kinetic, parts.ball.internal]);
     })()"""
-    assert ask("history.js", script, {"told": told, "message": message}) == [[3.0, 0.0], [2.0, 0.5], [1.0, 2.0]]
+    assert ask("history.js", script, {"history": history, "message": message}) == [[3.0, 0.0], [2.0, 0.5], [1.0, 2.0]]
 
 
 def test_the_newest_fragments_are_shown_whoever_tells_of_them(ask: Ask) -> None:
     counts = {"type": "counts", "t": 1e-6, "nodes": 9, "facets": 1, "smallest": -4, "sizes": [2, 1]}
     snapshot = {"type": "snapshot", "n": 0, "t": 2e-6, "step": 25, "fragments": 7, "smallest": -4, "sizes": [4, 2, 1]}
-    told = [
+    sources = [
         {**counts, "step": 20, "counted": 18, "fragments": 3}, snapshot,
         {**counts, "step": 40, "counted": 18, "fragments": 3}, {**counts, "step": 50, "counted": 45, "fragments": 9},
     ]  # fmt: skip
@@ -306,7 +306,7 @@ def test_the_newest_fragments_are_shown_whoever_tells_of_them(ask: Ask) -> None:
         data.slice(0, at + 1).forEach((one, i) => live.take({ ...one, seq: i + 1 }));
         return [live.counts.fragments, live.spread.sizes.length];
     })"""
-    assert ask("live.js", script, told) == [[3, 2], [7, 3], [7, 3], [9, 2]]
+    assert ask("live.js", script, sources) == [[3, 2], [7, 3], [7, 3], [9, 2]]
 
 
 def test_a_distribution_in_bins_is_summed_from_the_largest(ask: Ask) -> None:
@@ -332,8 +332,8 @@ def test_an_address_that_cannot_be_read_is_the_list(ask: Ask) -> None:
 
 def test_a_section_has_the_area_the_places_and_the_values_of_the_tets_that_it_cuts(ask: Ask) -> None:
     body = shattered(4, 7)
-    told = {"n": 0, "step": 0, "t": 0.0, "ranks": 1}
-    made = blob.made(body.whole(1), told, lambda labels: np.zeros(len(labels)), blob.Budget())
+    head = {"n": 0, "step": 0, "t": 0.0, "ranks": 1}
+    made = blob.made(body.whole(1), head, lambda labels: np.zeros(len(labels)), blob.Budget())
     data = gzip.decompress(made.tets)
     known = Snapshot(data)
     tets = np.array(ask("section.js", "page.nodes(data)", known.array("tet_steps").ravel().tolist())).reshape(-1, 4)
@@ -375,7 +375,7 @@ def section_of(corners: np.ndarray, normal: np.ndarray, at: float) -> float:
 
 
 def test_debris_does_not_make_the_frame_wider_and_heavy_pieces_do(ask: Ask) -> None:
-    told = {"n": 0, "step": 0, "t": 0.0, "ranks": 1}
+    head = {"n": 0, "step": 0, "t": 0.0, "ranks": 1}
 
     def framed(mass: float) -> tuple[float, float]:
         """Returns the lengths along x of two frames, m: around the bodies, and around everything."""
@@ -391,7 +391,7 @@ def test_debris_does_not_make_the_frame_wider_and_heavy_pieces_do(ask: Ask) -> N
         across[far] = -1
         alone.mass[far] = mass
         alone = replace(alone, x=x, v=np.vstack([body.v, body.v[nodes]]), tets=tets, across=across)
-        data = blob.made(alone.whole(1), told, lambda labels: np.zeros(len(labels)), blob.Budget()).data
+        data = blob.made(alone.whole(1), head, lambda labels: np.zeros(len(labels)), blob.Budget()).data
         ends = []
         for options in ("{}", "{ all: true }"):
             points = np.array(ask("framing.js", f"page.points(data, {options})", decoded(ask, data))).reshape(-1, 3)
@@ -440,11 +440,11 @@ def test_scales_are_those_of_pictures(ask: Ask) -> None:
 
 def test_the_ends_of_a_scale_are_those_that_are_chosen(ask: Ask, made: bytes) -> None:
     header = Snapshot(made).header.fields["speed"]
-    told = [[0.0, 10.0, 90.0, 100.0], [0.0, 20.0, 190.0, 900.0]]
+    ranges = [[0.0, 10.0, 90.0, 100.0], [0.0, 20.0, 190.0, 900.0]]
     choices = {("all", "run"): (0.0, 1000.0), ("most", "run"): (10.0, 200.0), ("hand", "run"): (3.0, 4.0)}
     for (how, over), ends in choices.items():
         choice = json.dumps({"how": how, "over": over, "hand": [3.0, 4.0]})
-        found = ask("ranges.js", f"page.range({choice}, 'speed', null, data)", told)
+        found = ask("ranges.js", f"page.range({choice}, 'speed', null, data)", ranges)
         assert (found["low"] <= ends[0], found["high"] >= ends[1] - 1e-9, found["high"]) == (True, True, ends[1])
     one = ask("ranges.js", "page.range({ how: 'all', over: 'now' }, 'speed', [data], [])", decoded(ask, made))
     assert one["low"] <= header.low
@@ -490,6 +490,6 @@ def test_a_section_begins_inside_of_the_tets_of_a_quarter_model(ask: Ask) -> Non
 def test_the_tooltip_of_a_chart_stays_text_whatever_a_chart_adds_to_it(ask: Ask) -> None:
     globals_ = "globalThis.getComputedStyle = () => ({ getPropertyValue: () => '' }); globalThis.document = {};"
     script = f"(() => {{ {globals_} return page.whole(true, {{ tooltip: {{ trigger: 'axis' }} }}).tooltip; }})()"
-    told = ask("axes.js", script)
-    assert (told["renderMode"], told["trigger"]) == ("richText", "axis")
+    texts = ask("axes.js", script)
+    assert (texts["renderMode"], texts["trigger"]) == ("richText", "axis")
     assert "common(" not in (WEB / "charts.js").read_text()

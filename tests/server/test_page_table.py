@@ -14,10 +14,10 @@ from .node import NODE, Ask
 pytestmark = pytest.mark.skipif(NODE is None, reason="no node on this machine")
 
 SPEED, SIZE = "parts[0].velocity[2]", "parts[0].mesh.element_size"
-TOLD = """
-    const told = new page.RunTable();
-    told.take(data);
-    const all = [...told.rows.values()];
+TABLE = """
+    const table = new page.RunTable();
+    table.take(data);
+    const all = [...table.rows.values()];
 """
 
 
@@ -34,8 +34,8 @@ def line(run: str, n: int = 0, **more: Any) -> dict[str, Any]:
 def answer(*runs: tuple[dict[str, Any], card.Card]) -> dict[str, Any]:
     """Returns the answer of the server with these runs."""
     made = rows.Table()
-    for told, known in runs:
-        assert made.add(told, known)
+    for run, known in runs:
+        assert made.add(run, known)
     listed = [json.loads(bytes(row)) for row in made.rows]
     return {"runs": listed, "cases": [group.shown() for group in made.groups], "pending": 0, "next": None}
 
@@ -67,34 +67,34 @@ def some() -> dict[str, Any]:
 
 def test_values_and_results_of_a_run_are_those_that_the_server_has(ask: Ask, some: dict[str, Any]) -> None:
     pair = f"[page.valueOf(row, '{SPEED}'), row.results.get('fragments') ?? null]"
-    script = f"{TOLD} return all.map((row) => {pair});"
+    script = f"{TABLE} return all.map((row) => {pair});"
     assert asked(ask, "runtable.js", script, some) == [[-100 * n, 3 * n] for n in range(5)] + [[None, None]]
 
 
 def test_columns_are_the_keys_that_differ_within_cases_that_are_alike(ask: Ask, some: dict[str, Any]) -> None:
     some_of_them = "all.filter(({ id }) => id === 'run1' || id === 'run3')"
-    script = f"{TOLD} return [page.differing(all, 9), page.differing({some_of_them}, 9)];"
+    script = f"{TABLE} return [page.differing(all, 9), page.differing({some_of_them}, 9)];"
     found = asked(ask, "runtable.js", script, some)
     assert set(found[0]) == {SPEED, SIZE}
     assert found[1] == [SPEED]
 
 
 def test_a_second_answer_changes_what_it_tells_and_removed_runs_go(ask: Ask, some: dict[str, Any]) -> None:
-    script = f"""{TOLD}
-        const same = told.take(data);
-        const after = told.take({{ ...data, runs: [{{ ...data.runs[0], state: "lost" }}] }});
-        told.keepOnly(data.runs.slice(1), true);
-        return [same, after, told.rows.size, told.rows.has("run0")];"""
+    script = f"""{TABLE}
+        const same = table.take(data);
+        const after = table.take({{ ...data, runs: [{{ ...data.runs[0], state: "lost" }}] }});
+        table.keepOnly(data.runs.slice(1), true);
+        return [same, after, table.rows.size, table.rows.has("run0")];"""
     assert asked(ask, "runtable.js", script, some) == [False, True, 5, False]
 
 
 MODULES = "columns.js runtable.js sorting.js response.js"
 COLUMNS = """
     const { RunTable, differing } = page;
-    const told = new RunTable();
-    told.take(data);
-    const all = [...told.rows.values()];
-    const columns = page.columnsOf(all, differing(all, 9), told.units);
+    const table = new RunTable();
+    table.take(data);
+    const all = [...table.rows.values()];
+    const columns = page.columnsOf(all, differing(all, 9), table.units);
     const by = (id) => columns.find((one) => one.id === id);
 """
 
@@ -202,11 +202,11 @@ def test_keys_that_go_together_are_one_axis(ask: Ask) -> None:
           drawn.map(({ name, data }) => [name, data.length]),
           page.together(points, [key("fixed")]).map(({ id }) => id)];
     })()"""
-    told = [
+    points = [
         {"id": f"{v}{size}", "fixed": 1, "v": v, "w": 9 - v, "word": f"law {v}", "size": size, "y": v * size}
         for v in (1, 2, 3) for size in (4, 5)
     ]  # fmt: skip
-    groups, drawn, alone = ask("response.js", script, told)
+    groups, drawn, alone = ask("response.js", script, points)
     assert groups == [["v", "v and 2 more that go with it", 3], ["size", "size", 1]]
     assert drawn == [["size 4", 3], ["size 5", 3]]
     assert alone == ["fixed"]
@@ -217,6 +217,6 @@ def test_a_key_of_words_has_places_on_the_axis(ask: Ask) -> None:
         const column = { title: "form", value: (row) => row.form, text: (row) => row.form };
         const result = { title: "y", value: (row) => row.y };
         return page.curves(data.map((row, n) => ({ n, row: { ...row, state: "succeeded" } })), column, [], result);"""
-    told = [{"id": "a", "form": "split", "y": 2.0}, {"id": "b", "form": "nodal", "y": 1.0}]
-    found = asked(ask, "response.js", script, told)
+    points = [{"id": "a", "form": "split", "y": 2.0}, {"id": "b", "form": "nodal", "y": 1.0}]
+    found = asked(ask, "response.js", script, points)
     assert found == {"words": ["split", "nodal"], "curves": [{"name": "", "data": [[0, 2, "a"], [1, 1, "b"]]}]}

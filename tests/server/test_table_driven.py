@@ -181,7 +181,7 @@ def test_an_adaptive_sweep_is_seen_as_it_is_reported(site: Site, page: Page) -> 
         "unit": "m/s", "low": 200.0, "high": 800.0, "tolerance": 10.0,
     }  # fmt: skip
 
-    def told(**more: Any) -> dict[str, Any]:
+    def report(**more: Any) -> dict[str, Any]:
         answer = httpx2.put(
             f"{site.url}v1/sweeps/adaptive/{name}", json={**search, **more}, headers=headers, timeout=60
         )
@@ -192,17 +192,17 @@ def test_an_adaptive_sweep_is_seen_as_it_is_reported(site: Site, page: Page) -> 
         run = site.submit(case_text("plate", extra=""), f"label=sweep={made['id']}")
         return {"x": x, "changed": {key: f"{x} m/s"}, "run": run, "value": value, "problem": problem}
 
-    made = told()
+    made = report()
     page.go(f"{site.url}#/sweeps/{made['id']}")
     page.wait("document.querySelector('.threshold-found')?.innerText === 'not bracketed yet'")
     points = [point(200.0, 0.0), point(800.0, 500.0), point(500.0, None, "failed: <b>the energy residual</b>")]
-    told(points=points, bracket=[200.0, 800.0])
+    report(points=points, bracket=[200.0, 800.0])
     page.wait("document.querySelector('.threshold-found').innerText === '500 ± 300 m/s'")
     page.wait("document.querySelectorAll('.runs tbody tr:not(.space)').length === 3")
     assert "3, 1 without a result" in page.text(".threshold .facts")
     course = [[400.0, 0.0, None], [600.0, 300.0, 8.0], [800.0, 500.0, 6.0]]
     curve = {"law": "Lambert and Jonas", "limit": 412.0, "error": 3.0, "factor": 0.9, "exponent": 2.1, "course": course}
-    told(points=points, bracket=[405.0, 415.0], curve=curve, over=True)
+    report(points=points, bracket=[405.0, 415.0], curve=curve, over=True)
     page.wait("document.querySelector('.threshold-found').innerText === '410 ± 5 m/s'")
     assert "Lambert and Jonas: 412 ± 3 m/s" in page.text(".threshold .facts")
     assert "goes on" not in page.text(".threshold")
@@ -210,8 +210,8 @@ def test_an_adaptive_sweep_is_seen_as_it_is_reported(site: Site, page: Page) -> 
     page.go(f"{site.url}#/")
     page.wait(f"{ROWS} > 5")
     page.slide("select[aria-label=groups]", "sweep")
-    page.wait("document.querySelector('.runs .group .said')?.innerText.endsWith('velocity[2] 410 ± 5 m/s')")
-    assert page.text(".runs .group .said").startswith("probe.left = 0 m/s at parts[0]")
+    page.wait("document.querySelector('.runs .group .note')?.innerText.endsWith('velocity[2] 410 ± 5 m/s')")
+    assert page.text(".runs .group .note").startswith("probe.left = 0 m/s at parts[0]")
     page.slide("select[aria-label=groups]", "")
 
 
