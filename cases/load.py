@@ -44,8 +44,8 @@ def parse_case(data: Mapping[str, Any]) -> Case:
         case = Case.model_validate(read)
     except ValidationError as error:
         problems += from_pydantic(error, data)
-        told = {each.key for each in problems}
-        raise CaseError([*problems, *(each for each in check_parts(read) if each.key not in told)]) from None
+        wrong_keys = {each.key for each in problems}
+        raise CaseError([*problems, *(each for each in check_parts(read) if each.key not in wrong_keys)]) from None
     problems += check(case)
     if problems:
         raise CaseError(problems)
@@ -133,8 +133,8 @@ def _no_repeats(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
 
 def _syntax(message: str, text: str) -> Problem:
     place = _LINE.search(message)
-    said = f"broken TOML: {_LINE.sub('', message).strip()}"
-    return _at_line(int(place[1]), text, said) if place else Problem("", "", said)
+    broken = f"broken TOML: {_LINE.sub('', message).strip()}"
+    return _at_line(int(place[1]), text, broken) if place else Problem("", "", broken)
 
 
 def _at_line(number: int, text: str, message: str) -> Problem:
@@ -160,7 +160,7 @@ def apply_overrides(data: Mapping[str, Any], overrides: Overrides) -> dict[str, 
     changed: dict[str, Any] = copy.deepcopy(dict(data))
     problems: list[Problem] = []
     made: set[tuple[int | str, ...]] = set()
-    for key, told, value in _assignments(overrides):
+    for key, text, value in _assignments(overrides):
         try:
             if value is ... or not _KEY.fullmatch(key):
                 raise ValueError("write an assignment such as run.ranks=2 or parts[0].velocity[2]='-200 m/s'")
@@ -170,7 +170,7 @@ def apply_overrides(data: Mapping[str, Any], overrides: Overrides) -> dict[str, 
             made.add(tuple(items))
             _assign(changed, items, value)
         except ValueError as error:
-            problems.append(Problem(key, told, str(error)))
+            problems.append(Problem(key, text, str(error)))
     if problems:
         raise CaseError(problems)
     return changed

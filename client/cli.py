@@ -102,13 +102,13 @@ def validate(case: CaseArgument, overrides: Overrides = None, as_json: Json = Fa
         found = examine(data_of(case, overrides or ()), locate(case).parent)
     checked, expected, odd = found.case, found.expected, found.odd
     if as_json:
-        told = {
+        answer = {
             "estimate": expected,
             "loads": loads(checked, found.survey.loads),
             "files": found.survey.parts,
             "touching": found.touching,
         }
-        echo_json({"name": checked.name, "valid": True, "warnings": odd, **told})
+        echo_json({"name": checked.name, "valid": True, "warnings": odd, **answer})
         return
     warn(odd)
     warned = f", {counted(len(odd), 'warning')}" if odd else ""

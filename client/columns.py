@@ -85,12 +85,12 @@ def _column(column: list[str]) -> Column:
         return column
 
 
-def by_part(told: Columns) -> dict[str, dict[str, Sequence[float]]]:
+def by_part(columns: Columns) -> dict[str, dict[str, Sequence[float]]]:
     """Returns the energies of the parts in a history, by energy and part; empty for a case with one part."""
     found: dict[str, dict[str, Sequence[float]]] = {}
-    for column in told:
+    for column in columns:
         if (named := history.part_of(column)) is not None:
-            found.setdefault(named[0], {})[named[1]] = told.numbers(column)
+            found.setdefault(named[0], {})[named[1]] = columns.numbers(column)
     return found
 
 

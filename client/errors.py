@@ -101,21 +101,21 @@ class LookError(UsageError, ViewError):
 
 
 def _line(status: int, problem: Mapping[str, Any]) -> str:
-    said = _brief(problem.get("detail") or problem.get("title") or f"the server answered {status}")
+    message = _brief(problem.get("detail") or problem.get("title") or f"the server answered {status}")
     hint = _brief(problem.get("hint") or "")
-    return f"{said} ({hint})" if hint and hint not in said else said
+    return f"{message} ({hint})" if hint and hint not in message else message
 
 
-def _brief(told: object) -> str:
+def _brief(message: object) -> str:
     """Returns a message of a server as text for people."""
-    text = str(told)
+    text = str(message)
     return text if len(text) <= _LONGEST else f"{text[:_LONGEST]} ..."
 
 
 def refusal(status: int, problem: Mapping[str, Any]) -> ConoidError:
     """Returns the error class of a refusal: the class of the same problem on this machine."""
-    told = problem.get("errors")
-    entries = [entry for entry in told if isinstance(entry, Mapping)] if isinstance(told, list) else []
+    errors = problem.get("errors")
+    entries = [entry for entry in errors if isinstance(entry, Mapping)] if isinstance(errors, list) else []
     if status == 422 and entries:
         return CaseError(
             Problem(*(str(entry.get(name) or "") for name in ("key", "value", "message"))) for entry in entries

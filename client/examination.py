@@ -81,6 +81,6 @@ def _survey(case: Case, folder: Path) -> tuple[Survey, list[Problem]]:
             raise ValueError
         return survey.from_json(ended.stdout), []
     except (ValueError, msgspec.MsgspecError):
-        said = ended.stderr.decode("utf-8", "replace").strip().splitlines()
-        why = said[-1] if said else f"it ended with code {ended.returncode}"
+        lines = ended.stderr.decode("utf-8", "replace").strip().splitlines()
+        why = lines[-1] if lines else f"it ended with code {ended.returncode}"
         raise ClientError(f"the program that reads mesh files has failed: {why}") from None

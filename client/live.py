@@ -92,7 +92,7 @@ class Live:
         self.helped = [seconds / others for seconds in message.helped] if others > 0.0 else []
 
     @property
-    def told(self) -> str:
+    def explanation(self) -> str:
         """Message of the state; for a queued run, the reason for which the run waits."""
         return self.message or (self.reason if self.state is State.QUEUED else "")
 

@@ -122,7 +122,7 @@ class Result:
         try:
             return outcome_of(path.read_bytes())
         except msgspec.MsgspecError as error:
-            raise ClientError(f"{self.folder.told(layout.OUTCOME)}: this outcome cannot be read: {error}") from None
+            raise ClientError(f"{self.folder.named(layout.OUTCOME)}: this outcome cannot be read: {error}") from None
 
     @cached_property
     def case(self) -> dict[str, Any]:
@@ -132,7 +132,7 @@ class Result:
             data = msgspec.json.decode(path.read_bytes(), type=dict[str, Any])
             msgspec.convert(data, _Case)
         except (msgspec.MsgspecError, RecursionError) as error:
-            raise ClientError(f"{self.folder.told(layout.RESOLVED_CASE)}: this case cannot be read: {error}") from None
+            raise ClientError(f"{self.folder.named(layout.RESOLVED_CASE)}: this case cannot be read: {error}") from None
         return data
 
     @cached_property
@@ -230,8 +230,8 @@ class Result:
             raise UnfinishedError(f"{self.folder.name} has no frame whose time is known")
         first, last = min(known), max(known)
         if not first - _BEYOND * (last - first) <= time <= last + _BEYOND * (last - first):
-            told = f"the frames of {self.folder.name} are of {si(first, 's')} to {si(last, 's')}"
-            raise LookError(f"time = {si(time, 's')}: {told}")
+            range_of_frames = f"the frames of {self.folder.name} are of {si(first, 's')} to {si(last, 's')}"
+            raise LookError(f"time = {si(time, 's')}: {range_of_frames}")
         return known[min(known, key=lambda at: abs(at - time))]
 
     def scene(self) -> Scene:

@@ -13,7 +13,7 @@ from typing import Any
 
 from conoid.cases.figures import duration
 from conoid.cases.messages import AnyMessage
-from conoid.cases.messages import Snapshot as Told
+from conoid.cases.messages import Snapshot as SnapshotMessage
 from conoid.cases.output import keys
 
 from .errors import ClientError, NotFoundError, ServiceError, UnfinishedError, UnreachableError, passes
@@ -142,13 +142,13 @@ class Run:
 
     # Snapshots --------------------------------------------------------------------------------------------------------
 
-    def snapshots(self) -> list[Told]:
+    def snapshots(self) -> list[SnapshotMessage]:
         """Returns the messages of the journal about the snapshots of the fragments."""
         return self.session.get(SnapshotPage, f"{self.path}/snapshots").snapshots
 
     def snapshot(self, n: int = -1) -> Snapshot:
         """Returns snapshot ``n``; -1: the newest. Raises UnfinishedError if there is none."""
-        number = n if n >= 0 else max((told.n for told in self.snapshots()), default=0)
+        number = n if n >= 0 else max((message.n for message in self.snapshots()), default=0)
         try:
             return Snapshot(self.session.fetch(f"{self.path}/snapshots/{number}"))
         except NotFoundError:
@@ -161,7 +161,7 @@ class Run:
         """
         chosen = link or self.link()
         for message in self.messages(after, chosen):
-            if isinstance(message, Told):
+            if isinstance(message, SnapshotMessage):
                 data = getattr(chosen, "blobs", {}).get(message.sha256)
                 yield Snapshot(data) if data else self.snapshot(message.n)
 
@@ -243,6 +243,6 @@ class RemoteFolder:
         target = inside(self.root, name)
         return target if target.is_file() else self.run.download(self.root, name)
 
-    def told(self, name: str) -> str:
+    def named(self, name: str) -> str:
         """Returns the text with run and server: the local copy is temporary."""
         return f"{name} of run {self.run.id} at {self.run.session.url}"

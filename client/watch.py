@@ -105,7 +105,7 @@ def tell(messages: Iterable[AnyMessage], known: Live, write: Callable[[str], Non
     """Prints one plain line for each change of state, each warning and each percent of progress. While no message
     arrives, prints progress lines, which become rarer.
     """
-    told, texts = -1, set[str]()
+    printed, texts = -1, set[str]()
     with progress.broken(write, lambda: _waiting(known)) as say:
         for message in messages:
             known.take(message)
@@ -116,8 +116,8 @@ def tell(messages: Iterable[AnyMessage], known: Live, write: Callable[[str], Non
                 if message.level in {"warning", "error"} and message.text not in texts:
                     texts.add(message.text)
                     say(f"{clock(message.wall)}  {known.run}  {message.level}: {message.text}")
-            elif isinstance(message, Status) or (isinstance(message, Progress) and at > told):
-                told = max(told, at) if isinstance(message, Progress) else told
+            elif isinstance(message, Status) or (isinstance(message, Progress) and at > printed):
+                printed = max(printed, at) if isinstance(message, Progress) else printed
                 say(line(known))
     return known
 
@@ -127,5 +127,5 @@ def _waiting(known: Live) -> str:
         away = f"no server answers, for {duration(time.time() - known.away)}"
         return f"{clock(time.time())}  {known.run}  {away}; it was {known.state.value} at its last message"
     lasting = f", for {duration(time.time() - known.changed)}" if known.changed else ""
-    at = f": {known.told}" if known.told else ""
+    at = f": {known.explanation}" if known.explanation else ""
     return f"{clock(time.time())}  {known.run}  still {known.state.value}{lasting}{at}"

@@ -110,11 +110,11 @@ def _token_commands(parser: argparse.ArgumentParser) -> None:
 
 def _settings(options: argparse.Namespace) -> Settings:
     site = site_of(options.site)
-    told = {name: value for name, _, _ in _CAPS if (value := getattr(options, f"max_{name}")) is not None}
-    for name, value in told.items():
+    caps = {name: value for name, _, _ in _CAPS if (value := getattr(options, f"max_{name}")) is not None}
+    for name, value in caps.items():
         if not 0 < value < float("inf"):
             raise SettingsError(f"--max-{name.replace('_', '-')} {value}: above 0, finite")
-    given: dict[str, Any] = {**capped(site), **told}
+    given: dict[str, Any] = {**capped(site), **caps}
     chosen = {"slots": options.slots} if options.slots is not None else {}
     if site.launcher == "slurm" and site.slurm is not None:
         chosen.setdefault("slots", site.slurm.slots)
@@ -182,8 +182,8 @@ def _add(options: argparse.Namespace) -> None:
     print(create_token(store, options.name, frozenset(word.strip() for word in options.scopes.split(","))), flush=True)
     store.close()
     if new:
-        told = f"{settings.database_file} is new: the token is valid at a server with this --runs"
-        print(f"conoid.server: {told}", file=sys.stderr)
+        note = f"{settings.database_file} is new: the token is valid at a server with this --runs"
+        print(f"conoid.server: {note}", file=sys.stderr)
 
 
 def _adopt(options: argparse.Namespace) -> None:

@@ -165,8 +165,8 @@ async def _database(request: Request, error: Exception) -> Response:
 
 def database_away(error: Exception) -> ServiceError:
     """Returns the status of a failed write: 507 for a full disk, 503 otherwise."""
-    said = str(error).splitlines()[0]
-    if "disk is full" in said:
+    reason = str(error).splitlines()[0]
+    if "disk is full" in reason:
         return ServiceError(507, "storage", "the disk of the server's database is full", retryable=True)
     detail = "the server's database cannot be used now"
     return ServiceError(503, "unavailable", detail, retryable=True, headers={"Retry-After": "5"})

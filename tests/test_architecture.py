@@ -134,16 +134,16 @@ def test_a_numeric_constant_says_where_it_comes_from() -> None:
     """The docstring below the constant, or below its group, has its source, its measurement, or the remark that the
     value was chosen."""
     for path in SOURCES:
-        told, line = False, 0
+        explained, line = False, 0
         for node in reversed(tree(path).body):
-            told = isinstance(node, ast.Expr) or (
-                told and (isinstance(node, ast.Assign) and node.end_lineno == line - 1)
+            explained = isinstance(node, ast.Expr) or (
+                explained and (isinstance(node, ast.Assign) and node.end_lineno == line - 1)
             )
             line = node.lineno
             if not isinstance(node, ast.Assign) or not is_a_choice(node.value) or isinstance(node.value, ast.Dict):
                 continue
             if all(name.isupper() for name in ast.unparse(node.targets[0]).strip("()").replace("_", "").split(", ")):
-                assert told, f"{name_of(path)}:{node.lineno}: {ast.unparse(node)}"
+                assert explained, f"{name_of(path)}:{node.lineno}: {ast.unparse(node)}"
 
 
 PAGES = sorted([*ROOT.glob("*.md"), *ROOT.glob("docs/**/*.md")])

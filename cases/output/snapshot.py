@@ -84,14 +84,14 @@ _decoder = msgspec.json.Decoder(Header)
 def pack(header: Header, columns: Mapping[str, Column]) -> bytes:
     """Returns the block of bytes; fills in ``header.arrays``."""
     places = {name: Array(dtype=c.dtype, shape=list(c.shape), offset=_FAR) for name, c in columns.items()}
-    room = _rounded(len(_told(header, places)))
+    room = _rounded(len(_encoded(header, places)))
     blob, size = [], _START + room
     for name, column in columns.items():
         data = bytes(column.data)
         places[name] = msgspec.structs.replace(places[name], offset=size)
         blob.append(data.ljust(_rounded(len(data)), b"\0"))
         size += len(blob[-1])
-    text = _told(header, places).ljust(room)
+    text = _encoded(header, places).ljust(room)
     return b"".join([MAGIC, VERSION.to_bytes(4, "little"), room.to_bytes(4, "little"), text, *blob])
 
 
@@ -130,7 +130,7 @@ def size_of(array: Array) -> int:
     return items * int("".join(digit for digit in array.dtype if digit.isdigit())) // 8
 
 
-def _told(header: Header, places: dict[str, Array]) -> bytes:
+def _encoded(header: Header, places: dict[str, Array]) -> bytes:
     return msgspec.json.encode(msgspec.structs.replace(header, arrays=places))
 
 

@@ -44,8 +44,8 @@ def files_of(case: Mapping[str, Any]) -> list[Named]:
 def _below(value: Any, place: tuple[int | str, ...]) -> Iterator[Named]:
     if isinstance(value, Mapping):
         if isinstance(path := value.get("path"), str):
-            told = value.get("sha256")
-            yield Named(place, path, told.strip().lower() if isinstance(told, str) else None)
+            sha256 = value.get("sha256")
+            yield Named(place, path, sha256.strip().lower() if isinstance(sha256, str) else None)
         for key, inner in value.items():
             yield from _below(inner, (*place, str(key)))
     for n, inner in enumerate(_listed(value)):

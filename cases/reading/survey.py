@@ -68,7 +68,7 @@ class Survey(msgspec.Struct, kw_only=True, frozen=True):
     refused: list[str] = []
     touching: list[Touch] = []
     """Pairs of touching parts, at least one of which has a mesh from a file."""
-    told: list[str] = []
+    warnings: list[str] = []
     """Warnings about the meshes, a line each, as a run gives them."""
 
     def of(self, part: int) -> Surveyed | None:

@@ -6,7 +6,7 @@ from typing import Any
 
 Scalar = bool | int | float | str
 """A value of a key."""
-_UNTOLD = frozenset({"name", "title", "description", "reference"})
+_WITHOUT_EFFECT = frozenset({"name", "title", "description", "reference"})
 """Keys of a case without an effect on the answer."""
 
 
@@ -14,8 +14,8 @@ def flat(case: dict[str, Any], most: int, longest: int) -> dict[str, Scalar]:
     """Returns the values of the keys of a case, by key, at most ``most`` of them; texts of at most ``longest``
     characters. Omits keys without an effect on the answer: names, descriptions, references.
     """
-    told = ((key, value) for key, value in case.items() if key not in _UNTOLD)
-    pairs = (pair for key, value in told for pair in _scalars(key, value))
+    entries = ((key, value) for key, value in case.items() if key not in _WITHOUT_EFFECT)
+    pairs = (pair for key, value in entries for pair in _scalars(key, value))
     return {key: value[:longest] if isinstance(value, str) else value for key, value in islice(pairs, most)}
 
 

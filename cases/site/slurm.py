@@ -58,10 +58,10 @@ def jobs(place: str, *names: str) -> list[Entry]:
     words = ["squeue", "--noheader", "--array", "--states=all", f"--user={os.getuid()}", "--format=%i|%T|%S|%j|%r"]
     for begin in range(0, max(1, len(names)), _ONE_BY_ONE):
         some = names[begin : begin + _ONE_BY_ONE]
-        told = call(place, [*words, *([f"--name={','.join(some)}"] if some else [])])
-        if told and not told.endswith("\n"):
+        output = call(place, [*words, *([f"--name={','.join(some)}"] if some else [])])
+        if output and not output.endswith("\n"):
             raise away("squeue", "squeue has broken off in the middle of its list")
-        found += _entries(told.split("\n")[:-1], set(some))
+        found += _entries(output.split("\n")[:-1], set(some))
     return found
 
 
@@ -99,9 +99,9 @@ def details(place: str, job: str) -> dict[str, str]:
     """Returns all properties of a job from the controller; for a repeated word the first, since paths and comments
     come last. Raises AwayError, RefusedError for an unknown job.
     """
-    told = call(place, ["scontrol", "show", "job", "--oneliner", job])
+    output = call(place, ["scontrol", "show", "job", "--oneliner", job])
     found: dict[str, str] = {}
-    for name, equals, value in (word.partition("=") for word in told.split()):
+    for name, equals, value in (word.partition("=") for word in output.split()):
         if equals:
             found.setdefault(name, value)
     return found
@@ -120,8 +120,8 @@ def taken(place: str, job: str) -> dict[str, str]:
     found: dict[str, str] = {}
     fields = ("State", "ExitCode", "Elapsed", "TotalCPU", "MaxRSS", "NodeList")
     with suppress(SlurmError):
-        told = call(place, ["sacct", "--noheader", "--parsable2", f"--jobs={job}", f"--format={','.join(fields)}"])
-        for line in told.splitlines()[:1]:
+        output = call(place, ["sacct", "--noheader", "--parsable2", f"--jobs={job}", f"--format={','.join(fields)}"])
+        for line in output.splitlines()[:1]:
             found |= {f"sacct {name}": value for name, value in zip(fields, line.split("|"), strict=False)}
     return found
 
@@ -140,19 +140,19 @@ def submit(place: str, folder: Path, job: Job, profile: Profile) -> str:
         if known := jobs(place, job.name):
             return known[0].job
         try:
-            told = call(place, ["sbatch", *batch.sbatch_words(job, profile, folder)], lock.fileno())
+            output = call(place, ["sbatch", *batch.sbatch_words(job, profile, folder)], lock.fileno())
         except (RefusedError, LaterError):
             if known := jobs(place, job.name):
                 return known[0].job
             raise
-    return _number(told)
+    return _number(output)
 
 
-def _number(told: str) -> str:
+def _number(output: str) -> str:
     """Reads the number of a new job from ``sbatch --parsable``. Raises AwayError."""
-    number = told.strip().partition(";")[0]
+    number = output.strip().partition(";")[0]
     if not number.isdecimal():
-        raise AwayError(f"sbatch has not printed the number of the job, but {told.strip()[:60]!r}")
+        raise AwayError(f"sbatch has not printed the number of the job, but {output.strip()[:60]!r}")
     return number
 
 
@@ -169,8 +169,8 @@ def submit_array(place: str, records: Sequence[Job], profile: Profile) -> dict[i
         found = {job.task: there[job.key] for job in records if job.task is not None and job.key in there}
         lacking = [job.task for job in records if job.task is not None and job.key not in there]
         if lacking:
-            told = call(place, ["sbatch", *batch.array_words(records[0], profile, lacking)], lock.fileno())
-            number = _number(told)
+            output = call(place, ["sbatch", *batch.array_words(records[0], profile, lacking)], lock.fileno())
+            number = _number(output)
             found |= {task: f"{number}_{task}" for task in lacking}
     return found
 

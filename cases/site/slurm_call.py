@@ -91,14 +91,14 @@ def away(command: str, why: str) -> AwayError:
     return error
 
 
-def _failure(command: str, said: Sequence[str]) -> SlurmError:
+def _failure(command: str, lines: Sequence[str]) -> SlurmError:
     """Returns the error of a failed command. sbatch names the limit in a line of its own, before the last one."""
-    text, last = " ".join(said).lower(), said[-1][:300]
-    named = said[-2].rpartition(": ")[2] if len(said) > 1 else ""
-    told = f"{last} ({named[:100]})" if named and " " not in named else last
+    text, last = " ".join(lines).lower(), lines[-1][:300]
+    named = lines[-2].rpartition(": ")[2] if len(lines) > 1 else ""
+    message = f"{last} ({named[:100]})" if named and " " not in named else last
     if command == "sbatch" and any(word in text for word in _PASSING) and not any(word in text for word in _LASTING):
-        return LaterError(told)
-    return RefusedError(told) if any(word in last.lower() for word in _REFUSALS) else away(command, last)
+        return LaterError(message)
+    return RefusedError(message) if any(word in last.lower() for word in _REFUSALS) else away(command, last)
 
 
 def environment(base: Mapping[str, str]) -> dict[str, str]:

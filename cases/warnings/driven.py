@@ -44,10 +44,10 @@ def passing(case: Case) -> Iterator[Problem]:
     No warning for rotations, for mesh files, and for bodies that are turned, rotate or stretch.
     """
     driven = list(islice(_driven(case), _MOST))
-    told: set[int] = set()
+    reported: set[int] = set()
     for number, message in chain(_through_walls(case, driven), _through_bodies(case, driven)):
-        if number not in told:
-            told.add(number)
+        if number not in reported:
+            reported.add(number)
             yield problem(("boundaries", number), ..., message)
 
 

@@ -36,8 +36,8 @@ def _saves(i: int, expected: Estimate) -> str:
     """Returns the words for the saving of a rigid part."""
     mine, others = expected.parts[i], [part.dt for j, part in enumerate(expected.parts) if j != i]
     tets = f"{100.0 * mine.elements / expected.elements:.0f} %" if mine.elements and expected.elements else "a share"
-    told = f"would save {tets} of the tets"
+    gain = f"would save {tets} of the tets"
     if mine.dt is not None and None not in others:
         longer = min((dt for dt in others if dt is not None), default=math.inf) / mine.dt
-        told += f" and make steps {longer:.2g} times as long" if 1.05 < longer < math.inf else ""
-    return told
+        gain += f" and make steps {longer:.2g} times as long" if 1.05 < longer < math.inf else ""
+    return gain

@@ -18,7 +18,7 @@ def warned(case: Case, expected: Estimate, survey: Survey, touches: Iterable[Tou
         *_notes(case, survey),
         *oddities(case, expected),
         *apart(case, touches),
-        *(Problem("", "", line) for line in survey.told),
+        *(Problem("", "", line) for line in survey.warnings),
     ]
 
 

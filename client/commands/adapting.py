@@ -22,8 +22,8 @@ from .options import aloud, complain
 def file_of(case: str, goal: str, sets: Sequence[str]) -> Path:
     """Returns the default file of an adaptive sweep. The same arguments of the command give the same file."""
     keys = sorted(word.partition("=")[0].strip() for word in sets)
-    told = hashlib.sha256("\n".join([goal.replace(" ", ""), *keys]).encode()).hexdigest()[:6]
-    return Path(f"{locate(case).stem}-{told}.sweep.json")
+    digest = hashlib.sha256("\n".join([goal.replace(" ", ""), *keys]).encode()).hexdigest()[:6]
+    return Path(f"{locate(case).stem}-{digest}.sweep.json")
 
 
 def adaptive(

@@ -167,8 +167,8 @@ def _prepared(
     (folder / layout.RESOLVED_CASE).write_bytes(resolved)
     command = _command(folder, run.ranks, run.threads, profile[1])
     job = batch.new_job(folder.name, run.ranks, profile, command, time.time(), place=place, threads=run.threads)
-    told = messages.Status(run=folder.name, seq=1, wall=time.time(), state=State.QUEUED, message="handed to Slurm")
-    (folder / layout.JOURNAL).write_bytes(messages.to_json(told) + b"\n")
+    queued = messages.Status(run=folder.name, seq=1, wall=time.time(), state=State.QUEUED, message="handed to Slurm")
+    (folder / layout.JOURNAL).write_bytes(messages.to_json(queued) + b"\n")
     return _written(folder, job, profile[1])
 
 

@@ -77,7 +77,7 @@ def converge(
         for each in run_all(at, data, plan, folder_of(case)):
             done.append(each)
             name(f"{len(done)} of {many} runs have ended")
-            complain(f"{len(done)} of {many}: {_told(each)}")
+            complain(f"{len(done)} of {many}: {_result_of(each)}")
     book = _book(checked, overrides or (), plan, accuracy, done)
     _write(book, quantity, out)
     raise typer.Exit(ExitCode.CRASHED if book.failed else ExitCode.SUCCEEDED)
@@ -94,7 +94,7 @@ def _session(out: Path, cores: int, on_server: bool, url: str | None, token: str
         yield server.session
 
 
-def _told(each: Done) -> str:
+def _result_of(each: Done) -> str:
     where = f"{each.point.variant}, sizes x {number(each.point.factor)}"
     cost = f"{counted(each.steps, 'step')}, {duration(each.cpu)} of CPU time"
     return f"{where}: {each.problem or cost}"

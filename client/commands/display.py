@@ -90,14 +90,14 @@ def _state(live: Live) -> Text:
 
 def _why(live: Live) -> list[Text]:
     """Returns cause and message as separate lines."""
-    return [Text(one_line(" · ".join(told)), overflow="fold")] if (told := _told(live)) else []
+    return [Text(one_line(" · ".join(words)), overflow="fold")] if (words := _explained(live)) else []
 
 
-def _told(live: Live) -> list[str]:
+def _explained(live: Live) -> list[str]:
     """Returns cause and message, if they add to the state, and a line if no server answers."""
     if live.away:
         return ["at its last message; no server answers"]
-    return [part for part in (live.cause, live.told) if part and part != live.state.value]
+    return [part for part in (live.cause, live.explanation) if part and part != live.state.value]
 
 
 def _bar(live: Live) -> RenderableType:
@@ -173,9 +173,9 @@ def _ranks(live: Live, width: int, most: int) -> list[RenderableType]:
     grid.add_column(justify="right", style="bright_black", no_wrap=True)
     grid.add_column(no_wrap=True)
     grid.add_column(no_wrap=True)
-    for rank, told in enumerate(beside):
+    for rank, note in enumerate(beside):
         parts = {name: seconds[rank] for name, seconds in phases.items()}
-        grid.add_row(f"rank {rank}", _stacked(parts, longest, bar), told)
+        grid.add_row(f"rank {rank}", _stacked(parts, longest, bar), note)
     whole = sum(totals) or 1.0
     legend = [
         Text(f"■ {name} {percent(sum(seconds) / whole, 0)}", style=_PHASE_STYLE[name])
@@ -236,14 +236,14 @@ def _ledger(energy: Energy, width: int, *, terms: bool) -> RenderableType:
     grid.add_column(no_wrap=True)
     grid.add_column(justify="right", no_wrap=True)
     bar = min(_BAR, max(8, width - 22))
-    told = {name: value for name, value in every.items() if abs(value) >= _SMALL * whole}
-    for name, value in told.items():
+    large = {name: value for name, value in every.items() if abs(value) >= _SMALL * whole}
+    for name, value in large.items():
         length = min(bar, round(bar * abs(value) / whole))
         grid.add_row(name, Text("━" * length + " " * (bar - length), style="blue"), si(value, "J"))
     small = [
         Text(f"{name} {si(value, 'J')}", style="bright_black")
         for name, value in every.items()
-        if value and name not in told
+        if value and name not in large
     ]
     return Group(grid, *_flow(small, width), residual)
 
@@ -285,7 +285,7 @@ def seen(snapshot: Snapshot) -> str:
 def line(live: Live) -> str:
     """Returns one update as one plain line."""
     parts = [clock(live.wall) if live.wall else "", live.run, live.state.value]
-    parts += _told(live)
+    parts += _explained(live)
     progress = live.progress
     if progress is not None:
         parts += [

@@ -112,8 +112,8 @@ def _ended(each: Hard, case: Case, run: Run) -> Verdict:
     return Verdict(each, case.title, outcome, drifted, faults(each, outcome, drifted))
 
 
-def _momenta(told: Columns) -> list[tuple[float, float, float]]:
-    x, y, z = (told.numbers(f"momentum_{axis}") for axis in "xyz")
+def _momenta(columns: Columns) -> list[tuple[float, float, float]]:
+    x, y, z = (columns.numbers(f"momentum_{axis}") for axis in "xyz")
     return list(zip(x, y, z, strict=True))
 
 
@@ -131,8 +131,8 @@ def to_markdown(ended: Sequence[Verdict]) -> str:
     ]  # fmt: skip
     bad = [f"- **{verdict.hard.name}**: {'; '.join(verdict.faults)}" for verdict in ended if verdict.faults]
     spent = sum(v.outcome.cpu for v in ended if not math.isnan(v.outcome.cpu))
-    said = f"{len(ended) - len(bad)} of {len(ended)} passed, in {duration(spent)} of CPU time."
-    return "\n\n".join(filter(None, [table(head, rows), said, "\n".join(bad)])) + "\n"
+    summary = f"{len(ended) - len(bad)} of {len(ended)} passed, in {duration(spent)} of CPU time."
+    return "\n\n".join(filter(None, [table(head, rows), summary, "\n".join(bad)])) + "\n"
 
 
 def _references(outcome: Outcome) -> str:

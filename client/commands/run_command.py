@@ -72,11 +72,11 @@ def run_once(
             at.append("submitting the case")
             server.session.outbox.say = at.append
             run = server.session.submit(data, folder=folder_of(case))
-        info, told = _follow(run, checked, out, plain)
+        info, printed = _follow(run, checked, out, plain)
     result = Result.open(server.runs / run.id)
     drawn = None
     if info.outcome is not None:
-        _report(result, info.outcome, told, out)
+        _report(result, info.outcome, printed, out)
         if picture is not None and result.frames:
             with progress.broken(out.print, lambda: f"drawing {picture}"):
                 drawn = view(result, field or _telling_field(checked), picture)
@@ -105,7 +105,7 @@ def _follow(run: Run, case: Case, out: Console, plain: bool) -> tuple[RunInfo, s
     """Shows the run until its end. The first Ctrl-C cancels the run; a second Ctrl-C has no effect. The function also
     returns the log texts that were printed as lines, because a panel shows only the last lines of the log.
     """
-    known, told = Live(run.id, title=case.title or case.name), set[str]()
+    known, printed = Live(run.id, title=case.title or case.name), set[str]()
     try:
         link = run.link()
         known.link = link.name
@@ -115,20 +115,20 @@ def _follow(run: Run, case: Case, out: Console, plain: bool) -> tuple[RunInfo, s
                 show(messages, known, out)
             else:
                 tell(messages, known, lambda text: out.print(one_line(text), soft_wrap=True))
-                told = {entry.text for entry in known.log}
+                printed = {entry.text for entry in known.log}
     except KeyboardInterrupt:
         signal.signal(signal.SIGINT, signal.SIG_IGN)
         signal.signal(signal.SIGTERM, signal.SIG_IGN)
         out.print("cancelling: the run stops at its next step")
         run.cancel()
-        return run.wait(GRACE + _LAST_WORDS), told
-    return run.wait(_LAST_WORDS), told
+        return run.wait(GRACE + _LAST_WORDS), printed
+    return run.wait(_LAST_WORDS), printed
 
 
-def _report(result: Result, outcome: Outcome, told: set[str], out: Console) -> None:
-    """Prints the outcome; ``told``: warnings that were printed before."""
+def _report(result: Result, outcome: Outcome, printed: set[str], out: Console) -> None:
+    """Prints the outcome; ``printed``: warnings that were printed before."""
     out.print()
-    for part in tables.end_tables(outcome, told):
+    for part in tables.end_tables(outcome, printed):
         out.print(part)
     out.print()
     out.print(f"results    {result.folder.path('outcome.json').parent}", soft_wrap=True)

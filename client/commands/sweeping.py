@@ -139,8 +139,8 @@ def sweep(
 
 def _same(case: str, points: Sequence[Point], cores: Sequence[str], at_once: int | None) -> str:
     """Returns the idempotency key of the sweep with these arguments."""
-    told = json.dumps([locate(case).stem, points, list(cores), at_once], default=str)
-    return f"sweep-{hashlib.sha256(told.encode()).hexdigest()[:40]}"
+    identity = json.dumps([locate(case).stem, points, list(cores), at_once], default=str)
+    return f"sweep-{hashlib.sha256(identity.encode()).hexdigest()[:40]}"
 
 
 def _handed_in(
@@ -153,8 +153,8 @@ def _handed_in(
         if error.problem.get("code") != "key_reused":
             raise
         keys = _changed(session, str(error.problem.get("detail", "")), data, points[0], folder_of(case))
-        told = f"the case has changed since this sweep was begun{keys}; --new begins another one"
-        raise UsageError(f"{case}: {told}") from None
+        hint = f"the case has changed since this sweep was begun{keys}; --new begins another one"
+        raise UsageError(f"{case}: {hint}") from None
     except KeyboardInterrupt:
         complain("the server may have the points already; conoid sweep-cancel last stops them once it has taken all in")
         raise
@@ -201,7 +201,7 @@ def _end(made: Sweep, info: SweepInfo, out: Path | None, *, as_json: bool) -> No
         echo(info.id)
     failed = [point for point in info.points if point.run.state.final and point.run.state is not State.SUCCEEDED]
     if failed and info.over:
-        complain(told(failed, info.total))
+        complain(failures(failed, info.total))
         raise typer.Exit(1)
 
 
@@ -212,7 +212,7 @@ def _how(point: SweepPoint) -> str:
     return f"{values}: {point.run.state.value}{why}"
 
 
-def told(failed: list[SweepPoint], total: int) -> str:
+def failures(failed: list[SweepPoint], total: int) -> str:
     """Prints the number of runs without success, and the first few of these runs."""
     values, run = failed[0].values, failed[0].run
     point = ", ".join(f"{key} = {value}" for key, value in values.items())

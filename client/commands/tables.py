@@ -75,12 +75,12 @@ def runs_table(rows: Sequence[RunRow], keys: Sequence[str]) -> Table:
     """Prints one line for each run, with the values of ``keys``; in a narrow terminal texts end with an ellipsis."""
     last = ("cores", "submitted", "took")
     named = short_names(keys)
-    told = [_differs(row, named) for row in rows]
+    texts_of_values = [_differs(row, named) for row in rows]
     labels = [" ".join(f"{name}={value}" for name, value in _own(row.info).items()) for row in rows]
-    more = [name for name, texts in (("values", told), ("labels", labels)) if any(texts)]
+    more = [name for name, texts in (("values", texts_of_values), ("labels", labels)) if any(texts)]
     made = table("run", "case", "state", *more, *last, right=("cores", "took"), wide=("case", "state", *more))
     made.padding = 0
-    for row, values, words in zip(rows, told, labels, strict=True):
+    for row, values, words in zip(rows, texts_of_values, labels, strict=True):
         run = row.info
         took = duration((run.finished or 0) - run.started) if run.started and run.finished else ""
         some = [text for name, text in (("values", values), ("labels", words)) if name in more]
@@ -189,8 +189,8 @@ def sources_table(constants: Sequence[Constant]) -> Table:
     return pairs({each.source: each.cited for each in constants})
 
 
-def outcome_table(outcome: Outcome, told: Collection[str] = ()) -> Table:
-    """Prints the outcome of a run and its warnings, except warnings in ``told``, which were printed before."""
+def outcome_table(outcome: Outcome, printed: Collection[str] = ()) -> Table:
+    """Prints the outcome of a run and its warnings, except warnings in ``printed``, which were printed before."""
     energy, ranks = outcome.energy, crew(outcome.ranks, outcome.threads)
     entries: dict[str, str | Text] = {"state": state_text(State(outcome.state), outcome.cause), "why": outcome.message}
     speed, setup, worst = outcome.element_updates_per_second, outcome.setup, rough(outcome.worst_residual)
@@ -206,7 +206,7 @@ def outcome_table(outcome: Outcome, told: Collection[str] = ()) -> Table:
             "compression": "; ".join(map(_compressed, outcome.compressed)),
             "digest": outcome.digest[:16],
         }
-    return pairs({**entries, "warnings": "\n".join(each for each in outcome.warnings if each not in told)})
+    return pairs({**entries, "warnings": "\n".join(each for each in outcome.warnings if each not in printed)})
 
 
 def _a_step(outcome: Outcome) -> str:
@@ -217,11 +217,11 @@ def _a_step(outcome: Outcome) -> str:
     rank = alone.index(max(alone))
     shared = sum(each[rank] for each in outcome.parallel.values())
     serial, regions = alike((alone[rank] / steps, shared / steps), "s")
-    told = f"{serial} by one thread alone, {regions} in what threads share"
+    times = f"{serial} by one thread alone, {regions} in what threads share"
     if outcome.threads == 1 or not shared:
-        return told
+        return times
     busy = outcome.helped[rank] / ((outcome.threads - 1) * shared)
-    return f"{told}, in which the others are busy for {percent(busy, 0)}"
+    return f"{times}, in which the others are busy for {percent(busy, 0)}"
 
 
 def _compressed(met: Compressed) -> str:
@@ -272,9 +272,9 @@ def probes_table(probes: Sequence[Measured]) -> Table:
     return made
 
 
-def end_tables(outcome: Outcome, told: Collection[str] = ()) -> list[Table | str]:
+def end_tables(outcome: Outcome, printed: Collection[str] = ()) -> list[Table | str]:
     """Prints the outcome of a run, its probes and reference numbers, with an empty line between them."""
-    parts: list[Table | str] = [outcome_table(outcome, told)]
+    parts: list[Table | str] = [outcome_table(outcome, printed)]
     if outcome.probes:
         parts += ["", probes_table(outcome.probes)]
     if outcome.reference:

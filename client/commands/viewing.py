@@ -114,10 +114,10 @@ def view_frames(
         echo(drawn.out)
 
 
-def _shares(told: Sequence[str]) -> dict[str, float]:
+def _shares(texts: Sequence[str]) -> dict[str, float]:
     """Returns the opacity of each part of ``PART=SHARE``. Raises LookError."""
     found = {}
-    for text in told:
+    for text in texts:
         part, _, share = text.rpartition("=")
         try:
             found[part] = float(share)

@@ -49,13 +49,13 @@ _ABAQUS = ("*HEADING", "*PREPRINT", "*PART,", "*NODE,", "*ASSEMBLY", "*ELEMENT,"
 
 def dialect_of(path: Path, wanted: str | None) -> type[Dialect]:
     """Returns the code of a deck: as given, otherwise by its first lines and its name. Raises UsageError, OSError."""
-    found = wanted or _told(path)
+    found = wanted or _detected(path)
     if found not in DIALECTS:
         raise UsageError(f"--format = {shown(found)}: allowed: {choices(list(DIALECTS))}")
     return DIALECTS[found]
 
 
-def _told(path: Path) -> str:
+def _detected(path: Path) -> str:
     try:
         head = [text.strip() for _, text in itertools.islice(lines(path), _LOOKED)]
     except ValueError as error:

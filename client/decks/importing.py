@@ -77,7 +77,7 @@ def _units(dialect: Dialect, wanted: str | None) -> tuple[units.System, str]:
         return own, "given in the deck"
     if system is not None:
         return system, "given by --units"
-    return units.told(dialect.weighed())
+    return units.system_of(dialect.weighed())
 
 
 def _checked(data: dict[str, Any]) -> list[str]:
@@ -97,29 +97,29 @@ def lines(found: Imported, target: str) -> list[str]:
     keyword with the reason.
     """
     account = found.account
-    told = [f"{found.deck.name}, {found.kind} -> {target}", f"units: {found.system}: {found.why}"]
-    told += [f"note: {each}" for each in account.remarks]
+    text = [f"{found.deck.name}, {found.kind} -> {target}", f"units: {found.system}: {found.why}"]
+    text += [f"note: {each}" for each in account.remarks]
     width = max((len(each.place) for each in account.entries), default=0)
     for title, fate in (("refused", "refused"), ("translated", "taken"), ("not translated", "left")):
         entries = account.of(fate)  # type: ignore[arg-type]
         if entries:
-            told += ["", f"{title}: {counted(len(entries), 'keyword')}"]
-            told += [line for entry in entries for line in _entry(entry, width)]
+            text += ["", f"{title}: {counted(len(entries), 'keyword')}"]
+            text += [line for entry in entries for line in _entry(entry, width)]
     general = [
         line for line in found.refusals if line not in {each for one in account.entries for each in one.refusals()}
     ]
-    return [*told, *(["", "refused:"] if general else []), *(f"  {line}" for line in general)]
+    return [*text, *(["", "refused:"] if general else []), *(f"  {line}" for line in general)]
 
 
 def _entry(entry: Entry, width: int) -> list[str]:
-    said = "; ".join(entry.reasons) if entry.fate != "taken" else ", ".join(entry.places)
+    notes = "; ".join(entry.reasons) if entry.fate != "taken" else ", ".join(entry.places)
     arrow = " ->" if entry.fate == "taken" else ":"
     words = {"left": "left out", "differs": "differs", "refused": "REFUSED"}
     together: dict[tuple[str, str], list[str]] = {}
     for each in entry.details:
         together.setdefault((words[each.kind], each.why), []).append(each.what)
     details = [f"  {'':{width}} {word}: {', '.join(what)}: {why}" for (word, why), what in together.items()]
-    return [f"  {entry.place:<{width}} {entry.keyword}{arrow} {said}", *details]
+    return [f"  {entry.place:<{width}} {entry.keyword}{arrow} {notes}", *details]
 
 
 def report(found: Imported, target: str) -> dict[str, Any]:

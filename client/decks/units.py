@@ -154,7 +154,7 @@ class Weighed:
     young: float | None
 
 
-def told(materials: Iterable[Weighed]) -> tuple[System, str]:
+def system_of(materials: Iterable[Weighed]) -> tuple[System, str]:
     """Returns the single usual system in which a material is steel by its density, and Young's modulus if it has
     one, with the reason. Raises UsageError if there is none, or several.
     """

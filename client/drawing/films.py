@@ -50,8 +50,8 @@ def _mp4(images: Iterator[Any], rate: float, out: Path) -> None:
     frames = (image.convert("RGB").crop((0, 0, width, height)).tobytes() for image in chain([first], images))
     done = subprocess.run(command, input=b"".join(frames), capture_output=True, check=False)
     if done.returncode:
-        told = done.stderr.decode(errors="replace").strip().splitlines()
-        raise ViewError(f"ffmpeg could not write the film: {told[-1] if told else f'code {done.returncode}'}")
+        errors = done.stderr.decode(errors="replace").strip().splitlines()
+        raise ViewError(f"ffmpeg could not write the film: {errors[-1] if errors else f'code {done.returncode}'}")
 
 
 def ffmpeg() -> str:

@@ -42,11 +42,11 @@ def _wrong(file: Any) -> str:
     lists = {name: np.asarray(root[name]) for name in _LISTS}
     for name, size in sizes.items():
         if len(lists[name]) != size:
-            return f"{name} has {len(lists[name])} entries, where {size} are told"
+            return f"{name} has {len(lists[name])} entries, where {size} are announced"
     for group, size in (("PointData", points.sum()), ("CellData", cells.sum())):
         for name, values in root.get(group, {}).items():
             if len(np.asarray(values)) != size:
-                return f"{group}/{name} has {len(values)} entries, where {size} are told"
+                return f"{group}/{name} has {len(values)} entries, where {size} are announced"
     return _astray(lists, points, cells, ids)
 
 

@@ -83,12 +83,12 @@ def main() -> int:
     """Reads a Picture from standard input, draws, and prints the result as one line of JSON. An error is one line on
     standard error.
     """
-    code, line = told(sys.stdin.buffer.read())
+    code, line = answer(sys.stdin.buffer.read())
     print(line, file=sys.stderr if code else sys.stdout)
     return code
 
 
-def told(asked: bytes) -> tuple[int, str]:
+def answer(asked: bytes) -> tuple[int, str]:
     """Returns the exit code and the line to print for a Picture as JSON."""
     picture = msgspec.json.decode(asked, type=Picture)
     try:

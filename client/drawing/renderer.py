@@ -27,10 +27,10 @@ def render(picture: Picture) -> Drawn:
     picture cannot be drawn.
     """
     with whole(Path(picture.out)) as part:
-        code, told, errors = child(msgspec.structs.replace(picture, out=str(part)))
+        code, answer, errors = child(msgspec.structs.replace(picture, out=str(part)))
         if code:
             raise explain(code, errors.replace(str(part), picture.out))
-    return msgspec.structs.replace(msgspec.json.decode(told, type=Drawn), out=picture.out)
+    return msgspec.structs.replace(msgspec.json.decode(answer, type=Drawn), out=picture.out)
 
 
 def child(picture: Picture) -> tuple[int, bytes, str]:
@@ -62,13 +62,13 @@ def explain(code: int, errors: str) -> ClientError:
             f"the renderer crashed (signal {-code if code < 0 else code - 128}): VTK found no way to draw off screen; "
             "install the system package libegl1 (with libgl1-mesa-dri) or libosmesa6"
         )
-    told = errors.strip().splitlines()[-1] if errors.strip() else f"the renderer ended with code {code}"
-    if told.startswith("ModuleNotFoundError"):
-        return ViewError(f"pictures need the extra 'view': pip install 'conoid[view]' ({told})")
-    missing = re.search(r"(lib[\w+-]+)\.so[.\d]*: cannot open shared object", told)
+    message = errors.strip().splitlines()[-1] if errors.strip() else f"the renderer ended with code {code}"
+    if message.startswith("ModuleNotFoundError"):
+        return ViewError(f"pictures need the extra 'view': pip install 'conoid[view]' ({message})")
+    missing = re.search(r"(lib[\w+-]+)\.so[.\d]*: cannot open shared object", message)
     if missing:
         return ViewError(f"VTK needs the system library {missing[1]}; on Debian and Ubuntu: {_package(missing[1])}")
-    return LookError(told) if code == LookError.exit_code else ViewError(told)
+    return LookError(message) if code == LookError.exit_code else ViewError(message)
 
 
 def _package(library: str) -> str:

@@ -64,6 +64,6 @@ def numbers(names: Iterable[str], parts: Sequence[str], option: str) -> list[int
         elif not parts and name.isdigit():
             found.append(int(name))
         else:
-            told = allowed(name, parts) if parts else "this frame has no names of parts, write their numbers"
-            raise LookError(f"{option} = {name!r}: {told}")
+            hint = allowed(name, parts) if parts else "this frame has no names of parts, write their numbers"
+            raise LookError(f"{option} = {name!r}: {hint}")
     return found

@@ -87,8 +87,8 @@ def chosen(options: Mapping[str, Any], target: Path) -> Look:
         look = msgspec.convert(dict(options), Look)
     except msgspec.ValidationError as error:
         name = str(error).partition("$.")[2].rstrip("`").partition("[")[0]
-        told = str(error).partition(" - at ")[0]
-        raise LookError(f"{name} = {options.get(name)!r}: {told[:1].lower()}{told[1:]}") from None
+        message = str(error).partition(" - at ")[0]
+        raise LookError(f"{name} = {options.get(name)!r}: {message[:1].lower()}{message[1:]}") from None
     _require_scale(look)
     for name, value in (("zoom", look.zoom), ("rate", look.rate)):
         if not 0.0 < value < float("inf"):

@@ -25,7 +25,7 @@ class Folder(Protocol):
     def path(self, name: str) -> Path:
         """Returns a local path of a file. Raises UnfinishedError for a file that is not written yet."""
 
-    def told(self, name: str) -> str:
+    def named(self, name: str) -> str:
         """Returns the name of a file in messages."""
 
 
@@ -53,7 +53,7 @@ class LocalFolder:
             raise ClientError(f"{path}: this link leads out of the run's folder")
         return path
 
-    def told(self, name: str) -> str:
+    def named(self, name: str) -> str:
         """Returns the path of the folder."""
         return str(self.root / name)
 

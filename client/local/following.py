@@ -53,7 +53,7 @@ class FolderRun:
         """
         self.folder, self._place = folder.resolve(), place
         self.id = self.folder.name
-        self._asked, self._told = time.monotonic(), ""
+        self._asked, self._reported = time.monotonic(), ""
 
     def status(self) -> Titled:
         """Title of the run's case, if the case exists already."""
@@ -89,9 +89,9 @@ class FolderRun:
                 yield end
                 return
             if not raw:
-                for told in self._ask(state):
-                    yield told
-                    if State(told.state).final:
+                for status in self._ask(state):
+                    yield status
+                    if State(status.state).final:
                         return
                 pause(_PAUSE)
             else:
@@ -116,18 +116,18 @@ class FolderRun:
 
     def _pending(self, state: State, message: str) -> Iterator[Status]:
         """Returns the reason for which a queued run waits, if it has changed."""
-        if state is State.QUEUED and message != self._told:
-            self._told = message
-            yield self._said(state, message)
+        if state is State.QUEUED and message != self._reported:
+            self._reported = message
+            yield self._status(state, message)
 
     def _outcome(self) -> Status | None:
         try:
             end = from_json(whole.read(self.folder / layout.OUTCOME))
         except (OSError, msgspec.MsgspecError):
             return None
-        return self._said(end.state, end.message, end.cause)
+        return self._status(end.state, end.message, end.cause)
 
-    def _said(self, state: str, message: str, cause: str | None = None) -> Status:
+    def _status(self, state: str, message: str, cause: str | None = None) -> Status:
         return Status(run=self.id, wall=time.time(), state=state, cause=cause, message=message)
 
     def _ask(self, state: State) -> Iterator[Status]:
@@ -140,7 +140,7 @@ class FolderRun:
         job = self._job()
         if job is None:
             if state in _AT_WORK and not slurm.held(self.folder) and self._outcome() is None:
-                yield self._said(
+                yield self._status(
                     State.LOST, "no worker writes into its folder, and none has left an outcome", Cause.NODE
                 )
             return
@@ -154,4 +154,4 @@ class FolderRun:
                 yield from self._pending(State.QUEUED, f"Slurm job {entry.job} is pending: {entry.reason}")
             elif entry.state in slurm.FINAL and not slurm.held(self.folder):
                 message = f"Slurm job {entry.job} ended as {entry.state} and left no outcome"
-                yield self._outcome() or self._said(State.LOST, message, Cause.NODE)
+                yield self._outcome() or self._status(State.LOST, message, Cause.NODE)

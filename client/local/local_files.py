@@ -75,12 +75,12 @@ class Hashes:
                 if named.sha256 is None:
                     problems.append(_wrong(named, "path", named.path, f"no such file ({path.absolute()})"))
             except (OSError, ValueError) as error:  # a name with a null byte
-                said = error.strerror if isinstance(error, OSError) else str(error)
-                problems.append(_wrong(named, "path", named.path, f"{said} ({path.absolute()})"))
+                reason = error.strerror if isinstance(error, OSError) else str(error)
+                problems.append(_wrong(named, "path", named.path, f"{reason} ({path.absolute()})"))
             else:
                 if named.sha256 not in {None, found[-1].sha256, found[-1].named_in or None}:
-                    told = f"{named.path!r} has {found[-1].sha256}"
-                    problems.append(_wrong(named, "sha256", named.sha256, told))
+                    found_hash = f"{named.path!r} has {found[-1].sha256}"
+                    problems.append(_wrong(named, "sha256", named.sha256, found_hash))
         if problems:
             raise CaseError(problems)
         return found
@@ -130,8 +130,8 @@ def state_at(path: Path) -> State:
         return state_of(file.fileno())
 
 
-def _wrong(named: Named, key: str, value: object, said: str) -> Problem:
-    return problem((*named.table, key), value, said)
+def _wrong(named: Named, key: str, value: object, reason: str) -> Problem:
+    return problem((*named.table, key), value, reason)
 
 
 def state_of(file: int) -> State:

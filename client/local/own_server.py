@@ -124,8 +124,10 @@ def _token(runs: Path) -> str:
     except subprocess.TimeoutExpired:
         raise ClientError(f"the server did not start within {duration(_START_SECONDS)}") from None
     if made.returncode != 0 or not made.stdout.strip():
-        said = made.stderr.strip().splitlines()
-        raise ClientError(f"the server did not start: {said[-1] if said else f'it ended with code {made.returncode}'}")
+        lines = made.stderr.strip().splitlines()
+        raise ClientError(
+            f"the server did not start: {lines[-1] if lines else f'it ended with code {made.returncode}'}"
+        )
     return made.stdout.split()[-1]
 
 

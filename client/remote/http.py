@@ -154,8 +154,8 @@ class Http:
                     file.write(chunk)
             if listed is not None and (got := beside.stat().st_size) != listed:
                 raise AnswerError(f"{path} has {got} bytes, where the list of files has {listed}")
-            told = response.headers.get("Repr-Digest")
-            if told is not None and told != f"sha-256=:{base64.b64encode(digest.digest()).decode()}:":
+            expected = response.headers.get("Repr-Digest")
+            if expected is not None and expected != f"sha-256=:{base64.b64encode(digest.digest()).decode()}:":
                 raise AnswerError(f"{path} arrived damaged: its sha256 is not that of the server")
             beside.replace(target)
         except OSError as error:
@@ -251,16 +251,16 @@ class Http:
 
     def _refusal(self, response: httpx2.Response) -> Mapping[str, Any]:
         """Returns the message of the server; for a missing token, a text about how to set a token for this client."""
-        told = replies.problem(response.status_code, self._body(response))
+        message = replies.problem(response.status_code, self._body(response))
         if response.status_code != UNAUTHORIZED:
-            return told
+            return message
         if self._has_token:
             hint = "the one of --token, CONOID_TOKEN or the configuration file is not known there, or was revoked"
         else:
             hint = (
                 "none was sent: set CONOID_TOKEN, or give --token; the operator makes one with conoid serve token add"
             )
-        return {**told, "hint": f"server {self.url}: {hint}"}
+        return {**message, "hint": f"server {self.url}: {hint}"}
 
     def _decoded(self, kind: type[T], content: bytes) -> T:
         try:

@@ -72,7 +72,7 @@ class Outbox:
         data = _with_those_of(data, ready)
         return (
             data,
-            [_told(point, each, data) for point, each in zip(points, ready, strict=True)],
+            [_with_hashes(point, each, data) for point, each in zip(points, ready, strict=True)],
             SURVEY + _POINT * len(made),
         )
 
@@ -91,7 +91,7 @@ def _with_those_of(data: dict[str, Any], ready: Sequence[Mapping[str, Any]]) -> 
     return apply_overrides(data, {f"{dotted(table)}.sha256": sha256 for table, sha256 in known.items()})
 
 
-def _told(point: Point, ready: Mapping[str, Any], data: Mapping[str, Any]) -> Point:
+def _with_hashes(point: Point, ready: Mapping[str, Any], data: Mapping[str, Any]) -> Point:
     """Returns a point with the hashes of its own files."""
     own = [file for file in files_of(ready) if file not in files_of(data)]
     return {**point, **{f"{dotted(file.table)}.sha256": file.sha256 for file in own}}

@@ -37,13 +37,13 @@ def most(response: httpx2.Response, target: Path) -> int:
     """Returns the largest size of a downloaded file: its announced size if the disk has enough space. Raises
     ClientError.
     """
-    told = response.headers.get("content-length", "")
-    if not told.isdecimal() or "content-encoding" in response.headers:
+    length = response.headers.get("content-length", "")
+    if not length.isdecimal() or "content-encoding" in response.headers:
         return LONGEST
     free = shutil.disk_usage(target.parent).free
-    if int(told) > free:
-        raise ClientError(f"{target}: cannot be written: it has {size(int(told))}, and {size(free)} are free")
-    return int(told)
+    if int(length) > free:
+        raise ClientError(f"{target}: cannot be written: it has {size(int(length))}, and {size(free)} are free")
+    return int(length)
 
 
 def reason(error: Exception) -> str:

@@ -6,7 +6,7 @@ from typing import Annotated, Any
 import msgspec
 
 from conoid.cases.messages import Progress
-from conoid.cases.messages import Snapshot as Told
+from conoid.cases.messages import Snapshot as SnapshotMessage
 from conoid.cases.outcome import Outcome
 from conoid.cases.run import State
 
@@ -102,4 +102,4 @@ class EventPage(msgspec.Struct, kw_only=True, frozen=True):
 class SnapshotPage(msgspec.Struct, kw_only=True, frozen=True):
     """The snapshots of a run."""
 
-    snapshots: list[Told]
+    snapshots: list[SnapshotMessage]

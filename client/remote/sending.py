@@ -42,12 +42,12 @@ def send(http: Http, file: LocalFile, say: Callable[[str], None] = lambda text: 
     """Sends a file; on return the server has it with the hash that was computed before. ``say`` is called with the
     progress. Raises ClientError if the file has changed, ServiceError, UnreachableError.
     """
-    told = _status(http, file)
-    if told is not None and told.whole:
+    sent = _status(http, file)
+    if sent is not None and sent.whole:
         return
     with whole.opened(file.path) as opened:
         file.check(opened.fileno())
-        _Sending(http, file, opened, say).go_on(told.offset if told is not None else 0)
+        _Sending(http, file, opened, say).go_on(sent.offset if sent is not None else 0)
 
 
 def _status(http: Http, file: LocalFile) -> SentFile | None:
@@ -76,8 +76,8 @@ class _Sending:
         while True:
             self._say(f"sending {self._file.path.name}, {size(offset)} of {size(self._file.size)}")
             try:
-                told = self._sent(offset)
-                if told.whole:
+                sent = self._sent(offset)
+                if sent.whole:
                     return
             except (ServiceError, UnreachableError) as error:
                 if not self._passes(error) or time.monotonic() - moved > _PATIENCE:
@@ -86,7 +86,7 @@ class _Sending:
                 time.sleep(_PAUSE)
                 there = self._offset(offset)
             else:
-                there = told.offset
+                there = sent.offset
             if there is None:
                 return
             if there > offset:
@@ -103,13 +103,13 @@ class _Sending:
         span = f"{offset}-{end - 1}" if data else "*"
         headers = {"Content-Range": f"bytes {span}/{self._file.size}"} if self._file.size else {}
         began = time.monotonic()
-        told = self._http.put(SentFile, _place(self._file), data, headers, _LAST if end == self._file.size else 0.0)
+        sent = self._http.put(SentFile, _place(self._file), data, headers, _LAST if end == self._file.size else 0.0)
         spent = time.monotonic() - began
         if spent > _WANTED:
             self._piece = max(_SMALLEST, self._piece // 2)
         elif spent < _WANTED / 4:
             self._piece = min(_LARGEST, self._piece * 2)
-        return told
+        return sent
 
     def _passes(self, error: ClientError) -> bool:
         """Returns True if the upload may continue. Raises ClientError if the file has changed since it was hashed."""
@@ -127,7 +127,7 @@ class _Sending:
     def _offset(self, known: int) -> int | None:
         """Returns the byte to continue with, None if the server has the file; ``known`` if it cannot be asked now."""
         try:
-            told = _status(self._http, self._file)
+            sent = _status(self._http, self._file)
         except (ServiceError, UnreachableError):
             return known
-        return 0 if told is None else None if told.whole else told.offset
+        return 0 if sent is None else None if sent.whole else sent.offset

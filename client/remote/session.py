@@ -141,8 +141,8 @@ class Session(Http):
         the same sweep, whose points without success run again with ``again``. Raises CaseError, ServiceError.
         """
         chosen = listed(points_along(points, grid=grid) if isinstance(points, Mapping) else points)
-        data, told, more = self.outbox.sweep(case, chosen, folder)
-        body = to_json({"case": data, "points": told, "at_once": at_once})
+        data, sent, more = self.outbox.sweep(case, chosen, folder)
+        body = to_json({"case": data, "points": sent, "at_once": at_once})
         kind, more = "application/json", more + _POINT * len(chosen)
         made = self.post(SweepInfo, "/v1/sweeps", body, kind, key or str(uuid.uuid4()), more)
         if again and made.failed:

@@ -185,11 +185,11 @@ def follow(link: Link, refill: Refill, ended: Callable[[], bool], after: int = 0
     that cannot be decoded is not in the journal and has no number; a warning about this message precedes the next
     one.
     """
-    order, said = InOrder(_patient(refill), after), False
+    order, warned = InOrder(_patient(refill), after), False
     try:
-        for message in _told(link, order, ended):
-            if link.trouble and not said:
-                said = True
+        for message in _in_order(link, order, ended):
+            if link.trouble and not warned:
+                warned = True
                 yield Log(run=message.run, level="warning", text=link.trouble)
             yield message
             if isinstance(message, Status) and State(message.state).final:
@@ -198,7 +198,7 @@ def follow(link: Link, refill: Refill, ended: Callable[[], bool], after: int = 0
         link.close()
 
 
-def _told(link: Link, order: InOrder, ended: Callable[[], bool]) -> Iterator[AnyMessage]:
+def _in_order(link: Link, order: InOrder, ended: Callable[[], bool]) -> Iterator[AnyMessage]:
     yield from order.catch_up()
     over = False
     while not over:

@@ -32,7 +32,7 @@ def strip(ended: Outcome | None) -> str:
         ("fragments", f"{count(ended.fragments)}<small>{escape(counted(ended.broken, 'facet'))} broken</small>"),
         ("references", f"{passed} of {len(ended.reference)}<small>pass</small>" if ended.reference else "none"),
     ]  # fmt: skip
-    shown = "".join(f"<div><dt>{name}</dt><dd>{told}</dd></div>" for name, told in entries)
+    shown = "".join(f"<div><dt>{name}</dt><dd>{value}</dd></div>" for name, value in entries)
     return f'<dl class="facts strip">{shown}</dl>'
 
 
@@ -52,13 +52,15 @@ def results(ended: Outcome | None) -> str:
 
 def warnings(ended: Outcome | None) -> str:
     """Returns the warnings of the run."""
-    told = ended.warnings if ended is not None else []
-    return f"<ul class=warnings tabindex=0>{''.join(f'<li>{escape(line)}</li>' for line in told)}</ul>" if told else ""
+    texts = ended.warnings if ended is not None else []
+    return (
+        f"<ul class=warnings tabindex=0>{''.join(f'<li>{escape(line)}</li>' for line in texts)}</ul>" if texts else ""
+    )
 
 
-def case(told: dict[str, object]) -> str:
+def case(entries: dict[str, object]) -> str:
     """Returns title, description and parts of the case."""
-    parts = told.get("parts")
+    parts = entries.get("parts")
     rows = []
     for part in parts if isinstance(parts, list) else []:
         velocity = part.get("velocity")
@@ -69,7 +71,7 @@ def case(told: dict[str, object]) -> str:
             exact(size, "m") if isinstance(size, float) else "", vector(velocity, "m/s", 6) if velocity else "",
             (part.get("fracture") or {}).get("model", ""),
         ])  # fmt: skip
-    about = f"<p>{escape(str(told.get('description', '')))}</p>" if told.get("description") else ""
+    about = f"<p>{escape(str(entries.get('description', '')))}</p>" if entries.get("description") else ""
     return about + html.table(["part", "material", "shape", "element size", "velocity", "breaks"], rows)
 
 
@@ -113,29 +115,29 @@ def energy(result: Result, ended: Outcome | None) -> str:
 def _parts(result: Result) -> str:
     """Returns the energy of each part at the end of the history; empty for a case with one part."""
     try:
-        told = by_part(result.history)
+        energies = by_part(result.history)
     except UnfinishedError:
         return ""
-    parts = next(iter(told.values()), {})
+    parts = next(iter(energies.values()), {})
     ended = [part for part, values in parts.items() if values]
-    columns = [alike([of[part][-1] for part in ended], "J") for of in told.values()]
+    columns = [alike([of[part][-1] for part in ended], "J") for of in energies.values()]
     rows = [list(row) for row in zip(ended, *columns, strict=True)]
-    return html.table(["part, at the end", *told], rows, [1, 2]) if rows else ""
+    return html.table(["part, at the end", *energies], rows, [1, 2]) if rows else ""
 
 
 def fragments(result: Result) -> str:
     """Returns the totals of the fragments, and the laws of their masses and extents."""
-    said = summary(result)
-    if said is None:
+    found = summary(result)
+    if found is None:
         return ""
     rows = [
-        ["fragments of ten tets or more", count(said.fragments)],
-        ["dust", f"{count(said.dust)}, {percent(said.dust_share)} of the mass"],
-        ["largest fragment", f"{percent(said.largest_share)} of the mass"],
+        ["fragments of ten tets or more", count(found.fragments)],
+        ["dust", f"{count(found.dust)}, {percent(found.dust_share)} of the mass"],
+        ["largest fragment", f"{percent(found.largest_share)} of the mass"],
     ]
-    laws = [*_laws("mass", said.masses, "kg"), *_laws("extent", said.sizes, "m")]
-    told = html.table(["of", "law", "parameter", "value", "ln L"], laws, [3, 4]) if laws else ""
-    return html.table(["", ""], rows) + told
+    laws = [*_laws("mass", found.masses, "kg"), *_laws("extent", found.sizes, "m")]
+    fits = html.table(["of", "law", "parameter", "value", "ln L"], laws, [3, 4]) if laws else ""
+    return html.table(["", ""], rows) + fits
 
 
 def _laws(what: str, fits: Sequence[Fit], unit: str) -> list[list[str]]:
@@ -160,11 +162,11 @@ def balance(result: Result, ended: Outcome | None) -> str:
         [t, count(cut.step), cut.cause, count(cut.tets), spent, saved]
         for cut, t, spent, saved in zip(some, times, costs, gains, strict=True)
     ]
-    told = f"<p>{counted(len(cuts), 'cut')}{f', the first {_CUTS} of them:' if len(cuts) > _CUTS else ''}</p>"
-    told += html.table(["time", "step", "cause", "tets moved", "cost", "saved by those before"], rows, [1, 3, 4, 5])
+    text = f"<p>{counted(len(cuts), 'cut')}{f', the first {_CUTS} of them:' if len(cuts) > _CUTS else ''}</p>"
+    text += html.table(["time", "step", "cause", "tets moved", "cost", "saved by those before"], rows, [1, 3, 4, 5])
     if ended is not None:
-        told += f"<p>They cost {si(ended.balancing_cost, 's')} and saved {si(ended.balancing_saved, 's')}.</p>"
-    return told
+        text += f"<p>They cost {si(ended.balancing_cost, 's')} and saved {si(ended.balancing_saved, 's')}.</p>"
+    return text
 
 
 def messages(result: Result) -> str:
@@ -173,8 +175,8 @@ def messages(result: Result) -> str:
     return f"<pre class=log tabindex=0>{escape(chr(10).join(lines))}</pre>" if lines else ""
 
 
-def keys(told: dict[str, object]) -> str:
+def keys(entries: dict[str, object]) -> str:
     """Returns the case with all defaults, in SI units."""
-    text = escape(json.dumps(told, indent=2, ensure_ascii=False))
+    text = escape(json.dumps(entries, indent=2, ensure_ascii=False))
     shown = f"<pre class=log tabindex=0>{text}</pre>"
     return f"<details><summary>with every default filled in, in SI</summary>{shown}</details>"

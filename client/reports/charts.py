@@ -53,59 +53,63 @@ def course(messages: Sequence[AnyMessage]) -> Course:
     A run that continued from a checkpoint computes some times twice. The first loads of these times are dropped;
     their CPU time is counted.
     """
-    told = Course()
+    made = Course()
     for message in messages:
         if isinstance(message, Load):
-            while told.times and told.times[-1] >= message.t:
-                told.times.pop()
-                told.outside.pop()
-            told.times.append(message.t)
-            told.outside.append(message.outside)
+            while made.times and made.times[-1] >= message.t:
+                made.times.pop()
+                made.outside.pop()
+            made.times.append(message.t)
+            made.outside.append(message.outside)
             for name, seconds in message.phases.items():
-                before = told.seconds.get(name, [0.0] * len(seconds))
-                told.seconds[name] = [a + b for a, b in zip(before, seconds, strict=True)]
+                before = made.seconds.get(name, [0.0] * len(seconds))
+                made.seconds[name] = [a + b for a, b in zip(before, seconds, strict=True)]
         elif isinstance(message, Balance):
-            told.cuts = [t for t in told.cuts if t < message.t] + [message.t]
-    if not told.times:
+            made.cuts = [t for t in made.cuts if t < message.t] + [message.t]
+    if not made.times:
         raise ClientError("this run has no messages with the loads of its ranks")
-    return told
+    return made
 
 
-def balance(told: Course, title: str, case: str, out: Path) -> None:
+def balance(balances: Course, title: str, case: str, out: Path) -> None:
     """Writes a PNG of the surface nodes of each rank with the balance events, and of the CPU time by phase and rank."""
-    figure = balance_figure(told)
+    figure = balance_figure(balances)
     figure.suptitle(title, fontsize=11, color=_INK)
     figure.supxlabel(PAPER.get(case, ""), fontsize=8, color=_INK)
     save(figure, out)
 
 
-def balance_figure(told: Course) -> Figure:
+def balance_figure(balances: Course) -> Figure:
     """Draws surface nodes of each rank with the balance events, and CPU time by phase and rank."""
     figure = Figure(figsize=(11, 4.8), layout="constrained")
     left, right = figure.subplots(1, 2)
-    _outside(left, told)
-    _phases(right, told.seconds)
+    _outside(left, balances)
+    _phases(right, balances.seconds)
     for axes in (left, right):
         axes.set_title(axes.get_title(), fontsize=10, color=_INK)
         axes.spines[["top", "right"]].set_visible(False)
     return figure
 
 
-def _outside(axes: Axes, told: Course) -> None:
-    last = told.outside[-1]
+def _outside(axes: Axes, balances: Course) -> None:
+    last = balances.outside[-1]
     ranks = len(last)
     named = range(ranks) if ranks <= _NAMED else (last.index(max(last)), last.index(min(last)))
-    for t in told.cuts:
-        axes.axvline(1e6 * t, color=_FAINT, linewidth=0.8, linestyle=":", label="cut" if t == told.cuts[0] else None)
+    for t in balances.cuts:
+        axes.axvline(
+            1e6 * t, color=_FAINT, linewidth=0.8, linestyle=":", label="cut" if t == balances.cuts[0] else None
+        )
     palette = iter(_RANKS)
     for rank in sorted(range(ranks), key=lambda r: r in named):
-        points = [(1e6 * t, row[rank]) for t, row in zip(told.times, told.outside, strict=True) if len(row) == ranks]
+        points = [
+            (1e6 * t, row[rank]) for t, row in zip(balances.times, balances.outside, strict=True) if len(row) == ranks
+        ]
         style: dict[str, Any] = (
             {"color": next(palette), "label": f"rank {rank}"} if rank in named else {"color": _FAINT}
         )
         axes.plot(*zip(*points, strict=True), linewidth=1.5 if rank in named else 0.7, **style)
     axes.set(xlabel="time, µs", ylabel="outside nodes", ylim=(0, None), xlim=(0, None))
-    told_of = f"surface nodes: {counted(len(told.cuts), 'cut')} on {counted(ranks, 'rank')}"
+    told_of = f"surface nodes: {counted(len(balances.cuts), 'cut')} on {counted(ranks, 'rank')}"
     axes.set_title(told_of if ranks else "no parts in contact")
     if axes.get_legend_handles_labels()[0]:
         axes.legend(fontsize=8, frameon=False)

@@ -17,7 +17,7 @@ from ..columns import Columns
 from ..errors import UnfinishedError
 from ..result import Result
 
-_TOLD = 3
+_NAMED = 3
 """Largest number of changed keys that are named."""
 _OUTCOME = (
     "steps", "time", "ranks", "elapsed", "cpu", "elements", "nodes", "fragments", "broken", "eroded", "eroded_mass",
@@ -92,8 +92,8 @@ def differing(a: Any, b: Any) -> list[Key]:
 def changes(before: Any, now: Any) -> str:
     """Returns the first keys that differ, each with both values; empty if all are equal."""
     found = differing(before, now)
-    keys = ", ".join(f"{one.key} was {shown(one.a)} and is {shown(one.b)}" for one in found[:_TOLD])
-    return keys + (f", and {counted(len(found) - _TOLD, 'more key')}" if len(found) > _TOLD else "")
+    keys = ", ".join(f"{one.key} was {shown(one.a)} and is {shown(one.b)}" for one in found[:_NAMED])
+    return keys + (f", and {counted(len(found) - _NAMED, 'more key')}" if len(found) > _NAMED else "")
 
 
 def _flat(data: Any, path: str = "") -> Iterator[tuple[str, Any]]:
@@ -168,12 +168,12 @@ def material(a: Result, b: Result, names: Sequence[str] = ()) -> Material:
     0 and the probes that both runs have.
     """
     runs = {a.folder.name: a, b.folder.name: b} if a.folder.name != b.folder.name else {"A": a, "B": b}
-    told = {name: run.history for name, run in runs.items()}
+    histories = {name: run.history for name, run in runs.items()}
     both = common(a.history, b.history)
-    chosen = [n for n in both if n in _DRAWN and any(any(each.numbers(n)) for each in told.values())]
+    chosen = [n for n in both if n in _DRAWN and any(any(each.numbers(n)) for each in histories.values())]
     chosen += [n for n in both if n not in history.COLUMNS and history.part_of(n) is None]
     tables = {name: run.fragments_of() for name, run in runs.items() if run.fragment_tables}
-    return Material(told, tables, list(names or chosen))
+    return Material(histories, tables, list(names or chosen))
 
 
 def _sizes(a: Result, b: Result) -> list[Value]:

@@ -45,23 +45,23 @@ def save(figure: Figure, out: Path) -> Path:
     return out
 
 
-def energy(told: Columns) -> Figure:
+def energy(course: Columns) -> Figure:
     """Draws the whole ledger; its terms without the kinetic energy; the residual; and, for several parts, the
     kinetic and the internal energy of each part.
     """
-    parts = {name: _largest(some) for name, some in by_part(told).items()}
+    parts = {name: _largest(some) for name, some in by_part(course).items()}
     figure, (left, middle, right, *others) = _panels(3 + len(parts))
-    t = _micro(told)
-    left.plot(t, told.numbers("kinetic"), color="#4c78a8", label="kinetic", linewidth=1.4)
-    came = [a + b for a, b in zip(told.numbers("initial"), told.numbers("external"), strict=True)]
+    t = _micro(course)
+    left.plot(t, course.numbers("kinetic"), color="#4c78a8", label="kinetic", linewidth=1.4)
+    came = [a + b for a, b in zip(course.numbers("initial"), course.numbers("external"), strict=True)]
     left.plot(t, came, color=_INK, label="initial + external", linewidth=1.4)
-    there = ("kinetic", *(name for name in _LEDGER if name in told))
-    total = [math.fsum(values) for values in zip(*(told.numbers(name) for name in there), strict=True)]
+    there = ("kinetic", *(name for name in _LEDGER if name in course))
+    total = [math.fsum(values) for values in zip(*(course.numbers(name) for name in there), strict=True)]
     left.plot(t, total, color="#e45756", label="sum of all terms", linewidth=1.0, linestyle="--")
     for name, colour in zip(_LEDGER, _COLOURS, strict=False):
-        if name in told and any(told.numbers(name)):
-            middle.plot(t, told.numbers(name), color=colour, label=name, linewidth=1.4)
-    positive = [value if value > 0.0 else math.nan for value in told.numbers("residual")]
+        if name in course and any(course.numbers(name)):
+            middle.plot(t, course.numbers(name), color=colour, label=name, linewidth=1.4)
+    positive = [value if value > 0.0 else math.nan for value in course.numbers("residual")]
     right.semilogy(t, positive, color=_INK, linewidth=1.2)
     _name(left, "energy", "energy, J", ylim=(0, None))
     _name(middle, "without the kinetic term", "energy, J")
@@ -79,12 +79,12 @@ def _largest(curves: dict[str, Sequence[float]]) -> dict[str, Sequence[float]]:
     return {name: curves[name] for name in curves if name in chosen}
 
 
-def steps(told: Columns) -> Figure:
+def steps(course: Columns) -> Figure:
     """Draws the length of the time step in the colour of its limiter."""
     figure, (axes,) = _panels(1)
-    held = [_limiter(text) for text in told["limiter"] if isinstance(text, str)] or [""] * told.rows
+    held = [_limiter(text) for text in course["limiter"] if isinstance(text, str)] or [""] * course.rows
     often = sorted(set(held), key=lambda name: -held.count(name))[:_LIMITERS]
-    points = list(zip(_micro(told), told.numbers("dt"), held, strict=True))
+    points = list(zip(_micro(course), course.numbers("dt"), held, strict=True))
     axes.plot([t for t, _, _ in points], [1e9 * dt for _, dt, _ in points], color=_FAINT, linewidth=0.7)
     for name, colour in zip((*often, "others"), (*_COLOURS[:_LIMITERS], _FAINT), strict=False):
         some = [(t, 1e9 * dt) for t, dt, by in points if by == name or (name == "others" and by not in often)]
@@ -130,16 +130,16 @@ def distribution(axes: Axes, tables: Mapping[str, Columns]) -> None:
     _name(axes, "N(m): fragments of mass m or more", "N", xlabel="m, g")
 
 
-def columns(told: Columns, names: Sequence[str] = ()) -> Figure:
+def columns(course: Columns, names: Sequence[str] = ()) -> Figure:
     """Draws columns of a history, with one panel for each unit. The default is the columns of the probes. Raises
     ClientError.
     """
-    return overlaid({"": told}, names or probes(told) or ["momentum_x", "momentum_y", "momentum_z"])
+    return overlaid({"": course}, names or probes(course) or ["momentum_x", "momentum_y", "momentum_z"])
 
 
-def probes(told: Columns) -> list[str]:
+def probes(course: Columns) -> list[str]:
     """Returns the columns of the case's probes."""
-    return [name for name in told if name not in history.COLUMNS and history.part_of(name) is None]
+    return [name for name in course if name not in history.COLUMNS and history.part_of(name) is None]
 
 
 def overlaid(runs: Mapping[str, Columns], names: Sequence[str], spare: int = 0) -> Figure:
@@ -150,10 +150,10 @@ def overlaid(runs: Mapping[str, Columns], names: Sequence[str], spare: int = 0) 
     figure, panels = _panels(len(groups) + spare)
     for (unit, some), axes in zip(groups.items(), panels, strict=False):
         for name, colour in zip(some, _COLOURS * len(some), strict=False):
-            for told, dash in zip(runs.values(), _DASHES, strict=False):
-                if name in told:
-                    label = name if told is next(iter(runs.values())) else None
-                    axes.plot(_micro(told), told.numbers(name), dash, color=colour, label=label, linewidth=1.3)
+            for course, dash in zip(runs.values(), _DASHES, strict=False):
+                if name in course:
+                    label = name if course is next(iter(runs.values())) else None
+                    axes.plot(_micro(course), course.numbers(name), dash, color=colour, label=label, linewidth=1.3)
         what = ", ".join(some) if len(some) < 4 else f"{some[0]}, {some[1]} and {len(some) - 2} more"
         _name(axes, what if len(runs) == 1 else _dashed(runs), unit or "1")
     return figure
@@ -176,9 +176,9 @@ def _by_unit(runs: Mapping[str, Columns], names: Sequence[str]) -> dict[str, lis
     """Returns the names by unit, in their order. A unit has at most as many names as a panel has curves."""
     groups: dict[str, list[str]] = {}
     for name in names:
-        told = next((told for told in runs.values() if name in told), next(iter(runs.values())))
-        told.numbers(name)
-        unit = told.units[name]
+        course = next((course for course in runs.values() if name in course), next(iter(runs.values())))
+        course.numbers(name)
+        unit = course.units[name]
         groups.setdefault(unit, [])
         if len(groups[unit]) < _PROBES:
             groups[unit].append(name)
@@ -204,5 +204,5 @@ def _name(axes: Axes, title: str, ylabel: str, xlabel: str = "time, µs", **limi
         axes.legend(fontsize=8, frameon=False)
 
 
-def _micro(told: Columns) -> list[float]:
-    return [1e6 * t for t in told.numbers("t")]
+def _micro(course: Columns) -> list[float]:
+    return [1e6 * t for t in course.numbers("t")]

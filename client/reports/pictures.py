@@ -87,8 +87,8 @@ def _key(drawn: Drawn) -> str:
     first, last = exacts(drawn.limits, drawn.unit, 4)
     stripe = f'<i style="background:linear-gradient(90deg,{",".join(field.colours)})"></i>'
     beyond = drawn.low < drawn.limits[0] or drawn.high > drawn.limits[1]
-    said = f" <span class=hint>values from {escape(low)} to {escape(high)}</span>" if beyond else ""
-    return f"<span class=scale>{escape(first)} {stripe} {escape(last)}</span>{said}"
+    note = f" <span class=hint>values from {escape(low)} to {escape(high)}</span>" if beyond else ""
+    return f"<span class=scale>{escape(first)} {stripe} {escape(last)}</span>{note}"
 
 
 # Charts ---------------------------------------------------------------------------------------------------------------

@@ -105,7 +105,7 @@ def _snapshots(result: Result, names: Sequence[str]) -> tuple[list[dict[str, Any
     """Returns the entries of the snapshots for the body, and scripts with their bytes. Snapshots of all tets are
     added while the total size stays below the limit.
     """
-    told = {message.n: message for message in _messages(result) if isinstance(message, Snapshot)}
+    announced = {message.n: message for message in _messages(result) if isinstance(message, Snapshot)}
     packed = _packed(result, names)
     room = BUDGET - sum(map(len, packed.values()))
     entries, embedded = [], []
@@ -117,7 +117,9 @@ def _snapshots(result: Result, names: Sequence[str]) -> tuple[list[dict[str, Any
                 room -= len(volume)
                 entry["tets"] = len(volume)
                 embedded.append(_script("application/octet-stream", _base64(volume), f"tets-{n}"))
-        entries.append({"n": n, **entry, **({"t": told[n].t, "fields": told[n].fields} if n in told else {})})
+        entries.append(
+            {"n": n, **entry, **({"t": announced[n].t, "fields": announced[n].fields} if n in announced else {})}
+        )
         embedded.append(_script("application/octet-stream", _base64(data), f"snapshot-{n}"))
     return entries, embedded
 

@@ -98,13 +98,13 @@ def _page(title: str, body: str) -> str:
 
 def _head(name: str, title: str, case: str, ended: Outcome | None) -> str:
     state = ended.state if ended is not None else "not ended"
-    told = f'<p class="told">{escape(ended.message)}</p>' if ended is not None and ended.message else ""
+    message = f'<p class="message">{escape(ended.message)}</p>' if ended is not None and ended.message else ""
     kind = state if ended is not None else "running"
     return (
         f'<header class="head"><div class="run-head"><div class="titles"><h1>{escape(title)}</h1>'
         f'<div class="sub">{escape(" · ".join(dict.fromkeys(filter(None, [case, name]))))}</div></div>'
         f'<div class="side"><span class="pill {escape(kind)}">{escape(state.replace("_", " "))}</span></div></div>'
-        f"{told}</header>"
+        f"{message}</header>"
     )
 
 

@@ -83,9 +83,9 @@ class Book:
 
     def _nothing(self) -> str:
         """Returns the words for a study without an error to compare with the cost."""
-        said = "Nothing converges on these meshes: there is no error to weigh against the cost"
+        text = "Nothing converges on these meshes: there is no error to weigh against the cost"
         if len(self.series) > 1:
-            said += "; how far the variants differ is in their table"
+            text += "; how far the variants differ is in their table"
         own = next((each for each in self.series if each.variant == self.own), None)
         for each in self.open_references():
             if own is None or each.name not in own.meshes[0].samples:
@@ -94,8 +94,8 @@ class Book:
             if not math.isnan(limit.uncertainty):
                 value = f"{number(mesh.samples[each.name].mean)} {each.unit}".strip()
                 where, by = si(self.own_size * mesh.factor, "m"), exact(limit.uncertainty, "", 2)
-                return f"{said}. {each.name} {limit.trend.value}: {value} at {where}, uncertain by {by}."
-        return f"{said}."
+                return f"{text}. {each.name} {limit.trend.value}: {value} at {where}, uncertain by {by}."
+        return f"{text}."
 
 
 def to_markdown(book: Book, wanted: str | None = None) -> str:
@@ -220,13 +220,13 @@ def _worth(book: Book, name: str) -> str:
         ]
         for p in points
     ]  # fmt: skip
-    said = (
+    text = (
         f"From the limit {number(goal.value)} {each.unit} of {goal.variant}, itself uncertain by "
         f"{_percent(goal.uncertainty)} %, by way of each variant's own: errors that cancel by chance do not count."
     )
     others = [str(variant) for variant in trade.elsewhere(book.series, each, goal)]
-    said += f" Another limit, further away than both are uncertain, has: {'; '.join(others)}." if others else ""
-    return f"{said}\n\n{table(('variant', 'element size', 'CPU s', 'error %', 'Pareto'), rows)}"
+    text += f" Another limit, further away than both are uncertain, has: {'; '.join(others)}." if others else ""
+    return f"{text}\n\n{table(('variant', 'element size', 'CPU s', 'error %', 'Pareto'), rows)}"
 
 
 def _seconds(value: float) -> str:

@@ -44,9 +44,9 @@ class Number:
         return max(abs(self.expected if self.expected is not None else self.value), self.tolerance)
 
 
-def of_run(case: Case, outcome: Outcome, told: Columns) -> list[Number]:
+def of_run(case: Case, outcome: Outcome, columns: Columns) -> list[Number]:
     """Returns references in their order, then probes, then energies at the end over the initial one, then counts."""
-    found = [*_references(outcome), *_probes(case, told), *_energies(outcome), *_counts(case, outcome)]
+    found = [*_references(outcome), *_probes(case, columns), *_energies(outcome), *_counts(case, outcome)]
     return [number for number in found if "worst_residual" not in number.name]
 
 
@@ -73,10 +73,10 @@ def _references(outcome: Outcome) -> Iterator[Number]:
         yield Number(name, check.value, check.unit, check.expected, check.tolerance, check.source)
 
 
-def _probes(case: Case, told: Columns) -> Iterator[Number]:
+def _probes(case: Case, columns: Columns) -> Iterator[Number]:
     """Returns the mean over time, the value of the largest magnitude, and the last value."""
     for name in (probe.name for probe in case.probes):
-        values, unit = told.numbers(name), told.units[name]
+        values, unit = columns.numbers(name), columns.units[name]
         finite = [value for value in values if value == value]
         if finite:
             yield Number(f"mean of {name}", sum(finite) / len(finite), unit)

@@ -144,11 +144,11 @@ def compare(record: Record, spec: Spec, ranks: int, cost: float, scale: Point) -
 def chosen(spec: Spec, words: str, alpha: float | None = None) -> Spec:
     """Returns the ``spec`` of a case with another policy, as a user writes it: ``every:500``. Raises UsageError."""
     policy, colon, every = words.partition(":")
-    told = {"policy": policy} | ({"every": every} if every else {}) | ({"alpha": alpha} if alpha is not None else {})
+    options = {"policy": policy} | ({"every": every} if every else {}) | ({"alpha": alpha} if alpha is not None else {})
     try:
         if colon and (policy != "every" or not every):
             raise ValueError
-        return Spec.model_validate(spec.model_dump() | told)
+        return Spec.model_validate(spec.model_dump() | options)
     except ValueError:
         raise UsageError(
             f"policy = {words!r}, alpha = {number(spec.alpha if alpha is None else alpha)}: "

@@ -110,8 +110,8 @@ def _succeeded(folder: Path) -> bool:
     ended = folder / layout.OUTCOME
     outcome = from_json(ended.read_bytes()) if ended.is_file() else None
     if outcome is None or outcome.state != State.SUCCEEDED:
-        said = outcome.message if outcome is not None else "no outcome was written"
-        raise ClientError(f"the run in {folder} did not succeed: {said}")
+        message = outcome.message if outcome is not None else "no outcome was written"
+        raise ClientError(f"the run in {folder} did not succeed: {message}")
     return True
 
 

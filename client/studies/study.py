@@ -136,8 +136,8 @@ def _by_tasks(study: Study) -> str:
     )
     if study.error is None:
         return text
-    told, was = study.error
-    so, there = study.speed_up(told), study.speed_up(was)
+    predicted, was = study.error
+    so, there = study.speed_up(predicted), study.speed_up(was)
     off = percent(so / there - 1.0, 0)
     told_so = f"Two threads are {fixed(so)} times as fast as one so, and {fixed(there)} times when they are there"
     return f"{text} {told_so}: {off} off."
@@ -151,11 +151,11 @@ def _serial(study: Study) -> list[str]:
     if not runs:
         return []
     rows.append(["all", *(_parted(run, names) for run in runs)])
-    said = (
+    caption = (
         "Milliseconds a step of the busiest rank, by the clock: what one thread does alone + what is in regions, which "
         "threads share."
     )
-    return [said, table(["phase", *(run.name for run in runs)], rows)]
+    return [caption, table(["phase", *(run.name for run in runs)], rows)]
 
 
 def _parted(run: Projection, names: Sequence[str]) -> str:

@@ -105,18 +105,18 @@ def advice(all_series: Sequence[Series], number: Number, goal: Target, accuracy:
     enough = [worth for worth in line if worth.error <= accuracy]
     chosen = enough[0] if enough else line[-1]
     name, size = chosen.variant.form, si(own_size * chosen.mesh.factor, "m")
-    said = f"{name} at {size}: {number.name} within {_percent(chosen.error)} for {duration(chosen.cost)} of CPU time"
-    said += f"; {name} {WORDS}" if name == "split" else ""
+    text = f"{name} at {size}: {number.name} within {_percent(chosen.error)} for {duration(chosen.cost)} of CPU time"
+    text += f"; {name} {WORDS}" if name == "split" else ""
     order, growth = _order(all_series, number, chosen.variant), _growth(all_series, chosen.variant)
     if math.isnan(order):
-        return f"{said}; no order was observed, so nothing is known of finer meshes"
+        return f"{text}; no order was observed, so nothing is known of finer meshes"
     halved, dearer = chosen.error * (1.0 - 0.5**order), chosen.cost * 2.0**growth
-    said += f"; halving the size buys {_percent(halved)} for {duration(dearer)}"
+    text += f"; halving the size buys {_percent(halved)} for {duration(dearer)}"
     if enough:
-        return said
+        return text
     share = (accuracy / chosen.error) ** (1.0 / order)
     wanted, cost = own_size * chosen.mesh.factor * share, chosen.cost * share**-growth
-    return f"{said}; {_percent(accuracy)} would need about {si(wanted, 'm')} and {duration(cost)}"
+    return f"{text}; {_percent(accuracy)} would need about {si(wanted, 'm')} and {duration(cost)}"
 
 
 def _order(all_series: Sequence[Series], number: Number, variant: Variant) -> float:

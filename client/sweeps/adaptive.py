@@ -106,10 +106,10 @@ def _reporter(session: Server, wanted: Search) -> Reporter:
     return Reporter(session.put, name, case, wanted.goal, wanted.spans, wanted.tolerance)
 
 
-def search(session: Server, wanted: Search, book: Book, told: Reporter, say: Say, at: Say) -> Found:
+def search(session: Server, wanted: Search, book: Book, reporter: Reporter, say: Say, at: Say) -> Found:
     """Runs points until the bracket is as narrow as the tolerance, or until no further point can narrow the bracket.
-    ``say`` receives a line for each run that has ended, ``at`` a line about the present round. ``told`` sends reports
-    to the server.
+    ``say`` receives a line for each run that has ended, ``at`` a line about the present round. ``reporter`` sends
+    reports to the server.
 
     Points of the ``book`` that have succeeded are not run again. Each new point is written to the book at once.
     Raises CaseError for ends with which the case is not valid, ClientError.
@@ -117,21 +117,21 @@ def search(session: Server, wanted: Search, book: Book, told: Reporter, say: Say
     for x in wanted.ends:
         parse_case(apply_overrides(wanted.case, changes(wanted.spans, x)))
     fresh: list[Tried] = []
-    _report(wanted, told, _counted(wanted, book, fresh))
+    _report(wanted, reporter, _counted(wanted, book, fresh))
     many = wanted.at_once or _free(session, wanted.case)
     while True:
         tried = _counted(wanted, book, fresh)
-        following, why = ([], _CANCELLED) if told.stop else _next(wanted, tried, len(fresh), many)
+        following, why = ([], _CANCELLED) if reporter.stop else _next(wanted, tried, len(fresh), many)
         if not following:
             found = _found(wanted, tried, why, len(fresh))
-            _report(wanted, told, tried, over=True, why=found.unsettled)
+            _report(wanted, reporter, tried, over=True, why=found.unsettled)
             return found
         at(f"{counted(len(following), 'run')} at {', '.join(map(number, following))} {wanted.spans[0].unit}".strip())
-        for each, open_ones in _round(session, wanted, told, tried, following):
+        for each, open_ones in _round(session, wanted, reporter, tried, following):
             fresh.append(each)
             book.add(each)
-            _report(wanted, told, [*_counted(wanted, book, fresh), *open_ones])
-            say(f"{_at(wanted, each.x)}: {_told(wanted, each)}; {_state(wanted, [*tried, *fresh])}")
+            _report(wanted, reporter, [*_counted(wanted, book, fresh), *open_ones])
+            say(f"{_at(wanted, each.x)}: {_result_text(wanted, each)}; {_state(wanted, [*tried, *fresh])}")
 
 
 def _counted(wanted: Search, book: Book, fresh: Sequence[Tried]) -> list[Tried]:
@@ -140,11 +140,11 @@ def _counted(wanted: Search, book: Book, fresh: Sequence[Tried]) -> list[Tried]:
     return [each for x, each in every.items() if wanted.ends[0] <= x <= wanted.ends[1]]
 
 
-def _report(wanted: Search, told: Reporter, tried: Sequence[Tried], *, over: bool = False, why: str = "") -> None:
+def _report(wanted: Search, reporter: Reporter, tried: Sequence[Tried], *, over: bool = False, why: str = "") -> None:
     ended = [each for each in tried if each.value is not None]
     made = bracket(_samples(ended))
     fit = None if made is None else _fit(wanted, ended, made)
-    told.tell(tried, made, fit, over=over, why=why)
+    reporter.tell(tried, made, fit, over=over, why=why)
 
 
 def _next(wanted: Search, tried: Sequence[Tried], spent: int, many: int) -> tuple[list[float], str]:
@@ -180,25 +180,25 @@ def _samples(tried: Sequence[Tried]) -> list[Sample]:
 
 
 def _round(
-    session: Server, wanted: Search, told: Reporter, tried: Sequence[Tried], at: Sequence[float]
+    session: Server, wanted: Search, reporter: Reporter, tried: Sequence[Tried], at: Sequence[float]
 ) -> Iterator[tuple[Tried, list[Tried]]]:
     """Runs points at the same time. Yields each point in its order when its run has ended, with the points whose
     runs have not ended.
     """
-    runs = [(x, _submitted(session, wanted, told, x)) for x in at]
+    runs = [(x, _submitted(session, wanted, reporter, x)) for x in at]
     started = [Tried(x=x, values=changes(wanted.spans, x), run=run.id, state="") for x, run in runs]
-    _report(wanted, told, [*tried, *started])
+    _report(wanted, reporter, [*tried, *started])
     for n, (x, run) in enumerate(runs):
         yield _ended(wanted, x, run), started[n + 1 :]
 
 
-def _submitted(session: Server, wanted: Search, told: Reporter, x: float) -> Run:
+def _submitted(session: Server, wanted: Search, reporter: Reporter, x: float) -> Run:
     """Returns the run of a point. A run of an earlier search is used if it has succeeded or has not ended, else a
     new run is submitted.
     """
     case = apply_overrides(wanted.case, changes(wanted.spans, x))
-    name = f"adaptive-{_hash(wanted.goal.result, [span.key for span in wanted.spans], case, told.id)[:12]}"
-    labels = {"sweep": told.id or f"adaptive {wanted.goal.result}"[:200], "point": _at(wanted, x)[:200]}
+    name = f"adaptive-{_hash(wanted.goal.result, [span.key for span in wanted.spans], case, reporter.id)[:12]}"
+    labels = {"sweep": reporter.id or f"adaptive {wanted.goal.result}"[:200], "point": _at(wanted, x)[:200]}
     for attempt in range(_ATTEMPTS):
         key = f"{name}-{_hash(metadata.version('conoid'), case)}-{attempt}"
         try:
@@ -279,7 +279,7 @@ def _at(wanted: Search, x: float) -> str:
     return f"{span.key} = {number(x)} {span.unit}".strip()
 
 
-def _told(wanted: Search, each: Tried) -> str:
+def _result_text(wanted: Search, each: Tried) -> str:
     if each.value is None:
         return each.problem
     return f"{wanted.goal.result} = {number(each.value)} {wanted.goal.unit}".strip()

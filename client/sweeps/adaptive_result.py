@@ -85,18 +85,18 @@ class Found(msgspec.Struct, kw_only=True, frozen=True):
 
     def lines(self) -> list[str]:
         """Returns the result as lines for the terminal."""
-        told = [self._first(), *self._passes()]
+        text = [self._first(), *self._passes()]
         if self.fit is not None:
-            told.append(_curve(self.fit, self.unit))
+            text.append(_curve(self.fit, self.unit))
             if not self._within(self.fit.limit):
-                told.append("the curve has its limit outside of the bracket: near it the results do not follow the law")
+                text.append("the curve has its limit outside of the bracket: near it the results do not follow the law")
         if self.why:
-            told.append(f"bracket wider than requested ({self._x(self.tolerance)}): {self.why}")
+            text.append(f"bracket wider than requested ({self._x(self.tolerance)}): {self.why}")
         failed = f", {self.failed} of them without a result" if self.failed else ""
-        told.append(
+        text.append(
             f"{counted(self.points, 'run')}{failed}, {self.fresh} of them now; {duration(self.cpu)} of CPU time"
         )
-        return told
+        return text
 
     def _first(self) -> str:
         passes = f"{self.goal.result} = {number(self.goal.threshold)} {self.goal.unit}".strip()
@@ -189,8 +189,8 @@ def read(path: Path) -> Kept:
 def _require_same(path: Path, kept: Kept, fresh: Kept) -> None:
     other = "name another file with --out, or remove it"
     if (kept.goal, kept.keys) != (fresh.goal, fresh.keys):
-        told = f"{kept.goal.result} = {number(kept.goal.threshold)} over {', '.join(kept.keys)}"
-        raise UsageError(f"{path}: holds another sweep, {told}; {other}")
+        question = f"{kept.goal.result} = {number(kept.goal.threshold)} over {', '.join(kept.keys)}"
+        raise UsageError(f"{path}: holds another sweep, {question}; {other}")
     if kept.version != fresh.version:
         raise UsageError(f"{path}: its runs are of Conoid {kept.version}, this is {fresh.version}; {other}")
     if changed := changes(kept.case, fresh.case):

@@ -74,10 +74,10 @@ class Reporter:
             curve=None if fit is None or made is None else self._curve(fit, made, tried),
         )  # fmt: skip
         try:
-            told = self._put(Reported, self._path, msgspec.json.encode(search), {"Content-Type": "application/json"})
+            answer = self._put(Reported, self._path, msgspec.json.encode(search), {"Content-Type": "application/json"})
         except ClientError:  # the server is not reachable, or is older than these reports
             return
-        self.id, self.stop = told.id, told.stop
+        self.id, self.stop = answer.id, answer.stop
 
     def _x(self, x: float) -> float:
         return self._scale * x

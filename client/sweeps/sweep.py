@@ -100,12 +100,12 @@ class Sweep:
         the sweep and each point whose run has ended.
         """
         deadline = math.inf if timeout is None else time.monotonic() + timeout
-        told = set[str]()
+        announced = set[str]()
         while True:
             info = self.status()
             for point in info.points:
-                if point.run.state.final and point.run.id not in told:
-                    told.add(point.run.id)
+                if point.run.state.final and point.run.id not in announced:
+                    announced.add(point.run.id)
                     say(info, point)
             left = [point for point in info.points if not point.run.state.final]
             if not left:
@@ -194,8 +194,8 @@ def points_along(axes: Mapping[str, Iterable[Any]], *, grid: bool = False, named
         lists = {key: values * most if len(values) == 1 else values for key, values in lists.items()}
         counts = {key: len(values) for key, values in lists.items()}
         if len(set(counts.values())) > 1:
-            told = ", ".join(f"{key} has {n}" for key, n in counts.items())
-            raise CaseError([Problem(named, "", f"as many values for each key, or a grid: {told}")])
+            lengths = ", ".join(f"{key} has {n}" for key, n in counts.items())
+            raise CaseError([Problem(named, "", f"as many values for each key, or a grid: {lengths}")])
         rows = zip(*lists.values(), strict=True)
     return [dict(zip(lists, row, strict=True)) for row in rows]
 
@@ -213,9 +213,9 @@ def _values(key: str, values: Any, named: str) -> list[Any]:
 def listed(points: Any) -> list[Point]:
     """Returns the points in the form in which they are sent, each a mapping of keys to values. Raises CaseError."""
     found: list[Any] = [points] if isinstance(points, str) or not isinstance(points, Iterable) else list(points)
-    told = "a point is a mapping of keys to values, such as {'run.ranks': 2}"
+    hint = "a point is a mapping of keys to values, such as {'run.ranks': 2}"
     wrong = [
-        Problem(f"points[{n}]", shown(point), told) for n, point in enumerate(found) if not isinstance(point, Mapping)
+        Problem(f"points[{n}]", shown(point), hint) for n, point in enumerate(found) if not isinstance(point, Mapping)
     ]
     if wrong:
         raise CaseError(wrong)

@@ -31,9 +31,9 @@ def failure(url: str | sa.URL, error: Exception, deed: str = "used") -> StoreErr
     except sa.exc.ArgumentError:
         sqlite, place = None, repr(url)
     full = " (its disk is full)" if sqlite and _full(Path(sqlite).parent) else ""
-    told = StoreError(f"the database cannot be {deed}: {place}: {str(error).splitlines()[0]}{full}")
-    told.exit_code = 2 if isinstance(error, sa.exc.ArgumentError) else 1
-    return told
+    raised = StoreError(f"the database cannot be {deed}: {place}: {str(error).splitlines()[0]}{full}")
+    raised.exit_code = 2 if isinstance(error, sa.exc.ArgumentError) else 1
+    return raised
 
 
 def _full(folder: Path) -> bool:

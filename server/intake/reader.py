@@ -61,11 +61,11 @@ class Reader:
     def read(self, question: Question) -> Reading:
         """Reads a case. Raises CaseError with every problem, ServiceError 422 for a case that takes too much time or
         memory, 503; RuntimeError."""
-        told = self._ask(msgspec.msgpack.encode(question))
-        if not told:
+        data = self._ask(msgspec.msgpack.encode(question))
+        if not data:
             detail = f"the case takes too long to be read: more than {CPU} s, or too much memory"
             raise ServiceError(422, "too_costly", detail)
-        answer = msgspec.msgpack.decode(told, type=Answer)
+        answer = msgspec.msgpack.decode(data, type=Answer)
         if answer.crash:
             raise RuntimeError(answer.crash)
         if answer.reading is None:

@@ -128,10 +128,10 @@ def _read(question: Question) -> Reading:
         raise CaseError(problems)
     files = _files(case)
     known = not files or question.survey is not None
-    told, odd = _weighed(case, data, question) if known else ({}, [])
+    needs, odd = _weighed(case, data, question) if known else ({}, [])
     return Reading(
         name=case.name, title=case.title, ranks=case.run.ranks, threads=case.run.threads, profile=case.run.profile,
-        wall_time=limits.wall_time(case, question.limits), estimate=told,
+        wall_time=limits.wall_time(case, question.limits), estimate=needs,
         resolved=resolved_json(case), case=case.model_dump_json().encode(), doubts=odd, files=files,
         survey=question.survey or b"",
     )  # fmt: skip
@@ -156,19 +156,19 @@ def _names(data: Mapping[str, Any]) -> list[FileName]:
 
 def _weighed(case: Case, data: Mapping[str, Any], question: Question) -> tuple[dict[str, int | float], list[Problem]]:
     """Returns the needs and the warnings of a case. Raises CaseError if the case cannot be run on this server."""
-    told = from_json(question.survey) if question.survey else Survey()
-    if told.refused:
-        raise CaseError(Problem("", "", line) for line in told.refused)
-    expected = _estimate(case, question, told)
+    survey = from_json(question.survey) if question.survey else Survey()
+    if survey.refused:
+        raise CaseError(Problem("", "", line) for line in survey.refused)
+    expected = _estimate(case, question, survey)
     # Contact of parts is reported for files only: for other bodies the search takes seconds.
     unread = [problem((file.key, "path"), file.path, _UNREAD) for file in _files(case) if question.survey == b""]
-    odd = [*unread, *bare_numbers(data), *warned(case, expected, told, told.touching)]
+    odd = [*unread, *bare_numbers(data), *warned(case, expected, survey, survey.touching)]
     return limits.figures(expected), odd
 
 
-def _estimate(case: Case, question: Question, told: Survey) -> Estimate:
+def _estimate(case: Case, question: Question, survey: Survey) -> Estimate:
     try:
-        expected = estimate(case, Path(question.folder) if question.folder else None, told)
+        expected = estimate(case, Path(question.folder) if question.folder else None, survey)
     except (ArithmeticError, ValueError):
         raise CaseError([Problem("parts", "", "the elements are too many or too small to be counted")]) from None
     if problems := limits.check_size(expected, question.limits):
@@ -201,19 +201,19 @@ def main() -> int:
 
 def _next(control: socket.socket) -> bool:
     """Answers one case; False at the end of standard input. If no process can be forked, the answer is empty."""
-    told, descriptors, _, _ = socket.recv_fds(control, 1, 1)
+    message, descriptors, _, _ = socket.recv_fds(control, 1, 1)
     for descriptor in descriptors:
         with socket.socket(fileno=descriptor) as connection, suppress(OSError):
             if os.fork() == 0:
                 _child(connection)
-    return bool(told)
+    return bool(message)
 
 
 def _warm() -> None:
     """Reads a shipped case, so that each fork has what the first case makes (validators, materials)."""
     none = Limits(slots=1 << 20, elements=None, steps=None, memory=None, core_seconds=None, wall_time=None)
-    told = read(Question(body=shipped_path(_SHIPPED).read_bytes(), json=False, limits=none))
-    assert told.reading is not None, told
+    answer = read(Question(body=shipped_path(_SHIPPED).read_bytes(), json=False, limits=none))
+    assert answer.reading is not None, answer
 
 
 def _child(connection: socket.socket) -> None:

@@ -187,18 +187,18 @@ def _hashed(total: "hashlib._Hash", part: Part, offset: int) -> int:
 def span_of(request: Request) -> Span:
     """Returns the range of bytes of a PUT from its headers. Raises ServiceError 400, 411, 415."""
     check_encoding(request)
-    length, told = request.headers.get("content-length", ""), request.headers.get("content-range")
+    length, content_range = request.headers.get("content-length", ""), request.headers.get("content-range")
     if not length.isdecimal():
         raise ServiceError(411, "length_required", "a file is sent with its Content-Length", pointer="Content-Length")
-    if told is None:
+    if content_range is None:
         return Span(0, int(length), int(length), anew=True)
-    match = _RANGE.fullmatch(told)
+    match = _RANGE.fullmatch(content_range)
     if match is None:
-        detail = f"Content-Range {told[:80]!r}: write bytes FIRST-LAST/SIZE"
+        detail = f"Content-Range {content_range[:80]!r}: write bytes FIRST-LAST/SIZE"
         raise ServiceError(400, "bad_range", detail, pointer="Content-Range")
     total = int(match[3])
     first, end = (total, total) if match[1] is None else (int(match[1]), int(match[2]) + 1)
     if not first <= end <= total or end - first != int(length):
-        detail = f"Content-Range {told[:80]!r} does not fit Content-Length {int(length)}"
+        detail = f"Content-Range {content_range[:80]!r} does not fit Content-Length {int(length)}"
         raise ServiceError(400, "bad_range", detail, pointer="Content-Range")
     return Span(first, end, total)

@@ -85,8 +85,8 @@ class Desk:
             return reading
         try:
             with apart(self._settings.runs, reading.files, source) as place:
-                told = _surveyed(reading, place, {} if surveys is None else surveys)
-                return self._reader.read(structs.replace(question, survey=told, folder=str(place)))
+                survey = _surveyed(reading, place, {} if surveys is None else surveys)
+                return self._reader.read(structs.replace(question, survey=survey, folder=str(place)))
         except CaseError as error:
             raise WrongCaseError(error.problems, reading.files) from None
 

@@ -29,7 +29,7 @@ def surveyed(case: Mapping[str, object], folder: Path) -> bytes:
     ended = bounded.run(survey.PROGRAM, BOUNDS, question=survey.question(dict(case), folder), folder=folder)
     with suppress(ValueError, msgspec.MsgspecError):
         if ended.code == 0:
-            survey.from_json(ended.told)
-            return ended.told
+            survey.from_json(ended.output)
+            return ended.output
     _log.warning("the files of a case have not been read: %s", ended.why)
     return b""

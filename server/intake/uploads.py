@@ -116,7 +116,7 @@ class Uploads:
                 with suppress(FileNotFoundError):
                     status = os.stat(path, follow_symlinks=False)
                     _want(path, status)
-                    return _told(path.name, status)
+                    return _upload_of(path.name, status)
         return None
 
     def _paths(self, owner: str, sha256: str) -> list[Path]:
@@ -146,20 +146,22 @@ class Uploads:
         rules, there = self._rules, self.of(owner)
         hint = f"a file that no run has goes {rules.age} after it was last asked for, or with DELETE /v1/files/SHA256"
         if total > rules.size:
-            told = f"the file has {size(total)}; this server allows {size(rules.size)}"
-            raise ServiceError(413, "too_large", told)
+            message = f"the file has {size(total)}; this server allows {size(rules.size)}"
+            raise ServiceError(413, "too_large", message)
         if len(there) >= rules.number:
             raise later(
                 "file_quota", f"you have sent {len(there)} files; this server keeps {rules.number} of a user", hint
             )
         sent = sum(each.size for each in there)
         if sent + total > rules.bytes:
-            told = f"the file has {size(total)}, and your files {size(sent)}; this server allows {size(rules.bytes)}"
-            raise later("file_quota", told, hint)
+            message = f"the file has {size(total)}, and your files {size(sent)}; this server allows {size(rules.bytes)}"
+            raise later("file_quota", message, hint)
         left = self.left(owner)
         if left is not None and total > left:
-            told = f"the file has {size(total)}, and you may have {size(max(0, left))} more on disk: remove some runs"
-            raise later("output_quota", told)
+            message = (
+                f"the file has {size(total)}, and you may have {size(max(0, left))} more on disk: remove some runs"
+            )
+            raise later("output_quota", message)
 
     def _check_disk(self, more: int) -> None:
         free = shutil.disk_usage(self._runs).free - more
@@ -262,11 +264,11 @@ def _want(path: Path, status: os.stat_result) -> None:
 def _sent(entry: "os.DirEntry[str]") -> Upload | None:
     """Returns the upload of a path; None for other files and for a file that has been removed."""
     with suppress(FileNotFoundError):
-        return _told(entry.name, entry.stat(follow_symlinks=False))
+        return _upload_of(entry.name, entry.stat(follow_symlinks=False))
     return None
 
 
-def _told(name: str, status: os.stat_result) -> Upload | None:
+def _upload_of(name: str, status: os.stat_result) -> Upload | None:
     sha256, _, rest = name.partition(".")
     if not HASH.fullmatch(sha256) or (rest and _size_of(name) is None):
         return None

@@ -36,15 +36,15 @@ class Ended:
     """Output of a program that has ended, and its exit code. A code below 0 is minus the number of the signal that
     ended the program."""
 
-    told: bytes
-    said: str
+    output: bytes
+    errors: str
     """Text of the standard error output. If the time limit was exceeded, it is the message about this."""
     code: int
 
     @property
     def why(self) -> str:
         """Last line of the standard error output."""
-        return next(iter(self.said.strip().splitlines()[-1:]), f"code {self.code}")
+        return next(iter(self.errors.strip().splitlines()[-1:]), f"code {self.code}")
 
 
 def run(
@@ -63,8 +63,8 @@ def run(
         stdin=pipe, stdout=pipe, stderr=pipe, env=env, cwd=folder, start_new_session=True,
     ) as child:  # fmt: skip
         try:
-            told, said = child.communicate(question, timeout=bounds.wall)
+            output, errors = child.communicate(question, timeout=bounds.wall)
         except subprocess.TimeoutExpired:
             os.killpg(child.pid, signal.SIGKILL)
-            told, said = b"", f"not ready after {bounds.wall} s".encode()
-    return Ended(told, said.decode("utf-8", "replace"), child.returncode)
+            output, errors = b"", f"not ready after {bounds.wall} s".encode()
+    return Ended(output, errors.decode("utf-8", "replace"), child.returncode)

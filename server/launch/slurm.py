@@ -80,10 +80,10 @@ class SlurmLauncher:
 
     def _write_access(self, job: Job) -> None:
         assert job.telemetry is not None
-        told = job.telemetry
+        telemetry = job.telemetry
         access = batch.Access(
-            endpoint=self._site.router or told.endpoint, prefix=told.prefix, user=told.user, password=told.password,
-            authority=self._site.authority,
+            endpoint=self._site.router or telemetry.endpoint, prefix=telemetry.prefix, user=telemetry.user,
+            password=telemetry.password, authority=self._site.authority,
         )  # fmt: skip
         whole.write(job.folder / layout.ACCESS, batch.to_json(access), 0o600)
 

@@ -51,7 +51,7 @@ class SlurmWorker:
         self.group, self.since = group, time.monotonic()
         self._entry: Entry | None = None
         self._exit: Exit | None = None
-        self._stop, self._kill, self._told = (folder / layout.STOP_REQUEST).exists(), False, ""
+        self._stop, self._kill, self._notified = (folder / layout.STOP_REQUEST).exists(), False, ""
         self._missing, self._ended, self._away, self._why = 0, 0.0, 0.0, ""
         self._released = 0
         self._later, self._pause, self._not_before = "", _POLITE, 0.0
@@ -164,9 +164,9 @@ class SlurmWorker:
             self._launch_again(entry)
         elif self._kill:
             slurm.kill(self._site.bin, entry.job)
-        elif self._stop and self._told != entry.state:
+        elif self._stop and self._notified != entry.state:
             slurm.notify(self._site.bin, entry)
-            self._told = entry.state
+            self._notified = entry.state
 
     def _launch_again(self, entry: Entry) -> None:
         """Releases a job that Slurm holds after a failed start on a node."""
@@ -289,5 +289,5 @@ class SlurmWorker:
         job, attempt = self._job, self._job.attempt + 1
         fresh = batch.new_job(job.run, job.ranks, profile, job.command, time.time(), attempt, job.bin, job.threads)
         whole.write(self._folder / layout.JOB, batch.to_json(fresh))
-        self._job, self._entry, self._ended, self._missing, self._told = fresh, None, 0.0, 0, ""
+        self._job, self._entry, self._ended, self._missing, self._notified = fresh, None, 0.0, 0, ""
         self._released = 0

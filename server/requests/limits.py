@@ -146,8 +146,8 @@ def _cores(case: Case, settings: Limits) -> Iterator[Problem]:
     if run.ranks > slots:
         yield Problem("run.ranks", str(run.ranks), f"this server has {slots} slots; allowed: 1 to {slots}")
     elif run.cores > slots:
-        told = f"{crew(run.ranks, run.threads)} take {run.cores} slots, and this server has {slots}"
-        yield Problem("run.threads", str(run.threads), f"{told}; allowed: 1 to {slots // run.ranks}")
+        message = f"{crew(run.ranks, run.threads)} take {run.cores} slots, and this server has {slots}"
+        yield Problem("run.threads", str(run.threads), f"{message}; allowed: 1 to {slots // run.ranks}")
 
 
 def _files(case: Case) -> Iterator[Problem]:

@@ -42,11 +42,11 @@ async def validate(
         return {"valid": False, "problems": problems, "files": [to_builtins(file) for file in files]}
     odd = [entry(doubt) for doubt in reading.doubts]
     case = json.loads(reading.case)
-    told = {"survey": json.loads(reading.survey)} if reading.survey else {}
+    survey = {"survey": json.loads(reading.survey)} if reading.survey else {}
     files = [to_builtins(file) for file in reading.files]
     return {
         "valid": True, "problems": [], "warnings": odd, "estimate": reading.estimate, "case": case, "files": files,
-        **told,
+        **survey,
     }  # fmt: skip
 
 

@@ -47,18 +47,18 @@ async def content(
     """Returns one snapshot in the form of docs/reference/snapshots.md. The ETag of a snapshot is its sha256; a snapshot
     never changes.
     """
-    told = await service.pool.run(_told, service, run, n)
-    return await _sent(request, service, run, told.path, told.bytes, told.sha256, if_none_match)
+    announced = await service.pool.run(_announced, service, run, n)
+    return await _sent(request, service, run, announced.path, announced.bytes, announced.sha256, if_none_match)
 
 
 @router.get("/v1/runs/{run_id}/snapshots/{n}/tets", responses=_BYTES, response_class=Response)
 async def tets(request: Request, run: OwnedRun, service: ServiceOf, n: Number, if_none_match: Known = "") -> Response:
     """Returns all tets of a snapshot for sections, compressed by gzip; 404 if it has none."""
-    told = await service.pool.run(_told, service, run, n)
-    if not told.tets:
+    announced = await service.pool.run(_announced, service, run, n)
+    if not announced.tets:
         raise not_found(f"the tets of snapshot {n} of run {run.id}")
-    path = str(Path(told.path).with_suffix(layout.TETS_SUFFIX))
-    return await _sent(request, service, run, path, told.tets, f"{told.sha256}-tets", if_none_match)
+    path = str(Path(announced.path).with_suffix(layout.TETS_SUFFIX))
+    return await _sent(request, service, run, path, announced.tets, f"{announced.sha256}-tets", if_none_match)
 
 
 @router.get("/v1/runs/{run_id}/fragments/{label}")
@@ -71,8 +71,8 @@ def fragment(run: OwnedRun, service: ServiceOf, label: Label, if_none_match: Kno
     found = service.histories.of(folder / layout.JOURNAL)
     with found.lock:
         found.catch_up()
-        told = [_decode(found.snapshots[n]) for n in sorted(found.snapshots)]
-    return download.tagged(msgspec.json.encode(fragment_history.course(folder, told, label)), if_none_match)
+        announced = [_decode(found.snapshots[n]) for n in sorted(found.snapshots)]
+    return download.tagged(msgspec.json.encode(fragment_history.course(folder, announced, label)), if_none_match)
 
 
 async def _sent(
@@ -85,7 +85,7 @@ async def _sent(
     return await service.downloads.whole(request, service.settings.runs / run.id, path, size, headers, _TYPE)
 
 
-def _told(service: Service, run: Run, n: int) -> Snapshot:
+def _announced(service: Service, run: Run, n: int) -> Snapshot:
     """Returns the message of the journal about a snapshot. Raises ServiceError 404."""
     found = service.histories.of(service.settings.runs / run.id / layout.JOURNAL)
     with found.lock:

@@ -60,7 +60,7 @@ class EarlierRuns:
     def _take_up(self, path: Path, known_of: Callable[[], Run | None]) -> None:
         """Reads a run. Writes the database only if its state is older than the state in the folder, so that a
         thousand unchanged runs cause no writes."""
-        told = self._failed.pop(path, "")
+        reason = self._failed.pop(path, "")
         try:
             known = known_of()
             left = recovery.look(path, known, self._launcher)
@@ -68,7 +68,7 @@ class EarlierRuns:
                 self._index.add(left.run, left.key, pins.labels(path))
         except (OSError, ValueError, SQLAlchemyError) as error:
             self._failed[path] = words(error)
-            if told != words(error):
+            if reason != words(error):
                 _log.error("run %s cannot be taken up: %s", path.name, words(error))
             return
         self._found(left)

@@ -21,13 +21,13 @@ _TYPE = slice(9, 13)
 """The bytes of a journal line before the type of its message."""
 
 
-class _Said(msgspec.Struct):
+class _LastLine(msgspec.Struct):
     """The field of a message that contains its time."""
 
     wall: float
 
 
-_said = msgspec.json.Decoder(_Said)
+_decoder = msgspec.json.Decoder(_LastLine)
 
 
 def when(path: Path) -> float:
@@ -35,7 +35,7 @@ def when(path: Path) -> float:
     journal, or of its outcome if there is no journal; 0 if neither can be read.
     """
     try:
-        return _said.decode(journal.last(path / layout.JOURNAL)).wall or _written(path)
+        return _decoder.decode(journal.last(path / layout.JOURNAL)).wall or _written(path)
     except (*folder.DAMAGED, msgspec.MsgspecError):
         return _written(path)
 
@@ -50,16 +50,16 @@ def _written(path: Path) -> float:
 def so_far(outcome: Outcome, run: Run, path: Path) -> Outcome:
     """Returns ``outcome`` with the last step, time and energies of the journal in ``path``, if the journal has a
     step."""
-    started, told, counts = _newest(path / layout.JOURNAL)
+    started, progress, counts = _newest(path / layout.JOURNAL)
     if started is None:
         return outcome
     known: dict[str, Any] = {
         "elements": started.elements, "nodes_initial": started.nodes, "setup": started.setup,
         "elapsed": max(0.0, run.finished - run.started) if run.started else math.nan,
     }  # fmt: skip
-    if told is not None:
-        known |= {"steps": told.step, "time": told.t, "energy": told.energy}
-        known |= {"worst_residual": told.worst_residual} if told.worst_residual is not None else {}
+    if progress is not None:
+        known |= {"steps": progress.step, "time": progress.t, "energy": progress.energy}
+        known |= {"worst_residual": progress.worst_residual} if progress.worst_residual is not None else {}
     if counts is not None:
         gone = started.elements - counts.elements
         known |= {"nodes": counts.nodes, "eroded": gone, "fragments": counts.fragments, "broken": counts.facets}

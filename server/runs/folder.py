@@ -207,15 +207,15 @@ def first(made: Submission) -> Run:
     )  # fmt: skip
 
 
-def replay(accepted: Run, told: Iterable[Status]) -> Run:
+def replay(accepted: Run, statuses: Iterable[Status]) -> Run:
     """Returns the run with the changes in the Status lines of its journal."""
-    return reduce(_after, told, accepted)
+    return reduce(_after, statuses, accepted)
 
 
-def _after(told: Run, status: Status) -> Run:
+def _after(run: Run, status: Status) -> Run:
     state, cause = State(status.state), Cause(status.cause) if status.cause else None
-    after = replace(told, state=state, cause=cause, message=status.message)
-    if state in {State.QUEUED, State.STARTING} and state is not told.state:
+    after = replace(run, state=state, cause=cause, message=status.message)
+    if state in {State.QUEUED, State.STARTING} and state is not run.state:
         return replace(after, started=status.wall if state is State.STARTING else 0.0)
     return replace(after, finished=status.wall) if state.final else after
 

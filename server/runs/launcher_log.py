@@ -42,14 +42,14 @@ def last_words(folder: Path, log: Path | None = None) -> str:
     MPI; empty without such a line.
     """
     text = _tail(folder, log).decode(errors="replace")
-    said = [line.strip() for line in text.partition("=====")[0].splitlines() if not line.startswith(_ABORTS)]
-    return next((line[:_LAST_WORDS] for line in reversed(said) if line), "")
+    lines = [line.strip() for line in text.partition("=====")[0].splitlines() if not line.startswith(_ABORTS)]
+    return next((line[:_LAST_WORDS] for line in reversed(lines) if line), "")
 
 
 def disk_failed(folder: Path) -> bool:
     """Whether a rank reported an error of its disk, or the disk of the log itself has no space for such a report."""
-    said = _tail(folder)
-    if any(words in said for words in _COMPLAINTS):
+    text = _tail(folder)
+    if any(words in text for words in _COMPLAINTS):
         return True
     try:
         disk = os.statvfs(folder)

@@ -132,10 +132,10 @@ def _stop(run: Run, why: Cause) -> Next:
 
 
 def _exited(run: Run, event: WorkerExited, now: float) -> Next:
-    told = event.outcome if event.outcome is not None and _readable(event.outcome) else None
-    outcome = told or _without_outcome(run, event)
-    said = event.reading[1] if event.reading is not None and run.stopping_for is None else None
-    asked = Cause.CANCELLED in {run.stopping_for, said}
+    readable = event.outcome if event.outcome is not None and _readable(event.outcome) else None
+    outcome = readable or _without_outcome(run, event)
+    cause = event.reading[1] if event.reading is not None and run.stopping_for is None else None
+    asked = Cause.CANCELLED in {run.stopping_for, cause}
     if outcome.state == State.CANCELLED and not asked:
         outcome = _renamed(run, event, outcome)
     return _end(run, _at(run, event, now), outcome, written=outcome is event.outcome)
@@ -171,8 +171,8 @@ def _without_outcome(run: Run, event: WorkerExited) -> Outcome:
     """Returns the final state of a worker without an outcome. The exit code suggests a cause, but never proves
     success."""
     state, cause, message = _reading_of(run, event)
-    said = f"; {event.traces}" if event.traces else ""
-    return Outcome(state=state, cause=cause, message=f"{message}{said}", ranks=run.ranks, threads=run.threads)
+    traces = f"; {event.traces}" if event.traces else ""
+    return Outcome(state=state, cause=cause, message=f"{message}{traces}", ranks=run.ranks, threads=run.threads)
 
 
 def _reading_of(run: Run, event: WorkerExited) -> tuple[State, Cause, str]:

@@ -15,15 +15,15 @@ _PINNED, _YES, _NO = ".keep", "yes", "no"
 
 def pinned(folder: Path) -> bool:
     """Whether the run is kept permanently: by the last request, else by its label ``keep``."""
-    if said := told(folder):
-        return said == _YES
+    if request := last_request(folder):
+        return request == _YES
     try:
         return submission(folder).labels.get("keep", _NO) != _NO
     except (OSError, msgspec.MsgspecError):
         return False
 
 
-def told(folder: Path) -> str:
+def last_request(folder: Path) -> str:
     """Returns the last request to keep the run, ``yes`` or ``no``; empty without a request."""
     try:
         return whole.read(folder / _PINNED, 80).decode()
@@ -39,8 +39,8 @@ def labels(folder: Path) -> dict[str, str]:
         made = submission(folder).labels
     except (OSError, msgspec.MsgspecError):
         return {}
-    said = told(folder)
-    return {**made, "keep": said} if said else made
+    request = last_request(folder)
+    return {**made, "keep": request} if request else made
 
 
 def pin(folder: Path, keep: bool) -> None:

@@ -37,9 +37,9 @@ def look(path: Path, known: Run | None, launcher: Launcher) -> Left:
     if made is None and known is None:
         raise ValueError(f"{layout.SUBMISSION} cannot be read, and the database does not know the run")
     accepted = folder.first(made) if made is not None else _as_accepted(known)
-    told = _told(path)
+    statuses = _statuses(path)
     trace = launcher.find(accepted.id, path)
-    run = _mended(folder.replay(accepted, told), bool(told), known, path, trace, launcher.queues)
+    run = _mended(folder.replay(accepted, statuses), bool(statuses), known, path, trace, launcher.queues)
     code, full = launcher_log.exit_code(path), launcher_log.disk_failed(path)
     found = Found(_fate(path, trace), _outcome(path), trace.rebooted, code, full, ends.when(path))
     return Left(
@@ -62,7 +62,7 @@ def _outcome(path: Path) -> Outcome | None:
         return None
 
 
-def _told(path: Path) -> list[Status]:
+def _statuses(path: Path) -> list[Status]:
     """Returns the Status messages of the journal; none if the journal cannot be read."""
     try:
         return journal.statuses(path / layout.JOURNAL)

@@ -98,9 +98,9 @@ def _why(source: Path) -> str:
     ended = outcome(source)
     if ended is not None and ended.state == State.SUCCEEDED:
         return "one that has succeeded keeps none"
-    said = "it began no step" if ended is not None and not ended.steps else "it has written none"
+    reason = "it began no step" if ended is not None and not ended.steps else "it has written none"
     every = f"run.checkpoint_every ({_every(source)} in its case)"
-    return f"{said}; one is written every {every}, and when 'conoid checkpoint' asks for one"
+    return f"{reason}; one is written every {every}, and when 'conoid checkpoint' asks for one"
 
 
 def _every(source: Path) -> str:

@@ -34,8 +34,8 @@ def passing(error: BaseException) -> bool:
 
 def words(error: BaseException) -> str:
     """Returns the error in one line."""
-    said = error.strerror if isinstance(error, OSError) else str(error)
-    return (said or type(error).__name__).splitlines()[0]
+    reason = error.strerror if isinstance(error, OSError) else str(error)
+    return (reason or type(error).__name__).splitlines()[0]
 
 
 @dataclass(frozen=True)

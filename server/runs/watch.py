@@ -61,12 +61,12 @@ class Watch:
         if self._read(now):
             yield WorkerRuns()
         if exit_ is not None:
-            told = folder.outcome(self._folder)
+            outcome = folder.outcome(self._folder)
             code = launcher_log.exit_code(self._folder) if exit_.code is None else exit_.code
-            self._full = told is None and (self._full or launcher_log.disk_failed(self._folder))
+            self._full = outcome is None and (self._full or launcher_log.disk_failed(self._folder))
             traces = self._traces(exit_.last_words)
-            at = ends.when(self._folder) if unseen or told is not None else 0.0
-            yield WorkerExited(code, told, exit_.out_of_memory, self._full, traces, exit_.reading, at)
+            at = ends.when(self._folder) if unseen or outcome is not None else 0.0
+            yield WorkerExited(code, outcome, exit_.out_of_memory, self._full, traces, exit_.reading, at)
         elif now >= self._kill_at:
             self._kill_at = now + 1.0
             self.worker.kill()

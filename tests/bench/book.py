@@ -60,7 +60,7 @@ def shipped_cases(quick: bool) -> dict[str, Any]:
     with LocalServer(OUT / "runs", CORES) as server:
         folders = {key: shipped()[key.partition("|")[0]].parent for key in chosen}
         runs = {key: server.session.submit(data[key], folder=folders[key]) for key in chosen}
-        return {"left": left, "runs": {key: _told(key, run) for key, run in runs.items()}}
+        return {"left": left, "runs": {key: _plain(key, run) for key, run in runs.items()}}
 
 
 def _costs(name: str, coarse: Sequence[str]) -> dict[str, dict[str, Any]]:
@@ -81,7 +81,7 @@ def _seconds(case: Case) -> float:
     return estimate(case).core_seconds or 0.0
 
 
-def _told(key: str, run: Run) -> Any:
+def _plain(key: str, run: Run) -> Any:
     info = run.wait()
     print(f"{key}: {info.state.value}", flush=True)
     outcome = info.outcome

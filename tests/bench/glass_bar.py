@@ -97,10 +97,10 @@ def read(size: str, folder: Path) -> Bar:
 
 
 def _work(folder: Path) -> list[tuple[float, int, float]]:
-    told = [messages.from_json(line) for line in (folder / layout.JOURNAL).read_bytes().splitlines()]
+    journal = [messages.from_json(line) for line in (folder / layout.JOURNAL).read_bytes().splitlines()]
     return [
         (load.t, load.steps, sum(sum(phase) for phase in load.phases.values()) - sum(load.waiting))
-        for load in told if isinstance(load, messages.Load)
+        for load in journal if isinstance(load, messages.Load)
     ]  # fmt: skip
 
 

@@ -177,7 +177,7 @@ OTHERS = (
 )  # fmt: skip
 SHOWN = (RANDOM[0], RANDOM[3], OTHERS[4], LATTICES[0], LATTICES[1], LATTICES[3])
 """Plans whose cracks are drawn."""
-_SAID = {"split=5": "5 tets a cell", "shear_weight": "shear counts a tenth", "contact": "sides do not meet"}
+_SHOWN = {"split=5": "5 tets a cell", "shear_weight": "shear counts a tenth", "contact": "sides do not meet"}
 """Names of assignments in the table."""
 _DIGITS = (1, 1, 1, 1, 1, 2, 2)
 _HEAD = ("breaks, us", "opens, us", "angle, deg", "to 20 mm", "reach, mm", "c / c_R", "within 10 deg")
@@ -191,9 +191,9 @@ def measure(plans: Iterable[Plan]) -> Iterator[Path]:
 
 def name(some: Plan) -> str:
     """Returns the name in tables."""
-    said = [text for key, text in _SAID.items() if any(key in word for word in some.words)]
+    variants = [text for key, text in _SHOWN.items() if any(key in word for word in some.words)]
     rough = some.kind == "gmsh" or not some.straight
-    return ", ".join([some.name, *said, *(["rough slit"] if rough else [])])
+    return ", ".join([some.name, *variants, *(["rough slit"] if rough else [])])
 
 
 def report(paths: Sequence[Path]) -> str:

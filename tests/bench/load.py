@@ -201,13 +201,13 @@ def watch(url: str, token: str, run: str, kind: str, seconds: float) -> None:
     """Runs half of the clients: prints when all of them follow, then the delay of each message, s."""
     late: list[float] = []
     with Session(url, token) as session:
-        told = session.run(run).status()
+        info = session.run(run).status()
         last = session.get(dict[str, Any], f"/v1/runs/{run}/history")["last"]
         follow = _by_zenoh if kind == "zenoh" else _by_sse
         ready = threading.Barrier(WATCHERS // 2 + 1)
         threads = [
             threading.Thread(
-                target=follow, args=(Session(url, token), told.id, last, seconds, late, ready), daemon=True
+                target=follow, args=(Session(url, token), info.id, last, seconds, late, ready), daemon=True
             )
             for _ in range(WATCHERS // 2)
         ]
@@ -256,7 +256,7 @@ def _growth(seen: Seen) -> str:
     return f"in the end {slope * 60 / 1e6:+.2f} MB a minute"
 
 
-def told(seen: Seen) -> str:
+def tables(seen: Seen) -> str:
     """Returns the tables."""
     every = [value for values in seen.answers.values() for value in values]
     streams = [value for values in seen.stream.values() for value in values]
@@ -286,4 +286,4 @@ if __name__ == "__main__":
     if sys.argv[1:2] == ["watch"]:
         watch(sys.argv[2], sys.argv[3], sys.argv[4], sys.argv[5], float(sys.argv[6]))
     else:
-        print(told(measure(float(sys.argv[1]) if len(sys.argv) > 1 else 60.0)))
+        print(tables(measure(float(sys.argv[1]) if len(sys.argv) > 1 else 60.0)))

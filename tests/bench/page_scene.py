@@ -88,11 +88,11 @@ def lay(folder: Path, made_of: Path, events: int, triangles: int, ranks: int = 2
     place.parent.mkdir()
     place.write_bytes(blob(0, triangles, _END))
     with (folder / layout.JOURNAL).open("wb", 1 << 20) as file:
-        for seq, message in enumerate(_told(folder.name, events, place, ranks), 1):
+        for seq, message in enumerate(_journal(folder.name, events, place, ranks), 1):
             file.write(messages.to_json(message).replace(b'"seq":0', b'"seq":%d' % seq, 1) + b"\n")
 
 
-def _told(run: str, events: int, snapshot: Path, ranks: int) -> Iterator[messages.AnyMessage]:
+def _journal(run: str, events: int, snapshot: Path, ranks: int) -> Iterator[messages.AnyMessage]:
     for state in (State.ACCEPTED, State.QUEUED, State.STARTING, State.RUNNING):
         yield messages.Status(run=run, wall=1000.0, state=state)
     steps = events // 3

@@ -51,18 +51,18 @@ def measure(options: argparse.Namespace, folder: Path) -> tuple[Pairs, float]:
         subprocess.run(command, cwd=_ROOT, check=False)
     marks = [json.loads((folder / f"{_MARKS}.{rank}").read_text()) for rank in range(options.ranks)]
     blocks = _blocks(marks, options.pairs, options.steps)
-    told = [k for k, block in enumerate(blocks) if block.told]
-    within = sum(rank[k + 1][3] - rank[k][3] for rank in marks for k in told)
-    return Pairs("snapshots", blocks), within / (options.steps * sum(blocks[k].cpu for k in told))
+    switched_on = [k for k, block in enumerate(blocks) if block.live]
+    within = sum(rank[k + 1][3] - rank[k][3] for rank in marks for k in switched_on)
+    return Pairs("snapshots", blocks), within / (options.steps * sum(blocks[k].cpu for k in switched_on))
 
 
 def _blocks(marks: list[list[list[float]]], pairs: int, steps: int) -> list[Block]:
     """Returns CPU times of solver and other threads, wall time, and time within the calls, from the marks of each
     rank at the ends of the blocks."""
     blocks = []
-    for k, told in zip(range(min(map(len, marks)) - 1), switch.turns(pairs), strict=False):
+    for k, live in zip(range(min(map(len, marks)) - 1), switch.turns(pairs), strict=False):
         spent = [[(b - a) / steps for a, b in zip(rank[k], rank[k + 1], strict=True)] for rank in marks]
-        blocks.append(Block(told, sum(s[0] for s in spent), sum(s[1] for s in spent), spent[0][2]))
+        blocks.append(Block(live, sum(s[0] for s in spent), sum(s[1] for s in spent), spent[0][2]))
     return blocks[: len(blocks) // 2 * 2]
 
 
@@ -160,7 +160,7 @@ def main() -> None:
         ended = from_json((folder / layout.OUTCOME).read_bytes())
     for what in ("cpu", "wall"):
         middle, low, high = pairs.ratio(what)
-        with_, without = (1e3 * pairs.median(told, what) for told in (True, False))
+        with_, without = (1e3 * pairs.median(live, what) for live in (True, False))
         print(
             f"{what}: {with_:.3f} ms a step with, {without:.3f} without, ratio {middle:.4f} ({low:.4f} to {high:.4f})"
         )

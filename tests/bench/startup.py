@@ -59,9 +59,9 @@ def measure(rounds: int = 3, ranks: int = 2) -> Startup:
         cold = _phases(cache)
         warm = [_phases(cache) for _ in range(rounds)]
         shutil.rmtree(Path(folder) / "kernels")
-        cold_ranks, said = _launch(ranks, {**cache, "NUMBA_DEBUG_CACHE": "1"})
+        cold_ranks, output = _launch(ranks, {**cache, "NUMBA_DEBUG_CACHE": "1"})
         warm_ranks = statistics.median(_launch(ranks, cache)[0] for _ in range(rounds))
-        count = Counter((int(rank), what) for rank, what in _CACHED.findall(said))
+        count = Counter((int(rank), what) for rank, what in _CACHED.findall(output))
         ahead = sum(1 for _ in Path(folder).rglob("*.nbc"))
         submitted = _submitted(rounds, ranks, cache)
     return Startup(

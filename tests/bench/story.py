@@ -79,7 +79,7 @@ class Story:
         self._write_history()
         snapshot = self._write_snapshot()
         with (self.path / layout.JOURNAL).open("ab") as file:
-            for seq, message in enumerate(self._told(snapshot), 2):
+            for seq, message in enumerate(self._journal(snapshot), 2):
                 file.write(messages.to_json(message).replace(b'"seq":0', b'"seq":%d' % seq, 1) + b"\n")
         (self.path / layout.OUTCOME).write_bytes(outcome.to_json(self._outcome()))
 
@@ -108,7 +108,7 @@ class Story:
     def _wall(self, n: int) -> float:
         return self.began + self.seconds * n / _POINTS
 
-    def _told(self, snapshot: messages.Snapshot) -> Iterator[messages.AnyMessage]:
+    def _journal(self, snapshot: messages.Snapshot) -> Iterator[messages.AnyMessage]:
         for state in (State.QUEUED, State.STARTING, State.RUNNING):
             yield messages.Status(run=self.run, wall=self.began, state=state)
         for n in range(1, self.last + 1):

@@ -34,7 +34,7 @@ class Block:
     """Time per step between two Progress messages, s: CPU time of the solver thread, CPU time of all other threads,
     wall time."""
 
-    told: bool
+    live: bool
     cpu: float
     beside: float
     wall: float
@@ -47,15 +47,15 @@ class Pairs:
     way: str
     blocks: list[Block]
 
-    def median(self, told: bool, what: str) -> float:
+    def median(self, live: bool, what: str) -> float:
         """Returns the times per step of the blocks with or without telemetry, s."""
-        return float(statistics.median(getattr(block, what) for block in self.blocks if block.told is told))
+        return float(statistics.median(getattr(block, what) for block in self.blocks if block.live is live))
 
     def ratio(self, what: str) -> tuple[float, float, float]:
         """Returns the ratio of each pair of blocks, with over without telemetry: the median, and its 95 % interval
         (sign test)."""
         pairs = zip(self.blocks[::2], self.blocks[1::2], strict=True)
-        ratios = sorted((getattr(a, what) / getattr(b, what)) ** (1 if a.told else -1) for a, b in pairs)
+        ratios = sorted((getattr(a, what) / getattr(b, what)) ** (1 if a.live else -1) for a, b in pairs)
         n = len(ratios)
         low = max(0, math.floor(n / 2 - _HALF_WIDTH * math.sqrt(n)))
         return statistics.median(ratios), ratios[low], ratios[n - 1 - low]
@@ -79,14 +79,14 @@ class Switch:
         self._ready = ready
         self._end = end
         self._warm = _WARM
-        self._told = True
+        self._live = True
         self._mark = (0.0, 0.0, 0.0, 0)
 
     def tell(self, message: messages.AnyMessage, blob: bytes = b"") -> None:
         """Handles a message from the solver."""
         if isinstance(message, messages.Progress):
             self._next_block(message.step)
-        if self._told:
+        if self._live:
             self._telemetry.tell(message, blob)
 
     def _next_block(self, step: int) -> None:
@@ -97,13 +97,13 @@ class Switch:
         else:
             self._note(step)
         turn = True if self._warm else next(self._turns, None)
-        self._told, self._end.raised = bool(turn), turn is None
+        self._live, self._end.raised = bool(turn), turn is None
         self._mark = _now(step)
 
     def _note(self, step: int) -> None:
         cpu, process, wall, steps = (new - old for new, old in zip(_now(step), self._mark, strict=True))
         if not self._end.raised:
-            self.blocks.append(Block(self._told, cpu / steps, (process - cpu) / steps, wall / steps))
+            self.blocks.append(Block(self._live, cpu / steps, (process - cpu) / steps, wall / steps))
 
 
 def _now(step: int) -> tuple[float, float, float, int]:
@@ -115,7 +115,7 @@ def turns(pairs: int, seed: int = 1) -> list[bool]:
     coin = random.Random(seed)
     firsts = [True, False] * ((pairs + 1) // 2)
     coin.shuffle(firsts)
-    return [told for first in firsts[:pairs] for told in (first, not first)]
+    return [live for first in firsts[:pairs] for live in (first, not first)]
 
 
 def measure(way: str, endpoint: str, prefix: str, pairs: int, ready: Callable[[], None]) -> Pairs:

@@ -51,10 +51,10 @@ class Recorder:
         """Seconds of waiting, as in ``Comm``."""
         return self._comm.waited
 
-    def note(self, told: Any) -> Any:
+    def note(self, data: Any) -> Any:
         """Records received data, and returns it."""
-        pickle.dump(told, self._file)
-        return told
+        pickle.dump(data, self._file)
+        return data
 
     def begin_maximum(self, words: Ints, result: Ints) -> Pending:
         """Same as in ``Comm``. If ranks share cores, reports are further apart in time, so that the number of steps
@@ -126,7 +126,7 @@ class Player:
         if self._clock is not None:
             self.calls.append(Call(self._clock() - self._last, **parts))
 
-    def told(self) -> Any:
+    def next_data(self) -> Any:
         """Returns the next data of the tape, at the end of a call."""
         item = pickle.load(self._file)
         if self._clock is not None:
@@ -160,18 +160,18 @@ class Player:
         """Same as in ``Comm``."""
         began = len(self.calls)
         self.note(enters=True, leaves=1, size=8 * self.size)
-        told: dict[int, Ints] = self.told()
+        received: dict[int, Ints] = self.next_data()
         for call in self.calls[began:]:
             call.sends = [(rank, int(Tag.SWAP), words.nbytes) for rank, words in sends.items() if words.size]
-            call.receives = [(rank, int(Tag.SWAP)) for rank in told]
-        return told
+            call.receives = [(rank, int(Tag.SWAP)) for rank in received]
+        return received
 
     def trade(self, sends: dict[int, Ints], sources: Iterable[int]) -> dict[int, Ints]:
         """Same as in ``Comm``."""
         out = [(rank, int(Tag.TRADE), words.nbytes) for rank, words in sends.items()]
         self.note(sends=out, receives=[(rank, int(Tag.TRADE)) for rank in sources])
-        told: dict[int, Ints] = self.told()
-        return told
+        received: dict[int, Ints] = self.next_data()
+        return received
 
     def __getattr__(self, name: str) -> Any:
         """Any other method of the communicator: one collective, or two."""
@@ -180,10 +180,10 @@ class Player:
     def _collective(self, many: int) -> Any:
         began = len(self.calls)
         self.note(enters=True, leaves=many)
-        told = self.told()
+        received = self.next_data()
         for call in self.calls[began:]:
-            call.size = told.nbytes if isinstance(told, np.ndarray) else 0
-        return told
+            call.size = received.nbytes if isinstance(received, np.ndarray) else 0
+        return received
 
 
 class _Played:
@@ -202,8 +202,8 @@ class _Played:
     def finish(self) -> None:
         """Same as in ``Exchange``."""
         self._comm.note(**self._awaited)
-        for words, told in zip(self._results, self._comm.told(), strict=True):
-            words[...] = told
+        for words, received in zip(self._results, self._comm.next_data(), strict=True):
+            words[...] = received
         self._comm.posted()
 
     def free(self) -> None:

@@ -138,12 +138,12 @@ def report(costs: Sequence[Pairs], answers: dict[str, str]) -> str:
     ]  # fmt: skip
     pairs = len(costs[0].blocks) // 2
     how = f"{pairs} pairs of blocks each way; medians, in brackets where that of all pairs lies at 95 % (sign test)."
-    said = ", ".join(f"{way} {digest[:12]}" for way, digest in answers.items())
-    return f"{table(head, rows)}\n\n{how}\n\nDigest of a short Taylor bar: {said}."
+    digests = ", ".join(f"{way} {digest[:12]}" for way, digest in answers.items())
+    return f"{table(head, rows)}\n\n{how}\n\nDigest of a short Taylor bar: {digests}."
 
 
 def _medians(cost: Pairs, what: str) -> list[str]:
-    return [f"{1e6 * cost.median(told, what):.2f}" for told in (True, False)]
+    return [f"{1e6 * cost.median(live, what):.2f}" for live in (True, False)]
 
 
 def _change(cost: Pairs, what: str) -> str:

@@ -105,7 +105,7 @@ def test_the_switch_finds_what_telling_costs(cost: float) -> None:
         step += 10
     assert ready.call_count == 1
     pairs = switch.Pairs("live", listener.blocks)
-    assert [block.told for block in pairs.blocks] == switch.turns(20)
+    assert [block.live for block in pairs.blocks] == switch.turns(20)
     middle, low, high = pairs.ratio("cpu")
     assert low <= middle <= high
     assert middle == pytest.approx(1.0 + cost / 5e-3, abs=0.05)

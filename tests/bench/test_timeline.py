@@ -41,13 +41,13 @@ def test_calls_that_do_not_belong_together_are_told() -> None:
 
 
 def test_a_rank_alone_is_told_what_it_was_told_and_counts_from_the_first_step_on(tmp_path: Path) -> None:
-    told = [5, {1: b"", 3: b""}, [1, 2]]
-    tape(tmp_path, 0).write_bytes(b"".join(map(pickle.dumps, told)))
+    sent = [5, {1: b"", 3: b""}, [1, 2]]
+    tape(tmp_path, 0).write_bytes(b"".join(map(pickle.dumps, sent)))
     player = Player(tmp_path, 0, 4)
     assert player.broadcast(None) == 5
     player.sent.since_last()
-    assert player.swap({}) == told[1]
-    assert player.share(None) == told[2]
+    assert player.swap({}) == sent[1]
+    assert player.share(None) == sent[2]
     player.close()
     assert [(call.enters, call.leaves, call.receives) for call in player.calls] == [
         (True, 1, [(1, Tag.SWAP), (3, Tag.SWAP)]), (True, 2, []),

@@ -69,7 +69,7 @@ def main(words: Sequence[str]) -> int:
             short |= not _made(SCENES[name], trial, options.folder / name, deadline)
     except KeyboardInterrupt:
         short = True
-    ended = [_told(name, options.folder / name, layouts) for name in names]
+    ended = [_ended(name, options.folder / name, layouts) for name in names]
     return 1 if not all(ended) else 3 if short else 0
 
 
@@ -111,7 +111,7 @@ def _succeeded(place: Path) -> bool:
     return ended.is_file() and from_json(ended.read_bytes()).state == State.SUCCEEDED
 
 
-def _told(name: str, folder: Path, layouts: Sequence[Layout]) -> bool:
+def _ended(name: str, folder: Path, layouts: Sequence[Layout]) -> bool:
     """Prints the tables of the finished runs of a scene; returns whether their digests are equal."""
     scene = SCENES[name]
     there = [trial for trial in trials(layouts, CORES) if _succeeded(folder / trial.folder)]

@@ -29,9 +29,9 @@ def pulled(parts: str) -> tuple[np.ndarray, Simulation, float, float]:
     at the end its energy residual and the fraction of the external work that the bond has taken.
     """
     sim = built(start(8e-6) + parts + PULL + SYMMETRY + PROBE)
-    told = list[tuple[float, float]]()
-    end = run(sim, lambda: told.append((sim.clock.t, sim.probes.measure()[0])))
-    return np.array(told), sim, end.residual, abs(end.fracture) / end.external
+    record = list[tuple[float, float]]()
+    end = run(sim, lambda: record.append((sim.clock.t, sim.probes.measure()[0])))
+    return np.array(record), sim, end.residual, abs(end.fracture) / end.external
 
 
 @pytest.fixture(scope="module")
@@ -39,21 +39,21 @@ def whole() -> np.ndarray:
     return pulled(block("below", (0, 0, -20), (4, 4, 20), 1))[0]
 
 
-def plateau(told: np.ndarray) -> float:
-    return float(told[told[:, 0] > 5.5e-6, 1].mean())
+def plateau(record: np.ndarray) -> float:
+    return float(record[record[:, 0] > 5.5e-6, 1].mean())
 
 
-def arrival(told: np.ndarray) -> float:
+def arrival(record: np.ndarray) -> float:
     """Returns the time at which half of the traction arrives, s."""
-    k = int(np.argmax(told[:, 1] > 50e6))
-    return float(np.interp(50e6, told[k - 1 : k + 1, 1], told[k - 1 : k + 1, 0]))
+    k = int(np.argmax(record[:, 1] > 50e6))
+    return float(np.interp(50e6, record[k - 1 : k + 1, 1], record[k - 1 : k + 1, 0]))
 
 
 def test_a_bar_of_two_like_meshes_is_one_bar(whole: np.ndarray) -> None:
-    told, _, residual, taken = pulled(
+    record, _, residual, taken = pulled(
         block("below", (0, 0, -20), (4, 4, 0), 1) + block("above", (0, 0, 0), (4, 4, 20), 1) + BOND
     )
-    np.testing.assert_allclose(told[:, 1], whole[:, 1], rtol=0.0, atol=100.0)  # 1e-6 of the traction
+    np.testing.assert_allclose(record[:, 1], whole[:, 1], rtol=0.0, atol=100.0)  # 1e-6 of the traction
     assert residual < 1e-5
     assert taken < 1e-9
 
@@ -61,9 +61,9 @@ def test_a_bar_of_two_like_meshes_is_one_bar(whole: np.ndarray) -> None:
 @pytest.mark.parametrize(("below", "above"), [(1.0, 0.77), (0.77, 1.0), (1.0, 0.5)])
 def test_a_wave_passes_meshes_that_do_not_match(below: float, above: float, whole: np.ndarray) -> None:
     parts = block("below", (0, 0, -20), (4, 4, 0), below) + block("above", (0, 0, 0), (4, 4, 20), above)
-    told, sim, residual, taken = pulled(parts + BOND)
-    assert plateau(told) == pytest.approx(plateau(whole), rel=0.01)
-    assert arrival(told) == pytest.approx(arrival(whole), rel=0.01)
+    record, sim, residual, taken = pulled(parts + BOND)
+    assert plateau(record) == pytest.approx(plateau(whole), rel=0.01)
+    assert arrival(record) == pytest.approx(arrival(whole), rel=0.01)
     assert residual < 1e-5
     assert taken < 1e-9
     assert sim.ledger.momentum[2] == pytest.approx(100e6 * 16e-6 * sim.clock.t, rel=1e-12)
@@ -73,15 +73,15 @@ def test_a_spinning_joint_keeps_its_momenta() -> None:
     motion = "velocity = [3, 4, 50]\nspin = { centre = [0, 0, 0], rate = [900, 0, 5000] }"
     parts = [block("below", (0, 0, -4), (4, 4, 0), 2, motion), block("above", (1, 1, 0), (5, 4, 4), 1.3, motion)]
     sim = built(start(30e-6, 0.3) + "[contact]\n" + "".join(parts) + BOND)
-    told: list[np.ndarray] = []
+    momenta: list[np.ndarray] = []
 
     def look() -> None:
         if sim.clock.step % 20 == 1:
             sim.ledger.close(sim.model.nodes.v)
-            told.append(np.concatenate([sim.ledger.momentum, sim.ledger.angular_momentum]))
+            momenta.append(np.concatenate([sim.ledger.momentum, sim.ledger.angular_momentum]))
 
     end = run(sim, look)
-    linear, angular = np.split(np.array(told), 2, axis=1)
+    linear, angular = np.split(np.array(momenta), 2, axis=1)
     assert np.abs(linear - linear[0]).max() < 1e-14 * np.abs(linear[0]).max()
     assert np.abs(angular - angular[0]).max() < 1e-9 * np.abs(angular[0]).max()
     assert abs(end.fracture) < 1e-9 * end.kinetic

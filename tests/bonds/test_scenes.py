@@ -40,10 +40,10 @@ def test_an_interface_that_has_eroded_ties_nothing() -> None:
     assert abs(energy.residual) < 1e-3
 
 
-@pytest.mark.parametrize(("velocity", "told"), [("velocity = [0, 0, 3]", 1), ("", 0)])
-def test_bonded_parts_of_two_velocities_are_reported(velocity: str, told: int) -> None:
+@pytest.mark.parametrize(("velocity", "warned"), [("velocity = [0, 0, 3]", 1), ("", 0)])
+def test_bonded_parts_of_two_velocities_are_reported(velocity: str, warned: int) -> None:
     found = assemble(load.parse_toml(joint(below=velocity)), Path()).warnings
-    assert sum("'below' and 'above' start at two velocities where they are tied, up to 3" in w for w in found) == told
+    assert sum("'below' and 'above' start at two velocities where they are tied, up to 3" in w for w in found) == warned
 
 
 @pytest.mark.parametrize("third", ["shared", "tied", ""])

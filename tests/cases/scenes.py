@@ -61,6 +61,6 @@ def problems(*overrides: str) -> list[Problem]:
     return list(caught.value.problems)
 
 
-def said(*overrides: str) -> dict[str, str]:
+def messages(*overrides: str) -> dict[str, str]:
     """Returns the problems of the rod with changes, by key."""
     return {problem.key: problem.message for problem in problems(*overrides)}

@@ -21,7 +21,7 @@ def joint(bond: dict[str, Any], *overrides: str) -> dict[str, Any]:
     return apply_overrides(data, overrides)
 
 
-def said(bond: dict[str, Any], *overrides: str) -> list[str]:
+def problems_of(bond: dict[str, Any], *overrides: str) -> list[str]:
     with pytest.raises(CaseError) as caught:
         parse_case(joint(bond, *overrides))
     return str(caught.value).splitlines()
@@ -65,7 +65,7 @@ def test_a_bond_has_one_strength_and_one_energy_in_both_modes_by_default() -> No
     ],
 )  # fmt: skip
 def test_a_slip_is_one_line(bond: dict[str, Any], overrides: list[str], line: str) -> None:
-    found = said(bond, *overrides)
+    found = problems_of(bond, *overrides)
     assert len(found) == 1
     assert found[0].startswith(line)
 

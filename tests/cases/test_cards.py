@@ -74,7 +74,7 @@ def test_a_card_says_the_same_in_every_format(tmp_path: Path, keyword: str, card
 
 
 @pytest.mark.parametrize(
-    ("text", "told"),
+    ("text", "message"),
     [
         ("", "line 1: the file has no keyword"),
         ("1 2 3\n*NODE\n", "line 1: '1 2 3' stands before the first keyword"),
@@ -102,13 +102,13 @@ def test_a_card_says_the_same_in_every_format(tmp_path: Path, keyword: str, card
         ("*INCLUDE\n", "line 1: *INCLUDE names no file"),
     ],
 )
-def test_what_cannot_be_followed_is_refused_with_its_line(tmp_path: Path, text: str, told: str) -> None:
+def test_what_cannot_be_followed_is_refused_with_its_line(tmp_path: Path, text: str, message: str) -> None:
     folder = tmp_path / "below"
     folder.mkdir()
     (tmp_path / "other.k").write_text("*NODE\n")
     (folder / "outer.k").symlink_to(tmp_path / "other.k")
     os.mkfifo(folder / "pipe.k")
-    assert refusal(folder, text).startswith(told)
+    assert refusal(folder, text).startswith(message)
 
 
 def test_included_files_are_read_where_they_are_named(tmp_path: Path) -> None:

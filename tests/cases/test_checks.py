@@ -4,7 +4,7 @@ import pytest
 
 from conoid.cases.load import parse_case
 
-from .scenes import problems, rod, said
+from .scenes import messages, problems, rod
 
 BOX = 'parts[0].mesh={shape="box", low=[0, 0, 0], high=["1 mm", "1 mm", "9 mm"], element_size="0.5 mm"}'
 SLIT = BOX[:-1] + ', generator="structured", slit={axis="z", at="3 mm", low=[0, 0], high=["0.5 mm", "1 mm"]}}'
@@ -117,7 +117,7 @@ def test_the_rod_is_sound() -> None:
     ],
 )  # fmt: skip
 def test_a_fault_is_named(overrides: list[str], key: str, message: str) -> None:
-    found = said(*overrides)
+    found = messages(*overrides)
     assert list(found) == [key]
     assert message in found[key]
 
@@ -125,7 +125,7 @@ def test_a_fault_is_named(overrides: list[str], key: str, message: str) -> None:
 def test_what_flies_at_a_symmetry_plane_need_not_lie_on_it() -> None:
     """The rod moves down: towards a plane below it, and away from a plane above it."""
     parse_case(rod("boundaries[0]={kind='symmetry', axis='z', at='-1 mm'}"))
-    assert "boundaries[0].at" in said("boundaries[0]={kind='symmetry', axis='z', at='40 mm'}")
+    assert "boundaries[0].at" in messages("boundaries[0]={kind='symmetry', axis='z', at='40 mm'}")
 
 
 def test_names_are_unique() -> None:
@@ -157,10 +157,10 @@ def _toml(value: object) -> str:
 
 
 def test_a_reference_needs_the_keys_of_its_quantity() -> None:
-    assert said("reference[0]={quantity='probe_max', value=1, tolerance=1, source='s'}") == {
+    assert messages("reference[0]={quantity='probe_max', value=1, tolerance=1, source='s'}") == {
         "reference[0].probe": "this key is missing; 'probe_max' needs 'probe'"
     }
-    assert said("reference[0]={quantity='radius', value=1, tolerance=1, source='s'}") == {
+    assert messages("reference[0]={quantity='radius', value=1, tolerance=1, source='s'}") == {
         "reference[0].axis": "this key is missing; 'radius' needs 'axis', 'part'",
         "reference[0].part": "this key is missing; 'radius' needs 'axis', 'part'",
     }
@@ -169,7 +169,7 @@ def test_a_reference_needs_the_keys_of_its_quantity() -> None:
 def test_contact_time_needs_a_wall_or_contact() -> None:
     contact = "reference[0]={quantity='contact_time', value='1 us', tolerance='1 us', source='s'}"
     parse_case(rod(contact))
-    found = said(contact, "boundaries[0]={kind='symmetry', axis='z'}")
+    found = messages(contact, "boundaries[0]={kind='symmetry', axis='z'}")
     assert found == {"reference[0].quantity": "needs a boundary with kind = 'wall', or contact"}
 
 
@@ -185,25 +185,27 @@ def test_contact_time_needs_a_wall_or_contact() -> None:
 def test_a_body_touches_the_wall_and_no_more(mesh: str, lowest: float) -> None:
     at = [f"parts[0].mesh={mesh}", f"boundaries[0].point=[0, 0, {lowest}]", "probes=[]"]
     parse_case(rod(*at))
-    assert "behind this wall" in said(*at, f"boundaries[0].point[2]={lowest + 1e-6}")["boundaries[0]"]
+    assert "behind this wall" in messages(*at, f"boundaries[0].point[2]={lowest + 1e-6}")["boundaries[0]"]
 
 
 def test_an_oblique_wall_meets_a_cylinder_at_its_rim() -> None:
     at = ["boundaries[0].normal=[0, 1, 1]", "boundaries[0].point=[0, '-3 mm', 0]"]
     parse_case(rod(*at))
-    assert "behind this wall" in said(*at, "boundaries[0].point[1]=-2.99 mm")["boundaries[0]"]
+    assert "behind this wall" in messages(*at, "boundaries[0].point[1]=-2.99 mm")["boundaries[0]"]
 
 
 def test_a_mesh_file_is_a_path() -> None:
     file = 'parts[0].mesh={shape="file", unit="1 mm", path="rod.msh"}'
     parse_case(rod(file))
     for path in ("https://example.org/rod.msh", " "):
-        assert said(file, f"parts[0].mesh.path='{path}'") == {"parts[0].mesh.path": "expected the path of a mesh file"}
+        assert messages(file, f"parts[0].mesh.path='{path}'") == {
+            "parts[0].mesh.path": "expected the path of a mesh file"
+        }
 
 
 def test_melting_lies_above_the_reference_temperature() -> None:
     law = "{model='johnson_cook', A=1, B=1, n=1, C=0, m=1, melt_temperature=200, specific_heat=1}"
-    found = said("materials.m={density=1, elastic={young=1, poisson=0}, strength=" + law + "}")
+    found = messages("materials.m={density=1, elastic={young=1, poisson=0}, strength=" + law + "}")
     assert found == {"materials.m.strength.melt_temperature": "must be above 293.15 K, the reference"}
 
 
@@ -212,7 +214,7 @@ def test_what_would_break_in_tension_before_it_strains_is_refused() -> None:
     law = "{{model='johnson_cook', A=1, B=1, n=1, C=0, m=1, melt_temperature=2000, specific_heat=1, damage={}}}"
     steel = "materials.m={{density=1, elastic={{young=1, poisson=0}}, strength={}}}"
     parse_case(rod(steel.format(law.format("{D1=-2.2, D2=5.43, D3=-0.47}"))))
-    found = said(steel.format(law.format("{D1=-2.2, D2=1.0, D3=-0.47}")))
+    found = messages(steel.format(law.format("{D1=-2.2, D2=1.0, D3=-0.47}")))
     assert found == {
         "materials.m.strength.damage.D1": "a tensile test would break at a plastic strain of -1.35, D1 + D2 e^(D3/3)"
     }
@@ -235,7 +237,7 @@ def test_what_would_break_in_tension_before_it_strains_is_refused() -> None:
 )  # fmt: skip
 def test_brittle_strength(law: str, key: str, message: str) -> None:
     strength = f"{{model='mohr_coulomb', cohesion=10, {law}}}"
-    found = said(f"materials.m={{density=1, elastic={{young=1, poisson=0}}, strength={strength}}}")
+    found = messages(f"materials.m={{density=1, elastic={{young=1, poisson=0}}, strength={strength}}}")
     assert list(found) == [f"materials.m.strength.{key}"]
     assert message in found[f"materials.m.strength.{key}"]
 
@@ -243,7 +245,7 @@ def test_brittle_strength(law: str, key: str, message: str) -> None:
 def test_what_dilates_has_the_linear_pressure() -> None:
     strength = "{model='mohr_coulomb', cohesion=10, friction_angle='20 deg', dilation_angle='5 deg'}"
     eos = "{model='mie_gruneisen', c0=1, S=1, gamma0=1}"
-    found = said(f"materials.m={{density=1, elastic={{young=1, poisson=0}}, strength={strength}, eos={eos}}}")
+    found = messages(f"materials.m={{density=1, elastic={{young=1, poisson=0}}, strength={strength}, eos={eos}}}")
     assert list(found) == ["materials.m.eos"]
     assert "linear pressure" in found["materials.m.eos"]
 
@@ -262,7 +264,7 @@ SPIN = "{kind='rotation', spin={centre=[0, 0, 0], rate=[0, 0, '1000 rad/s']}}"
     ],
 )
 def test_a_part_has_one_drive_along_an_axis(first: str, second: str, axes: str) -> None:
-    found = said(f"boundaries=[{first}, {second}]", "parts[0].mesh.sector=full")
+    found = messages(f"boundaries=[{first}, {second}]", "parts[0].mesh.sector=full")
     message = f"prescribes the velocity of part 'rod' along {axes}, which boundaries[0] prescribes differently"
     assert found == {"boundaries[1]": f"{message}; keep one of the two"}
 

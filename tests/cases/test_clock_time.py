@@ -38,10 +38,10 @@ def test_ranks_are_as_efficient_as_they_were_measured() -> None:
 
 
 def test_what_is_assumed_is_told_with_the_time() -> None:
-    def told(ranks: int, threads: int) -> str:
+    def note(ranks: int, threads: int) -> str:
         case, out = demo(ranks, threads), io.StringIO()
         Console(file=out, width=200).print(estimate_table(case, estimate(case)))
         return next(line for line in out.getvalue().splitlines() if line.startswith("clock time"))
 
-    assert "on 2 ranks x 4 threads; assumed: ranks 66 % efficient, threads share 8" in told(2, 4)
-    assert told(1, 1).rstrip().endswith("on 1 rank")
+    assert "on 2 ranks x 4 threads; assumed: ranks 66 % efficient, threads share 8" in note(2, 4)
+    assert note(1, 1).rstrip().endswith("on 1 rank")

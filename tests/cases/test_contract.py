@@ -61,12 +61,12 @@ def test_messages_travel_unchanged(message: messages.AnyMessage) -> None:
 
 
 def test_a_snapshot_travels_with_its_bytes_and_is_read_without() -> None:
-    told = next(example for example in EXAMPLES if isinstance(example, messages.Snapshot))
-    payload = messages.to_msgpack(messages.with_blob(told, b"CONOSNAP"))
-    assert messages.from_msgpack(payload) == told
+    snapshot = next(example for example in EXAMPLES if isinstance(example, messages.Snapshot))
+    payload = messages.to_msgpack(messages.with_blob(snapshot, b"CONOSNAP"))
+    assert messages.from_msgpack(payload) == snapshot
     both = messages.fragments_from_msgpack(payload)
     assert both.blob == b"CONOSNAP"
-    assert messages.without_blob(both) == told
+    assert messages.without_blob(both) == snapshot
 
 
 def test_a_reader_ignores_fields_of_later_versions() -> None:

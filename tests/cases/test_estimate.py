@@ -264,8 +264,8 @@ def test_memory_is_a_bound_that_is_not_far_off(name: str, whole: float | None, d
     expected = estimate(read_case(shipped_path(name)))
     assert expected.memory_bytes is not None
     assert (expected.dust_bytes > 0) == (dust is not None)
-    for measured, told in ((whole, expected.memory_bytes), (dust, expected.memory_bytes + expected.dust_bytes)):
-        assert measured is None or 1.0 <= told / measured < 1.3
+    for measured, estimated in ((whole, expected.memory_bytes), (dust, expected.memory_bytes + expected.dust_bytes)):
+        assert measured is None or 1.0 <= estimated / measured < 1.3
 
 
 def test_a_mesh_file_tells_its_tets_by_its_size_only(tmp_path: Path) -> None:

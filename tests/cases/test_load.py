@@ -26,7 +26,7 @@ from conoid.cases.load import (
 from conoid.cases.model.bodies import Cylinder
 from conoid.cases.model.materials import Strength
 
-from .scenes import ROD, problems, rod, said
+from .scenes import ROD, messages, problems, rod
 
 
 def test_reads_si() -> None:
@@ -53,7 +53,7 @@ def test_the_resolved_case_keeps_what_is_switched_off() -> None:
 
 
 def test_all_errors_at_once() -> None:
-    found = said(
+    found = messages(
         "parts[0].mesh.radus=1 mm",
         "parts[0].mesh.radius=3 s",
         "parts[0].mesh.sector=third",
@@ -110,13 +110,13 @@ def test_one_line_says_what_is_allowed(override: str, key: str, message: str) ->
 
 
 def test_a_material_is_read_through_its_model() -> None:
-    found = said("materials.foo.density=-1", "materials.foo.strength.model=jc", "materials.foo.elastic.youn=1 GPa")
+    found = messages("materials.foo.density=-1", "materials.foo.strength.model=jc", "materials.foo.elastic.youn=1 GPa")
     laws = [get_args(law.model_fields["model"].annotation)[0] for law in get_args(get_args(Strength)[0])]
     assert found["materials.foo.strength.model"] == f"allowed: {', '.join(map(repr, laws))}"
     assert found["materials.foo.elastic.youn"] == "unknown key; did you mean 'young'?"
     assert found["materials.foo.elastic.poisson"] == "this key is missing"
     assert found["materials.foo.density"] == "allowed: greater than 0"
-    found = said("materials.density.density=1", "materials.density.elasticity=1")
+    found = messages("materials.density.density=1", "materials.density.elasticity=1")
     assert found["materials.density.elasticity"] == "unknown key; did you mean 'elastic'?"
 
 
@@ -133,9 +133,9 @@ def test_a_reference_unit_follows_the_field_of_its_probe() -> None:
     probed = 'reference[0]={quantity="probe_mean", probe="middle", value="-2 GPa", tolerance="1 MPa", source="s"}'
     case = parse_case(rod(probed))
     assert (case.reference[0].value, case.reference[0].tolerance) == (-2e9, 1e6)
-    found = said(probed, "reference[0].value=2 m")
+    found = messages(probed, "reference[0].value=2 m")
     assert found == {"reference[0].value": "'2 m' has the wrong dimension; expected a stress, in a unit such as 'Pa'"}
-    found = said(probed, "reference[0].probe=midle")
+    found = messages(probed, "reference[0].probe=midle")
     assert "did you mean 'middle'?" in found["reference[0].value"]
     assert "did you mean 'middle'?" in found["reference[0].probe"]
 

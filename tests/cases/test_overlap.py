@@ -23,7 +23,7 @@ def scene(one: dict[str, Any], other: dict[str, Any], **more: Any) -> dict[str, 
     return {"name": "two", "run": {"end_time": "1 us"}, "parts": parts, **more}
 
 
-def told(data: dict[str, Any]) -> list[str]:
+def warned(data: dict[str, Any]) -> list[str]:
     """Returns the problems of overlap."""
     try:
         parse_case(data)
@@ -43,7 +43,7 @@ def told(data: dict[str, Any]) -> list[str]:
     ],
 )
 def test_bodies_that_overlap(one: dict[str, Any], other: dict[str, Any], depth: float) -> None:
-    (line,) = told(scene(one, other))
+    (line,) = warned(scene(one, other))
     assert line.startswith("parts[1].mesh: 'other' overlaps parts[0], 'one', by about ")
     assert float(line.split("about ")[1].split()[0]) == pytest.approx(depth, rel=0.1)
     assert line.endswith(" m or more; move them apart, or set contact.overlap = 'push'")
@@ -54,13 +54,13 @@ def test_tied_bodies_may_overlap_by_the_gap_of_their_bond() -> None:
     about contact."""
     upper = {**BLOCK, "low": [-5e-3, -5e-3, -5e-5], "high": [5e-3, 5e-3, 4e-3]}
     bond = {"parts": ["other", "one"], "kind": "tied"}
-    assert len(told(scene(BLOCK, upper))) == 1
-    assert told(scene(BLOCK, upper, bond=[bond])) == []
-    (line,) = told(scene(BLOCK, upper, bond=[{**bond, "gap": "0.01 mm"}]))
+    assert len(warned(scene(BLOCK, upper))) == 1
+    assert warned(scene(BLOCK, upper, bond=[bond])) == []
+    (line,) = warned(scene(BLOCK, upper, bond=[{**bond, "gap": "0.01 mm"}]))
     assert line.endswith(
         "by about 5e-05 m or more; the gap of their bond, 1e-05 m, is less; move them apart, or raise it"
     )
-    assert told({**scene(BLOCK, upper, bond=[bond, 3, {"parts": 7}]), "run": {}}) == []
+    assert warned({**scene(BLOCK, upper, bond=[bond, 3, {"parts": 7}]), "run": {}}) == []
     assert len(list(grazes(parse_case(scene(TUBE, ROD))))) == 1
     for kind in ("tied", "shared"):
         assert not list(grazes(parse_case(scene(TUBE, ROD, bond=[{**bond, "kind": kind}]))))
@@ -82,15 +82,15 @@ def test_tied_bodies_may_overlap_by_the_gap_of_their_bond() -> None:
 )
 def test_bodies_that_touch_or_are_cut_away_do_not(one: dict[str, Any], other: dict[str, Any]) -> None:
     """Facets of 1 mm may cut off 0.06 mm of the tube and of a rod that is 0.04 mm too wide: the worker decides."""
-    assert told(scene(one, other)) == []
+    assert warned(scene(one, other)) == []
 
 
 def test_turned_bodies_are_where_they_are_turned_to() -> None:
     far = {**BLOCK, "low": [6e-3, -1e-3, -4e-3], "high": [9e-3, 1e-3, 0]}
     data = scene(BLOCK, far)
-    assert told(data) == []
+    assert warned(data) == []
     data["parts"][1]["turn"] = {"axis": "z", "angle": "180 deg", "centre": [5e-3, 0, 0]}
-    assert len(told(data)) == 1
+    assert len(warned(data)) == 1
 
 
 @pytest.mark.parametrize("angle", [30, 45, 60, 90, 120, 150])
@@ -101,14 +101,14 @@ def test_turned_bodies_that_touch_do_not(angle: int) -> None:
     data = scene(block, {**block, "low": [2e-3, 0, 0], "high": [4e-3, 2e-3, 2e-3]})
     for part in data["parts"]:
         part["turn"] = turn
-    assert told(data) == []
+    assert warned(data) == []
     data["parts"][1]["mesh"]["low"] = [1.7e-3, 0, 0]
-    assert len(told(data)) == 1
+    assert len(warned(data)) == 1
 
 
 @pytest.mark.parametrize("contact", ["none", {"overlap": "push"}, {"parts": ["one"]}])
 def test_bodies_that_need_not_be_apart(contact: object) -> None:
-    assert told(scene(BLOCK, {**BALL, "centre": [0, 0, 0]}, contact=contact)) == []
+    assert warned(scene(BLOCK, {**BALL, "centre": [0, 0, 0]}, contact=contact)) == []
 
 
 def test_overlap_and_unknown_materials_are_told_with_everything_else() -> None:
@@ -138,7 +138,7 @@ def test_parts_that_are_none_are_told_once(parts: object) -> None:
 
 def test_what_is_told_here_the_worker_refuses_as_well() -> None:
     data = scene(BLOCK, {**BLOCK, "low": [4e-3, -3e-3, -3e-3], "high": [9e-3, 3e-3, -1e-3]})
-    assert told(data)
+    assert warned(data)
     pushed = parse_case({**data, "contact": {"overlap": "push"}})
     assert pushed.contact is not None
     refused = pushed.model_copy(update={"contact": pushed.contact.model_copy(update={"overlap": "refuse"})})
@@ -150,7 +150,7 @@ def test_many_bodies_cost_little_time() -> None:
     """Two hundred tubes are inside of each other: of 20,000 pairs only the first are tested."""
     shells = [{**TUBE, "inner_radius": 1e-3 * k + 1e-3, "radius": 1e-3 * k + 2e-3} for k in range(200)]
     parts = [{"name": f"shell_{k}", "material": "steel", "mesh": shell} for k, shell in enumerate(shells)]
-    assert told({"name": "shells", "run": {"end_time": "1 us"}, "parts": parts}) == []
+    assert warned({"name": "shells", "run": {"end_time": "1 us"}, "parts": parts}) == []
 
 
 @pytest.mark.parametrize(

@@ -38,7 +38,7 @@ element_size = "1 mm"
 """
 
 
-def told(data: dict[str, Any]) -> dict[str, str]:
+def warnings_of(data: dict[str, Any]) -> dict[str, str]:
     """Returns the warnings, by key."""
     case = parse_case(data)
     odd = doubts(data, case, estimate(case))
@@ -80,7 +80,7 @@ def test_a_shipped_case_raises_no_doubt_but_of_what_its_paper_leaves_out(name: s
 def test_a_material_of_the_library_raises_no_doubt(name: str) -> None:
     made = library()[name].model_dump(mode="json", exclude_none=True)
     data = {**rod("parts[0].material=own"), "materials": {"own": made}}
-    assert [key for key in told(data) if "taken for" not in told(data)[key]] == []
+    assert [key for key in warnings_of(data) if "taken for" not in warnings_of(data)[key]] == []
 
 
 @pytest.mark.parametrize(
@@ -120,13 +120,13 @@ def test_zero_and_what_has_no_unit_may_be_bare(override: str) -> None:
     assert bare_numbers(rod(override)) == []
 
 
-@pytest.mark.parametrize(("time", "told"), [("2 us", []), (2e-6, ["boundaries[3].course[1]"])])
-def test_the_factor_of_a_course_has_no_unit(time: object, told: list[str]) -> None:
+@pytest.mark.parametrize(("time", "warnings"), [("2 us", []), (2e-6, ["boundaries[3].course[1]"])])
+def test_the_factor_of_a_course_has_no_unit(time: object, warnings: list[str]) -> None:
     course = [["0 us", 0], [time, 1], ["3 us", 0.5]]
     driven = {"kind": "velocity", "parts": ["bar"], "x": "1 m/s", "course": course}
     data = rod()
     data["boundaries"] = [*data["boundaries"], driven]
-    assert [each.key for each in bare_numbers(data)] == told
+    assert [each.key for each in bare_numbers(data)] == warnings
 
 
 def test_a_case_in_si_is_told_once_a_key() -> None:
@@ -138,7 +138,7 @@ def test_a_case_in_si_is_told_once_a_key() -> None:
 
 
 def test_a_sound_scene_raises_no_doubt() -> None:
-    assert told(target()) == {}
+    assert warnings_of(target()) == {}
 
 
 @pytest.mark.parametrize(
@@ -158,7 +158,7 @@ def test_a_sound_scene_raises_no_doubt() -> None:
     ],
 )  # fmt: skip
 def test_what_is_odd(changes: dict[str, Any], key: str, message: str) -> None:
-    found = told(target(**changes))
+    found = warnings_of(target(**changes))
     assert message in found[key], found
 
 
@@ -173,7 +173,7 @@ def test_what_is_odd(changes: dict[str, Any], key: str, message: str) -> None:
     ],
 )
 def test_an_initial_velocity_that_a_boundary_replaces_is_reported(drive: dict[str, Any], message: str | None) -> None:
-    found = told(target() | {"boundaries": [{"kind": "velocity", "parts": ["ball"], **drive}]})
+    found = warnings_of(target() | {"boundaries": [{"kind": "velocity", "parts": ["ball"], **drive}]})
     assert (message is not None) == ("parts[0].velocity[2]" in found)
     assert message is None or found["parts[0].velocity[2]"].endswith(message)
 
@@ -183,12 +183,12 @@ def test_what_others_may_send_on_its_way_is_not_odd() -> None:
     ball, but not if it is a metre away.
     """
     data = target(ball={"velocity": [0, 0, "5 m/s"]})
-    assert "'ball' meets nothing at all" in told(data)["parts[0].velocity"]
+    assert "'ball' meets nothing at all" in warnings_of(data)["parts[0].velocity"]
     beside = {**data["parts"][0], "name": "beside", "velocity": [0, 0, "-900 m/s"]}
     data["parts"].append({**beside, "mesh": {**beside["mesh"], "centre": ["7 mm", 0, "3 mm"]}})
-    assert "parts[0].velocity" not in told(data)
+    assert "parts[0].velocity" not in warnings_of(data)
     data["parts"][0] = {**data["parts"][0], "mesh": {**data["parts"][0]["mesh"], "centre": [0, 0, "1 m"]}}
-    assert "'ball' meets nothing at all" in told(data)["parts[0].velocity"]
+    assert "'ball' meets nothing at all" in warnings_of(data)["parts[0].velocity"]
 
 
 EOS = {"model": "mie_gruneisen", "c0": "4600 m/s", "S": 1.49, "gamma0": 2}
@@ -203,7 +203,7 @@ def test_an_impact_that_a_linear_pressure_misses_is_told(speed: float, more: dic
     of the speed."""
     own = {"density": "7850 kg/m^3", "elastic": {"young": "200 GPa", "poisson": 0.3}} | more
     motion = {"material": "own", "velocity": [0, 0, f"-{speed} m/s"]}
-    found = told({**target(ball=motion, plate={"material": "own"}), "materials": {"own": own}})
+    found = warnings_of({**target(ball=motion, plate={"material": "own"}), "materials": {"own": own}})
     assert list(found) == ([] if low is None else ["parts[0].material"])
     assert low is None or f"without eos: linear pressure is some {low} below" in found["parts[0].material"]
 
@@ -225,7 +225,7 @@ BELOW = {"low": ["-1 m", "-1 m", "-5 mm"], "high": ["1 m", "1 m", "-5 mm"]}
 
 
 def warned(*boundaries: dict[str, Any]) -> dict[str, str]:
-    return told({**target(), "boundaries": list(boundaries)})
+    return warnings_of({**target(), "boundaries": list(boundaries)})
 
 
 @pytest.mark.parametrize(
@@ -304,7 +304,7 @@ def test_two_driven_bodies_that_pass_through_each_other_are_told() -> None:
 )  # fmt: skip
 def test_constants_of_no_solid(material: dict[str, Any], key: str, message: str) -> None:
     steel = {"density": "7850 kg/m^3", "elastic": {"young": "200 GPa", "poisson": 0.3}}
-    found = told({**target(ball={"material": "own"}), "materials": {"own": steel | material}})
+    found = warnings_of({**target(ball={"material": "own"}), "materials": {"own": steel | material}})
     assert message in found[f"materials.own.{key}"], found
 
 
@@ -361,11 +361,11 @@ def test_velocity_is_that_of_the_worker() -> None:
 def test_a_plane_of_symmetry_through_a_body_is_told() -> None:
     """A plane on the surface of the body, or outside of it, gives no warning."""
     plane = {"kind": "symmetry", "axis": "x"}
-    assert told({**target(), "boundaries": [{**plane, "at": "1 mm", "parts": ["plate"]}]}) == {
+    assert warnings_of({**target(), "boundaries": [{**plane, "at": "1 mm", "parts": ["plate"]}]}) == {
         "boundaries[0].at": "'0.001 m': goes through part 'plate', which lies between -0.01 and 0.01 m: each side "
         "is in contact with its own mirror image; model one side"
     }
-    assert told({**target(), "boundaries": [{**plane, "at": "10 mm", "parts": ["plate"]}]}) == {}
+    assert warnings_of({**target(), "boundaries": [{**plane, "at": "10 mm", "parts": ["plate"]}]}) == {}
 
 
 @pytest.mark.parametrize(("side", "warned"), [(0.0, True), (0.3, True), (1.0, False)])
@@ -373,7 +373,7 @@ def test_the_box_of_a_probe_that_has_no_room_for_a_tet_is_told(side: float, warn
     """A tet of 1 mm has a volume of some 0.12 mm^3."""
     box = {"low": [0, 0, "-3 mm"], "high": [f"{side} mm", f"{side} mm", f"{side - 3.0} mm"]}
     probe = {"name": "p", "part": "plate", "field": "pressure", **box}
-    odd = told({**target(), "probes": [probe]})
+    odd = warnings_of({**target(), "probes": [probe]})
     assert list(odd) == (["probes[0]"] if warned else [])
     assert all("where it holds no centre of one the run does not start" in each for each in odd.values())
 
@@ -392,4 +392,4 @@ def test_the_form_split_is_named_where_a_part_may_stay_elastic(changes: dict[str
     data = target() | {"numerics": changes["numerics"]}
     for part in data["parts"]:
         part["material"] = changes.get("material", part["material"])
-    assert ("numerics.pressure" in told(data)) == named
+    assert ("numerics.pressure" in warnings_of(data)) == named

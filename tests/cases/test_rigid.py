@@ -110,14 +110,14 @@ def test_a_rigid_part_costs_no_tets_and_no_steps_before_a_run() -> None:
 def test_a_stiff_part_could_be_rigid() -> None:
     """Steel on rubber gives a suggestion; steel on steel and rigid parts give none."""
 
-    def told(*overrides: str) -> list[str]:
+    def warned(*overrides: str) -> list[str]:
         case = parse_case(scene(*overrides))
         return [str(each) for each in oddities(case, estimate(case)) if "rigid = true" in str(each)]
 
-    (line,) = told("parts[0].rigid=false")
+    (line,) = warned("parts[0].rigid=false")
     assert line.startswith("parts[0].rigid: is 318 times as stiff against waves as all that 'ball' meets")
-    assert told() == []
-    assert told("parts[0].rigid=false", "parts[1].material=steel") == []
+    assert warned() == []
+    assert warned("parts[0].rigid=false", "parts[1].material=steel") == []
 
 
 def test_a_part_that_stayed_elastic_could_have_been_rigid() -> None:

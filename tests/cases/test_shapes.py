@@ -129,7 +129,7 @@ def test_half_and_quarter_are_shares_of_the_whole(name: str) -> None:
 
 
 @pytest.mark.parametrize(
-    ("name", "change", "said"),
+    ("name", "change", "message"),
     [
         ("tangent", {"crh": None}, "crh: needs at least one of crh and nose"),
         ("tangent", {"crh": None, "nose": 0.4}, "nose = 0.4: must not be below the radius, 0.5 m"),
@@ -154,10 +154,10 @@ def test_half_and_quarter_are_shares_of_the_whole(name: str) -> None:
         ("ring", {"angle": "1e-6 deg"}, "element_size = 0.1: must not be above the smallest extent"),
     ],
 )
-def test_sizes_that_do_not_fit_are_refused_in_one_line(name: str, change: dict[str, Any], said: str) -> None:
+def test_sizes_that_do_not_fit_are_refused_in_one_line(name: str, change: dict[str, Any], message: str) -> None:
     with pytest.raises(CaseError) as refused:
         parse_case(scene(**{"element_size": 0.1, **SHAPES[name], **change}))
-    assert str(refused.value).startswith(f"parts[0].mesh.{said}")
+    assert str(refused.value).startswith(f"parts[0].mesh.{message}")
     assert "\n" not in str(refused.value)
 
 

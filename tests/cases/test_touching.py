@@ -42,9 +42,9 @@ def test_parts_that_touch_and_do_not_meet_are_a_doubt() -> None:
     pair = PLATE, above(PLATE, 5.0)
     for contact, doubtful in (("none", True), ({}, False), ({"parts": ["part0"]}, True)):
         made = case(*pair, contact=contact)
-        said = [each.message for each in apart(made, touching(made))]
+        warned = [each.message for each in apart(made, touching(made))]
         assert (
-            said
+            warned
             == [
                 "'part0' and 'part1' touch over about 400 mm^2 without contact or bond: they can pass through each "
                 "other; a [[bond]] joins parts"

@@ -44,7 +44,7 @@ def test_reads(text: str | float, unit: str, value: float) -> None:
 
 
 @pytest.mark.parametrize(
-    ("text", "unit", "said"),
+    ("text", "unit", "message"),
     [
         ("3 s", "m", "expected a length, in a unit such as 'm'"),
         ("3 mm", "Pa", "expected a stress"),
@@ -70,10 +70,10 @@ def test_reads(text: str | float, unit: str, value: float) -> None:
         ("1 m2", "m", "cannot read the unit"),
     ],
 )
-def test_refuses(text: object, unit: str, said: str) -> None:
+def test_refuses(text: object, unit: str, message: str) -> None:
     with pytest.raises(ValueError, match=r"^[^\n]*$") as caught:
         parse_quantity(text, unit)
-    assert said in str(caught.value)
+    assert message in str(caught.value)
 
 
 @pytest.mark.parametrize(

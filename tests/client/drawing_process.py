@@ -17,7 +17,7 @@ _LOOP = """
 import sys
 from conoid.client.drawing import render
 for line in sys.stdin.buffer:
-    code, answer = render.told(line)
+    code, answer = render.answer(line)
     print(f"{code}{answer}", flush=True)
 """
 
@@ -36,8 +36,8 @@ def studio() -> Iterator[Callable[[Picture], Ended]]:
         talk.write(msgspec.json.encode(picture) + b"\n")
         talk.flush()
         line = listen.readline()
-        code, told = int(line[:1]), line[1:]
-        return code, told, told.decode() if code else ""
+        code, text = int(line[:1]), line[1:]
+        return code, text, text.decode() if code else ""
 
     with child:
         yield draw

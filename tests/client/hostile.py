@@ -29,7 +29,7 @@ def head(status: int, length: int | None, kind: str = "application/json", more: 
     return f"HTTP/1.1 {status} X\r\nContent-Type: {kind}\r\n{size}{more}Connection: close\r\n\r\n".encode()
 
 
-def said(data: Any, status: int = 200, kind: str = "application/json") -> Answer:
+def answering(data: Any, status: int = 200, kind: str = "application/json") -> Answer:
     """Returns a complete answer; plain data is sent as JSON."""
     body = data if isinstance(data, bytes) else json.dumps(data).encode()
     return lambda: [head(status, len(body), kind), body]
@@ -37,10 +37,10 @@ def said(data: Any, status: int = 200, kind: str = "application/json") -> Answer
 
 def run_info(**changes: Any) -> dict[str, Any]:
     """Returns the status of a run as a server sends it."""
-    told: dict[str, Any] = {
+    fields: dict[str, Any] = {
         "id": "a", "owner": "ann", "name": "bar", "state": "running", "ranks": 2, "submitted": 1.7e9, "started": 1.7e9,
     }  # fmt: skip
-    return {**told, **changes}
+    return {**fields, **changes}
 
 
 class Hostile(socketserver.ThreadingTCPServer):
@@ -67,7 +67,7 @@ class _Handler(socketserver.BaseRequestHandler):
             asked = _head_of(self.request).split(b" ")
             path = asked[1].decode() if len(asked) > 1 else ""
             self.server.asked.append(path)
-            answer = self.server.answers.get(path.partition("?")[0], said({"detail": "there is none"}, 404))
+            answer = self.server.answers.get(path.partition("?")[0], answering({"detail": "there is none"}, 404))
             for piece in answer():
                 self.request.sendall(piece)
 

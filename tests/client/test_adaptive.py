@@ -49,7 +49,7 @@ class Firing:
     def __init__(self, curve: Callable[[float], float | str], slots: int = 1) -> None:
         self.curve, self.slots = curve, slots
         self.made: dict[str, RunInfo] = {}
-        self.told: list[Search] = []
+        self.reports: list[Search] = []
         self.stop = False
         self.outbox: Any = self
         self.fired: list[float] = []
@@ -60,7 +60,7 @@ class Firing:
 
     def put(self, kind: type[Reported], path: str, body: bytes, headers: Mapping[str, str]) -> Reported:
         assert path.startswith("/v1/sweeps/adaptive/")
-        self.told.append(msgspec.json.decode(body, type=Search))
+        self.reports.append(msgspec.json.decode(body, type=Search))
         return Reported(id="s1", stop=self.stop)
 
     def runs(self, states: Sequence[str] = (), limit: int = 50) -> list[RunInfo]:
@@ -134,9 +134,9 @@ def test_the_server_is_told_of_each_point_and_of_what_was_found() -> None:
     law = lambert_jonas(413.7, 0.92, 2.6)
     at = Firing(lambda v: -law(1000.0 * v), 4)
     found = find(at, ("-0.2 km/s", "-0.8 km/s"), tolerance=0.005)
-    first, *_, last = at.told
+    first, *_, last = at.reports
     assert (first.points, first.over, first.low, first.high, first.tolerance) == ([], False, -800.0, -200.0, 5.0)
-    assert sum(point.value is None for point in at.told[1].points) == 4, "of a round, before any has ended"
+    assert sum(point.value is None for point in at.reports[1].points) == 4, "of a round, before any has ended"
     assert last.over
     assert (last.why, len(last.points), last.unit) == ("", found.points, "m/s")
     assert found.limit is not None
@@ -165,8 +165,8 @@ def test_the_error_along_a_curve_is_what_refits_of_scattered_points_give() -> No
 
     fits = [scattered() for _ in range(300)]
     at = [course(fit, 600.0, 700.0) for fit in fits]
-    told, values = [line[1][2] for line in at], [line[1][1] for line in at]
-    assert statistics.fmean(error for error in told if error is not None) == pytest.approx(
+    values_scattered, values = [line[1][2] for line in at], [line[1][1] for line in at]
+    assert statistics.fmean(error for error in values_scattered if error is not None) == pytest.approx(
         statistics.stdev(values), rel=0.2
     )
 
@@ -211,8 +211,8 @@ def test_the_error_of_a_curve_through_points_that_scatter_is_what_they_scatter()
     assert found.fit.error is not None
     assert 0.1 < found.fit.error < 20.0
     assert abs(found.fit.limit - 400.0) < 4.0 * found.fit.error
-    assert at.told[-1].curve is not None
-    assert (at.told[-1].curve.limit, at.told[-1].curve.error) == (found.fit.limit, found.fit.error)
+    assert at.reports[-1].curve is not None
+    assert (at.reports[-1].curve.limit, at.reports[-1].curve.error) == (found.fit.limit, found.fit.error)
 
 
 def test_points_that_do_not_follow_the_law_have_no_curve() -> None:
@@ -351,7 +351,7 @@ def test_a_wrong_goal_is_refused_before_any_run(goal: str, words: str) -> None:
 
 
 @pytest.mark.parametrize(
-    ("words", "told"),
+    ("words", "message"),
     [
         (["run.ranks=1"], "key varies from LOW to HIGH"),
         ([f"{KEY}=200:200"], "both ends are the same"),
@@ -359,8 +359,8 @@ def test_a_wrong_goal_is_refused_before_any_run(goal: str, words: str) -> None:
         ([f"{KEY}=200:800", "run.ranks=1,2"], "run.ranks has 2 values"),
     ],
 )
-def test_wrong_spans_are_refused(words: list[str], told: str) -> None:
-    with pytest.raises(CaseError, match=told):
+def test_wrong_spans_are_refused(words: list[str], message: str) -> None:
+    with pytest.raises(CaseError, match=message):
         spans_of(words)
 
 

@@ -20,7 +20,7 @@ from conoid.client.remote.config import address
 from conoid.client.remote.http import Http
 from conoid.client.run import Run
 
-from .hostile import Answer, Hostile, head, hostile, run_info, said
+from .hostile import Answer, Hostile, answering, head, hostile, run_info
 
 COMMANDS = [
     ("show", "a"), ("ls",), ("get", "a"), ("watch", "a"), ("cancel", "a"), ("sweep-table", "a"), ("show", "last"),
@@ -30,21 +30,21 @@ OTHERS = [
     ("report", "a"), ("figures", "energy", "a", "x.png"), ("sweep", "demo", "--set", "run.ranks=1,2"),
 ]  # fmt: skip
 ODD: dict[str, Answer] = {
-    "a page": said(b"<html>Welcome</html>", kind="text/html"),
-    "a page of a proxy": said(b"<html>Bad gateway</html>", 502, "text/html"),
-    "bytes": said(bytes(range(256)), 500, "application/octet-stream"),
-    "a number": said(5),
-    "a list": said([]),
-    "nothing": said(b""),
-    "no content": said(b"", 204),
-    "another shape": said({"runs": 5, "id": [], "state": {}, "events": "x", "files": {"a": 1}, "sweeps": None}),
-    "a depth": said(b"[" * 100_000),
-    "a depth of a refusal": said(b"[" * 100_000, 400),
-    "a state of a newer server": said(run_info(state="paused")),
-    "an id that is a path": said(run_info(id="../x")),
-    "errors that are a number": said({"detail": ["x"], "errors": 7, "hint": {"a": 1}}, 422),
-    "errors of odd kinds": said({"errors": [{"key": 5, "value": None}, 3]}, 422),
-    "a refusal without end": said({"detail": "x\n" * 1_000_000}, 409),
+    "a page": answering(b"<html>Welcome</html>", kind="text/html"),
+    "a page of a proxy": answering(b"<html>Bad gateway</html>", 502, "text/html"),
+    "bytes": answering(bytes(range(256)), 500, "application/octet-stream"),
+    "a number": answering(5),
+    "a list": answering([]),
+    "nothing": answering(b""),
+    "no content": answering(b"", 204),
+    "another shape": answering({"runs": 5, "id": [], "state": {}, "events": "x", "files": {"a": 1}, "sweeps": None}),
+    "a depth": answering(b"[" * 100_000),
+    "a depth of a refusal": answering(b"[" * 100_000, 400),
+    "a state of a newer server": answering(run_info(state="paused")),
+    "an id that is a path": answering(run_info(id="../x")),
+    "errors that are a number": answering({"detail": ["x"], "errors": 7, "hint": {"a": 1}}, 422),
+    "errors of odd kinds": answering({"errors": [{"key": 5, "value": None}, 3]}, 422),
+    "a refusal without end": answering({"detail": "x\n" * 1_000_000}, 409),
     "elsewhere": lambda: [head(302, 0, more="Location: http://other.test/\x1b[31m\r\n")],
     "not packed": lambda: [head(200, 4, more="Content-Encoding: gzip\r\n"), b"abcd"],
     "no HTTP": lambda: [b"SSH-2.0-OpenSSH_9.6\r\n"],
@@ -132,10 +132,10 @@ def test_a_stream_without_end_is_given_up(server: Hostile) -> None:
 
 
 def test_a_message_that_is_none_is_one_line(server: Hostile) -> None:
-    server.answers["/s"] = said(b"data: [1, 2]\n\n", kind="text/event-stream")
+    server.answers["/s"] = answering(b"data: [1, 2]\n\n", kind="text/event-stream")
     with Http(server.url) as asked, pytest.raises(AnswerError, match="cannot be read"):
         list(asked.stream("/s"))
-    server.answers["/v1/runs/a/events"] = said({"events": [[1]], "last": 1, "more": False})
+    server.answers["/v1/runs/a/events"] = answering({"events": [[1]], "last": 1, "more": False})
     with Http(server.url) as asked, pytest.raises(AnswerError, match="cannot be read"):
         Run(asked, "a").events()
 
@@ -172,12 +172,12 @@ def test_a_name_from_a_server_is_below_the_folder_or_refused(name: str, server: 
     into = quiet_home / "into"
     into.mkdir()
     (into / "out").symlink_to(elsewhere)
-    with pytest.raises(ClientError) as told:
+    with pytest.raises(ClientError) as raised:
         inside(into, name)
-    assert len(str(told.value)) < 300
-    server.answers = Every(said(b"evil"))
+    assert len(str(raised.value)) < 300
+    server.answers = Every(answering(b"evil"))
     listed = json.dumps({"files": [{"path": name, "size": 4}]}).encode()
-    server.answers = {"/v1/runs/a": said(run_info()), "/v1/runs/a/files": said(listed)}
+    server.answers = {"/v1/runs/a": answering(run_info()), "/v1/runs/a/files": answering(listed)}
     before = everything(quiet_home)
     result = CliRunner().invoke(app, ["get", "a", "--out", "into", "--url", server.url])
     assert isinstance(result.exception, SystemExit), repr(result.exception)
@@ -192,8 +192,8 @@ def everything(folder: Path) -> set[Path]:
 @pytest.mark.parametrize("name", ["a b%20#?.txt", "übung", "-x", "ab:c", "x" * 250, "frames/a\nb", ".hidden", "a\\b"])
 def test_an_odd_name_is_fetched_as_it_is(name: str, server: Hostile, quiet_home: Path) -> None:
     listed = {"files": [{"path": name, "size": 2}]}
-    server.answers = {"/v1/runs/a": said(run_info()), "/v1/runs/a/files": said(listed)}
-    server.answers[f"/v1/runs/a/files/{quote(name)}"] = said(b"ok", kind="text/plain")
+    server.answers = {"/v1/runs/a": answering(run_info()), "/v1/runs/a/files": answering(listed)}
+    server.answers[f"/v1/runs/a/files/{quote(name)}"] = answering(b"ok", kind="text/plain")
     result = CliRunner().invoke(app, ["get", "a", "--out", "into", "--url", server.url])
     assert result.exit_code == 0, result.output
     assert (Path("into") / name).read_bytes() == b"ok"
@@ -203,8 +203,11 @@ def test_a_link_in_the_folder_is_replaced_not_followed(server: Hostile, quiet_ho
     (quiet_home / "mine").write_text("mine")
     (quiet_home / "into").mkdir()
     (quiet_home / "into" / "a").symlink_to(quiet_home / "mine")
-    server.answers = {"/v1/runs/a": said(run_info()), "/v1/runs/a/files": said({"files": [{"path": "a", "size": 1}]})}
-    server.answers["/v1/runs/a/files/a"] = said(b"theirs", kind="text/plain")
+    server.answers = {
+        "/v1/runs/a": answering(run_info()),
+        "/v1/runs/a/files": answering({"files": [{"path": "a", "size": 1}]}),
+    }
+    server.answers["/v1/runs/a/files/a"] = answering(b"theirs", kind="text/plain")
     assert CliRunner().invoke(app, ["get", "a", "--out", "into", "--url", server.url]).exit_code == 0
     assert (quiet_home / "mine").read_text() == "mine"
 
@@ -221,9 +224,9 @@ def test_a_link_in_the_folder_is_replaced_not_followed(server: Hostile, quiet_ho
     ],
 )  # fmt: skip
 def test_an_address_that_is_none_is_one_line(url: str, quiet_home: Path) -> None:
-    with pytest.raises(UsageError) as told:
+    with pytest.raises(UsageError) as raised:
         address(url)
-    assert "secret" not in str(told.value)
+    assert "secret" not in str(raised.value)
     result = CliRunner().invoke(app, ["ls"], env={"CONOID_URL": url})
     assert result.exit_code == 2
     assert len(result.stderr.splitlines()) == 1
@@ -242,6 +245,6 @@ def test_an_address_may_have_a_path(url: str, used: str) -> None:
 
 
 def test_what_is_asked_lies_below_the_path_of_the_address(server: Hostile) -> None:
-    server.answers["/conoid/v1/table"] = said({"runs": [], "cases": [], "pending": 0, "next": None})
+    server.answers["/conoid/v1/table"] = answering({"runs": [], "cases": [], "pending": 0, "next": None})
     result = CliRunner().invoke(app, ["runs", "--url", f"{server.url}/conoid/"])
     assert result.stdout == "no runs\n"

@@ -23,9 +23,9 @@ def test_the_course_of_a_run_that_went_on_from_a_checkpoint_is_drawn_once() -> N
     """The run went back from step 3 to step 1. Its messages about steps 2 and 3 come twice; the CPU time of both is
     counted.
     """
-    told: list[AnyMessage] = [load(1.0, [5, 5]), load(2.0, [7, 5]), cut(2.0), load(3.0, [6, 6])]
+    sent: list[AnyMessage] = [load(1.0, [5, 5]), load(2.0, [7, 5]), cut(2.0), load(3.0, [6, 6])]
     again: list[AnyMessage] = [load(2.0, [7, 5]), cut(2.5), load(3.0, [6, 7])]
-    course = charts.course([*told, *again])
+    course = charts.course([*sent, *again])
     assert (course.times, course.outside) == ([1.0, 2.0, 3.0], [[5, 5], [7, 5], [6, 7]])
     assert course.cuts == [2.0, 2.5]
     assert course.seconds == {"contact": [5.0, 5.0]}

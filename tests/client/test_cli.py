@@ -65,9 +65,9 @@ def test_validate_tells_every_error_and_ends_with_2(quiet_home: Path) -> None:
     result = conoid("validate", "demo", "--set", "run.end_tim=1", "--set", "run.ranks=many")
     assert result.exit_code == 2
     assert result.stdout == ""
-    said = result.stderr.splitlines()
-    assert said[0].startswith("conoid: run.ranks = 'many': ")
-    assert said[1:] == ["conoid: run.end_tim: unknown key; did you mean 'end_time'?"]
+    lines = result.stderr.splitlines()
+    assert lines[0].startswith("conoid: run.ranks = 'many': ")
+    assert lines[1:] == ["conoid: run.end_tim: unknown key; did you mean 'end_time'?"]
 
 
 def test_validate_looks_for_mesh_files(quiet_home: Path) -> None:
@@ -99,9 +99,9 @@ def test_validate_warns_of_a_bare_number_and_what_it_comes_to(quiet_home: Path) 
 
 def test_warnings_of_a_case_in_si_do_not_fill_the_screen(quiet_home: Path) -> None:
     (quiet_home / "si.json").write_bytes(resolved_json(read_case(shipped_path("long_rod"))))
-    said = conoid("validate", "si.json").stderr.splitlines()
-    assert len(said) == 13
-    assert said[-1].endswith(" more; conoid validate --json has all")
+    lines = conoid("validate", "si.json").stderr.splitlines()
+    assert len(lines) == 13
+    assert lines[-1].endswith(" more; conoid validate --json has all")
 
 
 def test_a_case_that_is_about_to_run_is_doubted_too(user: Path) -> None:
@@ -116,8 +116,8 @@ def test_a_case_that_is_about_to_run_is_doubted_too(user: Path) -> None:
 def test_no_server_is_one_line(words: tuple[str, ...], quiet_home: Path) -> None:
     result = conoid(*words, "--url", "http://127.0.0.1:1")
     assert result.exit_code == 1
-    told = "is it running there? (conoid serve; another address: CONOID_URL or --url)"
-    assert result.stderr == f"conoid: no answer from http://127.0.0.1:1: {told}\n"
+    hint = "is it running there? (conoid serve; another address: CONOID_URL or --url)"
+    assert result.stderr == f"conoid: no answer from http://127.0.0.1:1: {hint}\n"
 
 
 def test_a_label_is_a_name_and_a_value(quiet_home: Path) -> None:
@@ -168,11 +168,11 @@ def test_submit_show_ls_get(user: Path) -> None:
     assert run in shown.stdout
     assert "succeeded" in shown.stdout
     assert "FAIL" in shown.stdout, "a missed reference value is printed"
-    told = read(conoid("runs", "--json"))[0]
-    assert told["id"] == run
-    assert told["results"]["steps"] == 2
-    assert not told.keys() & {"estimate", "outcome"}, "a list does not know them"
-    assert told["short"] in conoid("ls", "--limit", 5).stdout
+    listed = read(conoid("runs", "--json"))[0]
+    assert listed["id"] == run
+    assert listed["results"]["steps"] == 2
+    assert not listed.keys() & {"estimate", "outcome"}, "a list does not know them"
+    assert listed["short"] in conoid("ls", "--limit", 5).stdout
     assert read(conoid("show", run, "--json"))["outcome"]["steps"] == 2
     got = conoid("get", run, "outcome.json", "history.csv", "--out", "here")
     assert got.stdout.split() == ["here/outcome.json", "here/history.csv"]
@@ -186,17 +186,17 @@ def test_submit_show_ls_get(user: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("plan", "code", "said"),
+    ("plan", "code", "message"),
     [
         ({}, 0, ""),
         ({"fail": "diverged"}, 1, "the diverged of the tale"),
         ({"fail": "input"}, 2, "the input of the tale"),
     ],
 )
-def test_watch_ends_as_the_run_does(plan: dict[str, str], code: int, said: str, user: Path) -> None:
+def test_watch_ends_as_the_run_does(plan: dict[str, str], code: int, message: str, user: Path) -> None:
     result = conoid("watch", submitted(user, **plan))
     assert result.exit_code == code, result.output
-    assert said in result.stderr
+    assert message in result.stderr
 
 
 def test_cancel_and_the_exit_code_of_watch(user: Path) -> None:
@@ -337,9 +337,9 @@ def test_watch_can_be_left(user: Path) -> None:
     assert child.stdout is not None
     child.stdout.readline()
     child.send_signal(signal.SIGINT)
-    _, said = child.communicate(timeout=60)
+    _, errors = child.communicate(timeout=60)
     assert child.returncode == 130
-    assert said == f"conoid: the run continues; conoid watch {run} shows it again\n"
+    assert errors == f"conoid: the run continues; conoid watch {run} shows it again\n"
     assert read(conoid("show", run, "--json"))["state"] in {"starting", "running"}
     conoid("cancel", run)
 

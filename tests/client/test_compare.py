@@ -68,19 +68,19 @@ def test_a_run_that_never_ended_by_itself_is_compared_too(runs: tuple[Result, Re
     ended = json.loads((tmp_path / "a" / "outcome.json").read_text())
     (tmp_path / "a" / "outcome.json").write_text(json.dumps({**ended, "eroded": 0}))
     (tmp_path / "b" / "outcome.json").write_text('{"state": "lost", "steps": null, "time": null, "elements": 5}')
-    told = CliRunner().invoke(app, ["compare", str(tmp_path / "a"), str(tmp_path / "b")])
-    assert told.exit_code == 0, told.output
-    steps = next(line for line in told.stdout.splitlines() if line.startswith("steps"))
+    printed = CliRunner().invoke(app, ["compare", str(tmp_path / "a"), str(tmp_path / "b")])
+    assert printed.exit_code == 0, printed.output
+    steps = next(line for line in printed.stdout.splitlines() if line.startswith("steps"))
     assert steps.split()[2:] == ["–", "–", "–"], "of b, the difference, the share"
-    assert "nan" not in told.stdout
+    assert "nan" not in printed.stdout
 
 
 def test_the_command_tells_and_draws(runs: tuple[Result, Result], tmp_path: Path) -> None:
     out = tmp_path / "both.png"
-    told = CliRunner().invoke(app, ["compare", str(tmp_path / "a"), str(tmp_path / "b"), "--out", str(out)])
-    assert told.exit_code == 0, told.output
-    assert "the same answer, to the bit" in told.stdout
-    assert "parts.rod.mesh.element_size" in told.stdout
+    printed = CliRunner().invoke(app, ["compare", str(tmp_path / "a"), str(tmp_path / "b"), "--out", str(out)])
+    assert printed.exit_code == 0, printed.output
+    assert "the same answer, to the bit" in printed.stdout
+    assert "parts.rod.mesh.element_size" in printed.stdout
     assert out.read_bytes().startswith(b"\x89PNG")
     drawn = curves.comparison(material(*runs))
     assert [axes.get_ylabel() for axes in drawn.axes] == ["J", "m/s", "N"]
@@ -91,11 +91,11 @@ def test_the_tables_are_read_on_a_terminal_of_80_columns(runs: tuple[Result, Res
     """Runs of a server have names of 22 letters."""
     for name in ("a", "b"):
         case = json.loads((tmp_path / name / "case.resolved.json").read_text())
-        said = f"{name} bar of steel that hits a wall " * 20
-        (tmp_path / name / "case.resolved.json").write_text(json.dumps({**case, "description": said}))
+        title = f"{name} bar of steel that hits a wall " * 20
+        (tmp_path / name / "case.resolved.json").write_text(json.dumps({**case, "description": title}))
     folders = [(tmp_path / name).rename(tmp_path / f"1k17skpaczsdw34brntcee{name}") for name in ("a", "b")]
-    told = CliRunner().invoke(app, ["compare", *map(str, folders)], env={"COLUMNS": "80"})
-    lines = [line.rstrip() for line in told.stdout.splitlines()]
+    printed = CliRunner().invoke(app, ["compare", *map(str, folders)], env={"COLUMNS": "80"})
+    lines = [line.rstrip() for line in printed.stdout.splitlines()]
     assert max(map(len, lines)) <= 80
     assert [line.split() for line in lines[:2]] == [["A", folders[0].name], ["B", folders[1].name]]
     shown = {line.split()[0] for line in lines if line}
@@ -115,11 +115,11 @@ def test_energy_is_drawn_part_by_part_where_there_are_several(tmp_path: Path) ->
     write_history(
         write_run(tmp_path / "bar"), t=[0.0, 1e-6], initial=[8.0] * 2, residual=[1e-6] * 2, **parts, push=[0.0, 1.0]
     )
-    told = Result.open(tmp_path / "bar").history
-    *_, kinetic, internal = curves.energy(told).axes
+    history = Result.open(tmp_path / "bar").history
+    *_, kinetic, internal = curves.energy(history).axes
     assert [line.get_label() for line in kinetic.get_lines()] == ["glass", "steel"]
     assert internal.get_title() == "internal energy of each part"
-    assert curves.probes(told) == ["push"]
+    assert curves.probes(history) == ["push"]
 
 
 def test_the_step_is_drawn_by_what_holds_it(runs: tuple[Result, Result]) -> None:

@@ -17,7 +17,7 @@ from conoid.cases.output import layout
 from conoid.client.cli import app
 from conoid.client.commands.console import PlainConsole, one_line, plain
 
-from .hostile import EVIL, OBEYED, Hostile, hostile, run_info, said
+from .hostile import EVIL, OBEYED, Hostile, answering, hostile, run_info
 
 CLIENT = Path(__file__).parents[2] / "client"
 SEQUENCES = ["\x1b]0;owned\x07", "\x1b[2J", "\x9b31m", "\x1b]52;c;cm0=\x07", "a\rb", "\x08\x08", "\u202egnp.exe"]
@@ -47,10 +47,10 @@ def test_what_a_terminal_would_obey_is_escaped(evil: str) -> None:
     table.add_row(Text(f"a {evil} b", style="bold"), evil)
     for thing in (evil, Text(evil), Panel(evil, title=Text(evil)), table):
         console.print(thing)
-    said = out.getvalue()
-    assert evil not in said
-    assert not obeyed(said) - {"\x1b"}
-    assert "\x1b[" in said, "its own colours stay"
+    printed = out.getvalue()
+    assert evil not in printed
+    assert not obeyed(printed) - {"\x1b"}
+    assert "\x1b[" in printed, "its own colours stay"
 
 
 def test_a_line_of_text_stays_as_it_is() -> None:
@@ -104,10 +104,10 @@ ASKED = {
     ],
 )  # fmt: skip
 def test_no_command_prints_what_a_terminal_would_obey(words: tuple[str, ...], server: Hostile) -> None:
-    refusal = said({"title": EVIL, "detail": EVIL, "hint": EVIL}, 409)
-    server.answers = {path: said(data) for path, data in ASKED.items()}
+    refusal = answering({"title": EVIL, "detail": EVIL, "hint": EVIL}, 409)
+    server.answers = {path: answering(data) for path, data in ASKED.items()}
     server.answers |= {
-        "/v1/sweeps/b/table": said(TABLE, kind="text/csv"),
+        "/v1/sweeps/b/table": answering(TABLE, kind="text/csv"),
         "/v1/runs/a:checkpoint": refusal,
     }
     if words[0] == "submit":
@@ -117,20 +117,20 @@ def test_no_command_prints_what_a_terminal_would_obey(words: tuple[str, ...], se
     assert not obeyed(result.output)
     assert result.output.strip()
     if "--json" in words and words[0] != "get":
-        told = json.loads(result.stdout)
-        assert (told[0] if isinstance(told, list) else told)["message"] == EVIL
+        answer = json.loads(result.stdout)
+        assert (answer[0] if isinstance(answer, list) else answer)["message"] == EVIL
 
 
 @pytest.mark.parametrize("more", [(), ("--json",), ("--plain",)])
 def test_a_folder_prints_nothing_that_a_terminal_would_obey(more: tuple[str, ...], quiet_home: Path) -> None:
     folder = quiet_home / "run\x1b[31m"
     folder.mkdir()
-    told: list[messages.AnyMessage] = [
+    journal: list[messages.AnyMessage] = [
         messages.Status(run=EVIL, seq=1, state="running", message=EVIL),
         messages.Log(run=EVIL, seq=2, level="error", text=f"one\nconoid: two {EVIL}"),
         messages.Status(run=EVIL, seq=3, state="failed", message=EVIL, cause="crash"),
     ]
-    (folder / layout.JOURNAL).write_bytes(b"".join(messages.to_json(each) + b"\n" for each in told))
+    (folder / layout.JOURNAL).write_bytes(b"".join(messages.to_json(each) + b"\n" for each in journal))
     (folder / layout.RESOLVED_CASE).write_text(json.dumps({"title": EVIL}))
     result = CliRunner().invoke(app, ["watch", str(folder), *more])
     assert result.exit_code == 1, repr(result.exception)

@@ -77,8 +77,8 @@ def test_the_front_has_what_nothing_cheaper_beats() -> None:
 
 
 def test_the_advice_says_what_the_next_halving_buys_and_what_the_wanted_error_needs() -> None:
-    said = book(two_forms()).advice()
-    assert said == (
+    advice = book(two_forms()).advice()
+    assert advice == (
         "nodal at 500 µm: length within 1.2 % for 2 min 40 s of CPU time; halving the size buys 0.94 % for 42 min 40 s"
     )
     assert "0.1 % would need about 141 µm and 6 h 56 min" in book(two_forms(), accuracy=1e-3).advice()
@@ -197,8 +197,8 @@ def test_the_numbers_of_a_run_are_references_probes_and_shares_of_energy() -> No
                     residual=0.0)  # fmt: skip
     checks = [Check(name=name, value=1.0, expected=1.0, tolerance=0.1, passed=True, unit="m")
               for name in ("extent rod z", "extent rod z", "worst_residual")]  # fmt: skip
-    told = read_columns("t [s],middle_stress [Pa]\n0,1\n1,-5\n2,1\n")
-    found = of_run(case("bar_on_bar"), Outcome(state="succeeded", energy=energy, reference=checks), told)
+    columns = read_columns("t [s],middle_stress [Pa]\n0,1\n1,-5\n2,1\n")
+    found = of_run(case("bar_on_bar"), Outcome(state="succeeded", energy=energy, reference=checks), columns)
     assert {n.name: n.value for n in found} == {
         "extent rod z": 1.0, "extent rod z (2)": 1.0, "mean of middle_stress": -1.0, "peak of middle_stress": -5.0,
         "end of middle_stress": 1.0,
@@ -213,19 +213,19 @@ def test_what_advice_may_be_about_is_known_before_anything_runs(name: str) -> No
                     residual=0.0)  # fmt: skip
     checks = [Check(name=each.title, value=1.0, expected=1.0, tolerance=0.1, passed=True) for each in made.reference]
     head = ",".join(["t [s]", *(f"{probe.name} [Pa]" for probe in made.probes)])
-    told = read_columns("\n".join([head, ",".join("1" for _ in head.split(","))]) + "\n")
+    columns = read_columns("\n".join([head, ",".join("1" for _ in head.split(","))]) + "\n")
     outcome = Outcome(state="succeeded", energy=energy, reference=checks, broken=1, fragments=2, eroded=3)
-    assert {number.name for number in of_run(made, outcome, told)} <= set(names(made))
+    assert {number.name for number in of_run(made, outcome, columns)} <= set(names(made))
 
 
 @pytest.mark.parametrize(
-    ("words", "said"),
+    ("words", "message"),
     [
         (["--meshes", "1,x"], "--meshes"), (["--meshes", "1,1"], "each once"), (["--forms", "nodal,cubic"], "--forms"),
         (["--vary", "moods"], "--vary"), (["--quantity", "nope"], "--quantity = 'nope': a part of a name; allowed: "),
     ],
 )  # fmt: skip
-def test_options_that_mean_nothing_are_refused(words: list[str], said: str) -> None:
+def test_options_that_mean_nothing_are_refused(words: list[str], message: str) -> None:
     ended = CliRunner().invoke(cli.app, ["converge", "bar_on_bar", *words])
     assert ended.exit_code == 2
-    assert said in ended.output
+    assert message in ended.output

@@ -53,10 +53,10 @@ def test_spoilt_decks_end_in_a_list_or_in_one_line(tmp_path: Path, name: str) ->
         for _ in range(chance.choice((1, 1, 3))):
             text = spoilt(text, chance) or ["\n"]
         (tmp_path / name).write_text("".join(text), encoding="utf-8")
-        assert "\n" not in told(tmp_path / name)
+        assert "\n" not in refusal_of(tmp_path / name)
 
 
-def told(deck: Path) -> str:
+def refusal_of(deck: Path) -> str:
     """Returns all lines that the import of a deck prints, or the line with which the deck is refused."""
     try:
         found = read_deck(deck, None if deck.suffix == ".rad" else "mm,t,s")
@@ -89,18 +89,18 @@ FILES: dict[str, tuple[bytes, str]] = {
 
 @pytest.mark.parametrize("name", FILES)
 def test_what_is_no_deck_is_refused_in_one_line(tmp_path: Path, name: str) -> None:
-    content, told = FILES[name]
+    content, message = FILES[name]
     (tmp_path / name).write_bytes(content)
-    said = conoid("import", tmp_path / name, "--units", "mm,t,s")
-    assert said.exit_code == 2
-    assert told in said.stderr
+    result = conoid("import", tmp_path / name, "--units", "mm,t,s")
+    assert result.exit_code == 2
+    assert message in result.stderr
     assert not list(tmp_path.glob("*.toml"))
 
 
 def test_what_is_no_regular_file_is_not_opened(tmp_path: Path) -> None:
     for path in ("/dev/zero", tmp_path, tmp_path / "none.k"):
-        said = conoid("import", path, "--out", tmp_path / "case.toml")
-        assert (said.exit_code, len(said.stderr.splitlines())) == (1, 1)
+        result = conoid("import", path, "--out", tmp_path / "case.toml")
+        assert (result.exit_code, len(result.stderr.splitlines())) == (1, 1)
 
 
 # The command ----------------------------------------------------------------------------------------------------------
@@ -108,10 +108,10 @@ def test_what_is_no_regular_file_is_not_opened(tmp_path: Path) -> None:
 
 def test_the_case_and_the_list_stand_beside_the_deck(tmp_path: Path) -> None:
     shutil.copy(FOLDER / "lspp_taylor.k", tmp_path / "bar.k")
-    said = conoid("import", tmp_path / "bar.k")
-    assert said.exit_code == 0, said.stderr
+    result = conoid("import", tmp_path / "bar.k")
+    assert result.exit_code == 0, result.stderr
     listed = (tmp_path / "bar.import.txt").read_text()
-    assert listed in said.stdout
+    assert listed in result.stdout
     assert "*CONTROL_TIMESTEP -> numerics.dt_safety" in listed
     case = (tmp_path / "bar.toml").read_text()
     assert 'mesh.path = "bar.k"' in case
@@ -124,25 +124,25 @@ def test_the_case_and_the_list_stand_beside_the_deck(tmp_path: Path) -> None:
 def test_the_mesh_is_found_from_the_folder_of_the_case(tmp_path: Path) -> None:
     shutil.copy(FOLDER / "cae_taylor.inp", tmp_path / "bar.inp")
     (tmp_path / "cases").mkdir()
-    said = conoid(
+    result = conoid(
         "import", tmp_path / "bar.inp", "--units", "mm,t,s", "--out", tmp_path / "cases" / "rod.toml", "--json"
     )
-    assert said.exit_code == 0, said.stderr
+    assert result.exit_code == 0, result.stderr
     assert 'mesh.path = "../bar.inp"' in (tmp_path / "cases" / "rod.toml").read_text()
-    assert said.stdout == (tmp_path / "cases" / "rod.import.json").read_text()
+    assert result.stdout == (tmp_path / "cases" / "rod.import.json").read_text()
     assert conoid("validate", tmp_path / "cases" / "rod.toml").exit_code == 0
 
 
 def test_a_refused_deck_has_its_list_and_no_case_but_with_anyway(tmp_path: Path) -> None:
     deck = tmp_path / "foam.k"
     deck.write_text(lsdyna("*MAT_HONEYCOMB_TITLE", "core", row(1, "7.85E-9", 1.0)), encoding="utf-8")
-    said = conoid("import", deck, "--units", "mm,t,s")
-    assert said.exit_code == 2
-    assert "*MAT_HONEYCOMB_TITLE: Conoid has no such material law" in said.stderr
+    result = conoid("import", deck, "--units", "mm,t,s")
+    assert result.exit_code == 2
+    assert "*MAT_HONEYCOMB_TITLE: Conoid has no such material law" in result.stderr
     assert "refused: 1 keyword" in (tmp_path / "foam.import.txt").read_text()
     assert not (tmp_path / "foam.toml").exists()
-    said = conoid("import", deck, "--units", "mm,t,s", "--anyway")
-    assert said.exit_code == 0
+    result = conoid("import", deck, "--units", "mm,t,s", "--anyway")
+    assert result.exit_code == 0
     case = (tmp_path / "foam.toml").read_text()
     assert "# NOT TRANSLATED: line 16, *MAT_HONEYCOMB_TITLE: Conoid has no such material law" in case
     refused = conoid("validate", tmp_path / "foam.toml")

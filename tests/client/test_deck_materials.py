@@ -79,8 +79,8 @@ def test_johnson_cook_of_lsdyna(tmp_path: Path) -> None:
 def test_the_reference_rate_of_lsdyna_is_in_its_unit_of_time(tmp_path: Path, system: str, rate: float) -> None:
     found = read(tmp_path, "a.k", lsdyna(*LSDYNA_JC, eos=1), system)
     assert johnson_cook(material(found)).reference_rate == pytest.approx(rate, rel=1e-15)
-    told = [each.what for entry in found.account.entries for each in entry.details]
-    assert ("EPSO = 1.0" in told) == (system != "mm,t,s"), "a rate of 1 that is not 1/s is pointed at"
+    details = [each.what for entry in found.account.entries for each in entry.details]
+    assert ("EPSO = 1.0" in details) == (system != "mm,t,s"), "a rate of 1 that is not 1/s is pointed at"
 
 
 def test_gruneisen_of_lsdyna_in_compression(tmp_path: Path) -> None:
@@ -98,12 +98,12 @@ def test_gruneisen_of_lsdyna_in_compression(tmp_path: Path) -> None:
     assert made.elastic.bulk == pytest.approx(density * speed**2, rel=1e-12)
 
 
-@pytest.mark.parametrize(("field", "told"), [("S2", "S2 = 0.4"), ("A", "A = 0.4"), ("E0", "E0 = 0.4")])
-def test_terms_that_this_pressure_has_not_refuse(tmp_path: Path, field: str, told: str) -> None:
+@pytest.mark.parametrize(("field", "message"), [("S2", "S2 = 0.4"), ("A", "A = 0.4"), ("E0", "E0 = 0.4")])
+def test_terms_that_this_pressure_has_not_refuse(tmp_path: Path, field: str, message: str) -> None:
     values = {"S2": 0.0, "S3": 0.0, "GAMAO": 1.99, "A": 0.0, "E0": 0.0, field: 0.4}
     eos = row(1, "3.94E6", 1.49, *values.values())
     found = read(tmp_path, "a.k", lsdyna(*LSDYNA_JC[:6], eos, row(1.0), eos=1))
-    assert any(told in line for line in found.refusals)
+    assert any(message in line for line in found.refusals)
 
 
 LINEAR = {

@@ -23,8 +23,8 @@ def test_a_set_of_sets_has_their_nodes(tmp_path: Path) -> None:
     (held,) = bare(found.data["boundaries"])
     assert held == {"kind": "velocity", "x": "0 mm/s", "y": "0 mm/s", "z": "0 mm/s"}
     again = ("*SET_NODE_ADD", row(9), row(9))
-    (told,) = read(tmp_path, "b.k", lsdyna(*STEEL, *again, HELD, row(9, 0, 1, 1, 1))).refusals
-    assert "the node set 9 has itself among its members" in told
+    (refusal,) = read(tmp_path, "b.k", lsdyna(*STEEL, *again, HELD, row(9, 0, 1, 1, 1))).refusals
+    assert "the node set 9 has itself among its members" in refusal
 
 
 @pytest.mark.parametrize("code", ["lsdyna", "abaqus", "radioss"])
@@ -64,8 +64,8 @@ TWICE = {
 
 @pytest.mark.parametrize("what", TWICE)
 def test_a_number_that_two_have_refuses(tmp_path: Path, what: str) -> None:
-    told = read(tmp_path, "a.k", lsdyna(*TWICE[what])).refusals
-    assert any(f"the {what} is defined twice" in line for line in told), told
+    refusals = read(tmp_path, "a.k", lsdyna(*TWICE[what])).refusals
+    assert any(f"the {what} is defined twice" in line for line in refusals), refusals
 
 
 def test_solids_of_a_part_that_is_not_defined_refuse(tmp_path: Path) -> None:
@@ -83,8 +83,10 @@ def test_the_cards_of_the_option_mpp_are_not_those_of_the_contact(tmp_path: Path
 
 def test_a_curve_that_ends_early_refuses_where_it_is_constant_as_well(tmp_path: Path) -> None:
     curve = ("*DEFINE_CURVE", row(1), r20(0.0, 5.0), r20(0.001, 5.0))
-    told = read(tmp_path, "a.k", lsdyna(*STEEL, *curve, "*BOUNDARY_PRESCRIBED_MOTION_RIGID", row(1, 3, 0, 1))).refusals
-    assert any("the curve ends at 0.001" in line for line in told)
+    refusals = read(
+        tmp_path, "a.k", lsdyna(*STEEL, *curve, "*BOUNDARY_PRESCRIBED_MOTION_RIGID", row(1, 3, 0, 1))
+    ).refusals
+    assert any("the curve ends at 0.001" in line for line in refusals)
 
 
 def test_a_second_velocity_of_a_body_that_turns_refuses(tmp_path: Path) -> None:
@@ -96,12 +98,12 @@ def test_a_second_velocity_of_a_body_that_turns_refuses(tmp_path: Path) -> None:
 
 def test_groups_within_themselves_and_that_take_away_refuse(tmp_path: Path) -> None:
     law = ("/MAT/ELAST/1", "steel", "7.85E-9", r20(2.1e5, 0.3))
-    for group, told in (
+    for group, message in (
         (("/GRNOD/GRNOD/5", "g", row(5)), "is within itself"),
         (("/GRNOD/NODE/5", "g", row(1, -2)), "below 0"),
     ):
         found = read(tmp_path, "a_0000.rad", radioss(*law, *group, "/BCS/1", "held", row("111 000", 0, 5)), None)
-        assert any(told in line for line in found.refusals), found.refusals
+        assert any(message in line for line in found.refusals), found.refusals
 
 
 def starter(points: list[str]) -> str:
@@ -164,8 +166,8 @@ def test_the_bodies_of_one_instance_are_rigid_where_the_deck_names_one(tmp_path:
 
 def test_a_surface_of_a_set_that_is_not_there_refuses(tmp_path: Path) -> None:
     pair = "*Surface, name=S\nnothing, S1\n*Contact Pair, interaction=I\nS, S\n*Surface Interaction, name=I\n"
-    told = read(tmp_path, "a.inp", abaqus("*Density\n7.85e-9,\n*Elastic\n2.1e5, 0.3", model=pair)).refusals
-    assert any("of the set 'nothing', which has no elements" in line for line in told), told
+    refusals = read(tmp_path, "a.inp", abaqus("*Density\n7.85e-9,\n*Elastic\n2.1e5, 0.3", model=pair)).refusals
+    assert any("of the set 'nothing', which has no elements" in line for line in refusals), refusals
 
 
 def test_a_contact_with_a_part_that_has_no_solids_is_left_out(tmp_path: Path) -> None:

@@ -62,7 +62,7 @@ def test_walls_of_radioss(tmp_path: Path, what: str) -> None:
 
 
 @pytest.mark.parametrize(
-    ("cards", "told"),
+    ("cards", "message"),
     [
         (("*RIGIDWALL_PLANAR_FINITE", row(0), row(0, 0, -1, 0, 0, 1), row(1, 0, 0, 9, 9)), "a finite rigid wall"),
         (("*RIGIDWALL_PLANAR_MOVING", row(0), row(0, 0, -1, 0, 0, 1), row(0, 40.0)), "V0 = 40.0: a speed without MASS"),
@@ -71,9 +71,9 @@ def test_walls_of_radioss(tmp_path: Path, what: str) -> None:
         (("*CONSTRAINED_NODAL_RIGID_BODY", row(1, 0, 3)), "a rigid body of nodes; parts[].rigid makes a whole part"),
     ],
 )
-def test_walls_that_end_and_rigid_bodies_of_nodes_refuse(tmp_path: Path, cards: tuple[str, ...], told: str) -> None:
+def test_walls_that_end_and_rigid_bodies_of_nodes_refuse(tmp_path: Path, cards: tuple[str, ...], message: str) -> None:
     (line,) = read(tmp_path, "a.k", lsdyna(*STEEL, *cards)).refusals
-    assert told in line
+    assert message in line
 
 
 def rbody(mass: float = 0.0) -> tuple[str, ...]:
@@ -102,13 +102,13 @@ def test_a_rigid_body_of_all_nodes_of_a_part_is_held_by_its_main_node(tmp_path: 
     (moved,) = found.data["boundaries"]
     assert moved["kind"] == "velocity"
     assert {axis: moved.get(axis) for axis in "xyz"} == {"x": "0 mm/s", "y": "0 mm/s", "z": None}
-    told = read(tmp_path, "a_0000.rad", radioss(*rbody(1e-3), *held), None).refusals
-    assert len(told) == 1
-    assert "MASS = 0.001: mass and inertia beside those of the mesh" in told[0]
-    told = read(
+    refusals = read(tmp_path, "a_0000.rad", radioss(*rbody(1e-3), *held), None).refusals
+    assert len(refusals) == 1
+    assert "MASS = 0.001: mass and inertia beside those of the mesh" in refusals[0]
+    refusals = read(
         tmp_path, "a_0000.rad", radioss(*rbody(), held[0], held[1], f"{'110 000':>10}{row(0, 9)}"), None
     ).refusals
-    assert "a rigid body that is held along some axes and turns" in told[0]
+    assert "a rigid body that is held along some axes and turns" in refusals[0]
 
 
 @pytest.mark.parametrize("kind", ["TYPE24", "TYPE25"])
@@ -119,5 +119,7 @@ def test_a_general_contact_of_radioss(tmp_path: Path, kind: str) -> None:
     assert found.refusals == []
     assert found.data["contact"] == {"self_contact": ["body"], "friction": 0.15}
     late = (*lines[:3], f"{r20(0, 0.15)}{'':20}{r20(1e-6, 0)}")
-    told = read(tmp_path, "a_0000.rad", radioss(*ELASTIC, *surface, f"/INTER/{kind}/1", "all", *late), None).refusals
-    assert "TSTART = 1e-06: contact that begins later" in told[0]
+    refusals = read(
+        tmp_path, "a_0000.rad", radioss(*ELASTIC, *surface, f"/INTER/{kind}/1", "all", *late), None
+    ).refusals
+    assert "TSTART = 1e-06: contact that begins later" in refusals[0]

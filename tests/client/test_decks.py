@@ -41,8 +41,8 @@ def test_every_keyword_of_a_deck_is_taken_over_or_left_once(name: str) -> None:
     there = sorted((file, number) for file, path in files.items() for _, number in keyword_lines(path))
     assert sorted((each.file, each.line) for each in found.account.entries) == there
     assert all(each.decided for each in found.account.entries)
-    told = [line for line in lines(found, "case.toml") if re.match(r"  line \d+", line)]
-    assert len(told) == len(there)
+    listed = [line for line in lines(found, "case.toml") if re.match(r"  line \d+", line)]
+    assert len(listed) == len(there)
     assert len(report(found, "case.toml")["keywords"]) == len(there)
 
 
@@ -198,9 +198,9 @@ REFUSED = {
 
 @pytest.mark.parametrize("what", REFUSED)
 def test_what_would_answer_wrong_in_silence_refuses_the_import(tmp_path: Path, what: str) -> None:
-    cards, told = REFUSED[what]
+    cards, message = REFUSED[what]
     found = read(tmp_path, "a.k", lsdyna(*cards))
-    assert any(told in line for line in found.refusals), found.refusals
+    assert any(message in line for line in found.refusals), found.refusals
     assert all("\n" not in line for line in found.refusals)
 
 
@@ -215,11 +215,11 @@ def test_walls_and_sliding_nodes_that_are_no_plane_are_told(tmp_path: Path) -> N
 
 
 def test_the_list_of_a_deck_is_data_as_well() -> None:
-    told = json.loads(json.dumps(report(imported("ansa_drop.k"), "ansa_drop.toml")))
-    assert told["units"] == "mm, t, s"
-    assert told["refused"] == []
-    assert {each["fate"] for each in told["keywords"]} == {"taken", "left"}
-    step = next(each for each in told["keywords"] if each["keyword"] == "*CONTROL_TIMESTEP")
+    listed = json.loads(json.dumps(report(imported("ansa_drop.k"), "ansa_drop.toml")))
+    assert listed["units"] == "mm, t, s"
+    assert listed["refused"] == []
+    assert {each["fate"] for each in listed["keywords"]} == {"taken", "left"}
+    step = next(each for each in listed["keywords"] if each["keyword"] == "*CONTROL_TIMESTEP")
     assert [each["kind"] for each in step["details"]] == ["differs", "left"]
 
 
@@ -240,10 +240,10 @@ PUBLIC: dict[str, tuple[str, str, tuple[str, ...]]] = {
 
 @pytest.mark.parametrize("what", PUBLIC)
 def test_features_of_public_decks(tmp_path: Path, what: str) -> None:
-    name, text, told = PUBLIC[what]
+    name, text, expected = PUBLIC[what]
     found = read(tmp_path, name, text, None if name.endswith(".rad") else "mm,t,s")
-    assert len(found.refusals) == len(told)
-    assert all(any(words in line for line in found.refusals) for words in told), found.refusals
+    assert len(found.refusals) == len(expected)
+    assert all(any(words in line for line in found.refusals) for words in expected), found.refusals
 
 
 def test_nodes_that_hold_themselves_are_a_plane_of_symmetry(tmp_path: Path) -> None:

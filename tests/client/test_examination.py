@@ -48,12 +48,12 @@ def conoid(*words: object) -> Result:
 def test_a_mesh_file_is_measured_and_its_estimate_is_that_of_its_tets(folder: Path) -> None:
     result = conoid("validate", "bar.toml", "--json")
     assert result.exit_code == 0, result.output
-    told = json.loads(result.stdout)
-    assert told["estimate"]["parts"][0]["bulk"]["mass"] == pytest.approx(7850.0 * 1e-6 / 6.0)
-    assert told["estimate"]["elements"] == 1
-    assert told["estimate"]["dt"] == pytest.approx(0.9 * told["files"][0]["step_length"] / 5900.0, rel=0.2)
-    assert [each["message"] for each in told["warnings"]] == ["elements that carry no volume are skipped: 1 MASS"]
-    assert told["warnings"][0]["key"] == "parts[0].mesh.path"
+    answer = json.loads(result.stdout)
+    assert answer["estimate"]["parts"][0]["bulk"]["mass"] == pytest.approx(7850.0 * 1e-6 / 6.0)
+    assert answer["estimate"]["elements"] == 1
+    assert answer["estimate"]["dt"] == pytest.approx(0.9 * answer["files"][0]["step_length"] / 5900.0, rel=0.2)
+    assert [each["message"] for each in answer["warnings"]] == ["elements that carry no volume are skipped: 1 MASS"]
+    assert answer["warnings"][0]["key"] == "parts[0].mesh.path"
 
 
 def test_a_slip_of_the_unit_is_told_as_of_any_body(folder: Path) -> None:

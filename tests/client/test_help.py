@@ -18,12 +18,12 @@ WIDTH = 60
 
 
 def test_the_help_has_all_commands_in_groups_a_line_each() -> None:
-    told = CliRunner().invoke(app, ["--help"], terminal_width=80).stdout
-    assert "More:" not in told
+    printed = CliRunner().invoke(app, ["--help"], terminal_width=80).stdout
+    assert "More:" not in printed
     for title, names in GROUPS.items():
-        assert f"{title}:\n" in told or not set(names) & set(NAMES)
+        assert f"{title}:\n" in printed or not set(names) & set(NAMES)
     for name in NAMES:
-        assert len(re.findall(rf"^  {name} +[A-Z].*[^.]\.$", told, re.MULTILINE)) == 1, name
+        assert len(re.findall(rf"^  {name} +[A-Z].*[^.]\.$", printed, re.MULTILINE)) == 1, name
 
 
 @pytest.mark.parametrize("name", NAMES)

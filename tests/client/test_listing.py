@@ -63,9 +63,9 @@ def _written(path: Path, text: str) -> Path:
 
 def test_runs_are_found_by_case_label_state_words_and_date(server: LocalServer, made: dict[str, str]) -> None:
     def found(*words: str) -> set[str]:
-        told = conoid("runs", *words, "--json", "--limit", 50)
-        assert told.exit_code == 0, told.output
-        return {name for name, run in made.items() if run in told.stdout}
+        listed = conoid("runs", *words, "--json", "--limit", 50)
+        assert listed.exit_code == 0, listed.output
+        return {name for name, run in made.items() if run in listed.stdout}
 
     assert found() == set(made)
     assert found("--case", "slow_*") == {"slow"}

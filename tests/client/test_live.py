@@ -19,7 +19,7 @@ from conoid.client.watch import show, tell, watch
 from . import run_messages
 
 
-def told(last: int) -> Live:
+def progressed(last: int) -> Live:
     live = Live(run_messages.RUN, title="A bar")
     for message in run_messages.whole()[:last]:
         live.take(message)
@@ -27,17 +27,17 @@ def told(last: int) -> Live:
 
 
 def test_progress_is_a_share_of_the_simulated_time() -> None:
-    assert told(4).fraction == 0.0
-    assert told(6).fraction == 0.25
-    assert told(15).fraction == 1.0
+    assert progressed(4).fraction == 0.0
+    assert progressed(6).fraction == 0.25
+    assert progressed(15).fraction == 1.0
 
 
 def test_time_stands_still_once_the_run_has_ended() -> None:
-    assert told(15).elapsed == 15 - 4
+    assert progressed(15).elapsed == 15 - 4
 
 
 def test_phases_are_grouped_and_the_rest_of_the_interval_is_descheduled() -> None:
-    live = told(7)
+    live = progressed(7)
     assert live.phases == {
         "compute": pytest.approx([1.2, 0.7]), "exchange": [0.2, 0.8], "output": [0.1, 0.0],
         "descheduled": pytest.approx([0.5, 0.5]),
@@ -46,12 +46,12 @@ def test_phases_are_grouped_and_the_rest_of_the_interval_is_descheduled() -> Non
 
 
 def test_the_other_threads_of_a_rank_are_busy_by_the_time_of_their_tasks() -> None:
-    live = told(6)
+    live = progressed(6)
     load = next(each for each in run_messages.whole() if isinstance(each, Load))
     live.take(msgspec.structs.replace(load, threads=4, helped=[3.0, 0.0]))
     assert live.helped == [3.0 / (3 * 2.0), 0.0]
     assert "65 % busy, its threads 50 %" in rendered(live)
-    assert told(7).helped == []
+    assert progressed(7).helped == []
 
 
 def test_what_a_rank_waits_for_others_is_no_exchange() -> None:
@@ -80,8 +80,8 @@ def test_exit_codes(state: State, cause: str | None, code: int) -> None:
 
 def test_a_run_that_has_not_begun_says_how_long_it_waits(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("conoid.client.commands.display.time.time", lambda: run_messages.START + 3 + 42)
-    assert "starting  42 s" in rendered(told(3))
-    assert "running  42 s" not in rendered(told(6))
+    assert "starting  42 s" in rendered(progressed(3))
+    assert "running  42 s" not in rendered(progressed(6))
 
 
 def rendered(live: Live, width: int = 100, height: int = 60) -> str:
@@ -93,7 +93,7 @@ def rendered(live: Live, width: int = 100, height: int = 60) -> str:
 
 @pytest.mark.parametrize("width", [60, 80, 100])
 def test_the_panel_shows_everything_that_is_watched(width: int) -> None:
-    text = rendered(told(11), width)
+    text = rendered(progressed(11), width)
     for shown in (
         "A bar", "running", "50.0 %", "40.0 µs of 80.0 µs", "8.10 ns", "tet 7 (bar): sound speed", "30 s",
         "9.70 M updates/s", "rank 0", "65 % busy", "35 % busy", "imbalance 1.20", "kinetic", "6.00 J", "2.0e-4",
@@ -105,7 +105,7 @@ def test_the_panel_shows_everything_that_is_watched(width: int) -> None:
 
 
 def test_a_warning_is_shown_once_and_whole() -> None:
-    live, words = told(9), "contact has let some tets of the dust into each other, " * 3
+    live, words = progressed(9), "contact has let some tets of the dust into each other, " * 3
     for n in range(20, 24):
         live.take(Log(run=run_messages.RUN, seq=n, wall=run_messages.START, level="warning", text=words + "the end"))
     text = rendered(live, 60)
@@ -114,11 +114,11 @@ def test_a_warning_is_shown_once_and_whole() -> None:
 
 @pytest.mark.parametrize("width", [60, 100, 200])
 def test_the_panel_fits_the_terminal(width: int) -> None:
-    assert max(map(len, rendered(told(13), width).splitlines())) <= width
+    assert max(map(len, rendered(progressed(13), width).splitlines())) <= width
 
 
 def test_the_panel_fits_the_height_of_the_terminal() -> None:
-    live = told(11)
+    live = progressed(11)
     live.phases = {"compute": [1.0] * 40}
     for n in range(20, 30):
         live.take(Log(run=run_messages.RUN, seq=n, wall=run_messages.START, level="warning", text=f"tet {n} is flat"))
@@ -130,12 +130,12 @@ def test_the_panel_fits_the_height_of_the_terminal() -> None:
 
 
 def test_bars_of_the_ranks_are_in_proportion() -> None:
-    lines = [line for line in rendered(told(7)).splitlines() if "rank" in line and "busy" in line]
+    lines = [line for line in rendered(progressed(7)).splitlines() if "rank" in line and "busy" in line]
     assert [line.count("█") for line in lines] == [36, 36], "both ranks took the whole interval"
 
 
 def test_many_ranks_are_cut_and_said_so() -> None:
-    live = told(6)
+    live = progressed(6)
     live.phases = {"compute": [1.0] * 40}
     assert "and 28 more ranks" in rendered(live)
 
@@ -150,8 +150,8 @@ def test_plain_lines_tell_each_state_and_percent_and_each_warning_once() -> None
         "accepted", "queued", "starting", "running", "running", "warning:", "running", "running", "running",
         "succeeded",
     ]  # fmt: skip
-    told = [line.split()[3] for line in lines if "%" in line and "succeeded" not in line]
-    assert told == ["25.0", "50.0", "75.0", "100.0"]
+    percents = [line.split()[3] for line in lines if "%" in line and "succeeded" not in line]
+    assert percents == ["25.0", "50.0", "75.0", "100.0"]
 
 
 def test_what_a_start_is_at_is_told_and_changes_no_state() -> None:
@@ -244,8 +244,8 @@ def test_a_server_that_is_gone_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
     run, lines = Deserted(), list[str]()
 
     class Heard(Console):
-        def print(self, *told: object, **options: object) -> None:
-            lines.append(str(told[0]))
+        def print(self, *objects: object, **options: object) -> None:
+            lines.append(str(objects[0]))
             if "no server answers, for " in lines[-1]:
                 run.heard.set()
 
@@ -274,9 +274,9 @@ def test_what_a_run_in_the_queue_waits_for_is_told(monkeypatch: pytest.MonkeyPat
     run, out = Queued(), io.StringIO()
 
     class Heard(Console):
-        def print(self, *told: object, **options: object) -> None:
-            super().print(*told, **options)  # type: ignore[arg-type]
-            if run.reason in str(told):
+        def print(self, *objects: object, **options: object) -> None:
+            super().print(*objects, **options)  # type: ignore[arg-type]
+            if run.reason in str(objects):
                 run.heard.set()
 
     known = watch(run, live=False, console=Heard(file=out, width=200))

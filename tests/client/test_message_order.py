@@ -25,7 +25,7 @@ class Journal:
 
 
 def seqs(order: InOrder, *arriving: int) -> list[int]:
-    return [told.seq for seq in arriving for told in order.take(message(seq))]
+    return [passed.seq for seq in arriving for passed in order.take(message(seq))]
 
 
 def test_what_comes_in_order_needs_no_journal() -> None:
@@ -44,7 +44,7 @@ def test_a_gap_is_refilled_once() -> None:
 
 def test_a_late_joiner_reads_the_history_first() -> None:
     order = InOrder(Journal(4).after)
-    history = [told.seq for told in order.catch_up()]
+    history = [passed.seq for passed in order.catch_up()]
     assert history + seqs(order, 3, 4, 5) == [1, 2, 3, 4, 5]
 
 
@@ -66,14 +66,14 @@ def test_any_loss_repeat_and_disorder_gives_the_journal(seed: int) -> None:
     dice = random.Random(seed)
     journal = Journal()
     order = InOrder(journal.after)
-    told: list[int] = []
+    passed: list[int] = []
     late: list[int] = []
     for seq in range(1, 200):
         journal.written = seq
         late.append(seq)
         if dice.random() < 0.3:
             dice.shuffle(late)
-            told += seqs(order, *[each for each in late if dice.random() < 0.7], *late[:2])
+            passed += seqs(order, *[each for each in late if dice.random() < 0.7], *late[:2])
             late = []
-    told += [each.seq for each in order.catch_up()]
-    assert told == list(range(1, 200))
+    passed += [each.seq for each in order.catch_up()]
+    assert passed == list(range(1, 200))

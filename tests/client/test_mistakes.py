@@ -39,8 +39,8 @@ def damaged(quiet_home: Path) -> Path:
     """A finished run's folder whose files are damaged."""
     folder = quiet_home / "damaged"
     folder.mkdir()
-    said = [messages.Status(run="r", seq=1, state="running"), messages.Status(run="r", seq=3, state="succeeded")]
-    lines = [messages.to_json(said[0]), b"garbage", b'{"type": "progress", "ru', b"[]", messages.to_json(said[1])]
+    sent = [messages.Status(run="r", seq=1, state="running"), messages.Status(run="r", seq=3, state="succeeded")]
+    lines = [messages.to_json(sent[0]), b"garbage", b'{"type": "progress", "ru', b"[]", messages.to_json(sent[1])]
     (folder / layout.JOURNAL).write_bytes(b"\n".join(lines) + b"\n")
     (folder / layout.OUTCOME).write_text("x")
     (folder / layout.RESOLVED_CASE).write_text("{")
@@ -150,7 +150,7 @@ def test_a_damaged_case_is_named(damaged: Path, command: str) -> None:
 
 
 @pytest.mark.parametrize(
-    ("words", "code", "said"),
+    ("words", "code", "message"),
     [
         (("sweep", "demo", "--list", "missing.csv"), 2, "--list = 'missing.csv': No such file or directory"),
         (("sweep", "demo", "--list", "."), 2, "--list = '.': is not a regular file"),
@@ -158,9 +158,9 @@ def test_a_damaged_case_is_named(damaged: Path, command: str) -> None:
         (("run", "demo", "--out", "file"), 1, "file: File exists"),
     ],
 )
-def test_a_file_that_cannot_be_used_is_named(quiet_home: Path, words: tuple[str, ...], code: int, said: str) -> None:
+def test_a_file_that_cannot_be_used_is_named(quiet_home: Path, words: tuple[str, ...], code: int, message: str) -> None:
     Path("file").touch()
-    assert refused(code, *words).endswith(said)
+    assert refused(code, *words).endswith(message)
 
 
 def test_a_table_that_is_no_text_is_named(quiet_home: Path) -> None:
@@ -219,9 +219,9 @@ def test_a_file_outside_of_a_run_is_not_fetched(quiet_home: Path) -> None:
         inside(quiet_home, "../x")
 
 
-@pytest.mark.parametrize(("state", "said"), [("succeeded", "s has ended\n"), ("running", "s cancelling\n")])
+@pytest.mark.parametrize(("state", "message"), [("succeeded", "s has ended\n"), ("running", "s cancelling\n")])
 def test_a_sweep_that_has_ended_is_not_said_to_be_cancelled(
-    quiet_home: Path, monkeypatch: pytest.MonkeyPatch, state: str, said: str
+    quiet_home: Path, monkeypatch: pytest.MonkeyPatch, state: str, message: str
 ) -> None:
     class Server(httpx2.BaseTransport):
         def handle_request(self, request: httpx2.Request) -> httpx2.Response:
@@ -229,7 +229,7 @@ def test_a_sweep_that_has_ended_is_not_said_to_be_cancelled(
             return httpx2.Response(202, content=msgspec.json.encode(info))
 
     monkeypatch.setattr(sweeping, "connect", lambda *_: Session("http://x", transport=Server()))
-    assert conoid("sweep-cancel", "s").stdout == said
+    assert conoid("sweep-cancel", "s").stdout == message
 
 
 # Cases ----------------------------------------------------------------------------------------------------------------
@@ -237,5 +237,5 @@ def test_a_sweep_that_has_ended_is_not_said_to_be_cancelled(
 
 def test_a_number_that_cannot_be_computed_with_is_refused(quiet_home: Path) -> None:
     line = refused(2, "validate", "demo", "--set", "parts[0].mesh.element_size='1e-300 m'")
-    told = "cannot be used: in SI units it is not between 1e-30 and 1e+30"
-    assert line == f"conoid: parts[0].mesh.element_size = '1e-300 m': {told}"
+    message = "cannot be used: in SI units it is not between 1e-30 and 1e+30"
+    assert line == f"conoid: parts[0].mesh.element_size = '1e-300 m': {message}"

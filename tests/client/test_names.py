@@ -15,20 +15,20 @@ from conoid.client.cli import app
 from conoid.client.errors import AnswerError, NotFoundError, UsageError
 from conoid.client.remote.session import Session
 
-from .hostile import Hostile, hostile, run_info, said
+from .hostile import Hostile, answering, hostile, run_info
 
 IDS = ["1kbbx", "1kbbw", "1kaaa"]
-NONE = said({"detail": "run: there is none"}, 404)
+NONE = answering({"detail": "run: there is none"}, 404)
 
 
 @pytest.fixture
 def server(quiet_home: Path) -> Iterator[Hostile]:
     """A server with three runs and three sweeps of the same ids; it returns ids up to the requested one."""
     with hostile() as made:
-        made.answers = {f"/v1/runs/{name}": said(run_info(id=name)) for name in IDS}
-        made.answers |= {f"/v1/sweeps/{name}": said(sweep(name)) for name in IDS}
-        made.answers["/v1/runs"] = said({"runs": [run_info(id=name) for name in IDS], "next": None})
-        made.answers["/v1/sweeps"] = said({"sweeps": [sweep(name) for name in IDS], "next": None})
+        made.answers = {f"/v1/runs/{name}": answering(run_info(id=name)) for name in IDS}
+        made.answers |= {f"/v1/sweeps/{name}": answering(sweep(name)) for name in IDS}
+        made.answers["/v1/runs"] = answering({"runs": [run_info(id=name) for name in IDS], "next": None})
+        made.answers["/v1/sweeps"] = answering({"sweeps": [sweep(name) for name in IDS], "next": None})
         yield made
 
 
@@ -59,8 +59,8 @@ def test_a_name_that_nothing_has_raises(server: Hostile) -> None:
 
 
 def test_a_beginning_that_one_has_is_enough(server: Hostile) -> None:
-    server.answers["/v1/runs"] = said({"runs": [run_info(id="1kaaa")], "next": None})
-    server.answers["/v1/sweeps"] = said({"sweeps": [sweep("1kaaa")], "next": None})
+    server.answers["/v1/runs"] = answering({"runs": [run_info(id="1kaaa")], "next": None})
+    server.answers["/v1/sweeps"] = answering({"sweeps": [sweep("1kaaa")], "next": None})
     with Session(server.url) as session:
         assert session.run("1ka").id == "1kaaa"
         assert session.find_sweep("1ka").id == "1kaaa"
@@ -80,16 +80,16 @@ def test_a_beginning_that_several_have_is_one_line_with_them(server: Hostile) ->
 
 
 def test_a_server_too_old_for_beginnings_says_what_it_said(server: Hostile) -> None:
-    server.answers["/v1/runs"] = said({"detail": "prefix: no such parameter"}, 400)
+    server.answers["/v1/runs"] = answering({"detail": "prefix: no such parameter"}, 400)
     with Session(server.url) as session, pytest.raises(NotFoundError, match="there is none"):
         session.run("1kb")
 
 
 def test_a_list_without_end_is_given_up(server: Hostile, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("conoid.client.remote.session._MOST_PAGES", 5)
-    server.answers["/v1/runs"] = said({"runs": [], "next": "x"})
-    server.answers["/v1/sweeps"] = said({"sweeps": [], "next": "x"})
-    server.answers["/v1/runs/1kaaa/events"] = said({"events": [], "last": 0, "more": True})
+    server.answers["/v1/runs"] = answering({"runs": [], "next": "x"})
+    server.answers["/v1/sweeps"] = answering({"sweeps": [], "next": "x"})
+    server.answers["/v1/runs/1kaaa/events"] = answering({"events": [], "last": 0, "more": True})
     with Session(server.url) as session:
         for endless in (session.runs, session.sweeps, session.run("1kaaa").events):
             with pytest.raises(AnswerError, match="has no end"):
@@ -104,11 +104,11 @@ def folder(quiet_home: Path) -> Path:
     """A running run in a folder whose name is not an id."""
     made = quiet_home / "my runs" / "a%b ü"
     made.mkdir(parents=True)
-    told: list[messages.AnyMessage] = [
+    journal: list[messages.AnyMessage] = [
         messages.Status(run="r", seq=1, wall=1.7e9, state="queued"),
         messages.Status(run="r", seq=2, wall=1.7e9 + 5, state="running"),
     ]
-    (made / layout.JOURNAL).write_bytes(b"".join(messages.to_json(each) + b"\n" for each in told))
+    (made / layout.JOURNAL).write_bytes(b"".join(messages.to_json(each) + b"\n" for each in journal))
     (made / layout.RESOLVED_CASE).write_text(json.dumps({"name": "bar", "title": "A bar", "run": {"ranks": 3}}))
     return made
 
@@ -123,8 +123,8 @@ def worker(folder: Path) -> Iterator[None]:
 
 @pytest.mark.usefixtures("worker")
 def test_a_run_in_a_folder_is_shown_and_asked(folder: Path) -> None:
-    told = json.loads(conoid("show", folder, "--json"))
-    assert (told["id"], told["state"], told["ranks"], told["name"]) == ("a%b ü", "running", 3, "bar")
+    answer = json.loads(conoid("show", folder, "--json"))
+    assert (answer["id"], answer["state"], answer["ranks"], answer["name"]) == ("a%b ü", "running", 3, "bar")
     assert "A bar" in conoid("show", folder)
     assert "checkpoint requested" in conoid("checkpoint", folder)
     assert "snapshot requested" in conoid("snapshot", folder)
@@ -164,8 +164,8 @@ def test_a_copy_of_a_run_does_not_stand_for_the_one_of_the_server(folder: Path, 
     """conoid get makes a folder with the id of the run as its name."""
     name = "1kaaa".ljust(22, "0")
     folder.rename(Path(name))
-    server.answers[f"/v1/runs/{name}"] = said(run_info(id=name))
-    server.answers[f"/v1/runs/{name}:cancel"] = said(run_info(id=name, state="stopping"))
+    server.answers[f"/v1/runs/{name}"] = answering(run_info(id=name))
+    server.answers[f"/v1/runs/{name}:cancel"] = answering(run_info(id=name, state="stopping"))
     assert conoid("cancel", name, "--url", server.url) == f"{name} stopping\n"
     assert "no worker writes into it" in conoid("cancel", f"./{name}/../{name}")
 

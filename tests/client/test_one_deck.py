@@ -21,7 +21,7 @@ from conoid.worker.mesh.read import read
 from .deck_texts import abaqus, r20, radioss
 
 
-def said(path: Path) -> list[object]:
+def readings(path: Path) -> list[object]:
     """Returns all keywords of a deck with their fields, as the importer reads them."""
     return [
         (block.name, [block.fields(card, *(10,) * 8) for card in block.filled()], block.least)
@@ -66,7 +66,7 @@ def test_the_one_file_says_what_the_deck_says(tmp_path: Path, seed: int) -> None
     root = tmp_path / "in" / "top.k"
     root.write_text(f"*KEYWORD\n*INCLUDE\n{top.relative_to(tmp_path / 'in')}\n*NODE\n1,0,0,0\n*END\n")
     files = one_deck.write(root, tmp_path / "one.k")
-    assert said(tmp_path / "one.k") == said(root)
+    assert readings(tmp_path / "one.k") == readings(root)
     assert not one_deck.includes(tmp_path / "one.k")
     assert {path.name for path in files} == {path.name for path in files_of(root)}
 
@@ -110,9 +110,9 @@ def test_a_deck_that_leads_out_of_its_folder_is_refused_in_a_line(tmp_path: Path
     (tmp_path / "secret").write_text("*NODE\n")
     (tmp_path / "in").mkdir()
     (tmp_path / "in" / "a.k").write_text(f"*KEYWORD\n*INCLUDE\n{name}\n")
-    with pytest.raises(CaseError, match=r"^parts\[0\]\.mesh\.path = 'a\.k': the (included )?file '.*' ") as told:
+    with pytest.raises(CaseError, match=r"^parts\[0\]\.mesh\.path = 'a\.k': the (included )?file '.*' ") as raised:
         Hashes().of(case("a.k"), tmp_path / "in")
-    assert "\n" not in str(told.value)
+    assert "\n" not in str(raised.value)
 
 
 def split(folder: Path, name: str, text: str, begin: str, end: str, line: str) -> None:

@@ -88,8 +88,8 @@ def test_who_follows_a_run_outlasts_a_proxy_whose_server_starts_again(status: in
         left[0] -= 1
         if left[0] >= 0:
             raise UnreachableError("none") if status is None else ServiceError(status, {})
-        told: list[AnyMessage] = [Status(run="a", seq=1, state="succeeded")]
-        return told[after:]
+        journal: list[AnyMessage] = [Status(run="a", seq=1, state="succeeded")]
+        return journal[after:]
 
     assert [message.seq for message in follow(Silent(), refill, lambda: False)] == [1]
 

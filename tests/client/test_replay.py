@@ -31,18 +31,18 @@ def wandering() -> list[AnyMessage]:
     20 surface nodes, others 10.
     """
     row = [(float(x), 0.0, 0.0) for x in range(8)]
-    told: list[AnyMessage] = [
+    sent: list[AnyMessage] = [
         Groups(run="r", seq=1, load=[0] * 8, outside=[10] * 8, centres=row, tets=[5] * 8, cost=COST)
     ]
     for window in range(1, 17):
         load = [10**9 * (group == spot(window)) for group in range(8)]
         outside = [20 if group <= spot(window) else 10 for group in range(8)]
-        told.append(Groups(run="r", seq=1 + window, step=10 * window, load=load, outside=outside))
-    return told
+        sent.append(Groups(run="r", seq=1 + window, step=10 * window, load=load, outside=outside))
+    return sent
 
 
-def account(words: str, told: Sequence[AnyMessage] | None = None, ranks: int = 2) -> replay.Account:
-    record = replay.read(told if told is not None else wandering())
+def account(words: str, sent: Sequence[AnyMessage] | None = None, ranks: int = 2) -> replay.Account:
+    record = replay.read(sent if sent is not None else wandering())
     return replay.replay(record, replay.chosen(Spec(), words), ranks, record.cost)
 
 
@@ -90,8 +90,8 @@ def test_one_rank_has_nothing_to_cut() -> None:
 
 
 def test_what_a_rank_takes_whatever_it_has_is_lost_by_nobody() -> None:
-    told = [m if not i else replace(m, rank=10**9) for i, m in enumerate(wandering())]
-    never = account("never", told)
+    sent = [m if not i else replace(m, rank=10**9) for i, m in enumerate(wandering())]
+    never = account("never", sent)
     assert (never.lost, never.work) == (80.0, 80.0 + 160.0)
 
 
@@ -102,8 +102,8 @@ def cut(step: int, cost: float) -> Balance:
 def test_the_cost_is_the_mean_of_the_cuts_of_the_run_and_its_own_line_is_what_happened() -> None:
     phases = {"elements": [6.0, 1.0], "nodes": [1.0, 1.0], "contact": [0.0, 1.0], "fracture": [0.0, 0.0]}
     load = Load(run="r", step=30, phases=phases | {"exchange": [9.0, 0.0]}, imbalance=1.4)
-    told = [*wandering(), load, cut(30, 2.0), cut(60, 4.0)]
-    record = replay.read(told, "every:30")
+    sent = [*wandering(), load, cut(30, 2.0), cut(60, 4.0)]
+    record = replay.read(sent, "every:30")
     happened = record.happened
     assert record.cost == 3.0
     assert (happened.ranks, happened.cuts, happened.lost, happened.cost) == (2, [30, 60], 2.0, 6.0)
@@ -111,16 +111,16 @@ def test_the_cost_is_the_mean_of_the_cuts_of_the_run_and_its_own_line_is_what_ha
 
 
 def test_a_run_that_goes_on_from_a_checkpoint_is_read_once() -> None:
-    told = wandering()
-    again = [told[0], *told[9:]]
+    sent = wandering()
+    again = [sent[0], *sent[9:]]
     resumed = replace(again[0], step=80)
-    assert account("measured", [*told[:12], resumed, *again[1:]]) == account("measured")
+    assert account("measured", [*sent[:12], resumed, *again[1:]]) == account("measured")
 
 
 def test_a_run_that_has_told_nothing_is_refused() -> None:
-    for told in ([], wandering()[:1], wandering()[1:]):
+    for sent in ([], wandering()[:1], wandering()[1:]):
         with pytest.raises(ClientError, match="has no loads of groups"):
-            replay.read(told)
+            replay.read(sent)
     with pytest.raises(ClientError, match="ranks = 9: 1 to 8"):
         account("never", ranks=9)
 
@@ -175,9 +175,9 @@ def run_folder(folder: Path) -> Path:
 
 def test_the_command_compares_all_policies_in_a_folder(tmp_path: Path) -> None:
     folder = str(run_folder(tmp_path / "run"))
-    told = CliRunner().invoke(app, ["replay-balance", folder, "--policy", "measured", "--json"])
-    assert told.exit_code == 0, told.output
-    data = json.loads(told.stdout)
+    printed = CliRunner().invoke(app, ["replay-balance", folder, "--policy", "measured", "--json"])
+    assert printed.exit_code == 0, printed.output
+    data = json.loads(printed.stdout)
     assert [(p["policy"], p["total"]) for p in data["policies"]] == [
         ("measured", 108.0), ("outside 1.2", 122.0), ("every:10", 220.0), ("never", 80.0),
     ]  # fmt: skip

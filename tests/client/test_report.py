@@ -99,8 +99,8 @@ def test_it_says_how_the_run_ended_and_whether_it_is_right(folder: Path, tmp_pat
     outcome["reference"] += [{**outcome["reference"][0], "name": "width of rod", "pass": False}]
     (folder / "outcome.json").write_text(json.dumps(outcome))
     text = read(report.write(Result.open(folder), tmp_path / "bar.html", [])).text
-    for said in ("A steel bar", "succeeded", "d" * 64, "extent of rod", "Fragments", "of ten tets or more"):
-        assert said in text
+    for words in ("A steel bar", "succeeded", "d" * 64, "extent of rod", "Fragments", "of ten tets or more"):
+        assert words in text
     html = (tmp_path / "bar.html").read_text()
     assert html.count("<span class=good>pass</span>") == html.count("<span class=bad>FAIL</span>") == 1
 
@@ -137,10 +137,10 @@ def test_the_parts_have_their_energies_where_there_are_several(folder: Path, tmp
         "internal.ball": [0.0] * 2,
     }
     write_history(folder, t=[0.0, 4e-5], dt=[1e-8] * 2, **parts)
-    told = read(report.write(Result.open(folder), tmp_path / "two.html", fields=[])).text
-    assert "part, at the endkineticinternal" in told
-    assert "rod3.00 J1.25 J" in told
-    assert "ball0.500 J0 J" in told
+    text = read(report.write(Result.open(folder), tmp_path / "two.html", fields=[])).text
+    assert "part, at the endkineticinternal" in text
+    assert "rod3.00 J1.25 J" in text
+    assert "ball0.500 J0 J" in text
 
 
 def test_a_field_that_cannot_be_drawn_is_a_line(folder: Path, tmp_path: Path) -> None:
@@ -161,7 +161,7 @@ def test_what_takes_long_says_what_it_is_at(folder: Path, quiet_home: Path, monk
     monkeypatch.setattr(progress, "LONGEST", 0.05)
     heard = threading.Event()
 
-    def told(*lines: str) -> None:
+    def renderer(*lines: str) -> None:
         if lines[0].startswith("writing bar.html: energy, "):
             heard.set()
 
@@ -169,7 +169,7 @@ def test_what_takes_long_says_what_it_is_at(folder: Path, quiet_home: Path, monk
         assert heard.wait(30.0)
         return []
 
-    monkeypatch.setattr(options, "complain", told)
+    monkeypatch.setattr(options, "complain", renderer)
     monkeypatch.setattr(report, "_energy", energy)
     done = CliRunner().invoke(app, ["report", str(folder), "--no-pictures"])
     assert done.exit_code == 0, done.output

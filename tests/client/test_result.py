@@ -91,5 +91,5 @@ def test_a_mesh_is_that_of_the_nearest_frame(folder: Path) -> None:
 
 def test_a_result_shows_itself_in_notebooks(folder: Path) -> None:
     html = Result.open(folder)._repr_html_()
-    for said in ("A steel bar", "succeeded", "extent of rod", "pass"):
-        assert said in html
+    for words in ("A steel bar", "succeeded", "extent of rod", "pass"):
+        assert words in html

@@ -118,8 +118,8 @@ def test_the_figure_marks_what_others_measured() -> None:
         drawn = ElementTree.fromstring(speed_up(study(one_rank(), two_ranks()), others, "somebody"))
         red = [e for e in drawn.iter(f"{svg}circle") if e.get("fill") == "#c8553d"]
         assert len(red) == len(others) + (len(others) > 0), "the points and their mark in the legend"
-        told = [e.text for e in drawn.iter(f"{svg}text") if re.fullmatch(r"\d+\.\d\d", e.text or "")]
-        assert told == [*(f"{value:.2f}" for value in others.values()), "1.33"]
+        labels = [e.text for e in drawn.iter(f"{svg}text") if re.fullmatch(r"\d+\.\d\d", e.text or "")]
+        assert labels == [*(f"{value:.2f}" for value in others.values()), "1.33"]
 
 
 @pytest.mark.parametrize(
@@ -168,11 +168,11 @@ def test_what_cannot_be_read_is_one_line(option: str, value: str) -> None:
 def test_numbers_of_ranks_that_cannot_be(ranks: str) -> None:
     result = conoid("demo", "--ranks", ranks)
     assert result.exit_code == 2
-    said = (
+    message = (
         "allowed: numbers of ranks, or ranks x threads, with commas between them, such as 1,2,4x4; up to 4096 ranks, "
         "up to 256 threads\n"
     )
-    assert result.stderr.endswith(said)
+    assert result.stderr.endswith(message)
     assert len(result.stderr) < 250
 
 

@@ -246,7 +246,7 @@ def unusable(folder: Path, kind: str) -> str:
 
 
 @pytest.mark.parametrize(
-    ("kind", "said"),
+    ("kind", "message"),
     [
         ("a pipe", "is not a regular file"), ("a link to a device", "is not a regular file"),
         ("a link to itself", "is not a regular file"), ("a folder", "is not a regular file"),
@@ -254,13 +254,13 @@ def unusable(folder: Path, kind: str) -> str:
         ("a link to nothing", "no such file"), ("nothing", "no such file"), ("no name", "embedded null byte"),
     ],
 )  # fmt: skip
-def test_what_is_no_file_is_refused_in_a_line(folder: Path, kind: str, said: str) -> None:
+def test_what_is_no_file_is_refused_in_a_line(folder: Path, kind: str, message: str) -> None:
     """The client refuses the path before a request to a server, and does not hang."""
-    with Session("http://127.0.0.1:9") as session, pytest.raises(CaseError) as told:
+    with Session("http://127.0.0.1:9") as session, pytest.raises(CaseError) as raised:
         session.submit(case_with(unusable(folder, kind)))
-    (problem,) = told.value.problems
+    (problem,) = raised.value.problems
     assert problem.key == "parts[0].mesh.path"
-    assert problem.message.startswith(said)
+    assert problem.message.startswith(message)
     assert "\n" not in str(problem)
 
 
@@ -289,12 +289,12 @@ def test_commands_send_what_a_case_names(server: LocalServer, folder: Path, monk
     monkeypatch.setenv("CONOID_TOKEN", server.token)
     (folder / "meshes" / "other.inp").write_text(BAR.replace("10, 0, 0\n", "11, 0, 0\n"))
     hashes = [hashlib.sha256((folder / "meshes" / name).read_bytes()).hexdigest() for name in ("bar.inp", "other.inp")]
-    code, run, said = conoid("submit", folder / "bar.toml")
-    assert code == 0, said
+    code, run, printed = conoid("submit", folder / "bar.toml")
+    assert code == 0, printed
     assert [path.name for path in (server.runs / run / layout.FILES).iterdir()] == [f"{hashes[0]}.inp"]
     names = "parts[0].mesh.path=meshes/bar.inp,meshes/other.inp"
-    code, sweep, said = conoid("sweep", folder / "bar.toml", "--set", names, "--wait")
-    assert code == 0, said
+    code, sweep, printed = conoid("sweep", folder / "bar.toml", "--set", names, "--wait")
+    assert code == 0, printed
     points = server.session.find_sweep(sweep).status().points
     copies = [next((server.runs / point.run.id / layout.FILES).iterdir()).stem for point in points]
     assert copies == hashes
@@ -302,8 +302,8 @@ def test_commands_send_what_a_case_names(server: LocalServer, folder: Path, monk
     assert conoid("get", run, "--out", folder / "here")[0] == 0
     (folder / "meshes" / "bar.inp").unlink()
     server.session.delete(f"/v1/files/{hashes[0]}")
-    code, again, said = conoid("submit", folder / "here" / "case.json")
-    assert code == 0, said
+    code, again, printed = conoid("submit", folder / "here" / "case.json")
+    assert code == 0, printed
     assert (server.runs / again / layout.FILES / f"{hashes[0]}.inp").read_text() == BAR
 
 
@@ -314,6 +314,6 @@ def test_what_a_server_does_not_take_is_told_in_its_words(server: LocalServer, t
         file.truncate(5 << 30)  # takes no room
     with path.open("rb") as file:
         local = LocalFile(Named((), "large.inp", None), path, "0" * 64, state_of(file.fileno()))
-    with pytest.raises(ServiceError, match=r"^the file has 5\.37 GB; this server allows 4\.29 GB$") as told:
+    with pytest.raises(ServiceError, match=r"^the file has 5\.37 GB; this server allows 4\.29 GB$") as raised:
         sending.send(server.session, local)
-    assert told.value.status == 413
+    assert raised.value.status == 413

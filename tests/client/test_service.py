@@ -41,9 +41,9 @@ def test_zenoh_tells_every_message_once_and_in_order(session: Session, tmp_path:
     run = session.submit(case_file(tmp_path, steps=40, pace=0.01, lose=lose))
     link = run.link()
     assert isinstance(link, ZenohLink)
-    told = list(run.messages(link=link))
-    assert [message.seq for message in told] == list(range(1, len(told) + 1))
-    assert told == run.events()
+    received = list(run.messages(link=link))
+    assert [message.seq for message in received] == list(range(1, len(received) + 1))
+    assert received == run.events()
 
 
 def test_a_late_joiner_is_told_the_whole_story(session: Session, tmp_path: Path) -> None:
@@ -59,8 +59,8 @@ def test_a_late_joiner_is_told_the_whole_story(session: Session, tmp_path: Path)
 
 def test_sse_tells_the_same(session: Session, tmp_path: Path) -> None:
     run = session.submit(case_file(tmp_path, steps=20, pace=0.01))
-    told = list(run.messages(link=SseLink(lambda: session.stream(f"{run.path}/stream"))))
-    assert told == run.events()
+    received = list(run.messages(link=SseLink(lambda: session.stream(f"{run.path}/stream"))))
+    assert received == run.events()
 
 
 def test_without_a_router_the_stream_falls_back_to_sse(

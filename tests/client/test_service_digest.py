@@ -40,13 +40,13 @@ def test_a_run_of_a_mesh_file_has_the_digest_of_the_worker_alone(quiet_home: Pat
         (quiet_home / name).write_text(text)
     ended = CliRunner().invoke(app, ["run", "case/bar.toml", "--json"])
     assert ended.exit_code == 0, ended.output
-    told = json.loads(ended.stdout)
-    (copy,) = (Path(told["folder"]) / layout.FILES).iterdir()
+    answer = json.loads(ended.stdout)
+    (copy,) = (Path(answer["folder"]) / layout.FILES).iterdir()
     assert copy.name == f"{hashlib.sha256(BAR.encode()).hexdigest()}.inp"
     assert copy.read_text() == BAR
     (quiet_home / "meshes" / "bar.inp").write_text(BAR.replace("10, 10, 10", "10, 10, 11"))
-    for case, same in ((Path(told["folder"]) / "case.json", True), (quiet_home / "case" / "bar.toml", False)):
+    for case, same in ((Path(answer["folder"]) / "case.json", True), (quiet_home / "case" / "bar.toml", False)):
         command = [sys.executable, "-m", "conoid.worker", str(case), "--out", str(quiet_home / str(same))]
         subprocess.run(command, check=True, capture_output=True)
         outcome = json.loads((quiet_home / str(same) / layout.OUTCOME).read_bytes())
-        assert (outcome["digest"] == told["outcome"]["digest"]) is same
+        assert (outcome["digest"] == answer["outcome"]["digest"]) is same

@@ -43,16 +43,16 @@ def test_a_damaged_file_of_a_server_is_named_by_its_run() -> None:
     the message.
     """
     session = served(lambda _: httpx2.Response(200, content=b"{"))
-    for name, said in (("case.resolved.json", "case"), ("outcome.json", "outcome")):
-        with pytest.raises(ClientError, match=f"^{name} of run r1 at http://conoid.test: this {said} cannot be read: "):
-            _ = Run(session, "r1").result().case if said == "case" else Run(session, "r1").result().outcome
+    for name, noun in (("case.resolved.json", "case"), ("outcome.json", "outcome")):
+        with pytest.raises(ClientError, match=f"^{name} of run r1 at http://conoid.test: this {noun} cannot be read: "):
+            _ = Run(session, "r1").result().case if noun == "case" else Run(session, "r1").result().outcome
 
 
-@pytest.mark.parametrize(("overrides", "told"), [("run.ranks=2", "'run.ranks=2'"), (5, "5")])
-def test_one_text_is_no_list_of_assignments(overrides: Any, told: str) -> None:
+@pytest.mark.parametrize(("overrides", "message"), [("run.ranks=2", "'run.ranks=2'"), (5, "5")])
+def test_one_text_is_no_list_of_assignments(overrides: Any, message: str) -> None:
     """Before, the text was read letter by letter."""
     with pytest.raises(
-        CaseError, match=rf"^overrides = {told}: write a list of assignments, such as \['run.ranks=2'\]"
+        CaseError, match=rf"^overrides = {message}: write a list of assignments, such as \['run.ranks=2'\]"
     ):
         body_of("demo", overrides)
 
@@ -86,15 +86,15 @@ def test_a_refusal_is_its_detail_and_hint() -> None:
 
 
 @pytest.mark.parametrize(
-    ("token", "said"),
+    ("token", "message"),
     [(None, "none was sent: set CONOID_TOKEN"), ("conoid_1_old", "the one of --token, CONOID_TOKEN or the")],
 )
-def test_a_token_that_is_missing_or_wrong_names_where_it_comes_from(token: str | None, said: str) -> None:
+def test_a_token_that_is_missing_or_wrong_names_where_it_comes_from(token: str | None, message: str) -> None:
     answer = problem(401, detail="this needs a valid token", hint="send the header 'Authorization: Bearer <token>'")
     session = served(answer, token)
     with pytest.raises(ServiceError) as caught:
         session.me()
-    assert str(caught.value).startswith(f"this needs a valid token (server {session.url}: {said}")
+    assert str(caught.value).startswith(f"this needs a valid token (server {session.url}: {message}")
     assert "header" not in str(caught.value)
 
 
@@ -106,8 +106,8 @@ def test_a_refused_case_tells_every_error() -> None:
     session = served(problem(422, detail="run.ranks = 9: this server has 2 slots (and 1 more)", errors=errors))
     with pytest.raises(CaseError) as caught:
         session.submit({"name": "bar"})
-    told = list(map(str, caught.value.problems))
-    assert told == ["run.ranks = 9: this server has 2 slots", "parts[0].mesh: this key is missing"]
+    problems = list(map(str, caught.value.problems))
+    assert problems == ["run.ranks = 9: this server has 2 slots", "parts[0].mesh: this key is missing"]
 
 
 def test_what_is_not_there_is_the_same_error_here_and_on_a_server(tmp_path: Path) -> None:
@@ -130,8 +130,8 @@ def test_an_answer_that_is_no_problem_json_is_still_one_line() -> None:
 def test_no_server_says_how_to_start_one() -> None:
     with Session("http://127.0.0.1:1") as session, pytest.raises(UnreachableError) as caught:
         session.me()
-    told = "is it running there? (conoid serve; another address: CONOID_URL or --url)"
-    assert str(caught.value) == f"no answer from http://127.0.0.1:1: {told}"
+    hint = "is it running there? (conoid serve; another address: CONOID_URL or --url)"
+    assert str(caught.value) == f"no answer from http://127.0.0.1:1: {hint}"
 
 
 def test_a_submission_is_tried_again_with_the_same_key() -> None:
@@ -256,11 +256,11 @@ def test_a_shipped_case_is_named_and_overridden(quiet_home: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("source", "said"),
+    ("source", "message"),
     [("dmeo", "did you mean 'demo'"), ("nothing.toml", "cannot read this file"), ("README.md", r"ends in \.toml or")],
 )
-def test_what_is_no_case_is_said(source: str, said: str) -> None:
-    with pytest.raises(CaseError, match=said):
+def test_what_is_no_case_is_said(source: str, message: str) -> None:
+    with pytest.raises(CaseError, match=message):
         body_of(source)
 
 
@@ -288,12 +288,12 @@ def test_a_saved_token_is_not_shown_to_another_server(quiet_home: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("text", "said"),
+    ("text", "message"),
     [("url = 3", "allowed are url and token"), ("key = 'x'", "allowed are"), ("url = ", "cannot be read")],
 )
-def test_a_wrong_configuration_names_the_file(quiet_home: Path, text: str, said: str) -> None:
+def test_a_wrong_configuration_names_the_file(quiet_home: Path, text: str, message: str) -> None:
     save(quiet_home, text)
-    with pytest.raises(ClientError, match=rf"client\.toml.*{said}"):
+    with pytest.raises(ClientError, match=rf"client\.toml.*{message}"):
         target()
 
 

@@ -22,7 +22,7 @@ def session(server: LocalServer) -> Session:
 def test_they_are_listed_fetched_and_read(session: Session, tmp_path: Path) -> None:
     run = session.submit(case_file(tmp_path, snapshots=3))
     run.wait()
-    assert [told.n for told in run.snapshots()] == [0, 1, 2]
+    assert [snapshot.n for snapshot in run.snapshots()] == [0, 1, 2]
     one = run.snapshot(1)
     assert (one.header.n, one.header.step) == (1, 1)
     assert one.data == Path(run.download(tmp_path, "snapshots/000001.snap")).read_bytes()

@@ -42,15 +42,15 @@ def reading(
     link: Link, journal: Journal, ended: Callable[[], bool] = lambda: False
 ) -> tuple[list[int], threading.Thread]:
     """Follows a run in a thread and returns a list that receives the numbers of the messages."""
-    told: list[int] = []
+    received: list[int] = []
 
     def read() -> None:
         for message in follow(link, journal.after, ended):
-            told.append(message.seq)  # noqa: PERF401  (it is looked at while it grows)
+            received.append(message.seq)  # noqa: PERF401  (it is looked at while it grows)
 
     thread = threading.Thread(target=read, daemon=True)
     thread.start()
-    return told, thread
+    return received, thread
 
 
 def subscribed(broker: Broker) -> ZenohLink:
@@ -80,44 +80,44 @@ def test_a_late_joiner_reads_history_then_stream_without_gap_or_repeat(broker: B
     journal.lines = story[:6]
     link = subscribed(broker)
     broker.publish(story[4])  # this message arrived during the subscription
-    told, thread = reading(link, journal)
-    until(lambda: len(told) == 6)
+    received, thread = reading(link, journal)
+    until(lambda: len(received) == 6)
     for message in story[6:]:
         journal.lines.append(message)
         broker.publish(message)
     thread.join(10)
-    assert told == list(range(1, 16))
+    assert received == list(range(1, 16))
     assert journal.reads == 1, "the other messages came from the stream"
 
 
 def test_a_gap_is_refilled_from_the_journal(broker: Broker) -> None:
     journal, story = Journal(), run_messages.whole()
-    told, thread = reading(subscribed(broker), journal)
+    received, thread = reading(subscribed(broker), journal)
     until(lambda: journal.reads == 1)
     for message in story:
         journal.lines.append(message)
         if message.seq not in {3, 4, 9}:
             broker.publish(message)
     thread.join(10)
-    assert told == list(range(1, 16))
+    assert received == list(range(1, 16))
 
 
 def test_a_router_that_falls_silent_loses_nothing(broker: Broker) -> None:
     journal, story = Journal(), run_messages.whole()
-    told, thread = reading(subscribed(broker), journal)
+    received, thread = reading(subscribed(broker), journal)
     broker.publish(story[0])
     journal.lines = story
     thread.join(10)
-    assert told == list(range(1, 16)), "the journal is polled while nothing comes"
+    assert received == list(range(1, 16)), "the journal is polled while nothing comes"
 
 
 def test_a_run_that_ended_without_a_last_word_ends_the_stream(broker: Broker) -> None:
     journal = Journal()
     journal.lines = run_messages.whole()[:9]
-    told, thread = reading(subscribed(broker), journal, ended=lambda: True)
+    received, thread = reading(subscribed(broker), journal, ended=lambda: True)
     thread.join(10)
     assert not thread.is_alive()
-    assert told == list(range(1, 10))
+    assert received == list(range(1, 10))
 
 
 def test_other_runs_and_rubbish_are_not_heard(broker: Broker) -> None:
@@ -155,9 +155,9 @@ def test_sse_tells_the_same_and_its_break_is_bridged_by_the_journal() -> None:
         yield from story[2:5]
         raise UnreachableError("the proxy gave up")
 
-    told, thread = reading(SseLink(events), journal)
+    received, thread = reading(SseLink(events), journal)
     thread.join(10)
-    assert told == list(range(1, 16))
+    assert received == list(range(1, 16))
 
 
 def test_a_server_that_restarts_is_waited_for(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -203,7 +203,7 @@ def test_a_stream_that_nobody_can_read_is_told_once_and_the_journal_is_read() ->
     journal.lines = [run_messages.status(1, "running"), run_messages.status(2, "succeeded")]
     link = SseLink(unreadable)
     until(lambda: bool(link.trouble))
-    warning, *told = follow(link, journal.after, lambda: True)
-    assert [message.seq for message in told] == [1, 2]
+    warning, *received = follow(link, journal.after, lambda: True)
+    assert [message.seq for message in received] == [1, 2]
     assert isinstance(warning, Log)
     assert warning.text.startswith("the events cannot be followed, and the journal is read instead: the answer of http")

@@ -140,5 +140,7 @@ def test_a_sweep_that_has_not_succeeded_names_a_run() -> None:
         return SweepPoint(values={"run.ranks": speed}, run=run)
 
     failed = [point(2, State.FAILED, "the energy residual"), point(3, State.CANCELLED, "")]
-    assert sweeping.told(failed, 5) == "2 of 5 runs have not succeeded; r2 (run.ranks = 2) failed: the energy residual"
-    assert sweeping.told(failed[1:], 5) == "1 of 5 runs have not succeeded; r3 (run.ranks = 3) cancelled"
+    assert (
+        sweeping.failures(failed, 5) == "2 of 5 runs have not succeeded; r2 (run.ranks = 2) failed: the energy residual"
+    )
+    assert sweeping.failures(failed[1:], 5) == "1 of 5 runs have not succeeded; r3 (run.ranks = 3) cancelled"

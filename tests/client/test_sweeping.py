@@ -99,9 +99,9 @@ def test_a_sweep_without_a_server_goes_on_and_its_file_is_a_table(
 def test_a_threshold_by_one_command_and_again_from_its_file(user: Path) -> None:
     case = case_file(user)
     words = ("sweep", case, "--adaptive", "probe.left = 0", "--set", f"{SPEED}=200:400 m/s", "--tolerance", "5 m/s")
-    told = conoid(*words)
-    assert told.exit_code == 0, told.output
-    lines = told.stdout.splitlines()
+    result = conoid(*words)
+    assert result.exit_code == 0, result.output
+    lines = result.stdout.splitlines()
     assert lines[0].startswith(f"{SPEED} = 25")
     assert "where probe.left = 0 m/s: 0 m/s at " in lines[0]
     assert lines[1].startswith("Lambert and Jonas: 250 +- ")
@@ -125,14 +125,14 @@ def test_the_same_threshold_from_python(server: LocalServer, quiet_home: Path) -
 
 
 @pytest.mark.parametrize(
-    ("words", "told"),
+    ("words", "message"),
     [
         (("--adaptive", "probe.left = 0"), "KEY=LOW:HIGH"),
         (("--adaptive", "probe.left = 0", "--grid", "--set", "a=1:2"), "neither --grid nor --list"),
         (("--tolerance", "1", "--set", "run.ranks=1"), "are for --adaptive"),
     ],
 )
-def test_options_that_do_not_go_together(user: Path, words: tuple[str, ...], told: str) -> None:
+def test_options_that_do_not_go_together(user: Path, words: tuple[str, ...], message: str) -> None:
     refused = conoid("sweep", case_file(user), *words)
     assert refused.exit_code == 2
-    assert told in refused.stderr
+    assert message in refused.stderr

@@ -79,14 +79,14 @@ def test_the_end_of_a_run_says_what_one_thread_did_alone() -> None:
         state="succeeded", steps=1000, ranks=2, threads=3, helped=[9.0, 3.0],
         serial={"elements": [0.5, 1.0], "rest": [0.25, 1.0]}, parallel={"elements": [5.0, 6.0], "rest": [0.0, 0.0]},
     )  # fmt: skip
-    for outcome, said in (
+    for outcome, text in (
         (ended, "2.00 ms by one thread alone, 6.00 ms in what threads share, in which the others are busy for 25 %"),
         (msgspec.structs.replace(ended, threads=1), "2.00 ms by one thread alone, 6.00 ms in what threads share"),
     ):
         out = io.StringIO()
         PlainConsole(file=out, width=160, highlight=False).print(outcome_table(outcome))
         (line,) = [line for line in out.getvalue().splitlines() if line.startswith("a step")]
-        assert line.removeprefix("a step").strip() == said
+        assert line.removeprefix("a step").strip() == text
 
 
 def test_the_end_of_a_run_has_its_probes_with_units_and_extremes() -> None:

@@ -65,18 +65,18 @@ def ran(folder: Path, case: str) -> Result:
 @pytest.mark.slow
 def test_it_ends_as_it_says(tmp_path: Path) -> None:
     result = ran(tmp_path, CASE)
-    end, told = result.outcome, result.history
+    end, history = result.outcome, result.history
     expected = estimate(parse_case(toml_data(CASE)))
     assert expected.memory_bytes is not None
     assert 1.0 <= (expected.memory_bytes + expected.dust_bytes) / end.peak_memory[0] < 1.3
-    times, speeds, forces = ([abs(float(v)) for v in told[name]] for name in ("t", "sphere_speed", "backing_force"))
+    times, speeds, forces = ([abs(float(v)) for v in history[name]] for name in ("t", "sphere_speed", "backing_force"))
     force, at = max(zip(forces, times, strict=True))
-    for said in (
+    for text in (
         f"ends after {end.steps} steps with `{end.state}`, a worst residual of {rough(end.worst_residual)}",
         f"{end.fragments} fragments", f"sphere still has {speeds[-1]:.0f} m/s",
         f"was {1e-3 * force:.0f} kN in the quarter model, after {1e6 * at:.1f} us",
     ):  # fmt: skip
-        assert said in " ".join(TEXT.split())
+        assert text in " ".join(TEXT.split())
 
 
 @pytest.mark.slow

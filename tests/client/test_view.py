@@ -93,12 +93,12 @@ def test_a_file_that_is_no_frame_is_one_line(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("source", "field", "said"),
+    ("source", "field", "message"),
     [("nothing", "mises", "no such run, folder or frame"), ("pyproject.toml", "mises", r"ends in \.vtkhdf"),
      (".", "stress", "allowed: mises, pressure")],
 )  # fmt: skip
-def test_what_cannot_be_drawn_is_said_before_anything_starts(source: str, field: str, said: str) -> None:
-    with pytest.raises(ViewError, match=said):
+def test_what_cannot_be_drawn_is_said_before_anything_starts(source: str, field: str, message: str) -> None:
+    with pytest.raises(ViewError, match=message):
         view(source, field)
 
 
@@ -140,8 +140,8 @@ def test_a_missing_pyvista_names_the_extra(tmp_path: Path, monkeypatch: pytest.M
 
 
 def test_a_missing_library_names_its_package() -> None:
-    told = "ImportError: libGL.so.1: cannot open shared object file: No such file or directory"
-    assert str(explain(1, told)) == "VTK needs the system library libGL; on Debian and Ubuntu: apt install libgl1"
+    error = "ImportError: libGL.so.1: cannot open shared object file: No such file or directory"
+    assert str(explain(1, error)) == "VTK needs the system library libGL; on Debian and Ubuntu: apt install libgl1"
 
 
 def test_a_renderer_that_hangs_is_ended(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -201,10 +201,10 @@ def test_a_section_cuts_away_what_lies_before_it(folder: Path, tmp_path: Path) -
     assert below.high < 400.0 < whole.high, "the hot foot lies between the plane and the camera"
     assert above.high == pytest.approx(whole.high)
     for beyond, towards in itertools.product((-1, 9), ("z", "-z")):
-        with pytest.raises(LookError) as told:
+        with pytest.raises(LookError) as raised:
             view(folder, "temperature", tmp_path / "d.png", size=SIZE, camera=towards, section=f"z={beyond}")
-        assert str(told.value) == f"section = z={beyond}: the body is between z=0 and z=0.02657 (in m)"
-        assert told.value.exit_code == 2
+        assert str(raised.value) == f"section = z={beyond}: the body is between z=0 and z=0.02657 (in m)"
+        assert raised.value.exit_code == 2
 
 
 @pytest.mark.usefixtures("warm")
@@ -303,7 +303,7 @@ def test_cameras_are_read() -> None:
 
 
 @pytest.mark.parametrize(
-    ("options", "said"),
+    ("options", "message"),
     [({"percentiles": (50, 50)}, "the smaller one first"), ({"limits": (2, 1)}, "= 2, 1: two numbers, the lower end"),
      ({"zoom": 0}, "above 0"), ({"out": "x.jpg"}, r"ends in \.png, \.gif or \.mp4"),
      ({"colour": "red"}, "colour: there is no such option; allowed: mirror, section"),
@@ -312,16 +312,16 @@ def test_cameras_are_read() -> None:
      ({"limits": (1,)}, r"limits = \(1,\): expected `array` of length 2"),
      ({"time": "60"}, "time = '60': write it with its unit"), ({"time": "x us"}, "time = 'x us': ")],
 )  # fmt: skip
-def test_a_wrong_choice_is_one_line(options: dict[str, Any], said: str, folder: Path) -> None:
-    with pytest.raises(ViewError, match=said):
+def test_a_wrong_choice_is_one_line(options: dict[str, Any], message: str, folder: Path) -> None:
+    with pytest.raises(ViewError, match=message):
         view(folder, "mises", **options)
 
 
 def test_a_picture_that_cannot_be_written_is_named(folder: Path, tmp_path: Path) -> None:
     (tmp_path / "file").touch()
-    with pytest.raises(ViewError) as told:
+    with pytest.raises(ViewError) as raised:
         view(folder, "pressure", tmp_path / "file" / "bar.png", size=SIZE)
-    assert str(told.value) == f"{tmp_path}/file: File exists"
+    assert str(raised.value) == f"{tmp_path}/file: File exists"
 
 
 @pytest.mark.usefixtures("warm")
@@ -330,9 +330,9 @@ def test_a_picture_for_which_the_disk_is_too_small_leaves_the_old_one(name: str,
     out = tmp_path / name
     out.write_bytes(b"old")
     out.with_name(f".bar.{os.getpid()}.part{out.suffix}").symlink_to("/dev/full")
-    with pytest.raises(ViewError) as told:
+    with pytest.raises(ViewError) as raised:
         view(folder, "pressure", out, size=SIZE)
-    assert str(told.value) == f"{out}: No space left on device"
+    assert str(raised.value) == f"{out}: No space left on device"
     assert [(path.name, path.read_bytes()) for path in tmp_path.iterdir()] == [(name, b"old")]
 
 
@@ -361,9 +361,9 @@ def test_a_body_is_cut_and_mirrored_at_once(mirror: str, section: str, folder: P
     ],
 )  # fmt: skip
 def test_what_cannot_be_seen_is_one_line(options: dict[str, Any], folder: Path, tmp_path: Path) -> None:
-    with pytest.raises(LookError) as told:
+    with pytest.raises(LookError) as raised:
         view(folder, "mises", tmp_path / "a.png", size=(64, 64), **options)
-    assert "\n" not in str(told.value)
+    assert "\n" not in str(raised.value)
 
 
 @pytest.mark.usefixtures("warm")
@@ -411,9 +411,9 @@ def test_a_damaged_frame_is_named(damage: Any, tmp_path: Path) -> None:
     write_frame(path)
     require_whole(str(path))
     damage(path)
-    with pytest.raises(ViewError, match=f"^{path}: this is no frame, or a damaged one: ") as told:
+    with pytest.raises(ViewError, match=f"^{path}: this is no frame, or a damaged one: ") as raised:
         require_whole(str(path))
-    assert "\n" not in str(told.value)
+    assert "\n" not in str(raised.value)
 
 
 def test_a_picture_of_a_damaged_frame_is_one_line(tmp_path: Path) -> None:

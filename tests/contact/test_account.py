@@ -81,8 +81,10 @@ def test_contact_that_makes_energy_ends_the_run() -> None:
     assert any("the line contact of the energy has made 0.015" in text for text in sim.ledger.warnings(0.9))
     sim.contact.books.contact_loss[1] = -0.02 * sim.ledger.initial
     sim.ledger.close(v)
-    said = r"the line contact of the energy has made 0\.035 of the largest energy, above run\.made_limit 0\.02, at the"
-    with pytest.raises(EnergyError, match=said):
+    message = (
+        r"the line contact of the energy has made 0\.035 of the largest energy, above run\.made_limit 0\.02, at the"
+    )
+    with pytest.raises(EnergyError, match=message):
         sim.ledger.require(sim.case.run, 0.9, "at the end")
 
 

@@ -92,18 +92,18 @@ def test_edges_that_cross_beyond_an_end_do_so_while_ends_move_by_less_than_the_b
     ends = random.normal(size=(400, 4, 3))
     ends[:, 2] = ends[:, 0] + 10.0 ** random.uniform(-3.0, 0.0, (400, 1)) * random.normal(size=(400, 3))
     s, t = crossings(ends)
-    told = np.array([
+    x = np.array([
         beyond_ends(tuple(e[1] - e[0]), tuple(e[3] - e[2]), tuple(e[2] - e[0]), *at)
         for e, at in zip(ends, zip(s, t, strict=True), strict=True)
     ])  # fmt: skip
     apart = (np.minimum(s, t) < 0.0) | (np.maximum(s, t) > 1.0)
     assert apart.sum() > 200
-    assert (told[apart] > 0.0).all()
-    assert (told[~apart] == 0.0).all()
+    assert (x[apart] > 0.0).all()
+    assert (x[~apart] == 0.0).all()
     ways = random.normal(size=(200, 4, 3))
     ways /= 2.0 * np.linalg.norm(ways, axis=-1, keepdims=True)
     for share, meet in ((1.0, False), (20.0, True)):
-        s, t = crossings(ends[apart][:, None] + share * told[apart][:, None, None, None] * ways)
+        s, t = crossings(ends[apart][:, None] + share * x[apart][:, None, None, None] * ways)
         assert ((np.minimum(s, t) >= 0.0) & (np.maximum(s, t) <= 1.0)).any() == meet
 
 

@@ -41,7 +41,7 @@ def test_ranks_that_need_a_sum_have_it_and_nothing_else_is_sent(seed: int) -> No
         n = len(contacts)
         rows = ActiveRows(ContactRows.room(n)._replace(nodes=contacts), np.arange(n, dtype=np.int32), n=n)
         agreed = company.agree(rows, local)
-        told = comm.sent.since_last()["bytes"]
+        bytes_sent = comm.sent.since_last()["bytes"]
         agreed.number(np.arange(NODES, dtype=np.int32))
         words = np.zeros((NODES, 5), np.int64)
         words[slots, 1:4] = given[me]
@@ -51,7 +51,7 @@ def test_ranks_that_need_a_sum_have_it_and_nothing_else_is_sent(seed: int) -> No
             agreed.finish(again, 1, 3)
         sent = sum((pushed[me] & known[me] & known[k] & (pushed[k] | held[k])).sum() for k in range(RANKS) if k != me)
         assert comm.sent.since_last()["bytes"] == 2 * sent * 4 * 8
-        assert told == sum(2 * 8 * 4 * (1 + len(both[k]) // (4 * 63)) for k in range(RANKS) if k != me)
+        assert bytes_sent == sum(2 * 8 * 4 * (1 + len(both[k]) // (4 * 63)) for k in range(RANKS) if k != me)
         assert not again[:, [0, 4]].any()
         assert np.array_equal(np.unique(agreed.shared), np.unique(slots[_concerned(known, held, pushed, me)]))
         return again[slots, 1:4], sent

@@ -19,8 +19,8 @@ def test_the_residual_is_the_change_by_the_last_sweep(seed: int) -> None:
     before, first = solver.total.copy(), solver.unsettled.copy()
     solver.sweep()
     last = solver.unsettled - first
-    told = [(np.abs(words).sum(axis=1) >> 16).sum() for words in (solver.total - before, solver.total)]
-    assert last.tolist() == told
+    changes = [(np.abs(words).sum(axis=1) >> 16).sum() for words in (solver.total - before, solver.total)]
+    assert last.tolist() == changes
     assert 0 < last[0] < last[1]
 
 

@@ -95,7 +95,7 @@ def _try(name: str, group: Group, made: Grounds, book: Path) -> None:
 
 def _done(book: Path) -> dict[str, list[Row]]:
     lines = book.read_text().splitlines() if book.exists() else []
-    return {told["name"]: [Row(**row) for row in told["rows"]] for told in map(json.loads, lines)}
+    return {record["name"]: [Row(**row) for row in record["rows"]] for record in map(json.loads, lines)}
 
 
 def _options() -> argparse.Namespace:

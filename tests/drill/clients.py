@@ -11,7 +11,7 @@ from functools import cache, partial
 from itertools import repeat
 from pathlib import Path
 
-from ..client.hostile import Answer, head, hostile, run_info, said
+from ..client.hostile import Answer, answering, head, hostile, run_info
 from .judge import TRUE, Row
 from .stand import Stand
 from .strikes import emptied, filled
@@ -68,9 +68,9 @@ def slow() -> Iterator[bytes]:
 
 ANSWERS: dict[str, Answer] = {
     "garbage": lambda: [os.urandom(4096)],
-    "an answer that is no JSON": said(b"<html>It works!</html>", kind="text/html"),
-    "JSON of something else": said({"version": 7, "items": []}),
-    "JSON that is nested too deeply": said(b"[" * 100_000),
+    "an answer that is no JSON": answering(b"<html>It works!</html>", kind="text/html"),
+    "JSON of something else": answering({"version": 7, "items": []}),
+    "JSON that is nested too deeply": answering(b"[" * 100_000),
     "half of an answer": lambda: [head(200, 5000), b'{"runs": ['],
     "more bytes than the header gives": lambda: [head(200, 2), b'{"runs": []' * 1000],
     "no answer at all": lambda: [],
@@ -104,18 +104,18 @@ def answered(name: str, answer: Answer, stand: Stand) -> Iterator[Row]:
 def files(stand: Stand) -> Iterator[Row]:
     """Tries lists of files with a wrong size, an incomplete body, a wrong checksum, and a name outside of the
     folder."""
-    told = {"longer than it is": 9, "shorter than it is": 1}
+    sizes = {"longer than it is": 9, "shorter than it is": 1}
     wrong: dict[str, tuple[dict[str, object], Answer]] = {
-        name: ({"path": "a.csv", "size": size}, said(b"12345")) for name, size in told.items()
+        name: ({"path": "a.csv", "size": size}, answering(b"12345")) for name, size in sizes.items()
     }
     wrong["cut off"] = ({"path": "a.csv", "size": 5}, lambda: [head(200, 5), b"12"])
     digest = "Repr-Digest: sha-256=:AAAA:\r\n"
     wrong["of another sum"] = ({"path": "a.csv", "size": 5}, lambda: [head(200, 5, more=digest), b"12345"])
-    wrong["named out of the folder"] = ({"path": "../a.csv", "size": 5}, said(b"12345"))
+    wrong["named out of the folder"] = ({"path": "../a.csv", "size": 5}, answering(b"12345"))
     for name, (line, body) in wrong.items():
         with hostile() as server:
-            server.answers[f"/v1/runs/{RUN}"] = said(run_info(id=RUN, state="succeeded"))
-            server.answers[f"/v1/runs/{RUN}/files"] = said({"files": [line]})
+            server.answers[f"/v1/runs/{RUN}"] = answering(run_info(id=RUN, state="succeeded"))
+            server.answers[f"/v1/runs/{RUN}/files"] = answering({"files": [line]})
             server.answers[f"/v1/runs/{RUN}/files/a.csv"] = body
             yield _row(
                 f"a file {name}: get", server.url, ["get", RUN, "--out", str(stand.root / "copy")], stand.root / "copy"

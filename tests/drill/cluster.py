@@ -78,7 +78,7 @@ class ClusterStand(Stand):
         assert self.cluster is not None
         return [number for number, state in self.cluster.jobs("conoid-") if state in states]
 
-    def told(self, *words: str) -> None:
+    def run_command(self, *words: str) -> None:
         """Runs a command of the operator; a refusal by Slurm is ignored."""
         assert self.cluster is not None
         with suppress(AssertionError):
@@ -99,14 +99,14 @@ class ClusterStand(Stand):
         with suppress(AssertionError):
             self.cluster.resume()
         for job in self.jobs("PENDING", "REQUEUED", "REQUEUE_HOLD", "SPECIAL_EXIT"):
-            self.told("scontrol", "release", job)
-            self.told("scontrol", "update", f"jobid={job}", "StartTime=now", "TimeLimit=UNLIMITED")
+            self.run_command("scontrol", "release", job)
+            self.run_command("scontrol", "update", f"jobid={job}", "StartTime=now", "TimeLimit=UNLIMITED")
 
     def close(self) -> None:
         """Ends the server and all jobs."""
         super().close()
-        self.told("scancel", "--full", "--signal=KILL", "--user=root")
-        self.told("scancel", "--user=root")
+        self.run_command("scancel", "--full", "--signal=KILL", "--user=root")
+        self.run_command("scancel", "--user=root")
 
 
 def stand(root: Path, cluster: Cluster) -> ClusterStand:
@@ -189,7 +189,7 @@ def controllers() -> Iterator[Strike]:
 
 def node(state: str) -> Callable[[ClusterStand, Cluster], None]:
     """Returns a function that sets the state of the node."""
-    return lambda stand, cluster: stand.told(
+    return lambda stand, cluster: stand.run_command(
         "scontrol", "update", f"nodename={cluster.host}", f"state={state}", "reason=drill"
     )
 
@@ -214,7 +214,7 @@ def looked_after(_: ClusterStand, __: Cluster) -> None:
 def preempted(stand: ClusterStand, _: Cluster) -> None:
     """Submits a job of higher priority that needs every core."""
     wants = ("-p", "high", "-n", str(real_slurm.CORES), "-o", "/dev/null", "--wrap", "sleep 4")
-    stand.told("sbatch", *wants)
+    stand.run_command("sbatch", *wants)
     time.sleep(3.0)
 
 
@@ -223,7 +223,7 @@ def each(state: str, *words: str) -> Callable[[ClusterStand, Cluster], None]:
 
     def done(stand: ClusterStand, _: Cluster) -> None:
         for job in stand.jobs(state):
-            stand.told(*words, job)
+            stand.run_command(*words, job)
 
     return done
 
@@ -231,7 +231,7 @@ def each(state: str, *words: str) -> Callable[[ClusterStand, Cluster], None]:
 def limited(stand: ClusterStand, _: Cluster) -> None:
     """Sets the time limit of all running jobs to one minute."""
     for job in stand.jobs("RUNNING"):
-        stand.told("scontrol", "update", f"jobid={job}", "TimeLimit=1")
+        stand.run_command("scontrol", "update", f"jobid={job}", "TimeLimit=1")
 
 
 def nodes() -> Iterator[Strike]:

@@ -32,7 +32,7 @@ from conoid.server.runs import folder
 from conoid.server.runs.folder import Submission
 from conoid.server.settings import Settings
 
-from ..server.journal_lines import told, write
+from ..server.journal_lines import lines_of_run, write
 from ..server.sweep_bodies import wish
 from .attacker import KINDS
 from .judge import TRUE, Row
@@ -58,7 +58,7 @@ long run; number of files of another run."""
 MANY, LINES = 20, 1_000_000
 """Data of the attacker: number of runs with long journals, and number of lines of such a journal. The server caches
 the histories of fewer runs."""
-SAID = {-1, 200, 202, 204, 206, 304, 400, 401, 404, 405, 408, 409, 410, 413, 415, 416, 422, 429, 500, 503}
+ALLOWED = {-1, 200, 202, 204, 206, 304, 400, 401, 404, 405, 408, 409, 410, 413, 415, 416, 422, 429, 500, 503}
 """Statuses that an attacker may get as an answer; -1: the attacker does not read the answer."""
 
 
@@ -131,14 +131,14 @@ def _tried(stand: Stand, kind: str) -> tuple[Row, float]:
     attacker = subprocess.Popen(words, stdout=subprocess.PIPE, cwd=Path(__file__).parents[2])
     grown, machine = _Growth(stand, before), _Machine()
     during = _asked(scene.people, SECONDS + 1.0)
-    said = {int(status): n for status, n in json.loads(attacker.communicate(timeout=120.0)[0]).items()}
+    statuses = {int(status): n for status, n in json.loads(attacker.communicate(timeout=120.0)[0]).items()}
     worst, late = during.took[-1], machine.end()
     happened = (
         f"GET p99 {p99(during.took) * 1e3:.0f} ms, worst {worst * 1e3:.0f} ms of {len(during.took)} (alone p99 "
         f"{p99(quiet.took) * 1e3:.0f} ms, a sleeper is {late * 1e3:.0f} ms late, load {load:.0f}); answers "
-        f"{' '.join(f'{status}: {n}' for status, n in said.items())}; {grown.end() / 1e6:+.0f} MB"
+        f"{' '.join(f'{status}: {n}' for status, n in statuses.items())}; {grown.end() / 1e6:+.0f} MB"
     )
-    return Row(f"beside others: {kind}", "crowd", happened, worst, _verdict(during, said, grown.most)), late
+    return Row(f"beside others: {kind}", "crowd", happened, worst, _verdict(during, statuses, grown.most)), late
 
 
 def p99(times: Sequence[float]) -> float:
@@ -146,11 +146,11 @@ def p99(times: Sequence[float]) -> float:
     return times[int(0.99 * (len(times) - 1))]
 
 
-def _verdict(during: Person, said: dict[int, int], grown: int) -> str:
+def _verdict(during: Person, statuses: dict[int, int], grown: int) -> str:
     most, worst = p99(during.took), during.took[-1]
     if during.wrong:
         return f"others refused: {len(during.wrong)} times, {during.wrong[0]}"
-    if odd := [status for status in said if status not in SAID and status != 0]:
+    if odd := [status for status in statuses if status not in ALLOWED and status != 0]:
         return f"lie: the attacker is answered {odd[0]}"
     if grown > GROWTH:
         return f"grown: by {grown >> 20} MiB"
@@ -253,7 +253,11 @@ def _made(stand: Stand) -> Scene:
     mallory.close()
     _long_journal(stand.runs / long)
     many = [f"{n:022d}" for n in range(MANY)]
-    write(stand.runs / many[0], (message for message in told(3 * LINES // 7) if not isinstance(message, Status)), 1)
+    write(
+        stand.runs / many[0],
+        (message for message in lines_of_run(3 * LINES // 7) if not isinstance(message, Status)),
+        1,
+    )
     for each in many[1:]:
         (stand.runs / each / layout.JOURNAL).hardlink_to(stand.runs / many[0] / layout.JOURNAL)
     for n in range(FILES):
@@ -294,7 +298,7 @@ def _record(run: str) -> Submission:
 
 def _long_journal(path: Path) -> None:
     """Writes a journal of 20,000 reports and 2,500 lines of 20 kB."""
-    last = write(path, (message for message in told(REPORTS) if not isinstance(message, Status)), 100)
+    last = write(path, (message for message in lines_of_run(REPORTS) if not isinstance(message, Status)), 100)
     with (path / layout.JOURNAL).open("ab") as file:
         for n in range(EVENTS):
             file.write(to_json(Log(run=path.name, seq=last + 1 + n, level="info", text="x" * 20_000)) + b"\n")

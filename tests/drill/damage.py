@@ -172,7 +172,7 @@ def rows(stand: Stand, some: Sequence[Damage]) -> Iterator[Row]:
     for one, run in zip(some, made, strict=True):
         (WAYS | IRREGULAR)[one.way](stand.runs / run / one.name)
     if some[0].down:
-        assert stand.start(), stand.said()
+        assert stand.start(), stand.last_line()
     for run in made:
         judge.reads(stand, run)
     time.sleep(0.3)

@@ -53,7 +53,7 @@ class Grounds:
             self._stands[kind] = self._make[kind](root)
         found = self._stands[kind]
         if found.child is None or found.child.poll() is not None:
-            assert found.start(), f"the server of the stand {kind!r} does not start: {found.said()}"
+            assert found.start(), f"the server of the stand {kind!r} does not start: {found.last_line()}"
         return found
 
     def renew(self, kind: str, log: Path | None = None) -> None:

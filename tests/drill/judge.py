@@ -97,9 +97,9 @@ def _success(stand: Stand, truth: Truth, seen: str) -> str:
 def _folder(stand: Stand, truth: Truth, seen: str) -> str:
     """Checks that journal, outcome and list agree with the answer."""
     path, state = stand.runs / truth.run, seen.partition("/")[0]
-    told, ended = journal.statuses(path / layout.JOURNAL), folder.outcome(path)
-    if not told or told[-1].state != state:
-        return f"lie: the journal has {told[-1].state if told else 'nothing'}, not {state}"
+    reported, ended = journal.statuses(path / layout.JOURNAL), folder.outcome(path)
+    if not reported or reported[-1].state != state:
+        return f"lie: the journal has {reported[-1].state if reported else 'nothing'}, not {state}"
     if ended is None or ended.state != state:
         return f"lie: the outcome has {ended.state if ended else 'nothing'}, not {state}"
     listed = {run["id"]: run["state"] for run in stand.ask("GET", "/v1/runs?limit=500")[1]["runs"]}
@@ -114,6 +114,6 @@ def reads(stand: Stand, run: str) -> None:
 
 def stranded(stand: Stand) -> str:
     """Returns an error if the metric ``conoid_stranded`` of the server is not 0."""
-    told = str(stand.ask("GET", "/metrics")[1])
-    found = [line for line in told.splitlines() if line.startswith("conoid_stranded ")]
+    text = str(stand.ask("GET", "/metrics")[1])
+    found = [line for line in text.splitlines() if line.startswith("conoid_stranded ")]
     return "" if found and float(found[0].split()[1]) == 0.0 else f"stranded by its own account: {found}"

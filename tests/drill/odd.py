@@ -47,8 +47,8 @@ def files(stand: Stand) -> Iterator[Row]:
             with open(path, "wb") as file:
                 file.write(path)
     began = time.monotonic()
-    status, told = stand.ask("GET", f"/v1/runs/{run}/files")
-    urls = [file["url"] for file in told["files"]] if status == 200 else []
+    status, answer = stand.ask("GET", f"/v1/runs/{run}/files")
+    urls = [file["url"] for file in answer["files"]] if status == 200 else []
     assert stand.http is not None
     contents = {stand.http.get(url).content for url in urls}
     for name in NAMES:

@@ -96,13 +96,13 @@ def is_submitted_meanwhile(stand: Stand, unsaid: frozenset[str]) -> Life:
     result must be one run."""
     key = f"k{time.monotonic_ns()}"
     yield
-    answer, told = stand.hand_in(key)
+    answer, body = stand.hand_in(key)
     yield
     deadline = time.monotonic() + stand.patience
     while (later := stand.hand_in(key))[0] != 202 and time.monotonic() < deadline:
         time.sleep(0.2)
     happened = f"answered {answer}, then {later[0]}"
-    if answer == 202 and later[0] == 202 and told["id"] != later[1]["id"]:
+    if answer == 202 and later[0] == 202 and body["id"] != later[1]["id"]:
         happened += ": two runs"
     run = later[1]["id"] if later[0] == 202 else "none"
     return Truth(run, SUCCEEDED, happened, launches=8)

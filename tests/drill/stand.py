@@ -92,19 +92,19 @@ class Stand:
                 env={**os.environ, **self.environment},
             )  # fmt: skip
         deadline = time.monotonic() + patience
-        while (told := self._address(address)) is None:
+        while (found := self._address(address)) is None:
             if self.child.poll() is not None or time.monotonic() > deadline:
                 self.kill()
                 return False
             time.sleep(0.02)
-        self._connect(told["url"])
+        self._connect(found["url"])
         return True
 
     def _address(self, path: Path) -> dict[str, Any] | None:
         with suppress(OSError, ValueError):
-            told: dict[str, Any] = json.loads(path.read_text())
-            if self.child is not None and told["pid"] in {self.child.pid, *_children(self.child.pid)}:
-                return told
+            found: dict[str, Any] = json.loads(path.read_text())
+            if self.child is not None and found["pid"] in {self.child.pid, *_children(self.child.pid)}:
+                return found
         return None
 
     def _connect(self, url: str) -> None:
@@ -141,9 +141,9 @@ class Stand:
     def again(self) -> None:
         """Kills the server and starts a new one. Raises AssertionError if it does not start."""
         self.kill()
-        assert self.start(), f"the server does not start: {self.said()}"
+        assert self.start(), f"the server does not start: {self.last_line()}"
 
-    def said(self) -> str:
+    def last_line(self) -> str:
         """Returns the last line of the server's log."""
         return (self.root / "server.log").read_text(errors="replace").strip().rpartition("\n")[2][:200]
 
@@ -190,9 +190,9 @@ class Stand:
 
     def submit(self, **plan: Any) -> str:
         """Submits a run; returns its id."""
-        status, told = self.hand_in(**plan)
-        assert status == 202, told
-        return str(told["id"])
+        status, answer = self.hand_in(**plan)
+        assert status == 202, answer
+        return str(answer["id"])
 
     def running(self, **plan: Any) -> str:
         """Submits a run that waits for the signal of ``go``; returns its id. The run may still be in the queue."""
@@ -212,10 +212,10 @@ class Stand:
     def state(self, run: str) -> str:
         """Returns state and cause of a run, such as ``succeeded`` or ``lost/node``; otherwise the status of the
         answer."""
-        status, told = self.ask("GET", f"/v1/runs/{run}")
+        status, answer = self.ask("GET", f"/v1/runs/{run}")
         if status != 200:
             return str(status)
-        return f"{told['state']}/{told['cause']}" if told["cause"] else str(told["state"])
+        return f"{answer['state']}/{answer['cause']}" if answer["cause"] else str(answer["state"])
 
     def reached(self, run: str, *states: str) -> str:
         """Waits until the run has one of these states, by default any final state; returns its last state, also

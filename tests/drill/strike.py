@@ -53,14 +53,14 @@ def rows(stand: Stand, strike: Strike) -> Iterator[Row]:
         wrong = judge.verdict(stand, truth, seen, seconds)
         first.append((situation.__name__.replace("_", " "), truth, seen, seconds, wrong))
     stand.again()
-    told = judge.stranded(stand)
+    stranded = judge.stranded(stand)
     for name, truth, seen, seconds, wrong in first:
         later = judge.settle(stand, truth, time.monotonic())[0] if truth.run != "none" else seen
         if wrong == TRUE and later != seen:
             wrong = f"lie: {later} after the next start, {seen} before"
         errors = [error for error in stand.errors if _concerns(error, truth, name)]
-        if wrong == TRUE and (errors or told):
-            wrong = errors[0] if errors else told
+        if wrong == TRUE and (errors or stranded):
+            wrong = errors[0] if errors else stranded
         happened = "; ".join(filter(None, (truth.happened, seen)))
         yield Row(f"{strike.name}: {name}", strike.family, happened, seconds, wrong)
 
@@ -84,8 +84,8 @@ def _begin(stand: Stand, lives: Sequence[Life]) -> None:
 def _settled(stand: Stand) -> None:
     deadline = time.monotonic() + stand.patience
     while time.monotonic() < deadline:
-        told = stand.ask("GET", "/v1/runs?limit=50&state=accepted,starting,queued")[1]["runs"]
-        if not [run for run in told if run["ranks"] == 1]:
+        open_runs = stand.ask("GET", "/v1/runs?limit=50&state=accepted,starting,queued")[1]["runs"]
+        if not [run for run in open_runs if run["ranks"] == 1]:
             return
         time.sleep(0.1)
 

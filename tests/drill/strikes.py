@@ -61,7 +61,7 @@ def and_started(lift: Deed) -> Deed:
     def both(stand: Stand) -> None:
         lift(stand)
         if stand.child is None or stand.child.poll() is not None:
-            assert stand.start(), stand.said()
+            assert stand.start(), stand.last_line()
 
     return both
 
@@ -284,14 +284,14 @@ def restored(stand: Stand) -> None:
     deleted(stand)
     for kept in stand.root.glob(f"{DATABASE}*"):
         shutil.move(kept, stand.runs / kept.name)
-    assert stand.start(), stand.said()
+    assert stand.start(), stand.last_line()
     renewed(stand)
 
 
 def renewed(stand: Stand) -> None:
     """Starts the server if necessary, and creates a new token if the old one was lost."""
     if stand.child is None or stand.child.poll() is not None:
-        assert stand.start(), stand.said()
+        assert stand.start(), stand.last_line()
     if stand.ask("GET", "/v1/me")[0] == 401:
         stand.new_token()
 
@@ -326,7 +326,7 @@ def killed(stand: Stand) -> None:
 
 def started(stand: Stand) -> None:
     if stand.child is None or stand.child.poll() is not None:
-        assert stand.start(), stand.said()
+        assert stand.start(), stand.last_line()
 
 
 def killed_often(stand: Stand) -> None:

@@ -16,11 +16,11 @@ NAMED = 12
 def write(path: Path, rows: Sequence[Row], untried: Sequence[str] = ()) -> int:
     """Writes and prints the table; returns 0 if all verdicts are true. ``untried``: names of groups without a
     result."""
-    told = [*summary(rows), *missing(untried)]
-    lines = [*told, "", "| fault | what happened | s to the truth | verdict |", "|---|---|---|---|"]
+    head = [*summary(rows), *missing(untried)]
+    lines = [*head, "", "| fault | what happened | s to the truth | verdict |", "|---|---|---|---|"]
     lines += [f"| {row.fault} | {row.happened} | {row.seconds:.1f} | {row.verdict} |" for row in rows]
     path.write_text("\n".join(lines) + "\n")
-    print(*told, f"table: {path}", sep="\n")
+    print(*head, f"table: {path}", sep="\n")
     return int(any(row.verdict != TRUE for row in rows))
 
 

@@ -38,7 +38,7 @@ others."""
 @pytest.fixture
 def stand(tmp_path: Path) -> Iterator[Stand]:
     made = Stand(tmp_path, patience=60.0)
-    assert made.start(), made.said()
+    assert made.start(), made.last_line()
     yield made
     made.close()
 

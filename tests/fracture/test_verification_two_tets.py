@@ -83,9 +83,9 @@ def test_energy_released_without_work_is_reported(back: float) -> None:
     run(sim, look)
     assert taken
     assert sim.ledger.unpaid == pytest.approx(back, rel=1e-6, abs=1e-9)
-    told = [text for text in sim.ledger.warnings(0.9) if "more than they had absorbed" in text]
-    assert len(told) == (back > 0.01)
-    assert all("released 0.02 of" in text for text in told)
+    warned = [text for text in sim.ledger.warnings(0.9) if "more than they had absorbed" in text]
+    assert len(warned) == (back > 0.01)
+    assert all("released 0.02 of" in text for text in warned)
 
 
 def test_the_traction_follows_the_law_in_every_step() -> None:

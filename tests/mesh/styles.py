@@ -79,17 +79,17 @@ class Text:
 
     def keyword(self, word: str, *parameters: str, abbreviate: bool = False) -> None:
         """Writes a keyword line with parameters ``NAME=value`` or single words."""
-        said = [f"*{self.case(word)}"]
+        words = [f"*{self.case(word)}"]
         for each in parameters:
             name, equals, value = each.partition("=")
             name = name[: self.random.randint(3, len(name))] if abbreviate and len(name) > 5 else name
             blank = self.random.choice(("", "", " "))
-            said.append(f"{self.case(name)}{blank}{equals}{blank}{value}")
+            words.append(f"{self.case(name)}{blank}{equals}{blank}{value}")
         comma = self.random.choice((", ", ",", " , "))
-        if len(said) > 1 and self.random.random() < 0.1:
-            self.lines += [comma.join(said[:-1]) + ",", self.random.choice(("", "   ")) + said[-1]]
+        if len(words) > 1 and self.random.random() < 0.1:
+            self.lines += [comma.join(words[:-1]) + ",", self.random.choice(("", "   ")) + words[-1]]
         else:
-            self.lines.append(comma.join(said))
+            self.lines.append(comma.join(words))
 
     def nodes(self, body: Block) -> None:
         """Writes the data lines of *NODE."""

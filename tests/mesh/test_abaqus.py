@@ -241,8 +241,8 @@ def test_volumes_that_cannot_be_read_are_refused_where_they_are_chosen(kind: str
     tet = TET.replace("C3D4", "C3D4, ELSET=A")
     text = f"{ONE}{tet}*ELEMENT, TYPE={kind}, ELSET=B\n7{nodes}\n8{nodes}\n"
     for group in ("B", None):
-        said = rf"^2 elements of the type {kind}.* \(the first is 7\); elements with a volume can be C3D4, .*"
-        with pytest.raises(MeshError, match=said):
+        message = rf"^2 elements of the type {kind}.* \(the first is 7\); elements with a volume can be C3D4, .*"
+        with pytest.raises(MeshError, match=message):
             read(text, tmp_path, group)
     assert read(text, tmp_path, "A").notes == (f"elements that cannot be read are outside of the group: 2 {kind}",)
 
@@ -250,8 +250,8 @@ def test_volumes_that_cannot_be_read_are_refused_where_they_are_chosen(kind: str
 def test_a_connector_to_the_ground_does_not_swallow_the_next_one(tmp_path: Path) -> None:
     extra = "*ELEMENT, TYPE=CONN3D2\n5, 1,\n6, , 2\n*ELEMENT, TYPE=SPRING1\n7, 3\n8, 4,\n"
     text = f"{ONE}{TET}{extra}*ELSET, ELSET=A\n1,5,6,7,8\n"
-    said = "elements that carry no volume are skipped: 2 CONN3D2, 2 SPRING1"
-    assert read(text, tmp_path, "A").notes == (said,)
+    message = "elements that carry no volume are skipped: 2 CONN3D2, 2 SPRING1"
+    assert read(text, tmp_path, "A").notes == (message,)
 
 
 def test_elements_of_the_assembly_and_of_other_parts_are_counted(tmp_path: Path) -> None:
@@ -267,8 +267,8 @@ def test_a_node_set_with_undefined_nodes_is_reported(tmp_path: Path) -> None:
     outer = "*NODE\n1, 9., 9., 9.\n*NSET, NSET=Point\n1\n*NSET, NSET=Base, INSTANCE=Left\n5, 77\n*END ASSEMBLY"
     notes = read(inner + TWO.replace("*END ASSEMBLY", outer), tmp_path).notes
     found = [note for note in notes if "do not" in note or "does not define" in note]
-    said = "sets have members that the file does not define, and are smaller: "
-    assert found == [f"{said}the node set 'Base' (1, such as 77), the node set 'Grip' (2, such as 98)"]
+    message = "sets have members that the file does not define, and are smaller: "
+    assert found == [f"{message}the node set 'Base' (1, such as 77), the node set 'Grip' (2, such as 98)"]
 
 
 def test_a_part_without_an_instance_is_told(tmp_path: Path) -> None:
@@ -411,9 +411,9 @@ def test_what_would_join_or_remove_bodies_is_counted(tmp_path: Path) -> None:
     joined = "*TIE, NAME=t\na, b\n*Tie, name=u\nb, c\n*Embedded Element\nx\n*END ASSEMBLY"
     later = "*EQUA\n2\n1, 1, 1., 2, 1, -1.\n*STEP\n*MODEL CHANGE, REMOVE\nx\n"
     text = PART + TWO.replace("*END ASSEMBLY", joined) + later
-    told = "keywords that join, hold or remove bodies are ignored: "
-    assert read(text, tmp_path).notes[-1] == f"{told}1 *EMBEDDED ELEMENT, 1 *EQUATION, 1 *MODEL CHANGE, 2 *TIE"
-    assert not any(told in note for note in read(PART + TWO, tmp_path).notes)
+    message = "keywords that join, hold or remove bodies are ignored: "
+    assert read(text, tmp_path).notes[-1] == f"{message}1 *EMBEDDED ELEMENT, 1 *EQUATION, 1 *MODEL CHANGE, 2 *TIE"
+    assert not any(message in note for note in read(PART + TWO, tmp_path).notes)
 
 
 def test_keywords_of_the_analysis_are_passed_over(tmp_path: Path) -> None:

@@ -147,7 +147,7 @@ def _open(step: str) -> str:
 
 
 @pytest.mark.parametrize(
-    ("damage", "said"),
+    ("damage", "message"),
     [
         (lambda step: step[: len(step) // 2], "the STEP file is cut off"),
         (lambda step: os.urandom(4000), "neither a STEP file (it begins with ISO-10303-21;) nor a BREP file"),
@@ -161,10 +161,10 @@ def _open(step: str) -> str:
     ],
     ids=["cut", "garbage", "empty", "unit", "lost", "syntax", "open", "external"],
 )  # fmt: skip
-def test_a_damaged_file_is_refused_in_one_line(folder: Path, step: str, damage: Any, said: str) -> None:
+def test_a_damaged_file_is_refused_in_one_line(folder: Path, step: str, damage: Any, message: str) -> None:
     with pytest.raises(MeshError) as refused:
         made(folder / "bad.step", damage(step))
-    assert str(refused.value).startswith(f"mesh.path = 'bad.step': {said}")
+    assert str(refused.value).startswith(f"mesh.path = 'bad.step': {message}")
     assert "\n" not in str(refused.value)
 
 

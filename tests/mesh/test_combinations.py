@@ -149,17 +149,17 @@ def test_its_size_is_known_about_before_it_is_meshed() -> None:
 
 
 @pytest.mark.parametrize(
-    ("request_", "said"),
+    ("request_", "message"),
     [
         ({"shape": "intersection", "of": [JACKET, {**CORE, "base": [5.0, 0.0, 0.0]}]}, "mesh: nothing is left of it"),
         ({"shape": "difference", "of": [CORE, JACKET]}, "mesh: nothing is left of it"),
         ({"shape": "union", "of": [CORE, JACKET], "element_size": 1e-5}, "mesh.element_size = 1e-05 m: about"),
     ],
 )
-def test_what_cannot_be_meshed_is_refused_in_one_line(request_: dict[str, Any], said: str) -> None:
+def test_what_cannot_be_meshed_is_refused_in_one_line(request_: dict[str, Any], message: str) -> None:
     with pytest.raises(MeshError) as refused:
         made(combination(request_))
-    assert str(refused.value).startswith(said)
+    assert str(refused.value).startswith(message)
 
 
 def _nested(depth: int) -> dict[str, Any]:
@@ -167,7 +167,7 @@ def _nested(depth: int) -> dict[str, Any]:
 
 
 @pytest.mark.parametrize(
-    ("mesh", "said"),
+    ("mesh", "message"),
     [
         ({"shape": "union", "of": [CORE]}, "parts[0].mesh.of: at least 2 are needed"),
         ({"shape": "union", "of": [CORE, {"shape": "blob"}]}, "parts[0].mesh.of[1].shape = 'blob': allowed: 'box'"),
@@ -181,11 +181,11 @@ def _nested(depth: int) -> dict[str, Any]:
         ({"shape": "union", "of": [CORE, JACKET], "sector": "half"}, "parts[0].mesh.sector = 'half': needs a boundary"),
     ],
 )
-def test_a_combination_that_is_wrong_is_refused_under_its_key(mesh: dict[str, Any], said: str) -> None:
+def test_a_combination_that_is_wrong_is_refused_under_its_key(mesh: dict[str, Any], message: str) -> None:
     part = {"name": "body", "material": "steel", "mesh": _written({"element_size": 0.1, **mesh})}
     with pytest.raises(CaseError) as refused:
         parse_case({"name": "one", "parts": [part], "run": {"end_time": 1e-6}})
-    assert str(refused.value).startswith(said)
+    assert str(refused.value).startswith(message)
     assert "\n" not in str(refused.value)
 
 
@@ -197,9 +197,9 @@ def _written(mesh: Any) -> Any:
 
 
 @pytest.mark.parametrize(
-    ("low", "told"), [((4, 4, 0), "edges"), ((4, 4, 4), "points"), ((4, 0, 0), ""), ((5, 0, 0), "")]
+    ("low", "message"), [((4, 4, 0), "edges"), ((4, 4, 4), "points"), ((4, 0, 0), ""), ((5, 0, 0), "")]
 )
-def test_solids_that_touch_in_an_edge_or_a_point_alone_are_told(low: tuple[int, int, int], told: str) -> None:
+def test_solids_that_touch_in_an_edge_or_a_point_alone_are_told(low: tuple[int, int, int], message: str) -> None:
     boxes = [
         {"shape": "box", "low": [1e-3 * x for x in corner], "high": [1e-3 * (x + 4) for x in corner]}
         for corner in ((0, 0, 0), low)
@@ -207,4 +207,4 @@ def test_solids_that_touch_in_an_edge_or_a_point_alone_are_told(low: tuple[int, 
     request = {"shape": "union", "of": boxes, "element_size": 2e-3}
     origin = measured(TypeAdapter[Mesh](Mesh).validate_python(request), {}, "mesh").origin  # type: ignore[arg-type]
     assert origin is not None
-    assert [f"in {told} alone" in note for note in origin.notes] == [True] * bool(told)
+    assert [f"in {message} alone" in note for note in origin.notes] == [True] * bool(message)

@@ -166,10 +166,10 @@ def test_a_bad_tet_is_named_as_in_the_file(
 ) -> None:
     (tmp_path / name).write_text(text.format(height=height))
     line = r" \(line 8\)" if name == "two.inp" else ""
-    said = (
+    message = (
         rf"'{name}': tet 100{line} is {word}: its nodes 10, 20, 30, 40 span a volume of {volume} m\^3; .*\(1 of 2 tets"
     )
-    with pytest.raises(MeshError, match=said):
+    with pytest.raises(MeshError, match=message):
         read(name, tmp_path, unit=1e-3)
 
 

@@ -106,7 +106,7 @@ def test_tets_of_ten_and_four_nodes_are_read_in_the_order_of_the_manual(tmp_path
 
 
 @pytest.mark.parametrize(
-    ("text", "said"),
+    ("text", "message"),
     [
         (TWO.replace("10,1,1,2,4,3,5,6,8,7", "10,1,5,6,8,7,1,2,4,3"), r"hexahedron 10 \(line 16\) is inverted"),
         (TWO.replace("20,2,5", "10,2,5"), "element 10 is defined twice"),
@@ -127,8 +127,8 @@ def test_tets_of_ten_and_four_nodes_are_read_in_the_order_of_the_manual(tmp_path
         (TWO.replace("1,0,0,0\n", "1,0,0,&z\n"), "line 3: the parameter '&z' is not defined above"),
     ],
 )  # fmt: skip
-def test_what_cannot_be_read_is_refused_with_its_line(text: str, said: str, tmp_path: Path) -> None:
-    with pytest.raises(MeshError, match=rf"^mesh\.path = 'two.key': {said}") as raised:
+def test_what_cannot_be_read_is_refused_with_its_line(text: str, message: str, tmp_path: Path) -> None:
+    with pytest.raises(MeshError, match=rf"^mesh\.path = 'two.key': {message}") as raised:
         volume(tmp_path, text)
     assert "\n" not in str(raised.value)
 
@@ -157,7 +157,7 @@ def test_what_is_not_in_the_mesh_is_told(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("more", "said"),
+    ("more", "message"),
     [
         ("*SET_NODE_LIST_TITLE\ngrip\n1\n1,2,98,99\n", r"\*SET_NODE grip \(2, such as 98\)"),
         (
@@ -167,13 +167,13 @@ def test_what_is_not_in_the_mesh_is_told(tmp_path: Path) -> None:
         ("*SET_SOLID_GENERAL\n3\nALL\nDELEM,99\n", None),
     ],
 )
-def test_sets_with_undefined_members_are_reported(more: str, said: str | None, tmp_path: Path) -> None:
+def test_sets_with_undefined_members_are_reported(more: str, message: str | None, tmp_path: Path) -> None:
     volume(tmp_path, TWO + more)
     origin = taken(tmp_path / "two.key").origin
     assert origin is not None
     found = [note for note in origin.notes if "members that the file does not define, and are smaller" in note]
-    assert len(found) == (said is not None)
-    assert said is None or re.search(f": {said}$", found[0])
+    assert len(found) == (message is not None)
+    assert message is None or re.search(f": {message}$", found[0])
 
 
 def test_another_unit_than_that_of_the_deck_is_refused(tmp_path: Path) -> None:

@@ -113,8 +113,8 @@ def test_text_may_begin_with_a_byte_order_mark_and_have_other_ends_of_lines(
 
 def test_an_unknown_group_lists_those_of_volumes(folder: Path) -> None:
     for group, but in (("ice", ""), ("left", r" \('left' is a group of surfaces\)"), ("Lower", ""), ("4", "")):
-        said = rf"^mesh\.group = '{group}': no such group of volumes{but}; known: lower, upper, all$"
-        with pytest.raises(MeshError, match=said):
+        message = rf"^mesh\.group = '{group}': no such group of volumes{but}; known: lower, upper, all$"
+        with pytest.raises(MeshError, match=message):
             read_msh(folder / "plain-4.1-0.msh", group, "mesh")
 
 

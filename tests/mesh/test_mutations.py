@@ -55,9 +55,9 @@ def outcome(path: Path) -> TetMesh | None:
     try:
         return read(MeshFile(shape="file", path=path.name, unit=1.0), path, "mesh")
     except MeshError as error:
-        said = str(error)
-    assert said.startswith("mesh")
-    assert "\n" not in said
+        message = str(error)
+    assert message.startswith("mesh")
+    assert "\n" not in message
     return None
 
 

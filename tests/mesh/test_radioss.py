@@ -113,7 +113,7 @@ def test_tets_are_read_in_one_line_and_in_two(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("text", "said"),
+    ("text", "message"),
     [
         (TWO.replace(row(10, 1, 2, 4, 3, 5, 6, 8, 7), row(10, 5, 6, 8, 7, 1, 2, 4, 3)), r"hexahedron 10 \(line 15\)"),
         (TWO.replace(row(20, 5, 6, 8, 7, 9, 10, 12, 11), row(20, 5, 6, 8, 7)), "line 17: an element of /BRICK with 4"),
@@ -129,8 +129,8 @@ def test_tets_are_read_in_one_line_and_in_two(tmp_path: Path) -> None:
         ("hello\n", "line 1: 'hello' stands before the first keyword"),
     ],
 )  # fmt: skip
-def test_what_cannot_be_read_is_refused_with_its_line(text: str, said: str, tmp_path: Path) -> None:
+def test_what_cannot_be_read_is_refused_with_its_line(text: str, message: str, tmp_path: Path) -> None:
     (tmp_path / "two.rad").write_text(text)
-    with pytest.raises(MeshError, match=rf"^mesh\.path = 'two.rad': {said}") as raised:
+    with pytest.raises(MeshError, match=rf"^mesh\.path = 'two.rad': {message}") as raised:
         taken(tmp_path / "two.rad")
     assert "\n" not in str(raised.value)

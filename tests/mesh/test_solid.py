@@ -37,8 +37,8 @@ def made_or_refused(truth: Mixture) -> NamedMesh | None:
     try:
         return solid(truth.content())
     except MeshError as error:
-        said = str(error)
-    assert "so distorted" in said or "inverted" in said
+        message = str(error)
+    assert "so distorted" in message or "inverted" in message
     return None
 
 
@@ -102,7 +102,7 @@ def test_a_hexahedron_may_repeat_nodes(nodes: list[int], volume: float | None, t
 
 
 @pytest.mark.parametrize(
-    ("nodes", "said"),
+    ("nodes", "message"),
     [
         ([4, 5, 6, 7, 0, 1, 2, 3], r"^hexahedron 7 \(line 12\) is inverted \(1 of 1 elements\)$"),
         ([0, 1, 2, 3, 0, 1, 2, 3], r"^hexahedron 7 \(line 12\) is flat"),
@@ -112,8 +112,8 @@ def test_a_hexahedron_may_repeat_nodes(nodes: list[int], volume: float | None, t
         ([0, 2, 1, 3, 4, 5, 6, 7], r"^hexahedron 7 \(line 12\) is "),
     ],
 )
-def test_an_element_without_a_proper_volume_is_refused_with_its_line(nodes: list[int], said: str) -> None:
-    with pytest.raises(MeshError, match=said):
+def test_an_element_without_a_proper_volume_is_refused_with_its_line(nodes: list[int], message: str) -> None:
+    with pytest.raises(MeshError, match=message):
         one(nodes, line=12)
 
 
@@ -127,8 +127,8 @@ def test_warped_faces_are_told_by_what_they_lose(raised: int, share: float) -> N
     found = one(list(range(8)), points)
     assert found.mesh.volumes().sum() == pytest.approx(1 + 0.3 * share)
     lost = (0.25 - share) * 0.3 / (1 + 0.3 * share)
-    said = f"{100 * abs(lost):.2g} % {'less' if lost > 0 else 'more'} volume than between them"
-    assert found.notes[1] == f"faces that are not flat are two triangles each: {said}"
+    message = f"{100 * abs(lost):.2g} % {'less' if lost > 0 else 'more'} volume than between them"
+    assert found.notes[1] == f"faces that are not flat are two triangles each: {message}"
 
 
 @pytest.mark.parametrize("other", [False, True])

@@ -85,7 +85,7 @@ def _folded() -> Any:
 
 
 @pytest.mark.parametrize(
-    ("data", "said"),
+    ("data", "message"),
     [
         (binary(BALL[:-1]), "the surface has a hole: 3 edges belong to one facet, one of them (0, 0, -5) - ("),
         (binary(_flipped()), "facets are flipped: 3 edges have facets that face opposite ways"),
@@ -105,10 +105,10 @@ def _folded() -> Any:
     ids=["hole", "flipped", "inwards", "doubled", "twice", "folded", "crossing", "through", "within", "cut", "cut text",
          "word", "nan", "empty", "garbage"],
 )  # fmt: skip
-def test_a_surface_that_is_wrong_is_refused_in_one_line(tmp_path: Path, data: bytes | str, said: str) -> None:
+def test_a_surface_that_is_wrong_is_refused_in_one_line(tmp_path: Path, data: bytes | str, message: str) -> None:
     with pytest.raises(MeshError) as refused:
         made(tmp_path, data)
-    assert str(refused.value).startswith(f"mesh.path = 'a.stl': {said}")
+    assert str(refused.value).startswith(f"mesh.path = 'a.stl': {message}")
     assert "\n" not in str(refused.value)
 
 

@@ -118,10 +118,10 @@ def test_solids_of_a_step_file_are_two_parts_of_one_body(tmp_path: Path) -> None
     whole = joined(core, jacket, folder=tmp_path)
     assert volumes(whole) == pytest.approx([1e-6, 2e-7])
     assert interface(whole) == pytest.approx(1e-4)
-    told = surveyed(case(core, jacket), tmp_path, compiled=False)
-    assert not told.refused
-    assert [part.elements for part in told.parts] == np.bincount(whole.tet_part).tolist()
+    survey = surveyed(case(core, jacket), tmp_path, compiled=False)
+    assert not survey.refused
+    assert [part.elements for part in survey.parts] == np.bincount(whole.tet_part).tolist()
     block = {"shape": "box", "low": ["10 mm", "2 mm", "2 mm"], "high": ["15 mm", "8 mm", "8 mm"]}
-    told = surveyed(case(core, {**block, "element_size": "2 mm"}), tmp_path, compiled=False)
-    assert not told.refused
-    assert len(told.parts) == 1
+    survey = surveyed(case(core, {**block, "element_size": "2 mm"}), tmp_path, compiled=False)
+    assert not survey.refused
+    assert len(survey.parts) == 1

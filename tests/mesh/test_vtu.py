@@ -146,12 +146,12 @@ def reads(path: Path) -> bool:
 
 def test_entities_and_pieces_are_refused(tmp_path: Path) -> None:
     start = '<VTKFile type="UnstructuredGrid"><UnstructuredGrid>'
-    for text, said in (
+    for text, message in (
         (f'<!DOCTYPE x [<!ENTITY a "b">]>{start}', "the file defines XML entities"),
         (f"{start}</UnstructuredGrid></VTKFile>", "the file has 0 pieces"),
         ('<VTKFile type="PolyData"></VTKFile>', "this is no .vtu file"),
         ("hello", "the file is damaged or no .vtu file"),
     ):
         (tmp_path / "bad.vtu").write_text(text)
-        with pytest.raises(MeshError, match=rf"^mesh\.path = 'bad.vtu': {said}"):
+        with pytest.raises(MeshError, match=rf"^mesh\.path = 'bad.vtu': {message}"):
             taken(tmp_path / "bad.vtu")

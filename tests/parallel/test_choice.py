@@ -25,21 +25,21 @@ def steps(team: Team, chosen: Choice, number: int) -> tuple[list[str], "np.ndarr
     done."""
     done, table = np.zeros(120_000, np.int64), Arguments(*KINDS)
     tasks = np.column_stack([np.arange(0, 120_000, 10_000), np.arange(10_000, 130_000, 10_000)])
-    said = []
+    reports = []
     for _ in range(number):
         team.run(count, table.set(done), tasks, np.array([0, 12]))
-        said.append(chosen.step())
-    return [text for text in said if text], done
+        reports.append(chosen.step())
+    return [text for text in reports if text], done
 
 
 def test_a_scene_that_is_too_small_is_told_once(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(projecting, "measured", lambda: Costs(turn=10**8, call=0, wake=10**7))
     monkeypatch.setattr(choice, "_AGAIN", 0.0)
     team = Team(4)
-    said, done = steps(team, Choice(team), 40)
-    assert len(said) == 1
-    assert said[0].startswith("the scene is too small for 4 threads and uses 1. A colour has 12.0 tasks of ")
-    assert "to share one costs 100 ms, to wake a thread 10.0 ms" in said[0]
+    reports, done = steps(team, Choice(team), 40)
+    assert len(reports) == 1
+    assert reports[0].startswith("the scene is too small for 4 threads and uses 1. A colour has 12.0 tasks of ")
+    assert "to share one costs 100 ms, to wake a thread 10.0 ms" in reports[0]
     assert team.most == 1
     assert (done == 40).all()
 
@@ -48,8 +48,8 @@ def test_a_scene_that_is_large_enough_keeps_its_threads(monkeypatch: pytest.Monk
     monkeypatch.setattr(projecting, "measured", lambda: Costs(turn=0, call=0, wake=0))
     team = Team(4)
     chosen = Choice(team)
-    said, done = steps(team, chosen, 40)
-    assert said == []
+    reports, done = steps(team, chosen, 40)
+    assert reports == []
     assert (team.most, team.projecting) == (4, None)
     assert (done == 40).all()
 

@@ -45,13 +45,13 @@ def test_a_signal_to_the_launcher_cancels_the_run(number: signal.Signals, tmp_pa
     assert outcome(folder).message == "stopped on request"
     assert outcome(folder).steps
     assert outcome(folder).digest
-    said = journal(folder)
-    assert isinstance(said[-1], messages.Finished)
-    assert said[-1].state == "cancelled"
-    assert [message.seq for message in said] == list(range(1, len(said) + 1))
-    worst = [message.worst_residual for message in said if isinstance(message, messages.Progress)]
+    journaled = journal(folder)
+    assert isinstance(journaled[-1], messages.Finished)
+    assert journaled[-1].state == "cancelled"
+    assert [message.seq for message in journaled] == list(range(1, len(journaled) + 1))
+    worst = [message.worst_residual for message in journaled if isinstance(message, messages.Progress)]
     assert 0.0 < (worst[-1] or 0.0) <= outcome(folder).worst_residual
-    seen = [message for message in said if isinstance(message, messages.Snapshot)]
+    seen = [message for message in journaled if isinstance(message, messages.Snapshot)]
     assert seen[-1].step == outcome(folder).steps, "the last state has a snapshot"
     assert not wait_until_gone(processes(folder))
 
@@ -69,9 +69,9 @@ def test_a_file_in_the_folder_cancels_the_run_and_a_second_worker_keeps_out(tmp_
         launcher.communicate(timeout=30.0)
     assert launcher.returncode == 4
     assert (outcome(folder).state, outcome(folder).cause) == ("cancelled", "cancelled")
-    said = journal(folder)
-    assert isinstance(said[-1], messages.Finished)
-    assert [message.seq for message in said] == list(range(1, len(said) + 1))
+    journaled = journal(folder)
+    assert isinstance(journaled[-1], messages.Finished)
+    assert [message.seq for message in journaled] == list(range(1, len(journaled) + 1))
 
 
 def test_what_asked_one_attempt_to_stop_stops_no_other(tmp_path: Path) -> None:
@@ -142,12 +142,12 @@ def test_bad_input_is_one_line_and_exit_code_two(
     sets = [word for change in changes for word in ("--set", change)]
     done = ended(command(2, "free_spin", "--out", str(folder), *sets))
     assert done.returncode == 2
-    said = [line for line in done.stderr.splitlines() if "application called MPI_Abort" not in line]
-    assert len(said) == 1, done.stderr
-    assert all(word in said[0] for word in words)
+    lines = [line for line in done.stderr.splitlines() if "application called MPI_Abort" not in line]
+    assert len(lines) == 1, done.stderr
+    assert all(word in lines[0] for word in words)
     assert "Traceback" not in done.stdout + done.stderr
     end = outcome(folder)
-    assert (end.state, end.cause, end.message) == ("failed", "input", said[0])
+    assert (end.state, end.cause, end.message) == ("failed", "input", lines[0])
 
 
 MESH = """$MeshFormat
@@ -200,9 +200,9 @@ def test_a_bad_mesh_is_one_line_and_exit_code_two(height: object, words: tuple[s
 def test_a_folder_that_cannot_be_made_is_one_line() -> None:
     done = ended(command(1, "free_spin", "--out", "/proc/none"))
     assert done.returncode == 5
-    said = [line for line in done.stderr.splitlines() if "application called MPI_Abort" not in line]
-    assert len(said) == 1, done.stderr
-    assert "was removed or cannot be written: [Errno 2] No such file or directory: '/proc/none" in said[0]
+    lines = [line for line in done.stderr.splitlines() if "application called MPI_Abort" not in line]
+    assert len(lines) == 1, done.stderr
+    assert "was removed or cannot be written: [Errno 2] No such file or directory: '/proc/none" in lines[0]
 
 
 def test_a_case_that_is_not_there(tmp_path: Path) -> None:

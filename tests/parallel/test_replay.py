@@ -45,20 +45,20 @@ def test_a_run_tells_its_groups_alike_on_any_number_of_ranks(run: Callable[[int]
 
 
 def test_a_run_begins_and_ends_with_its_groups(moving: Path) -> None:
-    told = groups(moving)
-    assert [bool(m.centres) for m in told] == [True] + [False] * (len(told) - 1)
-    assert (told[0].step, told[0].load) == (0, [0] * 256)
-    assert all(map(any, zip(*(m.load for m in told), strict=True))), "each has cost something; some erode to the end"
-    assert sum(told[-1].outside) > sum(told[0].outside), "something has broken"
+    before = groups(moving)
+    assert [bool(m.centres) for m in before] == [True] + [False] * (len(before) - 1)
+    assert (before[0].step, before[0].load) == (0, [0] * 256)
+    assert all(map(any, zip(*(m.load for m in before), strict=True))), "each has cost something; some erode to the end"
+    assert sum(before[-1].outside) > sum(before[0].outside), "something has broken"
 
 
 def test_the_replay_of_a_run_knows_its_cuts(moving: Path) -> None:
     command = [sys.executable, "-m", "conoid.client.cli", "replay-balance", str(moving), "--json"]
-    told = json.loads(subprocess.run(command, check=True, capture_output=True, text=True, timeout=60).stdout)
-    happened, replayed = told["run"], told["policies"][0]
+    answer = json.loads(subprocess.run(command, check=True, capture_output=True, text=True, timeout=60).stdout)
+    happened, replayed = answer["run"], answer["policies"][0]
     assert (happened["policy"], happened["ranks"]) == ("every:5", 3)
     assert happened["cuts"] == replayed["cuts"] == list(range(5, groups(moving)[-1].step, 5))
     assert len(replayed["cuts"]) > 1
     assert replayed["cost"] == pytest.approx(happened["cost"])
     assert 0.0 < replayed["lost"] < replayed["work"]
-    assert [p["policy"] for p in told["policies"]] == ["every:5", "measured", "outside 1.2", "never"]
+    assert [p["policy"] for p in answer["policies"]] == ["every:5", "measured", "outside 1.2", "never"]

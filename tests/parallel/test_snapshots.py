@@ -26,7 +26,7 @@ from .scenes import FAST, arguments
 STOPPING = Path(__file__).with_name("stopping.py")
 
 
-def told(folder: Path) -> list[Snapshot]:
+def snapshots_of(folder: Path) -> list[Snapshot]:
     """Returns the snapshots of the journal; an incomplete line after a kill is ignored."""
     lines = (folder / layout.JOURNAL).read_bytes().splitlines(keepends=True)
     found = [from_json(line) for line in lines if line.endswith(b"\n")]
@@ -57,7 +57,7 @@ def spread(folder: Path, kind: type[Counts | Snapshot]) -> tuple[int, int, list[
 
 
 def of_cause(folder: Path, cause: str) -> bytes:
-    (one,) = [message for message in told(folder) if message.cause == cause]
+    (one,) = [message for message in snapshots_of(folder) if message.cause == cause]
     return whole(folder, one)
 
 
@@ -153,8 +153,8 @@ def test_one_is_made_when_asked_for_and_changes_no_bit(tmp_path: Path, breaking:
     (place / FAST).mkdir(parents=True)
     (place / FAST / layout.SNAPSHOT_REQUEST).touch()
     together(2, place, [[*arguments(FAST, place, place), "--set", "run.snapshots=0"]])
-    assert [message.cause for message in told(place / FAST)] == ["asked for"]
-    whole(place / FAST, told(place / FAST)[0])
+    assert [message.cause for message in snapshots_of(place / FAST)] == ["asked for"]
+    whole(place / FAST, snapshots_of(place / FAST)[0])
     assert not (place / FAST / layout.SNAPSHOT_REQUEST).exists()
     one, two = (outcome_from_json((f / layout.OUTCOME).read_bytes()) for f in (place / FAST, breaking(1, FAST)))
     assert one.digest == two.digest
@@ -163,11 +163,11 @@ def test_one_is_made_when_asked_for_and_changes_no_bit(tmp_path: Path, breaking:
 def test_a_run_that_goes_on_goes_on_counting_and_tidies_up(tmp_path: Path) -> None:
     words, folder = arguments(FAST, tmp_path, tmp_path), tmp_path / FAST
     assert ended(command(2, "20", *words, module=[str(STOPPING)])).returncode == 4
-    before = told(folder)
-    (folder / layout.SNAPSHOTS / "000099.snap").write_bytes(b"never told")
+    before = snapshots_of(folder)
+    (folder / layout.SNAPSHOTS / "000099.snap").write_bytes(b"never announced")
     layout.share(folder, 7, 1).write_bytes(b"half")
     assert ended(command(1, str(10**9), *words, "--restart", module=[str(STOPPING)])).returncode == 0
-    after = told(folder)
+    after = snapshots_of(folder)
     assert after[: len(before)] == before
     assert [message.n for message in after] == list(range(len(after)))
     assert len(after) > len(before)
@@ -184,7 +184,7 @@ def test_what_a_killed_run_tells_of_is_whole(tmp_path: Path) -> None:
         os.killpg(launcher.pid, signal.SIGKILL)
         launcher.wait(20.0)
     assert not wait_until_gone(processes(tmp_path))
-    found = told(tmp_path)
+    found = snapshots_of(tmp_path)
     assert len(found) > 1
     for message in found:
         snapshot.header_of(whole(tmp_path, message))

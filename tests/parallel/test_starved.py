@@ -54,21 +54,21 @@ def outcome(tmp_path: Path, end: str, ranks: int, *words: str) -> Outcome:
     return from_json((out / layout.OUTCOME).read_bytes())
 
 
-def told(end: Outcome) -> list[str]:
+def warned(end: Outcome) -> list[str]:
     """Returns the warnings of a run; the numbers of the case have no units."""
     return [text for text in end.warnings if "no unit, taken for" not in text]
 
 
 def test_half_flat_is_no_reason_to_say_anything(tmp_path: Path) -> None:
     end = outcome(tmp_path, "0.5 ms", 1)
-    assert (end.state, told(end)) == ("succeeded", [])
+    assert (end.state, warned(end)) == ("succeeded", [])
 
 
 @pytest.mark.parametrize("ranks", [1, pytest.param(2, marks=pytest.mark.slow)])
 def test_flat_is(tmp_path: Path, ranks: int) -> None:
     end = outcome(tmp_path, "1.1 ms", ranks)
     assert end.state == "failed"
-    [line] = told(end)
+    [line] = warned(end)
     assert line.startswith("the stable step has fallen to ")
     assert "below 1/1000 of the first, at 0.00099" in line
     assert " s (stability: tet " in line
@@ -79,7 +79,7 @@ def test_flat_is(tmp_path: Path, ranks: int) -> None:
 def test_what_is_used_up_says_how_short_the_steps_were(tmp_path: Path, ranks: int) -> None:
     """At the end of the run a fifth of the height of the body is left."""
     end = outcome(tmp_path, "1.1 ms", ranks, "--set", "run.max_steps=300")
-    assert (end.state, end.cause, end.steps, told(end)) == ("timed_out", "steps", 300, [])
+    assert (end.state, end.cause, end.steps, warned(end)) == ("timed_out", "steps", 300, [])
     assert end.message.startswith("run.max_steps is used up before run.end_time, at 0.0008")
     assert "; the stable step has fallen to " in end.message
     assert " of the first (stability: tet " in end.message

@@ -70,8 +70,8 @@ def must_be_one(whole: Path, other: Path) -> None:
         one.worst_residual,
     )
     assert (other / layout.HISTORY).read_bytes() == (whole / layout.HISTORY).read_bytes()
-    told = [message.index for message in journal(other) if isinstance(message, Frame)]
-    assert told == [message.index for message in journal(whole) if isinstance(message, Frame)]
+    indices = [message.index for message in journal(other) if isinstance(message, Frame)]
+    assert indices == [message.index for message in journal(whole) if isinstance(message, Frame)]
     for table in [fragments.genealogy(whole), *sorted((whole / "fragments").glob("fragments_*.csv"))]:
         if table.exists():
             assert (other / table.relative_to(whole)).read_bytes() == table.read_bytes()

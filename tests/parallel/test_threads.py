@@ -23,7 +23,7 @@ _arguments, _counts = reader(*KINDS), reader(*COUNTS)
 
 
 @njit("UniTuple(float64, 5)(int64)", cache=False)
-def told(table):  # type: ignore[no-untyped-def]
+def arguments_read(table):  # type: ignore[no-untyped-def]
     (values, flag, numbers), factor, shift = _arguments(table)
     return values[1, 2], 1.0 if flag else 0.0, float(numbers[-1]), factor, float(shift)
 
@@ -39,13 +39,13 @@ def count(table, first, end, thread):  # type: ignore[no-untyped-def]
 
 def test_a_kernel_gets_what_the_table_was_given_last() -> None:
     table, values = Arguments(*KINDS), np.arange(6.0).reshape(2, 3)
-    assert told(table.set((values, True, np.array([7, 8])), 0.5, -3)) == (5.0, 1.0, 8.0, 0.5, -3.0)
+    assert arguments_read(table.set((values, True, np.array([7, 8])), 0.5, -3)) == (5.0, 1.0, 8.0, 0.5, -3.0)
     values[1, 2] = 9.0
     grown = np.array([1, 2, 3])
     last = values, False, grown
-    assert told(table.set(last, 0.25, 4)) == (9.0, 0.0, 3.0, 0.25, 4.0)
-    assert told(table.set(last, 0.5, 4)) == (9.0, 0.0, 3.0, 0.5, 4.0)
-    assert told(table.set((values, True, grown[:2]), 0.5, 4)) == (9.0, 1.0, 2.0, 0.5, 4.0)
+    assert arguments_read(table.set(last, 0.25, 4)) == (9.0, 0.0, 3.0, 0.25, 4.0)
+    assert arguments_read(table.set(last, 0.5, 4)) == (9.0, 0.0, 3.0, 0.5, 4.0)
+    assert arguments_read(table.set((values, True, grown[:2]), 0.5, 4)) == (9.0, 1.0, 2.0, 0.5, 4.0)
 
 
 def test_arrays_of_a_table_lie_in_c_order() -> None:

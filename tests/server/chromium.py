@@ -130,8 +130,8 @@ class Browser:
             number = self._last
             if answer is not None:
                 self._answers[number] = answer
-            told = {"id": number, "method": method, "params": params, **({"sessionId": session} if session else {})}
-            self._to.write(json.dumps(told).encode() + b"\0")
+            request = {"id": number, "method": method, "params": params, **({"sessionId": session} if session else {})}
+            self._to.write(json.dumps(request).encode() + b"\0")
         return number
 
     def _listen(self) -> None:
@@ -139,11 +139,11 @@ class Browser:
         while data := self._from.read1(1 << 20):
             *whole, rest = (rest + data).split(b"\0")
             for text in whole:
-                told = json.loads(text)
-                if told.get("id") in self._answers:
-                    self._answers[told["id"]].put(told)
-                elif "method" in told and (listener := self._listeners.get(told.get("sessionId", ""))):
-                    listener(told["method"], told["params"])
+                received = json.loads(text)
+                if received.get("id") in self._answers:
+                    self._answers[received["id"]].put(received)
+                elif "method" in received and (listener := self._listeners.get(received.get("sessionId", ""))):
+                    listener(received["method"], received["params"])
         self._from.close()
 
 
@@ -174,16 +174,16 @@ class Page:
         """Calls a method of the protocol for this page. Raises PageError."""
         return self._browser.call(method, self._session, **params)
 
-    def heard(self, method: str, told: dict[str, Any]) -> None:
+    def heard(self, method: str, params: dict[str, Any]) -> None:
         """Handles an event of this page, in the thread that reads the pipe."""
-        if method == "Runtime.consoleAPICalled" and told["type"] == "error":
-            self.errors.append(" ".join(str(one.get("value", one.get("description"))) for one in told["args"]))
+        if method == "Runtime.consoleAPICalled" and params["type"] == "error":
+            self.errors.append(" ".join(str(one.get("value", one.get("description"))) for one in params["args"]))
         elif method == "Runtime.exceptionThrown":
-            self.errors.append(_failure(told["exceptionDetails"]))
-        elif method == "Log.entryAdded" and told["entry"]["level"] == "error":
-            self.errors.append(f"{told['entry']['text']} {told['entry'].get('url', '')}")
+            self.errors.append(_failure(params["exceptionDetails"]))
+        elif method == "Log.entryAdded" and params["entry"]["level"] == "error":
+            self.errors.append(f"{params['entry']['text']} {params['entry'].get('url', '')}")
         elif method == "Network.responseReceived":
-            self.answers.append((told["response"]["status"], told["response"]["url"]))
+            self.answers.append((params["response"]["status"], params["response"]["url"]))
         elif method == "Page.javascriptDialogOpening":
             self._browser.send("Page.handleJavaScriptDialog", self._session, accept=True)
 

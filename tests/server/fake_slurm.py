@@ -18,8 +18,8 @@ ACCEPT = 'echo "$((100 + $(wc -l < calls)))|PENDING|N/A|$name|Resources" >> queu
 
 def commands(place: Path, body: str) -> str:
     """Writes an sbatch that runs ``body``, and a squeue that prints the queued jobs."""
-    told = {name: f"#!/bin/bash\necho $@ >> {{place}}/{file}\n" for name, file in TELL.items()}
-    for name, text in {"sbatch": SBATCH, "squeue": SQUEUE, **told}.items():
+    scripts = {name: f"#!/bin/bash\necho $@ >> {{place}}/{file}\n" for name, file in TELL.items()}
+    for name, text in {"sbatch": SBATCH, "squeue": SQUEUE, **scripts}.items():
         path = place / "bin" / name
         path.write_text(text.format(place=place, body=body))
         path.chmod(0o755)

@@ -26,7 +26,7 @@ def parts(k: int) -> dict[str, messages.PartEnergy]:
     return {name: messages.PartEnergy(kinetic=a, internal=b) for name, (a, b) in made.items()} if k else {}
 
 
-def told(reports: int, ranks: int = 2, every: int = 100) -> Iterator[messages.AnyMessage]:
+def lines_of_run(reports: int, ranks: int = 2, every: int = 100) -> Iterator[messages.AnyMessage]:
     """Yields the messages of a run with ``reports`` reports. After each ``every`` reports come a balance event and a
     snapshot.
     """
@@ -59,10 +59,10 @@ def snapshot(n: int, text: str | bytes, tets: int = 0, **at: Any) -> messages.Sn
     )  # fmt: skip
 
 
-def write(folder: Path, told: Iterator[messages.AnyMessage], after: int = 0) -> int:
+def write(folder: Path, lines: Iterator[messages.AnyMessage], after: int = 0) -> int:
     """Appends messages to a journal and writes the files of the snapshots; returns the number of the last message."""
     with (folder / layout.JOURNAL).open("ab" if after else "wb") as file:
-        for message in told:
+        for message in lines:
             after += 1
             line = messages.to_json(message).replace(b'"seq":0', b'"seq":%d' % after)
             file.write(line + b"\n")

@@ -22,9 +22,9 @@ def asking(web: Path) -> Ask:
     (web / "package.json").write_text('{"type": "module"}')
 
     def asked(modules: str, script: str, data: Any = None) -> Any:
-        told = json.dumps({"module": f"{web}/{modules}", "script": script, "data": data})
+        question = json.dumps({"module": f"{web}/{modules}", "script": script, "data": data})
         command = [str(NODE), str(Path(__file__).with_name("scripts.mjs"))]
-        done = subprocess.run(command, input=told, capture_output=True, text=True, timeout=60, check=False)
+        done = subprocess.run(command, input=question, capture_output=True, text=True, timeout=60, check=False)
         assert done.returncode == 0, done.stderr
         return json.loads(done.stdout)
 

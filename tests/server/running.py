@@ -129,8 +129,8 @@ class Process:
             assert self.child.poll() is None, "the server ended at its start"
             assert time.monotonic() < deadline
             time.sleep(0.01)
-        told: dict[str, Any] = json.loads(address.read_text())
-        return told
+        record: dict[str, Any] = json.loads(address.read_text())
+        return record
 
     def user(self, url: str, name: str = "ann") -> User:
         """Returns a user with a new token."""

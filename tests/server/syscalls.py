@@ -98,8 +98,8 @@ def _members(word: str) -> set[str]:
     if not word.startswith("@"):
         return {word}
     command = [str(shutil.which("systemd-analyze")), "--no-pager", "syscall-filter", word]
-    told = subprocess.run(command, check=True, capture_output=True, text=True).stdout.splitlines()[1:]
-    lines = [line.strip() for line in told]
+    printed = subprocess.run(command, check=True, capture_output=True, text=True).stdout.splitlines()[1:]
+    lines = [line.strip() for line in printed]
     return set().union(*(_members(line) for line in lines if line and not line.startswith("#")))
 
 

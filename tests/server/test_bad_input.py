@@ -59,15 +59,15 @@ def changed(old: str, new: str) -> str:
 )  # fmt: skip
 def test_a_bad_case(users: tuple[User, User], text: str, key: str, value: str, allowed: str) -> None:
     ann, _ = users
-    said = line(ann.http.post("/v1/runs", content=text, headers=TOML), 422)
-    assert key in said
-    assert value in said
-    assert allowed in said
+    message = line(ann.http.post("/v1/runs", content=text, headers=TOML), 422)
+    assert key in message
+    assert value in message
+    assert allowed in message
 
 
 def test_a_body_of_two_mebibytes(users: tuple[User, User]) -> None:
-    said = line(users[0].http.post("/v1/runs", content=b"#" * (2 << 20), headers=TOML), 413)
-    assert str(1 << 20) in said
+    message = line(users[0].http.post("/v1/runs", content=b"#" * (2 << 20), headers=TOML), 413)
+    assert str(1 << 20) in message
 
 
 def test_no_token(users: tuple[User, User]) -> None:

@@ -83,9 +83,9 @@ def test_a_job_that_waits_is_cancelled_by_its_folder(place: Path, cluster: Clust
 
 def test_a_profile_that_is_not_there_is_told_with_those_that_are(tmp_path: Path) -> None:
     (tmp_path / "site.toml").write_text(SITE)
-    told = conoid("batch", "two_tets", "--ranks", 1, "--slurm", "fast", "--site", tmp_path / "site.toml")
-    assert told.exit_code == 1
-    assert "profile = 'fast': allowed: standard" in told.output
+    result = conoid("batch", "two_tets", "--ranks", 1, "--slurm", "fast", "--site", tmp_path / "site.toml")
+    assert result.exit_code == 1
+    assert "profile = 'fast': allowed: standard" in result.output
 
 
 @pytest.mark.parametrize(
@@ -101,9 +101,9 @@ def test_a_profile_that_is_not_there_is_told_with_those_that_are(tmp_path: Path)
 )
 def test_a_settings_file_that_is_wrong_is_refused_with_one_line(tmp_path: Path, text: str, wrong: str) -> None:
     (tmp_path / "site.toml").write_text(text)
-    with pytest.raises(batch.SiteError, match=re.escape(wrong)) as told:
+    with pytest.raises(batch.SiteError, match=re.escape(wrong)) as raised:
         batch.read_site(tmp_path / "site.toml")
-    assert "\n" not in str(told.value)
+    assert "\n" not in str(raised.value)
 
 
 def test_the_shipped_profile_and_script_belong_together() -> None:
@@ -150,9 +150,9 @@ def test_following_ends_where_the_outcome_is(tmp_path: Path, whole: int) -> None
     (tmp_path / layout.OUTCOME).write_text(
         '{"state": "cancelled", "cause": "cancelled", "message": "stopped on request"}'
     )
-    told = list(FolderRun(tmp_path).messages())
-    assert [message.seq for message in told] == [*range(1, whole + 1), 0]
-    assert getattr(told[-1], "state", "") == State.CANCELLED
+    received = list(FolderRun(tmp_path).messages())
+    assert [message.seq for message in received] == [*range(1, whole + 1), 0]
+    assert getattr(received[-1], "state", "") == State.CANCELLED
 
 
 @pytest.fixture
@@ -224,8 +224,8 @@ def evil(folder: Path, **changes: str) -> Path:
         (folder / "bin" / name).write_text(f"#!/bin/sh\ntouch {folder}/owned\n")
         (folder / "bin" / name).chmod(0o755)
     record = batch.new_job("a", 1, ("standard", batch.Profile()), [str(folder / "bin" / "sbatch")], 0.0)
-    told = {**msgspec.to_builtins(record), "bin": str(folder / "bin"), "job": "7", **changes}
-    (folder / layout.JOB).write_text(json.dumps(told))
+    forged = {**msgspec.to_builtins(record), "bin": str(folder / "bin"), "job": "7", **changes}
+    (folder / layout.JOB).write_text(json.dumps(forged))
     (folder / layout.JOB_SCRIPT).write_text(f"#!/bin/sh\ntouch {folder}/owned\n")
     (folder / layout.JOURNAL).write_text('{"type":"status","run":"a","seq":1,"state":"queued"}\n')
     return folder
@@ -238,8 +238,8 @@ def test_a_folder_chooses_no_program(elsewhere: Path, monkeypatch: pytest.Monkey
     monkeypatch.setenv("CONOID_SITE", str(elsewhere))
     monkeypatch.setattr(following, "_ASK_EVERY", 0.0)
     monkeypatch.chdir(folder := evil(elsewhere.parent / "theirs"))
-    told = conoid("cancel", ".").stdout
-    assert "Slurm has no job 7" in told
+    printed = conoid("cancel", ".").stdout
+    assert "Slurm has no job 7" in printed
     assert not (elsewhere.parent / "ended").exists()
 
     def stop(seconds: float) -> None:
@@ -255,9 +255,9 @@ def test_a_folder_chooses_no_program(elsewhere: Path, monkeypatch: pytest.Monkey
 )
 def test_what_stands_in_a_record_is_no_option_of_a_command(changes: dict[str, str], elsewhere: Path) -> None:
     folder = evil(elsewhere.parent / "theirs", **changes)
-    told = conoid("cancel", folder)
-    (line,) = told.stderr.splitlines()
-    assert told.exit_code == 1
+    result = conoid("cancel", folder)
+    (line,) = result.stderr.splitlines()
+    assert result.exit_code == 1
     assert "this record cannot be read" in line
 
 
@@ -282,8 +282,8 @@ def test_a_pipe_in_a_folder_keeps_nobody_waiting(name: str, tmp_path: Path, monk
     (tmp_path / layout.JOURNAL).write_text('{"type":"status","run":"a","seq":1,"state":"running"}\n')
     os.mkfifo(tmp_path / name)
     assert FolderRun(tmp_path).status().title == ""
-    told = list(islice(FolderRun(tmp_path).messages(pause=lambda _: None), 2))
-    assert getattr(told[-1], "state", "") == State.LOST
+    received = list(islice(FolderRun(tmp_path).messages(pause=lambda _: None), 2))
+    assert getattr(received[-1], "state", "") == State.LOST
 
 
 def test_a_request_to_stop_follows_no_link(tmp_path: Path) -> None:
@@ -317,5 +317,5 @@ def test_a_run_that_waits_for_its_worker_is_not_lost(tmp_path: Path, monkeypatch
         if next(pauses, None) is None:
             (tmp_path / layout.OUTCOME).write_text('{"state": "succeeded"}')
 
-    told = [getattr(message, "state", "") for message in FolderRun(tmp_path).messages(pause=pause)]
-    assert told == [State.QUEUED, State.SUCCEEDED]
+    states = [getattr(message, "state", "") for message in FolderRun(tmp_path).messages(pause=pause)]
+    assert states == [State.QUEUED, State.SUCCEEDED]

@@ -48,24 +48,24 @@ def test_no_peak_is_lost_however_long_the_file_is(tmp_path: Path, monkeypatch: p
     """Spikes in single lines at random places are read in pieces of random lengths and combined into few groups."""
     monkeypatch.setattr(columns, "_GROUPS", 64)
     lot, path = random.Random(7), tmp_path / layout.HISTORY
-    found, told = Columns(path), list[float]()
+    found, sent = Columns(path), list[float]()
     for piece in (1, 63, 64, 65, 2, *(lot.randrange(1, 700) for _ in range(20))):
         values = [lot.gauss(0.0, 1.0) for _ in range(piece)]
         if lot.random() < 0.5:
             values[lot.randrange(piece)] = lot.choice((-1.0, 1.0)) * lot.uniform(1e3, 1e6)
-        write(path, values, len(told))
-        told += values
+        write(path, values, len(sent))
+        sent += values
         found.catch_up()
         assert sum(map(len, found._kept)) <= 2 * 3 * 64
         shown = found.values(["t", "push"], 40)
         assert len(shown["t"]) == len(shown["push"]) <= 44
-        assert (min(shown["push"]), max(shown["push"])) == (min(told), max(told))
+        assert (min(shown["push"]), max(shown["push"])) == (min(sent), max(sent))
         assert shown["t"] == sorted(shown["t"])
-        assert (shown["t"][0], shown["t"][-1], shown["push"][-1]) == (0.0, 1e-9 * (len(told) - 1), told[-1])
-        spike = max(range(len(told)), key=lambda k: abs(told[k]))
+        assert (shown["t"][0], shown["t"][-1], shown["push"][-1]) == (0.0, 1e-9 * (len(sent) - 1), sent[-1])
+        spike = max(range(len(sent)), key=lambda k: abs(sent[k]))
         at = max(range(len(shown["push"])), key=lambda k: abs(shown["push"][k]))
-        assert abs(shown["t"][at] / 1e-9 - spike) <= 2 * len(told) / 15
-    assert found.lines == len(told)
+        assert abs(shown["t"][at] / 1e-9 - spike) <= 2 * len(sent) / 15
+    assert found.lines == len(sent)
 
 
 def test_extremes_keep_their_order_and_pass_over_what_is_no_number() -> None:
@@ -121,9 +121,9 @@ def test_columns_over_http(server: Running) -> None:
     path.unlink(missing_ok=True)
     assert shown(server, place) == {"lines": 0, "behind": False, "columns": {}, "values": {}}
     write(path, [5.0, math.nan, 7.0])
-    told = shown(server, place, name="push")
-    assert told["values"] == {"t": [0.0, 1e-9, 2e-9], "push": [5.0, None, 7.0]}
-    assert told["columns"]["push"] == {"unit": "N", "last": 7.0, "least": 5.0, "most": 7.0}
+    columns = shown(server, place, name="push")
+    assert columns["values"] == {"t": [0.0, 1e-9, 2e-9], "push": [5.0, None, 7.0]}
+    assert columns["columns"]["push"] == {"unit": "N", "last": 7.0, "least": 5.0, "most": 7.0}
     assert shown(server, place)["values"] == {}
     assert list(shown(server, place, name="*")["values"]) == ["step", "t", "push"]
     answer = server.ann.http.get(place, params={"name": "pull"})

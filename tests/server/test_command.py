@@ -22,17 +22,17 @@ from conoid.server.settings import Settings, SettingsError, loopback
 
 from .running import MakeProcess
 
-Said = Callable[..., tuple[int, str, str]]
+Printed = Callable[..., tuple[int, str, str]]
 
 
 @pytest.fixture
-def say(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> Said:
+def say(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> Printed:
     """Runs the command on a folder of its own; returns exit code, output and errors."""
 
     def run(*arguments: str) -> tuple[int, str, str]:
         code = main(["--runs", str(tmp_path / "runs"), *arguments])
-        told = capsys.readouterr()
-        return code, told.out, told.err
+        printed = capsys.readouterr()
+        return code, printed.out, printed.err
 
     return run
 
@@ -56,27 +56,27 @@ def say(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> Said:
         (["--max-core-seconds", "inf"], "--max-core-seconds inf: above 0, finite"),
     ],
 )
-def test_what_cannot_be_is_one_line(say: Said, arguments: list[str], words: str) -> None:
+def test_what_cannot_be_is_one_line(say: Printed, arguments: list[str], words: str) -> None:
     code, out, err = say(*arguments)
     assert (code, out) == (2, "")
     assert err.startswith(f"conoid.server: {words}")
     assert err.count("\n") == 1
 
 
-def test_a_port_that_is_taken(say: Said) -> None:
+def test_a_port_that_is_taken(say: Printed) -> None:
     with socket.create_server(("127.0.0.1", 0)) as taken:
         port = str(taken.getsockname()[1])
-        told = say("--port", port)
-        assert told[::2] == (1, f"conoid.server: --host 127.0.0.1 --port {port}: Address already in use\n")
-        told = say("--port", "0", "--zenoh-port", port)
-        assert told[0] == 1
+        message = say("--port", port)
+        assert message[::2] == (1, f"conoid.server: --host 127.0.0.1 --port {port}: Address already in use\n")
+        message = say("--port", "0", "--zenoh-port", port)
+        assert message[0] == 1
         taken_too = (
             f"the Zenoh router cannot listen on port {port}: address already in use; --zenoh-port 0 takes a free one"
         )
-        assert told[2] == f"conoid.server: {taken_too}\n"
+        assert message[2] == f"conoid.server: {taken_too}\n"
 
 
-def test_what_cannot_be_done_ends_with_1(say: Said, tmp_path: Path) -> None:
+def test_what_cannot_be_done_ends_with_1(say: Printed, tmp_path: Path) -> None:
     assert say("--host", "192.0.2.1")[::2] == (
         1, "conoid.server: --host 192.0.2.1 --port 8750: Cannot assign requested address\n"
     )  # fmt: skip
@@ -86,13 +86,13 @@ def test_what_cannot_be_done_ends_with_1(say: Said, tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(("url", "code"), [("sqlite:////no/folder/x", 1), ("nonsense", 2), ("postgresql+none://x", 2)])
 def test_a_database_that_cannot_be_opened(url: str, code: int) -> None:
-    with pytest.raises(StoreError, match="the database cannot be opened") as told:
+    with pytest.raises(StoreError, match="the database cannot be opened") as raised:
         Store(url)
-    assert "\n" not in str(told.value)
-    assert told.value.exit_code == code
+    assert "\n" not in str(raised.value)
+    assert raised.value.exit_code == code
 
 
-def test_tokens(say: Said, tmp_path: Path) -> None:
+def test_tokens(say: Printed, tmp_path: Path) -> None:
     code, out, err = say("token", "add", "ann", "--scopes", "read")
     assert code == 0
     assert (
@@ -122,8 +122,8 @@ def test_a_folder_without_tokens_is_named_and_not_made(
 ) -> None:
     monkeypatch.chdir(tmp_path)
     assert main(["token", *asked, "--runs", "elsewhere"]) == 2
-    said = f"conoid.server: --runs {tmp_path}/elsewhere: no server has used this folder, and it has no tokens\n"
-    assert capsys.readouterr().err == said
+    message = f"conoid.server: --runs {tmp_path}/elsewhere: no server has used this folder, and it has no tokens\n"
+    assert capsys.readouterr().err == message
     assert not list(tmp_path.iterdir())
 
 
@@ -135,7 +135,7 @@ def test_a_folder_without_tokens_is_named_and_not_made(
         (["ann", "--scopes", "read,rule"], "unknown scope 'rule'; known: read, submit"),
     ],
 )
-def test_tokens_that_cannot_be(say: Said, arguments: list[str], words: str) -> None:
+def test_tokens_that_cannot_be(say: Printed, arguments: list[str], words: str) -> None:
     code, out, err = say("token", "add", *arguments)
     assert (code, out) == (2, "")
     assert words in err
@@ -143,9 +143,9 @@ def test_tokens_that_cannot_be(say: Said, arguments: list[str], words: str) -> N
 
 def test_one_server_a_folder(process: MakeProcess) -> None:
     first = process("--no-zenoh")
-    told = first.start()
-    assert told["pid"] == first.child.pid if first.child else False
-    assert told["zenoh"] is None
+    address = first.start()
+    assert address["pid"] == first.child.pid if first.child else False
+    assert address["zenoh"] is None
     second = subprocess.run(
         [sys.executable, "-m", "conoid.server", "--runs", str(first.runs), "--port", "0", "--no-zenoh"],
         capture_output=True, text=True, timeout=60, check=False,

@@ -115,13 +115,13 @@ def test_answers_about_a_damaged_run_do_not_fail(server: Running) -> None:
     assert server.ann.http.post("/v1/runs", content=body, headers=key).status_code == 410
 
 
-@pytest.mark.parametrize("said", ["Input/output error", "Read-only file system", "No space left on device"])
-def test_complaints_of_a_disk_are_known(tmp_path: Path, said: str) -> None:
+@pytest.mark.parametrize("message", ["Input/output error", "Read-only file system", "No space left on device"])
+def test_complaints_of_a_disk_are_known(tmp_path: Path, message: str) -> None:
     (tmp_path / layout.LOGS).mkdir()
     log = tmp_path / layout.LOGS / layout.LAUNCHER_LOG
     log.write_text("a tet has turned inside out\n")
     assert not launcher_log.disk_failed(tmp_path)
-    log.write_text(f"OSError: {said}\n")
+    log.write_text(f"OSError: {message}\n")
     assert launcher_log.disk_failed(tmp_path)
 
 
@@ -221,7 +221,7 @@ def test_an_end_that_the_database_has_missed_twice_is_told_once_it_can_be_writte
         assert seen.state is State.SUCCEEDED, "the database still has the state of a waiting run"
     monkeypatch.setattr(index, "_REST", 0.0)
     house.supervisor._tidy()
-    told = house.store.get(run.id)
-    assert told is not None
-    assert (told.state, house.supervisor.current(run.id)) == (State.SUCCEEDED, None)
+    row = house.store.get(run.id)
+    assert row is not None
+    assert (row.state, house.supervisor.current(run.id)) == (State.SUCCEEDED, None)
     house.store.close()

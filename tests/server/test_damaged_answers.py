@@ -79,9 +79,9 @@ def test_a_link_in_place_of_a_file_of_a_run_is_not_followed(server: Running, tmp
     path.symlink_to(other)
     for route in (*ROUTES, "/v1/runs/{0}:restart", f"/v1/runs/{{0}}/files/{name}"):
         send = server.ann.http.post if route.endswith(":restart") else server.ann.http.get
-        told = send(route.format(run)).text
-        assert "secret" not in told, route
-        assert '"fragments":77' not in told, route
+        text = send(route.format(run)).text
+        assert "secret" not in text, route
+        assert '"fragments":77' not in text, route
 
 
 @pytest.mark.parametrize(

@@ -27,7 +27,7 @@ STARTED = Started(run="a", wall=11.0, ranks=2, elements=50, nodes=30, end_time=1
 COUNTS = Counts(run="a", elements=45, nodes=33, shared=2, fragments=4, elements_per_rank=[20, 25], facets=9)
 
 
-def told(folder: Path, *messages: AnyMessage) -> Path:
+def journaled(folder: Path, *messages: AnyMessage) -> Path:
     """Makes a folder whose journal has these messages and an incomplete line."""
     (folder / layout.JOURNAL).write_bytes(b"".join(to_json(each) + b"\n" for each in messages) + b'{"type":"prog')
     return folder
@@ -38,13 +38,15 @@ def at(step: int) -> Progress:
 
 
 def test_a_journal_without_the_worst_residual_is_read_too(tmp_path: Path) -> None:
-    ended = ends.so_far(LOST, RUN, told(tmp_path, STARTED, progress("a", 3, 10)))
+    ended = ends.so_far(LOST, RUN, journaled(tmp_path, STARTED, progress("a", 3, 10)))
     assert ended.steps == 3
     assert math.isnan(ended.worst_residual)
 
 
 def test_a_lost_run_has_come_as_far_as_its_journal_tells(tmp_path: Path) -> None:
-    told(tmp_path, Status(run="a", state="starting"), STARTED, at(3), COUNTS, at(7), Status(run="a", state="running"))
+    journaled(
+        tmp_path, Status(run="a", state="starting"), STARTED, at(3), COUNTS, at(7), Status(run="a", state="running")
+    )
     ended = ends.so_far(LOST, RUN, tmp_path)
     assert (ended.steps, ended.time, ended.elements, ended.setup, ended.elapsed) == (7, 0.7, 50, 0.5, 4.5)
     assert (ended.nodes_initial, ended.nodes, ended.eroded, ended.fragments, ended.broken) == (30, 33, 5, 4, 9)
@@ -55,7 +57,7 @@ def test_a_lost_run_has_come_as_far_as_its_journal_tells(tmp_path: Path) -> None
 
 @pytest.mark.parametrize("messages", [[], [Status(run="a", state="queued")]])
 def test_what_nobody_has_told_is_null(messages: list[AnyMessage], tmp_path: Path) -> None:
-    ended = ends.so_far(LOST, replace(RUN, started=0.0), told(tmp_path, *messages) if messages else tmp_path)
+    ended = ends.so_far(LOST, replace(RUN, started=0.0), journaled(tmp_path, *messages) if messages else tmp_path)
     assert ended == LOST
     text = outcome_to_json(ended)
     assert b'"steps": null' in text
@@ -69,7 +71,7 @@ def test_the_end_is_the_last_that_was_heard(tmp_path: Path) -> None:
     (tmp_path / layout.OUTCOME).write_bytes(b"{}")
     os.utime(tmp_path / layout.OUTCOME, (70.0, 70.0))
     assert ends.when(tmp_path) == 70.0
-    assert ends.when(told(tmp_path, STARTED)) == 11.0
+    assert ends.when(journaled(tmp_path, STARTED)) == 11.0
 
 
 class Gone:
@@ -92,7 +94,7 @@ class Gone:
 def test_an_end_that_nobody_saw_is_when_the_run_was_last_heard_of(seen: bool, at: float, tmp_path: Path) -> None:
     """The job of Slurm ended while no server was running."""
     worker = Gone(alive=seen)
-    watch = Watch(told(tmp_path, STARTED), worker, None)  # type: ignore[arg-type]
+    watch = Watch(journaled(tmp_path, STARTED), worker, None)  # type: ignore[arg-type]
     looks = [*watch.look()]
     worker.alive_now = False
     looks += watch.look()

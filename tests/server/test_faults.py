@@ -272,8 +272,8 @@ def test_a_locked_database_is_told_and_passes(server: Running, monkeypatch: pyte
 
 def test_readiness_tells_a_full_disk(server: Running, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(durable, "probe", full)
-    told = server.nobody.http.get("/readyz")
-    assert (told.status_code, told.json()["checks"]["runs"]) == (503, False)
+    answer = server.nobody.http.get("/readyz")
+    assert (answer.status_code, answer.json()["checks"]["runs"]) == (503, False)
 
 
 def test_a_cancel_is_remembered_without_the_database(process: MakeProcess) -> None:

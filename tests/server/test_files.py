@@ -96,7 +96,7 @@ def test_digest_and_etag(server: Running, run: str, folder: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("asked", "status", "part", "told"),
+    ("asked", "status", "part", "content_range"),
     [
         ("bytes=0-3", 206, slice(0, 4), "bytes 0-3/1000"),
         ("bytes=990-", 206, slice(990, None), "bytes 990-999/1000"),
@@ -112,14 +112,14 @@ def test_digest_and_etag(server: Running, run: str, folder: Path) -> None:
     ],
 )
 def test_ranges(
-    server: Running, run: str, folder: Path, asked: str, status: int, part: slice | None, told: str | None
+    server: Running, run: str, folder: Path, asked: str, status: int, part: slice | None, content_range: str | None
 ) -> None:
     content = os.urandom(1000)
     (folder / "frames").mkdir()
     (folder / "frames" / "000000.vtkhdf").write_bytes(content)
     answer = server.ann.http.get(f"/v1/runs/{run}/files/frames/000000.vtkhdf", headers={"Range": asked})
     assert answer.status_code == status
-    assert answer.headers.get("content-range") == told
+    assert answer.headers.get("content-range") == content_range
     if part is not None:
         assert answer.content == content[part]
         assert answer.headers["content-length"] == str(len(content[part]))

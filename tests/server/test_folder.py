@@ -33,8 +33,8 @@ def test_a_new_folder_tells_its_run(tmp_path: Path) -> None:
     assert (made / "case.toml").read_bytes() == b"case"
     assert (made / layout.RESOLVED_CASE).read_bytes() == b"resolved"
     assert folder.submission(made) == submission(run, now)
-    told = folder.run(made)
-    assert (told.id, told.owner, told.state, told.submitted) == (run, "ann", State.ACCEPTED, now)
+    read = folder.run(made)
+    assert (read.id, read.owner, read.state, read.submitted) == (run, "ann", State.ACCEPTED, now)
     assert (folder.outcome(made), folder.outcome_error(made), folder.process(made)) == (None, "", None)
 
 
@@ -44,8 +44,8 @@ def test_what_a_worker_says_of_its_start_does_not_begin_the_run_anew(tmp_path: P
     with (made / layout.JOURNAL).open("ab") as journal:
         for seq, (state, wall) in enumerate([("queued", 1.0), ("starting", 2.0), ("starting", 60.0)], 2):
             journal.write(messages.to_json(messages.Status(run=run, seq=seq, wall=now + wall, state=state)) + b"\n")
-    told = folder.run(made)
-    assert (told.state, told.started) == (State.STARTING, now + 2.0)
+    read = folder.run(made)
+    assert (read.state, read.started) == (State.STARTING, now + 2.0)
 
 
 def test_a_scan_finds_runs_only_and_removes_what_was_never_promised(tmp_path: Path) -> None:
@@ -62,8 +62,8 @@ def test_a_scan_finds_runs_only_and_removes_what_was_never_promised(tmp_path: Pa
 def test_an_outcome_with_a_number_that_is_none_can_be_read(tmp_path: Path) -> None:
     check = Check(name="mean", value=math.nan, expected=1.0, tolerance=0.1, passed=False)
     (tmp_path / layout.OUTCOME).write_bytes(to_json(Outcome(state="succeeded", time=math.nan, reference=[check])))
-    told = folder.outcome(tmp_path)
-    assert told is not None
-    assert math.isnan(told.reference[0].value)
-    assert math.isnan(told.time)
-    assert told.reference[0].expected == 1.0
+    outcome = folder.outcome(tmp_path)
+    assert outcome is not None
+    assert math.isnan(outcome.reference[0].value)
+    assert math.isnan(outcome.time)
+    assert outcome.reference[0].expected == 1.0

@@ -58,11 +58,11 @@ def test_a_server_starts_on_a_full_disk_and_answers(runs: Path) -> None:
                 assert (answer.status_code, answer.json()["retryable"]) == (507, True)
         finally:
             child.terminate()
-        said = child.communicate(timeout=PATIENCE)[1].decode()
+        printed = child.communicate(timeout=PATIENCE)[1].decode()
     kept.close()
     assert child.returncode == 0
-    assert "Traceback" not in said
-    assert f"{runs}/server.json: not written, and tried again in 5 s: File too large" in said
+    assert "Traceback" not in printed
+    assert f"{runs}/server.json: not written, and tried again in 5 s: File too large" in printed
 
 
 def test_an_address_is_written_when_there_is_room(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -87,9 +87,9 @@ def test_a_token_on_a_full_disk(
     monkeypatch.setattr(engine, "_tune", full)
     codes = [main(["--runs", str(runs), "token", "add", f"user{n}"]) for n in range(60)]
     assert set(codes) == {0, 1}
-    told = capsys.readouterr().err.splitlines()
+    printed = capsys.readouterr().err.splitlines()
     place = f"{runs}/server.sqlite: (sqlite3.OperationalError) database or disk is full"
-    assert told == [f"conoid.server: the database cannot be used: {place}"] * codes.count(1)
+    assert printed == [f"conoid.server: the database cannot be used: {place}"] * codes.count(1)
 
 
 @pytest.mark.parametrize(("place", "named"), [(0, "server.identity"), (1, "")])

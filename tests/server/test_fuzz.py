@@ -18,7 +18,7 @@ from conoid.cases.messages import Status
 from conoid.cases.output import layout
 from conoid.cases.run import State
 
-from .journal_lines import told, write
+from .journal_lines import lines_of_run, write
 from .running import Process, User, case_text, processes
 
 REJECTED, ACCEPTED = "ST202", "ST201"
@@ -69,8 +69,8 @@ def seeds(ann: User, place: Path) -> dict[str, list[Any]]:
 
 def speak(folder: Path) -> None:
     """Adds messages to the journal that the fake worker does not write: reports, a balance event, a snapshot."""
-    said = [message for message in told(100) if not isinstance(message, Status)]
-    write(folder, iter(said), after=len((folder / layout.JOURNAL).read_bytes().splitlines()))
+    sent = [message for message in lines_of_run(100) if not isinstance(message, Status)]
+    write(folder, iter(sent), after=len((folder / layout.JOURNAL).read_bytes().splitlines()))
     layout.snapshot(folder, 0).parent.mkdir()
     layout.snapshot(folder, 0).write_bytes(b"99")
 
@@ -100,25 +100,25 @@ def hooked() -> dict[str, str]:
     return {**os.environ, "PYTHONPATH": str(Path(__file__).parent), "SCHEMATHESIS_HOOKS": "fuzz_toml"}
 
 
-def hold_whole(report: dict[str, Any], said: str) -> None:
+def hold_whole(report: dict[str, Any], schema: str) -> None:
     """Requires that every phase has ended without an error on every route, and that valid cases were accepted."""
     ended = {name: report["phases"][name]["status"] for name in PHASES}
-    assert set(ended.values()) <= {"success", "failure"}, f"{ended}\n{said[-6000:]}"
+    assert set(ended.values()) <= {"success", "failure"}, f"{ended}\n{schema[-6000:]}"
     assert report["complete"]
-    assert not report["errors"], said[-6000:]
+    assert not report["errors"], schema[-6000:]
     operations = report["operations"]
     assert operations["tested"] == operations["total"]
     for route in TAKE_CASES:
         assert report["valid_rates"][route]["examples"]["accepted"] >= 1, f"{route}: {report['valid_rates'][route]}"
 
 
-def failures(said: str, paths: Iterable[str]) -> list[tuple[str, str, str]]:
+def failures(output: str, paths: Iterable[str]) -> list[tuple[str, str, str]]:
     """Returns the findings of schemathesis: the code of the check, the route and the status of the answer.
 
     The output has a block for each route, and a block for all sequences of requests, where the last request has
     failed. ``paths`` are the paths of the description.
     """
-    text = said.partition("= FAILURES =")[2].rpartition("= SUMMARY =")[0]
+    text = output.partition("= FAILURES =")[2].rpartition("= SUMMARY =")[0]
     found = []
     for block in re.split(r"^_{3,} (?=[A-Z]+ /|Stateful)", text, flags=re.MULTILINE)[1:]:
         for case in re.split(r"^\d+\. Test Case ID", block, flags=re.MULTILINE)[1:]:
@@ -162,7 +162,7 @@ def test_what_did_not_run_is_no_success() -> None:
 
 
 def test_what_came_of_requests_in_a_row_belongs_to_the_last_of_them() -> None:
-    said = """= FAILURES =
+    output = """= FAILURES =
 ____ POST /v1/sweeps ____
 1. Test Case ID: a
 - ST202 Schema-valid request rejected
@@ -176,7 +176,7 @@ ____ Stateful tests ____
 = SUMMARY ="""
     paths = ["/v1/runs", "/v1/runs/{run_id}", "/v1/runs/{run_id}/stream"]
     found = [("ST202", "POST /v1/sweeps", "422"), ("ST201", "GET /v1/runs/{run_id}/stream", "204")]
-    assert failures(said, paths) == found
+    assert failures(output, paths) == found
 
 
 @pytest.mark.slow

@@ -17,7 +17,7 @@ from conoid.cases.run import State
 from conoid.server.answers import history
 from conoid.server.answers.history import History
 
-from .journal_lines import snapshot, told, write
+from .journal_lines import lines_of_run, snapshot, write
 from .running import Running
 
 
@@ -37,7 +37,7 @@ def run(server: Running) -> str:
 
 
 def test_short_runs_are_told_whole(server: Running, run: str) -> None:
-    last = write(server.ann.runs / run, told(200))
+    last = write(server.ann.runs / run, lines_of_run(200))
     found = shown(server, run)
     series = found["series"]
     assert found["last"] == last
@@ -63,7 +63,7 @@ def test_short_runs_are_told_whole(server: Running, run: str) -> None:
 
 
 def test_long_runs_are_thinned_evenly_and_end_with_the_newest(server: Running, run: str) -> None:
-    write(server.ann.runs / run, told(20_000))
+    write(server.ann.runs / run, lines_of_run(20_000))
     found = shown(server, run, points=500)
     steps = found["series"]["step"]
     assert len(steps) == 500
@@ -76,7 +76,7 @@ def test_long_runs_are_thinned_evenly_and_end_with_the_newest(server: Running, r
 
 def test_what_comes_later_is_read_on_from_where_it_stood(server: Running, run: str) -> None:
     folder = server.ann.runs / run
-    last = write(folder, told(50))
+    last = write(folder, lines_of_run(50))
     assert shown(server, run)["last"] == last
     status = messages.Status(run="r", wall=2000.0, state=State.SUCCEEDED)
     with (folder / layout.JOURNAL).open("ab") as file:
@@ -91,14 +91,14 @@ def test_what_comes_later_is_read_on_from_where_it_stood(server: Running, run: s
 
 def test_the_course_of_a_run_that_went_on_is_told_once(server: Running, run: str) -> None:
     folder = server.ann.runs / run
-    last = write(folder, told(50))
-    write(folder, (message for message in told(80) if message.step >= 300), last)
+    last = write(folder, lines_of_run(50))
+    write(folder, (message for message in lines_of_run(80) if message.step >= 300), last)
     steps = shown(server, run)["series"]["step"]
     assert steps == [10 * k for k in range(80)]
 
 
 def test_memory_is_bounded(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    write(tmp_path, told(3000, ranks=200))
+    write(tmp_path, lines_of_run(3000, ranks=200))
     monkeypatch.setattr(history, "_BYTES", 500_000)
     found = History(tmp_path / layout.JOURNAL)
     found.catch_up()
@@ -127,7 +127,7 @@ def test_the_log_of_the_whole_run_is_bounded_and_a_warning_is_there_once(server:
 
 def test_garbage_in_the_journal_does_no_harm(server: Running, run: str) -> None:
     folder = server.ann.runs / run
-    write(folder, told(20))
+    write(folder, lines_of_run(20))
     with (folder / layout.JOURNAL).open("ab") as file:
         file.write(b'{"type":"balance","run":"half\n{"type":"snapshot"}\n{"type":"status","state":"odd"}\n\xff\n\n')
         file.write(b'{"type":"progress","seq":90,"run":\n{"type":"counts","seq":91,"fragments":"many"}\n')
@@ -147,7 +147,7 @@ def test_a_run_without_reports_has_a_history(server: Running, run: str) -> None:
 
 def test_snapshots_are_listed_and_fetched_once(server: Running, run: str) -> None:
     folder = server.ann.runs / run
-    write(folder, told(200))
+    write(folder, lines_of_run(200))
     (folder / layout.SNAPSHOTS).mkdir()
     layout.snapshot(folder, 0).write_bytes(b"99")
     place = f"/v1/runs/{run}/snapshots"
@@ -167,7 +167,7 @@ def test_snapshots_are_listed_and_fetched_once(server: Running, run: str) -> Non
 
 def test_a_snapshot_that_is_damaged_is_not_sent_to_be_kept(server: Running, run: str) -> None:
     folder = server.ann.runs / run
-    write(folder, told(200))
+    write(folder, lines_of_run(200))
     (folder / layout.SNAPSHOTS).mkdir()
     place = f"/v1/runs/{run}/snapshots/0"
     for damaged in (b"9", b"", b"999"):
@@ -181,9 +181,9 @@ def test_a_snapshot_that_is_damaged_is_not_sent_to_be_kept(server: Running, run:
 
 def test_a_snapshot_that_the_journal_does_not_tell_of_is_not_there(server: Running, run: str) -> None:
     folder = server.ann.runs / run
-    write(folder, told(150))
+    write(folder, lines_of_run(150))
     (folder / layout.SNAPSHOTS).mkdir()
-    layout.snapshot(folder, 7).write_bytes(b"never told")
+    layout.snapshot(folder, 7).write_bytes(b"never announced")
     layout.snapshot(folder, 1).with_suffix(".part").write_bytes(b"half")
     place = f"/v1/runs/{run}/snapshots"
     assert [one["n"] for one in server.ann.http.get(place).json()["snapshots"]] == [0]
@@ -260,7 +260,7 @@ def test_one_is_asked_for_while_it_runs(server: Running, tmp_path: Path) -> None
 
 @pytest.mark.slow
 def test_a_million_events_open_in_two_seconds(server: Running, run: str) -> None:
-    last = write(server.ann.runs / run, told(430_000))
+    last = write(server.ann.runs / run, lines_of_run(430_000))
     assert last >= 10**6
     began = time.monotonic()
     found = shown(server, run)
@@ -291,9 +291,9 @@ def test_sizes_are_those_of_the_latest_state_that_was_counted(server: Running, r
     made = msgspec.structs.replace(snapshot(0, "x", run="r", step=25), smallest=-8, sizes=[4])
     late = messages.Counts(**at, step=40, fragments=3, smallest=-9, sizes=[1, 2], counted=18)
     last = write(server.ann.runs / run, iter([made, late, msgspec.structs.replace(load, step=40)]), last)
-    told = shown(server, run)
-    assert told["sizes"]["sizes"] == [4]
-    assert told["series"]["fragments"] == [3, 7]
+    answer = shown(server, run)
+    assert answer["sizes"]["sizes"] == [4]
+    assert answer["series"]["fragments"] == [3, 7]
     newer = msgspec.structs.replace(late, step=50, counted=45, fragments=9, sizes=[9])
     write(server.ann.runs / run, iter([newer, msgspec.structs.replace(load, step=50)]), last)
     assert shown(server, run)["sizes"]["sizes"] == [9]

@@ -46,13 +46,13 @@ def hold_true(user: User, body: Body) -> None:
     """Requires the properties that the answer to any body must have."""
     answer = send(user, body)
     assert answer.status_code in ALLOWED, f"{body[0]}: {answer.status_code} {answer.text[:300]}"
-    told = json.loads(answer.content)
-    assert finite(told), body[0]
+    made = json.loads(answer.content)
+    assert finite(made), body[0]
     if answer.status_code == 202:
-        seen = user.http.get(told["url"])
+        seen = user.http.get(made["url"])
         assert seen.status_code == 200, f"{body[0]}: {seen.text[:300]}"
         assert finite(json.loads(seen.content)), body[0]
-        user.http.post(f"{told['url']}:cancel")
+        user.http.post(f"{made['url']}:cancel")
 
 
 def test_there_are_hundreds_of_them() -> None:
@@ -145,13 +145,13 @@ def test_a_flood_without_a_token_keeps_nobody_waiting(users: tuple[User, User]) 
     bob.wait_for(run)
     url = bob.http.base_url
     command = [sys.executable, str(FLOOD), str(url.host), str(url.port), "10", "8"]
-    told = []
+    statuses = []
     flood = threading.Thread(
-        target=lambda: told.append(subprocess.run(command, capture_output=True, text=True, check=True).stdout)
+        target=lambda: statuses.append(subprocess.run(command, capture_output=True, text=True, check=True).stdout)
     )
     measure("a flood without a token", bob, run, [flood])
-    print(f"the flood had {told[0]}")
-    assert set(json.loads(told[0])) == {"401"}
+    print(f"the flood had {statuses[0]}")
+    assert set(json.loads(statuses[0])) == {"401"}
 
 
 def half_sent(host: str, port: int, count: int, seconds: float) -> None:

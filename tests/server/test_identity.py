@@ -45,13 +45,13 @@ def refusal(runs: Path, url: str) -> str:
     before = {path.name: path.read_bytes() for path in runs.iterdir() if path.suffix != ".sqlite"}
     with opened(url) as store:
         bond = store.bond()
-        with pytest.raises(IdentityError) as told:
+        with pytest.raises(IdentityError) as raised:
             identity.require(runs, store)
         assert store.bond() == bond
     assert {path.name: path.read_bytes() for path in runs.iterdir() if path.suffix != ".sqlite"} == before
-    assert "\n" not in str(told.value)
-    assert f"python -m conoid.server --runs {runs} adopt" in str(told.value)
-    return str(told.value)
+    assert "\n" not in str(raised.value)
+    assert f"python -m conoid.server --runs {runs} adopt" in str(raised.value)
+    return str(raised.value)
 
 
 def test_a_copy_of_the_folder_is_refused_with_and_without_its_database(served: Path, tmp_path: Path) -> None:

@@ -105,9 +105,9 @@ def test_no_fault_at_any_place_strands_a_run(house: Home, name: str, error: str,
         run = house.accept()
         plan = Plan(house.settings.runs, place, raised, times, reads)
         house.live(run, scenario, plan)
-        told, fired = house.store.get(run.id), plan.fired
-        assert told is not None
-        assert (told.state, told.cause) == (scenario.state, scenario.cause), f"place {place}: {told.message}"
+        row, fired = house.store.get(run.id), plan.fired
+        assert row is not None
+        assert (row.state, row.cause) == (scenario.state, scenario.cause), f"place {place}: {row.message}"
         assert folder.run(house.settings.runs / run.id).state is scenario.state, f"place {place}: the journal"
         ended = folder.outcome(house.settings.runs / run.id)
         assert ended is not None

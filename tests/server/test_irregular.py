@@ -49,7 +49,7 @@ READERS: dict[str, Callable[[Path], Any]] = {
     layout.OUTCOME: lambda path: (folder.outcome(path), folder.outcome_error(path), ends.when(path)),
     layout.WORKER: folder.process,
     layout.STOP_REQUEST: folder.stop_asked,
-    ".keep": pins.told,
+    ".keep": pins.last_request,
     layout.RESOLVED_CASE: restarts._every,
     f"{layout.LOGS}/{layout.LAUNCHER_LOG}": lambda path: (launcher_log.exit_code(path), launcher_log.rank_killed(path)),
     "case.toml": lambda path: restarts.body(path / "case.toml", None),
@@ -102,10 +102,10 @@ def test_an_outcome_that_is_a_pipe_keeps_no_request_waiting(server: Running) -> 
 def test_a_frame_that_goes_to_no_file_is_trouble_of_the_disk(tmp_path: Path, kind: str) -> None:
     in_place(tmp_path / "frames" / "000001.vtkhdf", kind)
     refused = pytest.raises(OSError, match="is not a regular file, and keeps nothing")
-    with refused as told, hdf5.created(tmp_path / "frames" / "000001.vtkhdf"):
+    with refused as raised, hdf5.created(tmp_path / "frames" / "000001.vtkhdf"):
         raise AssertionError("opened")
-    assert storage.failed(told.value)
-    assert storage.gone(told.value, tmp_path), "by the place of its name, not by that of what it leads to"
+    assert storage.failed(raised.value)
+    assert storage.gone(raised.value, tmp_path), "by the place of its name, not by that of what it leads to"
 
 
 def test_a_file_that_is_read_as_a_whole_has_a_limit(tmp_path: Path) -> None:

@@ -100,7 +100,7 @@ def test_what_has_been_removed_is_in_no_list(server: Running) -> None:
     assert second["next"] is None
 
 
-def told(user: User, run: str) -> dict[str, bool]:
+def places_of(user: User, run: str) -> dict[str, bool]:
     """Returns in which answers a successful run occurs."""
     text = user.http.get("/metrics").text
     return {
@@ -116,13 +116,16 @@ def test_a_run_whose_folder_was_removed_by_hand_is_told_of_nowhere(
 ) -> None:
     monkeypatch.setattr(existing, "_FRESH", 0.0)
     run, _ = ended(server), ended(server)
-    everywhere, nowhere = dict.fromkeys(told(server.ann, run), True), dict.fromkeys(told(server.ann, run), False)
-    assert told(server.ann, run) == everywhere
+    everywhere, nowhere = (
+        dict.fromkeys(places_of(server.ann, run), True),
+        dict.fromkeys(places_of(server.ann, run), False),
+    )
+    assert places_of(server.ann, run) == everywhere
     folder = server.ann.runs / run
     folder.rename(folder.with_name("away"))
-    assert told(server.ann, run) == nowhere
+    assert places_of(server.ann, run) == nowhere
     folder.with_name("away").rename(folder)
-    assert told(server.ann, run) == everywhere
+    assert places_of(server.ann, run) == everywhere
 
 
 def test_a_list_reads_names_once_a_second_and_no_folder(server: Running, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -167,8 +170,8 @@ def test_lines_survive_a_lost_database_and_a_torn_end(server: Running, tmp_path:
     path = server.ann.runs / FILE
     path.write_bytes(path.read_bytes() + b'{"id": "to')
     lines = RemovedRuns(server.ann.runs)
-    told = server.service.store.get(other)
-    assert told is not None
+    row = server.service.store.get(other)
+    assert row is not None
     lines.add(farewell(lines, run, other))
     again = RemovedRuns(server.ann.runs)
     assert [again.get(one) is not None for one in (run, other, "nobody")] == [True, True, False]
@@ -210,14 +213,14 @@ def test_what_a_run_writes_after_the_last_look_at_it_counts(server: Running, tmp
 def test_who_asks_is_told_what_his_runs_have_on_disk_where_no_rule_has_them_looked_at(
     server: Running, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    def told(user: User) -> int:
+    def bytes_of(user: User) -> int:
         return int(user.http.get("/v1/me").json()["used"]["output_bytes"])
 
     monkeypatch.setattr(removal, "_PATIENCE", 0.0)
-    assert told(server.ann) == 0
+    assert bytes_of(server.ann) == 0
     (server.ann.runs / ended(server) / "large").write_bytes(bytes(1_000_000))
-    assert 1_000_000 < told(server.ann) < 1_100_000
-    assert told(server.bob) == 0
+    assert 1_000_000 < bytes_of(server.ann) < 1_100_000
+    assert bytes_of(server.bob) == 0
 
 
 def test_a_run_that_is_removed_during_a_look_ends_no_look(server: Running) -> None:

@@ -66,23 +66,23 @@ def hand_in(user: User, data: dict[str, Any], status: int = 202, key: str = "") 
         "/v1/runs", content=json.dumps(data), headers={**JSON, **({"Idempotency-Key": key} if key else {})}
     )
     assert answer.status_code == status, answer.text
-    told: dict[str, Any] = answer.json()
-    return told
+    submitted: dict[str, Any] = answer.json()
+    return submitted
 
 
 def test_a_run_has_its_own_copy_and_reads_no_path(server: Running, quick: list[Path]) -> None:
     send(server.ann)
-    told = hand_in(server.ann, case("/etc/rod.INP"))
-    assert told["files"] == [{"path": "/etc/rod.INP", "sha256": HASH}]
-    folder = server.ann.runs / told["id"]
+    submitted = hand_in(server.ann, case("/etc/rod.INP"))
+    assert submitted["files"] == [{"path": "/etc/rod.INP", "sha256": HASH}]
+    folder = server.ann.runs / submitted["id"]
     copy = folder / layout.FILES / f"{HASH}.inp"
     assert copy.read_bytes() == MESH
     assert copy.stat().st_ino == (server.ann.runs / uploads.FOLDER / "ann" / HASH).stat().st_ino, "it takes no room"
-    assert json.loads((folder / layout.SUBMISSION).read_bytes())["files"] == told["files"]
+    assert json.loads((folder / layout.SUBMISSION).read_bytes())["files"] == submitted["files"]
     assert HASH in (folder / layout.RESOLVED_CASE).read_text()
     assert not list(server.ann.runs.glob(".new*")), "the folder in which it was read is gone"
-    assert server.ann.wait_for(told["id"])["state"] == "succeeded"
-    assert server.ann.http.get(f"/v1/runs/{told['id']}/files/files/{HASH}.inp").content == MESH
+    assert server.ann.wait_for(submitted["id"])["state"] == "succeeded"
+    assert server.ann.http.get(f"/v1/runs/{submitted['id']}/files/files/{HASH}.inp").content == MESH
     assert server.ann.http.delete(f"/v1/files/{HASH}").status_code == 204
     assert copy.read_bytes() == MESH, "the run keeps its own"
 
@@ -92,9 +92,9 @@ def test_a_file_is_used_by_those_who_have_sent_it(server: Running, quick: list[P
     send(server.ann)
     nobodys = hashlib.sha256(b"nobody's").hexdigest()
     for hand in (hand_in, validated):
-        told = [hand(server.bob, case(sha256=each), 422) for each in (HASH, nobodys)]
-        assert json.dumps(told[0]).replace(HASH, "?") == json.dumps(told[1]).replace(nobodys, "?")
-        (entry,) = told[0]["errors"] if "errors" in told[0] else told[0]["problems"]
+        refusals = [hand(server.bob, case(sha256=each), 422) for each in (HASH, nobodys)]
+        assert json.dumps(refusals[0]).replace(HASH, "?") == json.dumps(refusals[1]).replace(nobodys, "?")
+        (entry,) = refusals[0]["errors"] if "errors" in refusals[0] else refusals[0]["problems"]
         assert (entry["key"], entry["message"][:25]) == ("parts[0].mesh.sha256", "you have sent no such fil")
     assert not quick, "nothing was read"
     assert not list(server.ann.runs.glob(".new*"))
@@ -105,8 +105,8 @@ def test_a_file_is_used_by_those_who_have_sent_it(server: Running, quick: list[P
 
 
 def validated(user: User, data: dict[str, Any], status: int) -> dict[str, Any]:
-    told: dict[str, Any] = user.http.post("/v1/cases:validate", content=json.dumps(data), headers=JSON).json()
-    return told
+    checked: dict[str, Any] = user.http.post("/v1/cases:validate", content=json.dumps(data), headers=JSON).json()
+    return checked
 
 
 def test_a_check_names_the_files_of_a_case_whatever_is_wrong_with_it(server: Running, quick: list[Path]) -> None:
@@ -160,8 +160,8 @@ def test_where_the_disk_has_no_second_names_a_run_gets_a_copy(
 
     send(server.ann)
     monkeypatch.setattr(os, "link", none)
-    told = hand_in(server.ann, case("rod.inp"))
-    copy = server.ann.runs / told["id"] / layout.FILES / f"{HASH}.inp"
+    submitted = hand_in(server.ann, case("rod.inp"))
+    copy = server.ann.runs / submitted["id"] / layout.FILES / f"{HASH}.inp"
     assert (copy.read_bytes(), copy.stat().st_nlink) == (MESH, 1)
 
 
@@ -175,8 +175,8 @@ def test_a_restart_takes_the_copy_of_its_run(server: Running, quick: list[Path],
     fresh = server.ann.http.post(f"/v1/runs/{run}:restart").json()
     assert (server.ann.runs / fresh["id"] / layout.FILES / f"{HASH}.inp").read_bytes() == MESH
     (server.ann.runs / run / layout.FILES / f"{HASH}.inp").unlink()
-    told = server.ann.http.post(f"/v1/runs/{run}:restart")
-    assert (told.status_code, told.json()["detail"]) == (409, f"run {run}: its copy of 'rod.inp' is gone")
+    answer = server.ann.http.post(f"/v1/runs/{run}:restart")
+    assert (answer.status_code, answer.json()["detail"]) == (409, f"run {run}: its copy of 'rod.inp' is gone")
 
 
 def test_points_of_a_sweep_have_files_of_their_own(server: Running, quick: list[Path]) -> None:
@@ -195,9 +195,9 @@ def test_points_of_a_sweep_have_files_of_their_own(server: Running, quick: list[
     assert names == [[f"{HASH}.inp"], [f"{HASH}.inp"], [f"{other}.inp"]]
     assert len(quick) == 2
     points[1]["parts[0].mesh.sha256"] = "0" * 64
-    told = server.ann.http.post("/v1/sweeps", content=json.dumps(wish), headers=JSON).json()
-    assert "you have sent no such file" in told["detail"]
-    assert told["detail"].endswith("(point 1)")
+    sweep = server.ann.http.post("/v1/sweeps", content=json.dumps(wish), headers=JSON).json()
+    assert "you have sent no such file" in sweep["detail"]
+    assert sweep["detail"].endswith("(point 1)")
 
 
 def test_a_sweep_that_is_being_handed_in_needs_its_files(server: Running, quick: list[Path]) -> None:
@@ -271,8 +271,8 @@ def test_what_files_hold_is_measured_by_the_caps(
         part=0, elements=5000, nodes=2000, faces=100, step_length=1e-3, altitude=1e-3, mass=1.0, low=(0.0, 0.0, 0.0),
         high=(1.0, 1.0, 1.0), momentum=(0.0, 0.0, 0.0), energy=0.0, speed=0.0, notes=[],
     )  # fmt: skip
-    told = survey.to_json(Survey(parts=[part])) if read else b""
-    monkeypatch.setattr(submission, "surveyed", lambda case, folder: told)
+    data = survey.to_json(Survey(parts=[part])) if read else b""
+    monkeypatch.setattr(submission, "surveyed", lambda case, folder: data)
     server.service.desk._limits = limits.of(
         Settings(runs=settings.runs, slots=2, caps=Caps(elements=1000, free_disk=0))
     )
@@ -291,9 +291,9 @@ def test_the_worker_reads_files_before_a_run_is_accepted(
     """
     monkeypatch.setenv("CONOID_CACHE_DIR", str(tmp_path / "cache"))
     send(server.ann)
-    told = server.ann.http.post("/v1/cases:validate", content=json.dumps(case("rod.inp", group="All")), headers=JSON)
-    assert told.json()["estimate"]["elements"] == 1
-    (part,) = told.json()["survey"]["parts"]
+    answer = server.ann.http.post("/v1/cases:validate", content=json.dumps(case("rod.inp", group="All")), headers=JSON)
+    assert answer.json()["estimate"]["elements"] == 1
+    (part,) = answer.json()["survey"]["parts"]
     assert part["mass"] == pytest.approx(7800.0 * 1e-6 / 6.0)
     line = hand_in(server.ann, case("rod.inp", group="ice"), 422)["detail"]
     assert line == "parts[0].mesh.group = 'ice': no such element set, instance or part; known: All"

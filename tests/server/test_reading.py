@@ -112,9 +112,9 @@ def test_a_program_that_has_ended_or_hangs_is_replaced(made: Reader, number: sig
 def test_a_program_that_cannot_be_started_is_said_in_time(made: Reader, monkeypatch: pytest.MonkeyPatch) -> None:
     os.kill(program_of(made), signal.SIGKILL)
     monkeypatch.setattr(sys, "executable", "/bin/false")
-    with pytest.raises(ServiceError, match="no case can be read now") as told:
+    with pytest.raises(ServiceError, match="no case can be read now") as raised:
         made.read(QUESTION)
-    assert told.value.status == 503
+    assert raised.value.status == 503
 
 
 def test_a_case_whose_process_hangs_is_given_up_and_holds_up_no_other(
@@ -125,18 +125,18 @@ def test_a_case_whose_process_hangs_is_given_up_and_holds_up_no_other(
     assert made._program is not None
     connection, pid = made._program.begun()
     os.kill(pid, signal.SIGSTOP)
-    told: list[int] = []
+    pids: list[int] = []
 
     def ask() -> None:
         with pytest.raises(ServiceError, match="the case cannot be read now") as error:
             reader._answer(connection, pid, b"")
-        told.append(error.value.status)
+        pids.append(error.value.status)
 
     hung = threading.Thread(target=ask)
     hung.start()
     assert made.read(QUESTION).name == "bar"
     hung.join(PATIENCE)
-    assert told == [503]
+    assert pids == [503]
     deadline = time.monotonic() + PATIENCE
     while os.path.exists(f"/proc/{pid}"):
         assert time.monotonic() < deadline, "its process is left"

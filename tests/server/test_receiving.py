@@ -70,10 +70,10 @@ def test_others_are_answered_while_a_body_arrives(up: tuple[Process, User, User]
         assert answered.wait(30)
         yield data[2 * MEGA :]
 
-    told: list[Any] = []
+    answers: list[Any] = []
     headers = {"Content-Length": str(len(data))}
     sender = threading.Thread(
-        target=lambda: told.append(ann.http.put(f"/v1/files/{sha256}", content=body(), headers=headers))
+        target=lambda: answers.append(ann.http.put(f"/v1/files/{sha256}", content=body(), headers=headers))
     )
     sender.start()
     assert asked.wait(30)
@@ -82,10 +82,10 @@ def test_others_are_answered_while_a_body_arrives(up: tuple[Process, User, User]
     assert ann.http.get("/v1/runs").status_code == 200
     assert ann.http.put(f"/v1/files/{small}", content=b"small").status_code == 201
     assert ann.http.put(f"/v1/files/{sha256}", content=b"x").json()["code"] == "in_progress"
-    assert not told
+    assert not answers
     answered.set()
     sender.join(30)
-    assert told[0].status_code == 201
+    assert answers[0].status_code == 201
 
 
 def test_more_bytes_than_were_announced_are_no_part_of_the_file(up: tuple[Process, User, User]) -> None:
@@ -185,11 +185,11 @@ def test_the_memory_of_the_server_does_not_grow_with_a_file(
             file.write(block)
             digest.update(block)
     before, worst, over = peak(server), 0.0, threading.Event()
-    told: list[Any] = []
+    answers: list[Any] = []
 
     def send() -> None:
         with path.open("rb") as file:
-            told.append(ann.http.put(f"/v1/files/{digest.hexdigest()}", content=file))
+            answers.append(ann.http.put(f"/v1/files/{digest.hexdigest()}", content=file))
         over.set()
 
     threading.Thread(target=send).start()
@@ -197,7 +197,7 @@ def test_the_memory_of_the_server_does_not_grow_with_a_file(
         began = time.monotonic()
         assert bob.http.get("/v1/runs").status_code == 200
         worst = max(worst, time.monotonic() - began)
-    assert told[0].status_code == 201
+    assert answers[0].status_code == 201
     grown = peak(server) - before
     print(f"{size / 1e6:.0f} MB: the server grew by {grown / 1e6:.1f} MB, the slowest GET took {1e3 * worst:.0f} ms")
     assert grown < 15e6

@@ -70,8 +70,8 @@ def test_every_route_needs_a_token(server: Running, token: str | None) -> None:
 
 
 def test_the_list_of_routes_is_the_one_that_is_served(server: Running) -> None:
-    told = server.nobody.http.get("/openapi.json").json()["paths"]
-    assert {path for _, path in ROUTES} | OPEN == {path.replace("{path}", "{path:path}") for path in told}
+    paths = server.nobody.http.get("/openapi.json").json()["paths"]
+    assert {path for _, path in ROUTES} | OPEN == {path.replace("{path}", "{path:path}") for path in paths}
     assert len(ROUTES) >= 15
 
 
@@ -396,9 +396,9 @@ def test_bad_parameters(server: Running, path: str, pointer: str) -> None:
 
 def test_an_unknown_parameter_is_told_what_is_known(server: Running) -> None:
     """Otherwise a wrongly spelt state would list all runs."""
-    told = refusal(server.ann.http.get("/v1/runs?stat=failed"), 400, "bad_parameter")
+    problem = refusal(server.ann.http.get("/v1/runs?stat=failed"), 400, "bad_parameter")
     allowed = "case, cursor, label, limit, prefix, since, state, text, until"
-    assert told["detail"] == f"stat: /v1/runs has no such parameter; allowed: {allowed}; did you mean 'state'?"
+    assert problem["detail"] == f"stat: /v1/runs has no such parameter; allowed: {allowed}; did you mean 'state'?"
 
 
 @pytest.mark.parametrize(
@@ -510,15 +510,15 @@ def test_the_page(tmp_path: Path) -> None:
 
 
 def test_openapi_has_the_schema_of_a_case(server: Running) -> None:
-    told = server.ann.http.get("/openapi.json").json()
-    schemas = told["components"]["schemas"]
+    document = server.ann.http.get("/openapi.json").json()
+    schemas = document["components"]["schemas"]
     assert schemas["Case"]["properties"]["parts"]["items"] == {"$ref": "#/components/schemas/Part"}
     assert schemas["Part"]["properties"]["material"]["description"]
     for path in ("/v1/runs", "/v1/cases:validate"):
-        content = told["paths"][path]["post"]["requestBody"]["content"]
+        content = document["paths"][path]["post"]["requestBody"]["content"]
         assert set(content) == {"application/toml", "application/json"}
         assert content["application/json"]["schema"] == {"$ref": "#/components/schemas/Case"}
-    text = json.dumps(told)
+    text = json.dumps(document)
     assert "#/$defs/" not in text
     for name in set(re.findall(r'"#/components/schemas/(\w+)"', text)):
         assert name in schemas
@@ -532,8 +532,8 @@ def test_a_wrong_method_is_told_the_right_ones(server: Running, path: str, allow
 
 
 def test_every_answer_of_openapi_has_a_shape(server: Running) -> None:
-    told = server.ann.http.get("/openapi.json").json()["paths"]
-    for path, operations in told.items():
+    paths = server.ann.http.get("/openapi.json").json()["paths"]
+    for path, operations in paths.items():
         for method, operation in operations.items():
             secured = path not in OPEN
             assert bool(operation["security"]) == secured, path
@@ -564,9 +564,9 @@ def test_the_key_of_a_run_that_was_removed_is_answered_as_openapi_says(server: R
     server.ann.wait_for(run)
     assert server.ann.http.delete(f"/v1/runs/{run}").status_code == 204
     refusal(server.ann.http.post("/v1/runs", content=case_text(), headers=headers), 410, "gone")
-    told = server.ann.http.get("/openapi.json").json()["paths"]
+    paths = server.ann.http.get("/openapi.json").json()["paths"]
     for path in ("/v1/runs", "/v1/sweeps"):
-        assert "410" in told[path]["post"]["responses"], path
+        assert "410" in paths[path]["post"]["responses"], path
 
 
 def test_what_is_known_is_known_in_every_form_of_its_tag(server: Running) -> None:
@@ -582,19 +582,19 @@ def test_what_is_known_is_known_in_every_form_of_its_tag(server: Running) -> Non
 
 def test_a_body_that_breaks_off_is_no_fault_of_the_server() -> None:
     """Before, the log had an error with two tracebacks."""
-    said: Iterator[dict[str, Any]] = iter(
+    body: Iterator[dict[str, Any]] = iter(
         [{"type": "http.request", "body": b"[run]", "more_body": True}, {"type": "http.disconnect"}]
     )
 
     async def receive() -> dict[str, Any]:
-        return next(said)
+        return next(body)
 
     async def read() -> bytes:
         return await read_body(Request({"type": "http", "headers": [(b"content-length", b"100")]}, receive))
 
-    with pytest.raises(ServiceError, match="the body broke off") as told:
+    with pytest.raises(ServiceError, match="the body broke off") as raised:
         asyncio.run(read())
-    assert told.value.status == 400
+    assert raised.value.status == 400
 
 
 # Addresses and parameters ---------------------------------------------------------------------------------------------
@@ -612,9 +612,9 @@ def test_no_answer_leads_to_where_the_asker_says(server: Running, path: str) -> 
     "query", ["limit=1&limit=2", "state=running&state=failed", "prefix=a&prefix=a", "cursor=&cursor="]
 )
 def test_a_parameter_of_one_value_is_given_once(server: Running, query: str) -> None:
-    said = refusal(server.ann.http.get(f"/v1/runs?{query}"), 422, "bad_parameter")
-    assert "it has one value, and is given 2 times" in said["detail"]
-    assert said["pointer"] == query.partition("=")[0]
+    problem = refusal(server.ann.http.get(f"/v1/runs?{query}"), 422, "bad_parameter")
+    assert "it has one value, and is given 2 times" in problem["detail"]
+    assert problem["pointer"] == query.partition("=")[0]
 
 
 def test_labels_may_be_several(server: Running) -> None:

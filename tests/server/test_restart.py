@@ -77,21 +77,21 @@ def stage(server: Process, folder: Path) -> Aftermath:
 
     soon.touch()
     records = {name: server.runs / names[name] / "worker.json" for name in names}
-    told = {name: json.loads(path.read_text()) for name, path in records.items() if path.exists()}
+    worker_records = {name: json.loads(path.read_text()) for name, path in records.items() if path.exists()}
     records["unrecorded"].unlink()
     for name in ("dies", "rebooted", "replaced"):
-        os.kill(told[name]["pid"], signal.SIGKILL)
+        os.kill(worker_records[name]["pid"], signal.SIGKILL)
     for name in ("finishes", "dies", "rebooted", "replaced"):
         gone(names[name])
-    records["rebooted"].write_text(json.dumps({**told["rebooted"], "boot": "another"}))
-    records["replaced"].write_text(json.dumps({**told["replaced"], "pid": os.getpid()}))
+    records["rebooted"].write_text(json.dumps({**worker_records["rebooted"], "boot": "another"}))
+    records["replaced"].write_text(json.dumps({**worker_records["replaced"], "pid": os.getpid()}))
     with (server.runs / names["announced"] / "journal.jsonl").open("a") as file:
         line = {"type": "status", "run": names["announced"], "seq": 3, "wall": 1.0, "state": "starting"}
         file.write(json.dumps(line) + "\n")
     names["accepted"] = accepted(server.runs)
     (server.runs / f".new-{names['accepted']}").mkdir()
     ann = server.user(server.start()["url"])
-    return Aftermath(ann, server.runs, go, names, {name: record["pid"] for name, record in told.items()})
+    return Aftermath(ann, server.runs, go, names, {name: record["pid"] for name, record in worker_records.items()})
 
 
 def accepted(runs: Path) -> str:

@@ -75,11 +75,11 @@ def test_without_a_checkpoint_there_is_nothing_to_go_on_from(server: Running) ->
 def test_a_run_that_has_none_yet_says_how_it_gets_some(server: Running) -> None:
     run = server.ann.submit(end="crash", extra='checkpoint_every = "60 s"')
     server.ann.wait_for(run)
-    said = server.ann.http.post(f"/v1/runs/{run}:restart").json()["detail"]
-    assert said.startswith(
+    detail = server.ann.http.post(f"/v1/runs/{run}:restart").json()["detail"]
+    assert detail.startswith(
         f"run {run} has no checkpoint: it has written none; one is written every run.checkpoint_every"
     )
-    assert "(60 s in its case)" in said
+    assert "(60 s in its case)" in detail
 
 
 def remade(path: Path, kind: str) -> None:
@@ -108,9 +108,9 @@ def test_where_the_newest_is_damaged_a_new_run_gets_the_one_before(tmp_path: Pat
     (warning,) = warnings
     assert warning.startswith("checkpoint 000000020 is damaged: ")
     shutil.rmtree(layout.checkpoint(source, 10))
-    with pytest.raises(ServiceError, match="no checkpoint: all are damaged; 000000020: ") as told:
+    with pytest.raises(ServiceError, match="no checkpoint: all are damaged; 000000020: ") as raised:
         restarts.fill(source, tmp_path / "c")
-    assert told.value.status == 409
+    assert raised.value.status == 409
 
 
 def test_what_is_no_file_among_the_results_is_left_out(tmp_path: Path) -> None:
@@ -153,6 +153,6 @@ def test_checkpoints_that_are_replaced_all_the_time_are_asked_for_later(
         raise FileNotFoundError(one)
 
     monkeypatch.setattr(os, "link", replaced)
-    with pytest.raises(ServiceError, match="replaced faster") as told:
+    with pytest.raises(ServiceError, match="replaced faster") as raised:
         restarts.fill(source, tmp_path / "b")
-    assert (told.value.status, told.value.body["retryable"]) == (503, True)
+    assert (raised.value.status, raised.value.body["retryable"]) == (503, True)

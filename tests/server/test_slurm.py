@@ -80,8 +80,8 @@ def test_a_run_waits_with_a_reason_runs_and_is_cancelled(site: Site, tmp_path: P
 
 def test_a_job_asks_for_a_core_for_each_thread_of_each_rank(site: Site) -> None:
     run = site.submit(case_text(ranks=2, threads=3))
-    told = site.cluster.command("scontrol", "show", "job", job_of(site, run).job)
-    assert {"NumTasks=2", "CPUs/Task=3"} <= set(told.split())
+    job = site.cluster.command("scontrol", "show", "job", job_of(site, run).job)
+    assert {"NumTasks=2", "CPUs/Task=3"} <= set(job.split())
     site.ann.http.post(f"/v1/runs/{run}:cancel")
     site.ended(run)
 
@@ -286,10 +286,10 @@ def test_a_run_is_watched_live_over_zenoh(solver: Site) -> None:
     with connect(str(solver.ann.http.base_url), token) as session:
         link = Heard(session.run(run).link())
         assert link.name == "Zenoh"
-        told = list(session.run(run).messages(link=link))
+        received = list(session.run(run).messages(link=link))
     assert sum(isinstance(message, Progress) for message in link.heard) > 5
-    assert any(isinstance(message, Finished) for message in told)
-    assert [message.seq for message in told] == list(range(1, told[-1].seq + 1)), "nothing is lost on the way"
+    assert any(isinstance(message, Finished) for message in received)
+    assert [message.seq for message in received] == list(range(1, received[-1].seq + 1)), "nothing is lost on the way"
     assert solver.ended(run)["state"] == "succeeded"
     folder = solver.server.runs / run
     assert (folder / layout.ACCESS).stat().st_mode & 0o777 == 0o600

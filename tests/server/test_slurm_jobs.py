@@ -60,20 +60,20 @@ def test_nobody_hands_over_while_the_queue_cannot_be_read(place: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    "said", [b"\xff{|||\n", b"<html>\n", b"7|\n", b"7|RUNNING|0|conoid-a|None\n8|PEND", b"a|b|c|d|e\n"]
+    "output", [b"\xff{|||\n", b"<html>\n", b"7|\n", b"7|RUNNING|0|conoid-a|None\n8|PEND", b"a|b|c|d|e\n"]
 )
-def test_a_list_that_is_none_is_no_empty_list(place: Path, said: bytes) -> None:
+def test_a_list_that_is_none_is_no_empty_list(place: Path, output: bytes) -> None:
     """Otherwise a run whose job is missing in the list would be submitted again."""
     found = commands(place, "echo 101")
-    (place / "queue").write_bytes(said)
+    (place / "queue").write_bytes(output)
     with pytest.raises(slurm_call.AwayError, match="squeue"):
         slurm.submit(found, place / "run", JOB, Profile())
     assert calls(place) == 0
 
 
-@pytest.mark.parametrize("said", ["", "<html>", "101 102"])
-def test_a_number_that_is_none_is_looked_for(place: Path, said: str) -> None:
-    found = commands(place, f"{ACCEPT}; echo '{said}'")
+@pytest.mark.parametrize("output", ["", "<html>", "101 102"])
+def test_a_number_that_is_none_is_looked_for(place: Path, output: str) -> None:
+    found = commands(place, f"{ACCEPT}; echo '{output}'")
     with pytest.raises(slurm_call.AwayError, match="sbatch"):
         slurm.submit(found, place / "run", JOB, Profile())
     assert slurm.submit(found, place / "run", JOB, Profile()) == "101"
@@ -98,7 +98,7 @@ def test_an_sbatch_that_outlives_its_server_keeps_the_next_from_a_second(place: 
 
 
 @pytest.mark.parametrize(
-    ("said", "kind"),
+    ("output", "kind"),
     [
         ("sbatch: error: Batch job submission failed: Invalid partition name specified", slurm_call.RefusedError),
         (
@@ -113,8 +113,8 @@ def test_an_sbatch_that_outlives_its_server_keeps_the_next_from_a_second(place: 
         ("sbatch: error: If munged is up, restart with --num-threads=10", slurm_call.AwayError),
     ],
 )
-def test_a_refusal_is_told_from_silence(place: Path, said: str, kind: type[Exception]) -> None:
-    found = commands(place, f"echo '{said}' >&2; exit 1")
+def test_a_refusal_is_told_from_silence(place: Path, output: str, kind: type[Exception]) -> None:
+    found = commands(place, f"echo '{output}' >&2; exit 1")
     with pytest.raises(kind):
         slurm_call.call(found, ["sbatch"])
 
@@ -128,9 +128,9 @@ def test_of_two_jobs_the_one_that_has_begun_stays(place: Path) -> None:
     worker.turn(entries)
     assert (place / "ended").read_text() == "7\n"
     assert (worker.phase(), worker.began()) == ("runs", 5.0)
-    told = batch.read_job(place / "run")
-    assert told is not None
-    assert told.job == "8"
+    record = batch.read_job(place / "run")
+    assert record is not None
+    assert record.job == "8"
 
 
 @pytest.mark.parametrize("reason", ["launch failed requeued held", "launch_failed_requeued_held"])
@@ -172,8 +172,8 @@ def test_a_restarted_server_ends_no_run_that_was_interrupted(
         idempotency_key=None, wall_time=None, estimate={},
     )  # fmt: skip
     folder = create(tmp_path, made, b"", b"{}")
-    for told in (State.QUEUED, State.STARTING, State.RUNNING, State.STOPPING):
-        journal.append(folder / layout.JOURNAL, Status(run=run, wall=now, state=told))
+    for last in (State.QUEUED, State.STARTING, State.RUNNING, State.STOPPING):
+        journal.append(folder / layout.JOURNAL, Status(run=run, wall=now, state=last))
     (folder / layout.JOB).write_bytes(batch.to_json(JOB))
     site = Slurm(profiles={"a": Profile()}, bin=commands_of(tmp_path))
     known = Run(run, "ann", "bar", 2, now, state=State.RUNNING, stopping_for=asked)
@@ -228,10 +228,10 @@ def test_a_job_that_was_interrupted_gets_a_next_one(place: Path, state: str) -> 
     (place / "run" / layout.INTERRUPTED).write_text("{}")
     worker.turn([Entry("7", state, 5.0, JOB.name, "None")])
     assert (worker.exited(), worker.phase()) == (None, "waits")
-    told = batch.read_job(place / "run")
-    assert told is not None
-    assert (told.attempt, told.job) == (2, "")
-    assert told.name != JOB.name
+    record = batch.read_job(place / "run")
+    assert record is not None
+    assert (record.attempt, record.job) == (2, "")
+    assert record.name != JOB.name
     worker.stop()
     worker.turn([])
     assert worker.exited() is not None, "nothing is handed over once somebody has asked for the end"
@@ -335,8 +335,8 @@ def test_what_starts_together_is_one_array(place: Path) -> None:
     assert arrays.hand_over(workers) == set()
     assert numbers(workers) == ["101_0", "101_1", "101_2"]
     assert (place / "arrays").read_text() == "0,1,2\n"
-    told = [batch.read_job(worker.folder) for worker in workers]
-    assert [job.key for job in told if job] == [entry.name for entry in slurm.jobs(str(place / "bin"))]
+    records = [batch.read_job(worker.folder) for worker in workers]
+    assert [job.key for job in records if job] == [entry.name for entry in slurm.jobs(str(place / "bin"))]
     arrays.hand_over(workers)
     assert (place / "arrays").read_text() == "0,1,2\n"
 

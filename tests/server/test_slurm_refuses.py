@@ -68,14 +68,14 @@ def answers(place: Path, text: str, code: int = 1) -> None:
     commands(place, f"cat answer >&2; exit {code}")
 
 
-@pytest.mark.parametrize("said", PASSING)
-def test_a_run_waits_for_a_refusal_that_passes(place: Path, said: str) -> None:
-    answers(place, said)
+@pytest.mark.parametrize("output", PASSING)
+def test_a_run_waits_for_a_refusal_that_passes(place: Path, output: str) -> None:
+    answers(place, output)
     worker = worker_of(place)
     worker.turn([])
     assert worker.exited() is None
     assert (worker.phase(), worker.over) == ("waits", False)
-    assert said.splitlines()[-1][:80] in worker.note()
+    assert output.splitlines()[-1][:80] in worker.note()
     worker.turn([])
     assert (place / "calls").read_text() == "called\n", "asked again after a pause"
     commands(place, "echo 7")
@@ -85,21 +85,21 @@ def test_a_run_waits_for_a_refusal_that_passes(place: Path, said: str) -> None:
     assert "takes no job" not in worker.note()
 
 
-@pytest.mark.parametrize("said", LASTING)
-def test_a_refusal_that_lasts_fails_the_run(place: Path, said: str) -> None:
-    answers(place, said)
+@pytest.mark.parametrize("output", LASTING)
+def test_a_refusal_that_lasts_fails_the_run(place: Path, output: str) -> None:
+    answers(place, output)
     worker = worker_of(place)
     worker.turn([])
     ended = worker.exited()
     assert ended is not None
     assert ended.reading is not None
     assert ended.reading[:2] == (State.FAILED, Cause.LAUNCH)
-    assert said.splitlines()[-1] in ended.reading[2]
+    assert output.splitlines()[-1] in ended.reading[2]
 
 
-@pytest.mark.parametrize("said", AWAY)
-def test_a_controller_that_is_away_has_refused_nothing(place: Path, said: str) -> None:
-    answers(place, said)
+@pytest.mark.parametrize("output", AWAY)
+def test_a_controller_that_is_away_has_refused_nothing(place: Path, output: str) -> None:
+    answers(place, output)
     with pytest.raises(slurm_call.AwayError):
         worker_of(place).turn([])
 
@@ -126,11 +126,11 @@ def test_a_name_of_another_job_hides_no_run(place: Path, name: str, first: bool)
 
 
 @pytest.mark.parametrize(
-    "told", ["nonsense\n", "8|RUNNING|5|conoid-run-1|None", "\n", "8|running|5|a|None\n", "slurm: x\n"]
+    "output", ["nonsense\n", "8|RUNNING|5|conoid-run-1|None", "\n", "8|running|5|a|None\n", "slurm: x\n"]
 )
-def test_what_is_no_list_is_not_taken_for_an_empty_one(place: Path, told: str) -> None:
+def test_what_is_no_list_is_not_taken_for_an_empty_one(place: Path, output: str) -> None:
     commands(place, "echo 7")
-    (place / "queue").write_text(told)
+    (place / "queue").write_text(output)
     with pytest.raises(slurm_call.AwayError):
         slurm.jobs(str(place / "bin"), "conoid-run-1")
 
@@ -189,9 +189,9 @@ def test_a_command_that_hangs_is_left_alone_for_a_while(place: Path, monkeypatch
     (place / "bin" / "scancel").write_text("#!/bin/sh\nexec sleep 20\n")
     for why in ("has not answered within", "tried again soon"):
         began = time.monotonic()
-        with pytest.raises(slurm_call.AwayError, match=why) as told:
+        with pytest.raises(slurm_call.AwayError, match=why) as raised:
             slurm.cancel(str(place / "bin"), "7")
-        assert told.value.command == "scancel"
+        assert raised.value.command == "scancel"
         assert time.monotonic() < began + 5.0
     assert slurm.jobs(str(place / "bin")) == [], "others are asked"
 

@@ -47,9 +47,9 @@ def test_a_secret_that_is_none_is_refused(tmp_path: Path, content: bytes, mode: 
     path = tmp_path / "server.secret"
     path.write_bytes(content)
     path.chmod(mode)
-    with pytest.raises(TelemetryError, match=why) as told:
+    with pytest.raises(TelemetryError, match=why) as raised:
         _read_secret(tmp_path)
-    assert "\n" not in str(told.value)
+    assert "\n" not in str(raised.value)
 
 
 def test_a_secret_that_is_no_file_is_refused(tmp_path: Path) -> None:
@@ -75,9 +75,9 @@ def test_a_run_that_was_to_be_cancelled_is_cancelled_where_its_folder_cannot_be_
 @pytest.fixture
 def counted(monkeypatch: pytest.MonkeyPatch) -> dict[str, int]:
     """Replaces the kernel's counter by a value of the test."""
-    told = {"kills": 4}
-    monkeypatch.setattr(memory, "kills", lambda: told["kills"])
-    return told
+    counts = {"kills": 4}
+    monkeypatch.setattr(memory, "kills", lambda: counts["kills"])
+    return counts
 
 
 def test_a_kill_is_want_of_memory_only_if_the_kernel_says_so(

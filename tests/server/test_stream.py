@@ -58,10 +58,10 @@ def test_events_come_while_the_run_lives(ann: User, tmp_path: Path) -> None:
     assert next(event for event in stream if event.get("state") == "running")
     assert next(stream)["type"] == "started"
     (tmp_path / "go").touch()
-    told = time.time()
+    sent_at = time.time()
     progress = next(stream)
     assert progress["type"] == "progress"
-    assert time.time() - told < 2.0
+    assert time.time() - sent_at < 2.0
     assert [event["type"] for event in stream] == ["finished", "status"]
 
 

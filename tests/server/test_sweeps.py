@@ -188,8 +188,8 @@ def narrow(settings: Settings) -> Iterator[User]:
 def test_a_sweep_for_which_there_is_no_room_makes_no_run(narrow: User, tmp_path: Path) -> None:
     first = narrow.submit(wait=str(tmp_path / "go"))
     for _ in range(2):
-        said = handed_in(narrow, wish(), "k", 429)
-        assert "1 of your runs have not ended, and the sweep has 4; this server allows 4" in said["detail"]
+        refused = handed_in(narrow, wish(), "k", 429)
+        assert "1 of your runs have not ended, and the sweep has 4; this server allows 4" in refused["detail"]
     assert [run["id"] for run in narrow.http.get("/v1/runs").json()["runs"]] == [first]
     assert narrow.http.get("/v1/sweeps").json() == {"sweeps": [], "next": None}
     (tmp_path / "go").touch()
@@ -198,8 +198,8 @@ def test_a_sweep_for_which_there_is_no_room_makes_no_run(narrow: User, tmp_path:
 
 
 def test_a_sweep_larger_than_any_room_is_refused_for_good(narrow: User) -> None:
-    said = handed_in(narrow, wish(points=[{}] * 5), status=422)
-    assert (said["detail"], said["retryable"]) == ("5 points; this server allows 4 open runs of a user", False)
+    refused = handed_in(narrow, wish(points=[{}] * 5), status=422)
+    assert (refused["detail"], refused["retryable"]) == ("5 points; this server allows 4 open runs of a user", False)
 
 
 def test_a_sweep_that_is_refused_in_the_middle_leaves_nothing_that_runs(
@@ -333,12 +333,12 @@ def test_nobody_who_hands_in_a_run_waits_for_sweeps(settings: Settings, monkeypa
 
     monkeypatch.setattr(Desk, "read", slow)
     with opened(settings) as service, TestClient(build_app(service), base_url="http://127.0.0.1") as client:
-        told: dict[str, int] = {}
+        statuses: dict[str, int] = {}
 
         def hand_in(name: str, path: str, body: bytes, kind: str) -> None:
             scopes = frozenset({"read", "submit"})
             headers = {"Authorization": f"Bearer {create_token(service.store, name, scopes)}", "Content-Type": kind}
-            told[f"{name} {path}"] = client.post(path, content=body, headers=headers).status_code
+            statuses[f"{name} {path}"] = client.post(path, content=body, headers=headers).status_code
 
         sweeps = [
             threading.Thread(
@@ -356,10 +356,10 @@ def test_nobody_who_hands_in_a_run_waits_for_sweeps(settings: Settings, monkeypa
             )
             run.start()
             run.join(10)
-            assert told == {"ann /v1/runs": 202}
+            assert statuses == {"ann /v1/runs": 202}
         finally:
             go.set()
             for thread in sweeps:
                 thread.join()
-        assert told == {"ann /v1/runs": 202, "ann /v1/sweeps": 202, "bob /v1/sweeps": 202}
+        assert statuses == {"ann /v1/runs": 202, "ann /v1/sweeps": 202, "bob /v1/sweeps": 202}
         service.supervisor.end_all()

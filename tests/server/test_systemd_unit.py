@@ -86,10 +86,10 @@ def url(place: Place) -> Iterator[str]:
 def token(place: Place) -> str:
     """Token for ann, made by the command of docs/howto/site.md."""
     serve = ["/opt/conoid/bin/python", "-m", "conoid.server", "--runs", "/var/lib/conoid/runs"]
-    told = subprocess.run(
+    ended = subprocess.run(
         place.command(*serve, "token", "add", "ann"), check=True, capture_output=True, text=True
     ).stdout
-    return told.split()[-1]
+    return ended.split()[-1]
 
 
 def ended(url: str, place: Place, text: str) -> str:

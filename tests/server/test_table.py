@@ -32,13 +32,13 @@ def table(user: User, **query: Any) -> dict[str, Any]:
     return found
 
 
-def value(told: dict[str, Any], run: dict[str, Any], key: str) -> Any:
+def value(answer: dict[str, Any], run: dict[str, Any], key: str) -> Any:
     """Returns a value of the case of a run."""
-    return run["values"].get(key, told["cases"][run["case"]]["values"].get(key))
+    return run["values"].get(key, answer["cases"][run["case"]]["values"].get(key))
 
 
-def result(told: dict[str, Any], run: dict[str, Any], name: str) -> Any:
-    names = [each["name"] for each in told["cases"][run["case"]]["results"]]
+def result(answer: dict[str, Any], run: dict[str, Any], name: str) -> Any:
+    names = [each["name"] for each in answer["cases"][run["case"]]["results"]]
     return run["results"][names.index(name)]
 
 
@@ -49,14 +49,14 @@ def test_the_table_has_values_results_and_who_asks_alone(server: Running, tmp_pa
     live = server.ann.submit(wait=str(tmp_path / "go"), end_time="3 us")
     server.ann.wait_for(live, State.RUNNING)
     server.bob.submit(name="secret")
-    told = table(server.ann)
-    assert [run["id"] for run in told["runs"]] == [live, *ended[::-1]]
-    assert [value(told, run, "run.end_time") for run in told["runs"]] == [3e-6, 2e-6, 1e-6]
-    assert len(told["cases"]) == 1
-    assert told["cases"][0]["units"]["run.end_time"] == "s"
-    assert [run["results"] and result(told, run, "steps") for run in told["runs"]] == [None, 2, 1]
-    assert all(run["title"] == "A bar" and run["id"].startswith(run["short"]) for run in told["runs"])
-    assert "secret" not in json.dumps(told)
+    answer = table(server.ann)
+    assert [run["id"] for run in answer["runs"]] == [live, *ended[::-1]]
+    assert [value(answer, run, "run.end_time") for run in answer["runs"]] == [3e-6, 2e-6, 1e-6]
+    assert len(answer["cases"]) == 1
+    assert answer["cases"][0]["units"]["run.end_time"] == "s"
+    assert [run["results"] and result(answer, run, "steps") for run in answer["runs"]] == [None, 2, 1]
+    assert all(run["title"] == "A bar" and run["id"].startswith(run["short"]) for run in answer["runs"])
+    assert "secret" not in json.dumps(answer)
     assert [run["name"] for run in table(server.bob)["runs"]] == ["secret"]
     (tmp_path / "go").touch()
     server.ann.wait_for(live)
@@ -81,11 +81,11 @@ def test_the_files_are_read_once_and_an_index_that_is_lost_is_made_again(
 def test_what_there_is_no_time_for_is_told_the_next_time(server: Running, monkeypatch: pytest.MonkeyPatch) -> None:
     server.ann.wait_for(server.ann.submit(steps=1))
     monkeypatch.setattr(cards, "_PATIENCE", 0.0)
-    told = table(server.ann)
-    assert (told["pending"], told["runs"][0]["results"]) == (1, None)
+    answer = table(server.ann)
+    assert (answer["pending"], answer["runs"][0]["results"]) == (1, None)
     monkeypatch.setattr(cards, "_PATIENCE", 10.0)
-    told = table(server.ann)
-    assert (told["pending"], result(told, told["runs"][0], "steps")) == (0, 1)
+    answer = table(server.ann)
+    assert (answer["pending"], result(answer, answer["runs"][0], "steps")) == (0, 1)
 
 
 def test_pages_are_whole_and_none_is_larger_than_is_allowed(server: Running, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -97,12 +97,12 @@ def test_pages_are_whole_and_none_is_larger_than_is_allowed(server: Running, mon
         seen, sizes_seen = list[str](), list[int]()
         query: dict[str, Any] = {"limit": limit}
         while True:
-            told = table(server.ann, **query)
-            seen += [run["id"] for run in told["runs"]]
-            sizes_seen.append(len(told["runs"]))
-            if told["next"] is None:
+            answer = table(server.ann, **query)
+            seen += [run["id"] for run in answer["runs"]]
+            sizes_seen.append(len(answer["runs"]))
+            if answer["next"] is None:
                 break
-            query["cursor"] = told["next"]
+            query["cursor"] = answer["next"]
         assert (seen, sizes_seen) == (runs[::-1], sizes)
     assert server.ann.http.get("/v1/table", params={"limit": 501}).status_code == 400
 
@@ -134,8 +134,8 @@ def test_damaged_files_make_a_poor_row_and_no_error(server: Running) -> None:
     server.ann.wait_for(run)
     for name in (layout.OUTCOME, layout.RESOLVED_CASE, layout.SUBMISSION):
         (server.ann.runs / run / name).write_bytes(b"\xff[" * 500)
-    told = table(server.ann)["runs"][0]
-    assert (told["id"], told["results"], told["values"], told["state"]) == (run, [], {}, "succeeded")
+    row = table(server.ann)["runs"][0]
+    assert (row["id"], row["results"], row["values"], row["state"]) == (run, [], {}, "succeeded")
 
 
 def test_what_has_changed_is_told_alone(server: Running, tmp_path: Path) -> None:
@@ -165,12 +165,12 @@ def test_runs_are_chosen_by_case_words_and_time(server: Running) -> None:
         server.ann.wait_for(runs[name])
 
     def found(**query: Any) -> set[str]:
-        told = [
+        reported = [
             {run["id"] for run in server.ann.http.get(path, params=query).json()["runs"]}
             for path in ("/v1/runs", "/v1/table")
         ]
-        assert told[0] == told[1]
-        return {name for name, run in runs.items() if run in told[0]}
+        assert reported[0] == reported[1]
+        return {name for name, run in runs.items() if run in reported[0]}
 
     assert found(case="steel_100") == {"steel_100"}
     assert found(case="STEEL*") == {"steel_100", "steel_200"}
@@ -192,10 +192,10 @@ def test_a_sweep_is_found_by_its_label(server: Running) -> None:
     sweep = handed_in(server.ann, wish())
     for point in sweep["points"]:
         server.ann.wait_for(point["run"]["id"])
-    told = table(server.ann, label=f"sweep={sweep['id']}")
-    assert [value(told, run, "run.end_time") for run in told["runs"]] == [4e-6, 3e-6, 2e-6, 1e-6]
-    assert {run["labels"]["sweep"] for run in told["runs"]} == {sweep["id"]}
-    assert len({run["short"] for run in told["runs"]}) == 4
+    answer = table(server.ann, label=f"sweep={sweep['id']}")
+    assert [value(answer, run, "run.end_time") for run in answer["runs"]] == [4e-6, 3e-6, 2e-6, 1e-6]
+    assert {run["labels"]["sweep"] for run in answer["runs"]} == {sweep["id"]}
+    assert len({run["short"] for run in answer["runs"]}) == 4
 
 
 # Without a server -----------------------------------------------------------------------------------------------------

@@ -178,8 +178,8 @@ def test_a_token_made_while_the_server_runs(process: MakeProcess) -> None:
     server = process("--zenoh-port", "0")
     url = server.start()["url"]
     for name in ("ann", "bob"):
-        told = server.user(url, name).http.get("/v1/me").json()["zenoh"]
-        with client(int(told["endpoint"].rpartition(":")[2]), told["user"], told["password"]):
+        access = server.user(url, name).http.get("/v1/me").json()["zenoh"]
+        with client(int(access["endpoint"].rpartition(":")[2]), access["user"], access["password"]):
             pass
 
 

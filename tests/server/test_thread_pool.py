@@ -74,9 +74,9 @@ def as_(who: str, pool: ThreadPool, work: Callable[[], Any]) -> Callable[[], Awa
 def test_a_user_whose_work_hangs_holds_up_nobody_else(gate: threading.Event) -> None:
     pool = ThreadPool(each=2, waiting=100, patience=0.3, most=8)
     before = threading.active_count()
-    told = together([as_("ann", pool, gate.wait) for _ in range(50)] + [as_("bob", pool, lambda: 7)] * 50)
-    assert told[50:] == [7] * 50
-    assert {error.status for error in told[:50]} == {503}
+    results = together([as_("ann", pool, gate.wait) for _ in range(50)] + [as_("bob", pool, lambda: 7)] * 50)
+    assert results[50:] == [7] * 50
+    assert {error.status for error in results[:50]} == {503}
     assert threading.active_count() <= before + 8
 
 
@@ -102,8 +102,8 @@ def test_users_take_turns(gate: threading.Event) -> None:
 
 def test_too_many_jobs_are_refused_at_once(gate: threading.Event) -> None:
     pool = ThreadPool(each=1, waiting=3, patience=0.2)
-    told = together([as_("ann", pool, gate.wait) for _ in range(10)])
-    assert sorted(error.status for error in told) == [429] * 6 + [503] * 4
+    results = together([as_("ann", pool, gate.wait) for _ in range(10)])
+    assert sorted(error.status for error in results) == [429] * 6 + [503] * 4
 
 
 def test_errors_of_the_work_are_those_of_the_caller() -> None:
@@ -121,10 +121,10 @@ def test_requests_and_long_answers_of_a_user_are_counted() -> None:
             await asyncio.sleep(seconds)
         return 200
 
-    told = together([lambda: ask(False, 0.1) for _ in range(10)])
-    assert [getattr(one, "status", one) for one in told] == [200] * 5 + [429] * 5
-    told = together([lambda: ask(True, 0.2) for _ in range(4)] + [lambda: ask(False, 0.0)])
-    assert [getattr(one, "status", one) for one in told] == [200, 200, 429, 429, 200]
+    results = together([lambda: ask(False, 0.1) for _ in range(10)])
+    assert [getattr(one, "status", one) for one in results] == [200] * 5 + [429] * 5
+    results = together([lambda: ask(True, 0.2) for _ in range(4)] + [lambda: ask(False, 0.0)])
+    assert [getattr(one, "status", one) for one in results] == [200, 200, 429, 429, 200]
     assert not user_limits._asked
     assert not user_limits._long
 

@@ -36,10 +36,10 @@ def made(size: int, seed: int = 1) -> tuple[bytes, str]:
     return data, hashlib.sha256(data).hexdigest()
 
 
-def put(user: User, sha256: str, data: Any, told: str | None = None, **headers: str) -> Any:
-    """Sends one PUT of the whole file, or of the piece in the header ``told``."""
-    piece = {"Content-Range": f"bytes {told}"} if told else {}
-    return user.http.put(f"/v1/files/{sha256}", content=data, headers={**piece, **headers})
+def put(user: User, sha256: str, data: Any, piece: str | None = None, **headers: str) -> Any:
+    """Sends one PUT of the whole file, or of the range of bytes ``piece`` of it."""
+    part = {"Content-Range": f"bytes {piece}"} if piece else {}
+    return user.http.put(f"/v1/files/{sha256}", content=data, headers={**part, **headers})
 
 
 def refused(answer: Any, status: int, code: str) -> str:
@@ -65,8 +65,8 @@ def test_a_file_comes_in_pieces_and_is_there_when_it_is_whole(server: Running) -
     first = put(server.ann, sha256, data[:400], "0-399/1000")
     assert (first.status_code, first.json()["offset"], first.json()["whole"]) == (200, 400, False)
     assert files_of(server.ann) == [f"{sha256}.1000.part"]
-    told = server.ann.http.head(f"/v1/files/{sha256}")
-    assert [told.headers[f"Upload-{name}"] for name in ("Offset", "Length", "Complete")] == ["400", "1000", "?0"]
+    answer = server.ann.http.head(f"/v1/files/{sha256}")
+    assert [answer.headers[f"Upload-{name}"] for name in ("Offset", "Length", "Complete")] == ["400", "1000", "?0"]
     wrong = put(server.ann, sha256, data[:400], "0-399/1000")
     assert refused(wrong, 409, "wrong_offset") == "the server has 400 bytes of the file, and the body begins at 0"
     assert wrong.headers["Upload-Offset"] == "400"
@@ -134,11 +134,11 @@ def test_whatever_comes_in_whatever_order_a_whole_file_is_the_right_one(server: 
             if expected == 422:
                 del book[sha256]
         assert answer.status_code == expected, answer.text
-        told = server.ann.http.get(f"/v1/files/{sha256}")
-        assert told.status_code == (200 if sha256 in book else 404)
+        found = server.ann.http.get(f"/v1/files/{sha256}")
+        assert found.status_code == (200 if sha256 in book else 404)
         if sha256 in book:
             had = book[sha256]
-            assert (told.json()["whole"], told.json()["offset"]) == (had is None, len(data if had is None else had))
+            assert (found.json()["whole"], found.json()["offset"]) == (had is None, len(data if had is None else had))
     for data, sha256 in files:
         if sha256 in book and book[sha256] is None:
             assert (server.ann.runs / uploads.FOLDER / "ann" / sha256).read_bytes() == data
@@ -219,7 +219,7 @@ def test_a_stranger_learns_nothing(server: Running, monkeypatch: pytest.MonkeyPa
             return real(path, *more, **words)
 
         monkeypatch.setattr(os, name, noted)
-    told: list[tuple[list[Any], list[str]]] = []
+    seen: list[tuple[list[Any], list[str]]] = []
     for _, sha256 in (there, none):
         asked.clear()
         http = server.bob.http
@@ -229,7 +229,7 @@ def test_a_stranger_learns_nothing(server: Running, monkeypatch: pytest.MonkeyPa
             http.delete(f"/v1/files/{sha256}"),
         ]
         answers += [http.get("/v1/files"), put(server.bob, sha256, b"x", "7-7/500")]
-        told.append(
+        seen.append(
             (
                 [(a.status_code, a.text.replace(sha256, "HASH"), dict(a.headers)) for a in answers],
                 [one.replace(sha256, "HASH") for one in asked],
@@ -237,8 +237,8 @@ def test_a_stranger_learns_nothing(server: Running, monkeypatch: pytest.MonkeyPa
         )
         assert not any("/ann" in one for one in asked)
         server.bob.http.delete(f"/v1/files/{sha256}")
-    assert told[0] == told[1]
-    assert len(told[0][1]) > 5
+    assert seen[0] == seen[1]
+    assert len(seen[0][1]) > 5
     assert server.nobody.http.get(f"/v1/files/{there[1]}").status_code == 401
 
 

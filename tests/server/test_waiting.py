@@ -106,10 +106,10 @@ def test_what_may_break_takes_memory_for_its_dust_where_there_is_some(dust: floa
     """A run whose memory exceeds that of the server only after all tets separate starts alone. A run whose memory
     exceeds that of the server from the start does not start.
     """
-    told: dict[str, int | float] = {"memory_bytes": 3e9, **({"dust_bytes": dust} if dust else {})}
+    estimate: dict[str, int | float] = {"memory_bytes": 3e9, **({"dust_bytes": dust} if dust else {})}
     made = Submission(
         id="1", owner="ann", name="", title="", ranks=1, submitted=0.0, case_file="case.toml", body_sha256="",
-        idempotency_key=None, wall_time=None, estimate=told,
+        idempotency_key=None, wall_time=None, estimate=estimate,
     )  # fmt: skip
     assert need_of(made, 1.0, room).memory == memory
 

@@ -71,14 +71,14 @@ def ended(ann: User, run: str) -> dict[str, Any]:
 
 
 def test_from_http_to_a_result_live(ann: User) -> None:
-    told = ann.http.get("/v1/me").json()["zenoh"]
+    access = ann.http.get("/v1/me").json()["zenoh"]
     config = zenoh.Config()
     for key, value in {
         "mode": "client",
-        "connect/endpoints": [told["endpoint"]],
+        "connect/endpoints": [access["endpoint"]],
         "scouting/multicast/enabled": False,
         "transport/shared_memory/enabled": False,
-        "transport/auth/usrpwd": {"user": told["user"], "password": told["password"]},
+        "transport/auth/usrpwd": {"user": access["user"], "password": access["password"]},
     }.items():
         config.insert_json5(key, json.dumps(value))
     heard: list[Any] = []
@@ -93,7 +93,7 @@ def test_from_http_to_a_result_live(ann: User) -> None:
             over.set()
 
     with zenoh.open(config) as session:
-        subscriber = session.declare_subscriber(f"{told['prefix']}/**", hear)
+        subscriber = session.declare_subscriber(f"{access['prefix']}/**", hear)
         run = ann.submit(BAR.format(end_time="10 us"))
         seen = ended(ann, run)
         assert seen["state"] == "succeeded", seen
@@ -130,13 +130,13 @@ def test_from_http_to_a_result_live(ann: User) -> None:
     _are_lines_of_the_history(ann, run, [event for event in events if event["type"] == "progress"])
 
 
-def _are_lines_of_the_history(ann: User, run: str, told: list[dict[str, Any]]) -> None:
+def _are_lines_of_the_history(ann: User, run: str, messages: list[dict[str, Any]]) -> None:
     """Requires that probes and energy of each report are a line of history.csv at the same time."""
     values = ann.http.get(f"/v1/runs/{run}/columns", params={"name": "*", "points": 8192}).json()["values"]
-    names = list(told[-1]["probes"])
+    names = list(messages[-1]["probes"])
     assert names
-    assert told[-1]["sampled"] == values["t"][-1]
-    for report in told:
+    assert messages[-1]["sampled"] == values["t"][-1]
+    for report in messages:
         at = values["t"].index(report["sampled"])
         assert report["probes"] == {name: values[name][at] for name in names}
         assert report["energy"]["kinetic"] == values["kinetic"][at]

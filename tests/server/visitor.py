@@ -97,7 +97,7 @@ def violations(page: Page) -> list[str]:
     """Returns the findings of axe-core for the levels A and AA: rule, number of places, and the first place."""
     source = Path(str(metadata.distribution("axe-playwright-python").locate_file("axe_playwright_python/axe.min.js")))
     page.evaluate(source.read_text(encoding="utf-8") + "; true")
-    told: list[dict[str, Any]] = page.evaluate(
+    found: list[dict[str, Any]] = page.evaluate(
         f"axe.run({{ runOnly: {json.dumps(STANDARDS)} }}).then((report) => report.violations)"
     )
-    return [f"{one['id']}: {len(one['nodes'])} places, {one['nodes'][0]['html'][:120]}" for one in told]
+    return [f"{one['id']}: {len(one['nodes'])} places, {one['nodes'][0]['html'][:120]}" for one in found]

@@ -104,8 +104,8 @@ def test_any_number_of_ranks_makes_the_same_bytes_but_for_their_numbers(budget: 
             assert np.array_equal(mine[name], theirs[name]), name
         assert set(np.unique(theirs["triangle_rank"])) <= set(range(ranks))
         heads = [snapshot.header_of(blob.data) for blob in (one, other)]
-        told = [{**vars_of(head), "ranks": 0, "arrays": 0} for head in heads]
-        assert told[0] == told[1]
+        fields = [{**vars_of(head), "ranks": 0, "arrays": 0} for head in heads]
+        assert fields[0] == fields[1]
         assert (one.sizes, one.smallest, one.fragments) == (other.sizes, other.smallest, other.fragments)
 
 

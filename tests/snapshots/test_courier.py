@@ -54,10 +54,10 @@ def test_shares_of_two_ranks_become_one_snapshot(courier: Courier, tmp_path: Pat
     mine, theirs = shattered(3, 4).shares(2)
     share.write(layout.share(tmp_path, 5, 1), theirs)
     courier.send(task(5, ranks=2), mine)
-    told, data = answer(courier)
-    assert (told["n"], told["step"], told["cause"]) == (5, 50, "end")
-    assert hashlib.sha256(data).hexdigest() == told["sha256"]
-    assert snapshot.header_of(data).fragments_total == told["fragments"]
+    message, data = answer(courier)
+    assert (message["n"], message["step"], message["cause"]) == (5, 50, "end")
+    assert hashlib.sha256(data).hexdigest() == message["sha256"]
+    assert snapshot.header_of(data).fragments_total == message["fragments"]
     names = sorted(path.name for path in (tmp_path / layout.SNAPSHOTS).iterdir())
     assert names == ["000005.snap", "000005.tets"]
 
@@ -110,8 +110,8 @@ def test_a_packer_that_dies_costs_one_snapshot(courier: Courier) -> None:
     os.kill(courier.packer, signal.SIGKILL)
     courier.send(task(1), mine)
     courier.send(task(2), mine)
-    told = [answer(courier)[0] for _ in range(2)]
-    assert "error" not in told[1]
+    messages_sent = [answer(courier)[0] for _ in range(2)]
+    assert "error" not in messages_sent[1]
 
 
 def test_a_request_to_stop_the_run_leaves_the_packer_for_the_last_snapshot(courier: Courier) -> None:
@@ -160,10 +160,10 @@ def test_what_waits_for_the_network_is_bounded_and_counted() -> None:
     telemetry = Telemetry("tcp/127.0.0.1:1", "conoid/v1/ann/run")
     began = time.monotonic()
     for n in range(5):
-        told = messages.Snapshot(
+        message = messages.Snapshot(
             run="run", seq=n, n=n, path="p", bytes=4, triangles=1, fragments=1, sha256="0" * 64
         )  # fmt: skip
-        telemetry.tell(told, b"blob")
+        telemetry.tell(message, b"blob")
     for n in range(1100):
         telemetry.tell(messages.Log(run="run", seq=n, level="info", text="x"))
     assert time.monotonic() - began < 1.0

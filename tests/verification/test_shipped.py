@@ -36,8 +36,8 @@ def outcomes(tmp_path_factory: pytest.TempPathFactory) -> Outcomes:
             alike = [name] if name in HEAVY else [each for each in sorted(load.shipped()) if each not in HEAVY]
             (root / "runs.json").write_text(json.dumps([[each, "--out", str(root / each)] for each in alike]))
             words = [sys.executable, str(MANY), str(root / "runs.json")]
-            (root / "said").write_text(subprocess.run(words, capture_output=True, text=True, timeout=600).stderr)
-        assert (root / name / layout.OUTCOME).exists(), (root / "said").read_text()
+            (root / "printed").write_text(subprocess.run(words, capture_output=True, text=True, timeout=600).stderr)
+        assert (root / name / layout.OUTCOME).exists(), (root / "printed").read_text()
         return from_json((root / name / layout.OUTCOME).read_bytes())
 
     return outcome

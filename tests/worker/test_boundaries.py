@@ -234,8 +234,8 @@ def test_a_body_may_fly_at_a_symmetry_plane() -> None:
 
 def test_motion_that_a_symmetry_plane_stops_at_the_start_is_told() -> None:
     sim = with_boundary({"kind": "symmetry", "axis": "z"}, velocity=(5.0, 0.0, 30.0))
-    told = sim.warnings[-1]
-    assert told.startswith("boundaries[0]: nodes start on this plane of symmetry with up to 30 m/s across it")
+    warning = sim.warnings[-1]
+    assert warning.startswith("boundaries[0]: nodes start on this plane of symmetry with up to 30 m/s across it")
     fine = with_boundary({"kind": "symmetry", "axis": "z"}, velocity=(5.0, 0.0, 0.0)).warnings
     assert not any("symmetry" in text for text in fine)
 

@@ -101,15 +101,15 @@ def test_nothing_is_looked_for_where_nothing_has_broken_since(clock: Clock) -> N
 
 def test_counts_are_told_when_they_have_changed(clock: Clock) -> None:
     sim, counter = breaking(clock, 0.0), Counter()
-    told = counter.changed(sim, 0)
-    assert told is not None
-    assert (told["fragments"], told["counted"], told["sizes"]) == (3, -1, [])
+    counts = counter.changed(sim, 0)
+    assert counts is not None
+    assert (counts["fragments"], counts["counted"], counts["sizes"]) == (3, -1, [])
     assert counter.changed(sim, 0) is None
     sim.clock.step = 7
     counter.find(sim)
-    told = counter.changed(sim, 0)
-    assert told is not None
-    assert told["counted"] == 7
+    counts = counter.changed(sim, 0)
+    assert counts is not None
+    assert counts["counted"] == 7
     assert counter.changed(sim, 1) is not None
 
 
@@ -137,10 +137,10 @@ def test_what_erosion_cuts_off_is_a_fragment(ranks: int) -> None:
             gone = block.id[np.abs(middle - (x or -1.0)) < 5e-4]
             tick(sim, np.concatenate(comm.share(gone)))
             counter.find(sim)
-            told = counter.changed(sim, 0) or pytest.fail("no message")
+            changed = counter.changed(sim, 0) or pytest.fail("no message")
             count, labels = counts.fragments(sim)
             assert [len(of) for of in labels] == [one.n for one in sim.model.blocks]
-            found += [told["fragments"], count, sum(told["sizes"])]
+            found += [changed["fragments"], count, sum(changed["sizes"])]
         return found
 
     two, three = [2, 2, 2], [3, 3, 3]

@@ -193,31 +193,31 @@ TWO_TETS = """*NODE
 
 
 @pytest.mark.parametrize(
-    ("second", "more", "told"),
+    ("second", "more", "warned"),
     [
         ("2, 1, 3, 2, 5", "", False),
         ("2, 6, 8, 7, 5", "", True),
         ("2, 6, 8, 7, 5", "contact = { self_contact = ['body'] }", False),
     ],
 )
-def test_pieces_of_a_part_that_do_not_meet_are_told(second: str, more: str, told: bool, tmp_path: Path) -> None:
+def test_pieces_of_a_part_that_do_not_meet_are_told(second: str, more: str, warned: bool, tmp_path: Path) -> None:
     (tmp_path / "two.inp").write_text(TWO_TETS + second)
     mesh = "mesh = { shape = 'file', path = 'two.inp', unit = '1 mm' }"
     case = parse_toml(f"name='two'\n{more}\nrun={{end_time='1 us'}}\n[[parts]]\nname='body'\nmaterial='steel'\n{mesh}")
     _, piece = domain.build(case, tmp_path, SerialComm())
     assert [text.partition(", without contact between them")[0] for text in piece.warnings] == [
         "parts[0].mesh: 2 pieces that share no node"
-    ] * told
+    ] * warned
 
 
 @pytest.mark.parametrize(
-    ("overlap", "told"),
+    ("overlap", "message"),
     [
         ("refuse", r"^parts: a piece of 'body' overlaps another of its pieces by 0\.0001\d* m at \(.*\) m; move them"),
         ("push", None),
     ],
 )
-def test_pieces_of_a_part_that_meets_itself_may_not_overlap(overlap: str, told: str | None, tmp_path: Path) -> None:
+def test_pieces_of_a_part_that_meets_itself_may_not_overlap(overlap: str, message: str | None, tmp_path: Path) -> None:
     """The upper tet is on top of the lower tet and penetrates it by 0.1 mm."""
     deeper = TWO_TETS.replace("5, 0, 0, -1", "5, 0, 0, -1.1")
     for node in ("6, 0, 0", "7, 1, 0", "8, 0, 1"):
@@ -226,7 +226,7 @@ def test_pieces_of_a_part_that_meets_itself_may_not_overlap(overlap: str, told: 
     mesh = "mesh = { shape = 'file', path = 'two.inp', unit = '1 mm' }"
     meets = f"contact = {{ self_contact = ['body'], overlap = '{overlap}' }}"
     case = parse_toml(f"name='two'\n{meets}\nrun={{end_time='1 us'}}\n[[parts]]\nname='body'\nmaterial='steel'\n{mesh}")
-    with pytest.raises(InputError, match=told) if told else contextlib.nullcontext():
+    with pytest.raises(InputError, match=message) if message else contextlib.nullcontext():
         domain.build(case, tmp_path, SerialComm())
 
 

@@ -99,7 +99,7 @@ def test_the_pressure_of_contact_carries_the_weight(
 
     def work(sim: Simulation) -> tuple[bytes, list[float]]:
         step.prepare(sim)
-        told, folder = list[float](), tmp_path / f"{sim.comm.size}"
+        measured, folder = list[float](), tmp_path / f"{sim.comm.size}"
         data: dict[str, Floats] = {}
         while not sim.clock.done:
             step.first_half(sim)
@@ -107,8 +107,8 @@ def test_the_pressure_of_contact_carries_the_weight(
                 data = written(sim, folder, sim.clock.frame)
                 sim.clock.frame += 1
             step.second_half(sim)
-            if sim.clock.frame == 3 and not told:
-                told.append(0.0)
+            if sim.clock.frame == 3 and not measured:
+                measured.append(0.0)
                 sim = kept_again(sim, case, folder)
         step.first_half(sim)
         data = written(sim, folder, 4)

@@ -74,11 +74,11 @@ def test_sums_are_those_of_the_nodes(ranks: int) -> None:
         sim.free()
         return bits(found), found, nodes.id[own], nodes.mass[own], nodes.x[own], v[own]
 
-    told = on(ranks, case, [MESH], work)
-    assert len({each[0] for each in told}) == 1
-    found = told[0][1]
-    ids = np.argsort(np.concatenate([each[2] for each in told]))
-    m, x, v = (np.concatenate([each[k] for each in told])[ids] for k in (3, 4, 5))
+    measured = on(ranks, case, [MESH], work)
+    assert len({each[0] for each in measured}) == 1
+    found = measured[0][1]
+    ids = np.argsort(np.concatenate([each[2] for each in measured]))
+    m, x, v = (np.concatenate([each[k] for each in measured])[ids] for k in (3, 4, 5))
     flags = [np.ones(len(m), bool), MESH.points[:, 1] <= 1.501e-3, x[:, 0] < PLANE["at"]]
     assert 10 < flags[2].sum() < len(m) - 10
     expected = np.concatenate([totals(m[some], x[some], v[some]) for some in flags])
@@ -118,12 +118,15 @@ def test_peaks_are_the_largest_values_of_the_tets(ranks: int) -> None:
         sim.free()
         return bits(found), found, inside, values
 
-    told = on(ranks, case, [MESH], work)
-    assert len({each[0] for each in told}) == 1
-    values, inside = np.concatenate([each[3] for each in told], axis=1), np.concatenate([each[2] for each in told])
+    measured = on(ranks, case, [MESH], work)
+    assert len({each[0] for each in measured}) == 1
+    values, inside = (
+        np.concatenate([each[3] for each in measured], axis=1),
+        np.concatenate([each[2] for each in measured]),
+    )
     assert (values.max(axis=1) > values[:, inside].max(axis=1)).any()
     assert values[3].min() > 0.0
-    for found, some in ((told[0][1][:6], values), (told[0][1][6:], values[:, inside])):
+    for found, some in ((measured[0][1][:6], values), (measured[0][1][6:], values[:, inside])):
         expected = [*(some.max(axis=1) * (1.0, -1.0, 1.0, 1.0)), 350.0, 0.0]
         assert found.tolist() == pytest.approx(expected, rel=1e-12)
 
@@ -173,10 +176,10 @@ def test_what_parts_push_each_other_with_is_the_change_of_their_momentum(ranks: 
         sim.free()
         return values, forces, changed, last
 
-    told = on(ranks, case, meshes, work)
-    values, forces, _, _ = told[0]
-    assert len({bits(each[0]) for each in told}) == 1
-    changed = np.sum([each[2] for each in told], axis=0)
+    measured = on(ranks, case, meshes, work)
+    values, forces, _, _ = measured[0]
+    assert len({bits(each[0]) for each in measured}) == 1
+    changed = np.sum([each[2] for each in measured], axis=0)
     impulses = np.zeros((3, 3, 3))
     order = [(one, other) for one in range(3) for other in range(3) if one != other]
     for (one, other), impulse in zip(order, values[18:36].reshape(6, 3), strict=True):
@@ -225,14 +228,14 @@ def test_a_hole_is_as_wide_as_what_the_rays_are_free_to_go(ranks: int) -> None:
         sim.free()
         return np.array(found)
 
-    told = on(ranks, case, [mesh], work)
-    assert len({bits(each) for each in told}) == 1
+    measured = on(ranks, case, [mesh], work)
+    assert len({bits(each) for each in measured}) == 1
     flat = np.cos(np.pi / 96.0)
     area = 24.0 * 0.5 * np.sin(np.pi / 48.0)  # area of the polygon, for a quarter of the circle of radius 1
     width, diameter = 20e-3, 20e-3 * math.sqrt(area / (np.pi / 4.0))
-    assert told[0][0] == pytest.approx([width * flat, diameter], rel=1e-3)
-    assert told[0][1] == pytest.approx([width, diameter * math.sqrt(1.4)], rel=2e-3)
-    assert told[0][1][0] == pytest.approx(20e-3, rel=1e-3)
+    assert measured[0][0] == pytest.approx([width * flat, diameter], rel=1e-3)
+    assert measured[0][1] == pytest.approx([width, diameter * math.sqrt(1.4)], rel=2e-3)
+    assert measured[0][1][0] == pytest.approx(20e-3, rel=1e-3)
 
 
 def test_rays_are_as_long_as_the_way_to_the_first_tet() -> None:
@@ -271,15 +274,17 @@ def test_a_cone_has_the_angle_of_the_areas_that_have_left(ranks: int) -> None:
         sim.free()
         return np.array(found)
 
-    told = on(ranks, case, [plate], work)
-    assert len({bits(each) for each in told}) == 1
-    assert told[0][0] == 0.0
+    measured = on(ranks, case, [plate], work)
+    assert len({bits(each) for each in measured}) == 1
+    assert measured[0][0] == 0.0
     radii = []
     for height in (0.0, 2e-3):
         on_face = (np.abs(plate.points[plate.tets][:, :, 2] - height) < 1e-9).sum(axis=1) == 3
         radii.append(math.sqrt(np.isin(np.flatnonzero(on_face), gone).sum() * 0.125e-6 / math.pi))
-    assert told[0][1] == pytest.approx(2.0 * math.atan((radii[1] - radii[0]) / 2e-3), rel=1e-12)
-    assert math.degrees(told[0][1]) == pytest.approx(70.0, abs=8.0)  # half a cube, with four cubes through the plate
+    assert measured[0][1] == pytest.approx(2.0 * math.atan((radii[1] - radii[0]) / 2e-3), rel=1e-12)
+    assert math.degrees(measured[0][1]) == pytest.approx(
+        70.0, abs=8.0
+    )  # half a cube, with four cubes through the plate
 
 
 @pytest.mark.parametrize("ranks", [1, 2])
@@ -304,9 +309,9 @@ def test_the_heaviest_fragment_beyond_a_plane_is_found(ranks: int) -> None:
         sim.free()
         return np.array(found)
 
-    told = on(ranks, case, [bar], work)
-    assert len({bits(each) for each in told}) == 1
-    whole, pieces = told[0]
+    measured = on(ranks, case, [bar], work)
+    assert len({bits(each) for each in measured}) == 1
+    whole, pieces = measured[0]
     assert whole.tolist() == [0.0, pytest.approx(8930.0 * 48e-9)]
     assert pieces == pytest.approx([7.0, 8930.0 * 20e-9], rel=1e-12)
 

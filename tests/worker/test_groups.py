@@ -81,13 +81,13 @@ def course(sim: Simulation) -> tuple[list[dict[str, Any]], Simulation]:
     balance = Balance.of(sim)
     groups = Groups(sim, 1.5)
     step.prepare(sim)
-    told = [groups.record(sim)]
+    recorded = [groups.record(sim)]
     for moment in range(40):
         if moment == 20:
             sim, _ = balance.move(sim)
             groups.moved(sim)
         tick(sim, {10: np.arange(400, 500), 30: np.arange(450, 550)}.get(moment))
-    return [*told, groups.record(sim)], sim
+    return [*recorded, groups.record(sim)], sim
 
 
 def test_groups_are_recorded_alike_on_any_number_of_ranks(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -98,8 +98,8 @@ def test_groups_are_recorded_alike_on_any_number_of_ranks(monkeypatch: pytest.Mo
     (first, last), sim = on(1, case, MESHES, course)[0]
     assert first["tets"] == sim.model.groups[:, 3].tolist()
     assert (first["load"], first["cost"]) == ([0] * 256, 1.5)
-    for told, _ in on(3, case, MESHES, course):
-        assert told == [first, last]
+    for recorded, _ in on(3, case, MESHES, course):
+        assert recorded == [first, last]
     groups, nodes = np.array(first["centres"]), sim.model.nodes
     assert sim.contact is not None
     assert sum(last["outside"]) == sim.contact.outside > sum(first["outside"]) + 100
@@ -136,8 +136,8 @@ def test_costs_add_up_to_the_work_of_all_ranks() -> None:
         for _ in range(5):
             tick(sim)
         now = sum(sim.timers.seconds[name] for name in WORK[1:]) + on_parts(sim).sum()
-        told = groups.record(sim)
-        return 1e-9 * (sum(told["load"]) + sim.comm.size * told["rank"]), (now - then) / 5
+        recorded = groups.record(sim)
+        return 1e-9 * (sum(recorded["load"]) + sim.comm.size * recorded["rank"]), (now - then) / 5
 
     for ranks in (1, 2):
         results = on(ranks, case, MESHES, measured)

@@ -208,13 +208,13 @@ def compiled(folder: Path) -> set[str]:
 
 
 def test_all_kernels_are_compiled_and_the_progress_is_told(tree: Path, tmp_path: Path) -> None:
-    told: list[tuple[int, int]] = []
+    progress: list[tuple[int, int]] = []
     folder = tmp_path / "cache"
-    assert ahead.compile_all(folder, lambda *numbers: told.append(numbers), tree, "tiny")
+    assert ahead.compile_all(folder, lambda *numbers: progress.append(numbers), tree, "tiny")
     assert compiled(folder) == {"below.scaled", "above.scale", "above.total"}
-    assert (told[0], told[-1]) == ((0, 3), (3, 3))
-    assert told == sorted(told)
-    assert not ahead.compile_all(folder, lambda *numbers: told.append(numbers), tree, "tiny"), "all are there"
+    assert (progress[0], progress[-1]) == ((0, 3), (3, 3))
+    assert progress == sorted(progress)
+    assert not ahead.compile_all(folder, lambda *numbers: progress.append(numbers), tree, "tiny"), "all are there"
 
 
 def test_modules_that_have_not_changed_are_linked_from_an_earlier_folder(tree: Path, tmp_path: Path) -> None:
@@ -227,14 +227,14 @@ def test_modules_that_have_not_changed_are_linked_from_an_earlier_folder(tree: P
         ("above", ABOVE.replace("values[i] = s", "values[i] += s")),
         ("numbers", "FACTOR = 3.0\n"),
     ]
-    told = []
+    progress = []
     for folder, (name, edited) in zip(folders, edits, strict=True):
         (tree / f"{name}.py").write_text(edited)
         assert ahead.compile_all(folder, lambda *_: None, tree, "tiny")
         environment = os.environ | {store.VARIABLE: str(folder)}
         ask = [sys.executable, "-c", text]
-        told.append(subprocess.run(ask, env=environment, capture_output=True, text=True, check=True).stdout)
-    assert told == ["[2. 2.] 1\n", "[3. 3.] 1\n", "[4. 4.] 1\n"]
+        progress.append(subprocess.run(ask, env=environment, capture_output=True, text=True, check=True).stdout)
+    assert progress == ["[2. 2.] 1\n", "[3. 3.] 1\n", "[4. 4.] 1\n"]
     assert [compiled(folder) for folder in folders] == [{"below.scaled", "above.scale", "above.total"}] * 3
     below, above = (
         [next(folder.rglob(f"{name}*.nbc")).stat().st_ino for folder in folders] for name in ("below.sc", "above.sc")
@@ -302,16 +302,16 @@ def test_a_folder_that_cannot_be_written_is_named(tree: Path, tmp_path: Path) ->
 def test_a_second_program_waits_for_the_first(tree: Path, tmp_path: Path) -> None:
     folder = tmp_path / "cache"
     folder.mkdir()
-    told: list[tuple[int, int]] = []
+    progress: list[tuple[int, int]] = []
     with (folder / ahead._LOCK).open("w") as lock:
         fcntl.flock(lock, fcntl.LOCK_EX)
         second = threading.Thread(
-            target=ahead.compile_all, args=(folder, lambda *numbers: told.append(numbers), tree, "tiny")
+            target=ahead.compile_all, args=(folder, lambda *numbers: progress.append(numbers), tree, "tiny")
         )
         second.start()
         time.sleep(1.0)
         assert not compiled(folder)
-        assert told == [(0, 3)]
+        assert progress == [(0, 3)]
         (folder / ahead.COMPLETE).touch()
     second.join(60.0)
     assert not second.is_alive()
@@ -338,15 +338,15 @@ def test_numba_is_not_imported_before_its_cache_has_a_name() -> None:
     subprocess.run([sys.executable, "-c", text], check=True)
     text = "import numba; from conoid.worker.kernels import store; store.use_cache()"
     clean = {key: value for key, value in os.environ.items() if key != store.VARIABLE}
-    told = subprocess.run([sys.executable, "-c", text], env=clean, capture_output=True, text=True, check=False)
-    assert "numba was imported before" in told.stderr
+    ended = subprocess.run([sys.executable, "-c", text], env=clean, capture_output=True, text=True, check=False)
+    assert "numba was imported before" in ended.stderr
 
 
 def test_no_two_processes_call_a_function_the_same() -> None:
     """The objects of several processes are loaded together, so the functions in them need unique names."""
     ask = "from conoid.worker.kernels import jit; from numba.core.bytecode import FunctionIdentity as F; "
     ask += "print(next(F._unique_ids))"
-    told = [subprocess.run([sys.executable, "-c", ask], capture_output=True, text=True, check=True) for _ in range(2)]
-    one, other = (int(each.stdout) for each in told)
+    ended = [subprocess.run([sys.executable, "-c", ask], capture_output=True, text=True, check=True) for _ in range(2)]
+    one, other = (int(each.stdout) for each in ended)
     assert one != other
     assert min(one, other) > 2**40

@@ -57,7 +57,7 @@ def test_sets_are_counted_before_a_run(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("boundary", "more", "said"),
+    ("boundary", "more", "message"),
     [
         (
             {"on": "GRIP", "parts": ["bar"]},
@@ -78,10 +78,10 @@ def test_sets_are_counted_before_a_run(tmp_path: Path) -> None:
     ],
 )
 def test_a_set_that_cannot_be_meant_is_refused_in_one_line(
-    boundary: Mapping[str, object], more: str, said: str, tmp_path: Path
+    boundary: Mapping[str, object], more: str, message: str, tmp_path: Path
 ) -> None:
     (line,) = survey(tmp_path, {**HOLD, **boundary}, more=more).refused
-    assert line.startswith(f"boundaries[0].on = {said}")
+    assert line.startswith(f"boundaries[0].on = {message}")
     probe = {"name": "p", "part": "bar", "field": "velocity_x", "on": boundary["on"]}
     if "parts" in boundary:
         assert survey(tmp_path, probes=(probe,), more=more).refused == [line.replace("boundaries", "probes")]

@@ -226,9 +226,9 @@ def test_a_traction_on_a_bonded_interface_is_reported(tmp_path: Path) -> None:
         "parts": [{"name": name, "material": "m", "mesh": mesh} for name, mesh in (("a", BOX), ("b", upper))],
         "bond": [{"kind": "tied", "parts": ["a", "b"]}],
     }  # fmt: skip
-    said = "boundaries[0]: 8 mm^2 of its faces are bonded to another part"
+    message = "boundaries[0]: 8 mm^2 of its faces are bonded to another part"
     whole = assembly.assemble(parse_case(data), tmp_path)
-    assert [each.startswith(said) for each in whole.warnings] == [True]
+    assert [each.startswith(message) for each in whole.warnings] == [True]
     side = {**SHEAR, "low": [0, 0, 0], "high": [0, 2e-3, 2e-3]}
     assert not assembly.assemble(parse_case({**data, "boundaries": [side]}), tmp_path).warnings
 
@@ -250,8 +250,8 @@ def test_a_mesh_that_disagrees_with_what_is_expected_is_told(caplog: pytest.LogC
     assert "boundaries[0] drives 25 nodes; expected: 25 nodes" in caplog.text
     shorter = TetMesh(made.points * [1.0, 1.0, 0.975], made.tets)
     shorter.points[:, 0] += (shorter.points[:, 1] > 1.9e-3) * 2e-5  # one node of the layer is outside of the box
-    (told,) = whole_of(case, shorter).warnings
-    assert told.startswith("boundaries[0]: drives 24 nodes, where validate expects 25 nodes; check its box")
+    (warning,) = whole_of(case, shorter).warnings
+    assert warning.startswith("boundaries[0]: drives 24 nodes, where validate expects 25 nodes; check its box")
 
 
 def test_a_layer_that_lies_just_outside_is_told() -> None:
@@ -291,8 +291,8 @@ def test_nothing_of_a_part_that_is_named_is_told() -> None:
     })  # fmt: skip
     meshes = iter([structured(part.mesh) for part in case.parts])  # type: ignore[arg-type]
     with patch.object(assembly, "build_mesh", lambda *_, **__: next(meshes)):
-        (told,) = assembly.assemble(case, Path()).warnings
-    assert told == "boundaries[0]: acts on nothing of part 'other', which it names"
+        (warning,) = assembly.assemble(case, Path()).warnings
+    assert warning == "boundaries[0]: acts on nothing of part 'other', which it names"
 
 
 BAR = {"shape": "box", "low": [0, 0, 0], "high": [2e-3, 2e-3, 2e-3], "element_size": 5e-4, "generator": "structured"}

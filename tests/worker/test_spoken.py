@@ -14,7 +14,7 @@ ENERGY = messages.Energy(
 )
 
 
-def said(capsys: pytest.CaptureFixture[str]) -> list[str]:
+def printed(capsys: pytest.CaptureFixture[str]) -> list[str]:
     """Returns the lines without the time of day."""
     return [line.split("  ", 1)[-1] for line in capsys.readouterr().out.splitlines()]
 
@@ -50,4 +50,4 @@ def test_start_progress_warnings_and_end_are_lines(capsys: pytest.CaptureFixture
 
 def test_a_failure_says_why(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
     Speaker(tmp_path).close(Outcome(state="failed", cause="input", message="run.end = 3: unknown key\nrun.x = 1: no"))
-    assert said(capsys)[0] == "failed: run.end = 3: unknown key\\nrun.x = 1: no"
+    assert printed(capsys)[0] == "failed: run.end = 3: unknown key\\nrun.x = 1: no"

@@ -42,7 +42,7 @@ def clocks(monkeypatch: pytest.MonkeyPatch) -> Clocks:
     return Clocks(monkeypatch)
 
 
-def told(seconds: dict[str, float]) -> dict[str, float]:
+def reported(seconds: dict[str, float]) -> dict[str, float]:
     return {name: value for name, value in seconds.items() if value}
 
 
@@ -56,7 +56,7 @@ def test_an_inner_phase_takes_its_own_time_out(clocks: Clocks) -> None:
             clocks.work(8.0)
         clocks.work(2.0)
     spent = clocks.timers.since_last()
-    assert told(spent.cpu) == told(spent.serial) == {"nodes": 3.0, "contact": 8.0, "rest": 0.25}
+    assert reported(spent.cpu) == reported(spent.serial) == {"nodes": 3.0, "contact": 8.0, "rest": 0.25}
 
 
 def test_wall_time_lies_inside_regions_or_outside(clocks: Clocks) -> None:
@@ -64,9 +64,9 @@ def test_wall_time_lies_inside_regions_or_outside(clocks: Clocks) -> None:
         clocks.work(2.0, wall=3.0, region=2.5)
     clocks.team.helped += 1.5
     spent = clocks.timers.since_last()
-    assert told(spent.cpu) == {"elements": 2.0}
-    assert told(spent.parallel) == {"elements": 2.5}
-    assert told(spent.serial) == {"elements": 0.5}
+    assert reported(spent.cpu) == {"elements": 2.0}
+    assert reported(spent.parallel) == {"elements": 2.5}
+    assert reported(spent.serial) == {"elements": 0.5}
     assert spent.helped == 1.5
     assert clocks.timers.since_last() == timers.Spent()
 
@@ -75,8 +75,8 @@ def test_waiting_for_other_ranks_is_exchange_and_is_not_serial(clocks: Clocks) -
     with clocks.timers.phase("contact"):
         clocks.work(5.0, region=1.0, wait=3.0)
     spent = clocks.timers.since_last()
-    assert told(spent.cpu) == {"contact": 2.0, "exchange": 3.0}
-    assert told(spent.serial) == told(spent.parallel) == {"contact": 1.0}
+    assert reported(spent.cpu) == {"contact": 2.0, "exchange": 3.0}
+    assert reported(spent.serial) == reported(spent.parallel) == {"contact": 1.0}
     assert spent.waiting == 3.0
 
 

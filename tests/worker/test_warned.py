@@ -78,9 +78,9 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 def both(data: dict[str, Any], folder: Path) -> tuple[list[str], list[str]]:
     """Returns the warnings of an examination and those of a run up to its first step, without bare numbers, which
     the run reports when it reads the case."""
-    told = [str(each) for each in examine(data, folder).odd]
+    examined = [str(each) for each in examine(data, folder).odd]
     begun = simulation.build(parse_case(data), folder, SerialComm())
-    return [each for each in told if "no unit, taken for" not in each], list(begun.warnings)
+    return [each for each in examined if "no unit, taken for" not in each], list(begun.warnings)
 
 
 @pytest.mark.parametrize(
@@ -100,10 +100,10 @@ def both(data: dict[str, Any], folder: Path) -> tuple[list[str], list[str]]:
 )
 def test_both_warn_of_the_same(data: Any, shifts: Any, bent: float, words: str, folder: Path) -> None:
     write(folder / "bar.inp", *shifts, bent=bent)
-    told, begun = both(data, folder)
-    assert told == begun
-    assert any(words in each for each in told), told
-    assert any("elements that carry no volume are skipped: 1 MASS" in each for each in told)
+    examined, begun = both(data, folder)
+    assert examined == begun
+    assert any(words in each for each in examined), examined
+    assert any("elements that carry no volume are skipped: 1 MASS" in each for each in examined)
 
 
 @pytest.mark.parametrize(
@@ -139,8 +139,10 @@ def test_what_is_there_twice_is_refused_by_both(shift: Any, contact: Any, folder
     """
     write(folder / "bar.inp", (0, 0, 0), shift)
     made = parse_case(case() | {"contact": contact})
-    said = r"parts\[0\].mesh: pieces of 'bar' that share no node overlap: about [0-9.e-]+ of 1.6e-08 m\^3 counts twice"
-    with pytest.raises(ConoidError, match=said) as error:
+    message = (
+        r"parts\[0\].mesh: pieces of 'bar' that share no node overlap: about [0-9.e-]+ of 1.6e-08 m\^3 counts twice"
+    )
+    with pytest.raises(ConoidError, match=message) as error:
         simulation.build(made, folder, SerialComm())
     assert surveyed(made, folder).refused == [str(error.value)]
     twice = float(str(error.value).split("about ")[1].split()[0])
@@ -155,14 +157,14 @@ def test_a_process_of_each_warns_of_the_same(tmp_path: Path, monkeypatch: pytest
     write(tmp_path / "bar.inp", (0, 0, 0), (0, 0, 3))
     data = case({**PLANE, "parts": ["bar"]}, material={**GLASS, "density": 2500}, velocity=[0, 0, "-2 km/s"])
     (tmp_path / "case.json").write_text(json.dumps(data))
-    told = [str(each) for each in examine(data, tmp_path).odd]
+    examined = [str(each) for each in examine(data, tmp_path).odd]
     command = [sys.executable, "-m", "conoid.worker", str(tmp_path / "case.json"), "--out", str(tmp_path / "out")]
     subprocess.run(command, check=True)
     outcome = from_json((tmp_path / "out" / "outcome.json").read_bytes())
-    assert list(outcome.warnings[: len(told)]) == told
+    assert list(outcome.warnings[: len(examined)]) == examined
     assert {"no unit", "share no node", "tension only", "without eos", "no volume"} <= {
         words for words in ("no unit", "share no node", "tension only", "without eos", "no volume")
-        if any(words in each for each in told)
+        if any(words in each for each in examined)
     }  # fmt: skip
     journal = (tmp_path / "out" / "journal.jsonl").read_text()
-    assert all(json.dumps(each)[1:-1] in journal or each in journal for each in told)
+    assert all(json.dumps(each)[1:-1] in journal or each in journal for each in examined)

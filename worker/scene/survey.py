@@ -54,10 +54,10 @@ def surveyed(case: Case, folder: Path, compiled: bool = True) -> Survey:
     if refused:
         return Survey(parts=facts.parts, loads=loads, refused=refused)
     try:
-        told = _begun(case, meshes, compiled)
+        warnings = _begun(case, meshes, compiled)
     except ConoidError as error:
         return Survey(parts=facts.parts, loads=loads, refused=[str(error)])
-    return Survey(parts=facts.parts, loads=loads, touching=facts.survey().touching, told=told)
+    return Survey(parts=facts.parts, loads=loads, touching=facts.survey().touching, warnings=warnings)
 
 
 def _made(case: Case, index: int, folder: Path, there: dict[int, TetMesh]) -> dict[int, TetMesh]:
