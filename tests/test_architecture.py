@@ -50,7 +50,7 @@ def heads(path: Path) -> set[str]:
     return {name.partition(".")[0] for name in imported(ast.walk(tree(path)))}
 
 
-def test_a_house_knows_only_itself_and_the_contract() -> None:
+def test_a_house_imports_only_itself_and_the_contract() -> None:
     for path in SOURCES:
         house = path.relative_to(ROOT).parts[0]
         allowed = set() if house == "cases" else {"cases"}
@@ -130,7 +130,7 @@ def is_a_choice(value: ast.expr) -> bool:
     return any(numbers) and not words & {"CHUNK", "range", "types"} and not (ratio and "/" in ast.unparse(value))
 
 
-def test_a_numeric_constant_says_where_it_comes_from() -> None:
+def test_a_numeric_constant_has_its_source() -> None:
     """The docstring below the constant, or below its group, has its source, its measurement, or the remark that the
     value was chosen."""
     for path in SOURCES:
@@ -215,14 +215,14 @@ def test_the_solver_stays_in_the_worker() -> None:
 
 
 @pytest.mark.parametrize(("library", "house"), ONE_MODULE.items())
-def test_one_module_knows(library: str, house: str) -> None:
+def test_one_module_imports_it(library: str, house: str) -> None:
     users = [name_of(path) for path in SOURCES if library in heads(path)]
     assert len(users) <= 1, f"{library} is imported by {users}"
     assert all(user.startswith(f"{house}/") for user in users)
 
 
 @pytest.mark.parametrize("house", HOUSES)
-def test_one_module_of_a_house_knows_zenoh(house: str) -> None:
+def test_one_module_of_a_house_imports_zenoh(house: str) -> None:
     users = [name_of(path) for path in SOURCES if name_of(path).startswith(f"{house}/") and "zenoh" in heads(path)]
     assert len(users) <= 1, f"zenoh is imported by {users}"
 

@@ -134,7 +134,7 @@ def test_growth_is_that_of_a_tet_and_its_gates_are_for_elastic_tets() -> None:
     ]  # fmt: skip
 
 
-def test_an_armed_box_looks_for_cracks_and_for_contact_and_has_neither() -> None:
+def test_an_armed_box_is_searched_for_cracks_and_contact_and_has_neither() -> None:
     ride = Ride(growth.scene(3_000, armed=True))
     ride.stretch(1e-7)
     ride.steps(20)
@@ -170,7 +170,7 @@ def paid(elements: float, contact: float, digest: str) -> guard.Paid:
     return guard.Paid(outcome)
 
 
-def test_the_guard_compares_medians_of_rounds_and_says_whether_the_answer_is_the_same() -> None:
+def test_the_guard_compares_medians_of_rounds_and_the_digests() -> None:
     rounds = [(paid(1.0, 3.0, "abcdefghi"), paid(1.0, contact, "abcdefghi")) for contact in (3.0, 6.0, 9.0)]
     found = guard.Compared(guard.QUICK[0], rounds)
     assert (found.ratio("contact"), found.ratio("elements"), found.ratio("fracture")) == (2.0, 1.0, 1.0)

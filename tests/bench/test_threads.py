@@ -34,7 +34,7 @@ def made(folder: Path, trial: Trial, state: str = "succeeded") -> None:
     (place / layout.JOURNAL).write_bytes(to_json(line) + b"\n")
 
 
-def test_what_is_there_is_kept_and_what_has_not_ended_is_made_anew(
+def test_ended_points_are_kept_and_others_run_again(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     asked: list[tuple[str, str]] = []

@@ -35,12 +35,12 @@ def test_a_collective_ends_for_all_when_the_last_has_come() -> None:
     assert line.waited[1] == pytest.approx(4.0, abs=1e-4)
 
 
-def test_calls_that_do_not_belong_together_are_told() -> None:
+def test_mismatched_collective_calls_are_reported() -> None:
     with pytest.raises(DeadlockError, match=r"ranks \[0, 1\]"):
         Timeline([[Call(0.0, receives=[(1, 7)])], [Call(0.0, receives=[(0, 7)])]], NETWORK).run()
 
 
-def test_a_rank_alone_is_told_what_it_was_told_and_counts_from_the_first_step_on(tmp_path: Path) -> None:
+def test_a_replayed_rank_receives_the_recorded_data_and_counts_from_the_first_step(tmp_path: Path) -> None:
     sent = [5, {1: b"", 3: b""}, [1, 2]]
     tape(tmp_path, 0).write_bytes(b"".join(map(pickle.dumps, sent)))
     player = Player(tmp_path, 0, 4)

@@ -26,7 +26,7 @@ def test_measured_cuts_when_more_is_lost_than_a_cut_costs() -> None:
     assert trigger.cause(16, False) == "time lost exceeds the cost"
 
 
-def test_measured_begins_to_count_anew_after_a_cut() -> None:
+def test_the_measured_policy_counts_again_after_a_cut() -> None:
     """A loss before a decomposition is not counted again; a loss after it is counted, because the next decomposition
     may remove it."""
     trigger = Trigger(Balance(policy="measured"), 10.0)
@@ -72,7 +72,7 @@ def test_a_rank_has_grown_beyond_alpha_times_what_it_had(outside: int, grown: bo
     assert Guard(1.2, 100).grown(outside) is grown
 
 
-def test_a_rank_that_has_not_been_cut_remembers_its_first_count() -> None:
+def test_a_rank_without_a_cut_keeps_its_first_count() -> None:
     guard = Guard(1.5)
     assert [guard.grown(n) for n in (10, 15, 16)] == [False, False, True]
 
@@ -91,7 +91,7 @@ def test_cuts_that_do_not_pay_become_rare() -> None:
     assert [w - 1 for w in waited[:2]] == pytest.approx([4, 8], abs=1.5)
 
 
-def test_a_stretch_tells_its_beginning_from_its_end() -> None:
+def test_the_start_and_the_end_of_a_stretch_are_distinguished() -> None:
     """The loads are equal for 100 steps, then one rank has 1 s more in each step: the halves have 1 and 1.5, for any
     windows."""
     for window in (1, 3, 10, 50):

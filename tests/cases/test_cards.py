@@ -69,7 +69,7 @@ def test_a_deck_is_its_keywords_with_their_cards_up_to_its_end(tmp_path: Path) -
         ),
     ],
 )
-def test_a_card_says_the_same_in_every_format(tmp_path: Path, keyword: str, card: str) -> None:
+def test_a_card_is_read_equally_in_every_format(tmp_path: Path, keyword: str, card: str) -> None:
     assert row(deck(tmp_path, f"{keyword}\n{card}\n")[-1]) == (12, 1.5, 200.0)
 
 

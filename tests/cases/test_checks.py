@@ -283,5 +283,5 @@ def test_drives_that_agree_or_may_hold_other_nodes_are_sound(first: str, second:
     parse_case(rod(f"boundaries=[{first}, {second}]", "parts[0].mesh.sector=full"))
 
 
-def test_a_law_that_counts_damage_lets_tets_erode_by_it() -> None:
+def test_a_law_that_counts_damage_permits_erosion_by_damage() -> None:
     parse_case(rod("parts[0].material=weldox_460e", "parts[0].erosion={damage=1}"))

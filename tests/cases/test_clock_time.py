@@ -37,7 +37,7 @@ def test_ranks_are_as_efficient_as_they_were_measured() -> None:
     assert clock_time(demo(16, 1), COSTS, 0.0).seconds == pytest.approx(100.0 / 16.0**0.4)
 
 
-def test_what_is_assumed_is_told_with_the_time() -> None:
+def test_the_assumptions_are_printed_with_the_time() -> None:
     def note(ranks: int, threads: int) -> str:
         case, out = demo(ranks, threads), io.StringIO()
         Console(file=out, width=200).print(estimate_table(case, estimate(case)))

@@ -185,7 +185,7 @@ HARD = {
 
 
 @pytest.mark.parametrize("hard", [hard for hard in suite() if hard.name in HARD], ids=lambda hard: hard.name)
-def test_what_breaks_takes_what_lies_between_the_two_estimates(hard: Hard) -> None:
+def test_breaking_takes_memory_between_the_two_estimates(hard: Hard) -> None:
     """The measured time is between half of the first estimate and one and a half times the second."""
     expected = estimate(parse_case(apply_overrides(read_data(hard.path), hard.changes)))
     assert expected.core_seconds is not None
@@ -268,7 +268,7 @@ def test_memory_is_a_bound_that_is_not_far_off(name: str, whole: float | None, d
         assert measured is None or 1.0 <= estimated / measured < 1.3
 
 
-def test_a_mesh_file_tells_its_tets_by_its_size_only(tmp_path: Path) -> None:
+def test_the_tets_of_a_mesh_file_are_estimated_by_its_size_only(tmp_path: Path) -> None:
     file = parse_case(rod('parts[0].mesh={shape="file", unit="1 mm", path="rod.msh"}'))
     assert estimate(file, tmp_path).elements is None
     (tmp_path / "rod.msh").write_bytes(b"x" * 42_000)

@@ -103,7 +103,7 @@ def test_all_errors_at_once() -> None:
         ("numerics.viscosity=off", "numerics.viscosity", "expected a table of keys"),
     ],
 )
-def test_one_line_says_what_is_allowed(override: str, key: str, message: str) -> None:
+def test_one_line_gives_the_allowed_values(override: str, key: str, message: str) -> None:
     found = [problem for problem in problems(override) if problem.key == key]
     assert len(found) == 1
     assert message in found[0].message
@@ -240,7 +240,7 @@ def test_a_title_is_no_document() -> None:
     assert caught.value.problems == (Problem("title", "", "900000 characters are too many; allowed: up to 200"),)
 
 
-def test_a_list_is_told_its_length() -> None:
+def test_a_list_has_its_length() -> None:
     with pytest.raises(CaseError) as caught:
         parse_case(apply_overrides(rod(), ["parts[0].velocity=10 m/s"]))
     assert str(caught.value) == "parts[0].velocity = '10 m/s': expected a list of 3"

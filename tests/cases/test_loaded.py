@@ -81,14 +81,14 @@ def test_area_and_faces_are_those_of_the_mesh(region: dict[str, Any]) -> None:
     assert load.faces == pytest.approx(len(faces), rel=0.3)
 
 
-def test_what_is_not_known_is_none() -> None:
+def test_an_unknown_area_is_none() -> None:
     file = pressed({"shape": "file", "unit": "1 mm", "path": "rod.msh"}, BORE)
     loose = pressed({"shape": "two_tets", "element_size": 1e-3}, BORE)
     assert [(load.area, load.faces) for case in (file, loose) for load in loads(case)] == [(None, None)] * 2
     assert list(unloaded(file)) == []
 
 
-def test_a_region_without_a_face_is_doubted() -> None:
+def test_a_region_without_a_face_gets_a_warning() -> None:
     (odd,) = unloaded(pressed(TUBE, {"cylinder": {"radius": 4e-3}}))
     assert str(odd).startswith("boundaries[0]: probably no face of its bodies lies in it")
     assert list(unloaded(pressed(TUBE, BORE))) == []

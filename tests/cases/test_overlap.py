@@ -111,7 +111,7 @@ def test_bodies_that_need_not_be_apart(contact: object) -> None:
     assert warned(scene(BLOCK, {**BALL, "centre": [0, 0, 0]}, contact=contact)) == []
 
 
-def test_overlap_and_unknown_materials_are_told_with_everything_else() -> None:
+def test_overlap_and_unknown_materials_are_reported_with_all_other_problems() -> None:
     data = scene(BLOCK, {**BALL, "centre": [0, 0, 1e-3]})
     data["parts"][0]["material"] = "stel"
     data["parts"].append({"name": "third", "material": "copper_ofhcc", "mesh": {"shape": "ball"}})
@@ -129,14 +129,14 @@ def test_overlap_and_unknown_materials_are_told_with_everything_else() -> None:
 
 
 @pytest.mark.parametrize("parts", [3, [], [3], [{}], [{"material": ["steel"]}], {"material": "steel"}])
-def test_parts_that_are_none_are_told_once(parts: object) -> None:
+def test_unknown_parts_are_reported_once(parts: object) -> None:
     with pytest.raises(CaseError) as caught:
         parse_case({"name": "a", "run": {"end_time": "1 us"}, "parts": parts, "contact": 7, "materials": []})
     keys = [problem.key for problem in caught.value.problems]
     assert len(keys) == len(set(keys))
 
 
-def test_what_is_told_here_the_worker_refuses_as_well() -> None:
+def test_problems_of_the_reader_are_refused_by_the_worker_too() -> None:
     data = scene(BLOCK, {**BLOCK, "low": [4e-3, -3e-3, -3e-3], "high": [9e-3, 3e-3, -1e-3]})
     assert warned(data)
     pushed = parse_case({**data, "contact": {"overlap": "push"}})
@@ -167,7 +167,7 @@ def test_many_bodies_cost_little_time() -> None:
         (ROD, {**ROD, "base": [0, 0, 8e-3]}, False),
     ],
 )
-def test_a_rod_that_fills_a_tube_is_doubted(one: dict[str, Any], other: dict[str, Any], close: bool) -> None:
+def test_a_rod_that_fills_a_tube_gets_a_warning(one: dict[str, Any], other: dict[str, Any], close: bool) -> None:
     """Facets cut 0.06 mm off the tube at its hole."""
     data = scene(one, other, contact={})
     case = parse_case(data)

@@ -65,7 +65,7 @@ CRUSHED = {"glass_ball_cohesive", "glass_steel_bar", "glass_steel_demo"}
 
 
 @pytest.mark.parametrize("name", sorted(shipped()))
-def test_a_shipped_case_raises_no_doubt_but_of_what_its_paper_leaves_out(name: str) -> None:
+def test_a_shipped_case_gets_only_warnings_about_values_missing_in_its_paper(name: str) -> None:
     path = shipped()[name]
     case = read_case(path)
     found = doubts(read_data(path), case, estimate(case))
@@ -77,7 +77,7 @@ def test_a_shipped_case_raises_no_doubt_but_of_what_its_paper_leaves_out(name: s
 
 
 @pytest.mark.parametrize("name", sorted(library()))
-def test_a_material_of_the_library_raises_no_doubt(name: str) -> None:
+def test_a_material_of_the_library_gets_no_warning(name: str) -> None:
     made = library()[name].model_dump(mode="json", exclude_none=True)
     data = {**rod("parts[0].material=own"), "materials": {"own": made}}
     assert [key for key in warnings_of(data) if "taken for" not in warnings_of(data)[key]] == []
@@ -102,7 +102,7 @@ def test_a_material_of_the_library_raises_no_doubt(name: str) -> None:
         ("parts[0].temperature=300", "parts[0].temperature", "300: no unit, taken for 300 K"),
     ],
 )
-def test_a_bare_number_says_what_it_was_taken_for(override: str, key: str, message: str) -> None:
+def test_a_warning_about_a_bare_number_names_the_assumed_unit(override: str, key: str, message: str) -> None:
     changes = [override, "parts[0].mesh.sector=full"] if "turn" in override else [override]
     found = {each.key: f"{each.value}: {each.message}" for each in bare_numbers(rod(*changes))}
     assert list(found) == [key]
@@ -129,7 +129,7 @@ def test_the_factor_of_a_course_has_no_unit(time: object, warnings: list[str]) -
     assert [each.key for each in bare_numbers(data)] == warnings
 
 
-def test_a_case_in_si_is_told_once_a_key() -> None:
+def test_a_case_in_si_gets_one_warning_a_key() -> None:
     case = parse_case(rod())
     found = [each.key for each in bare_numbers(Case.model_validate_json(resolved_json(case)).model_dump(mode="json"))]
     assert len(found) == len(set(found))
@@ -137,7 +137,7 @@ def test_a_case_in_si_is_told_once_a_key() -> None:
     assert "parts[0].mesh.radius" in found
 
 
-def test_a_sound_scene_raises_no_doubt() -> None:
+def test_a_valid_scene_gets_no_warning() -> None:
     assert warnings_of(target()) == {}
 
 
@@ -198,7 +198,7 @@ EOS = {"model": "mie_gruneisen", "c0": "4600 m/s", "S": 1.49, "gamma0": 2}
     ("speed", "more", "low"),
     [(570.0, {}, None), (600.0, {}, "7 %"), (4000.0, {}, "33 %"), (4000.0, {"eos": EOS}, None)],
 )
-def test_an_impact_that_a_linear_pressure_misses_is_told(speed: float, more: dict[str, Any], low: str | None) -> None:
+def test_an_impact_beyond_a_linear_pressure_is_reported(speed: float, more: dict[str, Any], low: str | None) -> None:
     """Steel has plane waves of 5,856 m/s and c0 = 4,607 m/s: the error is (1.5 - 1/4) u / (c0 + 1.5 u), with u half
     of the speed."""
     own = {"density": "7850 kg/m^3", "elastic": {"young": "200 GPa", "poisson": 0.3}} | more
@@ -238,7 +238,7 @@ def warned(*boundaries: dict[str, Any]) -> dict[str, str]:
         ({"kind": "velocity", "parts": ["ball"], "x": 0}, "0.0005 m"),
     ],
 )
-def test_a_drive_into_a_wall_is_told(drive: dict[str, Any], depth: str) -> None:
+def test_a_drive_into_a_wall_is_reported(drive: dict[str, Any], depth: str) -> None:
     """The ball moves along z. The wall does not act on it, because its x is prescribed: its lowest point moves from
     1 mm to -4 mm."""
     part = drive["parts"][0]
@@ -258,7 +258,7 @@ def test_a_drive_into_a_wall_is_told(drive: dict[str, Any], depth: str) -> None:
         {**DOWN, "z": "-500 m/s", "course": [["0 us", 0]]},
     ],
 )
-def test_a_drive_that_stays_before_a_wall_raises_no_doubt(drive: dict[str, Any]) -> None:
+def test_a_drive_that_stays_before_a_wall_gets_no_warning(drive: dict[str, Any]) -> None:
     assert "boundaries[1]" not in warned(FLOOR, drive)
 
 
@@ -276,7 +276,7 @@ def test_many_drives_of_many_bodies_cost_little_time() -> None:
     assert time.perf_counter() - begin < 20.0
 
 
-def test_two_driven_bodies_that_pass_through_each_other_are_told() -> None:
+def test_two_driven_bodies_that_pass_through_each_other_are_reported() -> None:
     ball = {"kind": "velocity", "parts": ["ball"], "z": "-500 m/s"}
     held = {"kind": "velocity", "parts": ["plate"], "x": 0, "y": 0, "z": 0}
     message = "'ball' moves into 'plate', which boundaries[0] drives; contact does not change prescribed motion"
@@ -358,7 +358,7 @@ def test_velocity_is_that_of_the_worker() -> None:
     assert (x, y, z) == pytest.approx((2 * 0.3 - 3 * 0.2 + 0.4, 3 * 0.1 - 1 * 0.3 + 1.0, -10.0 + 0.2 - 2 * 0.1 + 1.8))
 
 
-def test_a_plane_of_symmetry_through_a_body_is_told() -> None:
+def test_a_plane_of_symmetry_through_a_body_is_reported() -> None:
     """A plane on the surface of the body, or outside of it, gives no warning."""
     plane = {"kind": "symmetry", "axis": "x"}
     assert warnings_of({**target(), "boundaries": [{**plane, "at": "1 mm", "parts": ["plate"]}]}) == {
@@ -369,7 +369,7 @@ def test_a_plane_of_symmetry_through_a_body_is_told() -> None:
 
 
 @pytest.mark.parametrize(("side", "warned"), [(0.0, True), (0.3, True), (1.0, False)])
-def test_the_box_of_a_probe_that_has_no_room_for_a_tet_is_told(side: float, warned: bool) -> None:
+def test_a_probe_box_smaller_than_a_tet_is_reported(side: float, warned: bool) -> None:
     """A tet of 1 mm has a volume of some 0.12 mm^3."""
     box = {"low": [0, 0, "-3 mm"], "high": [f"{side} mm", f"{side} mm", f"{side - 3.0} mm"]}
     probe = {"name": "p", "part": "plate", "field": "pressure", **box}

@@ -29,14 +29,14 @@ def scene(*overrides: str) -> dict[str, Any]:
     return apply_overrides(data, overrides)
 
 
-def test_a_mass_that_is_given_is_the_one_that_is_told() -> None:
+def test_a_given_mass_is_the_reported_mass() -> None:
     """The printed momentum and energy are those of the given mass."""
     case = parse_case(scene("parts[0].rigid={mass='2 kg'}"))
     found = bulk(case.parts[0], case.parts[0].mesh, 7850.0)  # type: ignore[arg-type]
     assert (found.mass, found.momentum, found.energy) == (2.0, (0.0, 0.0, -10.0), 25.0)
 
 
-def test_a_given_inertia_is_the_one_whose_energy_is_told() -> None:
+def test_a_given_inertia_gives_the_reported_energy() -> None:
     """The energy is 1/2 M v^2 + 1/2 w . I w about the given centre, 2 mm away from the axis of the spin."""
     inertia = "[1e-7, 2e-7, 2.5e-7, 0.2e-7, 0.1e-7, -0.3e-7]"
     spin = "parts[0].spin={centre=[0, 0, 0], rate=[100, 200, 300]}"

@@ -86,7 +86,7 @@ def test_volume_and_area_of_a_revolved_body_are_its_integrals(name: str) -> None
 
 @pytest.mark.parametrize("sector", SECTORS)
 @pytest.mark.parametrize("name", SHAPES)
-def test_what_the_formulas_say_of_a_shape_agrees(name: str, sector: str) -> None:
+def test_formulas_of_a_shape_agree_with_its_mesh(name: str, sector: str) -> None:
     """The reference of the volume are random points inside of the body; the references of area and extent are the
     patches of its surfaces."""
     body, chance = shape(name, sector=sector), random.Random(1)

@@ -31,7 +31,7 @@ def test_capitals_blanks_and_beginnings_do_not_matter(word: str, found: str | No
     assert next(iter(close(word, names)), None) == found
 
 
-def test_the_end_of_a_message_has_what_is_allowed_and_what_was_meant() -> None:
+def test_a_message_ends_with_the_allowed_names_and_a_suggestion() -> None:
     assert allowed("mizes", ["mises", "pressure"]) == "allowed: mises, pressure; did you mean 'mises'?"
     assert allowed("xyz", ["mises", "pressure"]) == "allowed: mises, pressure"
     assert nearest("xyz", ["mises"]) == "known: 'mises'"
@@ -53,11 +53,11 @@ def test_the_end_of_a_message_has_what_is_allowed_and_what_was_meant() -> None:
         ("parts[0].fracture.model=cohesiv", "cohesive"),
     ],
 )
-def test_a_case_names_what_was_meant(change: str, meant: str) -> None:
+def test_an_unknown_name_of_a_case_gets_a_suggestion(change: str, meant: str) -> None:
     assert f"did you mean '{meant}'" in problem_of(change)
 
 
-def test_cases_units_and_profiles_name_what_was_meant() -> None:
+def test_unknown_cases_units_and_profiles_get_suggestions() -> None:
     with pytest.raises(CaseError, match="did you mean 'taylor_copper'"):
         shipped_path("taylor_coper")
     with pytest.raises(ValueError, match=r"unknown unit 'Mpa' in 'Mpa'; known: .*; did you mean 'MPa'"):

@@ -38,7 +38,7 @@ def test_the_area_of_two_bodies_that_touch(one: dict[str, Any], other: dict[str,
     assert [1e6 * each.area for each in found] == ([pytest.approx(mm2, rel=0.03)] if mm2 else [])
 
 
-def test_parts_that_touch_and_do_not_meet_are_a_doubt() -> None:
+def test_touching_parts_without_contact_or_bond_get_a_warning() -> None:
     pair = PLATE, above(PLATE, 5.0)
     for contact, doubtful in (("none", True), ({}, False), ({"parts": ["part0"]}, True)):
         made = case(*pair, contact=contact)
@@ -54,7 +54,7 @@ def test_parts_that_touch_and_do_not_meet_are_a_doubt() -> None:
 
 
 @pytest.mark.parametrize("kind", ["shared", "tied"])
-def test_parts_with_a_bond_are_not_told(kind: str) -> None:
+def test_bonded_parts_get_no_warning(kind: str) -> None:
     made = case(PLATE, above(PLATE, 5.0))
     bond = {"parts": ["part1", "part0"], "kind": kind}
     joined = parse_case({**made.model_dump(mode="json"), "bond": [bond], "contact": "none"})

@@ -130,7 +130,7 @@ def test_a_ballistic_limit_is_bracketed_and_fitted(slots: int, sign: float) -> N
     assert found.cpu == 2.0 * found.points
 
 
-def test_the_server_is_told_of_each_point_and_of_what_was_found() -> None:
+def test_each_point_and_the_result_are_reported_to_the_server() -> None:
     law = lambert_jonas(413.7, 0.92, 2.6)
     at = Firing(lambda v: -law(1000.0 * v), 4)
     found = find(at, ("-0.2 km/s", "-0.8 km/s"), tolerance=0.005)
@@ -231,7 +231,7 @@ def test_a_result_that_goes_through_a_threshold_has_a_line() -> None:
     assert found.limit == pytest.approx(500.0, abs=found.uncertainty)
 
 
-def test_no_passage_in_the_range_says_so_with_both_ends() -> None:
+def test_a_range_without_a_crossing_is_reported_with_both_ends() -> None:
     found = find(Firing(lambda v: 0.0))
     assert not found.reached
     assert found.points == 2
@@ -258,7 +258,7 @@ def test_a_result_that_is_no_number_is_a_point_without_a_result() -> None:
     assert (found.failed, found.reached) == (1, True)
 
 
-def test_what_is_not_monotonic_is_said() -> None:
+def test_a_result_that_is_not_monotonic_is_reported() -> None:
     found = find(Firing(lambda v: float(v > 300) * float(not 500 < v < 700) * v, 7))
     assert found.changes > 1
     assert found.mixed is not None
@@ -386,7 +386,7 @@ def test_points_divide_what_is_left_as_evenly_as_can_be() -> None:
 
 
 @pytest.mark.parametrize(("limit", "outside"), [(265.0, False), (-265.0, False), (272.1, True), (250.0, True)])
-def test_a_curve_that_does_not_begin_in_the_bracket_is_said_to(limit: float, outside: bool) -> None:
+def test_a_curve_that_does_not_begin_in_the_bracket_is_reported(limit: float, outside: bool) -> None:
     fit = Fit(law="Lambert and Jonas", limit=limit, error=1.0, points=6, factor=1.0, exponent=2.0)
     found = Found(
         key="v", unit="m/s", goal=Goal(result="probe.speed", threshold=0.0, unit="m/s"), limit=-264.0,

@@ -131,7 +131,7 @@ def test_a_stream_without_end_is_given_up(server: Hostile) -> None:
         list(asked.stream("/v1/runs/a/stream"))
 
 
-def test_a_message_that_is_none_is_one_line(server: Hostile) -> None:
+def test_an_invalid_message_is_one_line(server: Hostile) -> None:
     server.answers["/s"] = answering(b"data: [1, 2]\n\n", kind="text/event-stream")
     with Http(server.url) as asked, pytest.raises(AnswerError, match="cannot be read"):
         list(asked.stream("/s"))
@@ -223,7 +223,7 @@ def test_a_link_in_the_folder_is_replaced_not_followed(server: Hostile, quiet_ho
         "http:x",
     ],
 )  # fmt: skip
-def test_an_address_that_is_none_is_one_line(url: str, quiet_home: Path) -> None:
+def test_an_invalid_address_is_refused_in_one_line(url: str, quiet_home: Path) -> None:
     with pytest.raises(UsageError) as raised:
         address(url)
     assert "secret" not in str(raised.value)
@@ -244,7 +244,7 @@ def test_an_address_may_have_a_path(url: str, used: str) -> None:
     assert address(url) == used
 
 
-def test_what_is_asked_lies_below_the_path_of_the_address(server: Hostile) -> None:
+def test_requests_are_below_the_path_of_the_address(server: Hostile) -> None:
     server.answers["/conoid/v1/table"] = answering({"runs": [], "cases": [], "pending": 0, "next": None})
     result = CliRunner().invoke(app, ["runs", "--url", f"{server.url}/conoid/"])
     assert result.stdout == "no runs\n"

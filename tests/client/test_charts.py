@@ -57,7 +57,7 @@ def test_a_chart_is_written(outside: list[int], tmp_path: Path) -> None:
     assert picture[..., :3].std() > 0.1
 
 
-def test_a_chart_whose_ending_nobody_knows_is_asked_wrongly(tmp_path: Path) -> None:
+def test_a_chart_with_an_unknown_suffix_is_a_usage_error(tmp_path: Path) -> None:
     course = charts.course([load(0.5e-6, [4, 9])])
     with pytest.raises(UsageError, match=r"balance.foo: cannot be written: Format 'foo' is not supported"):
         charts.balance(course, "a bar", "glass_steel_bar", tmp_path / "balance.foo")

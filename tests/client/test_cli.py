@@ -61,7 +61,7 @@ def test_validate_estimates_without_a_server(quiet_home: Path) -> None:
     assert read(conoid("validate", "demo", "--json"))["estimate"]["elements"] == 25920
 
 
-def test_validate_tells_every_error_and_ends_with_2(quiet_home: Path) -> None:
+def test_validate_prints_every_error_and_ends_with_2(quiet_home: Path) -> None:
     result = conoid("validate", "demo", "--set", "run.end_tim=1", "--set", "run.ranks=many")
     assert result.exit_code == 2
     assert result.stdout == ""
@@ -70,13 +70,13 @@ def test_validate_tells_every_error_and_ends_with_2(quiet_home: Path) -> None:
     assert lines[1:] == ["conoid: run.end_tim: unknown key; did you mean 'end_time'?"]
 
 
-def test_validate_looks_for_mesh_files(quiet_home: Path) -> None:
+def test_validate_searches_mesh_files(quiet_home: Path) -> None:
     result = conoid("validate", "demo", "--set", 'parts[0].mesh={shape="file", path="rod.msh", unit="1 mm"}')
     assert result.exit_code == 2
     assert "parts[0].mesh.path = 'rod.msh': no such file (" in result.stderr
 
 
-def test_validate_tells_what_parts_bring_along(quiet_home: Path) -> None:
+def test_validate_prints_mass_and_energy_of_parts(quiet_home: Path) -> None:
     shown = conoid("validate", "demo").stdout
     line = next(line for line in shown.splitlines() if line.startswith("rod"))
     assert " ".join(line.split()) == "rod steel_42crmo4 25 920 4.08 g 3.2 x 6.4 x 32.4 mm 1.17 N s 168 J"
@@ -104,7 +104,7 @@ def test_warnings_of_a_case_in_si_do_not_fill_the_screen(quiet_home: Path) -> No
     assert lines[-1].endswith(" more; conoid validate --json has all")
 
 
-def test_a_case_that_is_about_to_run_is_doubted_too(user: Path) -> None:
+def test_a_case_that_is_about_to_run_gets_its_warnings(user: Path) -> None:
     path = case_file(user, steps=1)
     path.write_text(path.read_text().replace('end_time = "1 us"', "end_time = 1e-6"))
     result = conoid("submit", path)
@@ -152,7 +152,7 @@ def test_view_takes_times_with_their_units(quiet_home: Path) -> None:
     assert conoid(*words, "79").stderr == "conoid: time = '79': write it with its unit, such as '60 us'\n"
 
 
-def test_view_says_what_it_knows(quiet_home: Path) -> None:
+def test_view_prints_the_description_of_a_frame(quiet_home: Path) -> None:
     result = conoid("view", write_run(quiet_home / "bar"), "--field", "misses")
     assert result.exit_code == 2
     assert result.stderr.startswith("conoid: field = 'misses': allowed: mises, pressure, principal_stress, damage")
@@ -344,7 +344,7 @@ def test_watch_can_be_left(user: Path) -> None:
     conoid("cancel", run)
 
 
-def test_a_server_that_cannot_start_says_why(alone: Path) -> None:
+def test_a_server_that_cannot_start_prints_the_reason(alone: Path) -> None:
     (alone / "runs").mkdir()
     with (alone / "runs" / "server.lock").open("w") as lock:
         fcntl.flock(lock, fcntl.LOCK_EX)

@@ -75,7 +75,7 @@ def test_a_run_that_never_ended_by_itself_is_compared_too(runs: tuple[Result, Re
     assert "nan" not in printed.stdout
 
 
-def test_the_command_tells_and_draws(runs: tuple[Result, Result], tmp_path: Path) -> None:
+def test_the_command_prints_and_draws(runs: tuple[Result, Result], tmp_path: Path) -> None:
     out = tmp_path / "both.png"
     printed = CliRunner().invoke(app, ["compare", str(tmp_path / "a"), str(tmp_path / "b"), "--out", str(out)])
     assert printed.exit_code == 0, printed.output
@@ -170,7 +170,7 @@ def test_fragments_of_every_frame_are_one_data_frame(runs: tuple[Result, Result]
         runs[0].fragments_of(3)
 
 
-def test_without_pandas_the_error_says_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_without_pandas_the_error_names_the_extra(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(__import__("sys").modules, "pandas", None)
     with pytest.raises(ClientError, match=r"pip install 'conoid\[tables\]'"):
         read_columns("a [m]\n1\n").frame()

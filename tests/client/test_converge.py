@@ -76,7 +76,7 @@ def test_the_front_has_what_nothing_cheaper_beats() -> None:
     assert [w.cost for w in line] == sorted(w.cost for w in line)
 
 
-def test_the_advice_says_what_the_next_halving_buys_and_what_the_wanted_error_needs() -> None:
+def test_the_advice_gives_the_gain_of_halving_and_the_cost_of_the_wanted_error() -> None:
     advice = book(two_forms()).advice()
     assert advice == (
         "nodal at 500 µm: length within 1.2 % for 2 min 40 s of CPU time; halving the size buys 0.94 % for 42 min 40 s"
@@ -84,7 +84,7 @@ def test_the_advice_says_what_the_next_halving_buys_and_what_the_wanted_error_ne
     assert "0.1 % would need about 141 µm and 6 h 56 min" in book(two_forms(), accuracy=1e-3).advice()
 
 
-def test_what_only_scatters_has_no_order_and_what_grows_is_said_to() -> None:
+def test_scatter_gives_no_order_and_a_growing_error_is_reported() -> None:
     scatter = [-0.03, 0.0, 0.03]
     done = [
         run(NODAL, h, 2.0 + shake + 0.001 * h, 10.0 * h**-4, member, broken=round(100 / h) + member)
@@ -102,7 +102,7 @@ def test_what_only_scatters_has_no_order_and_what_grows_is_said_to() -> None:
     assert found.advice().startswith("Nothing converges")
 
 
-def test_a_reference_that_the_finest_mesh_lacks_is_passed_over() -> None:
+def test_a_reference_that_the_finest_mesh_lacks_is_skipped() -> None:
     """The box of the probe contains no centre of a tet on the finest mesh."""
     numbers = (Number("broken, number", 7.0),)
     finest = [Done(Point(NODAL, 0.5, 0, {}), "r", 64_000, 200, 160.0, numbers)]
@@ -111,7 +111,7 @@ def test_a_reference_that_the_finest_mesh_lacks_is_passed_over() -> None:
     assert found.advice() == "Nothing converges on these meshes: there is no error to weigh against the cost."
 
 
-def test_variants_on_one_mesh_are_told_apart_from_their_scatter() -> None:
+def test_variants_on_one_mesh_are_distinguished_from_their_scatter() -> None:
     """A study of the time step on one mesh has no limit; the result is the effect of the step on a quantity."""
     shorter = Variant("nodal", 0.6)
     done = [

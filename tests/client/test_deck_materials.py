@@ -169,7 +169,7 @@ def test_a_bent_flow_curve_refuses(tmp_path: Path) -> None:
     assert any("no straight line" in line for line in found.refusals)
 
 
-def test_simplified_johnson_cook_knows_no_heat(tmp_path: Path) -> None:
+def test_simplified_johnson_cook_has_no_thermal_softening(tmp_path: Path) -> None:
     cards = (
         "*MAT_098",
         row(1, "7.85E-9", 2.1e5, 0.3, 1),

@@ -28,7 +28,7 @@ def test_a_set_of_sets_has_their_nodes(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("code", ["lsdyna", "abaqus", "radioss"])
-def test_a_set_of_nodes_is_told_from_a_surface_of_its_name(tmp_path: Path, code: str) -> None:
+def test_a_set_of_nodes_is_distinguished_from_a_surface_of_its_name(tmp_path: Path, code: str) -> None:
     if code == "lsdyna":
         sets = ("*SET_NODE_LIST", row(5), row(1, 2), "*SET_SEGMENT", row(5), row(1, 2, 3, 3))
         found = read(tmp_path, "a.k", lsdyna(*STEEL, *sets, HELD, row(5, 0, 1, 1, 1)))

@@ -32,7 +32,7 @@ def keyword_lines(path: Path) -> list[tuple[str, int]]:
 
 
 @pytest.mark.parametrize("name", DECKS)
-def test_every_keyword_of_a_deck_is_taken_over_or_left_once(name: str) -> None:
+def test_every_keyword_of_a_deck_is_listed_once(name: str) -> None:
     found = imported(name)
     files = {
         "": FOLDER / name,
@@ -47,7 +47,7 @@ def test_every_keyword_of_a_deck_is_taken_over_or_left_once(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", DECKS)
-def test_the_case_says_the_same_as_text_and_as_data(name: str) -> None:
+def test_the_case_is_equal_as_text_and_as_data(name: str) -> None:
     found = imported(name)
     assert tomllib.loads(found.toml) == bare(found.data)
     assert found.refusals == []
@@ -101,7 +101,7 @@ SI: dict[str, dict[str, Any]] = {
 
 
 @pytest.mark.parametrize("name", DECKS)
-def test_what_is_taken_over_is_what_the_deck_says(name: str) -> None:
+def test_the_imported_case_has_the_values_of_the_deck(name: str) -> None:
     found = imported(name)
     data = bare(found.data)
     for key, value in SI[name].items():
@@ -125,7 +125,7 @@ def test_what_is_taken_over_is_what_the_deck_says(name: str) -> None:
         ("7.85", "210", "mm, mg, us"), ("7.85", "2.1E12", "cm, g, s"), ("7.34E-4", "3.0E7", "in, lbf*s^2/in, s"),
     ],
 )  # fmt: skip
-def test_units_are_told_from_steel(tmp_path: Path, density: str, young: str, system: str) -> None:
+def test_units_are_detected_from_steel(tmp_path: Path, density: str, young: str, system: str) -> None:
     found = read(tmp_path, "a.k", lsdyna("*MAT_ELASTIC", row(1, density, young, 0.3)), None)
     assert str(found.system) == system
     assert "steel" in found.why
@@ -197,14 +197,14 @@ REFUSED = {
 
 
 @pytest.mark.parametrize("what", REFUSED)
-def test_what_would_answer_wrong_in_silence_refuses_the_import(tmp_path: Path, what: str) -> None:
+def test_a_keyword_that_would_change_the_answer_refuses_the_import(tmp_path: Path, what: str) -> None:
     cards, message = REFUSED[what]
     found = read(tmp_path, "a.k", lsdyna(*cards))
     assert any(message in line for line in found.refusals), found.refusals
     assert all("\n" not in line for line in found.refusals)
 
 
-def test_walls_and_sliding_nodes_that_are_no_plane_are_told(tmp_path: Path) -> None:
+def test_walls_and_sliding_nodes_off_a_plane_are_reported(tmp_path: Path) -> None:
     """Walls do not stop driven nodes: a set of sliding nodes on no plane of symmetry would move through the wall."""
     deck = abaqus("*Density\n7.85e-9,\n*Elastic\n2.1e5, 0.3", model="*Nset, nset=some\n1, 2\n*Boundary\nsome, 1, 1")
     assert read(tmp_path, "a.inp", deck).data["boundaries"][0]["on"] == "some"
@@ -255,7 +255,7 @@ def test_nodes_that_hold_themselves_are_a_plane_of_symmetry(tmp_path: Path) -> N
     ("codes", "held"),
     [((), {}), ((1, 7, 7), {"x": "0 mm/s", "y": "0 mm/s", "z": "0 mm/s"}), ((1, 4, 7), {"x": "0 mm/s", "y": "0 mm/s"})],
 )
-def test_a_rigid_body_is_rigid_and_held_as_its_material_says(
+def test_a_rigid_body_is_held_as_its_material_defines(
     tmp_path: Path, codes: tuple[int, ...], held: dict[str, str]
 ) -> None:
     found = read(tmp_path, "a.k", lsdyna("*MAT_RIGID", row(1, "7.85E-9", 2.1e5, 0.3), row(*codes)))

@@ -56,7 +56,7 @@ def test_a_mesh_file_is_measured_and_its_estimate_is_that_of_its_tets(folder: Pa
     assert answer["warnings"][0]["key"] == "parts[0].mesh.path"
 
 
-def test_a_slip_of_the_unit_is_told_as_of_any_body(folder: Path) -> None:
+def test_a_wrong_unit_gets_the_same_warning_as_for_any_body(folder: Path) -> None:
     result = conoid("validate", "bar.toml", "--set", "parts[0].mesh.unit='1 m'")
     assert result.exit_code == 0, result.output
     assert "warning: run.end_time = '0.0001 s': is shorter than the first time step" in result.stderr
@@ -73,9 +73,7 @@ def test_what_a_run_would_refuse_is_refused_before(command: str, folder: Path) -
     assert not (folder / "runs").exists()
 
 
-def test_where_the_worker_is_not_installed_a_file_that_was_not_read_is_told(
-    folder: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_without_the_worker_an_unread_mesh_file_is_reported(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     found = importlib.util.find_spec
     monkeypatch.setattr(importlib.util, "find_spec", lambda name: None if name == "conoid.worker" else found(name))
     result = conoid("validate", "bar.toml")

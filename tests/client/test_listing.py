@@ -108,7 +108,7 @@ def test_every_command_takes_the_short_id(server: LocalServer, made: dict[str, s
     )
 
 
-def test_a_beginning_that_several_have_is_told(made: dict[str, str]) -> None:
+def test_an_ambiguous_prefix_is_reported(made: dict[str, str]) -> None:
     common = made["slow"][:2]
     done = conoid("show", common)
     assert done.exit_code == 2

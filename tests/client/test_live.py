@@ -78,7 +78,7 @@ def test_exit_codes(state: State, cause: str | None, code: int) -> None:
     assert exit_code(state, cause) == code
 
 
-def test_a_run_that_has_not_begun_says_how_long_it_waits(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_run_that_has_not_begun_shows_its_waiting_time(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("conoid.client.commands.display.time.time", lambda: run_messages.START + 3 + 42)
     assert "starting  42 s" in rendered(progressed(3))
     assert "running  42 s" not in rendered(progressed(6))
@@ -134,13 +134,13 @@ def test_bars_of_the_ranks_are_in_proportion() -> None:
     assert [line.count("█") for line in lines] == [36, 36], "both ranks took the whole interval"
 
 
-def test_many_ranks_are_cut_and_said_so() -> None:
+def test_a_chart_of_many_ranks_is_shortened_with_a_note() -> None:
     live = progressed(6)
     live.phases = {"compute": [1.0] * 40}
     assert "and 28 more ranks" in rendered(live)
 
 
-def test_plain_lines_tell_each_state_and_percent_and_each_warning_once() -> None:
+def test_plain_lines_print_each_state_percent_and_warning_once() -> None:
     lines: list[str] = []
     story = run_messages.whole()
     often = [msgspec.structs.replace(run_messages.progress(6, 0.25 + n / 1e4), seq=6) for n in range(100)]
@@ -154,7 +154,7 @@ def test_plain_lines_tell_each_state_and_percent_and_each_warning_once() -> None
     assert percents == ["25.0", "50.0", "75.0", "100.0"]
 
 
-def test_what_a_start_is_at_is_told_and_changes_no_state() -> None:
+def test_progress_of_the_start_is_reported_and_changes_no_state() -> None:
     lines: list[str] = []
     words = [run_messages.status(4 + n, "starting", message=f"compiling kernels: {n} of 3") for n in range(4)]
     live = tell([run_messages.status(3, "starting"), *words], Live(run_messages.RUN), lines.append)
@@ -162,7 +162,7 @@ def test_what_a_start_is_at_is_told_and_changes_no_state() -> None:
     assert live.changed == run_messages.START + 3
 
 
-def test_a_silent_run_is_heard_of(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_run_without_messages_is_detected(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(progress, "LONGEST", 0.05)
     lines: list[str] = []
     heard = threading.Event()
@@ -184,7 +184,7 @@ def test_a_silent_run_is_heard_of(monkeypatch: pytest.MonkeyPatch) -> None:
     assert lines[-1].endswith("running")
 
 
-def test_a_failure_tells_its_cause() -> None:
+def test_a_failure_gives_its_cause() -> None:
     lines: list[str] = []
     tell([run_messages.status(1, "failed", "energy", "the residual passed 0.05")], Live(run_messages.RUN), lines.append)
     assert lines[0].endswith("failed  energy  the residual passed 0.05")
@@ -237,7 +237,7 @@ class Deserted(Queued):
         yield run_messages.status(2, "succeeded")
 
 
-def test_a_server_that_is_gone_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_server_that_has_ended_is_reported(monkeypatch: pytest.MonkeyPatch) -> None:
     """The client cannot find out then whether the run still runs."""
     monkeypatch.setattr(progress, "LONGEST", 0.05)
     monkeypatch.setattr("conoid.client.watch.REASON_EVERY", 0.01)
@@ -268,7 +268,7 @@ class Nothing:
         """Does nothing."""
 
 
-def test_what_a_run_in_the_queue_waits_for_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_reason_of_waiting_in_the_queue_is_reported(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(progress, "LONGEST", 0.05)
     monkeypatch.setattr("conoid.client.watch.REASON_EVERY", 0.01)
     run, out = Queued(), io.StringIO()

@@ -42,7 +42,7 @@ def test_a_gap_is_refilled_once() -> None:
     assert order.missing == 0
 
 
-def test_a_late_joiner_reads_the_history_first() -> None:
+def test_a_late_subscriber_reads_the_history_first() -> None:
     order = InOrder(Journal(4).after)
     history = [passed.seq for passed in order.catch_up()]
     assert history + seqs(order, 3, 4, 5) == [1, 2, 3, 4, 5]

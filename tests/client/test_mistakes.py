@@ -50,7 +50,7 @@ def damaged(quiet_home: Path) -> Path:
 # A folder that is none of a run ---------------------------------------------------------------------------------------
 
 
-def test_a_folder_that_is_none_of_a_run_is_not_followed(quiet_home: Path) -> None:
+def test_a_folder_without_a_run_is_not_followed(quiet_home: Path) -> None:
     Path("empty").mkdir()
     assert refused(1, "watch", "empty") == "conoid: empty has no journal.jsonl"
     (quiet_home / "many" / "one").mkdir(parents=True)
@@ -83,13 +83,13 @@ def test_a_link_out_of_a_folder_is_not_read(damaged: Path) -> None:
 
 
 @pytest.mark.parametrize("command", ["watch", "show", "report", "get", "cancel"])
-def test_a_path_at_which_there_is_no_run_asks_no_server(command: str, quiet_home: Path) -> None:
+def test_a_path_without_a_run_sends_no_request(command: str, quiet_home: Path) -> None:
     assert refused(1, command, "runs/none") == (
         "conoid: runs/none: not the folder of a run; write its folder, its id, or 'last'"
     )
 
 
-def test_a_folder_is_told_that_a_server_wants_an_id(quiet_home: Path) -> None:
+def test_a_server_refuses_a_folder_and_asks_for_an_id(quiet_home: Path) -> None:
     (quiet_home / "runs" / "one").mkdir(parents=True)
     assert refused(2, "restart", "runs/one") == (
         "conoid: run = 'runs/one': this command needs a server; write the id of a run, or 'last'"
@@ -116,11 +116,11 @@ def test_a_key_that_is_set_twice_is_named(words: tuple[str, ...], quiet_home: Pa
         ("submit", "demo", "--key", ""),
     ],
 )  # fmt: skip
-def test_what_is_asked_wrongly_ends_with_2(words: tuple[str, ...], quiet_home: Path) -> None:
+def test_a_usage_error_ends_with_2(words: tuple[str, ...], quiet_home: Path) -> None:
     refused(2, *words)
 
 
-def test_nothing_is_put_into_a_folder_that_is_none_of_a_run(quiet_home: Path) -> None:
+def test_no_file_is_written_into_a_folder_without_a_run(quiet_home: Path) -> None:
     Path("empty").mkdir()
     assert refused(1, "cancel", "empty") == "conoid: empty has no journal.jsonl"
     assert not list(Path("empty").iterdir())
@@ -163,12 +163,12 @@ def test_a_file_that_cannot_be_used_is_named(quiet_home: Path, words: tuple[str,
     assert refused(code, *words).endswith(message)
 
 
-def test_a_table_that_is_no_text_is_named(quiet_home: Path) -> None:
+def test_a_table_in_place_of_a_text_is_named(quiet_home: Path) -> None:
     Path("points.csv").write_bytes(b"run.ranks,x\n1,\xff\n")
     assert refused(2, "sweep", "demo", "--list", "points.csv") == "conoid: --list = 'points.csv': not UTF-8 text"
 
 
-def test_what_did_not_come_in_time_is_told(quiet_home: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_time_limit_of_a_read_is_reported_in_one_line(quiet_home: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     def late(*_: object) -> None:
         raise TimeoutError("run x is still running after 30 s")
 
@@ -186,7 +186,7 @@ def test_without_slurm_nothing_is_prepared(quiet_home: Path, monkeypatch: pytest
 
 
 @pytest.mark.parametrize("url", ["http://[", "http://[::1", "http://a:b", "http://a b", "http://h:99999", "http://:1"])
-def test_an_address_that_is_none_is_one_line(url: str, quiet_home: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_an_invalid_address_is_refused_in_one_line(url: str, quiet_home: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("CONOID_URL", url)
     assert refused(2, "ls") == f"conoid: url = {url!r}: write it with http:// or https://, such as {DEFAULT_URL}"
 
@@ -220,7 +220,7 @@ def test_a_file_outside_of_a_run_is_not_fetched(quiet_home: Path) -> None:
 
 
 @pytest.mark.parametrize(("state", "message"), [("succeeded", "s has ended\n"), ("running", "s cancelling\n")])
-def test_a_sweep_that_has_ended_is_not_said_to_be_cancelled(
+def test_an_ended_sweep_is_not_reported_as_cancelled(
     quiet_home: Path, monkeypatch: pytest.MonkeyPatch, state: str, message: str
 ) -> None:
     class Server(httpx2.BaseTransport):

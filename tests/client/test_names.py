@@ -58,7 +58,7 @@ def test_a_name_that_nothing_has_raises(server: Hostile) -> None:
                 session.find_sweep(name)
 
 
-def test_a_beginning_that_one_has_is_enough(server: Hostile) -> None:
+def test_a_unique_prefix_is_enough(server: Hostile) -> None:
     server.answers["/v1/runs"] = answering({"runs": [run_info(id="1kaaa")], "next": None})
     server.answers["/v1/sweeps"] = answering({"sweeps": [sweep("1kaaa")], "next": None})
     with Session(server.url) as session:
@@ -69,7 +69,7 @@ def test_a_beginning_that_one_has_is_enough(server: Hostile) -> None:
     assert "/v1/runs?limit=9&prefix=1ka" in server.asked
 
 
-def test_a_beginning_that_several_have_is_one_line_with_them(server: Hostile) -> None:
+def test_an_ambiguous_prefix_is_one_line_with_all_matches(server: Hostile) -> None:
     with Session(server.url) as session:
         with pytest.raises(UsageError, match="run = '1kbb': several ids begin so: 1kbbx, 1kbbw"):
             session.run("1kbb")
@@ -79,7 +79,7 @@ def test_a_beginning_that_several_have_is_one_line_with_them(server: Hostile) ->
     assert "several ids begin so" in refused(2, "cancel", "1kbb", "--url", server.url)
 
 
-def test_a_server_too_old_for_beginnings_says_what_it_said(server: Hostile) -> None:
+def test_the_message_of_a_server_without_prefix_search_is_shown(server: Hostile) -> None:
     server.answers["/v1/runs"] = answering({"detail": "prefix: no such parameter"}, 400)
     with Session(server.url) as session, pytest.raises(NotFoundError, match="there is none"):
         session.run("1kb")
@@ -134,7 +134,7 @@ def test_a_run_in_a_folder_is_shown_and_asked(folder: Path) -> None:
     }
 
 
-def test_a_run_in_a_folder_that_nobody_computes_is_lost(folder: Path) -> None:
+def test_a_run_in_a_folder_without_a_worker_is_lost(folder: Path) -> None:
     assert json.loads(conoid("show", folder, "--json"))["state"] == "lost"
     assert "no worker writes into it" in refused(1, "checkpoint", folder)
 
@@ -155,7 +155,7 @@ def test_files_of_a_folder_are_copied(folder: Path, quiet_home: Path) -> None:
     assert "has no none" in refused(1, "get", folder, "none", "--out", "copy")
 
 
-def test_what_only_a_server_can_do_says_so(folder: Path) -> None:
+def test_a_command_that_needs_a_server_is_refused_for_a_folder(folder: Path) -> None:
     assert "this command needs a server" in refused(2, "restart", folder)
     assert "there is none" in refused(1, "sweep-table", folder)
 

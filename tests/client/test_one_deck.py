@@ -59,7 +59,7 @@ def deck(folder: Path, seed: int) -> Path:
 
 
 @pytest.mark.parametrize("seed", range(12))
-def test_the_one_file_says_what_the_deck_says(tmp_path: Path, seed: int) -> None:
+def test_the_one_file_equals_the_deck_with_its_includes(tmp_path: Path, seed: int) -> None:
     """Names of parts are relative to the folder of the deck, which is that of the first file here."""
     (tmp_path / "in").mkdir()
     top = deck(tmp_path / "in", seed)
@@ -139,7 +139,7 @@ OTHERS = {
 
 
 @pytest.mark.parametrize("name", OTHERS)
-def test_decks_of_other_codes_that_include_say_the_same_and_are_handed_in_as_one(tmp_path: Path, name: str) -> None:
+def test_decks_with_includes_give_the_same_case_and_are_sent_as_one_file(tmp_path: Path, name: str) -> None:
     split(tmp_path, name, *OTHERS[name])
     units = None if name.endswith(".rad") else "mm,t,s"
     found, plain = (read_deck(tmp_path / each, units) for each in (name, f"whole_{name}"))

@@ -80,7 +80,7 @@ def test_a_refusal_is_no_absence() -> None:
 
 
 @pytest.mark.parametrize("status", [None, 502, 503])
-def test_who_follows_a_run_outlasts_a_proxy_whose_server_starts_again(status: int | None) -> None:
+def test_a_follower_continues_after_a_restart_behind_a_proxy(status: int | None) -> None:
     """The shipped nginx answers 502 while the server behind it restarts."""
     left = [20]
 
@@ -107,7 +107,7 @@ def test_an_end_that_cannot_be_asked_for_now_is_asked_for_again(status: int) -> 
     assert list(follow(Silent(), lambda after: [], ended)) == []
 
 
-def test_who_may_not_follow_a_run_is_told_so() -> None:
+def test_a_user_without_permission_gets_an_error() -> None:
     def refill(after: int) -> list[AnyMessage]:
         raise ServiceError(401, {})
 

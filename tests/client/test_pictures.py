@@ -97,7 +97,7 @@ def test_the_image_of_a_component_points_the_other_way(frame: Path, tmp_path: Pa
 
 
 @pytest.mark.usefixtures("warm")
-def test_parts_are_hidden_glassy_left_whole_and_looked_at(frame: Path, tmp_path: Path) -> None:
+def test_parts_can_be_hidden_transparent_uncut_and_in_focus(frame: Path, tmp_path: Path) -> None:
     every = drawn(frame, "part", tmp_path / "a.png")
     head = drawn(frame, "part", tmp_path / "b.png", hide=["foot"])
     assert head.faces < every.faces

@@ -89,7 +89,7 @@ def test_one_rank_has_nothing_to_cut() -> None:
     assert (alone.cuts, alone.lost, alone.work) == ([], 0.0, 160.0)
 
 
-def test_what_a_rank_takes_whatever_it_has_is_lost_by_nobody() -> None:
+def test_a_constant_cost_of_a_rank_is_not_counted_as_loss() -> None:
     sent = [m if not i else replace(m, rank=10**9) for i, m in enumerate(wandering())]
     never = account("never", sent)
     assert (never.lost, never.work) == (80.0, 80.0 + 160.0)
@@ -117,7 +117,7 @@ def test_a_run_that_goes_on_from_a_checkpoint_is_read_once() -> None:
     assert account("measured", [*sent[:12], resumed, *again[1:]]) == account("measured")
 
 
-def test_a_run_that_has_told_nothing_is_refused() -> None:
+def test_a_run_without_load_messages_is_refused() -> None:
     for sent in ([], wandering()[:1], wandering()[1:]):
         with pytest.raises(ClientError, match="has no loads of groups"):
             replay.read(sent)
@@ -126,7 +126,7 @@ def test_a_run_that_has_told_nothing_is_refused() -> None:
 
 
 @pytest.mark.parametrize("words", ["evry:10", "never:3", "every:", "every:0", "every:x", ""])
-def test_a_policy_that_is_none_is_refused(words: str) -> None:
+def test_an_unknown_policy_is_refused(words: str) -> None:
     with pytest.raises(ClientError, match=r"allowed: measured, outside, every, every:N, never"):
         replay.chosen(Spec(), words)
 

@@ -83,7 +83,7 @@ def test_what_is_no_file_is_written_to_as_it_is(tmp_path: Path) -> None:
 
 
 @pytest.mark.usefixtures("warm")
-def test_a_report_is_one_file_that_asks_for_nothing(folder: Path, tmp_path: Path) -> None:
+def test_a_report_is_one_file_without_requests(folder: Path, tmp_path: Path) -> None:
     out = report.write(Result.open(folder), tmp_path / "bar.html", ["temperature"])
     page = read(out)
     assert page.addresses
@@ -94,7 +94,7 @@ def test_a_report_is_one_file_that_asks_for_nothing(folder: Path, tmp_path: Path
     assert out.stat().st_size < 5_000_000
 
 
-def test_it_says_how_the_run_ended_and_whether_it_is_right(folder: Path, tmp_path: Path) -> None:
+def test_the_report_gives_the_end_of_the_run_and_its_references(folder: Path, tmp_path: Path) -> None:
     outcome = json.loads((folder / "outcome.json").read_text())
     outcome["reference"] += [{**outcome["reference"][0], "name": "width of rod", "pass": False}]
     (folder / "outcome.json").write_text(json.dumps(outcome))
@@ -105,7 +105,7 @@ def test_it_says_how_the_run_ended_and_whether_it_is_right(folder: Path, tmp_pat
     assert html.count("<span class=good>pass</span>") == html.count("<span class=bad>FAIL</span>") == 1
 
 
-def test_nothing_that_a_case_says_becomes_markup(folder: Path, tmp_path: Path) -> None:
+def test_no_text_of_a_case_becomes_markup(folder: Path, tmp_path: Path) -> None:
     case = json.loads((folder / "case.resolved.json").read_text())
     case |= {"title": "<script>alert(1)</script>", "description": "<b>&"}
     (folder / "case.resolved.json").write_text(json.dumps(case))
@@ -157,7 +157,7 @@ def test_the_command_names_the_file_after_the_run(folder: Path, quiet_home: Path
     assert "field = 'x': allowed: mises" in wrong.stderr
 
 
-def test_what_takes_long_says_what_it_is_at(folder: Path, quiet_home: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_long_report_prints_its_progress(folder: Path, quiet_home: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(progress, "LONGEST", 0.05)
     heard = threading.Event()
 

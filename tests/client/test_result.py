@@ -55,7 +55,7 @@ def test_a_run_that_goes_on_has_no_outcome(tmp_path: Path) -> None:
         _ = Result.open(tmp_path).outcome
 
 
-def test_a_folder_of_runs_is_told_from_that_of_a_run(tmp_path: Path) -> None:
+def test_a_folder_of_runs_is_distinguished_from_a_folder_of_a_run(tmp_path: Path) -> None:
     for number in range(10):
         (tmp_path / f"bar-{number}").mkdir()
         (tmp_path / f"bar-{number}" / "journal.jsonl").touch()

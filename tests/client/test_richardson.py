@@ -119,7 +119,7 @@ def test_quantiles_of_student(free: float) -> None:
     assert student(0.975, free) == pytest.approx(float(stats.t.ppf(0.975, free)), rel=0.012)
 
 
-def test_two_samples_differ_where_welch_says_so() -> None:
+def test_two_samples_differ_by_the_test_of_welch() -> None:
     a, near, far = Sample((1.0, 1.2, 0.9, 1.1)), Sample((1.05, 1.3, 0.95, 1.2)), Sample((1.5, 1.7, 1.4, 1.6))
     for other in (near, far):
         assert differ(a, other) == (stats.ttest_ind(a.values, other.values, equal_var=False).pvalue < 0.05)

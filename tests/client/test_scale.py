@@ -58,7 +58,7 @@ def test_losses_are_all_that_lies_between_the_ideal_and_the_worst() -> None:
     assert one.time / 2 + sum(map(sum, losses.values())) == pytest.approx(run.worst)
 
 
-def test_the_tables_say_it() -> None:
+def test_the_tables_contain_the_results() -> None:
     text = to_markdown(study(one_rank(), two_ranks()))
     assert "1.00 ms a message, 1.00 MB/s" in text
     row = next(line for line in text.splitlines() if line.startswith("| 2 "))
@@ -103,7 +103,7 @@ def test_a_projection_by_tasks_takes_the_work_of_so_many_threads() -> None:
     assert (run.time, by_tasks(1).time, alone.speed_up(run)) == (3.5, 8.0, 8.0 / 3.5)
 
 
-def test_what_one_thread_does_alone_is_told_by_phase() -> None:
+def test_serial_time_is_reported_by_phase() -> None:
     text = to_markdown(study(one_rank(), two_threads()))
     lines = [line.replace(" ", "") for line in text.splitlines()]
     assert "|phase|1x2|" in lines

@@ -264,7 +264,7 @@ def test_what_is_no_file_is_refused_in_a_line(folder: Path, kind: str, message: 
     assert "\n" not in str(problem)
 
 
-def test_a_link_to_a_file_is_followed_and_a_wrong_hash_is_told(folder: Path) -> None:
+def test_a_link_to_a_file_is_followed_and_a_wrong_hash_is_reported(folder: Path) -> None:
     (folder / "link.inp").symlink_to(folder / "meshes" / "bar.inp")
     digest = hashlib.sha256(BAR.encode()).hexdigest()
     case = case_with("link.inp")
@@ -307,7 +307,7 @@ def test_commands_send_what_a_case_names(server: LocalServer, folder: Path, monk
     assert (server.runs / again / layout.FILES / f"{hashes[0]}.inp").read_text() == BAR
 
 
-def test_what_a_server_does_not_take_is_told_in_its_words(server: LocalServer, tmp_path: Path) -> None:
+def test_a_refusal_is_shown_in_the_words_of_the_server(server: LocalServer, tmp_path: Path) -> None:
     """A refused file is not sent again."""
     path = tmp_path / "large.inp"
     with path.open("wb") as file:

@@ -37,7 +37,7 @@ def test_a_run_is_submitted_watched_and_read(
 
 
 @pytest.mark.parametrize("lose", [0, 3])
-def test_zenoh_tells_every_message_once_and_in_order(session: Session, tmp_path: Path, lose: int) -> None:
+def test_zenoh_delivers_every_message_once_and_in_order(session: Session, tmp_path: Path, lose: int) -> None:
     run = session.submit(case_file(tmp_path, steps=40, pace=0.01, lose=lose))
     link = run.link()
     assert isinstance(link, ZenohLink)
@@ -46,7 +46,7 @@ def test_zenoh_tells_every_message_once_and_in_order(session: Session, tmp_path:
     assert received == run.events()
 
 
-def test_a_late_joiner_is_told_the_whole_story(session: Session, tmp_path: Path) -> None:
+def test_a_late_subscriber_receives_all_messages(session: Session, tmp_path: Path) -> None:
     run = session.submit(case_file(tmp_path, steps=60, pace=0.01))
     first = run.messages()
     while next(first).seq < 40:
@@ -57,7 +57,7 @@ def test_a_late_joiner_is_told_the_whole_story(session: Session, tmp_path: Path)
     assert [message.seq for message in run.messages(after=joined[-1] - 2)] == joined[-2:]
 
 
-def test_sse_tells_the_same(session: Session, tmp_path: Path) -> None:
+def test_sse_sends_the_same_messages(session: Session, tmp_path: Path) -> None:
     run = session.submit(case_file(tmp_path, steps=20, pace=0.01))
     received = list(run.messages(link=SseLink(lambda: session.stream(f"{run.path}/stream"))))
     assert received == run.events()
@@ -112,7 +112,7 @@ def test_runs_are_listed_newest_first(session: Session, tmp_path: Path) -> None:
     assert {run.state for run in session.runs(["succeeded"], limit=200)} == {State.SUCCEEDED}
 
 
-def test_the_server_says_what_is_wrong(session: Session, tmp_path: Path) -> None:
+def test_the_message_of_the_server_is_shown(session: Session, tmp_path: Path) -> None:
     with pytest.raises(CaseError) as caught:
         session.submit(case_file(tmp_path, ranks=64), ["run.end_tim=1"])
     assert list(map(str, caught.value.problems)) == ["run.end_tim: unknown key; did you mean 'end_time'?"]

@@ -58,7 +58,7 @@ def test_one_text_is_no_list_of_assignments(overrides: Any, message: str) -> Non
 
 
 @pytest.mark.parametrize("case", [None, 5, ["demo"]])
-def test_what_is_no_case_is_told(case: Any) -> None:
+def test_a_file_that_is_not_a_case_is_reported(case: Any) -> None:
     with pytest.raises(CaseError, match=r"^case = .*: a case is a file, the name of a shipped one, or plain data$"):
         body_of(case)
 
@@ -98,7 +98,7 @@ def test_a_token_that_is_missing_or_wrong_names_where_it_comes_from(token: str |
     assert "header" not in str(caught.value)
 
 
-def test_a_refused_case_tells_every_error() -> None:
+def test_a_refused_case_lists_every_error() -> None:
     errors = [
         {"key": "run.ranks", "value": "9", "message": "this server has 2 slots"},
         {"key": "parts[0].mesh", "value": "", "message": "this key is missing"},
@@ -119,7 +119,7 @@ def test_what_is_not_there_is_the_same_error_here_and_on_a_server(tmp_path: Path
     assert all(issubclass(each, ConoidError) for each in (CaseError, NotFoundError, ServiceError, UnreachableError))
 
 
-def test_an_answer_that_is_no_problem_json_is_still_one_line() -> None:
+def test_an_answer_without_problem_json_is_one_line() -> None:
     with pytest.raises(ServiceError, match=r"^the server answered 502$") as caught:
         served(lambda _: httpx2.Response(502, text="<html>Bad gateway</html>")).me()
     assert caught.value.retryable
@@ -127,7 +127,7 @@ def test_an_answer_that_is_no_problem_json_is_still_one_line() -> None:
         served(lambda _: httpx2.Response(200, text="<html>Welcome</html>")).me()
 
 
-def test_no_server_says_how_to_start_one() -> None:
+def test_a_missing_server_is_reported_with_the_command_that_starts_one() -> None:
     with Session("http://127.0.0.1:1") as session, pytest.raises(UnreachableError) as caught:
         session.me()
     hint = "is it running there? (conoid serve; another address: CONOID_URL or --url)"
@@ -183,7 +183,7 @@ def test_lists_are_read_page_by_page() -> None:
     assert [run.id for run in served(answer).runs(["queued", "running"])] == ["r1", "r2"]
 
 
-def test_an_outcome_is_read_also_where_a_number_is_none() -> None:
+def test_an_outcome_with_a_missing_number_is_read() -> None:
     check = {"name": "contact_time", "value": None, "expected": 1.0, "tolerance": 0.1, "pass": False}
     ended = {**RECEIPT, "state": "failed", "outcome": {"state": "failed", "reference": [check]}}
     outcome = served(lambda _: httpx2.Response(200, json=ended)).run("r1").status().outcome
@@ -209,7 +209,7 @@ def test_a_file_name_cannot_leave_the_folder(name: str, tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("elsewhere", ["http://evil.test/v1/runs/r1/files/a", "/v1/runs/r2/files/a", ""])
-def test_files_are_fetched_where_the_server_says_and_nowhere_else(tmp_path: Path, elsewhere: str) -> None:
+def test_files_are_fetched_only_from_addresses_of_the_server(tmp_path: Path, elsewhere: str) -> None:
     """A name that is not valid UTF-8 is shown as text; its address contains the exact bytes."""
     asked: list[str] = []
 
@@ -259,7 +259,7 @@ def test_a_shipped_case_is_named_and_overridden(quiet_home: Path) -> None:
     ("source", "message"),
     [("dmeo", "did you mean 'demo'"), ("nothing.toml", "cannot read this file"), ("README.md", r"ends in \.toml or")],
 )
-def test_what_is_no_case_is_said(source: str, message: str) -> None:
+def test_text_that_is_not_a_case_is_refused(source: str, message: str) -> None:
     with pytest.raises(CaseError, match=message):
         body_of(source)
 
@@ -351,7 +351,7 @@ def test_a_server_that_hangs_is_asked_once(seconds: float, times: int, monkeypat
     assert asked == [times]
 
 
-def test_an_empty_name_of_a_case_is_told() -> None:
+def test_an_empty_name_of_a_case_is_reported() -> None:
     for name in ("", " "):
         with pytest.raises(
             CaseError, match=r"^case = '': the name is empty: write a .toml or .json file, or a shipped"

@@ -56,7 +56,7 @@ def test_sse_brings_the_same(session: Session, tmp_path: Path) -> None:
     assert [one.header.n for one in seen] == list(range(6))
 
 
-def test_watch_says_that_one_came(session: Session, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_watch_reports_a_new_snapshot(session: Session, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     run = session.submit(case_file(tmp_path, steps=4, snapshots=2, pace=0.02))
     known = run.watch(live=False)
     assert "snapshot 1 at t 100 ms: 1 fragment" in capsys.readouterr().out

@@ -75,7 +75,7 @@ def until(truth: Callable[[], bool]) -> None:
         time.sleep(0.005)
 
 
-def test_a_late_joiner_reads_history_then_stream_without_gap_or_repeat(broker: Broker) -> None:
+def test_a_late_subscriber_reads_history_then_stream_without_gap_or_repeat(broker: Broker) -> None:
     journal, story = Journal(), run_messages.whole()
     journal.lines = story[:6]
     link = subscribed(broker)
@@ -102,7 +102,7 @@ def test_a_gap_is_refilled_from_the_journal(broker: Broker) -> None:
     assert received == list(range(1, 16))
 
 
-def test_a_router_that_falls_silent_loses_nothing(broker: Broker) -> None:
+def test_no_message_is_lost_when_a_router_stops_sending(broker: Broker) -> None:
     journal, story = Journal(), run_messages.whole()
     received, thread = reading(subscribed(broker), journal)
     broker.publish(story[0])
@@ -120,7 +120,7 @@ def test_a_run_that_ended_without_a_last_word_ends_the_stream(broker: Broker) ->
     assert received == list(range(1, 10))
 
 
-def test_other_runs_and_rubbish_are_not_heard(broker: Broker) -> None:
+def test_messages_of_other_runs_and_invalid_ones_are_ignored(broker: Broker) -> None:
     link = subscribed(broker)
     try:
         other = msgspec.structs.replace(run_messages.status(1, "running"), run="r2")
@@ -134,20 +134,20 @@ def test_other_runs_and_rubbish_are_not_heard(broker: Broker) -> None:
         link.close()
 
 
-def test_a_wrong_password_is_told(broker: Broker) -> None:
+def test_a_wrong_password_is_reported(broker: Broker) -> None:
     wrong = Router(endpoint=broker.router.endpoint, user="ann", password="guess")
     with pytest.raises(StreamError, match="refused or cannot be reached"):
         ZenohLink(wrong, PREFIX)
 
 
-def test_no_router_is_told_at_once() -> None:
+def test_a_missing_router_is_reported_at_once() -> None:
     began = time.monotonic()
     with pytest.raises(StreamError):
         ZenohLink(Router(endpoint=f"tcp/127.0.0.1:{free_port()}"), PREFIX)
     assert time.monotonic() - began < 6.0
 
 
-def test_sse_tells_the_same_and_its_break_is_bridged_by_the_journal() -> None:
+def test_sse_sends_the_same_messages_and_a_gap_is_read_from_the_journal() -> None:
     journal, story = Journal(), run_messages.whole()
     journal.lines = story
 
@@ -175,7 +175,7 @@ def test_a_server_that_restarts_is_waited_for(monkeypatch: pytest.MonkeyPatch) -
     assert [message.seq for message in follow(link, refill, lambda: False)] == list(range(1, 16))
 
 
-def test_a_server_that_stays_away_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_an_unreachable_server_is_reported(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(stream, "_PATIENCE", 0.0)
 
     def refill(_after: int) -> list[AnyMessage]:
@@ -194,7 +194,7 @@ def test_a_full_mailbox_drops_instead_of_waiting() -> None:
     assert first.seq == 1
 
 
-def test_a_stream_that_nobody_can_read_is_told_once_and_the_journal_is_read() -> None:
+def test_an_unreadable_stream_is_reported_once_and_the_journal_is_read() -> None:
     def unreadable() -> Iterator[AnyMessage]:
         raise AnswerError("the answer of http://conoid.test cannot be read")
         yield

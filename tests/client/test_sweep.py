@@ -129,7 +129,7 @@ def test_a_plot_of_what_is_not_there_is_refused(x: str | None, columns: list[str
         sweep_plot.figure(ROWS, ["v", "run.ranks"], x, columns)
 
 
-def test_nothing_to_draw_is_told() -> None:
+def test_a_sweep_without_an_ended_run_has_no_figure() -> None:
     with pytest.raises(ClientError, match="no run of the sweep has ended"):
         sweep_plot.figure([{**ROWS[0], "cpu [s]": ""}], ["v"], None, [])
 

@@ -53,7 +53,7 @@ def test_a_pipe_gets_whole_names(capsys: pytest.CaptureFixture[str]) -> None:
     assert all("batch=first" in line and "sweep" not in line for line in lines)
 
 
-def test_the_values_that_are_told_are_those_that_differ_within_cases_that_are_alike() -> None:
+def test_the_listed_values_differ_within_equal_cases() -> None:
     other = Alike(values={"x": 1.0}, units={}, results=[])
     alone = RunRow(
         info=INFOS[0], values={"x": 1.0, "run.ranks": 2}, results={}, units={}, references=0, missed=[], alike=other
@@ -62,7 +62,7 @@ def test_the_values_that_are_told_are_those_that_differ_within_cases_that_are_al
     assert differing(RUNS[:1], 9) == []
 
 
-def test_the_end_of_a_run_says_how_much_compression_matter_of_tension_alone_has_met() -> None:
+def test_the_outcome_has_the_largest_compression_of_laws_for_tension_only() -> None:
     met = Compressed(part="tile", times=21.1, most=50.6e9, least=0.0, tets=509, tet=1, x=0.0, y=0.0, z=0.0, time=1e-6)
     out = io.StringIO()
     for compressed in ([met], []):
@@ -74,7 +74,7 @@ def test_the_end_of_a_run_says_how_much_compression_matter_of_tension_alone_has_
     )
 
 
-def test_the_end_of_a_run_says_what_one_thread_did_alone() -> None:
+def test_the_outcome_has_the_serial_time_of_one_thread() -> None:
     ended = Outcome(
         state="succeeded", steps=1000, ranks=2, threads=3, helped=[9.0, 3.0],
         serial={"elements": [0.5, 1.0], "rest": [0.25, 1.0]}, parallel={"elements": [5.0, 6.0], "rest": [0.0, 0.0]},
@@ -104,7 +104,7 @@ def test_the_end_of_a_run_has_its_probes_with_units_and_extremes() -> None:
     ]  # fmt: skip
 
 
-def test_keys_are_short_as_far_as_they_are_told_apart() -> None:
+def test_keys_are_shortened_while_they_stay_distinct() -> None:
     keys = ["parts[0].velocity[2]", "parts[1].velocity[2]", "run.end_time", "a.b.c", "x.b.c", "c"]
     assert list(short_names(keys).values()) == [*keys[:2], "end_time", "a.b.c", "x.b.c", "c"]
 

@@ -63,7 +63,7 @@ def ran(folder: Path, case: str) -> Result:
 
 
 @pytest.mark.slow
-def test_it_ends_as_it_says(tmp_path: Path) -> None:
+def test_the_tutorial_ends_with_the_documented_results(tmp_path: Path) -> None:
     result = ran(tmp_path, CASE)
     end, history = result.outcome, result.history
     expected = estimate(parse_case(toml_data(CASE)))

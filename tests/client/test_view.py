@@ -84,7 +84,7 @@ def test_a_field_that_the_frame_lacks_is_named(tmp_path: Path) -> None:
 
 
 @pytest.mark.usefixtures("warm")
-def test_a_file_that_is_no_frame_is_one_line(tmp_path: Path) -> None:
+def test_a_file_that_is_not_a_frame_is_refused_in_one_line(tmp_path: Path) -> None:
     (tmp_path / "f.vtkhdf").write_bytes(b"nothing")
     with pytest.raises(ViewError) as caught:
         view(tmp_path / "f.vtkhdf", "mises", tmp_path / "p.png")
@@ -97,7 +97,7 @@ def test_a_file_that_is_no_frame_is_one_line(tmp_path: Path) -> None:
     [("nothing", "mises", "no such run, folder or frame"), ("pyproject.toml", "mises", r"ends in \.vtkhdf"),
      (".", "stress", "allowed: mises, pressure")],
 )  # fmt: skip
-def test_what_cannot_be_drawn_is_said_before_anything_starts(source: str, field: str, message: str) -> None:
+def test_an_unknown_field_is_refused_before_the_renderer_starts(source: str, field: str, message: str) -> None:
     with pytest.raises(ViewError, match=message):
         view(source, field)
 
@@ -165,7 +165,7 @@ def test_fields_can_be_listed_without_vtk() -> None:
 
 
 @pytest.mark.usefixtures("warm")
-def test_frames_know_their_times_and_stand_side_by_side(folder: Path, tmp_path: Path) -> None:
+def test_frames_have_times_and_are_drawn_side_by_side(folder: Path, tmp_path: Path) -> None:
     drawn = view(folder, "mises", tmp_path / "two.png", size=SIZE, time=[0.0, 75e-6], up="z")
     assert drawn.times == [0.0, 80e-6], "of each time the nearest frame"
     one = view(folder, "mises", tmp_path / "one.png", size=SIZE, frame=0)
@@ -194,7 +194,7 @@ def test_a_transparent_ground_is_left_out(folder: Path, tmp_path: Path) -> None:
 
 
 @pytest.mark.usefixtures("warm")
-def test_a_section_cuts_away_what_lies_before_it(folder: Path, tmp_path: Path) -> None:
+def test_a_section_removes_the_tets_in_front_of_it(folder: Path, tmp_path: Path) -> None:
     whole = view(folder, "temperature", tmp_path / "a.png", size=SIZE)
     below = view(folder, "temperature", tmp_path / "b.png", size=SIZE, camera="-z", section="z=0.02")
     above = view(folder, "temperature", tmp_path / "c.png", size=SIZE, camera="z", section="z=0.02")
@@ -226,7 +226,7 @@ def seen(**options: Any) -> Picture:
 
 
 @pytest.mark.usefixtures("warm")
-def test_the_bar_of_a_length_is_as_long_as_it_says(folder: Path, tmp_path: Path) -> None:
+def test_a_scale_bar_has_its_printed_length(folder: Path, tmp_path: Path) -> None:
     """The body is 32.4 mm long at the start and 0.82 of that in the last frame; body and scale bar have the same
     scale.
     """
@@ -336,7 +336,7 @@ def test_a_picture_for_which_the_disk_is_too_small_leaves_the_old_one(name: str,
     assert [(path.name, path.read_bytes()) for path in tmp_path.iterdir()] == [(name, b"old")]
 
 
-def test_what_a_failure_is_told_by() -> None:
+def test_a_failure_names_its_file() -> None:
     assert reason(OSError(28, "No space left on device"), "bar.gif") == "bar.gif: No space left on device"
 
 
@@ -360,7 +360,7 @@ def test_a_body_is_cut_and_mirrored_at_once(mirror: str, section: str, folder: P
         {"section": "x=1e99"}, {"camera": "1e-999,0,0"},
     ],
 )  # fmt: skip
-def test_what_cannot_be_seen_is_one_line(options: dict[str, Any], folder: Path, tmp_path: Path) -> None:
+def test_an_invisible_object_is_refused_in_one_line(options: dict[str, Any], folder: Path, tmp_path: Path) -> None:
     with pytest.raises(LookError) as raised:
         view(folder, "mises", tmp_path / "a.png", size=(64, 64), **options)
     assert "\n" not in str(raised.value)

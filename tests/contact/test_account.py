@@ -121,7 +121,7 @@ def test_contact_gives_back_no_energy_that_it_has_not_taken() -> None:
 
 
 @pytest.mark.parametrize("ranks", [2, 3])
-def test_all_ranks_and_a_restarted_run_decide_alike(ranks: int) -> None:
+def test_all_ranks_and_a_restarted_run_decide_equally(ranks: int) -> None:
     def decide(comm: Comm) -> tuple[bool, bool, float]:
         account = Account(1.0)
         booked(account, 1.0 if comm.rank == 0 else -0.03125)

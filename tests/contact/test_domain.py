@@ -49,7 +49,7 @@ def touched(things: Boxes, askers: Boxes) -> Flags:
 @pytest.mark.parametrize("edge", [0.02, 0.2, 2.0])
 @pytest.mark.parametrize("ranks", [2, 3, 5])
 @pytest.mark.parametrize("kind", KINDS)
-def test_whatever_touches_another_ranks_boxes_is_sent_there(kind: str, ranks: int, edge: float) -> None:
+def test_faces_that_touch_boxes_of_another_rank_are_sent_there(kind: str, ranks: int, edge: float) -> None:
     sent = 0
     for seed in range(5):
         shares = [Share(rank, seed, ranks) for rank in range(ranks)]

@@ -60,7 +60,7 @@ def test_what_has_gone_through_the_outermost_tets_is_buried() -> None:
 
 
 @pytest.mark.parametrize(("depth", "buried"), [(0.025 * SIZE, False), (0.1 * SIZE, True)])
-def test_what_touches_a_surface_whose_tets_are_flat_is_not_inside(depth: float, buried: bool) -> None:
+def test_a_node_that_touches_a_surface_of_flat_tets_is_not_inside(depth: float, buried: bool) -> None:
     """The top layer of the larger block is compressed to a hundredth: the tets below it have no corner on the
     surface.
     """

@@ -285,7 +285,7 @@ def test_a_pair_stays_deactivated_while_its_node_departs_by_less_than_the_slack(
 
 
 @pytest.mark.parametrize("kind", ["face", "node"])
-def test_a_pair_that_is_no_surface_is_tested_when_it_becomes_some(kind: str) -> None:
+def test_a_pair_inside_a_body_is_tested_when_it_becomes_surface(kind: str) -> None:
     """New lines do not activate the pair; the surface flag does."""
     pair = Pair()
     flags, fresh = (pair.exposed, pair.face_fresh) if kind == "face" else (pair.on_surface, pair.node_fresh)
@@ -354,7 +354,7 @@ def test_the_chains_of_pairs_hold_each_pair_of_a_node_once() -> None:
         assert sorted(chain) == np.flatnonzero(table.rows[:, 0] == node).tolist()
 
 
-def test_a_line_begins_anew_where_its_slot_is_with_the_mean_velocity_since() -> None:
+def test_a_line_begins_again_at_its_slot_with_the_mean_velocity() -> None:
     draw = np.random.default_rng(3)
     x, course, now = draw.normal(size=(6, 3)), draw.normal(size=(6, 3)), draw.normal(size=(6, 3))
     lines, some = Lines(x, course), np.arange(6) < 4
@@ -379,7 +379,7 @@ def test_how_far_a_slot_leaves_its_line_is_the_larger_of_the_steps_beginning_and
     assert (most, motion.faces[0], motion.edges[0]) == pytest.approx((0.3, 0.9, 0.3))
 
 
-def test_lines_are_taken_over_by_other_slots() -> None:
+def test_lines_are_copied_to_other_slots() -> None:
     """New slots begin at their positions; the other slots keep their lines, at any time."""
     draw = np.random.default_rng(4)
     old = Lines(draw.normal(size=(4, 3)), draw.normal(size=(4, 3)))

@@ -225,7 +225,7 @@ def flown(seed: int) -> World:
 
 
 @pytest.mark.parametrize("seed", SEEDS)
-def test_what_has_changed_is_registered_whatever_happens(seed: int) -> None:
+def test_changed_slots_are_registered_after_any_event(seed: int) -> None:
     """The changes are departures, foreseen cracks, exposed faces, new scenes that copy pairs, and searches without
     previous pairs."""
     world = flown(seed)

@@ -91,7 +91,7 @@ def test_parts_that_touch_but_share_no_node_are_exposed_to_each_other() -> None:
     assert (piece.across < 0).sum() == 2 * 6 * 4 * 2
 
 
-def test_faces_look_outward_and_enclose_the_volume() -> None:
+def test_faces_are_oriented_outward_and_enclose_the_volume() -> None:
     found, model = whole(shuffled(block(CELLS, SIZE), 3))
     x, (a, b, c, d) = model.nodes.x0, found.faces.nodes.T
     normal = normals(x, a, b, c)
@@ -130,7 +130,7 @@ def test_sharp_edges_of_a_box_are_its_twelve_edges() -> None:
     assert edges.size.sum() == pytest.approx(4.0 * BOX.sum(), rel=1e-12)
 
 
-def test_the_two_faces_of_an_edge_look_outward_too() -> None:
+def test_the_two_faces_of_an_edge_are_oriented_outward() -> None:
     found, model = whole(shuffled(block(CELLS, SIZE), 5))
     x, (a, b, c, d) = model.nodes.x0, found.edges.nodes[:, :4].T
     assert (found.edges.sides[:, 0] < found.edges.sides[:, 1]).all()
@@ -209,7 +209,7 @@ def test_concave_edges_belong_to_the_list_too() -> None:
 
 
 @pytest.mark.parametrize("ranks", [2, 3])
-def test_an_edge_with_four_faces_is_treated_alike_on_any_number_of_ranks(ranks: int) -> None:
+def test_an_edge_with_four_faces_gives_one_answer_on_any_number_of_ranks(ranks: int) -> None:
     mesh = cubes(CUBES[2])
     case = meeting_of([{}], {"self_contact": ("body0",)})
     ((piece, model),) = pieces_of(case, [mesh])

@@ -51,7 +51,7 @@ def test_twenty_faults_leave_every_state_true(stand: Stand) -> None:
     assert [f"{row.fault}: {row.verdict}" for row in found if row.verdict != TRUE] == []
 
 
-def test_nobody_waits_longer_than_told_for_a_server_that_hangs(tmp_path: Path) -> None:
+def test_no_request_waits_longer_than_its_limit_for_a_server_that_hangs(tmp_path: Path) -> None:
     """A request to a hung server must give up, else a fault of three seconds would take minutes."""
     with socket.create_server(("127.0.0.1", 0)) as silent:
         stand = Stand(tmp_path, http=httpx2.Client(base_url=f"http://127.0.0.1:{silent.getsockname()[1]}"))

@@ -176,7 +176,7 @@ def test_sides_that_slide_rub(friction: float) -> None:
 
 
 @pytest.mark.parametrize("friction", [0.0, 0.2])
-def test_cracks_close_alike_on_any_number_of_ranks(friction: float) -> None:
+def test_cracks_close_equally_on_any_number_of_ranks(friction: float) -> None:
     """The cracks close and slide, with broad phases in between; the results are bit-identical."""
 
     def work(sim: Simulation) -> tuple[list[float], int]:

@@ -421,7 +421,7 @@ def _other(folder: Path) -> Path:
     return folder / "history.csv"
 
 
-def test_laws_are_as_likely_as_scipy_says() -> None:
+def test_likelihoods_of_laws_equal_those_of_scipy() -> None:
     values = np.random.default_rng(3).exponential(2e-3, 500) + 1e-5
     rayleigh, exponential, power = tables.fits(values.tolist())
     for fit, law in (

@@ -136,14 +136,14 @@ Lower,
     [("Hit", -1, [2, 1]), ("names", -1, [2, 1, 2]), ("Upper", -1, [2]), ("Rod.Upper", 0, [1, 1]),
      ("Rod 2.Lower", 8, [2])],
 )  # fmt: skip
-def test_members_and_sets_of_instances_are_told_apart(group: str, low: float, tets: list[int], tmp_path: Path) -> None:
+def test_members_and_sets_of_instances_stay_distinct(group: str, low: float, tets: list[int], tmp_path: Path) -> None:
     """A set of the assembly hides sets of the same name in parts; each set belongs to its own scope."""
     found = read(PART + QUALIFIED, tmp_path, group)
     assert found.names.tets.tolist() == tets
     assert found.mesh.points[:, 2].min() == low
 
 
-def test_a_set_that_hides_another_one_is_told(tmp_path: Path) -> None:
+def test_a_set_that_hides_another_set_is_reported(tmp_path: Path) -> None:
     notes = read(PART + QUALIFIED, tmp_path, "Upper").notes
     assert "the set 'Upper' is that of the assembly; another one is Rod.Upper" in notes
 
@@ -271,7 +271,7 @@ def test_a_node_set_with_undefined_nodes_is_reported(tmp_path: Path) -> None:
     assert found == [f"{message}the node set 'Base' (1, such as 77), the node set 'Grip' (2, such as 98)"]
 
 
-def test_a_part_without_an_instance_is_told(tmp_path: Path) -> None:
+def test_a_part_without_an_instance_is_reported(tmp_path: Path) -> None:
     spare = PART.replace("*HEADING\n a comment line, with, commas\n", "").replace("NAME=Rod", "NAME=Spare")
     assert "parts without an instance are left out: 'Spare' (2 elements)" in read(PART + spare + TWO, tmp_path).notes
 
@@ -416,5 +416,5 @@ def test_what_would_join_or_remove_bodies_is_counted(tmp_path: Path) -> None:
     assert not any(message in note for note in read(PART + TWO, tmp_path).notes)
 
 
-def test_keywords_of_the_analysis_are_passed_over(tmp_path: Path) -> None:
+def test_keywords_of_the_analysis_are_skipped(tmp_path: Path) -> None:
     assert len(read(FLAT + ANALYSIS, tmp_path).mesh.tets) == 2

@@ -89,7 +89,7 @@ def test_a_cache_that_cannot_be_written_costs_only_time(tmp_path: Path, monkeypa
     assert len(build(BLOCK, HERE).tets) == 6 * 27
 
 
-def test_the_cache_forgets_what_was_not_used_for_longest(cache: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_cache_drops_the_least_recently_used_entry(cache: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     build(BLOCK, HERE)
     old = only(cache)
     os.utime(old, (0, 0))
@@ -192,7 +192,7 @@ except MeshError as error:
 
 
 @pytest.mark.parametrize(("memory", "says"), [(3 * 2**30, "True"), (200 * 2**20, "0.195 GiB")])
-def test_a_child_asks_for_no_more_than_is_allowed(memory: int, says: str, cache: Path) -> None:
+def test_a_child_allocates_no_more_than_is_allowed(memory: int, says: str, cache: Path) -> None:
     """The test uses hard limits, as set by ``ulimit -v`` and ``ulimit -t`` or by a batch system, which no user can
     raise."""
     command = [sys.executable, "-c", UNDER_LIMITS, str(memory), "200"]

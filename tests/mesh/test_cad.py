@@ -51,7 +51,7 @@ def made(path: Path, data: str | bytes, **more: Any) -> TetMesh:
     [(str, 1e-3, "1 mm"), (in_metres, 1.0, "1 m"), (in_inches, 0.0254, "1 in")],
     ids=["mm", "m", "inch"],
 )
-def test_a_file_says_its_unit(folder: Path, step: str, change: Any, unit: float, written_unit: str) -> None:
+def test_a_file_contains_its_unit(folder: Path, step: str, change: Any, unit: float, written_unit: str) -> None:
     """The key ``unit`` may have the same unit, and no other."""
     path = folder / "unit.step"
     for given in (None, written_unit):

@@ -129,7 +129,7 @@ def test_the_same_combination_has_the_same_bits_and_is_kept_by_content() -> None
     assert np.array_equal(np.sort(one.points, axis=0), np.sort(other.points, axis=0))
 
 
-def test_short_edges_and_small_rounds_are_told() -> None:
+def test_short_edges_and_small_fillets_are_reported() -> None:
     notch = {"shape": "box", "low": [0.49, -1.0, 0.49], "high": [1.0, 1.0, 1.0]}
     round_hole = {"shape": "cylinder", "radius": 0.05, "length": 2.0, "base": [0.0, 0.0, -1.0]}
     block = {"shape": "box", "low": [-0.5, -0.5, -0.5], "high": [0.5, 0.5, 0.5]}
@@ -199,7 +199,7 @@ def _written(mesh: Any) -> Any:
 @pytest.mark.parametrize(
     ("low", "message"), [((4, 4, 0), "edges"), ((4, 4, 4), "points"), ((4, 0, 0), ""), ((5, 0, 0), "")]
 )
-def test_solids_that_touch_in_an_edge_or_a_point_alone_are_told(low: tuple[int, int, int], message: str) -> None:
+def test_solids_that_touch_only_in_an_edge_or_a_point_are_reported(low: tuple[int, int, int], message: str) -> None:
     boxes = [
         {"shape": "box", "low": [1e-3 * x for x in corner], "high": [1e-3 * (x + 4) for x in corner]}
         for corner in ((0, 0, 0), low)

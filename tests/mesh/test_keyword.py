@@ -142,7 +142,7 @@ def test_a_name_of_two_things_and_an_unknown_one_are_refused(tmp_path: Path) -> 
         volume(tmp_path, TWO + more, "middle")
 
 
-def test_what_is_not_in_the_mesh_is_told(tmp_path: Path) -> None:
+def test_ignored_keywords_are_reported(tmp_path: Path) -> None:
     more = "*ELEMENT_SHELL\n1,9,1,2,3,4\n*CONTACT_TIED_NODES_TO_SURFACE\n1,2\n*SET_NODE_GENERAL\n3\nBOX,1\n"
     volume(tmp_path, TWO.replace("3,0,1,0\n", "3,0,1,0,7\n") + more)
     origin = taken(tmp_path / "two.key").origin

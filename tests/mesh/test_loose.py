@@ -100,7 +100,7 @@ def test_the_seed_makes_the_shards() -> None:
     assert edges(structured(shards(perturbation=0.1))).std() > 0.003
 
 
-def test_all_turns_are_alike() -> None:
+def test_all_rotations_are_treated_equally() -> None:
     """The rotations have no preferred direction: means of their entries and of the squares are within four standard
     errors, and the angles have the density (1 - cos a) / pi."""
     turns = rotations(uniform(np.arange(60_000), 9).reshape(-1, 3))

@@ -80,7 +80,7 @@ def test_wrong_shapes_are_refused(points: object, tets: object) -> None:
         TetMesh(np.asarray(points), np.asarray(tets))
 
 
-def test_faces_look_outward() -> None:
+def test_faces_are_oriented_outward() -> None:
     a, b, c = (CORNER[FACES[:, i]] for i in range(3))
     outward = np.einsum("ij,ij->i", np.cross(b - a, c - a), a - CORNER.mean(axis=0))
     assert (outward > 0).all()

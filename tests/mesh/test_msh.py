@@ -124,7 +124,7 @@ SMALL = f"$MeshFormat\n2.2 0 8\n$EndMeshFormat\n{NODES}{TETS}"
 NAMES = '$PhysicalNames\n2\n3 1 "{}"\n3 2 "{}"\n$EndPhysicalNames\n'
 
 
-def test_groups_of_one_entity_are_told_apart(tmp_path: Path) -> None:
+def test_groups_of_one_entity_are_distinguished(tmp_path: Path) -> None:
     (tmp_path / "small.msh").write_text(SMALL)
     assert [read_msh(tmp_path / "small.msh", group, "mesh").names.tets.tolist() for group in ("1", "2", None)] == [
         [100], [101], [100, 101],
@@ -190,6 +190,6 @@ def test_what_does_not_fit_is_refused(before: str, after: str, message: str, tmp
     assert "\n" not in str(raised.value)
 
 
-def test_a_section_that_is_not_known_is_told(tmp_path: Path) -> None:
+def test_an_unknown_section_is_reported(tmp_path: Path) -> None:
     (tmp_path / "small.msh").write_text(f"{SMALL}$Strange\n1 2 3\n$EndStrange\n$Periodic\n0\n$EndPeriodic\n")
     assert read_msh(tmp_path / "small.msh", None, "mesh").notes == ("unknown sections are ignored: $Strange",)

@@ -118,7 +118,7 @@ def test_an_element_without_a_proper_volume_is_refused_with_its_line(nodes: list
 
 
 @pytest.mark.parametrize(("raised", "share"), [(4, 1 / 3), (5, 1 / 6)])
-def test_warped_faces_are_told_by_what_they_lose(raised: int, share: float) -> None:
+def test_warped_faces_are_reported_with_their_lost_volume(raised: int, share: float) -> None:
     """A corner of the unit cube is raised by h. The volume below a bilinear top is larger by h / 4. The volume below
     the triangles is larger by h / 3 if the diagonal ends at this corner, as it does at the smallest number, else by
     h / 6."""

@@ -32,7 +32,7 @@ def steps(team: Team, chosen: Choice, number: int) -> tuple[list[str], "np.ndarr
     return [text for text in reports if text], done
 
 
-def test_a_scene_that_is_too_small_is_told_once(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_scene_that_is_too_small_for_threads_is_reported_once(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(projecting, "measured", lambda: Costs(turn=10**8, call=0, wake=10**7))
     monkeypatch.setattr(choice, "_AGAIN", 0.0)
     team = Team(4)

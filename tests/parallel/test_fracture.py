@@ -96,7 +96,7 @@ def shared(sim: Simulation) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def test_all_ranks_know_who_shares_what_separates() -> None:
+def test_all_ranks_have_the_sharers_of_separating_nodes() -> None:
     """After every split the lists of two ranks are the same, in the same order, with each node once. If any rank may
     push a node, all ranks that push or have the node take part in its sum. A rank receives each ghost node once.
     """

@@ -38,7 +38,7 @@ def groups(folder: Path) -> list[Groups]:
 
 
 @pytest.mark.slow
-def test_a_run_tells_its_groups_alike_on_any_number_of_ranks(run: Callable[[int], Path]) -> None:
+def test_a_run_records_equal_groups_on_any_number_of_ranks(run: Callable[[int], Path]) -> None:
     one, two = groups(run(1)), groups(run(2))
     assert (one[0].centres, one[0].tets, one[0].outside) == (two[0].centres, two[0].tets, two[0].outside)
     assert (one[-1].step, one[-1].outside) == (two[-1].step, two[-1].outside)
@@ -52,7 +52,7 @@ def test_a_run_begins_and_ends_with_its_groups(moving: Path) -> None:
     assert sum(before[-1].outside) > sum(before[0].outside), "something has broken"
 
 
-def test_the_replay_of_a_run_knows_its_cuts(moving: Path) -> None:
+def test_the_replay_of_a_run_has_its_cuts(moving: Path) -> None:
     command = [sys.executable, "-m", "conoid.client.cli", "replay-balance", str(moving), "--json"]
     answer = json.loads(subprocess.run(command, check=True, capture_output=True, text=True, timeout=60).stdout)
     happened, replayed = answer["run"], answer["policies"][0]

@@ -62,7 +62,9 @@ def of_cause(folder: Path, cause: str) -> bytes:
 
 
 @pytest.mark.parametrize("cause", ["start", "end"])
-def test_any_number_of_ranks_sees_the_same(cause: str, breaking: Callable[[int, str], Path], moving: Path) -> None:
+def test_any_number_of_ranks_gives_the_same_surface(
+    cause: str, breaking: Callable[[int, str], Path], moving: Path
+) -> None:
     one = of_cause(breaking(1, FAST), cause)
     mine, head = arrays(one), snapshot.header_of(one)
     for folder, ranks in ((breaking(2, FAST), 2), (moving, 3)):
@@ -78,7 +80,7 @@ def test_any_number_of_ranks_sees_the_same(cause: str, breaking: Callable[[int, 
 
 
 @pytest.mark.parametrize("ranks", [1, 2])
-def test_the_last_snapshot_says_what_the_tables_say(ranks: int, breaking: Callable[[int, str], Path]) -> None:
+def test_the_last_snapshot_equals_the_tables_of_fragments(ranks: int, breaking: Callable[[int, str], Path]) -> None:
     """Momentum that is not in the rows of the snapshot belongs to nodes whose tets have eroded."""
     folder = breaking(ranks, FAST)
     data = of_cause(folder, "end")
@@ -177,7 +179,7 @@ def test_a_run_that_goes_on_goes_on_counting_and_tidies_up(tmp_path: Path) -> No
     )
 
 
-def test_what_a_killed_run_tells_of_is_whole(tmp_path: Path) -> None:
+def test_the_files_that_a_killed_run_announced_are_complete(tmp_path: Path) -> None:
     with started(command(2, "glass_steel_demo", "--out", str(tmp_path))) as launcher:
         wait_for(tmp_path / layout.JOURNAL, '"cause":"run.snapshots"', launcher)
         time.sleep(0.3)

@@ -59,7 +59,7 @@ def warned(end: Outcome) -> list[str]:
     return [text for text in end.warnings if "no unit, taken for" not in text]
 
 
-def test_half_flat_is_no_reason_to_say_anything(tmp_path: Path) -> None:
+def test_a_half_flat_tet_gives_no_warning(tmp_path: Path) -> None:
     end = outcome(tmp_path, "0.5 ms", 1)
     assert (end.state, warned(end)) == ("succeeded", [])
 
@@ -76,7 +76,7 @@ def test_flat_is(tmp_path: Path, ranks: int) -> None:
 
 
 @pytest.mark.parametrize("ranks", [pytest.param(1, marks=pytest.mark.slow), 2])
-def test_what_is_used_up_says_how_short_the_steps_were(tmp_path: Path, ranks: int) -> None:
+def test_a_run_out_of_steps_reports_its_step_sizes(tmp_path: Path, ranks: int) -> None:
     """At the end of the run a fifth of the height of the body is left."""
     end = outcome(tmp_path, "1.1 ms", ranks, "--set", "run.max_steps=300")
     assert (end.state, end.cause, end.steps, warned(end)) == ("timed_out", "steps", 300, [])

@@ -203,7 +203,7 @@ def refused(words: Sequence[str]) -> str:
     return launched.stderr.strip()
 
 
-def test_what_cannot_go_on_says_why(tmp_path: Path) -> None:
+def test_a_run_that_cannot_be_resumed_has_a_reason(tmp_path: Path) -> None:
     words = case("nodal", tmp_path, tmp_path)
     none = f"--restart: {tmp_path / 'nodal'} has no complete checkpoint: "
     assert refused(words) == f"{none}there is none"

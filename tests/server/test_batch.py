@@ -81,7 +81,7 @@ def test_a_job_that_waits_is_cancelled_by_its_folder(place: Path, cluster: Clust
         time.sleep(0.2)
 
 
-def test_a_profile_that_is_not_there_is_told_with_those_that_are(tmp_path: Path) -> None:
+def test_a_message_about_a_missing_profile_lists_the_existing_ones(tmp_path: Path) -> None:
     (tmp_path / "site.toml").write_text(SITE)
     result = conoid("batch", "two_tets", "--ranks", 1, "--slurm", "fast", "--site", tmp_path / "site.toml")
     assert result.exit_code == 1
@@ -118,7 +118,7 @@ def test_the_shipped_profile_and_script_belong_together() -> None:
     assert words[-3:] == ["/runs/run/job.sh", "/runs/run", job.name]
 
 
-def test_an_mpiexec_is_looked_for_only_where_the_profile_needs_one() -> None:
+def test_an_mpiexec_is_searched_only_where_the_profile_needs_one() -> None:
     def none() -> list[str]:
         raise AssertionError("the request was not sent")
 
@@ -277,7 +277,7 @@ def test_a_run_that_goes_on_is_started_by_a_command_of_this_machine(elsewhere: P
 
 
 @pytest.mark.parametrize("name", [layout.JOB, layout.OUTCOME, layout.RESOLVED_CASE, layout.LOCK])
-def test_a_pipe_in_a_folder_keeps_nobody_waiting(name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_pipe_in_a_folder_does_not_block_a_reader(name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(following, "_ASK_EVERY", 0.0)
     (tmp_path / layout.JOURNAL).write_text('{"type":"status","run":"a","seq":1,"state":"running"}\n')
     os.mkfifo(tmp_path / name)

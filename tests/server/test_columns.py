@@ -75,7 +75,7 @@ def test_extremes_keep_their_order_and_pass_over_what_is_no_number() -> None:
     assert extremes([math.inf, -math.inf]) == (math.inf, -math.inf)
 
 
-def test_a_file_that_was_written_anew_is_read_anew(tmp_path: Path) -> None:
+def test_a_rewritten_file_is_read_again(tmp_path: Path) -> None:
     """A run that continues from a checkpoint removes lines of the history and writes them again."""
     path = tmp_path / layout.HISTORY
     write(path, [1.0, 2.0, 9.0])
@@ -104,7 +104,7 @@ def test_a_long_file_is_read_in_bounded_pieces(tmp_path: Path, monkeypatch: pyte
     assert (found.behind, found.lines) == (False, 200)
 
 
-def test_damage_does_no_harm(tmp_path: Path) -> None:
+def test_damaged_lines_of_a_history_are_skipped(tmp_path: Path) -> None:
     path = tmp_path / layout.HISTORY
     write(path, [1.0])
     with path.open("ab") as file:

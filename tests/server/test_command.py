@@ -222,7 +222,7 @@ def test_all_processes_of_a_run_are_known_and_ended() -> None:
     assert processes.start_time(os.getpid()) is not None
 
 
-def test_shared_memory_that_nobody_uses_is_found(tmp_path: Path) -> None:
+def test_shared_memory_without_a_user_is_found(tmp_path: Path) -> None:
     for name in ("mpich_shm_old", "mpich_shm_new", "mpich_shm_used", "other_old"):
         (tmp_path / name).write_bytes(b"x" * 4096)
         if not name.endswith("new"):

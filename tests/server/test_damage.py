@@ -44,7 +44,7 @@ def turned(house: House, run: Run, state: State | None = None) -> Run:
 
 
 @pytest.mark.parametrize("when", ["waits", "runs", "no server is there"])
-def test_a_journal_that_nobody_can_write_ends_its_run(tmp_path: Path, when: str) -> None:
+def test_a_journal_that_cannot_be_written_ends_its_run(tmp_path: Path, when: str) -> None:
     house = House(tmp_path / "runs")
     house.puppets.ends = "never"
     run = house.accept()
@@ -125,7 +125,7 @@ def test_complaints_of_a_disk_are_known(tmp_path: Path, message: str) -> None:
     assert launcher_log.disk_failed(tmp_path)
 
 
-def test_an_outcome_that_nobody_can_read_makes_room(tmp_path: Path) -> None:
+def test_an_unreadable_outcome_frees_its_slots(tmp_path: Path) -> None:
     from conoid.cases.outcome import Outcome
 
     folder_in_place(tmp_path / layout.OUTCOME)
@@ -135,7 +135,7 @@ def test_an_outcome_that_nobody_can_read_makes_room(tmp_path: Path) -> None:
     assert ended.state == "lost"
 
 
-def test_a_disk_that_was_full_at_the_end_is_remembered(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_disk_that_was_full_at_the_end_is_the_cause(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     house = House(tmp_path / "runs")
     house.puppets.ends = "never"
     run = house.accept()
@@ -182,7 +182,7 @@ def test_a_folder_that_is_locked_away_keeps_no_server_from_its_start(
 
 
 @pytest.mark.parametrize("state", [State.QUEUED, State.RUNNING])
-def test_a_run_whose_folder_was_emptied_is_taken_up_all_the_same(tmp_path: Path, state: State) -> None:
+def test_a_run_whose_folder_was_emptied_is_continued(tmp_path: Path, state: State) -> None:
     house = House(tmp_path / "runs")
     house.puppets.ends = "never"
     run = turned(house, house.accept(), State.RUNNING)
@@ -201,7 +201,7 @@ def test_a_run_whose_folder_was_emptied_is_taken_up_all_the_same(tmp_path: Path,
     house.store.close()
 
 
-def test_an_end_that_the_database_has_missed_twice_is_told_once_it_can_be_written(
+def test_an_end_that_the_database_missed_twice_is_written_later(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """The end could not be written to the database at the end of the run, and not at the start of the next server."""

@@ -94,7 +94,7 @@ def test_a_link_in_place_of_a_file_of_a_run_is_not_followed(server: Running, tmp
         to_json(Snapshot(**SNAPSHOT, path="a.snap", sha256="€\r\nX: y")),
     ],
 )
-def test_a_damaged_journal_is_passed_over(ended: tuple[Running, str], line: bytes) -> None:
+def test_a_damaged_journal_is_skipped(ended: tuple[Running, str], line: bytes) -> None:
     server, run = ended
     path = server.ann.runs / run / layout.JOURNAL
     before = path.read_bytes()
@@ -128,7 +128,7 @@ def test_damaged_files_of_a_run_leave_its_row(server: Running, name: str, more: 
 
 @pytest.mark.parametrize(("name", "value"), [("since", "nan"), ("until", "inf"), ("changed", "-inf"), ("text", "a\0"),
                                              ("case", "\0"), ("label", "a=\0")])  # fmt: skip
-def test_a_question_without_sense_is_refused_in_one_line(ended: tuple[Running, str], name: str, value: str) -> None:
+def test_an_invalid_request_is_refused_in_one_line(ended: tuple[Running, str], name: str, value: str) -> None:
     server, _ = ended
     answer = server.ann.http.get("/v1/table", params={name: value})
     assert answer.status_code in {400, 422}

@@ -152,7 +152,7 @@ def test_events_pass_through_nginx_when_they_happen(process: MakeProcess, tmp_pa
 @WITH_NGINX
 @pytest.mark.slow
 @pytest.mark.timeout(300)
-def test_a_silent_log_passes_through_nginx(process: MakeProcess, tmp_path: Path) -> None:
+def test_a_log_without_new_lines_passes_through_nginx(process: MakeProcess, tmp_path: Path) -> None:
     """nginx ends an answer from which no bytes arrive for 90 s."""
     ann, run = running(process, tmp_path)
     with (

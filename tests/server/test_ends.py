@@ -43,7 +43,7 @@ def test_a_journal_without_the_worst_residual_is_read_too(tmp_path: Path) -> Non
     assert math.isnan(ended.worst_residual)
 
 
-def test_a_lost_run_has_come_as_far_as_its_journal_tells(tmp_path: Path) -> None:
+def test_a_lost_run_has_the_progress_of_its_journal(tmp_path: Path) -> None:
     journaled(
         tmp_path, Status(run="a", state="starting"), STARTED, at(3), COUNTS, at(7), Status(run="a", state="running")
     )
@@ -56,7 +56,7 @@ def test_a_lost_run_has_come_as_far_as_its_journal_tells(tmp_path: Path) -> None
 
 
 @pytest.mark.parametrize("messages", [[], [Status(run="a", state="queued")]])
-def test_what_nobody_has_told_is_null(messages: list[AnyMessage], tmp_path: Path) -> None:
+def test_values_without_a_message_are_null(messages: list[AnyMessage], tmp_path: Path) -> None:
     ended = ends.so_far(LOST, replace(RUN, started=0.0), journaled(tmp_path, *messages) if messages else tmp_path)
     assert ended == LOST
     text = outcome_to_json(ended)
@@ -66,7 +66,7 @@ def test_what_nobody_has_told_is_null(messages: list[AnyMessage], tmp_path: Path
     assert math.isnan(from_json(text).elapsed)
 
 
-def test_the_end_is_the_last_that_was_heard(tmp_path: Path) -> None:
+def test_the_end_is_the_last_received_message(tmp_path: Path) -> None:
     assert ends.when(tmp_path) == 0.0
     (tmp_path / layout.OUTCOME).write_bytes(b"{}")
     os.utime(tmp_path / layout.OUTCOME, (70.0, 70.0))
@@ -91,7 +91,7 @@ class Gone:
 
 
 @pytest.mark.parametrize(("seen", "at"), [(True, 0.0), (False, 11.0)], ids=["seen alive", "gone when first looked at"])
-def test_an_end_that_nobody_saw_is_when_the_run_was_last_heard_of(seen: bool, at: float, tmp_path: Path) -> None:
+def test_an_unobserved_end_has_the_time_of_the_last_message(seen: bool, at: float, tmp_path: Path) -> None:
     """The job of Slurm ended while no server was running."""
     worker = Gone(alive=seen)
     watch = Watch(journaled(tmp_path, STARTED), worker, None)  # type: ignore[arg-type]

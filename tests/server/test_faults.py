@@ -37,7 +37,9 @@ def full(*_: object) -> None:
 # Disks ----------------------------------------------------------------------------------------------------------------
 
 
-def test_a_disk_that_is_full_at_the_launch_strands_nobody(server: Running, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_disk_that_is_full_at_the_launch_leaves_no_run_unfinished(
+    server: Running, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr(durable, "write", full)
     monkeypatch.setattr(durable, "probe", full)
     runs = [server.ann.submit() for _ in range(3)]
@@ -82,7 +84,7 @@ def test_a_worker_that_complains_of_a_full_disk_failed_for_storage(server: Runni
     assert (ended["state"], ended["cause"]) == ("failed", "storage")
 
 
-def test_a_worker_whose_file_was_removed_says_which(server: Running) -> None:
+def test_a_worker_names_the_removed_file(server: Running) -> None:
     """The last line on standard error is that of MPI, which does not name the file."""
     ended = server.ann.wait_for(server.ann.submit(end="gone"))
     assert (ended["state"], ended["cause"]) == ("failed", "storage")
@@ -119,7 +121,7 @@ def test_files_are_for_their_user_alone(process: MakeProcess) -> None:
         assert mode == (0o700 if path.is_dir() else 0o600), f"{path}: {mode:o}"
 
 
-def test_a_deleted_lock_lets_no_second_server_in(tmp_path: Path) -> None:
+def test_a_deleted_lock_admits_no_second_server(tmp_path: Path) -> None:
     with only_one(tmp_path):
         (tmp_path / "server.lock").unlink()
         with pytest.raises(AloneError, match="another server"), only_one(tmp_path):
@@ -131,7 +133,7 @@ def test_a_deleted_lock_lets_no_second_server_in(tmp_path: Path) -> None:
 # Causes ---------------------------------------------------------------------------------------------------------------
 
 
-def test_who_was_stopped_by_nobody_known_was_not_cancelled(server: Running, tmp_path: Path) -> None:
+def test_a_run_stopped_without_a_request_is_not_cancelled(server: Running, tmp_path: Path) -> None:
     run = server.ann.submit(wait=str(tmp_path / "go"))
     server.ann.wait_for(run, State.RUNNING)
     os.kill(json.loads((server.service.settings.runs / run / layout.WORKER).read_text())["pid"], signal.SIGTERM)
@@ -160,7 +162,7 @@ def test_a_rank_that_is_killed_is_a_matter_of_the_node(process: MakeProcess, tmp
 # Clocks ---------------------------------------------------------------------------------------------------------------
 
 
-def test_a_clock_that_is_set_ends_nobody(server: Running, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+def test_a_clock_that_is_set_ends_no_run(server: Running, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     real = time.time
     run = server.ann.submit(case_text(extra='max_wall_time = "60 s"', wait=str(tmp_path / "go")))
     server.ann.wait_for(run, State.RUNNING)
@@ -171,7 +173,7 @@ def test_a_clock_that_is_set_ends_nobody(server: Running, monkeypatch: pytest.Mo
     assert server.ann.wait_for(run)["state"] == "succeeded"
 
 
-def test_a_clock_that_is_set_back_keeps_nobody_alive(server: Running, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_clock_that_is_set_back_extends_no_time_limit(server: Running, monkeypatch: pytest.MonkeyPatch) -> None:
     real = time.time
     run = server.ann.submit(end="deaf", steps=1)
     server.ann.wait_for(run, State.RUNNING)
@@ -217,7 +219,7 @@ def test_a_damaged_submission_leaves_the_state_true(server: Running, tmp_path: P
 @pytest.mark.parametrize("name", [layout.SUBMISSION, layout.JOURNAL, layout.WORKER])
 @pytest.mark.parametrize("how", ["deleted", "garbled"])
 @pytest.mark.parametrize("lives", [True, False])
-def test_a_file_is_lost_while_no_server_looks(tmp_path: Path, name: str, how: str, lives: bool) -> None:
+def test_a_file_is_lost_while_no_server_runs(tmp_path: Path, name: str, how: str, lives: bool) -> None:
     house = House(tmp_path / "runs")
     house.puppets.ends = "never"
     run = house.accept()
@@ -248,7 +250,9 @@ def until(house: House, run_id: str, state: State | None = None) -> Run:
 # Database -------------------------------------------------------------------------------------------------------------
 
 
-def test_a_locked_database_is_told_and_passes(server: Running, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+def test_a_locked_database_is_reported_and_the_run_continues(
+    server: Running, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
     run = server.ann.submit(wait=str(tmp_path / "go"))
     server.ann.wait_for(run, State.RUNNING)
     database = server.service.settings.runs / "server.sqlite"
@@ -270,13 +274,13 @@ def test_a_locked_database_is_told_and_passes(server: Running, monkeypatch: pyte
     assert len(list(server.service.settings.runs.glob("[0-9]*"))) == 1, "what was refused left nothing"
 
 
-def test_readiness_tells_a_full_disk(server: Running, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_readiness_reports_a_full_disk(server: Running, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(durable, "probe", full)
     answer = server.nobody.http.get("/readyz")
     assert (answer.status_code, answer.json()["checks"]["runs"]) == (503, False)
 
 
-def test_a_cancel_is_remembered_without_the_database(process: MakeProcess) -> None:
+def test_a_cancel_is_kept_without_the_database(process: MakeProcess) -> None:
     server = process("--no-zenoh", "--grace", "300")
     ann = server.user(server.start()["url"])
     run = ann.submit(end="deaf", steps=1)

@@ -250,7 +250,7 @@ def test_head_of_what_has_no_end_ends_at_once(server: Running, tmp_path: Path) -
     (tmp_path / "go").touch()
 
 
-def test_a_silent_log_that_is_followed_says_that_it_is_there(
+def test_a_followed_log_sends_keep_alive_bytes(
     server: Running, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """The stream sends bytes with value 0 as a sign of life. A followed log does not contain such bytes."""

@@ -90,7 +90,7 @@ def test_a_header_that_comes_a_byte_at_a_time_is_read_in_few_pieces(ann: User, m
     assert len(pieces) <= 4 + 1 + (time.monotonic() - began) / 0.5
 
 
-def test_half_requests_keep_nobody_out(ann: User) -> None:
+def test_incomplete_requests_do_not_exclude_other_users(ann: User) -> None:
     knocks = [knock(ann) for _ in range(400)]
     for _ in range(5):
         with httpx2.Client(base_url=ann.http.base_url, timeout=5.0) as other:
@@ -121,7 +121,9 @@ def test_a_connection_is_used_again(ann: User) -> None:
 
 
 @pytest.mark.parametrize("path", ["stream", "logs/0?follow=true"])
-def test_who_is_revoked_hears_no_more(ann: User, monkeypatch: pytest.MonkeyPatch, tmp_path: Path, path: str) -> None:
+def test_a_revoked_user_receives_no_messages(
+    ann: User, monkeypatch: pytest.MonkeyPatch, tmp_path: Path, path: str
+) -> None:
     monkeypatch.setattr(auth, "RECHECK", 0.3)
     run = ann.submit(wait=str(tmp_path / "go"), steps=10_000, pace=0.02)
     ann.wait_for(run, State.RUNNING)
@@ -136,7 +138,7 @@ def test_who_is_revoked_hears_no_more(ann: User, monkeypatch: pytest.MonkeyPatch
     assert time.monotonic() - began < 5.0
 
 
-def test_a_stream_ends_when_it_was_told_to(ann: User, tmp_path: Path) -> None:
+def test_a_stream_ends_on_request(ann: User, tmp_path: Path) -> None:
     run = ann.submit(wait=str(tmp_path / "go"))
     ann.wait_for(run, State.RUNNING)
     began = time.monotonic()
@@ -183,7 +185,7 @@ def test_a_body_that_was_refused_is_not_read_to_its_end(ann: User) -> None:
     assert sent < 1 << 25
 
 
-def test_an_answer_that_nobody_reads_is_cut_off(ann: User, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_an_answer_without_a_reader_is_cut_off(ann: User, monkeypatch: pytest.MonkeyPatch) -> None:
     real, gone = Connection._look, threading.Event()
 
     def look(self: Connection) -> None:
@@ -208,7 +210,7 @@ def test_an_answer_that_nobody_reads_is_cut_off(ann: User, monkeypatch: pytest.M
     assert received < 1 << 25
 
 
-def test_a_user_with_many_idle_connections_keeps_nobody_out(ann: User) -> None:
+def test_many_idle_connections_of_one_user_do_not_exclude_others(ann: User) -> None:
     """The server accepts 20 connections at a time."""
     place = ann.http.base_url.host, ann.http.base_url.port
     request = f"GET /v1/me HTTP/1.1\r\nHost: x\r\nAuthorization: {ann.http.headers['Authorization']}\r\n\r\n".encode()

@@ -27,7 +27,7 @@ def test_ids_sort_by_time_and_are_never_the_same() -> None:
     assert not any(map(folder.is_id, ["", "..", "x" * 22 + "/", ids[0].upper(), ids[0] + "\n"]))
 
 
-def test_a_new_folder_tells_its_run(tmp_path: Path) -> None:
+def test_a_new_folder_contains_its_run(tmp_path: Path) -> None:
     run, now = folder.new_id()
     made = folder.create(tmp_path, submission(run, now), b"case", b"resolved")
     assert (made / "case.toml").read_bytes() == b"case"
@@ -38,7 +38,7 @@ def test_a_new_folder_tells_its_run(tmp_path: Path) -> None:
     assert (folder.outcome(made), folder.outcome_error(made), folder.process(made)) == (None, "", None)
 
 
-def test_what_a_worker_says_of_its_start_does_not_begin_the_run_anew(tmp_path: Path) -> None:
+def test_messages_of_the_start_do_not_restart_the_run(tmp_path: Path) -> None:
     run, now = folder.new_id()
     made = folder.create(tmp_path, submission(run, now), b"case", b"resolved")
     with (made / layout.JOURNAL).open("ab") as journal:
@@ -59,7 +59,7 @@ def test_a_scan_finds_runs_only_and_removes_what_was_never_promised(tmp_path: Pa
     assert not list(tmp_path.glob(".new-*"))
 
 
-def test_an_outcome_with_a_number_that_is_none_can_be_read(tmp_path: Path) -> None:
+def test_an_outcome_with_an_invalid_number_can_be_read(tmp_path: Path) -> None:
     check = Check(name="mean", value=math.nan, expected=1.0, tolerance=0.1, passed=False)
     (tmp_path / layout.OUTCOME).write_bytes(to_json(Outcome(state="succeeded", time=math.nan, reference=[check])))
     outcome = folder.outcome(tmp_path)

@@ -36,7 +36,7 @@ def run(server: Running) -> str:
     return made
 
 
-def test_short_runs_are_told_whole(server: Running, run: str) -> None:
+def test_short_runs_are_reported_completely(server: Running, run: str) -> None:
     last = write(server.ann.runs / run, lines_of_run(200))
     found = shown(server, run)
     series = found["series"]
@@ -89,7 +89,7 @@ def test_what_comes_later_is_read_on_from_where_it_stood(server: Running, run: s
     assert (found["last"], found["state"], found["elapsed"]) == (last + 1, "succeeded", 990.0)
 
 
-def test_the_course_of_a_run_that_went_on_is_told_once(server: Running, run: str) -> None:
+def test_the_course_of_a_resumed_run_is_read_once(server: Running, run: str) -> None:
     folder = server.ann.runs / run
     last = write(folder, lines_of_run(50))
     write(folder, (message for message in lines_of_run(80) if message.step >= 300), last)
@@ -125,7 +125,7 @@ def test_the_log_of_the_whole_run_is_bounded_and_a_warning_is_there_once(server:
     assert [line["text"][:8] for line in found["warnings"]] == ["line 7", "line 57", "long lon"]
 
 
-def test_garbage_in_the_journal_does_no_harm(server: Running, run: str) -> None:
+def test_invalid_lines_of_the_journal_are_skipped(server: Running, run: str) -> None:
     folder = server.ann.runs / run
     write(folder, lines_of_run(20))
     with (folder / layout.JOURNAL).open("ab") as file:
@@ -179,7 +179,7 @@ def test_a_snapshot_that_is_damaged_is_not_sent_to_be_kept(server: Running, run:
     assert server.ann.http.get(place).content == b"99"
 
 
-def test_a_snapshot_that_the_journal_does_not_tell_of_is_not_there(server: Running, run: str) -> None:
+def test_a_snapshot_that_the_journal_lacks_is_not_found(server: Running, run: str) -> None:
     folder = server.ann.runs / run
     write(folder, lines_of_run(150))
     (folder / layout.SNAPSHOTS).mkdir()

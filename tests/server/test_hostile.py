@@ -109,7 +109,7 @@ def users(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[User, User
 
 
 @pytest.mark.slow
-def test_no_hostile_body_harms_the_server(users: tuple[User, User]) -> None:
+def test_no_hostile_body_stops_the_server(users: tuple[User, User]) -> None:
     ann, _ = users
     ann.http.timeout = httpx2.Timeout(300.0)
     for body in ALL:
@@ -118,7 +118,7 @@ def test_no_hostile_body_harms_the_server(users: tuple[User, User]) -> None:
 
 
 @pytest.mark.slow
-def test_fifty_at_once_keep_nobody_waiting(users: tuple[User, User]) -> None:
+def test_fifty_requests_at_once_delay_no_user(users: tuple[User, User]) -> None:
     ann, bob = users
     run = bob.submit()
     bob.wait_for(run)
@@ -129,7 +129,7 @@ def test_fifty_at_once_keep_nobody_waiting(users: tuple[User, User]) -> None:
 
 
 @pytest.mark.slow
-def test_half_sent_requests_keep_nobody_waiting(users: tuple[User, User]) -> None:
+def test_incomplete_requests_delay_no_user(users: tuple[User, User]) -> None:
     _, bob = users
     run = bob.submit()
     bob.wait_for(run)
@@ -139,7 +139,7 @@ def test_half_sent_requests_keep_nobody_waiting(users: tuple[User, User]) -> Non
 
 
 @pytest.mark.slow
-def test_a_flood_without_a_token_keeps_nobody_waiting(users: tuple[User, User]) -> None:
+def test_a_flood_without_a_token_delays_no_user(users: tuple[User, User]) -> None:
     _, bob = users
     run = bob.submit()
     bob.wait_for(run)

@@ -74,12 +74,12 @@ def test_another_folder_on_the_same_database_is_refused(served: Path, tmp_path: 
 
 
 @pytest.mark.parametrize("content", [b"", b"null", b'{"server": 1}', b"\xff\xfe", b"[" * 100_000])
-def test_a_file_that_says_nothing_is_refused(served: Path, content: bytes) -> None:
+def test_an_empty_file_is_refused(served: Path, content: bytes) -> None:
     (served / identity.FILE).write_bytes(content)
     assert "server.identity cannot be read" in refusal(served, beside(served))
 
 
-def test_a_database_that_is_made_anew_belongs_to_the_folder(served: Path) -> None:
+def test_a_new_database_belongs_to_the_folder(served: Path) -> None:
     (served / "server.sqlite").unlink()
     with opened(beside(served)) as store:
         identity.require(served, store)

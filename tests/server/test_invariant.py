@@ -97,7 +97,7 @@ def quick(monkeypatch: pytest.MonkeyPatch) -> None:
         for lives in product(SCENARIOS, ERRORS, (1, 3))
     ],
 )
-def test_no_fault_at_any_place_strands_a_run(house: Home, name: str, error: str, times: int) -> None:
+def test_no_fault_at_any_place_leaves_a_run_unfinished(house: Home, name: str, error: str, times: int) -> None:
     scenario, (raised, reads) = SCENARIOS[name], ERRORS[error]
     place, fired = 0, 1
     while fired:

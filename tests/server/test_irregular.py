@@ -99,7 +99,7 @@ def test_an_outcome_that_is_a_pipe_keeps_no_request_waiting(server: Running) -> 
 
 
 @pytest.mark.parametrize("kind", ["pipe", "/dev/full", "/dev/null"])
-def test_a_frame_that_goes_to_no_file_is_trouble_of_the_disk(tmp_path: Path, kind: str) -> None:
+def test_a_frame_that_cannot_be_written_is_a_disk_error(tmp_path: Path, kind: str) -> None:
     in_place(tmp_path / "frames" / "000001.vtkhdf", kind)
     refused = pytest.raises(OSError, match="is not a regular file, and keeps nothing")
     with refused as raised, hdf5.created(tmp_path / "frames" / "000001.vtkhdf"):

@@ -82,7 +82,7 @@ def test_the_oldest_go_until_the_rest_is_small_enough(server: Running) -> None:
     assert "more than 2.50 MB" in server.ann.http.get(f"/v1/runs/{runs[0]}").json()["detail"]
 
 
-def test_who_removes_a_run_is_told_too(server: Running) -> None:
+def test_the_removal_of_a_run_is_reported_to_its_user(server: Running) -> None:
     run = ended(server)
     assert server.ann.http.delete(f"/v1/runs/{run}").status_code == 204
     answer = server.ann.http.delete(f"/v1/runs/{run}")
@@ -111,9 +111,7 @@ def places_of(user: User, run: str) -> dict[str, bool]:
     }
 
 
-def test_a_run_whose_folder_was_removed_by_hand_is_told_of_nowhere(
-    server: Running, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_run_whose_folder_was_removed_is_in_no_answer(server: Running, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(existing, "_FRESH", 0.0)
     run, _ = ended(server), ended(server)
     everywhere, nowhere = (
@@ -195,7 +193,7 @@ def test_others_pin_nothing(server: Running, verb: str) -> None:
     assert server.bob.http.post(f"/v1/runs/{ended(server)}:{verb}").status_code == 404
 
 
-def test_what_a_run_writes_after_the_last_look_at_it_counts(server: Running, tmp_path: Path) -> None:
+def test_bytes_written_after_the_last_check_of_a_run_count(server: Running, tmp_path: Path) -> None:
     run = server.ann.submit(wait=str(tmp_path / "go"))
     server.ann.wait_for(run, State.RUNNING)
     looks = keeper_of(server, age="1 h")
@@ -210,7 +208,7 @@ def test_what_a_run_writes_after_the_last_look_at_it_counts(server: Running, tmp
     assert looks.kept("ann") > before + 1_000_000
 
 
-def test_who_asks_is_told_what_his_runs_have_on_disk_where_no_rule_has_them_looked_at(
+def test_a_user_gets_the_disk_usage_of_own_runs_without_any_rule(
     server: Running, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def bytes_of(user: User) -> int:
@@ -223,7 +221,7 @@ def test_who_asks_is_told_what_his_runs_have_on_disk_where_no_rule_has_them_look
     assert bytes_of(server.bob) == 0
 
 
-def test_a_run_that_is_removed_during_a_look_ends_no_look(server: Running) -> None:
+def test_a_run_removed_during_a_check_does_not_end_the_check(server: Running) -> None:
     first, second = ended(server), ended(server)
     looks = keeper_of(server, bytes=1)
     store = server.service.store
@@ -242,7 +240,7 @@ def test_a_run_that_is_removed_during_a_look_ends_no_look(server: Running) -> No
     assert looks.kept("ann") == 0
 
 
-def test_no_error_ends_the_looks(server: Running, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_no_error_ends_the_periodic_checks(server: Running, monkeypatch: pytest.MonkeyPatch) -> None:
     looked = threading.Event()
     left = [2]
 

@@ -106,7 +106,7 @@ def test_the_way_through_a_batch_system() -> None:
 
 
 @pytest.mark.parametrize("before", [State.QUEUED, State.STARTING, State.RUNNING])
-def test_a_batch_system_says_what_the_folder_does_not(before: State) -> None:
+def test_a_batch_system_gives_a_state_that_the_folder_lacks(before: State) -> None:
     reading = (State.TIMED_OUT, Cause.WALLTIME, "job 7 has reached its time limit")
     run, _ = advance(replace(RUN, state=before), WorkerExited(15, None, reading=reading), 5.0)
     assert (run.state, run.cause, run.message) == reading

@@ -113,7 +113,7 @@ def test_a_file_that_grows_is_not_hashed_again_and_again(
 # Labels ---------------------------------------------------------------------------------------------------------------
 
 
-def test_a_label_is_looked_up_in_the_database(server: Running, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_label_is_searched_in_the_database(server: Running, monkeypatch: pytest.MonkeyPatch) -> None:
     red, both = labelled(server, "colour=red"), labelled(server, "colour=red", "size=2")
     blue = labelled(server, "colour=blue")
     for one in (red, both, blue):

@@ -109,7 +109,7 @@ def validated(user: User, data: dict[str, Any], status: int) -> dict[str, Any]:
     return checked
 
 
-def test_a_check_names_the_files_of_a_case_whatever_is_wrong_with_it(server: Running, quick: list[Path]) -> None:
+def test_a_check_names_the_files_of_any_wrong_case(server: Running, quick: list[Path]) -> None:
     def verdict(made: dict[str, Any]) -> dict[str, Any]:
         answer: dict[str, Any] = server.ann.http.post(
             "/v1/cases:validate", content=json.dumps(made), headers=JSON
@@ -213,7 +213,7 @@ def submission_wish() -> Any:
     return Wish(case=case(), points=[{"parts[0].mesh.sha256": "0" * 64}])
 
 
-def test_the_keeper_removes_what_nobody_needs_without_being_asked(server: Running, quick: list[Path]) -> None:
+def test_the_keeper_removes_old_runs_without_a_request(server: Running, quick: list[Path]) -> None:
     """This also holds for a site without rules. A file stays as long as a run needs it."""
     other = send(server.ann, b"nobody's")
     send(server.ann)

@@ -96,7 +96,7 @@ def test_an_odd_address_of_the_page_is_not_there(client: TestClient, address: st
         assert client.request(method, f"/{address}").status_code == 404
 
 
-def test_a_route_is_there_whatever_is_asked_of_it(client: TestClient) -> None:
+def test_a_route_exists_for_any_parameters(client: TestClient) -> None:
     """The route also answers if the page answers all other addresses."""
     for method, path, allowed in (
         ("PUT", "/v1/runs", "GET, HEAD, POST"),

@@ -47,7 +47,7 @@ def played(web: Path, script: str) -> Any:
     return json.loads(done.stdout)
 
 
-def test_libraries_are_asked_for_again_when_nobody_answered(web: Path) -> None:
+def test_libraries_are_requested_again_after_a_missing_answer(web: Path) -> None:
     script = """
         const { three } = await load("libraries.js");
         const first = await three().catch((error) => error.message);
@@ -113,7 +113,7 @@ def listing(*runs: str) -> str:
     return f"{{ runs: [{', '.join(runs)}], cases: [], pending: 0, next: null }}"
 
 
-def test_a_list_without_runs_says_how_to_begin(web: Path) -> None:
+def test_an_empty_list_of_runs_explains_how_to_begin(web: Path) -> None:
     assert "conoid submit taylor_copper" in played(web, LIST.replace("answer", listing()))
     shown = played(web, LIST.replace("answer", listing("run")))
     assert "conoid submit" not in shown
@@ -121,7 +121,7 @@ def test_a_list_without_runs_says_how_to_begin(web: Path) -> None:
     assert "bar" in shown
 
 
-def test_a_refusal_is_no_silence(web: Path) -> None:
+def test_a_refusal_is_distinguished_from_a_missing_answer(web: Path) -> None:
     problem = played(web, LIST.replace("answer", "403"))
     assert "the server answered 403" in problem
     assert "No answer" not in problem
@@ -171,7 +171,7 @@ ENDED = {
 }
 
 
-def test_a_run_that_has_ended_says_why_and_what_it_was_warned_of(web: Path) -> None:
+def test_the_page_of_an_ended_run_shows_its_cause_and_warnings(web: Path) -> None:
     """The warnings are those of the whole log and of the outcome. Each warning is shown once, for any time at which the
     page is opened.
     """
@@ -220,7 +220,7 @@ def test_a_run_that_has_used_up_its_steps_goes_on_with_more(web: Path) -> None:
     assert asked == "?max_steps=1000"
 
 
-def test_a_page_by_a_short_id_waits_for_the_server_and_claims_nothing(web: Path) -> None:
+def test_a_page_by_a_short_id_waits_for_the_server(web: Path) -> None:
     """The server is not reachable when the page is opened by its address, and finds the run later."""
     script = """
         const soon = globalThis.setTimeout;
@@ -324,7 +324,7 @@ def test_what_stands_beside_a_failure_is_of_the_outcome(web: Path) -> None:
         ),
     ],
 )
-def test_a_run_that_is_not_there_says_so(web: Path, problem: dict[str, Any], words: str) -> None:
+def test_the_page_of_a_missing_run_explains_the_reason(web: Path, problem: dict[str, Any], words: str) -> None:
     script = """
         const { RunPage } = await load("run.js");
         const { Problem } = await load("api.js");
@@ -336,7 +336,7 @@ def test_a_run_that_is_not_there_says_so(web: Path, problem: dict[str, Any], wor
     assert words in played(web, script % json.dumps(problem))
 
 
-def test_a_case_is_checked_when_nobody_types_and_started_once(web: Path) -> None:
+def test_a_case_is_checked_when_typing_stops_and_started_once(web: Path) -> None:
     script = """
         const { NewPage } = await load("new.js");
         const valid = { valid: true, problems: [], warnings: [], estimate: {}, files: [] };

@@ -86,7 +86,7 @@ def test_probes_are_chosen_by_key_kept_and_saved(site: tuple[Site, list[str]], b
     page.close()
 
 
-def test_twelve_runs_are_told_apart(site: tuple[Site, list[str]], browser: Browser) -> None:
+def test_twelve_runs_are_distinguished(site: tuple[Site, list[str]], browser: Browser) -> None:
     server, runs = site
     page = browser.page(1280, 720)
     sign_in(page, server)

@@ -64,7 +64,7 @@ def test_events_reach_the_screen_in_time(watched: tuple[str, Page]) -> None:
     assert len(events) > 20
 
 
-def test_what_is_shown_is_what_the_files_say(site: Site, watched: tuple[str, Page]) -> None:
+def test_the_page_shows_the_values_of_the_files(site: Site, watched: tuple[str, Page]) -> None:
     run, page = watched
     folder = site.runs / run
     last = sorted((folder / "fragments").glob("fragments_*.csv"))[-1]

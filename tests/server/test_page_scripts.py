@@ -103,7 +103,7 @@ def test_sizes_and_laws_are_those_of_the_tables(ask: Ask, made: bytes) -> None:
         assert math.isclose(one["likelihood"], fit.log_likelihood, rel_tol=1e-9)
 
 
-def test_waiting_is_told_from_not_being_run(ask: Ask) -> None:
+def test_waiting_is_distinguished_from_being_descheduled(ask: Ask) -> None:
     load = {"phases": {"elements": [1.0, 0.5], "exchange": [0.5, 1.0]}, "waiting": [0.25, 0.875]}
     assert ask("live.js", "page.grouped(data, 2)", load) == {
         "compute": [1.0, 0.5], "exchange": [0.25, 0.125], "waiting": [0.25, 0.875], "descheduled": [0.5, 0.5],
@@ -134,7 +134,7 @@ def test_a_long_series_is_thinned_and_keeps_its_ends(ask: Ask) -> None:
     assert 1000 <= len(times) <= 2000
 
 
-def test_keys_that_differ_are_told_by_their_place(ask: Ask) -> None:
+def test_keys_that_differ_are_named_by_their_place(ask: Ask) -> None:
     one = {"name": "a", "parts": [{"name": "bar", "v": [0, 0, 1]}], "run": {"ranks": 1, "frames": None}, "list": [1, 2]}
     other = {"name": "b", "parts": [{"name": "bar", "v": [0, 0, 2]}], "run": {"ranks": 1, "seed": None}, "list": [1]}
     assert ask("differences.js", "page.differences(data)", [one, other, {**one, "new": True}]) == [
@@ -145,7 +145,7 @@ def test_keys_that_differ_are_told_by_their_place(ask: Ask) -> None:
     assert ask("differences.js", script, [one, keys]) == ["bar v z", "list 1", "ranks", "mild steel A"]
 
 
-def test_runs_are_called_by_what_tells_them_apart(ask: Ask) -> None:
+def test_runs_are_named_by_the_keys_that_differ(ask: Ask) -> None:
     def named(names: list[str], differing: list[list[Any]]) -> list[str]:
         ids = [f"1k1f9cbqje{k:02d}" for k in range(len(names))]
         plan = {"parts": [{"name": "bar", "v": [0, 0, 1]}]}
@@ -246,7 +246,7 @@ def test_the_box_beside_the_cursor_has_the_nearest_points_of_all_lines(ask: Ask)
     assert ask("cursorbox.js", script, stacked) == [["above", "1 J"], ["below", "9 J"]]
 
 
-def test_forces_go_by_who_pushes_whom_and_a_magnitude_needs_all_components(ask: Ask) -> None:
+def test_forces_are_grouped_by_pairs_and_a_magnitude_needs_all_components(ask: Ask) -> None:
     def probe(name: str, field: str, **more: str) -> dict[str, str]:
         return {"name": name, "part": "glass", "field": field, **more}
 
@@ -277,7 +277,7 @@ def test_no_module_of_the_page_writes_numbers_on_its_own() -> None:
     assert not found
 
 
-def test_energies_of_parts_come_from_the_history_and_from_messages_alike(ask: Ask) -> None:
+def test_energies_of_parts_are_equal_in_the_history_and_in_messages(ask: Ask) -> None:
     parts = {
         "rod": {"kinetic": [3.0, 2.0], "internal": [0.0, 1.5]},
         "ball": {"kinetic": [1.0, 1.0], "internal": [0.0, 0.5]},
@@ -294,7 +294,7 @@ def test_energies_of_parts_come_from_the_history_and_from_messages_alike(ask: As
     assert ask("history.js", script, {"history": history, "message": message}) == [[3.0, 0.0], [2.0, 0.5], [1.0, 2.0]]
 
 
-def test_the_newest_fragments_are_shown_whoever_tells_of_them(ask: Ask) -> None:
+def test_the_newest_fragments_of_any_source_are_shown(ask: Ask) -> None:
     counts = {"type": "counts", "t": 1e-6, "nodes": 9, "facets": 1, "smallest": -4, "sizes": [2, 1]}
     snapshot = {"type": "snapshot", "n": 0, "t": 2e-6, "step": 25, "fragments": 7, "smallest": -4, "sizes": [4, 2, 1]}
     sources = [
@@ -408,7 +408,7 @@ def decoded(ask: Ask, data: bytes) -> Any:
     return ask("snapshot.js", "page.decode(data)", sent(data))
 
 
-def test_a_camera_stands_as_near_as_its_frame_lets_it(ask: Ask) -> None:
+def test_a_camera_is_as_near_as_the_frame_allows(ask: Ask) -> None:
     random = np.random.default_rng(2)
     for _ in range(3):
         points, turn = random.normal(size=(40, 3)), np.linalg.qr(random.normal(size=(3, 3)))[0]
@@ -487,7 +487,7 @@ def test_a_section_begins_inside_of_the_tets_of_a_quarter_model(ask: Ask) -> Non
         assert ask("section.js", "page.within(...data)", [middle, box, normal]) == pytest.approx(place)
 
 
-def test_the_tooltip_of_a_chart_stays_text_whatever_a_chart_adds_to_it(ask: Ask) -> None:
+def test_the_tooltip_of_any_chart_stays_text(ask: Ask) -> None:
     globals_ = "globalThis.getComputedStyle = () => ({ getPropertyValue: () => '' }); globalThis.document = {};"
     script = f"(() => {{ {globals_} return page.whole(true, {{ tooltip: {{ trigger: 'axis' }} }}).tooltip; }})()"
     texts = ask("axes.js", script)

@@ -79,7 +79,7 @@ def test_columns_are_the_keys_that_differ_within_cases_that_are_alike(ask: Ask, 
     assert found[1] == [SPEED]
 
 
-def test_a_second_answer_changes_what_it_tells_and_removed_runs_go(ask: Ask, some: dict[str, Any]) -> None:
+def test_a_second_answer_changes_its_rows_and_drops_removed_runs(ask: Ask, some: dict[str, Any]) -> None:
     script = f"""{TABLE}
         const same = table.take(data);
         const after = table.take({{ ...data, runs: [{{ ...data.runs[0], state: "lost" }}] }});

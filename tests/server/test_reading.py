@@ -109,7 +109,7 @@ def test_a_program_that_has_ended_or_hangs_is_replaced(made: Reader, number: sig
     assert program_of(made) != before
 
 
-def test_a_program_that_cannot_be_started_is_said_in_time(made: Reader, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_program_that_cannot_be_started_is_reported_in_time(made: Reader, monkeypatch: pytest.MonkeyPatch) -> None:
     os.kill(program_of(made), signal.SIGKILL)
     monkeypatch.setattr(sys, "executable", "/bin/false")
     with pytest.raises(ServiceError, match="no case can be read now") as raised:
@@ -117,7 +117,7 @@ def test_a_program_that_cannot_be_started_is_said_in_time(made: Reader, monkeypa
     assert raised.value.status == 503
 
 
-def test_a_case_whose_process_hangs_is_given_up_and_holds_up_no_other(
+def test_a_case_whose_process_hangs_is_given_up_and_delays_no_other(
     made: Reader, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(reader, "WALL", 0.0)

@@ -138,7 +138,7 @@ def test_a_body_that_breaks_off_leaves_what_has_come(up: tuple[Process, User, Us
     assert rest.status_code == 201
 
 
-def test_who_comes_again_takes_over_from_a_connection_that_says_nothing_more(up: tuple[Process, User, User]) -> None:
+def test_a_new_connection_replaces_a_stalled_one(up: tuple[Process, User, User]) -> None:
     """A broken connection cannot be distinguished from a slow one for five seconds."""
     _, ann, _ = up
     data = random.Random(3).randbytes(MEGA)

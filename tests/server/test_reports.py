@@ -60,7 +60,7 @@ def test_it_is_for_the_owner_of_a_run_that_has_ended(server: Running) -> None:
         ("fails", "no frame"),
     ],
 )
-def test_what_takes_too_much_is_ended_and_said_in_one_line(server: Running, does: str, says: str) -> None:
+def test_a_program_above_its_limits_is_ended_and_reported_in_one_line(server: Running, does: str, says: str) -> None:
     run = ended(server, does)
     answer = server.ann.http.post(f"/v1/runs/{run}:report")
     assert (answer.status_code, answer.json()["code"]) == (500, "no_report")
@@ -73,7 +73,7 @@ def test_what_takes_too_much_is_ended_and_said_in_one_line(server: Running, does
     assert [name for name in again if not name.endswith(".part")] == []
 
 
-def test_a_server_without_the_packages_says_which(server: Running, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_server_without_packages_names_them(server: Running, monkeypatch: pytest.MonkeyPatch) -> None:
     run, real = ended(server), importlib.util.find_spec
     monkeypatch.setattr(importlib.util, "find_spec", lambda name: None if name == "pyvista" else real(name))
     answer = server.ann.http.post(f"/v1/runs/{run}:report")

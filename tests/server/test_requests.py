@@ -394,7 +394,7 @@ def test_bad_parameters(server: Running, path: str, pointer: str) -> None:
     assert refusal(server.ann.http.get(path), 400, "bad_parameter")["pointer"] == pointer
 
 
-def test_an_unknown_parameter_is_told_what_is_known(server: Running) -> None:
+def test_a_refusal_of_an_unknown_parameter_lists_the_known_ones(server: Running) -> None:
     """Otherwise a wrongly spelt state would list all runs."""
     problem = refusal(server.ann.http.get("/v1/runs?stat=failed"), 400, "bad_parameter")
     allowed = "case, cursor, label, limit, prefix, since, state, text, until"
@@ -475,13 +475,13 @@ def test_a_crash_is_counted(server: Running, monkeypatch: pytest.MonkeyPatch) ->
     assert 'conoid_answers_total{method="GET",route="/v1/runs",status="500"} 1' in text
 
 
-def test_readiness_tells_a_dead_supervisor(server: Running) -> None:
+def test_readiness_reports_a_dead_supervisor(server: Running) -> None:
     server.service.supervisor.close()
     answer = server.nobody.http.get("/readyz")
     assert (answer.status_code, answer.json()["checks"]["supervisor"]) == (503, False)
 
 
-def test_a_crash_tells_the_log_and_not_the_caller(
+def test_a_crash_is_written_to_the_log_and_not_to_the_answer(
     server: Running, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
     def fail(*_: object) -> None:
@@ -527,7 +527,7 @@ def test_openapi_has_the_schema_of_a_case(server: Running) -> None:
 
 
 @pytest.mark.parametrize(("path", "allowed"), [("/v1/runs", "GET, HEAD, POST"), ("/v1/runs/x:cancel", "POST")])
-def test_a_wrong_method_is_told_the_right_ones(server: Running, path: str, allowed: str) -> None:
+def test_a_wrong_method_gets_the_allowed_methods(server: Running, path: str, allowed: str) -> None:
     assert server.ann.http.put(path).headers["allow"] == allowed
 
 
@@ -550,7 +550,7 @@ def test_the_schema_that_a_shipped_case_names_is_served_beside_it(server: Runnin
     assert server.ann.http.get("/v1/cases/../case.schema.json").json() == json_schema()
 
 
-def test_a_case_that_may_be_run_is_doubted_all_the_same(server: Running) -> None:
+def test_a_valid_case_gets_its_warnings(server: Running) -> None:
     text = case_text(end_time="1 us").replace('"1 us"', "1e-6")
     verdict = server.ann.http.post("/v1/cases:validate", content=text, headers=TOML).json()
     assert verdict["valid"]
@@ -558,7 +558,7 @@ def test_a_case_that_may_be_run_is_doubted_all_the_same(server: Running) -> None
     assert odd["run.end_time"] == "no unit, taken for 1e-06 s"
 
 
-def test_the_key_of_a_run_that_was_removed_is_answered_as_openapi_says(server: Running) -> None:
+def test_the_key_of_a_removed_run_is_answered_as_in_openapi(server: Running) -> None:
     headers = {**TOML, "Idempotency-Key": "k"}
     run = server.ann.http.post("/v1/runs", content=case_text(), headers=headers).json()["id"]
     server.ann.wait_for(run)
@@ -601,7 +601,7 @@ def test_a_body_that_breaks_off_is_no_fault_of_the_server() -> None:
 
 
 @pytest.mark.parametrize("path", ["/v1/runs/", "/v1/me/", "/healthz/", "/v1/sweeps/", "/readyz//"])
-def test_no_answer_leads_to_where_the_asker_says(server: Running, path: str) -> None:
+def test_no_answer_uses_an_address_of_the_request(server: Running, path: str) -> None:
     """Before, the redirect for a trailing slash used the header Host."""
     answer = server.ann.http.get(path, headers={"Host": "evil.test"}, follow_redirects=False)
     assert answer.status_code == 404

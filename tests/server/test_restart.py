@@ -122,7 +122,7 @@ def test_an_adopted_worker_can_be_cancelled(after: Aftermath) -> None:
     assert after.ann.wait_for(after.names["obeys"])["state"] == "cancelled"
 
 
-def test_a_deaf_worker_is_killed_by_the_next_server(after: Aftermath) -> None:
+def test_a_worker_that_ignores_signals_is_killed_by_the_next_server(after: Aftermath) -> None:
     ended = after.ann.wait_for(after.names["deaf"])
     assert (ended["state"], ended["cause"]) == ("cancelled", "cancelled")
 
@@ -175,7 +175,7 @@ def test_a_stopped_server_leaves_its_workers_and_can_lose_its_database(process: 
     assert ann.wait_for(living)["state"] == "succeeded"
 
 
-def test_a_server_that_is_told_to_ends_its_runs(process: MakeProcess, tmp_path: Path) -> None:
+def test_a_server_ends_its_runs_on_request(process: MakeProcess, tmp_path: Path) -> None:
     server = process("--no-zenoh", "--end-runs")
     ann = server.user(server.start()["url"])
     run = ann.submit(steps=100_000, pace=0.01)

@@ -20,7 +20,7 @@ from .checkpointed import made, with_checkpoint, with_checkpoint_in
 from .running import Running
 
 
-def test_a_new_run_takes_over_the_checkpoints(server: Running, tmp_path: Path) -> None:
+def test_a_new_run_copies_the_checkpoints(server: Running, tmp_path: Path) -> None:
     run = server.ann.submit(wait=str(tmp_path / "go"))
     server.ann.wait_for(run, State.RUNNING)
     with_checkpoint(server, run, 7)
@@ -72,7 +72,7 @@ def test_without_a_checkpoint_there_is_nothing_to_go_on_from(server: Running) ->
     assert server.ann.http.post(f"/v1/runs/{run}:restart?ranks=2&threads=2").status_code == 422
 
 
-def test_a_run_that_has_none_yet_says_how_it_gets_some(server: Running) -> None:
+def test_a_run_without_checkpoints_explains_how_to_get_some(server: Running) -> None:
     run = server.ann.submit(end="crash", extra='checkpoint_every = "60 s"')
     server.ann.wait_for(run)
     detail = server.ann.http.post(f"/v1/runs/{run}:restart").json()["detail"]
@@ -122,7 +122,7 @@ def test_what_is_no_file_among_the_results_is_left_out(tmp_path: Path) -> None:
     assert (tmp_path / "b" / layout.FRAMES / "000000.vtkhdf").exists()
 
 
-def test_a_checkpoint_that_is_replaced_meanwhile_is_looked_for_again(
+def test_a_checkpoint_that_is_replaced_meanwhile_is_searched_again(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """A running run keeps its newest checkpoints only, and may write another one at any time."""

@@ -78,7 +78,7 @@ def test_a_run_waits_with_a_reason_runs_and_is_cancelled(site: Site, tmp_path: P
     assert record["accounting"]["NodeList"] == site.cluster.host
 
 
-def test_a_job_asks_for_a_core_for_each_thread_of_each_rank(site: Site) -> None:
+def test_a_job_requests_a_core_for_each_thread_of_each_rank(site: Site) -> None:
     run = site.submit(case_text(ranks=2, threads=3))
     job = site.cluster.command("scontrol", "show", "job", job_of(site, run).job)
     assert {"NumTasks=2", "CPUs/Task=3"} <= set(job.split())
@@ -134,7 +134,7 @@ def test_a_controller_that_is_away_is_no_state_of_a_run(site: Site, tmp_path: Pa
         site.cluster.await_node()
 
 
-def test_nobody_adds_words_to_a_profile(site: Site) -> None:
+def test_no_setting_can_add_words_to_a_profile(site: Site) -> None:
     for name in ("standard --wrap=id", "../standard", "other"):
         answer = site.ann.http.post("/v1/runs", params={"profile": name}, content=case_text(), headers=TOML)
         assert answer.status_code == 400

@@ -51,7 +51,7 @@ def test_a_job_whose_number_was_lost_on_the_way_is_not_handed_over_again(place: 
     assert calls(place) == 1
 
 
-def test_nobody_hands_over_while_the_queue_cannot_be_read(place: Path) -> None:
+def test_no_job_is_submitted_while_the_queue_cannot_be_read(place: Path) -> None:
     found = commands(place, f"{ACCEPT}; echo 101")
     (place / "away").touch()
     with pytest.raises(slurm_call.AwayError):
@@ -62,7 +62,7 @@ def test_nobody_hands_over_while_the_queue_cannot_be_read(place: Path) -> None:
 @pytest.mark.parametrize(
     "output", [b"\xff{|||\n", b"<html>\n", b"7|\n", b"7|RUNNING|0|conoid-a|None\n8|PEND", b"a|b|c|d|e\n"]
 )
-def test_a_list_that_is_none_is_no_empty_list(place: Path, output: bytes) -> None:
+def test_an_invalid_list_is_not_an_empty_list(place: Path, output: bytes) -> None:
     """Otherwise a run whose job is missing in the list would be submitted again."""
     found = commands(place, "echo 101")
     (place / "queue").write_bytes(output)
@@ -72,7 +72,7 @@ def test_a_list_that_is_none_is_no_empty_list(place: Path, output: bytes) -> Non
 
 
 @pytest.mark.parametrize("output", ["", "<html>", "101 102"])
-def test_a_number_that_is_none_is_looked_for(place: Path, output: str) -> None:
+def test_a_missing_job_number_is_searched(place: Path, output: str) -> None:
     found = commands(place, f"{ACCEPT}; echo '{output}'")
     with pytest.raises(slurm_call.AwayError, match="sbatch"):
         slurm.submit(found, place / "run", JOB, Profile())
@@ -113,7 +113,9 @@ def test_an_sbatch_that_outlives_its_server_keeps_the_next_from_a_second(place: 
         ("sbatch: error: If munged is up, restart with --num-threads=10", slurm_call.AwayError),
     ],
 )
-def test_a_refusal_is_told_from_silence(place: Path, output: str, kind: type[Exception]) -> None:
+def test_a_refusal_by_slurm_is_distinguished_from_a_missing_answer(
+    place: Path, output: str, kind: type[Exception]
+) -> None:
     found = commands(place, f"echo '{output}' >&2; exit 1")
     with pytest.raises(kind):
         slurm_call.call(found, ["sbatch"])
@@ -152,7 +154,7 @@ def test_a_job_that_no_node_starts_is_released_a_few_times_and_then_lost(place: 
 
 
 @pytest.mark.parametrize("reason", ["JobHeldUser", "JobHeldAdmin", "Resources"])
-def test_a_job_that_somebody_holds_stays_held(place: Path, reason: str) -> None:
+def test_a_held_job_stays_held(place: Path, reason: str) -> None:
     worker = SlurmWorker(place / "run", JOB, Slurm(profiles={"a": Profile()}, bin=commands(place, "exit 1")))
     worker.write_down(job="7")
     worker.turn([Entry("7", "PENDING", 0.0, JOB.name, reason)])
@@ -257,7 +259,7 @@ RUNNING = {"JobState": "RUNNING", "Restarts": "0", "StartTime": "1000", "TimeLim
         ({"TimeLimit": "1-00:00:00", "JobState": "COMPLETING"}, 4450.0, "cancelled"),
     ],
 )
-def test_what_a_signal_has_meant(changes: dict[str, str], now: float, verdict: str) -> None:
+def test_a_signal_is_mapped_to_a_cause(changes: dict[str, str], now: float, verdict: str) -> None:
     assert attempt.judge({**RUNNING, **changes}, 0, 120.0, now) == verdict
     assert attempt.judge({}, 0, 120.0, now) == "unknown"
 
@@ -291,7 +293,7 @@ def test_one_worker_writes_into_a_folder(tmp_path: Path) -> None:
     second.close()
 
 
-def test_a_world_of_the_wrong_size_is_told(tmp_path: Path) -> None:
+def test_a_wrong_number_of_ranks_is_reported(tmp_path: Path) -> None:
     """This happens with srun without --mpi=pmi2: each process is a world of one rank."""
     words = [sys.executable, "-m", "conoid.worker", "two_tets", "--out", str(tmp_path / "out"), "--ranks", "2"]
     ended = subprocess.run(words, capture_output=True, text=True, timeout=120, check=False)
@@ -341,7 +343,7 @@ def test_what_starts_together_is_one_array(place: Path) -> None:
     assert (place / "arrays").read_text() == "0,1,2\n"
 
 
-def test_an_array_whose_number_was_lost_is_not_handed_over_again(place: Path) -> None:
+def test_an_array_whose_number_was_lost_is_not_submitted_again(place: Path) -> None:
     """The next server, which has only the records, does not submit the array again either. A task that does not
     exist is submitted.
     """

@@ -46,7 +46,7 @@ def partition(_: Site) -> str:
 
 
 @pytest.mark.parametrize("state", ["INACTIVE", "DRAIN"])
-def test_a_run_waits_for_a_partition_and_is_told_why(site: Site, state: str) -> None:
+def test_a_run_that_waits_for_a_partition_shows_the_reason(site: Site, state: str) -> None:
     name = partition(site)
     site.cluster.command("scontrol", "update", f"PartitionName={name}", f"State={state}")
     try:
@@ -62,7 +62,7 @@ def test_a_run_waits_for_a_partition_and_is_told_why(site: Site, state: str) -> 
     assert site.tail(run) != "no log", "in its folder, for any name of the folder"
 
 
-def test_a_job_of_an_odd_name_blinds_nobody(site: Site, tmp_path: Path) -> None:
+def test_a_job_with_an_odd_name_hides_no_other_job(site: Site, tmp_path: Path) -> None:
     script = tmp_path / "odd.sh"
     script.write_text("#!/bin/sh\nsleep 20\n")
     odd = site.cluster.command("sbatch", "--parsable", "--job-name=a\nb|c", "--chdir", str(tmp_path), str(script))
@@ -123,7 +123,7 @@ def test_a_run_whose_script_alone_was_killed_goes_on_from_its_checkpoint(site: S
     assert len(site.jobs(run)) == 2
 
 
-def test_a_point_that_crashes_is_told_by_what_it_said(site: Site) -> None:
+def test_a_crashed_point_is_reported_with_its_message(site: Site) -> None:
     ended = site.ended(sweep_of(site, 2, end="crash")[1], 60.0)
     assert ended["state"] == "failed"
     assert "its last words: " in ended["message"], ended

@@ -196,7 +196,7 @@ def test_a_command_that_hangs_is_left_alone_for_a_while(place: Path, monkeypatch
     assert slurm.jobs(str(place / "bin")) == [], "others are asked"
 
 
-def test_a_database_of_accounting_that_hangs_holds_up_nobody(place: Path) -> None:
+def test_an_accounting_database_that_hangs_delays_no_run(place: Path) -> None:
     commands(place, "echo 7")
     (place / "bin" / "sacct").write_text("#!/bin/sh\nexec sleep 20\n")
     (place / "bin" / "sacct").chmod(0o755)
@@ -209,7 +209,7 @@ def test_a_database_of_accounting_that_hangs_holds_up_nobody(place: Path) -> Non
     assert time.monotonic() < began + 5.0
 
 
-def test_a_task_that_crashed_is_told_by_what_it_said(place: Path) -> None:
+def test_a_crashed_task_is_reported_with_its_message(place: Path) -> None:
     commands(place, "echo 7")
     worker = array_of(place, 2)[1]
     (place / "array" / "1.log").write_text("loading\nmodule: cannot find gcc/99\n")

@@ -43,7 +43,7 @@ def test_a_database_that_is_gone_is_not_ready(tmp_path: Path, deed: Callable[[Pa
         (bytes(range(32)), 0o640, "has the mode 640"),
     ],
 )
-def test_a_secret_that_is_none_is_refused(tmp_path: Path, content: bytes, mode: int, why: str) -> None:
+def test_an_invalid_secret_is_refused(tmp_path: Path, content: bytes, mode: int, why: str) -> None:
     path = tmp_path / "server.secret"
     path.write_bytes(content)
     path.chmod(mode)
@@ -52,7 +52,7 @@ def test_a_secret_that_is_none_is_refused(tmp_path: Path, content: bytes, mode: 
     assert "\n" not in str(raised.value)
 
 
-def test_a_secret_that_is_no_file_is_refused(tmp_path: Path) -> None:
+def test_a_secret_that_is_not_a_file_is_refused(tmp_path: Path) -> None:
     os.mkfifo(tmp_path / "server.secret", 0o600)
     with pytest.raises(TelemetryError, match="is not a regular file"):
         _read_secret(tmp_path)
@@ -80,7 +80,7 @@ def counted(monkeypatch: pytest.MonkeyPatch) -> dict[str, int]:
     return counts
 
 
-def test_a_kill_is_want_of_memory_only_if_the_kernel_says_so(
+def test_a_kill_is_out_of_memory_only_if_the_kernel_reports_it(
     counted: dict[str, int], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     seen = memory.Kills()
@@ -93,7 +93,7 @@ def test_a_kill_is_want_of_memory_only_if_the_kernel_says_so(
     assert seen.ended(12), "its log cannot be read, and somebody was ended in these seconds"
 
 
-def test_a_kill_long_after_another_ones_is_none_of_memory(
+def test_a_kill_long_after_an_out_of_memory_kill_has_another_cause(
     counted: dict[str, int], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     now = [0.0]

@@ -94,7 +94,7 @@ def test_a_sweep_that_broke_off_is_completed(server: Running, monkeypatch: pytes
     assert len(server.ann.http.get("/v1/runs").json()["runs"]) == len(ENDS)
 
 
-def test_no_more_run_at_a_time_than_was_said(server: Running, tmp_path: Path) -> None:
+def test_no_more_points_run_at_a_time_than_requested(server: Running, tmp_path: Path) -> None:
     case = tomllib.loads(case_text(wait=str(tmp_path / "go")))
     body = json.dumps({"case": case, "points": [{"run.end_time": end} for end in ENDS], "at_once": 1}).encode()
     sweep = handed_in(server.ann, body)
@@ -136,7 +136,7 @@ def test_a_wrong_sweep_makes_no_run(server: Running, body: bytes, words: str) ->
     assert server.ann.http.get("/v1/runs").json()["runs"] == []
 
 
-def test_a_damaged_file_harms_no_other_sweep(server: Running) -> None:
+def test_a_damaged_file_does_not_affect_other_sweeps(server: Running) -> None:
     sweep = handed_in(server.ann, wish())
     (server.service.settings.runs / "sweeps" / f"{folder.new_id()[0]}.json").write_text("{")
     again = Sweeps(server.service.settings, server.service.desk)
@@ -159,7 +159,7 @@ def test_the_same_from_python(server: Running, tmp_path: Path) -> None:
         assert made.cancel().states == {"succeeded": len(ENDS)}
 
 
-def test_a_number_that_is_none_is_named(server: Running) -> None:
+def test_an_invalid_number_is_named(server: Running) -> None:
     from conoid.client.remote.session import Session
 
     with Session("http://127.0.0.1") as session:
@@ -285,7 +285,7 @@ def test_a_run_that_is_forgotten_shifts_no_other_to_its_point(server: Running) -
     assert {f"{line['run.end_time [us]']} us": line["run"] for line in lines} == rest
 
 
-def test_a_cancel_that_cannot_be_recorded_says_so(server: Running, tmp_path: Path) -> None:
+def test_a_cancel_that_cannot_be_recorded_is_refused(server: Running, tmp_path: Path) -> None:
     body = json.dumps({"case": tomllib.loads(case_text(wait=str(tmp_path / "go"))), "points": [{}]}).encode()
     sweep = handed_in(server.ann, body)
     with pytest.MonkeyPatch.context() as patch:
@@ -319,7 +319,7 @@ def test_a_point_that_is_nested_too_deeply_is_refused(server: Running) -> None:
     assert "nested too deeply (point 0)" in handed_in(server.ann, wish(points=[point]), status=422)["detail"]
 
 
-def test_nobody_who_hands_in_a_run_waits_for_sweeps(settings: Settings, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_submitted_run_does_not_wait_for_sweeps(settings: Settings, monkeypatch: pytest.MonkeyPatch) -> None:
     """The user of the sweep does not wait either, and a sweep does not wait for that of another user."""
     monkeypatch.setattr(reader, "usable_cores", lambda: 1)
     real, reading, go = Desk.read, {"ann": threading.Event(), "bob": threading.Event()}, threading.Event()

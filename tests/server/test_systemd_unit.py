@@ -113,7 +113,7 @@ def test_a_run_of_two_ranks_succeeds_inside_the_units_sandbox(place: Place, url:
 
 @SANDBOX
 @pytest.mark.slow
-def test_the_sandbox_lets_kernels_be_compiled_and_gmsh_mesh(place: Place, url: str) -> None:
+def test_the_sandbox_permits_compilation_and_gmsh(place: Place, url: str) -> None:
     text = case_text(ranks=2, end_time="0.2 us").replace("structured", "gmsh")
     assert ended(url, place, text) == "succeeded"
     assert list((place.state / ".cache/conoid/meshes").iterdir())

@@ -42,7 +42,7 @@ def result(answer: dict[str, Any], run: dict[str, Any], name: str) -> Any:
     return run["results"][names.index(name)]
 
 
-def test_the_table_has_values_results_and_who_asks_alone(server: Running, tmp_path: Path) -> None:
+def test_the_table_has_values_and_results_of_the_runs_of_one_user(server: Running, tmp_path: Path) -> None:
     ended = [server.ann.submit(steps=n, end_time=f"{n} us") for n in (1, 2)]
     for run in ended:
         server.ann.wait_for(run)
@@ -78,7 +78,9 @@ def test_the_files_are_read_once_and_an_index_that_is_lost_is_made_again(
     assert (made_again["values"], made_again["results"], made_again["title"]) == ({}, [], "A bar")
 
 
-def test_what_there_is_no_time_for_is_told_the_next_time(server: Running, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_results_left_out_by_the_time_limit_come_with_the_next_answer(
+    server: Running, monkeypatch: pytest.MonkeyPatch
+) -> None:
     server.ann.wait_for(server.ann.submit(steps=1))
     monkeypatch.setattr(cards, "_PATIENCE", 0.0)
     answer = table(server.ann)
@@ -138,7 +140,7 @@ def test_damaged_files_make_a_poor_row_and_no_error(server: Running) -> None:
     assert (row["id"], row["results"], row["values"], row["state"]) == (run, [], {}, "succeeded")
 
 
-def test_what_has_changed_is_told_alone(server: Running, tmp_path: Path) -> None:
+def test_only_changed_values_are_sent(server: Running, tmp_path: Path) -> None:
     old, live = server.ann.submit(steps=1), server.ann.submit(wait=str(tmp_path / "go"))
     at = server.ann.wait_for(old)["finished"]
     server.ann.wait_for(live, State.RUNNING)
@@ -210,7 +212,7 @@ def test_a_short_id_is_the_shortest_beginning_that_no_other_has() -> None:
     assert rows.short(["abcdefghij"], 7) == {"abcdefghij": "abcdefg"}
 
 
-def test_values_come_back_whatever_cases_have_in_common() -> None:
+def test_values_are_restored_for_any_common_keys() -> None:
     draw = random.Random(5)
     keys = [f"parts[{n}].velocity" for n in range(40)]
     cases: list[dict[str, bool | int | float | str]] = [

@@ -144,7 +144,7 @@ def test_twelve_marked_runs_are_compared_by_keys_alone(site: Site, page: Page) -
     page.wait(f"{ROWS} > 5")
 
 
-def test_what_runs_is_seen_without_a_request_each(site: Site, page: Page) -> None:
+def test_running_runs_are_updated_by_one_request(site: Site, page: Page) -> None:
     runs = [site.submit(case_text("live", steps=60, pace=0.2)) for _ in range(2)]
     page.wait("document.querySelectorAll('.runs .pill.running').length === 2", 60)
     meters = "[...document.querySelectorAll('.runs .state .meter')].map((one) => Number(one.ariaValueNow))"

@@ -67,7 +67,7 @@ def telemetry(tmp_path: Path) -> Iterator[Telemetry]:
     router.close()
 
 
-def test_each_hears_the_own_runs_only(telemetry: Telemetry) -> None:
+def test_each_user_receives_messages_of_own_runs_only(telemetry: Telemetry) -> None:
     ann, bob = telemetry.reader("ann", ANN), telemetry.reader("bob", BOB)
     worker = telemetry.worker("ann", "r1")
     with (
@@ -129,7 +129,7 @@ def test_a_token_that_comes_later_and_one_that_goes(telemetry: Telemetry) -> Non
         pass
 
 
-def test_who_listens_hears_again_after_the_router_was_reopened(telemetry: Telemetry) -> None:
+def test_a_subscriber_receives_messages_after_the_router_was_reopened(telemetry: Telemetry) -> None:
     ann, worker = telemetry.reader("ann", ANN), telemetry.worker("ann", "r1")
     with (
         client(telemetry.port, ann.user, ann.password) as anns,
@@ -154,7 +154,7 @@ def test_a_port_that_is_taken(telemetry: Telemetry, tmp_path: Path) -> None:
         Telemetry(tmp_path, "127.0.0.1", telemetry.port, [])
 
 
-def test_the_server_tells_the_states_that_are_its_own(process: MakeProcess, tmp_path: Path) -> None:
+def test_the_server_publishes_its_own_states(process: MakeProcess, tmp_path: Path) -> None:
     server = process("--zenoh-port", "0")
     ann = server.user(server.start()["url"])
     zenoh_ = ann.http.get("/v1/me").json()["zenoh"]
@@ -192,7 +192,7 @@ def test_without_tokens_anybody_on_this_machine_may_listen(tmp_path: Path) -> No
     router.close()
 
 
-def test_silent_connections_close_the_port_to_nobody(telemetry: Telemetry) -> None:
+def test_idle_connections_do_not_close_the_port(telemetry: Telemetry) -> None:
     """Neither open connections block the port, nor connections that replace closed ones."""
     ann, worker = telemetry.reader("ann", ANN), telemetry.worker("ann", "r1")
     with ExitStack() as stack:

@@ -71,7 +71,7 @@ def as_(who: str, pool: ThreadPool, work: Callable[[], Any]) -> Callable[[], Awa
     return run
 
 
-def test_a_user_whose_work_hangs_holds_up_nobody_else(gate: threading.Event) -> None:
+def test_a_user_whose_work_hangs_does_not_delay_others(gate: threading.Event) -> None:
     pool = ThreadPool(each=2, waiting=100, patience=0.3, most=8)
     before = threading.active_count()
     results = together([as_("ann", pool, gate.wait) for _ in range(50)] + [as_("bob", pool, lambda: 7)] * 50)
@@ -129,7 +129,7 @@ def test_requests_and_long_answers_of_a_user_are_counted() -> None:
     assert not user_limits._long
 
 
-def test_a_disk_that_hangs_is_said_in_time_and_health_never_waits(
+def test_a_disk_that_hangs_is_reported_in_time_and_health_never_waits(
     users: tuple[User, User], gate: threading.Event, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     ann, bob = users

@@ -83,7 +83,7 @@ def test_a_file_comes_in_pieces_and_is_there_when_it_is_whole(server: Running) -
 
 
 @pytest.mark.parametrize("size", [0, 1, 2999, 3000])
-def test_a_file_comes_whole_and_anew(server: Running, size: int) -> None:
+def test_a_complete_file_replaces_its_pieces(server: Running, size: int) -> None:
     data, sha256 = made(size)
     if size > 1:
         put(server.ann, sha256, b"?" * (size - 1), f"0-{size - 2}/{size}")
@@ -101,7 +101,7 @@ def test_what_a_killed_server_had_not_verified_is_verified_by_a_word(server: Run
 
 
 @pytest.mark.parametrize("seed", range(3))
-def test_whatever_comes_in_whatever_order_a_whole_file_is_the_right_one(server: Running, seed: int) -> None:
+def test_pieces_in_any_order_make_the_right_file(server: Running, seed: int) -> None:
     """Random pieces of two files are sent, at right and wrong offsets, with right and wrong bytes, and compared with
     a model.
     """
@@ -204,7 +204,7 @@ def test_bytes_and_number_of_files_are_a_users_quota(server: Running) -> None:
     assert put(server.ann, one, first[10:], "10-2999/3000").status_code == 201, "what has begun may end"
 
 
-def test_a_stranger_learns_nothing(server: Running, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_user_gets_no_information_about_files_of_others(server: Running, monkeypatch: pytest.MonkeyPatch) -> None:
     """The answers for a hash of another user's file and for an unknown hash are equal and take the same work."""
     (there, none) = made(500, 1), made(500, 2)
     assert put(server.ann, there[1], there[0]).status_code == 201
@@ -289,7 +289,7 @@ def test_wherever_a_disk_fails_the_same_again_makes_the_file_whole(tmp_path: Pat
     assert fired == 3, "opening, renaming, the name on disk"
 
 
-def test_another_connection_waits_and_takes_over_from_one_that_is_silent(server: Running) -> None:
+def test_another_connection_waits_and_continues_a_stalled_one(server: Running) -> None:
     """The receiver has one transfer that received bytes recently, and another without recent bytes."""
     data, sha256 = made(100)
     transfer = receiving._Transfer()
@@ -333,7 +333,7 @@ def test_old_files_go_unless_a_run_or_a_sweep_needs_them(tmp_path: Path) -> None
     assert store.owners() == [], "an empty folder is gone"
 
 
-def test_a_part_that_a_hung_thread_holds_harms_no_later_one(tmp_path: Path) -> None:
+def test_a_piece_held_by_a_hung_thread_does_not_affect_later_pieces(tmp_path: Path) -> None:
     store = Uploads(tmp_path, Files(), 0)
     data, sha256 = made(100)
     old = store.begin("ann", sha256, 100, 0)

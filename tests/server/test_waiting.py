@@ -28,7 +28,7 @@ def started(queue: list[Need], busy: list[Busy], room: Room) -> list[str]:
     return plan(queue, busy, room, NOW, free).start
 
 
-def test_a_hundred_runs_of_one_hold_up_nobody_elses_one() -> None:
+def test_a_hundred_runs_of_one_user_do_not_delay_another_user() -> None:
     queue = [need(f"a{n:03}", seconds=10.0) for n in range(100)] + [need("b000", "bob", seconds=10.0)]
     assert [one.run for one in ordered(queue, {"ann": 20.0}, {})][:2] == ["b000", "a000"]
 
@@ -78,7 +78,7 @@ def test_a_small_run_that_ends_in_time_passes_a_large_one() -> None:
     assert started([large, need("for ever")], busy, Room(4)) == []
 
 
-def test_nobody_passes_by_the_end_of_a_run_that_nobody_knows() -> None:
+def test_an_unknown_end_of_a_run_is_not_skipped() -> None:
     large = need("large", ranks=4)
     for ends in (0.0, NOW - 5.0):
         assert started([large, need("short", limit=1.0)], [Busy(3, ends=ends)], Room(4)) == []
@@ -114,7 +114,7 @@ def test_what_may_break_takes_memory_for_its_dust_where_there_is_some(dust: floa
     assert need_of(made, 1.0, room).memory == memory
 
 
-def test_who_is_held_holds_nobody_up() -> None:
+def test_a_held_run_delays_no_other() -> None:
     def blocked(need: Need, starts: Sequence[Need]) -> str:
         return "no more than one" if need.owner == "ann" and any(one.owner == "ann" for one in starts) else ""
 
@@ -122,7 +122,7 @@ def test_who_is_held_holds_nobody_up() -> None:
     assert (made.start, made.why) == (["1", "3"], {"2": "no more than one"})
 
 
-def test_who_can_never_start_holds_nobody_up() -> None:
+def test_a_run_that_can_never_start_delays_no_other() -> None:
     """The server was started again with fewer slots or less memory."""
     made = plan([need("0", ranks=4), need("1", memory=9e9), need("2")], [], Room(2, 4e9), NOW, free)
     assert made.start == ["2"]

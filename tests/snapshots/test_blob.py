@@ -130,7 +130,7 @@ def test_a_budget_is_kept_and_nothing_is_wasted(budget: Budget) -> None:
         assert got.triangles >= 0.5 * budget.triangles or len(got.data) >= 0.5 * budget.bytes
 
 
-def test_what_is_merged_keeps_its_place_and_every_fragment_is_still_seen() -> None:
+def test_merged_points_keep_their_place_and_every_fragment_stays_visible() -> None:
     body = shattered(8, 20)
     full, got = made(body), made(body, 1, Budget(triangles=1500))
     drawn = np.unique(arrays(got.data)["vertex_fragment"])

@@ -126,7 +126,7 @@ def test_a_request_to_stop_the_run_leaves_the_packer_for_the_last_snapshot(couri
     assert "error" not in answer(courier)[0]
 
 
-def test_a_packer_that_hangs_holds_nobody_up(courier: Courier) -> None:
+def test_a_packer_that_hangs_does_not_delay_the_run(courier: Courier) -> None:
     (mine,) = shattered(2, 2).shares(1)
     courier.send(task(0), mine)
     answer(courier)

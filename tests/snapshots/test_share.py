@@ -24,7 +24,7 @@ def model_of(rows: int) -> Model:
     return Model(nodes, blocks, ["a", "b"], 2, n)
 
 
-def test_damage_is_given_away_of_parts_whose_law_counts_it() -> None:
+def test_damage_is_sent_for_parts_whose_law_counts_it() -> None:
     """A part may have this row because it has a later row, such as that of pores: then the row is no damage."""
     held = np.zeros((0, 2), np.int64)
     share = copied(model_of(DAMAGE + 2), held, {1})

@@ -86,7 +86,7 @@ def test_arrows_are_few_and_spread_over_the_body() -> None:
     assert np.abs(speeds - known).max() <= 0.51 * (field.high - field.low) / 255.0 + 1e-4
 
 
-def test_ranges_of_fields_are_told_with_their_percentiles() -> None:
+def test_ranges_of_fields_are_announced_with_their_percentiles() -> None:
     whole = made(shattered(4, 6))
     header = snapshot.header_of(whole.data)
     for name, (least, low, high, most) in whole.fields.items():

@@ -232,7 +232,7 @@ def test_a_body_may_fly_at_a_symmetry_plane() -> None:
     assert np.average(sim.model.nodes.v[:, 2], weights=sim.model.nodes.mass) > 50.0
 
 
-def test_motion_that_a_symmetry_plane_stops_at_the_start_is_told() -> None:
+def test_motion_that_a_symmetry_plane_stops_at_the_start_is_reported() -> None:
     sim = with_boundary({"kind": "symmetry", "axis": "z"}, velocity=(5.0, 0.0, 30.0))
     warning = sim.warnings[-1]
     assert warning.startswith("boundaries[0]: nodes start on this plane of symmetry with up to 30 m/s across it")

@@ -84,7 +84,7 @@ def test_fragments_are_found_as_often_as_their_share_of_the_time_allows(clock: C
     assert found * cost == pytest.approx(100.0 * counts.SHARE, rel=0.1)
 
 
-def test_nothing_is_looked_for_where_nothing_has_broken_since(clock: Clock) -> None:
+def test_no_search_is_made_without_a_new_break(clock: Clock) -> None:
     sim, counter = breaking(clock, 0.001), Counter()
     assert counter.due(sim, clock.now, ending=False)
     counter.find(sim)
@@ -99,7 +99,7 @@ def test_nothing_is_looked_for_where_nothing_has_broken_since(clock: Clock) -> N
     assert not counter.due(sim, clock.now + 1e3, ending=True)
 
 
-def test_counts_are_told_when_they_have_changed(clock: Clock) -> None:
+def test_counts_are_reported_when_they_have_changed(clock: Clock) -> None:
     sim, counter = breaking(clock, 0.0), Counter()
     counts = counter.changed(sim, 0)
     assert counts is not None

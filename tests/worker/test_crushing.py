@@ -86,7 +86,7 @@ def test_of_equal_tets_the_smallest_id_is_named() -> None:
     assert hardest(chunks(stress), np.array([7, 3, 5, 9]), 4, STRENGTH, 0.0, 0, 1)[0] == 1
 
 
-def test_a_plane_wave_and_a_bar_meet_the_criterion_where_the_warning_says() -> None:
+def test_a_plane_wave_and_a_bar_reach_the_criterion_at_the_warned_strength() -> None:
     """The value is griffith() in a plane wave, from which on ``conoid validate`` gives a warning, and 8 T in a bar."""
     k = 0.22 / 0.78
     wave = griffith(BRITTLE) * np.diag([-1.0, -k, -k])
@@ -143,11 +143,11 @@ def test_what_hits_a_wall_meets_the_stress_of_the_wave(alone: Compressed) -> Non
 
 
 @pytest.mark.parametrize("ranks", [2, 3])
-def test_all_ranks_say_what_one_alone_says(ranks: int, alone: Compressed) -> None:
+def test_several_ranks_print_the_output_of_one_rank(ranks: int, alone: Compressed) -> None:
     assert on(ranks, CASE, [MESH], met) == [[alone]] * ranks
 
 
-def test_a_run_that_goes_on_remembers(tmp_path: Path, alone: Compressed) -> None:
+def test_a_resumed_run_restores_its_state(tmp_path: Path, alone: Compressed) -> None:
     """The restarted run reports the largest value also if it occurred before the checkpoint."""
 
     def work(sim: Simulation) -> list[Compressed]:

@@ -49,7 +49,7 @@ def test_the_same_arguments_give_the_same_parts(parts: int) -> None:
     assert (bisect(points, np.ones(500), parts) == bisect(points.copy(), np.ones(500), parts)).all()
 
 
-def test_ties_are_told_apart_by_their_ids() -> None:
+def test_ties_are_ordered_by_their_ids() -> None:
     """The cut of points at one position follows the ids."""
     owner = bisect(np.zeros((40, 3)), np.ones(40), 4)
     assert owner.tolist() == sorted(owner.tolist())

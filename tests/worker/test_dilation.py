@@ -110,7 +110,7 @@ def test_the_triaxial_path(form: Form, psi: float) -> None:
     assert np.allclose(elastic_work(patch, form) - stored, grown, rtol=1e-9)
 
 
-def test_the_apex_takes_the_deviator_and_lets_no_strength_come_back() -> None:
+def test_the_apex_removes_the_deviator_and_no_strength_returns() -> None:
     """The deviator becomes zero for a pressure far beyond the apex, and the pressure rises at most by the amount of
     this flow.
     """

@@ -67,7 +67,7 @@ def test_every_node_is_owned_once_by_the_rank_of_its_first_tet(ranks: int) -> No
 
 
 @pytest.mark.parametrize("ranks", RANKS)
-def test_holders_of_a_node_know_each_other(ranks: int) -> None:
+def test_holders_of_a_node_have_the_list_of_holders(ranks: int) -> None:
     """Each pair of ranks lists their common nodes in the same order; masses and positions are those of the whole
     mesh."""
     whole, pieces = cut(ranks)
@@ -200,7 +200,7 @@ TWO_TETS = """*NODE
         ("2, 6, 8, 7, 5", "contact = { self_contact = ['body'] }", False),
     ],
 )
-def test_pieces_of_a_part_that_do_not_meet_are_told(second: str, more: str, warned: bool, tmp_path: Path) -> None:
+def test_separate_pieces_of_a_part_are_reported(second: str, more: str, warned: bool, tmp_path: Path) -> None:
     (tmp_path / "two.inp").write_text(TWO_TETS + second)
     mesh = "mesh = { shape = 'file', path = 'two.inp', unit = '1 mm' }"
     case = parse_toml(f"name='two'\n{more}\nrun={{end_time='1 us'}}\n[[parts]]\nname='body'\nmaterial='steel'\n{mesh}")
@@ -230,7 +230,7 @@ def test_pieces_of_a_part_that_meets_itself_may_not_overlap(overlap: str, messag
         domain.build(case, tmp_path, SerialComm())
 
 
-def test_the_start_says_what_it_is_at(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_start_reports_its_progress(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Cached meshes are read without a progress message."""
     monkeypatch.setenv("CONOID_CACHE_DIR", str(tmp_path))
     case = parse_toml(TWO_BOXES)

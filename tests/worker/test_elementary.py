@@ -55,7 +55,7 @@ def test_powers_of_one_number_are_right_to_what_their_exponent_makes_of_a_roundi
     assert elementary.power(0.0, 0.3) == 0.0
 
 
-def test_every_lane_is_alike() -> None:
+def test_every_lane_gives_the_same_result() -> None:
     random = np.random.default_rng(2)
     x = np.exp(random.uniform(-600.0, 600.0, CHUNK))
     y = np.log(x)

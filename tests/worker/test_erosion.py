@@ -120,7 +120,7 @@ def test_the_accounts_close_for_a_spinning_body_without_contact(form: Form, node
 
 
 @pytest.mark.parametrize("material", [COPPER_GAS, COPPER, STEEL_42CRMO4])
-def test_the_heat_of_what_leaves_is_counted_where_its_pressure_sees_heat(material: Material) -> None:
+def test_the_heat_of_eroded_tets_is_counted_if_their_pressure_depends_on_heat(material: Material) -> None:
     """The lower bound of the line ``eroded`` is minus 2 J of viscous heat for each tet, and zero for a pressure
     without heat."""
     sim = alone(block((2, 2, 2), MM), material=material)
@@ -176,7 +176,7 @@ def test_a_tet_that_turns_inside_out_books_no_work_that_it_has_not_done(
 
 @pytest.mark.parametrize("form", ["standard", "nodal"])
 @pytest.mark.parametrize("material", [STEEL, COPPER, COPPER_GAS], ids=["elastic", "copper", "gas"])
-def test_the_first_step_knows_how_fast_nodes_come(material: Material, form: Form) -> None:
+def test_the_first_step_has_the_speeds_of_approaching_nodes(material: Material, form: Form) -> None:
     """One node of a cube starts at 10 km/s. Without a bound of the step by the motion 20 to 209 % of the energy was
     wrong."""
     sim = alone(block((3, 3, 3), MM), form=form, material=material, viscosity={})
@@ -326,7 +326,7 @@ def test_what_a_tiring_tet_covers_comes_to_the_surface_without_a_search() -> Non
     assert (part.across[np.isin(part.id, covers // 4)] == state.LAID_BARE).sum() >= 4
 
 
-def test_what_loses_its_support_is_held_by_what_lies_below() -> None:
+def test_a_body_without_its_support_is_held_by_the_one_below() -> None:
     """A driven tip is about to touch a tet when this tet is removed: in the same step the tip is in contact with the
     slope behind it."""
     speed, aside = 1000.0, 3e-3
@@ -472,7 +472,7 @@ def test_mirrors_hold_what_starts_off_the_plane_or_may_leave_it() -> None:
 
 
 @pytest.mark.parametrize("ranks", [1, 2])
-def test_damage_that_takes_no_tet_is_told(ranks: int) -> None:
+def test_an_erosion_limit_that_removes_no_tet_is_reported(ranks: int) -> None:
     """The damage is in a band narrower than a tet. A small damage gives no warning, and there is no warning after a
     removal."""
     damaged = materials.JohnsonCookDamage(D1=0.05, D2=3.44, D3=-2.12, D4=0.002, D5=0.61)

@@ -73,7 +73,7 @@ def test_extremes_are_those_of_all_lines_that_have_a_number(tmp_path: Path) -> N
     assert all(math.isnan(value) for value in (*found["absent"], *extremes(tmp_path / "gone", ["push"])["push"]))
 
 
-def test_a_file_of_the_run_that_is_gone_is_told_from_other_files(tmp_path: Path) -> None:
+def test_a_removed_file_of_a_run_is_distinguished_from_other_files(tmp_path: Path) -> None:
     folder = tmp_path / "run"
     folder.mkdir()
     table = History(folder, {})
@@ -85,7 +85,7 @@ def test_a_file_of_the_run_that_is_gone_is_told_from_other_files(tmp_path: Path)
     assert not storage.gone(ValueError(str(folder)), folder)
 
 
-def test_what_is_removed_while_a_run_goes_on_is_told_once(tmp_path: Path) -> None:
+def test_files_removed_during_a_run_are_reported_once(tmp_path: Path) -> None:
     for name in ("frames/000000.vtkhdf", "frames/000001.vtkhdf", "frames/000002.part", "snapshots/000000.snap"):
         (tmp_path / name).parent.mkdir(exist_ok=True)
         (tmp_path / name).touch()

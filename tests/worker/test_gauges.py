@@ -206,7 +206,7 @@ def test_pushes_of_parts_are_the_same_bits_on_any_ranks() -> None:
     assert len({each for n in (1, 2, 4) for each in on(n, case, meshes, work)}) == 1
 
 
-def test_nothing_is_booked_by_pairs_that_nobody_asks_for() -> None:
+def test_no_pairs_are_booked_without_a_probe_of_them() -> None:
     case, meshes = _three()
     sim = build(case.model_copy(update={"probes": ()}), meshes)
     assert sim.contact is not None
@@ -347,7 +347,7 @@ def test_keys_of_probes_are_checked(keys: dict[str, Any], key: str, says: str) -
     assert any(each.key == key and says in each.message for each in error.value.problems)
 
 
-def test_walls_tell_the_impulse_that_they_have_given() -> None:
+def test_walls_report_their_impulses() -> None:
     floor = {"kind": "wall", "point": (-1e-6, 0, 0), "normal": (1, 0, 0)}
     probes = (probe("wall_impulse_x"), probe("momentum_x"))
     sim = build(scene(STEEL, end=1e-6, velocity=(-60.0, 0.0, 0.0), boundaries=(floor,), probes=probes), [MESH])

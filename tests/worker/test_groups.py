@@ -23,7 +23,7 @@ MM = 1e-3
 MESH = block((7, 4, 4), 1e-3, seed=3)
 
 
-def test_groups_do_not_know_the_number_of_ranks() -> None:
+def test_groups_do_not_depend_on_the_number_of_ranks() -> None:
     one = domain.cut(whole_of(MESH), 1)[0]
     sizes = np.bincount(one.tet_group)
     assert len(sizes) == len(one.groups) == domain.GROUPS
@@ -90,7 +90,7 @@ def course(sim: Simulation) -> tuple[list[dict[str, Any]], Simulation]:
     return [*recorded, groups.record(sim)], sim
 
 
-def test_groups_are_recorded_alike_on_any_number_of_ranks(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_groups_are_recorded_equally_on_any_number_of_ranks(monkeypatch: pytest.MonkeyPatch) -> None:
     """Each group contains the same tets and nodes for any number of ranks, also after motion. Removed nodes are in
     no group, and copies are in the group of their parents."""
     case = breaking()
@@ -110,7 +110,7 @@ def test_groups_are_recorded_alike_on_any_number_of_ranks(monkeypatch: pytest.Mo
     assert np.linalg.norm(nodes.x0 - groups[nodes.group], axis=1).max() < 2.0 * MM
 
 
-def test_a_record_is_due_at_times_of_the_run_and_costs_little_of_it() -> None:
+def test_a_record_is_scheduled_by_the_time_of_the_run_and_costs_little() -> None:
     sim = build(breaking().model_copy(update={"run": schema.Run(end_time=1.0)}), MESHES)
     groups = Groups(sim, 0.0)
     began = groups._recorded
@@ -144,7 +144,7 @@ def test_costs_add_up_to_the_work_of_all_ranks() -> None:
         assert results[0][0] == pytest.approx(sum(work for _, work in results), abs=256e-9)
 
 
-def test_a_cut_that_one_look_calls_for_is_weighed_by_what_was_measured_before_it() -> None:
+def test_a_proposed_cut_is_weighed_by_earlier_measurements() -> None:
     """The whole loss that causes the cut occurs between two reports."""
 
     def predicted(sim: Simulation) -> tuple[str | None, float]:

@@ -31,7 +31,7 @@ except OSError as error:
 
 
 @pytest.mark.parametrize("room", [0, 100, 3000, 60_000, 300_000, 370_000])
-def test_a_disk_that_is_too_small_is_told_once_and_harms_nothing_else(room: int, tmp_path: Path) -> None:
+def test_a_disk_that_is_too_small_is_reported_once_and_stops_nothing_else(room: int, tmp_path: Path) -> None:
     path = tmp_path / "frame.part"
     done = subprocess.run(
         [sys.executable, "-c", FULL, str(path), str(room)], capture_output=True, text=True, timeout=60
@@ -51,6 +51,6 @@ def test_a_file_is_there_as_it_was_written(tmp_path: Path) -> None:
         assert file.attrs["t"] == 1.5
 
 
-def test_what_goes_wrong_inside_is_what_is_told(tmp_path: Path) -> None:
+def test_the_error_of_the_worker_is_the_reported_one(tmp_path: Path) -> None:
     with pytest.raises(KeyError, match="none"), hdf5.created(tmp_path / "a.h5") as file:
         raise KeyError("none", file)

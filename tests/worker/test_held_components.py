@@ -81,7 +81,7 @@ def test_boundaries_hold_together() -> None:
 @pytest.mark.parametrize(
     "name", ["simulation.py", "scene/domain.py", "erosion.py", "boundaries/mirrors.py", "step.py", "contact"]
 )
-def test_nobody_asks_for_the_type_of_a_boundary(name: str) -> None:
+def test_no_code_tests_the_type_of_a_boundary(name: str) -> None:
     place = HOUSE / name
     for path in sorted(place.rglob("*.py")) if place.is_dir() else [place]:
         asked = [

@@ -59,7 +59,7 @@ def test_jitter_fills_its_range_and_adds_to_the_velocity() -> None:
 
 
 @pytest.mark.parametrize("ranks", [2, 3, 7])
-def test_jitter_does_not_know_of_ranks(ranks: int) -> None:
+def test_jitter_does_not_depend_on_ranks(ranks: int) -> None:
     whole = whole_of(MESH, scene(jitter=1.0))
     for piece in domain.cut(whole, ranks):
         expected = 2.0 * uniform(3 * piece.node_ids[:, None] + np.arange(3), motion._JITTER) - 1.0

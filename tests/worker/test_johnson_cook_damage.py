@@ -141,6 +141,6 @@ def test_a_part_without_damage_carries_no_row_of_it() -> None:
     assert Patch(mesh, STEEL).block.has(DAMAGE)
 
 
-def test_erosion_knows_a_limit_of_damage() -> None:
+def test_erosion_has_a_limit_of_damage() -> None:
     assert wear.life(Erosion(damage=1.0))[wear.DAMAGED] == 1.0
     assert wear.life(Erosion())[wear.DAMAGED] == math.inf

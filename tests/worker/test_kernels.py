@@ -166,7 +166,7 @@ def used(n):  # type: ignore[no-untyped-def]
     return found
 
 
-def test_only_kernels_that_make_arrays_or_are_handed_some_count_who_uses_them() -> None:
+def test_only_kernels_with_arrays_count_references() -> None:
     """Arrays that a kernel allocates are freed, for any kernel that has read them."""
     pages, many = Path("/proc/self/statm"), 1_000_000
     assert used(10) == 20.0
@@ -207,7 +207,7 @@ def compiled(folder: Path) -> set[str]:
     return {path.name.split("-")[0] for path in folder.rglob("*.nbc")}
 
 
-def test_all_kernels_are_compiled_and_the_progress_is_told(tree: Path, tmp_path: Path) -> None:
+def test_all_kernels_are_compiled_and_the_progress_is_reported(tree: Path, tmp_path: Path) -> None:
     progress: list[tuple[int, int]] = []
     folder = tmp_path / "cache"
     assert ahead.compile_all(folder, lambda *numbers: progress.append(numbers), tree, "tiny")
@@ -318,7 +318,7 @@ def test_a_second_program_waits_for_the_first(tree: Path, tmp_path: Path) -> Non
     assert not compiled(folder), "the first has compiled them"
 
 
-def test_the_worker_tells_what_it_waits_for(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+def test_the_worker_reports_the_cause_of_its_waiting(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     def compile_all(folder: Path, tell: ahead.Tell) -> bool:
         tell(31, 112)
         raise CompileError("kernels of x cannot be compiled: y")

@@ -71,7 +71,7 @@ def test_every_law_of_the_case_has_one_of_the_same_name_in_the_worker() -> None:
 
 
 @pytest.mark.parametrize("schema", SCHEMAS, ids=lambda s: s.__name__)
-def test_a_law_says_what_it_costs_and_how_strong_it_is(schema: type[Constants]) -> None:
+def test_a_law_gives_its_cost_and_its_strength(schema: type[Constants]) -> None:
     made = named(get_args(schema.model_fields["model"].annotation)[0]).strength
     assert made is not None
     assert schema.nanoseconds > 0.0

@@ -152,7 +152,7 @@ def test_a_work_that_is_not_a_number_is_no_residual_of_nothing(row: int) -> None
     assert math.isnan(sim.ledger.close(sim.model.nodes.v).residual)
 
 
-def test_motion_that_nobody_has_paid_for_ends_the_run() -> None:
+def test_motion_without_a_source_of_energy_ends_the_run() -> None:
     """The line that is below zero does not matter: here plastic work is subtracted again, and the sum of all lines
     closes."""
     sim = build(scene(COPPER, end=4e-6, **FLIGHT), [MESH])

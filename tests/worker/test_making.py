@@ -75,7 +75,7 @@ def test_rounding_is_not_judged_and_what_is_not_a_number_is_left_to_the_residual
     assert making.worst == {}
 
 
-def test_a_run_that_goes_on_remembers_what_was_made() -> None:
+def test_a_resumed_run_restores_the_energy_that_was_made() -> None:
     making, other = Making(0.0), Making(0.0)
     making.look(lines(plastic=0.5, averaging=-0.01), 2.0, 1e-6)
     other.resume(making.keep())

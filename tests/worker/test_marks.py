@@ -77,7 +77,7 @@ def test_sets_are_counted_before_a_run(tmp_path: Path) -> None:
         ({"on": "NOTHING", "parts": ["bar"]}, "*NSET, NSET=NOTHING", "'NOTHING': no node of 'bar' is in it"),
     ],
 )
-def test_a_set_that_cannot_be_meant_is_refused_in_one_line(
+def test_a_set_of_the_wrong_kind_is_refused_in_one_line(
     boundary: Mapping[str, object], more: str, message: str, tmp_path: Path
 ) -> None:
     (line,) = survey(tmp_path, {**HOLD, **boundary}, more=more).refused
@@ -87,7 +87,7 @@ def test_a_set_that_cannot_be_meant_is_refused_in_one_line(
         assert survey(tmp_path, probes=(probe,), more=more).refused == [line.replace("boundaries", "probes")]
 
 
-def test_a_kind_before_a_colon_tells_two_sets_of_one_name_apart(tmp_path: Path) -> None:
+def test_a_kind_before_a_colon_distinguishes_sets_of_one_name(tmp_path: Path) -> None:
     more = "*SURFACE, NAME=CLAMP\nLAST, S4"
     boundaries = [{**HOLD, "on": f"{kind}:CLAMP", "parts": ["bar"]} for kind in ("nodes", "surface")]
     found = survey(tmp_path, boundaries[0], more=more)

@@ -109,7 +109,7 @@ def resealed(place: Path, text: bytes) -> None:
 
 
 @pytest.mark.parametrize("harm", HARMS)
-def test_a_checkpoint_that_is_not_whole_is_passed_over(tmp_path: Path, harm: str) -> None:
+def test_an_incomplete_checkpoint_is_skipped(tmp_path: Path, harm: str) -> None:
     case = parse_case(read_data(shipped_path("free_tets")))
     places = [checkpoint.write(parcel(), case, tmp_path, step, 0.0, SerialComm())[0] for step in (1, 2, 3)]
     (tmp_path / "checkpoints" / "notes.7").mkdir()

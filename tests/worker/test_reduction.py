@@ -79,7 +79,7 @@ def test_ranks_agree_on_the_largest_of_fields_and_on_sums(fractures: bool, conta
         assert found.touched.tolist() == ([1, 2, 3] if fractures else [])
 
 
-def test_a_run_that_goes_on_keeps_the_limits_and_forgets_what_was_asked_for() -> None:
+def test_a_resumed_run_keeps_the_limits_and_drops_old_requests() -> None:
     reduction = StepReduction()
     reduction.resume(np.ones(len(NAMES), np.int64))
     reduction.begin_again()

@@ -239,7 +239,7 @@ def test_the_surface_of_a_quarter_cylinder_is_estimated_without_its_cuts() -> No
     assert load.area == pytest.approx(1e-6 * (3.0 + 2.0) * np.pi, abs=load.spread)
 
 
-def test_a_mesh_that_disagrees_with_what_is_expected_is_told(caplog: pytest.LogCaptureFixture) -> None:
+def test_a_mesh_that_differs_from_the_expected_values_is_reported(caplog: pytest.LogCaptureFixture) -> None:
     """A whole end is expected, but the mesh ends a third of an element before it."""
     caplog.set_level("INFO", "conoid.worker")
     bar = {"shape": "box", "low": [0, 0, 0], "high": [2e-3, 2e-3, 4e-3], "element_size": 5e-4}
@@ -254,7 +254,7 @@ def test_a_mesh_that_disagrees_with_what_is_expected_is_told(caplog: pytest.LogC
     assert warning.startswith("boundaries[0]: drives 24 nodes, where validate expects 25 nodes; check its box")
 
 
-def test_a_layer_that_lies_just_outside_is_told() -> None:
+def test_a_layer_just_outside_is_reported() -> None:
     bar = {"shape": "box", "low": [0, 0, 0], "high": [2e-3, 2e-3, 4e-3], "element_size": 5e-4}
     box = {"low": [0, 0, 0], "high": [2e-3, 2e-3, 0.98e-3]}
     case = case_of({**bar, "generator": "structured"}, {**PUSH, **box})
@@ -275,7 +275,7 @@ def test_a_box_between_planes_is_refused_before_a_run_and_in_it() -> None:
         build(file, [structured(case_of({**bar, "generator": "structured"}).parts[0].mesh)])  # type: ignore[arg-type]
 
 
-def test_nothing_of_a_part_that_is_named_is_told() -> None:
+def test_a_selection_without_nodes_is_reported() -> None:
     bar = {
         "shape": "box",
         "low": [0, 0, 0],
@@ -310,7 +310,7 @@ def beside_a_plane(points: Any, at: str) -> tuple[int, tuple[str, ...]]:
     return int((heights == 0.0).sum()), sim.warnings
 
 
-def test_nodes_just_off_a_plane_of_symmetry_are_told() -> None:
+def test_nodes_just_off_a_plane_of_symmetry_are_reported() -> None:
     assert beside_a_plane(lambda x: x, "0 mm") == (25, ())
     on, (text, other) = beside_a_plane(lambda x: x + np.array([2e-6, 0.0, 0.0]), "0 mm")
     assert on == 0

@@ -48,6 +48,6 @@ def test_start_progress_warnings_and_end_are_lines(capsys: pytest.CaptureFixture
     ]
 
 
-def test_a_failure_says_why(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+def test_a_failure_names_its_cause(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
     Speaker(tmp_path).close(Outcome(state="failed", cause="input", message="run.end = 3: unknown key\nrun.x = 1: no"))
     assert printed(capsys)[0] == "failed: run.end = 3: unknown key\\nrun.x = 1: no"

@@ -76,7 +76,7 @@ def test_a_part_is_measured_as_it_stands_and_moves(folder: Path) -> None:
     assert found.notes == ["elements that carry no volume are skipped: 1 S3"]
 
 
-def test_every_refusal_is_told_at_once(folder: Path) -> None:
+def test_every_refusal_is_reported_at_once(folder: Path) -> None:
     (folder / "bad.inp").write_text(TWO + "*NGEN\n1, 2\n")
     found = surveyed(case(part("ice"), part(None), part(None, "bad.inp")), folder)
     assert [each.part for each in found.parts] == [1]

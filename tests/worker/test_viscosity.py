@@ -26,7 +26,7 @@ from .meshes import block
         (-3.0, -1.0, 0.5, 0.2, 0.0),
     ],
 )
-def test_what_is_resisted_lies_between_the_mean_and_the_own_rate(
+def test_the_resisted_rate_lies_between_the_mean_and_the_own_rate(
     own: float, mean: float, kept: float, squeezed: float, rate: float
 ) -> None:
     assert resisted(own, mean, kept, squeezed) == pytest.approx(rate, rel=1e-15)

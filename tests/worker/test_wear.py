@@ -91,7 +91,7 @@ def test_a_flat_or_swollen_or_stiff_tet_is_broken_and_limits_the_step_no_more(ro
 
 @pytest.mark.parametrize("count", [rows.VOLUME_FLUX, rows.TEMPERATURE + 1])
 @pytest.mark.parametrize("value", [-0.5, 0.0])
-def test_a_tet_inside_out_acts_on_nobody(value: float, count: int) -> None:
+def test_an_inverted_tet_is_broken_and_carries_no_stress(value: float, count: int) -> None:
     chunk = Chunk(count)
     chunk.w[scratch.VOLUME + 3] = value * VOLUME
     chunk.w[scratch.LIMIT + 3] = np.nan
@@ -130,7 +130,7 @@ def test_a_block_without_plastic_strain_wears_by_its_shape_only() -> None:
     assert np.flatnonzero(chunk.worn).tolist() == [6]
 
 
-def test_a_part_lives_as_its_case_says() -> None:
+def test_a_part_exists_as_its_case_defines() -> None:
     spec = schema.Erosion(plastic_strain=1.5, volume=(0.3, 4.0), time_step=0.1)
     small = moved(block((2, 2, 2), 0.1 * MM), (9.0, 0.0, 0.0))
     sim = build(meeting_of([{"erosion": spec}, {}]), [block((2, 2, 2), MM), small])
@@ -188,7 +188,7 @@ def tallied(largest: Floats, rows: Floats, comm: Comm) -> Floats:
     return tally.total(comm)
 
 
-def test_a_tally_knows_neither_order_nor_ranks() -> None:
+def test_a_tally_depends_neither_on_order_nor_on_ranks() -> None:
     random = np.random.default_rng(3)
     largest = np.array([3.7, 2e-9, 5e12])
     values = random.uniform(-1.0, 1.0, (400, 3)) * largest * 10.0 ** random.uniform(-12.0, 0.0, (400, 3))
