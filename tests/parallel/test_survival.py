@@ -208,8 +208,12 @@ def test_a_run_that_cannot_be_resumed_has_a_reason(tmp_path: Path) -> None:
     none = f"--restart: {tmp_path / 'nodal'} has no complete checkpoint: "
     assert refused(words) == f"{none}there is none"
     go(words, [(1, 1, 4)])
-    assert refused([*words, "--set", "run.end_time=2 us"]) == (
-        "run.end_time: differs from the case of the checkpoint, which --restart resumes"
+    for key, value, si in (("run.end_time", "2 us", 2e-6), ("contact.friction", "0.77", 0.77)):
+        message = refused([*words, "--set", f"{key}={value}"])
+        assert message.startswith(f"{key} = {si}: the case of the checkpoint has ")
+        assert message.endswith(" in this key; --restart resumes this case")
+    assert refused([*words, "--set", "run.max_steps=4"]) == (
+        "run.max_steps = 4: the checkpoint has 4 steps; set a number above 4"
     )
     file = next((tmp_path / "nodal" / layout.CHECKPOINTS).glob("*/rank-0.h5"))
     data = bytearray(file.read_bytes())

@@ -2,7 +2,9 @@
 
 import csv
 import math
+import os
 import shutil
+from collections.abc import Callable
 from pathlib import Path
 
 import h5py
@@ -20,7 +22,7 @@ from conoid.worker.output.frames import principal
 from conoid.worker.output.history import History, extremes
 from conoid.worker.output.journal import Journal
 from conoid.worker.output.losses import Losses
-from conoid.worker.output.rewind import rewind
+from conoid.worker.output.rewind import lost, rewind
 from conoid.worker.parallel.comm import Comm, SerialComm
 
 from ..contact.ranks import on_ranks
@@ -116,6 +118,34 @@ def test_a_journal_and_a_history_that_are_removed_take_no_more_lines(tmp_path: P
     journal.close()
 
 
+@pytest.mark.parametrize(
+    ("damage", "kept"),
+    [
+        (lambda data: data, 2), (lambda data: b"", 0), (lambda data: data[:-9], 1), (lambda data: b"\xff\x00" * 99, 0),
+        (lambda data: data.replace(b"1e-07", b"1e-Q7", 1), 1), (lambda data: data[-40:], 0),
+    ],
+)  # fmt: skip
+def test_a_resumed_run_reports_lines_of_a_history_that_are_lost(
+    damage: Callable[[bytes], bytes], kept: int, tmp_path: Path
+) -> None:
+    """Extremes of probes are read from the history: without its lines they would be wrong without a message."""
+    write_history(tmp_path)
+    path = tmp_path / layout.HISTORY
+    path.write_bytes(damage(path.read_bytes()))
+    assert rewind(tmp_path, 3, 0) == kept
+    assert [text.split(":")[0] for text in lost(kept, 2)] == (
+        [] if kept == 2 else [f"history.csv has {kept} of the 2 lines that were written up to the checkpoint"]
+    )
+    write_history(tmp_path)
+    assert len(path.read_text().splitlines()) == 1 + kept + 2
+
+
+def test_a_history_that_is_no_file_blocks_nothing(tmp_path: Path) -> None:
+    os.mkfifo(tmp_path / layout.HISTORY)
+    with pytest.raises(IsADirectoryError, match="is not a regular file"):
+        rewind(tmp_path, 2, 0)
+
+
 def test_one_part_alone_has_no_columns() -> None:
     assert history.of_parts(["rod"]) == {}
     assert [history.part_of(name) for name in history.of_parts(["rod", "ball"])][1:3] == [
@@ -130,7 +160,7 @@ def test_parquet_has_the_same_numbers_and_the_units(tmp_path: Path) -> None:
     assert table.column("t").to_pylist() == [1e-7, 2e-7]
     assert table.column("limiter").to_pylist() == ["tet 1", "tet, 2"]
     assert table.schema.field("push").metadata == {b"unit": b"N"}
-    rewind(tmp_path, 2, 0)
+    assert rewind(tmp_path, 2, 0) == 1
     assert not (tmp_path / layout.HISTORY_PARQUET).exists(), "a run that goes on has no end yet"
 
 

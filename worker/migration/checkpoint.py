@@ -12,6 +12,7 @@ conditions of a complete checkpoint are in conoid.cases.output.checkpoints.
 import json
 import os
 import shutil
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -34,6 +35,7 @@ from conoid.cases.output.checkpoints import (
     sealed,
     sha256,
 )
+from conoid.cases.reading.problems import Location, problem, shown
 
 from ..errors import InputError
 from ..output import hdf5
@@ -119,22 +121,36 @@ def latest(folder: Path) -> tuple[Path, Manifest, list[str]]:
 
 
 def require_same(case: Case, manifest: Manifest) -> None:
-    """Raise InputError if the case differs from the case of the checkpoint in a key on which the answer depends."""
+    """Raise InputError if the case differs from the case of the checkpoint in a key on which the answer depends, or
+    allows no further step."""
     now, then = (_answering(data) for data in (json.loads(resolved_json(case)), manifest.case))
-    for key in sorted({*now, *then}):
-        if now.get(key) != then.get(key):
-            raise InputError(f"{key}: differs from the case of the checkpoint, which --restart resumes")
+    for location, value, former in _differences(now, then, ()):
+        was = "does not have" if former is ... else f"has {shown(former)} in"
+        message = f"the case of the checkpoint {was} this key; --restart resumes this case"
+        raise InputError(str(problem(location, value, message)))
+    if case.run.max_steps <= manifest.step:
+        message = f"the checkpoint has {manifest.step} steps; set a number above {manifest.step}"
+        raise InputError(str(problem(("run", "max_steps"), case.run.max_steps, message)))
+
+
+def _differences(now: Any, then: Any, location: Location) -> Iterator[tuple[Location, object, object]]:
+    """Yield the place and the two values of each key that differs; Ellipsis for a key that is missing."""
+    if isinstance(now, dict) and isinstance(then, dict):
+        for key in sorted({*now, *then}):
+            yield from _differences(now.get(key, ...), then.get(key, ...), (*location, key))
+    elif isinstance(now, list) and isinstance(then, list) and len(now) == len(then):
+        for k, pair in enumerate(zip(now, then, strict=True)):
+            yield from _differences(*pair, (*location, k))
+    elif now != then:
+        yield location, now, then
 
 
 def _answering(case: dict[str, Any]) -> dict[str, Any]:
-    """Return the keys of a case on which its answer depends. The keys of ``run`` and ``contact`` are returned one by
-    one.
-    """
+    """Return the keys of a case on which its answer depends."""
     found = {key: value for key, value in case.items() if key not in ("balance", "title", "description")}
     for table, free in _FREE.items():
         if isinstance(keys := found.get(table), dict):
-            del found[table]
-            found |= {f"{table}.{key}": value for key, value in keys.items() if key not in free}
+            found[table] = {key: value for key, value in keys.items() if key not in free}
     return found
 
 

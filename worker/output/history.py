@@ -3,6 +3,7 @@ history.parquet gets the same data, if pyarrow is installed.
 """
 
 import csv
+import io
 import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -11,6 +12,7 @@ import msgspec
 
 from conoid.cases.messages import Energy
 from conoid.cases.output import history, layout
+from conoid.cases.reading import whole
 
 from . import storage
 
@@ -26,7 +28,7 @@ class History:
         head = history.header({**history.COLUMNS, **further})
         there = _head(self._path) or head
         self._places = [k for k, name in enumerate(head) if name in there]
-        self._file = self._path.open("a", newline="", encoding="utf-8")
+        self._file = io.TextIOWrapper(io.BufferedWriter(whole.appended(self._path)), "utf-8", newline="")
         self._writer = csv.writer(self._file)
         if not self._path.stat().st_size:
             self._writer.writerow(head)

@@ -1,39 +1,68 @@
 """Removal of output after the step of a checkpoint. A resumed run writes this output again."""
 
 import csv
+import io
 import os
 from pathlib import Path
 
 from conoid.cases.output import fragments, layout
+from conoid.cases.reading import whole
+
+_TEXTS = frozenset({"limiter"})
+"""Columns of the tables that are not numbers."""
 
 
-def rewind(folder: Path, step: int, frame: int) -> None:
-    """Remove lines from the history and the genealogy in a run's folder.
+def rewind(folder: Path, step: int, frame: int) -> int:
+    """Remove lines from the history and the genealogy in a run's folder; return the number of lines of the history
+    that stay.
 
-    Removed are lines of the history from ``step`` on and lines of the genealogy from ``frame`` on; all lines at step
-    0.
+    Removed are lines of the history from ``step`` on and lines of the genealogy from ``frame`` on, all lines at step
+    0, and damaged lines. Raises OSError.
     """
-    _keep_below(folder / layout.HISTORY, step)
+    kept = _keep_below(folder / layout.HISTORY, step)
     _keep_below(fragments.genealogy(folder), frame)
     for last in (layout.OUTCOME, layout.HISTORY_PARQUET):
         (folder / last).unlink(missing_ok=True)
+    return kept
 
 
-def _keep_below(path: Path, limit: int) -> None:
-    """Keep the header of a table and its complete lines with a first column below ``limit``."""
-    if not path.exists():
-        return
-    if limit == 0:
+def lost(kept: int, written: int) -> list[str]:
+    """Return the warning for a history that has fewer lines than were written up to the checkpoint."""
+    if kept >= written:
+        return []
+    what = f"{layout.HISTORY} has {kept} of the {written} lines that were written up to the checkpoint"
+    return [f"{what}: largest and smallest values of probes, and references that use them, may miss an extreme"]
+
+
+def _keep_below(path: Path, limit: int) -> int:
+    """Keep the header of a table and its complete lines with a first column below ``limit``; return their number. A
+    table without a header is removed."""
+    if not os.path.lexists(path):
+        return 0
+    with io.TextIOWrapper(io.BufferedReader(whole.opened(path)), "utf-8", "replace", newline="") as file:
+        head, *rows = list(csv.reader(file)) or [[]]
+    if limit == 0 or not head or head[0] not in ("step", "frame"):
         path.unlink()
-        return
-    with path.open(newline="", encoding="utf-8") as file:
-        head, *rows = csv.reader(file)
+        return 0
+    numbers = [k for k, name in enumerate(head) if name not in _TEXTS]
+    rows = [row for row in rows if len(row) == len(head) and _below(row, limit, numbers)]
+    _write(path, [head, *rows])
+    return len(rows)
+
+
+def _below(row: list[str], limit: int, numbers: list[int]) -> bool:
+    try:
+        return int(row[0]) < limit and all(float(row[k]) is not None for k in numbers)
+    except ValueError:
+        return False
+
+
+def _write(path: Path, rows: list[list[str]]) -> None:
+    with path.open("rb") as file:
+        ending = "\r\n" if b"\r\n" in file.read(4096) else "\n"
     beside = path.with_suffix(".part")
     with beside.open("w", newline="", encoding="utf-8") as file:
-        ending = "\r\n" if b"\r\n" in path.read_bytes()[:4096] else "\n"
-        writer = csv.writer(file, lineterminator=ending)
-        writer.writerow(head)
-        writer.writerows(row for row in rows if len(row) == len(head) and int(row[0]) < limit)
+        csv.writer(file, lineterminator=ending).writerows(rows)
         file.flush()
         os.fsync(file.fileno())
     beside.rename(path)

@@ -68,7 +68,9 @@ def compute(
         thick = reference.thicknesses(sim)
         start = Start(sim.model.elements_global, sim.model.nodes_global, thick, warnings=sim.warnings)
     if comm.rank == 0:
-        rewind.rewind(folder, sim.clock.step, sim.clock.frame)
+        lost = rewind.lost(rewind.rewind(folder, sim.clock.step, sim.clock.frame), start.lines)
+        _warn(journal, lost)
+        start = replace(start, warnings=(*start.warnings, *lost))
         checkpoint.forget(folder, sim.clock.step)
     probes = {probe.name: FIELD_UNITS[probe.field] for probe in case.probes}
     columns = {**of_parts(sim.model.parts), **probes}

@@ -39,6 +39,8 @@ class Start:
     """Result of reference.thicknesses at the start."""
     sample: int = 0
     """Number of samples scheduled so far."""
+    lines: int = 0
+    """Number of lines of the history so far."""
     updates: int = 0
     """Sum over the steps so far of the number of tets."""
     resumed: bool = False
@@ -67,7 +69,7 @@ class Loop:
         self._notices, counter = Notices(journal), Counter()
         self._groups = Groups(sim, balance.trigger.cost)
         self._requests = Requests(sim.case, folder, signals, self._groups, time.monotonic())
-        self.samples = Samples(sim, history, start.sample)
+        self.samples = Samples(sim, history, start.sample, start.lines)
         self.snapshots = Snapshots(sim, folder, journal)
         self.frames = Frames(folder, self._notices, counter)
         self._reports = Reports(sim, balance, self._groups, self._notices, counter, self._requests, start.updates)
@@ -164,7 +166,9 @@ class Loop:
         with sim.timers.phase("output"):
             parcel = simulation.keep(sim)
             self.balance.weigh(sim, parcel)
-            parcel.known["start"] = asdict(replace(self._start, sample=self.samples.number, updates=self.updates))
+            samples = self.samples
+            start = replace(self._start, sample=samples.number, lines=samples.lines, updates=self.updates)
+            parcel.known["start"] = asdict(start)
             place, size = checkpoint.write(parcel, sim.case, self._folder, clock.step, clock.t, sim.comm)
         cause = "the run stops" if stop else ("asked for" if requests.for_checkpoint else "run.checkpoint_every")
         if sim.comm.rank == 0:

@@ -88,7 +88,7 @@ def _run(options: argparse.Namespace, comm: Comm, signals: Signals, began: float
 def _succeeded(folder: Path) -> bool:
     """Returns whether the run in a folder has succeeded. The outcome of a successful run must not be replaced."""
     try:
-        return State(outcomes.from_json((folder / layout.OUTCOME).read_bytes()).state) is State.SUCCEEDED
+        return State(outcomes.from_json(whole.read(folder / layout.OUTCOME)).state) is State.SUCCEEDED
     except (OSError, ValueError):
         return False
 

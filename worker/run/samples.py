@@ -16,14 +16,18 @@ from ..simulation import Simulation
 class Samples:
     """Takes samples and stores the latest sample."""
 
-    def __init__(self, sim: Simulation, history: History | None, number: int) -> None:
-        """``history``: the file, None on all ranks except 0; ``number``: number of samples scheduled so far."""
+    def __init__(self, sim: Simulation, history: History | None, number: int, lines: int) -> None:
+        """``history``: the file, None on all ranks except 0; ``number``: number of samples scheduled so far;
+        ``lines``: number of samples taken so far.
+        """
         run = sim.case.run
         self._history = history
         self._names = [probe.name for probe in sim.case.probes]
         self._every = run.end_time, run.samples
         self.number = number
         """Number of samples scheduled so far."""
+        self.lines = lines
+        """Number of samples taken so far."""
         self._next = number * run.end_time / run.samples
         """Time of the next sample, s."""
         self.time: float | None = None
@@ -56,7 +60,7 @@ class Samples:
             sim.crushing.count()
         probes = sim.probes.measure(step.between(sim, before) if sim.probes.sums and not ending else None)
         self.measured = probes.tolist()
-        self.number = int(clock.t * samples / end) + 1
+        self.number, self.lines = int(clock.t * samples / end) + 1, self.lines + 1
         self._next = self.number * end / samples
         limiter = sim.limiter()
         if self._history is not None:
