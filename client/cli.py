@@ -3,6 +3,7 @@
 import os
 import sys
 from importlib import metadata
+from itertools import pairwise
 from pathlib import Path
 from typing import Annotated, Any, cast
 
@@ -17,7 +18,7 @@ from .commands import benches, converging, hard, listing, reports, server_runs, 
 from .commands.batch import batch_run
 from .commands.console import echo, echo_json, one_line, prepare
 from .commands.helping import Grouped
-from .commands.options import CaseArgument, Json, Overrides, Ranks, aloud, complain, on_cores, show, warn
+from .commands.options import FILE_OPTIONS, CaseArgument, Json, Overrides, Ranks, aloud, complain, on_cores, show, warn
 from .commands.run_command import run_once
 from .decks.command import import_deck
 from .drawing.fields import FIELDS
@@ -34,11 +35,23 @@ class Guarded(Grouped):
 
     def main(self, *arguments: Any, **options: Any) -> Any:
         """Parses the arguments and runs the command; a full disk is reported for a help text as well."""
+        if sys.stdout is None:
+            complain("standard output is closed; redirect it to a file or to /dev/null")
+            sys.exit(1)
         try:
             return super().main(*arguments, **options)
         except OSError as error:
             complain(f"{error.filename}: {error.strerror}" if error.filename else str(error.strerror or error))
             sys.exit(1)
+
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+        """Parses the arguments. Refuses an empty name of a file, such as an unset variable, which would be the working
+        folder."""
+        for option, value in pairwise([*args, "-"]):
+            if option.removesuffix("=") in FILE_OPTIONS and (not value or option.endswith("=")):
+                complain(f"{option.removesuffix('=')} is empty: write the name of a file or a folder")
+                raise typer.Exit(ExitCode.BAD_INPUT)
+        return super().parse_args(ctx, args)
 
     def invoke(self, ctx: Any) -> Any:
         """Runs the command."""

@@ -9,7 +9,9 @@ from typing import Any, Literal, get_args, get_origin
 from pydantic import BaseModel, ValidationError
 from pydantic_core import ErrorDetails
 
+from ..model.rigid import Flag
 from ..model.schema import Case
+from ..model.tables import Switch
 from .similar import choices, meant, nearest
 
 Location = tuple[int | str, ...]
@@ -114,7 +116,9 @@ def _translate(detail: ErrorDetails, data: Mapping[str, Any]) -> Problem:
         case "tuple_type":
             return problem(location, value, _list_wanted(location, _lengths(detail["loc"])))
         case "model_type" | "model_attributes_type" | "dict_type":
-            return problem(location, value, "expected a table of keys")
+            return problem(location, value, _table_wanted(detail["loc"]))
+        case "string_type":
+            return problem(location, value, "expected a text; in TOML a text is in quotes")
         case "too_short":
             least = context["min_length"]
             return problem(location, ..., "at least one is needed" if least == 1 else f"at least {least} are needed")
@@ -141,6 +145,18 @@ def _list_wanted(location: Location, lengths: set[int]) -> str:
     if len(location) == 1:
         return f"expected a list of tables; in TOML each one begins with [[{location[0]}]]"
     return f"expected a list of {lengths.pop()}" if len(lengths) == 1 else "expected a list"
+
+
+def _table_wanted(location: Location) -> str:
+    """Returns what a key can have: a table, and ``true``, ``false`` or ``"none"`` where the model allows them."""
+    marks = {
+        type(mark)
+        for model in _models_at(location[:-1])
+        if location[-1] in model.model_fields
+        for mark in model.model_fields[str(location[-1])].metadata
+    }
+    more = ", true or false" if Flag in marks else ' or "none"' if Switch in marks else ""
+    return f"expected a table of keys{more}"
 
 
 def _written(location: Location, data: Any) -> Location:

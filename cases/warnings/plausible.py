@@ -23,8 +23,10 @@ from .contradicted import contradicted
 from .damping import damped
 from .driven import passing
 from .idle import unloaded
+from .mirrored import mirrored
 from .reach import cut_bodies, scant_probes
 from .stiff import stiff
+from .unused import unused
 
 DAY = 86_400.0
 """Core time from which a warning is given: a day, in core seconds (chosen value)."""
@@ -74,6 +76,8 @@ def oddities(case: Case, expected: Estimate) -> list[Problem]:
         *strangers(case),
         *passing(case),
         *contradicted(case),
+        *mirrored(case),
+        *unused(case),
         *unloaded(case),
         *cut_bodies(case),
         *stiff(case, expected),

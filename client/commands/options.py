@@ -36,6 +36,9 @@ lines."""
 _NO_WIDTH = 1000
 """Width of a line in a file or a pipe, characters. Chosen value: wider than any table."""
 
+FILE_OPTIONS = ("--out", "--view", "--list", "--runs", "--site")
+"""Options whose value is the name of a file or a folder."""
+
 Url = Annotated[
     str | None, typer.Option("--url", help="Address of the server [CONOID_URL, or the configuration file].")
 ]

@@ -36,8 +36,8 @@ _COUNTABLE = 1 << 53
 
 
 async def check_query(request: Request) -> None:
-    """Raises ServiceError 400 for an unknown parameter, because a misspelt parameter would count as absent, and 422
-    for a parameter that is given twice and can have only one value.
+    """Raises ServiceError 400 for an unknown parameter, because a misspelt parameter would count as absent, and for a
+    parameter that is given twice and can have only one value.
     """
     if not request.query_params:
         return
@@ -47,7 +47,7 @@ async def check_query(request: Request) -> None:
     for name, values in Counter(name for name, _ in request.query_params.multi_items()).items():
         if values > 1 and name in fields and not _many(fields[name].field_info.annotation):
             detail = f"{name} = {shown(request.query_params[name])}: it has one value, and is given {values} times"
-            raise ServiceError(422, "bad_parameter", detail, pointer=name)
+            raise ServiceError(400, "bad_parameter", detail, pointer=name)
         if name not in known:
             detail = f"{name[:80]}: {request.url.path} has no such parameter; {allowed(name, known)}"
             raise ServiceError(400, "bad_parameter", detail, pointer=name[:80])

@@ -100,7 +100,10 @@ def test_all_errors_at_once() -> None:
         ("run=3", "run", "expected a table of keys"),
         ("run.ranks=true", "run.ranks", "expected a whole number"),
         ("run.ranks=5000", "run.ranks", "less than or equal to 4096"),
-        ("numerics.viscosity=off", "numerics.viscosity", "expected a table of keys"),
+        ("numerics.viscosity=off", "numerics.viscosity", 'expected a table of keys or "none"'),
+        ("contact=False", "contact", 'expected a table of keys or "none"'),
+        ("parts[0].rigid=True", "parts[0].rigid", "expected a table of keys, true or false"),
+        ("title=1", "title", "expected a text; in TOML a text is in quotes"),
     ],
 )
 def test_one_line_gives_the_allowed_values(override: str, key: str, message: str) -> None:

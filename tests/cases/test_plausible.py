@@ -178,6 +178,37 @@ def test_an_initial_velocity_that_a_boundary_replaces_is_reported(drive: dict[st
     assert message is None or found["parts[0].velocity[2]"].endswith(message)
 
 
+@pytest.mark.parametrize(
+    ("part", "pull", "keys"),
+    [
+        ({}, ["-9 m/s^2", 0, 0], {"boundaries[1].acceleration[0]": "is accelerated the other way"}),
+        ({}, [0, 0, "-9 m/s^2"], {}),
+        ({"velocity": ["5 m/s", 0, 0]}, [0, 0, "1 m/s^2"], {"parts[0].velocity[0]": "moves the other way, and"}),
+        ({"spin": {"centre": [0, 0, 0], "rate": [0, "9 rad/s", 0]}}, [0, 0, "1 m/s^2"], {"parts[0].spin.rate": "stop"}),
+        ({"spin": {"centre": [0, 0, 0], "rate": ["9 rad/s", 0, 0]}}, [0, 0, "1 m/s^2"], {}),
+    ],
+)  # fmt: skip
+def test_loads_and_motions_across_a_plane_of_symmetry_are_reported(
+    part: dict[str, Any], pull: list[Any], keys: dict[str, str]
+) -> None:
+    mesh = {"shape": "box", "low": [0, 0, 0], "high": ["4 mm", "2 mm", "2 mm"], "element_size": "1 mm"}
+    body = {"name": "a", "material": "steel_4340", "mesh": mesh, **part}
+    planes = [{"kind": "symmetry", "axis": "x"}, {"kind": "gravity", "acceleration": pull}]
+    found = warnings_of({"name": "a", "parts": [body], "boundaries": planes, "run": {"end_time": "1 us"}})
+    across = {key: text for key, text in found.items() if "points across the plane of symmetry x = 0 m" in text}
+    assert across.keys() == keys.keys()
+    assert all(text in across[key] for key, text in keys.items())
+
+
+def test_keys_without_effect_are_reported() -> None:
+    data = target(ball__mesh={"split": 5}) | {"balance": {"every": 3, "alpha": 1.5}}
+    found = warnings_of(data)
+    assert found["balance.every"] == '3: has no effect without policy = "every"'
+    assert found["balance.alpha"] == '1.5: has no effect without policy = "outside"'
+    assert found["parts[0].mesh.split"] == '5: has no effect without generator = "structured"'
+    assert not {"balance.every"} & warnings_of(data | {"balance": {"every": 3, "policy": "every"}}).keys()
+
+
 def test_what_others_may_send_on_its_way_is_not_odd() -> None:
     """A ball flies away from the plate, and a second body beside the ball hits the plate: fragments may reach the
     ball, but not if it is a metre away.

@@ -1,5 +1,7 @@
 """Mistakes of users and damaged files get one line: no traceback, no endless wait, no success."""
 
+import subprocess
+import sys
 from pathlib import Path
 
 import httpx2
@@ -56,6 +58,22 @@ def test_a_folder_without_a_run_is_not_followed(quiet_home: Path) -> None:
     (quiet_home / "many" / "one").mkdir(parents=True)
     (quiet_home / "many" / "one" / layout.JOURNAL).touch()
     assert "many is not the folder of a run, it holds those of one" in refused(1, "watch", "many")
+
+
+@pytest.mark.parametrize(
+    "words", [("get", "last", "--out", ""), ("get", "last", "--out="), ("sweep", "x.toml", "--list", "")]
+)
+def test_an_empty_name_of_a_file_is_refused(words: tuple[str, ...], quiet_home: Path) -> None:
+    """The empty value of an unset variable would mean the working folder."""
+    option = next(word.removesuffix("=") for word in words if word.startswith("--"))
+    assert refused(2, *words) == f"conoid: {option} is empty: write the name of a file or a folder"
+
+
+def test_a_closed_standard_output_is_an_error(quiet_home: Path) -> None:
+    words = f"{sys.executable} -m conoid.client.cli materials >&-"
+    ended = subprocess.run(["sh", "-c", words], capture_output=True, text=True, check=False)
+    assert (ended.returncode, ended.stdout) == (1, "")
+    assert ended.stderr == "conoid: standard output is closed; redirect it to a file or to /dev/null\n"
 
 
 @pytest.mark.parametrize(

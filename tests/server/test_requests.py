@@ -612,7 +612,7 @@ def test_no_answer_uses_an_address_of_the_request(server: Running, path: str) ->
     "query", ["limit=1&limit=2", "state=running&state=failed", "prefix=a&prefix=a", "cursor=&cursor="]
 )
 def test_a_parameter_of_one_value_is_given_once(server: Running, query: str) -> None:
-    problem = refusal(server.ann.http.get(f"/v1/runs?{query}"), 422, "bad_parameter")
+    problem = refusal(server.ann.http.get(f"/v1/runs?{query}"), 400, "bad_parameter")
     assert "it has one value, and is given 2 times" in problem["detail"]
     assert problem["pointer"] == query.partition("=")[0]
 

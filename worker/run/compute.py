@@ -68,10 +68,7 @@ def compute(
         thick = reference.thicknesses(sim)
         start = Start(sim.model.elements_global, sim.model.nodes_global, thick, warnings=sim.warnings)
     if comm.rank == 0:
-        lost = rewind.lost(rewind.rewind(folder, sim.clock.step, sim.clock.frame), start.lines)
-        _warn(journal, lost)
-        start = replace(start, warnings=(*start.warnings, *lost))
-        checkpoint.forget(folder, sim.clock.step)
+        start = _rewound(folder, sim, journal, start)
     probes = {probe.name: FIELD_UNITS[probe.field] for probe in case.probes}
     columns = {**of_parts(sim.model.parts), **probes}
     history = History(folder, columns) if comm.rank == 0 else None
@@ -124,6 +121,14 @@ def _resumed(case: Case, folder: Path, comm: Comm, journal: Journal | None) -> t
     sim.reduction.begin_again()
     log.info("continues from %s, step %d, t %.6g s", place.name, sim.clock.step, sim.clock.t)
     return sim, replace(Start(**parcel.known["start"]), resumed=True)
+
+
+def _rewound(folder: Path, sim: Simulation, journal: Journal | None, start: Start) -> Start:
+    """Removes the output after the first step of this process; returns ``start`` with a warning for lost lines."""
+    lost = rewind.lost(rewind.rewind(folder, sim.clock.step, sim.clock.frame), start.lines)
+    checkpoint.forget(folder, sim.clock.step)
+    _warn(journal, lost)
+    return replace(start, warnings=(*start.warnings, *lost))
 
 
 def _warn(journal: Journal | None, texts: Sequence[str]) -> None:
