@@ -53,9 +53,9 @@ class Contact(Model):
     """Number of Jacobi sweeps, with momentum, over the active contacts of a time step. Default: adaptive, 5 to 80. The
     number increases where the last sweep of the previous step changed the impulses by more than 0.15 %, as in rubble
     under pressure, and decreases below half of that. The adaptive number is at least 10 if parts collide at more than a
-    fifth of the wave speed of one of them. It is at least 40 with ``restitution``, and if a prescribed motion or a
-    traction may press on parts that fracture. With too few sweeps broken material is too soft under pressure, and the
-    number of fragments is wrong. The cost of contact is proportional to the number of sweeps."""
+    fifth of the wave speed of one of them. The adaptive number is at least 40 with ``restitution``, and if a prescribed
+    motion or a traction may press on parts that fracture. With too few sweeps broken material is too soft under
+    pressure, and the number of fragments is wrong. The cost of contact is proportional to the number of sweeps."""
     skin: Annotated[Ratio, Positive] = 0.3
     """Skin of the broad phase over the harmonic mean of the face size: twice the distance by which a node may depart
     from its extrapolated motion before its candidate pairs are searched again. Changes the cost, not the answer."""

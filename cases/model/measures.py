@@ -67,8 +67,8 @@ class Probe(Model):
 
     **Forces** on the whole part: ``contact_force_*``, of all other bodies or of the part ``by``, normal forces and
     friction, N, as a mean since the previous line; ``wall_force_*``, the same of walls. ``contact_impulse_*`` and
-    ``wall_impulse_*``, N s, are the integrals since the start. They include the whole last time step, of which the
-    velocities include half.
+    ``wall_impulse_*``, N s, are the integrals since the start. These integrals include the whole last time step, but
+    the velocities include only half of this step.
 
     **Motion of a wall**: ``wall_position_*``, m, of its ``point``, and ``wall_velocity_*``, m/s, of the wall that
     ``wall`` names; without ``part``. The force of the bodies on the wall is minus ``wall_force_*`` without ``part``.

@@ -103,7 +103,8 @@ _Number = Annotated[str, msgspec.Meta(pattern=r"^([0-9]+(_[0-9]+)?)?\Z")]
 
 
 class Job(msgspec.Struct, kw_only=True, frozen=True):
-    """job.json: the command of a job of the batch system. It is on disk before the submission to the batch system.
+    """job.json: the command of a job of the batch system. This file is on disk before the submission to the batch
+    system.
 
     Readers of a folder use its name and number only, nothing else in it: ``command`` and ``bin`` are for the job.
     """
@@ -222,7 +223,7 @@ def key_of(name: str, task: int | None) -> str:
 
 
 def script(profile: Profile, python: str) -> str:
-    """Returns the batch script: the site's lines, then the run. It does not depend on the run or its owner."""
+    """Returns the batch script: the site's lines, then the run. The script does not depend on the run or its owner."""
     modules = [f"module load {shlex.quote(module)}" for module in profile.modules]
     lines = "".join(f"{line}\n" for line in [*modules, *profile.lines])
     return _TEMPLATE.format(lines=lines, python=shlex.quote(python))

@@ -38,8 +38,8 @@ class Address(msgspec.Struct, kw_only=True, frozen=True):
 class LocalServer:
     """A server on free loopback ports, with a token that only this process has; a context manager.
 
-    The server runs inside the context and is stopped afterwards. It is not in the terminal's process group: Ctrl-C
-    reaches only this process. On Linux the server ends when this process dies.
+    The server runs inside the context and is stopped afterwards. The server is not in the terminal's process group:
+    Ctrl-C reaches only this process. On Linux the server ends when this process dies.
     """
 
     def __init__(self, runs: Path, slots: int) -> None:

@@ -145,7 +145,7 @@ export class NewPage {
     this.timer = setTimeout(() => this.check(), ms);
   }
 
-  // One check at a time, of the present text; text that is typed meanwhile is checked afterwards.
+  // The page runs one check of the present text at a time; text that is typed meanwhile is checked afterwards.
   async check() {
     const { text } = this.editor;
     if (this.checking || this.checked === text || this.abort.signal.aborted) return;

@@ -1,5 +1,5 @@
-// Drawing over the body: axes, scale bar, legend, time. It is a canvas, so that a saved picture shows the
-// same as the page.
+// Drawing over the body: axes, scale bar, legend, time. The overlay is a canvas, so that a saved picture shows the same
+// as the page.
 
 import { alike, si } from "./figures.js";
 

@@ -9,7 +9,7 @@ const PATIENCE = 60000; // ms without progress after which the upload is given u
 const PASSING = new Set(["wrong_offset", "in_progress", "incomplete", "busy"]);
 const pause = (ms) => new Promise((resolve) => setTimeout(resolve, ms));
 
-// { offset, whole } of a file by its sha256; 0 and false for an unknown one. It is looked up in the list of the
+// { offset, whole } of a file by its sha256; 0 and false for an unknown one. The file is searched in the list of the
 // user's files: a browser logs an answer of 404 as an error of the page.
 export async function there(sha256, signal) {
   const { files } = await call("v1/files", { signal });

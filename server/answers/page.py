@@ -125,8 +125,8 @@ def install(app: FastAPI, web: Path, *, auth: bool) -> str:
 
 def _addressed(page: Mapping[str, Library]) -> tuple[dict[str, Library], dict[str, Library]]:
     """Returns the files of the page by address, then the same files by addresses that contain a hash of all of them.
-    index.html names the second addresses: a browser that has been here before requests no script again. It also names
-    all scripts, because a browser finds the imports of a script only when the script has arrived.
+    index.html names the second addresses: a browser that has been here before requests no script again. index.html also
+    names all scripts, because a browser finds the imports of a script only when the script has arrived.
     """
     if "index.html" not in page:
         return dict(page), {}

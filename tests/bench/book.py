@@ -90,7 +90,8 @@ def _plain(key: str, run: Run) -> Any:
 
 def tests(quick: bool) -> dict[str, Any]:
     """Runs every test that a row names, and returns their assertions. Tests that start ranks run first and alone,
-    because their ranks wait for each other with a time limit. The other tests run after that, one file on each core.
+    because their ranks wait for each other with a time limit. All tests without ranks run afterwards, one file on each
+    core.
     """
     nodes = sorted({f"tests/{node}" for row in catalogue() for node in row.get("tests", ())})
     ranked = [node for node in nodes if node.startswith(_RANKS)]

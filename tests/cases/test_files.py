@@ -19,7 +19,7 @@ def case_with(**mesh: Any) -> dict[str, Any]:
 
 
 def test_every_table_below_a_mesh_that_has_a_path_names_a_file() -> None:
-    """This includes tables inside of other tables; all other keys of a table are ignored."""
+    """Tables inside of other tables name files too; all keys of a table except ``path`` are ignored."""
     inner = {"shape": "union", "of": [{"path": "a.STEP", "sha256": HASH.upper()}, {"shape": "box"}, 3]}
     case = {"parts": [{"mesh": {"path": "b.k"}}, {}, None, {"mesh": inner}, {"mesh": {"path": 7}}], "path": "no"}
     found = [(file.table, file.path, file.sha256, file.copy) for file in files_of(case)]

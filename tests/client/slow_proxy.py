@@ -1,4 +1,4 @@
-"""A proxy between a client and a server, in this process. It can be slow, and breaks connections on request."""
+"""A proxy between a client and a server, in this process. The proxy can be slow, and breaks connections on request."""
 
 import socket
 import threading

@@ -48,7 +48,7 @@ def test_many_ranks_are_grey_but_for_the_extreme_ones(ranks: int, named: int) ->
 
 @pytest.mark.parametrize("outside", [[4, 9], []])
 def test_a_chart_is_written(outside: list[int], tmp_path: Path) -> None:
-    """This also holds for a run without contact, whose messages have no surface nodes."""
+    """A chart is also written for a run without contact, whose messages have no surface nodes."""
     out = tmp_path / "balance.png"
     course = charts.course([load(0.5e-6, outside), load(2e-6, outside)])
     charts.balance(course, "a bar", "glass_steel_bar", out)

@@ -70,8 +70,8 @@ def coloured(path: Path) -> Any:
 def test_a_cut_has_the_field_that_is_inside(
     section: str, mirror: str, camera: str, frame: Path, tmp_path: Path
 ) -> None:
-    """This also holds for a mirrored body, and for a section in the plane of a mirror, which cuts no tets and shows
-    the inside.
+    """The cut of a mirrored body has the field too. A section in the plane of a mirror cuts no tets and shows the
+    inside.
     """
     outside = drawn(frame, "temperature", tmp_path / "a.png", raw=True, mirror=mirror)
     cut = drawn(frame, "temperature", tmp_path / "b.png", raw=True, mirror=mirror, section=section, camera=camera)

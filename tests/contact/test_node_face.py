@@ -73,7 +73,8 @@ def expected(
     x: Floats, v: Floats, faces: Indices, part: "np.ndarray", tested: "np.ndarray", dt: float
 ) -> list[Expected]:
     """Returns the contacts sorted by node, then by face. A node inside of several faces of a part has contact with
-    the nearest face. It has no contact with a part if it is nearer to the front of another face of this part."""
+    the nearest face. A node has no contact with a part if the node is nearer to the front of another face of this
+    part."""
     sizes, rows = face_sizes(x, faces), []
     for s in tested:
         mine = [Expected(x, v, s, f, sizes[i], part[s] == part[f[0]], dt) for i, f in enumerate(faces)]

@@ -341,7 +341,7 @@ def test_pairs_are_carried_over_to_other_numbers_in_the_order_of_the_first_with_
 
 
 def test_the_chains_of_pairs_hold_each_pair_of_a_node_once() -> None:
-    """This includes pairs that were appended to the table."""
+    """Pairs that were appended to the table are in the chains too."""
     table, first = random_table(1), np.full(20, -1, np.int32)
     table.hang(first, 0)
     table.add(np.array([[3, 16], [3, 17], [4, 16]], np.int32))

@@ -85,7 +85,9 @@ def test_impulses_add_up_to_exactly_nothing_and_act_along_the_normals(seed: int)
 
 @pytest.mark.parametrize("seed", SEEDS)
 def test_a_contact_never_pulls(seed: int) -> None:
-    """This holds after any sweep. A contact that opens without an impulse is not changed, to the bit."""
+    """No impulse of a contact is negative after any sweep. A contact that opens without an impulse is not changed, to
+    the bit.
+    """
     met, v, mobility = network(seed, wanted=20.0, friction=0.4)
     solver = Solver(met, v, mobility)
     for _ in range(20):
@@ -110,8 +112,8 @@ def test_an_impulse_that_was_too_large_is_reduced(seed: int) -> None:
 @pytest.mark.parametrize("wanted", [0.0, 10.0])
 @pytest.mark.parametrize("seed", SEEDS)
 def test_kinetic_energy_never_rises_where_nothing_overlaps(seed: int, wanted: float) -> None:
-    """This holds after any number of sweeps, also with held components. Without prescribed motions the energy does
-    not rise from sweep to sweep."""
+    """The kinetic energy does not rise for any number of sweeps, also with held components. Without prescribed motions
+    the energy does not rise from sweep to sweep."""
     met, v, mobility = network(seed, wanted=wanted)
     mobility *= np.random.default_rng(seed).uniform(size=mobility.shape) > 0.1
     v[mobility == 0.0] = 0.0
@@ -128,7 +130,7 @@ def test_kinetic_energy_never_rises_where_nothing_overlaps(seed: int, wanted: fl
 @pytest.mark.parametrize("held", [0.0, 0.2])
 @pytest.mark.parametrize("friction", [0.1, 0.5, 2.0])
 def test_kinetic_energy_never_rises_with_friction(friction: float, held: float, along_axes: bool) -> None:
-    """This includes friction of one contact along the normal of another contact."""
+    """Some contacts have friction along the normal of another contact."""
     worst = 0.0
     for seed in range(60):
         met, v, mobility = network(seed, friction=friction)
@@ -143,7 +145,7 @@ def test_kinetic_energy_never_rises_with_friction(friction: float, held: float, 
 
 @pytest.mark.parametrize("friction", [0.0, 0.1, 0.5, 2.0])
 def test_kinetic_energy_never_rises_in_a_step(friction: float) -> None:
-    """This holds for any number of sweeps with extrapolation."""
+    """The kinetic energy does not rise for any number of sweeps with extrapolation."""
     worst = 0.0
     for seed in range(40):
         met, v, mobility = network(seed, friction=friction, wanted=5.0 if seed % 2 else 0.0)

@@ -110,7 +110,7 @@ def coarse() -> cracks.Run:
 
 
 def test_a_crack_in_a_strip_is_slower_than_surface_waves(coarse: cracks.Run) -> None:
-    """This holds for any load, up to four times G_c at the end."""
+    """The crack is slower for any load, up to four times G_c at the end."""
     where, speed = coarse.crack.speeds()
     assert len(speed) >= 5
     assert 0.3 * cracks.rayleigh(coarse.made) < speed.max() < cracks.rayleigh(coarse.made)

@@ -1,5 +1,5 @@
-"""Writes .msh and .inp files with gmsh in random options: ``python gmsh_files.py FOLDER SEED COUNT``. This is a
-separate process, because gmsh has the licence GPL. ``truth.json`` contains the members of each group of each file,
+"""Writes .msh and .inp files with gmsh in random options: ``python gmsh_files.py FOLDER SEED COUNT``. The program runs
+as a separate process, because gmsh has the licence GPL. ``truth.json`` contains the members of each group of each file,
 from the model of gmsh.
 """
 

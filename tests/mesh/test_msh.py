@@ -67,7 +67,9 @@ def volume(found: NamedMesh) -> float:
 @pytest.mark.parametrize("dialect", DIALECTS)
 @pytest.mark.parametrize("kind", ["plain", "SaveAll", "SaveParametric", "ghosts"])
 def test_each_group_has_its_own_tets_once(kind: str, dialect: str, folder: Path) -> None:
-    """This includes tets in two groups, which a file of the format 2.2 lists once for each group, and ghost cells."""
+    """Some tets are in two groups; a file of the format 2.2 lists such a tet once for each group. Other tets are ghost
+    cells.
+    """
     path = folder / f"{kind}-{dialect}.msh"
     if kind == "SaveAll" and dialect.startswith("2.2"):  # gmsh omits the groups in such a file
         assert len(read_msh(path, "lower", "mesh").mesh.tets) == 0

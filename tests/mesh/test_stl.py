@@ -47,7 +47,9 @@ def inside(facets: Any) -> float:
 def test_text_and_binary_are_the_same_body_with_elements_of_the_size_asked_for(
     tmp_path: Path, facets: Any, share: float
 ) -> None:
-    """This holds for any size of the triangles of the file: the triangles of the box are the largest possible."""
+    """The elements have the requested size for any triangles of the file: the triangles of the box are the largest
+    possible.
+    """
     meshes = [made(tmp_path, data) for data in (text(facets), binary(facets))]
     for mesh in meshes:
         assert mesh.volumes().sum() == pytest.approx(inside(facets), rel=share)

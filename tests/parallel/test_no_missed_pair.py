@@ -195,7 +195,7 @@ def found(case: Case, ranks: int) -> dict[int, Met]:
     "name", [name if name in QUICK else pytest.param(name, marks=pytest.mark.slow) for name in NAMES]
 )
 def test_every_pair_that_meets_is_found_once_on_any_number_of_ranks(name: str) -> None:
-    """This includes the contacts that one rank finds in the steps in between."""
+    """The contacts that one rank finds in the steps between two searches are compared too."""
     case = case_of(name)
     whole = brute(case)
     assert sum(map(bool, whole.all.values())) > len(whole.all) // 3

@@ -143,7 +143,7 @@ def test_a_run_stopped_without_a_request_is_not_cancelled(server: Running, tmp_p
 
 
 def test_a_rank_that_is_killed_is_a_matter_of_the_node(process: MakeProcess, tmp_path: Path) -> None:
-    """This holds for the server that started the run, and for the next server."""
+    """The cause ``node`` is recorded by the server that started the run, and by a server that was started later."""
     server = process("--no-zenoh", "--slots", "4")
     ann = server.user(server.start()["url"])
     runs = [ann.submit(ranks=2, wait=str(tmp_path / "go")) for _ in range(2)]

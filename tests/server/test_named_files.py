@@ -213,8 +213,8 @@ def submission_wish() -> Any:
     return Wish(case=case(), points=[{"parts[0].mesh.sha256": "0" * 64}])
 
 
-def test_the_keeper_removes_old_runs_without_a_request(server: Running, quick: list[Path]) -> None:
-    """This also holds for a site without rules. A file stays as long as a run needs it."""
+def test_the_keeper_removes_unused_files_without_a_request(server: Running, quick: list[Path]) -> None:
+    """Sent files are removed on a site without rules too. A file stays as long as a run needs it."""
     other = send(server.ann, b"nobody's")
     send(server.ann)
     run = hand_in(server.ann, case())["id"]

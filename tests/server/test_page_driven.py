@@ -23,7 +23,7 @@ pytestmark = [
 GRID, END_TIME = (64, 14), 60e-6
 """Margins of a chart left and right of its axes, px (charts.js); end time of the demo, s."""
 DEMO = 1800.0
-"""Time limit of the demo, s. It takes one minute on two free cores."""
+"""Time limit of the demo, s. The demo takes one minute on two free cores."""
 
 
 @pytest.fixture(scope="module")

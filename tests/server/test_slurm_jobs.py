@@ -294,7 +294,7 @@ def test_one_worker_writes_into_a_folder(tmp_path: Path) -> None:
 
 
 def test_a_wrong_number_of_ranks_is_reported(tmp_path: Path) -> None:
-    """This happens with srun without --mpi=pmi2: each process is a world of one rank."""
+    """srun without --mpi=pmi2 starts such processes: each process is a world of one rank."""
     words = [sys.executable, "-m", "conoid.worker", "two_tets", "--out", str(tmp_path / "out"), "--ranks", "2"]
     ended = subprocess.run(words, capture_output=True, text=True, timeout=120, check=False)
     assert ended.returncode == 1

@@ -366,8 +366,8 @@ def test_gravity_follows_its_course() -> None:
 
 
 def test_the_ledger_of_a_free_fall_closes_to_round_off() -> None:
-    """The work of gravity is 1/2 m v(n-1/2) . v(n+1/2) for steps of any size. This is the kinetic energy of the
-    balance.
+    """The work of gravity is 1/2 m v(n-1/2) . v(n+1/2) for steps of any size. The product 1/2 m v(n-1/2) . v(n+1/2) is
+    the kinetic energy of the energy balance.
     """
     sim = with_boundary(GRAVITY, dt_growth=2.0)
     energy = 0.5 * float(sim.model.nodes.mass.sum()) * float(np.dot(FALL, FALL))

@@ -90,8 +90,8 @@ def test_without_self_contact_it_passes_and_is_counted() -> None:
     ],
 )  # fmt: skip
 def test_what_erodes_or_fractures_meets_itself(contact: dict[str, Any] | None, meet: tuple[str, ...]) -> None:
-    """This is the default for eroding parts; a list of parts replaces it. Parts that fracture always have
-    self-contact."""
+    """Self-contact is the default for eroding parts; a list of parts replaces this default. Parts that fracture always
+    have self-contact."""
     case = meeting_of([{"erosion": EROSION}, {"fracture": schema.Fracture()}, {}])
     named = zip(case.parts, ("wears", "breaks", "stays"), strict=True)
     parts = tuple(part.model_copy(update={"name": name}) for part, name in named)

@@ -82,10 +82,10 @@ def elastic_work(patch: Patch, form: Form) -> Floats:
 @pytest.mark.parametrize("form", FORMS)
 @pytest.mark.parametrize("psi", ANGLES)
 def test_the_triaxial_path(form: Form, psi: float) -> None:
-    """A block under the lateral pressure s is shortened along z. It is elastic up to the stress f + s (1 + sin phi)
-    / (1 - sin phi). After that no stress changes if the volume grows by 2 sin psi / (1 - sin psi) of the shortening,
-    half of it on each lateral axis. The work is that of the stress. The stored energy is p^2 / 2K + q^2 / 6G per
-    present volume; the rest of the work is plastic.
+    """A block under the lateral pressure s is shortened along z. The block is elastic up to the stress f + s (1 + sin
+    phi) / (1 - sin phi). After that no stress changes if the volume grows by 2 sin psi / (1 - sin psi) of the
+    shortening, half of it on each lateral axis. The work is that of the stress. The stored energy is p^2 / 2K + q^2 /
+    6G per present volume; the rest of the work is plastic.
     """
     patch, lateral, steps = Patch(block((2, 2, 2)), glass(psi), form), 100e6, 200
     patch.put(PRESSURE, lateral)

@@ -124,9 +124,9 @@ def test_increments_equal_halved_brackets() -> None:
 
 
 def test_small_increments_are_right_by_themselves() -> None:
-    """The stress is right for increments of any size. This includes d = dt times the reference rate, where the rate
-    term begins, and the first yield, where the flow stress rises a million times more steeply than the trial stress
-    falls.
+    """The stress is right for increments of any size. Tested increments include d = dt times the reference rate, where
+    the rate term begins, and the first yield, where the flow stress rises a million times more steeply than the trial
+    stress falls.
     """
     patch, before, dt = random_states(100_000, 97)
     patch.advance(dt)

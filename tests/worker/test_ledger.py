@@ -144,7 +144,7 @@ def test_the_parts_are_what_the_ledger_sums_up() -> None:
 
 @pytest.mark.parametrize("row", [WORK, WORK_VISCOUS])
 def test_a_work_that_is_not_a_number_is_no_residual_of_nothing(row: int) -> None:
-    """This includes a run without initial energy: the run ends by its limit of the residual."""
+    """A run without initial energy is tested too: the run ends by its limit of the residual."""
     sim = build(scene(STEEL, end=1e-6, viscosity={}), [MESH])
     run(sim)
     assert sim.ledger.close(sim.model.nodes.v).residual == 0.0

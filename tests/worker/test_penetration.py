@@ -122,8 +122,8 @@ def test_the_depth_is_the_mean_of_three_lines() -> None:
 @pytest.mark.parametrize("ranks", [1, 3])
 @pytest.mark.parametrize("way", [1.0, -1.0])
 def test_a_state_without_the_tets_of_a_cavity_and_of_a_hole(way: float, ranks: int) -> None:
-    """Two plates of 4 mm are hit from below or from above. They have a hole of 2 mm and, 1 mm deeper, a narrow
-    cavity of 2 mm at the rear of the first plate and the front of the second. Tets are removed by the position of
+    """Two plates of 4 mm are hit from below or from above. The plates have a hole of 2 mm and, 1 mm deeper, a narrow
+    cavity of 2 mm at the rear of the first plate and the front of the second plate. Tets are removed by the position of
     their centres; layers of the mesh are 1 mm thick.
     """
     plate = block((8, 8, 4), MM, shake=0.0)

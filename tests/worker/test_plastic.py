@@ -76,7 +76,9 @@ def test_the_return_is_idempotent() -> None:
 
 
 def test_work_is_elastic_energy_plus_plastic_work() -> None:
-    """This also holds if a step goes far beyond the yield stress: the work minus the plastic work is V s : s / 4 G."""
+    """The sum also equals the work if a step goes far beyond the yield stress: the work minus the plastic work is V s :
+    s / 4 G.
+    """
     L = np.diag([1.0, -0.5, -0.5]) * 1e3
     for steps in (20, 200):
         point = drive(COPPER, L, 1e-4 / steps, steps)

@@ -77,7 +77,7 @@ def test_on_the_axis_both_components_turn_round() -> None:
 
 @pytest.mark.parametrize("speed", [0.3, 7.0, 40.0])
 def test_between_two_planes_a_body_has_an_image_behind_each(speed: float) -> None:
-    """This also holds for a node that passes several widths of the column in a step."""
+    """The images are also right for a node that passes several widths of the column in a step."""
     x, v = np.linspace(-0.4, 0.6, 11)[:, None] * [1.0, 0.0, 0.0], np.tile([speed, 0.0, 2.0], (11, 1))
     sides = np.tile([1.0, -1.0], (11, 1))
     state, mirrors = flight(x, v, [0, 0], [-0.5, 0.7], sides, 13, 0.1)

@@ -134,8 +134,8 @@ def test_both_refuse_the_same(data: Any, words: str, folder: Path) -> None:
 )
 @pytest.mark.parametrize("contact", ["none", {}])
 def test_what_is_there_twice_is_refused_by_both(shift: Any, contact: Any, folder: Path) -> None:
-    """The common volume is the part of 8 mm^3 that the shift leaves. It is exact if the tets coincide; otherwise the
-    error is half a layer of tets.
+    """The common volume is the part of 8 mm^3 that the shift leaves. The common volume is exact if the tets coincide;
+    otherwise its error is half a layer of tets.
     """
     write(folder / "bar.inp", (0, 0, 0), shift)
     made = parse_case(case() | {"contact": contact})

@@ -47,7 +47,7 @@ class Spent:
     parallel: dict[str, float] = field(default_factory=_none)
     """Wall time in regions by phase."""
     waiting: float = 0.0
-    """CPU time in calls that wait for other ranks. It is also part of ``exchange`` of ``cpu``."""
+    """CPU time in calls that wait for other ranks. This time is also part of ``exchange`` of ``cpu``."""
     helped: float = 0.0
     """Time of the other threads of the rank in tasks, summed over these threads."""
     projected: dict[int, dict[str, float]] = field(default_factory=dict)

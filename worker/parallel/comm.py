@@ -53,7 +53,7 @@ class Pending(Protocol):
 
 
 class Comm(Protocol):
-    """The operations of a communicator. All are collective except ``exchange`` and ``trade``."""
+    """The operations of a communicator. All operations are collective except ``exchange`` and ``trade``."""
 
     rank: int
     size: int

@@ -91,7 +91,8 @@ class Whole:
     numbers: Ints
     """(tets,) number of the fragment of each tet in the last frame."""
     initial: int
-    """Number of fragments at the start. These have the first numbers. 0 if no part fractures."""
+    """Number of fragments at the start. The fragments of the start have the first numbers. The number is 0 if no part
+    fractures."""
     next: int
     """Number of the next new fragment."""
 

@@ -26,7 +26,7 @@ _NONE: Ints = np.zeros(0, np.int64)
 
 
 class Clearance:
-    """Clearance of the scene of a rank. It is valid until pairs, faces or short lines change."""
+    """Clearance of the scene of a rank. The clearance is valid until pairs, faces or short lines change."""
 
     def __init__(self) -> None:
         self._scene: Scene | None = None
