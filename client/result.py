@@ -1,4 +1,4 @@
-"""Results of a run: outcome, time history, frames, resolved case. Each is read at its first use."""
+"""Results of a run: outcome, time history, frames, resolved case. Each of these files is read at its first use."""
 
 import json
 import re

@@ -42,7 +42,7 @@ class Watched(Protocol):
         """Returns the present status."""
 
     def link(self) -> Link:
-        """Opens a subscription to its messages."""
+        """Opens a subscription to the messages of the run."""
 
     def messages(self, *, link: Link) -> Iterable[AnyMessage]:
         """Yields all messages once and in order."""

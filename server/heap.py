@@ -15,9 +15,9 @@ run are larger. Without this setting glibc would raise the limit to the largest 
 
 
 def share() -> bool:
-    """Limits the number of heaps; must be called before the first thread starts. Returns False if the C library has
-    no such setting. Without the limit each thread has a heap of its own, which stays as large as the largest answer
-    that the thread has made.
+    """Limits the number of heaps; must be called before the first thread starts. Returns False if the C library does
+    not have this setting. Without the limit each thread has a heap of its own, which stays as large as the largest
+    answer that the thread has made.
     """
     if not sys.platform.startswith("linux"):
         return False

@@ -55,7 +55,7 @@ class Caps:
 
 @dataclass(frozen=True)
 class Settings:
-    """All options of ``python -m conoid.server``. Raises SettingsError if they do not fit together."""
+    """All options of ``python -m conoid.server``. Raises SettingsError if the options do not fit together."""
 
     runs: Path
     host: str = "127.0.0.1"

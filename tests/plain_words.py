@@ -1,6 +1,6 @@
 """Checker of the language of the repository: banned words, first words of docstrings, line lengths, commit subjects.
 
-    python -m tests.plain_words                  fails where a folder has more findings than NOT_YET allows
+    python -m tests.plain_words                  fails where a folder has more findings than NOT_YET allows; lists them
     python -m tests.plain_words worker/contact   every finding below the given files and folders
     python -m tests.plain_words --subjects       fails where the subject of a recent commit breaks the rule
 
@@ -17,7 +17,7 @@ import subprocess
 import sys
 import tokenize
 from collections import Counter
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from functools import cache
 from pathlib import Path
 from typing import NamedTuple
@@ -234,17 +234,24 @@ def chosen(places: list[str]) -> list[Finding]:
 
 
 def main(places: list[str]) -> int:
-    """Print findings below ``places``, or counts by folder; exit status."""
+    """Print findings below ``places``, or the findings of the folders that have too many; exit status."""
     if places:
-        for found in chosen(places):
-            print(f"{found.path}:{found.line}: {found.rule}: {found.words}")
+        show(chosen(places))
         return 0
-    counts = Counter(folder(found.path) for path in files() for found in findings(path))
-    wrong = [f"{line}: python -m tests.plain_words {line.partition(':')[0]} lists them" for line in excess(counts)]
+    every = [found for path in files() for found in findings(path)]
+    counts = Counter(folder(found.path) for found in every)
+    wrong = excess(counts)
+    show(found for found in every if any(line.startswith(f"{folder(found.path)}:") for line in wrong))
     for line in wrong:
         print(line)
-    print(f"words: {sum(counts.values())} findings in {len(counts)} folders")
+    print(f"words: {len(every)} findings in {len(counts)} folders")
     return 1 if wrong else 0
+
+
+def show(every: Iterable[Finding]) -> None:
+    """Print each finding in one line."""
+    for found in every:
+        print(f"{found.path}:{found.line}: {found.rule}: {found.words}")
 
 
 def check_subjects() -> int:

@@ -97,8 +97,8 @@ class Trigger:
     stretch: Stretch = field(default_factory=Stretch)
     """Work of each rank since the last decomposition."""
     fruitless: int = 0
-    """Number of consecutive decompositions that saved less than they cost. Each of them doubles the loss that
-    triggers the next decomposition."""
+    """Number of consecutive decompositions that saved less than they cost. Each such decomposition doubles the loss
+    that triggers the next one."""
 
     def look(self, loads: Sequence[float], steps: int) -> None:
         """Adds the ``loads`` of all ranks, s per step, over some steps."""

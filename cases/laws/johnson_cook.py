@@ -60,7 +60,7 @@ class JohnsonCook(Law):
     m: Annotated[Ratio, Positive]
     """Exponent of the thermal softening."""
     reference_rate: Annotated[Rate, Positive] = 1.0
-    """Plastic strain rate at which A, B and n were measured. Below it the rate has no effect."""
+    """Plastic strain rate at which A, B and n were measured. Below this rate the rate of strain has no effect."""
     reference_temperature: Annotated[Temperature, Field(ge=0)] = 293.15
     """Temperature at which A, B and n were measured; below it there is no softening."""
     melt_temperature: Annotated[Temperature, Positive]

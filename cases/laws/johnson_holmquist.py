@@ -42,7 +42,7 @@ class JohnsonHolmquist(Law):
     C: Annotated[Ratio, Field(ge=0)] = 0.0
     """Coefficient of the strain rate."""
     reference_rate: Annotated[Rate, Positive] = 1.0
-    """Strain rate at which A and B were measured. Below it the rate has no effect."""
+    """Strain rate at which A and B were measured. Below this rate the rate of strain has no effect."""
     largest_fractured: Annotated[Ratio, Positive] | None = None
     """Largest fractured strength, over that at the Hugoniot elastic limit. Default: no limit."""
     D1: Annotated[Ratio, Positive]

@@ -117,8 +117,8 @@ class Cone(ConeForm, Drawn):
 class Ogive(OgiveForm, Drawn):
     """A projectile: a cylindrical shank with an ogival nose, whose outline is an arc of a circle.
 
-    With one of ``crh`` and ``nose`` given, the nose is a tangent ogive: its arc continues the shank smoothly, and
-    its length is D sqrt(crh - 1/4), D the diameter. With both given it is a secant ogive, with an edge at the shank.
+    With one of ``crh`` and ``nose`` given, the nose is a tangent ogive: its arc continues the shank smoothly, and its
+    length is D sqrt(crh - 1/4), D the diameter. With both given the nose is a secant ogive, with an edge at the shank.
     """
 
 

@@ -167,7 +167,7 @@ class Traction(Model):
     except with ``follows``."""
     follows: bool = False
     """Whether ``pressure`` acts on the current area of each face, against its current normal, as a gas or a liquid
-    does. On a closed surface its resultant force and moment are zero up to rounding."""
+    does. On a closed surface the resultant force and moment of the pressure are zero up to rounding."""
     course: Course = ()
     """Factor of the load over time, as pairs of time and factor (see ``kind = "velocity"``). Default: constant from
     the start."""

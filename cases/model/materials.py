@@ -95,12 +95,13 @@ class Material(Model):
     strength: Strength | None = None
     """Law of the flow stress; ``model`` selects which. Default: none, the material stays elastic."""
     eos: MieGruneisen | None = None
-    """Equation of state. Default: pressure linear in the volume strain, with the bulk modulus of ``elastic``. Use it
-    above pressures of some percent of the bulk modulus. Not with ``johnson_holmquist``, which has its own."""
+    """Equation of state. Default: pressure linear in the volume strain, with the bulk modulus of ``elastic``. Use an
+    equation of state above pressures of some percent of the bulk modulus. Not with ``johnson_holmquist``, which has its
+    own."""
     spall: Annotated[Stress, Positive] | None = None
-    """Spall strength: largest tensile pressure. Beyond it pores open, which absorb the work; they close again
-    without resistance before the material is compressed. Default: no limit. Not with ``johnson_holmquist``, which
-    has its own."""
+    """Spall strength: largest tensile pressure. Beyond this tension pores open, which absorb the work; they close again
+    without resistance before the material is compressed. Default: no limit. Not with ``johnson_holmquist``, which has
+    its own."""
     brittle: Brittle | None = None
     """Fracture of facets; needed by parts with ``fracture``. Default: the material cannot fracture."""
     description: str = ""

@@ -65,10 +65,10 @@ class Part(Model):
     rigid: Annotated[Rigid | None, BeforeValidator(read_rigid), Flag()] = None
     """Whether the part is rigid: ``true``, or a table with its mass, centre of mass and inertia. A rigid part has six
     degrees of freedom and no stress; it costs only the contact of its surface and does not limit the time step. Gravity
-    acts on it. A plane of symmetry on which the body has nodes, and a boundary that drives all of its nodes, restrict
-    the motion of the body. With one prescribed velocity component the body can still rotate about this axis; with two
-    or three components it cannot rotate. A plane of symmetry that it does not touch at the start acts on it as a wall
-    without friction, with ``contact.restitution``."""
+    acts on a rigid part. A plane of symmetry on which the body has nodes, and a boundary that drives all of its nodes,
+    restrict the motion of the body. With one prescribed velocity component the body can still rotate about this axis;
+    with two or three components it cannot rotate. A plane of symmetry that it does not touch at the start acts on it as
+    a wall without friction, with ``contact.restitution``."""
 
 
 MOST_PARTS = 256

@@ -40,7 +40,7 @@ class Included:
 
     def enter(self, name: str, including: Path) -> Path:
         """Opens a file that ``including`` names, relative to the folder of the deck, otherwise to its own. Raises
-        ValueError where it does not exist, is not below the folder of the deck, or includes itself.
+        ValueError if the file does not exist, is not below the folder of the deck, or includes itself.
         """
         folder = self._path.resolve().parent
         places = [(start / name.replace("\\", "/")) for start in (folder, including.resolve().parent)]

@@ -36,15 +36,15 @@ class Surveyed(msgspec.Struct, kw_only=True, frozen=True):
     elements: int
     nodes: int
     faces: int
-    """Number of nodes of its surface."""
+    """Number of nodes of the surface of the part."""
     step_length: float
     """Smallest 1 / sqrt(sum |grad N|^2) of its tets, m."""
     altitude: float
-    """Smallest altitude of its tets, m."""
+    """Smallest altitude of the tets of the part, m."""
     mass: float
     low: Vector
     high: Vector
-    """Corners of its bounding box."""
+    """Corners of the bounding box of the part."""
     momentum: Vector
     energy: float
     """Kinetic energy of the part, J, without jitter."""

@@ -90,7 +90,7 @@ class Bulk:
     """Mass, kg."""
     low: Vector
     high: Vector
-    """Corners of its bounding box, m."""
+    """Corners of the bounding box of the body, m."""
     momentum: Vector
     """Momentum, N s."""
     energy: float

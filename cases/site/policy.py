@@ -89,7 +89,7 @@ class RunCaps(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=T
     wall_time: float | None = None
     """Wall time, s."""
     output_bytes: int | None = None
-    """Size of its folder; a larger run is stopped, and keeps its results so far."""
+    """Size of the folder of a run; a larger run is stopped, and keeps its results so far."""
 
 
 class Retention(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=True):

@@ -46,7 +46,7 @@ class Entry(NamedTuple):
 
     @property
     def not_launched(self) -> bool:
-        """Whether it waits because a node failed to start it."""
+        """Whether the job waits because a node failed to start it."""
         return self.state in PENDING and self.reason.replace("_", " ").lower() == NOT_LAUNCHED
 
 

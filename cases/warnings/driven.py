@@ -34,7 +34,8 @@ class Driven(NamedTuple):
     part: Part
     mesh: Generated
     ways: list[Vector]
-    """Displacement of its driven nodes at each time, m; components without drive continue at the initial velocity."""
+    """Displacement of the driven nodes of the body at each time, m; components without drive continue at the initial
+    velocity."""
 
 
 def passing(case: Case) -> Iterator[Problem]:

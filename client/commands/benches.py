@@ -86,7 +86,7 @@ def layouts_of(text: str) -> list[Layout]:
 
 
 def _read(option: str, text: str, reading: Callable[[str], float]) -> float:
-    """Reads the value of an option. Raises ClientError with its name."""
+    """Reads the value of an option. Raises ClientError with the name of the option."""
     try:
         return reading(text)
     except ValueError as error:

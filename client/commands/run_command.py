@@ -102,8 +102,9 @@ def _warn_of_cores(case: Case) -> None:
 
 
 def _follow(run: Run, case: Case, out: Console, plain: bool) -> tuple[RunInfo, set[str]]:
-    """Shows the run until its end. The first Ctrl-C cancels the run; a second Ctrl-C has no effect. The function also
-    returns the log texts that were printed as lines, because a panel shows only the last lines of the log.
+    """Prints the state of the run until the run ends. The first Ctrl-C cancels the run; a second Ctrl-C has no effect.
+    The function also returns the log texts that were printed as lines, because a panel shows only the last lines of the
+    log.
     """
     known, printed = Live(run.id, title=case.title or case.name), set[str]()
     try:

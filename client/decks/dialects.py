@@ -35,7 +35,7 @@ class Dialect(Protocol):
         """Unit system that the deck names, if any."""
 
     def weighed(self) -> Iterable[Weighed]:
-        """Densities of its materials."""
+        """Densities of the materials of the deck."""
 
     def draft(self, system: System) -> Draft:
         """Returns the case; afterwards every keyword of ``account`` is decided."""

@@ -38,7 +38,7 @@ class Body:
     """Key of the part in the deck."""
     title: str
     material: str
-    """Key of its material in the deck."""
+    """Key of the material of the part in the deck."""
     group: str | None
     """``mesh.group`` of the case; None for the whole file."""
     entry: Entry

@@ -137,7 +137,7 @@ def as_json(found: Imported, target: str) -> str:
 
 
 def size_of(path: Path) -> int:
-    """Returns the bytes of a deck. Raises ClientError if it is not a regular file."""
+    """Returns the bytes of a deck. Raises ClientError if the deck is not a regular file."""
     try:
         with whole.opened(path) as file:
             return file.seek(0, 2)

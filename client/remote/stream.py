@@ -144,8 +144,8 @@ def _within(seconds: float, work: Callable[[], T]) -> T:
 
 
 class SseLink:
-    """The SSE stream of the server, read in a thread. After a break it returns no more messages, and the journal is
-    read.
+    """The SSE stream of the server, read in a thread. After a break the stream returns no more messages, and the
+    journal is read.
     """
 
     name, trouble = "SSE", ""
@@ -172,7 +172,7 @@ class SseLink:
         return self._mailbox.get(timeout)
 
     def close(self) -> None:
-        """Ends the thread at its next message, or with the process."""
+        """Ends the thread that reads the stream, at the next message or with the process."""
         self._closed.set()
 
 

@@ -42,7 +42,7 @@ class _Frame:
         return "\n".join(_mark(*self.place(*pair), colour, fill) for pair in values.items())
 
     def labels(self, values: Mapping[int, float], right: int, down: int) -> str:
-        """Writes the values beside their marks."""
+        """Writes the value of each mark beside the mark."""
         places = ((*self.place(*pair), pair[1]) for pair in values.items())
         return "\n".join(f'<text x="{x + right:.1f}" y="{y + down:.1f}">{value:.2f}</text>' for x, y, value in places)
 

@@ -77,8 +77,8 @@ class Record:
 
 
 def read(messages: Iterable[AnyMessage], policy: str = "") -> Record:
-    """Reads the loads in a journal. Raises ClientError if it has none. Messages of steps beyond the checkpoint from
-    which a run continued are dropped.
+    """Reads the loads in a journal. Raises ClientError if the journal has no loads. Messages of steps beyond the
+    checkpoint from which a run continued are dropped.
     """
     moments: list[Groups] = []
     first, costs, expected = None, [], 0.0

@@ -76,8 +76,8 @@ def scale(
 
 
 def run(case: str, overrides: Sequence[str], trial: Trial, folder: Path, seconds: float | None = None) -> None:
-    """Makes a run of a study if it does not exist yet. Raises ClientError if it fails, TimeoutExpired if it has not
-    ended after so many ``seconds``.
+    """Makes a run of a study if it does not exist yet. Raises ClientError if the run fails, TimeoutExpired if the run
+    has not ended after so many ``seconds``.
     """
     place = folder / trial.folder
     if not _there(place, resolved_json(case_of(case, trial.changes(overrides)))):

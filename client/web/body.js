@@ -124,7 +124,7 @@ export class Body {
     this.pick(this.picked === null ? -1 : rowOf(snapshot, this.picked), true);
     this.list();
     this.element.dataset.shown = header.n;
-    requestAnimationFrame(() => setTimeout(this.ready)); // After the frame that draws it.
+    requestAnimationFrame(() => setTimeout(this.ready)); // Runs after the frame that draws the snapshot.
   }
 
   offer() {

@@ -10,7 +10,7 @@ const GROUP = "run";
 const NEAR = "100px"; // Distance to the window: a chart farther off is drawn when the browser is idle, and again when it comes near.
 const PICTURE = { width: 960, height: 420 }; // px of a saved picture.
 const IDLE = 2000; // ms after which a chart out of view is drawn by a browser that is never idle.
-const whenIdle = (work) => globalThis.requestIdleCallback?.(work, { timeout: IDLE }) ?? setTimeout(work, 200); // Some browsers lack it.
+const whenIdle = (work) => globalThis.requestIdleCallback?.(work, { timeout: IDLE }) ?? setTimeout(work, 200); // Some browsers lack this function.
 
 // A chart of `height` px. `option()` returns an option of ECharts, or null without data.
 // `unit` is that of its x axis; only charts over time share the cursor. Enter calls `onEnter` with the index of the cursor in the first series; `table()` resolves to

@@ -1,5 +1,4 @@
-// Token of this tab, or the one that this browser has stored. Without storage it lasts as long as the
-// page.
+// Token of this tab, or the one that this browser has stored. Without storage the token lasts as long as the page.
 
 const KEY = "conoid.token";
 let here = "";

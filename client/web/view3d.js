@@ -1,5 +1,5 @@
-// The body in 3-D: a canvas for the picture and one above it for axes, scale bar and legend. Frames are drawn only after
-// a change. It fills its element, and may exist several times; share() of camera.js couples their cameras.
+// The body in 3-D: a canvas for the picture and one above it for axes, scale bar and legend. Frames are drawn only
+// after a change. A view fills its element. Several views may exist; share() of camera.js couples their cameras.
 
 import { Arrows } from "./arrows.js";
 import { ViewCamera } from "./camera.js";

@@ -72,7 +72,7 @@ class History:
     newest: Sample | None = None
     cuts: list[bytes] = field(default_factory=list)
     snapshots: dict[int, bytes] = field(default_factory=dict)
-    """Lines of snapshots by their number."""
+    """Lines of the journal about snapshots, by the number of the snapshot."""
     notes: Notes = field(default_factory=Notes)
     answers: dict[int, tuple[int, bytes]] = field(default_factory=dict)
     """Answers for a run that has ended, by number of points: ``seq`` of the last event, and the body."""

@@ -33,7 +33,7 @@ _FRESH = 1.0
 """Time in s for which a list of all processes is used again (chosen value). The list is used for processes that an
 ended server has started."""
 _HOUR = 3600.0
-"""Age in s from which shared memory that no process has mapped is removed (chosen value). A launch maps its shared
+"""Age in s from which shared memory that no process has mapped is removed (chosen value). A new run maps its shared
 memory much sooner."""
 
 

@@ -1,7 +1,8 @@
 """Processes that the kernel has killed for lack of memory.
 
-The kernel counts them, for the machine and for each control group, and writes their numbers into its log, which a
-service may not be allowed to read. An end is reported as lack of memory only where one of the two proves it.
+The kernel counts these processes, for the machine and for each control group, and writes the process numbers into its
+log. A service may not be allowed to read this log. An end is reported as lack of memory only where one of the two
+proves it.
 """
 
 import ctypes

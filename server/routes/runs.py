@@ -166,8 +166,8 @@ async def show(
 @router.delete("/v1/runs/{run_id}", status_code=204)
 @blocking
 def purge(run_id: str, service: ServiceOf, identity: Submitter) -> Response:
-    """Removes a run that has ended, with all its files. Afterwards it is answered with 410. A removal cannot be
-    undone.
+    """Removes a run that has ended, with all its files. Later requests for the run are answered with 410. A removal
+    cannot be undone.
     """
     run = find(service, identity, run_id)
     if not run.state.final or service.supervisor.current(run.id) is not None:

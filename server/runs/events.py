@@ -59,7 +59,9 @@ class WorkerStarts:
 
 @dataclass(frozen=True)
 class WorkerWaits:
-    """A batch system has stopped the worker. The worker continues from its checkpoint when it gets cores again."""
+    """A batch system has stopped the worker. The worker continues from its last checkpoint when the batch system gives
+    it cores again.
+    """
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,5 @@
-"""The folder of a run: submission, case, outcome and process record. All of it can be read without the server."""
+"""The folder of a run: submission, case, outcome and process record. All files of the folder can be read without the
+server."""
 
 import hashlib
 import os

@@ -88,8 +88,8 @@ class Tail:
         return b""
 
     def _pass_over(self, descriptor: int) -> bool:
-        """Skips a line that is too long. Returns False while its end has not been reached; the rest is skipped
-        later."""
+        """Skips a line that is too long. Returns False while the end of the line has not been reached; the rest of the
+        line is skipped later."""
         for _ in range(_PASSED // _LONGEST):
             data = os.pread(descriptor, _LONGEST, self._offset)
             end = data.find(b"\n") + 1
@@ -166,8 +166,8 @@ def last(path: Path) -> bytes:
 
 
 def _last_lines(descriptor: int, end: int) -> list[Line]:
-    """Returns lines before ``end``. The last of them is the last complete line before ``end``. Empty if there is no
-    line. At most ``_LONGEST`` bytes are in memory.
+    """Returns lines before ``end``. The last returned line is the last complete line before ``end``. Empty if there is
+    no line. At most ``_LONGEST`` bytes are in memory.
     """
     window = _CHUNK
     while True:

@@ -84,8 +84,8 @@ def _taken(source: Path, target: Path) -> bool:
 
 
 def _describe(place: Path, target: Path) -> None:
-    """Copies the two files that describe a damaged checkpoint. The worker reads them and warns that this checkpoint
-    is skipped.
+    """Copies the two files that describe a damaged checkpoint. The worker reads these two files and warns that the
+    checkpoint is skipped.
     """
     shutil.rmtree(target, ignore_errors=True)
     target.mkdir(parents=True)

@@ -85,7 +85,7 @@ class Book:
     shown: list[Gate] = field(default_factory=list)
 
     def add(self, title: str, text: str, data: object, shown: Iterator[Gate] | None = None) -> None:
-        """Adds a section, its numbers, and the requirements that its numbers answer."""
+        """Adds a section of the report, its numbers, and the requirements for which these numbers are measured."""
         self.text.append(f"## {title}\n\n{text.rstrip()}\n")
         print(f"\n{self.text[-1]}", flush=True)
         self.data[title] = data

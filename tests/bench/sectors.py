@@ -9,10 +9,10 @@ gmsh makes each mesh. The meshes of the half and of the whole (``full``) are mad
 run ``RUNS`` times, default 3, with time steps that differ by 1 %. In one series nodes without tets leave after a
 contact, in the other they remain as particles.
 
-The table has, after 60 us, mean and standard error of the depth of the hole. From the last run it has, of the mass
-of nodes without tets within the radius of the rod, the share within a quarter of SIZE of the axis; removed nodes
-count at the place of their contact. Beside that share are the share of a uniform distribution over the radius, and
-the remaining momentum of the rod along the axis.
+The table has, after 60 us, mean and standard error of the depth of the hole. From the last run the table has, of the
+mass of nodes without tets within the radius of the rod, the share within a quarter of SIZE of the axis; removed nodes
+count at the place of their contact. Beside that share are the share of a uniform distribution over the radius, and the
+remaining momentum of the rod along the axis.
 """
 
 import math

@@ -122,7 +122,7 @@ class Player:
         self._clock, self._last = cpu_time, cpu_time()
 
     def note(self, **parts: Any) -> None:
-        """Stores a call at its begin."""
+        """Stores the start of a call."""
         if self._clock is not None:
             self.calls.append(Call(self._clock() - self._last, **parts))
 

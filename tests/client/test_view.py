@@ -406,7 +406,7 @@ def empty(path: Path) -> None:
 
 @pytest.mark.parametrize("damage", [cut, torn, astray, short, lacks, other, empty])
 def test_a_damaged_frame_is_named(damage: Any, tmp_path: Path) -> None:
-    """VTK prints messages of its own for some damaged frames, and reads beyond the ends of arrays for others."""
+    """VTK prints messages for some damaged frames, and reads beyond the ends of arrays for other damaged frames."""
     path = tmp_path / "000001.vtkhdf"
     write_frame(path)
     require_whole(str(path))

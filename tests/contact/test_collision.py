@@ -315,7 +315,7 @@ def test_only_a_face_in_one_symmetry_plane_is_no_surface() -> None:
 
 @pytest.mark.parametrize(("parts", "named"), [(("body1",), "body1"), ((), "body0")])
 def test_a_part_whose_faces_all_lie_on_symmetry_planes_is_named(parts: tuple[str, ...], named: str) -> None:
-    """If no part has a face, the first part is named."""
+    """The first part is named if no part has a face."""
     cube = block((2, 2, 2), SIZE, shake=0.0)
     planes = tuple(
         schema.Symmetry(kind="symmetry", axis=axis, at=at, parts=parts)

@@ -1,8 +1,8 @@
 """Bodies that collide with one face each, equal or nearly equal.
 
-All nodes of one have their feet on the border of the other's face. None of them is ever inside of the other body if
-that becomes narrower behind its face, so contacts are not found later; and edges cross in the plane of both faces,
-at the limit of their contacts.
+All nodes of one have their feet on the border of the other's face. No node is ever inside of the other body if this
+body becomes narrower behind its face, so contacts are not found later; and edges cross in the plane of both faces, at
+the limit of their contacts.
 """
 
 import numpy as np

@@ -139,7 +139,7 @@ class Stand:
             self.child.wait(20)
 
     def again(self) -> None:
-        """Kills the server and starts a new one. Raises AssertionError if it does not start."""
+        """Kills the server and starts a new one. Raises AssertionError if the server does not start."""
         self.kill()
         assert self.start(), f"the server does not start: {self.last_line()}"
 

@@ -159,8 +159,8 @@ def test_a_crack_that_closes_acts_as_two_bodies_do() -> None:
 
 @pytest.mark.parametrize("friction", [0.0, 0.3])
 def test_sides_that_slide_rub(friction: float) -> None:
-    """Pressed and sheared sides lose mu times the normal impulse. Without friction they lose only the part by the
-    rotation of faces by the strain, v / c = 2e-4.
+    """Pressed and sheared sides lose mu times the normal impulse. Without friction the sides lose only the part due to
+    the rotation of faces by the strain, v / c = 2e-4.
     """
     sim = cracked(friction=friction)
     assert sim.contact is not None

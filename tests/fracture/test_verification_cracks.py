@@ -166,7 +166,7 @@ def test_branching_plates_start_and_branch_as_published(plates: list[cracks.Run]
 @pytest.mark.slow
 @pytest.mark.timeout(1200)
 def test_branching_plates_are_no_faster_than_published(plates: list[cracks.Run]) -> None:
-    """The median of their largest speeds before they branch is below 0.6 of the Rayleigh speed."""
+    """The median of the largest speeds of the cracks before branching is below 0.6 of the Rayleigh speed."""
     fastest = [run.fastest[0] for run in plates]
     print(f"largest speeds of one crack {np.round(fastest, 3)}")
     assert np.median(fastest) < 0.6

@@ -1,4 +1,5 @@
-"""A Chromium without a window. The tests send it commands of the DevTools protocol over a pipe; it draws by software.
+"""A Chromium without a window. The tests send commands of the DevTools protocol to the browser over a pipe; the browser
+draws by software.
 
 https://chromedevtools.github.io/devtools-protocol describes the methods that are called here.
 """

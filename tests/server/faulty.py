@@ -91,7 +91,7 @@ def fsync(descriptor: int) -> None:
 
 
 def write(descriptor: int, data: bytes) -> int:
-    """Replaces ``os.write``. When it fails, half of the data are on disk."""
+    """Replaces ``os.write``. When a write fails, half of the data are on disk."""
     if _current.plan is not None and not _current.plan.reads:
         try:
             _current.plan.touch()

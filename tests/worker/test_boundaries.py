@@ -483,8 +483,8 @@ def test_a_traction_without_a_face_is_refused() -> None:
 
 @pytest.mark.parametrize("ranks", [1, 3])
 def test_a_traction_leaves_with_the_tets_of_its_faces(ranks: int) -> None:
-    """Nodes of removed tets get no force of the traction any more. With a remaining force they would be accelerated
-    without limit, because their mass is tiny.
+    """Nodes of removed tets get no force of the traction any more. With a remaining force these nodes would be
+    accelerated without limit, because their mass is tiny.
     """
     top = {frozenset(face.tolist()) for face in boundary_faces(MESH.tets) if (MESH.points[face][:, 2] > 2.9e-3).all()}
     loaded = {e: [c for c in top if c <= set(tet.tolist())] for e, tet in enumerate(MESH.tets)}

@@ -155,8 +155,8 @@ def test_speed_of_sound_of_a_linear_solid() -> None:
 
 
 def test_there_is_no_pressure_beyond_the_pole() -> None:
-    """p_H is infinite at the compression 1 / S. Beyond it the law returns no pressure, instead of a finite pressure
-    that decreases."""
+    """p_H is infinite at the compression 1 / S. Beyond this compression the law returns no pressure, instead of a
+    finite pressure that decreases."""
     for ratio, finite in ((1.0 - 0.99 / GAS.S, True), (1.0 - 1.01 / GAS.S, False), (-0.1, False)):
         patch = Patch(free_tets(1, 5), COPPER_GAS)
         patch.put(VOLUME_RATIO, ratio)

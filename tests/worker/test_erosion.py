@@ -256,7 +256,7 @@ def test_the_surface_follows_what_is_left(ranks: int) -> None:
 
 
 def test_a_node_that_loses_all_its_tets_at_once_meets_others() -> None:
-    """Such a node also meets others if it was inside of the body, and never on the surface before."""
+    """A node from the inside of the body, which was never on the surface, meets other nodes too."""
     case, meshes = scene_of_two()
     sim = build(wearing(case, EROSION), meshes)
     step.prepare(sim)

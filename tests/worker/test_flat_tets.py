@@ -66,8 +66,8 @@ def lowest(form: Form, aspect: float, speed: float, seed: int) -> tuple[float, f
 @pytest.mark.parametrize("form", AVERAGED)
 @pytest.mark.parametrize(("aspect", "seed"), [(3e-3, 1), (3e-3, 2), (1e-2, 3)])
 def test_a_flat_tet_is_not_crushed(form: Form, aspect: float, seed: int) -> None:
-    """The tet loses no more volume than in the standard form. With the mean over its nodes it was crushed in each of
-    these scenes.
+    """The tet loses no more volume than in the standard form. With the mean pressure over its nodes the flat tet was
+    crushed in each of these scenes.
     """
     volume, residual = lowest(form, aspect, 200.0, seed)
     assert volume > lowest("standard", aspect, 200.0, seed)[0] - 0.02

@@ -87,7 +87,9 @@ def _common(one: Origin | None, x: Floats, other: Origin | None, y: Floats) -> t
 
 
 def _lines(values: Floats) -> Ids:
-    """Return (n,) a number for each coordinate. Coordinates that differ by round-off have the same number."""
+    """Return (n,) integers: equal coordinates have equal integers. Coordinates that differ by round-off have the same
+    number.
+    """
     order = np.argsort(values, kind="stable")
     steps = np.diff(values[order], prepend=values[order[:1]])
     numbers = np.empty(len(values), np.int64)

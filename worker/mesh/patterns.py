@@ -23,8 +23,8 @@ QUADS = np.array([[0, 3, 2, 1], [4, 5, 6, 7], [0, 1, 5, 4], [1, 2, 6, 5], [2, 3,
 EDGES = ((0, 1), (1, 2), (2, 3), (3, 0), (4, 5), (5, 6), (6, 7), (7, 4), (0, 4), (1, 5), (2, 6), (3, 7))
 """Edges of a hexahedron: two nodes each."""
 MOST = 6
-"""Largest number of tets of a cut. A cut into five tets has a tet in the middle, a cut into six tets has a long
-diagonal."""
+"""Largest number of tets of a cut. A hexahedron that is cut into five tets has a tet in the middle; a hexahedron that
+is cut into six tets has a long diagonal."""
 _CUBE = ((0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0), (0, 0, 1), (1, 0, 1), (1, 1, 1), (0, 1, 1))
 """Coordinates of the nodes of a hexahedron."""
 

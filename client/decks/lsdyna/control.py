@@ -63,7 +63,7 @@ def _behind(block: Block, options: frozenset[str], entry: Entry) -> list[Card]:
     cards = trimmed(block.cards)[bool(options & {"ID", "TITLE"}) :]
     if "MPP" not in options or not cards:
         return cards
-    entry.remark("left", f"line {cards[0].number}", "how the other code divides the work of contact")
+    entry.remark("left", f"line {cards[0].number}", "division of the work of contact in the other code")
     return cards[1 + (len(cards) > 1 and cards[1].text.lstrip().startswith("&")) :]
 
 

@@ -17,8 +17,8 @@ _LAYOUT = (
 def rigid(
     option: Option, entry: Entry, bodies: Sequence[Body], topology: Topology, nodes: Callable[[int, Entry], Chosen]
 ) -> tuple[int, str] | None:
-    """Makes the body of an option's nodes rigid; returns its main node, and the key of the body. None if it is
-    refused. Raises CardError, ValueError.
+    """Makes the body of an option's nodes rigid; returns its main node, and the key of the body. Returns None if the
+    option is refused. Raises CardError, ValueError.
     """
     fields = Fields(option, entry, option.rows[1:], _LAYOUT)
     fields.refuse("SENS", "a body that becomes rigid later")

@@ -25,7 +25,7 @@ class Option:
     """An option such as ``/MAT/LAW2/1``: its words in upper case, and its lines with their numbers."""
 
     shown: str
-    """The option as it is in the file."""
+    """Text of the option in the file."""
     words: list[str]
     line: int
     rows: list[Row]

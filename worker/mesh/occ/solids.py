@@ -60,7 +60,7 @@ def _of_solid(mesh: Cad | Combination, sources: Sources, key: str) -> _Made:
 
 def draw_solid(gmsh: Any, mesh: Cad | Combination, frame: Frame, sources: Sources, key: str) -> Solids:
     """Draw a body in the ``frame`` of the model, which has the centre and the axis of the body. Return the volumes of
-    its sector.
+    the sector of a body.
 
     Solids that touch have common faces. Raises MeshError if no solid is left, or if the mesh would have too many tets.
     """
