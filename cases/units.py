@@ -74,8 +74,8 @@ _FACTOR = re.compile(r"\s*([*/·]?)\s*([A-Za-zµ%]+|1)(?:\^([+-]?\d))?")
 QUANTITY = "the quantity's"
 """Placeholder for the unit of a number whose unit another key determines."""
 _LONGEST = 80
-"""Largest number of characters of a quantity (chosen value). Any number with its unit is shorter. Longer text is
-refused early, so that it costs no time."""
+"""Largest number of characters of a quantity (chosen value). Any number with its unit is shorter. Text above this
+length is refused before it is parsed."""
 LARGEST = 1e30
 """Largest quantity in SI units; its inverse is the smallest quantity. The value was chosen because the energy of any
 such mass and speed is a finite number."""

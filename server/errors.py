@@ -164,7 +164,7 @@ async def _database(request: Request, error: Exception) -> Response:
 
 
 def database_away(error: Exception) -> ServiceError:
-    """Returns the status of a failed write: 507 for a full disk, 503 otherwise."""
+    """Returns the status of a failed write: 507 for a full disk, 503 for any other error."""
     reason = str(error).splitlines()[0]
     if "disk is full" in reason:
         return ServiceError(507, "storage", "the disk of the server's database is full", retryable=True)

@@ -99,9 +99,9 @@ class Material(Model):
     equation of state above pressures of some percent of the bulk modulus. Not with ``johnson_holmquist``, which has its
     own."""
     spall: Annotated[Stress, Positive] | None = None
-    """Spall strength: largest tensile pressure. Beyond this tension pores open, which absorb the work; they close again
-    without resistance before the material is compressed. Default: no limit. Not with ``johnson_holmquist``, which has
-    its own."""
+    """Spall strength: largest tensile pressure. Beyond this tension pores open, which absorb the work; the pores close
+    again without resistance before the material is compressed. Default: no limit. Not with ``johnson_holmquist``, which
+    has its own."""
     brittle: Brittle | None = None
     """Fracture of facets; needed by parts with ``fracture``. Default: the material cannot fracture."""
     description: str = ""

@@ -21,7 +21,7 @@ class Viscosity(Model):
     linear: Annotated[Ratio, Field(ge=0)] = 0.06
     """Coefficient of the linear term, which damps numerical oscillations behind a wave front, and also elastic waves.
     With 0.06 a velocity jump of some m/s is followed by oscillations: the tension in the spall plane of a flyer plate
-    is then a third too high. With 0.3 it is a sixth too high."""
+    is then a third too high. With 0.3 this tension is a sixth too high."""
     shock: Annotated[Ratio, Field(ge=0)] = 0.4
     """Increase of the linear coefficient in shocks: the front is spread over some tets and does not overshoot."""
     quadratic: Annotated[Ratio, Field(ge=0)] = 1.5

@@ -22,7 +22,7 @@ class Rigid(Model):
 
     mass: Annotated[Mass, Field(gt=0)] | None = None
     """Mass of the modelled part of the body (with a sector: of the sector). Default: that of the mesh. Without
-    ``inertia`` it scales the inertia of the mesh."""
+    ``inertia`` the mass scales the inertia of the mesh."""
     centre: Point | None = None
     """Centre of mass at the start, in the coordinates of the case; together with ``inertia``. Default: that of the
     mesh."""

@@ -4,7 +4,8 @@ import difflib
 from collections.abc import Iterable
 
 _LONGEST = 80
-"""Number of characters of a word that are compared. The value was chosen because no allowed name has more."""
+"""Number of characters of a word that are compared. The value was chosen because no allowed name has more
+characters."""
 _CUTOFF, _MOST = 0.6, 3
 """Smallest similarity of a suggested name (default of difflib), and number of suggestions (chosen value)."""
 _PART = 3

@@ -1,8 +1,8 @@
 """Calls of Slurm commands with a time limit, and the classes of their failures.
 
-A failed command raises one of three errors: RefusedError, the controller refuses the request; LaterError, it refuses
-for now; AwayError, the result is unknown. After the last one the job may exist all the same, so it is searched for
-before it is submitted again.
+A failed command raises one of three errors: RefusedError, the controller refuses the request; LaterError, the
+controller refuses for now; AwayError, the result is unknown. After an AwayError the job may exist all the same, so the
+job is searched for before it is submitted again.
 """
 
 import os

@@ -8,7 +8,7 @@ s1 + 3 s3 > 0. In the plane wave of an impact there is no lateral strain, so tha
     s1 = 8 T (1 + k) / (1 - k)^2
 
 20 T for nu = 0.22; alumina of 300 MPa and nu = 0.22 has 6.0 GPa; its measured Hugoniot elastic limit is 6.6 GPa
-(alumina_995_jh2 in materials.toml). In a bar under uniaxial stress it is 8 T.
+(alumina_995_jh2 in materials.toml). In a bar under uniaxial stress this limit is 8 T.
 """
 
 import itertools

@@ -49,9 +49,9 @@ def import_deck(
     Beside the case stands the account NAME.import.txt (with --json: NAME.import.json): every keyword of the deck with
     its key in the case, or the reason why it has none. Parts take their mesh from the deck itself.
 
-    Where the case would give a wrong answer without something that Conoid lacks, the import is refused and names it:
-    --anyway writes the case all the same. Units are given, named by a Radioss deck, or found from a material with
-    the density of steel. docs/howto/import.md lists the translated keywords.
+    If Conoid lacks a feature without which the case would give a wrong answer, the import is refused and names the
+    feature. --anyway writes the case all the same. Units are given, named by a Radioss deck, or found from a material
+    with the density of steel. docs/howto/import.md lists the translated keywords.
     """
     target = out or deck.with_suffix(".toml")
     if target.suffix != ".toml":

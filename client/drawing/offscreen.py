@@ -26,8 +26,8 @@ _LIGHTS = ((-0.7, 0.9, 1.6), 0.66), ((1.3, 0.2, 1.0), 0.34)
 _WALL = "#aab6c3"
 _MATTER = {"ambient": 0.45, "diffuse": 0.85, "specular": 0.10, "specular_power": 20.0}
 _FEATURE = 35.0
-"""Angle between two faces above which the shading of their edge is not smoothed, degrees. Chosen value: the faces of
-a curved surface differ by less."""
+"""Angle between two faces above which the shading of their edge is not smoothed, degrees. Chosen value: the faces of a
+curved surface differ by less than this angle."""
 
 
 @dataclass(frozen=True)

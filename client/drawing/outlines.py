@@ -9,8 +9,8 @@ from .offscreen import Exposure
 _STRONG, _MIDDLE, _WEAK = 0.85, 0.6, 0.4
 """Darkness of the lines round a part, at a jump of the depth, round a fragment and along an edge. Chosen values."""
 _BEND = np.radians(38.0)
-"""Angle between two faces above which their edge has a line. Chosen value: the faces of a curved surface differ by
-less."""
+"""Angle between two faces above which their edge has a line. Chosen value: the faces of a curved surface differ by less
+than this angle."""
 _EVEN = np.radians(12.0)
 """Difference of angles below which the pixels of a face have the same slope. Chosen value: a crack with a width of
 one pixel has a larger difference."""

@@ -62,8 +62,8 @@ def _cores(case: dict[str, Any], known: Live, what: str) -> int:
 
 
 def ask(folder: Path, request: str, wish: str) -> str:
-    """Writes a request file that the worker reads; returns one line about the request. Raises UnfinishedError
-    without a worker, OSError.
+    """Writes a request file that the worker reads; returns one line about the request. Raises OSError, and
+    UnfinishedError if no worker runs.
     """
     LocalFolder(folder).path(layout.JOURNAL)
     if not slurm.held(folder):

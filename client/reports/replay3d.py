@@ -141,7 +141,7 @@ def _messages(result: Result) -> list[Any]:
 
 
 def spread(names: Sequence[str], most: int) -> list[str]:
-    """Returns at most a given number of the names, evenly, with the first and the last name."""
+    """Returns at most a given number of names, evenly spaced in the list, with the first and the last name."""
     return sorted({names[round(k * (len(names) - 1) / max(most - 1, 1))] for k in range(most)})
 
 

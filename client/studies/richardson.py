@@ -17,7 +17,7 @@ SAFETY, CAUTION = 1.25, 3.0
 SLOWEST = 0.5
 """Order below which Eca and Hoekstra do not trust an extrapolation."""
 _ORDERS = (0.01, 12.0)
-"""Range in which an order is searched. Chosen value: beyond it differences are not significant."""
+"""Range in which an order is searched. Chosen value: relative differences below this value are not significant."""
 _GOLDEN = (math.sqrt(5.0) - 1.0) / 2.0
 _SCAN, _HALVINGS = 240, 80
 """Number of orders that are tried, and number of golden-section steps about the best one. Chosen values: with these

@@ -35,7 +35,8 @@ thousand probes has slightly more than a thousand columns."""
 _TEXT = frozenset({"limiter"})
 """Names of columns of text."""
 csv.field_size_limit(1 << 30)
-"""Largest length of a field. The csv module refuses a longer field. A field that is not a number becomes NaN."""
+"""Largest length of a field. The csv module refuses fields above this length. A field that is not a number becomes
+NaN."""
 
 
 class Columns:

@@ -1,5 +1,4 @@
-"""The folder of a run: submission, case, outcome and process record. All files of the folder can be read without the
-server."""
+"""The folder of a run: submission, case, outcome and process record. A reader of these files needs no server."""
 
 import hashlib
 import os

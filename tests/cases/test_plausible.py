@@ -47,7 +47,7 @@ def warnings_of(data: dict[str, Any]) -> dict[str, str]:
 
 
 def target(**changes: Any) -> dict[str, Any]:
-    """Returns the ball and the plate; ``plate__mesh`` and the like are merged in."""
+    """Returns the ball and the plate; arguments such as ``plate__mesh`` replace keys below ``plate``."""
     data = toml_data(TARGET)
     for key, value in changes.items():
         part, _, table = key.partition("__")

@@ -24,7 +24,7 @@ def good() -> dict[str, Any]:
 
 
 def corpus() -> list[Body]:
-    """Returns all hostile bodies; each call returns the same."""
+    """Returns all hostile bodies; each call returns the same bodies."""
     made = [*_quadratic(), *_deep(), *_numbers(), *_text(), *_large(), *_replaced(), *_mutated()]
     return [(f"{n:03d} {name}", kind, body) for n, (name, kind, body) in enumerate(made)]
 

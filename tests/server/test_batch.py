@@ -297,8 +297,8 @@ def test_a_request_to_stop_follows_no_link(tmp_path: Path) -> None:
 def test_a_folder_without_a_worker_is_neither_cancelled_nor_still_running(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """A killed worker writes no last message. A request file would otherwise wait for the next worker, and following
-    the run would not end.
+    """A killed worker writes no last message. Without this rule a request file would wait for the next worker, and a
+    command that follows the run would not end.
     """
     monkeypatch.setattr(following, "_ASK_EVERY", 0.0)
     (tmp_path / layout.JOURNAL).write_text('{"type":"status","run":"a","seq":1,"state":"running"}\n')

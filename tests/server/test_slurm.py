@@ -332,8 +332,8 @@ def test_a_preempted_run_goes_on_to_the_same_digest(solver: Site, profile: str, 
 def hurry(solver: Site, run: str) -> None:
     """Releases a requeued job.
 
-    Slurm lets a requeued job wait for two minutes, and the test skips this time. The node must have finished with
-    the job: a job that starts in the second of its end is taken for the one that was ended.
+    Slurm lets a requeued job wait for two minutes, and the test skips this time. The node must have finished with the
+    job: a job that starts in the second in which the old job ended is mistaken for the old job.
     """
     since = dict[str, float]()
     deadline = time.monotonic() + 20.0

@@ -75,7 +75,7 @@ def stored(sim: Simulation) -> float:
 
 
 def stored_at_corners(sim: Simulation, tension: float) -> float:
-    """Returns the same energy for glass with the Johnson-Holmquist law, whose averaged pressure is the mean of the
+    """Returns the elastic energy for glass with the Johnson-Holmquist law, whose averaged pressure is the mean of the
     pressures at the four nodes of a tet."""
     (part,) = sim.model.blocks
     bulk, averaged = part.params[law.BULK], part.state.shape[1] > CORNERS

@@ -9,7 +9,7 @@ from ..model.state import Flags, Floats, Ints
 from .pieces import Pieces
 
 _NOTHING = 1e-12
-"""Share of the area of a row; a smaller weight is treated as rounding error."""
+"""Share of the area of a row; weights below this share are treated as rounding errors."""
 
 
 @dataclass

@@ -121,7 +121,7 @@ class Elements:
         self._over(self._standard, (), (dt, scale), self._send)
 
     def again(self, scale: float) -> None:
-        """Sums the forces of the present stress again, in a coarser quantum."""
+        """Sums the forces of the present stress again, in a quantum above the previous one."""
         limit = self.peaks[[records.LARGEST_LIMIT, records.LIMITING_TET]]
         self._scratches.peaks[:] = 0
         self.model.nodes.force[:] = 0

@@ -9,8 +9,8 @@ r"""Passes over the elements of a block, chunk by chunk, as the time step calls 
                                                                     v
                         nodal means --> pressure, (stress), viscosity --> forces --> nodal sums     force_pass
 
-``standard_pass`` does everything in one pass. The averaged pressure forms need two, with the completed nodal sums
-between them. ``forces_again`` repeats only the sum of forces, in a coarser quantum.
+``standard_pass`` does everything in one pass. The averaged pressure forms need two passes, with the completed nodal
+sums between them. ``forces_again`` repeats only the sum of forces, in a coarser quantum.
 
 The deviatoric stress is computed where its law allows (materials/law.py): a law that does not depend on the pressure in
 the first pass; one that does, in the second, after the equation of state, which then computes the velocity gradient

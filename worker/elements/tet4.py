@@ -44,7 +44,7 @@ from .scratch import (
 _VOLUME = TET_VOLUME * CHUNK
 _SIXTH = 1.0 / 6.0
 _LINE = 8
-"""Number of float64 in a cache line of 64 bytes. On processors with longer lines some lines are fetched twice."""
+"""Number of float64 in a cache line of 64 bytes. On processors with lines of 128 bytes some lines are fetched twice."""
 
 
 @njit("void(float64[::1], int64, int64)", cache=True, forceinline=True)

@@ -33,7 +33,7 @@ class Softening(NamedTuple):
     """(m, 3) size D of the opening at which softening begins, m."""
     lent: Floats
     """(m, 3) size D at insertion, e, m: a pair that closes below this size would release more energy than it
-    absorbed. The value is smaller, or 0, after the pair has been unloaded."""
+    absorbed. The value decreases, possibly to 0, when the pair is unloaded."""
     offset: Floats
     """(m, 3, 3) offset of the opening, m: along the normal, along the first edge, and across both."""
 

@@ -132,7 +132,7 @@ def hyperelastic(w, s, params, n, dt):  # type: ignore[no-untyped-def]
 def stiffen(w, s, params, n):  # type: ignore[no-untyped-def]
     """Raises MODULUS from K + 4/3 G to an upper bound for a strained tet: K + 4/3 (G + 2 W / V0) / |J|.
 
-    Positive for an inverted tet as well: limits.step_limit detects it by its volume.
+    The value is positive for an inverted tet too: limits.step_limit detects it by its volume.
     """
     shear = params[SHEAR]
     of_mass = shear / params[DENSITY]

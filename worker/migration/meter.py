@@ -71,8 +71,8 @@ def _candidates(had: Floats, took: Floats) -> Floats:
 
 
 def on_parts(sim: Simulation) -> Floats:
-    """Return (parts,) the CPU time of the passes over the tets of each part so far, s. With one block it is the time
-    of the phase.
+    """Return (parts,) the CPU time of the passes over the tets of each part so far, s. With one block the time of the
+    part is the time of the phase.
     """
     seconds, blocks = np.zeros(len(sim.model.parts)), sim.model.blocks
     for block in blocks:

@@ -41,8 +41,8 @@ def once(table: Table, key: "np.ndarray") -> Table:
 
 @dataclass
 class Parcel:
-    """Parcel: state of tets and nodes in a message or a checkpoint. ``known`` and the names of all columns are equal
-    on all ranks.
+    """A parcel is the state of tets and nodes in a message or a checkpoint. ``known`` and the names of all columns are
+    equal on all ranks.
     """
 
     known: dict[str, Any] = field(default_factory=dict)

@@ -32,7 +32,7 @@ _LIMB = 2.0**_LIMB_BITS
 int64."""
 _WORD, _REAL = struct.Struct("=q"), struct.Struct("=d")
 _SMALLEST = -993
-"""Smallest exponent of a column. With a smaller exponent the scale would overflow."""
+"""Smallest exponent of a column. An exponent below this value would overflow the scale."""
 
 
 def float_of(bits: int) -> float:

@@ -188,8 +188,8 @@ def press(  # type: ignore[no-untyped-def]
 ):
     """Passes over the rows until the impulses settle.
 
-    Adds the impulses to ``impulse`` (b, 6) and ``given`` (walls, b, 3), and the impulses of friction to ``rubbed`` and
-    ``by`` as well.
+    Adds the impulses to ``impulse`` (b, 6) and ``given`` (walls, b, 3), and the impulses of friction also to ``rubbed``
+    and ``by``.
 
     1. Velocity u of the node relative to the wall.
     2. Compliance along n of body and wall: 1 / m + (r x n) . I^-1 (r x n) + 1 / M.

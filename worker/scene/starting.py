@@ -28,10 +28,10 @@ def start(
 ) -> list[str]:
     """Apply the boundaries to the initial velocities; return warnings. Collective.
 
-    ``known``: for each boundary whether all its parts are in the model. A boundary that is not known has fewer
-    checks. None: all boundaries are known. Raises InputError, on every rank, for a boundary without a node, for two
-    boundaries that drive a node differently, for a body that starts behind a wall or through a symmetry plane, and
-    for motion prescribed across a symmetry plane.
+    ``known``: for each boundary whether all its parts are in the model. Fewer checks are made for a boundary with a
+    part that is not in the model. None: all boundaries are known. Raises InputError, on every rank, for a boundary
+    without a node, for two boundaries that drive a node differently, for a body that starts behind a wall or through a
+    symmetry plane, and for motion prescribed across a symmetry plane.
     """
     held = [held_by(case, spec, model) for spec in case.boundaries]
     known = [True] * len(held) if known is None else known

@@ -36,8 +36,8 @@ _AHEAD = 2.0
 """Number of steps before the end of the horizon at which the next search is scheduled. The second of these steps is
 needed because the narrow phase also detects the contacts of the step after the present one."""
 _LEAST = 3.0 + _AHEAD
-"""Smallest remaining horizon, in steps, for which the candidates of the last search are kept; with a shorter one the
-next search would follow immediately. Chosen value: three steps more than _AHEAD; one of the three allows for a time
+"""Smallest remaining horizon, in steps, for which the candidates of the last search are kept; with a shorter horizon
+the next search would follow immediately. Chosen value: three steps more than _AHEAD; one of the three allows for a time
 step that increases."""
 
 

@@ -23,7 +23,7 @@ from ..stage import Contact
 from .inside import outermost
 
 LARGE = 0.1
-"""A tet is counted if a larger share of its volume lies in other tets. Chosen value: where curved bodies of flat
+"""A tet is counted if more than this share of its volume lies in other tets. Chosen value: where curved bodies of flat
 facets touch, their tets have about a hundredth of the volume in common."""
 _SHARED, _MOST = 0.01, 0.5
 """Limits of the warning: common volume over the volume of all tets that were cut, and the largest common volume of

@@ -26,8 +26,8 @@ from ..stage import Contact
 from .overlap import to_borders
 
 SLIGHT = 0.05
-"""Depth over the typical size of a face; smaller depths count as 0. Chosen value: it is above the residual of the
-contact sweeps."""
+"""Depth over the typical size of a face; depths below this value count as 0. Chosen value: it is above the residual of
+the contact sweeps."""
 _WORDS = 5
 """Number of words of a node in a message."""
 _AT_ONCE = 1 << 14

@@ -17,7 +17,7 @@ from ..narrow_phase.facing import FACING
 _INSIDE = 1e-9
 """Tolerance of the volume coordinates of a node inside of a tet."""
 _ROUNDING = 1e-6
-"""Depth over the size of a face; smaller depths count as 0."""
+"""Depth over the size of a face; depths below this value count as 0."""
 _TRIES = 30
 """Largest number of passes in which overlapping bodies are moved apart. Chosen value."""
 

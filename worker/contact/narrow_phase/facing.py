@@ -30,12 +30,12 @@ _SLIDES = 2e-3
 counts as beside the edge only up to the depth TOUCHING; otherwise the contact of a fast projectile would be detected
 one step late (test_hard_contact). Chosen value: twice the fastest approach observed in sliding."""
 _BEHIND = 0.1
-"""Share of the size of a face: sum of the depths of the corners of the face behind a neighbouring face. If the sum
-is larger, the common edge is convex. Chosen value: below the sum for an angle of 25 degrees between the faces, above
-rounding."""
+"""Share of the size of a face: sum of the depths of the corners of the face behind a neighbouring face. If the sum is
+above this value, the common edge is convex. Chosen value: below the sum for an angle of 25 degrees between the faces,
+above rounding."""
 _OVER = 0.1
-"""Least component along a face of the mean direction from a node to its faces' midpoints, above which the faces of
-the node reach over that face. The faces of a blunt edge have a smaller component. Chosen value: a third of the
+"""Least component along a face of the mean direction from a node to its faces' midpoints, above which the faces of the
+node reach over that face. The faces of a blunt edge have a component below this value. Chosen value: a third of the
 component for the corner of a cube."""
 _F, _VECTOR = types.float64, types.UniTuple(types.float64, 3)  # type: ignore[no-untyped-call]
 

@@ -28,7 +28,7 @@ all nodes of a part lie behind its own faces. This share is also the smallest va
 contact of edges, for tets of any height."""
 FAST = 0.1
 """Pairs whose distance decreases in a step by less than this share of the typical size of a face limit the time step
-only when they are active. The altitude of a tet of that size is several times larger."""
+only when they are active. The altitude of a tet of the typical size is several times this distance."""
 PUSH_OUT = 0.1
 """Largest share of a penetration that is corrected in a step, and largest share of the closing speed that is returned
 for the correction. The two fractions are 0 while contact has no energy to return (``account.Account``)."""

@@ -23,8 +23,8 @@ from ...scene.selection import named
 from .active import MOBILITY, NODES, V
 
 _NEAR = 0.25
-"""Distance from a plane over the typical size of a face; nodes at a larger distance are ignored. Chosen value: no
-step moves a node so far (clock.py). If a step did, the boundary would still stop the node."""
+"""Distance from a plane over the typical size of a face; nodes beyond this distance are ignored. Chosen value: no step
+moves a node so far (clock.py). If a step did, the boundary would still stop the node."""
 
 
 class Stops(NamedTuple):

@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 from ..model import Floats
 
 _DEEP = 1e-6
-"""Tolerance, as a share of the extent of the surface: projections that overlap by less only touch. Chosen value:
-files have six or seven digits."""
+"""Tolerance, as a share of the extent of the surface: projections that overlap by less than this share only touch.
+Chosen value: files have six or seven digits."""
 _MOST = 10_000_000
 """Largest number of entries of cells. The cells are enlarged until the number is below this limit. Chosen value: a
 quarter of a GiB."""
