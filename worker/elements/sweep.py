@@ -54,13 +54,13 @@ def standard_pass(motion, body, marks, room, begin, end, dt, scale):  # type: ig
             rest.pass_over(peaks, quiet, LARGEST_LIMIT, LIMITING_TET)
             continue
         before = s.copy() if still else s[:0]
-        # 2. Edges at n+1; from the shape also displacements.
+        # 2. Compute the edges at n+1, and from the shape also the displacements.
         if shape:
             tet4.gather_moved(w, x0, x, t, s, n)
         else:
             tet4.gather(w[scratch.EDGE :], x, t, s, n)
         upset = s.copy() if erodes and any_inverted(w, n) else s[:0]
-        # 3. Deviatoric stress (trial stress, if the law needs the pressure) and volume strain.
+        # 3. Compute the deviatoric stress (trial stress, if the law needs the pressure) and the volume strain.
         if shape:
             tet4.end_gradients(w, n)
             strengthen(strength, w, s, params, n, dt)
@@ -72,13 +72,13 @@ def standard_pass(motion, body, marks, room, begin, end, dt, scale):  # type: ig
             chunks.from_rates(strength, w, s, params, n, dt)
             tet4.end_gradients(w, n)
             averaged.own_strains(w, n, dt)
-        # 4. Pressure, viscosity, stable step; plastic return at that pressure.
+        # 4. Compute pressure, viscosity and stable step; do the plastic return at that pressure.
         press(eos, w, s, params, n)
         chunks.viscosity_and_limit(w, s, params, n, dt, False)
         chunks.return_at_pressure(strength, w, s, params, n, dt)
         if len(upset) > 0:
             reset_inverted(w, s, upset, x, v, t, rows, n, dt)
-        # 5. Marks of worn tets and overstressed faces; forces.
+        # 5. Mark worn tets and overstressed faces; compute the forces.
         marked = chunks.mark(marks, first, last, w, peaks, s, params, rows)
         largest = chunks.sum_forces(force, w, wi, bits, peaks, t, s, ids, n, scale)
         quiet[rest.NOTED] = 0
@@ -102,7 +102,7 @@ def strain_pass(motion, body, marks, room, means, begin, end, dt):  # type: igno
         t, s = tets[c * CHUNK : (c + 1) * CHUNK], state[c * rows * CHUNK : (c + 1) * rows * CHUNK]
         n, means_of = len(t), body.averages[c * CHUNK : (c + 1) * CHUNK]
         flat, quiet = body.flat[c * CHUNK : c * CHUNK + n], body.quiet[c]
-        # 1. A chunk at rest: volumes only.
+        # 1. Compute only the volumes of a chunk at rest.
         still = not split and dt > 0.0 and rest.at_rest(v, t, n)
         if still and quiet[rest.NOTED] > 0:
             chunks.volumes_at_rest(w, x, t, s, shape, n)
@@ -110,14 +110,14 @@ def strain_pass(motion, body, marks, room, means, begin, end, dt):  # type: igno
                 exclude_flat(w, flat, n)
             averaged.scatter_volumes(sums, w, weight, means_of, n, dt)
             continue
-        # 2. Edges at n+1; from the shape, if its law acts here, also displacements.
+        # 2. Compute the edges at n+1; from the shape, if its law acts here, also the displacements.
         if shape and more:
             tet4.gather_moved(w, x0, x, t, s, n)
         else:
             tet4.gather(w[scratch.EDGE :], x, t, s[:0] if shape else s, n)
         before = s.copy() if still else s[:0]
         upset = s.copy() if erodes and any_inverted(w, n) else s[:0]
-        # 3. Volume change and deviatoric stress.
+        # 3. Compute volume change and deviatoric stress.
         if shape:
             tet4.end_gradients(w, n) if more or split else tet4.volumes(w, n)
             tet4.growth(w, s, n, dt)
@@ -133,7 +133,7 @@ def strain_pass(motion, body, marks, room, means, begin, end, dt):  # type: igno
             averaged.keep_flux(w, s, n)
         if params[DILATES] > 0.0:
             averaged.subtract_dilation(w, s, params, n, dt)
-        # 4. Nodal sums, without flat tets: heat or bulking, volumes.
+        # 4. Add heat or bulking, and volumes, to the nodal sums, without flat tets.
         if len(flat) > 0:
             exclude_flat(w, flat, n)
         if more:
@@ -164,7 +164,7 @@ def force_pass(motion, body, marks, room, means, begin, end, dt, scale):  # type
         t, s = tets[c * CHUNK : (c + 1) * CHUNK], state[c * rows * CHUNK : (c + 1) * rows * CHUNK]
         first, last, n = c * CHUNK, c * CHUNK + len(t), len(t)
         ids, flat, quiet, means_of = body.id[first:last], body.flat[first:last], noted[c], body.averages[first:last]
-        # 1. A chunk at rest, unchanged by the first pass and without strain at its nodes, has its last result.
+        # 1. Keep the last result of a chunk at rest, unchanged by the first pass and without strain at its nodes.
         still = quiet[rest.STEADY] != 0 and rest.without(means.strain, means_of, n)
         if still and more:
             still = rest.without(means.more, means_of, n)
@@ -172,13 +172,14 @@ def force_pass(motion, body, marks, room, means, begin, end, dt, scale):  # type
             rest.pass_over(peaks, quiet, LARGEST_LIMIT, LIMITING_TET)
             continue
         before = s.copy() if still else s[:0]
-        # 2. Edges and V grad N at n+1.
+        # 2. Compute edges and V grad N at n+1.
         if shape and not more:
             tet4.gather_moved(w, x0, x, t, s, n)
         else:
             tet4.gather(w[scratch.EDGE :], x, t, s, n)
         upset = s.copy() if erodes and any_inverted(w, n) else s[:0]
-        # 3. Trial stress of a law that needs the pressure; deviatoric stress from the shape, unless it acted before.
+        # 3. Compute the trial stress of a law that needs the pressure, and the deviatoric stress from the shape, unless
+        # it was computed before.
         if params[ORDER] == AFTER_PRESSURE:
             chunks.rates(w, v, t, n, dt)
             chunks.from_rates(strength, w, s, params, n, dt)
@@ -198,7 +199,7 @@ def force_pass(motion, body, marks, room, means, begin, end, dt, scale):  # type
             book_averaged(w, s, params, n)
         if len(upset) > 0:
             reset_inverted(w, s, upset, x, v, t, rows, n, 0.0)
-        # 6. Marks of worn tets and overstressed faces; forces and pressure gradients.
+        # 6. Mark worn tets and overstressed faces; compute forces and pressure gradients.
         marked = chunks.mark(marks, first, last, w, peaks, s, params, rows)
         largest = chunks.sum_forces(force, w, wi, bits, peaks, t, s, ids, n, scale)
         if means.split:

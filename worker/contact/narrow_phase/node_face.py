@@ -158,14 +158,17 @@ def due(pairs, slots, faces, end, first, stop):  # type: ignore[no-untyped-def]
 #              o s (n+1)                    (docs/theory/contact.md, "Impulses, not springs")
 #
 # Conditions of a contact, in the order of the tests in node_face (docs/theory/contact.md, "Which point", "Beside a free
-# edge" and "Face on face"): 1. No bond ties all four nodes. 2. The gap is at most NEAR of the face at the end of the
-# step. 3. The normals are compatible: node s faces the face (facing.facing), so that the rim of a bar is not in contact
-# with the side of another bar of the same width, nor the surface below a block that slides with the front of the block.
-# 4. If only one of its own faces faces the face, it passes the face from outside: gap0 >= -NEAR of the face. 5. The
-# foot of s at tau is on the face, and s is no deeper than ``reach`` of the face and half the altitude of its tet. 6.
-# The node is not beside a convex edge, in front of another face there (facing.in_front). 7. If s is inside by more than
-# TOUCHING, s is not nearer to the front of another face (facing.outside). A node behind several faces of a part keeps
-# its contact with the nearest one (``nearest``).
+# edge" and "Face on face"):
+# 1. No bond ties all four nodes.
+# 2. The gap is at most NEAR of the face at the end of the step.
+# 3. The normals are compatible: node s faces the face (facing.facing), so that the rim of a bar is not in contact with
+#    the side of another bar of the same width, nor the surface below a block that slides with the front of the block.
+# 4. If only one of the faces at node s faces the face, s passes the face from outside: gap0 >= -NEAR of the face.
+# 5. The foot of s at tau is on the face, and s is no deeper than ``reach`` of the face and half the altitude of its
+#    tet.
+# 6. The node is not beside a convex edge, in front of another face there (facing.in_front).
+# 7. If s is inside by more than TOUCHING, s is not nearer to the front of another face (facing.outside).
+# A node behind several faces of a part keeps its contact with the nearest face (``nearest``).
 
 
 @njit(f"void({_N2}, {_N2}, {_V2}, {_X2}, int32[::1], int64, int64)", cache=True, forceinline=True)
