@@ -59,12 +59,12 @@ def _preface(parts: Mapping[str, Any], lines: Sequence[Line], failed: Sequence[L
     machines = {value for part in parts.values() for key, value in part["machine"].items() if key == "processor"}
     on = f" on {', '.join(map(str, machines))}" if machines else ""
     return (
-        "Written by `make accuracy`: every row of the verification catalogue (V: exact or code to code, E: experiments "
-        "and published runs, H: hard cases), with what was measured, what is expected, where that comes from, the "
-        "error and the CPU time. Numbers of shipped cases come from their references, as they are and with elements "
-        "twice as large where that is possible; numbers of tests are those that their own assertions compared, the "
-        "last time each was passed. "
-        f"{GREEN} holds, {RED} fails, {GREY} was not run or is open.\n\n"
+        "Only `make accuracy` writes this page: do not edit it. The page has every row of the verification catalogue "
+        "(V: exact or code to code, E: experiments and published runs, H: hard cases) with the measured value, the "
+        "expected value and its source, the error and the CPU time. Numbers of a shipped case are those of its "
+        "references, for the case itself and, where possible, with elements twice as large. Numbers of a test are "
+        "those that its assertions compared when they passed last. "
+        f"{GREEN}: the row holds; {RED}: the row fails; {GREY}: the row was not run or is open.\n\n"
         f"Wall time of the parts: {walls}{on}. {len(lines)} rows: {sum(line.mark == GREEN for line in lines)} hold, "
         f"{len(failed)} fail, {sum(line.mark == GREY for line in lines)} open or not run"
         f"{': ' + ', '.join(line.row['id'] for line in failed) + ' fail' if failed else ''}."
