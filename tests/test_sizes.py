@@ -51,9 +51,7 @@ EXCEPTIONS: dict[str, dict[str, int]] = {
         "server/runs/supervisor.py: Supervisor": 18,
         "server/service.py: Service": 23,
     },
-    "one passage whose parts share most of their variables": {
-        "client/commands/sweeping.py: sweep": 53,
-        "client/commands/viewing.py: view_frames": 88,
+    "one passage: it makes objects in order of dependence, each from those before": {
         "server/app.py: opened": 61,
     },
     "to be split by subject": {

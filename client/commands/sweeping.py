@@ -57,6 +57,16 @@ Tolerance = Annotated[
     str | None,
     typer.Option("--tolerance", help="With --adaptive: width of the bracket; default: 1 % of the larger end."),
 ]
+Listed = Annotated[
+    Path | None, typer.Option("--list", metavar="FILE", help="Points from a CSV file; its first line has the keys.")
+]
+Most = Annotated[
+    int | None, typer.Option("--most", min=2, help="With --adaptive: largest number of runs; default: 40.")
+]
+Wait = Annotated[bool, typer.Option("--wait", help="Wait until all runs have ended; exit code 1 when one failed.")]
+Answer = Annotated[
+    Path | None, typer.Option("--out", help="File for the table (CSV); with --adaptive for the answer (JSON).")
+]
 
 
 @dataclass(frozen=True)
@@ -86,26 +96,18 @@ def sweep(
     case: CaseArgument,
     sets: Sets = None,
     grid: Annotated[bool, typer.Option("--grid", help="Run all combinations of the values.")] = False,
-    listed: Annotated[
-        Path | None, typer.Option("--list", metavar="FILE", help="Points from a CSV file; its first line has the keys.")
-    ] = None,
+    listed: Listed = None,
     adaptive: Adaptive = None,
     tolerance: Tolerance = None,
-    most: Annotated[
-        int | None, typer.Option("--most", min=2, help="With --adaptive: largest number of runs; default: 40.")
-    ] = None,
+    most: Most = None,
     ranks: Ranks = None,
     threads: Threads = None,
     at_once: Annotated[int | None, typer.Option("--at-once", min=1, help="Largest number of runs at a time.")] = None,
-    wait: Annotated[
-        bool, typer.Option("--wait", help="Wait until all runs have ended; exit code 1 when one failed.")
-    ] = False,
+    wait: Wait = False,
     new: Annotated[bool, typer.Option("--new", help="Start a new sweep, even if the same one exists.")] = False,
     local: Annotated[bool, typer.Option("--local", help="Run on this machine, without a server.")] = False,
     runs: Annotated[Path, typer.Option("--runs", help="With --local: folder of the runs.")] = Path("runs/local"),
-    out: Annotated[
-        Path | None, typer.Option("--out", help="File for the table (CSV); with --adaptive for the answer (JSON).")
-    ] = None,
+    out: Answer = None,
     url: Url = None,
     token: Token = None,
     as_json: Json = False,
