@@ -146,6 +146,15 @@ def _open(step: str) -> str:
     return step[:head] + step[step.index(",", head) + 1 :]
 
 
+def test_surface_bodies_of_a_file_are_reported(folder: Path, step: str) -> None:
+    """A plate that was saved as a surface beside solids would be missing without a message."""
+    note = "mesh: 1 surface body without volume in sheet.step: not in the mesh; only solids are read"
+    sheet = step.replace("ENDSEC;\nEND-", "#9998 = OPEN_SHELL('',());\nENDSEC;\nEND-")
+    assert made(folder / "sheet.step", sheet).origin.notes == (note,)
+    assert made(folder / "sheet.step", sheet, solids=[1]).origin.notes == ()
+    assert made(folder / "sheet.step", step).origin.notes == ()
+
+
 @pytest.mark.parametrize(
     ("damage", "message"),
     [

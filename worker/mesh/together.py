@@ -22,6 +22,7 @@ from .frame import refuse_impossible
 from .gmsh_session import OPTIONS, session
 from .model import Names, Origin, TetMesh
 from .occ import body as primitives
+from .occ.cad import left_out
 from .occ.combine import extent
 from .occ.draw import Solids
 from .occ.features import small_features
@@ -70,7 +71,7 @@ def together(bodies: Mapping[str, Joint], sources: Sources, name: str) -> list[T
         _sizes(model)
         cuts = sorted({cut for body in bodies.values() for cut in _cuts(body, frame)})
         made, names = with_names(gmsh, frame, min(body.element_size for body in bodies.values()), cuts)
-        return [_part(model, made, names, k, name) for k in range(len(bodies))]
+        return [_part(model, sources, made, names, k, name) for k in range(len(bodies))]
 
 
 def _scale(gmsh: Any, bodies: Mapping[str, Joint], sources: Sources) -> float:
@@ -148,19 +149,20 @@ def _size(gmsh: Any, body: Joint, frame: Frame) -> int:
     return int(size)
 
 
-def _part(model: _Model, made: TetMesh, names: Names, k: int, name: str) -> TetMesh:
+def _part(model: _Model, sources: Sources, made: TetMesh, names: Names, k: int, name: str) -> TetMesh:
     """Return the mesh of body ``k`` from all tets that are ``made``; ``names``: gmsh's numbers of nodes and tets."""
     elements = [model.gmsh.model.mesh.getElements(3, tag)[1] for tag in model.volumes[k]]
     own = np.concatenate([np.concatenate(each).astype(np.int64) for each in elements if len(each)])
     nodes, tets = np.unique(made.tets[np.isin(names.tets, own)], return_inverse=True)
-    origin = Origin(name, nodes.astype(np.int64), tuple(_notes(model, k)))
+    origin = Origin(name, nodes.astype(np.int64), tuple(_notes(model, sources, k)))
     return TetMesh(made.points[nodes], tets.reshape(-1, 4).astype(np.int32), origin)
 
 
-def _notes(model: _Model, k: int) -> list[str]:
-    """Return notes about a body whose sizes are known from the mesh only."""
+def _notes(model: _Model, sources: Sources, k: int) -> list[str]:
+    """Return notes about a body of CAD files or a combination."""
     key, body = list(model.bodies.items())[k]
     if not isinstance(body, _Solid):
         return []
     volumes = [(3, tag) for tag in model.volumes[k]]
-    return [f"{key}: {note}" for note in small_features(model.gmsh, body.element_size, model.frame, volumes)]
+    small = small_features(model.gmsh, body.element_size, model.frame, volumes)
+    return [f"{key}: {note}" for note in (*left_out(body, sources, key), *small)]

@@ -6,25 +6,29 @@ file therefore cannot refer to another file.
 
 import re
 import signal
+from collections.abc import Iterator
 from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
-from conoid.cases.figures import si
+from conoid.cases.figures import counted, si
 from conoid.cases.model.operands import CadForm
+from conoid.cases.model.solids import Cad, Solid
 from conoid.cases.reading.similar import choices
 
 from ...errors import MeshError
+from ..sources import Sources
 from .draw import Solids
 from .frame import Frame
 from .printed import captured
-from .step import length_units, solids_in
+from .step import length_units, solids_in, surfaces_in
 
 MOST_BYTES = 256 * 2**20
 """Largest size of a file. Chosen value: the text of an assembly of thousands of parts. OpenCASCADE needs some ten
 times as much memory."""
 _MILLIMETRE = Fraction(1, 1000)
 """Unit into which OpenCASCADE converts STEP files."""
+_STEP = b"ISO-10303-21;"
 _SYNTAX = b"Incorrect Syntax"
 """Text of an error after which OpenCASCADE continues."""
 _BREP, _BREP_END = b"CASCADE Topology V", re.compile(rb"\*\s*[+-]\d+ \d+\s*$")
@@ -62,6 +66,19 @@ def size_of(gmsh: Any, form: CadForm, path: Path, head: str) -> float:
     return float(unit) * float(max(extents))
 
 
+def left_out(form: Solid, sources: Sources, key: str) -> Iterator[str]:
+    """Yield a note for each STEP file of the body at ``key`` with surface bodies, which are not in the mesh. No note
+    if the case names the solids.
+    """
+    for named, path in sources.items():
+        if named == key or named.startswith(f"{key}."):
+            data = _bytes(path, named)
+            count = surfaces_in(data) if data.lstrip().startswith(_STEP) else 0
+            if count and not (isinstance(form, Cad) and form.solids):
+                bodies = counted(count, "surface body", "surface bodies")
+                yield f"{bodies} without volume in {path.name}: not in the mesh; only solids are read"
+
+
 def _place(occ: Any, solids: Solids, factor: float, frame: Frame) -> None:
     """Move solids from the coordinates of the file into the frame."""
     if factor != 1.0:
@@ -77,7 +94,7 @@ def _place(occ: Any, solids: Solids, factor: float, frame: Frame) -> None:
 def _read(gmsh: Any, form: CadForm, path: Path, head: str) -> tuple[Solids, Fraction]:
     """Return all solids of a file, in the order of the file, and the length of one unit of the file, m."""
     data = _bytes(path, head)
-    if data.lstrip().startswith(b"ISO-10303-21;"):
+    if data.lstrip().startswith(_STEP):
         kind, unit = "step", _step_unit(form, data, head)
     elif _BREP in data[:200]:
         kind, unit = "brep", _brep_unit(form, data, head)

@@ -14,6 +14,7 @@ from ...errors import MeshError
 from ..gmsh_session import OPTIONS, session
 from ..model import MAX_TETS, Origin, TetMesh
 from ..sources import Sources
+from .cad import left_out
 from .combine import Drawing, extent
 from .draw import Solids
 from .features import small_features
@@ -51,7 +52,11 @@ def _of_solid(mesh: Cad | Combination, sources: Sources, key: str) -> _Made:
     with session(OPTIONS) as gmsh:
         frame = Frame(mesh.centre, mesh.axis, scale_of(extent(gmsh, mesh, sources, key)))
         solids = draw_solid(gmsh, mesh, frame, sources, key)
-        notes = [*small_features(gmsh, mesh.element_size, frame, solids), *hinges(gmsh, solids)]
+        notes = [
+            *left_out(mesh, sources, key),
+            *small_features(gmsh, mesh.element_size, frame, solids),
+            *hinges(gmsh, solids),
+        ]
         set_size(gmsh, mesh.element_size, mesh.grading, frame)
         cuts = [(k, 0.0) for k in range(len(cut_by(mesh.sector, mesh.axis)))]
         made = meshed(gmsh, frame, mesh.element_size, cuts)

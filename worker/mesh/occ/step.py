@@ -11,6 +11,7 @@ _UNITS = re.compile(rb"GLOBAL_UNIT_ASSIGNED_CONTEXT\s*\(\s*\(([^)]*)\)")
 _NAME = re.compile(rb"#(\d+)")
 _DEFINED = re.compile(rb"[;\s]#(\d+)\s*=")
 _SOLID = re.compile(rb"=\s*(?:MANIFOLD_SOLID_BREP|BREP_WITH_VOIDS|FACETED_BREP)\s*\(")
+_OPEN = re.compile(rb"=\s*OPEN_SHELL\s*\(")
 _SI = re.compile(rb"SI_UNIT\s*\(\s*(?:\.(\w+)\.|\$)\s*,\s*\.METRE\.\s*\)")
 _BASED = re.compile(rb"CONVERSION_BASED_UNIT\s*\([^,]*,\s*#(\d+)\s*\)")
 _MEASURE = re.compile(rb"LENGTH_MEASURE\s*\(\s*([-+0-9.Ee]+)\s*\)\s*,\s*#(\d+)")
@@ -46,6 +47,11 @@ def length_units(data: bytes, head: str) -> set[Fraction]:
 def solids_in(data: bytes) -> int:
     """Return the number of solids that the file defines. An assembly may contain one solid several times."""
     return len(_SOLID.findall(_TEXT.sub(b"''", data)))
+
+
+def surfaces_in(data: bytes) -> int:
+    """Return the number of surface bodies that the file defines: surfaces without a volume."""
+    return len(_OPEN.findall(_TEXT.sub(b"''", data)))
 
 
 def _entity(text: bytes, name: bytes) -> bytes:
