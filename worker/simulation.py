@@ -127,29 +127,31 @@ class Simulation:
         return [each for each in found if each is not None]
 
     def limiting_id(self) -> int:
-        """Returns the id of the tet that limits the time step; of several such tets the smallest id. Collective."""
+        """Returns the id of the tet that limits the time step; of several such tets the smallest id; -1 if no tet
+        limits it. Collective."""
         mine = self.elements.limit_bits == fixed_point.bits_of(self.reduction.limit)
-        return -int(self.comm.maximum(np.array([-float(self.elements.limiting) if mine else -np.inf]))[0])
+        first = self.comm.maximum(np.array([-float(self.elements.limiting) if mine else -np.inf]))[0]
+        return -1 if np.isinf(first) or not self.model.elements_global else -int(first)
 
     def limiting_tet(self) -> str:
-        """Returns the name of the tet that limits the time step, or "a rigid part". Collective."""
-        if self.rigid is not None and self.reduction.limit == self.rigid.limit:
-            return "a rigid part"
+        """Returns the name of the tet that limits the time step, "a rigid part" or "no tet". Collective."""
         first = self.limiting_id()
+        if first < 0:
+            return "no tet" if self.rigid is None else "a rigid part"
         part = int(np.searchsorted(self.model.part_starts, first, side="right")) - 1
         return f"tet {first} of {self.model.parts[part]}"
 
     def limiter(self) -> str:
         """Returns the reason for the present time step and the tet that limits it. Collective."""
-        stable = self.clock.stable
+        stable, tet = self.clock.stable, self.limiting_tet()
         if self.limit > self.reduction.limit:
             return "contact: speed of approach"
-        if self.rigid is not None and self.reduction.limit == self.rigid.limit:
+        if tet == "a rigid part":
             return "rigid parts: spin, or no other limit"
         why = "stability" if stable * self.reduction.limit >= 0.999 * self.case.numerics.dt_safety else "growth"
         if self.clock.dt < 0.9 * stable:
             why = "output time"
-        return f"{why}: {self.limiting_tet()}"
+        return f"{why}: {tet}"
 
     def shared_nodes(self) -> int:
         """Returns the number of nodes that several ranks share. Collective."""

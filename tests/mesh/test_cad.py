@@ -150,9 +150,10 @@ def test_surface_bodies_of_a_file_are_reported(folder: Path, step: str) -> None:
     """A plate that was saved as a surface beside solids would be missing without a message."""
     note = "mesh: 1 surface body without volume in sheet.step: not in the mesh; only solids are read"
     sheet = step.replace("ENDSEC;\nEND-", "#9998 = OPEN_SHELL('',());\nENDSEC;\nEND-")
-    assert made(folder / "sheet.step", sheet).origin.notes == (note,)
-    assert made(folder / "sheet.step", sheet, solids=[1]).origin.notes == ()
-    assert made(folder / "sheet.step", step).origin.notes == ()
+    for data, solids, notes in ((sheet, (), (note,)), (sheet, (1,), ()), (step, (), ())):
+        origin = made(folder / "sheet.step", data, solids=list(solids)).origin
+        assert origin is not None
+        assert origin.notes == notes
 
 
 @pytest.mark.parametrize(

@@ -284,3 +284,24 @@ def test_a_resumed_run_ends_with_the_same_bits(tmp_path: Path) -> None:
         return state_of(resumed)
 
     assert on(2, SCENE, MESHES, halves)[0] == on(1, SCENE, MESHES, stepped)[0]
+
+
+def test_a_spin_that_contact_changes_is_the_limit_of_the_step() -> None:
+    """The limit of a rigid body follows its spin. A contact changes the spin after the step was chosen, so the limit
+    of the step is neither that of the body any more nor that of a tet."""
+    spinning = {
+        "rigid": RIGID,
+        "spin": schema.Spin(centre=(3e-3, 3e-3, 4e-3), rate=(0.0, 9e4, 0.0)),
+        "velocity": (0, 0, -900),
+    }
+    sim = build(rigid_case([spinning], (GROUND,)), [TILTED])
+    step.prepare(sim)
+    assert sim.rigid is not None
+    limits = []
+    for _ in range(60):
+        before = sim.rigid.limit
+        step.first_half(sim)
+        assert sim.limiter() in ("rigid parts: spin, or no other limit", "contact: speed of approach")
+        limits.append((before, sim.rigid.limit))
+        step.second_half(sim)
+    assert any(first != then for first, then in limits)
