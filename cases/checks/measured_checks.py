@@ -70,3 +70,8 @@ def check_grading(mesh: Primitive | Meshed, location: Location) -> Iterator[Prob
     if grading.far_size < mesh.element_size:
         message = f"must not be below the element size, {mesh.element_size} m"
         yield problem((*location, "far_size"), grading.far_size, message)
+    if grading.normal is not None and (grading.axis is not None or grading.radius):
+        yield problem((*location, "normal"), grading.normal, "a plane has no axis and no radius; remove them or normal")
+    if grading.surface and grading.model_fields_set & {"origin", "axis", "normal", "radius"}:
+        message = "distances are measured from the surface of the body; remove origin, axis, normal and radius"
+        yield problem((*location, "surface"), "true", message)

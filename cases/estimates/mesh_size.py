@@ -1,7 +1,6 @@
 """Estimates of the mesh of a primitive: number of tets, nodes and faces, and the step length of its worst tet."""
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache
 
@@ -9,7 +8,6 @@ from ..model.bodies import Box, Cylinder, Plate, RingSector, Shards, Sphere, Tub
 from ..model.grading import Grading
 from ..shapes.geometry import (
     Generated,
-    Vector,
     across,
     bounds,
     centre,
@@ -20,6 +18,7 @@ from ..shapes.geometry import (
     tets,
     volume,
 )
+from ..shapes.graded import size_at, sizes_by_depth
 from ..shapes.profile import Revolved, tips
 
 TETS_PER_VOLUME, TETS_PER_SURFACE = 5.55, 1.42
@@ -92,9 +91,17 @@ def _mean_powers(mesh: Generated) -> tuple[float, float]:
     """Returns means over the volume of 1 / h^3 and 1 / h^2 for the element size h of a graded mesh."""
     if mesh.grading is None:
         return mesh.element_size**-3, mesh.element_size**-2
-    graded = size_at(mesh, mesh.grading)
-    sizes = [graded(point) for point in _lattice(mesh)]
+    sizes = _sizes(mesh, mesh.grading)
     return math.fsum(h**-3 for h in sizes) / len(sizes), math.fsum(h**-2 for h in sizes) / len(sizes)
+
+
+def _sizes(mesh: Generated, grading: Grading) -> list[float]:
+    """Returns element sizes, m, in equal shares of the volume of a graded primitive."""
+    if grading.surface:
+        whole = mesh.model_copy(update={"sector": "full"})
+        return sizes_by_depth(mesh.element_size, grading, volume(whole), surface(whole))
+    graded = size_at(mesh.element_size, grading)
+    return [graded(point) for point in _lattice(mesh)]
 
 
 def _lattice(mesh: Generated) -> list[tuple[float, float, float]]:
@@ -102,21 +109,6 @@ def _lattice(mesh: Generated) -> list[tuple[float, float, float]]:
     lines = [[a + (b - a) * (i + 0.5) / _LATTICE for i in range(_LATTICE)] for a, b in zip(low, high, strict=True)]
     inside = round_part(mesh)
     return [point for x in lines[0] for y in lines[1] for z in lines[2] if inside(point := (x, y, z))] or [centre(mesh)]
-
-
-def size_at(mesh: Generated, grading: Grading) -> Callable[[Vector], float]:
-    """Returns the function of the element size, m, at a point of a graded primitive; built once for many points."""
-    size, near, more = mesh.element_size, grading.near, grading.far_size - mesh.element_size
-    width, origin, radius = grading.far - grading.near, grading.origin, grading.radius
-
-    def at(distance: float) -> float:
-        return size + more * min(max((abs(distance - radius) - near) / width, 0.0), 1.0)
-
-    if grading.axis is None:
-        return lambda point: at(math.dist(point, origin))
-    i, j = across(grading.axis)
-    x, y = origin[i], origin[j]
-    return lambda point: at(math.hypot(point[i] - x, point[j] - y))
 
 
 def _structured(mesh: Box | Plate | Cylinder | Tube | TwoTets | Shards) -> MeshSize:

@@ -12,17 +12,24 @@ class Grading(Model):
     """A graded mesh: ``element_size`` up to the distance ``near``, ``far_size`` from the distance ``far``, linear in
     between.
 
-    Distances are measured from the point ``origin``; with ``axis`` from the line through it; with ``radius`` from
-    the surface of the sphere (with ``axis``: cylinder) around it, to both sides.
+    Distances are measured from the point ``origin``; with ``axis`` from the line through it; with ``normal`` from the
+    plane through it; with ``radius`` from the surface of the sphere (with ``axis``: cylinder) around it, to both
+    sides; with ``surface`` from the surface of the body.
     """
 
     origin: Point = (0.0, 0.0, 0.0)
     """Point from which distances are measured."""
     axis: Axis | None = None
     """Direction of a line through ``origin`` from which distances are measured instead."""
+    normal: Axis | None = None
+    """Normal of a plane through ``origin`` from which distances are measured instead, to both sides. Must not be
+    combined with ``axis`` or ``radius``."""
     radius: Annotated[Length, Field(ge=0)] = 0.0
     """Radius of a sphere, or with ``axis`` of a cylinder, from whose surface distances are measured. 0: the point or
     line itself."""
+    surface: bool = False
+    """Whether distances are measured from the surface of the body instead, without the cuts of a sector: the tets are
+    small at the skin and coarse inside. Must not be combined with the keys above."""
     near: Annotated[Length, Field(ge=0)]
     """Distance up to which the size is ``element_size``; below ``far``."""
     far: Annotated[Length, Positive]

@@ -17,11 +17,11 @@ from ..estimates.mesh_size import (
     MeshSize,
 )
 from ..model.bodies import Box, Cone, Cylinder, Hemisphere, Ogive, Plate, RingSector, Sphere, SphericalCap, Tube
-from ..model.grading import Grading
 from ..model.operands import CombinedForm, DifferenceForm, FileForm, Operand, UnionForm
 from ..model.solids import Combination
 from ..model.tables import Axis, Model
-from .geometry import Vector, across, index
+from .geometry import Vector, across
+from .graded import size_at, sizes_by_depth
 from .placed import Placed, lattice
 
 Bounds = tuple[Vector, Vector]
@@ -126,21 +126,28 @@ def combined_size(mesh: Combination) -> MeshSize | None:
     points = list(lattice(*box, _LATTICE))
     held = [point for point in points if holds(point)]
     cell = math.prod(b - a for a, b in zip(*box, strict=True)) / len(points)
-    sizes = [_size_at(mesh.element_size, mesh.grading, point) for point in held]
-    filling, volume = cell * math.fsum(h**-3 for h in sizes), cell * len(held)
     if not held:
         return None
-    covering = _BULKY * 6.0 * volume ** (2.0 / 3.0) * math.fsum(h**-2 for h in sizes) / len(held)
+    volume = cell * len(held)
+    sizes = _sizes(mesh, held, volume)
+    filling = volume * math.fsum(h**-3 for h in sizes) / len(sizes)
+    covering = _skin(volume) * math.fsum(h**-2 for h in sizes) / len(sizes)
     elements = TETS_PER_VOLUME * filling + TETS_PER_SURFACE * covering
     nodes = NODES_PER_VOLUME * filling + NODES_PER_SURFACE * covering
     return MeshSize(max(6, round(elements)), max(8, round(nodes)), WORST * REGULAR * mesh.element_size)
 
 
-def _size_at(size: float, grading: Grading | None, point: Vector) -> float:
+def _sizes(mesh: Combination, held: list[Vector], volume: float) -> list[float]:
+    """Returns element sizes, m, in equal shares of the volume, m^3; ``held``: points of a lattice inside, m."""
+    grading = mesh.grading
     if grading is None:
-        return size
-    away = [p - o for p, o in zip(point, grading.origin, strict=True)]
-    if grading.axis is not None:
-        away[index(grading.axis)] = 0.0
-    share = (abs(math.hypot(*away) - grading.radius) - grading.near) / (grading.far - grading.near)
-    return size + (grading.far_size - size) * min(max(share, 0.0), 1.0)
+        return [mesh.element_size] * len(held)
+    if grading.surface:
+        return sizes_by_depth(mesh.element_size, grading, volume, _skin(volume))
+    graded = size_at(mesh.element_size, grading)
+    return [graded(point) for point in held]
+
+
+def _skin(volume: float) -> float:
+    """Returns the approximate surface of a combination of a volume, m^3, in m^2."""
+    return float(_BULKY * 6.0 * volume ** (2.0 / 3.0))

@@ -18,12 +18,13 @@ from conoid.cases.estimates.estimate import (
     estimate,
 )
 from conoid.cases.estimates.impact import impact_speeds
-from conoid.cases.estimates.mesh_size import mesh_size, size_at
+from conoid.cases.estimates.mesh_size import mesh_size
 from conoid.cases.estimates.shrinkage import DEEPEST, SLENDER, shrinkage, slenderness
 from conoid.cases.load import apply_overrides, parse_case, read_case, read_data, shipped, shipped_path, toml_data
 from conoid.cases.model.bodies import Mesh
 from conoid.cases.reading.library import material
 from conoid.cases.shapes.geometry import Generated, surface, volume
+from conoid.cases.shapes.graded import size_at
 from conoid.cases.suite import Hard, suite
 from conoid.worker.mesh.build import build
 from conoid.worker.mesh.structured import structured
@@ -55,6 +56,12 @@ UNSTRUCTURED = [
     {"shape": "sphere", "radius": 1, "element_size": 0.2, "sector": "half"},
     {"shape": "cylinder", "radius": 1, "length": 3, "element_size": 0.1,
      "grading": {"near": 0.5, "far": 2.5, "far_size": 0.4}},
+    {"shape": "box", "low": (-1, -1, 0), "high": (1, 1, 2), "element_size": 0.1,
+     "grading": {"normal": "z", "near": 0.3, "far": 1.2, "far_size": 0.3}},
+    {"shape": "sphere", "radius": 1, "element_size": 0.08, "sector": "quarter",
+     "grading": {"surface": True, "near": 0.1, "far": 0.6, "far_size": 0.3}},
+    {"shape": "ogive", "radius": 0.5, "shank": 1.5, "crh": 3, "element_size": 0.07,
+     "grading": {"surface": True, "near": 0.1, "far": 0.3, "far_size": 0.2}},
 ]  # fmt: skip
 STEPS = {
     "elastic_bar_wall": 2660, "elastic_bar_confined": 2750, "plastic_wave": 1620, "plastic_bar_wave": 2470,
@@ -122,7 +129,7 @@ def test_graded_size_runs_from_near_to_far() -> None:
     grading = {"near": 1, "far": 3, "far_size": 0.5, "axis": "z"}
     body = mesh({"shape": "sphere", "radius": 5}, element_size=0.1, grading=grading)
     assert body.grading is not None
-    sizes = [size_at(body, body.grading)((x, 0.0, 9.0)) for x in (0.0, 1.0, 2.0, 3.0, 4.0)]
+    sizes = [size_at(0.1, body.grading)((x, 0.0, 9.0)) for x in (0.0, 1.0, 2.0, 3.0, 4.0)]
     assert sizes == pytest.approx([0.1, 0.1, 0.3, 0.5, 0.5])
 
 
@@ -131,7 +138,7 @@ def test_graded_size_is_smallest_on_the_sphere_or_cylinder_of_the_radius(axis: s
     grading = {"near": 1, "far": 3, "far_size": 0.5, "radius": 4, "axis": axis}
     body = mesh({"shape": "sphere", "radius": 9}, element_size=0.1, grading=grading)
     assert body.grading is not None
-    sizes = [size_at(body, body.grading)((x, 0.0, 0.0)) for x in (0.0, 2.0, 3.0, 4.0, 5.0, 6.0, 8.0)]
+    sizes = [size_at(0.1, body.grading)((x, 0.0, 0.0)) for x in (0.0, 2.0, 3.0, 4.0, 5.0, 6.0, 8.0)]
     assert sizes == pytest.approx([0.5, 0.3, 0.1, 0.1, 0.1, 0.3, 0.5])
 
 

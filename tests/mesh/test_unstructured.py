@@ -147,6 +147,34 @@ def test_grading_sets_the_size_near_and_far(line: str | None, radius: float) -> 
         assert measured == pytest.approx(wanted, rel=0.25)
 
 
+SKIN = {"surface": True, "near": 0.12, "far": 0.5, "far_size": 0.3}
+
+
+@pytest.mark.parametrize(("kind", "sector"), [("box", "full"), ("box", "quarter"), ("sphere", "half")])
+def test_tets_are_small_below_the_surface_but_not_at_the_cut_of_a_sector(kind: str, sector: str) -> None:
+    shapes: dict[str, dict[str, Any]] = {
+        "box": {"low": (-1.0, -1.0, -0.8), "high": (1.0, 1.0, 0.8)},
+        "sphere": {"centre": (0.0, 0.0, 0.0), "radius": 1.3},
+    }
+    mesh = build(body(kind, **shapes[kind], element_size=0.1, sector=sector, grading=SKIN), HERE)
+    x, y, z = np.abs(mesh.points[mesh.tets].mean(axis=1)).T
+    depth = {
+        "box": np.minimum(np.minimum(1.0 - x, 1.0 - y), 0.8 - z),
+        "sphere": 1.3 - np.hypot(np.hypot(x, y), z),
+    }[kind]
+    size = np.cbrt(6 * mesh.volumes())
+    assert size[depth < 0.12].mean() == pytest.approx(0.1, rel=0.25)
+    assert size[depth > 0.55].mean() == pytest.approx(0.3, rel=0.25)
+
+
+def test_tets_are_small_beside_a_plane() -> None:
+    grading = {"origin": (0.0, 0.0, 0.5), "normal": "z", "near": 0.2, "far": 1.0, "far_size": 0.3}
+    mesh = build(body("box", low=(-0.5, -0.5, 0.0), high=(0.5, 0.5, 2.5), element_size=0.08, grading=grading), HERE)
+    away, size = np.abs(mesh.points[mesh.tets].mean(axis=1)[:, 2] - 0.5), np.cbrt(6 * mesh.volumes())
+    assert size[away < 0.2].mean() == pytest.approx(0.08, rel=0.25)
+    assert size[away > 1.1].mean() == pytest.approx(0.3, rel=0.25)
+
+
 def test_smoothing_raises_the_time_step_and_keeps_the_body() -> None:
     made = body("cylinder", sector="quarter", base=(0.0, 0.0, 0.0), generator="structured")
     regular = structured(made)

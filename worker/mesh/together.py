@@ -129,7 +129,7 @@ def _sizes(model: _Model) -> None:
     for body, tags in zip(model.bodies.values(), model.volumes, strict=True):
         sizes += [body.element_size, body.element_size if body.grading is None else body.grading.far_size]
         inside = field.add("Restrict")
-        field.setNumber(inside, "InField", _size(gmsh, body, frame))
+        field.setNumber(inside, "InField", _size(gmsh, body, frame, tags))
         field.setNumbers(inside, "VolumesList", tags)
         own.append(inside)
     least = field.add("Min")
@@ -139,10 +139,10 @@ def _sizes(model: _Model) -> None:
         gmsh.option.setNumber(f"Mesh.MeshSize{name}", GMSH_SIZE * frame.length(pick(sizes)))
 
 
-def _size(gmsh: Any, body: Joint, frame: Frame) -> int:
+def _size(gmsh: Any, body: Joint, frame: Frame, volumes: Sequence[int]) -> int:
     """Return the number of the field of the element size of a body: one value, or a grading."""
     if body.grading is not None:
-        return graded(gmsh, body.element_size, body.grading, frame)
+        return graded(gmsh, body.element_size, body.grading, frame, volumes, _cuts(body, frame))
     field = gmsh.model.mesh.field
     size = field.add("MathEval")
     field.setString(size, "F", repr(GMSH_SIZE * frame.length(body.element_size)))

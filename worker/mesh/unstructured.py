@@ -10,7 +10,7 @@ import math
 from typing import Any
 
 from conoid.cases.model.bodies import Box, Cylinder, Plate, RingSector, Sphere, Tube
-from conoid.cases.shapes.geometry import Generated, centre
+from conoid.cases.shapes.geometry import Generated, centre, cut_directions
 from conoid.cases.shapes.profile import Revolved
 
 from ..errors import MeshError
@@ -35,7 +35,8 @@ def unstructured(body: Generated, key: str = "mesh") -> TetMesh:
     with session(OPTIONS) as gmsh:
         draw(gmsh, body, scale)
         gmsh.model.occ.synchronize()
-        set_size(gmsh, body.element_size, body.grading, Frame(centre(body), body.axis, scale))
+        cuts = [(k, 0.0) for k in range(len(cut_directions(body, body.axis)))]
+        set_size(gmsh, body.element_size, body.grading, Frame(centre(body), body.axis, scale), cuts)
         gmsh.model.mesh.generate(3)
         mesh = tet_mesh(gmsh)
     if mesh.volumes().sum() < 0:

@@ -27,8 +27,8 @@ def primitive(body: Revolved | RingSector, key: str) -> TetMesh:
     with session(OPTIONS) as gmsh:
         draw(gmsh.model.occ, body, frame)
         gmsh.model.occ.synchronize()
-        set_size(gmsh, body.element_size, body.grading, frame)
         cuts = [(k, 0.0) for k in range(len(cut_directions(body, body.axis)))]
+        set_size(gmsh, body.element_size, body.grading, frame, cuts)
         return meshed(gmsh, frame, body.element_size, cuts)
 
 

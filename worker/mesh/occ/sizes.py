@@ -1,38 +1,87 @@
 """Sizes of elements in the current model: one size, or a grading."""
 
+import math
+from collections.abc import Sequence
 from typing import Any
 
 from conoid.cases.model.grading import Grading
 
 from .frame import Frame
+from .sliding import Cut
 
 GMSH_SIZE = 0.87
 """gmsh's size divided by ``element_size``. HXT makes 4 tets in the cube of its size. With this factor it makes 6
 tets in element_size^3, as the structured generator does, and the mean edge is 1.15 element_size."""
+_FINEST = 400
+"""Largest number of points of a face, in each direction, from which distances are measured. Chosen value: 160,000
+points of a face take gmsh a second."""
+_FLAT = 1e-6
+"""Largest extent across a plane, in the scale of the model, of a face on the cut of a sector: above the tolerance of
+OpenCASCADE, 1e-7."""
 
 
-def set_size(gmsh: Any, element_size: float, grading: Grading | None, frame: Frame) -> None:
-    """Set the size of the whole model."""
+def set_size(
+    gmsh: Any, element_size: float, grading: Grading | None, frame: Frame, cuts: Sequence[Cut] = ()
+) -> None:  # fmt: skip
+    """Set the size of the whole model, which is cut on the planes ``cuts`` of the frame."""
     sizes = [element_size] if grading is None else [element_size, grading.far_size]
     if grading is not None:
-        gmsh.model.mesh.field.setAsBackgroundMesh(graded(gmsh, element_size, grading, frame))
+        volumes = [tag for _, tag in gmsh.model.getEntities(3)]
+        gmsh.model.mesh.field.setAsBackgroundMesh(graded(gmsh, element_size, grading, frame, volumes, cuts))
     for name, pick in (("Min", min), ("Max", max)):
         gmsh.option.setNumber(f"Mesh.MeshSize{name}", GMSH_SIZE * frame.length(pick(sizes)))
 
 
-def graded(gmsh: Any, element_size: float, grading: Grading, frame: Frame) -> int:
-    """Return the number of a field of gmsh. The field is a size that is a linear function of the distance from a
-    point, from a line along an axis, or from a sphere or cylinder.
+def graded(
+    gmsh: Any, element_size: float, grading: Grading, frame: Frame, volumes: Sequence[int], cuts: Sequence[Cut]
+) -> int:  # fmt: skip
+    """Return the number of a field of gmsh. The field is a size that is a linear function of a distance.
+
+    ``volumes``: numbers of the volumes of the body; ``cuts``: planes of the frame on which it is cut.
     """
-    origin = frame.place(grading.origin)
-    along = None if grading.axis is None else frame.direction(grading.axis)
-    squares = [f"({'xyz'[i]}-({origin[i]!r}))^2" for i in range(3) if i != along]
     field = gmsh.model.mesh.field
-    distance, size = field.add("MathEval"), field.add("Threshold")
-    field.setString(distance, "F", f"Abs(Sqrt({'+'.join(squares)})-{frame.length(grading.radius)!r})")
+    if grading.surface:
+        distance = _depth(gmsh, max(frame.length(grading.near), frame.length(element_size)), volumes, cuts)
+    else:
+        distance = field.add("MathEval")
+        field.setString(distance, "F", _distance(grading, frame))
+    size = field.add("Threshold")
     for name, value in (("DistMin", grading.near), ("DistMax", grading.far)):
         field.setNumber(size, name, frame.length(value))
     for name, value in (("SizeMin", element_size), ("SizeMax", grading.far_size)):
         field.setNumber(size, name, GMSH_SIZE * frame.length(value))
     field.setNumber(size, "InField", distance)
     return int(size)
+
+
+def _distance(grading: Grading, frame: Frame) -> str:
+    """Return the distance from a point, a line along an axis, a plane, a sphere or a cylinder, in gmsh's words."""
+    origin = frame.place(grading.origin)
+    if grading.normal is not None:
+        d = frame.direction(grading.normal)
+        return f"Abs({'xyz'[d]}-({origin[d]!r}))"
+    along = None if grading.axis is None else frame.direction(grading.axis)
+    squares = [f"({'xyz'[i]}-({origin[i]!r}))^2" for i in range(3) if i != along]
+    return f"Abs(Sqrt({'+'.join(squares)})-{frame.length(grading.radius)!r})"
+
+
+def _depth(gmsh: Any, fine: float, volumes: Sequence[int], cuts: Sequence[Cut]) -> int:
+    """Return the number of a field: the distance from the surface of ``volumes``, measured from points of its faces.
+
+    The points are half of ``fine`` apart, so that the distance of a node on the surface is below ``fine``.
+    """
+    field, model = gmsh.model.mesh.field, gmsh.model
+    faces = [abs(tag) for _, tag in model.getBoundary([(3, tag) for tag in volumes], combined=True, oriented=False)]
+    boxes = {tag: model.getBoundingBox(2, tag) for tag in faces}
+    outer = [tag for tag, box in boxes.items() if not any(_lies_on(box, cut) for cut in cuts)]
+    longest = max((math.dist(boxes[tag][:3], boxes[tag][3:]) for tag in outer), default=0.0)
+    distance = field.add("Distance")
+    field.setNumbers(distance, "SurfacesList", outer)
+    field.setNumber(distance, "Sampling", min(max(math.ceil(2.0 * longest / fine), 20), _FINEST))
+    return int(distance)
+
+
+def _lies_on(box: Sequence[float], cut: Cut) -> bool:
+    """Return whether a face with the bounding ``box``, low and high corner, lies on a plane of the frame."""
+    d, at = cut
+    return max(abs(box[d] - at), abs(box[3 + d] - at)) < _FLAT

@@ -57,8 +57,8 @@ def _of_solid(mesh: Cad | Combination, sources: Sources, key: str) -> _Made:
             *small_features(gmsh, mesh.element_size, frame, solids),
             *hinges(gmsh, solids),
         ]
-        set_size(gmsh, mesh.element_size, mesh.grading, frame)
         cuts = [(k, 0.0) for k in range(len(cut_by(mesh.sector, mesh.axis)))]
+        set_size(gmsh, mesh.element_size, mesh.grading, frame, cuts)
         made = meshed(gmsh, frame, mesh.element_size, cuts)
     return _Made(made, [f"{key}: {note}" for note in notes])
 
