@@ -1,7 +1,7 @@
 """Conversion of rigid walls of a deck, which stop the nodes of a set, to walls of a case, which stop whole parts."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 from .account import Entry
@@ -16,6 +16,8 @@ class Stop:
     chosen: Chosen
     table: dict[str, Any]
     entry: Entry
+    more: list[Entry] = field(default_factory=list)
+    """Further keywords that the table contains."""
 
 
 def stand(draft: Draft, topology: Topology, bodies: Sequence[Body], stops: Sequence[Stop]) -> list[tuple[str, ...]]:
@@ -26,7 +28,8 @@ def stand(draft: Draft, topology: Topology, bodies: Sequence[Body], stops: Seque
         full, some = topology.whole(each.chosen)
         stopped = tuple(key for key in topology.bodies if key in (*full, *some))
         if not stopped:
-            each.entry.leave(f"{each.chosen.what} has no node of a part of the case")
+            for entry in (each.entry, *each.more):
+                entry.leave(f"{each.chosen.what} has no node of a part of the case")
             continue
         if some:
             why = "in the deck it stops only some nodes of their parts, in Conoid all nodes"
@@ -35,5 +38,5 @@ def stand(draft: Draft, topology: Topology, bodies: Sequence[Body], stops: Seque
         if len(stopped) < len(names):
             table["parts"] = [names[key] for key in stopped]
         keys.append(stopped)
-        draft.add_boundary(table, each.entry)
+        draft.add_boundary(table, each.entry, *each.more)
     return keys

@@ -61,6 +61,40 @@ def test_walls_of_radioss(tmp_path: Path, what: str) -> None:
     assert {key: wall.get(key) for key in wanted} == wanted
 
 
+PISTON = "/RWALL/PLANE/1", "piston", row(3, 2, 5, 0), r20(0, 0.1), r20(0, 0, 0, 0), r20(0, 3, 0)
+GRIP = "/GRNOD/NODE/9", "grip", row(3)
+PUSH = "/FUNCT/4", "push", r20(0, 0), r20(1e-3, 500)
+
+
+def impvel(axis: str, number: int, *more: float) -> tuple[str, ...]:
+    return f"/IMPVEL/{number}", "drive", f"{row(4)}{axis:>10}{row(0, 0, 9)}", r20(*(more or (1, 2)))
+
+
+def test_a_wall_of_radioss_has_the_prescribed_motion_of_its_node(tmp_path: Path) -> None:
+    found = read(tmp_path, "a_0000.rad", radioss(*ELASTIC, *ALL, *PISTON, *GRIP, *PUSH, *impvel("Y", 1)), None)
+    assert found.refusals == []
+    (wall,) = found.data["boundaries"]
+    assert (wall["kind"], wall["velocity"]) == ("wall", ["0 mm/s", "1000 mm/s", "0 mm/s"])
+    assert wall["course"] == [["0 s", 0.0], ["0.001 s", 1.0]]
+    both = (*impvel("Y", 1), *impvel("X", 2))
+    (wall,) = read(tmp_path, "a_0000.rad", radioss(*ELASTIC, *ALL, *PISTON, *GRIP, *PUSH, *both), None).data[
+        "boundaries"
+    ]
+    assert wall["velocity"] == ["1000 mm/s", "1000 mm/s", "0 mm/s"]
+
+
+@pytest.mark.parametrize(
+    ("options", "told"),
+    [
+        ((), "NODE = 3: a wall that moves with its node; give it a mass, or its node a /IMPVEL"),
+        ((*GRIP, *PUSH, *impvel("Y", 1), *impvel("X", 2, 2, 1)), "NODE = 3: the components of its motion have several"),
+    ],
+)
+def test_a_wall_whose_motion_is_unclear_is_refused(tmp_path: Path, options: tuple[str, ...], told: str) -> None:
+    (line,) = read(tmp_path, "a_0000.rad", radioss(*ELASTIC, *ALL, *PISTON, *options), None).refusals
+    assert told in line
+
+
 @pytest.mark.parametrize(
     ("cards", "message"),
     [

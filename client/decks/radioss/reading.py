@@ -20,6 +20,7 @@ from . import bodies, loads, materials
 from .mesh import read_nodes, read_points
 from .scene import Scene
 from .text import Fields, Option, cut, numbers, options, real
+from .walls import drive
 from .words import LEFT, REFUSED, SOLIDS
 
 
@@ -165,6 +166,7 @@ class Radioss:
         scene = Scene(draft, self._nodes, self._curve, lambda: self._topology.points, rigid, self._end())
         for option, entry in self._options:
             self._guarded(partial(loads.take, scene), option, entry)
+        drive(scene, draft, self._topology)
         begin(draft, self._topology, self._bodies, scene.starts)
         for body in self._bodies:
             draft.add_part(body, names)

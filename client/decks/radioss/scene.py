@@ -9,6 +9,16 @@ from ..holds import Course, Hold
 from ..start import Start
 from ..topology import Chosen, Point
 from ..walls import Stop
+from .text import Fields
+
+
+@dataclass(frozen=True)
+class Moved:
+    """A wall that moves with a node of the deck."""
+
+    node: int
+    stop: Stop
+    fields: Fields
 
 
 @dataclass
@@ -26,3 +36,4 @@ class Scene:
     starts: list[Start] = field(default_factory=list)
     holds: list[Hold] = field(default_factory=list)
     walls: list[Stop] = field(default_factory=list)
+    moved: list[Moved] = field(default_factory=list)

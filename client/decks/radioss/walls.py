@@ -1,11 +1,16 @@
-"""Rigid walls of a Radioss starter: planes, cylinders and spheres, at rest or moving freely with a mass."""
+"""Rigid walls of a Radioss starter: planes, cylinders and spheres, at rest, moving freely with a mass, or driven by the
+motion of their node.
+"""
 
 from typing import Any
 
 from ..account import Entry
-from ..units import LENGTH, MASS, SPEED
+from ..draft import Draft
+from ..holds import AXES, Hold
+from ..topology import Topology
+from ..units import LENGTH, MASS, SPEED, TIME
 from ..walls import Stop
-from .scene import Scene
+from .scene import Moved, Scene
 from .text import Fields, Option
 
 _SHAPES = {"PLANE": "plane", "CYL": "cylinder", "SPHER": "sphere"}
@@ -30,15 +35,49 @@ def wall(scene: Scene, option: Option, entry: Entry) -> None:
         fields.forgive("DIAMETER", "without meaning for a plane")
     if shape != "sphere":
         table["normal" if shape == "plane" else "axis"] = _direction(fields, start)
+    stop = Stop(scene.nodes(_group(fields), entry), table, entry)
     if moves:
         _moving(scene, fields, table)
+        scene.moved.append(Moved(fields.whole("NODE"), stop, fields))
     slide, friction = fields.whole("SLIDE"), fields.real("FRIC")
     if slide == 1:
         fields.refuse("SLIDE", "in the deck nodes stick to the wall; Conoid has Coulomb friction")
     if slide == 2 and friction:
         table["friction"] = friction
-    scene.walls.append(Stop(scene.nodes(_group(fields), entry), table, entry))
+    scene.walls.append(stop)
     fields.rest()
+
+
+def drive(scene: Scene, draft: Draft, topology: Topology) -> None:
+    """Gives each wall the prescribed motion of its node; a wall without such a motion needs a mass."""
+    for wall in scene.moved:
+        holds = [each for each in scene.holds if topology.nodes(each.chosen) == {wall.node}]
+        if holds:
+            scene.holds = [each for each in scene.holds if each not in holds]
+            wall.stop.more.extend(each.entry for each in holds)
+            _prescribe(draft, wall, holds)
+        elif "mass" in wall.stop.table:
+            why = "the wall moves with the mass of the option; other loads on its node are ignored"
+            wall.fields.differ("NODE", why)
+        else:
+            why = "a wall that moves with its node; give it a mass, or its node a /IMPVEL"
+            wall.fields.refuse("NODE", why)
+
+
+def _prescribe(draft: Draft, wall: Moved, holds: list[Hold]) -> None:
+    """Writes velocity and course of ``holds``, of the node of a wall, into its table."""
+    table, axes = wall.stop.table, [axis for each in holds for axis in each.speeds]
+    courses = {each.course for each in holds if any(each.speeds.values())}
+    if len(set(axes)) < len(axes) or len(courses) > 1:
+        why = "the components of its motion have several courses; a wall has one"
+        wall.fields.refuse("NODE", why)
+        return
+    table.pop("mass", None)
+    speeds = {axis: speed for each in holds for axis, speed in each.speeds.items()}
+    table["velocity"] = draft.vector([speeds.get(axis, 0.0) for axis in AXES], SPEED)
+    if course := next(iter(courses), ()):
+        table["course"] = [[draft.quantity(time, TIME), factor] for time, factor in course]
+    wall.fields.differ("NODE", "the wall has the prescribed motion of its node, and none along other axes")
 
 
 def _start(scene: Scene, fields: Fields, moves: bool) -> list[float]:
@@ -64,9 +103,6 @@ def _moving(scene: Scene, fields: Fields, table: dict[str, Any]) -> None:
         table["velocity"] = scene.draft.vector(speed, SPEED)
     if mass > 0.0:
         table["mass"] = scene.draft.quantity(mass, MASS)
-        fields.differ("NODE", "the wall moves with the mass of the option; other loads on its node are ignored")
-    else:
-        fields.refuse("NODE", "a wall that moves with its node; give it a mass, or velocity and course")
 
 
 def _group(fields: Fields) -> int:
