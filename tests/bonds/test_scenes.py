@@ -59,3 +59,22 @@ def test_three_parts_of_one_body_have_a_bond_at_each_interface(third: str) -> No
     else:
         with pytest.raises(InputError, match="'a' and 'c' have faces of one body in common and no bond; give them"):
             assemble(case, Path())
+
+
+@pytest.mark.parametrize("sizes", [(0.5, 0.4, 0.3), (0.5, 0.33, 0.25)])
+def test_three_parts_tied_in_a_ring_lose_no_energy(sizes: tuple[float, float, float]) -> None:
+    """A node on the common line has one row, since two would be nearly linearly dependent."""
+    corners = {"a": ((0, 0, 0), (2, 1, 1)), "b": ((0, 0, 1), (1, 1, 2)), "c": ((1, 0, 1), (2, 1, 2))}
+    blocks = "".join(block(name, *both, size) for (name, both), size in zip(corners.items(), sizes, strict=True))
+    bonds = "".join(f'\n[[bond]]\nparts = ["{i}", "{j}"]\nkind = "tied"\n' for i, j in ("ab", "ac", "bc"))
+    pull = '\n[[boundaries]]\nkind = "traction"\nparts = ["b", "c"]\nlow = [-1, -1, 1.99e-3]\nhigh = [1, 1, 2.01e-3]\n'
+    sim = built(start(3e-6) + blocks + bonds + pull + "stress = [1e7, 0, 1e8]\n" + moved(-1e-5, 1e-5, (0.0, 0.0, 0.0)))
+    assert sim.bonds is not None
+    held = sim.bonds.ties.rows.node
+    assert len(held) > len(np.unique(held)), "nodes of the line are tied in two bonds"
+    energy = run(sim)
+    assert abs(energy.fracture) < 1e-9 * energy.external
+    assert abs(energy.residual) < 1e-5
+    corner = np.flatnonzero(np.abs(sim.model.nodes.x0 - [1e-3, 0.0, 1e-3]).max(axis=1) < 1e-9)
+    assert len(corner) == 3
+    assert np.ptp(sim.model.nodes.v[corner], axis=0).max() < 0.05 * np.abs(sim.model.nodes.v[corner]).max()

@@ -18,7 +18,7 @@ from ..parallel.tags import Tag
 from ..rigid.points import Points
 from ..rigid.stage import Rigid
 from .records import BREAKS, KEPT, NORMAL, STATE, TiedNodes, TiedRows
-from .rows import Rows
+from .rows import Rows, chain
 
 _SETTLED = 1e-7
 """Residual of the sweeps of a step over the change of the impulses in the step. Chosen value: the energy dissipated
@@ -87,9 +87,10 @@ def laid_out(
     of_bodies = np.zeros(len(rows.node))
     if rigid is not None:
         of_bodies[points.row] = points.norms(rigid.bodies)
+    slack = (1.0 + chain(rows)) ** 2  # the smallest singular value of I - N is at least 1 / (1 + |N|) if N^2 = 0
     least, inverse = _norms(rows, mine, ids, table, planes[place[mine]], of_bodies[mine], comm)
     tied = _rows(rows, mine, ids, inverse, states, laws)
-    share, sweeps = momentum(least)
+    share, sweeps = momentum(least / slack)
     if rigid is not None and len(points):
         held_points = points.take(mine[points.row])
         rigid.bonds.take_up(held_points, np.searchsorted(ids, _name(held_points.row)).astype(np.int32), scale)

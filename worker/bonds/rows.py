@@ -42,6 +42,32 @@ class Rows:
         )  # fmt: skip
 
 
+def one_each(rows: Rows, intact: Flags) -> Flags:
+    """Returns (r,) the ``intact`` rows (r,) that act: of several rows of a node, the one with the largest area.
+
+    On a line where three parts are tied to each other, a node has a row of two bonds. The parts are joined by one of
+    them, and both are nearly linearly dependent (docs/theory/bonds.md, "Lines of three parts").
+    """
+    order = np.lexsort((rows.bond, -rows.area, ~intact, rows.node))
+    node, first = rows.node[order], np.ones(len(order), bool)
+    first[1:] = node[1:] != node[:-1]
+    chosen = np.zeros(len(order), bool)
+    chosen[order[first]] = True
+    return np.asarray(chosen & intact)
+
+
+def chain(rows: Rows) -> float:
+    """Returns a bound of the spectral norm of the weights of mortar nodes that are tied nodes of other rows; 0 without
+    such nodes: sqrt(largest sum of a row times largest sum of a column) of the absolute weights.
+    """
+    among = np.isin(rows.master, rows.node)
+    if not among.any():
+        return 0.0
+    weight = np.abs(rows.weight[among])
+    _, column = np.unique(rows.master[among], return_inverse=True)
+    return float(np.sqrt(np.bincount(rows.row[among], weight).max() * np.bincount(column, weight).max()))
+
+
 def assembled(pieces: Pieces, slaves: Ints, masters: Ints) -> Rows:
     """Returns the rows of ``pieces`` whose tied faces have the corners ``slaves`` and mortar faces the corners
     ``masters`` (p, 3), global ids.

@@ -27,6 +27,7 @@ from .account import BondAccount
 from .layout import Layout, laid_out
 from .pieces import Pieces
 from .records import DAMAGE
+from .rows import one_each
 from .ties import Ties
 
 
@@ -150,16 +151,17 @@ class Bonds:
     def _lay_out(self) -> None:
         """Makes the layout of the intact rows. Collective."""
         self.free()
-        alive = self.ties.states[:, DAMAGE] < 1.0
-        rows, states, nodes = self.ties.rows.take(alive), self.ties.states[alive], self._model.nodes
+        intact = self.ties.states[:, DAMAGE] < 1.0
+        acts = one_each(self.ties.rows, intact)
+        rows, states, nodes = self.ties.rows.take(acts), self.ties.states[acts], self._model.nodes
         planes, mobility = mirrored(nodes.n, self._bounds), mobilities(nodes, self._bounds)
         self.account.mobility = mobility
         self._layout = laid_out(
             rows, states, self._laws, nodes, mobility, planes, self._rigid, self.account.scale, self._comm
         )  # fmt: skip
-        self._layout.number = np.flatnonzero(alive)[self._layout.number]
+        self._layout.number = np.flatnonzero(acts)[self._layout.number]
         self.apart = False
-        self.ties.mark(rows)
+        self.ties.mark(self.ties.rows.take(intact))
 
 
 class _Passes:
