@@ -47,13 +47,17 @@ class _Part(msgspec.Struct):
 
 
 class _Boundary(msgspec.Struct):
-    """Fields of a boundary that pictures use. A wall has a point and a normal, a plane of symmetry has an axis."""
+    """Fields of a boundary that pictures use. The axis of a plane of symmetry is a name, that of a wall a vector."""
 
     kind: str
-    axis: Literal["x", "y", "z"] | None = None
+    axis: Literal["x", "y", "z"] | tuple[float, float, float] | None = None
     at: float = 0.0
+    shape: Literal["plane", "cylinder", "sphere"] = "plane"
     point: tuple[float, float, float] = (0.0, 0.0, 0.0)
-    normal: tuple[float, float, float] = (0.0, 0.0, 1.0)
+    normal: tuple[float, float, float] | None = None
+    radius: float | None = None
+    velocity: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    mass: float | None = None
     parts: list[str] | None = None
 
 
@@ -247,7 +251,7 @@ class Result:
                 for one in boundaries
                 if one["kind"] == "symmetry" and not one.get("parts")
             ),
-            walls=tuple(Wall(tuple(one["point"]), tuple(one["normal"])) for one in boundaries if _is_plain(one)),
+            walls=tuple(_wall(one) for one in boundaries if one["kind"] == "wall"),
             parts=tuple(part["name"] for part in case.get("parts", [])),
             title=str(case.get("title") or case.get("name") or ""),
         )
@@ -260,10 +264,12 @@ class Result:
             return {}
 
 
-def _is_plain(boundary: dict[str, Any]) -> bool:
-    """Returns True if a boundary is a fixed plane wall: other walls are not drawn."""
+def _wall(boundary: dict[str, Any]) -> Wall:
+    """Returns the wall of a boundary of the kind ``wall``."""
     moves = any(boundary.get("velocity") or ()) or boundary.get("mass") is not None
-    return boundary["kind"] == "wall" and boundary.get("shape", "plane") == "plane" and not moves
+    along = boundary.get("normal") or boundary.get("axis") or (0.0, 0.0, 1.0)
+    shape, radius = boundary.get("shape", "plane"), float(boundary.get("radius") or 0.0)
+    return Wall(tuple(boundary["point"]), tuple(along), shape, radius, moves)
 
 
 def outcome_of(text: bytes) -> Outcome:

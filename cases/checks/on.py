@@ -1,9 +1,11 @@
-"""Sets of mesh files that boundaries and probes select by the key ``on``: their numbers and their parts."""
+"""Sets of mesh files that boundaries and probes select by the key ``on``, and those that frames contain: their numbers
+and their parts."""
 
 from collections.abc import Iterator
+from typing import NamedTuple
 
 from ..model.bodies import MeshFile
-from ..model.boundaries import Prescribed, Rotation, Traction
+from ..model.boundaries import Prescribed, Rotation, Symmetry, Traction
 from ..model.measures import WHOLE, Probe, kind
 from ..model.schema import Case, Part
 from ..reading.problems import Location, Problem, problem
@@ -12,14 +14,30 @@ MOST = 62
 """Largest number of sets of a case. Each node has one bit for each set in an integer of 64 bits."""
 
 
-def ons(case: Case) -> list[tuple[Location, Prescribed | Rotation | Traction | Probe]]:
-    """Returns the boundaries and probes with a set, and their locations in the case."""
-    boundaries: list[tuple[Location, Prescribed | Rotation | Traction | Probe]] = [
-        (("boundaries", i), each)
+class Framed(NamedTuple):
+    """A set that frames contain (``run.sets``)."""
+
+    on: str
+    parts: tuple[str, ...] = ()
+
+
+Held = Prescribed | Rotation | Symmetry | Traction
+"""Kinds of boundaries that may have a set."""
+Selecting = Held | Probe | Framed
+"""All that selects a set."""
+
+
+def ons(case: Case) -> list[tuple[Location, Selecting]]:
+    """Returns the boundaries and probes with a set and the sets of frames, each with the place of the name of the set
+    in the case.
+    """
+    boundaries: list[tuple[Location, Selecting]] = [
+        (("boundaries", i, "on"), each)
         for i, each in enumerate(case.boundaries)
-        if isinstance(each, Prescribed | Rotation | Traction) and each.on is not None
+        if isinstance(each, Held) and each.on is not None
     ]
-    return [*boundaries, *((("probes", i), each) for i, each in enumerate(case.probes) if each.on is not None)]
+    probes = [(("probes", i, "on"), each) for i, each in enumerate(case.probes) if each.on is not None]
+    return [*boundaries, *probes, *((("run", "sets", i), Framed(name)) for i, name in enumerate(case.run.sets))]
 
 
 def bits(case: Case) -> dict[str, int]:
@@ -27,12 +45,12 @@ def bits(case: Case) -> dict[str, int]:
     return {name: bit for bit, name in enumerate(dict.fromkeys(each.on or "" for _, each in ons(case)))}
 
 
-def named(spec: Prescribed | Rotation | Traction | Probe) -> tuple[str, ...]:
+def named(spec: Selecting) -> tuple[str, ...]:
     """Returns the parts that a boundary or a probe names."""
     return ((spec.part,) if spec.part else ()) if isinstance(spec, Probe) else spec.parts
 
 
-def parts(case: Case, spec: Prescribed | Rotation | Traction | Probe) -> list[Part]:
+def parts(case: Case, spec: Selecting) -> list[Part]:
     """Returns the parts whose sets a boundary or probe selects: the named parts, or all parts with a mesh from a file
     if no part is named.
     """
@@ -41,22 +59,19 @@ def parts(case: Case, spec: Prescribed | Rotation | Traction | Probe) -> list[Pa
 
 
 def check_ons(case: Case) -> Iterator[Problem]:
-    """Yields a problem for each boundary or probe with a set of a part that has none; only mesh files have sets."""
+    """Yields a problem for each boundary, probe or frame with a set of a part that has none; only mesh files have
+    sets.
+    """
     for location, spec in ons(case):
         generated = [part.name for part in parts(case, spec) if not isinstance(part.mesh, MeshFile)]
         if generated:
-            yield problem(
-                (*location, "on"),
-                spec.on,
-                f"only meshes from files have sets; the mesh of {generated[0]!r} is generated",
-            )
+            message = f"only meshes from files have sets; the mesh of {generated[0]!r} is generated"
+            yield problem(location, spec.on, message)
         elif not parts(case, spec):
-            yield problem((*location, "on"), spec.on, "only meshes from files have sets; no part of the case has one")
+            yield problem(location, spec.on, "only meshes from files have sets; no part of the case has one")
         if isinstance(spec, Probe) and kind(spec.field) in WHOLE:
-            yield problem(
-                (*location, "on"),
-                spec.on,
-                f"is allowed with means, peaks and sums only; remove on, or use another field than {spec.field!r}",
-            )
+            message = "is allowed with means, peaks and sums only; remove on, or use another field than"
+            yield problem(location, spec.on, f"{message} {spec.field!r}")
     if len(bits(case)) > MOST:
-        yield problem(("boundaries",), ..., f"boundaries and probes use {len(bits(case))} sets; allowed: up to {MOST}")
+        message = f"boundaries, probes and frames use {len(bits(case))} sets; allowed: up to {MOST}"
+        yield problem(("boundaries",), ..., message)

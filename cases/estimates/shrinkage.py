@@ -131,7 +131,9 @@ def _confined(case: Case, part: Part) -> bool:
     planes = [
         (boundary.axis, boundary.at)
         for boundary in case.boundaries
-        if isinstance(boundary, Symmetry) and (not boundary.parts or part.name in boundary.parts)
+        if isinstance(boundary, Symmetry)
+        and boundary.on is None
+        and (not boundary.parts or part.name in boundary.parts)
     ]
     held = [all(_on(planes, d, side[d]) for side in body) for d in range(3)]
     return sum(held) >= 2

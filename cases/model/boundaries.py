@@ -27,6 +27,10 @@ class Symmetry(Model):
     """Coordinate of the plane along ``axis``."""
     parts: tuple[Name, ...] = ()
     """Names of the parts to which it applies; all parts when empty."""
+    on: SetName | None = None
+    """Name of a node set or a surface in the mesh file of the parts ([howto/meshes.md](../howto/meshes.md)): exactly
+    its nodes start on the plane, up to a hundredth of the shortest edge off it. All other nodes are beside the plane,
+    also where they touch it, as on the faces of a crack. Default: the nodes on the plane within rounding."""
 
 
 class Wall(Model):

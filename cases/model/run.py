@@ -5,7 +5,7 @@ from typing import Annotated, Literal
 from pydantic import BeforeValidator, Field
 
 from ..units import Ratio, Time
-from .tables import Count, Model, Positive, Switch, off
+from .tables import Count, Model, Positive, SetName, Switch, off
 
 Scale = Annotated[Ratio, Field(gt=0)]
 
@@ -46,6 +46,10 @@ class Run(Model):
     impulse of contact and walls on a node since the previous frame, along the normal of its share of the loaded
     surface (a third of each face that is hit at less than 60 degrees), over that area and time; 0 in the first
     frame. Walls that push rigid parts are not included: use a probe of ``wall_force``."""
+    sets: tuple[SetName, ...] = ()
+    """Names of node sets and surfaces of mesh files that the frames contain, beside those that boundaries and probes
+    select with ``on``: a point array ``set_NAME`` each, 1 on the nodes of the set. ``conoid view --on NAME`` draws the
+    tets that have a node in the set."""
     samples: Annotated[Count, Field(ge=1, le=1_000_000)] = 500
     """Number of lines of history.csv, evenly spaced up to the end."""
     snapshots: Annotated[Count, Field(ge=0, le=100_000)] = 100

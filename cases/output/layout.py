@@ -63,6 +63,13 @@ def frame(folder: Path, index: int) -> Path:
     return folder / FRAMES / f"{index:06d}.vtkhdf"
 
 
+def set_array(name: str) -> str:
+    """Name of the point array of a set of nodes in a frame. HDF5 separates groups by "/"; the name has U+2215
+    instead.
+    """
+    return "set_" + name.replace("/", "\u2215")
+
+
 def checkpoint(folder: Path, step: int) -> Path:
     """Path of the checkpoint before ``step`` in the run folder ``folder``."""
     return folder / CHECKPOINTS / f"{step:09d}"

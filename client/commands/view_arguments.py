@@ -34,6 +34,9 @@ Whole = Annotated[
 Hide = Annotated[
     list[str] | None, typer.Option("--hide", metavar="PART", help="A part that is not drawn; may be repeated.")
 ]
+On = Annotated[
+    str, typer.Option("--on", metavar="SET", help="Draw only the tets with a node in this set of the mesh file.")
+]
 Opacity = Annotated[
     list[str] | None, typer.Option("--opacity", metavar="PART=SHARE", help="Opacity of a part: target=0.3.")
 ]

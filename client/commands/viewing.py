@@ -31,6 +31,7 @@ def view_frames(
     section: asked.Section = "",
     whole: asked.Whole = None,
     hide: asked.Hide = None,
+    on: asked.On = "",
     opacity: asked.Opacity = None,
     focus: asked.Focus = None,
     camera: asked.Camera = "",
@@ -54,12 +55,10 @@ def view_frames(
     token: Token = None,
     as_json: Json = False,
 ) -> None:
-    """Draw frames off screen: as a PNG, several frames side by side, or as a film (--out x.gif or x.mp4, all
-    frames).
-    """
+    """Draw frames off screen: a PNG, several frames side by side, or a film (--out x.gif or x.mp4, all frames)."""
     options: dict[str, Any] = {
         "out": out, "frame": frame, "time": [seconds(each) for each in time or ()], "mirror": mirror,
-        "section": section, "whole": whole or [], "hide": hide or [], "opacity": _shares(opacity or ()),
+        "section": section, "whole": whole or [], "hide": hide or [], "on": on, "opacity": _shares(opacity or ()),
         "focus": focus or [], "camera": camera, "up": up, "zoom": zoom, "limits": limits, "percentiles": percentiles,
         "fixed": fixed, "bands": bands, "vectors": vectors, "size": size, "raw": raw, "edges": edges,
         "outlines": outlines, "scale": scale, "captions": captions, "dark": dark, "transparent": transparent,

@@ -65,7 +65,7 @@ class Printer:
         """Draws one panel with its lines at a larger size and reduces the panel to its size."""
         laid, look = self._laid, self._picture.look
         on = arrows.on(shot, laid.eye, laid.aspect, self._longest) if look.vectors else None
-        exposure = self._studio.expose(shot.pieces, laid.eye, on)
+        exposure = self._studio.expose(shot, laid.eye, on)
         colours = np.asarray(exposure.colour, float)
         if look.outlines and not look.edges:
             dark = outlines.lines(exposure, laid.pixel / self._fine, round(self._fine * laid.panels[0][3]))[..., None]

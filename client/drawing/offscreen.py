@@ -8,12 +8,13 @@ from typing import Any
 
 import numpy as np
 
-from . import part_colours, vtk
+from . import part_colours, vtk, walls
 from .camera import Camera
 from .fields import FIELDS, Field
 from .picture import Picture
 from .planes import Wall
 from .scales import Scale
+from .shot import Shot
 from .surfaces import Piece
 
 FAR = 4.0
@@ -25,6 +26,8 @@ _LIGHTS = ((-0.7, 0.9, 1.6), 0.66), ((1.3, 0.2, 1.0), 0.34)
 """A key light from the upper left and a weaker light from the right."""
 _WALL = "#aab6c3"
 _MATTER = {"ambient": 0.45, "diffuse": 0.85, "specular": 0.10, "specular_power": 20.0}
+_ROUND = {"lighting": True, "ambient": 0.75, "diffuse": 0.45, "specular": 0.0, "smooth_shading": True}
+"""Shading of round walls: pale, with a shape that is visible."""
 _FEATURE = 35.0
 """Angle between two faces above which the shading of their edge is not smoothed, degrees. Chosen value: the faces of a
 curved surface differ by less than this angle."""
@@ -54,9 +57,9 @@ class Studio:
         self._picture, self._scale, self._paper = picture, scale, paper
         self._plotter = vtk.window(size, paper)
 
-    def expose(self, pieces: Sequence[Piece], eye: Camera, arrows: Any | None) -> Exposure:
-        """Draws the pieces of a frame and arrows on the pieces."""
-        plotter = self._plotter
+    def expose(self, shot: Shot, eye: Camera, arrows: Any | None) -> Exposure:
+        """Draws the pieces of a frame, its walls, and arrows on the pieces."""
+        plotter, pieces = self._plotter, shot.pieces
         plotter.clear()
         labels, table = _labels(pieces)
         self._look(eye)
@@ -72,7 +75,7 @@ class Studio:
             glass, _ = self._numbers(eye)
         for actor in flat:
             plotter.remove_actor(actor, reset_camera=False, render=False)
-        colour, wall = self._lit(pieces, eye, arrows)
+        colour, wall = self._lit(shot, eye, arrows)
         parts, fragments = np.append(0, table[:, 0] + 1), np.append(0, np.arange(len(table)) + 1)
         return Exposure(colour, parts[number], fragments[number], depth, parts[glass], wall)
 
@@ -101,12 +104,12 @@ class Studio:
         plotter.set_background(self._paper)
         return red + (green << 8) + (blue << 16), depth
 
-    def _lit(self, pieces: Sequence[Piece], eye: Camera, arrows: Any | None) -> tuple[Any, Any]:
+    def _lit(self, shot: Shot, eye: Camera, arrows: Any | None) -> tuple[Any, Any]:
         """Returns the colour of each pixel, and an array that is True for pixels of walls."""
         plotter, picture = self._plotter, self._picture
         for position, intensity in _LIGHTS:
             plotter.add_light(vtk.light(position, intensity))
-        for piece in pieces:
+        for piece in shot.pieces:
             self._add(piece)
         if arrows is not None:
             plotter.add_mesh(arrows, color="#1d2733", **_MATTER, reset_camera=False)
@@ -118,10 +121,10 @@ class Studio:
         plotter.renderer.ResetCameraClippingRange()
         colour = self._taken()
         plotter.disable_depth_peeling() if glassy else plotter.disable_ssao()
-        if not picture.walls:
+        if not shot.walls:
             return colour, np.zeros(colour.shape[:2], bool)
-        for wall in picture.walls:
-            self._add_wall(pieces, wall)
+        for wall in shot.walls:
+            self._add_wall(shot.points, wall)
         plotter.renderer.ResetCameraClippingRange()
         with_walls = self._taken()
         return with_walls, (with_walls != colour).any(axis=2)
@@ -149,19 +152,10 @@ class Studio:
             colours = {"cmap": list(scale.colours), "n_colors": len(scale.colours), "clim": (scale.low, scale.high)}
             self._plotter.add_mesh(surface, scalars="shown", **colours, **look, **smooth)
 
-    def _add_wall(self, pieces: Sequence[Piece], wall: Wall) -> None:
-        """Adds a wall as a pale disk, a little larger than the body. The fit of the camera does not include the
-        disk.
-        """
-        normal = np.asarray(wall.normal) / np.linalg.norm(wall.normal)
-        points = np.concatenate([np.asarray(piece.surface.points, float) for piece in pieces])
-        centre = 0.5 * (points.min(axis=0) + points.max(axis=0))
-        across = points - centre
-        radius = 1.35 * float(np.linalg.norm(across - np.outer(across @ normal, normal), axis=1).max())
-        foot = centre - ((centre - np.asarray(wall.point)) @ normal + 2e-3 * radius) * normal
-        self._plotter.add_mesh(
-            vtk.disk(foot, normal, radius), color=_WALL, opacity=0.55, lighting=False, reset_camera=False
-        )
+    def _add_wall(self, points: Any, wall: Wall) -> None:
+        """Adds a pale wall. The fit of the camera does not include it."""
+        matter = {"lighting": False} if wall.shape == "plane" else _ROUND
+        self._plotter.add_mesh(walls.surface(points, wall), color=_WALL, opacity=0.55, reset_camera=False, **matter)
 
     def _look(self, eye: Camera) -> None:
         """Sets a parallel camera outside of the body. The near and the far plane enclose the body closely: depths

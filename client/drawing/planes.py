@@ -28,10 +28,17 @@ class Mirror(msgspec.Struct, frozen=True):
 
 
 class Wall(msgspec.Struct, frozen=True):
-    """A rigid wall to draw: a point on the wall, m, and the normal of the wall."""
+    """A rigid wall to draw: ``plane``, ``cylinder`` or ``sphere``."""
 
     point: Vector
-    normal: Vector
+    """A point of the plane or of the axis at the start, or the centre, m."""
+    direction: Vector = (0.0, 0.0, 1.0)
+    """Normal of a plane, or axis of a cylinder."""
+    shape: str = "plane"
+    radius: float = 0.0
+    """Radius of a cylinder or a sphere, m."""
+    moves: bool = False
+    """True for a wall whose position is in the frames."""
 
 
 VIEWS: dict[str, Vector] = {

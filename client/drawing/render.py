@@ -13,7 +13,7 @@ import msgspec
 import numpy as np
 
 from ..errors import LookError, ViewError
-from . import camera, films, scales, surfaces, vtk
+from . import camera, films, scales, sets, surfaces, vtk, walls
 from .composition import Printer
 from .fields import FIELDS, NAMED
 from .picture import Drawn, Picture
@@ -46,12 +46,14 @@ def _shots(picture: Picture) -> tuple[Picture, list[Shot]]:
     shots, bounds = [], []
     for path in picture.frames:
         mesh, time = vtk.read(path)
+        there = walls.placed(mesh, picture)
+        mesh = sets.of_set(mesh, picture.look.on)
         grid = surfaces.prepared(mesh, picture)
         bulk = surfaces.bulk(grid, picture)
         picture = camera.settled(_in_the_middle(picture, bulk), bulk)
         bounds.append(surfaces.extent(grid, np.ones(grid.n_cells, bool)))
         surfaces.require_sections(picture, np.array([bounds[-1]]))
-        shots.append(Shot(surfaces.pieces(grid, picture, picture.camera or camera.FROM), time, bounds[-1]))
+        shots.append(Shot(surfaces.pieces(grid, picture, picture.camera or camera.FROM), time, bounds[-1], there))
     return picture, shots
 
 

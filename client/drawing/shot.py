@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from .planes import Wall
 from .surfaces import Piece
 
 
@@ -17,6 +18,8 @@ class Shot:
     time: float | None
     bounds: Any
     """(3, 2) lowest and highest coordinates of the whole body, m."""
+    walls: Sequence[Wall] = ()
+    """Rigid walls at the time of the frame."""
 
     @property
     def shown(self) -> Any:

@@ -34,6 +34,9 @@ class Look(msgspec.Struct, kw_only=True, frozen=True):
     """Parts that sections do not cut."""
     hide: list[str] = []
     """Parts that are not drawn."""
+    on: str = ""
+    """Name of a set of the mesh file (``run.sets``, or a set of a boundary or a probe): only the tets that have a node
+    in it are drawn."""
     opacity: dict[str, float] = {}
     """Opacity of parts; 0.3 is glassy. Parts that are not named are opaque."""
     focus: list[str] = []

@@ -54,6 +54,16 @@ def disk(centre: Any, normal: Any, radius: float) -> Any:
     return pv.Disc(center=centre, inner=0.0, outer=radius, normal=normal, r_res=1, c_res=96)
 
 
+def tube(centre: Any, axis: Any, radius: float, height: float) -> Any:
+    """Returns the side of a cylinder, open at its ends."""
+    return pv.Cylinder(center=centre, direction=axis, radius=radius, height=height, resolution=96, capping=False)
+
+
+def ball(centre: Any, radius: float) -> Any:
+    """Returns the surface of a sphere."""
+    return pv.Sphere(radius=radius, center=centre, theta_resolution=72, phi_resolution=48)
+
+
 def arrows(places: Any, vectors: Any, factor: float) -> Any:
     """Returns arrows at ``places`` along ``vectors``, both (n, 3); ``factor`` scales their lengths."""
     cloud = pv.PolyData(places)

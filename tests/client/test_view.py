@@ -13,6 +13,7 @@ import pytest
 from matplotlib.image import imread
 from PIL import Image
 
+from conoid.cases.load import parse_case
 from conoid.client.drawing import camera, part_colours, renderer
 from conoid.client.drawing.fields import FIELDS
 from conoid.client.drawing.frame import require_whole
@@ -421,3 +422,49 @@ def test_a_picture_of_a_damaged_frame_is_one_line(tmp_path: Path) -> None:
     astray(folder / "frames" / "000007.vtkhdf")
     with pytest.raises(ViewError, match=r"7\.vtkhdf: this is no frame, or a damaged one: cells of piece 0 have"):
         view(folder, "mises", tmp_path / "t.png", size=SIZE)
+
+
+@pytest.mark.usefixtures("warm")
+def test_tets_of_a_set_are_drawn_alone(tmp_path: Path) -> None:
+    frame = tmp_path / "f.vtkhdf"
+    write_frame(frame)
+    with h5py.File(frame, "a") as file:
+        root = file["VTKHDF"]
+        low = root["Points"][:, 2] < 1e-9
+        root["PointData/set_FOOT"], root["PointData/set_a\u2215b"] = low.astype(np.uint8), 0 * low.astype(np.uint8)
+    across = 4
+    drawn = view(frame, "mises", tmp_path / "s.png", size=SIZE, on="FOOT")
+    assert 2 * across * across < drawn.faces < 2 * across * across + 4 * 2 * across + 4 * across * across
+    with pytest.raises(LookError, match=r"^on = 'FEET': did you mean 'FOOT'|^on = 'FEET': allowed: FOOT, a"):
+        view(frame, "mises", tmp_path / "s.png", size=SIZE, on="FEET")
+    with pytest.raises(LookError, match="no tet of this frame has a node in the set"):
+        view(frame, "mises", tmp_path / "s.png", size=SIZE, on="a/b")
+
+
+@pytest.mark.usefixtures("warm")
+def test_round_and_moving_walls_are_drawn_where_they_are(tmp_path: Path) -> None:
+    """The case is written as a worker writes it; the frames have the positions of the walls."""
+    run = write_run(tmp_path / "bar")
+    ball = {"kind": "wall", "name": "ball", "shape": "sphere", "radius": "2 mm", "mass": "1 g"}
+    walls = [
+        {**ball, "point": ["3 mm", "3 mm", "-9 m"]},
+        {"kind": "wall", "name": "tube", "shape": "cylinder", "radius": "9 mm", "axis": [0, 0, 1], "side": "inside",
+         "point": [0, 0, 0]},
+    ]  # fmt: skip
+    mesh = {"shape": "box", "low": [0, 0, 0], "high": ["1 mm", "1 mm", "1 mm"], "element_size": "1 mm"}
+    case = {"name": "bar", "parts": [{"name": "rod", "material": "steel", "mesh": mesh}], "boundaries": walls[:1]}
+    pictures = {}
+    for name, place, boundaries in (("far", None, walls[:1]), ("near", 13.0, walls[:1]), ("both", 13.0, walls)):
+        resolved = parse_case({**case, "run": {"end_time": "1 us"}, "boundaries": boundaries}).model_dump_json()
+        (run / "case.resolved.json").write_text(resolved)
+        for frame in (run / "frames").glob("*.vtkhdf"):
+            with h5py.File(frame, "a") as file:
+                field = file["VTKHDF/FieldData"]
+                field.pop("wall_position", None)
+                if place is not None:
+                    field["wall_position"] = np.array([[0.0, 0.0, 1e-3 * place], [0.0, 0.0, 0.0]])[: len(boundaries)]
+        drawn = view(run, "mises", tmp_path / f"{name}.png", size=SIZE)
+        pictures[name] = imread(drawn.out)[:, : int(0.8 * SIZE[0]), :3]
+    changed = [(np.abs(a - b).max(axis=2) > 0.02).sum() for a, b in itertools.pairwise(pictures.values())]
+    assert changed[0] > 300, "a ball of 2 mm that moved to the middle of the bar"
+    assert changed[1] > 10_000, "a tube around the bar"

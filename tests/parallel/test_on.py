@@ -4,6 +4,8 @@ ranks."""
 from pathlib import Path
 from random import Random
 
+import h5py
+
 from conoid.cases.outcome import Outcome, from_json
 from conoid.cases.output import layout
 
@@ -80,6 +82,29 @@ on = "CLAMP"
 y = 0.0
 """
 
+HALF = """
+name = "half"
+[run]
+end_time = "8 us"
+samples = 10
+frames = 1
+sets = ["END"]
+[[parts]]
+name = "bar"
+material = "steel"
+mesh = { shape = "file", path = "bar.inp", unit = "1 mm" }
+[[boundaries]]
+kind = "symmetry"
+axis = "x"
+ON
+[[boundaries]]
+kind = "traction"
+on = "END"
+stress = ["-200 MPa", 0, 0]
+course = [["0 us", 1], ["3 us", 1], ["3.1 us", -1]]
+"""
+"""A bar that is pressed on a plane of symmetry, and pulled off later."""
+
 
 def case(place: Path, name: str, words: dict[str, str], turning: bool) -> str:
     """Returns a case file. A box cannot rotate nodes, so it is compared without the rotation."""
@@ -94,13 +119,16 @@ def case(place: Path, name: str, words: dict[str, str], turning: bool) -> str:
 
 
 def test_sets_hold_what_boxes_hold_on_any_number_of_ranks(tmp_path: Path) -> None:
-    bar(tmp_path / "bar.inp", (10, 2, 2))
+    bar(tmp_path / "bar.inp", (10, 2, 2), more="*NSET, NSET=LIGAMENT, GENERATE\n1, 3")
     names = {"sets": (SETS, False), "boxes": (BOXES, False), "turning": (SETS, True)}
     files = {name: case(tmp_path, name, *what) for name, what in names.items()}
     truth = mixture(MANY)
     (tmp_path / "lump.k").write_text(prepost(truth, {7: list(truth.elements)}, Random(0)), encoding="utf-8")
     (tmp_path / "mixed.toml").write_text(MIXED, encoding="utf-8")
     files["mixed"] = str(tmp_path / "mixed.toml")
+    for name, on in (("plane", ""), ("held", 'on = "CLAMP"'), ("crack", 'on = "LIGAMENT"')):
+        (tmp_path / f"{name}.toml").write_text(HALF.replace("\nON\n", f"\n{on}\n"), encoding="utf-8")
+        files[name] = str(tmp_path / f"{name}.toml")
     ends: dict[tuple[str, int], Outcome] = {}
     histories = {}
     for ranks in (1, 3):
@@ -111,9 +139,25 @@ def test_sets_hold_what_boxes_hold_on_any_number_of_ranks(tmp_path: Path) -> Non
             ends[name, ranks] = from_json((out / layout.OUTCOME).read_bytes())
             histories[name, ranks] = (out / layout.HISTORY).read_bytes()
     assert {end.state for end in ends.values()} == {"succeeded"}
+    assert len({ends[name, ranks].digest for name in ("plane", "held") for ranks in (1, 3)}) == 1
+    assert ends["crack", 1].digest == ends["crack", 3].digest
+    assert_open(tmp_path / "crack-3", ligament=3, crack=6)
     assert len({ends[name, ranks].digest for name in ("sets", "boxes") for ranks in (1, 3)}) == 1
     assert ends["mixed", 1].digest == ends["mixed", 3].digest, "hexahedra, wedges and pyramids of a keyword deck"
     assert ends["turning", 1].digest == ends["turning", 3].digest != ends["sets", 1].digest
     assert (ends["sets", 1].broken or 0) > 10, "nodes on sets separate, too"
     assert histories["sets", 1] == histories["sets", 3]
     assert histories["turning", 1] == histories["turning", 3]
+
+
+def assert_open(folder: Path, ligament: int, crack: int) -> None:
+    """The nodes of the set stay on the plane, the others of its nodes have left it; the frame contains the sets."""
+    with h5py.File(layout.frame(folder, 1)) as file:
+        root = file["VTKHDF"]
+        x, data = root["Points"][:, 0], root["PointData"]
+        there = x - data["displacement"][:, 0] < 1e-9
+        held = data["set_LIGAMENT"][:] == 1
+        assert (held & there).sum() == held.sum() == ligament
+        assert (data["set_END"][:].sum(), (there & ~held).sum()) == (9, crack)
+        assert (x[held] == 0.0).all()
+        assert (x[there & ~held] > 1e-6).all()

@@ -95,6 +95,13 @@ def test_a_kind_before_a_colon_distinguishes_sets_of_one_name(tmp_path: Path) ->
     assert [load.nodes for load in survey(tmp_path, boundaries[1], more=more).loads] == [9]
 
 
+def test_a_set_off_its_plane_of_symmetry_is_refused(tmp_path: Path) -> None:
+    plane = {"kind": "symmetry", "axis": "x", "on": "CLAMP", "parts": ["bar"]}
+    assert survey(tmp_path, plane).refused == []
+    (line,) = survey(tmp_path, {**plane, "axis": "y"}).refused
+    assert line.startswith("boundaries[0].on = 'CLAMP': nodes of the set are up to 0.002 m off the plane y = 0 m")
+
+
 def test_faces_amid_a_body_bear_nothing(tmp_path: Path) -> None:
     found = survey(tmp_path, {**PULL, "on": "INNER", "parts": ["bar"]})
     assert found.refused == ["boundaries[0]: no face of the meshes that it is for lies in its region"]

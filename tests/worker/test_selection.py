@@ -306,7 +306,7 @@ def beside_a_plane(points: Any, at: str) -> tuple[int, tuple[str, ...]]:
     plane = {"kind": "symmetry", "axis": "x", "at": at}
     case = case_of({"shape": "file", "path": "a.inp", "unit": "1 mm"}, plane)
     sim = build(case, [TetMesh(points(made.points), made.tets)])
-    heights = conditions.heights(case.boundaries[0], sim.model)  # type: ignore[arg-type]
+    heights = conditions.heights(case, case.boundaries[0], sim.model)  # type: ignore[arg-type]
     return int((heights == 0.0).sum()), sim.warnings
 
 

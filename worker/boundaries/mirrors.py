@@ -19,7 +19,7 @@ from ..parallel.arguments import Arguments, reader
 from ..parallel.comm import Comm
 from ..parallel.team import TASK
 from ..rigid.bodies import of_nodes
-from ..scene.conditions import AXES, part_sides, sides
+from ..scene.conditions import AXES, node_sides, part_sides
 from .boundaries import Boundary, driven, free
 
 _TOGETHER = 64
@@ -72,8 +72,8 @@ class Mirrors(Boundary):
         """
         specs, of = [spec for _, spec in case.boundaries_of(Symmetry)], model.nodes.part
         axes, at = np.array([AXES[spec.axis] for spec in specs]), np.array([spec.at for spec in specs])
-        held = np.column_stack([sides(spec, model) for spec in specs])
-        body = np.column_stack([part_sides(spec, model, comm)[of] for spec in specs])
+        held = np.column_stack([node_sides(case, spec, model, comm) for spec in specs])
+        body = np.column_stack([part_sides(case, spec, model, comm)[of] for spec in specs])
         wears = np.array([part.erosion is not None for part in case.parts])[of]
         loose = np.where((held == 0.0) & wears[:, None], body, held)
         some = loose.any(axis=1) & ~driven(model.nodes.n, bounds) & (of_nodes(case, model.nodes) < 0)

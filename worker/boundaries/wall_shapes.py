@@ -48,7 +48,8 @@ class Walls:
             np.array([-1.0 if each.side == "inside" else 1.0 for each in specs]),
         )  # fmt: skip
         self.friction = np.array([each.friction for each in specs])
-        self._given = np.array([each.velocity for each in specs]).reshape(n, 3)
+        self.given = np.array([each.velocity for each in specs]).reshape(n, 3)
+        """(w, 3) velocity of each wall in the case, m/s: at the start, or times its course."""
         self._courses = [Course(each.course) for each in specs]
         self.mass = np.array([each.mass or np.inf for each in specs])
         """(w,) mass of each wall, kg; infinite for a fixed or driven wall."""
@@ -108,7 +109,7 @@ class Walls:
         self.shapes.point[:] += dt * self.speed
 
     def _driven(self, k: int, begin: float, end: float) -> Floats:
-        return np.asarray(self._given[k] * self._courses[k].mean(begin, end))
+        return np.asarray(self.given[k] * self._courses[k].mean(begin, end))
 
 
 @njit(types.float64(_F1, SHAPES, types.int64, _F, _F, _F), cache=True, error_model="numpy")

@@ -4,6 +4,8 @@ The first three fields are computed from positions and velocities. The contact p
 of contact since the frame before. Each value depends on its tet or node only, not on ranks or on the order of tets.
 """
 
+from collections.abc import Mapping
+from types import MappingProxyType
 from typing import NamedTuple
 
 import numpy as np
@@ -31,6 +33,10 @@ class Wanted(NamedTuple):
     """(nodes, 3) impulses of contact and walls on each node since the frame before, N s."""
     passed: float = 0.0
     """Time since the frame before, s; 0 for the first frame."""
+    walls: Floats | None = None
+    """(walls, 3) present position of ``point`` of each wall of the case, m; None if no wall moves."""
+    sets: Mapping[str, int] = MappingProxyType({})
+    """Names of the arrays of the sets, and the bits of the sets in ``Nodes.marks``."""
 
 
 def of_tets(names: tuple[str, ...], block: Block, nodes: Nodes) -> dict[str, Floats]:

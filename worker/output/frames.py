@@ -16,6 +16,7 @@ from conoid.cases.output import layout
 from ..model.rows import PLASTIC_STRAIN, PRESSURE, S_XX, S_XY, TEMPERATURE
 from ..model.state import CHUNK, Block, Floats, Ints, Model
 from ..parallel.comm import Comm
+from ..scene.marks import held
 from . import fields, hdf5
 
 _TETRA = 10
@@ -87,6 +88,7 @@ def _share(
         "velocity": nodes.v.astype(np.float32),
         "displacement": (nodes.x - nodes.x0).astype(np.float32),
         "impulses": wanted.impulses,
+        "sets": {name: held(nodes.marks, bit).astype(np.uint8) for name, bit in wanted.sets.items()},
         "tets": np.concatenate([nodes.id[b.tets] for b in model.blocks] or [np.zeros((0, 4), np.int64)]),
         "cells": {name: np.concatenate([c[name] for c in cells]) for name in cells[0]},
     }
@@ -126,6 +128,9 @@ def write(
         file.attrs["time"], file.attrs["time_unit"] = t, "s"
         file["VTKHDF/FieldData/time"] = np.array([t])
         file["VTKHDF/FieldData/time"].attrs["unit"] = "s"
+        if wanted.walls is not None:
+            file["VTKHDF/FieldData/wall_position"] = wanted.walls
+            file["VTKHDF/FieldData/wall_position"].attrs["unit"] = "m"
     beside.rename(path)
     _append_series(path, t)
     return str(path.relative_to(folder))
@@ -150,7 +155,7 @@ def _write_grid(file: "h5py.File", pieces: list[dict[str, Any]], total: int, pas
     root.create_dataset("Connectivity", data=tets.reshape(-1), **_PACKING)
     root.create_dataset("Offsets", data=np.arange(0, 4 * n + 1, 4), **_PACKING)
     root.create_dataset("Types", data=np.full(n, _TETRA, np.uint8), **_PACKING)
-    for name, values in point_data.items():
+    for name, values in (point_data | _sets(pieces, total)).items():
         _add(root, f"PointData/{name}", values)
     for name, values in cells.items():
         _add(root, f"CellData/{name}", values[order])
@@ -170,6 +175,15 @@ def _by_id(pieces: list[dict[str, Any]], name: str, total: int) -> "np.ndarray":
     for piece in pieces:
         values[piece["ids"]] = piece[name]
     return values
+
+
+def _sets(pieces: list[dict[str, Any]], total: int) -> dict[str, "np.ndarray"]:
+    """Return (nodes,) 1 for the nodes of each set, else 0, by the name of the array."""
+    found = {name: np.zeros(total, np.uint8) for name in pieces[0]["sets"]}
+    for piece in pieces:
+        for name, values in found.items():
+            values[piece["ids"]] = piece["sets"][name]
+    return found
 
 
 def _append_series(path: Path, t: float) -> None:

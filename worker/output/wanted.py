@@ -2,6 +2,10 @@
 
 import numpy as np
 
+from conoid.cases.checks.on import bits
+from conoid.cases.model.boundaries import Wall
+from conoid.cases.output import layout
+
 from ..boundaries.moving_walls import MovingWalls
 from ..boundaries.walls import RigidWalls
 from ..model.state import Floats
@@ -12,7 +16,17 @@ from .fields import Wanted
 def wanted(sim: Simulation, index: int) -> Wanted:
     """Return the requested fields of frame ``index`` and their data; called once a frame."""
     run = sim.case.run
-    return Wanted(run.fields, _impulses(sim), run.end_time / run.frames if index else 0.0)
+    sets = {layout.set_array(name): bit for name, bit in bits(sim.case).items()}
+    passed = run.end_time / run.frames if index else 0.0
+    return Wanted(run.fields, _impulses(sim), passed, _walls(sim), sets)
+
+
+def _walls(sim: Simulation) -> Floats | None:
+    """Return (walls, 3) the positions of the walls of the case, m; None if no wall moves."""
+    n = len(sim.case.boundaries_of(Wall))  # further walls are images of rigid parts behind planes of symmetry
+    walls = sim.walls
+    moves = (walls.lightness[:n] > 0.0) | walls.given[:n].any(axis=1)
+    return walls.shapes.point[:n].copy() if moves.any() else None
 
 
 def _impulses(sim: Simulation) -> Floats | None:

@@ -40,7 +40,8 @@ class Held:
         for index, boundary in enumerate(case.boundaries):
             if index in beside:
                 continue
-            if getattr(boundary, "on", None) is None and (not boundary.parts or part.name in boundary.parts):
+            on_set = not isinstance(boundary, Symmetry) and getattr(boundary, "on", None) is not None
+            if not on_set and (not boundary.parts or part.name in boundary.parts):
                 found._take(boundary)
         return found
 

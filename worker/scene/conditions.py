@@ -62,8 +62,8 @@ def bodies_beside(case: schema.Case, model: Model, comm: Comm) -> Ints:
     found = np.zeros((len(planes), len(model.parts)), np.int64)
     for row, (_, spec) in zip(found, planes, strict=True):
         on = np.zeros(len(model.parts))
-        on[nodes.part[of_parts(spec, model) & (heights(spec, model) == 0.0)]] = 1.0
-        row[:] = np.where(comm.maximum(on) > 0.0, 0.0, part_sides(spec, model, comm))
+        on[nodes.part[of_parts(spec, model) & on_plane(case, spec, model)]] = 1.0
+        row[:] = np.where(comm.maximum(on) > 0.0, 0.0, part_sides(case, spec, model, comm))
     return found
 
 
@@ -91,7 +91,7 @@ def build(
         for (_, spec), load in zip(case.boundaries_of(schema.Traction), loads, strict=True)
     ]
     for i, plane in case.boundaries_of(schema.Symmetry):
-        side, on = part_sides(plane, model, comm), _indices(held[i])
+        side, on = part_sides(case, plane, model, comm), _indices(held[i])
         boundaries.append(SymmetryPlane(on, AXES[plane.axis], side[nodes.part[on]] != 0.0))
     for spec, h in zip(case.boundaries, held, strict=True):
         if isinstance(spec, schema.Prescribed):
@@ -112,9 +112,7 @@ def held_by(case: schema.Case, spec: schema.Boundary, model: Model) -> Flags:
     if isinstance(spec, schema.Prescribed):
         return selection.held(spec, model.parts, nodes.x0, nodes.of_parts(), model.slack) & marked
     chosen = of_parts(spec, model) & marked
-    if isinstance(spec, schema.Symmetry):
-        chosen &= heights(spec, model) == 0.0
-    return chosen
+    return chosen & on_plane(case, spec, model) if isinstance(spec, schema.Symmetry) else chosen
 
 
 def of_parts(spec: schema.Boundary, model: Model) -> Flags:
@@ -122,27 +120,49 @@ def of_parts(spec: schema.Boundary, model: Model) -> Flags:
     return model.nodes.among(selection.named(spec, model.parts))
 
 
-def heights(spec: schema.Symmetry, model: Model) -> Floats:
+def heights(case: schema.Case, spec: schema.Symmetry, model: Model) -> Floats:
     """Return (n,) the heights of nodes above a symmetry plane at the start, m; 0 for nodes within round-off of the
-    plane.
+    plane, and for the nodes of its set within the slack of their part.
     """
-    found = model.nodes.x0[:, AXES[spec.axis]] - spec.at
-    return np.where(np.abs(found) <= model.rounding[model.nodes.part], 0.0, found)
+    found, part = model.nodes.x0[:, AXES[spec.axis]] - spec.at, model.nodes.part
+    within = model.rounding[part]
+    if spec.on is not None:
+        within = np.where(_marked(case, spec, model), model.slack[part], within)
+    return np.where(np.abs(found) <= within, 0.0, found)
 
 
-def sides(spec: schema.Symmetry, model: Model) -> Floats:
+def on_plane(case: schema.Case, spec: schema.Symmetry, model: Model) -> Flags:
+    """Return (n,) the nodes that start on a symmetry plane: those at the plane, or those of its set."""
+    there = heights(case, spec, model) == 0.0
+    return there if spec.on is None else np.asarray(there & _marked(case, spec, model))
+
+
+def _marked(case: schema.Case, spec: schema.Symmetry, model: Model) -> Flags:
+    return marks.held(model.nodes.marks, bits(case)[spec.on or ""])
+
+
+def sides(case: schema.Case, spec: schema.Symmetry, model: Model) -> Floats:
     """Return (n,) the side of a symmetry plane on which its nodes start: 1 above, -1 below, 0 for nodes on which the
-    plane does not act and for nodes on the plane.
+    plane does not act and for nodes at the plane.
     """
-    return np.where(of_parts(spec, model), np.sign(heights(spec, model)), 0.0)
+    return np.where(of_parts(spec, model), np.sign(heights(case, spec, model)), 0.0)
 
 
-def part_sides(spec: schema.Symmetry, model: Model, comm: Comm) -> Floats:
+def node_sides(case: schema.Case, spec: schema.Symmetry, model: Model, comm: Comm) -> Floats:
+    """Return ``sides``; nodes at the plane that are not in its set have the side of their part. Collective."""
+    side = sides(case, spec, model)
+    if spec.on is None:
+        return side
+    touching = of_parts(spec, model) & (heights(case, spec, model) == 0.0) & ~_marked(case, spec, model)
+    return np.where(touching, part_sides(case, spec, model, comm)[model.nodes.part], side)
+
+
+def part_sides(case: schema.Case, spec: schema.Symmetry, model: Model, comm: Comm) -> Floats:
     """Return (parts,) 1 for a part above a symmetry plane, -1 for a part below.
 
     The value is 0 for a part on which the plane does not act, and for a part with nodes on both sides. Collective.
     """
-    side, found = sides(spec, model), np.zeros((2, len(model.parts)))
+    side, found = sides(case, spec, model), np.zeros((2, len(model.parts)))
     nodes, part = model.nodes.of_parts()
     for way, sign in enumerate((1.0, -1.0)):
         found[way, part[side[nodes] == sign]] = 1.0

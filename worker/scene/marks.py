@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from conoid.cases.checks import on
-from conoid.cases.model.schema import Case
+from conoid.cases.model.schema import Case, Symmetry
 from conoid.cases.reading.problems import dotted
 
 from ..errors import MeshError
@@ -60,16 +60,16 @@ def marks(case: Case, meshes: Meshes, n: int, boundary: int | None = None) -> Ma
     """Return the marks of ``n`` nodes. Raises MeshError if a set does not exist or has no node, or if a name is
     ambiguous.
 
-    ``boundary``: only the sets of this boundary.
+    ``boundary``: only the sets of this boundary and of planes of symmetry.
     """
     bits = on.bits(case)
     made = Marks(np.zeros(n if bits else 0, np.int64))
     numbers = {part.name: index for index, part in enumerate(case.parts)}
     for location, spec in on.ons(case):
-        if boundary is not None and location != ("boundaries", boundary):
+        if boundary is not None and location[:2] != ("boundaries", boundary) and not isinstance(spec, Symmetry):
             continue
         candidates = [numbers[part.name] for part in on.parts(case, spec)]
-        where = f"{dotted((*location, 'on'))} = {spec.on!r}"
+        where = f"{dotted(location)} = {spec.on!r}"
         try:
             found = _found(case, spec.on or "", [i for i in candidates if i in meshes], meshes, bool(on.named(spec)))
         except MeshError as error:

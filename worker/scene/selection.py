@@ -183,14 +183,16 @@ def counted(
     nodes, (corners, of) = int(found.sum()), faces
     if isinstance(spec, schema.Prescribed):
         return Selected(number, nodes), found
-    chosen: Flags = np.asarray(found[corners].all(axis=1) & meant(case, spec)[of] & ~_cut(case, x, faces, near))
+    chosen: Flags = np.asarray(found[corners].all(axis=1) & meant(case, spec)[of] & ~_cut(case, x, faces, near, marked))
     if bit is not None:
         chosen &= marked.chosen(bit, corners, of)
     area = float(0.5 * np.linalg.norm(normals(x, corners[chosen]), axis=1).sum())
     return Selected(number, nodes, int(chosen.sum()), area), chosen
 
 
-def _cut(case: schema.Case, x: Floats, faces: tuple[Indices, Indices], near: Nearness) -> Flags:
+def _cut(
+    case: schema.Case, x: Floats, faces: tuple[Indices, Indices], near: Nearness, marked: Marks
+) -> Flags:  # fmt: skip
     """Return (m,) which exposed faces, (m, 3) with their parts (m,), lie on a plane of symmetry: a cut through the
     whole body, which no traction loads.
     """
@@ -198,7 +200,10 @@ def _cut(case: schema.Case, x: Floats, faces: tuple[Indices, Indices], near: Nea
     found = np.zeros(len(corners), bool)
     for _, plane in case.boundaries_of(schema.Symmetry):
         away = np.abs(x[corners, "xyz".index(plane.axis)] - plane.at).max(axis=1)
-        found |= named(plane, names)[of] & (away <= near.rounding[of])
+        there = away <= near.rounding[of]
+        if plane.on is not None:
+            there = marked.holds(bits(case)[plane.on])[corners].all(axis=1)
+        found |= named(plane, names)[of] & there
     return found
 
 
@@ -214,7 +219,7 @@ def off_planes(
     """
     names, (nodes, part) = [each.name for each in case.parts], members
     for number, plane in case.boundaries_of(schema.Symmetry):
-        if not known[number]:
+        if not known[number] or plane.on is not None:
             continue
         away = np.abs(x[nodes, "xyz".index(plane.axis)] - plane.at)
         off = named(plane, names)[part] & (away > near.rounding[part]) & (away <= near.slack[part])

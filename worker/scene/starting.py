@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from conoid.cases.checks.drives import REST, clash, motions
+from conoid.cases.checks.on import bits
 from conoid.cases.model import schema
 from conoid.cases.shapes.region import GENERATED
 
@@ -16,8 +17,8 @@ from ..boundaries.walls import RigidWalls
 from ..errors import InputError
 from ..model.state import Flags, Model, Nodes
 from ..parallel.comm import Comm
-from . import selection
-from .conditions import AXES, heights, held_by, sides
+from . import marks, selection
+from .conditions import AXES, heights, held_by, of_parts, sides
 
 _ASIDE = 1e-9
 """Velocity across a symmetry plane, as a share of the largest speed, below which it is round-off. Chosen value."""
@@ -44,6 +45,7 @@ def start(
     _refuse_conflicts(case.boundaries, held, boundaries, model.nodes, comm)
     _refuse_overlaps(case, model, boundaries, comm)
     _refuse_crossings(case, model, comm)
+    _refuse_off_plane(case, held, model, comm)
     warnings = [
         f"boundaries[{index}]: no node starts on this plane of symmetry; it holds nodes that reach it later"
         for index in beside if counts[index] == 0 and known[index]
@@ -57,7 +59,7 @@ def start(
 def _beside(case: schema.Case, model: Model, comm: Comm) -> list[int]:
     """Return the symmetry planes with nodes near the plane at the start."""
     planes = case.boundaries_of(schema.Symmetry)
-    found = comm.sum(np.array([int(np.count_nonzero(sides(spec, model))) for _, spec in planes], np.int64))
+    found = comm.sum(np.array([int(np.count_nonzero(sides(case, spec, model))) for _, spec in planes], np.int64))
     return [index for (index, _), many in zip(planes, found, strict=True) if many]
 
 
@@ -88,7 +90,8 @@ def _refuse_overlaps(case: schema.Case, model: Model, boundaries: list[Boundary]
 def _refuse_crossings(case: schema.Case, model: Model, comm: Comm) -> None:
     """Raise InputError for a tet on both sides of a symmetry plane: it would overlap its own mirror image."""
     for index, spec in case.boundaries_of(schema.Symmetry):
-        named, height, beyond = selection.named(spec, model.parts), heights(spec, model), np.zeros(len(model.parts))
+        named, beyond = selection.named(spec, model.parts), np.zeros(len(model.parts))
+        height = heights(case, spec, model)
         for block in (block for block in model.blocks if named[block.part]):
             of = height[block.tets]
             beyond[block.part] = np.minimum(of.max(axis=1), -of.min(axis=1)).max(initial=beyond[block.part])
@@ -98,6 +101,20 @@ def _refuse_crossings(case: schema.Case, model: Model, comm: Comm) -> None:
                 f"boundaries[{index}]: tets of part {model.parts[int(beyond.argmax())]!r} reach {most:.3g} m through "
                 "this plane of symmetry into their own mirror images; let the body end on it, or name the parts that "
                 "have an image in parts"
+            )
+
+
+def _refuse_off_plane(case: schema.Case, held: list[Flags], model: Model, comm: Comm) -> None:
+    """Raise InputError for a plane of symmetry whose set has nodes too far from it."""
+    for index, spec in case.boundaries_of(schema.Symmetry):
+        if spec.on is None:
+            continue
+        off = marks.held(model.nodes.marks, bits(case)[spec.on]) & of_parts(spec, model) & ~held[index]
+        away = np.abs(model.nodes.x0[off, AXES[spec.axis]] - spec.at).max(initial=0.0)
+        if (most := float(comm.maximum(np.array([away]))[0])) > 0.0:
+            raise InputError(
+                f"boundaries[{index}].on = {spec.on!r}: nodes of the set are up to {most:.3g} m off the plane "
+                f"{spec.axis} = {spec.at:g} m, more than a hundredth of an edge; check axis and at"
             )
 
 

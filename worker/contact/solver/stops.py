@@ -56,7 +56,7 @@ class Stops(NamedTuple):
         for k, (_, wall) in enumerate(walls):
             held[k] = named(wall, model.parts)
         for k, (_, plane) in enumerate(planes, len(walls)):
-            held[k] = part_sides(plane, model, comm)
+            held[k] = part_sides(case, plane, model, comm)
         held[:, case.rigid] = 0.0  # rigid bodies have stops of their own (rigid/stops.py)
         normals /= np.linalg.norm(normals, axis=1)[:, None]
         friction = np.array([*(wall.friction for _, wall in walls), *(0.0 for _ in planes)])

@@ -1,0 +1,29 @@
+"""Sets of mesh files in the frames of a run."""
+
+from typing import Any
+
+import numpy as np
+
+from conoid.cases.output import layout
+from conoid.cases.reading.similar import allowed
+
+from ..errors import LookError
+
+_SET = layout.set_array("")
+
+
+def of_set(mesh: Any, name: str) -> Any:
+    """Returns the tets of a frame that have a node in a set, or the whole mesh for an empty name. Raises LookError for
+    a set that the frame does not have, or without tets.
+    """
+    if not name:
+        return mesh
+    known = {array.removeprefix(_SET): array for array in mesh.point_data if array.startswith(_SET)}
+    array = layout.set_array(name)
+    if array not in known.values():
+        told = allowed(name, known) if known else "this frame has no set; a case names sets in run.sets"
+        raise LookError(f"on = {name!r}: {told}")
+    chosen = mesh.extract_points(np.flatnonzero(mesh.point_data[array]), adjacent_cells=True, include_cells=True)
+    if not chosen.n_cells:
+        raise LookError(f"on = {name!r}: no tet of this frame has a node in the set")
+    return chosen
