@@ -43,6 +43,7 @@ EXCEPTIONS: dict[str, dict[str, int]] = {
         "worker/contact/scene/scene.py: Scene": 15,
         "worker/contact/solver/solver.py: ActiveSet": 14,
         "worker/contact/stage.py: Contact": 14,
+        "worker/run/loop.py: Loop": 16,
         "worker/simulation.py: Simulation": 24,
     },
     "a part of the server: it wires others that are made once": {

@@ -2,6 +2,11 @@
 
 import math
 
+from .kernels.jit import njit
+
+T, LOST, DT, LAST_DT, MEAN_DT, SHORTER, STABLE = range(7)
+"""Numbers of the clock in a program of the step (stretch.py), in the order of ``Clock.numbers``."""
+
 COLLAPSE = 1e-6
 """Smallest stable step over the first stable step; below it the run ends with an error because a tet is crushed.
 Chosen value: a run with a million times as many steps would never end."""
@@ -14,6 +19,30 @@ needs no warning."""
 SLOWED = 0.1
 """Stable step over the first stable step below which the stable step is named as the reason why a run has reached
 its limit of time or of steps. Chosen value: plastic flow and dust reduce the stable step to a third in any run."""
+
+
+@njit("UniTuple(float64, 4)(float64, float64, float64, float64, float64, float64)", cache=True, error_model="numpy")
+def chosen(limit, safety, growth, stable, last_dt, left):  # type: ignore[no-untyped-def]
+    """Return the stable step, the next step, the mean of the last and the next step, and a quarter of their difference,
+    s; ``left``: time to the next output, s. See ``Clock.choose``.
+    """
+    stable = min(safety / limit if limit > 0.0 else math.inf, growth * stable)
+    dt = min(stable, last_dt)
+    if left > 0.0:
+        dt = left / max(float(math.ceil(left / stable)), 1.0)
+    return stable, dt, 0.5 * (last_dt + dt), 0.25 * (last_dt - dt)
+
+
+@njit("UniTuple(float64, 2)(float64, float64, float64, float64)", cache=True)
+def advanced(t, lost, dt, target):  # type: ignore[no-untyped-def]
+    """Return the time after a step ``dt``, s, and its rounding error; ``target``: time of the next output, which is set
+    exactly.
+    """
+    increment = dt - lost
+    new = t + increment
+    if abs(target - new) <= 1e-9 * dt:
+        return target, 0.0
+    return new, (new - t) - increment
 
 
 class Clock:
@@ -78,13 +107,28 @@ class Clock:
         is still stable, else the stable step.
         """
         self.last_dt = self.dt
-        self._stable = min(self._safety / limit if limit > 0.0 else math.inf, self._growth * self._stable)
         left = (self._after if self.frame_due else self._landing) - self.t
-        following = min(self._stable, self.last_dt)
-        self.dt = left / max(math.ceil(left / self._stable), 1) if left > 0.0 else following
+        self._stable, self.dt, self.mean_dt, self.shorter = chosen(
+            limit, self._safety, self._growth, self._stable, self.last_dt, left
+        )
         self._first = self._first or self._stable
-        self.mean_dt, self.shorter = 0.5 * (self.last_dt + self.dt), 0.25 * (self.last_dt - self.dt)
         return self.mean_dt
+
+    @property
+    def numbers(self) -> tuple[float, ...]:
+        """The numbers T to STABLE."""
+        return self.t, self._lost, self.dt, self.last_dt, self.mean_dt, self.shorter, self._stable
+
+    @property
+    def limits(self) -> tuple[float, float, float, float]:
+        """Safety factor, growth factor, stable step that needs a warning, s, and time of the next output, s."""
+        target = self._landing if self._of == self.frame else self.frame_time(self.frame)
+        return self._safety, self._growth, STARVED * self._first, target
+
+    def go_on(self, steps: int, numbers: list[float]) -> None:
+        """Sets the ``numbers`` after ``steps`` further steps of a program."""
+        self.t, self._lost, self.dt, self.last_dt, self.mean_dt, self.shorter, self._stable = numbers
+        self.step += steps
 
     @property
     def longest(self) -> float:
@@ -125,11 +169,6 @@ class Clock:
 
     def advance(self) -> None:
         """Adds the chosen step to the time; a frame time is set exactly."""
-        increment = self.dt - self._lost
-        new = self.t + increment
-        self._lost = (new - self.t) - increment
-        self.t = new
-        self.step += 1
         target = self._landing if self._of == self.frame else self.frame_time(self.frame)
-        if abs(target - self.t) <= 1e-9 * self.dt:
-            self.t, self._lost = target, 0.0
+        self.t, self._lost = advanced(self.t, self._lost, self.dt, target)
+        self.step += 1

@@ -145,6 +145,11 @@ class Erosion:
         nodes = self._model.nodes
         return int(self._comm.sum(np.array([(nodes.owned & self._loose).sum()]))[0])
 
+    @property
+    def idle(self) -> bool:
+        """True if nothing is removed or outstanding, and all nodes have tets."""
+        return not (self.due or self.account.outstanding or (self._tets_at == 0).any())
+
     def note(self, state: Nodes) -> None:
         """Before the kick: books the second half of the work of the last removal."""
         self.account.note(state)

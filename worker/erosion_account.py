@@ -43,6 +43,11 @@ class ErosionAccount:
         self._last: list[tuple[Ints, Floats]] = []
         """Nodes (k, 4) and last forces (k, 4, 3), N, of the tets of the last removal."""
 
+    @property
+    def outstanding(self) -> bool:
+        """Whether the second half of a removal is not booked yet."""
+        return bool(self._last or self._half.any())
+
     def note(self, state: Nodes) -> None:
         """Before the kick: books the second half of the work of the last removal."""
         for tets, forces in self._last:

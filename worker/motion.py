@@ -2,9 +2,9 @@
 
 from .kernels.jit import njit, types
 from .model.state import Nodes
-from .parallel.arguments import reader
+from .parallel.arguments import Follow, reader
 from .parallel.passes import Pass
-from .parallel.team import TASK, Team
+from .parallel.team import TASK, Stage, Team
 
 _F, _F1, _F2 = types.float64, types.float64[::1], types.float64[:, ::1]
 _KICK = _F2, types.int64[:, ::1], _F1, _F1, _F, _F
@@ -50,8 +50,16 @@ class Leapfrog:
         """
         self._kick.run(nodes.n, nodes.v, nodes.force, nodes.mass, nodes.stepping, impulse_quantum, shorter)
 
+    def kicking(self, nodes: Nodes, impulse_quantum: Follow, shorter: Follow) -> Stage:
+        """Returns ``kick`` as a stage of a program."""
+        return self._kick.stage(nodes.n, nodes.v, nodes.force, nodes.mass, nodes.stepping, impulse_quantum, shorter)
+
     def move(self, nodes: Nodes, dt: float, shorter: float) -> None:
         """Computes x(n+1) from x(n) with the time step ``dt``, s; adds the second part of the work of f(n) by unequal
         steps to ``stepping``, then sets the forces to zero.
         """
         self._move.run(nodes.n, nodes.x, nodes.v, nodes.force, nodes.stepping, dt, shorter)
+
+    def moving(self, nodes: Nodes, dt: Follow, shorter: Follow) -> Stage:
+        """Returns ``move`` as a stage of a program."""
+        return self._move.stage(nodes.n, nodes.x, nodes.v, nodes.force, nodes.stepping, dt, shorter)

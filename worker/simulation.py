@@ -173,7 +173,7 @@ class Simulation:
 
     def next_scale(self) -> float:
         """Returns the quanta per newton for the next sum of forces."""
-        return fixed_point.scale_for(max(self.reduction.force, self.floor))
+        return float(fixed_point.scale_for(max(self.reduction.force, self.floor)))
 
 
 def build(case: Case, folder: Path, comm: Comm, say: Say = quiet) -> Simulation:

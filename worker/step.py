@@ -50,7 +50,8 @@ from .simulation import Simulation
 def prepare(sim: Simulation) -> None:
     """Computes forces and limits of the initial state by a pass over the elements with dt = 0."""
     sim.model.nodes.force[:] = 0
-    _elements(sim, 0.0, None)
+    _advance_elements(sim, 0.0)
+    _reduce(sim, None)
     if sim.erosion is not None:
         sim.erosion.begin(sim.reduction.limit)
     sim.timers.switch("rest")
@@ -155,8 +156,17 @@ def second_half(sim: Simulation) -> None:
     if sim.rigid is not None:
         sim.rigid.move(nodes, clock.dt)
     clock.advance()
+    _advance_elements(sim, clock.dt)  # Rows 12 and 13: stress, forces, limits.
+    complete(sim)
+
+
+def complete(sim: Simulation) -> None:
+    """Executes rows 14 and 15 of the table: shared nodes, reduction, fracture. Raises PhysicsError if a tet has failed.
+
+    A step of a program (stretch.py) ends with this function.
+    """
     _offer_contact(sim)
-    _elements(sim, clock.dt, sim.fracture)  # Rows 12 to 14: elements, shared nodes, reduction.
+    _reduce(sim, sim.fracture)
     if sim.fracture is not None and sim.reduction.breaking != NOTHING:
         sim.timers.switch("fracture")
         # Row 15: facets break, nodes separate; the forces f(n+1) of tets of a new node are moved to the new node.
@@ -166,16 +176,18 @@ def second_half(sim: Simulation) -> None:
     sim.timers.switch("rest")
 
 
-def _elements(sim: Simulation, dt: float, fracture: Fracture | None) -> None:
-    """Executes rows 12 to 14 of the table. ``fracture``: None in the pass over the initial state, where no facet
-    breaks.
-    """
-    elements, reduction = sim.elements, sim.reduction
+def _advance_elements(sim: Simulation, dt: float) -> None:
+    """Executes rows 12 and 13 of the table."""
     sim.scale = sim.next_scale()
     sim.timers.switch("elements")
-    elements.advance(dt, sim.scale)  # Rows 12 and 13: stress, forces, limits.
+    sim.elements.advance(dt, sim.scale)
     if sim.crushing is not None:
         sim.crushing.update()
+
+
+def _reduce(sim: Simulation, fracture: Fracture | None) -> None:
+    """Executes row 14 of the table. ``fracture``: None in the pass over the initial state, where no facet breaks."""
+    elements, reduction = sim.elements, sim.reduction
     sim.timers.switch("exchange")
     _offer(sim, fracture)
     reduction.begin(sim.comm)  # Row 14: start the reduction.

@@ -126,6 +126,21 @@ class Timers:
         self._phase, self._cpu, self._wall, self._waited, self._within = name, cpu, wall, waited, within
         return ended
 
+    def divide(self, inside: dict[str, float], outside: dict[str, float]) -> None:
+        """End the present phase, in which a program of the phases ran, and divide its time; ``inside``, ``outside``:
+        wall time of the program by phase in and outside of regions, s. The rest of the time is of the present phase.
+        """
+        cpu, wall, spent = cpu_time(), wall_time(), self.spent
+        of_program = sum(inside.values()) + sum(outside.values())
+        passed = max(wall - self._wall, of_program)
+        outside = {**outside, self._phase: outside.get(self._phase, 0.0) + passed - of_program}
+        share = (cpu - self._cpu) / passed if passed > 0.0 else 0.0
+        for seconds, of in ((inside, spent.parallel), (outside, spent.serial)):
+            for name, added in seconds.items():
+                of[name] += added
+                spent.cpu[name] += share * added
+        self._cpu, self._wall, self._within = cpu, wall, self._team.within
+
     def _project(self, phase: str, serial: float) -> None:
         """Add to a phase the CPU time outside of regions, and the estimated time of each crew in regions."""
         assert self._team.projecting is not None

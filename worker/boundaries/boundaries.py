@@ -20,7 +20,7 @@ from ..model.state import Bits, Flags, Floats, Indices, Ints, Nodes, extended
 from ..model.topology import Split
 from ..parallel.arguments import Arguments
 from ..parallel.passes import Ranges
-from ..parallel.team import team
+from ..parallel.team import Stage, team
 from . import impulses
 
 FREE, PRESCRIBED, MIRRORED = range(3)
@@ -81,8 +81,26 @@ class Boundary(ABC):
         """Executes ``note`` with an account of the work of the impulses, J; ``factor``: 1/2 with the sign of the work
         in the account.
         """
-        table = self._notes.set(state.v, self.nodes, self._before, self._impulse, account, factor)
+        table = self._note_table(state, account, factor)
         self.over.run(impulses.note, table, len(self.nodes))
+
+    def _note_table(self, state: Nodes, account: Floats, factor: float) -> int:
+        return self._notes.set(state.v, self.nodes, self._before, self._impulse, account, factor)
+
+    def noting(self, state: Nodes) -> list[Stage]:
+        """Returns ``note`` as stages of a program (stretch.py)."""
+        return []
+
+    def acting(self, state: Nodes) -> list[Stage] | None:
+        """Returns ``apply`` as stages of a program; None if other code is needed."""
+        return None
+
+    def mirroring(self, vectors: Floats) -> list[Stage]:
+        """Returns ``mirror`` as stages of a program."""
+        return []
+
+    def went_on(self, dt: float) -> None:  # noqa: B027 (most boundaries need no time step)
+        """Sets the last time step, s, after a program."""
 
     def measure(self, mass: float, speed: float) -> None:  # noqa: B027 (most add up no integers of their own)
         """Sets the quanta from the largest nodal ``mass``, kg, and ``speed``, m/s, of the scene."""
@@ -173,6 +191,7 @@ class SymmetryPlane(Boundary):
         """
         super().__init__(nodes)
         self._axis = axis
+        self._holds, self._mirrors = Arguments(*impulses.HOLD), Arguments(*impulses.HOLD)
         self._beside = np.ones(len(nodes), bool) if beside is None else beside
 
     def held_components(self) -> Bits:
@@ -181,13 +200,22 @@ class SymmetryPlane(Boundary):
         return held
 
     def start(self, state: Nodes) -> None:
-        _hold(state.v, self.nodes, self._axis)
+        self.mirror(state.v)
 
     def apply(self, state: Nodes, dt: float, t: float) -> None:
-        _hold(state.v, self.nodes, self._axis)
+        self.mirror(state.v)
+
+    def acting(self, state: Nodes) -> list[Stage]:
+        return self._holding(self._holds, state.v)
 
     def mirror(self, vectors: Floats) -> None:
-        _hold(vectors, self.nodes, self._axis)
+        self.over.run(impulses.hold, self._mirrors.set(vectors, self.nodes, self._axis), len(self.nodes))
+
+    def mirroring(self, vectors: Floats) -> list[Stage]:
+        return self._holding(self._mirrors, vectors)
+
+    def _holding(self, arguments: Arguments, vectors: Floats) -> list[Stage]:
+        return self.over.stages(impulses.hold, arguments.set(vectors, self.nodes, self._axis), (), len(self.nodes))
 
     def release(self, loose: Flags, bounds: list[Boundary]) -> None:
         stay = ~(loose[self.nodes] & self._beside)
@@ -262,9 +290,3 @@ def _inherit(nodes, loss, work, impulse, before, n, parents, first):  # type: ig
         at[k] = p
         k += 1
     return at[:k].copy()
-
-
-@njit("void(float64[:, ::1], int32[::1], int64)", cache=True)
-def _hold(v, nodes, axis):  # type: ignore[no-untyped-def]
-    for a in nodes:
-        v[a, axis] = 0.0

@@ -6,13 +6,15 @@ from typing import Any
 
 import numpy as np
 
+from ..clock import MEAN_DT
 from ..kernels.jit import Kernel
 from ..materials.turning import sine_and_cosine
 from ..migration.parcel import Parcel
 from ..model.loads import Load
 from ..model.state import Bits, Floats, Indices, Ints, Nodes, extended
 from ..model.topology import Split
-from ..parallel.arguments import Arguments
+from ..parallel.arguments import Arguments, Follow
+from ..parallel.team import Stage
 from . import impulses
 from .boundaries import FREE, KEPT, PRESCRIBED, Boundary, free
 
@@ -23,12 +25,19 @@ class Driver(Boundary):
     def note(self, state: Nodes) -> None:
         self._note(state, self.external_work, 0.5)
 
+    def noting(self, state: Nodes) -> list[Stage]:
+        return self.over.stages(impulses.note, self._note_table(state, self.external_work, 0.5), (), len(self.nodes))
+
     def _act(self, kernel: Kernel, arguments: Arguments, state: Nodes, *values: Any) -> None:
         """Applies a kernel (impulses.py) with its further arguments ``values``."""
-        table = arguments.set(
-            state.v, state.mass, self.nodes, self._before, self._impulse, self.external_work, *values
-        )  # fmt: skip
-        self.over.run(kernel, table, len(self.nodes))
+        self.over.run(kernel, arguments.set(*self._of(state), *values), len(self.nodes))
+
+    def _acting(self, kernel: Kernel, arguments: Arguments, state: Nodes, *values: Any) -> list[Stage]:
+        """Returns ``_act`` as stages of a program."""
+        return self.over.stages(kernel, *arguments.bind(*self._of(state), *values), len(self.nodes))
+
+    def _of(self, state: Nodes) -> tuple[Any, ...]:
+        return state.v, state.mass, self.nodes, self._before, self._impulse, self.external_work
 
 
 class Course:
@@ -38,12 +47,13 @@ class Course:
 
     def __init__(self, points: Sequence[tuple[float, float]] = ()) -> None:
         self._times, self._factors = np.array(list(points) or [(0.0, 1.0)]).T
-        self._constant = float(self._factors[0]) if len(self._factors) == 1 else None
+        self.constant = float(self._factors[0]) if len(self._factors) == 1 else None
+        """The factor if it does not change, else None."""
 
     def mean(self, begin: float, end: float) -> float:
         """Returns the exact mean of the factor between two times, s; its value if they are equal."""
-        if self._constant is not None:
-            return self._constant
+        if self.constant is not None:
+            return self.constant
         within = self._times[(self._times > begin) & (self._times < end)]
         times = np.array([begin, *within, end])
         values = np.interp(times, self._times, self._factors)
@@ -71,10 +81,21 @@ class Gravity(Driver):
         self._last_dt = dt
 
     def apply(self, state: Nodes, dt: float, t: float) -> None:
-        factor = self._course.mean(t - 0.5 * self._last_dt, t + 0.5 * dt)
-        gained = 0.5 * (self._last_dt + dt) * factor * self._acceleration
+        mean_dt = 0.5 * (self._last_dt + dt)
+        factor = mean_dt * self._course.mean(t - 0.5 * self._last_dt, t + 0.5 * dt)
         self._last_dt = dt
-        self._act(impulses.accelerate, self._arguments, state, gained)
+        self._act(impulses.accelerate, self._arguments, state, self._acceleration, factor)
+
+    def acting(self, state: Nodes) -> list[Stage] | None:
+        factor = self._course.constant
+        if factor is None:
+            return None
+        return self._acting(
+            impulses.accelerate, self._arguments, state, self._acceleration, Follow(MEAN_DT, factor)
+        )  # fmt: skip
+
+    def went_on(self, dt: float) -> None:
+        self._last_dt = dt
 
 
 class Traction(Driver):
@@ -135,6 +156,15 @@ class Traction(Driver):
         self._last_dt = dt
         self._act(impulses.push, self._arguments, state, self.force, factor)
 
+    def acting(self, state: Nodes) -> list[Stage] | None:
+        factor = self._course.constant
+        if factor is None:
+            return None
+        return self._acting(impulses.push, self._arguments, state, self.force, Follow(MEAN_DT, factor))
+
+    def went_on(self, dt: float) -> None:
+        self._last_dt = dt
+
 
 class PrescribedVelocity(Driver):
     """Prescribed velocity components of nodes, times the factor of the ``course``; NaN for a free component.
@@ -159,6 +189,12 @@ class PrescribedVelocity(Driver):
 
     def apply(self, state: Nodes, dt: float, t: float) -> None:
         self._act(impulses.prescribe, self._arguments, state, self._velocity, self._course.mean(t, t + dt))
+
+    def acting(self, state: Nodes) -> list[Stage] | None:
+        factor = self._course.constant
+        return None if factor is None else self._acting(
+            impulses.prescribe, self._arguments, state, self._velocity, factor
+        )  # fmt: skip
 
 
 class PrescribedRotation(Driver):

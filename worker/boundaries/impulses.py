@@ -18,11 +18,14 @@ constant. The work is work from outside."""
 PRESCRIBE = (*_ACT, _F2, _F)
 """Types of the further arguments: velocities (n, 3), m/s, NaN for a free component, and the factor of the
 velocities."""
-ACCELERATE = (*_ACT, _F1)
-"""Type of the further argument: velocity increment (3,), m/s."""
+ACCELERATE = (*_ACT, _F1, _F)
+"""Types of the further arguments: acceleration (3,), m/s^2, and its duration, s."""
 PUSH = (*_ACT, _F2, _F)
 """Types of the further arguments: forces (n, 3), N, and the duration of the forces, s."""
+HOLD = _F2, _N1, types.int64
+"""Types of the arguments vectors (nodes, 3), nodes (n,), and the component that is held."""
 _note, _prescribe, _accelerate, _push = reader(*NOTE), reader(*PRESCRIBE), reader(*ACCELERATE), reader(*PUSH)
+_hold = reader(*HOLD)
 
 
 @njit("void(float64[::1], float64[:, ::1], float64[:, ::1], int64, float64)", cache=True)
@@ -64,12 +67,13 @@ def prescribe(table, begin, end, thread):  # type: ignore[no-untyped-def]
 @njit(TASK, cache=True)
 def accelerate(table, begin, end, thread):  # type: ignore[no-untyped-def]
     """Task: adds the same velocity to all nodes."""
-    v, mass, nodes, before, impulse, account, gained = _accelerate(table)
+    v, mass, nodes, before, impulse, account, acceleration, time = _accelerate(table)
     for j in range(begin, end):
         a = nodes[j]
         for i in range(3):
-            impulse[j, i] = mass[a] * gained[i]
-            v[a, i] += gained[i]
+            gained = time * acceleration[i]
+            impulse[j, i] = mass[a] * gained
+            v[a, i] += gained
         book(account, impulse, before, j, 0.5)
 
 
@@ -83,3 +87,11 @@ def push(table, begin, end, thread):  # type: ignore[no-untyped-def]
             impulse[j, i] = time * force[j, i]
             v[a, i] += impulse[j, i] / mass[a]
         book(account, impulse, before, j, 0.5)
+
+
+@njit(TASK, cache=True)
+def hold(table, begin, end, thread):  # type: ignore[no-untyped-def]
+    """Task: sets a component of the vectors of the nodes to zero."""
+    vectors, nodes, axis = _hold(table)
+    for j in range(begin, end):
+        vectors[nodes[j], axis] = 0.0

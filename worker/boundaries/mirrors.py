@@ -11,13 +11,12 @@ import numpy as np
 
 from conoid.cases.model.schema import Case, Symmetry
 
+from ..clock import DT
 from ..kernels.jit import njit, types
-from ..migration.parcel import Parcel
-from ..model.growing import Scratch
 from ..model.state import Bits, Flags, Floats, Indices, Ints, Model, Nodes, extended
-from ..parallel.arguments import Arguments, reader
+from ..parallel.arguments import Arguments, Follow, reader
 from ..parallel.comm import Comm
-from ..parallel.team import TASK
+from ..parallel.team import TASK, Stage
 from ..rigid.bodies import of_nodes
 from ..scene.conditions import AXES, node_sides, part_sides
 from .boundaries import Boundary, driven, free
@@ -31,8 +30,8 @@ not finite."""
 
 
 _F, _F1, _F2, _I1 = types.float64, types.float64[::1], types.float64[:, ::1], types.int64[::1]
-_TAKE = _F2, _F2, types.int32[::1]
-_STOP = _I1, _I1, types.int64, _F2, _F2, _F2, _F2, _F1, types.int32[::1], _I1, _F1, _F2, _F, _F
+_TAKE = _F2, _F2, _F1, _F2, types.int32[::1]
+_STOP = _F2, _F2, _F2, _F2, _F1, _F1, types.int32[::1], _I1, _F1, _F2, _F, _F
 _of_take, _of_stop = reader(*_TAKE), reader(*_STOP)
 
 
@@ -54,16 +53,13 @@ class Mirrors(Boundary):
         super().__init__(nodes)
         self._axes, self._at, self._sides, self._restitution = axes, at, sides, restitution
         self._loose_sides = sides.copy() if loose_sides is None else loose_sides
-        self._stopped: Ints = np.zeros(0, np.int64)
-        """Places (indices in the arrays of the boundary) of the nodes that were stopped or reflected in the last
-        step."""
         self._loose: Ints = np.zeros(0, np.int64)
-        """Places of the nodes without tets."""
+        """Places (indices in the arrays of the boundary) of the nodes without tets."""
         self._reflected: Ints = np.zeros(0, np.int64)
         self._aside = np.zeros((0, 3))
         """Places of the nodes that are reflected in this step, and the vectors from the new positions of the nodes
         to the positions of their images, m."""
-        self._takes, self._stops, self._scratch = Arguments(*_TAKE), Arguments(*_STOP), Scratch()
+        self._takes, self._stops = Arguments(*_TAKE), Arguments(*_STOP)
 
     @classmethod
     def of(cls, case: Case, model: Model, bounds: list[Boundary], comm: Comm) -> Self:
@@ -91,34 +87,36 @@ class Mirrors(Boundary):
         self._sides = extended(self._sides, self._sides[at])
         self._loose_sides = extended(self._loose_sides, self._loose_sides[at])
 
-    def resume(self, parcel: Parcel, name: str, dt: float) -> None:
-        super().resume(parcel, name, dt)
-        self._stopped = np.flatnonzero(self._impulse.any(axis=1))
-
     def note(self, state: Nodes) -> None:
-        self.over.run(_take, self._takes.set(self._before, state.v, self.nodes), len(self.nodes))
-        if len(self._stopped):
-            _book(self.contact_loss, self._impulse, self._before, self._stopped)
-            self._impulse[self._stopped] = 0.0
+        self.over.run(_take, self._takes.set(*self._noted(state)), len(self.nodes))
+
+    def noting(self, state: Nodes) -> list[Stage]:
+        return self.over.stages(_take, self._takes.set(*self._noted(state)), (), len(self.nodes))
 
     def apply(self, state: Nodes, dt: float, t: float) -> None:
-        n = len(self.nodes)
-        found, counts = self._scratch.of("found", n), self._scratch.of("counts", self.over.many(n))
-        table = self._stops.set(
-            found, counts, self.over.size, state.x, state.v, self._before, self._impulse, state.mass, self.nodes,
-            self._axes, self._at, self._sides, self._restitution, dt,
-        )  # fmt: skip
-        self.over.run(_stop, table, n)
-        ranges = zip(range(0, n, self.over.size), counts.tolist(), strict=True)
-        self._stopped = np.concatenate([found[:0], *(found[k : k + many] for k, many in ranges if many)])
+        self.over.run(_stop, self._stops.set(*self._of(state), dt), len(self.nodes))
         if len(self._loose):
             self._reflected, self._aside = _reflect(
                 state.x, state.v, self._impulse, state.mass, self.nodes, self._loose, self._axes, self._at,
                 self._loose_sides, dt,
             )  # fmt: skip
-            self._stopped = np.concatenate([self._stopped, self._reflected])
-        if len(self._stopped):
-            _book(self.contact_loss, self._impulse, self._before, self._stopped)
+            _book_all(self.contact_loss, self._impulse, self._before, self._reflected)
+
+    def acting(self, state: Nodes) -> list[Stage] | None:
+        if len(self._loose):
+            return None
+        return self.over.stages(_stop, *self._stops.bind(*self._of(state), Follow(DT)), len(self.nodes))
+
+    def _noted(self, state: Nodes) -> tuple[Floats | Indices, ...]:
+        """Returns the arguments of ``_take``."""
+        return self._before, self._impulse, self.contact_loss, state.v, self.nodes
+
+    def _of(self, state: Nodes) -> tuple[Floats | Ints | Indices | float, ...]:
+        """Returns the arguments of ``_stop`` without the time step."""
+        return (
+            state.x, state.v, self._before, self._impulse, self.contact_loss, state.mass, self.nodes, self._axes,
+            self._at, self._sides, self._restitution,
+        )  # fmt: skip
 
     def after_move(self, state: Nodes) -> None:
         if len(self._reflected):
@@ -126,31 +124,45 @@ class Mirrors(Boundary):
             self._reflected, self._aside = self._reflected[:0], self._aside[:0]
 
 
+@njit("void(float64[::1], float64[:, ::1], float64[:, ::1], int64)", cache=True)
+def _book(loss, impulse, before, j):  # type: ignore[no-untyped-def]
+    """Books half of the work of the impulse at place ``j`` at the velocity ``before`` it, as loss."""
+    for i in range(3):
+        loss[j] -= 0.5 * impulse[j, i] * before[j, i]
+
+
 @njit("void(float64[::1], float64[:, ::1], float64[:, ::1], int64[::1])", cache=True)
-def _book(loss, impulse, before, rows):  # type: ignore[no-untyped-def]
-    """Books half of the work of the impulses of these ``rows`` at the velocities ``before`` them, as loss."""
+def _book_all(loss, impulse, before, rows):  # type: ignore[no-untyped-def]
+    """``_book`` for these ``rows``."""
     for j in rows:
-        for i in range(3):
-            loss[j] -= 0.5 * impulse[j, i] * before[j, i]
+        _book(loss, impulse, before, j)
+
+
+@njit("boolean(float64[:, ::1], int64)", cache=True)
+def _stopped(impulse, j):  # type: ignore[no-untyped-def]
+    """Whether the node at place ``j`` has an impulse."""
+    return impulse[j, 0] != 0.0 or impulse[j, 1] != 0.0 or impulse[j, 2] != 0.0
 
 
 @njit(TASK, cache=True)
 def _take(table, begin, end, thread):  # type: ignore[no-untyped-def]
-    """Task: stores v(n-1/2)."""
-    before, v, nodes = _of_take(table)
+    """Task: stores v(n-1/2), books the second half of the work of the last impulses, and sets the impulses to zero."""
+    before, impulse, loss, v, nodes = _of_take(table)
     for j in range(begin, end):
         for i in range(3):
             before[j, i] = v[nodes[j], i]
+        if _stopped(impulse, j):
+            _book(loss, impulse, before, j)
+            impulse[j, 0] = impulse[j, 1] = impulse[j, 2] = 0.0
 
 
 @njit(TASK, cache=True, error_model="numpy")
 def _stop(table, begin, end, thread):  # type: ignore[no-untyped-def]
     """Task: stops nodes with tets that would end beyond a plane: the velocity ends on the plane, or is the rebound
-    velocity if there is ``restitution`` of that ``before`` (n, 3): v(n-1/2). Adds to ``impulse``; writes the places
-    of the stopped nodes into ``found`` from ``begin`` on, and their number into ``counts``; ``size``: length of a task.
+    velocity if there is ``restitution`` of that ``before`` (n, 3): v(n-1/2). Adds to ``impulse``, and books half of
+    the work of the impulses as ``loss``.
     """
-    found, counts, size, x, v, before, impulse, mass, nodes, axes, at, sides, restitution, dt = _of_stop(table)
-    n = begin
+    x, v, before, impulse, loss, mass, nodes, axes, at, sides, restitution, dt = _of_stop(table)
     for first in range(begin, end, _TOGETHER):
         last, met = min(first + _TOGETHER, end), 0
         for k in range(len(axes)):
@@ -170,10 +182,8 @@ def _stop(table, begin, end, thread):  # type: ignore[no-untyped-def]
                     change = side * (max(-height / dt, back if back > 0.0 else -np.inf) - speed)
                     v[a, i] += change
                     impulse[j, i] += mass[a] * change
-            if impulse[j, 0] != 0.0 or impulse[j, 1] != 0.0 or impulse[j, 2] != 0.0:
-                found[n] = j
-                n += 1
-    counts[begin // size] = n - begin
+            if _stopped(impulse, j):
+                _book(loss, impulse, before, j)
 
 
 @njit(

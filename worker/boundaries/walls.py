@@ -2,11 +2,11 @@
 
 import numpy as np
 
+from ..clock import DT, T
 from ..kernels.jit import njit, types
-from ..migration.parcel import Parcel
 from ..model.state import Bits, Flags, Floats, Indices, Ints, Nodes, extended
-from ..parallel.arguments import Arguments, reader
-from ..parallel.team import TASK
+from ..parallel.arguments import Arguments, Follow, reader
+from ..parallel.team import TASK, Stage
 from .boundaries import KEPT, Boundary, Stopping, free, mirrored
 from .impulses import book
 
@@ -35,19 +35,30 @@ class RigidWalls(Stopping):
         friction: Floats | None = None, reports: bool = False,
     ) -> None:  # fmt: skip
         """``reports``: True if ``since_last_report`` will be called."""
+        self._pushed = np.zeros((1, _PADDED))
+        """(threads, 8) time of the last impulse that each thread gave, s; the other columns are scratch."""
         super().__init__(nodes, len(points), reports=reports)
         self._friction = np.zeros(len(points)) if friction is None else friction
+        self._none = np.zeros(0)
         self._rubbed = np.zeros((len(nodes) if self._friction.any() else 0, 3))
         """(n, 3) friction impulse of the last step, N s; (0, 3) without friction."""
         self._mirrored = np.zeros((len(nodes), 3), bool) if mirrored is None else mirrored
         self._points = points
         self._normals = normals / np.linalg.norm(normals, axis=1)[:, None]
         self._held = held
-        self._pushed = False
-        self._pushes = Arguments(*_PUSH)
+        self._forgets, self._pushes = Arguments(*_FORGET), Arguments(*_PUSH)
         if self._friction.any():
             self.friction_loss = np.zeros(len(nodes))
             self._kept = (*self._kept, "friction_loss", "_rubbed")
+
+    @property
+    def last_push(self) -> float:
+        """Time of the last impulse, s."""
+        return float(self._pushed[:, 0].max())
+
+    @last_push.setter
+    def last_push(self, t: float) -> None:
+        self._pushed[:, 0] = t
 
     def held_components(self) -> Bits:
         return free(self.nodes)
@@ -70,41 +81,59 @@ class RigidWalls(Stopping):
             values = getattr(self, key)
             setattr(self, key, extended(values, np.zeros((len(at), *values.shape[1:]))))
 
-    def resume(self, parcel: Parcel, name: str, dt: float) -> None:
-        super().resume(parcel, name, dt)
-        self._pushed = True
-
     def note(self, state: Nodes) -> None:
-        self._note(state, self.contact_loss, -0.5)
-        if self._pushed:
-            if self.friction_loss is not None:
-                book_all(self.friction_loss, self._rubbed, self._before)
-            self._impulse[:], self._rubbed[:] = 0.0, 0.0
+        self.over.run(_forget, self._forgets.set(*self._noted(state)), len(self.nodes))
+
+    def noting(self, state: Nodes) -> list[Stage]:
+        return self.over.stages(_forget, self._forgets.set(*self._noted(state)), (), len(self.nodes))
 
     def apply(self, state: Nodes, dt: float, t: float) -> None:
-        pushed = np.zeros((self.over.threads, 8))
-        rubs = self.friction_loss is not None
-        table = self._pushes.set(
+        self.over.run(_push_out, self._pushes.set(*self._of(state), dt, t), len(self.nodes))
+
+    def acting(self, state: Nodes) -> list[Stage]:
+        table, ties = self._pushes.bind(*self._of(state), Follow(DT), Follow(T))
+        return self.over.stages(_push_out, table, ties, len(self.nodes))
+
+    def _noted(self, state: Nodes) -> tuple[Floats | Indices, ...]:
+        """Returns the arguments of ``_forget``."""
+        friction = self._none if self.friction_loss is None else self.friction_loss
+        return state.v, self.nodes, self._before, self._impulse, self.contact_loss, self._rubbed, friction
+
+    def _of(self, state: Nodes) -> tuple[Floats | Indices | Flags, ...]:
+        """Returns the arguments of ``_push_out`` without the numbers."""
+        if len(self._pushed) != self.over.threads:
+            self._pushed = np.full((self.over.threads, _PADDED), self.last_push)
+        friction = self._none if self.friction_loss is None else self.friction_loss
+        return (
             state.x, state.v, state.mass, self.nodes, self._before, self._impulse, self._rubbed, self.given,
-            self.contact_loss, self.friction_loss if rubs else self.contact_loss[:0], self._points, self._normals,
-            self._friction, self._held, self._mirrored, pushed, dt,
+            self.contact_loss, friction, self._points, self._normals, self._friction, self._held, self._mirrored,
+            self._pushed,
         )  # fmt: skip
-        self.over.run(_push_out, table, len(self.nodes))
-        self._pushed = bool(pushed[:, 0].any())
-        if self._pushed:
-            self.last_push = t
 
 
+_PADDED = 8
+"""Number of float64 in a cache line."""
 _F, _F1, _F2, _B2 = types.float64, types.float64[::1], types.float64[:, ::1], types.boolean[:, ::1]
-_PUSH = _F2, _F2, _F1, types.int32[::1], _F2, _F2, _F2, _F2, _F1, _F1, _F2, _F2, _F1, _B2, _B2, _F2, _F
-_of_push = reader(*_PUSH)
+_N1 = types.int32[::1]
+_FORGET = _F2, _N1, _F2, _F2, _F1, _F2, _F1
+_PUSH = _F2, _F2, _F1, _N1, _F2, _F2, _F2, _F2, _F1, _F1, _F2, _F2, _F1, _B2, _B2, _F2, _F, _F
+_of_forget, _of_push = reader(*_FORGET), reader(*_PUSH)
 
 
-@njit("void(float64[::1], float64[:, ::1], float64[:, ::1])", cache=True)
-def book_all(loss, impulse, before):  # type: ignore[no-untyped-def]
-    """Books half of the work of the impulses (n, 3) at the velocities ``before`` them, as loss."""
-    for j in range(len(loss)):
-        book(loss, impulse, before, j, -0.5)
+@njit(TASK, cache=True)
+def _forget(table, begin, end, thread):  # type: ignore[no-untyped-def]
+    """Task: stores v(n-1/2), books the second half of the work of the last impulses, and sets the impulses to zero."""
+    v, nodes, before, impulse, loss, rubbed, friction_loss = _of_forget(table)
+    for j in range(begin, end):
+        a = nodes[j]
+        for i in range(3):
+            before[j, i] = v[a, i]
+        if impulse[j, 0] != 0.0 or impulse[j, 1] != 0.0 or impulse[j, 2] != 0.0:
+            book(loss, impulse, before, j, -0.5)
+            impulse[j, 0] = impulse[j, 1] = impulse[j, 2] = 0.0
+        if len(friction_loss) > 0:
+            book(friction_loss, rubbed, before, j, -0.5)
+            rubbed[j, 0] = rubbed[j, 1] = rubbed[j, 2] = 0.0
 
 
 @njit(TASK, cache=True, error_model="numpy")
@@ -112,7 +141,7 @@ def _push_out(table, begin, end, thread):  # type: ignore[no-untyped-def]
     """Task: stops the nodes of a range at all walls, and books half of the work.
 
     Adds the impulses to ``impulse``, the friction impulses also to ``rubbed``, and the impulses of each wall to
-    ``given``. Sets column 0 of ``pushed`` (threads, 8; the other columns are padding) if a wall stopped a node.
+    ``given``. Sets column 0 of ``pushed`` (threads, 8) to the time ``t`` if a wall stopped a node.
 
     1. Gap and velocity along the normal, and the square of the normal without ``mirrored`` components. 2. Impulse such
     that the gap at the end of the step is zero. 3. Friction: sliding velocity across the normal, at most mu times the
@@ -120,7 +149,7 @@ def _push_out(table, begin, end, thread):  # type: ignore[no-untyped-def]
     """
     (
         x, v, mass, nodes, before, impulse, rubbed, given, loss, friction_loss, points, normals, friction, held,
-        mirrored, pushed, dt,
+        mirrored, pushed, dt, t,
     ) = _of_push(table)  # fmt: skip
     slide = pushed[thread, 1:4]
     for j in range(begin, end):
@@ -166,7 +195,7 @@ def _push_out(table, begin, end, thread):  # type: ignore[no-untyped-def]
             if not moved or len(points) == 1:
                 break
         if any_moved:
-            pushed[thread, 0] = 1.0
+            pushed[thread, 0] = t
             book(loss, impulse, before, j, -0.5)
             if len(friction_loss) > 0:
                 book(friction_loss, rubbed, before, j, -0.5)

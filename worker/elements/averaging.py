@@ -6,13 +6,14 @@ from ..accounts.timers import Timers
 from ..boundaries.boundaries import Boundary
 from ..materials.law import BULK
 from ..migration.parcel import Parcel
-from ..model.state import Floats, Indices, Ints, Model
+from ..model.state import Block, Floats, Indices, Ints, Model
 from ..model.topology import Split
+from ..parallel.arguments import Follow
 from ..parallel.comm import Comm
 from ..parallel.ownership import Neighbour, SharedSum
 from ..parallel.passes import Pass
 from ..parallel.tags import Tag
-from ..parallel.team import Team
+from ..parallel.team import Stage, Team
 from . import nodal, tasks
 from .averages import Averages
 from .flat import flat_tets
@@ -93,7 +94,7 @@ class AveragedElements(Elements):
         return [self.pressure if averages is None else averages.of_nodes({"pressure": self.pressure})["pressure"]]
 
     def advance(self, dt: float, scale: float) -> None:
-        self._scratches.peaks[:] = 0
+        self.scratches.peaks[:] = 0
         self._scale = scale
         means = self._means()
         self._over(self._strains, means, (dt,), lambda: self.shared_volumes.begin(self.means.sums))
@@ -103,6 +104,23 @@ class AveragedElements(Elements):
         self._complete.run(self.means.n, means, self.means.volumes, *self._constants())
         self._bridge(scale, opens=True)
         self._over(self._forces, means, (dt, scale), self._send)
+
+    def advancing(self, dt: Follow, scale: Follow) -> list[tuple[Stage, Block | None]]:
+        means = self._means()
+        complete = self._complete.stage(self.means.n, means, self.means.volumes, *self._constants())
+        strains, forces = self._staged(self._strains, means, (dt,)), self._staged(self._forces, means, (dt, scale))
+        return [*strains, (complete, None), *forces]
+
+    def ending(self, scale: Follow) -> list[Stage] | None:
+        if not self.split:
+            return []
+        if self._averages is not None:
+            return None
+        project = self._project.stage(self.means.n, self.means.fields, self.means.volumes, scale)
+        return [project, *(stage for each in self._scene for stage in each.mirroring(self.means.projected))]
+
+    def went_on(self, scale: float) -> None:
+        self._scale = scale
 
     def again(self, scale: float) -> None:
         self.means.gradient[:] = 0

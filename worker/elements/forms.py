@@ -16,10 +16,11 @@ from ..migration.parcel import Parcel
 from ..model.state import Block, Floats, Ints, Model
 from ..model.topology import Split
 from ..parallel import fixed_point
+from ..parallel.arguments import Follow
 from ..parallel.comm import Comm
 from ..parallel.ownership import Neighbour, SharedSum
 from ..parallel.tags import Tag
-from ..parallel.team import Team
+from ..parallel.team import Stage, Team
 from . import chunks, records, tasks
 from .colours import Coloured, coloured, whole
 from .passes import BlockPass, Values
@@ -55,9 +56,10 @@ class Elements:
 
     def __init__(self, model: Model, comm: Comm, neighbours: list[Neighbour], timers: Timers, team: Team) -> None:
         self.model = model
-        self._timers, self._team = timers, team
-        self._scratches = Scratches.of(team.threads)
-        self.peaks: Ints = self._scratches.peaks[0, : records.PEAKS]
+        self._timers, self.team = timers, team
+        self.scratches = Scratches.of(team.threads)
+        """Scratch and peaks of each thread."""
+        self.peaks: Ints = self.scratches.peaks[0, : records.PEAKS]
         """(5,) peaks over all tets of the rank, see elements/records.py."""
         self._words = self.peaks.data
         self._reals = self.peaks.view(np.float64).data
@@ -116,14 +118,27 @@ class Elements:
         """Computes stress and forces at n+1; adds the forces to nodal sums that are zero on entry. On return the
         completion of shared nodes is in progress.
         """
-        self._scratches.peaks[:] = 0
+        self.scratches.peaks[:] = 0
         self._bridge(scale, opens=True)
         self._over(self._standard, (), (dt, scale), self._send)
+
+    def advancing(self, dt: Follow, scale: Follow) -> list[tuple[Stage, Block | None]]:
+        """Returns ``advance`` on a single rank as stages of a program, with the block of each; ``scratches.peaks`` must
+        be zero before the stages.
+        """
+        return self._staged(self._standard, (), (dt, scale))
+
+    def ending(self, scale: Follow) -> list[Stage] | None:
+        """Returns ``finish`` on a single rank as stages of a program; None if other code is needed."""
+        return []
+
+    def went_on(self, scale: float) -> None:
+        """Sets the scale of the last sum of forces after a program."""
 
     def again(self, scale: float) -> None:
         """Sums the forces of the present stress again, in a quantum above the previous one."""
         limit = self.peaks[[records.LARGEST_LIMIT, records.LIMITING_TET]]
-        self._scratches.peaks[:] = 0
+        self.scratches.peaks[:] = 0
         self.model.nodes.force[:] = 0
         self._bridge(scale, opens=False)
         self._over(self._again, self._means(), (scale,), self._send)
@@ -202,18 +217,28 @@ class Elements:
             begin, end = (0, first) if border else (first, block.chunks)
             if begin < end:
                 some = self._tasks(block, begin, end)
-                table = work.address(nodes, block, self._scratches, means, numbers)
-                self._team.run(work.kernel, table, some.tasks, some.starts)
+                table = work.address(nodes, block, self.scratches, means, numbers)
+                self.team.run(work.kernel, table, some.tasks, some.starts)
             if len(blocks) > 1:
                 start, now = now, cpu_time()
                 block.seconds += now - start
-        if self._team.threads > 1:
-            chunks.gather_peaks(self._scratches.peaks)
+        if self.team.threads > 1:
+            chunks.gather_peaks(self.scratches.peaks)
+
+    def _staged(self, work: BlockPass, means: Values, numbers: Values) -> list[tuple[Stage, Block | None]]:
+        """Returns a pass over all tets of a single rank as stages of a program."""
+        found: list[tuple[Stage, Block | None]] = []
+        for block in self.model.blocks:
+            if not block.rigid and block.chunks:
+                some = self._tasks(block, 0, block.chunks)
+                table, ties = work.bind(self.model.nodes, block, self.scratches, means, numbers)
+                found.append((Stage(work.kernel, table, some.tasks, some.starts, ties), block))
+        return found
 
     def _tasks(self, block: Block, begin: int, end: int) -> Coloured:
         moved, known = self._coloured.get((block.part, begin), (-1, None))
         if known is None or moved != block.moved:
-            alone = self._team.threads == 1
+            alone = self.team.threads == 1
             known = whole(begin, end) if alone else coloured(block, begin, end, self.model.nodes.n)
             self._coloured[block.part, begin] = block.moved, known
         return known

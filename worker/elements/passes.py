@@ -4,7 +4,7 @@ from typing import Any
 
 from ..kernels.jit import Kernel
 from ..model.state import Block, Nodes
-from ..parallel.arguments import Arguments
+from ..parallel.arguments import Arguments, Tie
 from .records import Scratches, body_of, marks_of, motion_of
 
 Values = tuple[Any, ...]
@@ -23,8 +23,19 @@ class BlockPass:
 
     def address(self, nodes: Nodes, block: Block, scratches: Scratches, means: Values, numbers: Values) -> int:
         """Returns the address of the arguments for a block; ``means``: the fields of Means, or none."""
+        return self._table(block).set(*self._records(nodes, block), scratches, means, *numbers)
+
+    def bind(
+        self, nodes: Nodes, block: Block, scratches: Scratches, means: Values, numbers: Values
+    ) -> tuple[int, tuple[Tie, ...]]:  # fmt: skip
+        """Returns ``address`` for a program, and the words that follow its numbers (arguments.py)."""
+        return self._table(block).bind(*self._records(nodes, block), scratches, means, *numbers)
+
+    def _table(self, block: Block) -> Arguments:
         table = self._tables.get(block.part)
         if table is None:
             table = self._tables[block.part] = Arguments(*self._kinds)
-        marks = marks_of(block) if self._marked else ()
-        return table.set(motion_of(nodes), body_of(block), marks, scratches, means, *numbers)
+        return table
+
+    def _records(self, nodes: Nodes, block: Block) -> Values:
+        return motion_of(nodes), body_of(block), marks_of(block) if self._marked else ()

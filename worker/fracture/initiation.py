@@ -54,9 +54,11 @@ class Initiation:
         """True if a part uses nodal tractions."""
         return any(self._averaged)
 
-    def begin_step(self) -> None:
-        """Starts a new step. The clock of a facet stops if the facet is not overstressed in the step."""
-        self._step += 1
+    def begin_step(self, many: int = 1) -> None:
+        """Starts a new step, the last of ``many`` steps. The clock of a facet stops if the facet is not overstressed in
+        a step.
+        """
+        self._step += many
 
     def breaking(self, hot: bool) -> list[Breaking]:
         """Returns the facets that break by the present stress, by body; ``hot``: a face of this rank is

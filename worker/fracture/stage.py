@@ -78,6 +78,15 @@ class Fracture:
         if self.cohesion is not None and self.broken:
             self._unloading.apply(self._clock)
 
+    @property
+    def intact(self) -> bool:
+        """True if no facet of this rank is cohesive."""
+        return self.cohesion is None or not len(self.cohesion.facets.tets)
+
+    def went_on(self, steps: int) -> None:
+        """Counts ``steps`` steps in which no face was overstressed."""
+        self.initiation.begin_step(steps)
+
     def find(self, touched: Ints) -> int:
         """Returns the contribution of this rank to the reduction of the step: NOTHING, OVERSTRESSED or BREAKS; with
         nodal tractions BREAKS if a facet may break. Sets ``touched`` (ranks,) for the ranks that have a node of a facet

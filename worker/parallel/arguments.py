@@ -10,7 +10,7 @@ import ctypes
 from collections.abc import Iterator
 from itertools import compress
 from operator import is_not
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from llvmlite import ir
@@ -24,6 +24,23 @@ _POINTER: Any = ctypes.PYFUNCTYPE(ctypes.c_int64, ctypes.py_object, ctypes.c_cha
 )
 _DATA = 40
 """Offset of the data pointer in numpy's PyArrayInterface, bytes."""
+
+
+class Follow(NamedTuple):
+    """A number of a stage that changes from round to round: a number of the program times a constant factor."""
+
+    number: int
+    """Index of the number of the program."""
+    factor: float = 1.0
+
+
+class Tie(NamedTuple):
+    """A word of a table that follows a number of a program."""
+
+    number: int
+    factor: float
+    address: int
+    """Address of the word."""
 
 
 class Arguments:
@@ -69,6 +86,18 @@ class Arguments:
                 self._put(k, value)
         self._values[:] = values
         return self.address
+
+    def bind(self, *values: Any) -> tuple[int, tuple[Tie, ...]]:
+        """Write the arguments as ``set`` does; some of the numbers are ``Follow``. Return the address of the table and
+        the words that the program writes. The next ``set`` writes these words again.
+        """
+        address = self.set(*(0.0 if isinstance(value, Follow) else value for value in values))
+        ties = []
+        for k, value in enumerate(values):
+            if isinstance(value, Follow):
+                self._values[k] = None
+                ties.append(Tie(*value, address + 8 * self._places[self._begins[k]]))
+        return address, tuple(ties)
 
     def _put(self, k: int, value: Any) -> None:
         at = self._places[k]

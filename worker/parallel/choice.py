@@ -31,6 +31,11 @@ class Choice:
         self._steps, self._began, self._due = 0, 0.0, 0.0
         self._costs: Projecting | None = None
 
+    @property
+    def due(self) -> float:
+        """Wall time before which no measurement begins, s; 0 during a measurement."""
+        return self._due if self._team.projecting is None else 0.0
+
     def step(self) -> str:
         """Begin or end a measurement if it is time for it. Return a message, once, if fewer threads than given are
         used.

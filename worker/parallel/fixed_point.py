@@ -45,12 +45,14 @@ def bits_of(value: float) -> int:
     return int(_WORD.unpack(_REAL.pack(value))[0])
 
 
-def scale_for(largest: float) -> float:
+@njit("float64(float64)", cache=True)
+def scale_for(largest):  # type: ignore[no-untyped-def]
     """Return the number of quanta per newton for contributions up to ``largest``, N, with headroom."""
     return math.ldexp(1.0, CONTRIBUTION_BITS - HEADROOM_BITS - math.frexp(largest)[1])
 
 
-def outgrown(largest: float, scale: float) -> bool:
+@njit("boolean(float64, float64)", cache=True)
+def outgrown(largest, scale):  # type: ignore[no-untyped-def]
     """Return whether a contribution of ``largest``, N, exceeds the range of the scale."""
     return not largest * scale < 2.0**CONTRIBUTION_BITS
 

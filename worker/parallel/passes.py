@@ -6,7 +6,7 @@ import numpy as np
 
 from ..kernels.jit import Kernel
 from ..model.state import Ints
-from .arguments import Arguments
+from .arguments import Arguments, Tie
 from .team import Stage, Team
 
 NODES_OF_A_TASK = 4096
@@ -59,6 +59,14 @@ class Ranges(_Range):
                 self._cut(n)
             self._team.run(kernel, table, self._tasks, self._starts)
 
+    def stages(self, kernel: Kernel, table: int, ties: tuple[Tie, ...], n: int) -> list[Stage]:
+        """Return the run over the range from 0 to ``n`` as a stage of a program; [] if ``n`` is 0. The stage is valid
+        until another range is requested.
+        """
+        if n and n != self._n:
+            self._cut(n)
+        return [Stage(kernel, table, self._tasks, self._starts, ties)] if n else []
+
 
 class Pass(_Range):
     """A kernel with its table of arguments, to be run over ranges; see ``Ranges``."""
@@ -76,9 +84,10 @@ class Pass(_Range):
             self._team.run(self._kernel, self._arguments.set(*values), self._tasks, self._starts)
 
     def stage(self, n: int, *values: Any) -> Stage:
-        """Return the run over the range from 0 to ``n`` > 0 as a stage of a program. The stage is valid until other
-        arguments or another range are requested.
+        """Return the run over the range from 0 to ``n`` > 0 as a stage of a program; numbers among the ``values`` may
+        be ``Follow``. The stage is valid until other arguments or another range are requested.
         """
         if n != self._n:
             self._cut(n)
-        return Stage(self._kernel, self._arguments.set(*values), self._tasks, self._starts)
+        table, ties = self._arguments.bind(*values)
+        return Stage(self._kernel, table, self._tasks, self._starts, ties)

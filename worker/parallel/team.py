@@ -24,7 +24,7 @@ import numpy as np
 
 from ..kernels.jit import Kernel, njit
 from ..model.state import Ints
-from .arguments import address_of
+from .arguments import Tie, address_of
 from .words import SECOND, TASK, add, call_task, load, now, sched_yield, sem_post, sem_wait, swap, word_at
 
 __all__ = ["TASK", "Stage", "Team", "team"]
@@ -43,6 +43,9 @@ _LINE = 8
 """Number of words in a cache line."""
 _WAKES = 2
 """Largest number of threads that a thread wakes."""
+_LONG = 1000
+"""Smallest number of rounds of a program during which other threads of Python run. Chosen value: far above the number
+of sweeps of contact, far below the number of steps in a second."""
 _POLLS = 4000
 """Number of polls before a helper sleeps, and before the calling thread yields its core. Chosen value: some 50 us,
 longer than the gap between two colours, much shorter than a step."""
@@ -136,20 +139,34 @@ def _alone(job, kernel, table, tasks):  # type: ignore[no-untyped-def]
     job[_WITHIN] += now(job, _CLOCK) - begin
 
 
-@njit("void(int64[::1], int64, int64[:, ::1], int64)", cache=True)
-def _repeat(job, semaphore, stages, rounds):  # type: ignore[no-untyped-def]
-    """Run all stages, one after the other, ``rounds`` times; ``stages`` (n, 5) has the arguments of each pass."""
-    begin = now(job, _CLOCK)
+@njit("void(int64[::1], int64[::1], int64, int64[:, ::1], int64, int64[::1])", cache=True)
+def _repeat(spent, job, semaphore, stages, rounds, stop):  # type: ignore[no-untyped-def]
+    """Run all stages, one after the other, ``rounds`` times, or until a stage has set ``stop`` (1,) to a number other
+    than 0; ``stages`` (n, 5) has the arguments of each pass. Adds the time of each stage, ns, to ``spent`` (n,).
+    """
+    begin = last = now(job, _CLOCK)
     for _ in range(rounds):
         for k in range(len(stages)):
             kernel, table, tasks = stages[k, 0], stages[k, 1], stages[k, 2]
             starts, colours = stages[k, 3], stages[k, 4]
-            if job[_MOST] == 1:
+            if job[_MOST] == 1 or word_at(starts, colours) - word_at(starts, 0) == 1:
                 for t in range(word_at(starts, 0), word_at(starts, colours)):
                     call_task(kernel, table, word_at(tasks, 2 * t), word_at(tasks, 2 * t + 1), 0)
             else:
                 _share(job, semaphore, kernel, table, tasks, starts, colours)
-    job[_WITHIN] += now(job, _CLOCK) - begin
+            time = now(job, _CLOCK)
+            spent[k] += time - last
+            last = time
+            if stop[0] != 0:
+                job[_WITHIN] += last - begin
+                return
+    job[_WITHIN] += last - begin
+
+
+@njit("void(int64[::1], int64[::1], int64, int64[:, ::1], int64, int64[::1])", cache=True, nogil=True)
+def _repeat_long(spent, job, semaphore, stages, rounds, stop):  # type: ignore[no-untyped-def]
+    """``_repeat`` for a long program: other threads of Python run meanwhile."""
+    _repeat(spent, job, semaphore, stages, rounds, stop)
 
 
 @dataclass(frozen=True)
@@ -160,6 +177,8 @@ class Stage:
     table: int
     tasks: Ints
     starts: Ints
+    ties: tuple[Tie, ...] = ()
+    """Words of the table that follow numbers of the program."""
 
 
 class Timed(Protocol):
@@ -228,22 +247,27 @@ class Team:
             places = address_of(tasks), address_of(starts), len(starts) - 1
             _ask(self._job, self._semaphore, kernel.address, table, *places)
 
-    def repeat(self, stages: Sequence[Stage], rounds: int) -> None:
-        """Run all ``stages``, one after the other, ``rounds`` times, in one call.
+    def repeat(self, stages: Sequence[Stage], rounds: int, stop: Ints | None = None) -> Ints:
+        """Run all ``stages``, one after the other, ``rounds`` times, in one call; end early after the stage that sets
+        ``stop`` (1,) to a number other than 0. Return (stages,) the time of each stage, ns.
 
         Threads stay awake between the stages, and no Python code runs between them. A kernel that needs the number
         of the round stores it in its table.
         """
+        spent, stop = np.zeros(len(stages), np.int64), np.zeros(1, np.int64) if stop is None else stop
         if self.projecting is not None:
-            for _ in range(rounds):
-                for each in stages:
-                    self.run(each.kernel, each.table, each.tasks, each.starts)
-            return
+            for k in [*range(len(stages))] * rounds:
+                self.run(stages[k].kernel, stages[k].table, stages[k].tasks, stages[k].starts)
+                if stop[0]:
+                    break
+            return spent
         words = [
             (each.kernel.address, each.table, address_of(each.tasks), address_of(each.starts), len(each.starts) - 1)
             for each in stages
         ]
-        _repeat(self._job, self._semaphore, np.array(words), rounds)
+        kernel = _repeat if rounds < _LONG else _repeat_long
+        kernel(spent, self._job, self._semaphore, np.array(words), rounds, stop)
+        return spent
 
 
 @cache

@@ -55,6 +55,14 @@ def _read(_: Any, address: Any, k: Any) -> Any:
     return types.int64(address, k), emit
 
 
+def _write(_: Any, address: Any, number: Any) -> Any:
+    def emit(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+        builder.store(args[1], builder.inttoptr(args[0], ir.DoubleType().as_pointer()))
+        return context.get_dummy_value()
+
+    return types.void(address, number), emit
+
+
 def _read_clock(_: Any, words: Any, at: Any) -> Any:
     def emit(context: Any, builder: Any, signature: Any, args: Any) -> Any:
         kind = ir.FunctionType(ir.IntType(32), [_WORD, _WORD.as_pointer()])
@@ -91,6 +99,8 @@ now: Any = intrinsic(_read_clock)
 """Function for kernels: return the time, ns; two words at ``at`` are scratch."""
 word_at: Any = intrinsic(_read)
 """Function for kernels: return word ``k`` at an address."""
+write_real: Any = intrinsic(_write)
+"""Function for kernels: write a float64 to an address."""
 sched_yield: Any = intrinsic(lambda _: _library("sched_yield", types.void()))
 sem_wait: Any = intrinsic(lambda _, semaphore: _library("sem_wait", types.void(semaphore)))
 sem_post: Any = intrinsic(lambda _, semaphore: _library("sem_post", types.void(semaphore)))

@@ -20,6 +20,7 @@ from ..output.journal import Journal
 from ..parallel.choice import Choice
 from ..simulation import Simulation
 from ..snapshots.stage import Snapshots
+from ..stretch import Stretch, Until
 from . import stops
 from .frames import Frames
 from .notices import Notices
@@ -71,6 +72,7 @@ class Loop:
         self._requests = Requests(sim.case, folder, signals, self._groups, time.monotonic())
         self.samples = Samples(sim, history, start.sample, start.lines)
         self.snapshots = Snapshots(sim, folder, journal)
+        self._stretch = Stretch(sim)
         self.frames = Frames(folder, self._notices, counter)
         self._reports = Reports(sim, balance, self._groups, self._notices, counter, self._requests, start.updates)
 
@@ -90,8 +92,7 @@ class Loop:
             if self.sim.clock.done or self.sim.reduction.stop:
                 self._end()
                 return
-            self.updates += self.sim.model.elements_global
-            step.second_half(self.sim)
+            self._second_half()
             if self.choice is not None and (text := self.choice.step()):
                 self._notices.write(self.sim.clock, messages.Log, level="info", text=text)
 
@@ -126,6 +127,19 @@ class Loop:
         if before is not None or clock.frame_due or sim.reduction.snapshot or clock.step == 0:
             self._put_out(before, ending=ending)
         self.snapshots.tell()
+
+    def _second_half(self) -> None:
+        """Take stages 11 to 15 of the step, and before the stages 14 and 15 further steps that are quiet."""
+        sim, steps = self.sim, 0
+        if self._requests.idle:
+            wall, t, last = self._requests.next
+            wall = min(wall, self.choice.due) if self.choice is not None else wall
+            steps = self._stretch.run(Until(wall, min(t, self.samples.next), last))
+        self.updates += max(steps, 1) * sim.model.elements_global
+        if steps:
+            step.complete(sim)
+        else:
+            step.second_half(sim)
 
     def _put_out(self, before: Floats | None, *, ending: bool) -> None:
         """Run the scheduled outputs of time n.

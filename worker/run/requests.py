@@ -36,6 +36,16 @@ class Requests:
         self._wall = self._time = 0.0
         """Wall time and simulated time before which no request can begin, s."""
 
+    @property
+    def idle(self) -> bool:
+        """Whether no request is under way, and none depends on the step."""
+        return not (self._active or self._every_step)
+
+    @property
+    def next(self) -> tuple[float, float, int]:
+        """Wall time, s, simulated time, s, and number of the step, before which no request can begin."""
+        return self._wall, self._time, self._run.max_steps - 1
+
     def due(self, clock: Clock, now: float) -> bool:
         """Return whether the requests may have changed at the wall time ``now``, s."""
         last = clock.step + 1 >= self._run.max_steps

@@ -28,7 +28,7 @@ class Samples:
         """Number of samples scheduled so far."""
         self.lines = lines
         """Number of samples taken so far."""
-        self._next = number * run.end_time / run.samples
+        self.next = number * run.end_time / run.samples
         """Time of the next sample, s."""
         self.time: float | None = None
         """Time of the latest sample, s."""
@@ -39,7 +39,7 @@ class Samples:
 
     def due(self, clock: Clock) -> bool:
         """Return whether the time of the next sample is reached."""
-        return clock.t >= self._next
+        return clock.t >= self.next
 
     def probes(self) -> dict[str, float | None]:
         """Return the latest value of each probe by name; None for NaN, since JSON has no NaN."""
@@ -61,7 +61,7 @@ class Samples:
         probes = sim.probes.measure(step.between(sim, before) if sim.probes.sums and not ending else None)
         self.measured = probes.tolist()
         self.number, self.lines = int(clock.t * samples / end) + 1, self.lines + 1
-        self._next = self.number * end / samples
+        self.next = self.number * end / samples
         limiter = sim.limiter()
         if self._history is not None:
             parts = [value for part in self.parts.values() for value in msgspec.structs.astuple(part)]

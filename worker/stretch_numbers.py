@@ -1,0 +1,99 @@
+"""Numbers of a program of quiet steps (stretch.py), and the stage that decides: it ends a step or the program."""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from .clock import DT, LAST_DT, LOST, MEAN_DT, SHORTER, STABLE, T, advanced, chosen
+from .elements.chunks import gather_peaks
+from .elements.records import HOT, LARGEST_FORCE, LARGEST_LIMIT, WORN
+from .kernels.jit import njit, record, types
+from .model.state import Floats, Ints
+from .parallel.arguments import reader
+from .parallel.fixed_point import outgrown, scale_for
+from .parallel.team import TASK
+from .parallel.words import now, write_real
+
+SCALE, NEXT_SCALE, IMPULSE_QUANTUM, SHORTER_QUANTUM = range(STABLE + 1, STABLE + 5)
+"""Numbers after those of the clock: quanta per newton of the present forces and of the next forces; mean of two steps
+over the scale, N s; a quarter of the difference of two steps over the scale (motion.py)."""
+SAFETY, GROWTH, LEAST_STABLE, LANDING, NEXT, FLOOR, MANY = range(SHORTER_QUANTUM + 1, SHORTER_QUANTUM + 8)
+"""Numbers that are constant in a program: limits of the clock (``Clock.limits``); time of the first output or request,
+s; force, N, down to which the scale is refined. MANY: the number of all numbers."""
+STOP, STEPS, MOST_STEPS, DEADLINE, TIME = range(5)
+"""Words of a program: 0, or the reason for which the program ends; steps so far, and largest number of steps; wall
+time at which the program ends, ns; two words for reading the clock."""
+SCHEDULED, EVENT = 1, 2
+"""Reasons for which a program ends."""
+SIZE = TIME + 2
+"""Number of words."""
+
+
+class Ties(NamedTuple):
+    """Words of the tables of all stages that follow numbers of the program (parallel/arguments.py)."""
+
+    number: Ints
+    """(k,) index of the number."""
+    factor: Floats
+    """(k,) constant factor."""
+    address: Ints
+    """(k,) address of the word."""
+
+
+_F1, _I1, _I2 = types.float64[::1], types.int64[::1], types.int64[:, ::1]
+_TIES = record(Ties, _I1, _F1, _I1)
+DECIDE = _I1, _F1, _I2, _TIES
+"""Types of the arguments of ``decide``: words, numbers, peaks of each thread (elements/records.py), ties."""
+_of_decide = reader(*DECIDE)
+
+
+@njit(types.void(_F1, _TIES), cache=True, error_model="numpy")
+def spread(numbers, ties):  # type: ignore[no-untyped-def]
+    """Computes the quanta from the steps and the scale, and writes the numbers into the tables of the stages."""
+    numbers[IMPULSE_QUANTUM] = numbers[MEAN_DT] / numbers[SCALE]
+    numbers[SHORTER_QUANTUM] = numbers[SHORTER] / numbers[SCALE]
+    for k in range(len(ties.number)):
+        write_real(ties.address[k], numbers[ties.number[k]] * ties.factor[k])
+
+
+@njit("int64(int64[::1], float64[::1], int64[::1])", cache=True, error_model="numpy")
+def _ends(words, numbers, peaks):  # type: ignore[no-untyped-def]
+    """Whether other code than the program must complete the step: EVENT if a tet or a force has failed, a tet is worn
+    or a face is overstressed; SCHEDULED if an output or a request is scheduled; else 0.
+    """
+    limit = np.int64(peaks[LARGEST_LIMIT]).view(np.float64)
+    force = np.int64(peaks[LARGEST_FORCE]).view(np.float64)
+    if not (math.isfinite(limit) and math.isfinite(force)) or outgrown(force, numbers[SCALE]):
+        return EVENT
+    if peaks[WORN] != 0 or peaks[HOT] != 0:
+        return EVENT
+    late = words[STEPS] >= words[MOST_STEPS] or now(words, TIME) >= words[DEADLINE]
+    return SCHEDULED if late or numbers[T] >= numbers[NEXT] else 0
+
+
+@njit(TASK, cache=True, error_model="numpy")
+def decide(table, begin, end, thread):  # type: ignore[no-untyped-def]
+    """Stage after the elements: advances the time, then either sets STOP, or chooses the next step as step.py does and
+    prepares all tables for it.
+    """
+    words, numbers, peaks, ties = _of_decide(table)
+    gather_peaks(peaks)
+    numbers[SCALE] = numbers[NEXT_SCALE]
+    numbers[T], numbers[LOST] = advanced(numbers[T], numbers[LOST], numbers[DT], numbers[LANDING])
+    words[STEPS] += 1
+    words[STOP] = _ends(words, numbers, peaks[0])
+    if words[STOP] != 0:
+        return
+    limit = np.int64(peaks[0, LARGEST_LIMIT]).view(np.float64)
+    last_dt, left = numbers[DT], numbers[LANDING] - numbers[T]
+    stable, dt, mean_dt, shorter = chosen(limit, numbers[SAFETY], numbers[GROWTH], numbers[STABLE], last_dt, left)
+    if stable < numbers[LEAST_STABLE]:
+        words[STOP] = EVENT
+        return
+    numbers[STABLE], numbers[LAST_DT], numbers[DT] = stable, last_dt, dt
+    numbers[MEAN_DT], numbers[SHORTER] = mean_dt, shorter
+    force = np.int64(peaks[0, LARGEST_FORCE]).view(np.float64)
+    numbers[NEXT_SCALE] = scale_for(max(force, numbers[FLOOR]))
+    peaks[:] = 0
+    spread(numbers, ties)
