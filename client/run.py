@@ -59,22 +59,22 @@ class Run:
         is too busy, the client repeats the request for two minutes.
         """
         deadline = math.inf if timeout is None else time.monotonic() + timeout
-        heard = time.monotonic()
+        received = time.monotonic()
         while True:
             left = max(0.0, min(_WAIT, deadline - time.monotonic()))
             try:
                 info = self.session.get(RunInfo, self.path, wait=left)
             except (UnreachableError, ServiceError) as error:
-                if not passes(error) or time.monotonic() - heard > _PATIENCE:
+                if not passes(error) or time.monotonic() - received > _PATIENCE:
                     raise
                 if time.monotonic() >= deadline:
                     raise TimeoutError(f"run {self.id}: {error}") from None
                 time.sleep(min(1.0, left))
                 continue
-            heard = time.monotonic()
+            received = time.monotonic()
             if info.state.final:
                 return info
-            if heard >= deadline:
+            if received >= deadline:
                 raise TimeoutError(f"run {self.id} is still {info.state.value} after {duration(timeout)}")
 
     def cancel(self) -> RunInfo:

@@ -69,11 +69,11 @@ def explained(run: Watched, known: Live) -> Iterator[None]:
     over = threading.Event()
 
     def ask() -> None:
-        heard = -1
+        received = -1
         while not over.wait(REASON_EVERY):
-            if known.state is State.QUEUED or known.seq == heard:
+            if known.state is State.QUEUED or known.seq == received:
                 _ask(run, known)
-            heard = known.seq
+            received = known.seq
 
     thread = threading.Thread(target=ask, name="reason", daemon=True)
     thread.start()

@@ -40,6 +40,8 @@ ALLOWED = {
     r"\"who\"": "the name of an element of the page",
 }
 """Contexts in which a banned word is correct, and why."""
+NAMES = ("told", "said", "heard")
+"""Banned words that stood as names for messages, answers and warnings; no variable, attribute or function has them."""
 NOT_YET: dict[str, int] = {}
 """Folders that are not clean yet, with their numbers of findings. These numbers may fall and not rise."""
 
@@ -149,6 +151,23 @@ READERS: dict[str, Callable[[str], Iterator[Text]]] = {
 # Checks
 
 
+def of_names(path: Path, source: str) -> Iterator[tuple[int, str, str]]:
+    """Names of variables and attributes that are banned words: a message, an answer or a warning has its own name."""
+    if path.suffix == ".py":
+        tokens = tokenize.generate_tokens(io.StringIO(source).readline)
+        names = [(token.start[0], token.string, token.line) for token in tokens if token.type == tokenize.NAME]
+    else:
+        plain = (
+            re.sub(r"//[^\n]*|\"[^\"\n]*\"|'[^'\n]*'", "", source).splitlines()
+            if path.suffix in (".js", ".mjs")
+            else []
+        )
+        names = [(n, name, line) for n, line in enumerate(plain, 1) for name in re.findall(r"\w+", line)]
+    for number, name, line in names:
+        if name.strip("_").lower() in NAMES:
+            yield number, f"name {name}", line.strip()[:90]
+
+
 def of_words(text: Text) -> Iterator[tuple[int, str, str]]:
     """Banned words of a text outside code font; line, rule and words."""
     plain = re.sub(r"``[^`]*``|`[^`]*`|https?://\S+", lambda found: "\n" * found[0].count("\n"), text.words)
@@ -190,6 +209,7 @@ def findings(path: Path) -> list[Finding]:
     found = [*of_lengths(source), *of_paragraphs(source)] if path.suffix == ".md" else []
     if name not in WORDS_THEMSELVES:
         found += [each for text in READERS[path.suffix](source) for each in of_words(text)]
+        found += of_names(path, source)
     return [Finding(name, *each) for each in sorted(found)]
 
 

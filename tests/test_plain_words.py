@@ -1,6 +1,7 @@
 """Tests of the checker of words: it finds the words that CONVENTIONS.md bans, and ignores code and plain prose."""
 
 from collections import Counter
+from pathlib import Path
 
 import pytest
 
@@ -44,6 +45,18 @@ def test_each_kind_of_text_is_searched(suffix: str, source: str, rule: str) -> N
 @pytest.mark.parametrize(("suffix", "source"), [(s, each) for s, cases in RIGHT.items() for each in cases])
 def test_code_and_plain_prose_pass(suffix: str, source: str) -> None:
     assert rules(suffix, source) == []
+
+
+@pytest.mark.parametrize(
+    ("name", "source", "count"),
+    [
+        ("a.py", "told = [1]\nx = told + y.said  # told\nz = 'told'", 3),
+        ("a.js", "const told = 1; // told\nthis.said = 'told';", 2),
+        ("a.md", "`told`", 0),
+    ],
+)
+def test_names_of_variables_are_checked(name: str, source: str, count: int) -> None:
+    assert len(list(plain_words.of_names(Path(name), source))) == count
 
 
 def test_the_line_of_a_word_is_reported() -> None:

@@ -21,8 +21,8 @@ def of_set(mesh: Any, name: str) -> Any:
     known = {array.removeprefix(_SET): array for array in mesh.point_data if array.startswith(_SET)}
     array = layout.set_array(name)
     if array not in known.values():
-        told = allowed(name, known) if known else "this frame has no set; a case names sets in run.sets"
-        raise LookError(f"on = {name!r}: {told}")
+        hint = allowed(name, known) if known else "this frame has no set; a case names sets in run.sets"
+        raise LookError(f"on = {name!r}: {hint}")
     chosen = mesh.extract_points(np.flatnonzero(mesh.point_data[array]), adjacent_cells=True, include_cells=True)
     if not chosen.n_cells:
         raise LookError(f"on = {name!r}: no tet of this frame has a node in the set")

@@ -86,7 +86,7 @@ export function take(live, history, info = {}, plan = null) {
   live.balances = balance;
   live.snapshots = snapshots;
   Object.assign(live, { log, leftOut: history.log_left_out ?? 0, warnings: new Map(warnings.map(({ text, level }) => [text, level])) });
-  Object.assign(live, { seq: last, state, heard: Date.now() / 1000 });
+  Object.assign(live, { seq: last, state, received: Date.now() / 1000 });
   Object.assign(live, { cause: info.cause ?? null, message: info.message ?? "" });
   if (elapsed > 0) Object.assign(live, { wall: Date.now() / 1000, began: Date.now() / 1000 - elapsed, loaded: Date.now() / 1000 });
   if (rows.length) latest(live, rows.at(-1), ranks, info.progress, plan);

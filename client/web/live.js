@@ -10,7 +10,7 @@ const OWN = new Set(["contact", "exchange", "output"]); // Phases with a group o
 
 export class Live {
   constructor(run) {
-    Object.assign(this, { run, seq: 0, state: "", cause: null, message: "", began: null, wall: 0, heard: 0 });
+    Object.assign(this, { run, seq: 0, state: "", cause: null, message: "", began: null, wall: 0, received: 0 });
     Object.assign(this, { started: null, progress: null, load: null, counts: null, finished: null, loaded: 0 });
     this.plan = null; // Case with all defaults, null while missing
     this.columns = { units: {}, values: { t: [] }, lines: 0 }; // Columns of history.csv: by name, each as long as t
@@ -30,7 +30,7 @@ export class Live {
     if (message.seq <= this.seq) return false;
     this.seq = message.seq;
     this.wall = message.wall;
-    this.heard = Date.now() / 1000;
+    this.received = Date.now() / 1000;
     this[`on_${message.type}`]?.(message);
     return true;
   }
@@ -126,7 +126,7 @@ export class Live {
   }
 
   // Age of the newest message, s, by the clock of this machine.
-  get age() { return this.heard ? Date.now() / 1000 - this.heard : undefined; }
+  get age() { return this.received ? Date.now() / 1000 - this.received : undefined; }
 }
 
 // Removes every second point of the older half of a long series.

@@ -50,7 +50,7 @@ class Span:
 class _Transfer:
     """A connection that sends bytes of a file."""
 
-    heard: float = field(default_factory=time.monotonic)
+    received: float = field(default_factory=time.monotonic)
     given_up: bool = False
     busy: bool = False
     """Whether all bytes have arrived and are being verified."""
@@ -105,7 +105,7 @@ class Receiver:
         """Registers the connection that sends bytes of a file. A file has one such connection at a time. Raises
         ServiceError 409."""
         while (other := self._open.get((owner, sha256))) is not None:
-            if other.busy or time.monotonic() - other.heard < _STALLED:
+            if other.busy or time.monotonic() - other.received < _STALLED:
                 raise _in_progress()
             other.give_up()
             await other.over.wait()
@@ -131,7 +131,7 @@ class Receiver:
         try:
             while not transfer.given_up and (chunk := await _next(chunks, transfer)) is not None:
                 gathered += chunk
-                transfer.heard = time.monotonic()
+                transfer.received = time.monotonic()
                 if len(gathered) >= _GATHERED:
                     await self._pool.run(part.write, bytes(gathered))
                     gathered.clear()

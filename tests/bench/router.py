@@ -46,10 +46,10 @@ def main(port: str) -> None:
     }.items():
         config.insert_json5(key, json.dumps(value))
     session = zenoh.open(config)
-    heard = session.declare_subscriber("conoid/**", lambda sample: None)
+    received = session.declare_subscriber("conoid/**", lambda sample: None)
     print("ready", flush=True)
     threading.Event().wait()
-    heard.undeclare()  # type: ignore[no-untyped-call]
+    received.undeclare()  # type: ignore[no-untyped-call]
 
 
 if __name__ == "__main__":

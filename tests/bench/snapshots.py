@@ -91,8 +91,8 @@ def _read(endpoint: str, number: int) -> None:
     }.items():  # fmt: skip
         config.insert_json5(key, json.dumps(value))
     sessions = [zenoh.open(config) for _ in range(number)]
-    heard = [session.declare_subscriber("conoid/**", lambda sample: None) for session in sessions]
-    print("ready", len(heard), flush=True)
+    received = [session.declare_subscriber("conoid/**", lambda sample: None) for session in sessions]
+    print("ready", len(received), flush=True)
     signal.pause()
 
 

@@ -84,15 +84,15 @@ def test_a_wall_of_radioss_has_the_prescribed_motion_of_its_node(tmp_path: Path)
 
 
 @pytest.mark.parametrize(
-    ("options", "told"),
+    ("options", "message"),
     [
         ((), "NODE = 3: a wall that moves with its node; give it a mass, or its node a /IMPVEL"),
         ((*GRIP, *PUSH, *impvel("Y", 1), *impvel("X", 2, 2, 1)), "NODE = 3: the components of its motion have several"),
     ],
 )
-def test_a_wall_whose_motion_is_unclear_is_refused(tmp_path: Path, options: tuple[str, ...], told: str) -> None:
+def test_a_wall_whose_motion_is_unclear_is_refused(tmp_path: Path, options: tuple[str, ...], message: str) -> None:
     (line,) = read(tmp_path, "a_0000.rad", radioss(*ELASTIC, *ALL, *PISTON, *options), None).refusals
-    assert told in line
+    assert message in line
 
 
 @pytest.mark.parametrize(

@@ -165,16 +165,16 @@ def test_progress_of_the_start_is_reported_and_changes_no_state() -> None:
 def test_a_run_without_messages_is_detected(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(progress, "LONGEST", 0.05)
     lines: list[str] = []
-    heard = threading.Event()
+    received = threading.Event()
 
     def write(text: str) -> None:
         lines.append(text)
         if "still" in text:
-            heard.set()
+            received.set()
 
     def story() -> Iterator[AnyMessage]:
         yield run_messages.status(1, "starting", message="meshing tile, part 2 of 3")
-        assert heard.wait(30.0)
+        assert received.wait(30.0)
         yield run_messages.status(2, "running")
 
     tell(story(), Live(run_messages.RUN), write)
@@ -203,7 +203,7 @@ class Queued:
     id, title, reason = run_messages.RUN, "A bar", "waiting for 4 of 2 slots; 1 free"
 
     def __init__(self) -> None:
-        self.heard = threading.Event()
+        self.received = threading.Event()
 
     def status(self) -> "Queued":
         return self
@@ -213,7 +213,7 @@ class Queued:
 
     def messages(self, *, link: Link) -> Iterator[AnyMessage]:
         yield run_messages.status(1, "queued")
-        assert self.heard.wait(10)
+        assert self.received.wait(10)
         yield run_messages.status(2, "running")
         yield run_messages.status(3, "succeeded")
 
@@ -233,7 +233,7 @@ class Deserted(Queued):
 
     def messages(self, *, link: Link) -> Iterator[AnyMessage]:
         yield run_messages.status(1, "running")
-        assert self.heard.wait(10)
+        assert self.received.wait(10)
         yield run_messages.status(2, "succeeded")
 
 
@@ -243,13 +243,13 @@ def test_a_server_that_has_ended_is_reported(monkeypatch: pytest.MonkeyPatch) ->
     monkeypatch.setattr("conoid.client.watch.REASON_EVERY", 0.01)
     run, lines = Deserted(), list[str]()
 
-    class Heard(Console):
+    class Recorder(Console):
         def print(self, *objects: object, **options: object) -> None:
             lines.append(str(objects[0]))
             if "no server answers, for " in lines[-1]:
-                run.heard.set()
+                run.received.set()
 
-    known = watch(run, live=False, console=Heard(file=io.StringIO()))
+    known = watch(run, live=False, console=Recorder(file=io.StringIO()))
     assert any(line.endswith("it was running at its last message") for line in lines)
     assert "no server answers" not in rendered(known), "it has come back"
     known.away = run_messages.START
@@ -273,13 +273,13 @@ def test_the_reason_of_waiting_in_the_queue_is_reported(monkeypatch: pytest.Monk
     monkeypatch.setattr("conoid.client.watch.REASON_EVERY", 0.01)
     run, out = Queued(), io.StringIO()
 
-    class Heard(Console):
+    class Recorder(Console):
         def print(self, *objects: object, **options: object) -> None:
             super().print(*objects, **options)  # type: ignore[arg-type]
             if run.reason in str(objects):
-                run.heard.set()
+                run.received.set()
 
-    known = watch(run, live=False, console=Heard(file=out, width=200))
+    known = watch(run, live=False, console=Recorder(file=out, width=200))
     lines = [line for line in out.getvalue().splitlines() if run.reason in line]
     assert lines
     assert all("still queued" in line for line in lines)

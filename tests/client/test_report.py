@@ -159,14 +159,14 @@ def test_the_command_names_the_file_after_the_run(folder: Path, quiet_home: Path
 
 def test_a_long_report_prints_its_progress(folder: Path, quiet_home: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(progress, "LONGEST", 0.05)
-    heard = threading.Event()
+    received = threading.Event()
 
     def renderer(*lines: str) -> None:
         if lines[0].startswith("writing bar.html: energy, "):
-            heard.set()
+            received.set()
 
     def energy(*_: object) -> list[str]:
-        assert heard.wait(30.0)
+        assert received.wait(30.0)
         return []
 
     monkeypatch.setattr(options, "complain", renderer)

@@ -79,10 +79,10 @@ def test_a_file_arrives_over_a_line_that_breaks_again_and_again(
 ) -> None:
     monkeypatch.setattr(sending, "_LARGEST", 1 << 17)
     path = file_of(tmp_path, 3_000_000)
-    heard: list[str] = []
+    received: list[str] = []
     cuts = (1000, 200_000, 200_100, 1_000_000, 1_900_000, 2_900_000)
     with line_to(server.session.url, *cuts) as line, Session(line.url, server.token) as session:
-        session.outbox.say = heard.append
+        session.outbox.say = received.append
         session.outbox.ready(case_with(path), Path())
         assert line.broken == len(cuts)
         assert line.carried < 3_000_000 + len(cuts) * (1 << 17) + 60_000, "what had arrived was not sent again"
@@ -90,7 +90,7 @@ def test_a_file_arrives_over_a_line_that_breaks_again_and_again(
         session.outbox.ready(case_with(path), Path())
         assert line.carried < before + 1000, "the server lacks nothing"
     assert arrived(server, path)
-    assert heard[0] == "sending 1.inp, 0 B of 3.00 MB"
+    assert received[0] == "sending 1.inp, 0 B of 3.00 MB"
 
 
 @pytest.mark.slow

@@ -103,7 +103,7 @@ class Browser:
         target = self.call("Target.createTarget", url="about:blank", browserContextId=context)["targetId"]
         session = self.call("Target.attachToTarget", targetId=target, flatten=True)["sessionId"]
         page = Page(self, session, target, context)
-        self._listeners[session] = page.heard
+        self._listeners[session] = page.on_event
         page.open(width, height, dark=dark, phone=phone)
         return page
 
@@ -175,7 +175,7 @@ class Page:
         """Calls a method of the protocol for this page. Raises PageError."""
         return self._browser.call(method, self._session, **params)
 
-    def heard(self, method: str, params: dict[str, Any]) -> None:
+    def on_event(self, method: str, params: dict[str, Any]) -> None:
         """Handles an event of this page, in the thread that reads the pipe."""
         if method == "Runtime.consoleAPICalled" and params["type"] == "error":
             self.errors.append(" ".join(str(one.get("value", one.get("description"))) for one in params["args"]))

@@ -50,7 +50,7 @@ def test_a_node_publishes_with_tls_and_only_with_the_authority(tmp_path: Path, m
     assert stranger._open() is None, "a router without a trusted certificate"
     stranger.close()
     monkeypatch.setenv("CONOID_ZENOH_AUTHORITY", authority)
-    heard = threading.Event()
+    received = threading.Event()
     config = zenoh.Config()
     for name, value in {
         "mode": "client", "connect/endpoints": [router.local_endpoint], "scouting/multicast/enabled": False,
@@ -58,12 +58,12 @@ def test_a_node_publishes_with_tls_and_only_with_the_authority(tmp_path: Path, m
     }.items():  # fmt: skip
         config.insert_json5(name, json.dumps(value))
     with zenoh.open(config) as session:
-        session.declare_subscriber(f"{reader.prefix}/**", lambda sample: heard.set())
+        session.declare_subscriber(f"{reader.prefix}/**", lambda sample: received.set())
         rank = worker.Telemetry(listen, access.prefix)
         for _ in range(200):
             rank.tell(Log(run="run", level="info", text="from a node"))
-            if heard.wait(0.1):
+            if received.wait(0.1):
                 break
         rank.close()
     router.close()
-    assert heard.is_set()
+    assert received.is_set()

@@ -261,17 +261,17 @@ def test_ranks_and_threads_by_both_launchers(solver: Site, profile: str, ranks: 
     assert (taken["ranks"], taken["threads"], taken["digest"][:16]) == (ranks, threads, DIGEST)
 
 
-class Heard:
+class Recorder:
     """A subscription that stores the messages that have arrived."""
 
     def __init__(self, link: Link) -> None:
         self.name, self.trouble, self._link = link.name, "", link
-        self.heard: list[AnyMessage] = []
+        self.arrived: list[AnyMessage] = []
 
     def get(self, timeout: float) -> AnyMessage | None:
         message = self._link.get(timeout)
         if message is not None:
-            self.heard.append(message)
+            self.arrived.append(message)
         return message
 
     def close(self) -> None:
@@ -284,10 +284,10 @@ def test_a_run_is_watched_live_over_zenoh(solver: Site) -> None:
     run = solver.submit(with_ranks(2, LONG), "pmi2")
     token = str(solver.ann.http.headers["Authorization"]).removeprefix("Bearer ")
     with connect(str(solver.ann.http.base_url), token) as session:
-        link = Heard(session.run(run).link())
+        link = Recorder(session.run(run).link())
         assert link.name == "Zenoh"
         received = list(session.run(run).messages(link=link))
-    assert sum(isinstance(message, Progress) for message in link.heard) > 5
+    assert sum(isinstance(message, Progress) for message in link.arrived) > 5
     assert any(isinstance(message, Finished) for message in received)
     assert [message.seq for message in received] == list(range(1, received[-1].seq + 1)), "nothing is lost on the way"
     assert solver.ended(run)["state"] == "succeeded"

@@ -42,12 +42,12 @@ class Ear:
     """A subscription of a session to a key, with the messages that have arrived."""
 
     def __init__(self, session: zenoh.Session, key: str) -> None:
-        self.heard: list[tuple[str, bytes]] = []
+        self.received: list[tuple[str, bytes]] = []
         self._news = threading.Event()
         self._subscriber = session.declare_subscriber(key, self._take)
 
     def _take(self, sample: zenoh.Sample) -> None:
-        self.heard.append((str(sample.key_expr), sample.payload.to_bytes()))
+        self.received.append((str(sample.key_expr), sample.payload.to_bytes()))
         self._news.set()
 
     def hears(self, say: Callable[[], None], patience: float = PATIENCE) -> bool:
@@ -81,8 +81,8 @@ def test_each_user_receives_messages_of_own_runs_only(telemetry: Telemetry) -> N
         workers.put("conoid/v1/bob/r2/state", b"false")
         forger.put(f"{worker.prefix}/state", b"false")
         time.sleep(0.2)
-        assert {payload for _, payload in hers.heard} == {b"hello"}
-        assert his.heard == []
+        assert {payload for _, payload in hers.received} == {b"hello"}
+        assert his.received == []
 
 
 def test_the_history_and_the_life_sign_pass_the_rules(telemetry: Telemetry) -> None:
@@ -102,13 +102,13 @@ def test_the_history_and_the_life_sign_pass_the_rules(telemetry: Telemetry) -> N
         publisher.put(b"early")
         # A subscriber requests the history once. The declaration of the publisher's cache arrives over another
         # connection, perhaps later: the subscriber repeats the request until the history arrives.
-        heard, deadline = threading.Event(), time.monotonic() + PATIENCE
-        while not heard.is_set():
+        received, deadline = threading.Event(), time.monotonic() + PATIENCE
+        while not received.is_set():
             assert time.monotonic() < deadline
             late = ext.declare_advanced_subscriber(
-                anns, f"{worker.prefix}/counts", lambda _: heard.set(), history=ext.HistoryConfig()
+                anns, f"{worker.prefix}/counts", lambda _: received.set(), history=ext.HistoryConfig()
             )
-            heard.wait(1.0)
+            received.wait(1.0)
             late.undeclare()  # type: ignore[no-untyped-call]
         publisher.undeclare()  # type: ignore[no-untyped-call]
 
@@ -163,10 +163,10 @@ def test_the_server_publishes_its_own_states(process: MakeProcess, tmp_path: Pat
         ear = Ear(session, f"{zenoh_['prefix']}/**")
         run = ann.submit()
         ann.wait_for(run)
-        heard = [from_msgpack(payload) for _, payload in ear.heard]
-        states = [(message.seq, getattr(message, "state", "")) for message in heard]
+        received = [from_msgpack(payload) for _, payload in ear.received]
+        states = [(message.seq, getattr(message, "state", "")) for message in received]
         assert states == [(2, "queued"), (3, "starting"), (ann.events(run)[-1]["seq"], "succeeded")]
-        assert {key for key, _ in ear.heard} == {f"conoid/v1/ann/{run}/state"}
+        assert {key for key, _ in ear.received} == {f"conoid/v1/ann/{run}/state"}
     elsewhere = {"Host": "conoid.example.org"}
     assert ann.http.get("/v1/me", headers=elsewhere).json()["zenoh"] is None, "it listens on loopback only"
     seen = json.loads((tmp_path / "runs" / run / "environment.json").read_text())

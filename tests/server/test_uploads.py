@@ -297,7 +297,7 @@ def test_another_connection_waits_and_continues_a_stalled_one(server: Running) -
     book["ann", sha256] = transfer
     assert refused(put(server.ann, sha256, data), 409, "in_progress") == "another connection brings this file"
     assert put(server.bob, sha256, data).status_code == 201, "of another user"
-    transfer.heard -= 2 * receiving._STALLED
+    transfer.received -= 2 * receiving._STALLED
     real = transfer.give_up
 
     def leave() -> None:

@@ -81,15 +81,15 @@ def test_from_http_to_a_result_live(ann: User) -> None:
         "transport/auth/usrpwd": {"user": access["user"], "password": access["password"]},
     }.items():
         config.insert_json5(key, json.dumps(value))
-    heard: list[Any] = []
+    received: list[Any] = []
     blobs: dict[str, bytes] = {}
     over = threading.Event()
 
     def hear(sample: zenoh.Sample) -> None:
-        heard.append(from_msgpack(sample.payload.to_bytes()))
+        received.append(from_msgpack(sample.payload.to_bytes()))
         if str(sample.key_expr).endswith("/fragments"):
-            blobs[heard[-1].sha256] = fragments_from_msgpack(sample.payload.to_bytes()).blob
-        if getattr(heard[-1], "state", "") == "succeeded" and type(heard[-1]).__name__ == "Status":
+            blobs[received[-1].sha256] = fragments_from_msgpack(sample.payload.to_bytes()).blob
+        if getattr(received[-1], "state", "") == "succeeded" and type(received[-1]).__name__ == "Status":
             over.set()
 
     with zenoh.open(config) as session:
@@ -105,8 +105,8 @@ def test_from_http_to_a_result_live(ann: User) -> None:
     assert {"started", "progress", "load", "frame", "finished", "status"} <= {event["type"] for event in events}
     states = ["accepted", "queued", "starting", "running", "succeeded"]
     assert list(dict.fromkeys(ann.states(run))) == states, "a cold start reports its progress more than once"
-    assert {message.seq for message in heard} <= set(range(1, len(events) + 1))
-    assert {type(message).__name__ for message in heard} >= {"Started", "Progress", "Load", "Finished"}
+    assert {message.seq for message in received} <= set(range(1, len(events) + 1))
+    assert {type(message).__name__ for message in received} >= {"Started", "Progress", "Load", "Finished"}
     assert len(seen["outcome"]["digest"]) == 64
     assert seen["outcome"]["elements"] == seen["estimate"]["elements"]
     for name in ("frames/000003.vtkhdf", "history.csv", "log/rank-1.log"):

@@ -234,9 +234,9 @@ def test_the_start_reports_its_progress(tmp_path: Path, monkeypatch: pytest.Monk
     """Cached meshes are read without a progress message."""
     monkeypatch.setenv("CONOID_CACHE_DIR", str(tmp_path))
     case = parse_toml(TWO_BOXES)
-    heard: list[list[str]] = []
+    received: list[list[str]] = []
     for _ in range(2):
-        heard.append([])
-        domain.build(case, tmp_path, SerialComm(), heard[-1].append)
-    assert heard[0] == ["meshing left, part 1 of 2", "meshing right, part 2 of 2", "cutting 384 tets for 1 rank"]
-    assert heard[1] == heard[0][-1:]
+        received.append([])
+        domain.build(case, tmp_path, SerialComm(), received[-1].append)
+    assert received[0] == ["meshing left, part 1 of 2", "meshing right, part 2 of 2", "cutting 384 tets for 1 rank"]
+    assert received[1] == received[0][-1:]

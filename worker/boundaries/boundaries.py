@@ -167,13 +167,13 @@ class Stopping(Boundary):
         self.given: Floats = np.zeros((len(nodes), 3 * walls))
         self._kept = (*KEPT, "given")
         if reports:
-            self._told = self.given.copy()
-            self._kept = (*self._kept, "_told")
+            self._reported = self.given.copy()
+            self._kept = (*self._kept, "_reported")
 
     def since_last_report(self) -> Floats:
         """(n, 3) impulses of the walls on each node since the last call, N s."""
-        found = (self.given - self._told).reshape(len(self.given), -1, 3).sum(axis=1)
-        self._told[:] = self.given
+        found = (self.given - self._reported).reshape(len(self.given), -1, 3).sum(axis=1)
+        self._reported[:] = self.given
         return np.asarray(found)
 
 
