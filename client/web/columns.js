@@ -1,25 +1,29 @@
 // Columns of the tables of runs: the value of a row that a column shows, and its unit.
 
-import { count, duration, exact, scaleOf, si, UNKNOWN, when } from "./figures.js";
+import { count, duration, exact, percent, scaleOf, si, UNKNOWN, when } from "./figures.js";
 import { FINAL } from "./live.js";
-import { valueOf } from "./runtable.js";
+import { prominent, valueOf } from "./runtable.js";
+import { titles } from "./titles.js";
 
 const STATES = ["running", "stopping", "starting", "queued", "accepted", "succeeded", "cancelled", "timed_out", "failed", "lost"];
+const ID = 9; // Number of characters of a short id beside the name.
+const NOTE = 10; // Largest number of characters of the reason beside a state that the width allows for.
 
 export const share = (row) => (row.state === "succeeded" ? 1 : row.progress?.end_time > 0 ? row.progress.t / row.progress.end_time : 0);
 export const cores = ({ ranks, threads }) => (threads > 1 ? `${ranks}×${threads}` : String(ranks));
 export const took = (row) => (row.started && FINAL.has(row.state) ? row.finished - row.started : null);
 
 // { id, title, group, number, value(row), text(row) }: rows are sorted by `value`, which is null if missing;
+// Columns with a smaller `rank` stay in a narrow window; `letters(row)` is the width of a cell that is not its text.
 // `number` columns are right-aligned, and may have a `unit`, in which `write(value)` formats a number.
 const FIRST = [
-  { id: "run", title: "run", value: (row) => row.name, text: (row) => row.name, width: 27 },
-  { id: "state", title: "state", value: (row) => STATES.indexOf(row.state) - share(row), text: (row) => row.state, width: 24 },
+  { id: "run", title: "run", value: (row) => row.name, text: (row) => row.name, letters: ({ name }) => name.length + ID },
+  { id: "state", title: "state", value: (row) => STATES.indexOf(row.state) - share(row), text: (row) => row.state, letters },
 ];
 const LAST = [
   { id: "references", title: "references", value: (row) => (row.references ? row.missed.length : null), text: references },
   { id: "labels", title: "labels", value: labels, text: labels },
-  { id: "submitted", title: "submitted", value: (row) => row.submitted, text: (row) => when(row.submitted) },
+  { id: "submitted", title: "submitted", value: (row) => row.submitted, text: (row) => when(row.submitted), rank: 1 },
   { id: "took", title: "took", value: took, text: (row) => (took(row) === null ? "" : duration(took(row))), number: true },
   { id: "cores", title: "cores", full: "ranks × threads", value: (row) => row.ranks * row.threads, text: cores, number: true },
   { id: "cost", title: "CPU time", value: (row) => row.results?.get("cpu") ?? null, text: (row) => duration(row.results?.get("cpu") ?? NaN).replace(UNKNOWN, ""), number: true },
@@ -37,6 +41,18 @@ function labels(row) {
   return own.map(([name, value]) => `${name}=${value}`).join(" ");
 }
 
+// The state and its detail: progress, reason of waiting, or cause of the end.
+export function detail(row) {
+  const note = FINAL.has(row.state) || !row.progress ? (row.state === "succeeded" ? "" : row.message || row.reason || row.cause || "") : percent(share(row), 0);
+  return note.startsWith(row.state) ? "" : note;
+}
+
+// Number of characters that the state and its detail need; a bar of the progress takes as much as seven.
+function letters(row) {
+  const note = Math.min(NOTE, detail(row).length);
+  return 0.9 * row.state.length + 4 + 0.9 * (note && 2 + note) + (row.progress && !FINAL.has(row.state) ? 7 : 0);
+}
+
 function references(row) {
   if (!row.references) return "";
   return row.missed.length ? `${row.missed.length} of ${row.references} missed` : `${row.references} pass`;
@@ -44,20 +60,23 @@ function references(row) {
 
 // All columns of some rows. `keys`: keys of cases that differ between rows; `units`: units of results by name.
 export function columnsOf(rows, keys, units) {
-  const values = keys.map((key, n) => numeric(rows, {
-    id: `value:${key}`, title: key, group: "values that differ", shown: n < MOST_VALUES, value: (row) => valueOf(row, key), unit: rows.find((row) => row.kind?.units[key])?.kind.units[key] ?? "", exact: true,
+  const called = titles(keys, rows);
+  const first = [...prominent(rows, keys)].slice(0, MOST_VALUES);
+  const values = keys.map((key) => numeric(rows, {
+    id: `value:${key}`, title: called.get(key), full: key, group: "values that differ", shown: first.includes(key), rank: first.indexOf(key), value: (row) => valueOf(row, key), unit: rows.find((row) => row.kind?.units[key])?.kind.units[key] ?? "", exact: true,
   }));
-  const names = [...units.keys()].filter((name) => name !== "cpu" && rows.some((row) => (row.results?.get(name) ?? null) !== null));
+  const number = new Map([...units.keys()].map((name) => [name, rows.filter((row) => (row.results?.get(name) ?? null) !== null).length]));
+  const names = [...units.keys()].filter((name) => name !== "cpu" && number.get(name)).sort((a, b) => number.get(b) - number.get(a));
   const probes = names.filter((name) => /^probe\.[^.]*$/.test(name)).slice(0, MOST_PROBES);
   const telling = (name) => probes.includes(name) || TELLING.test(name);
   names.sort((a, b) => telling(b) - telling(a));
-  const results = names.map((name) => numeric(rows, {
+  const results = names.map((name, n) => numeric(rows, {
     id: `result:${name}`, title: titled(name), group: "results", full: name, unit: units.get(name),
-    shown: telling(name),
+    shown: telling(name), rank: n,
     value: (row) => row.results?.get(name) ?? null, unsure,
   }));
-  const facts = (list) => list.map((one) => ({ group: "run", shown: !IF_ANY.has(one.id) || rows.some((row) => one.text(row)), ...one }));
-  return brief([...facts(FIRST), ...values, ...results, ...facts(LAST)]);
+  const facts = (list) => list.map((one) => ({ group: "run", rank: MOST_VALUES, shown: !IF_ANY.has(one.id) || rows.some((row) => one.text(row)), ...one }));
+  return [...facts(FIRST), ...values, ...results, ...facts(LAST)];
 }
 
 const titled = (name) => name.replace(/worst_residual/, "worst energy residual").replace(/^probe\./, "").replace(/^reference\.(.*)$/, "$1, reference").replace(/\.(min|max)$/, " $1");
@@ -72,17 +91,4 @@ function numeric(rows, column) {
   const measured = (one) => (!unit && Number.isInteger(one) ? count(one) : si(one / worth, "", 4));
   const text = (one) => (one === null ? "" : column.exact ? exact(one / worth) : measured(one));
   return { ...column, number: values.length > 0, worth, base: unit, unit: name, write: text, text: (row) => text(value(row)) };
-}
-
-// Short names of keys: their last parts, as many as make them unique.
-function brief(columns) {
-  const keys = columns.filter(({ id }) => id.startsWith("value:")).map(({ title }) => title);
-  const tail = (key, parts) => key.split(".").slice(-parts).join(".");
-  return columns.map((column) => {
-    if (!column.id.startsWith("value:")) return column;
-    const key = column.title;
-    let parts = 1;
-    while (tail(key, parts) !== key && keys.some((other) => other !== key && tail(other, parts) === tail(key, parts))) parts += 1;
-    return { ...column, full: key, title: tail(key, parts) };
-  });
 }

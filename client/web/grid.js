@@ -1,13 +1,16 @@
 // Element of the table of runs: sortable columns, visible rows, groups, marks.
 
-import { counted, exact, duration, h, meter, pill, percent } from "./figures.js";
+import { counted, exact, duration, h, meter, pill } from "./figures.js";
 import { FINAL } from "./live.js";
-import { share } from "./columns.js";
+import { detail, share } from "./columns.js";
 import { Windowed } from "./windowed.js";
 
-const TALL = { wide: 34, narrow: 86 }; // Height of a row, px; the same as in runs.css.
+const TALL = { wide: 34, narrow: 108 }; // Height of a row, px; the same as in runs.css.
 const SAMPLED = 200; // Number of rows that determine the width of a column.
 const LETTERS = [7, 30]; // Least and largest width of a column in characters.
+const BOX = 38; // Width of the column of marks, px.
+const BAR = 18; // Width of a scroll bar, px.
+const FIELDS = 5; // Number of values of a run in a narrow window.
 const NARROW = matchMedia("(max-width: 760px)");
 
 export class Grid {
@@ -20,7 +23,7 @@ export class Grid {
     this.rows = new Windowed(this.region, (item) => this.row(item), () => (NARROW.matches ? TALL.narrow : TALL.wide));
     this.table = h("table.runs", { "aria-label": label }, this.widths, this.head, this.rows.body);
     this.region.append(this.table);
-    NARROW.addEventListener("change", this.redraw = () => this.rows.draw());
+    NARROW.addEventListener("change", this.redraw = () => this.rows.again());
   }
 
   close() {
@@ -30,12 +33,12 @@ export class Grid {
 
   // `items`: { row } or { group }, in order; `all`: all rows, which have changed if `stamp` has changed.
   draw({ columns, sort, items, all, marked, shorts, stamp }) {
-    Object.assign(this, { columns, marked, shorts, all });
+    Object.assign(this, { columns, marked, shorts, all, sorted: sort.id });
     this.drawHead(columns, sort);
     this.measure(columns, `${stamp} ${columns.map(({ id }) => id).join()}`);
     this.table.setAttribute("aria-rowcount", items.length + 1);
     const marks = [...marked].sort().join();
-    this.rows.set(items, `${columns.map(({ id, unit }) => id + unit).join()} ${marks}`);
+    this.rows.set(items, `${columns.map(({ id, unit }) => id + unit).join()} ${marks} ${NARROW.matches && sort.id}`);
   }
 
   drawHead(columns, sort) {
@@ -57,15 +60,34 @@ export class Grid {
     return h(`th${column.number ? ".right" : ""}${column.id === "run" ? ".first" : ""}`, { scope: "col", "aria-sort": here ? (sort.down ? "descending" : "ascending") : false }, button);
   }
 
+  // The columns that have room, without those of the largest rank; those in `kept` stay in any case.
+  fitting(columns, kept, rows) {
+    const all = columns.map((column, n) => ({ column, n, wide: width(column, sampled(rows)) }));
+    let over = all.reduce((sum, { wide }) => sum + wide, 0) - this.room();
+    const spare = all.filter(({ column: { id, rank } }) => !kept(id) && rank !== undefined && id !== "run" && id !== "state").sort((a, b) => b.column.rank - a.column.rank || b.n - a.n);
+    const gone = new Set();
+    for (const { n, wide } of spare) {
+      if (over <= 0) break;
+      gone.add(n);
+      over -= wide;
+    }
+    return columns.filter((_, n) => !gone.has(n));
+  }
+
+  // Room for columns in characters; a narrow window shows the values of a run below each other.
+  room() {
+    const wide = this.region.clientWidth || this.region.parentElement?.clientWidth;
+    return NARROW.matches || !wide ? Infinity : (wide - BOX - BAR) / letterOf(this.table);
+  }
+
   // Widths that stay constant while the rows scroll.
   measure(columns, stamp) {
     if (stamp === this.stamp) return;
     this.stamp = stamp;
-    const every = Math.max(1, Math.ceil(this.all.length / SAMPLED));
-    const some = this.all.filter((_, i) => i % every === 0);
-    const letters = columns.map((column) => column.width ?? Math.min(LETTERS[1], Math.max(LETTERS[0], heading(column), ...some.map((row) => column.text(row).length))) + 2);
-    this.widths.replaceChildren(h("col", { style: { width: "38px" } }), ...letters.map((n) => h("col", { style: { width: `${n}ch` } })));
-    this.table.style.width = `max(100%, calc(38px + ${letters.reduce((sum, n) => sum + n, 0)}ch))`;
+    const some = sampled(this.all);
+    const letters = columns.map((column) => width(column, some));
+    this.widths.replaceChildren(h("col", { style: { width: `${BOX}px` } }), ...letters.map((n) => h("col", { style: { width: `${n}ch` } })));
+    this.table.style.width = `max(100%, calc(${BOX}px + ${letters.reduce((sum, n) => sum + n, 0)}ch))`;
   }
 
   row(item) {
@@ -77,7 +99,16 @@ export class Grid {
     const box = h("input", { type: "checkbox", "data-marks": row.id, "aria-label": `mark ${row.name} ${this.shorts.get(row.id)}`, checked: marked && "" });
     box.addEventListener("click", (event) => this.on.mark(row, box.checked, event.shiftKey));
     return h(`tr${marked ? ".marked" : ""}`, { onclick: (event) => opened(event, `#/runs/${encodeURIComponent(row.id)}`) },
-      h("td.mark", { onclick: (event) => event.stopPropagation() }, box), this.columns.map((column) => this.cell(row, column)));
+      h("td.mark", { onclick: (event) => event.stopPropagation() }, box), (NARROW.matches ? this.few(row) : this.columns).map((column) => this.cell(row, column)));
+  }
+
+  // The columns of a row in a narrow window: that of the order, some keys, then results, then others.
+  few(row) {
+    const named = (...ids) => this.columns.filter(({ id }) => ids.includes(id));
+    const own = this.columns.filter(({ id, text }) => !["run", "state", "submitted"].includes(id) && text(row));
+    const kind = (name) => own.filter(({ id }) => id.startsWith(name));
+    const order = [...kind(this.sorted), ...kind("value:").slice(0, 2), ...kind("result:"), ...own];
+    return [...named("run", "state", "submitted"), ...[...new Set(order)].slice(0, FIELDS)];
   }
 
   cell(row, column) {
@@ -109,11 +140,25 @@ function opened(event, address) {
 
 const heading = ({ title, unit }) => 0.9 * title.length + (unit ? 1 + 0.9 * unit.length : 0) + 2.5;
 
-// The state with its detail: progress, reason of waiting, or cause of the end.
+const sampled = (rows) => {
+  const every = Math.max(1, Math.ceil(rows.length / SAMPLED));
+  return rows.filter((_, i) => i % every === 0);
+};
+
+// Width of a column in characters.
+const width = (column, rows) => column.width ?? Math.min(LETTERS[1], Math.max(LETTERS[0], heading(column), ...rows.map(column.letters ?? ((row) => column.text(row).length)))) + 2;
+
+// Width of the digit 0 in an element, px: the unit ch of CSS.
+function letterOf(element) {
+  const ctx = (letterOf.ctx ??= document.createElement("canvas").getContext("2d"));
+  const { fontSize, fontFamily } = getComputedStyle(element);
+  ctx.font = `${fontSize} ${fontFamily}`;
+  return ctx.measureText("0").width || 8;
+}
+
 function state(row) {
   const going = row.progress && !FINAL.has(row.state);
-  const note = going ? percent(share(row), 0) : row.state === "succeeded" ? "" : row.message || row.reason || row.cause || "";
-  const text = note.startsWith(row.state) ? "" : note;
+  const note = detail(row);
   return [pill(row.state), going ? h("span.bar", {}, meter(row.state, share(row))) : "",
-    h("span.note", { title: going && row.progress.eta > 0 ? `${duration(row.progress.eta)} left` : text }, text)];
+    note ? h("span.note", { title: going && row.progress.eta > 0 ? `${duration(row.progress.eta)} left` : note }, note) : ""];
 }

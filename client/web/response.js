@@ -14,7 +14,7 @@ export function levels(points, column) {
 }
 
 // The keys that vary, grouped with those that change together: each value of one belongs to one value of the other. The
-// first one stands for its group; `named` has the number of the others. If no key varies, the first one is the axis.
+// first one stands for its group; `named` has the name or the number of the others. If no key varies, the first one is the axis.
 export function together(points, keys) {
   const course = (key) => {
     const texts = points.map(({ row }) => key.text(row));
@@ -25,8 +25,9 @@ export function together(points, keys) {
   const varying = keys.filter((key) => new Set(points.map(({ row }) => key.text(row))).size > 1);
   for (const key of varying.length ? varying : keys.slice(0, 1)) groups.set(course(key), [...(groups.get(course(key)) ?? []), key]);
   return [...groups.values()].map(([first, ...more]) => {
-    const also = more.length ? ` and ${more.length} more that ${more.length > 1 ? "go" : "goes"} with it` : "";
-    return { ...first, members: [first, ...more], named: `${first.title}${also}`, full: `${first.full ?? first.title}${also}` };
+    const name = ({ title, full }) => full ?? title;
+    const also = (of) => (more.length > 1 ? ` and ${more.length} more that go with it` : more.length ? ` and ${of(more[0])}` : "");
+    return { ...first, members: [first, ...more], named: `${first.title}${also(({ title }) => title)}`, full: `${name(first)}${also(name)}` };
   });
 }
 

@@ -39,6 +39,7 @@ export class RunsPage {
     this.tools.close();
     this.grid.close();
     document.removeEventListener("visibilitychange", this.woken);
+    removeEventListener("resize", this.resized);
   }
 
   build() {
@@ -60,6 +61,7 @@ export class RunsPage {
   // Requests to the server ------------------------------------------------------------------------------------------
 
   async start() {
+    addEventListener("resize", this.resized = () => this.read && this.draw());
     document.addEventListener("visibilitychange", this.woken = () => document.hidden || this.next(0));
     await this.turn();
   }
@@ -162,6 +164,7 @@ export class RunsPage {
     performance.mark?.("conoid:draw");
     const { rows, columns } = this.pick();
     const choice = recall("runs.columns", {});
+    this.fit(columns, choice, rows);
     const shown = columns.filter(({ id, shown: asIs }) => id === "run" || (choice[id] ?? asIs));
     const column = columns.find(({ id }) => id === this.sort.id) ?? columns.find(({ id }) => id === NEWEST.id);
     const all = sorted(rows, column, column.id === this.sort.id ? this.sort.down : NEWEST.down);
@@ -176,6 +179,14 @@ export class RunsPage {
     this.tell(all);
     if (kept.top) { this.grid.region.scrollTop = kept.top; kept.top = 0; }
     performance.measure?.("conoid:table", "conoid:draw");
+  }
+
+  // Columns without room that the user has not selected are not shown.
+  fit(columns, choice, rows) {
+    for (const column of columns) column.shown = (column.wanted ??= column.shown);
+    const there = columns.filter(({ id, shown }) => choice[id] ?? shown);
+    const kept = new Set(this.grid.fitting(there, (id) => choice[id] || id === this.sort.id, rows));
+    for (const column of there) column.shown &&= kept.has(column);
   }
 
   items(rows, columns) {

@@ -71,20 +71,55 @@ export const valueOf = (row, key) => (key in row.values ? row.values[key] : row.
 
 const NEVER = /^run\.(ranks|threads|profile)$/; // Keys with columns of their own.
 
-// Keys whose values differ between rows of similar cases; those of most rows first.
-export function differing(rows, most) {
+const LEAST = 0.1; // Share of the most telling key's runs that a prominent key sets apart. Chosen.
+const ASIDE = /^(run\.(?!end_time)|balance\.|probes\[|reference\[)/; // Keys that do not change what is computed.
+
+// Keys whose values differ between rows of similar cases; the most telling first.
+export const differing = (rows, most) => ranked(rows).slice(0, most).map(({ key }) => key);
+
+// The keys among `keys` that are shown at first: not those that only few runs have changed, and of keys that change
+// together only one.
+export function prominent(rows, keys) {
+  const known = ranked(rows).filter(({ key }) => keys.includes(key));
+  const main = known.filter(({ key }) => !ASIDE.test(key));
+  const told = main.length ? main : known;
+  const least = LEAST * Math.max(0, ...told.map(({ apart }) => apart));
+  const seen = new Set();
+  const fresh = ({ courses }) => {
+    const found = courses.some((course) => !seen.has(course));
+    for (const course of courses) seen.add(course);
+    return found;
+  };
+  return new Set(told.filter((one) => one.apart >= least && fresh(one)).map(({ key }) => key));
+}
+
+// { key, apart, courses }: number of runs whose value is not the most frequent one of their kind; for each kind how the
+// values change, which is equal for keys that change together.
+function ranked(rows) {
   const found = new Map();
-  for (const kind of new Set(rows.map((row) => row.kind))) {
-    const own = rows.filter((row) => row.kind === kind && kind);
+  [...new Set(rows.map((row) => row.kind))].filter(Boolean).forEach((kind, number) => {
+    const own = rows.filter((row) => row.kind === kind);
     const keys = new Set(own.flatMap((row) => Object.keys(row.values)));
     const bases = new Set(own.map(({ base }) => base));
     if (bases.size > 1) for (const base of bases) for (const key of Object.keys(base)) keys.add(key);
     for (const key of keys) {
-      const first = valueOf(own[0], key);
-      if (own.some((row) => valueOf(row, key) !== first)) found.set(key, (found.get(key) ?? 0) + own.length);
+      const { apart, course } = spread(own.map((row) => valueOf(row, key)));
+      const known = found.get(key) ?? { apart: 0, courses: [] };
+      if (apart) found.set(key, { key, apart: known.apart + apart, courses: [...known.courses, `${number}: ${course}`] });
     }
-  }
-  return [...found].filter(([key]) => !NEVER.test(key)).sort((a, b) => b[1] - a[1]).slice(0, most).map(([key]) => key);
+  });
+  return [...found.values()].filter(({ key }) => !NEVER.test(key)).sort((a, b) => b.apart - a.apart);
+}
+
+// Number of values apart from the most frequent one, and the values by the order of their first occurrence.
+function spread(values) {
+  const places = new Map();
+  const course = values.map((value) => {
+    const one = places.get(value) ?? { place: places.size, number: 0 };
+    places.set(value, { ...one, number: one.number + 1 });
+    return one.place;
+  });
+  return { apart: values.length - Math.max(...[...places.values()].map(({ number }) => number)), course: course.join() };
 }
 
 // Shortest unique prefix of each id, of at least `least` characters.

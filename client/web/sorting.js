@@ -41,7 +41,7 @@ function tested(word, columns) {
 
 const named = (columns, name) => {
   const numbers = columns.filter(({ number }) => number);
-  const by = (test) => numbers.find(({ title, full = "" }) => test(title.toLowerCase()) || test(full.toLowerCase()));
+  const by = (test) => numbers.find(({ title, full = "" }) => [title, title.replaceAll(" ", "_"), full].some((one) => test(one.toLowerCase())));
   return by((title) => title === name) ?? by((title) => title.includes(name));
 };
 

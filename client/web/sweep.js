@@ -117,6 +117,7 @@ export class SweepPage {
     this.results = others.filter(({ id }) => id.startsWith("result:"));
     const point = { id: "run", title: "point", value: (row) => this.place.get(row.id), text: (row) => String(1 + this.place.get(row.id)), width: 16 };
     this.columns = [point, ...this.keys, ...others.filter(({ shown }) => shown)];
+    this.columns = this.grid.fitting(this.columns, (id) => id.startsWith("value:"), rows);
     this.drawHead();
     if (this.info.search) this.answer.draw(this.info);
     this.drawFailed();

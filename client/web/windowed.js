@@ -25,6 +25,12 @@ export class Windowed {
     this.draw();
   }
 
+  // Makes all rows again.
+  again() {
+    this.made = new Map();
+    this.draw();
+  }
+
   draw() {
     const tall = this.tall();
     const seen = Math.ceil((this.region.clientHeight || 600) / tall);

@@ -51,7 +51,13 @@ def _line_of(n: int) -> dict[str, Any]:
 
 
 def _card_of(n: int) -> card.Card:
-    values: dict[str, Scalar] = {SPEED: -100.0 * n, SIZE: 0.002 if n % 2 else 0.004, **{f"k{i}": i for i in range(20)}}
+    values: dict[str, Scalar] = {
+        SPEED: -100.0 * n,
+        SIZE: 0.002 if n % 2 else 0.004,
+        "parts[0].name": "bar",
+        **{f"parts[0].velocity[{i}]": 0.0 for i in (0, 1)},
+        **{f"k{i}": i for i in range(20)},
+    }
     results = {"probe.speed": None if n == 4 else 10.0 - n, "fragments": 3.0 * n, "cpu": 5.0}
     units = {"probe.speed": "m/s", "cpu": "s"}
     return card.Card(values=values, results=results, units=units, references=2, missed=["extent"] if n == 2 else [])
@@ -77,6 +83,31 @@ def test_columns_are_the_keys_that_differ_within_cases_that_are_alike(ask: Ask, 
     found = asked(ask, "runtable.js", script, some)
     assert set(found[0]) == {SPEED, SIZE}
     assert found[1] == [SPEED]
+
+
+def test_keys_that_few_runs_change_or_that_follow_another_are_not_shown_at_first(ask: Ask) -> None:
+    speeds = {n: {f"parts[{i}].velocity[2]": -100.0 * n for i in (0, 1)} for n in range(40)}
+    cards = [card.Card(values={**speeds[n], "mesh": n % 2, "limit": int(n == 7)}, results={}) for n in range(40)]
+    rows = answer(*((line(f"run{n:02}", n), one) for n, one in enumerate(cards)))
+    script = f"{TABLE} const keys = page.differing(all, 9); return [keys, [...page.prominent(all, keys)]];"
+    keys, first = asked(ask, "runtable.js", script, rows)
+    assert (set(keys), keys[-1]) == ({*speeds[0], "mesh", "limit"}, "limit")
+    assert first == [keys[0], "mesh"]
+
+
+def test_titles_of_keys_have_the_names_of_parts_and_axes(ask: Ask) -> None:
+    """A part that has another name in another case has its number, and two keys never have the same title."""
+    vector = {f"parts[0].velocity[{i}]": 0.0 for i in range(3)}
+    one = {**vector, "parts[0].name": "ball", "parts[1].name": "plate", "parts[1].mesh.element_size": 1e-3}
+    more = {"run.end_time": 1.0, "numerics.dt_safety": 0.9, "materials.steel.strength.A": 1e9, "parts[1].size": 1.0}
+    keys = [SPEED, "parts[1].mesh.element_size", *more, "parts[1].mesh.size", "q[0]"]
+    base = {**one, **more, "parts[1].mesh.size": 1, "q[0]": 1}
+    rows = [keys, [{"base": base}], [{"base": base}, {"base": {**base, "parts[0].name": "rod"}}]]
+    script = "data.slice(1).map((list) => [...page.titles(data[0], list).values()])"
+    alone, mixed = ask("titles.js", script, rows)
+    assert alone[:2] == ["ball velocity z", "plate element size"]
+    assert alone[2:] == ["end time", "dt safety", "steel strength A", "parts[1].size", "parts[1].mesh.size", "q 1"]
+    assert mixed == ["part 1 velocity z", *alone[1:]]
 
 
 def test_a_second_answer_changes_its_rows_and_drops_removed_runs(ask: Ask, some: dict[str, Any]) -> None:
@@ -106,7 +137,7 @@ def test_a_column_has_one_unit_and_short_names_that_are_clear(ask: Ask, some: di
         return [[size.title, size.unit, all.map(size.text)], [speed.unit, speed.title],
           columns.filter(({{ shown }}) => shown).map(({{ id }}) => id)];"""
     size, speed, shown = ask(MODULES, f"(() => {{ {script} }})()", some)
-    assert size == ["element_size", "mm", ["4", "2", "4", "2", "4", ""]]
+    assert size == ["bar element size", "mm", ["4", "2", "4", "2", "4", ""]]
     assert speed == ["m/s", "speed"]
     assert shown[:2] == ["run", "state"]
     assert {"value:parts[0].velocity[2]", "result:probe.speed", "result:fragments", "references"} <= set(shown)
@@ -118,7 +149,7 @@ def test_a_column_has_one_unit_and_short_names_that_are_clear(ask: Ask, some: di
     [
         ("", {0, 1, 2, 3, 4, 9}), ("state:failed", {1}), ("it broke", {1}), ("BATCH=first", {3, 4}),
         ("case:plate", {9}), ("bar speed>8", {0, 1}), ("speed>=8 speed<9.5", {1, 2}), ("element_size=2", {1, 3}),
-        ("velocity[2]<-250", {3, 4}),
+        ("velocity[2]<-250", {3, 4}), ("bar_velocity_z<-250", {3, 4}),
         ("run2", {2}), ("nothing", set()), ("run2 run3", set()), ("fragments=0", {0}), ("speed>x", set()),
     ],
 )  # fmt: skip
@@ -181,8 +212,8 @@ def test_a_response_leaves_out_what_has_not_come_to_its_end(ask: Ask, some: dict
     words, made, down, across, cells, best, lost = ask(MODULES, f"(() => {{ {script} }})()", some)
     assert words is None
     assert made == [
-        ["element_size 4 mm", [[-200, 8, "run2"], [0, 10, "run0"]]],
-        ["element_size 2 mm", [[-300, 7, "run3"]]],
+        ["bar element size 4 mm", [[-200, 8, "run2"], [0, 10, "run0"]]],
+        ["bar element size 2 mm", [[-300, 7, "run3"]]],
     ]
     assert (down, across) == (["2", "4"], 5)
     assert cells[0] == [[None, 0], [7, 1], [None, 0], [None, 1], [None, 0]]

@@ -1,0 +1,36 @@
+// Titles of columns for keys of cases: "ball velocity z" for "parts[0].velocity[2]". No elements are created here.
+
+import { words } from "./figures.js";
+
+const LEFT_OUT = new Set(["parts", "run", "boundaries", "materials", "numerics", "mesh"]); // Tables that titles leave out.
+const AXES = ["x", "y", "z"];
+const MEMBER = { parts: "part", boundaries: "boundary", probes: "probe" };
+
+// Map of keys to titles. Keys that would have the same title are their own titles.
+export function titles(keys, rows) {
+  const bases = [...new Set(rows.map(({ base }) => base))];
+  const told = new Map(keys.map((key) => [key, titled(key, bases)]));
+  const number = new Map();
+  for (const title of told.values()) number.set(title, (number.get(title) ?? 0) + 1);
+  return new Map([...told].map(([key, title]) => [key, number.get(title) > 1 ? key : title]));
+}
+
+function titled(key, bases) {
+  const there = bases.filter((base) => key in base);
+  const parts = key.split(".");
+  const told = parts.map((part, i) => {
+    const [, name, place] = /^(.*?)(?:\[(\d+)\])?$/.exec(part);
+    if (place !== undefined) return member(parts.slice(0, i).concat(name).join("."), name, Number(place), there);
+    return LEFT_OUT.has(name) && i < parts.length - 1 ? "" : name;
+  });
+  return words(told.filter(Boolean).join(" "));
+}
+
+// A member of a list: an axis of a vector, the name that all cases give it, or its number from 1.
+function member(list, name, place, bases) {
+  const vector = bases.length > 0 && bases.every((base) => `${list}[2]` in base && !(`${list}[3]` in base));
+  if (vector && place < AXES.length) return `${name} ${AXES[place]}`;
+  const names = new Set(bases.map((base) => base[`${list}[${place}].name`]));
+  const [own] = names;
+  return names.size === 1 && own ? own : `${MEMBER[name] ?? name} ${place + 1}`;
+}
