@@ -13,6 +13,7 @@ import { isShort, wholeNames } from "./shortids.js";
 
 const page = document.getElementById("page");
 const who = document.getElementById("who");
+const pages = document.getElementById("pages");
 const leave = document.getElementById("leave");
 const AWAY = 3000; // ms after which a request to a server that does not answer is repeated.
 let shown = null;
@@ -76,6 +77,7 @@ async function route() {
       return;
     }
   }
+  for (const link of pages.children) link.ariaCurrent = place(link.hash).page === name ? "page" : null;
   show((PAGES[name] ?? PAGES.runs)(names, query));
 }
 

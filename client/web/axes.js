@@ -22,8 +22,8 @@ export function common(alone) {
   return {
     animation: false,
     textStyle: { fontFamily: "system-ui, sans-serif", color: colour("ink") },
-    grid: { left: 64, right: 14, top: 40, bottom: 26 },
-    legend: { top: 0, left: 0, right: 4, type: "scroll", itemWidth: 18, itemHeight: 9, textStyle: { color: colour("soft"), fontSize: FONT, lineHeight: 18 }, inactiveColor: colour("faint"),
+    grid: { left: 64, right: 14, top: 46, bottom: 26 },
+    legend: { top: 0, left: 0, right: 4, type: "scroll", itemWidth: 14, itemHeight: 8, itemGap: 8, textStyle: { color: colour("soft"), fontSize: FONT, lineHeight: 18 }, inactiveColor: colour("faint"),
       pageIconColor: colour("soft"), pageIconInactiveColor: colour("line"), pageTextStyle: { color: colour("soft"), fontSize: FONT } },
     tooltip: {
       trigger: alone ? "item" : "axis", showContent: alone, renderMode: alone ? "richText" : "html", confine: true, backgroundColor: colour("card"), borderColor: colour("line"),
@@ -78,7 +78,7 @@ export function series({ name, data, colour: tone, unit = "", stack, dash = "sol
   return {
     name, unit, type: "line", data, showSymbol: data.length === 1, sampling: stack || data.length < 2000 ? undefined : "minmax", color: colour(tone), connectNulls: false,
     lineStyle: { width: stack ? 0.5 : width, type: dash }, tooltip: { valueFormatter: (value, point) => text(Array.isArray(value) ? value[1] : value, point) },
-    ...(stack ? { stack, stackStrategy: "all", areaStyle: { opacity: 0.85 } } : {}), emphasis: { focus: "series" }, ...more,
+    ...(stack ? { stack, stackStrategy: "all", symbol: "none", areaStyle: { opacity: 0.85 } } : {}), emphasis: { focus: "series" }, ...more,
   };
 }
 

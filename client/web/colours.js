@@ -10,9 +10,11 @@ const [STRONG, MUTED] = [[0.66, 0.12], [0.84, 0.045]];
 const DARKER = 0.13; // Difference of lightness between parts with the same hue.
 const REST = [140, 146, 152]; // Colour of the fragments without a row in the table of fragments, number -1.
 
+export const css = (colour) => `#${colour.map((byte) => byte.toString(16).padStart(2, "0")).join("")}`;
+
 // [r, g, b] of a rank or a part by its number from 0, and the same as a CSS colour.
 export const ofName = (number) => rgb(STRONG[0] - DARKER * (Math.floor(number / HUES.length) % 3), STRONG[1], HUES[number % HUES.length]);
-export const named = (number) => `#${ofName(number).map((byte) => byte.toString(16).padStart(2, "0")).join("")}`;
+export const named = (number) => css(ofName(number));
 
 // [r, g, b] of the fragment `id` (BigInt) of `part`. The first `bodies` numbers are those of the initial bodies.
 export function ofFragment(id, part, bodies) {

@@ -23,7 +23,7 @@ const FIRST = [
 const LAST = [
   { id: "references", title: "references", value: (row) => (row.references ? row.missed.length : null), text: references },
   { id: "labels", title: "labels", value: labels, text: labels },
-  { id: "submitted", title: "submitted", value: (row) => row.submitted, text: (row) => when(row.submitted), rank: 1 },
+  { id: "submitted", title: "submitted", value: (row) => row.submitted, text: (row) => when(row.submitted), rank: -1 },
   { id: "took", title: "took", value: took, text: (row) => (took(row) === null ? "" : duration(took(row))), number: true },
   { id: "cores", title: "cores", full: "ranks × threads", value: (row) => row.ranks * row.threads, text: cores, number: true },
   { id: "cost", title: "CPU time", value: (row) => row.results?.get("cpu") ?? null, text: (row) => duration(row.results?.get("cpu") ?? NaN).replace(UNKNOWN, ""), number: true },

@@ -80,7 +80,7 @@ export class ComparePage {
     }).catch(() => {});
     if (signal.aborted) return;
     const broken = this.runs.some(({ snapshot }) => snapshot && fitted(snapshot).points.length > snapshot.header.parts.length);
-    if (broken && !this.sizes.placed) this.grid.append(this.sizes.placed = this.card("Fragment sizes", this.sizes.tools, this.sizes.element));
+    if (broken && !this.sizes.placed) this.grid.append(this.sizes.placed = this.card("Fragments of a size and larger, without dust", this.sizes.tools, this.sizes.element));
     this.sizes.draw();
     this.bodies.offer(this.runs.flatMap(({ id, snapshots }, line) => (snapshots?.length ? [{ id, snapshots, line, called: this.names[line], plan: this.runs[line].plan }] : [])));
   }

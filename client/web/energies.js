@@ -1,11 +1,12 @@
 // Energy of a run over time: the ledger, whose terms add up to the energy input, and the energies of the parts.
 
-import { axis, largest, limit, logarithmic, series, time } from "./axes.js";
+import { axis, common, largest, limit, logarithmic, series, time } from "./axes.js";
 import { named } from "./colours.js";
 import { rough } from "./figures.js";
 import { TERMS } from "./live.js";
 
 export const VIEWS = { ledger: "all terms of the ledger", lost: "without the kinetic energy", internal: "internal energy by part", kinetic: "kinetic energy by part" };
+const SMALL = 0.005; // Share of the largest energy below which a term, too thin to be seen, is not in the legend.
 const FLOOR = 1e-10; // Residuals below this value are rounding errors.
 const RESIDUAL = 1e-2; // Limit of the residual.
 
@@ -29,7 +30,9 @@ export const names = (live, view) => (view === "internal" || view === "kinetic" 
 export function ofEnergy(live, view) {
   const list = view === "internal" || view === "kinetic" ? ofParts(live, view) : ofTerms(live, view);
   if (!(list[0]?.data.length > 1)) return null;
-  return { xAxis: time(end(live)), yAxis: axis("J", largest(list)), series: list };
+  const most = largest(list);
+  const named = list.filter(({ data, stack }) => !stack || data.some(([, value]) => Math.abs(value) >= SMALL * most)).map(({ name }) => name);
+  return { xAxis: time(end(live)), yAxis: axis("J", most), series: list, legend: { ...common(false).legend, data: named } };
 }
 
 // Stacked areas, negative terms below zero; with the kinetic energy their sum is the energy input, a line.

@@ -3,6 +3,7 @@
 import { duration, h, meter, percent, pill } from "./figures.js";
 import { FINAL } from "./live.js";
 
+const BRIEF = 9; // Characters of the id that are shown.
 const OLD = 5; // s without a message or an answer after which the age of the numbers is shown.
 
 export class Headline {
@@ -28,10 +29,13 @@ export class Headline {
     const over = FINAL.has(state);
     const old = !over && live.age > OLD ? `numbers ${duration(live.age)} old` : "";
     say(this.title, info.title || info.name || live.run);
-    say(this.sub, [info.name !== info.title && info.name, live.run].filter(Boolean).join(" · "));
-    say(this.link, [words, old].filter(Boolean).join(", "));
+    say(this.sub, [info.name !== info.title && info.name, live.run.slice(0, BRIEF)].filter(Boolean).join(" · "));
+    this.sub.title = live.run;
+    say(this.link, over ? "" : [words, old].filter(Boolean).join(", "));
+    this.link.hidden = over;
     this.link.className = `link ${kind || "over"}`;
     if (this.shown !== state) this.state.replaceChildren((this.shown = state) ? pill(state) : "");
+    this.progress.hidden = state === "succeeded";
     this.progress.replaceChildren(...(live.state ? [meter(state, live.fraction), h("b", {}, percent(live.fraction))] : []));
     const text = [!over && live.message, live.state === "queued" && info.reason, notice].filter(Boolean).join(" · ");
     say(this.message, text);

@@ -4,6 +4,7 @@ import { alike, count, duration, fixed, h, large, moment, rough, si, vector } fr
 import { FINAL } from "./live.js";
 import { fold } from "./storage.js";
 
+const FINE = 1e-3; // Residual below which the energy closes.
 const entry = (name, value, note) =>
   h("div", {}, h("dt", {}, name), h("dd", {}, h("span.value", {}, value), note ? h("small", {}, note) : null));
 
@@ -31,9 +32,12 @@ function five(live, outcome) {
     entry("dt", si(progress?.dt || live.ledger.findLast(({ dt }) => dt > 0)?.dt, "s"), progress?.limiter && `held by ${progress.limiter}`),
     entry("energy residual", worst ? residual(...worst) : "–"),
     entry("fragments", count(counts?.fragments)),
-    entry("imbalance", load ? fixed(load.imbalance) : "–"),
+    alone(live) ? entry("imbalance", "–", "one rank") : entry("imbalance", load ? fixed(load.imbalance) : "–"),
   ];
 }
+
+// True for a run on one rank, which has no imbalance.
+export const alone = ({ plan, loads }) => (plan?.run?.ranks ?? loads.at(-1)?.shares.length) === 1;
 
 function others(live, info, outcome) {
   const { progress, counts, started } = live;
@@ -66,7 +70,8 @@ export function ended(progress, outcome) {
   const failed = outcome?.cause === "energy";
   const energy = failed ? outcome.worst_residual : outcome?.energy?.residual;
   const value = energy ?? progress?.energy?.residual;
-  return { t: outcome?.time ?? progress?.t, step: outcome?.steps ?? progress?.step, residual: Number.isFinite(value) ? [value, failed] : null };
+  const beyond = failed && !(value < FINE); // The run may have failed by one line of the ledger.
+  return { t: outcome?.time ?? progress?.t, step: outcome?.steps ?? progress?.step, residual: Number.isFinite(value) ? [value, beyond] : null };
 }
 
 // The time so far and "of …" the end, in one unit.
@@ -76,6 +81,6 @@ function timed(now, end) {
 }
 
 export function residual(value, failed = false) {
-  const tone = failed ? "bad" : value < 1e-3 ? "good" : value < 1e-2 ? "warn" : "bad";
+  const tone = failed ? "bad" : value < FINE ? "good" : value < 1e-2 ? "warn" : "bad";
   return h(`span.${tone}`, {}, rough(value));
 }

@@ -6,6 +6,7 @@ import { alike, si } from "./figures.js";
 const PAD = 12; // px.
 const ARM = 26; // Length of an axis, px.
 const BAR = [12, 150]; // px: width and height of the colour bar.
+const SWATCH = 11; // px.
 const NAMES = 12; // Largest number of names in a legend.
 const ROUND = [1, 2, 5];
 const AXIS_TONES = ["#d64545", "#3c9a4e", "#3f73d8"];
@@ -84,10 +85,13 @@ function legend(ctx, frame) {
 function named(ctx, frame, x, y) {
   const { names } = frame.legend;
   const shown = names.slice(0, NAMES);
-  shown.forEach(({ name, colour }, i) => {
-    ctx.fillStyle = colour;
-    ctx.fillRect(x - 11, y + 18 * i - 5.5, 11, 11);
-    text(ctx, frame, name, x - 17, y + 18 * i, 12, frame.ink, "right");
+  const wide = Math.max(...shown.map(({ colours }) => colours.length)) * SWATCH;
+  shown.forEach(({ name, colours }, i) => {
+    colours.forEach((colour, k) => {
+      ctx.fillStyle = colour;
+      ctx.fillRect(x - wide + SWATCH * k, y + 18 * i - 5.5, SWATCH, SWATCH);
+    });
+    text(ctx, frame, name, x - wide - 6, y + 18 * i, 12, frame.ink, "right");
   });
   if (names.length > NAMES) text(ctx, frame, `and ${names.length - NAMES} more`, x, y + 18 * NAMES, 12, frame.soft, "right");
   return y + 18 * Math.min(names.length, NAMES + 1) - 6;

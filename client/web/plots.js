@@ -6,6 +6,7 @@ import { VIEWS, end, names, ofEnergy, ofResidual } from "./energies.js";
 import { count, exact, fixed, h, si } from "./figures.js";
 import { everyLine, everyReport } from "./history.js";
 import { FINAL, Live } from "./live.js";
+import { alone } from "./numbers.js";
 import { nearest, ofImbalance, ofSpent, ofWork, workTable } from "./loads.js";
 import { Chooser, columnsOf, ofForces, ofProbes } from "./probes.js";
 import { recall, remember } from "./storage.js";
@@ -44,7 +45,7 @@ export function plots(live, onBalance, before) {
     counts: add("counts", "nodes, broken facets and fragments over time", "Nodes, broken facets, fragments", [], () => ofCounts(live), { table: reports(ofCounts) }),
     residual: add("residual", "energy residual over time", "Energy residual", [], () => ofResidual(live), { table: lines(() => ["residual"]) }),
     dt: add("dt", "time step over time", "Time step", [], () => ofStep(live), { table: reports(ofStep) }),
-    imbalance: add("imbalance", "load imbalance over time", "Load imbalance: slowest rank over mean", [], () => ofImbalance(live),
+    imbalance: add("imbalance", "load imbalance over time", "Load imbalance", [], () => ofImbalance(live),
       { table: reports(ofImbalance), onClick: ({ seriesName, dataIndex }) => seriesName === "balance" && onBalance(dataIndex), onEnter: (at) => live.balances.length && onBalance(nearest(live, at)) }),
     heat: add("work", "work of each rank over time", "Work of each rank", [], () => ofWork(live), { alone: true, table: async () => workTable(await everyReport(live, (run) => new Live(run))) }),
     spent: add("cpu_time", "CPU time by phase over time", "CPU time by phase", [], () => ofSpent(live), { table: reports(ofSpent) }),
@@ -52,8 +53,8 @@ export function plots(live, onBalance, before) {
   return made;
 }
 
-// Charts without data in this run: it has no such probes, or cannot break.
-export const nothing = (live) => ({ probes: !live.plan?.probes?.length && !Object.keys(live.columns.values).some((name) => name.startsWith("momentum")), forces: !columnsOf(live).length });
+// Charts without data in this run: it has no such probes, or one rank only.
+export const nothing = (live) => ({ imbalance: alone(live), heat: alone(live), probes: !live.plan?.probes?.length && !Object.keys(live.columns.values).some((name) => name.startsWith("momentum")), forces: !columnsOf(live).length });
 
 function ofCounts(live) {
   const all = live.sizes;

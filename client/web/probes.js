@@ -33,7 +33,9 @@ export class Chooser {
   get chosen() {
     const { probes: names, momenta } = choices(this.live);
     const kept = [recall(this.key, null)].find(Array.isArray)?.filter((name) => names.includes(name) || momenta.includes(name));
-    return kept ?? names.slice(0, MOST_AT_FIRST);
+    const forces = columnsOf(this.live);
+    const others = names.filter((name) => !forces.includes(name)); // Forces have a chart of their own.
+    return kept ?? (others.length ? others : names).slice(0, MOST_AT_FIRST);
   }
 
   shut() {

@@ -77,8 +77,8 @@ const ASIDE = /^(run\.(?!end_time)|balance\.|probes\[|reference\[)/; // Keys tha
 // Keys whose values differ between rows of similar cases; the most telling first.
 export const differing = (rows, most) => ranked(rows).slice(0, most).map(({ key }) => key);
 
-// The keys among `keys` that are shown at first: not those that only few runs have changed, and of keys that change
-// together only one.
+// The keys among `keys` that are shown at first: not those that only few runs have changed, and of keys with the same
+// values only one.
 export function prominent(rows, keys) {
   const known = ranked(rows).filter(({ key }) => keys.includes(key));
   const main = known.filter(({ key }) => !ASIDE.test(key));
@@ -93,8 +93,8 @@ export function prominent(rows, keys) {
   return new Set(told.filter((one) => one.apart >= least && fresh(one)).map(({ key }) => key));
 }
 
-// { key, apart, courses }: number of runs whose value is not the most frequent one of their kind; for each kind how the
-// values change, which is equal for keys that change together.
+// { key, apart, courses }: number of runs whose value is not the most frequent one of their kind; the values of each kind
+// in which the key differs.
 function ranked(rows) {
   const found = new Map();
   [...new Set(rows.map((row) => row.kind))].filter(Boolean).forEach((kind, number) => {
@@ -103,23 +103,20 @@ function ranked(rows) {
     const bases = new Set(own.map(({ base }) => base));
     if (bases.size > 1) for (const base of bases) for (const key of Object.keys(base)) keys.add(key);
     for (const key of keys) {
-      const { apart, course } = spread(own.map((row) => valueOf(row, key)));
+      const values = own.map((row) => valueOf(row, key));
+      const apart = spread(values);
       const known = found.get(key) ?? { apart: 0, courses: [] };
-      if (apart) found.set(key, { key, apart: known.apart + apart, courses: [...known.courses, `${number}: ${course}`] });
+      if (apart) found.set(key, { key, apart: known.apart + apart, courses: [...known.courses, `${number}: ${values.join()}`] });
     }
   });
   return [...found.values()].filter(({ key }) => !NEVER.test(key)).sort((a, b) => b.apart - a.apart);
 }
 
-// Number of values apart from the most frequent one, and the values by the order of their first occurrence.
+// Number of values apart from the most frequent one.
 function spread(values) {
-  const places = new Map();
-  const course = values.map((value) => {
-    const one = places.get(value) ?? { place: places.size, number: 0 };
-    places.set(value, { ...one, number: one.number + 1 });
-    return one.place;
-  });
-  return { apart: values.length - Math.max(...[...places.values()].map(({ number }) => number)), course: course.join() };
+  const number = new Map();
+  for (const value of values) number.set(value, (number.get(value) ?? 0) + 1);
+  return values.length - Math.max(...number.values());
 }
 
 // Shortest unique prefix of each id, of at least `least` characters.

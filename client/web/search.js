@@ -39,7 +39,7 @@ export class Answer {
     const { bracket, curve } = search;
     this.state.textContent = search.over ? "" : goesOn(info) ? "goes on" : `no report since ${moment(info.reported)}: the command that selects the points has ended or lost its connection; the same command continues the sweep`;
     this.found.textContent = bracket ? x([(bracket[0] + bracket[1]) / 2, (bracket[1] - bracket[0]) / 2], " ± ") : search.over ? "not found" : "not bracketed yet";
-    this.sought.textContent = `${search.key}${search.more.length ? ` and ${counted(search.more.length, "key")} with it` : ""}, where ${search.result} = ${y(search.threshold)}`;
+    this.sought.textContent = `${search.key}${search.more.length ? ` and ${counted(search.more.length, "key")} with it` : ""}, where ${search.result} = ${y(search.threshold).replace(" ", "\u00a0")}`;
     const without = search.points.filter(({ problem }) => problem).length;
     const ends = (bracket ?? [search.low, search.high]).filter((end) => typeof results.get(end) === "number");
     const facts = [

@@ -12,7 +12,7 @@ import { colourings } from "./snapshot.js";
 import { Tools } from "./tools.js";
 
 const MOST = 4;
-const AT_FIRST = 2;
+const AT_FIRST = matchMedia("(min-width: 1100px)").matches ? 3 : 2;
 const PLAY = 400; // ms for each step of the clock.
 const STEPS = 100; // Steps of the clock.
 
@@ -34,7 +34,7 @@ export class SideBySide {
     this.row.addEventListener("keydown", (event) => this.key(event));
   }
 
-  // Runs with snapshots, { id, snapshots, line, called, plan }; the first two are shown.
+  // Runs with snapshots, { id, snapshots, line, called, plan }; the first two or three are shown.
   offer(runs) {
     this.runs = runs;
     this.element.hidden = !runs.length;

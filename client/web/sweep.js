@@ -203,7 +203,8 @@ export class SweepPage {
   // The response -------------------------------------------------------------------------------------------------------
 
   choices() {
-    const wanted = recall(this.name("result"), telling(this.points, this.results)?.id);
+    const others = this.results.filter(({ id }) => id !== `result:${this.info.search?.result}`); // The threshold has a chart of its own.
+    const wanted = recall(this.name("result"), telling(this.points, others.length ? others : this.results)?.id);
     fill(this.result, this.results.map(({ id, full, title }) => [id, full ?? title]), wanted);
     fill(this.over, this.groups.map(({ id, full }) => [id, full]), recall(this.name("over"), this.groups[0]?.id));
     this.overLabel.hidden = this.groups.length < 2;

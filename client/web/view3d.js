@@ -7,7 +7,7 @@ import { h } from "./figures.js";
 import { Outlines } from "./outlines.js";
 import { draw as drawOver } from "./overlay.js";
 import { ramp, scaleOf } from "./scales.js";
-import { named } from "./colours.js";
+import { css, ofFragment, ofName } from "./colours.js";
 import { Surface } from "./surface.js";
 
 const MANY = 60_000; // Number of triangles from which lines are drawn only after the body stops moving.
@@ -178,8 +178,10 @@ export class View3d {
     const field = header.fields[by];
     const arrows = this.look.arrows && this.fastest ? this.fastest : 0;
     if (field) return { title: scaleOf(by).label, unit: field.unit, ...range, colours: ramp(scaleOf(by).colours, this.bands), arrows };
+    const pieces = header.fragments_total > header.parts.length;
+    const tones = (i) => (by === "fragment" ? [ofFragment(BigInt(i), i, header.parts.length), ...(pieces ? [ofName(i)] : [])] : [ofName(i)]).map(css);
     const list = by === "rank" ? Array.from({ length: header.ranks }, (_, rank) => `rank ${rank}`) : header.parts;
-    return { title: by, names: list.map((name, i) => ({ name, colour: named(i) })), arrows };
+    return { title: by === "fragment" && pieces ? "whole bodies | pieces" : by === "fragment" ? "bodies" : by, names: list.map((name, i) => ({ name, colours: tones(i) })), arrows };
   }
 
   // Colours of the page, once for each theme.

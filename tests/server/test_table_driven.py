@@ -54,10 +54,10 @@ def plans(site: Site) -> list[dict[str, Any]]:
 
 
 def press(page: Page, words: str) -> None:
-    """Clicks on the button whose text begins with the given text."""
+    """Clicks on the first button with the given text in it."""
     page.evaluate(f"""(() => {{
       const words = {json.dumps(words)};
-      [...document.querySelectorAll("button")].find((one) => one.innerText.trim().startsWith(words)).click();
+      [...document.querySelectorAll("button")].find((one) => one.innerText.includes(words)).click();
     }})()""")
 
 
@@ -75,7 +75,7 @@ def column(page: Page, title: str) -> list[str]:
     return list(
         page.evaluate(f"""(() => {{
       const heads = [...document.querySelectorAll('.runs thead th')];
-      const place = heads.findIndex((head) => head.innerText.trim().startsWith({json.dumps(title)}));
+      const place = heads.findIndex((head) => head.innerText.includes({json.dumps(title)}));
       return [...document.querySelectorAll('.runs tbody tr:not(.space)')].map((row) => row.children[place].innerText);
     }})()""")
     )
@@ -93,7 +93,7 @@ def test_it_opens_and_sorts_at_once(site: Site, page: Page) -> None:
     opened = min(opening(site, page, k) for k in range(OPENED))
     assert page.text(".page-head .note").startswith("200 runs")
     page.evaluate("performance.clearMeasures()")
-    for title in ("fragments", "velocity[2]", "state", "submitted", "took"):
+    for title in ("fragments", "velocity z", "state", "submitted", "run"):
         press(page, title)
     spent = page.evaluate("performance.getEntriesByName('conoid:table').map(({ duration }) => duration)")
     print(f"\nopens in {opened:.2f} s; {len(spent)} sorts, the slowest {max(spent):.0f} ms")
@@ -110,7 +110,7 @@ def test_rows_are_sorted_filtered_and_grouped(page: Page) -> None:
     fill(page, "state:failed glass velocity[2]<250")
     page.wait("/^[0-9]+ of 200 runs$/.test(document.querySelector('.page-head .note').innerText)")
     assert all(text.startswith("failed") for text in column(page, "state"))
-    assert all(float(text) < 250 for text in column(page, "velocity[2]"))
+    assert all(float(text) < 250 for text in column(page, "velocity z"))
     fill(page, "no such run")
     page.wait("document.body.innerText.includes('No run matches')")
     press(page, "Show all runs")
