@@ -5,7 +5,7 @@ import { columnsOf } from "./columns.js";
 import { count, counted, exact, h, vector } from "./figures.js";
 import { Grid } from "./grid.js";
 import { FINAL } from "./live.js";
-import { grouped, matcher, sorted } from "./sorting.js";
+import { compared, grouped, matcher, sorted } from "./sorting.js";
 import { recall, remember } from "./storage.js";
 import { RunTable, differing, shorts } from "./runtable.js";
 import { Toolbar } from "./toolbar.js";
@@ -181,12 +181,13 @@ export class RunsPage {
     performance.measure?.("conoid:table", "conoid:draw");
   }
 
-  // Columns without room that the user has not selected are not shown.
+  // Columns without room are not shown, except those that the user has selected, sorts by or compares.
   fit(columns, choice, rows) {
-    for (const column of columns) column.shown = (column.wanted ??= column.shown);
+    const filter = compared(kept.text, columns);
+    for (const column of columns) column.shown = (column.wanted ??= column.shown) || filter.has(column.id);
     const there = columns.filter(({ id, shown }) => choice[id] ?? shown);
-    const kept = new Set(this.grid.fitting(there, (id) => choice[id] || id === this.sort.id, rows));
-    for (const column of there) column.shown &&= kept.has(column);
+    const fitting = new Set(this.grid.fitting(there, (id) => choice[id] || id === this.sort.id || filter.has(id), rows));
+    for (const column of there) column.shown &&= fitting.has(column);
   }
 
   items(rows, columns) {

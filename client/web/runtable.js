@@ -82,15 +82,15 @@ export const differing = (rows, most) => ranked(rows).slice(0, most).map(({ key 
 export function prominent(rows, keys) {
   const known = ranked(rows).filter(({ key }) => keys.includes(key));
   const main = known.filter(({ key }) => !ASIDE.test(key));
-  const told = main.length ? main : known;
-  const least = LEAST * Math.max(0, ...told.map(({ apart }) => apart));
+  const list = main.length ? main : known;
+  const least = LEAST * Math.max(0, ...list.map(({ apart }) => apart));
   const seen = new Set();
   const fresh = ({ courses }) => {
     const found = courses.some((course) => !seen.has(course));
     for (const course of courses) seen.add(course);
     return found;
   };
-  return new Set(told.filter((one) => one.apart >= least && fresh(one)).map(({ key }) => key));
+  return new Set(list.filter((one) => one.apart >= least && fresh(one)).map(({ key }) => key));
 }
 
 // { key, apart, courses }: number of runs whose value is not the most frequent one of their kind; the values of each kind

@@ -23,6 +23,12 @@ export function matcher(text, columns) {
   return (row) => tests.every((test) => test(row));
 }
 
+// Ids of the columns whose numbers a filter compares.
+export function compared(text, columns) {
+  const names = text.trim().toLowerCase().split(/\s+/).map((word) => COMPARED.exec(word)?.[1]).filter(Boolean);
+  return new Set(names.map((name) => named(columns, name)?.id));
+}
+
 function tested(word, columns) {
   const [, name, sign, number] = COMPARED.exec(word) ?? [];
   const column = name && named(columns, name);

@@ -9,21 +9,21 @@ const MEMBER = { parts: "part", boundaries: "boundary", probes: "probe" };
 // Map of keys to titles. Keys that would have the same title are their own titles.
 export function titles(keys, rows) {
   const bases = [...new Set(rows.map(({ base }) => base))];
-  const told = new Map(keys.map((key) => [key, titled(key, bases)]));
+  const found = new Map(keys.map((key) => [key, titled(key, bases)]));
   const number = new Map();
-  for (const title of told.values()) number.set(title, (number.get(title) ?? 0) + 1);
-  return new Map([...told].map(([key, title]) => [key, number.get(title) > 1 ? key : title]));
+  for (const title of found.values()) number.set(title, (number.get(title) ?? 0) + 1);
+  return new Map([...found].map(([key, title]) => [key, number.get(title) > 1 ? key : title]));
 }
 
 function titled(key, bases) {
   const there = bases.filter((base) => key in base);
   const parts = key.split(".");
-  const told = parts.map((part, i) => {
+  const found = parts.map((part, i) => {
     const [, name, place] = /^(.*?)(?:\[(\d+)\])?$/.exec(part);
     if (place !== undefined) return member(parts.slice(0, i).concat(name).join("."), name, Number(place), there);
     return LEFT_OUT.has(name) && i < parts.length - 1 ? "" : name;
   });
-  return words(told.filter(Boolean).join(" "));
+  return words(found.filter(Boolean).join(" "));
 }
 
 // A member of a list: an axis of a vector, the name that all cases give it, or its number from 1.
