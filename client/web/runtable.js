@@ -71,10 +71,10 @@ export const valueOf = (row, key) => (key in row.values ? row.values[key] : row.
 
 const NEVER = /^run\.(ranks|threads|profile)$/; // Keys with columns of their own.
 
-const LEAST = 0.1; // Share of the most telling key's runs that a prominent key sets apart. Chosen.
+const LEAST = 0.1; // Least number of runs that a prominent key sets apart, over that of the first key. Chosen.
 const ASIDE = /^(run\.(?!end_time)|balance\.|probes\[|reference\[)/; // Keys that do not change what is computed.
 
-// Keys whose values differ between rows of similar cases; the most telling first.
+// Keys whose values differ between rows of similar cases; those that set most runs apart first.
 export const differing = (rows, most) => ranked(rows).slice(0, most).map(({ key }) => key);
 
 // The keys among `keys` that are shown at first: not those that only few runs have changed, and of keys with the same
