@@ -29,7 +29,6 @@ EXCEPTIONS: dict[str, dict[str, int]] = {
         "server/runs/folder.py: Submission": 17,
         "worker/clock.py: Clock": 17,
         "worker/model/state.py: Block": 26,
-        "worker/model/state.py: Nodes": 16,
         "worker/reduction.py: Fields": 16,
         "worker/reduction.py: StepReduction": 18,
         "worker/rigid/bodies.py: Bodies": 18,

@@ -20,9 +20,9 @@ from .contact.surface import exposure
 from .elements.wear import BROKEN, DAMAGED, FREQUENCY, SOUND, TIRED, life
 from .erosion_account import ErosionAccount
 from .migration.parcel import Parcel
+from .model.columns import COPIED
 from .model.rows import DAMAGE
-from .model.state import Flags, Floats, Ints, Model, Nodes, extended
-from .model.topology import Split
+from .model.state import Flags, Floats, Ints, Model, Nodes
 from .parallel.comm import Comm
 from .parallel.ownership import Neighbour, complete
 from .parallel.tags import Tag
@@ -55,6 +55,9 @@ class Erosion:
         self.removed = np.zeros(model.nodes.n, bool)
         """(nodes,) True for removed nodes; the velocity of a removed node is zero."""
         self._tets_at = self._completed([block.tets.astype(np.int64) for block in model.blocks])
+        # Parts that fracture do not erode (cases/checks/checks.py): no tet of a separated node is removed. The number
+        # of tets of a copy is therefore never used; it only must not be zero.
+        model.nodes.columns.declare(self, removed=COPIED, _leaves=COPIED, _strikes=COPIED, _tets_at=COPIED)
         self._leaving: tuple[Ints, Floats] = np.zeros(0, np.int64), np.zeros((0, 3))
         """Nodes that are removed in this step, and their v(n-1/2), m/s."""
         self.account = ErosionAccount(clock, extremes)
@@ -71,18 +74,6 @@ class Erosion:
             spec = self._specs[block.part]
             if spec is not None:
                 block.life[FREQUENCY] = limit / spec.time_step
-
-    def grow(self, split: Split, ids: Ints) -> None:
-        """Extends the arrays by the copies of separated nodes.
-
-        Parts that fracture do not erode (cases/checks/checks.py): no tet of these nodes is removed. The number of tets
-        of a copy is therefore never used; it only must not be zero.
-        """
-        parents = split.copies.parents
-        self.removed = extended(self.removed, self.removed[parents])
-        self._leaves = extended(self._leaves, self._leaves[parents])
-        self._strikes = extended(self._strikes, self._strikes[parents])
-        self._tets_at = extended(self._tets_at, np.ones(len(parents), np.int64))
 
     def keep(self, parcel: Parcel) -> None:
         """Adds the state to a parcel (a checkpoint or migration message)."""

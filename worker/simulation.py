@@ -227,7 +227,7 @@ def _assemble(
     elements = elements_of(case, model, neighbours, scene, node_volume, comm, timers, threads)
     fracture = None
     if case.fractures:
-        by_node: list[KeptByNode] = [*scene, *(stage for stage in (erosion, contact, bonds) if stage is not None)]
+        by_node: list[KeptByNode] = [*scene, *([contact] if contact is not None else [])]
         fracture = Fracture(case, model, neighbours, elements, by_node, contact, comm, clock, threads)
     stopping = tuple(bound for bound in scene if bound.given is not None)
     probes = Probes(case, Scene(model, contact, stopping, rigid, moving, erosion, fracture, clock, comm))

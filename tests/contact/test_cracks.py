@@ -1,15 +1,20 @@
 """Cracks and families: updates of their tables."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
-from conoid.worker.contact.narrow_phase.cracks import Cracks, computed
+from conoid.worker.contact.narrow_phase.cracks import Cracks
 from conoid.worker.contact.narrow_phase.node_face import chain
+from conoid.worker.contact.scene import split_update
 from conoid.worker.contact.scene.split_pairs import Family, apart_from_edges, families, inherited
-from conoid.worker.contact.surface.families import Families
+from conoid.worker.contact.surface.families import Families, TouchingRows
 from conoid.worker.migration.parcel import joined, once
+from conoid.worker.model.columns import Columns
 from conoid.worker.model.state import Copies, Nodes
 from conoid.worker.model.topology import Split
+from conoid.worker.parallel.team import team
 
 
 def cracks_of(n: int) -> Cracks:
@@ -17,7 +22,7 @@ def cracks_of(n: int) -> Cracks:
     number = np.arange(n)
     found = Cracks.none(np.arange(0))
     tets, nodes = np.column_stack([2 * number, 2 * number + 1]), np.repeat(number[:, None], 3, axis=1)
-    found.add(tets, nodes.astype(np.int32), np.full((n, 2, 3), -1, np.int32), [])
+    found.add(4 * tets - 1, nodes.astype(np.int32), np.full((n, 2, 3), -1, np.int32))
     found.places[:], found.kept[:] = number[:, None], number[:, None]
     return found
 
@@ -38,7 +43,7 @@ def test_a_crack_that_comes_after_others_have_opened_stands_behind_those_that_ar
     cracks = cracks_of(4)
     cracks.open(cracks.faces[[1], 0], [])
     more = cracks_of(9)
-    cracks.add(more.faces[8:] // 4 + 1, more.nodes[8:, :3], np.full((1, 2, 3), -1, np.int32), [])
+    cracks.add(more.faces[8:], more.nodes[8:, :3], np.full((1, 2, 3), -1, np.int32))
     assert cracks.nodes[:, 0].tolist() == [0, 3, 2, 8]
     assert cracks.places[3].tolist() == [-1] * 6
 
@@ -54,7 +59,7 @@ def test_a_rank_with_both_sides_of_a_crack_has_the_row_of_the_first() -> None:
         sides = np.full((1, 2, 3), -1, np.int32)
         sides[0, k] = 0
         one = Cracks.none(np.arange(0))
-        one.add(np.array([[5, 9]]), np.array([order], np.int32), sides, [])
+        one.add(np.array([[20, 36]]), np.array([order], np.int32), sides)
         one.sides, one.faces, one.kept = sides, np.array([[20, 36]]), np.full((1, 12), float(k))
         had.append(one.keep(ids))
     for every in (had, had[::-1]):
@@ -64,12 +69,13 @@ def test_a_rank_with_both_sides_of_a_crack_has_the_row_of_the_first() -> None:
         assert not cracks.kept.any()
 
 
-def test_only_cracks_with_their_first_side_here_and_nodes_apart_are_computed() -> None:
+def test_only_cracks_with_their_first_side_here_and_nodes_apart_have_slots() -> None:
     nodes = np.array([[0, 1, 2, 0, 1, 2], [0, 1, 2, 0, 1, 3], [0, 1, 2, 4, 1, 2], [0, 1, 2, 0, 5, 2]], np.int32)
-    sides = np.zeros((4, 2, 3), np.int32)
+    sides, places, pushes = np.zeros((4, 2, 3), np.int32), np.full((4, 6), -1, np.int32), np.zeros(6, bool)
     sides[2, 0, 1] = -1
-    assert computed(np.arange(4), nodes, sides).tolist() == [1, 3]
-    assert computed(np.array([0, 1]), nodes, sides).tolist() == [1]
+    split_update._place(places, pushes, np.arange(4), nodes, sides, np.arange(6, dtype=np.int32))
+    assert (places == np.where(np.array([[0], [1], [0], [1]]), nodes, -1)).all()
+    assert np.flatnonzero(pushes).tolist() == [1, 2, 3, 5]
 
 
 def test_every_copy_has_the_candidates_of_its_parent() -> None:
@@ -103,19 +109,62 @@ def test_edges_that_had_both_ends_in_common_are_a_pair_once_they_have_none(
         assert found.tolist() == ([[0, 1]] if apart and own else [])
 
 
+def members(families: Families, node: int) -> list[int]:
+    found = [node]
+    while (following := int(families.ring[found[-1]])) != node:
+        found.append(following)
+    return sorted(found)
+
+
 @pytest.mark.parametrize("root", [[], [4], [4, 4], [7, 2, 7, 2, 7, 9]])
 def test_the_nodes_of_a_root_are_one_family(root: list[int]) -> None:
     every = Families.of(np.array(root, np.int64))
     for node, one in enumerate(root):
-        found = every.members(np.array([node]))
-        assert found.tolist() == [other == one for other in root]
+        assert members(every, node) == [k for k, other in enumerate(root) if other == one]
 
 
 def test_copies_join_the_families_of_their_parents() -> None:
     none, copies = np.zeros(0, np.int32), np.array([1, 1, 2], np.int64)
     new = Copies(copies, np.arange(4, 7), np.zeros(3, np.int32), np.ones(3, bool), np.zeros(3))
-    families = Families.of(np.array([10, 11, 12, 11], np.int64))
-    families.grow(Split(new, 4, np.ones(1, np.int64), none.astype(np.int64), none, none, none, none))
+    families, columns = Families.of(np.array([10, 11, 12, 11], np.int64)), Columns()
+    columns.declare(families, **Families.COLUMNS)
+    columns.extend(4, 3)
+    columns.copy(copies, np.arange(4, 7))
+    families.link(Split(new, 4, np.ones(1, np.int64), none.astype(np.int64), none, none, none, none))
     assert families.root.tolist() == [10, 11, 12, 11, 11, 11, 12]
-    assert np.flatnonzero(families.members(np.array([3]))).tolist() == [1, 3, 4, 5]
-    assert np.flatnonzero(families.members(np.array([0, 6]))).tolist() == [0, 2, 6]
+    assert members(families, 3) == [1, 3, 4, 5]
+    assert members(families, 6) == [2, 6]
+    assert members(families, 0) == [0]
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_the_nodes_beside_cracks_are_those_of_their_tets_and_families(seed: int) -> None:
+    """Random cracks between random tets, some of another rank; compared with sets."""
+    random = np.random.default_rng(seed)
+    families = Families.of(random.integers(0, 25, 40))
+    tets, n = random.integers(0, 40, (30, 4)).astype(np.uint32), 50
+    nodes = random.integers(0, 40, (n, 3)).astype(np.int32)
+    sides = np.stack([random.integers(0, 2, (n, 2)), random.integers(-1, 30, (n, 2)), np.zeros((n, 2), int)], axis=2)
+    cracks = Cracks.none(np.arange(0))
+    cracks.families = families
+    cracks.add(np.zeros((n, 2), np.int64), nodes, sides.astype(np.int32))
+    apart = random.uniform(size=(n, 3)) < 0.1
+    cracks.nodes[:, 3:] = np.where(apart, families.ring[nodes], nodes)
+    rows = np.flatnonzero(random.uniform(size=n) < 0.5)
+    expected = set[int]()
+    for r in rows[(cracks.nodes[rows, :3] != cracks.nodes[rows, 3:]).any(axis=1)]:
+        expected |= {int(a) for b, e, _ in sides[r] if b == 0 and e >= 0 for a in tets[e]}
+        pairs = cracks.nodes[r].reshape(2, 3).T
+        expected |= {k for one, two in pairs.tolist() if one != two for k in members(families, one)}
+    found = cracks.beside(rows, [SimpleNamespace(tets=tets)])  # type: ignore[list-item]
+    assert sorted(found.tolist()) == sorted(expected)
+    assert not families.marks.any()
+
+
+def test_rows_with_a_marked_entry_are_found_in_order() -> None:
+    random, n = np.random.default_rng(3), 9000
+    table, marks = random.integers(0, 500, (n, 6)).astype(np.int32), np.zeros(500, np.uint8)
+    marks[random.integers(0, 500, 20)] = 1
+    found = TouchingRows(team(2)).of(table, marks)
+    assert found.tolist() == np.flatnonzero(marks[table].any(axis=1)).tolist()
+    assert len(TouchingRows(team(1)).of(table[:0], marks)) == 0

@@ -13,6 +13,7 @@ from conoid.worker.contact.broad_phase.deviation import Deviation
 from conoid.worker.contact.broad_phase.pairs import PairTable
 from conoid.worker.contact.broad_phase.reference_motion import Lines, ReferenceMotion
 from conoid.worker.contact.narrow_phase.tables import ContactRows, EdgeTable, FaceTable, Pairs, SlotTable, Step
+from conoid.worker.model.columns import Columns
 from conoid.worker.parallel.comm import SerialComm
 from conoid.worker.parallel.team import team
 
@@ -152,8 +153,12 @@ class Shards:
         n = len(self.x)
         some = self.draw.choice(n, 3, replace=False)
         copies = np.arange(n, n + 3, dtype=np.int32)
-        self.reference.add(self.x[some], self.v[some])
-        self.reference.inherit(copies, some.astype(np.int32))
+        columns = Columns()
+        for lines in (self.reference.searched, self.reference.short):
+            columns.declare(lines, **Lines.COLUMNS)
+        columns.extend(n, 3)
+        self.reference.begin_at(n, self.x[some], self.v[some])
+        columns.copy(some.astype(np.int64), copies.astype(np.int64))
         self.v = np.concatenate([self.v, self.v[some] + self.violence * self.draw.normal(size=(3, 3))])
         for name in ("x", "shard", "normals", "on_surface"):
             setattr(self, name, np.concatenate([getattr(self, name), getattr(self, name)[some]]))

@@ -20,6 +20,7 @@ from conoid.worker.model.rows import MASS
 from conoid.worker.model.state import BROKEN, INTACT, Floats, Ints, Model
 from conoid.worker.parallel.comm import Comm
 from conoid.worker.parallel.fixed_point import exact_sums
+from conoid.worker.parallel.team import team
 from conoid.worker.simulation import Simulation
 
 from ..contact.bodies import meeting_of, moved, pieces_of
@@ -56,7 +57,7 @@ def test_pieces_are_those_of_scipy(seed: int) -> None:
     quarters = random.uniform(1.0, 2.0, len(rows))
     rows[:, stars.MASS], rows[:, stars.RANK] = quarters.view(np.int64), rows[:, stars.TET] % 7
     many = 0
-    of, labels, nodes, ranks, mass = stars.pieces(rows)
+    of, labels, nodes, ranks, mass = stars.Pieces(team(2)).of(rows, stars.node_begins(rows))
     assert mass == pytest.approx([0.25 * quarters[of == k].sum() for k in range(len(mass))])
     assert (np.unique(rows[:, stars.NODE])[nodes] == labels[:, 0]).all()
     assert (ranks == labels[:, 1] % 7).all()
@@ -168,7 +169,7 @@ def cracked(mesh: TetMesh, events: Sequence[Ints], ranks: int) -> Cracked:
         piece, model = pieces[comm.rank]
         arranged(model)
         meshes = {b: mesh_of(block) for b, block in enumerate(model.blocks)}
-        separation = Separation(model, piece.neighbours, meshes, comm)
+        separation = Separation(model, piece.neighbours, meshes, comm, team(1))
         for facets in events:
             break_on(model, separation, facets, comm)
         return model, [model.nodes.id[other.nodes] for other in piece.neighbours]
@@ -302,7 +303,7 @@ def test_a_rank_without_touched_nodes_does_not_communicate() -> None:
         piece, model = pieces[comm.rank]
         arranged(model)
         meshes = {b: mesh_of(block) for b, block in enumerate(model.blocks)}
-        separation = Separation(model, piece.neighbours, meshes, comm)
+        separation = Separation(model, piece.neighbours, meshes, comm, team(1))
         comm.sent.since_last()
         break_on(model, separation, facets, comm)
         return float(model.nodes.x0[:, 2].min()), comm.sent.since_last()

@@ -28,7 +28,7 @@ def test_contact_and_fracture_load_no_kernel_once_steps_have_begun(tmp_path: Pat
 
 def test_kernels_that_functions_name_are_found_as_their_own_and_as_those_of_other_modules() -> None:
     found = {*preload.called(split_update)}
-    assert {split_update._flagged, split_pairs.follow_faces, split_pairs.apart_from_edges} <= found
+    assert {split_update._lacking, split_pairs.tear_faces, split_pairs.inherited} <= found
     assert split_pairs._become not in found, "which kernels alone call"
     assert slot_numbers.number not in found
     assert tasks.take in {*preload.called(detection)}, "named in a method, within a class"

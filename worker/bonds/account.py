@@ -5,18 +5,20 @@ half with the velocity after it.
 import numpy as np
 
 from ..migration.parcel import Parcel
-from ..model.state import Floats, Indices, Ints, extended
+from ..model.columns import ZERO
+from ..model.state import Floats, Indices, Ints, Nodes
 from . import sweeps
 
 
 class BondAccount:
     """Work of the impulses of tied bonds on the nodes of a rank."""
 
-    def __init__(self, nodes: int, scale: float) -> None:
-        """``nodes``: number of local nodes; ``scale``: quanta per N s."""
+    def __init__(self, nodes: Nodes, scale: float) -> None:
+        """``nodes``: the local nodes; ``scale``: quanta per N s."""
         self.scale = scale
-        self.loss, self.external = np.zeros((2, nodes))
+        self.loss, self.external = np.zeros((2, nodes.n))
         """(nodes,) energy dissipated by the bonds, and work from outside by prescribed velocities against them, J."""
+        nodes.columns.declare(self, loss=ZERO, external=ZERO)  # booked values stay with the parent of a copy
         self.mobility: Floats = np.zeros((0, 3))
         """(nodes, 3) inverse mass by component, 1/kg, as the sweeps use it; 0 for a component with prescribed
         velocity."""
@@ -35,11 +37,6 @@ class BondAccount:
         """Books the first half of the impulses ``total`` (h, 3) of the step, quanta."""
         self._total = total
         self._book()
-
-    def grow(self, copies: int) -> None:
-        """Extends the account by copies of nodes; booked values stay with the parents."""
-        more = np.zeros(copies)
-        self.loss, self.external = extended(self.loss, more), extended(self.external, more)
 
     def keep(self, parcel: Parcel) -> None:
         """Adds the account to a parcel (a checkpoint or migration message)."""

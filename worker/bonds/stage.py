@@ -15,8 +15,7 @@ from ..boundaries.boundaries import Boundary, mirrored
 from ..clock import Clock
 from ..contact.exterior import mobilities
 from ..migration.parcel import Parcel
-from ..model.state import Floats, Ints, Model, Nodes
-from ..model.topology import Split
+from ..model.state import Floats, Model, Nodes
 from ..parallel import fixed_point
 from ..parallel.comm import Comm
 from ..parallel.passes import Pass
@@ -44,7 +43,7 @@ class Bonds:
         self._rigid = rigid
         self._model, self._bounds, self._comm, self._clock = model, bounds, comm, clock
         self._laws, self._passes = _laws(case), _Passes(team)
-        self.account = BondAccount(model.nodes.n, fixed_point.scale_for(impulse))
+        self.account = BondAccount(model.nodes, fixed_point.scale_for(impulse))
         self.ties = Ties(pieces, model, comm)
         self.apart = False
         """True if a row of this rank has failed in the step."""
@@ -104,10 +103,6 @@ class Bonds:
         changed = np.array([float(self.apart or self.ties.faces.changed())])
         if self._comm.maximum(changed)[0] > 0.0:
             self._rebuild()
-
-    def grow(self, split: Split, ids: Ints) -> None:
-        """Extends the account by the copies of nodes."""
-        self.account.grow(split.copies.n)
 
     # Checkpoint and migration --------------------------------------------------------------------------------------
 

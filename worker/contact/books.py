@@ -5,7 +5,8 @@ import numpy as np
 from conoid.cases.model.schema import Case
 
 from ..migration.parcel import Parcel
-from ..model.state import Floats, Indices, Ints, Nodes, extended
+from ..model.columns import ZERO
+from ..model.state import Floats, Indices, Ints, Nodes
 from ..parallel import fixed_point
 from ..parallel.comm import Comm
 from ..parallel.passes import Pass
@@ -20,12 +21,12 @@ class Books:
     step that applies the impulse. The other half, with v(n+1/2), is booked in the next step.
     """
 
-    def __init__(self, nodes: int, case: Case, impulse: float, energy: float, team: Team) -> None:
+    def __init__(self, nodes: Nodes, case: Case, impulse: float, energy: float, team: Team) -> None:
         """``impulse``, N s, and ``energy``, J: upper bounds at one node in one step."""
         self._book = Pass(team, tasks.book, *tasks.BOOK, size=tasks.SLOTS_OF_A_TASK)
-        self.contact_loss = np.zeros(nodes)
+        self.contact_loss = np.zeros(nodes.n)
         """(nodes,) energy lost by impact and friction, J."""
-        self.external_work = np.zeros(nodes)
+        self.external_work = np.zeros(nodes.n)
         """(nodes,) work of the supports of held nodes against contact, J."""
         self.scale = fixed_point.scale_for(impulse)
         """Number of quanta of impulse per N s."""
@@ -40,8 +41,10 @@ class Books:
         self.pairs = np.zeros((parts, parts, 3) if asked else (0, 0, 3), np.int64)
         """(parts, parts, 3) impulses so far on each part (first index) from each other part, quanta; it is (0, 0, 3)
         if no probe of the case has the key ``by``."""
-        self.pressed = np.zeros((nodes if "contact_pressure" in case.run.fields else 0, 3), np.int64)
+        self.pressed = np.zeros((nodes.n if "contact_pressure" in case.run.fields else 0, 3), np.int64)
         """(nodes, 3) impulses since the last frame, quanta; (0, 3) if the field ``contact_pressure`` is not written."""
+        # Booked energies and impulses remain at the parent of a copy.
+        nodes.columns.declare(self, contact_loss=ZERO, external_work=ZERO, pressed=ZERO)
         self.open: Ints = np.zeros((0, 3), np.int64)
         """(nodes, 3) impulses of the last step before a restart or a repartition, quanta; (0, 3) once they are
         booked."""
@@ -70,13 +73,6 @@ class Books:
         if "contact.pressed" in parcel.nodes:
             self.pressed = np.array(parcel.nodes["contact.pressed"])
         self.pairs, self.open = parcel.sums["contact.pairs"], parcel.nodes["contact.total"]
-
-    def grow(self, copies: int) -> None:
-        """Extends the arrays by ``copies`` nodes; booked energies remain at the parent nodes."""
-        self.contact_loss = extended(self.contact_loss, np.zeros(copies))
-        self.external_work = extended(self.external_work, np.zeros(copies))
-        if len(self.pressed):
-            self.pressed = extended(self.pressed, np.zeros((copies, 3), np.int64))
 
     @staticmethod
     def friction_work(friction: Floats) -> float:

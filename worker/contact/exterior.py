@@ -4,9 +4,11 @@ import numpy as np
 
 from ..boundaries.boundaries import FREE, Boundary
 from ..errors import InputError
+from ..kernels.jit import njit
 from ..migration.parcel import Parcel
+from ..model.columns import COPIED
 from ..model.ids import among
-from ..model.state import Block, Flags, Floats, Indices, Ints, Model, Nodes, extended
+from ..model.state import Block, Flags, Floats, Ints, Model, Nodes
 from ..model.topology import Split
 from ..parallel.comm import Comm
 from ..parallel.ownership import Neighbour
@@ -15,7 +17,7 @@ from .narrow_phase.cracks import Cracks
 from .scene.scene import Scene
 from .scene.surface_motion import SurfaceMotion, typical
 from .surface import exposure, normals, surface
-from .surface.families import CornerLists, Corners
+from .surface.families import CornerLists, Corners, Families
 
 _WORDS = 9 + 2 * normals.SHARE
 """Number of columns of a row of ``Exterior.widened``, which describes a crack that opens."""
@@ -43,6 +45,11 @@ class Exterior:
         self._moments = np.zeros((model.nodes.n, normals.COLUMNS), np.int64)
         self._broken = False
         """True if facets of any rank have broken, so that cracks may open."""
+        columns = model.nodes.columns
+        columns.declare(self, _moments=COPIED)
+        columns.declare(self, "motion", **SurfaceMotion.COLUMNS)
+        columns.declare(self, "motion.found", flags=COPIED)
+        columns.declare(self, "cracks.families", **Families.COLUMNS)
 
     def keep(self, parcel: Parcel) -> None:
         """Adds cracks, edges that became sharp, surface nodes and moments of normals to the ``parcel`` (a checkpoint or
@@ -142,10 +149,6 @@ class Exterior:
         if (loose & ~self.motion.loose).any():
             self.motion.loose, self.motion.mobility = loose, mobilities(self._model.nodes, self._bounds)
 
-    def crack(self, tets: Ints, nodes: Indices, sides: Indices) -> None:
-        """Adds broken facets; see ``Cracks.add``."""
-        self.cracks.add(tets, nodes, sides, self._model.blocks)
-
     def take_up(self) -> None:
         """Builds the surface, with all faces that may become surface before the next search. Collective."""
         if self._near_erosion is not None:
@@ -223,22 +226,28 @@ class Exterior:
         some = enumerate(self._model.blocks) if len(self.cracks.faces) else ()
         return [(block, self.cracks.corners(b, self._corner_lists)) for b, block in some if len(block.bond)]
 
-    def separate(self, split: Split) -> None:
-        """Updates the surface after nodes have separated on any rank."""
+    def separate(self, split: Split) -> Ints:
+        """Updates the cracks after nodes have separated on any rank; returns the rows of cracks at separated nodes."""
         self._broken |= bool(split.touched.any())
-        if split.copies.n:
-            parents = split.copies.parents
-            self.cracks.follow(split, self._model.nodes.id)
-            self.motion.grow(parents)
-            self._moments = extended(self._moments, self._moments[parents])
+        if not split.copies.n:
+            return np.zeros(0, np.int64)
+        return self.cracks.follow(split, self._model.nodes.id, self._corner_lists.touching)
 
     def grow(self, split: Split) -> None:
-        """Extends the mobility by the copies of nodes, with their new masses."""
-        parents, motion = split.copies.parents, self.motion
-        motion.mobility = extended(motion.mobility, motion.mobility[parents])
-        for some in (parents, split.first + np.arange(split.copies.n)):
-            free = motion.mobility[some] > 0.0
-            motion.mobility[some] = np.where(free, 1.0 / self._model.nodes.mass[some, None], 0.0)
+        """Updates the mobilities of separated nodes and their copies to their new masses."""
+        _lighten(self.motion.mobility, self._model.nodes.mass, split.copies.parents, split.first)
+
+
+@njit("void(float64[:, ::1], float64[::1], int64[::1], int64)", cache=True)
+def _lighten(mobility, mass, parents, first):  # type: ignore[no-untyped-def]
+    """Sets the mobilities of ``parents`` (k,) and of their copies, numbered from ``first`` on, to the inverse of their
+    masses; held components stay 0.
+    """
+    for c in range(len(parents)):
+        for i in range(3):
+            for a in (parents[c], first + c):
+                if mobility[a, i] > 0.0:
+                    mobility[a, i] = 1.0 / mass[a]
 
 
 def mobilities(nodes: Nodes, bounds: list[Boundary]) -> Floats:

@@ -76,7 +76,7 @@ class Contact:
         self.searches = Searches(case, model, neighbours, self.exterior, comm, clock, registered)
         largest, speed = extremes
         mass = part_pairs.lighter(self.searches.mu, model.nodes, self.exterior.motion.mobility, comm, rigid) or largest
-        self.books = Books(model.nodes.n, case, mass * speed, mass * speed * speed, team)
+        self.books = Books(model.nodes, case, mass * speed, mass * speed * speed, team)
         bodies = rigid.contacts if rigid is not None else None
         self._active = ActiveSet(self.books.scale, Stops.of(case, model, comm), team, bodies)
         self._scheme, self.sweep_count = _Scheme.of(case), SweepCount(sweeps(case))
@@ -145,11 +145,11 @@ class Contact:
         with self._timers.phase("contact"):
             self.searches.due |= self.exterior.uncover(gone, loose, removed, self.searches.scene)
 
-    def crack(self, tets: Ints, nodes: Indices, sides: Indices) -> None:
+    def crack(self, faces: Ints, nodes: Indices, sides: Indices) -> None:
         """Adds broken facets with a side on this rank and the local ``nodes`` (m, 3) of the sides; see ``Cracks``
-        for ``tets`` and ``sides``.
+        for ``faces`` and ``sides``.
         """
-        self.exterior.crack(tets, nodes, sides)
+        self.exterior.cracks.add(faces, nodes, sides)
 
     @property
     def costs(self) -> Ints:
@@ -195,12 +195,10 @@ class Contact:
 
     def separate(self, split: Split) -> None:
         """Updates contact after the separation of nodes; called on all ranks, see topology_updates.py."""
-        self.exterior.separate(split)
-        self.searches.separate(split)
+        self.searches.separate(split, self.exterior.separate(split))
 
     def grow(self, split: Split, ids: Ints) -> None:
-        """Extends the arrays by the copies of nodes; booked energies remain at the parent nodes."""
-        self.books.grow(split.copies.n)
+        """Updates the mobilities of separated nodes."""
         self.exterior.grow(split)
 
     def note(self, state: Nodes) -> None:

@@ -63,7 +63,7 @@ def _fill(out, m, i, found, shared, mesh, block):  # type: ignore[no-untyped-def
         out.mass[m] = min(mass, shared.mass[row])
         for k in range(3):
             out.sides[m, 1 - here, k] = shared.there[row, k]
-    out.tets[m, here], out.tets[m, 1 - here] = mesh.id[place], behind // 4
+    out.faces[m, here], out.faces[m, 1 - here] = 4 * mesh.id[place] + face, behind
     a, b, c = mesh.tets[place, FACES[face, 0]], mesh.tets[place, FACES[face, 1]], mesh.tets[place, FACES[face, 2]]
     out.nodes[m, 0], out.nodes[m, 1], out.nodes[m, 2] = a, b if first else c, c if first else b
     out.first[m] = first
@@ -88,5 +88,5 @@ def _gather(found, shared, mesh, block):  # type: ignore[no-untyped-def]
             _fill(out, m, i, found, shared, mesh, block)
             m += 1
     return BreakingFacets(
-        out.tets[:m], out.nodes[:m], out.sides[:m], out.first[:m], out.traction[:m], out.mass[:m]
+        out.faces[:m], out.nodes[:m], out.sides[:m], out.first[:m], out.traction[:m], out.mass[:m]
     )  # fmt: skip

@@ -104,8 +104,8 @@ class Candidates(NamedTuple):
 class BreakingFacets(NamedTuple):
     """Facets that break in a step."""
 
-    tets: Ints
-    """(m, 2) global ids of the tets of either side, the smaller first."""
+    faces: Ints
+    """(m, 2) global ids of the faces of either side, 4 * tet + local face, the smaller first."""
     nodes: Indices
     """(m, 3) local nodes, counter-clockwise seen from outside of the first side."""
     sides: Indices
@@ -117,10 +117,15 @@ class BreakingFacets(NamedTuple):
     mass: Floats
     """(m,) mass of the lighter tet, kg."""
 
+    @property
+    def tets(self) -> Ints:
+        """(m, 2) global ids of the tets of either side."""
+        return self.faces // 4
+
     def take(self, chosen: Flags) -> "BreakingFacets":
         """Returns the chosen facets."""
         return BreakingFacets(
-            self.tets[chosen], self.nodes[chosen], self.sides[chosen], self.first[chosen], self.traction[chosen],
+            self.faces[chosen], self.nodes[chosen], self.sides[chosen], self.first[chosen], self.traction[chosen],
             self.mass[chosen],
         )  # fmt: skip
 

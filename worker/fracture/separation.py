@@ -24,9 +24,10 @@ from ..model.state import BROKEN, Copies, Indices, Ints, Model, extended
 from ..model.topology import KEY, Split, keys
 from ..parallel.comm import Comm
 from ..parallel.ownership import Neighbour
+from ..parallel.team import Team
 from . import stars
 from .records import MESH, Mesh
-from .stars import Stars
+from .stars import Pieces, Stars
 
 _I1, _I2, _N1 = types.int64[::1], types.int64[:, ::1], types.int32[::1]
 
@@ -36,11 +37,16 @@ _NO_NODES = np.zeros(0, np.int64)
 class Separation:
     """Node separation in the parts that fracture, on one rank."""
 
-    def __init__(self, model: Model, neighbours: list[Neighbour], meshes: dict[int, Mesh], comm: Comm) -> None:
+    def __init__(
+        self, model: Model, neighbours: list[Neighbour], meshes: dict[int, Mesh], comm: Comm, threads: Team
+    ) -> None:
         """``meshes``: of the parts that fracture, by index of the block."""
         self._model, self._neighbours, self._comm = model, neighbours, comm
-        self.stars = {b: Stars(mesh.tets, model.nodes.n) for b, mesh in meshes.items()}
+        self.stars = {b: Stars(mesh.tets, model.nodes.n, threads) for b, mesh in meshes.items()}
         """Stars of the nodes, by index of the block."""
+        for star in self.stars.values():
+            model.nodes.columns.declare(star, **Stars.COLUMNS)
+        self._pieces = Pieces(threads)
         self._meshes = meshes
         self.broken = 0
         """Number of broken facets of all ranks."""
@@ -77,8 +83,8 @@ class Separation:
     def _separated(self, some: Ints, touched: Ints) -> Split:
         """Separates nodes; ``some``: local nodes of the broken facets of any rank."""
         model = self._model
-        rows, places = self._stars(some)
-        of, mine, node, owner, mass = stars.pieces(rows)
+        rows, places, begins = self._stars(some)
+        of, mine, node, owner, mass = self._pieces.of(rows, begins)
         every, new = self._number(mine, touched), model.nodes.n
         first, model.nodes_global = model.nodes_global, model.nodes_global + len(every)
         if not len(mine):
@@ -90,7 +96,6 @@ class Separation:
         if len(model.nodes.shares.node):
             self._split_shares(rows, of, some, new)
         for b, star in self.stars.items():
-            star.grow(copies.n)
             star.reconnect(self._meshes[b].tets, some, rows, places, of, new, b)
         return Split(copies, new, touched, *_leaving(rows, places, of, new))
 
@@ -119,18 +124,18 @@ class Separation:
         every: Ints = distinct(np.concatenate([mine, *some])) if some else mine
         return every
 
-    def _stars(self, touched: Ints) -> tuple[Ints, Ints]:
-        """Returns the rows of the complete stars of the touched nodes, by node and tet, and their places."""
+    def _stars(self, touched: Ints) -> tuple[Ints, Ints, Ints]:
+        """Returns the rows of the complete stars of the touched nodes, by node and tet, their places, and the start of
+        the rows of each node.
+        """
         ids, rank = self._model.nodes.id, self._comm.rank
-        found = [
-            stars.describe(touched, star.first, star.count, star.pool, ids, self._meshes[b], b, rank)
-            for b, star in self.stars.items()
-        ]
+        found = [star.describe(touched, ids, self._meshes[b], b, rank) for b, star in self.stars.items()]
         received = self._received(touched, found) if self._neighbours else []
         if len(found) == 1 and not received:
-            return found[0][0], found[0][1]
+            return found[0]
         rows = np.concatenate([*(rows for rows, _, _ in found), *received])
-        return stars.ordered(rows, np.concatenate([places for _, places, _ in found]))
+        rows, places = stars.ordered(rows, np.concatenate([places for _, places, _ in found]))
+        return rows, places, stars.node_begins(rows)
 
     def _received(self, touched: Ints, found: list[tuple[Ints, Ints, Ints]]) -> list[Ints]:
         """Exchanges the rows of stars of shared touched nodes: sends the rows ``found`` on this rank, returns the rows

@@ -53,7 +53,7 @@ class Fracture:
         self._model, self._elements, self._clock, self._comm = model, elements, clock, comm
         bodies, work, self.warnings = self._bodies(case)
         meshes = {body.index: body.mesh for body in bodies}
-        self.separation = Separation(model, neighbours, meshes, comm)
+        self.separation = Separation(model, neighbours, meshes, comm, team)
         specs = {i: part.fracture for i, part in enumerate(case.parts) if part.fracture is not None}
         self.initiation = Initiation(model, bodies, specs, self.separation.stars, neighbours, comm, clock, team)
         handover = Handover(model, meshes, neighbours, comm)

@@ -19,15 +19,21 @@ it. A single broken facet inside a body separates no node; a node separates if b
 pieces.
 """
 
+from typing import ClassVar
+
 import numpy as np
 
 from ..kernels.jit import njit, several, types
 from ..mesh.faces import FACES
-from ..model.growing import Rooms
+from ..model.columns import ZERO
+from ..model.growing import Scratch
 from ..model.rows import MASS as MASS_ROW
-from ..model.state import CHUNK, INTACT, Indices, Ints, Tets
+from ..model.state import CHUNK, INTACT, Floats, Indices, Ints, Tets
 from ..model.topology import keys
-from .records import MESH
+from ..parallel.arguments import reader
+from ..parallel.passes import Pass
+from ..parallel.team import TASK, Team
+from .records import MESH, Mesh
 
 NODE, TET, RANK, MASS, BEHIND = 0, 1, 2, 3, 4
 """Columns of the table of stars, one row for each node and tet of its star: global ids of node and tet, rank of the
@@ -40,13 +46,23 @@ tet of another rank."""
 _I1, _I2, _N1 = types.int64[::1], types.int64[:, ::1], types.int32[::1]
 
 
+_DESCRIBE = _I2, _I2, _I1, _I1, _N1, _N1, _N1, _I1, MESH, types.int64, types.int64
+_CUT = _I1, _I1, _I1, _I2, _I1
+_read_describe, _read_cut = reader(*_DESCRIBE), reader(*_CUT)
+_NODES = 8
+"""Number of nodes in a task. Chosen value: a task takes 10 to 20 us, compared with 2 us to start a parallel region."""
+
+
 class Stars:
     """Stars of all nodes of one block: a pool of tets in which the tets of each node are contiguous.
 
     When a node separates, its range of the pool is divided among it and its copies.
     """
 
-    def __init__(self, tets: Tets, nodes: int) -> None:
+    COLUMNS: ClassVar = {"first": ZERO, "count": ZERO}
+    """Columns by node (model/columns.py)."""
+
+    def __init__(self, tets: Tets, nodes: int, threads: Team) -> None:
         """``tets`` (n, 4): local nodes of the tets; ``nodes``: number of local nodes."""
         corners = tets.reshape(-1)
         self.pool: Indices = (np.argsort(corners, kind="stable") // 4).astype(np.int32)
@@ -55,14 +71,19 @@ class Stars:
         """(nodes,) number of tets of each node."""
         self.first: Indices = (np.cumsum(self.count) - self.count).astype(np.int32)
         """(nodes,) start of the range of each node in the pool."""
-        self._rooms = Rooms("first", "count")
+        self._describe, self._scratch = Pass(threads, _describe, *_DESCRIBE, size=_NODES), Scratch()
 
-    def grow(self, copies: int) -> None:
-        """Appends new nodes without tets."""
-        n = len(self.first)
-        for room in self._rooms.of(self, copies):
-            room[n : n + copies] = 0
-        self._rooms.take(self, n + copies)
+    def describe(self, nodes: Ints, ids: Ints, mesh: Mesh, block: int, rank: int) -> tuple[Ints, Ints, Ints]:
+        """Returns the rows (r, COLUMNS) and places (r, 3) of the stars of ascending local ``nodes`` (k,) in this block,
+        by node and tet, and (k + 1,) the start of the rows of each; they are valid until the next call. ``ids``: global
+        ids of all local nodes.
+        """
+        begins = _begins(nodes, self.count)
+        n = int(begins[-1])
+        rows, places = self._scratch.of("rows", n, np.int64, COLUMNS), self._scratch.of("places", n, np.int64, 3)
+        lists = self.first, self.count, self.pool
+        self._describe.run(len(nodes), rows, places, begins, nodes, *lists, ids, mesh, block, rank)
+        return rows, places, begins
 
     def reconnect(self, tets: Tets, nodes: Ints, rows: Ints, places: Ints, of: Ints, new: int, block: int) -> None:
         """Sets the separated nodes in the tets (n, 4) of this block, and divides the ranges of the pool.
@@ -74,39 +95,48 @@ class Stars:
         _reconnect(self.pool, self.first, self.count, tets, nodes, rows, places, of, new, block)
 
 
-@njit(several(_I2, _I2, _I1)(_I1, _N1, _N1, _N1, _I1, MESH, types.int64, types.int64), cache=True)
-def describe(nodes, first, count, pool, ids, mesh, block, rank):  # type: ignore[no-untyped-def]
-    """Returns the rows (r, COLUMNS) and places (r, 3) of the stars of ascending local ``nodes`` (k,) in one block,
-    by node and tet, and (k + 1,) the start of the rows of each; ``ids``: global ids of all local nodes.
-    """
-    begin = np.zeros(len(nodes) + 1, np.int64)
+@njit(_I1(_I1, _N1), cache=True)
+def _begins(nodes, count):  # type: ignore[no-untyped-def]
+    """(k + 1,) start of the rows of each of the ``nodes`` (k,)."""
+    begins = np.zeros(len(nodes) + 1, np.int64)
     for i in range(len(nodes)):
-        begin[i + 1] = begin[i] + count[nodes[i]]
-    rows, places = np.empty((begin[-1], COLUMNS), np.int64), np.empty((begin[-1], 3), np.int64)
-    bits = mesh.state.view(np.int64)
-    for i in range(len(nodes)):
+        begins[i + 1] = begins[i] + count[nodes[i]]
+    return begins
+
+
+@njit(TASK, cache=True)
+def _describe(table, begin, stop, thread):  # type: ignore[no-untyped-def]
+    """Task: Stars.describe."""
+    rows, places, begins, nodes, first, count, pool, ids, mesh, block, rank = _read_describe(table)
+    for i in range(begin, stop):
         a = nodes[i]
-        star = pool[first[a] : first[a] + count[a]].copy()
+        star = pool[first[a] : first[a] + count[a]]
         for s in range(1, len(star)):  # insertion sort, because a star has only about twenty tets
             e, r = star[s], s
             while r > 0 and mesh.id[star[r - 1]] > mesh.id[e]:
                 star[r] = star[r - 1]
                 r -= 1
             star[r] = e
-        r = begin[i]
-        for e in star:
-            corner = 0
-            while mesh.tets[e, corner] != a:
-                corner += 1
-            places[r, PLACE], places[r, CORNER], places[r, BLOCK] = e, corner, block
-            rows[r, NODE], rows[r, TET], rows[r, RANK] = ids[a], mesh.id[e], rank
-            rows[r, MASS] = bits[(e // CHUNK * mesh.columns + MASS_ROW) * CHUNK + e % CHUNK]
-            for m in range(3):
-                k = FACES[corner, m]
-                held = mesh.across[e, k] >= 0 and mesh.bond[e, k] == INTACT
-                rows[r, BEHIND + m] = mesh.across[e, k] // 4 if held else -1
-            r += 1
-    return rows, places, begin
+        for s in range(len(star)):
+            _row(rows, places, begins[i] + s, star[s], a, ids, mesh, block, rank)
+
+
+@njit(
+    types.void(_I2, _I2, types.int64, types.int64, types.int64, _I1, MESH, types.int64, types.int64), cache=True
+)  # fmt: skip
+def _row(rows, places, r, e, a, ids, mesh, block, rank):  # type: ignore[no-untyped-def]
+    """Writes row ``r``: node ``a`` and tet ``e``."""
+    corner = 0
+    while mesh.tets[e, corner] != a:
+        corner += 1
+    places[r, PLACE], places[r, CORNER], places[r, BLOCK] = e, corner, block
+    rows[r, NODE], rows[r, TET], rows[r, RANK] = ids[a], mesh.id[e], rank
+    mass = mesh.state[(e // CHUNK * mesh.columns + MASS_ROW) * CHUNK + e % CHUNK]
+    rows[r, MASS] = np.float64(mass).view(np.int64)
+    for m in range(3):
+        k = FACES[corner, m]
+        held = mesh.across[e, k] >= 0 and mesh.bond[e, k] == INTACT
+        rows[r, BEHIND + m] = mesh.across[e, k] // 4 if held else -1
 
 
 def ordered(rows: Ints, places: Ints) -> tuple[Ints, Ints]:
@@ -124,8 +154,8 @@ def _root(parent, i):  # type: ignore[no-untyped-def]
     return i
 
 
-@njit("boolean(int64[::1], int64[:, ::1], int64[::1], int64, int64)", cache=True)
-def _join(parent, rows, tets, begin, end):  # type: ignore[no-untyped-def]
+@njit("boolean(int64[::1], int64[:, ::1], int64, int64)", cache=True)
+def _join(parent, rows, begin, end):  # type: ignore[no-untyped-def]
     """Joins the rows of one star that are connected through intact facets; the root of each piece is its smallest row.
     Returns True if the star is a single piece.
     """
@@ -133,11 +163,11 @@ def _join(parent, rows, tets, begin, end):  # type: ignore[no-untyped-def]
     for i in range(begin, end):
         for m in range(BEHIND, COLUMNS):
             behind, j = rows[i, m], i + 1
-            if behind <= tets[i]:  # no facet, or a facet that was joined from the other side
+            if behind <= rows[i, TET]:  # no facet, or a facet that was joined from the other side
                 continue
-            while j < end and tets[j] < behind:
+            while j < end and rows[j, TET] < behind:
                 j += 1
-            if j == end or tets[j] != behind:
+            if j == end or rows[j, TET] != behind:
                 continue
             one, two = _root(parent, i), _root(parent, j)
             if one != two:
@@ -148,38 +178,79 @@ def _join(parent, rows, tets, begin, end):  # type: ignore[no-untyped-def]
     return False
 
 
-@njit(several(_I1, _I2, _I1, _N1, types.float64[::1])(_I2), cache=True)
-def pieces(rows):  # type: ignore[no-untyped-def]
-    """Returns the pieces that separate from their nodes, by node and smallest tet; ``rows`` by node and tet.
+class Pieces:
+    """Pass that cuts stars into pieces."""
 
-    (r,) the piece of each row, -1 in the piece with the smallest tet of its node, which keeps the node; and for each
-    piece: ids of the node and of its smallest tet, place of the node among the nodes of ``rows``, rank of that tet, and
-    a quarter of the mass of its tets, kg.
-    """
-    n, i_node = len(rows), 0
-    parent, of, first, mass = np.arange(n), np.full(n, -1), np.empty(n, np.int64), np.zeros(n)
-    node = np.empty(n, np.int64)
-    tets, quarters = rows[:, TET].copy(), rows[:, MASS].copy().view(np.float64)
-    begin, k = 0, 0
-    while begin < n:
-        end = begin
-        while end < n and rows[end, NODE] == rows[begin, NODE]:
-            end += 1
-        whole = _join(parent, rows, tets, begin, end)
-        for i in range(end if whole else begin + 1, end):
-            root = _root(parent, i)
+    def __init__(self, threads: Team) -> None:
+        self._cut, self._scratch = Pass(threads, _cut, *_CUT, size=_NODES), Scratch()
+
+    def of(self, rows: Ints, begins: Ints) -> tuple[Ints, Ints, Ints, Indices, Floats]:
+        """Returns the pieces that separate from their nodes, by node and smallest tet; ``rows`` by node and tet,
+        ``begins`` (k + 1,): start of the rows of each node.
+
+        (r,) the piece of each row, -1 in the piece with the smallest tet of its node, which keeps the node; valid until
+        the next call. For each piece: ids of the node and of its smallest tet, place of the node among the nodes of
+        ``rows``, rank of that tet, and a quarter of the mass of its tets, kg.
+        """
+        n = len(begins) - 1
+        of, parent, many = (self._scratch.of(name, m) for name, m in (("of", len(rows)), ("p", len(rows)), ("m", n)))
+        self._cut.run(n, of, many, parent, rows, begins)
+        found: tuple[Ints, Ints, Indices, Floats] = _numbered(of, many, rows, begins)
+        return of, *found
+
+
+@njit(TASK, cache=True)
+def _cut(table, first, stop, thread):  # type: ignore[no-untyped-def]
+    """Task: numbers the pieces of each star, ``of`` (r,) and ``many`` (k,)."""
+    of, many, parent, rows, begins = _read_cut(table)
+    for i in range(first, stop):
+        begin, end, k = begins[i], begins[i + 1], 0
+        for r in range(begin, end):
+            parent[r] = r
+        whole = _join(parent, rows, begin, end)
+        for r in range(begin, end):
+            root = begin if whole else _root(parent, r)
             if root == begin:
+                of[r] = -1
+            elif root == r:
+                of[r], k = k, k + 1
+            else:
+                of[r] = of[root]
+        many[i] = k
+
+
+@njit(several(_I2, _I1, _N1, types.float64[::1])(_I1, _I1, _I2, _I1), cache=True)
+def _numbered(of, many, rows, begins):  # type: ignore[no-untyped-def]
+    """Numbers the pieces of all stars; returns their labels, nodes, ranks and masses (Pieces.of)."""
+    total = many.sum()
+    labels, node = np.empty((total, 2), np.int64), np.empty(total, np.int64)
+    ranks, mass, k = np.empty(total, np.int32), np.zeros(total), 0
+    for i in range(len(many)):
+        if many[i] == 0:
+            continue
+        last = -1
+        for r in range(begins[i], begins[i + 1]):
+            if of[r] < 0:
                 continue
-            if root == i:
-                of[i], first[k], node[k] = k, i, i_node
-                k += 1
-            of[i] = of[root]
-            mass[of[i]] += 0.25 * quarters[i]
-        begin, i_node = end, i_node + 1
-    labels, ranks = np.empty((k, 2), np.int64), np.empty(k, np.int32)
-    for p in range(k):
-        labels[p, 0], labels[p, 1], ranks[p] = rows[first[p], NODE], rows[first[p], TET], rows[first[p], RANK]
-    return of, labels, node[:k].copy(), ranks, mass[:k].copy()
+            if of[r] > last:  # the smallest tet of the next piece
+                last = of[r]
+                labels[k + last, 0], labels[k + last, 1] = rows[r, NODE], rows[r, TET]
+                ranks[k + last], node[k + last] = rows[r, RANK], i
+            of[r] += k
+            mass[of[r]] += 0.25 * np.int64(rows[r, MASS]).view(np.float64)
+        k += many[i]
+    return labels, node, ranks, mass
+
+
+@njit(_I1(_I2), cache=True)
+def node_begins(rows):  # type: ignore[no-untyped-def]
+    """(k + 1,) start of the rows of each node in the ``rows`` of stars, by node."""
+    begins, n = np.empty(len(rows) + 1, np.int64), 0
+    for r in range(len(rows)):
+        if r == 0 or rows[r, NODE] != rows[r - 1, NODE]:
+            begins[n], n = r, n + 1
+    begins[n] = len(rows)
+    return begins[: n + 1].copy()
 
 
 @njit(types.void(_N1, _N1, _N1, types.uint32[:, ::1], _I1, _I2, _I2, _I1, types.int64, types.int64), cache=True)

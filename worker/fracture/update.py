@@ -36,7 +36,7 @@ class TopologyUpdate:
             cohesion.insert(new)
         if self._contact is not None:
             for b in broken:
-                self._contact.crack(b.facets.tets, b.facets.nodes, b.facets.sides)
+                self._contact.crack(b.facets.faces, b.facets.nodes, b.facets.sides)
             self._contact.separate(split)
 
     def _grow(self, split: Split) -> None:

@@ -13,7 +13,7 @@ from types import CodeType, ModuleType
 
 from conoid.cases.model.schema import Case
 
-from ..model.inheriting import inherit
+from ..model.inheriting import copy, fill, inherit
 from .jit import DECLARED, Kernel
 
 _WORKER = (__package__ or "").rpartition(".")[0]
@@ -32,7 +32,8 @@ def preload(case: Case) -> None:
             for kernel in called(module):
                 kernel.load()
     if case.fractures:
-        inherit.load()
+        for kernel in (fill, copy, inherit):
+            kernel.load()
 
 
 def called(module: ModuleType) -> Iterator[Kernel]:

@@ -35,6 +35,26 @@ class Scratch:
         return some
 
 
+def spacious(n: int, columns: tuple[int, ...], kind: Any) -> Any:
+    """Return an uninitialised (n, *columns) array in a buffer with spare rows (columns.py)."""
+    return np.empty((n + n // 2, *columns), kind)[:n]
+
+
+def spacious_copy(array: Any) -> Any:
+    """Return a copy of an array in a buffer with spare rows (columns.py)."""
+    copy = spacious(len(array), array.shape[1:], array.dtype)
+    copy[:] = array
+    return copy
+
+
+def spare(array: "np.ndarray", m: int) -> "np.ndarray | None":
+    """Return the buffer that begins with ``array`` and has ``m`` rows or more, None if there is no such buffer."""
+    room = array.base
+    if not isinstance(room, np.ndarray) or room.shape[1:] != array.shape[1:] or room.dtype != array.dtype:
+        return None
+    return room if len(room) >= m and same_memory(room[: len(array)], array) else None
+
+
 def same_memory(one: np.ndarray, two: np.ndarray) -> bool:
     """Return whether two C-ordered arrays of one type occupy the same memory."""
     return one.shape == two.shape and one.__array_interface__["data"] == two.__array_interface__["data"]

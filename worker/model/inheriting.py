@@ -1,23 +1,48 @@
-"""Initial values of nodes that are copies of other nodes."""
+"""Initial values of new rows of columns, and of nodes that are copies of other nodes."""
 
-from ..kernels.jit import njit
+from ..kernels.jit import njit, types
+from ..parallel.arguments import reader
+
+_WIDTH, _VALUE, _IS_COPIED, _SIZE = 2, 3, 4, 40
+"""Words of a column (columns.py): bytes of a row, value of each byte of a new row, whether a copy has the row of its
+source; bytes of the words of a column."""
+_bytes = reader(types.uint8[::1])
+
+
+@njit("void(int64[:, ::1], int64, int64, int64)", cache=True)
+def fill(columns, words, n, more):  # type: ignore[no-untyped-def]
+    """Set ``more`` rows from row ``n`` on to the values of the rules; ``words``: address of ``columns`` (c, 5)."""
+    for c in range(len(columns)):
+        (room,) = _bytes(words + _SIZE * c)
+        width, value = columns[c, _WIDTH], columns[c, _VALUE]
+        for i in range(width * n, width * (n + more)):
+            room[i] = value
+
+
+@njit("void(int64[:, ::1], int64, int64[::1], int64[::1])", cache=True)
+def copy(columns, words, sources, targets):  # type: ignore[no-untyped-def]
+    """Copy the rows ``sources`` of the columns with the rule COPIED to the rows ``targets``."""
+    for c in range(len(columns)):
+        if not columns[c, _IS_COPIED]:
+            continue
+        (room,) = _bytes(words + _SIZE * c)
+        width = columns[c, _WIDTH]
+        for k in range(len(sources)):
+            fro, to = width * sources[k], width * targets[k]
+            for i in range(width):
+                room[to + i] = room[fro + i]
 
 
 @njit(
-    "void(int32[::1], float64[:, ::1], float64[:, ::1], float64[:, ::1], float64[::1], int64[:, ::1], float64[::1], "
-    "int64[::1], float64[::1], int64)",
+    "void(int64[::1], int32[::1], boolean[::1], float64[::1], int64[::1], int64[::1], int32[::1], boolean[::1], "
+    "float64[::1], int64)",
     cache=True,
 )
-def inherit(part, x0, x, v, mass, force, stepping, parents, masses, n):  # type: ignore[no-untyped-def]
-    """Set the rows from ``n`` on of nodal columns.
-
-    The new rows are copies of ``parents`` (k,) with zero force and zero lost energy. Each copy takes its mass
+def inherit(ids, owner, owned, mass, parents, new_ids, new_owner, new_owned, masses, n):  # type: ignore[no-untyped-def]
+    """Set ids, owners and masses of the nodes from ``n`` on, copies of ``parents`` (k,). Each copy takes its mass
     ``masses`` (k,), kg, from its parent.
     """
     for c in range(len(parents)):
-        a = parents[c]
-        part[n + c] = part[a]
-        for i in range(3):
-            x0[n + c, i], x[n + c, i], v[n + c, i], force[n + c, i] = x0[a, i], x[a, i], v[a, i], 0
-        mass[n + c], stepping[n + c] = masses[c], 0.0
-        mass[a] -= masses[c]
+        ids[n + c], owner[n + c], owned[n + c] = new_ids[c], new_owner[c], new_owned[c]
+        mass[n + c] = masses[c]
+        mass[parents[c]] -= masses[c]

@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from . import ids as ids_of
-from .growing import Rooms
+from .columns import COPIED, ZERO, Columns
 from .shares import Shares
 
 Floats = npt.NDArray[np.float64]
@@ -79,10 +79,13 @@ class Nodes:
     copy has the bits of its parent."""
     shares: Shares = field(default_factory=Shares)
     """Masses of the nodes that belong to several parts."""
-    _inherited: Rooms = field(
-        default_factory=lambda: Rooms("part", "x0", "x", "v", "mass", "force", "stepping"), init=False
-    )
-    _given: Rooms = field(default_factory=lambda: Rooms("id", "owner", "owned"), init=False)
+    columns: Columns = field(default_factory=Columns, init=False, repr=False, compare=False)
+    """All columns of all stages by node. A stage declares its columns when it is built."""
+
+    def __post_init__(self) -> None:
+        """Declares the columns of this table."""
+        self.columns.declare(self, id=ZERO, owner=ZERO, owned=ZERO, mass=ZERO, force=ZERO, stepping=ZERO)
+        self.columns.declare(self, part=COPIED, x0=COPIED, x=COPIED, v=COPIED, group=COPIED, marks=COPIED)
 
     @property
     def n(self) -> int:
@@ -118,21 +121,17 @@ class Nodes:
         return mass
 
     def grow(self, copies: "Copies") -> None:
-        """Append copies of nodes: each copy has the state of its parent, and takes its mass from its parent."""
+        """Append copies of nodes to the columns of all stages: each copy has the state of its parent, and takes its
+        mass from its parent.
+        """
         # This module imports numba, which must not be imported before kernels/store.py has set its cache folder.
         from .inheriting import inherit
 
-        n, m = self.n, self.n + copies.n
-        inherited = self._inherited.of(self, copies.n)
-        inherit(*inherited, copies.parents, copies.mass, n)
-        for room, column in zip(self._given.of(self, copies.n), (copies.id, copies.owner, copies.owned), strict=True):
-            room[n:m] = column
-        if len(self.group):
-            self.group = extended(self.group, self.group[copies.parents])
-        if len(self.marks):
-            self.marks = extended(self.marks, self.marks[copies.parents])
-        self._inherited.take(self, m)
-        self._given.take(self, m)
+        n = self.n
+        self.columns.extend(n, copies.n)
+        self.columns.copy(copies.parents, np.arange(n, n + copies.n))
+        new = copies.id, copies.owner, copies.owned, copies.mass
+        inherit(self.id, self.owner, self.owned, self.mass, copies.parents, *new, n)
 
 
 @dataclass

@@ -49,6 +49,12 @@ class Split:
     block: Indices
     """(r,) index of the block of the tet."""
 
+    @property
+    def family(self) -> Indices:
+        """(c, 2) local indices of the parents, ascending, and of their copies."""
+        copies = np.arange(self.first, self.first + self.copies.n)
+        return np.column_stack([self.copies.parents, copies]).astype(np.int32)
+
     @classmethod
     def elsewhere(cls, first: int, touched: Ints) -> Self:
         """Return a split without copies on this rank, which has ``first`` nodes."""

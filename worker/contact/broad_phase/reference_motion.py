@@ -8,10 +8,13 @@ The time for which a pair is not tested is measured from other, short lines, ren
 with the mean velocities of these steps they are much closer to the slots, and need no registration (pairs.py).
 """
 
+from typing import ClassVar
+
 import numpy as np
 
 from ...kernels.jit import njit
-from ...model.growing import Rooms
+from ...model.columns import COPIED
+from ...model.growing import spacious_copy
 from ...model.state import Flags, Floats, Indices
 
 _V1, _V2, _N2 = "float64[::1]", "float64[:, ::1]", "int32[:, ::1]"
@@ -20,24 +23,23 @@ _V1, _V2, _N2 = "float64[::1]", "float64[:, ::1]", "int32[:, ::1]"
 class Lines:
     """Straight line along which each slot is extrapolated."""
 
+    COLUMNS: ClassVar = {"x": COPIED, "course": COPIED, "since": COPIED, "left": COPIED}
+    """Rules of the columns by slot (model/columns.py)."""
+
     def __init__(self, x: Floats, course: Floats) -> None:
         """``x``, ``course`` (slots, 3): positions, m, and velocities, m/s, at time 0."""
-        self.x, self.course = x.copy(), course.copy()
+        self.x, self.course = spacious_copy(x), spacious_copy(course)
         self.since = np.zeros(len(x))
         """(slots,) time at which each line began, s."""
         self.left = np.zeros(len(x))
         """(slots,) distance of each slot from its line in the present step, m: the larger of the distances at the
         beginning and at the end of the step."""
-        self._rooms = Rooms("x", "course", "since", "left")
 
-    def add(self, x: Floats, course: Floats, t: float) -> None:
-        """Adds slots with their positions and velocities at time ``t``, (n, 3) each."""
-        self._rooms.append(self, len(x), x=x - t * course, course=course, since=t, left=0.0)
-
-    def inherit(self, heirs: Indices, parents: Indices) -> None:
-        """Copies the lines of ``parents`` to their copies ``heirs``."""
-        for column in (self.x, self.course, self.since, self.left):
-            column[heirs] = column[parents]
+    def begin_at(self, first: int, x: Floats, course: Floats, t: float) -> None:
+        """Begins the lines of the slots from ``first`` on, with their positions and velocities at time ``t``, (n, 3)
+        each.
+        """
+        self.x[first:], self.course[first:], self.since[first:] = x - t * course, course, t
 
     def take_over(self, slots: Indices, old: "Lines", t: float) -> None:
         """Copies the lines of ``old`` at time ``t``; ``slots``: new number of each of its slots, -1 for removed
@@ -74,15 +76,10 @@ class ReferenceMotion:
         self.strayed = 0.0
         """Largest distance of a tracked slot from its line of the search in the step, m."""
 
-    def add(self, x: Floats, course: Floats) -> None:
-        """Adds slots with their present positions and velocities, (n, 3) each."""
-        self.searched.add(x, course, self.end)
-        self.short.add(x, course, self.end)
-
-    def inherit(self, heirs: Indices, parents: Indices) -> None:
-        """Copies the lines of ``parents`` to their copies ``heirs``."""
-        self.searched.inherit(heirs, parents)
-        self.short.inherit(heirs, parents)
+    def begin_at(self, first: int, x: Floats, course: Floats) -> None:
+        """Begins the lines of the slots from ``first`` on, with their present positions and velocities, (n, 3) each."""
+        self.searched.begin_at(first, x, course, self.end)
+        self.short.begin_at(first, x, course, self.end)
 
     def take_over(self, slots: Indices, old: "ReferenceMotion") -> None:
         """Copies the lines of ``old``; ``slots``: new number of each of its slots, -1 for removed slots."""

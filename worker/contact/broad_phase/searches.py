@@ -9,6 +9,7 @@ from conoid.cases.model.schema import Case
 
 from ...clock import Clock
 from ...migration.parcel import Parcel
+from ...model.columns import ABSENT
 from ...model.state import Flags, Floats, Ints, Model, Nodes
 from ...model.topology import Split
 from ...parallel.comm import Comm
@@ -21,7 +22,7 @@ from ..scene import layout
 from ..scene.near_surface import HALO, Rules
 from ..scene.scene import Scene
 from ..scene.split_update import SplitUpdate
-from ..scene.topology_updates import gather
+from ..scene.topology_updates import exchange
 from ..surface import normals
 from .extrapolation import courses
 from .registration import Registration, carry
@@ -54,6 +55,7 @@ class Searches:
         self.mu = part_pairs.friction(case)
         """(parts, parts) Coulomb's coefficient, NaN where two parts may not be in contact."""
         self.scene: Scene | None = None
+        model.nodes.columns.declare(self, "scene.own", place=ABSENT)
         self.due = True
         """True if the next step begins with a search."""
         self.many = 0
@@ -185,20 +187,20 @@ class Searches:
         sides = now.rows_of(self._comm.join(faces.reshape(-1)))
         now.enliven(sides[~now.faces.live[sides]])
 
-    def separate(self, split: Split) -> None:
-        """Updates the scene after the separation of nodes; called on all ranks, see topology_updates.py for the ranks
-        that exchange messages.
+    def separate(self, split: Split, cracks: Ints) -> None:
+        """Updates the scene after the separation of nodes; ``cracks``: rows of the cracks at separated nodes. Called on
+        all ranks, see topology_updates.py for the ranks that exchange messages.
         """
         if self.scene is None:
             return
         nodes, here = self._model.nodes, self._exterior.motion.here(self._model.nodes)
-        update = gather(split, self.scene, here, self._comm)
-        if update is None:
+        received = exchange(split, self.scene, here, self._comm) if self._comm.size > 1 else None
+        if not split.copies.n and received is None:
             return
         follower = SplitUpdate(self.scene, here, nodes)
-        follower.follow(update, self._exterior.cracks, self._model.blocks, self._neighbours)
+        follower.follow(split, received, self._exterior.cracks, cracks, self._model.blocks, self._neighbours)
         if self._comm.size > 1:
-            follower.share(update, self._neighbours)
+            follower.share(split, received, self._neighbours)
 
     def pushed(self, nodes: Ints) -> Flags:
         """(k,) which of the local ``nodes`` (k,) had an impulse of contact in the last step."""

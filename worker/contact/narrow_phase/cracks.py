@@ -14,10 +14,10 @@ import numpy as np
 
 from ...kernels.jit import njit
 from ...migration.parcel import Table, once
-from ...model.state import WIDE, Block, Flags, Floats, Indices, Ints, Nodes, extended
-from ...model.topology import Split
-from ..scene.split_pairs import touching
-from ..surface.families import CornerLists, Corners, Families
+from ...model.growing import Rooms
+from ...model.state import WIDE, Block, Flags, Floats, Indices, Ints, Nodes
+from ...model.topology import KEY, Split
+from ..surface.families import CornerLists, Corners, Families, TouchingRows
 from ..surface.records import CrackSides
 
 AGE, _YOUNG = 16, 0.3
@@ -25,6 +25,10 @@ AGE, _YOUNG = 16, 0.3
 cracks become aged (docs/theory/contact.md, "Edges at cracks")."""
 _KEPT = 12
 """Columns of the stored impulses of a crack."""
+_COLUMNS = "faces", "nodes", "sides", "foreseen", "aged", "places", "kept"
+"""Arrays with a row for each crack."""
+_IN_LIST, _WALKED = 1, 2
+"""Marks of a node: it is in the list, and so is its family."""
 
 
 @dataclass
@@ -52,6 +56,7 @@ class Cracks:
     """Families (all copies of one original node) of all local nodes."""
     _corners: dict[int, Corners] = field(default_factory=dict)
     """Corners of the narrow sides by block, kept until cracks or families change."""
+    _rooms: Rooms = field(default_factory=lambda: Rooms(*_COLUMNS), init=False, repr=False)
 
     @classmethod
     def none(cls, ids: Ints) -> "Cracks":
@@ -60,19 +65,11 @@ class Cracks:
         families, none, flags = Families.of(ids), np.zeros((0, 6), np.int32), np.zeros(0, bool)
         return cls(faces, none, sides, flags, flags, none, np.zeros((0, _KEPT)), families)
 
-    def add(self, tets: Ints, nodes: Indices, sides: Indices, blocks: list[Block]) -> None:
-        """Adds broken facets between ``tets`` (m, 2) with their three ``nodes`` (m, 3)."""
-        faces = 4 * tets + sides[:, :, 2]
-        for b, block in enumerate(blocks):
-            for k in (0, 1):
-                mine = (sides[:, k, 0] == b) & (sides[:, k, 1] >= 0)
-                faces[mine, 1 - k] = block.across[sides[mine, k, 1], sides[mine, k, 2]]
-        self.faces, self.sides = extended(self.faces, faces), extended(self.sides, sides)
-        self.nodes = extended(self.nodes, np.concatenate([nodes, nodes], axis=1))
-        self.foreseen = extended(self.foreseen, np.zeros(len(faces), bool))
-        self.aged = extended(self.aged, np.zeros(len(faces), bool))
-        self.places = extended(self.places, np.full((len(faces), 6), -1, np.int32))
-        self.kept = extended(self.kept, np.zeros((len(faces), _KEPT)))
+    def add(self, faces: Ints, nodes: Indices, sides: Indices) -> None:
+        """Adds broken facets between ``faces`` (m, 2) with their three ``nodes`` (m, 3)."""
+        both = np.concatenate([nodes, nodes], axis=1)
+        new = {"foreseen": False, "aged": False, "places": -1, "kept": 0.0}
+        self._rooms.append(self, len(faces), faces=faces, nodes=both, sides=sides, **new)
         self._corners = {}
 
     def corners(self, block: int, lists: CornerLists) -> Corners:
@@ -81,14 +78,18 @@ class Cracks:
             self._corners[block] = lists.of(self.nodes, self.sides, block, self.families)
         return self._corners[block]
 
-    def follow(self, split: Split, ids: Ints) -> None:
-        """Updates nodes and families after a split; ``ids`` of the local nodes."""
-        parents = np.zeros(len(ids), bool)
-        parents[split.copies.parents] = True
-        rows = touching(self.nodes, parents)
-        self.nodes[rows] = split.followed_sides(self.nodes[rows], ids, self.faces[rows] // 4)
-        self.families.grow(split)
+    def follow(self, split: Split, ids: Ints, touching: TouchingRows) -> Ints:
+        """Updates nodes and families after a split; ``ids`` of the local nodes. Returns the rows of the cracks at
+        separated nodes.
+        """
+        families, parents = self.families, split.copies.parents
+        families.marks[parents] = 1
+        rows = touching.of(self.nodes, families.marks)
+        families.marks[parents] = 0
+        _follow(self.nodes, self.faces, rows, ids, split.key, split.node)
+        families.link(split)
         self._corners = {}
+        return rows
 
     def keep(self, ids: Ints) -> Table:
         """Returns the cracks as a table, one row a side; ``ids`` of the local nodes."""
@@ -137,18 +138,17 @@ class Cracks:
             self.aged[:] = True
         return due
 
-    def beside(self, rows: Ints, blocks: list[Block]) -> tuple[Flags, Flags]:
-        """Returns (nodes,) flags of the nodes of the local tets at the cracks ``rows`` and of the families at their
-        corners; and flags of the separated nodes among these nodes.
+    def beside(self, rows: Ints, blocks: list[Block]) -> Indices:
+        """Returns the nodes of the local tets at the cracks ``rows`` and of the families at their corners, each once.
+        The nodes of the cracks that this rank computes are among them.
         """
-        families, near = self.families, np.zeros(len(self.families.ring), bool)
-        nodes = self.nodes[rows]
-        torn = nodes != nodes[:, [3, 4, 5, 0, 1, 2]]
-        sides = self.sides[rows[torn.any(axis=1)]].reshape(-1, 3)
+        marks, ring = self.families.marks, self.families.ring
+        found = np.empty(len(ring), np.int32)
+        n = _families_beside(found, marks, rows, self.nodes, ring)
         for b, block in enumerate(blocks):
-            near[block.tets[sides[(sides[:, 0] == b) & (sides[:, 1] >= 0), 1]]] = True
-        near |= families.members(nodes[torn].astype(np.int64))
-        return near, near & (families.ring != np.arange(len(near)))
+            n = _tets_beside(found, n, marks, rows, self.nodes, self.sides, b, block.tets)
+        marks[found[:n]] = 0
+        return found[:n]
 
     def arrange(self) -> None:
         """Sorts the cracks by the slots of their first nodes: neighbours in space become neighbours in memory."""
@@ -177,7 +177,55 @@ class Cracks:
 
     def _columns(self) -> "dict[str, np.ndarray]":
         """Arrays with a row for each crack."""
-        return {name: column for name, column in vars(self).items() if name not in ("families", "_corners")}
+        return {name: column for name, column in vars(self).items() if name in _COLUMNS}
+
+
+@njit("void(int32[:, ::1], int64[:, ::1], int64[::1], int64[::1], int64[::1], int32[::1])", cache=True)
+def _follow(nodes, faces, rows, ids, key, became):  # type: ignore[no-untyped-def]
+    """Replaces the nodes of the cracks ``rows`` by their copies; ``key`` and ``became``: key and node of a Split."""
+    for r in rows:
+        for k in range(6):
+            wanted = ids[nodes[r, k]] * KEY + faces[r, k // 3] // 4
+            at = np.searchsorted(key, wanted)
+            if at < len(key) and key[at] == wanted:
+                nodes[r, k] = became[at]
+
+
+@njit("int64(int32[::1], uint8[::1], int64[::1], int32[:, ::1], int32[::1])", cache=True)
+def _families_beside(found, marks, rows, nodes, ring):  # type: ignore[no-untyped-def]
+    """Lists the families of the separated nodes of the cracks ``rows``; returns the number of nodes."""
+    n = 0
+    for r in rows:
+        for k in range(6):
+            a = nodes[r, k]
+            if a == nodes[r, (k + 3) % 6] or marks[a] & _WALKED:
+                continue
+            while not marks[a] & _WALKED:
+                marks[a] = _IN_LIST | _WALKED
+                found[n], n, a = a, n + 1, ring[a]
+    return n
+
+
+@njit(
+    "int64(int32[::1], int64, uint8[::1], int64[::1], int32[:, ::1], int32[:, :, ::1], int64, uint32[:, ::1])",
+    cache=True,
+)
+def _tets_beside(found, n, marks, rows, nodes, sides, block, tets):  # type: ignore[no-untyped-def]
+    """Adds the nodes of the local tets of one block at the cracks ``rows`` with separated nodes to a list of ``n``
+    nodes; returns the number of nodes.
+    """
+    for r in rows:
+        if nodes[r, 0] == nodes[r, 3] and nodes[r, 1] == nodes[r, 4] and nodes[r, 2] == nodes[r, 5]:
+            continue
+        for s in range(2):
+            if sides[r, s, 0] != block or sides[r, s, 1] < 0:
+                continue
+            for k in range(4):
+                a = tets[sides[r, s, 1], k]
+                if not marks[a]:
+                    marks[a] = _IN_LIST
+                    found[n], n = a, n + 1
+    return n
 
 
 @njit("int64[::1](int64[:], int64[::1])", cache=True)
@@ -190,17 +238,3 @@ def named(ids, wanted):  # type: ignore[no-untyped-def]
             rows[n] = i
             n += 1
     return rows[:n].copy()
-
-
-@njit("int64[::1](int64[::1], int32[:, ::1], int32[:, :, ::1])", cache=True)
-def computed(rows, nodes, sides):  # type: ignore[no-untyped-def]
-    """Returns those cracks among ``rows`` that this rank computes: cracks with separated nodes whose first side is on
-    this rank.
-    """
-    some, n = np.empty(len(rows), np.int64), 0
-    for c in rows:
-        apart = nodes[c, 0] != nodes[c, 3] or nodes[c, 1] != nodes[c, 4] or nodes[c, 2] != nodes[c, 5]
-        if sides[c, 0, 1] >= 0 and apart:
-            some[n] = c
-            n += 1
-    return some[:n].copy()

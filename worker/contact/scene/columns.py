@@ -5,17 +5,12 @@ from functools import cached_property
 
 import numpy as np
 
+from ...model.columns import ABSENT, COPIED, ZERO, Columns
 from ...model.growing import Rooms
 from ...model.state import Bits, Flags, Floats, Indices, Ints
 from ..surface.normals import COLUMNS
 from ..surface.records import AGED, OPEN, SurfaceNodes
 from .incidence import Incidence
-
-_FRESH = {
-    **dict.fromkeys(("owned", "pushes", "live", "new", "fresh", "tracked", "on_surface"), False),
-    "first": -1, "root": -1, "normals": 0.0, "total": 0,
-}  # fmt: skip
-"""Initial values of the columns of a slot."""
 
 
 @dataclass
@@ -33,7 +28,6 @@ class OwnSlots:
     far_ids: Ints
     """(k,) global ids of the nodes that are not on this rank, ascending."""
     _rooms: Rooms = field(default_factory=lambda: Rooms("slots", "local"), init=False, repr=False)
-    _by_node: Rooms = field(default_factory=lambda: Rooms("place"), init=False, repr=False)
 
     @classmethod
     def of(cls, surface_nodes: SurfaceNodes, nodes: int) -> "OwnSlots":
@@ -56,10 +50,12 @@ class OwnSlots:
             self.far = np.concatenate([self.far, (first + far).astype(np.int32)])[order]
             self.far_ids = ids[order]
 
-    def grow(self, nodes: int) -> None:
-        """Extends the map to ``nodes`` local nodes; the new nodes have no slots yet."""
-        if nodes > len(self.place):
-            self._by_node.append(self, nodes - len(self.place), place=-1)
+
+SLOT_COLUMNS = {
+    **dict.fromkeys(("normals", "owned", "on_surface", "pushes", "live", "new", "tracked"), COPIED),
+    "root": ABSENT | COPIED, "first": ABSENT, "fresh": ZERO, "total": ZERO, "before": ZERO,
+}  # fmt: skip
+"""Rules of the columns of SceneSlots (model/columns.py)."""
 
 
 @dataclass
@@ -92,7 +88,8 @@ class SceneSlots:
     """(slots, 3) impulses of the last step, quanta."""
     before: Floats
     """(slots, 3) v(n-1/2), m/s."""
-    _rooms: Rooms = field(default_factory=lambda: Rooms("before", *_FRESH), init=False, repr=False)
+    columns: Columns = field(default_factory=Columns, init=False, repr=False)
+    """All columns by slot of the scene."""
 
     @classmethod
     def at_rest(cls, owned: Flags, pushes: Flags) -> "SceneSlots":
@@ -100,19 +97,10 @@ class SceneSlots:
         n = len(owned)
         live, new, fresh, tracked, on_surface = np.zeros((5, n), bool)
         first, root = np.full(n, -1, np.int32), np.arange(n, dtype=np.int32)
-        normals, total, before = np.zeros((n, COLUMNS)), np.zeros((n, 3), np.int64), np.zeros((n, 3))
+        spare = n + n // 2
+        normals, before = np.zeros((spare, COLUMNS))[:n], np.zeros((spare, 3))[:n]
+        total = np.zeros((spare, 3), np.int64)[:n]
         return cls(owned, pushes, live, new, fresh, tracked, on_surface, first, root, normals, total, before)
-
-    def add(self, rows: SurfaceNodes) -> None:
-        """Adds the slots of ``rows``."""
-        self._rooms.append(self, rows.n, before=rows.v, **_FRESH)
-
-    def inherit(self, copies: Indices, parents: Indices) -> None:
-        """Copies normals, broad-phase flags and ranks of parents to their copies."""
-        for column in (
-            self.normals, self.owned, self.on_surface, self.pushes, self.live, self.new, self.tracked, self.root,
-        ):  # fmt: skip
-            column[copies] = column[parents]
 
 
 @dataclass

@@ -24,7 +24,7 @@ def build(
     seen = with_ghosts(sides, rules, horizon, drift, comm) if comm.size > 1 else sides
     passes = passes or ScenePasses(team(1))
     order = np.argsort(passes.curve(seen.surface_nodes.x, rules.cell))
-    surface_nodes, faces, edges = seen.surface_nodes.take(order), seen.faces, seen.edges
+    surface_nodes, faces, edges = seen.surface_nodes.spacious(order), seen.faces, seen.edges
     corners, ends = (passes.located(surface_nodes.id, some.nodes) for some in (faces, edges))
     surface_nodes.local = nodes.places(surface_nodes.id)
     owned, pushes = np.zeros(surface_nodes.n, bool), np.zeros(surface_nodes.n, bool)

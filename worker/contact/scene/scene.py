@@ -5,6 +5,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from ...kernels.jit import njit
+from ...model.columns import ZERO
 from ...model.growing import same_memory
 from ...model.ids import among, places
 from ...model.state import Flags, Floats, Indices, Ints, Nodes
@@ -12,14 +13,14 @@ from ...parallel.comm import Comm
 from ...parallel.ownership import Neighbour, same
 from ...parallel.tags import Tag
 from ..broad_phase.pairs import PairTable
-from ..broad_phase.reference_motion import ReferenceMotion
+from ..broad_phase.reference_motion import Lines, ReferenceMotion
 from ..narrow_phase.rows import ActiveRows
 from ..narrow_phase.tables import EdgeTable, FaceTable, SlotTable
 from ..solver.active import Kept
 from ..solver.shared_sums import SharedSums
 from ..surface.records import OPEN, SurfaceNodes
 from . import ghosts
-from .columns import OwnSlots, SceneEdges, SceneFaces, SceneSlots
+from .columns import SLOT_COLUMNS, OwnSlots, SceneEdges, SceneFaces, SceneSlots
 from .ghosts import Copies
 from .near_surface import Rules
 from .passes import ScenePasses
@@ -65,6 +66,24 @@ class Scene:
     _stored: Kept | None = field(default=None, init=False)
     _cracks: Floats | None = field(default=None, init=False)
     """Argument of the last call of ``stored``."""
+
+    def __post_init__(self) -> None:
+        """Declares the columns by slot."""
+        columns = self.slots.columns
+        columns.declare(self.surface_nodes, **dict.fromkeys(vars(self.surface_nodes), ZERO))
+        columns.declare(self.slots, **SLOT_COLUMNS)
+        for lines in (self.reference.searched, self.reference.short):
+            columns.declare(lines, **Lines.COLUMNS)
+
+    def add_slots(self, rows: SurfaceNodes) -> None:
+        """Adds slots for the nodes ``rows``."""
+        first, surface_nodes = self.surface_nodes.n, self.surface_nodes
+        self.slots.columns.extend(first, rows.n)
+        for column, values in zip(surface_nodes.columns(), rows.columns(), strict=True):
+            column[first:] = values
+        self.slots.before[first:] = rows.v
+        self.reference.begin_at(first, rows.x, rows.course)
+        self.own.add(first, rows)
 
     def connect(self, company: list[Neighbour], nodes: Nodes, comm: Comm) -> None:
         """Sets up the messages: sums over the shared nodes ``company``, and copies of the ghosts. Collective."""

@@ -13,6 +13,8 @@ from ...model.topology import KEY
 _I, _I1, _I2, _N1, _N2, _B1 = (
     types.int64, types.int64[::1], types.int64[:, ::1], types.int32[::1], types.int32[:, ::1], types.boolean[::1],
 )  # fmt: skip
+_NAMES = several(_I1, _I1, _N1)
+"""Ids of the nodes, ``key`` of a Split, and the slots that replace the nodes of the keys."""
 
 
 class Family(NamedTuple):
@@ -80,8 +82,8 @@ def _torn(corners, first, near):  # type: ignore[no-untyped-def]
 @njit(several(_I1, _N2)(_I1, _N2, _B1, _I1, _N1, _I1, _I1, _N1), cache=True)
 def follow_faces(near, corners, fresh, faces, first, ids, key, became):  # type: ignore[no-untyped-def]
     """Replaces the ``corners`` (f, 4) of faces, of the ids ``faces`` (f,), by their copies; ``near``: rows of all faces
-    whose corners may have copies; ``first``: see Family; ``ids`` of the nodes; ``key`` and ``became``: see
-    TopologyUpdate, as slots. Returns the rows of the changed faces, and their corners before.
+    whose corners may have copies; ``first``: see Family; ``ids`` of the nodes; ``key`` of a Split, and the
+    slots ``became``. Returns the rows of the changed faces, and their corners before.
     """
     rows = _torn(corners, first, near)
     old = np.empty((len(rows), 4), np.int32)
@@ -211,15 +213,48 @@ def apart_from_edges(old, now, first, own):  # type: ignore[no-untyped-def]
     return pairs
 
 
-@njit("int64[::1](int32[:, ::1], boolean[::1])", cache=True)
-def touching(table, flags):  # type: ignore[no-untyped-def]
-    """Returns the rows of ``table`` (n, k) that contain a flagged entry."""
-    rows = np.empty(len(table), np.int64)
-    n = 0
-    for i in range(len(table)):
-        for k in range(table.shape[1]):
-            if flags[table[i, k]]:
-                rows[n] = i
-                n += 1
-                break
-    return rows[:n].copy()
+@njit(
+    _N2(_I1, _N2, _B1, _B1, _I1, _N1, _B1, _N1, _N2, _I, _B1, _NAMES),
+    cache=True,
+)
+def tear_faces(near, corners, fresh, live, faces, part, in_contact, first, member, most, owned, names):  # type: ignore[no-untyped-def]
+    """Replaces the corners of faces by their copies, see ``follow_faces``, and returns the new pairs, see
+    ``apart_from_faces``, of the ``live`` faces (f,) of bodies that may be in contact with themselves: ``part`` of the
+    nodes, ``in_contact`` (parts,).
+    """
+    rows, old = follow_faces(near, corners, fresh, faces, first, names[0], names[1], names[2])
+    now, searched = np.empty((len(rows), 4), np.int32), np.empty(len(rows), np.bool_)
+    for r in range(len(rows)):
+        searched[r] = live[rows[r]] and in_contact[part[old[r, 0]]]
+        for k in range(4):
+            now[r, k] = corners[rows[r], k]
+    pairs = np.empty((3 * len(rows) * (1 + most), 2), np.int32)
+    n = apart_from_faces(pairs, rows, old, now, first, member, owned, searched)
+    return pairs[:n].copy()
+
+
+@njit(_N2(_I1, _N2, _B1, _B1, _B1, _I2, _N1, _B1, _N1, _NAMES), cache=True)
+def tear_edges(near, corners, fresh, live, mine, sides, part, in_contact, first, names):  # type: ignore[no-untyped-def]
+    """Replaces the nodes of edges by their copies, see ``follow_edges``, and returns the new pairs, see
+    ``apart_from_edges``, of the ``live`` edges (e,); ``mine``: SceneEdges.own; ``part``, ``in_contact``: see
+    ``tear_faces``.
+    """
+    rows, old, gone = follow_edges(near, corners, fresh, sides, first, names[0], names[1], names[2])
+    some, pair, n = np.empty(len(rows), np.int64), np.empty(len(rows), np.int64), 0
+    for r in range(len(rows)):
+        if live[rows[r]] and not gone[r] and in_contact[part[old[r, 0]]]:
+            some[n], pair[n], n = r, (sides[rows[r], 0] << 32) + sides[rows[r], 1], n + 1
+    order = np.argsort(pair[:n])
+    before, now = np.empty((n, 6), np.int32), np.empty((n, 6), np.int32)
+    own = np.empty(n, np.bool_)
+    for i in range(n):
+        r = some[order[i]]
+        own[i] = mine[rows[r]]
+        for k in range(6):
+            before[i, k], now[i, k] = old[r, k], corners[rows[r], k]
+    found = apart_from_edges(before, now, first, own)
+    pairs = np.empty((len(found), 2), np.int32)
+    for i in range(len(found)):
+        for k in range(2):
+            pairs[i, k] = rows[some[order[found[i, k]]]]
+    return pairs

@@ -8,14 +8,15 @@ import numpy as np
 
 from ...kernels.jit import njit
 from ...model.state import Block, Flags, Indices, Ints, Nodes, extended
+from ...model.topology import Split
 from ...parallel.comm import Comm
 from ...parallel.ownership import Neighbour
-from ..narrow_phase.cracks import Cracks, computed
+from ..narrow_phase.cracks import Cracks
 from ..surface.records import SurfaceNodes
 from . import ghosts, split_pairs
 from .scene import Scene
 from .split_pairs import Family
-from .topology_updates import TopologyUpdate, meets
+from .topology_updates import SplitOfGhosts, meets
 
 
 class SplitUpdate:
@@ -25,7 +26,6 @@ class SplitUpdate:
         """``here``: all nodes of this rank, by local index."""
         self._scene, self._here = scene, here
         self._nodes = nodes
-        scene.own.grow(nodes.n)
 
     def places(self, ids: Ints) -> Indices:
         """Returns the slots of global ids, in the shape of ``ids``; -1 for a node without slot."""
@@ -33,48 +33,64 @@ class SplitUpdate:
         found = _located(ids.ravel(), self._nodes.id, own.place, own.far_ids, own.far)
         return np.asarray(found.reshape(ids.shape))
 
-    def follow(self, update: TopologyUpdate, cracks: Cracks, blocks: list[Block], neighbours: list[Neighbour]) -> None:
-        """Updates faces, edges, candidate pairs, and the slots of the cracks."""
-        rows = split_pairs.touching(cracks.nodes, _flagged(self._nodes.id, update.rows.id))
-        near, apart = cracks.beside(rows, blocks)
-        rows = computed(rows, cracks.nodes, cracks.sides)
-        self._join(update, neighbours)
-        self._hold(_lacking(near, rows, cracks.nodes, self._scene.own.place))
-        family = Family(*split_pairs.families(self.places(update.family), self._scene.surface_nodes.n))
-        became = self.places(update.became)
-        self._candidates(family)
-        self._faces(update, became, family)
-        self._edges(update, became, family)
-        self._across(cracks, rows, apart)
-
-    def _join(self, update: TopologyUpdate, neighbours: list[Neighbour]) -> None:
-        """Adds the families of the scene's nodes and of nodes that other ranks hold to the scene, and updates the
-        mobilities of all separated nodes.
+    def follow(
+        self, split: Split, received: SplitOfGhosts | None, cracks: Cracks, rows: Ints, blocks: list[Block],
+        neighbours: list[Neighbour],
+    ) -> None:  # fmt: skip
+        """Updates slots, faces, edges, candidate pairs, and the slots of the cracks; ``rows``: cracks at separated
+        nodes.
         """
-        local, have = self._nodes.places(update.family[:, 0]), self.places(update.family[:, 0]) >= 0
+        near, family = cracks.beside(rows, blocks), split.family
+        self._join(near, family, neighbours)
+        place = self._scene.own.place
+        pairs, key, became = place[family], split.key, place[split.node]
+        if received is not None:
+            self._join_ghosts(received)
+            pairs = np.concatenate([pairs, self.places(received.family)])
+            key, became = np.append(key, received.key), np.append(became, self.places(received.became))
+            order = np.argsort(key)
+            key, became = key[order], became[order]
+        self._tear(Family(*split_pairs.families(pairs, self._scene.surface_nodes.n)), key, became)
+        self._across(cracks, rows, near)
+
+    def _join(self, near: Indices, family: Indices, neighbours: list[Neighbour]) -> None:
+        """Adds the local nodes ``near``, the families of the scene's nodes and of nodes that other ranks hold to the
+        scene, and updates the mobilities of all separated nodes.
+        """
+        scene, here = self._scene, self._here
+        have = np.zeros(len(family), bool)
         for other in neighbours:
-            _mark(have, local, other.nodes)
-        rows, at = update.rows, self.places(update.rows.id)
-        self._add(rows.take(_joining(rows.id, at, update.family, have)))
+            _mark(have, np.ascontiguousarray(family[:, 0]), other.nodes)
+        lacking = _lacking(near, family, have, scene.own.place)
+        if len(lacking):
+            scene.add_slots(here.take(lacking))
+        _renew(scene.surface_nodes.mobility, scene.own.place, family, here.mobility)
+
+    def _join_ghosts(self, received: SplitOfGhosts) -> None:
+        """Adds the families of ghosts to the scene, and updates the mobilities of separated ghosts."""
+        have, rows = self.places(received.family[:, 0]) >= 0, received.rows
+        new = rows.take(_joining(rows.id, self.places(rows.id), received.family, have))
+        if new.n:
+            self._scene.add_slots(new)
         at = self.places(rows.id)
         self._scene.surface_nodes.mobility[at[at >= 0]] = rows.mobility[at >= 0]
 
     def cracks(self, cracks: Cracks, blocks: list[Block]) -> None:
         """Finds the slots of all cracks that this rank computes."""
         every = np.arange(len(cracks.nodes))
-        rows, (near, apart) = computed(every, cracks.nodes, cracks.sides), cracks.beside(every, blocks)
+        near = cracks.beside(every, blocks)
         cracks.places[:] = -1
-        self._hold(_lacking(near, rows, cracks.nodes, self._scene.own.place))
-        self._across(cracks, rows, apart)
+        self._join(near, np.zeros((0, 2), np.int32), [])
+        self._across(cracks, every, near)
         cracks.arrange()
 
-    def _across(self, cracks: Cracks, rows: Ints, apart: Flags) -> None:
-        """Finds the slots of some cracks. The separated nodes of the cracks, and the nodes that are ``apart`` (nodes,)
-        from the tets, may get impulses.
+    def _across(self, cracks: Cracks, rows: Ints, near: Indices) -> None:
+        """Finds the slots of the cracks ``rows`` that this rank computes. Their separated nodes, and the separated
+        nodes among ``near``, may get impulses.
         """
         scene = self._scene
-        _place(cracks.places, scene.slots.pushes, rows, cracks.nodes, scene.own.place)
-        scene.slots.pushes[scene.own.place[apart]] = True
+        _place(cracks.places, scene.slots.pushes, rows, cracks.nodes, cracks.sides, scene.own.place)
+        _push(scene.slots.pushes, near, cracks.families.ring, scene.own.place)
         scene.cracks = cracks.places
 
     def settle(self, neighbours: list[Neighbour], comm: Comm) -> None:
@@ -87,16 +103,19 @@ class SplitUpdate:
         owners = scene.surface_nodes.owner[self.places(used)]
         shared = ghosts.members(used, owners, neighbours, nodes, comm)
         local = nodes.places(np.unique(np.concatenate([used[:0], *shared.values()])))
-        self._hold(local[(local >= 0) & (scene.own.place[local] < 0)])
+        self._join(local[local >= 0], np.zeros((0, 2), np.int32), [])
         scene.connect([Neighbour(rank, self.places(ids)) for rank, ids in sorted(shared.items())], nodes, comm)
 
-    def share(self, update: TopologyUpdate, neighbours: list[Neighbour]) -> None:
+    def share(self, split: Split, received: SplitOfGhosts | None, neighbours: list[Neighbour]) -> None:
         """Updates the lists of shared nodes without a message. A copy is shared by the ranks that share its parent,
         because the same ranks hold, send and use the copy and its parent. A separated node is shared by all ranks that
         hold the node, because contacts across the crack may apply impulses to the node.
         """
         messages, surface_nodes, nodes = self._scene.messages, self._scene.surface_nodes, self._nodes
-        family = update.family[np.argsort(update.family[:, 1])]
+        family = nodes.id[split.family]
+        if received is not None:
+            family = np.concatenate([family, received.family])
+        family = family[np.argsort(family[:, 1])]
         local, at = nodes.places(family), self.places(family)
         held, there = np.zeros(nodes.n, bool), np.zeros(surface_nodes.n, bool)
         company, none = {some.rank: some for some in messages.company.neighbours}, np.zeros(0, np.int32)
@@ -111,66 +130,26 @@ class SplitUpdate:
             [_heirs(some, at, there) for some in messages.copies.receives],
         )
 
-    def _hold(self, local: Indices) -> None:
-        """Adds local nodes that the scene lacks."""
-        if len(local):
-            self._add(self._here.take(local))
-
-    def _add(self, rows: SurfaceNodes) -> None:
-        scene = self._scene
-        if not rows.n:
-            return
-        first = scene.surface_nodes.n
-        scene.surface_nodes.append(rows)
-        scene.slots.add(rows)
-        scene.reference.add(rows.x, rows.course)
-        scene.own.add(first, rows)
-
-    def _faces(self, update: TopologyUpdate, became: Indices, family: Family) -> None:
-        """Replaces the corners of faces by their copies, and adds pairs of a face with nodes that were its corners
-        before.
+    def _tear(self, family: Family, key: Ints, became: Indices) -> None:
+        """Replaces the corners of faces and edges by their copies, removes edges whose faces have separated, and adds
+        pairs: of a copy those of its parent, of a face the nodes that were its corners before, and of edges those that
+        had a common end before. ``key``: see Split; ``became``: slots.
         """
-        faces, slots, surface_nodes = self._scene.faces, self._scene.slots, self._scene.surface_nodes
-        near = faces.incidence.at(slots.root[family.pairs[:, 0]])
-        rows, old = split_pairs.follow_faces(
-            near, faces.corners, faces.fresh, faces.id, family.first, surface_nodes.id, update.key, became
+        scene, parents = self._scene, family.pairs[:, 0]
+        faces, edges, slots, of = scene.faces, scene.edges, scene.slots, scene.surface_nodes
+        slots.columns.copy(*np.ascontiguousarray(family.pairs.T, np.int64))
+        torn, bodies = slots.root[parents], (of.part, scene.rules.self_contact)
+        names, pairs = (of.id, key, became), scene.node_face
+        more = split_pairs.inherited(family.pairs, slots.first, pairs.next, pairs.rows)
+        apart = split_pairs.tear_faces(
+            faces.incidence.at(torn), faces.corners, faces.fresh, faces.live, faces.id, *bodies, family.first,
+            family.member, family.most, slots.live, names,
         )  # fmt: skip
-        if not len(rows):
-            return
-        pairs = np.empty((3 * len(rows) * (1 + family.most), 2), np.int32)
-        searched = faces.live[rows] & self._meets(old[:, 0])
-        n = split_pairs.apart_from_faces(
-            pairs, rows, old, faces.corners[rows], family.first, family.member, slots.live, searched
-        )  # fmt: skip
-        self._add_pairs(pairs[:n])
-
-    def _edges(self, update: TopologyUpdate, became: Indices, family: Family) -> None:
-        """Removes edges whose faces have separated, and adds pairs of edges that had a common end before."""
-        edges, surface_nodes = self._scene.edges, self._scene.surface_nodes
-        near = edges.incidence.at(self._scene.slots.root[family.pairs[:, 0]])
-        rows, old, gone = split_pairs.follow_edges(
-            near, edges.corners, edges.fresh, edges.sides, family.first, surface_nodes.id, update.key, became
-        )  # fmt: skip
-        some = edges.live[rows] & ~gone & self._meets(old[:, 0])
-        if some.any():
-            rows, old = rows[some], old[some]
-            order = np.lexsort(edges.sides[rows].T[::-1])
-            rows, old = rows[order], old[order]
-            found = split_pairs.apart_from_edges(old, edges.corners[rows], family.first, edges.own[rows])
-            self._scene.edge_edge.add(rows[found].astype(np.int32))
-
-    def _meets(self, places: Indices) -> Flags:
-        """(n,) whether the bodies of the nodes ``places`` may be in contact with themselves."""
-        return np.asarray(self._scene.rules.self_contact[self._scene.surface_nodes.part[places]])
-
-    def _candidates(self, family: Family) -> None:
-        """Copies candidate pairs, normals and flags of parents to their copies."""
-        scene, (parent, copy) = self._scene, family.pairs.T
-        scene.slots.inherit(copy, parent)
-        scene.reference.inherit(copy, parent)
-        self._add_pairs(
-            split_pairs.inherited(family.pairs, scene.slots.first, scene.node_face.next, scene.node_face.rows)
-        )
+        self._add_pairs(np.concatenate([more, apart]))
+        scene.edge_edge.add(split_pairs.tear_edges(
+            edges.incidence.at(torn), edges.corners, edges.fresh, edges.live, edges.own, edges.sides, *bodies,
+            family.first, names,
+        ))  # fmt: skip
 
     def _add_pairs(self, pairs: Indices) -> None:
         """Adds node-face pairs."""
@@ -186,17 +165,6 @@ def _heirs(some: Neighbour, family: Indices, flags: Flags) -> Neighbour:
     """
     heirs = family[meets(flags, some.nodes, family), 1]
     return Neighbour(some.rank, extended(some.nodes, heirs)) if len(heirs) else some
-
-
-@njit("boolean[::1](int64[::1], int64[::1])", cache=True)
-def _flagged(ids, wanted):  # type: ignore[no-untyped-def]
-    """(n + 1,) which of the ascending ``ids`` are ``wanted``; the last entry, for the index -1, is false."""
-    flags = np.zeros(len(ids) + 1, np.bool_)
-    for i in range(len(wanted)):
-        at = np.searchsorted(ids, wanted[i])
-        if at < len(ids) and ids[at] == wanted[i]:
-            flags[at] = True
-    return flags
 
 
 @njit("void(boolean[::1], int32[::1], int32[::1])", cache=True)
@@ -223,29 +191,62 @@ def _joining(ids, places, family, have):  # type: ignore[no-untyped-def]
     return rows[:n].copy()
 
 
-@njit("int32[::1](boolean[::1], int64[::1], int32[:, ::1], int32[::1])", cache=True)
-def _lacking(near, rows, nodes, place):  # type: ignore[no-untyped-def]
-    """Nodes, ascending, of the ``rows`` of cracks and of ``near`` (nodes,) that have no slot yet."""
-    flags, n = near.copy(), 0
-    for c in rows:
-        for k in range(6):
-            flags[nodes[c, k]] = True
-    some = np.empty(len(flags), np.int32)
-    for a in range(len(flags)):
-        if flags[a] and place[a] < 0:
-            some[n] = a
-            n += 1
+@njit("int32[::1](int32[::1], int32[:, ::1], boolean[::1], int32[::1])", cache=True)
+def _lacking(near, family, have, place):  # type: ignore[no-untyped-def]
+    """Nodes, ascending, without a slot: those of ``near``, and those of the families (c, 2), parents and copies, whose
+    parent has a slot or for which ``have`` (c,) is true.
+    """
+    some, n = np.empty(len(near) + 2 * len(family), np.int32), 0
+    for a in near:
+        if place[a] < 0:
+            some[n], n = a, n + 1
+    for c in range(len(family)):
+        if have[c] or place[family[c, 0]] >= 0:
+            for k in range(2):
+                if place[family[c, k]] < 0:
+                    some[n], n = family[c, k], n + 1
+    some = np.sort(some[:n])
+    n = 0
+    for i in range(len(some)):
+        if n == 0 or some[i] != some[n - 1]:
+            some[n], n = some[i], n + 1
     return some[:n].copy()
 
 
-@njit("void(int32[:, ::1], boolean[::1], int64[::1], int32[:, ::1], int32[::1])", cache=True)
-def _place(places, pushes, rows, nodes, place):  # type: ignore[no-untyped-def]
-    """Finds the slots of the nodes of the cracks ``rows``, and flags separated ones in ``pushes``."""
+@njit("void(float64[:, ::1], int32[::1], int32[:, ::1], float64[:, ::1])", cache=True)
+def _renew(mobility, place, family, here):  # type: ignore[no-untyped-def]
+    """Sets the ``mobility`` (slots, 3) of the local nodes of a ``family`` (c, 2) that have slots to that of ``here``
+    (nodes, 3).
+    """
+    for c in range(len(family)):
+        for k in range(2):
+            a = family[c, k]
+            for i in range(3):
+                if place[a] >= 0:
+                    mobility[place[a], i] = here[a, i]
+
+
+@njit("void(int32[:, ::1], boolean[::1], int64[::1], int32[:, ::1], int32[:, :, ::1], int32[::1])", cache=True)
+def _place(places, pushes, rows, nodes, sides, place):  # type: ignore[no-untyped-def]
+    """Finds the slots of the nodes of those cracks ``rows`` that this rank computes: cracks with separated nodes whose
+    first side is on this rank. Flags the separated nodes in ``pushes``.
+    """
     for c in rows:
+        apart = nodes[c, 0] != nodes[c, 3] or nodes[c, 1] != nodes[c, 4] or nodes[c, 2] != nodes[c, 5]
+        if sides[c, 0, 1] < 0 or not apart:
+            continue
         for k in range(6):
             places[c, k] = place[nodes[c, k]]
             if nodes[c, k] != nodes[c, (k + 3) % 6]:
                 pushes[places[c, k]] = True
+
+
+@njit("void(boolean[::1], int32[::1], int32[::1], int32[::1])", cache=True)
+def _push(pushes, near, ring, place):  # type: ignore[no-untyped-def]
+    """Flags the slots of the separated nodes among ``near``."""
+    for a in near:
+        if ring[a] != a:
+            pushes[place[a]] = True
 
 
 @njit("int32[::1](int64[:], int32[:], int32[:], int32[::1], int32[::1], boolean[::1])", cache=True)

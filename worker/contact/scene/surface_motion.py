@@ -1,9 +1,13 @@
 """Positions and velocities of the surface between two searches, and the validity of the candidate list."""
 
+from typing import ClassVar
+
 import numpy as np
 
 from ...kernels.jit import njit
-from ...model.state import Flags, Floats, Ints, Nodes, extended
+from ...model.columns import COPIED, ZERO
+from ...model.growing import spacious_copy
+from ...model.state import Flags, Floats, Nodes
 from ...parallel.comm import Comm
 from ...parallel.fixed_point import exact_sums
 from ..surface.records import SurfaceNodes, merged
@@ -22,6 +26,9 @@ ranks necessary."""
 
 class SurfaceMotion:
     """Motion of the surface of one rank since the last search."""
+
+    COLUMNS: ClassVar = {"mobility": COPIED, "_watched": COPIED, "_x": COPIED, "_course": COPIED, "loose": ZERO}
+    """Columns by node (model/columns.py)."""
 
     def __init__(self, found: Surface, nodes: Nodes, mobility: Floats, size: float, comm: Comm) -> None:
         """``mobility`` (nodes, 3): see records.SurfaceNodes; ``size``: typical size of a face, m."""
@@ -48,7 +55,7 @@ class SurfaceMotion:
 
     def begin(self, nodes: Nodes, course: Floats, t: float) -> None:
         """Stores the positions at time ``t`` and the extrapolated velocities ``course`` (nodes, 3)."""
-        self._x, self._course, self._t = nodes.x.copy(), course.copy(), t
+        self._x, self._course, self._t = spacious_copy(nodes.x), spacious_copy(course), t
 
     def spent(self, nodes: Nodes, t: float, dt: float) -> bool:
         """Returns True if the candidate list will be invalid a step ``dt`` after ``t``: the horizon has passed, or a
@@ -60,14 +67,6 @@ class SurfaceMotion:
             return False
         far = _strayed(nodes.x, nodes.v, self._x, self._course, self._watched, dt, t + dt - self._t)
         return bool(far > (_SPENT * HALO * self._size) ** 2)
-
-    def grow(self, parents: Ints) -> None:
-        """Extends the arrays by copies of nodes, with the values of their parents."""
-        found = self.found
-        found.flags = extended(found.flags, found.flags[parents])
-        self._watched = extended(self._watched, self._watched[parents])
-        self.loose = extended(self.loose, np.zeros(len(parents), bool))
-        self._x, self._course = extended(self._x, self._x[parents]), extended(self._course, self._course[parents])
 
     def here(self, nodes: Nodes) -> SurfaceNodes:
         """All nodes of this rank, by local index."""

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...kernels.jit import njit
-from ...model.state import Indices, Ints
+from ...model.state import Ints
 from ...model.topology import Split
 from ...parallel.comm import Comm
 from ..surface.records import SurfaceNodes
@@ -16,49 +16,46 @@ from .scene import Scene
 
 
 @dataclass
-class TopologyUpdate:
-    """Topology change of one step: new node of each tet, for all nodes and ghosts on a rank."""
+class SplitOfGhosts:
+    """Topology change of the ghosts of one step, received from other ranks: new node of each tet."""
 
     key: Ints
-    """(r,) ids of a node and of a tet as one number, ascending."""
+    """(r,) ids of a node and of a tet as one number."""
     became: Ints
     """(r,) id of the copy that replaces the node in that tet."""
     family: Ints
     """(c, 2) ids of parents, ascending, and of their copies."""
     rows: SurfaceNodes
-    """Parents and copies that belong to one message."""
+    """Parents and copies."""
 
 
-def gather(split: Split, scene: Scene, here: SurfaceNodes, comm: Comm) -> TopologyUpdate | None:
-    """Returns None if no node split. ``here``: all nodes of this rank, by local index. Splits of ghosts are received
-    from the rank that sends the state of the ghosts; only ranks with such messages take part.
+def exchange(split: Split, scene: Scene, here: SurfaceNodes, comm: Comm) -> SplitOfGhosts | None:
+    """Sends the splits of nodes to the ranks that have them as ghosts; returns the splits of the ghosts of this rank,
+    None if no ghost has split. ``here``: all nodes of this rank, by local index. Splits of ghosts are received from the
+    rank that sends the state of the ghosts; only ranks with such messages take part.
     """
     sources = [other.rank for other in scene.messages.copies.receives if split.touched[other.rank]]
     if not (sources or split.touched[comm.rank]):
         return None
-    parents, copies = split.copies.parents, split.first + np.arange(split.copies.n)
-    table = np.column_stack([split.key, here.id[split.node]])
-    local = np.column_stack([parents, copies]).astype(np.int32)
-    messages = _messages(split, scene, here, table, local) if split.touched[comm.rank] else {}
+    messages = _messages(split, scene, here) if split.touched[comm.rank] else {}
     received = [words for words in comm.trade(messages, sources).values() if len(words)]
-    if not (split.copies.n or received):
+    if not received:
         return None
-    family, rows = here.id[local], here.take(np.unique(local))
-    if received:
-        for words in received:
-            ends = 2 + 2 * np.cumsum(words[:2])
-            table = np.concatenate([table, words[2 : ends[0]].reshape(-1, 2)])
-            family = np.concatenate([family, words[ends[0] : ends[1]].reshape(-1, 2)])
-            rows = SurfaceNodes.joined([rows, ghosts.unpack_nodes(words[ends[1] :])])
-        table, family = table[np.argsort(table[:, 0])], family[np.lexsort((family[:, 1], family[:, 0]))]
-    return TopologyUpdate(table[:, 0].copy(), table[:, 1].copy(), family, rows)
+    tables, families, rows = [], [], []
+    for words in received:
+        ends = 2 + 2 * np.cumsum(words[:2])
+        tables.append(words[2 : ends[0]].reshape(-1, 2))
+        families.append(words[ends[0] : ends[1]].reshape(-1, 2))
+        rows.append(ghosts.unpack_nodes(words[ends[1] :]))
+    table, family = np.concatenate(tables), np.concatenate(families)
+    family = family[np.lexsort((family[:, 1], family[:, 0]))]
+    return SplitOfGhosts(table[:, 0].copy(), table[:, 1].copy(), family, SurfaceNodes.joined(rows))
 
 
-def _messages(split: Split, scene: Scene, here: SurfaceNodes, table: Ints, local: Indices) -> dict[int, Ints]:
-    """Messages by rank: rows of ``table`` (TopologyUpdate.key and became), families, and their nodes; ``local`` (c,
-    2): families of this rank.
-    """
+def _messages(split: Split, scene: Scene, here: SurfaceNodes) -> dict[int, Ints]:
+    """Messages by rank: rows of SplitOfGhosts.key and became, families, and their nodes."""
     messages, flags = {}, np.zeros(here.n, bool)
+    table, local = np.column_stack([split.key, here.id[split.node]]), split.family
     for other in scene.messages.copies.sends:
         messages[other.rank] = np.zeros(0, np.int64)
         some = meets(flags, other.nodes, local)

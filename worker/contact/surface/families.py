@@ -3,13 +3,14 @@ has all nodes of the family.
 """
 
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 
 from ...kernels.jit import njit, record, types
+from ...model.columns import COPIED, ZERO
 from ...model.growing import Scratch
-from ...model.state import Flags, Indices, Ints, extended
+from ...model.state import Bits, Indices, Ints
 from ...model.topology import Split
 from ...parallel.arguments import reader
 from ...parallel.packing import offsets, range_offsets
@@ -20,6 +21,8 @@ _N1, _N2, _I, _I1, _I2 = types.int32[::1], types.int32[:, ::1], types.int64, typ
 _CRACKS, _BITS, _RANGES = 512, 6, 4
 """Number of cracks in a task; number of bits of the index of a range of leaders; number of ranges in a task. Chosen
 values: a task takes 5 to 10 us with 20,000 cracks, compared with 2 us to start a parallel region."""
+_ROWS = 4096
+"""Number of cracks in a task. Chosen value: a task takes 10 to 20 us, compared with 2 us to start a parallel region."""
 _SPARE = 1 << 15
 """Working arrays have multiples of so many items."""
 
@@ -28,12 +31,17 @@ _SPARE = 1 << 15
 class Families:
     """Families of the local nodes."""
 
+    COLUMNS: ClassVar = {"root": COPIED, "ring": ZERO, "leader": COPIED, "marks": ZERO}
+    """Columns by node (model/columns.py)."""
+
     root: Ints
     """(nodes,) global id of the original node at the start of the run."""
     ring: Indices
     """(nodes,) next local node of the family, cyclic; the node itself if the family has one node."""
     leader: Indices
     """(nodes,) local node that represents the family."""
+    marks: Bits
+    """(nodes,) marks for kernels that list nodes; all 0 between two calls."""
 
     @classmethod
     def of(cls, root: Ints) -> "Families":
@@ -43,19 +51,11 @@ class Families:
         following, ends = np.roll(order, -1), np.append(first, len(root))[1:]
         following[ends - 1] = order[first]
         ring[order], leader[order] = following, np.repeat(order[first], ends - first)
-        return cls(root, ring, leader)
+        return cls(root, ring, leader, np.zeros(len(root), np.uint8))
 
-    def grow(self, split: Split) -> None:
-        """Adds the copies of a split."""
-        parents = split.copies.parents
-        self.root = extended(self.root, self.root[parents])
-        self.ring = extended(self.ring, np.zeros(len(parents), np.int32))
-        self.leader = extended(self.leader, self.leader[parents])
-        _insert(self.ring, parents, split.first)
-
-    def members(self, nodes: Ints) -> Flags:
-        """(nodes,) nodes in the family of one of the ``nodes`` (k,)."""
-        return np.asarray(_members(self.ring, nodes))
+    def link(self, split: Split) -> None:
+        """Adds the copies of a split, whose rows the columns have already, to the rings of their parents."""
+        _insert(self.ring, split.copies.parents, split.first)
 
 
 @njit("void(int32[::1], int64[::1], int64)", cache=True)
@@ -63,17 +63,6 @@ def _insert(ring, parents, first):  # type: ignore[no-untyped-def]
     """Inserts copies, numbered from ``first`` on, into the ring after their parents."""
     for c in range(len(parents)):
         ring[first + c], ring[parents[c]] = ring[parents[c]], first + c
-
-
-@njit("boolean[::1](int32[::1], int64[::1])", cache=True)
-def _members(ring, nodes):  # type: ignore[no-untyped-def]
-    """See Families.members."""
-    found = np.zeros(len(ring), np.bool_)
-    for a in nodes:
-        while not found[a]:
-            found[a] = True
-            a = ring[a]
-    return found
 
 
 class Corners(NamedTuple):
@@ -116,6 +105,8 @@ class CornerLists:
         )
         self._count, self._list = Pass(team, _count, *_COUNT, size=_RANGES), Pass(team, _list, *_LIST, size=_RANGES)
         self._scratch = Scratch()
+        self.touching = TouchingRows(team)
+        """Pass that finds the cracks at marked nodes."""
 
     def of(self, cracks: Indices, sides: Indices, block: int, families: Families) -> Corners:
         """Returns the ``Corners`` of a ``block``, which are valid until the next call for this block.
@@ -223,3 +214,44 @@ def _list(table, first, stop, thread):  # type: ignore[no-untyped-def]
             a = leaders[i]
             out.corners[number[a]] = codes[i]
             number[a] += 1
+
+
+_TOUCHING = _I1, _I1, _N2, types.uint8[::1]
+_read_touching = reader(*_TOUCHING)
+
+
+class TouchingRows:
+    """Pass that finds the rows of a table that contain a marked entry."""
+
+    def __init__(self, team: Team) -> None:
+        self._pass, self._scratch = Pass(team, _touching, *_TOUCHING, size=_ROWS), Scratch()
+
+    def of(self, table: Indices, marks: Bits) -> Ints:
+        """Returns the rows, ascending, of ``table`` (n, 6) that contain an entry with a mark."""
+        rows, counts = self._scratch.of("rows", len(table)), self._scratch.of("counts", self._pass.many(len(table)))
+        self._pass.run(len(table), rows, counts, table, marks)
+        return np.asarray(_packed(rows, counts))
+
+
+@njit(TASK, cache=True)
+def _touching(table, first, stop, thread):  # type: ignore[no-untyped-def]
+    """Task: lists the rows with a marked entry."""
+    rows, counts, nodes, marks = _read_touching(table)
+    n = first
+    for i in range(first, stop):
+        some = 0
+        for k in range(6):
+            some |= marks[nodes[i, k]]
+        if some:
+            rows[n], n = i, n + 1
+    counts[first // _ROWS] = n - first
+
+
+@njit("int64[::1](int64[::1], int64[::1])", cache=True)
+def _packed(rows, counts):  # type: ignore[no-untyped-def]
+    """Returns the rows that the tasks have listed."""
+    out, n = np.empty(counts.sum(), np.int64), 0
+    for k in range(len(counts)):
+        for i in range(_ROWS * k, _ROWS * k + counts[k]):
+            out[n], n = rows[i], n + 1
+    return out

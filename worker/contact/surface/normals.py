@@ -46,7 +46,7 @@ class MeanNormals:
         midpoint of the opposite edge. ``planes``: see SurfaceBuilder.build. Collective.
         """
         nodes, scale = model.nodes, SHARES / size**2
-        sums = np.zeros((nodes.n, COLUMNS), np.int64)
+        sums = np.zeros((nodes.n + nodes.n // 2, COLUMNS), np.int64)[: nodes.n]  # with spare rows
         for block in model.blocks:
             self._exposed.run(block, nodes.n, sums, nodes.x, block.tets, block.across, block.bond, planes, scale)
         complete(comm, neighbours, sums, Tag.NORMAL)

@@ -7,12 +7,11 @@ unchanged.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property
 from typing import Self
 
 import numpy as np
 
-from ...model.growing import Rooms
+from ...model.growing import spacious
 from ...model.ids import located
 from ...model.state import Bits, Flags, Floats, Indices, Ints
 
@@ -29,25 +28,21 @@ class Rows:
         """Number of rows."""
         return len(next(iter(vars(self).values())))
 
-    @cached_property
-    def _rooms(self) -> Rooms:
-        """Allocated rows of a table beyond its present length."""
-        return Rooms(*vars(self))
-
     def columns(self) -> list["np.ndarray"]:
         """Columns, in the order of their declaration."""
-        return [column for name, column in vars(self).items() if name != "_rooms"]
-
-    def append(self, rows: Self) -> None:
-        """Appends ``rows``."""
-        columns = dict(vars(rows))
-        columns.pop("_rooms", None)
-        self._rooms.append(self, rows.n, **columns)
+        return list(vars(self).values())
 
     def take(self, chosen: "np.ndarray") -> Self:
         """Returns the ``chosen`` rows as a table."""
         rows = np.flatnonzero(chosen) if chosen.dtype == bool else chosen
         return type(self)(*(column.take(rows, axis=0) for column in self.columns()))
+
+    def spacious(self, rows: Ints) -> Self:
+        """Returns the ``rows`` as a table whose columns have spare rows."""
+        taken = [spacious(len(rows), column.shape[1:], column.dtype) for column in self.columns()]
+        for out, column in zip(taken, self.columns(), strict=True):
+            np.take(column, rows, axis=0, out=out, mode="clip")  # "raise" would copy the result
+        return type(self)(*taken)
 
     @classmethod
     def joined(cls, tables: Sequence[Self]) -> Self:

@@ -1,0 +1,126 @@
+"""Columns of a table that grows: arrays with a row for each member of the table, in objects of several stages.
+
+A stage declares its columns once, with the values of new rows. Columns have spare rows: ``extend`` appends rows to all
+columns in one call of a kernel, without copying the columns.
+"""
+
+from enum import IntFlag
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from .growing import spare
+
+
+class Rule(IntFlag):
+    """Values of the rows that are appended to a column."""
+
+    ZERO = 0
+    """Zero, or False."""
+    ABSENT = 1
+    """All bits are set, for integers: -1."""
+    COPIED = 2
+    """Flag: a row that is a copy of another row has the values of that row."""
+
+
+ZERO, ABSENT, COPIED = Rule.ZERO, Rule.ABSENT, Rule.COPIED
+_WORDS, _ALL_BITS = 5, 255
+"""Words of a column for the kernels: address, number of bytes, bytes of a row, value of each byte of a new row, and
+whether a copy has the row of its source. Value of a byte with all bits."""
+
+
+class _Columns:
+    """Columns that are attributes of one object, which may be replaced by another object of the same kind."""
+
+    def __init__(self, owner: object, at: str, names: dict[str, int]) -> None:
+        """``at``: path from ``owner`` to the object, "" for the owner itself; ``names``: number of each column."""
+        self._owner, self._path, self.names = owner, at.split(".") if at else [], names
+
+    @property
+    def now(self) -> dict[str, Any]:
+        """The attributes of the object; none if the object does not exist."""
+        holder: Any = self._owner
+        for name in self._path:
+            holder = getattr(holder, name)
+            if holder is None:
+                return {}
+        found: dict[str, Any] = vars(holder)
+        return found
+
+
+class Columns:
+    """All columns of one table."""
+
+    def __init__(self) -> None:
+        """Creates a table without columns."""
+        self._objects: list[_Columns] = []
+        self._rules: list[Rule] = []
+        self._rooms: list[np.ndarray | None] = []
+        """Buffers of the columns, with spare rows; None for a column that the scene does not need."""
+        self._words = np.zeros((0, _WORDS), np.int64)
+
+    def declare(self, owner: object, at: str = "", /, **rules: Rule) -> None:
+        """Declares attributes of ``owner`` as columns, each with the rule for new rows.
+
+        ``at``: path from the owner to the object that has the attributes. An array of length 0 in a table with rows is
+        a column that the scene does not need.
+        """
+        first = len(self._rules)
+        self._objects.append(_Columns(owner, at, {name: first + k for k, name in enumerate(rules)}))
+        self._rules += rules.values()
+        self._rooms += [None] * len(rules)
+        self._words = np.zeros((len(self._rules), _WORDS), np.int64)
+        for k in range(first):
+            self._set(k, self._rooms[k])
+
+    def extend(self, n: int, more: int) -> None:
+        """Appends ``more`` rows to the ``n`` rows of all columns, with the values of their rules."""
+        from .inheriting import fill  # imports numba, which must not be imported before its cache folder is set
+
+        m, rooms = n + more, self._rooms
+        for some in self._objects:
+            if columns := some.now:
+                for name, k in some.names.items():
+                    array, room = columns[name], rooms[k]
+                    if room is None and not len(array):
+                        continue
+                    if room is None or array.base is not room or len(array) != n or len(room) < m:
+                        self._set(k, room := _room(array, n, m, name))
+                    if room is not None:
+                        columns[name] = room[:m]
+            else:
+                for k in some.names.values():
+                    self._set(k, None)
+        fill(self._words, self._words.ctypes.data, n, more)
+
+    def copy(self, sources: "npt.NDArray[Any]", targets: "npt.NDArray[Any]") -> None:
+        """Copies the rows ``sources`` (k,) of the COPIED columns to the rows ``targets`` (k,), both int64."""
+        from .inheriting import copy
+
+        copy(self._words, self._words.ctypes.data, sources, targets)
+
+    def _set(self, k: int, room: "np.ndarray | None") -> None:
+        self._rooms[k] = room
+        self._words[k] = _words(room, self._rules[k])
+
+
+def _room(array: "np.ndarray", n: int, m: int, name: str) -> "np.ndarray | None":
+    """Returns the buffer of an array of ``n`` rows if it has ``m`` rows or more, else a copy with spare rows; None for
+    an array without rows.
+    """
+    if len(array) != n:
+        if len(array):
+            raise ValueError(f"column {name!r} has {len(array)} rows instead of {n}")
+        return None
+    if (room := spare(array, m)) is None:
+        room = np.empty((m + m // 2, *array.shape[1:]), array.dtype)
+        room[:n] = array
+    return room
+
+
+def _words(room: "np.ndarray | None", rule: Rule) -> tuple[int, int, int, int, bool]:
+    if room is None:
+        return 0, 0, 0, 0, False
+    value = _ALL_BITS if rule & ABSENT else 0
+    return room.ctypes.data, room.nbytes, room.nbytes // len(room), value, bool(rule & COPIED)
