@@ -12,7 +12,7 @@ from .ledger import Energy as Energy
 from .ledger import PartEnergy as PartEnergy
 
 VERSION = 1
-"""Version of the format of messages; a reader may refuse another one."""
+"""Version of the format of messages; a reader may refuse messages of other versions."""
 
 
 class Message(msgspec.Struct, tag_field="type", tag=str.lower, kw_only=True, frozen=True):

@@ -159,7 +159,7 @@ class Traction(Model):
     surface. A face is loaded until its tet is deleted; with ``follows`` also until its tet has separated from all
     others. Faces that become free later are not loaded, nor faces on a plane of symmetry. Nodes up to a hundredth of
     the shortest edge of their part outside the region count as inside. ``conoid validate`` prints the approximate
-    loaded area; the run warns where the mesh has another one.
+    loaded area; the run warns if the area in the mesh differs.
     """
 
     kind: Literal["traction"]

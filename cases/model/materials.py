@@ -69,7 +69,7 @@ class Scatter(Model):
     minimum: Annotated[Stress, Field(ge=0)] = 0.0
     """Smallest strength of a facet."""
     seed: Annotated[Count, Field(ge=0)] = 0
-    """Seed: another one distributes the weak facets differently."""
+    """Seed of the random strengths: another seed distributes the weak facets differently."""
 
 
 class Brittle(Model):

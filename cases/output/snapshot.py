@@ -19,7 +19,7 @@ import msgspec
 
 MAGIC = b"CONOSNAP"
 VERSION = 1
-"""Version of the layout; a reader refuses another one."""
+"""Version of the layout; a reader refuses other versions."""
 TYPES = {"uint8": "B", "uint16": "H", "uint32": "I", "int64": "q", "float32": "f", "float64": "d"}
 """Types of arrays, and their letters in Python's ``struct``."""
 REST = -1

@@ -18,8 +18,8 @@ _TIMES = 200
 """Number of times up to the end that are checked. The value was chosen because the path of a body then takes a
 millisecond."""
 _MOST = 200
-"""Largest number of driven bodies, and of pairs of driven bodies, that are checked. The values were chosen because
-the check takes a second at most."""
+"""Largest number of driven bodies, and of pairs of driven bodies, that are checked. With the chosen values the check
+takes a second at most."""
 _TOUCH = 1e-9
 """Depth of contact without a warning, over the size of a body. The value is far above rounding and far below any
 gap."""

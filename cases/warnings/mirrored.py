@@ -1,4 +1,4 @@
-"""Warnings about loads and motions across a plane of symmetry: its mirror image has the opposite ones."""
+"""Warnings about loads and motions across a plane of symmetry: the mirror image has the opposite loads and motions."""
 
 from collections.abc import Iterator
 

@@ -25,8 +25,8 @@ _PAIRS = 32
 """Largest number of pairs of bodies that are checked. The value was chosen because the check takes a second or two
 at most."""
 _LEAST = 1e-3
-"""Smallest touching area over the surface of the smaller body (chosen value). A smaller area is an edge or a corner
-that rounding has found."""
+"""Smallest touching area over the surface of the smaller body (chosen value). An area below this value is an edge or a
+corner, found by rounding."""
 
 
 class Touch(msgspec.Struct, kw_only=True, frozen=True):

@@ -40,7 +40,9 @@ class Key(msgspec.Struct, frozen=True):
 
 
 class Value(msgspec.Struct, frozen=True):
-    """A number of two runs; NaN if it is unknown. ``difference`` is b - a, ``relative`` is (b - a) / abs(a)."""
+    """The same number in two runs; NaN if the number is unknown. ``difference`` is b - a, ``relative`` is (b - a) /
+    abs(a).
+    """
 
     name: str
     unit: str

@@ -96,7 +96,7 @@ def found(trial: Trial, folder: Path, layouts: Sequence[Layout], network: Networ
 
 
 def _there(folder: Path, case: bytes) -> bool:
-    """Returns True if the run exists. Raises ClientError if the folder contains another one."""
+    """Returns True if the run exists. Raises ClientError if the folder contains another run."""
     if not folder.exists():
         return False
     names = (layout.OUTCOME, layout.RESOLVED_CASE)

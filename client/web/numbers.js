@@ -1,4 +1,4 @@
-// Numbers of a run: the five most important ones, and all others.
+// Numbers of a run: five main numbers, and all other numbers.
 
 import { alike, count, duration, fixed, h, large, moment, rough, si, vector } from "./figures.js";
 import { FINAL } from "./live.js";

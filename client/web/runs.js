@@ -12,7 +12,7 @@ import { Toolbar } from "./toolbar.js";
 
 const FIRST = 200; // Runs of the first answer; later pages are larger.
 const PAGE = 500;
-const MOST = 10000; // Largest number of runs that are shown; the command line finds older ones.
+const MOST = 10000; // Largest number of runs that are shown; the command line finds older runs.
 const SOON = 2000; // ms between two answers while a run is open.
 const LATER = 6000; // ms otherwise.
 const ANEW = 60000; // ms after which the newest page is read completely: runs may have been removed, labels changed.

@@ -128,7 +128,7 @@ export class SideBySide {
     this.tell();
   }
 
-  // One colour scale for all shown bodies, and for all times unless the user wants another one.
+  // One colour scale for all shown bodies, and for all times unless the user selects another scale.
   paint() {
     const panes = this.shown.filter(({ snapshot }) => snapshot);
     const { by: { value: by }, choice } = this.tools;

@@ -1,4 +1,4 @@
-// A table with many rows, of which only the visible ones have elements. All rows have the same height.
+// A table with many rows; only the visible rows have elements. All rows have the same height.
 
 import { h } from "./figures.js";
 
@@ -69,7 +69,7 @@ export class Windowed {
   }
 }
 
-// Sets the children of an element in order; existing ones are not moved.
+// Sets the children of an element in order; existing children are not moved.
 function put(place, elements) {
   const wanted = new Set(elements);
   for (const child of [...place.children]) if (!wanted.has(child)) child.remove();

@@ -141,8 +141,8 @@ class Columns:
         }
 
     def values(self, names: Sequence[str], points: int) -> dict[str, list[float]]:
-        """Returns columns by name, of about ``points`` values at most. A short file gives all values. A longer file
-        gives the minimum and the maximum of each group of lines, in the order of their occurrence, and the last
+        """Returns columns by name, of about ``points`` values at most. A short file gives all values. A file with more
+        lines gives the minimum and the maximum of each group of lines, in the order of their occurrence, and the last
         value.
         """
         chosen = frozenset(names)

@@ -15,7 +15,7 @@ from ..launch.bounded import Bounds
 _log = logging.getLogger("conoid.server")
 BOUNDS = Bounds(cpu=200, wall=240, memory=8 << 30, file=4 << 30)
 """Limits of the program that reads mesh files. The values were chosen because 16 MB of text (384,000 tets) take some
-10 s. A longer file is read by its run only."""
+10 s. A file above this size is not read before the run."""
 
 
 def surveyed(case: Mapping[str, object], folder: Path) -> bytes:

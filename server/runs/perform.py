@@ -62,7 +62,7 @@ class Performer:
         durable.probe(self._settings.runs / run_id)
 
     def gone(self, run_id: str) -> bool:
-        """Whether the run's folder is missing. False if the folder of all runs is another one, because its disk is
+        """Whether the run's folder is missing. Returns False if the folder of all runs was replaced because its disk is
         missing."""
         try:
             same = os.stat(self._settings.runs).st_ino == self._root

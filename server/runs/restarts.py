@@ -59,7 +59,7 @@ def fill(source: Path, folder: Path) -> None:
 
 def _taken(source: Path, target: Path) -> bool:
     """Links every checkpoint with a complete manifest. Returns False if checkpoints were removed during the call,
-    because a running run keeps only its newest ones. Raises ServiceError 409 if there is no checkpoint.
+    because a running run keeps only its newest checkpoints. Raises ServiceError 409 if there is no checkpoint.
     """
     damaged: list[str] = []
     taken = 0

@@ -54,7 +54,7 @@ PICTURES = {
 
 MM = 1e-3
 _APART = 15.0
-"""Distance between two shapes, mm. Chosen: no shape hides another one."""
+"""Distance between two shapes, mm. Chosen value: no shape hides another shape."""
 
 
 def shapes() -> dict[str, Any]:

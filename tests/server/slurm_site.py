@@ -74,7 +74,7 @@ class Site:
         return self.cluster.jobs(f"conoid-{run}-")
 
     def again(self, number: signal.Signals = signal.SIGKILL) -> None:
-        """Ends the server and starts another one."""
+        """Ends the server and starts another server."""
         self.server.end(number)
         self.ann = self.server.user(self.server.start()["url"])
 

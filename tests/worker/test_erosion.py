@@ -104,8 +104,8 @@ SPIN = {"centre": (1.5 * MM, 1.5 * MM, 1.5 * MM), "rate": (4e4, 0.0, 5e4)}
 @pytest.mark.parametrize("nodes", ["particles", "remove"])
 @pytest.mark.parametrize("form", FORMS)
 def test_the_accounts_close_for_a_spinning_body_without_contact(form: Form, nodes: Any) -> None:
-    """A copper cube that spins at its elastic limit: removed tets take their work, kinetic energy and momentum with
-    them."""
+    """A copper cube that spins at its elastic limit: the work, kinetic energy and momentum of removed tets leave the
+    model."""
     case = meeting_of([{"erosion": schema.Erosion(nodes=nodes), "spin": SPIN}], material=COPPER, form=form)
     sim = build(case.model_copy(update={"contact": None}), [block((3, 3, 3), MM)])
     momentum = (sim.model.nodes.mass[:, None] * sim.model.nodes.v).sum(axis=0)

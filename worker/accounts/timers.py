@@ -106,7 +106,7 @@ class Timers:
         return self._blocks[name]
 
     def switch(self, name: str) -> str:
-        """End the present phase, begin another one, and return the phase that ended.
+        """End the present phase, begin another phase, and return the phase that ended.
 
         Each change of phase reads the clock of the thread, a system call of up to 1 us. Therefore a step changes the
         phase as rarely as possible.

@@ -58,7 +58,7 @@ def _frame(frame, x, face):  # type: ignore[no-untyped-def]
 
 @njit(types.void(_F2, _F2, _F2, types.int32[::1], _I), cache=True)
 def _project(flat, frame, x, face, origin):  # type: ignore[no-untyped-def]
-    """Sets ``flat`` to the corners of a face in the ``frame`` of another one, whose first corner is ``origin``: two
+    """Sets ``flat`` to the corners of a face in the ``frame`` of another face, whose first corner is ``origin``: two
     coordinates in its plane, and the height.
     """
     for k in range(3):

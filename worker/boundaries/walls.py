@@ -21,8 +21,8 @@ rounding (1e-32) and below any intended angle."""
 
 class RigidWalls(Stopping):
     """Stops nodes at walls: an impulse along the normal keeps a node from ending the step behind a wall, and never
-    pulls. Another one along the wall reduces its sliding velocity, at most by Coulomb's ``friction`` (w,) times the
-    normal one.
+    pulls. Another impulse along the wall reduces the sliding velocity of the node, at most by Coulomb's ``friction``
+    (w,) times the normal one.
 
     ``points`` and ``normals`` (w, 3); ``held`` (n, w): which walls stop which node. A node between two walls is stopped
     by the first wall, then by the second wall, several times. ``mirrored`` (n, 3): components held by planes of

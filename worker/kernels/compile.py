@@ -48,8 +48,8 @@ def compile_all(folder: Path, tell: Tell, root: Path = store.ROOT, package: str 
     """Compiles every kernel below ``root`` that ``folder`` lacks; returns False if none is missing. Raises
     CompileError.
 
-    A lock ensures that only one program compiles at a time. Another program waits, and continues the compilation if the
-    first one is killed.
+    A lock ensures that only one program compiles at a time. A second program waits, and continues the compilation if
+    the first program is killed.
     """
     if (folder / COMPLETE).exists():
         return False

@@ -14,7 +14,8 @@ from .setting import velocities
 _JITTER = 0x6A697474
 """Seed of the random velocities at the start."""
 _ALIKE = 1e-6
-"""Difference between two velocities, as a share of the larger one, below which it is round-off. Chosen value."""
+"""Difference between two velocities, as a share of the larger velocity, below which the difference is round-off. Chosen
+value."""
 
 
 def initial_velocities(case: schema.Case, x: Floats, part: Indices, shares: Shares) -> tuple[Floats, list[str]]:

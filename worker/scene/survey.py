@@ -1,8 +1,8 @@
 """Measurements of the mesh files of a case: ``python -m conoid.worker.scene.survey``.
 
 The process reads one question from standard input and writes one answer to standard output
-(conoid.cases.reading.survey). Child processes read the files with the limits and the store of a run. A later run
-does not read the files again.
+(conoid.cases.reading.survey). Child processes read the files with the limits and the store of a run. The run that
+follows does not read the files again.
 """
 
 import sys

@@ -63,7 +63,7 @@ class Courier:
         self._end()
 
     def _end(self) -> None:
-        """End the packer; the next task starts another one."""
+        """End the packer; the next task starts another packer."""
         if self._packer is not None:
             with contextlib.suppress(OSError):
                 self._packer.kill()

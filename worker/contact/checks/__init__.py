@@ -1,1 +1,1 @@
-"""Nodes and volumes of a body that lie inside of another one: at the start and at the end of a run."""
+"""Nodes and volumes of a body inside of another body, at the start and at the end of a run."""

@@ -26,9 +26,9 @@ deeper below that face than this share, is beside the edge. Chosen value: twice 
 slides along another edge, 1e-3 to 4e-3, at the moment when the end of the edge reaches the other edge. A node can be
 deeper than this below a face at a rim because edges have no contact at their ends."""
 _SLIDES = 2e-3
-"""Share of the size of a face: a node that slides along a face approaches the face by less in a step. A faster node
-counts as beside the edge only up to the depth TOUCHING; otherwise the contact of a fast projectile would be detected
-one step late (test_hard_contact). Chosen value: twice the fastest approach observed in sliding."""
+"""Share of the size of a face: a node that slides along a face approaches the face by less in a step. A node above this
+speed counts as beside the edge only up to the depth TOUCHING; otherwise the contact of a fast projectile would be
+detected one step late (test_hard_contact). Chosen value: twice the fastest approach observed in sliding."""
 _BEHIND = 0.1
 """Share of the size of a face: sum of the depths of the corners of the face behind a neighbouring face. If the sum is
 above this value, the common edge is convex. Chosen value: below the sum for an angle of 25 degrees between the faces,

@@ -106,7 +106,7 @@ def sector(occ: Any, solids: Solids, mesh: Solid) -> Solids:
 def joined(occ: Any, solids: Solids, key: str) -> Solids:
     """Return solids with common faces where they touch, so that their meshes have common nodes at these faces.
 
-    Raises MeshError if a solid is inside of another one.
+    Raises MeshError if a solid is inside of another solid.
     """
     if len(solids) < 2:
         return solids
