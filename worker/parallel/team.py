@@ -30,12 +30,13 @@ from .words import SECOND, TASK, add, call_task, load, now, sched_yield, sem_pos
 __all__ = ["TASK", "Stage", "Team", "team"]
 
 
-_NEXT, _DONE, _ASLEEP, _KERNEL, _TABLE, _TASKS, _MOST, _WITHIN, _CLOCK, _SEMAPHORE, _THREADS = (
-    0, 8, 16, 24, 25, 26, 27, 28, 29, 32, 40,
+_NEXT, _DONE, _ASLEEP, KERNEL, TABLE, TASKS, MOST, WITHIN, CLOCK, SIZE, _SEMAPHORE, END, _THREADS = (
+    0, 8, 16, 24, 25, 26, 27, 28, 29, 31, 32, 36, 40,
 )  # fmt: skip
-"""Offsets in the words of a job. Words that several threads write have a cache line of their own. _MOST: number of
-threads that may work; _WITHIN: time in regions so far, ns; _CLOCK: two words for reading the clock. From _THREADS on
-each thread has a line: its time in tasks, ns, and words for the clock."""
+"""Offsets in the words of a job. Words that several threads write have a cache line of their own. SIZE: length of each
+task of a range that ends at END, or 0 if the tasks are a table at the address TASKS; MOST: number of threads that may
+work; WITHIN: time in regions so far, ns; CLOCK: two words for reading the clock. From _THREADS on each thread has a
+line: its time in tasks, ns, and words for the clock."""
 _BITS, _MASK = 20, (1 << 20) - 1
 """Number of low bits of the word _NEXT, which have the next task, and their mask. The higher bits have the number of
 tasks."""
@@ -61,11 +62,15 @@ def _do_one(job, thread):  # type: ignore[no-untyped-def]
     k = word & _MASK
     if k >= word >> _BITS:
         return False
-    tasks = load(job, _TASKS)
-    first, end = word_at(tasks, 2 * k), word_at(tasks, 2 * k + 1)
+    size = load(job, SIZE)
+    if size > 0:
+        first, end = k * size, min((k + 1) * size, load(job, END))
+    else:
+        tasks = load(job, TASKS)
+        first, end = word_at(tasks, 2 * k), word_at(tasks, 2 * k + 1)
     own = _THREADS + _LINE * thread
     begin = now(job, own + 1)
-    call_task(load(job, _KERNEL), load(job, _TABLE), first, end, thread)
+    call_task(load(job, KERNEL), load(job, TABLE), first, end, thread)
     job[own] += now(job, own + 1) - begin
     add(job, _DONE, 1)
     return True
@@ -75,7 +80,7 @@ def _do_one(job, thread):  # type: ignore[no-untyped-def]
 def _wake(job, semaphore):  # type: ignore[no-untyped-def]
     """Wake sleeping threads: at most _WAKES, and no more than there are tasks and threads that may work."""
     word, threads = load(job, _NEXT), (len(job) - _THREADS) // _LINE
-    helpers = min((word >> _BITS) - (word & _MASK), load(job, _MOST)) - 1
+    helpers = min((word >> _BITS) - (word & _MASK), load(job, MOST)) - 1
     for _ in range(_WAKES):
         asleep = load(job, _ASLEEP)
         if asleep <= 0 or threads - 1 - asleep >= helpers:
@@ -102,41 +107,47 @@ def _help(job, semaphore, thread):  # type: ignore[no-untyped-def]
             idle = 0
 
 
+@njit("void(int64[::1], int64, int64)", cache=True)
+def divide(job, semaphore, many):  # type: ignore[no-untyped-def]
+    """Run ``many`` tasks of the pass that the words of the job describe; return when all are done."""
+    swap(job, _DONE, 0)
+    swap(job, _NEXT, many << _BITS)
+    if many > 1:
+        _wake(job, semaphore)
+    while _do_one(job, 0):
+        pass
+    polls = 0
+    while load(job, _DONE) < many:
+        polls += 1
+        if polls > _POLLS:
+            sched_yield()
+
+
 @njit("void(int64[::1], int64, int64, int64, int64, int64, int64)", cache=True)
-def _share(job, semaphore, kernel, table, tasks, starts, colours):  # type: ignore[no-untyped-def]
+def share(job, semaphore, kernel, table, tasks, starts, colours):  # type: ignore[no-untyped-def]
     """Run the tasks of a pass, one colour after the other; return when all are done."""
+    job[KERNEL], job[TABLE], job[SIZE] = kernel, table, 0
     for colour in range(colours):
         first = word_at(starts, colour)
-        many = word_at(starts, colour + 1) - first
-        job[_KERNEL], job[_TABLE], job[_TASKS] = kernel, table, tasks + 16 * first
-        swap(job, _DONE, 0)
-        swap(job, _NEXT, many << _BITS)
-        if many > 1:
-            _wake(job, semaphore)
-        while _do_one(job, 0):
-            pass
-        polls = 0
-        while load(job, _DONE) < many:
-            polls += 1
-            if polls > _POLLS:
-                sched_yield()
+        job[TASKS] = tasks + 16 * first
+        divide(job, semaphore, word_at(starts, colour + 1) - first)
 
 
 @njit("void(int64[::1], int64, int64, int64, int64, int64, int64)", cache=True)
 def _ask(job, semaphore, kernel, table, tasks, starts, colours):  # type: ignore[no-untyped-def]
     """Run one pass on all threads."""
-    begin = now(job, _CLOCK)
-    _share(job, semaphore, kernel, table, tasks, starts, colours)
-    job[_WITHIN] += now(job, _CLOCK) - begin
+    begin = now(job, CLOCK)
+    share(job, semaphore, kernel, table, tasks, starts, colours)
+    job[WITHIN] += now(job, CLOCK) - begin
 
 
 @njit("void(int64[::1], int64, int64, int64[:, ::1])", cache=True)
 def _alone(job, kernel, table, tasks):  # type: ignore[no-untyped-def]
     """Run one pass on the calling thread."""
-    begin = now(job, _CLOCK)
+    begin = now(job, CLOCK)
     for k in range(len(tasks)):
         call_task(kernel, table, tasks[k, 0], tasks[k, 1], 0)
-    job[_WITHIN] += now(job, _CLOCK) - begin
+    job[WITHIN] += now(job, CLOCK) - begin
 
 
 @njit("void(int64[::1], int64[::1], int64, int64[:, ::1], int64, int64[::1])", cache=True)
@@ -144,23 +155,23 @@ def _repeat(spent, job, semaphore, stages, rounds, stop):  # type: ignore[no-unt
     """Run all stages, one after the other, ``rounds`` times, or until a stage has set ``stop`` (1,) to a number other
     than 0; ``stages`` (n, 5) has the arguments of each pass. Adds the time of each stage, ns, to ``spent`` (n,).
     """
-    begin = last = now(job, _CLOCK)
+    begin = last = now(job, CLOCK)
     for _ in range(rounds):
         for k in range(len(stages)):
             kernel, table, tasks = stages[k, 0], stages[k, 1], stages[k, 2]
             starts, colours = stages[k, 3], stages[k, 4]
-            if job[_MOST] == 1 or word_at(starts, colours) - word_at(starts, 0) == 1:
+            if job[MOST] == 1 or word_at(starts, colours) - word_at(starts, 0) == 1:
                 for t in range(word_at(starts, 0), word_at(starts, colours)):
                     call_task(kernel, table, word_at(tasks, 2 * t), word_at(tasks, 2 * t + 1), 0)
             else:
-                _share(job, semaphore, kernel, table, tasks, starts, colours)
-            time = now(job, _CLOCK)
+                share(job, semaphore, kernel, table, tasks, starts, colours)
+            time = now(job, CLOCK)
             spent[k] += time - last
             last = time
             if stop[0] != 0:
-                job[_WITHIN] += last - begin
+                job[WITHIN] += last - begin
                 return
-    job[_WITHIN] += last - begin
+    job[WITHIN] += last - begin
 
 
 @njit("void(int64[::1], int64[::1], int64, int64[:, ::1], int64, int64[::1])", cache=True, nogil=True)
@@ -205,33 +216,33 @@ class Team:
         """Object that runs all tasks in place of the threads while tasks are timed."""
         size = _THREADS + _LINE * threads
         room = np.zeros(size + _LINE, np.int64)
-        self._job: Ints = room[-(room.ctypes.data // room.itemsize) % _LINE :][:size]
-        self._job[_MOST] = threads
-        self._words = self._job.data
-        self._semaphore = int(self._job[_SEMAPHORE:].ctypes.data)
-        ctypes.CDLL(None).sem_init(ctypes.c_void_p(self._semaphore), 0, 0)
+        self.job: Ints = room[-(room.ctypes.data // room.itemsize) % _LINE :][:size]
+        self.job[MOST] = threads
+        self._words = self.job.data
+        self.semaphore = int(self.job[_SEMAPHORE:].ctypes.data)
+        ctypes.CDLL(None).sem_init(ctypes.c_void_p(self.semaphore), 0, 0)
         for thread in range(1, threads):
-            arguments = self._job, self._semaphore, thread
+            arguments = self.job, self.semaphore, thread
             threading.Thread(target=_help, args=arguments, name=f"helper {thread}", daemon=True).start()
 
     @property
     def most(self) -> int:
         """Number of threads that may work."""
-        return int(self._words[_MOST])
+        return int(self._words[MOST])
 
     @most.setter
     def most(self, threads: int) -> None:
-        self._words[_MOST] = threads
+        self._words[MOST] = threads
 
     @property
     def within(self) -> float:
         """Wall time in ``run`` so far, s. More threads could share this time."""
-        return self._words[_WITHIN] / SECOND
+        return self._words[WITHIN] / SECOND
 
     @property
     def helped(self) -> float:
         """Time of all threads except the calling one in tasks, summed over these threads, s."""
-        return float(self._job[_THREADS + _LINE :: _LINE].sum()) / SECOND
+        return float(self.job[_THREADS + _LINE :: _LINE].sum()) / SECOND
 
     def run(self, kernel: Kernel, table: int, tasks: Ints, starts: Ints) -> None:
         """Run ``tasks`` (k, 2), first and end, with a ``kernel`` of the signature TASK and the arguments at the address
@@ -240,12 +251,12 @@ class Team:
         Tasks ``starts[c]`` to ``starts[c + 1]``, at most 2^20, write to no common memory.
         """
         if self.projecting is not None:
-            self._words[_WITHIN] += self.projecting.run(kernel, table, tasks, starts)
-        elif self._words[_MOST] == 1:
-            _alone(self._job, kernel.address, table, tasks)
+            self._words[WITHIN] += self.projecting.run(kernel, table, tasks, starts)
+        elif self._words[MOST] == 1:
+            _alone(self.job, kernel.address, table, tasks)
         else:
             places = address_of(tasks), address_of(starts), len(starts) - 1
-            _ask(self._job, self._semaphore, kernel.address, table, *places)
+            _ask(self.job, self.semaphore, kernel.address, table, *places)
 
     def repeat(self, stages: Sequence[Stage], rounds: int, stop: Ints | None = None) -> Ints:
         """Run all ``stages``, one after the other, ``rounds`` times, in one call; end early after the stage that sets
@@ -266,7 +277,7 @@ class Team:
             for each in stages
         ]
         kernel = _repeat if rounds < _LONG else _repeat_long
-        kernel(spent, self._job, self._semaphore, np.array(words), rounds, stop)
+        kernel(spent, self.job, self.semaphore, np.array(words), rounds, stop)
         return spent
 
 

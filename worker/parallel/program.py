@@ -1,0 +1,128 @@
+"""Programs: stages that the threads of a rank run one after the other, in one call without Python code between them.
+
+A stage is a kernel with its table of arguments and its tasks. The tasks are either given before the call (``Stage``),
+or they are a range whose length is a word of memory that is read when the stage begins (``Span``): an earlier stage may
+have written the length. A stage with the length 0 is skipped. A kernel may also choose which stage comes next: it
+writes its number to ``Program.control``. A number beyond the last stage ends the call.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..kernels.jit import Kernel, njit
+from ..model.state import Ints
+from .arguments import address_of
+from .team import CLOCK, END, KERNEL, MOST, SIZE, TABLE, WITHIN, Stage, Team, divide, share
+from .words import call_task, now, word_at
+
+_WORD = 8
+"""Size of a word, bytes."""
+_WORDS = 7
+"""Words of a stage: kernel, table; tasks, starts, number of colours; address of the length of a range, length of a
+task."""
+
+
+@njit("boolean(int64[::1], int64, int64[::1])", cache=True)
+def _of_range(job, semaphore, stage):  # type: ignore[no-untyped-def]
+    """Run a stage over a range; return whether it had more than one task."""
+    n, size = word_at(stage[5], 0), stage[6]
+    many = (n + size - 1) // size
+    if many <= 1 or job[MOST] == 1:
+        for k in range(many):
+            call_task(stage[0], stage[1], k * size, min((k + 1) * size, n), 0)
+    else:
+        job[KERNEL], job[TABLE], job[SIZE], job[END] = stage[0], stage[1], size, n
+        divide(job, semaphore, many)
+    return many > 1
+
+
+@njit("boolean(int64[::1], int64, int64[::1])", cache=True)
+def _of_tasks(job, semaphore, stage):  # type: ignore[no-untyped-def]
+    """Run a stage with given tasks; return whether it had more than one task."""
+    tasks, starts, colours = stage[2], stage[3], stage[4]
+    first, end = word_at(starts, 0), word_at(starts, colours)
+    if job[MOST] > 1:
+        share(job, semaphore, stage[0], stage[1], tasks, starts, colours)
+    else:
+        for k in range(first, end):
+            call_task(stage[0], stage[1], word_at(tasks, 2 * k), word_at(tasks, 2 * k + 1), 0)
+    return end - first > 1
+
+
+@njit("int64(int64[::1], int64, int64[:, ::1], int64[::1], int64, int64)", cache=True)
+def _run(job, semaphore, stages, control, first, end):  # type: ignore[no-untyped-def]
+    """Run the stages from ``first`` to ``end``; return the number of the stage that would come next. Only stages of
+    more than one task count as time in regions.
+    """
+    k, begin = first, now(job, CLOCK)
+    while k < end:
+        stage = stages[k]
+        shared = _of_range(job, semaphore, stage) if stage[6] > 0 else _of_tasks(job, semaphore, stage)
+        done = now(job, CLOCK)
+        if shared:
+            job[WITHIN] += done - begin
+        k, control[0], begin = control[0] if control[0] >= 0 else k + 1, -1, done
+    return k
+
+
+@dataclass(frozen=True)
+class Span:
+    """A pass over a range from 0 to the word ``at`` of ``lengths``, read when the stage begins; ``size``: length of a
+    task. The number of the task that begins at index ``first`` is ``first`` divided by ``size``.
+    """
+
+    kernel: Kernel
+    table: int
+    lengths: Ints
+    at: int
+    size: int
+
+    def words(self) -> list[int]:
+        """Return the words of the stage."""
+        return [self.kernel.address, self.table, 0, 0, 0, address_of(self.lengths) + _WORD * self.at, self.size]
+
+    def tasks(self) -> Ints:
+        """Return the present tasks (k, 2)."""
+        n = int(self.lengths[self.at])
+        first = np.arange(0, n, self.size)
+        return np.column_stack([first, np.minimum(first + self.size, n)])
+
+
+def _words(stage: Stage) -> list[int]:
+    tasks = address_of(stage.tasks), address_of(stage.starts), len(stage.starts) - 1
+    return [stage.kernel.address, stage.table, *tasks, 0, 0]
+
+
+class Program:
+    """Stages in the order in which they are run."""
+
+    def __init__(self, team: Team, stages: Sequence[Stage | Span], control: Ints) -> None:
+        """``control`` (1,): word of the next stage, -1 for the following one; kernels write it."""
+        self._team, self._stages, self.control = team, list(stages), control
+        words = [each.words() if isinstance(each, Span) else _words(each) for each in stages]
+        self._words = np.array(words, np.int64).reshape(-1, _WORDS)
+        control[0] = -1
+
+    def run(self, first: int = 0, end: int | None = None) -> int:
+        """Run the stages from ``first`` to ``end``, all by default, and return the number of the stage that would come
+        next: ``end``, or a larger number that a kernel has written.
+        """
+        end = len(self._stages) if end is None else end
+        team = self._team
+        if team.projecting is None:
+            return int(_run(team.job, team.semaphore, self._words, self.control, first, end))
+        k = first
+        while k < end:
+            self._timed(self._stages[k])
+            k = int(self.control[0]) if self.control[0] >= 0 else k + 1
+            self.control[0] = -1
+        return k
+
+    def _timed(self, stage: Stage | Span) -> None:
+        """Run a stage while tasks are timed (projecting.py)."""
+        if isinstance(stage, Stage):
+            self._team.run(stage.kernel, stage.table, stage.tasks, stage.starts)
+        elif len(tasks := stage.tasks()):
+            self._team.run(stage.kernel, stage.table, tasks, np.array([0, len(tasks)]))
