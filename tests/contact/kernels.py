@@ -1,5 +1,6 @@
 """Calls of the contact kernels for the tests: if the signature of a kernel changes, only this file changes."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
@@ -23,6 +24,7 @@ from conoid.worker.contact.narrow_phase.tables import (
 from conoid.worker.contact.solver.active import Kept
 from conoid.worker.contact.solver.shared_sums import SharedSums
 from conoid.worker.contact.solver.solver import ActiveSet
+from conoid.worker.contact.solver.step import SolverStep
 from conoid.worker.contact.solver.stops import Stops
 from conoid.worker.contact.surface.records import SurfaceNodes
 from conoid.worker.parallel.comm import SerialComm
@@ -220,15 +222,31 @@ class Solver:
         self.active = active or ActiveSet(scale, stops or none, team(1))
         self._surface_nodes = SurfaceNodes(np.arange(n), every, part, part, mobility, np.zeros((n, 3)), self.v, self.v)
         self._nodes: Any = SimpleNamespace(v=self.v, part=part, owned=np.ones(n, bool))
+        loss, words = np.zeros(n), np.zeros((2, 2), np.int64)
+        account: Any = SimpleNamespace(scale=1.0, words=words, carry=lambda: None)
+        self.books: Any = SimpleNamespace(
+            contact_loss=loss, external_work=loss, account=account, friction=Tally(np.ones(2)),
+            parts=np.zeros((2, 3), np.int64), pairs=np.zeros((0, 0, 3)),
+        )  # fmt: skip
+        self.before = np.zeros((n, 3))
         self.begin(np.zeros((n, 3)))
 
     def begin(self, x: Floats) -> None:
         """Begins a step with the nodes at ``x``."""
         self._surface_nodes.x, met = x, self.met
         rows = ActiveRows(met, np.arange(many(met), dtype=np.int32), n=many(met))
-        alone = SharedSums([], SerialComm()).agree(rows, self._surface_nodes.local)
-        self.active.begin(rows, self._surface_nodes, np.zeros(len(x), bool), alone, size=1.0, dt=1.0)
+        nothing = Kept(*np.zeros((2, 0, 4)))
+        self._step = SolverStep(
+            rows, self._surface_nodes, self.before, self.total, self._nodes, np.zeros(len(x), bool), self.books,
+            self.unsettled, nothing, 1.0, 1, rubs=True, size=1.0, dt=1.0,
+        )  # fmt: skip
+        self.active.bind(self._step)
+        self.active.begin(SharedSums([], SerialComm()).agree(rows, self._surface_nodes.local))
         self.active.weigh()
+
+    def _go_on(self, **changes: Any) -> None:
+        self._step = replace(self._step, **changes)
+        self.active.bind(self._step)
 
     @property
     def push(self) -> Floats:
@@ -240,35 +258,40 @@ class Solver:
 
     def sweep(self, times: int = 1) -> Floats:
         """Returns the velocities after ``many`` plain sweeps."""
+        self._go_on(sweeps=1)
         for _ in range(times):
-            self.active.sweep(1)
+            self.active.sweep()
             self._leave()
         return self.v
 
     def step(self, sweeps: int) -> Floats:
         """Returns the velocities after a step of ``many`` sweeps with momentum."""
-        self.active.sweep(sweeps)
+        self._go_on(sweeps=sweeps)
+        self.active.sweep()
         self._leave()
         return self.v
 
     def _leave(self) -> None:
-        self.active.leave(self._surface_nodes, self.total, self._nodes, np.zeros((2, 3), np.int64), self.unsettled)
+        self.active.leave()
         assert (self.total.sum(axis=0) == 0).all()
 
     @property
     def kept(self) -> Kept:
         """Returns the stored impulses of the step; the arrays had other values before."""
         kept = Kept(*np.full((2, many(self.met), 4), np.nan))
-        self.active.store(kept)
+        self._go_on(kept=kept)
+        self.active.store()
         return kept
 
     def resume(self, kept: Kept, ratio: float = 1.0) -> None:
         """Warm start with ``ratio`` times the impulses ``kept``."""
-        self.active.resume(kept, ratio)
+        self._go_on(kept=kept, ratio=ratio)
+        self.active.resume()
         self._leave()
 
     def heat(self, v_old: Floats) -> float:
         """Returns the work of friction, J, of the contacts with an impulse, from the velocities ``v_old``."""
-        friction = Tally(np.ones(2))
-        self.active.heat(friction, v_old)
-        return float(friction.total(SerialComm())[0])
+        self.books.friction = Tally(np.ones(2))
+        self._go_on(before=v_old)
+        self.active.work()
+        return float(self.books.friction.total(SerialComm())[0])

@@ -14,9 +14,10 @@ from conoid.cases.model import schema
 from conoid.worker import simulation, step
 from conoid.worker.accounts.digest import digest
 from conoid.worker.contact.narrow_phase.detection import Detection
-from conoid.worker.contact.narrow_phase.rows import ActiveRows
 from conoid.worker.contact.scene.scene import Scene
+from conoid.worker.contact.solver.shared_sums import ActiveSum
 from conoid.worker.contact.solver.solver import ActiveSet
+from conoid.worker.contact.solver.step import SolverStep
 from conoid.worker.errors import InputError
 from conoid.worker.mesh.model import TetMesh
 from conoid.worker.parallel.comm import Comm, SerialComm
@@ -84,15 +85,20 @@ def test_a_collision_keeps_the_momentum(friction: float) -> None:
 @pytest.mark.parametrize("friction", [0.0, 0.3])
 def test_a_step_without_impulses_needs_no_solver(friction: float) -> None:
     """The solver leaves all velocities as they are in the steps that are found to rest: the answers are equal."""
-    case, rest, found = case_of(friction=friction), ActiveSet.rest, list[tuple[bool, bool]]()
+    case, solve, found = case_of(friction=friction), ActiveSet.solve, list[tuple[bool, bool]]()
 
-    def noted(active: ActiveSet, rows: ActiveRows, *others: Any) -> bool:
-        found.append((quiet := rest(active, rows, *others), rows.n > 0))
-        return quiet
+    def noted(active: ActiveSet, step: SolverStep, shared: ActiveSum) -> bool:
+        pushed = solve(active, step, shared)
+        found.append((not len(active.places), step.rows.n > 0))
+        return pushed
 
-    with patch.object(ActiveSet, "rest", noted):
+    def tested(active: ActiveSet, step: SolverStep, shared: ActiveSum) -> bool:
+        active.tests_rest = False
+        return solve(active, step, shared)
+
+    with patch.object(ActiveSet, "solve", noted):
         one = answer(case)
-    with patch.object(ActiveSet, "rest", lambda *_: False):
+    with patch.object(ActiveSet, "solve", tested):
         assert answer(case) == one
     assert {(True, False), (True, True), (False, True)} <= set(found)
 

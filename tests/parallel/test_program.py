@@ -81,7 +81,7 @@ def test_a_program_is_run_in_parts(threads: int) -> None:
     assert (done == expected(11)).all()
 
 
-def test_only_stages_of_several_tasks_are_time_in_regions() -> None:
+def test_a_range_of_one_task_is_no_time_in_regions() -> None:
     alone = Team(1)
     program, _, lengths = made(alone)
     before = alone.within

@@ -94,12 +94,15 @@ class Books:
         """Sets the outstanding half of the work of friction to zero, because the next booking includes that half."""
         self.friction.words[:, 1] = 0
 
-    def book(self, scene: Scene, places: Indices, *, fresh: bool = False) -> None:
-        """Books half of the work of the last impulses at the ``places`` of the scene, with the velocities
-        ``before``. ``fresh`` impulses are also added to the impulses since the last frame, if these are written.
-        """
-        if fresh and len(self.pressed):
+    def press(self, scene: Scene) -> None:
+        """Adds the impulses of the step to the impulses since the last frame, if these are written."""
+        if len(self.pressed):
             self.pressed[scene.own.local] += scene.slots.total[scene.own.slots]
+
+    def book(self, scene: Scene, places: Indices) -> None:
+        """Books half of the work of the last impulses at the ``places`` of the scene, with the velocities ``before``.
+        The solver books the other half.
+        """
         self._book.run(
             len(places), self.contact_loss, self.external_work, places, scene.surface_nodes.local, scene.slots.before,
             scene.slots.total, scene.surface_nodes.mobility, self.scale,

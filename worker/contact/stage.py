@@ -33,8 +33,8 @@ from .exterior import Exterior
 from .narrow_phase.detection import Ahead, Detected, Detection
 from .narrow_phase.tables import PUSH_OUT
 from .scene.scene import Scene
-from .solver.active import Kept
 from .solver.solver import ActiveSet
+from .solver.step import SolverStep
 from .solver.stops import Stops
 from .solver.sweep_count import SweepCount
 from .surface import normals, sharp
@@ -250,26 +250,17 @@ class Contact:
         self._meet(now, give, dt)
         self.detection.retarget(now, self._scheme.restitution, give)
         shared = now.messages.company.agree(now.active, surface_nodes.local)
-        kept, ratio, loose = now.stored(self.exterior.cracks.kept), self._resume(give), self.exterior.motion.loose
-        if not self._active.rest(now.active, surface_nodes, kept, loose, shared, dt):
-            self._active.begin(now.active, surface_nodes, loose, shared, self.exterior.size, dt)
-            self._settle(now, state, kept, ratio, t)
-        shared.free()
-
-    def _settle(self, now: Scene, state: Nodes, kept: Kept, ratio: float, t: float) -> None:
-        """Computes the impulses of the active contacts, and books them; ``ratio``: see ``_resume``."""
-        books, active = self.books, self._active
-        active.weigh()
-        active.resume(kept, ratio)
-        active.sweep(self.sweep_count.sweeps)
-        active.store(kept)
-        if self.searches.rubs:
-            active.heat(books.friction, now.slots.before)
-        active.cost(books, now.slots.before, now.surface_nodes.part)
-        if active.leave(now.surface_nodes, now.slots.total, state, books.parts, self.sweep_count.unsettled):
+        kept, ratio = now.stored(self.exterior.cracks.kept), self._resume(give)
+        of, many, slots = self.exterior, self.sweep_count, now.slots
+        step = SolverStep(
+            now.active, surface_nodes, slots.before, slots.total, state, of.motion.loose, self.books, many.unsettled,
+            kept, ratio, many.sweeps, self.searches.rubs, of.size, dt,
+        )  # fmt: skip
+        if self._active.solve(step, shared):
             self.last_push = t
-        books.book(now, active.places, fresh=True)
-        active.press(books.pressed)
+            self.books.press(now)
+        self._active.press(self.books.pressed)
+        shared.free()
 
     def _resume(self, give: float) -> float:
         """Ratio of this step to the last one: the factor of stored impulses. Without restitution the factor is 0 while

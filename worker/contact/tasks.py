@@ -9,9 +9,7 @@ from ..parallel.team import TASK
 from .narrow_phase import closing_speed, corner_contact, crack_contact, edge_edge, node_face, tables
 from .narrow_phase.corner_contact import NARROW
 from .narrow_phase.tables import CONTACT_ROWS, EDGES, FACES, PAIRS, SLOTS, STEP
-from .solver import impulse_work, loading, restitution, slot_numbers, stops, sweeps
-from .solver.active import CONTACTS, KEPT, LOADED, NODES
-from .solver.stops import BRACED
+from .solver import impulse_work, restitution, slot_numbers
 from .surface.families import CORNERS
 
 PAIRS_OF_A_TASK = 1024
@@ -25,7 +23,7 @@ SLOTS_OF_A_TASK = 2048
 PAIRS_OF_A_TASK."""
 _F, _I = types.float64, types.int64
 _F1, _F2, _I1, _I2 = types.float64[::1], types.float64[:, ::1], types.int64[::1], types.int64[:, ::1]
-_N1, _N2, _U1 = types.int32[::1], types.int32[:, ::1], types.uint8[::1]
+_N1, _N2 = types.int32[::1], types.int32[:, ::1]
 DUE_FACES = PAIRS, SLOTS, FACES, _F, _I1
 NODE_FACE = CONTACT_ROWS, _F1, _I, PAIRS, SLOTS, FACES, STEP, _F, _I1, _I1, _F1
 EDGE_EDGE = CONTACT_ROWS, _I, PAIRS, EDGES, STEP, _F2, _F, _I1, _I1
@@ -33,26 +31,12 @@ ACROSS = CONTACT_ROWS, _I, _I1, _N2, _F, STEP, _I1, _I1
 ENTERING = CONTACT_ROWS, _I, _I, NARROW, CORNERS, STEP, _I1
 APPROACH = CONTACT_ROWS, _N1, PAIRS, FACES, STEP, _F1
 REBOUND = CONTACT_ROWS, _N1, _F2, _F2, _F, types.boolean
-MARK = _U1, _N1, _N2, _N1, _N1, _U1, _I2
-SORT = _N1, _N2, _F1, _I2, _N1, _N1, _N2, _N1
-LOAD = NODES, _N1, _F2, _F2, _F1
-WEIGH = NODES, CONTACTS, LOADED
-RESUME = NODES, CONTACTS, LOADED, KEPT, _F, _F
-SWEEP = NODES, CONTACTS, LOADED, _F, _I1, _F
-GIVE = NODES, _F, _I1
-BRACE = NODES, BRACED, _I1
-STORE = KEPT, LOADED, _N1
-COST = types.int64[:, :, ::1], LOADED, NODES, _F2, _N1, _F, types.boolean
-LEAVE = _F2, types.int64[:, :, ::1], _I2, _I2, NODES, _N1, _N1, _N1, types.boolean[::1]
 BOOK = _F1, _F1, _N1, _N1, _F2, _I2, _F2, _F
 TAKE = _F2, _F2, _N1, _F2, _F2, _N1
 AHEAD = _F2, _F2, _F2, _F2, _F
 _due_faces, _node_face, _edge_edge = reader(*DUE_FACES), reader(*NODE_FACE), reader(*EDGE_EDGE)
 _across, _entering, _approach = reader(*ACROSS), reader(*ENTERING), reader(*APPROACH)
-_rebound, _mark, _sort, _load, _weigh = reader(*REBOUND), reader(*MARK), reader(*SORT), reader(*LOAD), reader(*WEIGH)
-_resume, _sweep, _give, _store, _cost = reader(*RESUME), reader(*SWEEP), reader(*GIVE), reader(*STORE), reader(*COST)
-_brace, _leave, _book, _take = reader(*BRACE), reader(*LEAVE), reader(*BOOK), reader(*TAKE)
-_ahead = reader(*AHEAD)
+_rebound, _book, _take, _ahead = reader(*REBOUND), reader(*BOOK), reader(*TAKE), reader(*AHEAD)
 
 
 @njit(TASK, cache=True)
@@ -108,97 +92,6 @@ def rebound(table, first, stop, thread):  # type: ignore[no-untyped-def]
         restitution.rebound(out, found, v, before, share, first, stop)
     if back:
         restitution.hold_back(out, found, before, first, stop)
-
-
-@njit(TASK, cache=True)
-def mark(table, first, stop, thread):  # type: ignore[no-untyped-def]
-    """Task: ``slot_numbers.mark``."""
-    touched, set_of, nodes, found, zone, shared, many = _mark(table)
-    slot_numbers.mark(touched, set_of, nodes, found, zone, shared, many, first // CONTACTS_OF_A_TASK, first, stop)
-
-
-@njit(TASK, cache=True)
-def sort(table, first, stop, thread):  # type: ignore[no-untyped-def]
-    """Task: ``slot_numbers.sort``."""
-    row, slots, reach, begins, set_of, found, nodes, slot = _sort(table)
-    task = first // CONTACTS_OF_A_TASK
-    slot_numbers.sort(row, slots, reach, begins, set_of, found, nodes, slot, task, first, stop)
-
-
-@njit(TASK, cache=True)
-def load(table, first, stop, thread):  # type: ignore[no-untyped-def]
-    """Task: ``slot_numbers.load``."""
-    active, places, v, mobility, fastest = _load(table)
-    fastest[first // SLOTS_OF_A_TASK] = slot_numbers.load(active, places, v, mobility, first, stop)
-
-
-@njit(TASK, cache=True)
-def weigh(table, first, stop, thread):  # type: ignore[no-untyped-def]
-    """Task: ``sweeps.add_row_weights`` of a range of sets of contacts."""
-    active, contacts, loaded = _weigh(table)
-    for k in range(first, stop):
-        sweeps.add_row_weights(active, contacts, loaded, k)
-
-
-@njit(TASK, cache=True)
-def resume(table, first, stop, thread):  # type: ignore[no-untyped-def]
-    """Task: ``loading.load_kept`` and ``sweeps.resume`` of a range of sets of contacts."""
-    active, contacts, loaded, kept, ratio, scale = _resume(table)
-    for k in range(first, stop):
-        loading.load_kept(loaded, contacts, active, kept, k)
-        sweeps.resume(active, loaded, kept, contacts.pair, ratio, scale, k)
-
-
-@njit(TASK, cache=True)
-def sweep(table, first, stop, thread):  # type: ignore[no-untyped-def]
-    """Task: ``loading.load`` and ``sweeps.sweep`` of a range of sets of contacts."""
-    active, contacts, loaded, fastest, turn, scale = _sweep(table)
-    ahead = sweeps.momentum(turn[0], turn[1])
-    for k in range(first, stop):
-        loading.load(loaded, contacts, active, fastest, k)
-        sweeps.sweep(active, loaded, ahead, scale, k)
-
-
-@njit(TASK, cache=True)
-def give(table, first, stop, thread):  # type: ignore[no-untyped-def]
-    """Task: ``sweeps.give``; ``turn`` (2,): number of the sweep, and number of sweeps in the step."""
-    active, scale, turn = _give(table)
-    sweeps.give(active, scale, turn[0] + 1 == turn[1], first, stop)
-
-
-@njit(TASK, cache=True)
-def brace(table, first, stop, thread):  # type: ignore[no-untyped-def]
-    """Task: ``stops.stop``; then increases the number of the sweep by one."""
-    active, braced, turn = _brace(table)
-    stops.stop(active, braced)
-    turn[0] += 1
-
-
-@njit(TASK, cache=True)
-def store(table, first, stop, thread):  # type: ignore[no-untyped-def]
-    """Task: ``sweeps.store`` of a range of sets of contacts."""
-    kept, loaded, pair = _store(table)
-    for k in range(first, stop):
-        sweeps.store(kept, loaded, pair, k)
-
-
-@njit(TASK, cache=True)
-def cost(table, first, stop, thread):  # type: ignore[no-untyped-def]
-    """Task: ``impulse_work.cost`` of a range of sets of contacts, or ``impulse_work.heat`` if ``rubs``; sums by set."""
-    words, loaded, active, before, places, joule, rubs = _cost(table)
-    for k in range(first, stop):
-        if rubs:
-            impulse_work.heat(words[k], loaded, active, before, places, joule, k)
-        else:
-            impulse_work.cost(words[k], loaded, active, before, places, joule, k)
-
-
-@njit(TASK, cache=True)
-def leave(table, first, stop, thread):  # type: ignore[no-untyped-def]
-    """Task: ``slot_numbers.leave``, with sums by task."""
-    node_v, parts, unsettled, total, active, places, index, part, owned = _leave(table)
-    k = first // SLOTS_OF_A_TASK
-    slot_numbers.leave(node_v, parts[k], unsettled[k], total, active, places, index, part, owned, first, stop)
 
 
 @njit(TASK, cache=True)

@@ -120,6 +120,20 @@ class Arguments:
             self._words[at] = int(value)
 
 
+class Handle:
+    """Tables of arguments under one address, for the stages of a program: a kernel reads the tables that it needs."""
+
+    def __init__(self, *kinds: tuple[Any, ...]) -> None:
+        """``kinds``: numba types of the arguments of each table."""
+        self._tables = [Arguments(*each) for each in kinds]
+        self._words = np.array([each.address for each in self._tables])
+        self.address = int(self._words.ctypes.data)
+
+    def set(self, k: int, *values: Any) -> None:
+        """Write the arguments of table ``k``; see ``Arguments.set``."""
+        self._tables[k].set(*values)
+
+
 def _dtype(kind: Any) -> np.dtype[Any]:
     return np.dtype(str(kind.dtype).replace("boolean", "bool"))
 
@@ -159,6 +173,23 @@ def reader(*kinds: Any) -> Any:
     def read(_: Any, address: Any) -> Any:
         def emit(context: Any, builder: Any, signature: Any, args: Any) -> Any:
             return _read(context, builder, kind, builder.inttoptr(args[0], _WORD.as_pointer()), 0)[0]
+
+        return kind(address), emit
+
+    return intrinsic(read)
+
+
+def table_of(k: int, *kinds: Any) -> Any:
+    """Return a function for kernels. The function reads the arguments of table ``k`` of a ``Handle``, of these types,
+    at the address of the handle, and returns them as a tuple.
+    """
+    kind = several(*kinds)
+
+    def read(_: Any, address: Any) -> Any:
+        def emit(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+            tables = builder.inttoptr(args[0], _WORD.as_pointer())
+            base = builder.inttoptr(builder.load(builder.gep(tables, [_WORD(k)])), _WORD.as_pointer())
+            return _read(context, builder, kind, base, 0)[0]
 
         return kind(address), emit
 

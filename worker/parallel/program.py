@@ -38,28 +38,29 @@ def _of_range(job, semaphore, stage):  # type: ignore[no-untyped-def]
     return many > 1
 
 
-@njit("boolean(int64[::1], int64, int64[::1])", cache=True)
+@njit("void(int64[::1], int64, int64[::1])", cache=True)
 def _of_tasks(job, semaphore, stage):  # type: ignore[no-untyped-def]
-    """Run a stage with given tasks; return whether it had more than one task."""
+    """Run a stage with given tasks."""
     tasks, starts, colours = stage[2], stage[3], stage[4]
-    first, end = word_at(starts, 0), word_at(starts, colours)
     if job[MOST] > 1:
         share(job, semaphore, stage[0], stage[1], tasks, starts, colours)
     else:
-        for k in range(first, end):
+        for k in range(word_at(starts, 0), word_at(starts, colours)):
             call_task(stage[0], stage[1], word_at(tasks, 2 * k), word_at(tasks, 2 * k + 1), 0)
-    return end - first > 1
 
 
 @njit("int64(int64[::1], int64, int64[:, ::1], int64[::1], int64, int64)", cache=True)
 def _run(job, semaphore, stages, control, first, end):  # type: ignore[no-untyped-def]
-    """Run the stages from ``first`` to ``end``; return the number of the stage that would come next. Only stages of
-    more than one task count as time in regions.
+    """Run the stages from ``first`` to ``end``; return the number of the stage that would come next. A range of one
+    task does not count as time in regions.
     """
     k, begin = first, now(job, CLOCK)
     while k < end:
-        stage = stages[k]
-        shared = _of_range(job, semaphore, stage) if stage[6] > 0 else _of_tasks(job, semaphore, stage)
+        stage, shared = stages[k], True
+        if stage[6] > 0:
+            shared = _of_range(job, semaphore, stage)
+        else:
+            _of_tasks(job, semaphore, stage)
         done = now(job, CLOCK)
         if shared:
             job[WITHIN] += done - begin

@@ -62,17 +62,38 @@ def mark(touched, set_of, nodes, found, zone, shared, many, task, first, stop): 
         many[task, set_of[q]] += 1
 
 
-@njit(_I(_N1, _N1, _U1), cache=True)
-def number(places, slot, touched):  # type: ignore[no-untyped-def]
-    """Numbers the ``touched`` surface nodes in their order and clears the flags; returns the number of slots.
-    ``slot`` (surface_nodes,) is the inverse of ``places``.
+@njit(_I(_I1, _I), cache=True)
+def offsets(counts, many):  # type: ignore[no-untyped-def]
+    """Replaces the first ``many`` of the ``counts`` by the sums of those before them; returns the sum of all."""
+    n = 0
+    for k in range(many):
+        counts[k], n = n, n + counts[k]
+    return n
+
+
+@njit(types.void(_I1, _I2, _I2, _I), cache=True)
+def set_offsets(begin, begins, many, tasks):  # type: ignore[no-untyped-def]
+    """Sets ``begin`` (sets + 1,) to the first row of each set and ``begins`` (tasks, sets) to the first row of each of
+    the first ``tasks`` tasks in it, from the number of contacts ``many`` (tasks, sets).
     """
     n = 0
-    for a in range(len(touched)):
-        places[n], slot[a] = a, n
-        n += touched[a]
-        touched[a] = 0
-    return n
+    for kind in range(many.shape[1]):
+        begin[kind] = n
+        for k in range(tasks):
+            begins[k, kind] = n
+            n += many[k, kind]
+    begin[many.shape[1]] = n
+
+
+@njit(types.void(_N1, _N1, _U1, _I, _I, _I), cache=True)
+def number(places, slot, touched, n, first, stop):  # type: ignore[no-untyped-def]
+    """Numbers the ``touched`` surface nodes from ``first`` to ``stop`` in their order, from ``n`` on, and clears the
+    flags. ``slot`` (surface_nodes,) is the inverse of ``places``.
+    """
+    for a in range(first, stop):
+        if touched[a]:
+            places[n], slot[a], touched[a] = a, n, 0
+            n += 1
 
 
 @njit(types.void(_N1, _N2, _F1, _I2, _N1, _N1, _N2, _N1, _I, _I, _I), cache=True)

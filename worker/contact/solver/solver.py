@@ -4,30 +4,28 @@ from typing import Protocol
 
 import numpy as np
 
-from ...model.growing import Scratch
-from ...model.state import Flags, Floats, Indices, Ints, Nodes
-from ...parallel.fixed_point import Tally
-from ...parallel.team import Team
-from .. import tasks
-from ..books import Books
-from ..narrow_phase.rows import ActiveRows
+from ...kernels.jit import Kernel
+from ...model.state import Floats, Indices, Ints
+from ...parallel.program import Program, Span
+from ...parallel.team import Stage, Team
+from ..narrow_phase.tables import ContactRows
 from ..surface.records import SurfaceNodes
-from . import impulse_work, slot_numbers, stops, zones
-from .active import IMPULSE, PUSH, PUSH_T, ActiveContacts, ActiveNodes, Kept, Loaded
-from .quiet import Quiet
-from .sets import Sets, Slots
+from . import impulse_work, layout, stages, zones
+from .active import IMPULSE, PUSH, PUSH_T, ActiveContacts, ActiveNodes, Loaded
+from .layout import CONTACTS_N, CRACKS_N, NODES_N, PAIRS_N, SLOTS_N
 from .shared_sums import ActiveSum
+from .stages import CONTACTS_OF_A_TASK, END, KEPT_OF_A_TASK, SLOTS_OF_A_TASK
+from .step import SolverStep
 from .stops import Braced, Stops
 from .zones import Zones
 
+_NONE: Indices = np.zeros(0, np.int32)
 _ROW_WEIGHTS = 4
 """Number of columns of ``ActiveNodes.row_weights``."""
 _SPARE = 1.25
 """Allocated rows over the present number of nodes and contacts. While a body breaks, these numbers increase in
 nearly every step, and each new allocation costs time because the operating system clears new pages. Chosen value: a
 bar of glass has a quarter more rows after 400 steps."""
-
-_NONE: Indices = np.zeros(0, np.int32)
 
 
 class Bodies(Protocol):
@@ -68,174 +66,199 @@ class ActiveSet:
         self.scale, self.stops, self._bodies = scale, near, bodies
         self.places: Indices = np.zeros(0, np.int32)
         """(slots,) rows in the scene of the nodes that were slots in the last step."""
-        self._zones, self._passes = Zones(team.threads), Slots(team)
-        self._sets, self._room = Sets(team, self._zones.many), _Room(0, 0, 0, self._zones.many)
-        self._scratch, self._quiet = Scratch(), Quiet(team)
-        self._turn = np.zeros(2, np.int64)
-        """Number of the present sweep, and number of sweeps in the step."""
+        self.tests_rest = True
+        """Whether the contacts of a step are tested first whether they need an impulse."""
+        self._zones = Zones(team.threads)
+        self._room = _Room(0, 0, near.sides.shape, self._zones.many)
+        self._handle, (self._counts, self._reals) = layout.handle(), layout.numbers()
+        self._program = self._stages(team)
+        self._of: ContactRows | None = None
+        self._stored = True
 
     def go_on(self, scale: float, sides: Floats) -> None:
         """Sets the scale, and the ``sides`` of the stops, after a restart or a repartition."""
-        self.scale, self.stops = scale, self.stops._replace(sides=sides.reshape(self.stops.sides.shape))
+        self.scale, self._stored = scale, True
+        self.stops = self.stops._replace(sides=sides.reshape(self.stops.sides.shape))
 
-    def rest(
-        self, rows: ActiveRows, surface_nodes: SurfaceNodes, kept: Kept, loose: Flags, shared: ActiveSum, dt: float
-    ) -> bool:  # fmt: skip
-        """Tests whether the contacts ``rows`` need no impulse in a step ``dt``, s; then no other method has to be
-        called in the step. False if other ranks or rigid bodies may take part. ``kept``: stored impulses, set to zero
-        in a step without impulses; for the other arguments see ``begin``.
+    def _stages(self, team: Team) -> Program:
+        """Returns the stages of a step, in the order of their numbers."""
+        table, counts, control = self._handle.address, self._counts, np.zeros(1, np.int64)
+        self._handle.set(layout.STEP, counts, self._reals, control)
+        border, inner = zones.tasks(self._zones.many)
+
+        def spans(at: int, size: int, *kernels: Kernel) -> list[Stage | Span]:
+            return [Span(each, table, counts, at, size) for each in kernels]
+
+        def by_set(tasks: tuple[Ints, Ints], *kernels: Kernel) -> list[Stage | Span]:
+            return [Stage(each, table, *tasks) for each in kernels]
+
+        some, slots, kept = CONTACTS_OF_A_TASK, SLOTS_OF_A_TASK, KEPT_OF_A_TASK
+        alone = layout.ONE, 1
+        every = [
+            *spans(CONTACTS_N, some, stages.quiet), *spans(*alone, stages.rest),
+            *spans(CONTACTS_N, some, stages.mark), *spans(NODES_N, slots, stages.count),
+            *spans(*alone, stages.order), *spans(NODES_N, slots, stages.number),
+            *spans(CONTACTS_N, some, stages.sort), *spans(SLOTS_N, slots, stages.load), *spans(*alone, stages.begin),
+            *by_set(inner, stages.weigh, stages.resume), *spans(SLOTS_N, slots, stages.give),
+            *by_set(inner, stages.sweep), *spans(SLOTS_N, slots, stages.give), *spans(*alone, stages.turn),
+            *spans(PAIRS_N, kept, stages.clear_pairs), *spans(CRACKS_N, kept, stages.clear_cracks),
+            *by_set(inner, stages.store, stages.work), *spans(SLOTS_N, slots, stages.leave),
+            *by_set(border, stages.weigh, stages.resume, stages.sweep, stages.store, stages.work),
+        ]  # fmt: skip
+        return Program(team, every, control)
+
+    def bind(self, step: SolverStep) -> None:
+        """Begins a step: sets the arguments of the stages."""
+        self._step, rows, nodes = step, step.rows, step.nodes
+        if rows.n > len(self._room.row) or nodes.n > len(self._room.touched):
+            of = int(_SPARE * rows.n), int(_SPARE * nodes.n)
+            self._room = _Room(*of, self.stops.sides.shape, self._zones.many)
+        room, books, tables = self._room, step.books, self._handle
+        if rows.room is not self._of or room.row is not self._contacts.row:
+            self._of, found = rows.room, rows.room
+            self._contacts = ActiveContacts(
+                room.row, room.slots, room.reach, found.weights, found.normals, found.wanted, found.friction, found.pair
+            )  # fmt: skip
+            tables.set(layout.SORTED, self._contacts)
+        tables.set(layout.ROWS, rows.room, rows.found)
+        surface = nodes.x, nodes.v, nodes.mobility, nodes.part, nodes.local, step.before, step.total
+        tables.set(layout.NODES_OF, *surface, self._zones.of(nodes))
+        tables.set(layout.ROOM, *room.arrays)
+        tables.set(layout.STORED, step.kept)
+        tables.set(layout.BOUNDS, self.stops, step.loose)
+        tables.set(layout.BODIES, step.state.v, step.state.part, step.state.owned)
+        tables.set(layout.BOOKS, books.contact_loss, books.external_work)
+        tables.set(layout.SUMS, *room.sums)
+        counts, reals = self._counts, self._reals
+        kept = len(step.kept.pairs), len(step.kept.cracks)
+        counts[:] = rows.n, nodes.n, counts[SLOTS_N], *kept, 1, 0, step.sweeps, 3 if step.rubs else 1
+        joules = books.account.scale, float(books.friction.scale[0])
+        reals[:] = step.dt, step.ratio, self.scale, reals[layout.FASTEST], step.size, *joules
+
+    def solve(self, step: SolverStep, shared: ActiveSum) -> bool:
+        """Computes the impulses of a step, applies and books them; ``shared``: sums over ranks. Returns whether there
+        was any impulse on a node of this rank.
         """
-        alone = not len(shared.shared) and self._bodies is None
-        if not (alone and self._quiet.holds(rows, surface_nodes, kept, self.stops, loose, dt)):
-            return False
+        self.bind(step)
+        if not len(shared.shared) and self._bodies is None:
+            return self._solved()
+        self.begin(shared)
+        for stage in (self.weigh, self.resume, self.sweep, self.store, self.work):
+            stage()
+        return self.leave()
+
+    def _solved(self) -> bool:
+        """Runs all stages in one call. If no contact needs an impulse, no velocity changes."""
+        if self._step.rows.n and self._program.run(stages.QUIET if self.tests_rest else stages.MARK, END) == END:
+            self._stored = True
+            self._numbered()
+            self._booked()
+            return self._left()
         self.places, self._room.loaded.many[:] = _NONE, 0
-        kept.pairs[:], kept.cracks[:] = 0.0, 0.0
-        return True
+        if self._stored:
+            self._program.run(stages.CLEAR_PAIRS, stages.STORE)
+            self._stored = False
+        return False
 
-    def begin(
-        self, rows: ActiveRows, surface_nodes: SurfaceNodes, loose: Flags, shared: ActiveSum, size: float, dt: float
-    ) -> None:  # fmt: skip
-        """Numbers the contacts ``rows`` of a step ``dt``, s, and their nodes; ``shared``: sums over ranks; ``loose``
-        (nodes,): nodes without tets; ``size`` of a face, m.
-        """
-        self._sum, found = shared, rows.room
-        if rows.n > len(self._room.row) or surface_nodes.n > len(self._room.touched):
-            self._room = _Room(
-                int(_SPARE * rows.n), int(_SPARE * surface_nodes.n), len(self.stops.points), self._zones.many
-            )
-        room = self._room
-        self._number(rows, self._zones.of(surface_nodes))
-        self._fastest = self._loaded(surface_nodes)
-        self._turn[:] = 0
-        stops.find(
-            room.braced,
-            room.active,
-            self.stops,
-            self.places,
-            surface_nodes.x,
-            surface_nodes.part,
-            surface_nodes.local,
-            loose,
-            size,
-            dt,
-        )
-        stops.stop(room.active, room.braced)
+    def begin(self, shared: ActiveSum) -> None:
+        """Numbers the contacts and their nodes; ``shared``: sums over ranks."""
+        room, self._sum = self._room, shared
+        room.touched[shared.shared] = room.shared[shared.shared] = 1
+        self._program.run(stages.MARK, stages.SORT)
+        room.shared[shared.shared] = 0
+        self._numbered()
+        shared.number(room.slot)
+        self._program.run(stages.SORT, stages.WEIGH)
         if self._bodies is not None:
-            self._bodies.take_up(self.places, surface_nodes, self.scale)
-        self._contacts = ActiveContacts(
-            room.row, room.slots, room.reach, found.weights, found.normals, found.wanted, found.friction, found.pair
-        )  # fmt: skip
+            self._bodies.take_up(self.places, self._step.nodes, self.scale)
 
-    def _number(self, rows: ActiveRows, zone: Indices) -> None:
-        """Orders the contacts by sets, all idle, and numbers their nodes and the shared ones."""
-        room, n, shared, nodes = self._room, rows.n, self._sum.shared, rows.room.nodes
-        many = self._scratch.zeros("many", self._passes.mark.many(n), len(room.loaded.many))
-        room.touched[shared] = room.shared[shared] = 1
-        self._passes.mark.run(n, room.touched, room.set_of, nodes, rows.found, zone, room.shared, many)
-        room.shared[shared] = 0
-        slots = slot_numbers.number(room.places, room.slot, room.touched)
-        if slots != len(self.places) or self.places.base is not room.places.base:
+    def _numbered(self) -> None:
+        slots, room = int(self._counts[SLOTS_N]), self._room
+        if slots != len(self.places) or self.places.base is not room.places:
             self.places = room.places[:slots]
-        self._sum.number(room.slot)
-        counts = many.sum(axis=0)
-        begin = np.cumsum(counts) - counts
-        begins = self._scratch.of("begins", len(many), np.int64, len(counts))
-        np.cumsum(many, axis=0, out=begins)
-        begins += begin - many
-        self._passes.sort.run(
-            n, room.row, room.slots, room.reach, begins, room.set_of, rows.found, nodes, room.slot
-        )  # fmt: skip
-        room.loaded.begin[:-1], room.loaded.begin[-1] = begin, n
-        room.loaded.many[:] = 0
 
-    def _loaded(self, surface_nodes: SurfaceNodes) -> float:
-        fastest = self._scratch.of("fastest", self._passes.load.many(len(self.places)), np.float64)
-        self._passes.load.run(
-            len(self.places), self._room.active, self.places, surface_nodes.v, surface_nodes.mobility, fastest
-        )
-        return float(fastest.max(initial=0.0))
+    def _complete(self, border: int, inner: int, words: Ints, first: int, columns: int) -> None:
+        """Runs two stages over all contacts and completes ``columns`` columns of ``words`` over the ranks. Contacts
+        without shared slots are computed while the sums of contacts with shared slots are exchanged.
+        """
+        if not len(self._sum.shared):
+            self._program.run(inner, inner + 1)
+            return
+        self._program.run(border, border + 1)
+        self._sum.begin(words, first, columns)
+        self._program.run(inner, inner + 1)
+        self._sum.finish(words, first, columns)
 
     def weigh(self) -> None:
         """Computes the row weights, completed over the ranks."""
-        room = self._room
-        table = self._sets.weigh.set(room.active, self._contacts, room.loaded)
-        self._sets.complete(tasks.weigh, table, self._sum, room.active.row_weights, 0, _ROW_WEIGHTS)
+        active = self._room.active
+        self._complete(stages.WEIGH_BORDER, stages.WEIGH, active.row_weights, 0, _ROW_WEIGHTS)
         if self._bodies is not None:
-            self._bodies.weigh(room.active)
+            self._bodies.weigh(active)
 
-    def resume(self, kept: Kept, ratio: float) -> None:
-        """Warm start with ``ratio`` times the stored impulses ``kept``."""
-        room = self._room
-        table = self._sets.resume.set(room.active, self._contacts, room.loaded, kept, ratio, self.scale)
-        self._sets.complete(tasks.resume, table, self._sum, room.active.moving_words, IMPULSE, 3)
+    def resume(self) -> None:
+        """Warm start with the stored impulses."""
+        active = self._room.active
+        self._complete(stages.RESUME_BORDER, stages.RESUME, active.moving_words, IMPULSE, 3)
         if self._bodies is not None:
-            self._bodies.give(room.active)
-        self._passes.give.run(len(self.places), room.active, self.scale, self._turn)
-        stops.stop(room.active, room.braced)
+            self._bodies.give(active)
+        self._program.run(stages.START, stages.SWEEP)
 
-    def sweep(self, many: int) -> None:
-        """Runs ``many`` sweeps, in one call of the thread team if no other rank and no rigid body takes part."""
-        room, n, turn, bodies, sets, passes = (
-            self._room, len(self.places), self._turn, self._bodies, self._sets, self._passes,
-        )  # fmt: skip
-        turn[:] = 0, many
-        table = sets.sweep.set(room.active, self._contacts, room.loaded, self._fastest, turn, self.scale)
-        give, brace = (room.active, self.scale, turn), (room.active, room.braced, turn)
+    def sweep(self) -> None:
+        """Runs the sweeps, in one call if no other rank and no rigid body takes part."""
+        active, bodies, counts = self._room.active, self._bodies, self._counts
+        counts[layout.TURN] = 0
         if not len(self._sum.shared) and (bodies is None or not bodies.active):
-            if not n:
-                return
-            stages = [sets.inner(tasks.sweep, table), passes.give.stage(n, *give), passes.brace.stage(1, *brace)]
-            sets.repeat(stages, many)
+            self._program.run(stages.SWEEP, stages.CLEAR_PAIRS)
             return
-        for _ in range(many):
-            sets.complete(tasks.sweep, table, self._sum, room.active.moving_words, IMPULSE, 3)
+        for turn in range(self._step.sweeps):
+            counts[layout.TURN] = turn
+            self._complete(stages.SWEEP_BORDER, stages.SWEEP, active.moving_words, IMPULSE, 3)
             if bodies is not None:
-                bodies.give(room.active)
-            passes.give.run(n, *give)
-            passes.brace.run(1, *brace)
+                bodies.give(active)
+            self._program.run(stages.GIVE, stages.TURN_OVER)
 
-    def cost(self, books: Books, before: Floats, part: Indices) -> None:
-        """Books the energy that the impulses take from the bodies, and the impulses between parts if a probe needs
-        them; ``before`` (surface_nodes, 3): v(n-1/2), ``part`` (surface_nodes,).
+    def store(self) -> None:
+        """Stores the impulses of this step."""
+        self._program.run(stages.CLEAR_PAIRS, stages.WORK)
+        self._program.run(stages.STORE_BORDER, stages.WORK_BORDER)
+
+    def work(self) -> None:
+        """Books the energy that the impulses take from the bodies, the work of friction, and the impulses between parts
+        if a probe needs them.
         """
-        self._add(books.account.words, before, books.account.scale, rubs=False)
+        self._program.run(stages.WORK, stages.LEAVE)
+        self._program.run(stages.WORK_BORDER, stages.WORK_BORDER + 1)
+        self._booked()
+
+    def _booked(self) -> None:
+        step, room = self._step, self._room
+        books = step.books
+        words = books.account.words
+        words += room.along.sum(axis=0)
         books.account.carry()
-        for k in range(len(self._room.loaded.many) if len(books.pairs) else 0):
-            impulse_work.between(books.pairs, self._room.loaded, self.places, part, self.scale, k)
+        if step.rubs:
+            books.friction.words += room.rub.sum(axis=0)
+            books.friction.carry()
+        for k in range(len(room.loaded.many) if len(books.pairs) else 0):
+            impulse_work.between(books.pairs, room.loaded, self.places, step.nodes.part, self.scale, k)
 
-    def heat(self, friction: Tally, before: Floats) -> None:
-        """Books the work of friction, see impulse_work.heat."""
-        self._add(friction.words, before, float(friction.scale[0]), rubs=True)
-        friction.carry()
-
-    def _add(self, words: Ints, before: Floats, joule: float, *, rubs: bool) -> None:
-        room = self._room
-        each = self._scratch.zeros("words", len(room.loaded.many), *words.shape)
-        table = self._sets.cost.set(each, room.loaded, room.active, before, self.places, joule, rubs)
-        self._sets.run(tasks.cost, table)
-        words += each.sum(axis=0)
-
-    def store(self, kept: Kept) -> None:
-        """Stores the impulses of this step in ``kept``."""
-        kept.pairs[:], kept.cracks[:] = 0.0, 0.0
-        self._sets.run(tasks.store, self._sets.store.set(kept, self._room.loaded, self._contacts.pair))
-
-    def leave(self, surface_nodes: SurfaceNodes, total: Ints, state: Nodes, parts: Ints, unsettled: Ints) -> bool:
-        """Copies velocities to the local nodes, and adds impulses to ``total`` (surface_nodes, 3), to the sums of
-        the ``parts`` (parts, 3) and to the residual ``unsettled`` (2,); returns whether there was any impulse.
+    def leave(self) -> bool:
+        """Copies velocities to the local nodes, and adds impulses to the impulses of the scene, to the sums of the
+        parts and to the residual, and books half of their work; returns whether there was any impulse.
         """
-        room, n = self._room, len(self.places)
-        stops.release(room.active, room.braced)
-        many = self._passes.leave.many(n)
-        left, pushes = self._scratch.zeros("left", many, 3), self._scratch.zeros("pushes", many, *parts.shape)
-        some = surface_nodes.local, state.part, state.owned
-        self._passes.leave.run(n, state.v, pushes, left, total, room.active, self.places, *some)
-        parts += pushes.sum(axis=0)
-        unsettled += left[:, :2].sum(axis=0)
+        self._program.run(stages.LEAVE, END)
+        return self._left()
+
+    def _left(self) -> bool:
+        step, tasks = self._step, -(-len(self.places) // SLOTS_OF_A_TASK)
+        left = self._room.left[:tasks].sum(axis=0)
+        step.books.parts += self._room.parts[:tasks].sum(axis=0)
+        step.unsettled[:] += left[:2]
         if self._bodies is not None:
-            self._bodies.of_contact(parts)
-            unsettled += self._bodies.unsettled()
-        return bool(left[:, 2].any())
+            self._bodies.of_contact(step.books.parts)
+            step.unsettled[:] += self._bodies.unsettled()
+        return bool(left[2])
 
     def press(self, pressed: Ints) -> None:
         """Adds the impulses of rigid bodies in the step to ``pressed`` (nodes, 3), quanta, if ``pressed`` has rows."""
@@ -253,12 +276,25 @@ class ActiveSet:
 
 
 class _Room:
-    """Allocates arrays for ``contacts`` contacts, ``nodes`` surface nodes, ``many`` stops and ``of`` zones."""
+    """Working arrays for ``contacts`` contacts, ``nodes`` surface nodes, ``sides``: numbers of stops and parts, and
+    ``of`` zones.
+    """
 
-    def __init__(self, contacts: int, nodes: int, many: int, of: int) -> None:
+    def __init__(self, contacts: int, nodes: int, sides: tuple[int, ...], of: int) -> None:
+        stops, parts, sets = *sides, 2 * zones.sets(of)
+        tasks, ranges = -(-contacts // CONTACTS_OF_A_TASK), -(-nodes // SLOTS_OF_A_TASK)
         self.row, self.set_of = np.empty((2, contacts), np.int32)
         self.slots, self.reach = np.empty((contacts, 4), np.int32), np.empty(contacts)
-        self.places, self.slot = np.empty((2, nodes + 1), np.int32)
+        self.places, self.slot = np.empty(nodes, np.int32), np.empty(nodes, np.int32)
         self.touched, self.shared = np.zeros((2, nodes), np.uint8)
-        self.active, self.braced = ActiveNodes.of(nodes), Braced.room(many * nodes)
-        self.loaded = Loaded.of(contacts, 2 * zones.sets(of))
+        self.active, self.braced = ActiveNodes.of(nodes), Braced.room(stops * nodes, ranges)
+        self.loaded = Loaded.of(contacts, sets)
+        self.along, self.rub = np.zeros((2, sets, 2, 2), np.int64)
+        self.left, self.parts = np.zeros((ranges, 3), np.int64), np.zeros((ranges, parts, 3), np.int64)
+        self.arrays = (
+            self.active, self.row, self.slots, self.reach, self.set_of, self.places, self.slot, self.touched,
+            self.shared, self.loaded, self.braced,
+        )  # fmt: skip
+        flags, (many, begins) = np.zeros(tasks, np.int64), np.zeros((2, tasks, sets), np.int64)
+        counted, fastest = np.zeros(ranges, np.int64), np.zeros(ranges)
+        self.sums = flags, many, begins, counted, fastest, self.along, self.rub, self.left, self.parts

@@ -65,7 +65,9 @@ class Stops(NamedTuple):
 
 
 class Braced(NamedTuple):
-    """Slots near stops: one row for each pair of a slot and a stop."""
+    """Slots near stops: one row for each pair of a slot and a stop. The rows of a task, a range of slots, begin at the
+    first of these slots times the number of stops.
+    """
 
     rows: Indices
     """(room, 2) slot and stop of each pair."""
@@ -80,32 +82,34 @@ class Braced(NamedTuple):
     mu: Floats
     """(room,) coefficient of friction."""
     many: Ints
-    """(1,) number of pairs."""
+    """(tasks,) number of pairs of each task."""
 
     @classmethod
-    def room(cls, n: int) -> "Braced":
-        """Allocates arrays for ``n`` rows."""
+    def room(cls, n: int, tasks: int) -> "Braced":
+        """Allocates arrays for ``n`` rows of ``tasks`` tasks."""
         return cls(
             np.empty((n, 2), np.int32), np.empty((n, 3)), np.empty(n), np.empty(n), np.empty((n, 3)), np.empty(n),
-            np.zeros(1, np.int64),
+            np.zeros(tasks, np.int64),
         )  # fmt: skip
 
 
 _F1, _F2, _N1, _N2 = types.float64[::1], types.float64[:, ::1], types.int32[::1], types.int32[:, ::1]
-_B1 = types.boolean[::1]
+_B1, _F, _I = types.boolean[::1], types.float64, types.int64
 STOPS = record(Stops, _F2, _F2, _F2, _F1, _B1)
 BRACED = record(Braced, _N2, _F2, _F1, _F1, _F2, _F1, types.int64[::1])
 
 
-@njit(types.void(BRACED, NODES, STOPS, _N1, _F2, _N1, _N1, _B1, types.float64, types.float64), cache=True)
-def find(braced, active, stops, places, x, part, local, loose, size, dt):  # type: ignore[no-untyped-def]
-    """Finds the slots near a stop in a step ``dt``, s; ``x``, ``part`` and ``local`` of the surface nodes; ``loose``
-    (nodes,): nodes of this rank without tets, which no other rank has; ``size`` of a face, m.
+@njit(types.void(BRACED, NODES, STOPS, _N1, _F2, _N1, _N1, _B1, _F, _F, _I, _I, _I), cache=True)
+def find(braced, active, stops, places, x, part, local, loose, size, dt, task, first, stop):  # type: ignore[no-untyped-def]
+    """Finds the slots from ``first`` to ``stop`` near a stop in a step ``dt``, s, which are the slots of a ``task``;
+    ``x``, ``part`` and ``local`` of the surface nodes; ``loose`` (nodes,): nodes of this rank without tets, which no
+    other rank has; ``size`` of a face, m.
     """
-    fixed, n = active.fixed, 0
-    for k in range(len(stops.points)):
-        for s in range(len(places)):
-            a = places[s]
+    fixed, begin = active.fixed, first * len(stops.points)
+    n = begin
+    for s in range(first, stop):
+        a = places[s]
+        for k in range(len(stops.points)):
             side = stops.sides[k, part[a]]
             if side == 0.0 or (stops.mirrors[k] and local[a] >= 0 and loose[local[a]]):
                 continue
@@ -122,17 +126,18 @@ def find(braced, active, stops, places, x, part, local, loose, size, dt):  # typ
                 braced.rows[n, 0], braced.rows[n, 1] = s, k
                 braced.least[n], braced.push[n], braced.mu[n] = -gap / dt, 0.0, stops.friction[k]
                 n += 1
-    braced.many[0] = n
+    braced.many[task] = n - begin
 
 
-@njit(types.void(NODES, BRACED), cache=True)
-def stop(active, braced):  # type: ignore[no-untyped-def]
-    """Stops the nodes that would end the step behind a plane, and reduces the impulse of nodes that would not.
+@njit(types.void(NODES, BRACED, _I, _I), cache=True)
+def stop(active, braced, task, begin):  # type: ignore[no-untyped-def]
+    """Stops the nodes of a ``task``, whose rows begin at ``begin``, that would end the step behind a plane, and reduces
+    the impulse of nodes that would not.
 
     push = max(0, push + (least - n.v) / n.n), and friction limited to mu push.
     """
     v, path, slide = active.moving, active.path, np.empty(3)
-    for r in range(braced.many[0]):
+    for r in range(begin, begin + braced.many[task]):
         s, speed, along = braced.rows[r, 0], 0.0, 0.0
         for i in range(3):
             speed += braced.normal[r, i] * v[s, V + i]
@@ -161,10 +166,10 @@ def stop(active, braced):  # type: ignore[no-untyped-def]
                 path[s] += abs(change)
 
 
-@njit(types.void(NODES, BRACED), cache=True)
-def release(active, braced):  # type: ignore[no-untyped-def]
-    """Removes the impulses of all stops."""
-    for r in range(braced.many[0]):
+@njit(types.void(NODES, BRACED, _I, _I), cache=True)
+def release(active, braced, task, begin):  # type: ignore[no-untyped-def]
+    """Removes the impulses of the stops of a ``task``, whose rows begin at ``begin``."""
+    for r in range(begin, begin + braced.many[task]):
         for i in range(3):
             active.moving[braced.rows[r, 0], V + i] -= braced.push[r] * braced.normal[r, i] + braced.rub[r, i]
             braced.rub[r, i] = 0.0

@@ -1,0 +1,74 @@
+"""Tables of the solver: one handle for all stages of a step (parallel/arguments.py), and the numbers that the stages
+share.
+
+A table is set by the owner of its arrays and changes only when an array is replaced.
+"""
+
+import numpy as np
+
+from ...kernels.jit import types
+from ...parallel.arguments import Handle, table_of
+from ..narrow_phase.tables import CONTACT_ROWS
+from .active import CONTACTS, KEPT, LOADED, NODES
+from .stops import BRACED, STOPS
+
+_B1, _U1, _N1, _N2 = types.boolean[::1], types.uint8[::1], types.int32[::1], types.int32[:, ::1]
+_I1, _I2, _I3 = types.int64[::1], types.int64[:, ::1], types.int64[:, :, ::1]
+_F1, _F2 = types.float64[::1], types.float64[:, ::1]
+
+ROWS, NODES_OF, ROOM, SORTED, STORED, BOUNDS, BODIES, BOOKS, STEP, SUMS = range(10)
+"""Numbers of the tables: rows of the narrow phase; surface nodes; working arrays; contacts in the order of their sets;
+stored impulses; walls and planes; nodes of the rank; energies; numbers of the step; sums by task."""
+_KINDS = {
+    ROWS: (CONTACT_ROWS, _N1),
+    NODES_OF: (_F2, _F2, _F2, _N1, _N1, _F2, _I2, _N1),
+    ROOM: (NODES, _N1, _N2, _F1, _N1, _N1, _N1, _U1, _U1, LOADED, BRACED),
+    SORTED: (CONTACTS,),
+    STORED: (KEPT,),
+    BOUNDS: (STOPS, _B1),
+    BODIES: (_F2, _N1, _B1),
+    BOOKS: (_F1, _F1),
+    STEP: (_I1, _F1, _I1),
+    SUMS: (_I1, _I2, _I2, _I1, _F1, _I3, _I3, _I2, _I3),
+}
+rows_of = table_of(ROWS, *_KINDS[ROWS])
+"""Rows of the narrow phase (ContactRows), numbers of the active ones."""
+nodes_of = table_of(NODES_OF, *_KINDS[NODES_OF])
+"""Of the surface nodes: x, v, mobility, part, local index, v(n-1/2), impulse of the step, zone."""
+room_of = table_of(ROOM, *_KINDS[ROOM])
+"""ActiveNodes; row, slots, reach and set of each contact; places, slot, touched, shared (slot_numbers.py); Loaded,
+Braced."""
+sorted_of = table_of(SORTED, *_KINDS[SORTED])
+"""ActiveContacts."""
+stored_of = table_of(STORED, *_KINDS[STORED])
+"""Kept."""
+bounds_of = table_of(BOUNDS, *_KINDS[BOUNDS])
+"""Stops, nodes without tets."""
+bodies_of = table_of(BODIES, *_KINDS[BODIES])
+"""Of the nodes of the rank: velocity, part, whether the rank owns it."""
+books_of = table_of(BOOKS, *_KINDS[BOOKS])
+"""Of the nodes of the rank: energy lost by contact, external work."""
+step_of = table_of(STEP, *_KINDS[STEP])
+"""Counts, real numbers, control word of the program."""
+sums_of = table_of(SUMS, *_KINDS[SUMS])
+"""By task: contacts that need an impulse; contacts of each set, and first row of each set; touched nodes; largest
+velocity; by set: work along the normals, work of friction; by task: residual, impulses of the parts."""
+
+CONTACTS_N, NODES_N, SLOTS_N, PAIRS_N, CRACKS_N, ONE, TURN, SWEEPS, WORKS, COUNTS = range(10)
+"""Numbers of the counts: active contacts; surface nodes; slots; node-face pairs; node pairs across cracks; the number
+1; number of the sweep; sweeps of the step; which work is booked: 1 along the normals, 2 of friction, 3 both."""
+DT, RATIO, SCALE, FASTEST, SIZE, JOULE, RUB, REALS = range(8)
+"""Numbers of the reals: time step, s; factor of the stored impulses; quanta per N s; bound of the velocities, m/s; size
+of a face, m; quanta per J of the account and of friction."""
+
+
+def handle() -> Handle:
+    """Returns the tables of a solver."""
+    return Handle(*_KINDS.values())
+
+
+def numbers() -> "tuple[np.ndarray, np.ndarray]":
+    """Returns the counts and the reals of a solver."""
+    counts, reals = np.zeros(COUNTS, np.int64), np.zeros(REALS)
+    counts[ONE] = 1
+    return counts, reals
