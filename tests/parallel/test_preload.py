@@ -2,8 +2,7 @@
 
 from pathlib import Path
 
-from conoid.worker.contact import tasks
-from conoid.worker.contact.narrow_phase import detection
+from conoid.worker.contact.narrow_phase import detection, stages
 from conoid.worker.contact.scene import split_pairs, split_update
 from conoid.worker.contact.solver import slot_numbers
 from conoid.worker.kernels import preload
@@ -31,4 +30,4 @@ def test_kernels_that_functions_name_are_found_as_their_own_and_as_those_of_othe
     assert {split_update._lacking, split_pairs.tear_faces, split_pairs.inherited} <= found
     assert split_pairs._become not in found, "which kernels alone call"
     assert slot_numbers.number not in found
-    assert tasks.take in {*preload.called(detection)}, "named in a method, within a class"
+    assert stages.take in {*preload.called(detection)}, "named in a method, within a class"

@@ -41,7 +41,7 @@ def made(threads: Team) -> tuple[Program, np.ndarray, np.ndarray]:
     done, lengths, control = np.zeros(200, np.int64), np.array([1, 0, 0]), np.zeros(1, np.int64)
     table = Arguments(*KINDS)
     address = table.set(done, lengths, control)
-    stages = [
+    stages: list[Stage | Span] = [
         Span(count, address, lengths, 1, SIZE),
         Stage(count, address, np.array([[150, 151], [151, 152]]), np.array([0, 1, 1, 2])),
         Span(never, address, lengths, 2, SIZE),

@@ -4,16 +4,31 @@ import numpy as np
 
 from conoid.cases.model.schema import Case
 
+from ..kernels.jit import njit, types
 from ..migration.parcel import Parcel
 from ..model.columns import ZERO
 from ..model.state import Floats, Indices, Ints, Nodes
 from ..parallel import fixed_point
+from ..parallel.arguments import reader
 from ..parallel.comm import Comm
 from ..parallel.passes import Pass
-from ..parallel.team import Team
-from . import tasks
+from ..parallel.team import TASK, Team
 from .account import Account
 from .scene.scene import Scene
+from .solver.impulse_work import book
+
+_SLOTS = 2048
+"""Number of slots in a task. Chosen value: a task takes some 20 us; to start a region takes 2 us."""
+_F1, _F2, _N1 = types.float64[::1], types.float64[:, ::1], types.int32[::1]
+_BOOK = _F1, _F1, _N1, _N1, _F2, types.int64[:, ::1], _F2, types.float64
+_read = reader(*_BOOK)
+
+
+@njit(TASK, cache=True)
+def _book(table, first, stop, thread):  # type: ignore[no-untyped-def]
+    """Task: ``impulse_work.book``."""
+    loss, external, places, index, before, total, mobility, scale = _read(table)
+    book(loss, external, places, index, before, total, mobility, scale, first, stop)
 
 
 class Books:
@@ -23,7 +38,7 @@ class Books:
 
     def __init__(self, nodes: Nodes, case: Case, impulse: float, energy: float, team: Team) -> None:
         """``impulse``, N s, and ``energy``, J: upper bounds at one node in one step."""
-        self._book = Pass(team, tasks.book, *tasks.BOOK, size=tasks.SLOTS_OF_A_TASK)
+        self._book = Pass(team, _book, *_BOOK, size=_SLOTS)
         self.contact_loss = np.zeros(nodes.n)
         """(nodes,) energy lost by impact and friction, J."""
         self.external_work = np.zeros(nodes.n)

@@ -231,7 +231,7 @@ class Contact:
         with self._timers.phase("contact"):
             self.detection.take(now, state)
             ahead = Ahead(0.0, self._clock.dt, self.exterior.size, 1.0 + self._scheme.restitution)
-            found = self.detection.detect(now, self.exterior, self.searches.mu, 0.0, ahead, True, together=False)
+            found = self.detection.detect(now, self.exterior, self.searches.mu, ahead, True, together=False)
             self.limit = float(self._comm.maximum(np.array([found.approach]))[0])
         return self.limit > 0.0
 
@@ -248,7 +248,6 @@ class Contact:
         now.messages.copies.finish(surface_nodes.x, surface_nodes.v, now.slots.before)
         give = PUSH_OUT if self.books.account.settle(self.books.agreed) else 0.0
         self._meet(now, give, dt)
-        self.detection.retarget(now, self._scheme.restitution, give)
         shared = now.messages.company.agree(now.active, surface_nodes.local)
         kept, ratio = now.stored(self.exterior.cracks.kept), self._resume(give)
         of, many, slots = self.exterior, self.sweep_count, now.slots
@@ -281,8 +280,9 @@ class Contact:
         if step % self._scheme.interval == 0:
             self.exterior.sharpen(now, self._scheme.sharp)
             self.detection.clearance.clear()
-        ahead = Ahead(dt, self._clock.longest, self.exterior.size, 1.0 + self._scheme.restitution)
-        self.detection.detect(now, self.exterior, self.searches.mu, give, ahead, redraw, self.found.stray)
+        share = self._scheme.restitution
+        ahead = Ahead(dt, self._clock.longest, self.exterior.size, 1.0 + share, give, share, spent=give == 0.0)
+        self.detection.detect(now, self.exterior, self.searches.mu, ahead, redraw, self.found.stray)
 
     def free(self) -> None:
         """Frees the persistent MPI messages."""

@@ -5,7 +5,6 @@ in one step.
 import numpy as np
 
 from ...kernels.jit import njit, types
-from ...model.state import Floats
 from .tables import CONTACT_ROWS, FACES, PAIRS, STEP, altitude
 
 _F = types.float64
@@ -23,14 +22,18 @@ def bound(box, row, v, first, stop):  # type: ignore[no-untyped-def]
             box[row, i], box[row, 3 + i] = min(box[row, i], v[a, i]), min(box[row, 3 + i], -v[a, i])
 
 
-def spread(boxes: Floats) -> float:
-    """Upper bound of the difference of any two velocities in the ``boxes`` (k, 6) of ``bound``, m/s: the diagonal of
-    the box of all.
+@njit("float64(float64[:, ::1], int64)", cache=True)
+def spread(boxes, many):  # type: ignore[no-untyped-def]
+    """Upper bound of the difference of any two velocities in the first ``many`` of the ``boxes`` (k, 6) of ``bound``,
+    m/s: the diagonal of the box of all.
     """
-    if not len(boxes):
-        return 0.0
-    least = boxes.min(axis=0)
-    return float(np.sqrt(((least[:3] + least[3:]) ** 2).sum()))
+    square = 0.0
+    for i in range(3 if many > 0 else 0):
+        low, high = np.inf, np.inf
+        for k in range(many):
+            low, high = min(low, boxes[k, i]), min(high, boxes[k, 3 + i])
+        square += (low + high) ** 2
+    return np.sqrt(square)
 
 
 @njit(_F(STEP, types.int32[:, ::1], types.int64, types.int64), cache=True)

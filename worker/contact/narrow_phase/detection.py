@@ -7,27 +7,34 @@ from functools import cache
 import numpy as np
 
 from ...model.state import Block, Floats, Ints, Nodes
-from ...parallel.passes import Pass
+from ...parallel.arguments import Arguments
+from ...parallel.program import Program, Span
 from ...parallel.team import Team
-from .. import tasks
 from ..broad_phase.registration import Registration
 from ..exterior import Exterior
 from ..scene.scene import Scene
 from ..surface.families import Corners
-from ..tasks import CONTACTS_OF_A_TASK, CRACKS_OF_A_TASK, FAMILIES_OF_A_TASK, PAIRS_OF_A_TASK, SLOTS_OF_A_TASK
-from . import closing_speed
+from . import layout, stages
 from .clearance import Clearance
 from .corner_contact import NarrowSides
 from .cracks import Cracks
-from .node_face import nearest
+from .rows import gathered
+from .stages import (
+    CONTACTS_OF_A_TASK,
+    CRACKS_OF_A_TASK,
+    FAMILIES_OF_A_TASK,
+    PAIRS_OF_A_TASK,
+    SIDES_OF_A_TASK,
+    SLOTS_OF_A_TASK,
+)
 from .tables import FAST, Step, StepRoom
 from .tied import Tied
 
 _KINEMATIC = 2.0
 """Inverse of the largest share of the altitude of a tet that a node may pass in a step."""
-_FACES, _EDGES, _CRACKS = 0, 1, 2
-"""Numbers of the kinds of contacts (rows.py): node-face, edge-edge, across cracks. Corner contacts have the next
-numbers, one for each block."""
+_FACES, _EDGES, _CRACKS, _CORNERS = 0, 1, 2, 3
+"""Numbers of the kinds of contacts (rows.py): node-face, edge-edge, across cracks, at corners, the last one for each
+block."""
 _JOIN = 0.6
 """Share of the distance from its line at which a slot must be registered again. In a step in which one rank has to
 register slots, all other ranks register their slots beyond this share too, so that the ranks register in the same
@@ -66,14 +73,13 @@ class Ahead:
     size: float
     """Typical size of a face, m."""
     rebound: float
-    """Record of the step for kernels, see tables.Step."""
-
-    def beyond(self, fastest: float) -> float:
-        """Returns the largest length of the next step, s, if velocities that differ by up to ``fastest``, m/s, may
-        close in this step a distance of FAST times the size of a face; else 0. Slower pairs cannot limit a step, so
-        ranks that have only slow nodes need no data of other ranks.
-        """
-        return self.most if fastest * self.most > FAST * self.size else 0.0
+    """See tables.Step."""
+    give: float = 0.0
+    """See tables.PUSH_OUT."""
+    share: float = 0.0
+    """Share of the speed of approach to which target velocities are raised (restitution.rebound)."""
+    spent: bool = False
+    """True if contact has no energy to return, so that target velocities are lowered (restitution.hold_back)."""
 
 
 class Detection:
@@ -86,79 +92,96 @@ class Detection:
         """Tied bonds of the slots of the scene."""
         self.found = Detected.nothing()
         """Results of the last step on this rank."""
-        pairs, some = PAIRS_OF_A_TASK, CONTACTS_OF_A_TASK
-        self._take = Pass(team, tasks.take, *tasks.TAKE, size=SLOTS_OF_A_TASK)
-        self._rebound = Pass(team, tasks.rebound, *tasks.REBOUND, size=some)
-        self._due_faces = Pass(team, tasks.due_faces, *tasks.DUE_FACES, size=pairs)
-        self._node_face = Pass(team, tasks.node_face_pairs, *tasks.NODE_FACE, size=pairs)
-        self._edge_edge = Pass(team, tasks.edge_edge_pairs, *tasks.EDGE_EDGE, size=pairs)
-        self._approach = Pass(team, tasks.approach, *tasks.APPROACH, size=some)
-        self._across = Pass(team, tasks.across_cracks, *tasks.ACROSS, size=CRACKS_OF_A_TASK)
-        self._entering = Pass(team, tasks.entering_nodes, *tasks.ENTERING, size=FAMILIES_OF_A_TASK)
-        self._ahead = Pass(team, tasks.ahead, *tasks.AHEAD, size=SLOTS_OF_A_TASK)
+        self._handle, self._team = layout.handle(), team
+        self._counts, self._reals, control = np.zeros(layout.COUNTS, np.int64), np.zeros(layout.REALS), np.zeros(1, int)
+        self._handle.set(layout.NUMBERS, self._counts, self._reals, control)
+        self._program = Program(team, self._stages(), control)
+        self._corner_tables: list[Arguments] = []
+        self._families = np.zeros(0, np.int64)
+        """(blocks,) number of families of each block."""
         self._scratch = StepRoom()
         self._rows_of_corner = 1
         """Number of rows reserved for each corner of a narrow side, on average over a task."""
 
+    def _stages(self) -> list[Span]:
+        """Returns the stages of a step, in the order of their numbers."""
+        slots, pairs, some, sides = SLOTS_OF_A_TASK, PAIRS_OF_A_TASK, CONTACTS_OF_A_TASK, SIDES_OF_A_TASK
+        every = [
+            (stages.take, layout.OWN_N, slots), (stages.ahead, layout.SLOTS_N, slots), (stages.spread, layout.ONE, 1),
+            (stages.leave, layout.SLOTS_N, slots), (stages.largest_faces, layout.FACES_N, sides),
+            (stages.largest_edges, layout.EDGES_N, sides), (stages.check, layout.ONE, 1),
+            (stages.across, layout.CRACKS_N, CRACKS_OF_A_TASK), (stages.due, layout.FACE_PAIRS_N, pairs),
+            (stages.on_faces, layout.FACE_PAIRS_N, pairs), (stages.nearest, layout.ONE, 1),
+            (stages.approach, layout.ON_FACES, some), (stages.on_edges, layout.EDGE_PAIRS_N, pairs),
+            (stages.collect, layout.ONE, 1), (stages.retarget, layout.RETARGETED, some),
+        ]  # fmt: skip
+        return [Span(kernel, self._handle.address, self._counts, at, size) for kernel, at, size in every]
+
     def take(self, now: Scene, nodes: Nodes) -> None:
         """Copies positions and velocities of local nodes to the scene."""
-        own, surface_nodes = now.own, now.surface_nodes
-        self._take.run(len(own.slots), surface_nodes.x, surface_nodes.v, own.slots, nodes.x, nodes.v, own.local)
-
-    def retarget(self, now: Scene, share: float, give: float) -> None:
-        """Sets the target velocities of active contacts: see restitution.rebound for ``share``, and ``hold_back`` if
-        contact has no energy to ``give`` back (tables.PUSH_OUT).
-        """
-        if share > 0.0 or give == 0.0:
-            rows = now.active
-            self._rebound.run(rows.n, rows.room, rows.found, now.surface_nodes.v, now.slots.before, share, give == 0.0)
+        of, own, lines, counts = now.surface_nodes, now.own, now.reference, self._counts
+        n = of.n
+        places, self._begin, self._end = self._scratch.lines(n)
+        boxes = self._scratch.of("boxes", -(-n // SLOTS_OF_A_TASK), np.float64, 6)
+        tables, searched, short = self._handle, lines.searched, lines.short
+        tables.set(layout.OWN, own.slots, own.local, nodes.x, nodes.v)
+        tables.set(layout.PLACES, of.x, of.v, places, now.slots.before, boxes)
+        strayed = self._scratch.of("strayed", -(-n // SLOTS_OF_A_TASK), np.float64)
+        some = searched.left, searched.x, searched.course, short.left, short.x, short.course, now.slots.tracked
+        tables.set(layout.LINES, *some, strayed)
+        tables.set(layout.SIDES, lines.faces, now.faces.corners, lines.edges, now.edges.corners)
+        faces, edges = len(now.faces.corners), len(now.edges.corners)
+        counts[: layout.CRACKS_N] = len(own.slots), n, faces, edges
+        counts[layout.ONE] = 1
+        self._program.run(stages.TAKE, stages.AHEAD)
 
     def detect(
-        self, now: Scene, surface: Exterior, mu: Floats, give: float, ahead: Ahead, redraw: bool, together: bool
+        self, now: Scene, surface: Exterior, mu: Floats, ahead: Ahead, redraw: bool, together: bool
     ) -> Detected:  # fmt: skip
         """Detects the active contacts of the step from positions and velocities of the scene's nodes.
 
-        ``surface``: of this rank; ``mu`` (parts, parts): friction, NaN where two parts may not be in contact; ``give``:
-        see tables.PUSH_OUT; ``redraw``: True if new short lines begin in this step (reference_motion.py); ``together``:
-        True if any rank registers departed slots in this step.
+        ``surface``: of this rank; ``mu`` (parts, parts): friction, NaN where two parts may not be in contact;
+        ``redraw``: True if new short lines begin in this step (reference_motion.py); ``together``: True if any rank
+        registers departed slots in this step.
         """
-        surface_nodes, reference = now.surface_nodes, now.reference
+        reference = now.reference
         reference.advance(ahead.dt, ahead.most)
         if not redraw and self.clearance.holds(now) and self._far(now, together):
             return self.found
-        begin, end, spread = self._moved(surface_nodes.x, surface_nodes.v, ahead.dt)
-        reference.beyond = beyond = ahead.beyond(spread)
-        if redraw:
-            reference.shorten(surface_nodes.x)
-            now.node_face.wake()
-            now.edge_edge.wake()
-        stray = self._renewed(now, together)
-        step = Step.between(begin, end, surface_nodes.v, surface_nodes.part, mu, give, ahead.dt)
-        step = step.followed(beyond, FAST * ahead.size, ahead.rebound, now.face_table(), self._scratch)
+        stray = self._moved(now, ahead, redraw, together)
+        of = now.surface_nodes
+        step = Step.between(self._begin, self._end, of.v, of.part, mu, ahead.give, ahead.dt)
+        step = step.followed(reference.beyond, FAST * ahead.size, ahead.rebound, now.face_table(), self._scratch)
         if self.tied is not None:
-            step = step._replace(tied=self.tied.bits(surface_nodes))
-        now.active.begin(len(now.node_face), len(now.edge_edge), 3 * len(now.cracks))
-        for block, corners in surface.narrow():
-            self._corners(now, block, corners, surface.cracks, step)
-        opening = self._cracks(now, ahead.size, step)
-        limit = self._nodes_and_faces(now, step)
-        self._edges(now, step)
+            step = step._replace(tied=self.tied.bits(of))
+        opening = self._met(now, surface, step, ahead)
         now.faces.fresh[:], now.edges.fresh[:], now.slots.fresh[:] = False, False, False
-        self.found = Detected(_KINEMATIC * limit, opening, stray)
+        self.found = Detected(_KINEMATIC * float(np.sqrt(self._reals[layout.LIMIT])), opening, stray)
         if self._lasting and not now.active.n:
             self.clearance.measure(now, ahead.most, ahead.size)
         else:
             self.clearance.clear()
         return self.found
 
-    def _moved(self, x: Floats, v: Floats, dt: float) -> tuple[Floats, Floats, float]:
-        """Returns the positions of the slots at the beginning and at the end of a step ``dt``, s, without contact (see
-        Step), and an upper bound of the difference of any two of their velocities, m/s; ``x``, ``v`` (slots, 3).
+    def _moved(self, now: Scene, ahead: Ahead, redraw: bool, together: bool) -> bool:
+        """Measures the motion of the slots in the step, and registers the slots that must be registered; returns True
+        if a slot will depart too far in the next step, by linear extrapolation.
         """
-        places, begin, end = self._scratch.lines(len(x))
-        boxes = self._scratch.of("boxes", self._ahead.many(len(v)), np.float64, 6)
-        self._ahead.run(len(x), places, boxes, x, v, dt)
-        return begin, end, closing_speed.spread(boxes)
+        of, reference, reals = now.surface_nodes, now.reference, self._reals
+        reals[:] = ahead.dt, ahead.most, FAST * ahead.size, reference.t, reference.end, 0.0, 0.0, 0.0, ahead.size, 0.0
+        if redraw:
+            reference.shorten(of.x)
+            now.node_face.wake()
+            now.edge_edge.wake()
+        self._program.run(stages.AHEAD, stages.ACROSS)
+        reference.beyond = float(reals[layout.BEYOND])
+        before, most = reference.strayed, 0.5 * now.rules.skin
+        reference.strayed = float(reals[layout.STRAYED])
+        due = reference.strayed > (_JOIN if together else 1.0) * most
+        if due or now.pending:
+            self._registered.renew(now, of.x, of.v, due)
+            before = reference.strayed = reference.farthest(now.slots.tracked)
+        return 2.0 * reference.strayed - before > most
 
     def _far(self, now: Scene, together: bool) -> bool:
         """Measures the slots only; returns True if no pair has to be tested and no slot registered, so that there is no
@@ -172,83 +195,95 @@ class Detection:
         self.found = Detected(0.0, self.found.opening, 2.0 * strayed - before > most)
         return True
 
-    def _renewed(self, now: Scene, together: bool) -> bool:
-        """Registers the slots that must be registered; returns True if a slot will depart too far in the next step, by
-        linear extrapolation.
-        """
-        of, reference = now.surface_nodes, now.reference
-        most, before = 0.5 * now.rules.skin, reference.strayed
-        reference.strayed = self._registered.deviation.measure(
-            reference, of.x, of.v, now.faces.corners, now.edges.corners, now.slots.tracked
-        )  # fmt: skip
-        due = reference.strayed > (_JOIN if together else 1.0) * most
-        if due or now.pending:
-            self._registered.renew(now, of.x, of.v, due)
-            before = reference.strayed = reference.farthest(now.slots.tracked)
-        return 2.0 * reference.strayed - before > most
-
-    def _nodes_and_faces(self, now: Scene, step: Step) -> float:
-        """Adds node-face contacts; returns the largest speed over the altitude of a tet, 1/s."""
-        table, rows, end = now.node_face, now.active, now.reference.end
-        slots, faces = now.slot_table(), now.face_table()
-        pairs, n = table.arrays(), len(table)
-        many, depth = self._due_faces.many(n), rows.depth
-        due, counts = self._scratch.of("due", many), self._scratch.of("on faces", many)
-        coming = self._scratch.of("coming", many, np.float64)
-        self._due_faces.run(n, pairs, slots, faces, end + step.beyond, due)
-        some = rows.room, depth, rows.begins(_FACES), pairs, slots, faces, step, end
-        self._node_face.run(n, *some, due, counts, coming)
-        begins = _offsets(len(due))
-        table.take_tested(pairs.active, begins, due)
-        before = rows.n
-        rows.collect(_FACES, begins, counts)
-        found, holder = rows.found[before : rows.n], rows.holder(now.surface_nodes.n)
-        m = int(nearest(found, rows.room, depth, pairs, faces, step.part, holder))
-        rows.n = before + m
-        most = self._scratch.of("most", self._approach.many(m), np.float64)
-        self._approach.run(m, rows.room, found, pairs, faces, step, most)
-        return float(np.sqrt(max(coming.max(initial=0.0), most.max(initial=0.0))))
-
-    def _edges(self, now: Scene, step: Step) -> None:
-        """Adds edge-edge contacts."""
-        table, rows, reference = now.edge_edge, now.active, now.reference
-        pairs, n = table.arrays(), len(table)
-        many = self._edge_edge.many(n)
-        due, counts = self._scratch.of("tested", many), self._scratch.of("on edges", many)
-        some = rows.room, rows.begins(_EDGES), pairs, now.edge_table(), step, reference.short.course, reference.end
-        self._edge_edge.run(n, *some, due, counts)
-        begins = _offsets(len(due))
-        table.take_tested(pairs.active, begins, due)
-        rows.collect(_EDGES, begins, counts)
-
-    def _cracks(self, now: Scene, size: float, step: Step) -> Ints:
-        """Adds contacts across cracks; returns the cracks that open."""
-        rows, n = now.active, len(now.cracks)
-        if not n:
+    def _met(self, now: Scene, surface: Exterior, step: Step, ahead: Ahead) -> Ints:
+        """Finds the active contacts of the step; returns the cracks that open."""
+        rows, counts, n = now.active, self._counts, len(now.cracks)
+        narrow = surface.narrow()
+        self._reserve(now, narrow)
+        counts[layout.FIRST] = self._corners(now, narrow, surface.cracks, step) if narrow else 0
+        opening = self._bound(now, step)
+        counts[layout.RETARGETS] = (ahead.share > 0.0) + 2 * ahead.spent
+        self._reals[layout.SHARE] = ahead.share
+        self._program.run(stages.ACROSS, stages.CORNERS_FROM)
+        rows.n = int(counts[layout.FOUND])
+        if not counts[layout.WIDE]:
             return _NONE
-        many, scratch = self._across.many(n), self._scratch
-        counts, wide, opening = scratch.of("across", many), scratch.of("wide", many), scratch.of("opening", n)
-        self._across.run(n, rows.room, rows.begins(_CRACKS), opening, now.cracks, size, step, counts, wide)
-        begins = CRACKS_OF_A_TASK * np.arange(len(wide))
-        rows.collect(_CRACKS, 3 * begins, counts)
-        return np.concatenate([opening[:0], *(opening[k : k + m] for k, m in zip(begins, wide, strict=True) if m)])
+        begins, wide = CRACKS_OF_A_TASK * np.arange(self._across(n)), self._sums[7]
+        return np.concatenate([opening[k : k + m] for k, m in zip(begins, wide, strict=True) if m])
 
-    def _corners(self, now: Scene, block: Block, corners: Corners, cracks: Cracks, step: Step) -> None:
-        """Adds contacts at the ``corners`` of a block."""
-        n = len(corners.start) - 1
-        begins = corners.start[:n:FAMILIES_OF_A_TASK].astype(np.int64)
-        counts, spaces = np.zeros(len(begins), np.int64), np.diff(np.append(begins, corners.start[-1]))
-        narrow = NarrowSides(
-            cracks.nodes, cracks.sides, block.tets, block.across, block.bond, cracks.families.ring, now.own.place
+    def _reserve(self, now: Scene, narrow: list[tuple[Block, Corners]]) -> None:
+        """Reserves the rows of the contacts."""
+        corners = [self._rows_of_corner * len(each.corners) for _, each in narrow]
+        now.active.begin(len(now.node_face), len(now.edge_edge), 3 * len(now.cracks), *corners)
+
+    @staticmethod
+    def _across(cracks: int) -> int:
+        return -(-cracks // CRACKS_OF_A_TASK)
+
+    def _bound(self, now: Scene, step: Step) -> Ints:
+        """Sets the arguments of the stages; returns the array of the cracks that open."""
+        rows, scratch, tables, counts = now.active, self._scratch, self._handle, self._counts
+        on, off, m = len(now.node_face), len(now.edge_edge), len(now.cracks)
+        faces, edges, cracks = -(-on // PAIRS_OF_A_TASK), -(-off // PAIRS_OF_A_TASK), self._across(m)
+        some, real = scratch.of, np.float64
+        self._sums = (
+            some("due", faces), some("on faces", faces), some("coming", faces, real), some("most", faces, real),
+            some("tested", edges), some("on edges", edges), some("across", cracks), some("wide", cracks),
         )  # fmt: skip
+        opening: Ints = some("opening", m)
+        one, two = now.node_face.arrays(), now.edge_edge.arrays()
+        tables.set(layout.ROWS, rows.room, rows.found, rows.depth, rows.holder(now.surface_nodes.n))
+        tables.set(layout.NOW, step)
+        tables.set(layout.FACE_PAIRS, one, now.slot_table(), now.face_table())
+        tables.set(layout.EDGE_PAIRS, two, now.edge_table(), now.reference.short.course)
+        tables.set(layout.CRACKS, now.cracks, opening)
+        tables.set(layout.SUMS, *self._sums)
+        counts[layout.CRACKS_N : layout.FIRST] = m, on, off
+        counts[layout.FACE_ROWS :] = rows.begins(_FACES), rows.begins(_EDGES), rows.begins(_CRACKS)
+        now.node_face.take_tested(one.active, _offsets(faces), self._sums[0])
+        now.edge_edge.take_tested(two.active, _offsets(edges), self._sums[4])
+        return opening
+
+    def _corners(self, now: Scene, narrow: list[tuple[Block, Corners]], cracks: Cracks, step: Step) -> int:
+        """Adds contacts at the corners of the blocks; returns their number."""
+        if len(narrow) != len(self._corner_tables):
+            self._prepare(len(narrow))
+        n = 0
         while True:
-            each, rows = self._rows_of_corner, now.active
-            kind = rows.more(each * len(corners.corners))
-            self._entering.run(n, rows.room, rows.begins(kind), each, narrow, corners, step, counts)
-            if (counts <= each * spaces).all():
+            every = enumerate(narrow)
+            found = [self._at_block(now, k, block, corners, cracks, step) for k, (block, corners) in every]
+            self._at_corners.run()
+            if all((counts <= self._rows_of_corner * spaces).all() for counts, _, spaces in found):
                 break
             self._rows_of_corner *= 2
-        now.active.collect(kind, each * begins, counts)
+            self._reserve(now, narrow)
+        for k, (counts, begins, _) in enumerate(found):
+            first = now.active.begins(_CORNERS + k)
+            n = int(gathered(now.active.found, n, first + self._rows_of_corner * begins, counts))
+        return n
+
+    def _prepare(self, blocks: int) -> None:
+        """Makes the program of the corners of ``blocks``."""
+        self._families = np.zeros(blocks, np.int64)
+        self._corner_tables = [Arguments(*stages.AT_CORNERS) for _ in range(blocks)]
+        some = enumerate(self._corner_tables)
+        every = [Span(stages.at_corners, t.address, self._families, k, FAMILIES_OF_A_TASK) for k, t in some]
+        self._at_corners = Program(self._team, every, np.zeros(1, np.int64))
+
+    def _at_block(
+        self, now: Scene, k: int, block: Block, corners: Corners, cracks: Cracks, step: Step
+    ) -> tuple[Ints, Ints, Ints]:  # fmt: skip
+        """Sets the arguments of the stage of block number ``k``; returns for each task the number of contacts, to be
+        filled, the first corner, and the number of corners.
+        """
+        n = len(corners.start) - 1
+        begins = corners.start[:n:FAMILIES_OF_A_TASK].astype(np.int64)
+        counts = self._scratch.of(f"at corners {k}", len(begins))
+        sides = cracks.nodes, cracks.sides, block.tets, block.across, block.bond, cracks.families.ring, now.own.place
+        self._families[k] = n
+        each = now.active.begins(_CORNERS + k), self._rows_of_corner
+        self._corner_tables[k].set(now.active.room, *each, NarrowSides(*sides), corners, step, counts)
+        return counts, begins, np.diff(np.append(begins, corners.start[-1]))
 
 
 @cache

@@ -5,8 +5,8 @@ from itertools import accumulate
 
 import numpy as np
 
-from ...model.state import Floats, Indices, Ints
-from ..tasks import collected
+from ...kernels.jit import njit
+from ...model.state import Floats, Indices
 from .tables import ContactRows
 
 _SPARE = 4
@@ -34,19 +34,9 @@ class ActiveRows:
         self._ends, self.n = [0, *accumulate(many)], 0
         self._reserve(self._ends[-1])
 
-    def more(self, many: int) -> int:
-        """Reserves ``many`` rows for one more kind of contacts; returns the number of the kind."""
-        self._ends.append(self._ends[-1] + many)
-        self._reserve(self._ends[-1])
-        return len(self._ends) - 2
-
     def begins(self, kind: int) -> int:
         """First row of the range of a ``kind``."""
         return self._ends[kind]
-
-    def collect(self, kind: int, begins: Ints, counts: Ints) -> None:
-        """Adds the rows that tasks have found, ``counts`` from each of ``begins`` on in the range of their ``kind``."""
-        self.n = int(collected(self.found, self.n, self._ends[kind] + begins, counts))
 
     @property
     def nodes(self) -> Indices:
@@ -70,3 +60,27 @@ class ActiveRows:
                 getattr(self.room, name)[found] = getattr(room, name)[found]
             self.depth[found] = depth[found]
             self.found[: self.n] = found
+
+
+@njit("int64(int32[::1], int64, int64, int64, int64[::1], int64)", cache=True)
+def collected(found, n, base, size, counts, tasks):  # type: ignore[no-untyped-def]
+    """Writes the row numbers of ``tasks`` into ``found`` from ``n`` on: of task k, ``counts[k]`` rows from ``base``
+    plus k times ``size`` on. Returns the new length.
+    """
+    for k in range(tasks):
+        for row in range(base + k * size, base + k * size + counts[k]):
+            found[n] = row
+            n += 1
+    return n
+
+
+@njit("int64(int32[::1], int64, int64[::1], int64[::1])", cache=True)
+def gathered(found, n, begins, counts):  # type: ignore[no-untyped-def]
+    """Writes the row numbers of tasks, ``counts`` from each of ``begins`` on, into ``found`` from ``n`` on; returns the
+    new length.
+    """
+    for k in range(len(counts)):
+        for row in range(begins[k], begins[k] + counts[k]):
+            found[n] = row
+            n += 1
+    return n

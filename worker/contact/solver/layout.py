@@ -10,7 +10,7 @@ from ...kernels.jit import types
 from ...parallel.arguments import Handle, table_of
 from ..narrow_phase.tables import CONTACT_ROWS
 from .active import CONTACTS, KEPT, LOADED, NODES
-from .stops import BRACED, STOPS
+from .stops import BRACED, STOPS, SURFACE
 
 _B1, _U1, _N1, _N2 = types.boolean[::1], types.uint8[::1], types.int32[::1], types.int32[:, ::1]
 _I1, _I2, _I3 = types.int64[::1], types.int64[:, ::1], types.int64[:, :, ::1]
@@ -21,7 +21,7 @@ ROWS, NODES_OF, ROOM, SORTED, STORED, BOUNDS, BODIES, BOOKS, STEP, SUMS = range(
 stored impulses; walls and planes; nodes of the rank; energies; numbers of the step; sums by task."""
 _KINDS = {
     ROWS: (CONTACT_ROWS, _N1),
-    NODES_OF: (_F2, _F2, _F2, _N1, _N1, _F2, _I2, _N1),
+    NODES_OF: (SURFACE, _F2, _I2, _N1),
     ROOM: (NODES, _N1, _N2, _F1, _N1, _N1, _N1, _U1, _U1, LOADED, BRACED),
     SORTED: (CONTACTS,),
     STORED: (KEPT,),
@@ -34,7 +34,7 @@ _KINDS = {
 rows_of = table_of(ROWS, *_KINDS[ROWS])
 """Rows of the narrow phase (ContactRows), numbers of the active ones."""
 nodes_of = table_of(NODES_OF, *_KINDS[NODES_OF])
-"""Of the surface nodes: x, v, mobility, part, local index, v(n-1/2), impulse of the step, zone."""
+"""Of the surface nodes: Surface, v(n-1/2), impulse of the step, zone."""
 room_of = table_of(ROOM, *_KINDS[ROOM])
 """ActiveNodes; row, slots, reach and set of each contact; places, slot, touched, shared (slot_numbers.py); Loaded,
 Braced."""

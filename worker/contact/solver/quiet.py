@@ -9,14 +9,15 @@ from ...kernels.jit import njit, types
 from ..narrow_phase.tables import CONTACT_ROWS, CRACK
 from .active import KEPT
 from .loading import normal_speed
-from .stops import STOPS
+from .stops import STOPS, SURFACE
 
-_F, _F2, _N1, _I = types.float64, types.float64[:, ::1], types.int32[::1], types.int64
+_F, _N1, _I = types.float64, types.int32[::1], types.int64
 
 
-@njit(types.boolean(STOPS, _F2, _F2, _F2, _N1, _N1, types.boolean[::1], _F, types.int64), cache=True)
-def _stopped(stops, x, v, mobility, part, local, loose, dt, a):  # type: ignore[no-untyped-def]
+@njit(types.boolean(STOPS, SURFACE, types.boolean[::1], _F, types.int64), cache=True)
+def _stopped(stops, nodes, loose, dt, a):  # type: ignore[no-untyped-def]
     """Whether node ``a`` would end a step ``dt``, s, behind a plane of ``stops``: see stops.find and stops.stop."""
+    x, v, mobility, part, local = nodes
     for k in range(len(stops.points)):
         side = stops.sides[k, part[a]]
         if side == 0.0 or (stops.mirrors[k] and local[a] >= 0 and loose[local[a]]):
@@ -32,11 +33,11 @@ def _stopped(stops, x, v, mobility, part, local, loose, dt, a):  # type: ignore[
     return False
 
 
-@njit(_I(CONTACT_ROWS, _N1, KEPT, STOPS, _F2, _F2, _F2, _N1, _N1, types.boolean[::1], _F, _I, _I), cache=True)
-def needs_impulse(rows, found, kept, stops, x, v, mobility, part, local, loose, dt, first, stop):  # type: ignore[no-untyped-def]
+@njit(_I(CONTACT_ROWS, _N1, KEPT, STOPS, SURFACE, types.boolean[::1], _F, _I, _I), cache=True)
+def needs_impulse(rows, found, kept, stops, nodes, loose, dt, first, stop):  # type: ignore[no-untyped-def]
     """Returns 1 if one of the contacts ``found`` from ``first`` to ``stop``, ``rows`` of the narrow phase, may need an
-    impulse in a step ``dt``, s, else 0. ``kept``: stored impulses; ``x``, ``v``, ``mobility``, ``part``, ``local`` of
-    the surface nodes; ``loose`` (nodes,): nodes without tets.
+    impulse in a step ``dt``, s, else 0. ``kept``: stored impulses; ``nodes``: surface nodes; ``loose`` (nodes,): nodes
+    without tets.
     """
     for q in range(first, stop):
         p = found[q]
@@ -45,10 +46,10 @@ def needs_impulse(rows, found, kept, stops, x, v, mobility, part, local, loose, 
             return 1
         a, b, c, d = rows.nodes[p, 0], rows.nodes[p, 1], rows.nodes[p, 2], rows.nodes[p, 3]
         two = b == c
-        speed = normal_speed(rows.normals, rows.weights, p, v, 0, a, b, c, d, two)
+        speed = normal_speed(rows.normals, rows.weights, p, nodes.v, 0, a, b, c, d, two)
         if not speed >= rows.wanted[p]:
             return 1
         for k in range(2 if two else 4):
-            if _stopped(stops, x, v, mobility, part, local, loose, dt, rows.nodes[p, k]):
+            if _stopped(stops, nodes, loose, dt, rows.nodes[p, k]):
                 return 1
     return 0

@@ -16,7 +16,7 @@ from .layout import CONTACTS_N, CRACKS_N, NODES_N, PAIRS_N, SLOTS_N
 from .shared_sums import ActiveSum
 from .stages import CONTACTS_OF_A_TASK, END, KEPT_OF_A_TASK, SLOTS_OF_A_TASK
 from .step import SolverStep
-from .stops import Braced, Stops
+from .stops import Braced, Stops, Surface
 from .zones import Zones
 
 _NONE: Indices = np.zeros(0, np.int32)
@@ -73,6 +73,7 @@ class ActiveSet:
         self._handle, (self._counts, self._reals) = layout.handle(), layout.numbers()
         self._program = self._stages(team)
         self._of: ContactRows | None = None
+        self._contacts: ActiveContacts
         self._stored = True
 
     def go_on(self, scale: float, sides: Floats) -> None:
@@ -115,14 +116,14 @@ class ActiveSet:
             self._room = _Room(*of, self.stops.sides.shape, self._zones.many)
         room, books, tables = self._room, step.books, self._handle
         if rows.room is not self._of or room.row is not self._contacts.row:
-            self._of, found = rows.room, rows.room
+            self._of = found = rows.room
             self._contacts = ActiveContacts(
                 room.row, room.slots, room.reach, found.weights, found.normals, found.wanted, found.friction, found.pair
             )  # fmt: skip
             tables.set(layout.SORTED, self._contacts)
         tables.set(layout.ROWS, rows.room, rows.found)
-        surface = nodes.x, nodes.v, nodes.mobility, nodes.part, nodes.local, step.before, step.total
-        tables.set(layout.NODES_OF, *surface, self._zones.of(nodes))
+        surface = Surface(nodes.x, nodes.v, nodes.mobility, nodes.part, nodes.local)
+        tables.set(layout.NODES_OF, surface, step.before, step.total, self._zones.of(nodes))
         tables.set(layout.ROOM, *room.arrays)
         tables.set(layout.STORED, step.kept)
         tables.set(layout.BOUNDS, self.stops, step.loose)
@@ -143,8 +144,8 @@ class ActiveSet:
         if not len(shared.shared) and self._bodies is None:
             return self._solved()
         self.begin(shared)
-        for stage in (self.weigh, self.resume, self.sweep, self.store, self.work):
-            stage()
+        for stages_of in (self.weigh, self.resume, self.sweep, self.store, self.work):
+            stages_of()
         return self.leave()
 
     def _solved(self) -> bool:
@@ -270,8 +271,7 @@ class ActiveSet:
         friction, N s.
         """
         loaded = self._room.loaded
-        ranges = [range(a, a + n) for a, n in zip(loaded.begin[:-1], loaded.many, strict=True)]
-        some = np.concatenate([np.asarray(each, np.int64) for each in ranges])
+        some = np.concatenate([np.arange(a, a + n) for a, n in zip(loaded.begin[:-1], loaded.many, strict=True)])
         return loaded.row[some], np.column_stack([loaded.normal[some, PUSH], loaded.tangent[some, PUSH_T:]])
 
 

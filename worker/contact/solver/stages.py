@@ -49,11 +49,10 @@ no impulse."""
 def quiet(table, first, stop, thread):  # type: ignore[no-untyped-def]
     """Writes 1 if a contact of the range may need an impulse, else 0."""
     rows, found = rows_of(table)
-    x, v, mobility, part, local, _, _, _ = nodes_of(table)
     (kept,), (planes, loose), (_, reals, _) = stored_of(table), bounds_of(table), step_of(table)
     flags = sums_of(table)[0]
     flags[first // CONTACTS_OF_A_TASK] = needs_impulse(
-        rows, found, kept, planes, x, v, mobility, part, local, loose, reals[DT], first, stop
+        rows, found, kept, planes, nodes_of(table)[0], loose, reals[DT], first, stop
     )
 
 
@@ -71,7 +70,7 @@ def rest(table, first, stop, thread):  # type: ignore[no-untyped-def]
 @njit(TASK, cache=True)
 def mark(table, first, stop, thread):  # type: ignore[no-untyped-def]
     """``slot_numbers.mark``."""
-    (rows, found), zone, many = rows_of(table), nodes_of(table)[7], sums_of(table)[1]
+    (rows, found), zone, many = rows_of(table), nodes_of(table)[3], sums_of(table)[1]
     _, _, _, _, set_of, _, _, touched, shared, _, _ = room_of(table)
     k = first // CONTACTS_OF_A_TASK
     many[k] = 0
@@ -120,12 +119,12 @@ def sort(table, first, stop, thread):  # type: ignore[no-untyped-def]
 def load(table, first, stop, thread):  # type: ignore[no-untyped-def]
     """``slot_numbers.load``; finds the slots near stops, and stops them."""
     active, _, _, _, _, places, _, _, _, _, braced = room_of(table)
-    x, v, mobility, part, local, _, _, _ = nodes_of(table)
+    nodes = nodes_of(table)[0]
     (planes, loose), (_, reals, _) = bounds_of(table), step_of(table)
     k = first // SLOTS_OF_A_TASK
-    sums_of(table)[4][k] = slot_numbers.load(active, places, v, mobility, first, stop)
+    sums_of(table)[4][k] = slot_numbers.load(active, places, nodes.v, nodes.mobility, first, stop)
     if len(planes.points) > 0:
-        stops.find(braced, active, planes, places, x, part, local, loose, reals[SIZE], reals[DT], k, first, stop)
+        stops.find(braced, active, planes, places, nodes, loose, reals[SIZE], reals[DT], k, first, stop)
         stops.stop(active, braced, k, first * len(planes.points))
 
 
@@ -209,7 +208,7 @@ def store(table, first, stop, thread):  # type: ignore[no-untyped-def]
 @njit(TASK, cache=True)
 def work(table, first, stop, thread):  # type: ignore[no-untyped-def]
     """``impulse_work.cost`` and ``impulse_work.heat`` of a range of sets; sums by set."""
-    room, (counts, reals, _), before = room_of(table), step_of(table), nodes_of(table)[5]
+    room, (counts, reals, _), before = room_of(table), step_of(table), nodes_of(table)[1]
     _, _, _, _, _, along, friction, _, _ = sums_of(table)
     active, places, loaded = room[0], room[5], room[9]
     for k in range(first, stop):
@@ -226,7 +225,7 @@ def leave(table, first, stop, thread):  # type: ignore[no-untyped-def]
     room, (v, of, owned), (loss, external), (_, reals, _) = (
         room_of(table), bodies_of(table), books_of(table), step_of(table),
     )  # fmt: skip
-    _, _, mobility, _, local, before, total, _ = nodes_of(table)
+    (_, _, mobility, _, local), before, total, _ = nodes_of(table)
     _, _, _, _, _, _, _, left, parts = sums_of(table)
     k, planes = first // SLOTS_OF_A_TASK, len(bounds_of(table)[0].points)
     left[k], parts[k] = 0, 0

@@ -64,6 +64,16 @@ class Stops(NamedTuple):
         return cls(np.array(points, float).reshape(-1, 3), normals, held, friction, mirrors)
 
 
+class Surface(NamedTuple):
+    """Columns of the surface nodes, see SurfaceNodes."""
+
+    x: Floats
+    v: Floats
+    mobility: Floats
+    part: Indices
+    local: Indices
+
+
 class Braced(NamedTuple):
     """Slots near stops: one row for each pair of a slot and a stop. The rows of a task, a range of slots, begin at the
     first of these slots times the number of stops.
@@ -96,16 +106,17 @@ class Braced(NamedTuple):
 _F1, _F2, _N1, _N2 = types.float64[::1], types.float64[:, ::1], types.int32[::1], types.int32[:, ::1]
 _B1, _F, _I = types.boolean[::1], types.float64, types.int64
 STOPS = record(Stops, _F2, _F2, _F2, _F1, _B1)
+SURFACE = record(Surface, _F2, _F2, _F2, _N1, _N1)
 BRACED = record(Braced, _N2, _F2, _F1, _F1, _F2, _F1, types.int64[::1])
 
 
-@njit(types.void(BRACED, NODES, STOPS, _N1, _F2, _N1, _N1, _B1, _F, _F, _I, _I, _I), cache=True)
-def find(braced, active, stops, places, x, part, local, loose, size, dt, task, first, stop):  # type: ignore[no-untyped-def]
+@njit(types.void(BRACED, NODES, STOPS, _N1, SURFACE, _B1, _F, _F, _I, _I, _I), cache=True)
+def find(braced, active, stops, places, nodes, loose, size, dt, task, first, stop):  # type: ignore[no-untyped-def]
     """Finds the slots from ``first`` to ``stop`` near a stop in a step ``dt``, s, which are the slots of a ``task``;
-    ``x``, ``part`` and ``local`` of the surface nodes; ``loose`` (nodes,): nodes of this rank without tets, which no
-    other rank has; ``size`` of a face, m.
+    ``nodes``: surface nodes; ``loose`` (nodes,): nodes of this rank without tets, which no other rank has; ``size`` of
+    a face, m.
     """
-    fixed, begin = active.fixed, first * len(stops.points)
+    fixed, begin, x, part, local = active.fixed, first * len(stops.points), nodes.x, nodes.part, nodes.local
     n = begin
     for s in range(first, stop):
         a = places[s]

@@ -1,0 +1,231 @@
+"""Stages of the narrow phase: kernels over slots, faces, edges, cracks, pairs and contacts; tables: layout.py.
+
+Each task writes its rows from its own offset on, and the number of its rows into its place of the sums. The kernels
+without a range are run by one thread.
+"""
+
+from ...kernels.jit import njit, types
+from ...parallel.arguments import reader
+from ...parallel.team import TASK
+from ..broad_phase import reference_motion
+from ..solver import restitution, slot_numbers
+from ..surface.families import CORNERS
+from . import closing_speed, corner_contact, crack_contact, edge_edge, node_face, tables
+from .corner_contact import NARROW
+from .layout import (
+    BEYOND,
+    CRACK_ROWS,
+    CRACKS_N,
+    DT,
+    EDGE_PAIRS_N,
+    EDGE_ROWS,
+    END,
+    FACE_PAIRS_N,
+    FACE_ROWS,
+    FAST_SIZE,
+    FIRST,
+    FOUND,
+    LIMIT,
+    MOST,
+    ON_FACES,
+    RETARGETED,
+    RETARGETS,
+    SHARE,
+    SIZE,
+    SLOTS_N,
+    STRAYED,
+    WIDE,
+    T,
+    cracks_of,
+    edge_pairs_of,
+    face_pairs_of,
+    lines_of,
+    now_of,
+    numbers_of,
+    own_of,
+    places_of,
+    rows_of,
+    sides_of,
+    sums_of,
+)
+from .rows import collected
+from .tables import CONTACT_ROWS, STEP
+
+PAIRS_OF_A_TASK = 1024
+"""Number of candidate pairs in a task. Chosen value: a task takes about 20 us; to start a parallel region takes 2
+us."""
+CRACKS_OF_A_TASK, FAMILIES_OF_A_TASK, CONTACTS_OF_A_TASK, SLOTS_OF_A_TASK, SIDES_OF_A_TASK = 512, 128, 1024, 2048, 8192
+"""Numbers of cracks, families, contacts, slots, and of faces or edges in a task. Chosen values, by the same comparison
+as PAIRS_OF_A_TASK."""
+TAKE, AHEAD, SPREAD, LEAVE, LARGEST_FACES, LARGEST_EDGES, CHECK, ACROSS, DUE, NODE_FACE, NEAREST, APPROACH = range(12)
+EDGE_EDGE, COLLECT, RETARGET, CORNERS_FROM = range(12, 16)
+"""Numbers of the stages, in their order; the last is the first of the stages over corners, one for each block."""
+AT_CORNERS = CONTACT_ROWS, types.int64, types.int64, NARROW, CORNERS, STEP, types.int64[::1]
+_at_corners = reader(*AT_CORNERS)
+
+
+@njit("int64(int64, int64)", cache=True)
+def tasks_of(n, size):  # type: ignore[no-untyped-def]
+    """Number of the tasks of length ``size`` of a range to ``n``."""
+    return (n + size - 1) // size
+
+
+@njit(TASK, cache=True)
+def take(table, first, stop, thread):  # type: ignore[no-untyped-def]
+    """Copies positions and velocities of the nodes of this rank to their slots."""
+    slots, local, node_x, node_v = own_of(table)
+    x, v, _, _, _ = places_of(table)
+    slot_numbers.take(x, v, slots, node_x, node_v, local, first, stop)
+
+
+@njit(TASK, cache=True)
+def ahead(table, first, stop, thread):  # type: ignore[no-untyped-def]
+    """``tables.place`` and ``closing_speed.bound``."""
+    x, v, places, _, boxes = places_of(table)
+    tables.place(places, x, v, numbers_of(table)[1][DT], first, stop)
+    closing_speed.bound(boxes, first // SLOTS_OF_A_TASK, v, first, stop)
+
+
+@njit(TASK, cache=True)
+def spread(table, first, stop, thread):  # type: ignore[no-untyped-def]
+    """Sets the time beyond the step for which closing pairs are detected: the largest length of the next step if
+    velocities that differ by as much as those of the slots may close in it a distance of FAST_SIZE, else 0. Slower
+    pairs cannot limit a step, so ranks that have only slow nodes need no data of other ranks.
+    """
+    (counts, reals, _), boxes = numbers_of(table), places_of(table)[4]
+    fastest = closing_speed.spread(boxes, tasks_of(counts[SLOTS_N], SLOTS_OF_A_TASK))
+    reals[BEYOND] = reals[MOST] if fastest * reals[MOST] > reals[FAST_SIZE] else 0.0
+
+
+@njit(TASK, cache=True)
+def leave(table, first, stop, thread):  # type: ignore[no-untyped-def]
+    """Distances of slots from their lines (reference_motion.py)."""
+    x, v, _, _, _ = places_of(table)
+    left, line, course, near, short, mean, tracked, strayed = lines_of(table)
+    _, reals, _ = numbers_of(table)
+    t, dt = reals[T], reals[END] - reals[T] + reals[BEYOND]
+    reference_motion.leave(left, line, course, x, v, t, dt, first, stop)
+    reference_motion.leave(near, short, mean, x, v, t, dt, first, stop)
+    strayed[first // SLOTS_OF_A_TASK] = reference_motion.farthest(left, tracked, first, stop)
+
+
+@njit(TASK, cache=True)
+def largest_faces(table, first, stop, thread):  # type: ignore[no-untyped-def]
+    """``reference_motion.largest`` of faces."""
+    left, corners, _, _ = sides_of(table)
+    reference_motion.largest(left, corners, 3, lines_of(table)[3], first, stop)
+
+
+@njit(TASK, cache=True)
+def largest_edges(table, first, stop, thread):  # type: ignore[no-untyped-def]
+    """``reference_motion.largest`` of edges."""
+    _, _, left, corners = sides_of(table)
+    reference_motion.largest(left, corners, 2, lines_of(table)[3], first, stop)
+
+
+@njit(TASK, cache=True)
+def check(table, first, stop, thread):  # type: ignore[no-untyped-def]
+    """Sets the largest distance of a slot from its search line."""
+    (counts, reals, _), strayed = numbers_of(table), lines_of(table)[7]
+    reals[STRAYED] = 0.0
+    for k in range(tasks_of(counts[SLOTS_N], SLOTS_OF_A_TASK)):
+        reals[STRAYED] = max(reals[STRAYED], strayed[k])
+
+
+@njit(TASK, cache=True)
+def across(table, first, stop, thread):  # type: ignore[no-untyped-def]
+    """``crack_contact.across``."""
+    (counts, reals, _), (cracks, opening), k = numbers_of(table), cracks_of(table), first // CRACKS_OF_A_TASK
+    _, _, _, _, _, _, found, wide = sums_of(table)
+    found[k], wide[k] = crack_contact.across(
+        rows_of(table)[0], counts[CRACK_ROWS], opening, cracks, reals[SIZE], now_of(table)[0], first, stop
+    )
+
+
+@njit(TASK, cache=True)
+def due(table, first, stop, thread):  # type: ignore[no-untyped-def]
+    """``node_face.due``."""
+    (pairs, slots, faces), (_, reals, _) = face_pairs_of(table), numbers_of(table)
+    many = sums_of(table)[0]
+    end = reals[END] + reals[BEYOND]
+    many[first // PAIRS_OF_A_TASK] = node_face.due(pairs, slots, faces, end, first, stop)
+
+
+@njit(TASK, cache=True)
+def on_faces(table, first, stop, thread):  # type: ignore[no-untyped-def]
+    """``node_face.node_face`` of the pairs to be tested."""
+    (out, _, depth, _), (pairs, slots, faces), (step,) = rows_of(table), face_pairs_of(table), now_of(table)
+    (counts, reals, _), (many, found, coming, _, _, _, _, _) = numbers_of(table), sums_of(table)
+    k = first // PAIRS_OF_A_TASK
+    found[k], coming[k] = node_face.node_face(
+        out, depth, counts[FACE_ROWS], pairs, slots, faces, step, reals[END], first, first + many[k]
+    )
+
+
+@njit(TASK, cache=True)
+def nearest(table, first, stop, thread):  # type: ignore[no-untyped-def]
+    """Lists the contacts of nodes with faces; ``node_face.nearest``."""
+    (out, found, depth, holder), (pairs, _, faces) = rows_of(table), face_pairs_of(table)
+    (counts, reals, _), (_, many, coming, _, _, _, _, _) = numbers_of(table), sums_of(table)
+    tasks = tasks_of(counts[FACE_PAIRS_N], PAIRS_OF_A_TASK)
+    n = collected(found, counts[FIRST], counts[FACE_ROWS], PAIRS_OF_A_TASK, many, tasks)
+    listed = found[counts[FIRST] : n]
+    counts[ON_FACES] = node_face.nearest(listed, out, depth, pairs, faces, now_of(table)[0].part, holder)
+    reals[LIMIT] = 0.0
+    for k in range(tasks):
+        reals[LIMIT] = max(reals[LIMIT], coming[k])
+
+
+@njit(TASK, cache=True)
+def approach(table, first, stop, thread):  # type: ignore[no-untyped-def]
+    """``closing_speed.approach``."""
+    (out, found, _, _), (pairs, _, faces) = rows_of(table), face_pairs_of(table)
+    most, begin = sums_of(table)[3], numbers_of(table)[0][FIRST]
+    most[first // CONTACTS_OF_A_TASK] = closing_speed.approach(
+        out, found, pairs, faces, now_of(table)[0], begin + first, begin + stop
+    )
+
+
+@njit(TASK, cache=True)
+def on_edges(table, first, stop, thread):  # type: ignore[no-untyped-def]
+    """``edge_edge.edge_edge``."""
+    (out, _, _, _), (pairs, edges, course), (step,) = rows_of(table), edge_pairs_of(table), now_of(table)
+    (counts, reals, _), (_, _, _, _, tested, found, _, _) = numbers_of(table), sums_of(table)
+    k = first // PAIRS_OF_A_TASK
+    found[k], tested[k] = edge_edge.edge_edge(
+        out, counts[EDGE_ROWS], pairs, edges, step, course, reals[END], first, stop
+    )
+
+
+@njit(TASK, cache=True)
+def collect(table, first, stop, thread):  # type: ignore[no-untyped-def]
+    """Lists the other contacts, and sums up over the tasks: the limit of the next step, and the cracks that open."""
+    (_, found, _, _), (counts, reals, _) = rows_of(table), numbers_of(table)
+    _, _, _, most, _, on_edge, on_crack, wide = sums_of(table)
+    for k in range(tasks_of(counts[ON_FACES], CONTACTS_OF_A_TASK)):
+        reals[LIMIT] = max(reals[LIMIT], most[k])
+    tasks, counts[WIDE] = tasks_of(counts[CRACKS_N], CRACKS_OF_A_TASK), 0
+    n = counts[FIRST] + counts[ON_FACES]
+    n = collected(found, n, counts[CRACK_ROWS], 3 * CRACKS_OF_A_TASK, on_crack, tasks)
+    for k in range(tasks):
+        counts[WIDE] += wide[k]
+    tasks = tasks_of(counts[EDGE_PAIRS_N], PAIRS_OF_A_TASK)
+    counts[FOUND] = collected(found, n, counts[EDGE_ROWS], PAIRS_OF_A_TASK, on_edge, tasks)
+    counts[RETARGETED] = counts[FOUND] if counts[RETARGETS] != 0 else 0
+
+
+@njit(TASK, cache=True)
+def retarget(table, first, stop, thread):  # type: ignore[no-untyped-def]
+    """``restitution.rebound`` and ``restitution.hold_back``."""
+    (out, found, _, _), (_, v, _, before, _), (counts, reals, _) = rows_of(table), places_of(table), numbers_of(table)
+    if counts[RETARGETS] & 1:
+        restitution.rebound(out, found, v, before, reals[SHARE], first, stop)
+    if counts[RETARGETS] & 2:
+        restitution.hold_back(out, found, before, first, stop)
+
+
+@njit(TASK, cache=True)
+def at_corners(table, first, stop, thread):  # type: ignore[no-untyped-def]
+    """``corner_contact.entering``."""
+    out, base, each, narrow, of, step, counts = _at_corners(table)
+    counts[first // FAMILIES_OF_A_TASK] = corner_contact.entering(out, base, each, narrow, of, step, first, stop)
