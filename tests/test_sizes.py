@@ -40,9 +40,9 @@ EXCEPTIONS: dict[str, dict[str, int]] = {
     "a stage of the step: it wires arrays, kernels and neighbours that are made once": {
         "worker/contact/exterior.py: Exterior": 15,
         "worker/contact/broad_phase/searches.py: Searches": 14,
-        "worker/contact/narrow_phase/detection.py: Detection": 18,
+        "worker/contact/narrow_phase/detection.py: Detection": 19,
         "worker/contact/scene/scene.py: Scene": 15,
-        "worker/contact/solver/solver.py: ActiveSet": 16,
+        "worker/contact/solver/solver.py: ActiveSet": 14,
         "worker/contact/stage.py: Contact": 14,
         "worker/run/loop.py: Loop": 16,
         "worker/simulation.py: Simulation": 24,

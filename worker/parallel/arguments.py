@@ -99,6 +99,17 @@ class Arguments:
                 ties.append(Tie(*value, address + 8 * self._places[self._begins[k]]))
         return address, tuple(ties)
 
+    def place(self, k: int) -> int:
+        """Return the address of leaf number ``k``: an array, a number or a flag."""
+        return int(self.address + self._words.itemsize * self._places[k])
+
+    def put(self, first: int, leaves: tuple[Any, ...]) -> None:
+        """Write the leaves from number ``first`` on; those that are already in the table are not written again."""
+        end, kept = first + len(leaves), self._kept
+        for k, value in compress(enumerate(leaves, first), map(is_not, leaves, kept[first:end])):
+            self._put(k, value)
+        kept[first:end] = leaves
+
     def _put(self, k: int, value: Any) -> None:
         at = self._places[k]
         if self._is_array[k]:
@@ -125,13 +136,17 @@ class Handle:
 
     def __init__(self, *kinds: tuple[Any, ...]) -> None:
         """``kinds``: numba types of the arguments of each table."""
-        self._tables = [Arguments(*each) for each in kinds]
-        self._words = np.array([each.address for each in self._tables])
+        self._every = Arguments(*(kind for each in kinds for kind in each))
+        sizes = [sum(1 for kind in each for _ in _leaves(kind)) for each in kinds]
+        self._first = np.cumsum([0, *sizes])[:-1].tolist()
+        self._words = np.array([self._every.place(first) for first in self._first])
         self.address = int(self._words.ctypes.data)
 
-    def set(self, k: int, *values: Any) -> None:
-        """Write the arguments of table ``k``; see ``Arguments.set``."""
-        self._tables[k].set(*values)
+    def set(self, k: int, *leaves: Any) -> None:
+        """Write the arguments of the tables from number ``k`` on, one after the other, with the fields of records in
+        place of the records. Arguments that are already in the tables are not written again.
+        """
+        self._every.put(self._first[k], leaves)
 
 
 def _dtype(kind: Any) -> np.dtype[Any]:

@@ -100,6 +100,8 @@ class Detection:
         self._families = np.zeros(0, np.int64)
         """(blocks,) number of families of each block."""
         self._scratch = StepRoom()
+        self._sizes: tuple[int, ...] = ()
+        self._sums: list[np.ndarray] = []
         self._rows_of_corner = 1
         """Number of rows reserved for each corner of a narrow side, on average over a task."""
 
@@ -121,15 +123,15 @@ class Detection:
         """Copies positions and velocities of local nodes to the scene."""
         of, own, lines, counts = now.surface_nodes, now.own, now.reference, self._counts
         n = of.n
+        tasks = -(-n // SLOTS_OF_A_TASK)
         places, self._begin, self._end = self._scratch.lines(n)
-        boxes = self._scratch.of("boxes", -(-n // SLOTS_OF_A_TASK), np.float64, 6)
-        tables, searched, short = self._handle, lines.searched, lines.short
-        tables.set(layout.OWN, own.slots, own.local, nodes.x, nodes.v)
-        tables.set(layout.PLACES, of.x, of.v, places, now.slots.before, boxes)
-        strayed = self._scratch.of("strayed", -(-n // SLOTS_OF_A_TASK), np.float64)
-        some = searched.left, searched.x, searched.course, short.left, short.x, short.course, now.slots.tracked
-        tables.set(layout.LINES, *some, strayed)
-        tables.set(layout.SIDES, lines.faces, now.faces.corners, lines.edges, now.edges.corners)
+        boxes = self._scratch.of("boxes", tasks, np.float64, 6)
+        strayed, searched, short = self._scratch.of("strayed", tasks, np.float64), lines.searched, lines.short
+        self._handle.set(
+            layout.OWN, own.slots, own.local, nodes.x, nodes.v, of.x, of.v, places, now.slots.before, boxes,
+            searched.left, searched.x, searched.course, short.left, short.x, short.course, now.slots.tracked, strayed,
+            lines.faces, now.faces.corners, lines.edges, now.edges.corners,
+        )  # fmt: skip
         faces, edges = len(now.faces.corners), len(now.edges.corners)
         counts[: layout.CRACKS_N] = len(own.slots), n, faces, edges
         counts[layout.ONE] = 1
@@ -208,7 +210,7 @@ class Detection:
         rows.n = int(counts[layout.FOUND])
         if not counts[layout.WIDE]:
             return _NONE
-        begins, wide = CRACKS_OF_A_TASK * np.arange(self._across(n)), self._sums[7]
+        begins, wide = CRACKS_OF_A_TASK * np.arange(self._across(n)), self._sums[-1]
         return np.concatenate([opening[k : k + m] for k, m in zip(begins, wide, strict=True) if m])
 
     def _reserve(self, now: Scene, narrow: list[tuple[Block, Corners]]) -> None:
@@ -222,27 +224,32 @@ class Detection:
 
     def _bound(self, now: Scene, step: Step) -> Ints:
         """Sets the arguments of the stages; returns the array of the cracks that open."""
-        rows, scratch, tables, counts = now.active, self._scratch, self._handle, self._counts
-        on, off, m = len(now.node_face), len(now.edge_edge), len(now.cracks)
-        faces, edges, cracks = -(-on // PAIRS_OF_A_TASK), -(-off // PAIRS_OF_A_TASK), self._across(m)
-        some, real = scratch.of, np.float64
-        self._sums = (
-            some("due", faces), some("on faces", faces), some("coming", faces, real), some("most", faces, real),
-            some("tested", edges), some("on edges", edges), some("across", cracks), some("wide", cracks),
+        rows, counts, on, off, m = now.active, self._counts, len(now.node_face), len(now.edge_edge), len(now.cracks)
+        if (sizes := (on, off, m)) != self._sizes:
+            self._sizes, self._sums = sizes, self._rooms(*sizes)
+        (opening, due, *_, tested, _, _, _), one, two = self._sums, now.node_face.arrays(), now.edge_edge.arrays()
+        self._handle.set(
+            layout.ROWS, *rows.room, rows.found, rows.depth, rows.holder(now.surface_nodes.n), *step,
+            *one, *now.slot_table(), *now.face_table(), *two, *now.edge_table(), now.reference.short.course,
+            now.cracks, *self._sums,
         )  # fmt: skip
-        opening: Ints = some("opening", m)
-        one, two = now.node_face.arrays(), now.edge_edge.arrays()
-        tables.set(layout.ROWS, rows.room, rows.found, rows.depth, rows.holder(now.surface_nodes.n))
-        tables.set(layout.NOW, step)
-        tables.set(layout.FACE_PAIRS, one, now.slot_table(), now.face_table())
-        tables.set(layout.EDGE_PAIRS, two, now.edge_table(), now.reference.short.course)
-        tables.set(layout.CRACKS, now.cracks, opening)
-        tables.set(layout.SUMS, *self._sums)
         counts[layout.CRACKS_N : layout.FIRST] = m, on, off
         counts[layout.FACE_ROWS :] = rows.begins(_FACES), rows.begins(_EDGES), rows.begins(_CRACKS)
-        now.node_face.take_tested(one.active, _offsets(faces), self._sums[0])
-        now.edge_edge.take_tested(two.active, _offsets(edges), self._sums[4])
+        now.node_face.take_tested(one.active, _offsets(len(due)), due)
+        now.edge_edge.take_tested(two.active, _offsets(len(tested)), tested)
         return opening
+
+    def _rooms(self, on: int, off: int, m: int) -> list[np.ndarray]:
+        """Working arrays for ``on`` node-face pairs, ``off`` edge-edge pairs and ``m`` cracks: see layout.py, CRACKS
+        and SUMS.
+        """
+        faces, edges, cracks = -(-on // PAIRS_OF_A_TASK), -(-off // PAIRS_OF_A_TASK), self._across(m)
+        some, real = self._scratch.of, np.float64
+        return [
+            some("opening", m), some("due", faces), some("on faces", faces), some("coming", faces, real),
+            some("most", faces, real), some("tested", edges), some("on edges", edges), some("across", cracks),
+            some("wide", cracks),
+        ]  # fmt: skip
 
     def _corners(self, now: Scene, narrow: list[tuple[Block, Corners]], cracks: Cracks, step: Step) -> int:
         """Adds contacts at the corners of the blocks; returns their number."""

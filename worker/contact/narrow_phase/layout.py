@@ -29,12 +29,12 @@ _KINDS = {
 own_of = table_of(OWN, *_KINDS[OWN])
 """Slots and local indices of the nodes of this rank; positions and velocities of all nodes of this rank."""
 places_of = table_of(PLACES, *_KINDS[PLACES])
-"""Of the slots: x, v, positions at the beginning and at the end of the step, v(n-1/2); bounds of v by task."""
+"""Slots: x, v, positions at the beginning and at the end of the step, v(n-1/2); bounds of v by task."""
 lines_of = table_of(LINES, *_KINDS[LINES])
-"""Of the search lines: distances, positions, velocities; the same of the short lines; slots that are measured; by
+"""Search lines: distances, positions, velocities; the same of the short lines; slots that are measured; by
 task: largest distance from the search lines."""
 sides_of = table_of(SIDES, *_KINDS[SIDES])
-"""Of the faces: distances, corners; the same of the edges."""
+"""Faces: distances, corners; the same of the edges."""
 numbers_of = table_of(NUMBERS, *_KINDS[NUMBERS])
 """Counts, reals, control word of the program."""
 rows_of = table_of(ROWS, *_KINDS[ROWS])

@@ -44,12 +44,12 @@ class ActiveRows:
         return np.asarray(self.room.nodes[self.found[: self.n]])
 
     def holder(self, slots: int) -> Indices:
-        """(slots,) working array of a number for each slot, all -1. Each function that uses the array must reset it to
-        -1.
+        """Working array of a number for each slot, all -1, at least ``slots`` long. Each function that uses the array
+        must reset it to -1.
         """
         if len(self._holder) < slots:
             self._holder = np.full(slots + slots // _SPARE, -1, np.int32)
-        return self._holder[:slots]
+        return self._holder
 
     def _reserve(self, most: int) -> None:
         """Allocates at least ``most`` rows; copies only rows with active contacts."""

@@ -16,10 +16,11 @@ _B1, _U1, _N1, _N2 = types.boolean[::1], types.uint8[::1], types.int32[::1], typ
 _I1, _I2, _I3 = types.int64[::1], types.int64[:, ::1], types.int64[:, :, ::1]
 _F1, _F2 = types.float64[::1], types.float64[:, ::1]
 
-ROWS, NODES_OF, ROOM, SORTED, STORED, BOUNDS, BODIES, BOOKS, STEP, SUMS = range(10)
-"""Numbers of the tables: rows of the narrow phase; surface nodes; working arrays; contacts in the order of their sets;
-stored impulses; walls and planes; nodes of the rank; energies; numbers of the step; sums by task."""
+STEP, ROWS, NODES_OF, ROOM, SORTED, STORED, BOUNDS, BODIES, BOOKS, SUMS = range(10)
+"""Numbers of the tables: numbers of the step; rows of the narrow phase; surface nodes; working arrays; contacts in the
+order of their sets; stored impulses; walls and planes; nodes of the rank; energies; sums by task."""
 _KINDS = {
+    STEP: (_I1, _F1, _I1),
     ROWS: (CONTACT_ROWS, _N1),
     NODES_OF: (SURFACE, _F2, _I2, _N1),
     ROOM: (NODES, _N1, _N2, _F1, _N1, _N1, _N1, _U1, _U1, LOADED, BRACED),
@@ -28,13 +29,12 @@ _KINDS = {
     BOUNDS: (STOPS, _B1),
     BODIES: (_F2, _N1, _B1),
     BOOKS: (_F1, _F1),
-    STEP: (_I1, _F1, _I1),
     SUMS: (_I1, _I2, _I2, _I1, _F1, _I3, _I3, _I2, _I3),
 }
 rows_of = table_of(ROWS, *_KINDS[ROWS])
 """Rows of the narrow phase (ContactRows), numbers of the active ones."""
 nodes_of = table_of(NODES_OF, *_KINDS[NODES_OF])
-"""Of the surface nodes: Surface, v(n-1/2), impulse of the step, zone."""
+"""Surface nodes: Surface, v(n-1/2), impulse of the step, zone."""
 room_of = table_of(ROOM, *_KINDS[ROOM])
 """ActiveNodes; row, slots, reach and set of each contact; places, slot, touched, shared (slot_numbers.py); Loaded,
 Braced."""
@@ -45,9 +45,9 @@ stored_of = table_of(STORED, *_KINDS[STORED])
 bounds_of = table_of(BOUNDS, *_KINDS[BOUNDS])
 """Stops, nodes without tets."""
 bodies_of = table_of(BODIES, *_KINDS[BODIES])
-"""Of the nodes of the rank: velocity, part, whether the rank owns it."""
+"""Nodes of the rank: velocity, part, whether the rank owns it."""
 books_of = table_of(BOOKS, *_KINDS[BOOKS])
-"""Of the nodes of the rank: energy lost by contact, external work."""
+"""Nodes of the rank: energy lost by contact, external work."""
 step_of = table_of(STEP, *_KINDS[STEP])
 """Counts, real numbers, control word of the program."""
 sums_of = table_of(SUMS, *_KINDS[SUMS])

@@ -8,15 +8,14 @@ from ...kernels.jit import Kernel
 from ...model.state import Floats, Indices, Ints
 from ...parallel.program import Program, Span
 from ...parallel.team import Stage, Team
-from ..narrow_phase.tables import ContactRows
 from ..surface.records import SurfaceNodes
 from . import impulse_work, layout, stages, zones
-from .active import IMPULSE, PUSH, PUSH_T, ActiveContacts, ActiveNodes, Loaded
+from .active import IMPULSE, PUSH, PUSH_T, ActiveNodes, Loaded
 from .layout import CONTACTS_N, CRACKS_N, NODES_N, PAIRS_N, SLOTS_N
 from .shared_sums import ActiveSum
 from .stages import CONTACTS_OF_A_TASK, END, KEPT_OF_A_TASK, SLOTS_OF_A_TASK
 from .step import SolverStep
-from .stops import Braced, Stops, Surface
+from .stops import Braced, Stops
 from .zones import Zones
 
 _NONE: Indices = np.zeros(0, np.int32)
@@ -72,8 +71,6 @@ class ActiveSet:
         self._room = _Room(0, 0, near.sides.shape, self._zones.many)
         self._handle, (self._counts, self._reals) = layout.handle(), layout.numbers()
         self._program = self._stages(team)
-        self._of: ContactRows | None = None
-        self._contacts: ActiveContacts
         self._stored = True
 
     def go_on(self, scale: float, sides: Floats) -> None:
@@ -114,22 +111,14 @@ class ActiveSet:
         if rows.n > len(self._room.row) or nodes.n > len(self._room.touched):
             of = int(_SPARE * rows.n), int(_SPARE * nodes.n)
             self._room = _Room(*of, self.stops.sides.shape, self._zones.many)
-        room, books, tables = self._room, step.books, self._handle
-        if rows.room is not self._of or room.row is not self._contacts.row:
-            self._of = found = rows.room
-            self._contacts = ActiveContacts(
-                room.row, room.slots, room.reach, found.weights, found.normals, found.wanted, found.friction, found.pair
-            )  # fmt: skip
-            tables.set(layout.SORTED, self._contacts)
-        tables.set(layout.ROWS, rows.room, rows.found)
-        surface = Surface(nodes.x, nodes.v, nodes.mobility, nodes.part, nodes.local)
-        tables.set(layout.NODES_OF, surface, step.before, step.total, self._zones.of(nodes))
-        tables.set(layout.ROOM, *room.arrays)
-        tables.set(layout.STORED, step.kept)
-        tables.set(layout.BOUNDS, self.stops, step.loose)
-        tables.set(layout.BODIES, step.state.v, step.state.part, step.state.owned)
-        tables.set(layout.BOOKS, books.contact_loss, books.external_work)
-        tables.set(layout.SUMS, *room.sums)
+        room, books, found, state = self._room, step.books, rows.room, step.state
+        self._handle.set(
+            layout.ROWS, *found, rows.found,
+            nodes.x, nodes.v, nodes.mobility, nodes.part, nodes.local, step.before, step.total, self._zones.of(nodes),
+            *room.arrays, room.row, room.slots, room.reach, found.weights, found.normals, found.wanted, found.friction,
+            found.pair, *step.kept, *self.stops, step.loose, state.v, state.part, state.owned,
+            books.contact_loss, books.external_work, *room.sums,
+        )  # fmt: skip
         counts, reals = self._counts, self._reals
         kept = len(step.kept.pairs), len(step.kept.cracks)
         counts[:] = rows.n, nodes.n, counts[SLOTS_N], *kept, 1, 0, step.sweeps, 3 if step.rubs else 1
@@ -292,8 +281,8 @@ class _Room:
         self.along, self.rub = np.zeros((2, sets, 2, 2), np.int64)
         self.left, self.parts = np.zeros((ranges, 3), np.int64), np.zeros((ranges, parts, 3), np.int64)
         self.arrays = (
-            self.active, self.row, self.slots, self.reach, self.set_of, self.places, self.slot, self.touched,
-            self.shared, self.loaded, self.braced,
+            *self.active, self.row, self.slots, self.reach, self.set_of, self.places, self.slot, self.touched,
+            self.shared, *self.loaded, *self.braced,
         )  # fmt: skip
         flags, (many, begins) = np.zeros(tasks, np.int64), np.zeros((2, tasks, sets), np.int64)
         counted, fastest = np.zeros(ranges, np.int64), np.zeros(ranges)

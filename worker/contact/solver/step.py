@@ -11,7 +11,7 @@ from .active import Kept
 
 @dataclass(frozen=True)
 class SolverStep:
-    """What the solver reads and writes in a step."""
+    """Input and output of the solver in a step."""
 
     rows: ActiveRows
     """Active contacts."""
