@@ -66,6 +66,8 @@ class Header(msgspec.Struct, kw_only=True, frozen=True):
     fragments_listed: int
     """Rows of the table except the last one, if that is the sum of the others."""
     fields: dict[str, Field]
+    walls: list[tuple[float, float, float]] = []
+    """Positions of the walls of the case, m; empty if none of them moves."""
     arrays: dict[str, Array] = {}
 
 

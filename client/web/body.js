@@ -12,6 +12,7 @@ import { colourings, fragment, rowOf } from "./snapshot.js";
 import { Snapshots } from "./snapshots.js";
 import { Tools } from "./tools.js";
 import { View3d } from "./view3d.js";
+import { wallsOf } from "./walls.js";
 
 const MOST_KEPT = 40; // Largest number of decoded snapshots, about 1 MB each.
 const PLAY = 400; // ms for each snapshot.
@@ -68,6 +69,8 @@ export class Body {
       this.tools.mirrorLine.hidden = !this.planes.length;
       this.view = new View3d(modules, (row) => this.pick(row));
       this.view.set({ cuts: this.planes });
+      this.view.stand(wallsOf(plan));
+      this.tools.wallLine.hidden = !wallsOf(plan).length;
       this.view.eye.onMode = () => { this.tools.frame.value = this.view.eye.mode === "part" ? `part ${this.view.eye.part}` : this.view.eye.mode; };
       Object.assign(this.view.canvas, { tabIndex: 0 });
       this.view.canvas.setAttribute("role", "application");

@@ -5,6 +5,7 @@ import { swatch } from "./linestyles.js";
 import { symmetry } from "./plane.js";
 import { Snapshots } from "./snapshots.js";
 import { View3d } from "./view3d.js";
+import { wallsOf } from "./walls.js";
 
 const MOST_KEPT = 24; // Largest number of decoded snapshots for each run.
 const ALIKE = 0.01; // Largest difference of a snapshot from the time of the clock, over the time of the last snapshot, that is not written.
@@ -18,6 +19,7 @@ export class Pane {
     Object.assign(this, { run, cut, store: new Snapshots(run.id, MOST_KEPT), planes: symmetry(run.plan), wanted: null });
     this.view = new View3d(modules);
     this.view.set({ cuts: this.planes });
+    this.view.stand(wallsOf(run.plan));
     this.view.canvas.tabIndex = 0;
     this.view.canvas.setAttribute("role", "application");
     this.view.canvas.setAttribute("aria-label", `the body of ${run.called}; arrow keys turn all bodies, plus and minus zoom, more keys are listed under Camera`);

@@ -102,8 +102,10 @@ export class Tools {
     this.edgeNote = h("p.hint");
     this.mirrorLine = line("mirror", "mirror images", false);
     this.mirrorLine.hidden = true;
+    this.wallLine = line("walls", "rigid walls", true);
+    this.wallLine.hidden = true;
     return h("div.lines", {}, line("lines", "outlines of fragments", true), line("edges", "edges of the mesh", false), this.edgeNote,
-      this.mirrorLine, line("arrows", "velocities as arrows", false), line("axes", "axes", true), line("bar", "scale bar", true), line("legend", "legend", true), field("Pull apart", this.explode));
+      this.mirrorLine, this.wallLine, line("arrows", "velocities as arrows", false), line("axes", "axes", true), line("bar", "scale bar", true), line("legend", "legend", true), field("Pull apart", this.explode));
   }
 
   save() {

@@ -9,6 +9,7 @@ import { draw as drawOver } from "./overlay.js";
 import { ramp, scaleOf } from "./scales.js";
 import { css, ofFragment, ofName } from "./colours.js";
 import { Surface } from "./surface.js";
+import { Walls } from "./walls.js";
 
 const MANY = 60_000; // Number of triangles from which lines are drawn only after the body stops moving.
 const STILL = 160; // ms.
@@ -22,12 +23,13 @@ export class View3d {
     this.canvas = this.renderer.domElement;
     this.over = h("canvas.over", { "aria-hidden": "true" });
     this.element = h("div.view3d", {}, this.canvas, this.over);
-    this.look = { explode: 0, mirrors: [], cuts: [], opacities: [], lines: true, edges: false, arrows: false, axes: true, bar: true, legend: true, caption: "" };
+    this.look = { explode: 0, mirrors: [], cuts: [], opacities: [], lines: true, edges: false, walls: true, arrows: false, axes: true, bar: true, legend: true, caption: "" };
     this.surface = new Surface(THREE);
     this.outlines = new Outlines(THREE);
     this.arrows = new Arrows(THREE);
     this.extras = new THREE.Scene();
-    this.extras.add(this.arrows.mesh);
+    this.walls = new Walls(THREE);
+    this.extras.add(this.arrows.mesh, this.walls.group);
     this.point = new THREE.WebGLRenderTarget(1, 1);
     this.eye = new ViewCamera(modules, this.canvas, () => this.turned(), () => ({ ...this.look, snapshot: this.snapshot, shown: (part) => this.opacity(part) > 0.005 }));
     this.picked = -1;
@@ -45,6 +47,7 @@ export class View3d {
     this.snapshot = snapshot;
     this.surface.show(snapshot);
     this.surface.slice(this.section ?? null);
+    this.walls.show(snapshot);
     this.colour(this.by ?? "fragment", this.range, this.bands);
     this.pointers();
     if (this.sized) this.eye.keep();
@@ -65,11 +68,19 @@ export class View3d {
     this.later();
   }
 
-  // Any of `look`: explode, mirrors and cuts ({ axis, at } each), opacities by part, lines, edges, arrows, axes, bar, legend, caption.
+  // The rigid walls of the case (walls.js).
+  stand(list) {
+    this.walls.take(list);
+    if (this.snapshot) this.walls.show(this.snapshot);
+    this.later();
+  }
+
+  // Any of `look`: explode, mirrors and cuts ({ axis, at } each), opacities by part, lines, edges, walls, arrows, axes, bar, legend, caption.
   set(changes) {
     Object.assign(this.look, changes);
     this.surface.shared.explode.value = this.look.explode;
     this.surface.shared.edges.value = this.look.edges ? 0.5 : 0;
+    this.walls.group.visible = this.look.walls;
     if ("opacities" in changes) this.surface.opacities(this.look.opacities);
     if (!this.snapshot) return;
     if ("mirrors" in changes) {
@@ -154,7 +165,7 @@ export class View3d {
     renderer.setClearColor(0, 0);
     renderer.clear();
     surface.draw(renderer, camera);
-    if (this.arrows.mesh.visible) renderer.render(this.extras, camera);
+    if (this.arrows.mesh.visible || this.walls.seen) renderer.render(this.extras, camera);
     const lines = look.lines && !this.moving;
     if (lines || this.picked >= 0) {
       this.outlines.draw(renderer, () => surface.numbers(renderer, camera), camera, { picked: this.picked, lines, ink: tones.ink });
@@ -229,7 +240,7 @@ export class View3d {
     this.watch.disconnect();
     this.dark.removeEventListener("change", this.theme);
     this.eye.controls.dispose();
-    for (const one of [this.surface, this.outlines, this.arrows, this.point]) (one.close ?? one.dispose).call(one);
+    for (const one of [this.surface, this.outlines, this.arrows, this.walls, this.point]) (one.close ?? one.dispose).call(one);
     this.renderer.dispose();
   }
 }

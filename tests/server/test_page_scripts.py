@@ -15,6 +15,7 @@ import numpy as np
 import pytest
 from scipy.spatial import ConvexHull
 
+from conoid.cases.load import parse_case
 from conoid.cases.output import fragments
 from conoid.client.drawing import part_colours, scales
 from conoid.client.drawing.fields import FIELDS
@@ -493,3 +494,34 @@ def test_the_tooltip_of_any_chart_stays_text(ask: Ask) -> None:
     texts = ask("axes.js", script)
     assert (texts["renderMode"], texts["trigger"]) == ("richText", "axis")
     assert "common(" not in (WEB / "charts.js").read_text()
+
+
+def test_walls_stand_where_the_snapshot_has_them(ask: Ask) -> None:
+    """The case is the resolved one, in which absent keys are null."""
+    walls: list[dict[str, Any]] = [
+        {"kind": "wall", "point": [0, 0, -1], "normal": [0, 0, 2]},
+        {"kind": "wall", "name": "wall_1", "shape": "sphere", "point": [0, 0, 9], "radius": 2, "mass": 1},
+        {
+            "kind": "wall",
+            "name": "wall_2",
+            "shape": "cylinder",
+            "point": [5, 7, 0],
+            "axis": [0, 1, 0],
+            "radius": 1,
+            "velocity": [0, 0, 0],
+        },
+        {"kind": "wall", "name": "wall_3", "point": [0, 0, 9], "normal": [0, 0, -1], "velocity": [0, 0, -3]},
+        {"kind": "symmetry", "axis": "x"},
+    ]
+    mesh = {"shape": "box", "low": [0, 0, 0], "high": [1, 1, 1], "element_size": 1}
+    case = {"name": "w", "run": {"end_time": 1}, "parts": [{"name": "a", "material": "steel", "mesh": mesh}]}
+    plan = parse_case({**case, "boundaries": walls}).model_dump(mode="json")
+    script = """page.wallsOf(data.plan).map((wall, k) => page.placed(wall, data.walls[k], [[0, 0, 0], [2, 2, 2]]))
+        .map((at) => at && [at.centre, at.along, Math.round(at.radius * 100) / 100])"""
+    here = [[0, 0, -1], [0, 0, 4], [5, 7, 0], [0, 0, 3]]
+    assert ask("walls.js", script, {"plan": plan, "walls": here}) == [
+        [[1, 1, -1], [0, 0, 1], 2.34], [[0, 0, 4], [0, 0, 1], 2], [[5, 1, 0], [0, 1, 0], 1],
+        [[1, 1, 3], [0, 0, -1], 2.34],
+    ]  # fmt: skip
+    unknown = ask("walls.js", script, {"plan": plan, "walls": []})
+    assert [at is None for at in unknown] == [False, True, False, True], "positions of moving walls are not known"

@@ -30,7 +30,7 @@ PATIENCE = 60.0
 def task(n: int, ranks: int = 1) -> dict[str, Any]:
     return {
         "n": n, "step": 10 * n, "t": 1e-6 * n, "ranks": ranks, "parts": PARTS, "end": 1.0, "frames": 0, "cause": "end",
-        "dropped": 0,
+        "dropped": 0, "walls": [],
     }  # fmt: skip
 
 

@@ -66,6 +66,11 @@ class Walls:
         """Number of walls."""
         return len(self.mass)
 
+    def places(self, n: int) -> Floats | None:
+        """Returns (n, 3) the positions of the first ``n`` walls, m; None if none of them moves."""
+        moves = (self.lightness[:n] > 0.0) | self.given[:n].any(axis=1)
+        return self.shapes.point[:n].copy() if moves.any() else None
+
     def keep(self) -> tuple[Floats, Floats]:
         """Returns positions and velocities, for a checkpoint."""
         return self.shapes.point.copy(), self.speed.copy()

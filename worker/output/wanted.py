@@ -18,15 +18,7 @@ def wanted(sim: Simulation, index: int) -> Wanted:
     run = sim.case.run
     sets = {layout.set_array(name): bit for name, bit in bits(sim.case).items()}
     passed = run.end_time / run.frames if index else 0.0
-    return Wanted(run.fields, _impulses(sim), passed, _walls(sim), sets)
-
-
-def _walls(sim: Simulation) -> Floats | None:
-    """Return (walls, 3) the positions of the walls of the case, m; None if no wall moves."""
-    n = len(sim.case.boundaries_of(Wall))  # further walls are images of rigid parts behind planes of symmetry
-    walls = sim.walls
-    moves = (walls.lightness[:n] > 0.0) | walls.given[:n].any(axis=1)
-    return walls.shapes.point[:n].copy() if moves.any() else None
+    return Wanted(run.fields, _impulses(sim), passed, sim.walls.places(len(sim.case.boundaries_of(Wall))), sets)
 
 
 def _impulses(sim: Simulation) -> Floats | None:

@@ -63,7 +63,7 @@ Births = Callable[[Ints], Floats]
 
 
 def made(whole: Whole, stamp: dict[str, Any], births: Births, budget: Budget) -> Made:
-    """Return the snapshot of a model. ``stamp``: n, step, t and ranks for the header."""
+    """Return the snapshot of a model. ``stamp``: n, step, t, ranks and walls for the header."""
     labels = np.concatenate([np.zeros(0, np.int64), *connectivity.labels(whole.model, whole.held, SerialComm())])
     every = table.measured(whole, _numbers(whole, labels))
     columns, row = table.columns(every, births(every.label))

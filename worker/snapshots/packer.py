@@ -67,7 +67,7 @@ def _made(folder: Path, task: dict[str, Any], births: Births) -> dict[str, Any]:
         for path in paths:
             path.unlink(missing_ok=True)
     initial = whole.initial or len(task["parts"])
-    header = {name: task[name] for name in ("n", "step", "t", "ranks")}
+    header = {name: task[name] for name in ("n", "step", "t", "ranks", "walls")}
     made = blob.made(
         whole, header, lambda numbers: births.at(task["t"], numbers, initial, kept=whole.initial > 0), blob.Budget()
     )

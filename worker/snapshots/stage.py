@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from conoid.cases import messages
+from conoid.cases.model.boundaries import Wall
 from conoid.cases.output import fields, layout
 
 from ..clock import Clock
@@ -137,9 +138,11 @@ class Snapshots:
         passed = max(0, place - self._next) + self._dropped
         self._wait(max(self._next, place + 1))
         self._dropped = 0
+        walls = sim.walls.places(len(sim.case.boundaries_of(Wall)))
         return {
             "n": self._n, "step": clock.step, "t": clock.t, "ranks": sim.comm.size, "parts": sim.model.parts,
             "end": run.end_time, "frames": run.frames, "cause": cause, "dropped": passed,
+            "walls": [] if walls is None else walls.tolist(),
         }  # fmt: skip
 
 
