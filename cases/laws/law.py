@@ -1,8 +1,8 @@
 """The base of the laws of strength: cost, estimates and checks that every law provides besides its constants.
 
-A law is a file here, with its constants in SI, its checks and its estimates, and a file of the same name in
-worker/materials, with its kernel; ``Strength`` in cases/model/materials.py and ``LAWS`` in
-worker/materials/models.py list them.
+A law has two files of the same name: one in this folder with its constants in SI, its checks and its estimates, and one
+in worker/materials with its kernel. ``Strength`` in cases/model/materials.py and ``LAWS`` in worker/materials/models.py
+list them.
 """
 
 import math

@@ -47,7 +47,7 @@ class Run(Model):
     surface (a third of each face that is hit at less than 60 degrees), over that area and time; 0 in the first
     frame. Walls that push rigid parts are not included: use a probe of ``wall_force``."""
     sets: tuple[SetName, ...] = ()
-    """Names of node sets and surfaces of mesh files that the frames contain, beside those that boundaries and probes
+    """Names of node sets and surfaces of mesh files. Frames contain these sets, and the sets that boundaries and probes
     select with ``on``: a point array ``set_NAME`` each, 1 on the nodes of the set. ``conoid view --on NAME`` draws the
     tets that have a node in the set."""
     samples: Annotated[Count, Field(ge=1, le=1_000_000)] = 500

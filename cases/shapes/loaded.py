@@ -32,8 +32,8 @@ _FACETS, _CURVED, _FLAT = 0.3, 0.02, 1e-6
 first value times the square of the element size over the radius (a chord 1.3 times as long as an element and the end
 of a cylinder: a sixth of it squared), plus the second; flat faces: the third. Chosen, except the sixth (geometry)."""
 _CORNERS = 4.0
-"""Area of the faces of curved and unstructured meshes that can be in a region without any patch, over the square of
-the element size (chosen value)."""
+"""Area of faces, over the square of the element size, that a region may contain although it contains no patch; for
+curved and unstructured meshes (chosen value)."""
 
 
 def loads(case: Case, counted: Sequence[Load] = ()) -> list[Load]:

@@ -45,7 +45,7 @@ class LocalFolder:
         return sorted(path.relative_to(self.root).as_posix() for path in self.root.rglob("*") if path.is_file())
 
     def path(self, name: str) -> Path:
-        """Returns the file itself. Raises ClientError for a link that leads out of the folder."""
+        """Returns the path of the file in this folder. Raises ClientError for a link that leads out of the folder."""
         path = self.root / name
         if not path.is_file():
             raise UnfinishedError(self._lacks(name))

@@ -225,7 +225,8 @@ def _worth(book: Book, name: str) -> str:
         f"{_percent(goal.uncertainty)} %, by way of each variant's own: errors that cancel by chance do not count."
     )
     others = [str(variant) for variant in trade.elsewhere(book.series, each, goal)]
-    text += f" Another limit, further away than both are uncertain, has: {'; '.join(others)}." if others else ""
+    far = f" The limit of another variant differs by more than both uncertainties: {'; '.join(others)}."
+    text += far if others else ""
     return f"{text}\n\n{table(('variant', 'element size', 'CPU s', 'error %', 'Pareto'), rows)}"
 
 
