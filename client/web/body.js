@@ -207,7 +207,10 @@ export class Body {
   list() {
     if (!this.tools.fragments.open || !this.snapshot) return;
     const row = this.picked === null ? -1 : rowOf(this.snapshot, this.picked);
-    this.tools.heaviest.replaceChildren(...table(this.snapshot, row, (chosen) => this.pick(chosen)));
+    const { heaviest } = this.tools;
+    const focused = heaviest.contains(document.activeElement) && document.activeElement.innerText;
+    heaviest.replaceChildren(...table(this.snapshot, row, (chosen) => this.pick(chosen)));
+    if (focused) [...heaviest.querySelectorAll("button")].find(({ innerText }) => innerText === focused)?.focus({ preventScroll: true });
   }
 
   // Returns { t, mass, speed } of a fragment: from the server, or from the snapshots in memory.

@@ -8,6 +8,7 @@ import { save, tableOf, toCsv } from "./tables.js";
 
 const GROUP = "run";
 const NEAR = "100px"; // Distance to the window: a chart farther off is drawn when the browser is idle, and again when it comes near.
+const KINDS = ["CSV", "SVG"]; // Forms in which a chart is saved.
 const PICTURE = { width: 960, height: 420 }; // px of a saved picture.
 const IDLE = 2000; // ms after which a chart out of view is drawn by a browser that is never idle.
 const whenIdle = (work) => globalThis.requestIdleCallback?.(work, { timeout: IDLE }) ?? setTimeout(work, 200); // Some browsers lack this function.
@@ -18,11 +19,11 @@ const whenIdle = (work) => globalThis.requestIdleCallback?.(work, { timeout: IDL
 // is drawn after `before`, a promise. `missing()` returns the text of a chart without data.
 export class Chart {
   constructor(height, label, option, { alone = false, unit = "s", onClick, onEnter, table, before, missing = () => "", name = () => "chart" } = {}) {
-    this.element = h("div.plot", { tabindex: 0, role: "img", "aria-label": `${label}; arrow keys move the cursor${onEnter ? ", Enter opens the nearest marker" : ""}`, style: { height: `${height}px` } },
+    this.element = h("div.plot", { tabindex: 0, role: "img", style: { height: `${height}px` } },
       this.hint = h("p.hint"));
     Object.assign(this, { height, label, option, alone, unit, onClick, onEnter, table, missing, name, at: 0, seen: false });
-    const button = (kind, act) => h("button.tab", { type: "button", title: `save as ${kind}`, "aria-label": `save as ${kind}: ${label}`, onclick: act }, kind);
-    this.tools = h("span.save", { hidden: "" }, button("CSV", () => this.saveTable()), button("SVG", () => this.savePicture()));
+    const button = (kind, act) => h("button.tab", { type: "button", title: `save as ${kind}`, onclick: act }, kind);
+    this.tools = h("span.save", { hidden: "" }, button(KINDS[0], () => this.saveTable()), button(KINDS[1], () => this.savePicture()));
     this.eye = new IntersectionObserver((entries) => this.look(entries.at(-1).isIntersecting), { rootMargin: NEAR });
     this.eye.observe(this.element);
     this.watch = new ResizeObserver(() => this.chart?.resize());
@@ -33,7 +34,13 @@ export class Chart {
     this.element.addEventListener("pointermove", ({ clientX, clientY }) => { this.pointer = [clientX, clientY]; });
     this.element.addEventListener("pointerleave", () => this.leave());
     this.element.addEventListener("blur", () => this.leave());
+    this.rename(label);
     this.open(before);
+  }
+
+  rename(label) {
+    this.element.setAttribute("aria-label", `${label}; arrow keys move the cursor${this.onEnter ? ", Enter opens the nearest marker" : ""}`);
+    [...this.tools.children].forEach((button, i) => button.setAttribute("aria-label", `save as ${KINDS[i]}: ${label}`));
   }
 
   async open(before) {

@@ -31,6 +31,8 @@ export class ComparePage {
     this.sheet = new ResultTable();
     this.bodies = new SideBySide();
     this.sizes = new Chart(TALL, "number of fragments of a size and larger, of each run", () => this.ofSizes(), { alone: true, name: () => "fragment_sizes", table: undefined });
+    this.toBodies = jump("Bodies", this.bodies.element);
+    this.toBodies.hidden = true;
     this.element = h("div.work", {}, this.head, this.grid, this.sheet.element, this.bodies.element);
     document.title = `${ids.length} runs · Conoid`;
     this.read();
@@ -82,6 +84,7 @@ export class ComparePage {
     const broken = this.runs.some(({ snapshot }) => snapshot && fitted(snapshot).points.length > snapshot.header.parts.length);
     if (broken && !this.sizes.placed) this.grid.append(this.sizes.placed = this.card("Fragments of a size and larger, without dust", this.sizes.tools, this.sizes.element));
     this.sizes.draw();
+    this.toBodies.hidden = !this.runs.some(({ snapshots }) => snapshots?.length);
     this.bodies.offer(this.runs.flatMap(({ id, snapshots }, line) => (snapshots?.length ? [{ id, snapshots, line, called: this.names[line], plan: this.runs[line].plan }] : [])));
   }
 
@@ -124,7 +127,7 @@ export class ComparePage {
     const focused = document.activeElement?.dataset?.run;
     const cases = [...new Set(this.runs.map(({ info }) => info.title || info.name))];
     this.head.replaceChildren(
-      h("div.card-head", {}, h("h1", {}, `${this.runs.length} runs`), h("span.hint", {}, cases.length === 1 ? cases[0] : ""), h("span.note", {}, this.adder())),
+      h("div.card-head", {}, h("h1", {}, `${this.runs.length} runs`), h("span.hint", {}, cases.length === 1 ? cases[0] : ""), h("span.note.jumps", {}, this.adder(), jump("Values", this.sheet.element), this.toBodies)),
       h("div.run-lines", { role: "group", "aria-label": "runs; press to hide or show" }, this.runs.map((run, i) => this.entry(run, i))));
     if (focused) this.head.querySelector(`[data-run="${CSS.escape(focused)}"]`)?.focus();
   }
@@ -162,11 +165,12 @@ export class ComparePage {
     const made = { name };
     const list = h("select", { "aria-label": "quantity", onchange: () => {
       made.name = list.value;
+      made.chart.rename(about(made.name));
       this.keep();
       this.fill([made]);
     } }, Object.entries(this.offered()).filter(([, names]) => names.length).map(([group, names]) =>
       h("optgroup", { label: group }, names.map((one) => h("option", { value: one, selected: one === name ? "" : false }, inWords(one))))));
-    made.chart = new Chart(TALL, "a quantity of all runs over time", () => this.overlaid(made.name), { name: () => `compared_${made.name}`, table: () => this.table(made.name) });
+    made.chart = new Chart(TALL, about(name), () => this.overlaid(made.name), { name: () => `compared_${made.name}`, table: () => this.table(made.name) });
     const shut = h("button.tool.shut", { type: "button", "aria-label": "close this chart", onclick: () => {
       made.chart.close();
       made.element.remove();
@@ -225,6 +229,15 @@ export class ComparePage {
     return { legend: { show: false }, grid: { left: 64, right: 14, top: 26, bottom: 26 }, xName: "size [m]", xAxis: logarithmic("m", { splitLine: { show: false } }), yAxis: logarithmic("", { min: 1, axisLabel: { formatter: count } }), series: list };
   }
 }
+
+const about = (name) => `${inWords(name)} of all runs over time`;
+
+// A button that shows a card further down.
+const jump = (name, card) => h("button.quiet", { type: "button", "aria-label": `${name}: go to the card`, onclick: () => {
+  card.tabIndex = -1;
+  card.scrollIntoView({ block: "start" });
+  card.focus({ preventScroll: true });
+} }, `${name} ↓`);
 
 const empty = (ends) => ({ xAxis: time(Math.max(...ends)), yAxis: axis("", 1), series: [] });
 

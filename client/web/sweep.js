@@ -141,6 +141,8 @@ export class SweepPage {
   drawFailed() {
     const failed = this.points.filter(({ row }) => FINAL.has(row.state) && row.state !== "succeeded");
     this.failed.hidden = !failed.length;
+    if (this.failed.number === failed.length) return; // The links keep the focus.
+    this.failed.number = failed.length;
     this.failed.replaceChildren(h("div.card-head", {}, h("h2", {}, `${counted(failed.length, "point")} without a result`)),
       h("ul", {}, failed.map(({ n, row }) => h("li", {}, pill(row.state), " ", h("a", { href: `#/runs/${row.id}` }, this.words(row, n)), " ", row.message || row.cause || ""))));
   }

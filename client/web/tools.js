@@ -32,8 +32,15 @@ export class Tools {
     this.limit = h("span.hint.limit", { role: "status" });
     this.cutting = h("span.cutting", { hidden: "" }, this.place, this.position, this.flip);
     this.element = h("div.tools3d", { role: "toolbar", "aria-label": "tools of the body" }, field("Colour", this.by), field("Section", this.across), this.limit, this.panels);
-    this.element.addEventListener("keydown", (event) => { if (event.key === "Escape") this.shut(); });
+    this.element.addEventListener("keydown", (event) => { if (event.key === "Escape") this.leave(); });
     for (const one of this.panels) one.addEventListener("toggle", () => { if (one.open) this.shut(one); });
+  }
+
+  // The focus returns to the button of the open panel.
+  leave() {
+    const open = this.panels.find((one) => one.open);
+    this.shut();
+    open?.querySelector("summary").focus();
   }
 
   shut(except) {
