@@ -25,6 +25,7 @@ from .drawing.planes import Mirror, Wall
 from .drawing.scene import Scene, draw
 from .drawing.view_options import FILMS
 from .errors import ClientError, LookError, NotFoundError, UnfinishedError, ViewError
+from .history import read_history
 from .journal import from_line
 from .local.folders import Folder, LocalFolder
 from .reports import html
@@ -142,9 +143,10 @@ class Result:
     @cached_property
     def history(self) -> Columns:
         """The columns of history.csv in their order: step, t (s), dt (s), the energies (J), the probes.
-        ``history.frame()`` returns a pandas.DataFrame.
+        ``history.frame()`` returns a pandas.DataFrame. Warns if lines are missing.
         """
-        return read_columns(self.folder.path(layout.HISTORY).read_text(encoding="utf-8"))
+        text = self.folder.path(layout.HISTORY).read_text("utf-8", "replace")
+        return read_history(text, self.folder.named(layout.HISTORY), lambda: self.outcome)
 
     @cached_property
     def fragment_tables(self) -> list[int]:

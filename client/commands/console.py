@@ -8,6 +8,7 @@ hide text. All of them are printed as escapes such as ``\\u001b``, which are als
 import json
 import re
 import sys
+import warnings
 from collections.abc import Iterable
 from typing import Any
 
@@ -63,8 +64,14 @@ def echo_json(thing: Any, *, indent: bool = True) -> None:
     echo((msgspec.json.format(text, indent=2) if indent else text).decode())
 
 
+def _show_warning(message: Warning | str, *_: object, **__: object) -> None:
+    echo(f"conoid: warning: {one_line(str(message))}", err=True)
+
+
 def prepare() -> None:
-    """Makes this process print characters that the encoding of the terminal lacks as escapes."""
+    """Makes this process print warnings in one line, and characters that the encoding of the terminal lacks as
+    escapes."""
+    warnings.showwarning = _show_warning
     for stream in (sys.stdout, sys.stderr):
         if hasattr(stream, "reconfigure"):
             stream.reconfigure(errors="backslashreplace")

@@ -95,7 +95,7 @@ def write_run(folder: Path) -> Path:
     files = [{"name": name, "time": t} for name, t in times.items()]
     (folder / "frames" / "frames.vtkhdf.series").write_text(json.dumps({"file-series-version": "1.0", "files": files}))
     (folder / "history.csv").write_text(
-        "step,t [s],dt [s],limiter,kinetic [J]\n0,0.0,8e-09,tet 1,12.5\n10,8e-08,7.5e-09,tet 9,12.25\n"
+        "step,t [s],dt [s],limiter,kinetic [J]\n0,0.0,8e-09,tet 1,12.5\n10,8e-05,7.5e-09,tet 9,12.25\n"
     )
     boundaries: list[dict[str, Any]] = [{"kind": "symmetry", "axis": axis, "at": 0.0, "parts": []} for axis in "xy"]
     boundaries.append({"kind": "wall", "name": "wall", "point": [0, 0, 0], "normal": [0, 0, 1], "parts": []})

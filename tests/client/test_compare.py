@@ -19,7 +19,7 @@ from conoid.client.result import Result
 
 from .bodies import write_fragments, write_history, write_run
 
-TIMES = [0.0, 1e-6, 2e-6]
+TIMES = [0.0, 4e-5, 8e-5]
 
 
 @pytest.fixture
@@ -113,7 +113,7 @@ def test_energy_is_drawn_without_its_kinetic_term(runs: tuple[Result, Result]) -
 def test_energy_is_drawn_part_by_part_where_there_are_several(tmp_path: Path) -> None:
     parts = {f"{name}.{part}": [1.0, 2.0] for part in ("glass", "steel") for name in ("kinetic", "internal")}
     write_history(
-        write_run(tmp_path / "bar"), t=[0.0, 1e-6], initial=[8.0] * 2, residual=[1e-6] * 2, **parts, push=[0.0, 1.0]
+        write_run(tmp_path / "bar"), t=[0.0, 8e-5], initial=[8.0] * 2, residual=[1e-6] * 2, **parts, push=[0.0, 1.0]
     )
     history = Result.open(tmp_path / "bar").history
     *_, kinetic, internal = curves.energy(history).axes

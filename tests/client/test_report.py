@@ -136,7 +136,7 @@ def test_the_parts_have_their_energies_where_there_are_several(folder: Path, tmp
         "kinetic.ball": [1.0, 0.5],
         "internal.ball": [0.0] * 2,
     }
-    write_history(folder, t=[0.0, 4e-5], dt=[1e-8] * 2, **parts)
+    write_history(folder, t=[0.0, 8e-5], dt=[1e-8] * 2, **parts)
     text = read(report.write(Result.open(folder), tmp_path / "two.html", fields=[])).text
     assert "part, at the endkineticinternal" in text
     assert "rod3.00 J1.25 J" in text

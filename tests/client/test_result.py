@@ -1,5 +1,6 @@
 """Results of a run, each read at its first use."""
 
+import warnings
 from array import array
 from pathlib import Path
 
@@ -26,7 +27,7 @@ def test_the_outcome_with_its_reference(folder: Path) -> None:
 def test_history_is_columns_of_numbers_and_text(folder: Path) -> None:
     history = Result.open(folder).history
     assert list(history) == ["step", "t", "dt", "limiter", "kinetic"]
-    assert history["t"] == array("d", [0.0, 8e-8])
+    assert history["t"] == array("d", [0.0, 8e-5])
     assert history["limiter"] == ["tet 1", "tet 9"]
 
 
@@ -93,3 +94,26 @@ def test_a_result_shows_itself_in_notebooks(folder: Path) -> None:
     html = Result.open(folder)._repr_html_()
     for words in ("A steel bar", "succeeded", "extent of rod", "pass"):
         assert words in html
+
+
+@pytest.mark.parametrize(
+    ("text", "problem"),
+    [
+        ("step,t [s]\n0,0\n9,8e-5\n", None),
+        ("step,t [s]\n0,0\n5,4e-5\n", "the lines end at 40.0 µs, the run at 80.0 µs; the last lines are missing"),
+        ("step,t [s]\n", "the lines end at 0 s, the run at 80.0 µs; the last lines are missing"),
+        ("step,t [s]\n0,0\n9,8e-5\n5,4e-5\n", "the file is damaged: its lines are not in the order of time"),
+        ("step,t [s]\n0,0\n9,8e-\ufffd5\n", "the file is damaged: a time is not a number"),
+    ],
+)
+def test_missing_lines_of_a_history_give_a_warning(text: str, problem: str | None, tmp_path: Path) -> None:
+    """A history that was cut off shows the last values of an earlier time as those of the end."""
+    (tmp_path / "history.csv").write_text(text)
+    (tmp_path / "outcome.json").write_text('{"state": "succeeded", "time": 8e-5}')
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        assert "t" in Result.open(tmp_path).history
+    assert [str(each.message) for each in caught] == ([] if problem is None else [f"{tmp_path}/history.csv: {problem}"])
+    (tmp_path / "history.csv").write_text("")
+    with pytest.raises(UnfinishedError, match=r"history\.csv has no columns"):
+        _ = Result.open(tmp_path).history

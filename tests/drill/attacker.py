@@ -17,6 +17,7 @@ from collections import Counter
 from collections.abc import Callable, Iterator
 from contextlib import suppress
 from dataclasses import dataclass, field
+from typing import BinaryIO
 from urllib.parse import urlsplit
 
 from ..server.hostile import quadratic
@@ -228,6 +229,7 @@ def one(chosen: Attack, target: Target) -> None:
 
 
 def talk(chosen: Attack, target: Target, connection: socket.socket) -> None:
+    answers = connection.makefile("rb")  # one reader for all answers: it has read more than the first one
     for request in chosen.requests(target):
         if time.monotonic() > target.until:
             return
@@ -236,7 +238,7 @@ def talk(chosen: Attack, target: Target, connection: socket.socket) -> None:
                 connection.sendall(request[n : n + 1])
                 time.sleep(chosen.drip)
         connection.sendall(request)
-        if chosen.reads and not answered(target, connection):
+        if chosen.reads and not answered(target, answers):
             return
         if not chosen.reads:
             target.answers[-1] += 1
@@ -245,17 +247,16 @@ def talk(chosen: Attack, target: Target, connection: socket.socket) -> None:
     time.sleep(max(0.0, target.until - time.monotonic()))
 
 
-def answered(target: Target, connection: socket.socket) -> bool:
-    """Reads an answer. Returns False if the connection was closed."""
-    with connection.makefile("rb") as answer:
-        words = answer.readline().split()
-        target.answers[int(words[1]) if len(words) > 1 and words[1].isdigit() else 0] += 1
-        length = 0
-        while line := answer.readline().strip().lower():
-            if line.startswith(b"content-length:"):
-                length = int(line.partition(b":")[2])
-        answer.read(length)
-        return bool(words)
+def answered(target: Target, answers: BinaryIO) -> bool:
+    """Reads the next answer of a connection. Returns False if the connection was closed."""
+    words = answers.readline().split()
+    target.answers[int(words[1]) if len(words) > 1 and words[1].isdigit() else 0] += 1
+    length = 0
+    while line := answers.readline().strip().lower():
+        if line.startswith(b"content-length:"):
+            length = int(line.partition(b":")[2])
+    answers.read(length)
+    return bool(words)
 
 
 if __name__ == "__main__":
