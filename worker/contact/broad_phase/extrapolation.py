@@ -62,6 +62,7 @@ def _add_rigid(table, first, stop, thread):  # type: ignore[no-untyped-def]
     r, u = np.empty((4, 3)), np.empty(3)
     inertia, spin, turn = np.empty((3, 3)), np.empty(3), np.empty(3)
     for e in range(first * CHUNK, min(stop * CHUNK, len(tets))):
+        # 1. Compute the centre, the mean velocity u, and the corners r relative to the centre.
         spin[:] = 0.0
         inertia[:] = 0.0
         for i in range(3):
@@ -72,6 +73,7 @@ def _add_rigid(table, first, stop, thread):  # type: ignore[no-untyped-def]
             u[i] = mean
             for a in range(4):
                 r[a, i] = x[tets[e, a], i] - centre
+        # 2. Compute the angular momentum sum(r x v) and the inertia I of four unit masses.
         for a in range(4):
             square = r[a, 0] * r[a, 0] + r[a, 1] * r[a, 1] + r[a, 2] * r[a, 2]
             for i in range(3):
@@ -80,6 +82,7 @@ def _add_rigid(table, first, stop, thread):  # type: ignore[no-untyped-def]
                 inertia[i, i] += square
                 for m in range(3):
                     inertia[i, m] -= r[a, i] * r[a, m]
+        # 3. Solve I omega = sum(r x v) by Cramer's rule; omega = 0 for a thin tet.
         trace = inertia[0, 0] + inertia[1, 1] + inertia[2, 2]
         det = _det(inertia[0], inertia[1], inertia[2])
         turn[:] = 0.0
@@ -87,6 +90,7 @@ def _add_rigid(table, first, stop, thread):  # type: ignore[no-untyped-def]
             turn[0] = _det(spin, inertia[1], inertia[2]) / det
             turn[1] = _det(inertia[0], spin, inertia[2]) / det
             turn[2] = _det(inertia[0], inertia[1], spin) / det
+        # 4. Add u + omega x r and the count to the sums of the corners.
         for a in range(4):
             node = tets[e, a]
             for i in range(3):

@@ -108,7 +108,8 @@ def sweep(active, loaded, ahead, scale, k):  # type: ignore[no-untyped-def]
     rate, change = np.empty(3), np.empty(3)
     for q in range(loaded.many[k]):
         a, b, c, d = slots[q, 0], slots[q, 1], slots[q, 2], slots[q, 3]
-        speed = 0.0  # rate = sum(w_k v_k), u = n . rate
+        # 1. Compute the relative velocity rate = sum(w_k v_k) and its normal component u = n . rate.
+        speed = 0.0
         for i in range(3):
             if c < 0:
                 rate[i] = 0.0 + values[a, V + i] - values[b, V + i]
@@ -117,7 +118,7 @@ def sweep(active, loaded, ahead, scale, k):  # type: ignore[no-untyped-def]
                 rate[i] = rate[i] + tangent[q, 2] * values[c, V + i] + tangent[q, 3] * values[d, V + i]
             speed += normal[q, i] * rate[i]
         old, mu = normal[q, PUSH], normal[q, MU]
-        # p = max(0, p_old + (wanted - u) / R), extrapolated by ahead (p - p_last)
+        # 2. Compute the normal impulse p = max(0, p_old + (wanted - u) / R), extrapolated by ahead (p - p_last).
         least = max(0.0, old + (normal[q, WANTED] - speed) / normal[q, ROW_NORM])
         push = max(0.0, least + ahead * (least - normal[q, LAST]))
         normal[q, LAST] = least
@@ -126,7 +127,8 @@ def sweep(active, loaded, ahead, scale, k):  # type: ignore[no-untyped-def]
         normal[q, PUSH] = push
         for i in range(3):
             change[i] = (push - old) * normal[q, i]
-        if mu > 0.0:  # t = t_old - (rate - u n) / R_t, scaled back to |t| <= mu p
+        # 3. Compute the friction t = t_old - (rate - u n) / R_t, scaled back to |t| <= mu p.
+        if mu > 0.0:
             size = 0.0
             for i in range(3):
                 rate[i] = tangent[q, PUSH_T + i] - (rate[i] - speed * normal[q, i]) / tangent[q, ROW_NORM_T]
@@ -136,7 +138,8 @@ def sweep(active, loaded, ahead, scale, k):  # type: ignore[no-untyped-def]
             for i in range(3):
                 change[i] += factor * rate[i] - tangent[q, PUSH_T + i]
                 tangent[q, PUSH_T + i] = factor * rate[i]
-        for i in range(3):  # node k gets w_k (dp n + dt) in quanta; the first node gets minus the sum of the others
+        # 4. Add w_k (dp n + dt) to node k, in quanta; add minus the sum of the others to the first node.
+        for i in range(3):
             if c < 0:
                 rest = np.int64(np.rint(-change[i] * scale))
             else:
