@@ -18,7 +18,7 @@ class Snapshot:
     """Content of a snapshot. Arrays are views of its bytes where possible."""
 
     def __init__(self, data: bytes) -> None:
-        """Raises ClientError for other data."""
+        """Raises ClientError for bytes that are not a snapshot."""
         self.data = data
         try:
             self.header = snapshot.header_of(data)

@@ -8,8 +8,8 @@ from pathlib import Path
 from conoid.cases.reading import whole
 
 _PROBE = 1 << 16
-"""Number of bytes that are written to test whether a folder can be written (chosen value). A launch writes fewer
-bytes."""
+"""Number of bytes that are written to test whether a folder can be written (chosen value). The files that a launch
+writes have fewer bytes."""
 
 
 def write(path: Path, content: bytes, mode: int = 0o600) -> None:

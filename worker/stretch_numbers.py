@@ -31,7 +31,9 @@ SIZE = TIME + 2
 
 
 class Ties(NamedTuple):
-    """Words of the tables of all stages that follow numbers of the program (parallel/arguments.py)."""
+    """Words in the argument tables of all stages that must change with the numbers of the program
+    (parallel/arguments.py).
+    """
 
     number: Ints
     """(k,) index of the number."""

@@ -28,10 +28,10 @@ class Primitive(Model):
     """Keys of all primitives."""
 
     element_size: Annotated[Length, Positive]
-    """Edge length of the tets, approximately. At most the smallest extent of the body. Use a quarter of the
-    thickness or less where a body bends: with 4 tets through the thickness ``nodal`` and ``split`` are 13 % too
-    stiff, with 2 tets 50 % (``standard``: 26 and 100 %). The time step is proportional to it, the number of tets to
-    its third power."""
+    """Edge length of the tets, approximately. The value is at most the smallest extent of the body. Use a quarter of
+    the thickness or less where a body bends: with 4 tets through the thickness ``nodal`` and ``split`` are 13 % too
+    stiff, with 2 tets 50 % (``standard``: 26 and 100 %). The time step is proportional to it, the number of tets to its
+    third power."""
     generator: Literal["gmsh", "structured"] = "gmsh"
     """Mesh generator. ``gmsh``: unstructured, for all shapes. ``structured``: cells of a regular grid, each cut into
     tets; for box, plate, cylinder and tube, for verification and for ``slit``."""

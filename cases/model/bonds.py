@@ -20,7 +20,7 @@ class Bonded(Model):
     parts: tuple[Name, Name]
     """Names of the two parts. A pair of parts has at most one bond; a part may have bonds with several others."""
     strength: Annotated[Stress, Positive] | None = None
-    """Tensile strength: normal traction at which the interface breaks. Default: it never breaks."""
+    """Tensile strength: normal traction at which the interface breaks. Default: the bond never breaks."""
     shear_strength: Annotated[Stress, Positive] | None = None
     """Shear strength of the interface. Default: ``strength``. Tension and shear together break it where ``(t_n /
     strength)^2 + (t_s / shear_strength)^2`` reaches 1; compression has no effect."""
@@ -28,7 +28,7 @@ class Bonded(Model):
     """Fracture energy in tension, per area of the interface: the traction falls linearly with the opening. 0: the
     traction is 0 as soon as the interface breaks."""
     shear_energy: Annotated[FractureEnergy, Field(ge=0)] | None = None
-    """Fracture energy in shear. Default: ``energy``. Either both are 0 or both are above 0."""
+    """Fracture energy in shear. Default: ``energy``. The two energies are both 0 or both above 0."""
 
     @property
     def breaks(self) -> bool:
@@ -55,7 +55,7 @@ class Bonded(Model):
 class SharedBond(Bonded):
     """A bond of two parts whose meshes have the nodes of the interface in common: one body of two materials, without
     contact at the interface. The parts are groups of one mesh file that share nodes, or shapes, combinations and CAD
-    solids that touch and are meshed together. The cheaper and more accurate of the two bonds.
+    solids that touch and are meshed together. This bond is cheaper and more accurate than a tied bond.
     """
 
     kind: Literal["shared"]

@@ -14,9 +14,9 @@ Course = tuple[tuple[Time, Ratio], ...]
 
 class Symmetry(Model):
     """A plane of symmetry ``axis = at``, without friction. Nodes that start on the plane stay on it; nodes that move
-    towards it are in contact with their mirror image. No node passes the plane. Free nodes (without tets) are
-    reflected by it. A crack cannot open in the plane itself: half of a body that fractures in its middle is not
-    equivalent to the full body.
+    towards it are in contact with their mirror image. No node passes the plane. The plane reflects free nodes (without
+    tets). A crack cannot open in the plane itself: half of a body that fractures in its middle is not equivalent to the
+    full body.
     """
 
     kind: Literal["symmetry"]
@@ -106,8 +106,8 @@ class Prescribed(Model):
 
 
 class Rotation(Model):
-    """A prescribed rigid rotation of all nodes of the parts at constant angular velocity. Walls do not stop these
-    nodes."""
+    """A prescribed rigid rotation of all nodes of the parts at constant angular velocity. Walls do not stop nodes with
+    a prescribed rotation."""
 
     kind: Literal["rotation"]
     """Selects this boundary."""

@@ -39,7 +39,7 @@ class Contact(Model):
     any size: 8 to 9 % in a penetration at constant speed. With 1 the impacts of nodes lose only the error of the
     ``sweeps``, mostly below 0.1 % of the energy. Any value above 0 changes the defaults of ``sweeps`` and
     ``numerics.dt_growth``. At high speed, time steps of unequal length can remove or add more energy than the
-    restitution saves; the outcome contains a note above 1 %. Contact with walls always has 0."""
+    restitution saves; the outcome contains a note above 1 %. Contact with walls always has the coefficient 0."""
     edges: bool = True
     """Whether sharp edges are in contact with edges. ``false`` is cheaper, and edges can then pass through each
     other."""

@@ -24,12 +24,12 @@ class Erosion(Model):
     """Smallest and largest volume of a tet over its initial volume."""
     time_step: Annotated[Ratio, Field(gt=0, lt=1)] = 0.02
     """Smallest stable time step of a tet over the first time step of the run. Larger values make the run cheaper and
-    delete more."""
+    delete more tets."""
     nodes: Literal["strike", "particles", "remove"] = "strike"
-    """Treatment of free nodes, which have lost all tets and are particles with mass and without volume. ``strike``:
-    a free node moves on, and is deleted after a face has pushed it. ``particles``: it is never deleted; many of them
-    can gather on a line and dig a hole that real material would not dig. ``remove``: it is deleted at once. Mass,
-    momentum and energy of deleted nodes are booked."""
+    """Treatment of free nodes, which have lost all tets and are particles with mass and without volume. ``strike``: a
+    free node moves on, and is deleted after a face has pushed it. ``particles``: it is never deleted; many of them can
+    gather on a line and dig a hole that real material would not dig. ``remove``: a node without tets is deleted at
+    once. Mass, momentum and energy of deleted nodes are booked."""
 
 
 class Fracture(Model):
@@ -38,8 +38,8 @@ class Fracture(Model):
     """
 
     model: Literal["instant", "cohesive"] = "instant"
-    """Behaviour of a broken facet. ``instant``: it carries no traction. ``cohesive``: its traction falls linearly
-    with the opening and absorbs the fracture energy (Camacho and Ortiz 1996)."""
+    """Behaviour of a broken facet. ``instant``: a broken facet carries no traction. ``cohesive``: its traction falls
+    linearly with the opening and absorbs the fracture energy (Camacho and Ortiz 1996)."""
     shear_weight: Annotated[Ratio, Field(ge=0)] | None = None
     """Weight beta_tau of the shear traction in the effective traction ``sqrt(<t_n>^2 + beta_tau t_s^2)``, which is
     compared with the strength. Default: 0 (largest normal traction) for ``instant``, 1 for ``cohesive``, which needs
@@ -56,8 +56,8 @@ class Fracture(Model):
     overstressed. 0: it breaks in the step in which it exceeds the strength. The published criterion is printed with
     0.5; its own equations give 1."""
     order: Literal["simultaneous", "local_maximum"] = "simultaneous"
-    """Facets that break in one time step. ``simultaneous``: all that fulfil the criterion. ``local_maximum``: of
-    facets with a common node only the one with the largest overstress."""
+    """Facets that break in one time step. ``simultaneous``: all facets that fulfil the criterion break.
+    ``local_maximum``: of facets with a common node only the one with the largest overstress."""
     resolve: Literal["none", "strength"] = "none"
     """Adaptation to the mesh. ``strength``: reduce the strength until ``resolution`` elements fit in the cohesive
     zone, at the same fracture energy."""

@@ -109,14 +109,14 @@ class Probe(Model):
     """With ``contact_force_*`` and ``contact_impulse_*``: name of the part that pushes; all other bodies when
     absent."""
     low: Point | None = None
-    """With means, peaks and sums: corner of the box with the lowest coordinates; together with ``high``. The whole part
-    when absent."""
+    """With means, peaks and sums: corner of the box with the lowest coordinates; together with ``high``. The probe
+    measures the whole part if this key is absent."""
     high: Point | None = None
     """With means, peaks and sums: corner of the box with the highest coordinates; together with ``low``."""
     on: SetName | None = None
     """With means, peaks and sums: name of a node set or a surface in the mesh file of the part (docs/howto/meshes.md).
-    Means and peaks use the tets that have a node in it, sums use its nodes. Together with a box: only
-    what is in both."""
+    Means and peaks use the tets that have a node in it, sums use its nodes. Together with a box: only nodes or tets in
+    both."""
     beyond: Beyond | None = None
     """With sums and fields behind a target: side of a plane, such as ``{ axis = "z", at = "8 mm" }``."""
     axis: Axis | None = None

@@ -30,8 +30,8 @@ class CadForm(Model):
     path: str
     """Path of the file, STEP (ISO 10303-21) or BREP (OpenCASCADE), relative to the folder of the case."""
     unit: Annotated[Length, Positive] | None = None
-    """Length unit of the coordinates in the file, such as ``"1 mm"``. A BREP file requires it. A STEP file contains
-    its unit: the key may be absent, and another value than that of the file is refused."""
+    """Length unit of the coordinates in the file, such as ``"1 mm"``. A BREP file requires this key. A STEP file
+    contains its unit: the key may be absent, and another value than that of the file is refused."""
     solids: tuple[str | Annotated[Count, Field(ge=1)], ...] = ()
     """Solids to use, by their names in the file or by their numbers from 1 in its order; all when empty. Several
     solids are one body: their meshes have common nodes where the solids touch."""
@@ -134,7 +134,7 @@ class CadOperand(CadForm, Turned):
 
 class StlOperand(StlForm, Turned):
     """The interior of a closed surface of triangles (STL). Each triangle stays a face of the body: elements are not
-    larger than triangles. At most 1,500 triangles."""
+    larger than triangles. The surface has at most 1,500 triangles."""
 
 
 class UnionOperand(UnionForm, Turned):

@@ -58,7 +58,7 @@ class Run(Model):
     more than 1/200 of it; the first and the last are always made."""
     max_steps: Annotated[Count, Field(ge=1)] = 100_000_000
     """Largest number of time steps. A run that reaches it writes a checkpoint and stops with state ``timed_out``,
-    cause ``steps``. ``conoid restart RUN --max-steps NUMBER`` continues it."""
+    cause ``steps``. ``conoid restart RUN --max-steps NUMBER`` continues the run."""
     max_wall_time: Annotated[Time, Positive] | None = None
     """Largest wall time, counted from the first time step. A run that reaches it writes a checkpoint and stops.
     Default: no limit."""
@@ -82,7 +82,9 @@ class Run(Model):
 
 
 class Balance(Model):
-    """Load balance: when tets are redistributed over the ranks, and by which weight. No answer depends on it."""
+    """Load balance: when tets are redistributed over the ranks, and by which weight. The answer of a run does not
+    depend on the balance.
+    """
 
     policy: Literal["measured", "outside", "every", "never"] = "measured"
     """Criterion for a new decomposition of the mesh. ``measured``: the time lost by imbalance since the last

@@ -53,7 +53,8 @@ class Part(Model):
     """Initial uniform stretching, added to ``velocity``."""
     jitter: Annotated[Speed, Field(ge=0)] = 0.0
     """Amplitude of a random initial velocity, added to ``velocity``: each component of each node is uniform between
-    minus and plus this value. Every run has the same values. For tests of energy conservation."""
+    minus and plus this value. Every run has the same random values. The key is meant for tests of energy
+    conservation."""
     temperature: Annotated[Temperature, Field(ge=0)] = 293.15
     """Initial temperature. Used by ``strength`` with ``model = "johnson_cook"`` only."""
     erosion: Erosion | None = None

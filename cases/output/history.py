@@ -19,7 +19,7 @@ _HEADER = re.compile(r"(.*?)(?: \[([^\]]*)\])?")
 
 
 def of_parts(parts: Sequence[str]) -> dict[str, str]:
-    """Columns and units of the parts: ``kinetic.bar``. Empty with a single part, which is the whole."""
+    """Columns and units of the parts: ``kinetic.bar``. The list is empty for a case with a single part."""
     return {f"{name}.{part}": "J" for part in parts for name in OF_PARTS} if len(parts) > 1 else {}
 
 

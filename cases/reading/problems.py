@@ -20,7 +20,7 @@ _DISCRIMINATORS = ("kind", "shape", "model")
 _LONGEST = 80
 """Largest number of characters of a value in a message: a line of a terminal (chosen value)."""
 _MOST = 100
-"""Largest number of problems that are reported at once (chosen value). A user corrects fewer at once."""
+"""Largest number of problems that are reported at once (chosen value). A user corrects fewer errors at once."""
 
 
 @dataclass(frozen=True)

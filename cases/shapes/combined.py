@@ -1,6 +1,7 @@
 """Combinations of shapes before they are meshed: points inside, bounding box, approximate size.
 
-Exact for points; volumes by points of a lattice. Unknown for solids of a CAD file, until the file is read.
+Points are tested exactly; volumes are computed by points of a lattice. The value is unknown for solids of a CAD file
+until the file is read.
 """
 
 import math

@@ -76,7 +76,7 @@ class Slurm(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=Tru
     authority: str = ""
     """Certificate by which the nodes verify the router: a file that they can read."""
     poll: float = 2.0
-    """Time between two queries of the queue, s (chosen value). One squeue command is used for all runs."""
+    """Time between two queries of the queue, s (chosen value). One squeue command reads the jobs of all runs."""
     slots: int = 100_000
     """Largest number of cores that are submitted at a time, including pending jobs. The value was chosen so large
     because Slurm has limits of its own."""

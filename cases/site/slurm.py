@@ -158,7 +158,7 @@ def _number(output: str) -> str:
 
 def submit_array(place: str, records: Sequence[Job], profile: Profile) -> dict[int, str]:
     """Returns the number of the single job of each task of an array: of existing ones, and of a new array for the
-    others. The lock is that of the array. Raises AwayError, RefusedError, OSError.
+    others. The lock of the array prevents a second submission. Raises AwayError, RefusedError, OSError.
     """
     with open(Path(records[0].array) / ".submit.lock", "a") as lock:
         try:

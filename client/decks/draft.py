@@ -22,7 +22,7 @@ class Made:
     material: dict[str, Any]
     """Keys below ``[materials.NAME]``; empty for a law that Conoid lacks."""
     erosion: dict[str, Any] = field(default_factory=dict)
-    """Criteria of the material for the deletion of tets. In Conoid these are keys of the part."""
+    """Criteria of the material for the deletion of tets. In Conoid these criteria are keys of the part."""
     rigid: bool = False
     temperature: str | float | None = None
     """Initial temperature."""

@@ -15,8 +15,8 @@ _STEPS = tuple(np.uint64(step) for step in (0xD1B54A32D192ED03, 0xABC98388FB8FAC
 """2^64 over the powers of 1.2207, the root of g^4 = g + 1. The multiples of these numbers fill a cube evenly
 (Roberts 2018, R3)."""
 _STRONG, _MUTED = (0.66, 0.12), (0.84, 0.045)
-"""Lightness and chroma of the colour of a part, and of the colour of its intact body. The second is muted: fragments
-have stronger colours."""
+"""Lightness and chroma of the colour of a part, and of the colour of its intact body. The second colour is muted,
+because fragments have stronger colours."""
 _DARKER = 0.13
 """Difference of lightness between two parts with the same hue. Hues repeat after the first parts."""
 REST = (140, 146, 152)

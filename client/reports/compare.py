@@ -114,8 +114,8 @@ def _flat(data: Any, path: str = "") -> Iterator[tuple[str, Any]]:
 
 
 def _outcomes(a: Result, b: Result) -> list[Value]:
-    """Returns the numbers of both outcomes, NaN for a number that one run lacks. A number that both runs lack is
-    left out.
+    """Returns the numbers of both outcomes, NaN for a number that one run lacks. The comparison omits a number that
+    both runs lack.
     """
     pairs = ((name, _known(a.outcome, name), _known(b.outcome, name)) for name in _OUTCOME)
     return [Value(n, _UNITS.get(n, ""), *both) for n, *both in pairs if not all(map(math.isnan, both))]

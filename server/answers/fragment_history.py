@@ -16,7 +16,7 @@ MOST = 200
 """Largest number of snapshots that are read for the history of a fragment; the snapshots are evenly spaced. The
 value was chosen because so many snapshots take 0.2 s without cached tables."""
 _KNOWN = 512
-"""Largest number of cached tables of fragments of all runs. This number of tables needs at most 50 MB."""
+"""Largest number of cached tables of fragments of all runs. Such a number of tables needs at most 50 MB."""
 _HEADER = 16
 """Bytes at the start of a snapshot that contain the length of the header."""
 _LONGEST = 1 << 24

@@ -28,7 +28,7 @@ _AGAIN = 600.0
 _MOST_FAILED = 1000
 """Largest number of failed reports that are stored (chosen value)."""
 _LEFT = ".*report-*"
-"""Pattern of the names of temporary files of reports in progress. A killed server leaves such files."""
+"""Pattern of the names of temporary files of reports in progress. A killed server leaves such incomplete files."""
 
 
 class Reporters(ThreadPool):

@@ -1,8 +1,8 @@
 """Identity of a server: one folder of runs and one database, each with the name of the other.
 
-Two mistakes are refused. A second server on the same database would mark the runs of the first server as lost. A
-server on a copy of a folder would stop the workers of the original. ``adopt`` binds a folder and a database that
-were moved, or restored from a backup.
+Two wrong settings are refused. A second server on the same database would mark the runs of the first server as lost. A
+server on a copy of a folder would stop the workers of the original. ``adopt`` binds a folder and a database that were
+moved, or restored from a backup.
 """
 
 import secrets

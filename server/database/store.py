@@ -30,7 +30,7 @@ _AT_ONCE = 500
 
 @dataclass(frozen=True)
 class Token:
-    """A stored token. The secret is never stored, only its hash."""
+    """A stored token. The database stores the hash of the secret, never the secret."""
 
     id: str
     owner: str

@@ -187,7 +187,7 @@ def _text(body: bytes) -> str:
 
 
 def main() -> int:
-    """Answers requests until standard input ends. The program sends one byte when it is ready."""
+    """Answers requests until standard input ends. The program sends one byte when it is ready for requests."""
     signal.signal(signal.SIGCHLD, signal.SIG_IGN)
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     os.nice(_NICE)

@@ -51,8 +51,8 @@ class Sweeps:
         self._filling |= {plan.id for plan in self._left}
 
     def complete(self) -> None:
-        """Completes the incomplete sweeps of an earlier server in a thread. The runs of these sweeps wait until
-        then."""
+        """Completes the incomplete sweeps of an earlier server in a thread. The runs of a sweep wait until the sweep is
+        complete."""
         for plan in self._left:
             runs = plan.earlier or self._desk.runs_of(plan.owner, plan.keys)
             self.plans.put(msgspec.structs.replace(plan, runs=runs))

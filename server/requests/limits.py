@@ -191,7 +191,7 @@ def wall_time(case: Case, caps: Limits) -> float | None:
 
 
 def later(code: str, detail: str, hint: str | None = None) -> ServiceError:
-    """Returns 429: the user has reached a limit. A later request may succeed."""
+    """Returns 429: the user has reached a limit. The same request may succeed later."""
     return ServiceError(429, code, detail, hint=hint, retryable=True, headers={"Retry-After": "60"})
 
 

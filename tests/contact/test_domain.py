@@ -17,7 +17,9 @@ KINDS = ("box", "arbitrary")
 
 
 class Share:
-    """Boxes of one rank: of its nodes and edges, of its faces, of its edges; some ranks have no box of a kind."""
+    """Boxes of one rank: the box of its nodes and edges, the box of its faces, and the box of its edges. Some ranks
+    lack one of these boxes.
+    """
 
     def __init__(self, rank: int, seed: int, ranks: int) -> None:
         random = np.random.default_rng([seed, rank])

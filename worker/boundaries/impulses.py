@@ -14,7 +14,7 @@ NOTE = _F2, _N1, _F2, _F2, _F1, _F
 their work (n,), J, one row for each node of the boundary; and of 1/2 with the sign of the work in the account."""
 _ACT = _F2, _F1, _N1, _F2, _F2, _F1
 """Types of the arguments v, mass (nodes,) and nodes; and of v(n-1/2), impulses and account as in the previous
-constant. The work is work from outside."""
+constant. The work of these impulses is work from outside."""
 PRESCRIBE = (*_ACT, _F2, _F)
 """Types of the further arguments: velocities (n, 3), m/s, NaN for a free component, and the factor of the
 velocities."""

@@ -108,8 +108,8 @@ class Exterior:
         return found
 
     def sharpen(self, scene: Scene, least: Floats) -> None:
-        """Marks the edges as sharp whose two faces have normals with a cosine below ``least`` (parts,). Edges remain
-        sharp.
+        """Marks the edges as sharp whose two faces have normals with a cosine below ``least`` (parts,). An edge that
+        was sharp once remains sharp.
         """
         turned = scene.sharpen(least)[: self.surface.edges.n]
         if turned.any():

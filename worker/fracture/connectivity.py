@@ -222,7 +222,7 @@ def _name_range(table, first, stop, thread):  # type: ignore[no-untyped-def]
 
 @njit("void(int32[::1])", cache=True)
 def _settle(root):  # type: ignore[no-untyped-def]
-    """Points every tet directly at its root."""
+    """Sets the parent of every tet to the root of its piece."""
     for a in range(len(root)):
         b = root[a]
         while root[b] != b:

@@ -59,8 +59,8 @@ class Record:
         self.count = count(self._model, self.labels, self._comm)
 
     def number(self) -> None:
-        """Numbers the fragments of the last ``update``. Called at the start and at frames only. Frames are at the same
-        times in every run of a case, so the numbers are reproducible.
+        """Numbers the fragments of the last ``update``. The method is called at the start and at frames only. Frames
+        are at the same times in every run of a case, so the numbers are reproducible.
         """
         ids = _flat([block.id for block in self._model.blocks])
         found, self._family = numbered(self._last(ids), _flat(self.labels), self.next, self._comm)

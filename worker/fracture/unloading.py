@@ -20,7 +20,7 @@ from .cohesive import Cohesion
 @njit("void(int64[:, ::1], int64[:, ::1], int32[::1])", cache=True)
 def _move(force, change, rows):  # type: ignore[no-untyped-def]
     """Adds the ``change`` of the nodes ``rows`` (k,) to their forces, and sets it to zero. A node may occur several
-    times.
+    times in the list.
     """
     for a in rows:
         for i in range(3):

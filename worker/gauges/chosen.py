@@ -33,7 +33,9 @@ class ChosenTets:
         return sum(len(ids) for ids in self.ids[number])
 
     def changed(self) -> bool:
-        """Return whether tets were removed since the last call; True at the first call. ``found`` is made again."""
+        """Return whether tets were removed since the last call; True at the first call. The selection ``found`` is
+        computed again.
+        """
         if self._counted == (counted := [block.n for block in self._model.blocks]):
             return False
         self._counted = counted

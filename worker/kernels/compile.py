@@ -137,7 +137,7 @@ class _Module:
             return False
 
     def _link(self, other: Path, own: Path) -> bool:
-        """Links files; returns False if links are impossible. The kernels are compiled in that case."""
+        """Links files; returns False if links are impossible. If links are impossible, the kernels are compiled."""
         try:
             own.mkdir(exist_ok=True)
             for path in other.glob("*.nb[ci]"):

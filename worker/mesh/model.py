@@ -54,11 +54,11 @@ class NodeSet:
     """A set of nodes or a surface in a mesh file."""
 
     names: tuple[str, ...]
-    """Names of the set in a case. Lists show the first name."""
+    """Names of the set in a case. Lists of sets show the first name."""
     nodes: Ints
     """(k,) nodes of the mesh in the set, ascending. A surface has the nodes of all its faces."""
     faces: Ints | None = None
-    """(n, 3) faces of a surface that are outer faces of the mesh. None for a set of nodes."""
+    """(n, 3) faces of a surface that are outer faces of the mesh. The value is None for a set of nodes."""
     inner: int = 0
     """Number of faces of the surface that have all nodes in the mesh and are not outer faces of the mesh."""
 

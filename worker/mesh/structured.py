@@ -1,7 +1,7 @@
 """Regular meshes for verification: hexahedra cut into 5 or 6 tets, in plain numpy.
 
-A block is cut by planes. A solid cylinder is a square grid, mapped to the disk, times planes. A tube is rings times
-sectors times planes. ``element_size`` is rounded to a whole number of divisions, at least one.
+A block is cut into cells by planes. A solid cylinder is a square grid, mapped to the disk, times planes. A tube is
+rings times sectors times planes. ``element_size`` is rounded to a whole number of divisions, at least one.
 """
 
 import itertools

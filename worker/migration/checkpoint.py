@@ -105,7 +105,7 @@ def forget(folder: Path, step: int = -1) -> None:
 def latest(folder: Path) -> tuple[Path, Manifest, list[str]]:
     """Return the latest complete checkpoint, its manifest, and a line for each later one, which is damaged.
 
-    Raises InputError if none is complete.
+    Raises InputError if no checkpoint is complete.
     """
     damaged: list[str] = []
     for place in found(folder):

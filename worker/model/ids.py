@@ -11,8 +11,8 @@ _BISECTION = 32
 
 
 def located(known: _Ids, wanted: _Ids) -> _Places:
-    """Return the positions of ``wanted`` ids in the ascending ``known``, in the shape of ``wanted``. Every id must
-    be in ``known``.
+    """Return the positions of ``wanted`` ids in the ascending ``known``, in the shape of ``wanted``. Every wanted id
+    must be in ``known``.
     """
     if _few(known, wanted):
         return np.searchsorted(known, wanted).astype(np.int32)

@@ -53,7 +53,7 @@ class Counter:
         self._fragments, self._smallest, self._sizes = 0, 0, list[int]()
 
     def due(self, sim: Simulation, now: float, *, ending: bool) -> bool:
-        """Return whether fragments are to be found. Called on rank 0.
+        """Return whether fragments are to be found. Rank 0 alone calls this method.
 
         ``ending``: whether this is the last report.
         """

@@ -19,7 +19,7 @@ from . import storage
 
 M = TypeVar("M", bound=messages.Message)
 _MOST = 1 << 40
-"""Largest size of a journal that is read, bytes. This number is practically unlimited."""
+"""Largest size of a journal that is read, bytes. So large a number practically means no limit."""
 
 
 class _Head(msgspec.Struct):

@@ -1,4 +1,4 @@
-"""Removal of output after the step of a checkpoint. A resumed run writes this output again."""
+"""Removal of output after the step of a checkpoint. A resumed run writes the removed output again."""
 
 import csv
 import io

@@ -1,7 +1,7 @@
 """Choice of the number of threads that a rank uses: the number with the shortest regions, measured over some steps.
 
-A scene can be too small for threads: it has few tasks, or its tasks are as short as the time to hand one out. A
-number of threads below the full number is measured again at intervals, since contact and cracks add work. The full
+A scene can be too small for threads: it has few tasks, or its tasks are as short as the time to hand one out. A number
+of threads below the full number is measured again at intervals, since contact and cracks add work. A choice of the full
 number is final. The answer of the run does not depend on the number of threads.
 """
 

@@ -3,7 +3,7 @@
 A stage is a kernel with its table of arguments and its tasks. The tasks are either given before the call (``Stage``),
 or they are a range whose length is a word of memory that is read when the stage begins (``Span``): an earlier stage may
 have written the length. A stage with the length 0 is skipped. A kernel may also choose which stage comes next: it
-writes its number to ``Program.control``. A number beyond the last stage ends the call.
+writes its number to ``Program.control``. A stage number beyond the last stage ends the call.
 """
 
 from collections.abc import Sequence

@@ -77,7 +77,7 @@ def _read_clock(_: Any, words: Any, at: Any) -> Any:
 
 
 def _library(name: str, signature: Any) -> Any:
-    """Return a call of a function of the C library. The result of the function is ignored."""
+    """Return a call of a function of the C library. Callers ignore the result of the function."""
 
     def emit(context: Any, builder: Any, signature: Any, args: Any) -> Any:
         kind = ir.FunctionType(ir.IntType(32), [_WORD] * len(args))
@@ -89,7 +89,8 @@ def _library(name: str, signature: Any) -> Any:
 
 call_task: Any = intrinsic(_call)
 add: Any = intrinsic(_added)
-"""Function for kernels: add to a word atomically and return its old value. Two threads never get the same old value."""
+"""Function for kernels: add to a word atomically and return its old value. Two threads that add at the same time never
+get the same old value."""
 swap: Any = intrinsic(_swapped)
 """Function for kernels: set a word and return its old value. Earlier writes of the thread are visible to threads
 that read the new value."""

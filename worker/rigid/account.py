@@ -17,7 +17,7 @@ _KEPT = {
 
 class BodyAccount:
     """Work on the rigid bodies of a case: half of the work of an impulse is computed with the velocity before the
-    impulse, half with the velocity after it. Equal on all ranks.
+    impulse, half with the velocity after it. The values are equal on all ranks.
     """
 
     def __init__(self, bodies: Bodies) -> None:

@@ -33,7 +33,7 @@ core of this process. Chosen value: a run takes at most a twentieth longer, and 
 snapshot every 6 s."""
 
 _EARLY = 1e-6
-"""Time by which a snapshot may be early, as a share of the time between two snapshots. The value is much larger than
+"""Time by which a snapshot may be early, as a share of the time between two snapshots. The value is far above
 round-off."""
 
 
@@ -58,7 +58,7 @@ class Snapshots:
         sim.comm.barrier()
 
     def due(self, clock: Clock, now: float, *, look: bool) -> bool:
-        """Return whether to make a snapshot of the next state. Called on rank 0.
+        """Return whether to make a snapshot of the next state. Rank 0 alone calls this method.
 
         ``look``: whether to test for a request.
         """

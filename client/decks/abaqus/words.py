@@ -1,5 +1,5 @@
-"""Keywords of Abaqus that are omitted, with the reason, and keywords that change the answer. All other known
-keywords are read.
+"""Keywords of Abaqus that are omitted, with the reason, and keywords that change the answer. All known keywords outside
+of these tables are read.
 """
 
 _OUTPUT = "output: a run writes frames, history.csv and probes"

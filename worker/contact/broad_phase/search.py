@@ -22,7 +22,7 @@ _WORTHWHILE = 1024
 """Number of primitives of the smaller set above which those far from the other set are removed before the search.
 Chosen value: one task of boxes.py."""
 _ANY = np.zeros(0, np.int64)
-"""Rank of primitives whose pairs have any order."""
+"""Rank of primitives for which the order of a pair has no meaning."""
 
 
 class Finder:

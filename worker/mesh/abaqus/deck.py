@@ -98,8 +98,8 @@ class Deck:
         self._here = self.instances.add(name, Instance(name, block.line, part=part, move=move, axis=axis))
 
     def _placing(self) -> tuple[tuple[float, ...], tuple[float, ...]]:
-        """Return the two data lines of *INSTANCE: a translation, then an axis with an angle. Either line may be
-        empty.
+        """Return the two data lines of *INSTANCE: a translation, then an axis with an angle. Each of the two lines may
+        be empty.
         """
         lines = list(self._source.data())
         while lines and not lines[-1][1].strip():
@@ -192,8 +192,8 @@ class Deck:
         return instance
 
     def _member(self, one: ElementSet, instance: Instance | None, item: str, line: int, of_nodes: bool) -> None:
-        """Add members to a set: an element, or the elements of a set, of an instance or of this scope. For a set of
-        nodes add nodes.
+        """Add members to a set: an element, or the elements of a set, of an instance or of this scope. Add nodes to a
+        set of nodes.
         """
         owner = OWN if instance is None else instance.name.key
         if is_whole(item):

@@ -35,7 +35,7 @@ class ElementSet:
 
 @dataclass
 class Rows:
-    """Elements of one type."""
+    """Elements of one type in a scope."""
 
     numbers: "array[int]" = field(default_factory=lambda: array("q"))
     nodes: "array[int]" = field(default_factory=lambda: array("q"))

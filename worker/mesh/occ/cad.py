@@ -67,8 +67,8 @@ def size_of(gmsh: Any, form: CadForm, path: Path, head: str) -> float:
 
 
 def left_out(form: Solid, sources: Sources, key: str) -> Iterator[str]:
-    """Yield a note for each STEP file of the body at ``key`` with surface bodies, which are not in the mesh. No note
-    if the case names the solids.
+    """Yield a note for each STEP file of the body at ``key`` with surface bodies, which are not in the mesh. The note
+    is omitted if the case names the solids.
     """
     for named, path in sources.items():
         if named == key or named.startswith(f"{key}."):

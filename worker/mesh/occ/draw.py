@@ -148,7 +148,9 @@ def _in_thirds(occ: Any, sides: list[int]) -> Solids:
 
 
 def _swept(occ: Any, sides: list[int], begin: float, end: float) -> Solids:
-    """Return the volume that the area within ``sides`` sweeps between two angles, rad. The area is removed."""
+    """Return the volume that the area within ``sides`` sweeps between two angles, rad. The plane area itself is removed
+    afterwards.
+    """
     area = occ.addPlaneSurface([occ.addCurveLoop(sides)])
     if begin:
         occ.rotate([(2, area)], 0, 0, 0, 0, 0, 1, begin)
