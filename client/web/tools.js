@@ -8,7 +8,7 @@ import { scaleOf } from "./scales.js";
 
 const CUTS = ["none", "x", "y", "z", "as seen"];
 const STEPS = 400; // Steps of the slider of a section.
-const FILLED = 400_000; // Largest number of tets of a snapshot with a file of all tets (MOST_TETS of worker/snapshots/volume.py).
+const FILLED = 1_000_000; // Largest number of tets of a snapshot with a file of all tets (MOST_TETS of worker/snapshots/volume.py).
 const SIGNS = { "+": "+", "-": "−" };
 const KEYS = "x y z: look from there, with Shift from the other side · i: isometric · f: fit · a: fit all · e: edges · o: outlines · "
   + "v: arrows · m: mirror · arrows: turn, with Shift move · + −: zoom · , .: snapshot · Space: play";

@@ -11,9 +11,9 @@ import numpy as np
 
 from ..model.state import Floats, Ints
 
-MOST_TETS = 400_000
+MOST_TETS = 1_000_000
 """Largest number of tets of a model for which the file is written. Chosen value: a page cuts this number of tets in
-20 ms."""
+20 ms, and their file is made in 0.9 s of CPU time."""
 _BITS = 10
 """Number of bits of a coordinate on the Z-curve. Chosen value: finer than meshes of ``MOST_TETS`` tets."""
 _LEVEL = 1
