@@ -87,5 +87,5 @@ def test_what_is_kept_again_and_again_is_the_same_run(
 def test_what_the_answer_depends_on_may_not_change() -> None:
     manifest = Manifest(FORMAT, 1, 0.0, json.loads(resolved_json(case_of())), [], {})
     checkpoint.require_same(case_of(*OTHER), manifest)
-    with pytest.raises(InputError, match=r"^contact\.friction: differs from the case of the checkpoint"):
+    with pytest.raises(InputError, match=r"^contact\.friction = 0\.3: the case of the checkpoint has 0\.2"):
         checkpoint.require_same(case_of("contact.friction=0.3"), manifest)
