@@ -15,7 +15,9 @@ _QUARTERS = ((1.0, 0.0), (0.0, 1.0), (-1.0, 0.0), (0.0, -1.0))
 
 
 def angles(mesh: RingSector) -> list[Angles]:
-    """Returns the ranges of modelled angles: one, or two where a plane of the sector leaves both ends."""
+    """Returns the ranges of modelled angles: two ranges if a plane of the sector leaves both ends, otherwise one
+    range.
+    """
     begin = math.remainder(mesh.start, 2.0 * math.pi)
     if mesh.sector == "full":
         return [(begin, begin + mesh.angle)]

@@ -104,7 +104,7 @@ export const OVER = `
 precision highp float;
 void main() { gl_Position = vec4(gl_VertexID == 1 ? 3.0 : -1.0, gl_VertexID == 2 ? 3.0 : -1.0, 0.0, 1.0); }`;
 
-// Thin lines round every fragment, and a thick one in its own colour round the selected one.
+// Thin lines round every fragment, and a thick line in its own colour round the selected fragment.
 export const LINES = `
 precision highp float;
 precision highp int;

@@ -30,7 +30,7 @@ _MOST_BYTES = 8 << 20
 """Largest size in bytes of a case file that is read: ten times the largest body of a request, because the file has
 every default (chosen value)."""
 _LEFT_OUT = ("digest", ".passed")
-"""Last words of the names of results that are not numbers."""
+"""Last words of the names of those results that are not numbers, such as texts."""
 
 
 class Card(msgspec.Struct, kw_only=True, frozen=True):

@@ -65,7 +65,7 @@ class Loop:
         self.updates = start.updates
         """Sum over the steps so far of the number of tets."""
         self.choice: Choice | None = None
-        """Chooses the number of threads of this rank; None: all threads are used."""
+        """Object that chooses the number of threads of this rank; None if all threads are used."""
         self._folder, self._start = folder, start
         self._notices, counter = Notices(journal), Counter()
         self._groups = Groups(sim, balance.trigger.cost)

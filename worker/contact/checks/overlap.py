@@ -231,7 +231,7 @@ def _nearest(node: Floats, outward: Floats, ways: Floats, triangles: Floats) -> 
     reaches behind the plane.
 
     The depth is zero for a node on the surface, and if no faced triangle has the foot of the node. In a dent of the
-    surface the nearest triangle need not have it: a ridge may be nearest, and the foot lie on the far side.
+    surface the nearest triangle may be wrong: a ridge may be nearest, with the foot on its far side.
     """
     e, f, r = triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0], node - triangles[:, 0]
     normals = np.cross(e, f)

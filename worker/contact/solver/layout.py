@@ -32,18 +32,18 @@ _KINDS = {
     SUMS: (_I1, _I2, _I2, _I1, _F1, _I3, _I3, _I2, _I3),
 }
 rows_of = table_of(ROWS, *_KINDS[ROWS])
-"""Rows of the narrow phase (ContactRows), numbers of the active ones."""
+"""Rows of the narrow phase (ContactRows), and the numbers of the active rows."""
 nodes_of = table_of(NODES_OF, *_KINDS[NODES_OF])
 """Surface nodes: Surface, v(n-1/2), impulse of the step, zone."""
 room_of = table_of(ROOM, *_KINDS[ROOM])
 """ActiveNodes; row, slots, reach and set of each contact; places, slot, touched, shared (slot_numbers.py); Loaded,
 Braced."""
 sorted_of = table_of(SORTED, *_KINDS[SORTED])
-"""ActiveContacts."""
+"""Active contacts (ActiveContacts)."""
 stored_of = table_of(STORED, *_KINDS[STORED])
-"""Kept."""
+"""Stored impulses of the pairs (Kept)."""
 bounds_of = table_of(BOUNDS, *_KINDS[BOUNDS])
-"""Stops, nodes without tets."""
+"""Walls that stop nodes, and nodes without tets."""
 bodies_of = table_of(BODIES, *_KINDS[BODIES])
 """Nodes of the rank: velocity, part, whether the rank owns it."""
 books_of = table_of(BOOKS, *_KINDS[BOOKS])
