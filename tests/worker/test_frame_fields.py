@@ -92,7 +92,7 @@ def test_the_pressure_of_contact_carries_the_weight(
         {"kind": "wall", "point": (0.0, 0.0, 0.0), "normal": (0.0, 0.0, 1.0), **wall},
         {"kind": "gravity", "acceleration": (0.0, 0.0, -1e6)},
     )
-    case = meeting_of([{}, upper], end=1e-4, boundaries=boundaries, viscosity={"linear": 1.0})
+    case = meeting_of([{}, upper], end=4e-5, boundaries=boundaries, viscosity={"linear": 1.0})
     case = asking(case, ALL)
     meshes = [base, moved(base, (0.0, 0.0, 1e-3))]
     weight = 7850.0 * 9e-9 * 1e6
