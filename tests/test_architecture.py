@@ -341,7 +341,7 @@ def blurred(path: Path) -> set[str]:
     return found
 
 
-def test_what_an_answer_depends_on_has_the_same_bits_on_every_processor() -> None:
+def test_inputs_of_the_answer_have_the_same_bits_on_every_processor() -> None:
     """Use worker/materials/elementary.py and worker/materials/turning.py, and write sums of products as sums."""
     for path in (path for path in SOURCES if name_of(path).startswith("worker/")):
         if name_of(path) not in TELLS | {POWERS_OF_TWO, REFUSES, WINDS}:

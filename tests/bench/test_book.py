@@ -43,7 +43,7 @@ def outcome(value: float, passed: bool) -> dict[str, Any]:
             "reference": [{**check, "source": "theory"}]}  # fmt: skip
 
 
-def test_what_fails_is_red_and_what_was_not_run_is_grey() -> None:
+def test_failed_rows_are_red_and_rows_without_a_run_are_grey() -> None:
     rows: list[dict[str, Any]] = [
         {"id": "V1", "what": "good", "cases": ["a"]}, {"id": "V2", "what": "bad", "cases": ["b"]},
         {"id": "V3", "what": "open", "open": "nothing"}, {"id": "V4", "what": "test", "tests": ["x.py::test_y"]},

@@ -102,7 +102,7 @@ def test_a_card_is_read_equally_in_every_format(tmp_path: Path, keyword: str, ca
         ("*INCLUDE\n", "line 1: *INCLUDE names no file"),
     ],
 )
-def test_what_cannot_be_followed_is_refused_with_its_line(tmp_path: Path, text: str, message: str) -> None:
+def test_an_unsupported_card_is_refused_with_its_line(tmp_path: Path, text: str, message: str) -> None:
     folder = tmp_path / "below"
     folder.mkdir()
     (tmp_path / "other.k").write_text("*NODE\n")

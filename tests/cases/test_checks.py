@@ -126,7 +126,7 @@ def test_a_fault_is_named(overrides: list[str], key: str, message: str) -> None:
     assert message in found[key]
 
 
-def test_what_flies_at_a_symmetry_plane_need_not_lie_on_it() -> None:
+def test_a_body_that_moves_to_a_symmetry_plane_need_not_start_on_it() -> None:
     """The rod moves down: towards a plane below it, and away from a plane above it."""
     parse_case(rod("boundaries[0]={kind='symmetry', axis='z', at='-1 mm'}"))
     assert "boundaries[0].at" in messages("boundaries[0]={kind='symmetry', axis='z', at='40 mm'}")
@@ -213,7 +213,7 @@ def test_melting_lies_above_the_reference_temperature() -> None:
     assert found == {"materials.m.strength.melt_temperature": "must be above 293.15 K, the reference"}
 
 
-def test_what_would_break_in_tension_before_it_strains_is_refused() -> None:
+def test_a_part_that_breaks_before_it_strains_is_refused() -> None:
     """D1 below zero is usual, -2.2 for Armco iron: with D2 = 5.43 and D3 = -0.47 it breaks at 2.4."""
     law = "{{model='johnson_cook', A=1, B=1, n=1, C=0, m=1, melt_temperature=2000, specific_heat=1, damage={}}}"
     steel = "materials.m={{density=1, elastic={{young=1, poisson=0}}, strength={}}}"
@@ -246,7 +246,7 @@ def test_brittle_strength(law: str, key: str, message: str) -> None:
     assert message in found[f"materials.m.strength.{key}"]
 
 
-def test_what_dilates_has_the_linear_pressure() -> None:
+def test_a_material_with_dilation_has_the_linear_pressure() -> None:
     strength = "{model='mohr_coulomb', cohesion=10, friction_angle='20 deg', dilation_angle='5 deg'}"
     eos = "{model='mie_gruneisen', c0=1, S=1, gamma0=1}"
     found = messages(f"materials.m={{density=1, elastic={{young=1, poisson=0}}, strength={strength}, eos={eos}}}")

@@ -75,7 +75,7 @@ def test_a_reader_ignores_fields_of_later_versions() -> None:
 
 
 @pytest.mark.parametrize("line", [b'{"type": "gossip", "run": "r"}', b'{"type": "frame", "run": "r"}', b"[]"])
-def test_what_is_no_message_is_refused(line: bytes) -> None:
+def test_an_invalid_message_is_refused(line: bytes) -> None:
     with pytest.raises(msgspec.ValidationError):
         messages.from_json(line)
 

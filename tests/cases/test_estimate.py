@@ -174,7 +174,7 @@ def test_cost_follows_size_law_and_ranks() -> None:
     assert plain.dt == plain.parts[0].dt
 
 
-def test_what_may_break_may_cost_more() -> None:
+def test_parts_that_may_break_may_cost_more() -> None:
     whole = estimate(read_case(shipped_path("bar_on_bar")))
     bar = estimate(read_case(shipped_path("glass_steel_bar")))
     assert whole.breaking == 0.0
@@ -304,7 +304,7 @@ def test_bars_that_flatten_take_no_more_steps_than_expected(bar: tuple[float, in
     assert 0.99 < shrinkage(case, case.parts[0], speed) / measured < 2.7
 
 
-def test_what_is_slender_strains_what_it_meets() -> None:
+def test_a_slender_body_strains_the_body_that_it_hits() -> None:
     cube, bar = (flattening.data_of(150e6, length, 100.0)["parts"][0] for length in (1, 3))
     data = flattening.data_of(150e6, 1, 100.0)
     assert slenderness(parse_case(data)) == pytest.approx(1.0)

@@ -21,7 +21,7 @@ def test_python_writes_a_number_as_the_table_has_it(name: str, given: list[Any],
     assert getattr(figures, name)(*given) == text
 
 
-def test_what_is_not_known_or_has_no_end() -> None:
+def test_unknown_and_infinite_numbers_are_shown_as_symbols() -> None:
     assert figures.si(math.nan, "s") == figures.number(math.nan) == figures.rough(math.nan) == figures.UNKNOWN
     assert (figures.si(math.inf, "s"), figures.number(-math.inf)) == ("∞ s", "-∞")
     assert figures.day(1e18) == figures.UNKNOWN

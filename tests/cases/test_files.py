@@ -51,7 +51,7 @@ def test_a_run_of_a_server_reads_its_own_copy_and_no_path(tmp_path: Path) -> Non
 
 
 @pytest.mark.parametrize("wrong", ["", "12", HASH[:-1], HASH + "0", "g" * 64, "../../etc/passwd"])
-def test_what_is_no_hash_is_refused(wrong: str) -> None:
+def test_an_invalid_hash_is_refused(wrong: str) -> None:
     with pytest.raises(CaseError, match=r"^parts\[0\]\.mesh\.sha256 = .*: expected 64 hexadecimal digits") as raised:
         parse_case(case_with(sha256=wrong))
     assert len(raised.value.problems) == 1

@@ -41,12 +41,12 @@ def meeting(speed: float, contact: dict[str, Any] | None = None, **other: Any) -
         (meeting(550.0, {"restitution": 1}, material="glass", fracture={}), 40, 80),
     ],
 )
-def test_what_meets_fast_gets_more_sweeps(case: Case, least: int, most: int) -> None:
+def test_fast_collisions_get_more_sweeps(case: Case, least: int, most: int) -> None:
     """The limit is a fifth of the wave speed."""
     assert sweeps(case) == (least, most)
 
 
-def test_what_is_driven_together_and_breaks_gets_more_sweeps() -> None:
+def test_parts_that_are_pressed_together_and_break_get_more_sweeps() -> None:
     """A prescribed motion or a traction presses while it acts. Parts that cannot break, and a drive of a single
     part, need no more sweeps."""
     ram = {"kind": "velocity", "parts": ["b"], "z": -1.0}
@@ -101,12 +101,12 @@ def test_a_wall_is_met_at_the_speed_of_the_part() -> None:
         ({"x": 800.0, "parts": ["a"]}, 1000.0),
     ],
 )
-def test_what_is_driven_comes_at_the_speed_of_its_drive(drive: dict[str, Any], speed: float) -> None:
+def test_a_driven_part_has_the_speed_of_its_drive(drive: dict[str, Any], speed: float) -> None:
     """The prescribed motion acts on a box of a body in addition to its velocity, or on a whole body instead of it."""
     assert impact_speeds(bounded(meeting(600.0), {"kind": "velocity", **drive})) == pytest.approx([speed] * 2)
 
 
-def test_what_turns_comes_at_the_speed_of_its_rim() -> None:
+def test_a_rotating_body_has_the_speed_of_its_rim() -> None:
     """A cube of 1 mm rotates about its edge along z at 1e6 rad/s: its corners have up to 1,000 m/s along x and y."""
     spin = {"centre": [0, 0, 0], "rate": [0, 0, 1e6]}
     case = meeting(0.0).model_dump(mode="json", exclude_none=True)

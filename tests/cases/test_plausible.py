@@ -339,7 +339,7 @@ def test_constants_of_no_solid(material: dict[str, Any], key: str, message: str)
     assert message in found[f"materials.own.{key}"], found
 
 
-def test_what_a_part_brings_along() -> None:
+def test_mass_momentum_and_energy_of_a_part() -> None:
     ball, plate = estimate(parse_case(target())).parts
     assert ball.bulk is not None
     assert plate.bulk is not None

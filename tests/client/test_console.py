@@ -39,7 +39,7 @@ def obeyed(text: str) -> set[str]:
 
 
 @pytest.mark.parametrize("evil", [*SEQUENCES, EVIL])
-def test_what_a_terminal_would_obey_is_escaped(evil: str) -> None:
+def test_control_characters_are_escaped(evil: str) -> None:
     out = io.StringIO()
     console = PlainConsole(file=out, force_terminal=True, color_system="truecolor", width=80)
     table = Table(title=evil)
@@ -103,7 +103,7 @@ ASKED = {
         ("checkpoint", "a"), ("submit", "demo"), ("view", "a"), ("report", "a"), ("compare", "a", "a"),
     ],
 )  # fmt: skip
-def test_no_command_prints_what_a_terminal_would_obey(words: tuple[str, ...], server: Hostile) -> None:
+def test_no_command_prints_control_characters(words: tuple[str, ...], server: Hostile) -> None:
     refusal = answering({"title": EVIL, "detail": EVIL, "hint": EVIL}, 409)
     server.answers = {path: answering(data) for path, data in ASKED.items()}
     server.answers |= {
@@ -122,7 +122,7 @@ def test_no_command_prints_what_a_terminal_would_obey(words: tuple[str, ...], se
 
 
 @pytest.mark.parametrize("more", [(), ("--json",), ("--plain",)])
-def test_a_folder_prints_nothing_that_a_terminal_would_obey(more: tuple[str, ...], quiet_home: Path) -> None:
+def test_a_folder_prints_no_control_characters(more: tuple[str, ...], quiet_home: Path) -> None:
     folder = quiet_home / "run\x1b[31m"
     folder.mkdir()
     journal: list[messages.AnyMessage] = [

@@ -207,7 +207,7 @@ def test_the_numbers_of_a_run_are_references_probes_and_shares_of_energy() -> No
 
 
 @pytest.mark.parametrize("name", ["bar_on_bar", "plugging_weldox", "glass_ball_cohesive"])
-def test_what_advice_may_be_about_is_known_before_anything_runs(name: str) -> None:
+def test_the_quantity_of_the_advice_is_checked_before_any_run(name: str) -> None:
     made = case(name)
     energy = Energy(kinetic=6.0, elastic=3.0, plastic=1.0, viscous=1.0, contact=1.0, external=0.0, initial=10.0,
                     residual=0.0)  # fmt: skip

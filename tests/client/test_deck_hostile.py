@@ -88,7 +88,7 @@ FILES: dict[str, tuple[bytes, str]] = {
 
 
 @pytest.mark.parametrize("name", FILES)
-def test_what_is_no_deck_is_refused_in_one_line(tmp_path: Path, name: str) -> None:
+def test_a_file_that_is_not_a_deck_is_refused_in_one_line(tmp_path: Path, name: str) -> None:
     content, message = FILES[name]
     (tmp_path / name).write_bytes(content)
     result = conoid("import", tmp_path / name, "--units", "mm,t,s")
@@ -97,7 +97,7 @@ def test_what_is_no_deck_is_refused_in_one_line(tmp_path: Path, name: str) -> No
     assert not list(tmp_path.glob("*.toml"))
 
 
-def test_what_is_no_regular_file_is_not_opened(tmp_path: Path) -> None:
+def test_a_path_that_is_not_a_regular_file_is_not_opened(tmp_path: Path) -> None:
     for path in ("/dev/zero", tmp_path, tmp_path / "none.k"):
         result = conoid("import", path, "--out", tmp_path / "case.toml")
         assert (result.exit_code, len(result.stderr.splitlines())) == (1, 1)

@@ -65,7 +65,7 @@ def test_a_wrong_unit_gets_the_same_warning_as_for_any_body(folder: Path) -> Non
 
 
 @pytest.mark.parametrize("command", ["validate", "batch"])
-def test_what_a_run_would_refuse_is_refused_before(command: str, folder: Path) -> None:
+def test_an_input_that_a_run_refuses_is_refused_before_the_run(command: str, folder: Path) -> None:
     result = conoid(command, "bar.toml", "--set", "parts[0].mesh.group='ice'")
     assert result.exit_code == 2
     refused = "conoid: parts[0].mesh.group = 'ice': no such element set, instance or part; known: All"

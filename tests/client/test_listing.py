@@ -30,7 +30,7 @@ def test_moments_are_dates_and_how_long_ago(text: str, when: datetime) -> None:
 
 
 @pytest.mark.parametrize("text", ["", "soon", "3 fortnights", "2026-13-01", "-3d", "3", "1" * 400 + "d", "0000-01-01"])
-def test_what_is_no_moment_is_refused(text: str) -> None:
+def test_an_invalid_time_is_refused(text: str) -> None:
     with pytest.raises(UsageError, match=r"^--since = .*: write a date such as "):
         moment(text, "--since", NOW)
 

@@ -54,7 +54,7 @@ def test_the_other_threads_of_a_rank_are_busy_by_the_time_of_their_tasks() -> No
     assert progressed(7).helped == []
 
 
-def test_what_a_rank_waits_for_others_is_no_exchange() -> None:
+def test_waiting_for_other_ranks_is_not_exchange() -> None:
     """client/web/live.js has the same rule."""
     phases = {"elements": [1.0, 2.0], "exchange": [0.5, 0.25]}
     assert grouped(phases, interval=3.0, waiting=[0.25, 0.5]) == {

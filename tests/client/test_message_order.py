@@ -28,7 +28,7 @@ def seqs(order: InOrder, *arriving: int) -> list[int]:
     return [passed.seq for seq in arriving for passed in order.take(message(seq))]
 
 
-def test_what_comes_in_order_needs_no_journal() -> None:
+def test_messages_in_order_need_no_journal() -> None:
     journal = Journal(3)
     assert seqs(InOrder(journal.after), 1, 2, 3) == [1, 2, 3]
     assert journal.asked == []

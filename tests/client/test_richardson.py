@@ -74,7 +74,7 @@ def test_far_beyond_the_formal_order_less_is_believed() -> None:
         ([2.0, math.nan, 1.0], Trend.UNKNOWN),
     ],
 )
-def test_what_does_not_converge_is_called_so(values: list[float], trend: Trend) -> None:
+def test_a_quantity_that_does_not_converge_is_named(values: list[float], trend: Trend) -> None:
     found = limit([1.0, 2.0, 4.0], values, floor=1e-6)
     assert found.trend is trend
     assert found.value == values[0]

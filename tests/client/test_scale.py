@@ -130,7 +130,7 @@ def test_bandwidths(text: str, value: float) -> None:
 
 
 @pytest.mark.parametrize("text", ["5", "GB/s", "0 GB/s", "5 Gb/s", "-1 GB/s"])
-def test_what_is_no_bandwidth(text: str) -> None:
+def test_an_invalid_bandwidth_is_refused(text: str) -> None:
     with pytest.raises(ValueError, match="is no bandwidth"):
         bandwidth(text)
 
@@ -155,7 +155,7 @@ def test_another_answer_on_more_ranks_is_an_error(
 
 
 @pytest.mark.parametrize(("option", "value"), [("--ranks", "two"), ("--latency", "2 m"), ("--bandwidth", "5")])
-def test_what_cannot_be_read_is_one_line(option: str, value: str) -> None:
+def test_an_unreadable_file_is_one_line(option: str, value: str) -> None:
     result = conoid("demo", option, value)
     assert result.exit_code == 2
     assert len(result.stderr.splitlines()) == 1

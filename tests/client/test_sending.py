@@ -254,7 +254,7 @@ def unusable(folder: Path, kind: str) -> str:
         ("a link to nothing", "no such file"), ("nothing", "no such file"), ("no name", "embedded null byte"),
     ],
 )  # fmt: skip
-def test_what_is_no_file_is_refused_in_a_line(folder: Path, kind: str, message: str) -> None:
+def test_a_path_that_is_not_a_file_is_refused_in_one_line(folder: Path, kind: str, message: str) -> None:
     """The client refuses the path before a request to a server, and does not hang."""
     with Session("http://127.0.0.1:9") as session, pytest.raises(CaseError) as raised:
         session.submit(case_with(unusable(folder, kind)))

@@ -110,7 +110,7 @@ def test_a_refused_case_lists_every_error() -> None:
     assert problems == ["run.ranks = 9: this server has 2 slots", "parts[0].mesh: this key is missing"]
 
 
-def test_what_is_not_there_is_the_same_error_here_and_on_a_server(tmp_path: Path) -> None:
+def test_a_missing_file_is_the_same_error_locally_and_on_a_server(tmp_path: Path) -> None:
     with pytest.raises(NotFoundError):
         Result.open(tmp_path / "nothing")
     with pytest.raises(NotFoundError, match="there is none") as caught:
@@ -302,7 +302,7 @@ def test_an_address_needs_its_scheme(quiet_home: Path) -> None:
         target("localhost:8750")
 
 
-def test_what_a_worker_raises_is_of_the_same_tree() -> None:
+def test_errors_of_the_worker_are_in_the_same_tree() -> None:
     from conoid.worker import errors
 
     with pytest.raises(ConoidError, match="slipped"):

@@ -67,7 +67,7 @@ def test_a_copy_is_the_case_and_names_the_schema_beside_it(quiet_home: Path) -> 
         (("materials", "stel"), 2, "conoid: material = 'stel': unknown material; did you mean 'steel'?"),
     ],
 )
-def test_what_is_not_there_is_one_line(words: tuple[str, ...], code: int, message: str, quiet_home: Path) -> None:
+def test_a_missing_object_is_one_line(words: tuple[str, ...], code: int, message: str, quiet_home: Path) -> None:
     result = conoid(*words)
     assert result.exit_code == code
     assert result.stderr.startswith(message)

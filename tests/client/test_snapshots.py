@@ -75,7 +75,7 @@ def test_one_is_asked_for_while_it_runs_only(session: Session, tmp_path: Path) -
         run.take_snapshot()
 
 
-def test_what_is_no_snapshot_is_refused(tmp_path: Path) -> None:
+def test_an_invalid_snapshot_is_refused(tmp_path: Path) -> None:
     (tmp_path / "x.snap").write_bytes(b"no")
     with pytest.raises(ClientError, match="CONOSNAP"):
         read(tmp_path / "x.snap")

@@ -95,7 +95,7 @@ ROWS = [
 ]  # fmt: skip
 
 
-def test_what_differs_is_drawn_over_what_was_changed() -> None:
+def test_differing_results_are_drawn_over_the_changed_key() -> None:
     made = sweep_plot.figure(
         [*ROWS, {**ROWS[0], "fragments": "", "energy.plastic [J]": ""}], ["v", "run.ranks"], None, []
     )

@@ -44,7 +44,7 @@ def test_the_pieces_of_the_bullet_stand_in_its_case() -> None:
     assert all(f"PRODUCT('{solid}'," in (folder / "bullet.step").read_text() for solid in solids)
 
 
-def test_what_it_shows_is_what_is_printed(quiet_home: Path) -> None:
+def test_the_tutorial_shows_the_printed_text(quiet_home: Path) -> None:
     (quiet_home / "tile.toml").write_text(CASE)
     shown = re.search(r"```\n(tile: valid, 1 warning\n.*?)```", TEXT, re.DOTALL)
     assert shown is not None

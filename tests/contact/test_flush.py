@@ -58,14 +58,14 @@ def test_bars_fly_past_each_other_side_by_side() -> None:
 
 
 @pytest.mark.parametrize("depth", [0.0, 0.1, 1.0, 5.9])
-def test_what_is_lower_than_the_top_of_the_plate_meets_it(depth: float) -> None:
+def test_a_body_below_the_top_of_the_plate_hits_the_plate(depth: float) -> None:
     """The plates collide head-on, with flush tops and with a smaller overlap, down to a tenth of a millimetre."""
     low = -6.0 + depth
     assert speed(passed(box((5, 5, 3), 2.0, (-4.0, -5.0, low)), PLATE)) < 0.9 * SPEED
 
 
 @pytest.mark.parametrize("above", [0.0, 0.001])
-def test_what_slides_on_a_floor_meets_the_wall_at_its_end(above: float) -> None:
+def test_a_body_that_slides_on_a_floor_hits_the_wall_at_its_end(above: float) -> None:
     """The body is concave: a node in front of the floor enters through the wall."""
     whole = box((12, 6, 6), 2.0, (-6.0, -6.0, -6.0))
     middles = whole.points[whole.tets].mean(axis=1)

@@ -40,7 +40,7 @@ def same(one: SurfaceNodes, two: SurfaceNodes) -> bool:
 
 
 @pytest.mark.parametrize(("f", "e", "n"), [(7, 5, 11), (0, 5, 3), (7, 0, 3), (0, 0, 3), (0, 0, 0)])
-def test_what_is_packed_comes_out_bit_by_bit(f: int, e: int, n: int) -> None:
+def test_packed_values_are_unpacked_to_the_bit(f: int, e: int, n: int) -> None:
     random = np.random.default_rng(1)
 
     def flags(*shape: int) -> Flags:

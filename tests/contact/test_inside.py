@@ -29,7 +29,7 @@ def seen(sim: Simulation) -> Inside:
 
 
 @pytest.mark.parametrize("depth", [-0.1 * SIZE, 0.0, 0.01 * SIZE])
-def test_what_is_apart_in_touch_or_hardly_deep_is_not_inside(depth: float) -> None:
+def test_separate_touching_or_hardly_deep_bodies_are_not_inside(depth: float) -> None:
     found = seen(sunk(depth))
     assert (found.nodes, found.buried, found.deepest) == (0, 0, 0.0)
     assert found.warnings == []
@@ -49,7 +49,7 @@ def test_the_lower_nodes_of_a_block_are_as_deep_as_it_has_sunk(depth: float) -> 
     assert found.deepest * sim.contact.exterior.size == pytest.approx(depth, rel=1e-9)
 
 
-def test_what_has_gone_through_the_outermost_tets_is_buried() -> None:
+def test_a_node_below_the_outermost_tets_counts_as_inside() -> None:
     """The middle of the larger block consists of tets without a corner on its surface."""
     found = seen(sunk(2.0 * SIZE))
     assert found.nodes > 9

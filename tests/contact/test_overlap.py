@@ -52,7 +52,7 @@ def test_bodies_that_cross_each_other_are_refused() -> None:
     build(meeting_of([{}, {}]), [one, moved(other, [0.0, 0.0, 1.3 * SIZE])])
 
 
-def test_what_does_not_meet_may_overlap() -> None:
+def test_parts_without_contact_may_overlap() -> None:
     met(0.2 * SIZE, parts=("body0",))
 
 
@@ -122,7 +122,7 @@ def test_bodies_that_coincide_and_are_not_pushed_are_refused_by_the_worker() -> 
         build(meeting_of([{}, {}], {"overlap": "refuse"}, end=2e-7), [WIDE, WIDE])
 
 
-def test_what_flush_bodies_share_of_a_plane_is_no_overlap() -> None:
+def test_the_common_plane_of_flush_bodies_is_no_overlap() -> None:
     for off in ((4 * SIZE, 0.0, 0.0), (2 * SIZE, 0.0, 4 * SIZE), (4 * SIZE, 4 * SIZE, 0.0)):
         pushed(WIDE, TetMesh(WIDE.points + np.array(off), WIDE.tets))
 

@@ -359,13 +359,13 @@ def test_what_cannot_be_read_is_refused_with_its_line(text: str, message: str, t
     ["INCLUDE", "NGEN", "NFILL", "NMAP, TYPE=RECTANGULAR", "NCOPY", "ELGEN", "ELCOPY",
      "SYSTEM", "Im Perfection", "SYMMETRIC MODEL GENERATION", "PARAMETER"],
 )  # fmt: skip
-def test_what_makes_or_moves_nodes_is_refused(word: str, tmp_path: Path) -> None:
+def test_keywords_that_make_or_move_nodes_are_refused(word: str, tmp_path: Path) -> None:
     name = "".join(word.partition(",")[0].split()).upper()
     with pytest.raises(MeshError, match=rf"line 18: \*{name} is not supported; write the nodes and elements out"):
         read(f"{FLAT}*{word}\n1, 2\n", tmp_path)
 
 
-def test_what_is_included_and_is_not_there_is_refused(tmp_path: Path) -> None:
+def test_a_missing_included_file_is_refused(tmp_path: Path) -> None:
     with pytest.raises(MeshError, match=r"line 18: the included file 'x.inp' is no file there"):
         read(f"{FLAT}*INCLUDE, INPUT=x.inp\n", tmp_path)
 

@@ -197,7 +197,7 @@ def test_the_volume_that_corners_lose_is_that_of_the_quadratic_element() -> None
     assert f"{100 * lost / (1 / 6 + lost):.2g} % less volume than the curved elements" in found.notes[0]
 
 
-def test_what_eight_tets_cannot_match_is_refused() -> None:
+def test_a_mesh_that_eight_tets_cannot_match_is_refused() -> None:
     whole = ball(0.0)
     torn = Content(np.arange(1, len(whole.points) + 2), np.concatenate([whole.points, whole.points[6:7]]), whole.cells)
     torn.cells[0].nodes[1][torn.cells[0].nodes[1] == 6] = len(whole.points)

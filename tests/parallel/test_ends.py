@@ -74,7 +74,7 @@ def test_a_file_in_the_folder_cancels_the_run_and_a_second_worker_keeps_out(tmp_
     assert [message.seq for message in journaled] == list(range(1, len(journaled) + 1))
 
 
-def test_what_asked_one_attempt_to_stop_stops_no_other(tmp_path: Path) -> None:
+def test_a_request_to_stop_one_attempt_stops_no_other_attempt(tmp_path: Path) -> None:
     """In an earlier version the file remained and stopped every later attempt."""
     folder = tmp_path / "run"
     words = command(1, "free_spin", "--out", str(folder), "--set", "run.end_time=1us")
@@ -261,7 +261,7 @@ def test_as_many_ranks_as_tets_and_not_more(tmp_path: Path) -> None:
     assert "run.ranks = 6: at most 5" in outcome(tmp_path / "6").message
 
 
-def test_what_turns_to_dust_takes_the_memory_that_was_expected(tmp_path: Path) -> None:
+def test_complete_fragmentation_takes_the_estimated_memory(tmp_path: Path) -> None:
     expected = estimate(read_case(shipped_path("glass_ball_cohesive")))
     done = ended(command(2, "glass_ball_cohesive", "--out", str(tmp_path)))
     assert done.returncode == 0, done.stderr

@@ -35,7 +35,7 @@ def marks(name: str, ranks: int = 1) -> list[pytest.MarkDecorator]:
 @pytest.mark.parametrize(
     ("name", "ranks"), [pytest.param(name, n, marks=marks(name, n)) for n in RANKS for name in SCENES]
 )
-def test_what_breaks_is_the_same_on_any_number_of_ranks(name: str, ranks: int, breaking: Answers) -> None:
+def test_the_same_facets_break_on_any_number_of_ranks(name: str, ranks: int, breaking: Answers) -> None:
     one, many = breaking(1, name), breaking(ranks, name)
     first, other = outcome(one), outcome(many)
     assert (first.state, other.state) == ("succeeded", "succeeded")

@@ -133,7 +133,7 @@ def test_a_rank_gets_a_core_for_each_of_its_threads() -> None:
     assert {"--ntasks=4", "--cpus-per-task=16"} <= set(batch.sbatch_words(job, batch.Profile(), Path("/runs/run")))
 
 
-def test_what_a_run_is_called_is_no_word_for_a_shell(tmp_path: Path) -> None:
+def test_the_name_of_a_run_is_not_read_by_a_shell(tmp_path: Path) -> None:
     job = batch.new_job("x;id $(id) `id`", 1, ("a", batch.Profile()), [], 0.0)
     assert re.fullmatch(r"conoid-[A-Za-z0-9_.-]+", job.name)
 
@@ -253,7 +253,7 @@ def test_a_folder_chooses_no_program(elsewhere: Path, monkeypatch: pytest.Monkey
 @pytest.mark.parametrize(
     "changes", [{"job": "--user=me"}, {"job": "7 8"}, {"job": "7\n"}, {"name": "-u"}, {"name": "a,b"}, {"name": "a\n"}]
 )
-def test_what_stands_in_a_record_is_no_option_of_a_command(changes: dict[str, str], elsewhere: Path) -> None:
+def test_a_text_of_a_record_is_no_option_of_a_command(changes: dict[str, str], elsewhere: Path) -> None:
     folder = evil(elsewhere.parent / "theirs", **changes)
     result = conoid("cancel", folder)
     (line,) = result.stderr.splitlines()

@@ -56,7 +56,7 @@ def say(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> Printed:
         (["--max-core-seconds", "inf"], "--max-core-seconds inf: above 0, finite"),
     ],
 )
-def test_what_cannot_be_is_one_line(say: Printed, arguments: list[str], words: str) -> None:
+def test_an_invalid_argument_is_one_line(say: Printed, arguments: list[str], words: str) -> None:
     code, out, err = say(*arguments)
     assert (code, out) == (2, "")
     assert err.startswith(f"conoid.server: {words}")
@@ -76,7 +76,7 @@ def test_a_port_that_is_taken(say: Printed) -> None:
         assert message[2] == f"conoid.server: {taken_too}\n"
 
 
-def test_what_cannot_be_done_ends_with_1(say: Printed, tmp_path: Path) -> None:
+def test_a_failed_command_ends_with_1(say: Printed, tmp_path: Path) -> None:
     assert say("--host", "192.0.2.1")[::2] == (
         1, "conoid.server: --host 192.0.2.1 --port 8750: Cannot assign requested address\n"
     )  # fmt: skip

@@ -80,7 +80,7 @@ def test_a_folder_stands_in_the_place_of_a_file(tmp_path: Path, name: str) -> No
     house.store.close()
 
 
-def test_what_was_not_accepted_is_not_run(server: Running, tmp_path: Path) -> None:
+def test_a_refused_case_is_not_run(server: Running, tmp_path: Path) -> None:
     large = server.ann.submit(ranks=2, wait=str(tmp_path / "go"))
     runs = [server.ann.submit() for _ in range(4)]
     server.ann.wait_for(large, State.RUNNING)

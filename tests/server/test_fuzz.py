@@ -140,7 +140,7 @@ def last_route(case: str, paths: Iterable[str]) -> str:
     return f"{method} {max(likely, key=lambda path: path.count('/'))}" if likely else ""
 
 
-def test_what_did_not_run_is_no_success() -> None:
+def test_a_run_that_did_not_start_is_no_success() -> None:
     """The study must fail for a phase that stopped early, an error, a missing route, or cases that were all refused."""
     rates = {route: {"examples": {"accepted": 1}} for route in TAKE_CASES}
     phases = {name: {"status": "success"} for name in PHASES}
@@ -161,7 +161,7 @@ def test_what_did_not_run_is_no_success() -> None:
             hold_whole({**good, **wrong}, "")
 
 
-def test_what_came_of_requests_in_a_row_belongs_to_the_last_of_them() -> None:
+def test_the_result_of_a_row_of_requests_belongs_to_the_last_request() -> None:
     output = """= FAILURES =
 ____ POST /v1/sweeps ____
 1. Test Case ID: a

@@ -74,7 +74,7 @@ def test_long_runs_are_thinned_evenly_and_end_with_the_newest(server: Running, r
     assert len(found["snapshots"]) == len(found["balance"]) == 200
 
 
-def test_what_comes_later_is_read_on_from_where_it_stood(server: Running, run: str) -> None:
+def test_later_lines_are_read_from_the_last_position(server: Running, run: str) -> None:
     folder = server.ann.runs / run
     last = write(folder, lines_of_run(50))
     assert shown(server, run)["last"] == last

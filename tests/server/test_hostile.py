@@ -66,7 +66,7 @@ def test_a_sample_of_hostile_bodies_is_answered(server: Running) -> None:
 
 
 @pytest.mark.parametrize("size", ["1e160", "1e-160", "5e-324"])
-def test_what_cannot_be_counted_is_not_accepted(tmp_path_factory: pytest.TempPathFactory, size: str) -> None:
+def test_a_case_with_uncountable_tets_is_refused(tmp_path_factory: pytest.TempPathFactory, size: str) -> None:
     """A site without limits refuses such a case too."""
     from conoid.cases.load import CaseError
     from conoid.server.intake.reading import Question, read

@@ -89,7 +89,7 @@ def test_the_removal_of_a_run_is_reported_to_its_user(server: Running) -> None:
     assert (answer.status_code, answer.json()["outcome"]["why"]) == (410, "by ann")
 
 
-def test_what_has_been_removed_is_in_no_list(server: Running) -> None:
+def test_removed_runs_are_in_no_list(server: Running) -> None:
     """Before, a removed run was listed as ``succeeded`` and as the newest one, although every request to it fails."""
     runs = [ended(server) for _ in range(4)]
     for gone in (runs[3], runs[1]):

@@ -132,7 +132,7 @@ def test_cancel_stops_once_then_kills() -> None:
 
 
 @pytest.mark.parametrize("ended", [WorkerExited(ExitCode.STORAGE, None), WorkerExited(-9, None, disk_failed=True)])
-def test_what_died_of_a_full_disk_was_not_cancelled(ended: WorkerExited) -> None:
+def test_a_run_ended_by_a_full_disk_is_not_cancelled(ended: WorkerExited) -> None:
     run = replace(RUN, state=State.STOPPING, stopping_for=Cause.CANCELLED)
     after, _ = advance(run, ended, 5.0)
     assert (after.state, after.cause) == (State.FAILED, Cause.STORAGE)
@@ -196,7 +196,7 @@ def test_an_end_without_outcome_is_never_a_success(
         (State.RUNNING, Found("gone", rebooted=True), State.LOST, Cause.NODE, WriteOutcome),
     ],
 )
-def test_what_an_earlier_server_left(
+def test_a_run_of_an_earlier_server_gets_its_state(
     before: State, event: Found, state: State, cause: Cause | None, first: object
 ) -> None:
     run, actions = advance(replace(RUN, state=before), event, 5.0)

@@ -289,7 +289,7 @@ def test_a_file_that_two_parts_name_is_one_file(web: Path) -> None:
     assert played(web, script) == ["Waits for 1 file", 1, 0]
 
 
-def test_what_stands_beside_a_failure_is_of_the_outcome(web: Path) -> None:
+def test_numbers_beside_a_failure_are_those_of_the_outcome(web: Path) -> None:
     script = """
         const { RunState } = await load("runstate.js");
         const { Numbers } = await load("numbers.js");

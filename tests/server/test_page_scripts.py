@@ -65,7 +65,7 @@ def test_a_snapshot_is_read_as_python_reads_it(ask: Ask, made: bytes) -> None:
         (lambda data: data[:-64], "length"),
     ],
 )
-def test_what_is_no_snapshot_is_refused(ask: Ask, made: bytes, harm: Callable[[bytes], bytes], words: str) -> None:
+def test_an_invalid_snapshot_is_refused(ask: Ask, made: bytes, harm: Callable[[bytes], bytes], words: str) -> None:
     script = "(() => { try { page.decode(data); } catch (error) { return error.message; } })()"
     assert words in ask("snapshot.js", script, sent(harm(made)))
 

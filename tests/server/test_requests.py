@@ -411,7 +411,7 @@ def test_a_refusal_of_an_unknown_parameter_lists_the_known_ones(server: Running)
         ("DELETE", "/v1/runs", 405, "method_not_allowed"),
     ],
 )
-def test_what_is_not_there(server: Running, method: str, path: str, status: int, code: str) -> None:
+def test_a_missing_object_is_not_found(server: Running, method: str, path: str, status: int, code: str) -> None:
     refusal(server.ann.http.request(method, path), status, code)
 
 
@@ -569,7 +569,7 @@ def test_the_key_of_a_removed_run_is_answered_as_in_openapi(server: Running) -> 
         assert "410" in paths[path]["post"]["responses"], path
 
 
-def test_what_is_known_is_known_in_every_form_of_its_tag(server: Running) -> None:
+def test_an_etag_is_recognised_in_every_form(server: Running) -> None:
     """A proxy that compresses makes a tag weak; a browser may send several tags (RFC 9110, 13.1.2)."""
     run = server.ann.submit()
     server.ann.wait_for(run)

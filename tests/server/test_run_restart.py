@@ -113,7 +113,7 @@ def test_where_the_newest_is_damaged_a_new_run_gets_the_one_before(tmp_path: Pat
     assert raised.value.status == 409
 
 
-def test_what_is_no_file_among_the_results_is_left_out(tmp_path: Path) -> None:
+def test_results_that_are_not_files_are_left_out(tmp_path: Path) -> None:
     source = with_checkpoint_in(made(tmp_path / "a", 10))
     remade(source / "fragments" / "000000.csv", "pipe")
     remade(source / layout.HISTORY, "endless")

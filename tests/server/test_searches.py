@@ -82,7 +82,7 @@ def test_a_wrong_report_is_refused(server: Running, more: dict[str, Any]) -> Non
     assert server.ann.http.get("/v1/sweeps").json()["sweeps"] == []
 
 
-def test_what_is_no_report_is_refused(server: Running) -> None:
+def test_an_invalid_report_is_refused(server: Running) -> None:
     for body in (b"", b"[" * 100_000, b"\xff", b'{"low": 1e999}'):
         assert server.ann.http.put(f"/v1/sweeps/adaptive/{NAME}", content=body).status_code == 422
     assert server.ann.http.put(f"/v1/sweeps/adaptive/{NAME}", content=b" " * 300_000).status_code == 413

@@ -329,7 +329,7 @@ def numbers(workers: list[SlurmWorker]) -> list[str]:
     return [worker.record.job for worker in workers]
 
 
-def test_what_starts_together_is_one_array(place: Path) -> None:
+def test_runs_that_start_together_are_one_array(place: Path) -> None:
     arrays, workers = group_of(place, 3)
     workers[0].since = time.monotonic()
     assert arrays.hand_over(workers) == {worker.name for worker in workers}, "it may still grow"

@@ -128,7 +128,7 @@ def test_a_name_of_another_job_hides_no_run(place: Path, name: str, first: bool)
 @pytest.mark.parametrize(
     "output", ["nonsense\n", "8|RUNNING|5|conoid-run-1|None", "\n", "8|running|5|a|None\n", "slurm: x\n"]
 )
-def test_what_is_no_list_is_not_taken_for_an_empty_one(place: Path, output: str) -> None:
+def test_invalid_output_is_not_read_as_an_empty_list(place: Path, output: str) -> None:
     commands(place, "echo 7")
     (place / "queue").write_text(output)
     with pytest.raises(slurm_call.AwayError):

@@ -66,7 +66,7 @@ def test_another_case_or_another_user_runs_nothing_again(server: Running, tmp_pa
     assert [point["run"]["id"] for point in server.ann.http.get(sweep["url"]).json()["points"]] == runs
 
 
-def test_what_cannot_be_run_again_leaves_the_sweep_as_it_was(
+def test_a_sweep_is_unchanged_if_a_point_cannot_run_again(
     server: Running, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     sweep, body, runs = cancelled_in_part(server, tmp_path)

@@ -91,7 +91,7 @@ def test_a_complete_file_replaces_its_pieces(server: Running, size: int) -> None
     assert files_of(server.ann) == [sha256]
 
 
-def test_what_a_killed_server_had_not_verified_is_verified_by_a_word(server: Running) -> None:
+def test_a_file_that_a_killed_server_did_not_verify_is_verified_on_request(server: Running) -> None:
     data, sha256 = made(500)
     folder = server.ann.runs / uploads.FOLDER / "ann"
     folder.mkdir(parents=True)
@@ -181,7 +181,7 @@ def test_a_body_without_a_length_is_refused(server: Running) -> None:
 
 
 @pytest.mark.parametrize("name", ["x", "0" * 63, "A" * 64, "0" * 65, "..", "%2e%2e%2fserver.sqlite", "0" * 64 + "%0a"])
-def test_what_is_no_hash_names_no_file(server: Running, name: str) -> None:
+def test_an_invalid_hash_names_no_file(server: Running, name: str) -> None:
     for answer in (put(server.ann, name, b"x"), server.ann.http.get(f"/v1/files/{name}")):
         assert answer.status_code in {400, 404, 405}
         assert "\n" not in answer.json()["detail"]

@@ -102,7 +102,7 @@ def test_memory_is_summed_over_what_runs() -> None:
 @pytest.mark.parametrize(
     ("dust", "room", "memory"), [(0.0, math.inf, 3e9), (2e9, math.inf, 5e9), (2e9, 4e9, 4e9), (2e9, 1e9, 3e9)]
 )
-def test_what_may_break_takes_memory_for_its_dust_where_there_is_some(dust: float, room: float, memory: float) -> None:
+def test_parts_that_may_break_reserve_memory_for_fragments(dust: float, room: float, memory: float) -> None:
     """A run whose memory exceeds that of the server only after all tets separate starts alone. A run whose memory
     exceeds that of the server from the start does not start.
     """

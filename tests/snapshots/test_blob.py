@@ -195,7 +195,7 @@ def test_no_tets_are_a_snapshot_too() -> None:
 @pytest.mark.parametrize(
     "harm", [lambda d: d[:-8], lambda d: b"X" + d[1:], lambda d: d[:8] + b"\2" + d[9:], lambda d: d[:40]]
 )
-def test_what_is_not_whole_is_refused(harm) -> None:  # type: ignore[no-untyped-def]
+def test_a_damaged_snapshot_is_refused(harm) -> None:  # type: ignore[no-untyped-def]
     data = made(shattered(2, 2)).data
     with pytest.raises(ValueError, match="snapshot"):
         snapshot.header_of(harm(data))

@@ -155,7 +155,7 @@ def test_the_last_snapshot_does_not_wait_for_what_others_leave(
     assert first == second == min(last + 10, 19)
 
 
-def test_what_waits_for_the_network_is_bounded_and_counted() -> None:
+def test_messages_that_wait_for_the_network_are_bounded_and_counted() -> None:
     """The endpoint has no listener."""
     telemetry = Telemetry("tcp/127.0.0.1:1", "conoid/v1/ann/run")
     began = time.monotonic()

@@ -442,7 +442,7 @@ def test_irregular_plates_keep_the_pressure_of_their_impact() -> None:
         ("alumina", 200.0, None, (0.95, 1.38)), ("soda_lime", 1200.0, None, (0.95, 1.2)),
     ],
 )  # fmt: skip
-def test_what_is_brittle_keeps_the_pressure_of_its_impact(
+def test_brittle_parts_keep_the_pressure_of_the_impact(
     name: str, speed: float, sweeps: int | None, share: tuple[float, float]
 ) -> None:
     """The pressure is between that of broken and of intact bodies (1.38 times as large), and near that of broken

@@ -16,7 +16,7 @@ from ..bench.press import FLYING, GLASS, measure, press
 
 
 @pytest.mark.slow
-def test_what_is_driven_is_as_stiff_as_with_many_more_sweeps() -> None:
+def test_a_driven_pile_is_as_stiff_as_with_many_more_sweeps() -> None:
     """With five sweeps the work is a third, so the check can fail."""
     converged, own, few = (measure(press(sweeps)).work for sweeps in (120, None, 5))
     print(converged, own, few)
@@ -25,7 +25,7 @@ def test_what_is_driven_is_as_stiff_as_with_many_more_sweeps() -> None:
 
 
 @pytest.mark.slow
-def test_what_flies_rebounds_as_with_many_more_sweeps() -> None:
+def test_a_flying_body_rebounds_as_with_many_more_sweeps() -> None:
     """A ram of 200 m/s rebounds with 112 m/s, and with 40 m/s with five sweeps, so the check can fail."""
     converged, own, few = (measure(press(sweeps, FLYING)).speed for sweeps in (80, None, 5))
     print(converged, own, few)

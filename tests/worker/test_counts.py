@@ -125,7 +125,7 @@ ERODING = {
 
 
 @pytest.mark.parametrize("ranks", [1, 2])
-def test_what_erosion_cuts_off_is_a_fragment(ranks: int) -> None:
+def test_tets_cut_off_by_erosion_are_a_fragment(ranks: int) -> None:
     """A layer of tets in the middle of one of two bars is removed, so that the bar consists of two fragments."""
 
     def work(comm: Comm) -> list[int]:

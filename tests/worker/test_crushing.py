@@ -129,7 +129,7 @@ def alone() -> Compressed:
     return found
 
 
-def test_what_hits_a_wall_meets_the_stress_of_the_wave(alone: Compressed) -> None:
+def test_a_body_that_hits_a_wall_has_the_stress_of_the_wave(alone: Compressed) -> None:
     """In front of the wall the stress is density times wave speed times speed, 5.4 GPa; a coarse mesh overshoots."""
     wave = 2500.0 * 400.0 * (72e9 * 0.78 / (1.22 * 0.56) / 2500.0) ** 0.5
     assert 0.9 * wave < alone.most < 1.5 * wave
@@ -159,7 +159,7 @@ def test_a_resumed_run_restores_its_state(tmp_path: Path, alone: Compressed) -> 
     assert found.tets >= alone.tets
 
 
-def test_what_fails_in_compression_or_does_not_break_has_none() -> None:
+def test_crushing_is_not_measured_for_other_materials() -> None:
     assert Patch(MESH, GLASS).sim.crushing is None
     assert Patch(MESH, HARD).sim.crushing is None
 

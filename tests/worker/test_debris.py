@@ -89,7 +89,7 @@ def test_without_self_contact_it_passes_and_is_counted() -> None:
         ({"self_contact": ("stays",)}, ("breaks", "stays")), ({"parts": ("stays", "wears")}, ("wears",)),
     ],
 )  # fmt: skip
-def test_what_erodes_or_fractures_meets_itself(contact: dict[str, Any] | None, meet: tuple[str, ...]) -> None:
+def test_parts_that_erode_or_fracture_have_self_contact(contact: dict[str, Any] | None, meet: tuple[str, ...]) -> None:
     """Self-contact is the default for eroding parts; a list of parts replaces this default. Parts that fracture always
     have self-contact."""
     case = meeting_of([{"erosion": EROSION}, {"fracture": schema.Fracture()}, {}])

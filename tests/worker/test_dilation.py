@@ -124,7 +124,7 @@ def test_the_apex_removes_the_deviator_and_no_strength_returns() -> None:
     assert (patch.get(DILATION) <= most).all()
 
 
-def test_what_has_failed_keeps_its_volume() -> None:
+def test_failed_material_keeps_its_volume() -> None:
     """In shear at constant volume the pressure rises until the failure strain is reached, and not afterwards."""
     law = glass(ANGLES[0], failure_strain=0.02)
     patch = Patch(TetMesh(REGULAR, np.array([[0, 1, 2, 3]], np.int32)), law)

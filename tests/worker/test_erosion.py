@@ -144,7 +144,7 @@ WALL = {"kind": "wall", "point": (0.0, 0.0, 0.0), "normal": (0.0, 0.0, 1.0)}
     [(GRAVITY,), (DRIVEN,), (MIRROR,), (WALL,)],
     ids=["gravity", "driven", "mirror", "wall"],
 )
-def test_what_has_left_is_not_moved_any_more(bounds: tuple[Any, ...]) -> None:
+def test_removed_nodes_are_not_moved(bounds: tuple[Any, ...]) -> None:
     """Neither gravity nor a prescribed motion moves removed nodes, and their momentum and energy stay as at the time
     of removal."""
     residuals, sim = pulled(alone(block((3, 3, 3), MM), REMOVE, (0, 0, 100), boundaries=bounds))
@@ -269,7 +269,7 @@ def test_a_node_that_loses_all_its_tets_at_once_meets_others() -> None:
     assert sim.contact.exterior.surface.flags[particles].all()
 
 
-def test_what_is_laid_bare_meets_in_the_same_step() -> None:
+def test_exposed_faces_have_contact_in_the_same_step() -> None:
     """The search in the step of the removal includes the inner faces of the removed tet as candidates of the nodes
     above it."""
     case, meshes = scene_of_two()
@@ -297,7 +297,7 @@ def test_what_is_laid_bare_meets_in_the_same_step() -> None:
     assert wanted <= candidates()
 
 
-def test_what_a_tiring_tet_covers_comes_to_the_surface_without_a_search() -> None:
+def test_faces_covered_by_a_worn_tet_become_surface_without_a_search() -> None:
     case, meshes = scene_of_two()
     copper = case.model_copy(update={"materials": {"metal": COPPER}})
     sim = build(wearing(copper, schema.Erosion(plastic_strain=1.0)), meshes)

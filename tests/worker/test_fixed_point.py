@@ -214,7 +214,7 @@ def test_limbs_are_those_of_numpys_rounding(values: Floats) -> None:
 
 
 @pytest.mark.parametrize("odd", [math.nan, -math.nan, math.inf, -math.inf])
-def test_what_is_not_finite_is_above_all_that_is(odd: float) -> None:
+def test_a_value_that_is_not_finite_has_an_infinite_maximum(odd: float) -> None:
     for values in ([odd], [1.0, odd, -1e308], [odd, 0.0]):
         assert fixed_point.magnitude(fixed_point.most(np.array(values))) == math.inf
 

@@ -151,7 +151,7 @@ def _three() -> tuple[schema.Case, list[TetMesh]]:
 
 
 @pytest.mark.parametrize("ranks", [1, 3])
-def test_what_parts_push_each_other_with_is_the_change_of_their_momentum(ranks: int, tmp_path: Path) -> None:
+def test_the_impulse_between_parts_is_the_change_of_momentum(ranks: int, tmp_path: Path) -> None:
     """The impulses of two parts are equal and opposite to the bit, and the sum over all partners is the change of
     momentum, also after a checkpoint."""
     case, meshes = _three()

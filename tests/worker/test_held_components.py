@@ -62,7 +62,7 @@ def test_a_boundary_that_does_not_answer_cannot_be_made() -> None:
     ],
     ids=lambda value: type(value).__name__ if isinstance(value, Boundary) else "",
 )
-def test_what_is_held_has_no_mobility_in_contact(bound: Boundary, held: tuple[int, int, int]) -> None:
+def test_held_nodes_have_no_mobility_in_contact(bound: Boundary, held: tuple[int, int, int]) -> None:
     assert bound.held_components().tolist() == [list(held)] * 2
     mobility, planes = mobilities(nodes(5), [bound]), symmetry_planes(5, [bound])
     expected = np.full((5, 3), 0.5)

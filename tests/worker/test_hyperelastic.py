@@ -211,7 +211,7 @@ def rung(material: Material) -> tuple[float, float]:
 
 
 @pytest.mark.parametrize("material", [STEEL, HARD], ids=["from the shape", "by rates"])
-def test_what_rings_keeps_its_energy(material: Material) -> None:
+def test_a_ringing_body_keeps_its_energy(material: Material) -> None:
     """The pressure, which is a sum of increments, remains a function of the volume."""
     energy, apart = rung(material)
     print(f"energy {energy:.6f}; pressure {apart:.1e}")

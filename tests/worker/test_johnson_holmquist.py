@@ -128,7 +128,7 @@ def test_uniaxial_strain_follows_an_independent_integration(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_what_becomes_bulking_is_not_booked_as_plastic_work(name: str) -> None:
+def test_energy_of_bulking_is_not_booked_as_plastic_work(name: str) -> None:
     """Without pressure only the deviator stores energy, V s : s / 4 G, which is the work minus the plastic work."""
     made, law, bulk, shear = constants(name)
     mesh = free_tets(1, 3)

@@ -75,7 +75,7 @@ def whole() -> Course:
 @pytest.mark.parametrize("ranks", [1, 3])
 @pytest.mark.parametrize("stops", [(9, 9), (8, 20, 21)], ids=str)
 @pytest.mark.parametrize("changes", [(), OTHER], ids=["as it is", "other searches"])
-def test_what_is_kept_again_and_again_is_the_same_run(
+def test_a_run_saved_and_restored_repeatedly_is_the_same_run(
     changes: tuple[str, ...], stops: tuple[int, ...], ranks: int, whole: Course, tmp_path: Path
 ) -> None:  # fmt: skip
     cases = [case_of(), case_of(*changes)]

@@ -56,7 +56,7 @@ def test_every_line_closes_to_second_order(keys: dict[str, Any], frames: int) ->
 
 @pytest.mark.parametrize("material", [STEEL, HARD], ids=["from the shape", "by rates"])
 @pytest.mark.parametrize(("speed", "steps", "share"), [(800.0, 500, 0.005), (80.0, 2000, 0.001)])
-def test_what_rings_gains_no_energy(material: materials.Material, speed: float, steps: int, share: float) -> None:
+def test_a_ringing_body_gains_no_energy(material: materials.Material, speed: float, steps: int, share: float) -> None:
     """A cube with random velocities oscillates without viscosity; its strains are as large as those of the plastic
     flow of an impact."""
     sim = build(scene(material, "standard", jitter=speed), [block((6, 6, 6), 1e-3)])

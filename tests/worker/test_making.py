@@ -32,7 +32,7 @@ def test_what_takes_for_good_may_not_fall(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", RETURNED)
-def test_what_gives_back_may_give_no_more_than_it_has(name: str) -> None:
+def test_a_ledger_line_returns_no_more_than_it_has(name: str) -> None:
     making = Making(0.0)
     making.look(lines(**{name: 0.5}), 1.0, 1e-6)
     making.look(lines(**{name: 0.0}), 1.0, 2e-6)

@@ -86,7 +86,7 @@ def test_between_two_planes_a_body_has_an_image_behind_each(speed: float) -> Non
     assert np.abs(mirrors.contact_loss).max() < 1e-12
 
 
-def test_what_has_tets_is_stopped_beside_what_has_none() -> None:
+def test_nodes_with_tets_are_stopped_beside_nodes_without() -> None:
     state: Any = SimpleNamespace(x=np.full((2, 3), 0.1), v=np.full((2, 3), -1.0), mass=np.ones(2))
     mirrors = Mirrors(np.arange(2, dtype=np.int32), np.array([2]), np.zeros(1), np.ones((2, 1)))
     mirrors.release(np.array([False, True]), [mirrors])
@@ -137,7 +137,7 @@ def test_debris_keeps_its_energy_at_planes(at: float) -> None:
     assert not any(mine[bound.nodes].any() for bound in held), "the planes hold nodes with tets alone"
 
 
-def test_what_starts_on_the_axis_may_leave_it() -> None:
+def test_a_node_that_starts_on_the_axis_may_leave_it() -> None:
     """Debris on the axis that falls on a slope is pushed to the side: the plane does not hold a node without tets."""
     case, meshes = corner((0.0, 0.0, -800.0))
     points = meshes[1].points

@@ -26,7 +26,7 @@ def parcel(mine: list[int]) -> Parcel:
 
 @pytest.mark.parametrize("ranks", [2, 3, 5])
 @pytest.mark.parametrize("shift", [0, 1, 7])
-def test_what_is_even_already_stays(ranks: int, shift: int) -> None:
+def test_balanced_loads_are_not_moved(ranks: int, shift: int) -> None:
     """No tets move, for any assignment of the slabs of the row to ranks. If slabs are wrong by some tets, only these
     tets are moved."""
     order = np.random.default_rng(3).permutation(ranks)

@@ -164,7 +164,7 @@ def test_a_ring_carries_the_pressure_on_its_present_radius() -> None:
 
 
 @pytest.mark.parametrize("ranks", [1, 3])
-def test_what_erosion_takes_has_no_load_any_more_and_goes_on_after_a_checkpoint(ranks: int, tmp_path: Path) -> None:
+def test_eroded_faces_have_no_load_also_after_a_checkpoint(ranks: int, tmp_path: Path) -> None:
     faces = boundary_faces(MESH.tets)
     whole = {frozenset(face.tolist()) for face in faces}
     owner = {face: e for e, tet in enumerate(MESH.tets.tolist()) for face in whole if face <= set(tet)}

@@ -86,7 +86,7 @@ def test_a_push_takes_what_coulomb_allows_of_the_speed_along_the_wall(friction: 
     assert stages(sim.case)["friction"] == (friction > 0.0)
 
 
-def test_what_slides_comes_to_rest_and_friction_has_all_of_its_energy() -> None:
+def test_a_sliding_body_comes_to_rest_and_friction_takes_its_energy() -> None:
     """The deceleration is friction times weight: the block stops after 33 us and half of the 10 us in which the
     weight rises."""
     lines: list[Energy] = []

@@ -133,7 +133,7 @@ def test_both_refuse_the_same(data: Any, words: str, folder: Path) -> None:
     "shift", [(0, 0, 0), (1, 0, 0), (0.13, 0.21, 0.4), (1.2, 1.3, 1.1), (0, 0, 1.5), (0.5, 0, 0), (0.5, 0.5, 1.5)]
 )
 @pytest.mark.parametrize("contact", ["none", {}])
-def test_what_is_there_twice_is_refused_by_both(shift: Any, contact: Any, folder: Path) -> None:
+def test_a_volume_that_counts_twice_is_refused_by_both(shift: Any, contact: Any, folder: Path) -> None:
     """The common volume is the part of 8 mm^3 that the shift leaves. The common volume is exact if the tets coincide;
     otherwise its error is half a layer of tets.
     """

@@ -109,7 +109,7 @@ def test_an_inverted_tet_is_broken_and_carries_no_stress(value: float, count: in
 @pytest.mark.parametrize(
     ("row", "value"), [*((row, np.nan) for row in range(8)), (6, -np.inf), (rows.WORK, np.nan), (-1, np.nan)]
 )
-def test_what_is_not_a_number_stays_so_and_ends_the_run(row: int, value: float, volume: float) -> None:
+def test_a_nan_is_kept_and_ends_the_run(row: int, value: float, volume: float) -> None:
     """The limit of the step becomes NaN: step.py then stops and names the tet. No NaN is replaced by zero."""
     chunk = Chunk()
     chunk.w[scratch.VOLUME + 3] = volume * VOLUME if row >= 0 else np.nan
