@@ -17,6 +17,7 @@ from conoid.worker.fracture.insertion import inserted
 from conoid.worker.model.state import Nodes
 from conoid.worker.parallel.comm import SerialComm
 from conoid.worker.parallel.fixed_point import exact_sums
+from conoid.worker.parallel.team import team
 
 Floats = npt.NDArray[np.float64]
 
@@ -58,7 +59,7 @@ class Facet:
         )  # fmt: skip
         self.x0, self.weight = x, weight
         self.offset = float(new.softening.lent[0, 0])
-        self.cohesion = Cohesion(ENERGY * AREA)
+        self.cohesion = Cohesion(ENERGY * AREA, team(1))
         self.cohesion.insert(new)
 
     @property

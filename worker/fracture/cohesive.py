@@ -38,6 +38,8 @@ from ..migration.parcel import Parcel
 from ..model.state import Flags, Floats, Indices, Ints, Nodes
 from ..model.topology import Split
 from ..parallel.fixed_point import Tally
+from ..parallel.passes import Pass
+from ..parallel.team import Team
 from . import law
 from .columns import FacetConstants, Facets, PairState, Softening
 
@@ -45,9 +47,15 @@ from .columns import FacetConstants, Facets, PairState, Softening
 class Cohesion:
     """Cohesive facets of one rank: updates their openings and tractions, and sums their work."""
 
-    def __init__(self, energy: float) -> None:
-        """``energy``: order of magnitude of the work on a facet, J; it sets the quantum of the sums."""
+    def __init__(self, energy: float, threads: Team) -> None:
+        """``energy``: order of magnitude of the work on a facet, J; it sets the quantum of the sums; ``threads``: of
+        the rank.
+        """
         self.facets = Facets.none()
+        self._open, self._unload, self._foresee = (
+            Pass(threads, kernel, *kinds, size=law.FACETS_OF_A_TASK)
+            for kernel, kinds in ((law.open_facets, law.OPEN), (law.unload, law.UNLOAD), (law.foresee, law.FORESEE))
+        )
         self.gone = Tally(np.array([energy, energy]))
         """Sums over the failed facets: work done on the facets, J, and fracture energy of the facets, J."""
 
@@ -71,7 +79,9 @@ class Cohesion:
         f, tiny = self.facets, np.finfo(float).tiny
         if not len(f.tets):
             return
-        if law.open_facets(f, x):
+        failures = np.empty(self._open.many(len(f.tets)), np.int64)
+        self._open.run(len(f.tets), *f, x, failures)
+        if failures.any():
             failed = f.state.top - f.softening.knee >= np.maximum(f.softening.critical, tiny)
             kept: Flags = np.asarray(~failed.all(axis=1))
             self.gone.add(np.column_stack([f.state.work.sum(axis=1), _whole(f)])[~kept])
@@ -81,11 +91,13 @@ class Cohesion:
         """Lowers the tractions of pairs that would release more than they absorbed in the next step; adds the change
         of the nodal forces, quanta, to ``change`` (nodes, 3). See law.unload.
         """
-        law.unload(change, self.facets, nodes.x, nodes.v, nodes.force, nodes.mass, steps, nodes.scale, whole)
+        of = nodes.x, nodes.v, nodes.force, nodes.mass
+        self._unload.run(len(self.facets.tets), *self.facets, change.reshape(-1), *of, steps, nodes.scale, whole)
 
     def foresee(self, nodes: Nodes, mean_dt: float) -> None:
         """Stores the opening velocities in the next step that the present nodal forces alone would cause."""
-        law.foresee(self.facets, nodes.v, nodes.force, nodes.mass, mean_dt / nodes.scale)
+        of = nodes.v, nodes.force, nodes.mass
+        self._foresee.run(len(self.facets.tets), *self.facets, *of, mean_dt / nodes.scale)
 
     def keep(self, parcel: Parcel) -> None:
         """Adds the facets to a parcel (a checkpoint or migration message)."""

@@ -101,7 +101,9 @@ class Facets(NamedTuple):
 
 
 _F1, _F2, _F3 = types.float64[::1], types.float64[:, ::1], types.float64[:, :, ::1]
-FACETS = record(
-    Facets, types.int64[:, ::1], types.int32[:, ::1], record(FacetConstants, _F1, _F1, _F1),
+COLUMNS = (
+    types.int64[:, ::1], types.int32[:, ::1], record(FacetConstants, _F1, _F1, _F1),
     record(Softening, _F2, _F2, _F2, _F2, _F3), record(PairState, _F2, _F2, _F3, _F3, _F2, _F3),
 )  # fmt: skip
+"""Types of the fields of Facets."""
+FACETS = record(Facets, *COLUMNS)

@@ -65,7 +65,7 @@ class Fracture:
         """Facets that break in this step; None before they have been found."""
         self.cohesion: Cohesion | None = None
         if cohesive(case):
-            self.cohesion = elements.cohesion = Cohesion(work)
+            self.cohesion = elements.cohesion = Cohesion(work, team)
             self._unloading = Unloading(self.cohesion, model.nodes, neighbours, comm)
 
     @property

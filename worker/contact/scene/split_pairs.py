@@ -111,12 +111,12 @@ def follow_edges(near, corners, fresh, sides, first, ids, key, became):  # type:
         gone[r] = corners[e, 0] == corners[e, 1]
         for k in range(6):
             old[r, k] = corners[e, k]
-        for k in range(2):
-            corners[e, k] = _become(ids, key, became, old[r, k], one)
-            gone[r] |= corners[e, k] != _become(ids, key, became, old[r, k], two)
-        for k in range(2, 6, 2):
-            corners[e, k] = _become(ids, key, became, old[r, k], one)
-            corners[e, k + 1] = _become(ids, key, became, old[r, k + 1], two)
+        for k in range(6):
+            if first[old[r, k]] < 0:
+                continue
+            corners[e, k] = _become(ids, key, became, old[r, k], one if k < 2 or k % 2 == 0 else two)
+            if k < 2:
+                gone[r] |= corners[e, k] != _become(ids, key, became, old[r, k], two)
         if gone[r]:
             corners[e, 1:] = corners[e, 0]
     return rows, old, gone
