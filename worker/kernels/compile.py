@@ -60,7 +60,8 @@ def compile_all(folder: Path, tell: Tell, root: Path = store.ROOT, package: str 
         if not (folder / COMPLETE).exists():
             modules = {path: _Module.of(path, root, package) for path in counts}
             kept = {path for path, module in modules.items() if module.take_over(folder)}
-            _in_parallel(_order(set(counts) - kept), folder, progress, modules)
+            if missing := set(counts) - kept:
+                _in_parallel(_order(missing), folder, progress, modules)
             (folder / COMPLETE).touch()
     tell(total, total)
     return True
