@@ -122,6 +122,14 @@ def test_programs_change_no_bit(scene: str, tmp_path: Path) -> None:
     assert any(counted.steps) == (scene != "a load that changes")
 
 
+def test_snapshots_that_wait_for_a_wall_time_prevent_no_program(tmp_path: Path) -> None:
+    text, counted = text_of("free").replace("snapshots = 0", "snapshots = 100"), Programs()
+    with patch.object(Stretch, "run", lambda *given: counted(*given)):
+        outcome = run(text, tmp_path / "snapshots")
+    assert outcome.steps is not None
+    assert sum(counted.steps) > 0.5 * outcome.steps
+
+
 def test_a_run_ends_after_the_same_number_of_steps(tmp_path: Path) -> None:
     text = text_of("free").replace("frames = 3", "max_steps = 37")
     assert run(text, tmp_path / "program").steps == step_by_step(text, tmp_path / "alone").steps == 37

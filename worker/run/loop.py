@@ -132,7 +132,7 @@ class Loop:
         """Take stages 11 to 15 of the step, and before the stages 14 and 15 further steps that are quiet."""
         sim, steps = self.sim, 0
         if self._requests.idle:
-            wall, t, last = self._requests.next
+            wall, t, last = self._requests.next(sim.clock.t)
             wall = min(wall, self.choice.due) if self.choice is not None else wall
             steps = self._stretch.run(Until(wall, min(t, self.samples.next), last))
         self.updates += max(steps, 1) * sim.model.elements_global

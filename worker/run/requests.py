@@ -41,10 +41,12 @@ class Requests:
         """Whether no request is under way, and none depends on the step."""
         return not (self._active or self._every_step)
 
-    @property
-    def next(self) -> tuple[float, float, int]:
-        """Wall time, s, simulated time, s, and number of the step, before which no request can begin."""
-        return self._wall, self._time, self._run.max_steps - 1
+    def next(self, t: float) -> tuple[float, float, int]:
+        """Return wall time, s, simulated time, s, and number of the step, before which no request can begin. Requests
+        that were scheduled before the present time ``t``, s, wait for a later wall time: snapshots have a smallest
+        interval.
+        """
+        return self._wall, self._time if self._time > t else math.inf, self._run.max_steps - 1
 
     def due(self, clock: Clock, now: float) -> bool:
         """Return whether the requests may have changed at the wall time ``now``, s."""
