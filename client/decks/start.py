@@ -47,6 +47,9 @@ def _give(draft: Draft, body: Body, start: Start) -> None:
         why = f"{body.name} has a velocity already; two initial velocities, one of which rotates, are not translated"
         start.entry.remark("refused", start.chosen.what, why)
     old = body.velocity or (0.0, 0.0, 0.0)
+    if any(old[axis] not in (0.0, value) for axis, value in start.velocity.items()):
+        why = f"replaces the velocity that an earlier line of the deck gives {body.name}"
+        start.entry.remark("differs", start.chosen.what, why)
     x, y, z = (start.velocity.get(axis, old[axis]) for axis in range(3))
     body.velocity = (x, y, z)
     if any(start.rate):

@@ -96,6 +96,18 @@ def test_a_second_velocity_of_a_body_that_turns_refuses(tmp_path: Path) -> None:
         assert any("has a velocity already" in line for line in read(tmp_path, "a.k", lsdyna(*STEEL, *cards)).refusals)
 
 
+def test_a_velocity_that_replaces_another_one_is_in_the_account(tmp_path: Path) -> None:
+    """Two loads of one body are more often a mistake than a wish."""
+    push = ["*INITIAL_VELOCITY_GENERATION", row(1, 2, 0.0, 5.0), row(0)]
+    for speed, expected in ((7.0, ["replaces the velocity that an earlier line of the deck gives body"]), (5.0, [])):
+        again = ["*INITIAL_VELOCITY_GENERATION", row(1, 2, 0.0, speed), row(0)]
+        found = read(tmp_path, "a.k", lsdyna(*STEEL, *push, *again))
+        assert found.refusals == []
+        assert found.data["parts"][0]["velocity"][0] == f"{speed:g} mm/s"
+        details = [each for entry in found.account.entries for each in entry.details if each.kind == "differs"]
+        assert [each.why for each in details] == expected
+
+
 def test_groups_within_themselves_and_that_take_away_refuse(tmp_path: Path) -> None:
     law = ("/MAT/ELAST/1", "steel", "7.85E-9", r20(2.1e5, 0.3))
     for group, message in (
