@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from conoid.worker.contact.solver.slot_numbers import mark
+from conoid.worker.contact.solver.slot_numbers import mark, number, offsets, set_offsets
 from conoid.worker.contact.solver.solver import ActiveSet
 from conoid.worker.contact.solver.zones import Zones, sets, tasks
 from conoid.worker.parallel.team import team
@@ -66,6 +66,33 @@ def test_sets_of_one_colour_share_no_node() -> None:
         seen = np.concatenate([np.unique(rows[of == k]) for k, _ in inner[first:last]])
         assert len(seen) == len(np.unique(seen))
     assert nodes // 2 < many[0, inner[: zones.many, 0]].sum() < nodes
+
+
+def test_nodes_are_numbered_in_their_order_by_ranges() -> None:
+    random = np.random.default_rng(4)
+    touched = (random.uniform(size=1000) < 0.3).astype(np.uint8)
+    expected, size = np.flatnonzero(touched), 64
+    starts = range(0, len(touched), size)
+    counts = np.array([*(int(touched[k : k + size].sum()) for k in starts), -1])
+    places, slot = np.full(1000, -1, np.int32), np.full(1000, -1, np.int32)
+    assert offsets(counts, len(starts)) == len(expected)
+    assert counts[-1] == -1
+    for task in random.permutation(len(starts)):
+        first = size * task
+        number(places, slot, touched, counts[task], first, min(first + size, len(touched)))
+    assert np.array_equal(places[: len(expected)], expected)
+    assert np.array_equal(slot[expected], np.arange(len(expected)))
+    assert not touched.any()
+
+
+def test_the_rows_of_a_set_follow_each_other_task_after_task() -> None:
+    many = np.random.default_rng(5).integers(0, 9, (6, 7))
+    begin, begins = np.zeros(8, np.int64), np.full((6, 7), -1)
+    set_offsets(begin, begins, many, 5)
+    ends = np.cumsum(many[:5].T.reshape(-1))
+    assert np.array_equal(begins[:5].T.reshape(-1), ends - many[:5].T.reshape(-1))
+    assert np.array_equal(begin, np.append(begins[0], ends[-1]))
+    assert (begins[5] == -1).all()
 
 
 @pytest.mark.parametrize("threads", [2, 5])

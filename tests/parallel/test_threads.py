@@ -11,7 +11,7 @@ from conoid.worker.elements.colours import coloured
 from conoid.worker.kernels.jit import njit, several, types
 from conoid.worker.mesh.structured import structured
 from conoid.worker.model.state import CHUNK, Block
-from conoid.worker.parallel.arguments import Arguments, reader
+from conoid.worker.parallel.arguments import Arguments, Handle, reader, table_of
 from conoid.worker.parallel.team import TASK, Stage, team
 from conoid.worker.run import main
 from tests.bench.scene import box
@@ -20,6 +20,7 @@ _I1, _F2 = types.int64[::1], types.float64[:, ::1]
 KINDS = several(_F2, types.boolean, _I1), types.float64, types.int64
 COUNTS = (_I1, _I1)
 _arguments, _counts = reader(*KINDS), reader(*COUNTS)
+_first, _second = table_of(0, _I1), table_of(1, *KINDS)
 
 
 @njit("UniTuple(float64, 5)(int64)", cache=False)
@@ -46,6 +47,23 @@ def test_a_kernel_gets_what_the_table_was_given_last() -> None:
     assert arguments_read(table.set(last, 0.25, 4)) == (9.0, 0.0, 3.0, 0.25, 4.0)
     assert arguments_read(table.set(last, 0.5, 4)) == (9.0, 0.0, 3.0, 0.5, 4.0)
     assert arguments_read(table.set((values, True, grown[:2]), 0.5, 4)) == (9.0, 1.0, 2.0, 0.5, 4.0)
+
+
+@njit("Tuple((int64, float64, int64))(int64)", cache=False)
+def read_both(handle):  # type: ignore[no-untyped-def]
+    """Values of the two tables of a handle."""
+    (numbers,), ((values, flag, others), factor, shift) = _first(handle), _second(handle)
+    return numbers[0] + others[-1] + shift, values[1, 2] * factor, 1 if flag else 0
+
+
+def test_the_tables_of_a_handle_are_set_together_and_read_one_by_one() -> None:
+    handle, numbers, values = Handle((_I1,), KINDS), np.array([100]), np.arange(6.0).reshape(2, 3)
+    handle.set(0, numbers, values, True, np.array([7, 8]), 0.5, -3)
+    assert read_both(handle.address) == (105, 2.5, 1)
+    handle.set(1, values, False, np.array([7, 8, 9]), 2.0, 5)
+    assert read_both(handle.address) == (114, 10.0, 0)
+    handle.set(0, np.array([200]))
+    assert read_both(handle.address) == (214, 10.0, 0)
 
 
 def test_arrays_of_a_table_lie_in_c_order() -> None:

@@ -248,6 +248,7 @@ class Contact:
         now.messages.copies.finish(surface_nodes.x, surface_nodes.v, now.slots.before)
         give = PUSH_OUT if self.books.account.settle(self.books.agreed) else 0.0
         self._meet(now, give, dt)
+        self.detection.retarget(now, self._scheme.restitution, give)
         shared = now.messages.company.agree(now.active, surface_nodes.local)
         kept, ratio = now.stored(self.exterior.cracks.kept), self._resume(give)
         of, many, slots = self.exterior, self.sweep_count, now.slots
@@ -280,8 +281,7 @@ class Contact:
         if step % self._scheme.interval == 0:
             self.exterior.sharpen(now, self._scheme.sharp)
             self.detection.clearance.clear()
-        share = self._scheme.restitution
-        ahead = Ahead(dt, self._clock.longest, self.exterior.size, 1.0 + share, give, share, spent=give == 0.0)
+        ahead = Ahead(dt, self._clock.longest, self.exterior.size, 1.0 + self._scheme.restitution, give)
         self.detection.detect(now, self.exterior, self.searches.mu, ahead, redraw, self.found.stray)
 
     def free(self) -> None:

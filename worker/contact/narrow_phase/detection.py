@@ -76,10 +76,6 @@ class Ahead:
     """See tables.Step."""
     give: float = 0.0
     """See tables.PUSH_OUT."""
-    share: float = 0.0
-    """Share of the speed of approach to which target velocities are raised (restitution.rebound)."""
-    spent: bool = False
-    """True if contact has no energy to return, so that target velocities are lowered (restitution.hold_back)."""
 
 
 class Detection:
@@ -156,7 +152,7 @@ class Detection:
         step = step.followed(reference.beyond, FAST * ahead.size, ahead.rebound, now.face_table(), self._scratch)
         if self.tied is not None:
             step = step._replace(tied=self.tied.bits(of))
-        opening = self._met(now, surface, step, ahead)
+        opening = self._met(now, surface, step)
         now.faces.fresh[:], now.edges.fresh[:], now.slots.fresh[:] = False, False, False
         self.found = Detected(_KINEMATIC * float(np.sqrt(self._reals[layout.LIMIT])), opening, stray)
         if self._lasting and not now.active.n:
@@ -164,6 +160,16 @@ class Detection:
         else:
             self.clearance.clear()
         return self.found
+
+    def retarget(self, now: Scene, share: float, give: float) -> None:
+        """Sets the target velocities of active contacts: see restitution.rebound for ``share``, and ``hold_back`` if
+        contact has no energy to ``give`` back (tables.PUSH_OUT).
+        """
+        counts = self._counts
+        counts[layout.RETARGETS] = (share > 0.0) + 2 * (give == 0.0)
+        if counts[layout.RETARGETS]:
+            counts[layout.RETARGETED], self._reals[layout.SHARE] = now.active.n, share
+            self._program.run(stages.RETARGET, stages.CORNERS_FROM)
 
     def _moved(self, now: Scene, ahead: Ahead, redraw: bool, together: bool) -> bool:
         """Measures the motion of the slots in the step, and registers the slots that must be registered; returns True
@@ -197,30 +203,25 @@ class Detection:
         self.found = Detected(0.0, self.found.opening, 2.0 * strayed - before > most)
         return True
 
-    def _met(self, now: Scene, surface: Exterior, step: Step, ahead: Ahead) -> Ints:
+    def _met(self, now: Scene, surface: Exterior, step: Step) -> Ints:
         """Finds the active contacts of the step; returns the cracks that open."""
-        rows, counts, n = now.active, self._counts, len(now.cracks)
+        rows, counts = now.active, self._counts
         narrow = surface.narrow()
         self._reserve(now, narrow)
         counts[layout.FIRST] = self._corners(now, narrow, surface.cracks, step) if narrow else 0
         opening = self._bound(now, step)
-        counts[layout.RETARGETS] = (ahead.share > 0.0) + 2 * ahead.spent
-        self._reals[layout.SHARE] = ahead.share
-        self._program.run(stages.ACROSS, stages.CORNERS_FROM)
+        self._program.run(stages.ACROSS, stages.RETARGET)
         rows.n = int(counts[layout.FOUND])
         if not counts[layout.WIDE]:
             return _NONE
-        begins, wide = CRACKS_OF_A_TASK * np.arange(self._across(n)), self._sums[-1]
+        wide = self._sums[-1]
+        begins = CRACKS_OF_A_TASK * np.arange(len(wide))
         return np.concatenate([opening[k : k + m] for k, m in zip(begins, wide, strict=True) if m])
 
     def _reserve(self, now: Scene, narrow: list[tuple[Block, Corners]]) -> None:
         """Reserves the rows of the contacts."""
         corners = [self._rows_of_corner * len(each.corners) for _, each in narrow]
         now.active.begin(len(now.node_face), len(now.edge_edge), 3 * len(now.cracks), *corners)
-
-    @staticmethod
-    def _across(cracks: int) -> int:
-        return -(-cracks // CRACKS_OF_A_TASK)
 
     def _bound(self, now: Scene, step: Step) -> Ints:
         """Sets the arguments of the stages; returns the array of the cracks that open."""
@@ -243,7 +244,7 @@ class Detection:
         """Working arrays for ``on`` node-face pairs, ``off`` edge-edge pairs and ``m`` cracks: see layout.py, CRACKS
         and SUMS.
         """
-        faces, edges, cracks = -(-on // PAIRS_OF_A_TASK), -(-off // PAIRS_OF_A_TASK), self._across(m)
+        faces, edges, cracks = -(-on // PAIRS_OF_A_TASK), -(-off // PAIRS_OF_A_TASK), -(-m // CRACKS_OF_A_TASK)
         some, real = self._scratch.of, np.float64
         return [
             some("opening", m), some("due", faces), some("on faces", faces), some("coming", faces, real),

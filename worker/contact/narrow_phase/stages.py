@@ -28,7 +28,6 @@ from .layout import (
     LIMIT,
     MOST,
     ON_FACES,
-    RETARGETED,
     RETARGETS,
     SHARE,
     SIZE,
@@ -211,7 +210,6 @@ def collect(table, first, stop, thread):  # type: ignore[no-untyped-def]
         counts[WIDE] += wide[k]
     tasks = tasks_of(counts[EDGE_PAIRS_N], PAIRS_OF_A_TASK)
     counts[FOUND] = collected(found, n, counts[EDGE_ROWS], PAIRS_OF_A_TASK, on_edge, tasks)
-    counts[RETARGETED] = counts[FOUND] if counts[RETARGETS] != 0 else 0
 
 
 @njit(TASK, cache=True)
