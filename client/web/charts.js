@@ -111,7 +111,7 @@ export class Chart {
     return chart;
   }
 
-  // One chart shows the values of its lines: of all charts with the cursor, the chart with the pointer or the focus.
+  // All charts show the cursor; only the chart with the pointer or the focus shows the values of its lines.
   read(cursor) {
     const focused = document.activeElement === this.element;
     if (!this.reads || !cursor || !(this.pointer || focused)) return;

@@ -131,9 +131,9 @@ class SplitUpdate:
         )
 
     def _tear(self, family: Family, key: Ints, became: Indices) -> None:
-        """Replaces the corners of faces and edges by their copies, removes edges whose faces have separated, and adds
-        pairs: of a copy those of its parent, of a face the nodes that were its corners before, and of edges those that
-        had a common end before. ``key``: see Split; ``became``: slots.
+        """Replaces the corners of faces and edges by their copies, and removes edges whose faces have separated. Adds
+        pairs: a copy gets the pairs of its parent, a face gets the nodes that were its corners before, and an edge gets
+        the edges with which it had a common end before. ``key``: column of Split; ``became``: slots of the copies.
         """
         scene, parents = self._scene, family.pairs[:, 0]
         faces, edges, slots, of = scene.faces, scene.edges, scene.slots, scene.surface_nodes
