@@ -111,7 +111,10 @@ def _meshes(one: Part, other: Part, breaks: bool, location: Location) -> Iterato
         yield problem(location, names, message)
     worn = [part.name for part in (one, other) if part.erosion is not None]
     if breaks and worn:
-        message = f"{choices(worn)}: a part that erodes cannot have a bond that breaks; remove erosion or strength"
+        message = (
+            f"{choices(worn)}: a part that erodes cannot have a shared bond that breaks; {way}, or remove erosion or "
+            "strength"
+        )
         yield problem(location, names, message)
     if one.turn != other.turn:
         yield problem(location, names, f"their turns differ, so their nodes would separate; {way}")

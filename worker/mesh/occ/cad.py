@@ -38,21 +38,41 @@ _READING = 120
 """Time that OpenCASCADE may take to read a file, s; a damaged file can take for ever. Chosen value."""
 
 
-def imported(gmsh: Any, form: CadForm, path: Path, frame: Frame, head: str) -> Solids:
+def imported(gmsh: Any, form: CadForm, path: Path, frame: Frame, head: str, *, exact: bool = False) -> Solids:
     """Return the chosen solids of a file in the frame of the model. Raises MeshError with a message that begins with
     ``head``.
+
+    ``exact``: spheres, cylinders and cones keep their surfaces; otherwise they become splines, because gmsh scales a
+    drawn body by a general transformation.
     """
     occ = gmsh.model.occ
     every, unit = _read(gmsh, form, path, head)
-    chosen = _chosen(gmsh, form, every, head)
+    chosen, factor = _chosen(gmsh, form, every, head), float(unit / Fraction(repr(frame.scale)))
+    if exact:
+        every, chosen = _scaled(gmsh, form, path, head, factor, [every.index(each) for each in chosen])
     others = [each for each in every if each not in chosen]
     if others:
         occ.remove(others, recursive=True)
     if form.heal:
         chosen = [each for each in occ.healShapes(chosen)[:] if each[0] == 3]
-    _place(occ, chosen, float(unit / Fraction(repr(frame.scale))), frame)
+    _place(occ, chosen, 1.0 if exact else factor, frame)
     occ.synchronize()
     return chosen
+
+
+def _scaled(
+    gmsh: Any, form: CadForm, path: Path, head: str, factor: float, numbers: list[int]
+) -> tuple[Solids, Solids]:  # fmt: skip
+    """Read a file again, scaled by ``factor``; return all solids and those of ``numbers``. gmsh forgets the names of
+    solids that it scales as it reads them.
+    """
+    gmsh.model.occ.remove(gmsh.model.occ.getEntities(3), recursive=True)
+    gmsh.option.setNumber("Geometry.OCCScaling", factor)
+    try:
+        every, _ = _read(gmsh, form, path, head)
+    finally:
+        gmsh.option.setNumber("Geometry.OCCScaling", 1.0)
+    return every, [every[number] for number in numbers]
 
 
 def size_of(gmsh: Any, form: CadForm, path: Path, head: str) -> float:

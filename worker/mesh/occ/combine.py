@@ -28,6 +28,8 @@ class Drawing:
     gmsh: Any
     frame: Frame
     sources: Sources
+    exact: bool = False
+    """Whether bodies of CAD files keep their surfaces (``cad.imported``); for a single file only."""
 
     def solids(self, form: AnyForm, key: str) -> Solids:
         """Draw the form at ``key`` of its case, with its rotation. Return the volumes of the result, or no volume if
@@ -37,7 +39,8 @@ class Drawing:
         if isinstance(form, CombinedForm):
             made = self._combined(form, key)
         elif isinstance(form, CadForm):
-            made = imported(self.gmsh, form, self.sources[key], self.frame, f"{key}.path = {form.path!r}")
+            head = f"{key}.path = {form.path!r}"
+            made = imported(self.gmsh, form, self.sources[key], self.frame, head, exact=self.exact)
         elif isinstance(form, StlForm):
             made = faceted(self.gmsh, form, self.sources[key], self.frame, f"{key}.path = {form.path!r}")
         else:

@@ -25,6 +25,8 @@ from .sizes import set_size
 from .stl import read_stl
 from .surface import enclose
 
+_CLOSED = "Impossible to mesh periodic surface"
+"""Text of gmsh's error for a closed surface that it cannot mesh."""
 _TETS_PER_CUBE = 6.0
 """Number of tets in a volume of element_size^3."""
 
@@ -49,9 +51,19 @@ def measured(mesh: Measured, sources: Sources, key: str) -> TetMesh:
 
 
 def _of_solid(mesh: Cad | Combination, sources: Sources, key: str) -> _Made:
+    """Mesh a solid. If gmsh cannot mesh a closed spline surface, the surfaces of a CAD file are kept as they are."""
+    try:
+        return _meshed(mesh, sources, key, exact=False)
+    except MeshError as error:
+        if _CLOSED not in str(error) or not isinstance(mesh, Cad):
+            raise
+    return _meshed(mesh, sources, key, exact=True)
+
+
+def _meshed(mesh: Cad | Combination, sources: Sources, key: str, *, exact: bool) -> _Made:
     with session(OPTIONS) as gmsh:
         frame = Frame(mesh.centre, mesh.axis, scale_of(extent(gmsh, mesh, sources, key)))
-        solids = draw_solid(gmsh, mesh, frame, sources, key)
+        solids = draw_solid(gmsh, mesh, frame, sources, key, exact=exact)
         notes = [
             *left_out(mesh, sources, key),
             *small_features(gmsh, mesh.element_size, frame, solids),
@@ -63,14 +75,17 @@ def _of_solid(mesh: Cad | Combination, sources: Sources, key: str) -> _Made:
     return _Made(made, [f"{key}: {note}" for note in notes])
 
 
-def draw_solid(gmsh: Any, mesh: Cad | Combination, frame: Frame, sources: Sources, key: str) -> Solids:
+def draw_solid(
+    gmsh: Any, mesh: Cad | Combination, frame: Frame, sources: Sources, key: str, *, exact: bool = False
+) -> Solids:  # fmt: skip
     """Draw a body in the ``frame`` of the model, which has the centre and the axis of the body. Return the volumes of
     the sector of a body.
 
-    Solids that touch have common faces. Raises MeshError if no solid is left, or if the mesh would have too many tets.
+    Solids that touch have common faces. ``exact``: see ``cad.imported``. Raises MeshError if no solid is left, or if
+    the mesh would have too many tets.
     """
     occ = gmsh.model.occ
-    solids = joined(occ, sector(occ, Drawing(gmsh, frame, sources).solids(mesh, key), mesh), key)
+    solids = joined(occ, sector(occ, Drawing(gmsh, frame, sources, exact).solids(mesh, key), mesh), key)
     if not solids:
         raise MeshError(f"{key}: nothing is left of it; check sizes and places of its shapes")
     occ.synchronize()

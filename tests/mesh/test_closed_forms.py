@@ -1,0 +1,162 @@
+"""Volumes of random combinations and CAD solids compared with closed forms."""
+
+import json
+import math
+import subprocess
+import sys
+from collections.abc import Callable
+from functools import partial
+from pathlib import Path
+from random import Random
+from typing import Any
+
+import pytest
+from pydantic import TypeAdapter
+
+from conoid.cases.model.bodies import Mesh
+from conoid.cases.model.solids import Measured
+from conoid.worker.mesh.model import check
+from conoid.worker.mesh.occ.solids import measured
+
+FLATTER = 0.44
+"""Largest loss of volume by flat faces, over the volume of the round operands times (size / radius)^2: an arc of radius
+r with edges of 1.15 h loses (1.15 h / r)^2 / 6 of its area, a ball at most twice as much of its volume."""
+Case = tuple[dict[str, Any], float, float, float]
+"""A combination, its volume, the volume of its round operands (a third of their area times the radius), m^3, and their
+smallest radius, m; 0, 1 without."""
+
+
+def turned(shape: dict[str, Any], random: Random) -> dict[str, Any]:
+    """Turns a body; its volume does not change."""
+    turn = {"axis": random.choice("xyz"), "angle": random.uniform(-1.5, 1.5), "centre": [0.1, -0.2, 0.3]}
+    around = box([-9.0, -9.0, -9.0], [9.0, 9.0, 9.0])
+    return {"shape": "intersection", "of": [{**shape, "turn": turn}, around]} if random.random() < 0.5 else shape
+
+
+def box(low: list[float], high: list[float]) -> dict[str, Any]:
+    return {"shape": "box", "low": low, "high": high}
+
+
+def bored(random: Random) -> Case:
+    """A block with a bore: a b c - pi r^2 b."""
+    a, b, c, r = (random.uniform(*ends) for ends in ((0.8, 1.4), (0.6, 1.2), (0.8, 1.4), (0.2, 0.35)))
+    bore = {"shape": "cylinder", "axis": "y", "base": [0.05, -1.0, -0.02], "radius": r, "length": 3.0}
+    shape = {"shape": "difference", "of": [box([-a / 2, 0.0, -c / 2], [a / 2, b, c / 2]), bore]}
+    return shape, a * b * c - math.pi * r * r * b, math.pi * r * r * b, r
+
+
+def two_boxes(random: Random) -> Case:
+    """The union of two blocks, by inclusion and exclusion: no round face, exact."""
+    x, y, z = (random.uniform(0.2, 0.7) for _ in range(3))
+    shape = {"shape": "union", "of": [box([0, 0, 0], [1, 1, 1]), box([x, y, z], [x + 1, y + 0.8, z + 0.9])]}
+    common = (1 - x) * (min(1, y + 0.8) - y) * (min(1, z + 0.9) - z)
+    return shape, 1.0 + 0.72 - common, 0.0, 1.0
+
+
+def lens(random: Random) -> Case:
+    """The intersection of two balls (Weisstein, Sphere-Sphere Intersection, MathWorld, equation 16)."""
+    R, r = random.uniform(0.5, 0.8), random.uniform(0.45, 0.6)
+    d = random.uniform(0.35, 0.6) * (R + r)
+    volume = math.pi * (R + r - d) ** 2 * (d * d + 2 * d * r - 3 * r * r + 2 * d * R + 6 * r * R - 3 * R * R) / (12 * d)
+    balls = [{"shape": "sphere", "radius": R}, {"shape": "sphere", "radius": r, "centre": [0.0, d, 0.0]}]
+    plane = (d * d - r * r + R * R) / (2.0 * d)
+    area = 2.0 * math.pi * (R * (R - plane) + r * (r - d + plane))
+    return {"shape": "intersection", "of": balls}, volume, area * min(R, r) / 3.0, min(R, r)
+
+
+def crossed(random: Random) -> Case:
+    """The intersection of two equal cylinders at a right angle: 16 r^3 / 3 (Archimedes, The Method)."""
+    r = random.uniform(0.4, 0.6)
+    bars = [{"shape": "cylinder", "axis": axis, "radius": r, "length": 3.0, "base": base}
+            for axis, base in (("x", [-1.5, 0.0, 0.0]), ("z", [0.0, 0.0, -1.5]))]  # fmt: skip
+    return {"shape": "intersection", "of": bars}, 16.0 / 3.0 * r**3, 16.0 / 3.0 * r**3, r
+
+
+def shell(random: Random) -> Case:
+    """A ball without a block inside of it."""
+    r, a = random.uniform(0.6, 0.9), random.uniform(0.25, 0.4)
+    hole = box([-a, -a * 0.8, -a * 0.7], [a, a * 0.6, a * 0.9])
+    ball = 4.0 / 3.0 * math.pi * r**3
+    return {"shape": "difference", "of": [{"shape": "sphere", "radius": r}, hole]}, ball - 4.48 * a**3, ball, r
+
+
+def capped(random: Random) -> Case:
+    """A truncated cone with a hemisphere on its end."""
+    R, r, h = random.uniform(0.6, 0.8), random.uniform(0.4, 0.55), random.uniform(0.6, 1.0)
+    cone = {"shape": "cone", "radius": R, "top_radius": r, "length": h}
+    cap = {"shape": "hemisphere", "radius": r, "base": [0.0, 0.0, h]}
+    volume = math.pi * h / 3.0 * (R * R + R * r + r * r) + 2.0 / 3.0 * math.pi * r**3
+    return {"shape": "union", "of": [cone, cap]}, volume, volume, r
+
+
+FORMS: tuple[Callable[[Random], Case], ...] = (bored, two_boxes, lens, crossed, shell, capped)
+SIZE = 0.11
+
+
+def made(request: dict[str, Any], sources: dict[str, Path] | None = None) -> float:
+    """Returns the volume of the mesh of a body, m^3."""
+    body: Mesh = TypeAdapter[Mesh](Mesh).validate_python({"element_size": SIZE, **request})
+    assert isinstance(body, Measured)
+    return float(check(measured(body, sources or {}, "mesh")).volumes().sum())
+
+
+def assert_volume(seed: int, step: Path | None = None) -> None:
+    random = Random(seed)
+    shape, volume, curved, radius = FORMS[seed % len(FORMS)](random)
+    found = made(turned(shape, random)) if step is None else made(*exchanged(shape, step))
+    allowed = FLATTER * (SIZE / radius) ** 2 * curved + 1e-9 * volume
+    assert abs(found - volume) < allowed, (
+        f"seed {seed}: {found} instead of {volume}, {abs(found - volume) / allowed:.2f}"
+    )
+
+
+_WRITE = """
+import gmsh, json, math, sys
+shape, name = json.loads(sys.argv[1]), sys.argv[2]
+gmsh.initialize(readConfigFiles=False, run=False, interruptible=False)
+gmsh.option.setNumber("General.Terminal", 0)
+occ, W = gmsh.model.occ, {"x": (1, 0, 0), "y": (0, 1, 0), "z": (0, 0, 1)}
+def draw(s):
+    k, at = s["shape"], [1e3 * c for c in s.get("base", s.get("centre", (0, 0, 0)))]
+    if k == "box":
+        low = [1e3 * c for c in s["low"]]
+        return occ.addBox(*low, *(1e3 * h - l for h, l in zip(s["high"], low)))
+    r = 1e3 * s["radius"]
+    if k == "sphere":
+        return occ.addSphere(*at, r)
+    if k == "hemisphere":
+        return occ.addSphere(*at, r, angle1=0.0)
+    way = [1e3 * s["length"] * c for c in W[s.get("axis", "z")]]
+    return occ.addCone(*at, *way, r, 1e3 * s["top_radius"]) if k == "cone" else occ.addCylinder(*at, *way, r)
+first, *rest = [[(3, draw(s))] for s in shape["of"]]
+others = [each for one in rest for each in one]
+{"difference": occ.cut, "union": occ.fuse, "intersection": occ.intersect}[shape["shape"]](first, others)
+occ.synchronize()
+gmsh.write(name)
+gmsh.finalize()
+"""
+
+
+def exchanged(shape: dict[str, Any], folder: Path) -> tuple[dict[str, Any], dict[str, Path]]:
+    """Returns the body as a STEP file in millimetres, written by gmsh."""
+    name = folder / "body.step"
+    subprocess.run([sys.executable, "-c", _WRITE, json.dumps(shape), str(name)], check=True, capture_output=True)
+    return {"shape": "cad", "path": "body.step", "unit": "1 mm"}, {"mesh": name}
+
+
+@pytest.mark.parametrize("seed", range(len(FORMS)))
+def test_the_volume_of_a_combination_is_that_of_its_closed_form(seed: int) -> None:
+    assert_volume(seed)
+
+
+@pytest.mark.parametrize("seed", [0, 2, 5])
+def test_the_volume_of_a_step_file_is_that_of_its_closed_form(seed: int, tmp_path: Path) -> None:
+    assert_volume(seed, tmp_path)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", ["combination", "step"])
+def test_fifty_volumes(kind: str, tmp_path: Path) -> None:
+    each = partial(assert_volume, step=tmp_path) if kind == "step" else assert_volume
+    for seed in range(100, 150):
+        each(seed)
