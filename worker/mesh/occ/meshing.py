@@ -17,6 +17,9 @@ from .sliding import Cut, Sliding
 WANTED = 0.75
 """Step length, as a share of the step length of a regular tet with edge ``element_size``, below which step lengths
 are raised where possible."""
+_CHORD = 0.25
+"""Largest mean distance of flat faces from a round surface, over the element size: faces of edges e are e^2 / (8 r)
+from a sphere of radius r on average, e / 8 where e = r."""
 _OTHERS = ({"Mesh.Algorithm3D": 1}, {"Mesh.Algorithm3D": 1, "Mesh.Algorithm": 1})
 """Further attempts if gmsh fails: first its Delaunay mesher in place of HXT, then also triangles by MeshAdapt."""
 
@@ -41,6 +44,7 @@ def with_names(gmsh: Any, frame: Frame, element_size: float, cuts: Sequence[Cut]
 
 def _generate(gmsh: Any) -> None:
     """Make tets in every volume, by another of gmsh's meshers if one fails. Raises MeshError if all fail."""
+    problem = "gmsh leaves a volume without tets; is the surface of it damaged, or element_size too large?"
     for n, options in enumerate(({}, *_OTHERS)):
         for name, value in options.items():
             gmsh.option.setNumber(name, value)
@@ -51,6 +55,27 @@ def _generate(gmsh: Any) -> None:
                 raise
         else:
             if all(len(gmsh.model.mesh.getElements(*volume)[0]) for volume in gmsh.model.getEntities(3)):
-                return
+                if not (off := _off(gmsh)):
+                    return
+                problem = off
         gmsh.model.mesh.clear()
-    raise MeshError("gmsh leaves a volume without tets; is the surface of it damaged, or element_size too large?")
+    raise MeshError(problem)
+
+
+def _off(gmsh: Any) -> str:
+    """Return a message if the tets do not have the volume of the model, within what flat faces can change; else "".
+
+    gmsh meshes some closed surfaces inside out or only in part, without an error.
+    """
+    occ, volumes, filled = gmsh.model.occ, gmsh.model.getEntities(3), 0.0
+    try:
+        whole = sum(occ.getMass(*each) for each in volumes)
+        skin = sum(occ.getMass(*each) for each in gmsh.model.getBoundary(volumes, oriented=False))
+    except Exception:  # a volume inside of triangles, of which OpenCASCADE has no surface
+        return ""
+    for volume in volumes:
+        for tags in gmsh.model.mesh.getElements(*volume)[1]:
+            filled += float(np.abs(gmsh.model.mesh.getElementQualities(tags, "volume")).sum())
+    if abs(filled - whole) <= _CHORD * skin * gmsh.option.getNumber("Mesh.MeshSizeMax"):
+        return ""
+    return f"gmsh's mesh has {filled / whole:.3g} of the volume of the body; try another element_size"
