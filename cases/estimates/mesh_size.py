@@ -34,10 +34,9 @@ REGULAR = 6**-0.5
 WORST_UNSTRUCTURED = 0.68
 """Step length of the worst tet of gmsh over that of a regular tet: 0.64 to 0.74 for the bodies of the fit."""
 SHARP, BLUNT = 1.3, 0.9
-"""The step length at the tip of a cone or an ogive, at most: the first value times the tangent of half its angle;
-with a flat or round tip, the second times its radius over h. Measured: cones of half an angle of 9 and 27 degrees
-0.16 to 0.25 and 0.40 to 0.68, tips of a radius of h/4 and h/2 0.20 to 0.24 and 0.20 to 0.64, full bodies and
-sectors."""
+"""Largest step length at the tip of a cone or an ogive: the first value times the tangent of half its angle; with a
+flat or round tip, the second times its radius over h. Measured: cones of half an angle of 9 and 27 degrees 0.16 to 0.25
+and 0.40 to 0.68, tips of a radius of h/4 and h/2 0.20 to 0.24 and 0.20 to 0.64, full bodies and sectors."""
 WORST_CYLINDER, WORST_TUBE = 0.81, 0.78
 """The step length of structured cylinders cut into 6, and of tubes."""
 WORST_FIVE = 0.54

@@ -139,7 +139,7 @@ class Loose(Primitive):
     """Single tets of edge ``element_size``: without sectors, grading and choice of the generator."""
 
     generator: Literal["structured"] = "structured"
-    """Has no effect on this shape."""
+    """The key has no effect on this shape."""
     sector: Literal["full"] = "full"
     """Always the full body."""
     grading: None = None

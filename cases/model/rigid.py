@@ -28,9 +28,10 @@ class Rigid(Model):
     mesh."""
     inertia: Tensor | None = None
     """Moments of inertia about the centre of mass, along the axes of the case, at the start: xx, yy, zz, yz, zx, xy,
-    the integrals of density times y^2 + z^2, z^2 + x^2, x^2 + y^2, -yz, -zx, -xy. Positive definite, and no
-    principal moment above the sum of the other two. Default: the sum over the nodes of the mesh, each with a quarter
-    of the mass of its tets; it exceeds that of the smooth body by a share of the order of (tet size / body size)^2."""
+    the integrals of density times y^2 + z^2, z^2 + x^2, x^2 + y^2, -yz, -zx, -xy. The tensor must be positive definite,
+    with no principal moment above the sum of the other two moments. Default: the sum over the nodes of the mesh, each
+    with a quarter of the mass of its tets; it exceeds that of the smooth body by a share of the order of (tet size /
+    body size)^2."""
 
 
 class Flag:

@@ -85,7 +85,7 @@ class Arc:
         return self.at(self.z1)
 
     def volume(self) -> float:
-        """pi times the integral of r^2, m^3."""
+        """Volume: pi times the integral of r^2, m^3."""
 
         def integral(u: float) -> float:
             return (self.rc**2 + self.radius**2) * u - u**3 / 3.0 + 2.0 * self.rc * self._under(u)

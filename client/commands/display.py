@@ -39,8 +39,8 @@ _FRAME = 4
 _APART = 2
 """Number of characters between two columns."""
 _DETAILS = (_MOST_RANKS, 6, True), (4, 3, True), (2, 2, True), (2, 2, False), (1, 1, False)
-"""Layouts from large to small: ranks, lines of the log, whether terms of the energy are shown. The first that fits
-the height of the terminal is used."""
+"""Layouts from large to small: ranks, lines of the log, whether terms of the energy are shown. The first layout that
+fits the height of the terminal is used."""
 _SMALL = 0.005
 """Fraction of the whole energy below which terms of the energy are on a common line. Chosen value: such a term has a
 bar of no length."""

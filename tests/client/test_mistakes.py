@@ -93,7 +93,7 @@ def test_a_case_of_another_shape_is_one_line(command: str, text: str, damaged: P
 
 
 def test_a_link_out_of_a_folder_is_not_read(damaged: Path) -> None:
-    """Otherwise a report could contain a private file of the user who makes the report."""
+    """Without this check a report could contain a private file of the user who makes the report."""
     (damaged / layout.RESOLVED_CASE).unlink()
     (damaged.parent / "secret").write_text("{}")
     (damaged / layout.RESOLVED_CASE).symlink_to(damaged.parent / "secret")

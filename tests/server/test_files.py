@@ -55,7 +55,7 @@ def run(ended: tuple[Running, str], folder: Path) -> str:
 
 @pytest.fixture
 def folder(ended: tuple[Running, str], tmp_path: Path) -> Iterator[Path]:
-    """The folder of the run. Its content is restored after the test."""
+    """The folder of the run. The content of the file is restored after the test."""
     server, run = ended
     path = server.service.settings.runs / run
     kept = shutil.copytree(path, tmp_path / "kept")

@@ -1,7 +1,7 @@
 """V21: the contact patch test. Blocks whose meshes do not match carry a uniform pressure through their interface.
-Contacts of nodes with faces from both sides do not pass it exactly: if nodes of one mesh lie between nodes of the
-other, impulses act on whole nodes and not on the areas round them. The limit is an error of 5 % of the pressure in
-the worst tet.
+Contacts of nodes with faces from both sides do not pass the patch test exactly: if nodes of one mesh lie between nodes
+of the other, impulses act on whole nodes and not on the areas round them. The limit is an error of 5 % of the pressure
+in the worst tet.
 """
 
 from pathlib import Path

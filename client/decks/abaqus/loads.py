@@ -126,7 +126,7 @@ class Loads:
         raise InpError(f"line {line}: TYPE = {kind}: velocities, and displacements by an amplitude, are translated")
 
     def _course(self, name: str | None, entry: Entry) -> Course | None:
-        """Returns times and factors of an amplitude. Raises InpError for one that is not a table."""
+        """Returns times and factors of an amplitude. Raises InpError for an amplitude that is not a table."""
         if not name:
             return None
         found = self._amplitudes.get(joined(name))
