@@ -108,6 +108,8 @@ class Outcome(msgspec.Struct, kw_only=True, frozen=True):
     fragments: int | None = None
     broken: int | None = None
     """Number of broken facets."""
+    first_break: float = math.nan
+    """Time at which the first facet broke, s; NaN if none broke."""
     inside: int | None = None
     """Nodes that end inside another body or fragment (free nodes: also inside their own part), deeper than 0.05 of
     the typical face size."""

@@ -14,7 +14,7 @@ SMALL, FEWEST_ATTRIBUTES, MOST_PARAMETERS = ("worker/contact/", "worker/fracture
 EXCEPTIONS: dict[str, dict[str, int]] = {
     "a record: an attribute for each key, column or account that it holds": {
         "cases/laws/johnson_holmquist.py: JohnsonHolmquist": 18,
-        "cases/outcome.py: Outcome": 41,
+        "cases/outcome.py: Outcome": 42,
         "cases/output/search.py: Search": 17,
         "client/decks/draft.py: Draft": 16,
         "client/decks/lsdyna/reading.py: LsDyna": 17,

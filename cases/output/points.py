@@ -30,7 +30,7 @@ _VERDICTS = "no", "yes"
 KEY, RUN, RESULT = "key", "run", "result"
 
 _COUNTS = ("fragments", "broken", "eroded")
-_COSTS = {"time": "s", "elapsed": "s", "cpu": "s", "steps": "", "elements": "", "nodes": ""}
+_COSTS = {"first_break": "s", "time": "s", "elapsed": "s", "cpu": "s", "steps": "", "elements": "", "nodes": ""}
 _FORMULA = re.compile(r"[=@\t\r]|[+-](?!(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?( [^\W\d][\w*/^ -]*)?$)")
 """Start of a text that a spreadsheet would compute. A number with a sign, and perhaps a unit, does not match."""
 

@@ -20,8 +20,9 @@ from ..result import Result
 _NAMED = 3
 """Largest number of changed keys that are named."""
 _OUTCOME = (
-    "steps", "time", "ranks", "elapsed", "cpu", "elements", "nodes", "fragments", "broken", "eroded", "eroded_mass",
-    "inside", "deepest", "overlapping", "overlap", "rebalances", "worst_residual", "element_updates_per_second",
+    "steps", "time", "ranks", "elapsed", "cpu", "elements", "nodes", "fragments", "broken", "first_break", "eroded",
+    "eroded_mass", "inside", "deepest", "overlapping", "overlap", "rebalances", "worst_residual",
+    "element_updates_per_second",
 )  # fmt: skip
 _DRAWN = (
     "kinetic", "elastic", "plastic", "contact", "friction", "eroded", "fracture", "cohesive", "stepping", "averaging",

@@ -79,7 +79,7 @@ export function columnsOf(rows, keys, units) {
   return [...facts(FIRST), ...values, ...results, ...facts(LAST)];
 }
 
-const titled = (name) => name.replace(/worst_residual/, "worst energy residual").replace(/^probe\./, "").replace(/^reference\.(.*)$/, "$1, reference").replace(/\.(min|max)$/, " $1");
+const titled = (name) => name.replace(/worst_residual/, "worst energy residual").replace(/^first_break$/, "first broken facet").replace(/^probe\./, "").replace(/^reference\.(.*)$/, "$1, reference").replace(/\.(min|max)$/, " $1");
 
 // A column of numbers, in the unit that fits most of them; words stay unchanged.
 function numeric(rows, column) {

@@ -88,7 +88,7 @@ export function results(runs, which) {
     ...references.map((name) => of(`${name} (reference)`, runs.map(({ info }) => check(info, name)?.unit).find(Boolean) ?? "", ({ info }) => check(info, name)?.value)),
     of("references met", "", ({ info }) => (info.outcome?.reference?.length ? info.outcome.reference.filter(({ pass }) => pass).length / info.outcome.reference.length : null), (value) => fixed(100 * value, 0).concat(" %")),
     of("kinetic energy", "J", ({ columns }) => columns.extremes?.kinetic?.last),
-    of("fragments", "", ({ info }) => info.outcome?.fragments, count), of("eroded tets", "", end("eroded"), count),
+    of("fragments", "", ({ info }) => info.outcome?.fragments, count), of("first broken facet", "s", end("first_break")), of("eroded tets", "", end("eroded"), count),
     of("worst energy residual", "", ({ info }) => info.outcome?.worst_residual, rough),
     of("simulated time", "s", ({ columns }) => columns.extremes?.t?.last), of("steps", "", end("steps"), count), of("elements", "", end("elements"), count),
     of("wall time", "s", end("elapsed"), duration), of("CPU time", "s", end("cpu"), duration),

@@ -41,7 +41,7 @@ export const alone = ({ plan, loads }) => (plan?.run?.ranks ?? loads.at(-1)?.sha
 
 function others(live, info, outcome) {
   const { progress, counts, started } = live;
-  const crack = firstCrack(live);
+  const crack = Number.isFinite(outcome?.first_break) ? si(outcome.first_break, "s", 4) : firstCrack(live);
   return [
     entry("elapsed", duration(live.elapsed)),
     entry("step", count(ended(progress, outcome).step)),

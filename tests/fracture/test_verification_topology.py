@@ -1,5 +1,6 @@
 """H5, H20: after every event the mesh equals that of plain Python, and forces and masses belong to the right nodes."""
 
+import math
 from collections import Counter, defaultdict
 from pathlib import Path
 
@@ -99,14 +100,15 @@ def check_topology(sim: Simulation, before: Ints) -> None:
 
 @pytest.mark.parametrize("model", ["instant", "cohesive"])
 def test_a_shattering_block_stays_a_mesh(model: str) -> None:
-    sim, events, seen = burst(model, "standard"), 0, 0
+    sim, events, seen, first = burst(model, "standard"), 0, 0, math.nan
     before = sim.model.blocks[0].tets.astype(np.int64)
     mass = float(sim.model.nodes.mass.sum())
 
     def look(sim: Simulation, _: Floats) -> None:
-        nonlocal events, seen
+        nonlocal events, seen, first
         assert sim.fracture is not None
         if sim.fracture.broken > seen:
+            first = first if events else sim.clock.t
             seen, events = sim.fracture.broken, events + 1
             check_topology(sim, before)
             assert float(sim.model.nodes.mass.sum()) == pytest.approx(mass, rel=1e-12)
@@ -115,6 +117,8 @@ def test_a_shattering_block_stays_a_mesh(model: str) -> None:
     run(sim, look)
     print(f"{events} events, {seen} facets, {nodes} -> {sim.model.nodes.n} nodes of {4 * len(before)}")
     assert events > 5
+    assert sim.fracture is not None
+    assert sim.fracture.first == first > 0.0
     assert sim.model.nodes.n > 2 * nodes
 
 

@@ -37,7 +37,7 @@ class Course(NamedTuple):
     impulses: list[float]
     """Impulses of contact on each part, N s."""
     digest: str | None
-    broken: int
+    broken: tuple[int, float]
 
 
 def case_of(*changes: str) -> schema.Case:
@@ -58,7 +58,7 @@ def course(comm: Comm, folder: Path, cases: Sequence[schema.Case], stops: Sequen
         step.second_half(sim)
     assert sim.contact is not None
     assert sim.fracture is not None
-    broken = sim.fracture.broken
+    broken = sim.fracture.broken, sim.fracture.first
     found = Course(lines, sim.contact.impulses().reshape(-1).tolist(), digest(sim.model, comm, []), broken)
     sim.free()
     return found
@@ -68,7 +68,7 @@ def course(comm: Comm, folder: Path, cases: Sequence[schema.Case], stops: Sequen
 def whole() -> Course:
     (found,) = on_ranks(1, lambda comm: course(comm, Path(), [case_of()], []))
     last = found.lines[-1]
-    assert min(last.contact, last.friction, last.cohesive, found.broken) > 0
+    assert min(last.contact, last.friction, last.cohesive, *found.broken) > 0
     return found
 
 

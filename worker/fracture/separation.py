@@ -16,6 +16,8 @@ with their next step.
 (The paper's eqs 17 and 18 count new nodes per rank: there ids depend on the partition.)
 """
 
+import math
+
 import numpy as np
 
 from ..kernels.jit import njit, several, types
@@ -50,6 +52,8 @@ class Separation:
         self._meshes = meshes
         self.broken = 0
         """Number of broken facets of all ranks."""
+        self.first = math.nan
+        """Time at which the first of them broke, s."""
         self._mine = _NO_NODES
         """Local nodes, ascending, of the facets that break in this step."""
 

@@ -11,6 +11,8 @@ overstressed. A rank without a node of a broken facet, and without ghosts of a r
 the next step immediately.
 """
 
+import math
+
 import numpy as np
 
 from conoid.cases.model.joined import breakable, cohesive
@@ -73,6 +75,11 @@ class Fracture:
         """Number of broken facets of all ranks."""
         return self.separation.broken
 
+    @property
+    def first(self) -> float:
+        """Time at which the first facet of all ranks broke, s; NaN before."""
+        return self.separation.first
+
     def unload(self) -> None:
         """Before the kick: unloads cohesive facets that would release more than they absorbed. Collective."""
         if self.cohesion is not None and self.broken:
@@ -120,7 +127,10 @@ class Fracture:
             own = np.zeros_like(touched)
             self._survey(found, own)
             self._comm.begin_maximum(own, touched).finish()
+        whole = not self.broken
         self._break(found, touched)
+        if whole and self.broken:
+            self.separation.first = self._clock.t
 
     def _survey(self, found: list[Breaking], touched: Ints) -> None:
         count = sum(int(b.facets.first.sum()) for b in found)
@@ -129,6 +139,7 @@ class Fracture:
     def keep(self, parcel: Parcel) -> None:
         """Adds the state of fracture to a parcel (a checkpoint or migration message)."""
         parcel.known["fracture"] = self.broken, self._insertion.longest
+        parcel.known["first_break"] = self.first
         self.initiation.keep(parcel)
         if self.cohesion is not None:
             self.cohesion.keep(parcel)
@@ -136,6 +147,7 @@ class Fracture:
     def resume(self, parcel: Parcel) -> None:
         """Restores the state from a parcel (a checkpoint or migration message)."""
         self.separation.broken, self._insertion.longest = parcel.known["fracture"]
+        self.separation.first = parcel.known.get("first_break", math.nan)
         self.initiation.resume(parcel)
         if self.cohesion is not None:
             self.cohesion.resume(parcel, self._model.nodes)
