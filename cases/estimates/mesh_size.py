@@ -65,8 +65,7 @@ def mesh_size(mesh: Generated) -> MeshSize:
     """Returns the size of the mesh of a primitive: exact numbers for the structured generator, estimates for gmsh."""
     if not isinstance(mesh, Sphere | Revolved | RingSector) and mesh.generator == "structured":
         return _structured(mesh)
-    per_volume, per_surface = _mean_powers(mesh)
-    filling, covering = volume(mesh) * per_volume, surface(mesh) * per_surface
+    filling, covering = volume(mesh) * _mean_powers(mesh)[0], _covering(mesh)
     elements = TETS_PER_VOLUME * filling + TETS_PER_SURFACE * covering
     nodes = NODES_PER_VOLUME * filling + NODES_PER_SURFACE * covering
     return MeshSize(max(6, round(elements)), max(8, round(nodes)), _worst(mesh) * REGULAR * mesh.element_size)
@@ -82,7 +81,19 @@ def _worst(mesh: Generated) -> float:
 
 def surface_faces(mesh: Generated) -> int:
     """Returns the estimated number of surface faces of a primitive, with the cuts of its sector."""
-    return round(FACES_PER_SURFACE * surface(mesh) * _mean_powers(mesh)[1])
+    return round(FACES_PER_SURFACE * _covering(mesh))
+
+
+def _covering(mesh: Generated) -> float:
+    """Returns the integral of 1 / h^2 over the surface, with the cuts of the sector, for the element size h. Where the
+    size depends on the depth below the skin, the skin has the ``element_size``; other surfaces have the mean over the
+    volume.
+    """
+    if mesh.grading is None or not mesh.grading.surface:
+        return surface(mesh) * _mean_powers(mesh)[1]
+    whole = mesh.model_copy(update={"sector": "full"})
+    skin = surface(whole) * volume(mesh) / volume(whole)
+    return skin * mesh.element_size**-2 + (surface(mesh) - skin) * _mean_powers(mesh)[1]
 
 
 @lru_cache(maxsize=4096)
