@@ -125,7 +125,7 @@ def _write(book: Book, quantity: str | None, out: Path | None) -> None:
 def _numbers(option: str, text: str) -> list[float]:
     """Returns positive, different numbers from a list with commas. Raises ClientError."""
     try:
-        values = [float(word) for word in text.split(",") if word.strip()]
+        values = [float(word) for word in text.split(",")] if text.strip() else []
     except ValueError:
         values = [0.0]
     wrong = not all(0.0 < value < 1e6 for value in values) or len(set(values)) < len(values)
@@ -135,7 +135,7 @@ def _numbers(option: str, text: str) -> list[float]:
 
 
 def _forms(text: str) -> list[str]:
-    return [_one_of("--forms", word.strip(), FORMS) for word in text.split(",") if word.strip()]
+    return [_one_of("--forms", word.strip(), FORMS) for word in text.split(",")] if text.strip() else []
 
 
 def _one_of(option: str, word: str, known: Sequence[str]) -> str:

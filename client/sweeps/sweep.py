@@ -257,11 +257,11 @@ def value_of(text: str) -> Any:
 
 
 def _axis(word: str) -> tuple[str, list[Any]]:
-    key, equals, text = word.partition("=")
-    values = [value_of(part) for part in _parts(text)]
-    if not equals or not values:
+    key, _, text = word.partition("=")
+    parts = _parts(text)
+    if not all(part.strip() for part in (key, *parts)):
         raise CaseError([Problem("--set", repr(word), "write a key and its values, such as run.ranks=1,2")])
-    return key.strip(), values
+    return key.strip(), [value_of(part) for part in parts]
 
 
 def _parts(text: str) -> list[str]:
@@ -275,4 +275,4 @@ def _parts(text: str) -> list[str]:
             parts.append("")
         else:
             parts[-1] += letter
-    return [part for part in parts if part.strip()]
+    return parts

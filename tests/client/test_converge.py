@@ -221,7 +221,8 @@ def test_the_quantity_of_the_advice_is_checked_before_any_run(name: str) -> None
 @pytest.mark.parametrize(
     ("words", "message"),
     [
-        (["--meshes", "1,x"], "--meshes"), (["--meshes", "1,1"], "each once"), (["--forms", "nodal,cubic"], "--forms"),
+        (["--meshes", "1,x"], "--meshes"), (["--meshes", "1,,2"], "--meshes"), (["--meshes", "1,1"], "each once"),
+        (["--forms", "nodal,cubic"], "--forms"), (["--forms", "nodal,"], "--forms"),
         (["--vary", "moods"], "--vary"), (["--quantity", "nope"], "--quantity = 'nope': a part of a name; allowed: "),
     ],
 )  # fmt: skip

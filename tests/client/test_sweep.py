@@ -36,7 +36,9 @@ def test_a_comma_in_a_list_or_in_quotes_divides_nothing() -> None:
     ]  # fmt: skip
 
 
-@pytest.mark.parametrize("words", [[], ["run.ranks"], ["run.ranks="], ["a=1,2", "b=1,2,3"]])
+@pytest.mark.parametrize(
+    "words", [[], ["run.ranks"], ["run.ranks="], ["run.ranks=1,,2"], ["run.ranks=1,2,"], ["=1"], ["a=1,2", "b=1,2,3"]]
+)
 def test_wrong_words_are_refused(words: list[str]) -> None:
     with pytest.raises(ValueError, match="--set"):
         points_of(words)
