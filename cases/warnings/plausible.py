@@ -42,7 +42,7 @@ LIKELY: dict[str, tuple[float, float, str]] = {
     "specific heat": (50.0, 15_000.0, "J/kg/K: tungsten has 134, hydrogen 14,300"),
     "fracture energy": (1e-2, 1e6, "J/m^2: glass has 8, tough steel 100,000"),
     "temperature": (100.0, 6_000.0, "K: 20 degrees Celsius are 293 K"),
-    "extent": (1e-6, 100.0, "m"),
+    "extent": (1e-6, 5.0, "m: a mesh in mm that was read as m is a thousand times too large"),
     "bulk modulus, density c0^2, over that of elastic,": (0.5, 2.0, "both are of one solid at rest"),
 }
 """Usual ranges of quantities of solids. The ends of the ranges are near the values of known materials (handbooks)."""
