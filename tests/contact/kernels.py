@@ -22,11 +22,12 @@ from conoid.worker.contact.narrow_phase.tables import (
     Step,
 )
 from conoid.worker.contact.solver.active import Kept
-from conoid.worker.contact.solver.shared_sums import SharedSums
+from conoid.worker.contact.solver.shared_sums import ActiveSum, SharedSums
 from conoid.worker.contact.solver.solver import ActiveSet
 from conoid.worker.contact.solver.step import SolverStep
 from conoid.worker.contact.solver.stops import Stops
 from conoid.worker.contact.surface.records import SurfaceNodes
+from conoid.worker.model.state import Ints
 from conoid.worker.parallel.comm import SerialComm
 from conoid.worker.parallel.fixed_point import Tally
 from conoid.worker.parallel.team import team
@@ -288,6 +289,16 @@ class Solver:
         self._go_on(kept=kept, ratio=ratio)
         self.active.resume()
         self._leave()
+
+    def solve(self, sweeps: int, shared: Indices) -> tuple[Ints, Ints]:
+        """Runs a whole step in which other ranks share the nodes ``shared`` and have no impulses; returns the words of
+        the work along the normals and of friction.
+        """
+        self.books.account.words, self.books.friction = np.zeros((2, 2), np.int64), Tally(np.ones(2))
+        self._step = replace(self._step, sweeps=sweeps, kept=Kept(*np.zeros((2, many(self.met), 4))))
+        nobody, none = np.zeros((0, 2), np.int64), np.zeros(0, np.int32)
+        self.active.solve(self._step, ActiveSum([], none, shared, nobody, SerialComm()))
+        return self.books.account.words, self.books.friction.words
 
     def heat(self, v_old: Floats) -> float:
         """Returns the work of friction, J, of the contacts with an impulse, from the velocities ``v_old``."""

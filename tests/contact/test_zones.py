@@ -109,3 +109,15 @@ def test_impulses_of_many_threads_are_those_of_one(threads: int, seed: int) -> N
         ends.append((solver.v.copy(), solver.total.copy(), solver.push.copy(), solver.unsettled.copy()))
     for one, other in zip(*ends, strict=True):
         assert np.array_equal(one, other)
+
+
+def test_a_step_alone_books_no_work_of_a_step_with_shared_nodes() -> None:
+    """A rank that has lost its neighbours has no contacts in the sets at the border any more."""
+    met, v, mobility = network(4, friction=0.3)
+    nobody = np.zeros(0, np.int32)
+    before = Solver(met, v, mobility)
+    _, with_others = before.solve(9, np.arange(len(v) // 2, dtype=np.int32))
+    after, fresh = Solver(met, v, mobility, active=before.active), Solver(met, v, mobility)
+    for word, expected in zip(after.solve(9, nobody), fresh.solve(9, nobody), strict=True):
+        assert np.array_equal(word, expected)
+    assert with_others.any()

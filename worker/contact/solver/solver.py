@@ -210,6 +210,7 @@ class ActiveSet:
 
     def store(self) -> None:
         """Stores the impulses of this step."""
+        self._stored = True
         self._program.run(stages.CLEAR_PAIRS, stages.WORK)
         self._program.run(stages.STORE_BORDER, stages.WORK_BORDER)
 

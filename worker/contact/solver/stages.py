@@ -88,14 +88,16 @@ def count(table, first, stop, thread):  # type: ignore[no-untyped-def]
 
 @njit(TASK, cache=True)
 def order(table, first, stop, thread):  # type: ignore[no-untyped-def]
-    """Sets the first slot of each range of nodes, and the first row of each set of contacts and of each task in it."""
+    """Sets the first slot of each range of nodes, and the first row of each set of contacts and of each task in it.
+    The loaded contacts and the work of all sets are set to zero.
+    """
     counts, _, _ = step_of(table)
-    _, many, begins, counted, _, _, _, _, _ = sums_of(table)
+    _, many, begins, counted, _, along, friction, _, _ = sums_of(table)
     loaded, nodes = room_of(table)[9], len(nodes_of(table)[3])
     counts[SLOTS_N] = slot_numbers.offsets(counted, (nodes + SLOTS_OF_A_TASK - 1) // SLOTS_OF_A_TASK)
     tasks = (counts[CONTACTS_N] + CONTACTS_OF_A_TASK - 1) // CONTACTS_OF_A_TASK
     slot_numbers.set_offsets(loaded.begin, begins, many, tasks)
-    loaded.many[:] = 0
+    loaded.many[:], along[:], friction[:] = 0, 0, 0
     counts[TURN] = 0
 
 
@@ -207,12 +209,11 @@ def store(table, first, stop, thread):  # type: ignore[no-untyped-def]
 
 @njit(TASK, cache=True)
 def work(table, first, stop, thread):  # type: ignore[no-untyped-def]
-    """``impulse_work.cost`` and ``impulse_work.heat`` of a range of sets; sums by set."""
+    """``impulse_work.cost`` and ``impulse_work.heat`` of a range of sets; added to the sums of the sets."""
     room, (counts, reals, _), before = room_of(table), step_of(table), nodes_of(table)[1]
     _, _, _, _, _, along, friction, _, _ = sums_of(table)
     active, places, loaded = room[0], room[5], room[9]
     for k in range(first, stop):
-        along[k], friction[k] = 0, 0
         if counts[WORKS] & 1:
             impulse_work.cost(along[k], loaded, active, before, places, reals[JOULE], k)
         if counts[WORKS] & 2:
