@@ -62,16 +62,12 @@ class Course:
         return float((0.5 * np.diff(times) * (values[1:] + values[:-1])).sum() / (end - begin))
 
 
-class Gravity(Driver):
-    """Gravity: an ``acceleration`` (3,), m/s^2, times the mean factor of the ``course`` over the mean step of the
-    kick: in free fall velocities are exact at n+1/2, and positions at n if it is constant.
-    """
+class Forcing(Driver):
+    """A driver that acts over the mean step of the kick, times the mean factor of its ``course`` over this step."""
 
-    def __init__(self, nodes: Indices, acceleration: Floats, course: Course) -> None:
+    def __init__(self, nodes: Indices, course: Course) -> None:
         super().__init__(nodes)
-        self._acceleration, self._course = acceleration, course
-        self._arguments = Arguments(*impulses.ACCELERATE)
-        self._last_dt = 0.0
+        self._course, self._last_dt = course, 0.0
 
     def held_components(self) -> Bits:
         return free(self.nodes)
@@ -80,25 +76,39 @@ class Gravity(Driver):
         super().resume(parcel, name, dt)
         self._last_dt = dt
 
-    def apply(self, state: Nodes, dt: float, t: float) -> None:
-        mean_dt = 0.5 * (self._last_dt + dt)
-        factor = mean_dt * self._course.mean(t - 0.5 * self._last_dt, t + 0.5 * dt)
-        self._last_dt = dt
-        self._act(impulses.accelerate, self._arguments, state, self._acceleration, factor)
-
-    def acting(self, state: Nodes) -> list[Stage] | None:
-        factor = self._course.constant
-        if factor is None:
-            return None
-        return self._acting(
-            impulses.accelerate, self._arguments, state, self._acceleration, Follow(MEAN_DT, factor)
-        )  # fmt: skip
-
     def went_on(self, dt: float) -> None:
         self._last_dt = dt
 
+    def _duration(self, dt: float, t: float) -> float:
+        """Returns the mean step of the kick at time ``t`` times the mean factor, s; ``dt`` becomes the last step."""
+        mean_dt = 0.5 * (self._last_dt + dt)
+        factor = self._course.mean(t - 0.5 * self._last_dt, t + 0.5 * dt)
+        self._last_dt = dt
+        return mean_dt * factor
 
-class Traction(Driver):
+    def _forcing(self, kernel: Kernel, arguments: Arguments, state: Nodes, vectors: Floats) -> list[Stage] | None:
+        """Returns a kernel with its ``vectors`` and the duration as stages of a program; None if the factor changes."""
+        factor = self._course.constant
+        return None if factor is None else self._acting(kernel, arguments, state, vectors, Follow(MEAN_DT, factor))
+
+
+class Gravity(Forcing):
+    """Gravity: an ``acceleration`` (3,), m/s^2, times the mean factor of the ``course`` over the mean step of the
+    kick: in free fall velocities are exact at n+1/2, and positions at n if it is constant.
+    """
+
+    def __init__(self, nodes: Indices, acceleration: Floats, course: Course) -> None:
+        super().__init__(nodes, course)
+        self._acceleration, self._arguments = acceleration, Arguments(*impulses.ACCELERATE)
+
+    def apply(self, state: Nodes, dt: float, t: float) -> None:
+        self._act(impulses.accelerate, self._arguments, state, self._acceleration, self._duration(dt, t))
+
+    def acting(self, state: Nodes) -> list[Stage] | None:
+        return self._forcing(impulses.accelerate, self._arguments, state, self._acceleration)
+
+
+class Traction(Forcing):
     """Forces on corners of tets, times the mean factor of the ``course`` over the mean step of the kick; removed with
     their tets.
 
@@ -108,15 +118,11 @@ class Traction(Driver):
     on_faces = True
 
     def __init__(self, corners: Indices, load: Load, course: Course) -> None:
-        super().__init__(np.unique(corners))
-        self._corners, self._load, self._course = corners, load, course
+        super().__init__(np.unique(corners), course)
+        self._corners, self._load = corners, load
         self._arguments = Arguments(*impulses.PUSH)
         self.force = self._summed()
         """(n, 3) force on each node, N."""
-        self._last_dt = 0.0
-
-    def held_components(self) -> Bits:
-        return free(self.nodes)
 
     def keep(self, parcel: Parcel, name: str) -> None:
         super().keep(parcel, name)
@@ -132,7 +138,6 @@ class Traction(Driver):
         self.nodes = np.flatnonzero(used).astype(np.int32)
         super().resume(parcel, name, dt)
         self.force = self._summed()
-        self._last_dt = dt
 
     def grow(self, split: Split, ids: Ints) -> None:
         super().grow(split, ids)
@@ -151,19 +156,10 @@ class Traction(Driver):
         return force
 
     def apply(self, state: Nodes, dt: float, t: float) -> None:
-        mean_dt = 0.5 * (self._last_dt + dt)
-        factor = mean_dt * self._course.mean(t - 0.5 * self._last_dt, t + 0.5 * dt)
-        self._last_dt = dt
-        self._act(impulses.push, self._arguments, state, self.force, factor)
+        self._act(impulses.push, self._arguments, state, self.force, self._duration(dt, t))
 
     def acting(self, state: Nodes) -> list[Stage] | None:
-        factor = self._course.constant
-        if factor is None:
-            return None
-        return self._acting(impulses.push, self._arguments, state, self.force, Follow(MEAN_DT, factor))
-
-    def went_on(self, dt: float) -> None:
-        self._last_dt = dt
+        return self._forcing(impulses.push, self._arguments, state, self.force)
 
 
 class PrescribedVelocity(Driver):

@@ -19,15 +19,15 @@ from ..kernels.jit import njit
 from ..migration.parcel import Parcel
 from ..model.ids import IdIndex
 from ..model.loads import LoadedFaces
-from ..model.state import WIDE, Bits, Block, Flags, Floats, Indices, Ints, Model, Nodes
+from ..model.state import WIDE, Block, Flags, Floats, Indices, Ints, Model, Nodes
 from ..model.topology import Split
 from ..parallel.arguments import Arguments
 from ..parallel.comm import Comm
 from ..parallel.ownership import Neighbour, SharedSum, complete
 from ..parallel.tags import Tag
 from . import impulses
-from .boundaries import KEPT, free
-from .drivers import Course, Driver
+from .boundaries import KEPT
+from .drivers import Course, Forcing
 
 _BITS = 42
 """Binary logarithm of the number of quanta in the largest force on a node of a face at the start. Chosen value:
@@ -43,7 +43,7 @@ def scale(spec: Traction, outward: Floats) -> float:
     return math.ldexp(1.0, _BITS - math.frexp(largest)[1]) if largest > 0.0 else 1.0
 
 
-class SurfacePressure(Driver):
+class SurfacePressure(Forcing):
     """Applies a ``pressure``, Pa, to faces, times the mean factor of the ``course`` over the mean step of the kick.
 
     A rank has the faces of its tets, and all its nodes that are loaded on any rank.
@@ -58,8 +58,7 @@ class SurfacePressure(Driver):
         self._model, self._comm, self._neighbours = model, comm, neighbours
         self._faces, self._corners = faces, model.nodes.places(faces.nodes.reshape(-1)).reshape(-1, 3)
         self._quanta = -pressure * faces.scale / 6.0
-        super().__init__(self._agreed(np.zeros(model.nodes.n, bool)))
-        self._course, self._last_dt = course, 0.0
+        super().__init__(self._agreed(np.zeros(model.nodes.n, bool)), course)
         self._arguments = Arguments(*impulses.PUSH)
         self._places = self._placed()
         self._shared: SharedSum | None = None
@@ -80,14 +79,9 @@ class SurfacePressure(Driver):
         shared.finish(sums)
         return np.asarray(sums / (self._faces.scale if largest < 2.0**_MOST else math.nan))
 
-    def held_components(self) -> Bits:
-        return free(self.nodes)
-
     def apply(self, state: Nodes, dt: float, t: float) -> None:
         self._drop_loose_faces()
-        factor = 0.5 * (self._last_dt + dt) * self._course.mean(t - 0.5 * self._last_dt, t + 0.5 * dt)
-        self._last_dt = dt
-        self._act(impulses.push, self._arguments, state, self.force, factor)
+        self._act(impulses.push, self._arguments, state, self.force, self._duration(dt, t))
 
     def keep(self, parcel: Parcel, name: str) -> None:
         super().keep(parcel, name)
@@ -98,7 +92,7 @@ class SurfacePressure(Driver):
         booked = [(parcel.nodes[f"{name}.{key}"] != 0.0).reshape(len(parcel.nodes["id"]), -1) for key in KEPT]
         self.nodes = self._agreed(np.asarray(np.concatenate(booked, axis=1).any(axis=1)))
         super().resume(parcel, name, dt)
-        self._places, self._last_dt = self._placed(), dt
+        self._places = self._placed()
 
     def grow(self, split: Split, ids: Ints) -> None:
         super().grow(split, ids)
