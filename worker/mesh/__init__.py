@@ -1,1 +1,3 @@
-"""Meshes of 4-node tetrahedra: made or read, checked, ordered and cached. The entry point is ``build.build``."""
+"""Meshes of 4-node tetrahedra. The entry point is ``build.build``, which makes or reads a mesh, checks it, orders its
+tets and stores it in a cache.
+"""

@@ -1,4 +1,4 @@
-"""Cuts of hexahedra, wedges and pyramids of a file into tets, and notes for the user about these elements."""
+"""Cuts of hexahedra, wedges and pyramids of a file into tets, and notes to the user about the cuts."""
 
 from collections import Counter
 from collections.abc import Iterator
@@ -20,14 +20,14 @@ _SEEN = 1e-6
 
 @dataclass(frozen=True, eq=False)
 class Bricks:
-    """Elements that are not yet cut into tets, of all kinds in one list."""
+    """Elements that are not yet cut into tets. Hexahedra, wedges and pyramids are in one list."""
 
     nodes: Ids
-    """(m, 8) indices of the corners; every element is written as a hexahedron."""
+    """(m, 8) indices of the corners; each element is written as a hexahedron with repeated corners."""
     numbers: Ids
     lines: Ids
     forms: list[Form]
-    """Form of each kind of element, in the order of the kinds."""
+    """Form of each kind of element. The list has the order of the kinds."""
     counts: list[int]
 
     def called(self, k: int) -> str:
@@ -55,7 +55,8 @@ def bricks(cells: list[Cells]) -> Bricks:
 
 
 def cut_up(some: Bricks, triangles: Ids, points: Floats) -> Cut:
-    """Return the tets of the elements. Triangles ``triangles`` (k, 3) of other elements are faces of these tets.
+    """Cut the elements into tets and return the tets. The ``triangles`` (k, 3) of neighbouring elements become faces of
+    the tets.
 
     Raises MeshError for an element that is inverted, flat or too distorted.
     """
@@ -71,7 +72,7 @@ def cut_up(some: Bricks, triangles: Ids, points: Floats) -> Cut:
 
 
 def _what(nodes: Ids, points: Floats, diagonals: int) -> str:
-    """Return the reason for which an element cannot be cut."""
+    """Return the reason why an element cannot be cut."""
     at = points[nodes]
     volume = sum(float((np.cross(at[a] - at[0], at[b] - at[0]) * (at[c] - at[0])).sum()) for a, b, c in skin(diagonals))
     size = float(np.ptp(at, axis=0).max()) ** 3
@@ -81,7 +82,9 @@ def _what(nodes: Ids, points: Floats, diagonals: int) -> str:
 
 
 def _fitting(nodes: Ids, triangles: Ids) -> Ids:
-    """Return (m,) the diagonals of faces, which are determined by node numbers or by triangles of other elements."""
+    """Return (m,) the diagonals of the faces of each element. A diagonal is determined by node numbers, or by triangles
+    of neighbouring elements.
+    """
     diagonals = pattern(nodes)
     if not len(triangles):
         return diagonals
@@ -96,7 +99,7 @@ def _fitting(nodes: Ids, triangles: Ids) -> Ids:
 
 
 def _known(faces: Ids, triangles: Ids) -> "np.ndarray":
-    """Return (m, k) which of the faces (m, k, 3) are among the triangles, in any rotation of their corners."""
+    """Return (m, k) whether each of the faces (m, k, 3) is among the triangles, in any rotation of the corners."""
     both = np.sort(np.concatenate([triangles, faces.reshape(-1, 3)]), axis=1)
     _, of = np.unique(both, axis=0, return_inverse=True)
     of = of.reshape(-1)
@@ -106,7 +109,9 @@ def _known(faces: Ids, triangles: Ids) -> "np.ndarray":
 
 
 def triangles_of(cells: list[Cells]) -> Ids:
-    """Return (k, 3) the triangular faces of elements; no face if no element has a face with four corners."""
+    """Return (k, 3) the triangular faces of the elements. If no element has a face with four corners, return no
+    face.
+    """
     if not any(len(side) == 4 for each in cells for side in sides(each.kind.form)):
         return np.zeros((0, 3), np.int64)
     faces = [each.corners[:, side] for each in cells for side in sides(each.kind.form) if len(side) == 3]
@@ -135,10 +140,10 @@ def notes_of_cut(some: Bricks, made: Cut, points: Floats, volume: float) -> Iter
 
 
 def _warped(nodes: Ids, points: Floats) -> float:
-    """Return the volume between bilinear faces and their triangles.
+    """Return the volume between bilinear faces and the two triangles into which each face is cut.
 
-    For each face it is a twelfth of the triple product of three edges, with the sign of the diagonal, because the
-    bilinear face has the mean volume of both cuts of the face.
+    The volume of a face is a twelfth of the triple product of three edges, with the sign of the diagonal, because the
+    bilinear face has the mean volume of its two cuts.
     """
     diagonals, total = pattern(nodes), 0.0
     for bit, quad in enumerate(QUADS):
@@ -149,8 +154,8 @@ def _warped(nodes: Ids, points: Floats) -> float:
 
 
 def notes_of_middles(cells: list[Cells], points: Floats, tags: Ids) -> Iterator[str]:
-    """Return notes about hexahedra, wedges and pyramids of second order, and the volume that is lost. Only the corners
-    of these elements are used.
+    """Return notes about hexahedra, wedges and pyramids of second order, and the volume that is lost because only their
+    corners are used.
 
     Raises MeshError if a node is not near the middle of its edge.
     """
@@ -169,7 +174,7 @@ def notes_of_middles(cells: list[Cells], points: Floats, tags: Ids) -> Iterator[
 
 
 def _volume(cells: Cells, points: Floats) -> float:
-    """Return the approximate volume of elements with straight edges."""
+    """Return the approximate volume of the elements, as if their edges were straight."""
     total, start = 0.0, points[cells.corners[:, 0]]
     for side in sides(cells.kind.form):
         a, b, c, d = (points[cells.corners[:, k]] - start for k in [*side, side[0]][:4])

@@ -1,5 +1,5 @@
-"""Entry point of meshing: the tets of a mesh of a case, made once, then read from a cache that is indexed by
-content.
+"""Entry point of meshing. A mesh is made once; later calls read its tets from a cache that is indexed by the hash of
+its content.
 """
 
 import contextlib
@@ -30,7 +30,7 @@ from .store import load, save
 from .structured import structured
 
 _CACHE_BYTES = 4 * 2**30
-"""Size of the cache, bytes, above which the least recently used meshes are removed."""
+"""Largest size of the cache, bytes. Above this size the least recently used meshes are removed."""
 
 
 def build(
@@ -38,8 +38,9 @@ def build(
 ) -> TetMesh:
     """Return the tets of ``mesh``: checked, in Morton order, bit-identical in every call. Raises MeshError.
 
-    ``folder``: folder at which a relative path of a mesh file starts; ``key``: key of the mesh in its case, for
-    messages; ``made`` is called before a mesh is made. A child process within ``limits`` runs gmsh and reads files.
+    ``folder``: folder to which the path of a mesh file is relative; ``key``: key of the mesh in its case, for messages;
+    ``made``: function that is called before a mesh is made; ``limits``: limits of the child process that runs gmsh and
+    reads files.
     """
     source = sources(mesh, folder, key)
     if not isinstance(mesh, MeshFile) and mesh.generator == "gmsh":
@@ -86,8 +87,8 @@ def _loaded(target: Path, count: int) -> list[TetMesh] | None:
 
 @contextlib.contextmanager
 def _writable(target: Path) -> Iterator[Path]:
-    """Yield the path itself, or a path of the same name in a temporary folder. An unwritable cache costs time, but
-    the run continues.
+    """Yield ``target`` if it can be written, else a path of the same name in a temporary folder. A run without a
+    writable cache continues, but makes its mesh again.
     """
     try:
         target.parent.mkdir(parents=True, exist_ok=True)
@@ -102,7 +103,7 @@ def _writable(target: Path) -> Iterator[Path]:
 
 
 def _changed(mesh: TetMesh) -> bool:
-    """Return whether a file included by the file of a mesh has changed or was removed."""
+    """Return whether a file that the mesh file includes has changed or was removed."""
     for path, digest in mesh.origin.included if mesh.origin is not None else ():
         try:
             with whole.opened(path) as file:
@@ -114,7 +115,9 @@ def _changed(mesh: TetMesh) -> bool:
 
 
 def cache_folder() -> Path:
-    """Return the folder of cached meshes: below ``CONOID_CACHE_DIR``, else ``~/.cache/conoid``."""
+    """Return the folder of cached meshes, which is below ``CONOID_CACHE_DIR`` if that variable is set, else
+    ``~/.cache/conoid``.
+    """
     root = os.environ.get("CONOID_CACHE_DIR")
     return (Path(root) if root else Path.home() / ".cache" / "conoid") / "meshes"
 
@@ -143,8 +146,8 @@ def _need_gmsh(key: str) -> None:
 
 
 def _content(mesh: Mesh, found: Sources, key: str) -> str:
-    """Return the sha256 of everything that determines the mesh: the request, the bytes of the files, the source of
-    this package, and the versions.
+    """Return the sha256 of everything that determines the mesh: the request, the bytes of the files, the source of this
+    package, and the versions of the libraries.
     """
     asked = mesh.model_dump(mode="json")
     for file in files_of({"parts": [{"mesh": asked}]}):
@@ -154,7 +157,9 @@ def _content(mesh: Mesh, found: Sources, key: str) -> str:
 
 
 def _forget(asked: Any, place: tuple[int | str, ...]) -> None:
-    """Remove path and expected hash of a file from a request, because only the bytes of the file determine the mesh."""
+    """Remove the path and the expected hash of a file from a request, because only the bytes of the file determine the
+    mesh.
+    """
     for step in place:
         asked = asked[step]
     asked.update(path="", sha256=None)
@@ -162,8 +167,8 @@ def _forget(asked: Any, place: tuple[int | str, ...]) -> None:
 
 @cache
 def _maker() -> str:
-    """Return the sources of this package and of the modules that it uses, and the versions of the libraries that it
-    calls.
+    """Return the sources of this package, the sources of the modules that it imports, and the versions of the libraries
+    that it calls.
     """
     text, here = hashlib.sha256(), Path(__file__).parent
     used = [Path(str(module.__file__)) for module in (geometry, profile, ring, hashing, turning)]
@@ -181,7 +186,7 @@ def _versions(*packages: str) -> Iterator[str]:
 
 
 def _trim(folder: Path) -> None:
-    """Remove the least recently used meshes until the remaining meshes fit into the cache."""
+    """Remove the least recently used meshes until the size of the cache is allowed."""
     kept = sorted((file.stat().st_mtime, file.stat().st_size, file) for file in folder.glob("*.npz"))
     total = sum(size for _, size, _ in kept)
     for _, size, file in kept[:-1]:

@@ -15,8 +15,8 @@ Edges = tuple[tuple[int, int], ...]
 
 
 class Form(Enum):
-    """Form of an element: its name in messages, its number of corners, and the positions of these corners in a
-    hexahedron (``patterns``).
+    """Form of an element: its name in messages, its number of corners, and the position of each corner in a hexahedron
+    (``patterns``).
     """
 
     TET = "tet", 4, (0, 1, 2, 2, 3, 3, 3, 3)
@@ -25,7 +25,7 @@ class Form(Enum):
     PYRAMID = "pyramid", 5, (0, 1, 2, 3, 4, 4, 4, 4)
 
     def __init__(self, word: str, corners: int, inside: tuple[int, ...]) -> None:
-        """Set the values of a row of the table above."""
+        """Store the name, the number of corners, and their positions in a hexahedron."""
         self.word, self.corners, self.inside = word, corners, np.array(inside)
 
     @property
@@ -38,8 +38,8 @@ class Form(Enum):
 class Kind:
     """Elements of one form and order.
 
-    Each of the ``edges`` has a node in its middle. The midside nodes follow the corners, in the order of ``edges``.
-    ``nodes`` is the number of all nodes; nodes after the middles of edges are ignored.
+    In elements of second order each of the ``edges`` has a midside node. The midside nodes follow the corners, in the
+    order of ``edges``. ``nodes`` is the number of all nodes; nodes after the midside nodes are ignored.
     """
 
     form: Form
@@ -57,7 +57,7 @@ class Cells:
     nodes: Ids
     """(m, kind.nodes) tags of the nodes of each element."""
     lines: Ids
-    """(m,) line of each element in the file; 0 if the reader counts no lines."""
+    """(m,) line of each element in the file; 0 if the format has no line numbers."""
 
     @property
     def corners(self) -> Ids:
@@ -66,7 +66,7 @@ class Cells:
 
     @property
     def middles(self) -> Ids:
-        """(m, edges) tags of the nodes in the middle of the edges of each element."""
+        """(m, edges) tags of the midside nodes of each element."""
         first = self.kind.form.corners
         return self.nodes[:, first : first + len(self.kind.edges)]
 
@@ -75,12 +75,14 @@ class Cells:
         return f"{self.kind.form.word} {self.numbers[k]}" + (f" (line {self.lines[k]})" if self.lines[k] else "")
 
     def of(self, chosen: NDArray[np.bool_]) -> Self:
-        """Return the chosen elements."""
+        """Return the elements ``chosen`` of this kind."""
         return type(self)(self.kind, self.numbers[chosen], self.nodes[chosen], self.lines[chosen])
 
 
 def sides(form: Form) -> list[list[int]]:
-    """Return the corners of the faces of a form, three or four for each face, anticlockwise seen from outside."""
+    """Return the corners of the faces of a form. Each face has three or four corners, anticlockwise seen from
+    outside.
+    """
     found = []
     for quad in form.inside[QUADS].tolist():
         different = [node for k, node in enumerate(quad) if node != quad[k - 1]]
@@ -90,7 +92,7 @@ def sides(form: Form) -> list[list[int]]:
 
 
 def cells(kind: Kind, numbers: Ids, nodes: Ids, lines: Iterable[int] | Ids = ()) -> Cells:
-    """Return elements from the data of a reader: flat or (m, kind.nodes) tags."""
+    """Return elements made from the data of a file; ``nodes`` is flat or has the shape (m, kind.nodes)."""
     known = np.asarray(lines, np.int64) if not isinstance(lines, tuple) else np.zeros(len(numbers), np.int64)
     return Cells(kind, numbers, nodes.reshape(-1, kind.nodes), known)
 
@@ -102,4 +104,4 @@ TET10 = Kind(Form.TET, 10, ((0, 1), (1, 2), (0, 2), (0, 3), (1, 3), (2, 3)))
 HEX20 = Kind(Form.HEXAHEDRON, 20, (*_RING, (4, 5), (5, 6), (6, 7), (7, 4), *_UP))
 WEDGE15 = Kind(Form.WEDGE, 15, ((0, 1), (1, 2), (2, 0), (3, 4), (4, 5), (5, 3), (0, 3), (1, 4), (2, 5)))
 PYRAMID13 = Kind(Form.PYRAMID, 13, (*_RING, (0, 4), (1, 4), (2, 4), (3, 4)))
-"""Pyramid of 13 nodes as in Abaqus, LS-DYNA, Radioss and VTK."""
+"""Pyramid of 13 nodes, in the node order of Abaqus, LS-DYNA, Radioss and VTK."""

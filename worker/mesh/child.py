@@ -1,9 +1,9 @@
 """Child process that runs gmsh and reads foreign files: ``python -m conoid.worker.mesh.child``.
 
 gmsh is GPL, and gmsh and any parser may crash, hang or request all memory. Therefore meshers and readers run in a
-separate process with limits on memory, CPU time and wall time, an environment without secrets and an empty working
-folder. The process reads one JSON request from standard input. The mesh is returned as an .npz file, an error as one
-line on standard error.
+separate process. This process has limits of memory, CPU time and wall time, an environment without secrets, and an
+empty working folder. The process reads one JSON request from standard input. The process writes the mesh to an .npz
+file, and an error to standard error as one line.
 """
 
 import ctypes
@@ -30,31 +30,34 @@ from ..run.signals import REQUESTS
 from .sources import Sources
 
 _PASSED_ON = ("HOME", "LANG", "LC_ALL", "LD_LIBRARY_PATH", "PATH", "PYTHONPATH", "TMPDIR", "VIRTUAL_ENV")
-"""Environment variables of the child process."""
+"""Environment variables that the child process gets."""
 
 _LOOK = 0.2
-"""Interval between two tests of a running child, s."""
+"""Interval between two checks of a running child process, s."""
 
 _FULL = 0.97
-"""Share of its memory limit above which a child may be unable to report that its memory is full."""
+"""Fraction of the memory limit of a child process. Above this fraction the child may have too little memory to report
+an error."""
 
 _GRACE = 5
-"""CPU time between the signal that the limit is reached and the end of a child, s. Chosen value."""
+"""CPU time between the signal at the CPU limit and the end of a child process, s. Chosen value."""
 
 _DIES_WITH_PARENT = 1
-"""Option of prctl on Linux: PR_SET_PDEATHSIG, the child ends when its parent ends."""
+"""Number of the option PR_SET_PDEATHSIG of prctl on Linux, with which the child process ends when its parent ends."""
 
 
 @dataclass(frozen=True)
 class Limits:
-    """Limits of a child: address space in bytes, CPU time and wall time in s."""
+    """Limits of a child process: address space in bytes, CPU time and wall time in s."""
 
     memory: int = 12 * 2**30
     cpu: int = 900
     wall: int = 900
 
     def allowed(self) -> "Limits":
-        """Return these limits, each reduced to the hard limit of this process (``ulimit -H``) if that is lower."""
+        """Return these limits, each reduced to the hard limit of this process (``ulimit -H``) if the hard limit is
+        lower.
+        """
         memory, cpu = (resource.getrlimit(which)[1] for which in (resource.RLIMIT_AS, resource.RLIMIT_CPU))
         none = resource.RLIM_INFINITY
         return replace(
@@ -65,11 +68,12 @@ class Limits:
 
 
 def run_child(mesh: Mesh | Mapping[str, Mesh], sources: Sources, target: Path, key: str, limits: Limits) -> None:
-    """Make ``mesh`` (from the files in ``sources``) in a child process, which writes the mesh to ``target``.
+    """Make ``mesh`` (from the files in ``sources``) in a child process. The child process writes the mesh to
+    ``target``.
 
-    Several meshes, by their keys, are meshed together and written to ``beside(target, k)``. Raises MeshError with
-    the message line of the child, or with the limit that the child exceeded. Raises StoppedError if the run was
-    asked to stop: launchers send the signal to all processes of a rank.
+    If ``mesh`` is a table of meshes, they are meshed together and written to ``beside(target, k)``. Raises MeshError
+    with the message of the child process, or with the limit that it exceeded. Raises StoppedError if the run was asked
+    to stop, because a launcher sends the stop signal to all processes of a rank.
     """
     limits = limits.allowed()
     request = {
@@ -95,11 +99,11 @@ def run_child(mesh: Mesh | Mapping[str, Mesh], sources: Sources, target: Path, k
 
 
 def _watched(child: subprocess.Popen[bytes], request: bytes, key: str, limits: Limits) -> bytes:
-    """Return the text of the child on standard error, once the child has ended. If the child exceeds a limit, end the
-    child and raise MeshError.
+    """Wait for the end of the child process and return its standard error. If the child exceeds a limit, end it and
+    raise MeshError.
 
-    The memory of the child is also checked from this process: Python can loop for ever when even an exception does not
-    fit into memory.
+    The parent also checks the memory of the child, because Python can loop for ever if not even an exception fits into
+    memory.
     """
     last, message = time.monotonic() + limits.wall, request
     try:
@@ -117,9 +121,7 @@ def _watched(child: subprocess.Popen[bytes], request: bytes, key: str, limits: L
 
 
 def _address_space(process: int) -> int:
-    """Return the address space, bytes; 0 if the system does not provide the value (no /proc) or the process has just
-    ended.
-    """
+    """Return the address space of a process, bytes; 0 if the process has just ended or if the system has no /proc."""
     try:
         return int(Path(f"/proc/{process}/statm").read_text().split()[0]) * resource.getpagesize()
     except (OSError, IndexError, ValueError):
@@ -144,7 +146,7 @@ def _reason(key: str, code: int, errors: str, limits: Limits) -> str:
 
 
 def main() -> int:
-    """Answer the request on standard input; return the exit code."""
+    """Process the request on standard input; return the exit code."""
     request = json.load(sys.stdin)
     limits = Limits(**request["limits"])
     limit(limits)
@@ -167,9 +169,9 @@ def main() -> int:
 
 
 def perform(mesh: Mesh, key: str, sources: Sources, target: Path) -> None:
-    """Make or read a mesh, check, order and store it.
+    """Make or read a mesh, check it, order its tets and store it.
 
-    gmsh and numpy are imported here, within the limits.
+    gmsh and numpy are imported here, after the limits of the process are set.
     """
     from .model import check
     from .order import morton_ordered
@@ -191,12 +193,14 @@ def perform(mesh: Mesh, key: str, sources: Sources, target: Path) -> None:
 
 
 def beside(target: Path, k: int) -> Path:
-    """Return the path of mesh ``k`` of several that are meshed together."""
+    """Return the path of mesh number ``k`` if several meshes are made together."""
     return target.with_name(f"{target.stem}-{k}{target.suffix}")
 
 
 def perform_together(meshes: dict[str, Mesh], sources: Sources, target: Path) -> None:
-    """Make meshes with common nodes at their interfaces, by their keys, and store each mesh."""
+    """Make several meshes with common nodes at their interfaces, and store each mesh. ``meshes`` has the keys of the
+    meshes in the case.
+    """
     from .model import check
     from .order import morton_ordered
     from .store import save

@@ -1,10 +1,10 @@
 """Cuts of hexahedra, wedges and pyramids into tets with matching faces.
 
 Each quadrilateral face is cut by the diagonal through the smallest of its four node numbers. Therefore the two elements
-of a face cut the face in the same way, on any rank. A cut of an element with these diagonals always exists (Dompierre,
-Labbe, Vallet, Camarero 1999, "How to subdivide pyramids, prisms and hexahedra into tetrahedra"). If there are several
-such cuts, the cut with the longest stable step is chosen. If all cuts are flat or have a far shorter step, a node in
-the middle of the element is added.
+at a face cut it by one diagonal, on any rank. An element can be cut with the diagonals of its faces (Dompierre, Labbe,
+Vallet, Camarero 1999, "How to subdivide pyramids, prisms and hexahedra into tetrahedra"). If an element has several
+possible cuts, the cut with the longest stable step is chosen. If a node in the middle of the element gives a far longer
+stable step than any cut, this node is added.
 """
 
 from collections.abc import Iterator
@@ -17,20 +17,19 @@ from .model import FLAT, Floats, Ids, step_lengths, volume_and_area
 from .patterns import QUADS, cuts, skin
 
 _TOGETHER = 20_000
-"""Number of elements that are processed at once. Chosen value: about 100 MB."""
+"""Number of elements that are processed at once. The chosen value needs about 100 MB of memory."""
 _NOTHING = np.zeros((0, 4), np.int64), np.zeros(0, np.int64), np.zeros(0, np.int64)
 _WORSE = 0.5
-"""A cut is replaced by a cut with a node in the middle if its stable step is below this share of the step of the
-replacement. Chosen value: the replacement makes twelve tets of an element instead of five or six, a cost that is
-smaller than the gain from half the number of steps."""
+"""Ratio of the stable step of a cut to that of a cut with a node in the middle. Below this ratio the node in the middle
+is used. Chosen value: twelve tets instead of five or six cost less than twice the number of steps."""
 
 
 @dataclass(frozen=True)
 class Cut:
     """Tets made from elements.
 
-    ``tets`` (k, 4): tets of the elements ``owner`` (k,); node numbers from the number of points on are the nodes
-    ``middles`` (j, 3).
+    ``tets`` (k, 4): nodes of the tets; ``owner`` (k,): element of each tet. Numbers from the number of ``points`` on
+    refer to the nodes ``middles`` (j, 3).
     """
 
     tets: Ids
@@ -43,8 +42,8 @@ class Cut:
 
 
 def cut(nodes: Ids, points: Floats, diagonals: Ids) -> Cut:
-    """Cut elements (m, 8), with repeated nodes as in ``cells.Form``, over ``points``, with these diagonals of faces
-    (m,).
+    """Cut elements (m, 8) with the given diagonals (m,) of their faces. ``points`` are the coordinates of the nodes.
+    Repeated nodes are written as in ``cells.Form``.
     """
     made = [_cut_alike(nodes, points, each, diagonals) for each in _portions(diagonals)]
     tets, owner, poor = (np.concatenate(column) for column in zip(*made, strict=True)) if made else _NOTHING
@@ -53,8 +52,8 @@ def cut(nodes: Ids, points: Floats, diagonals: Ids) -> Cut:
 
 
 def pattern(nodes: Ids) -> Ids:
-    """Return (m,) the diagonals of the faces (``patterns.cuts``). Each diagonal contains the smallest node number;
-    of equal numbers the first.
+    """Return (m,) the diagonals of the faces (``patterns.cuts``). The diagonal of a face contains its smallest node
+    number; if numbers are equal, the first of them counts.
     """
     rank = np.argsort(np.argsort(nodes, axis=1, kind="stable"), axis=1, kind="stable")
     second = rank[:, QUADS].argmin(axis=2) % 2
@@ -62,22 +61,22 @@ def pattern(nodes: Ids) -> Ids:
 
 
 def halves(quads: Ids) -> Ids:
-    """Return (2 n, 3) the triangles of quadrilaterals (n, 4), cut by the same rule."""
+    """Return (2 n, 3) the triangles of quadrilaterals (n, 4), cut through the smallest of the four node numbers."""
     odd = (quads.argmin(axis=1) % 2 == 1)[:, None]
     rolled = np.where(odd, np.roll(quads, -1, axis=1), quads)
     return rolled[:, [[0, 1, 2], [0, 2, 3]]].reshape(-1, 3)
 
 
 def _portions(diagonals: Ids) -> Iterator[Ids]:
-    """Yield elements of one pattern, as many at once as fit into memory."""
+    """Yield groups of elements with one pattern of diagonals; a group has as many elements as fit into memory."""
     for each in np.unique(diagonals):
         chosen = np.flatnonzero(diagonals == each)
         yield from np.split(chosen, range(_TOGETHER, len(chosen), _TOGETHER))
 
 
 def _cut_alike(nodes: Ids, points: Floats, some: Ids, diagonals: Ids) -> tuple[Ids, Ids, Ids]:
-    """Return the tets and owners of the elements ``some``, and the elements for which a cut with a middle node is
-    better.
+    """Return the tets of the elements ``some`` and the element of each tet. Also return the elements for which a cut
+    with a middle node is better.
     """
     table = cuts(int(diagonals[some[0]]))
     if not len(table):
@@ -92,8 +91,8 @@ def _cut_alike(nodes: Ids, points: Floats, some: Ids, diagonals: Ids) -> tuple[I
 
 
 def _around(nodes: Ids, points: Floats, diagonals: Ids, poor: Ids) -> tuple[Ids, Ids, Floats, Ids, Ids]:
-    """Return tets and owners of the elements ``poor`` with a middle node, the middle nodes, their elements, and the
-    flat elements.
+    """Cut the elements ``poor`` with a middle node. Return the tets, the element of each tet, the middle nodes, the
+    element of each middle node, and the flat elements.
     """
     found = [_spoked(nodes[[each]], points, int(diagonals[each])) for each in poor]
     good = np.array([_shortest(*each)[0] > 0 for each in found], bool)
@@ -110,7 +109,7 @@ def _around(nodes: Ids, points: Floats, diagonals: Ids, poor: Ids) -> tuple[Ids,
 def _spoked(nodes: Ids, points: Floats, diagonals: int) -> tuple[Floats, Ids, Ids]:
     """Return corners and middle (9 s, 3) of each element, and the tets (s, 12, 4) between its faces and its middle.
 
-    The tets are returned twice: by indices of these points, and by nodes, with -1 for the middle.
+    The tets are returned in two numberings: by indices of the returned points, and by nodes, with -1 for the middle.
     """
     wheel = np.array([(a, c, b, 8) for a, b, c in skin(diagonals)], np.int64)
     different = np.array([(nodes[:, :k] != nodes[:, k, None]).all(axis=1) for k in range(8)]).T[..., None]
@@ -121,8 +120,8 @@ def _spoked(nodes: Ids, points: Floats, diagonals: int) -> tuple[Floats, Ids, Id
 
 
 def _shortest(points: Floats, tets: Ids, names: Ids) -> Floats:
-    """Return the shortest step length, m, of tets (..., k, 4), except tets that repeat a node; 0 if a tet has no
-    volume.
+    """Return the shortest step length, m, of the tets (..., k, 4); 0 if a tet has no volume. Tets that repeat a node
+    are ignored.
     """
     length = step_lengths(points, tets)
     volume, area = volume_and_area(points, tets)
@@ -133,6 +132,6 @@ def _shortest(points: Floats, tets: Ids, names: Ids) -> Floats:
 
 
 def _repeats(tets: Ids) -> NDArray[np.bool_]:
-    """Return which of the tets (..., 4) have a node twice."""
+    """Return which of the tets (..., 4) contain a node twice."""
     ordered = np.sort(tets, axis=-1)
     return np.asarray((ordered[..., 1:] == ordered[..., :-1]).any(axis=-1))

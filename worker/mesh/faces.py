@@ -22,7 +22,8 @@ def boundary_faces(tets: Ints) -> Ints:
 
 
 def same_side(tets: Ints) -> NDArray[np.int64]:
-    """Return (k, 2) pairs of positively oriented tets on the same side of a common face: such tets overlap.
+    """Return (k, 2) pairs of positively oriented tets on the same side of a common face. The two tets of a pair
+    overlap.
 
     If more than two tets are on one side, every two successive tets form a pair.
     """
@@ -38,7 +39,7 @@ def same_side(tets: Ints) -> NDArray[np.int64]:
 
 
 def across(tets: Ints) -> Ints:
-    """Return (n, 4) the neighbour of each face: 4 * tet + local face of the neighbour; -1 for a face without
+    """Return (n, 4) the neighbour of each face: 4 * tet + local face of the neighbour; -1 if the face has no
     neighbour.
     """
     group, size = _groups(tets[:, FACES].reshape(-1, 3))
@@ -64,8 +65,8 @@ def normals(points: Floats, faces: NDArray[np.integer]) -> Floats:
 
 
 def _groups(faces: Ints) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Return for each row the number of its face among the distinct faces, and for each distinct face its number of
-    rows.
+    """Return, for each row, the number of its face among the distinct faces. Also return the number of rows of each
+    distinct face.
     """
     low, middle, high = np.sort(faces, axis=1).astype(np.int64).T
     order = np.lexsort((high, low << 32 | middle))

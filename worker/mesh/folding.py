@@ -11,10 +11,10 @@ _TET = Form.TET.inside
 
 
 def folded(nodes: Ids) -> tuple[Ids, NDArray[np.bool_]]:
-    """Return hexahedra (m, 8), hexahedra with four different nodes as tets, and which of the elements can have a
-    volume.
+    """Return three arrays: the hexahedra (m, 8), the hexahedra with only four different nodes as tets, and which
+    elements can have a volume.
 
-    An element has a volume only if repeated nodes are connected by edges, and if no face has two equal opposite
+    An element can have a volume only if repeated nodes are connected by edges, and if no face has two equal opposite
     corners.
     """
     first = (nodes[:, :, None] == nodes[:, None, :]).argmax(axis=2)
@@ -31,8 +31,8 @@ def folded(nodes: Ids) -> tuple[Ids, NDArray[np.bool_]]:
 
 
 def _folds(first: Ids) -> bool:
-    """Return whether the repeated nodes are allowed (``folded``). The repeated nodes are given by the first index of
-    each node.
+    """Return whether the repeated nodes of each element are allowed (``folded``). ``first`` gives, for each node, the
+    first position of that node in the element.
     """
     reached = np.arange(8)
     for _ in range(8):

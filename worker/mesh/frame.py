@@ -1,7 +1,8 @@
-"""Local frame of bodies: its origin is the point where the sector is cut, its third direction is the axis of the body.
+"""Local frame of a body. The origin is the point where the sector is cut; the third direction is the axis of the body.
 
-The generators work in the frame (a, b, c), the cyclic order of ``across(axis)`` and ``axis``, and rotate the points at
-the end. Therefore each body is implemented for one axis only. The rotation only permutes coordinates and is exact.
+The generators work in the frame (a, b, c): the directions of ``across(axis)`` and ``axis`` in cyclic order. The
+generators rotate the points at the end, so each body is implemented for one axis only. The rotation only permutes
+coordinates and is exact.
 """
 
 import numpy as np
@@ -12,7 +13,7 @@ from ..errors import MeshError
 from .model import MAX_TETS, Floats
 
 TETS_PER_CUBE = 6.0
-"""Number of tets in a volume of element_size^3, for both generators."""
+"""Number of tets that a generator makes in a volume of element_size^3."""
 
 
 def directions(body: Generated) -> list[int]:
@@ -21,7 +22,9 @@ def directions(body: Generated) -> list[int]:
 
 
 def to_space(body: Generated, points: Floats) -> Floats:
-    """Return points (n, 3) in x, y, z, m, from (a, b, c). A zero becomes exactly the coordinate of the cut plane."""
+    """Return points (n, 3) in x, y, z, m, from coordinates (a, b, c). A coordinate of zero becomes exactly the
+    coordinate of the cut plane.
+    """
     turned = np.empty_like(points)
     turned[:, directions(body)] = points
     moved: Floats = turned + np.array(centre(body))
@@ -41,7 +44,7 @@ def block(body: Generated) -> tuple[list[float], list[float]]:
 
 
 def refuse_impossible(body: Generated, key: str) -> None:
-    """Raise MeshError for a body without volume or with too many tets; ``key``: key of the mesh in its case."""
+    """Raise MeshError if a body has no volume or would have too many tets; ``key``: key of the mesh in its case."""
     whole = volume(body)
     if not whole > 0:
         raise MeshError(f"{key}: the {body.shape} has no volume; check its sizes")

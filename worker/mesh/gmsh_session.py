@@ -11,7 +11,7 @@ from .model import TetMesh
 from .named import NamedMesh, gathered
 
 _TET = 4
-"""Number of the element type of the 4-node tet in gmsh."""
+"""Number by which gmsh identifies the 4-node tet."""
 
 
 OPTIONS = {
@@ -26,13 +26,13 @@ OPTIONS = {
     "Mesh.OptimizeThreshold": 0.45,
     "Mesh.RandomSeed": 1,
 }
-"""Options of every mesh that is made. The reasons for the values are in ``mesh/unstructured.py``."""
+"""gmsh options of every mesh that is made. The reasons for the values are in ``mesh/unstructured.py``."""
 
 
 @contextmanager
 def session(options: Mapping[str, float]) -> Iterator[Any]:
-    """Yield the gmsh module without output and without the settings of the user. An error that gmsh logs or raises
-    becomes MeshError.
+    """Yield the gmsh module, without its printed output and without the settings of the user. An error that gmsh logs
+    or raises becomes MeshError.
     """
     import gmsh
 
@@ -53,13 +53,13 @@ def session(options: Mapping[str, float]) -> Iterator[Any]:
 
 
 def tet_mesh(gmsh: Any) -> TetMesh:
-    """Return the tets of the current model, and the nodes that they use."""
+    """Return the tets of the current gmsh model, and the nodes of the tets."""
     return named_mesh(gmsh).mesh
 
 
 def named_mesh(gmsh: Any) -> NamedMesh:
-    """Return the tets and nodes of the current model, with gmsh's numbers of both. The nodes are in the order of
-    their numbers.
+    """Return the tets and nodes of the current gmsh model, with the numbers that gmsh gives them. The nodes are ordered
+    by number.
     """
     tags, corners = gmsh.model.mesh.getElementsByType(_TET)
     node_tags, coordinates, _ = gmsh.model.mesh.getNodes()

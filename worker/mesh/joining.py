@@ -1,4 +1,4 @@
-"""Parts that bonds join by shared nodes: coincident nodes of two parts become one node, coincident faces become an
+"""Parts that bonds join by shared nodes. Two coincident nodes become one node, and two coincident faces become an
 interface.
 """
 
@@ -15,17 +15,17 @@ from .model import Floats, Ids, Ints, Origin
 from .sharing import same_places
 
 _SAME = 1e-9
-"""Distance, as a share of the size of a body, below which nodes of structured meshes are merged. Chosen value: far
+"""Distance, divided by the size of a body, below which nodes of structured meshes are merged. The chosen value is far
 above round-off."""
 
 Placed = tuple[int, Origin | None, Floats]
-"""Index of the first node of a part, origin of its mesh, and its nodes (n, 3), m, after the rotation of the part."""
+"""A part: the index of its first node, the origin of its mesh, and its nodes (n, 3), m, after its rotation."""
 
 
 def joined(case: Case, placed: Mapping[int, Placed], n: int) -> Ids:
-    """Return (n,) the node that represents each of the ``n`` nodes of the ``placed`` parts, by their numbers.
+    """Return (n,) the number of the node that replaces each of the ``n`` nodes of the ``placed`` parts.
 
-    If bonds merge several nodes, the first of these nodes replaces all of them. Raises InputError for a bond without
+    If bonds merge several nodes, the first of these nodes replaces all others. Raises InputError if a bond has no
     common nodes.
     """
     edges = [np.zeros((0, 2), np.int64)]
@@ -37,7 +37,7 @@ def joined(case: Case, placed: Mapping[int, Placed], n: int) -> Ids:
                 raise InputError(_apart(case, k))
             edges.append(np.column_stack([first + p, second + q]))
     every = np.concatenate(edges)
-    from ..fracture.connectivity import components  # numba must have its cache folder before it is imported
+    from ..fracture.connectivity import components  # numba reads the folder of its cache at its import
 
     if not len(every):
         return np.arange(n)
@@ -47,10 +47,10 @@ def joined(case: Case, placed: Mapping[int, Placed], n: int) -> Ids:
 
 
 def _refuse_open(case: Case, placed: Mapping[int, Placed], stands: Ids) -> None:
-    """Raise InputError for two parts of one body with coincident faces, but without a bond between them.
+    """Raise InputError if two parts of one body have coincident faces but no bond.
 
-    Parts without a bond would separate at these faces, and no contact would act there. ``stands``: the result of
-    ``joined``.
+    Without a bond the parts would separate at these faces, and no contact would act between them. ``stands``: the
+    result of ``joined``.
     """
     body = bodies(case)
     numbers = {part.name: i for i, part in enumerate(case.parts)}
@@ -64,7 +64,7 @@ def _refuse_open(case: Case, placed: Mapping[int, Placed], stands: Ids) -> None:
 
 
 def _wide(x: Floats) -> bool:
-    """Return whether points (n, 3) are neither coincident nor collinear."""
+    """Return whether points (n, 3) span a plane: they are neither coincident nor collinear."""
     if len(x) < 3:
         return False
     d = x - x[0]
@@ -73,7 +73,7 @@ def _wide(x: Floats) -> bool:
 
 
 def _common(one: Origin | None, x: Floats, other: Origin | None, y: Floats) -> tuple[Ids, Ids]:
-    """Return the common nodes of two parts. Common nodes have equal numbers in one file or, in structured meshes,
+    """Return the common nodes of two parts. Common nodes have equal numbers in one mesh file or, in structured meshes,
     equal positions.
     """
     if one is not None and other is not None:
@@ -87,9 +87,7 @@ def _common(one: Origin | None, x: Floats, other: Origin | None, y: Floats) -> t
 
 
 def _lines(values: Floats) -> Ids:
-    """Return (n,) integers: equal coordinates have equal integers. Coordinates that differ by round-off have the same
-    number.
-    """
+    """Return (n,) integers that are equal for coordinates that are equal within round-off."""
     order = np.argsort(values, kind="stable")
     steps = np.diff(values[order], prepend=values[order[:1]])
     numbers = np.empty(len(values), np.int64)
@@ -98,8 +96,7 @@ def _lines(values: Floats) -> Ids:
 
 
 def require_faces(case: Case, there: Container[int], across: Ints, tet_part: Ints) -> None:
-    """Raise InputError for a bond without a common face, and for parts of one body with a common face but without a
-    bond.
+    """Raise InputError if a bond has no common face, or if two parts of one body have a common face but no bond.
 
     Only the parts whose numbers are in ``there`` are checked. ``across``: (tets, 4) neighbours of all tets
     (``faces.across``).

@@ -1,4 +1,4 @@
-"""Search for the set of a mesh file to which a name in a case refers."""
+"""Search in a mesh file for the set to which a name in a case refers."""
 
 from collections.abc import Sequence
 
@@ -8,16 +8,16 @@ from ..errors import MeshError
 from .model import NodeSet
 
 _KINDS = {"nodes": False, "surface": True}
-"""Words before a colon that select one of two kinds of sets."""
+"""Words before a colon, in a name such as ``nodes:NAME``, that select the kind of a set."""
 _SHOWN = 20
-"""Largest number of names in a message. Chosen value: three lines of a terminal."""
+"""Largest number of names in a message. The chosen value gives three lines of a terminal."""
 
 
 def meant(sets: Sequence[NodeSet], name: str) -> NodeSet | None:
     """Return the set of a name; None if no set has this name.
 
-    Several equal sets count as one. Sets without a node of the mesh are ignored. Raises MeshError for an ambiguous
-    name.
+    Several sets with equal contents count as one set. Sets without a node of the mesh are ignored. Raises MeshError for
+    an ambiguous name.
     """
     found = _called(sets, name)
     if not found and (kind := name.partition(":"))[0] in _KINDS:
@@ -32,8 +32,8 @@ def meant(sets: Sequence[NodeSet], name: str) -> NodeSet | None:
 
 
 def _called(sets: Sequence[NodeSet], name: str) -> list[NodeSet]:
-    """Return the sets with this name. For each kind without an exact match, return the sets whose names differ in
-    the case of letters.
+    """Return the sets with this name. If no set of a kind has exactly this name, return the sets of that kind whose
+    names differ in the case of letters only.
     """
     found = list[NodeSet]()
     for surfaces in (True, False):
@@ -53,6 +53,6 @@ def _same(one: NodeSet, other: NodeSet) -> bool:
 
 
 def known(sets: Sequence[NodeSet]) -> str:
-    """Return the available names, for messages."""
+    """Return the names of all sets as text for messages."""
     names = list(dict.fromkeys(each.names[0] for each in sets))
     return ", ".join([*names[:_SHOWN], *(["..."] if len(names) > _SHOWN else [])]) or "none"

@@ -1,4 +1,4 @@
-"""Meshes that are generated tet by tet: separate shards, and two tets with a common face."""
+"""Generated meshes of separate tets (shards), or of two tets with a common face."""
 
 import itertools
 import math
@@ -14,15 +14,15 @@ from ..model.hashing import uniform
 from .model import Floats, TetMesh
 
 _CORNERS = np.array([[1, 1, 1], [1, -1, -1], [-1, -1, 1], [-1, 1, -1]]) / math.sqrt(8.0)
-"""Corners of the regular tet of edge 1, relative to its centre. The volume of the shard is positive."""
+"""Corners of the regular tet of edge 1, relative to its centre. In this order the volume is positive."""
 
 _RANDOM = 15
-"""Random numbers of a shard: 3 for its rotation, 12 for its nodes."""
+"""Count of random numbers for a shard: 3 for its rotation, 12 for shifts of its nodes."""
 
 
 def shards(body: Shards) -> TetMesh:
-    """Return shards, each in the middle of its own cube, with a uniformly random rotation and then random shifts of
-    the nodes.
+    """Return a mesh of shards. Each shard is in the middle of its own cube, gets a uniformly random rotation, and then
+    random shifts of its nodes.
     """
     cubes = np.array(list(itertools.product(*map(range, body.count))), np.float64)
     random = uniform(np.arange(_RANDOM * len(cubes)), body.seed).reshape(-1, _RANDOM)
@@ -33,7 +33,7 @@ def shards(body: Shards) -> TetMesh:
 
 
 def rotations(random: Floats) -> Floats:
-    """Return (n, 3, 3) uniformly distributed rotations from numbers (n, 3) in [0, 1): Shoemake 1992."""
+    """Return (n, 3, 3) uniformly distributed rotations, made from random numbers (n, 3) in [0, 1): Shoemake 1992."""
     one, two = np.sqrt(1.0 - random[:, 0]), np.sqrt(random[:, 0])
     a, b = 2.0 * math.pi * random[:, 1], 2.0 * math.pi * random[:, 2]
     (sine_a, cosine_a), (sine_b, cosine_b) = sines_and_cosines(a), sines_and_cosines(b)
@@ -47,8 +47,8 @@ def rotations(random: Floats) -> Floats:
 
 
 def two_tets(body: TwoTets) -> tuple[Floats, NDArray[np.int32]]:
-    """Return points in the frame of the body, m, and tets. The common face is at the origin, normal to the third
-    direction.
+    """Return two tets with a common face: their points in the frame of the body, m, and their node indices. The common
+    face is at the origin, normal to the third direction.
     """
     edge = body.element_size
     sine, cosine = sines_and_cosines(2.0 * math.pi / 3.0 * np.arange(3.0))

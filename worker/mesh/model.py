@@ -25,24 +25,24 @@ Ints = NDArray[np.int32]
 Ids = NDArray[np.int64]
 
 MAX_TETS = 50_000_000
-"""Number of tets above which ``element_size`` is taken as a mistake."""
+"""Largest number of tets. A larger number is treated as a mistake in ``element_size``."""
 
 REGULAR_STEP = 1.0 / math.sqrt(6.0)
 """Step length of the regular tet with edge 1: half its altitude."""
 
 FLAT = 1e-9
-"""A tet has no volume if the volume is below this share of (root of the sum of its squared face areas)^(3/2). Chosen
-value: the share is 0.15 for a regular tet, and 1e-16 for the round-off of its nodes."""
+"""Smallest ratio of the volume of a tet to (root of the sum of its squared face areas)^(3/2). Below this ratio the tet
+counts as flat. Chosen value: the ratio is 0.15 for a regular tet, and 1e-16 for the round-off of its nodes."""
 
 
 @dataclass(frozen=True, eq=False)
 class Origin:
-    """File from which a mesh was read."""
+    """File from which a mesh was read, and the numbers of its nodes there."""
 
     file: str
     """sha256 of the bytes of the file, and of the files that it includes."""
     nodes: Ids
-    """(n,) number of each node, unique in the file."""
+    """(n,) number of each node in the file, unique there."""
     notes: tuple[str, ...] = ()
     """Contents of the file that are not in the mesh or are interpreted in an unexpected way, one line each."""
     included: tuple[tuple[str, str], ...] = ()
@@ -51,31 +51,31 @@ class Origin:
 
 @dataclass(frozen=True, eq=False)
 class NodeSet:
-    """A set of nodes or a surface in a mesh file."""
+    """A set of nodes, or a surface, that a mesh file defines."""
 
     names: tuple[str, ...]
-    """Names of the set in a case. Lists of sets show the first name."""
+    """Names of the set that a case may use. Lists of sets show the first name."""
     nodes: Ints
-    """(k,) nodes of the mesh in the set, ascending. A surface has the nodes of all its faces."""
+    """(k,) nodes of the mesh that belong to the set, ascending. A surface has the nodes of all its faces."""
     faces: Ints | None = None
-    """(n, 3) faces of a surface that are outer faces of the mesh. The value is None for a set of nodes."""
+    """(n, 3) faces of a surface that are outer faces of the mesh; None for a set of nodes."""
     inner: int = 0
-    """Number of faces of the surface that have all nodes in the mesh and are not outer faces of the mesh."""
+    """Number of faces of the surface that are inside of the mesh. All nodes of such a face are nodes of the mesh."""
 
 
 @dataclass(frozen=True, eq=False)
 class TetMesh:
     """A mesh: ``points`` (n, 3) float64, m; ``tets`` (m, 4) int32 node indices, positively oriented.
 
-    Treat both arrays as read-only. Raises MeshError for another shape.
+    Do not write into ``points`` and ``tets``. Raises MeshError if an array has a wrong shape.
     """
 
     points: Floats
     tets: Ints
     origin: Origin | None = None
-    """Origin of the mesh in a file; None for a generated mesh."""
+    """File from which the mesh was read; None for a generated mesh."""
     sets: tuple[NodeSet, ...] = ()
-    """Sets of the file of the mesh, including empty sets."""
+    """Sets that the mesh file defines, including empty sets."""
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "points", np.ascontiguousarray(self.points, np.float64))
@@ -105,22 +105,22 @@ class Names:
     nodes: Ids
     tets: Ids
     lines: Ids | None = None
-    """(m,) lines of the tets in the file; 0 if the reader counts no lines."""
+    """(m,) lines of the tets in the file; 0 if the format has no line numbers."""
 
     def tet(self, index: int) -> str:
-        """Return the name of a tet: ``tet 7 (line 12)``."""
+        """Return the name of a tet for messages: ``tet 7 (line 12)``."""
         line = "" if self.lines is None or not self.lines[index] else f" (line {self.lines[index]})"
         return f"tet {self.tets[index]}{line}"
 
 
 def step_lengths(points: Floats, tets: NDArray[np.integer]) -> Floats:
-    """Return the step lengths, m, of the tets (..., 4) over ``points`` (``TetMesh.step_lengths``)."""
+    """Return the step lengths, m, of the tets (..., 4); see ``TetMesh.step_lengths``."""
     volume, area = volume_and_area(points, tets)
     return np.divide(3 * volume, area, out=np.zeros_like(volume), where=area > 0)
 
 
 def check(mesh: TetMesh, names: Names | None = None) -> TetMesh:
-    """Return the mesh if it can be computed, else raise MeshError.
+    """Return the mesh if a run can use it, else raise MeshError.
 
     Conditions: finite coordinates, at least one tet, every index in range, every node used, every volume positive.
     Messages use ``names`` of nodes and tets if given, otherwise indices from 0.
@@ -160,7 +160,7 @@ def _check_volumes(mesh: TetMesh, names: Names) -> None:
 
 
 def volume_and_area(points: Floats, tets: NDArray[np.integer]) -> tuple[Floats, Floats]:
-    """Return the signed volume, m^3, and the root of the sum of the four squared face areas, m^2."""
+    """Return the signed volume of each tet, m^3, and the root of the sum of its four squared face areas, m^2."""
     x, y, z = ([column[tets[..., i]] for i in range(4)] for column in points.T)
     e = [[x[i] - x[0], y[i] - y[0], z[i] - z[0]] for i in (1, 2, 3)]
     a, b, c = _cross(e[1], e[2]), _cross(e[2], e[0]), _cross(e[0], e[1])

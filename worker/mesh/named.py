@@ -1,4 +1,4 @@
-"""A mesh with the numbers of its nodes and tets in its file."""
+"""A mesh with the numbers that its nodes and tets have in the mesh file."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -12,18 +12,20 @@ from .model import Ids, Names, TetMesh
 
 @dataclass(frozen=True)
 class NamedMesh:
-    """An unchecked mesh, and the numbers of its nodes and tets in its file."""
+    """An unchecked mesh, and the numbers that its nodes and tets have in the mesh file."""
 
     mesh: TetMesh
     names: Names
     places: Ids
-    """(n,) number of each node, unique in the file."""
+    """(n,) number of each node in the file, unique there."""
     notes: tuple[str, ...] = ()
     """Contents of the file that are not in the mesh or are interpreted in an unexpected way, one line each."""
 
 
 def gathered(node_tags: Ids, points: Any, tet_tags: Ids, corners: Ids) -> NamedMesh:
-    """Return tets given by node tags, (m, 4), as indices into the nodes that they use, in the order of the tags."""
+    """Return tets (m, 4) as indices of the nodes that they use. ``corners`` gives the tags of the nodes; the used nodes
+    are ordered by tag.
+    """
     order = np.argsort(node_tags, kind="stable")
     used, tets = np.unique(corners, return_inverse=True)
     place = np.searchsorted(node_tags, used, sorter=order)
@@ -40,8 +42,7 @@ def gathered(node_tags: Ids, points: Any, tet_tags: Ids, corners: Ids) -> NamedM
 def placed(tags: Ids, nodes: Ids, called: Callable[[int], str]) -> Ids:
     """Return node numbers (m, k) of a file as indices into ``tags``.
 
-    Raises MeshError for an unknown number, with the name of the element. The function ``called`` returns this name
-    from the index of the element.
+    Raises MeshError for an unknown node number. ``called(k)`` returns the name of element ``k`` for the message.
     """
     order = np.argsort(tags, kind="stable")
     found = np.minimum(np.searchsorted(tags, nodes, sorter=order), max(len(tags) - 1, 0))
@@ -53,7 +54,7 @@ def placed(tags: Ids, nodes: Ids, called: Callable[[int], str]) -> Ids:
 
 
 def refuse_repeated(what: str, numbers: Ids, where: str = "") -> None:
-    """Raise MeshError if two nodes, or two elements, have the same number."""
+    """Raise MeshError if two nodes, or two elements, have equal numbers."""
     found, times = np.unique(numbers, return_counts=True)
     if len(found) < len(numbers):
         raise MeshError(f"{what} {found[times > 1][0]} is defined twice{where}")

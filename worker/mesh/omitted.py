@@ -1,4 +1,4 @@
-"""Notes about contents of a deck that are not in its mesh or are interpreted in an unexpected way."""
+"""Notes about contents of a deck that are not in its mesh, or that the reader interprets in an unexpected way."""
 
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping
@@ -9,14 +9,14 @@ from .cells import Cells
 from .model import Ids
 
 _SHOWN = 5
-"""Largest number of sets in a note. Chosen value: a line of a terminal or two."""
+"""Largest number of sets in a note. The chosen value gives one or two lines of a terminal."""
 
 
 def notes(passed: Counter[str], volumes: Counter[str], joining: Counter[str], mark: str) -> Iterator[str]:
     """Return notes about contents of a deck that are not in the mesh.
 
-    The notes give the number of omitted elements without volume (``passed``), the number of ``volumes`` that cannot
-    be read, and the keywords that are ``joining`` bodies, with the ``mark`` of the deck before their names.
+    ``passed``: counts of omitted elements without volume; ``volumes``: counts of volume elements that cannot be read;
+    ``joining``: counts of keywords that join bodies. ``mark``: first character of a keyword in the deck.
     """
     for counts, reason in (
         (passed, "elements that carry no volume are skipped"),
@@ -28,16 +28,14 @@ def notes(passed: Counter[str], volumes: Counter[str], joining: Counter[str], ma
 
 
 def by_corners(chosen: Iterable[Cells]) -> Iterator[str]:
-    """Return notes about hexahedra of second order, of which only the corners are used."""
+    """Return notes about the chosen hexahedra of second order. Only the corners of these hexahedra are used."""
     for each in chosen:
         if each.kind.nodes > 10 and len(each.numbers):
             yield f"{len(each.numbers):,} hexahedra of {each.kind.nodes} nodes are taken by their corners"
 
 
 def undefined(lost: Mapping[str, Ids]) -> Iterator[str]:
-    """Return a note about sets with members that the file does not define; ``lost``: these members, by what and name of
-    the set.
-    """
+    """Return a note about sets with members that the file does not define; ``lost``: undefined members of each set."""
     some = {name: np.unique(numbers) for name, numbers in lost.items() if len(numbers)}
     if some:
         words = [f"{name} ({len(numbers)}, such as {numbers[0]})" for name, numbers in list(some.items())[:_SHOWN]]

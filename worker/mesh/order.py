@@ -1,8 +1,8 @@
 """Order of nodes and tets along the Morton curve: neighbours in space become neighbours in memory.
 
-A kernel over tets gathers and scatters nodes, so the order determines the rate of cache hits: on unstructured meshes
-the order gives a factor of 1.3 to 1.6 in speed. The order also makes the numbering independent of the generator or file
-of the mesh.
+A kernel over tets reads and writes values of nodes, so the order determines the rate of cache hits. Kernels on
+unstructured meshes run 1.3 to 1.6 times as fast as without this order. With this order the numbering does not depend on
+the generator or the file of the mesh.
 """
 
 from dataclasses import replace
@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from .model import Floats, TetMesh
 
 _BITS = 21
-"""Number of bits of a direction: three directions fill 63 bits."""
+"""Number of bits of a coordinate in a Morton code. Three coordinates need 63 bits."""
 _SPREAD = [
     (32, 0x1F00000000FFFF),
     (16, 0x1F0000FF0000FF),
@@ -21,14 +21,15 @@ _SPREAD = [
     (4, 0x10C30C30C30C30C3),
     (2, 0x1249249249249249),
 ]
-"""Shifts and masks that put two zero bits after each of 21 bits, by moving halves of the blocks apart."""
+"""Shifts and masks that put two zero bits after each of 21 bits. Each step moves the halves of a block of bits
+apart."""
 
 
 def morton_codes(points: Floats, low: Floats, edge: float) -> NDArray[np.uint64]:
     """Return (n,) positions of ``points``, (n, 3), along the Z-curve through a cube. The low corner of the cube is
     ``low``, (3,), its edge is ``edge``, m.
 
-    Each direction has 21 bits; x varies fastest.
+    Each coordinate has 21 bits in the code; x varies fastest.
     """
     cells = 2**_BITS
     scale = cells / edge if edge > 0 else 0.0
@@ -46,7 +47,8 @@ def _spread(bits: NDArray[np.uint64]) -> NDArray[np.uint64]:
 
 
 def morton_ordered(mesh: TetMesh) -> TetMesh:
-    """Return the mesh with nodes, and tets by centroid, along the Morton curve of the bounding cube of the mesh.
+    """Return the mesh with its nodes and tets ordered along the Morton curve of the bounding cube of the mesh. A tet
+    has the position of its centroid.
 
     Nodes or tets at equal positions keep their order. The order of the nodes within a tet does not change.
     """

@@ -1,6 +1,6 @@
-"""Cuts of a hexahedron into tets, by the diagonals of its faces.
+"""All cuts of a hexahedron into tets, for given diagonals of its faces.
 
-Nodes as in gmsh, Abaqus, LS-DYNA and VTK, positive; a wedge or a pyramid repeats nodes::
+The node order is that of gmsh, Abaqus, LS-DYNA and VTK. A wedge or a pyramid is a hexahedron with repeated nodes::
 
         7-------6
        /|      /|
@@ -36,8 +36,8 @@ Tet = tuple[int, int, int, int]
 def cuts(pattern: int) -> NDArray[np.int64]:
     """Return (n, MOST, 4) the cuts of a hexahedron without additional nodes.
 
-    Bit f of ``pattern``: whether face f is cut from its second node to its fourth instead of from its first to its
-    third. A row 0, 0, 0, 0 pads a cut into five tets. n is 0 for some patterns.
+    If bit f of ``pattern`` is 1, the diagonal of face f connects its second and fourth node, else its first and third
+    node. A cut into five tets has a last row 0, 0, 0, 0. For some patterns there is no cut, and n is 0.
     """
     found = sorted(set(_completed(frozenset(_turned(face) for face in skin(pattern)), ())))
     table = np.zeros((len(found), MOST, 4), np.int64)
@@ -57,7 +57,7 @@ def skin(pattern: int) -> list[Triangle]:
 def _completed(front: frozenset[Triangle], made: tuple[Tet, ...]) -> Iterator[tuple[Tet, ...]]:
     """Yield all cuts that begin with the tets ``made`` and fill the volume enclosed by the triangles of the ``front``.
 
-    Positive tets whose inner faces cancel fill a body once: no other test is needed.
+    Positive tets whose inner faces cancel fill a body exactly once, so no other test is needed.
     """
     if not front:
         yield tuple(sorted(made))
@@ -84,7 +84,7 @@ def _positive(tet: Tet) -> bool:
 
 
 def _turned(face: tuple[int, ...]) -> Triangle:
-    """Return the same triangle, beginning with its smallest node."""
+    """Return the face with its nodes rotated so that the smallest node is the first."""
     first = face.index(min(face))
     a, b, c = face[first:] + face[:first]
     return a, b, c

@@ -1,9 +1,9 @@
 """Reader of mesh files, for the child process: files are untrusted input.
 
 Conoid has its own readers, because gmsh and meshio fail on some files. gmsh treats a .msh file without a known header
-as a script, which can start programs. gmsh also adds ghost cells to the elements without a message, and adds all tets
-of an entity of the format 2.2 to the groups of any of them. meshio ends the process on an unknown element type of .inp,
-does not place instances and does not name the line of an error.
+as a script, which can start programs. gmsh adds ghost cells to the elements without a message. In the format 2.2 gmsh
+adds all tets of an entity to the group of any of these tets. meshio ends the process if an .inp file has an unknown
+element type; meshio also ignores the positions of instances and does not name the line of an error.
 """
 
 import hashlib
@@ -27,10 +27,10 @@ from .vtu.reading import read_vtu
 
 
 def read(file: MeshFile, path: Path, key: str = "mesh") -> TetMesh:
-    """Return the tets of ``path``, or of ``file.group`` if given, in m, checked. Raises MeshError, naming ``key``.
+    """Return the checked mesh of the file ``path``, in m, or of its group ``file.group`` if that is given. Raises
+    MeshError, naming ``key``.
 
-    Nodes that no tet uses and all elements without volume are omitted. Volume elements that cannot be cut are
-    refused.
+    Unused nodes and elements without volume are omitted. A volume element that cannot be cut into tets is an error.
     """
     readers: dict[str, Callable[[Path, str | None, str], Content]] = {
         ".msh": read_msh, ".inp": read_inp, ".k": read_keyword, ".key": read_keyword, ".dyn": read_keyword,
@@ -63,8 +63,8 @@ def read(file: MeshFile, path: Path, key: str = "mesh") -> TetMesh:
 
 
 def _refuse_unit(file: MeshFile, stated: str, key: str) -> None:
-    """Raise MeshError if the file states another unit of lengths than the case. A unit that the file states by a number
-    or by an unknown word is not compared.
+    """Raise MeshError if the file gives another unit of length than the case. A unit that is a number or an unknown
+    word is not compared.
     """
     try:
         factor, dimension = parse_unit(stated)

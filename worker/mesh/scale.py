@@ -1,5 +1,5 @@
-"""Conversion of coordinates into metres with one rounding. The number 0.001 is no binary fraction, so a product with
-it rounds twice.
+"""Conversion of coordinates into metres with a single rounding. A product with 0.001 would round twice, because 0.001
+is no binary fraction.
 """
 
 from fractions import Fraction
@@ -9,12 +9,12 @@ from .model import Floats
 _SPLITTER = 2.0**27 + 1.0
 """Factor that splits a float64 into two halves of 26 bits (Dekker 1971, Numer. Math. 18, 224)."""
 _WHOLE = 2**53
-"""Bound of integers: all integers below it are exact as float64."""
+"""Integers below this bound are exact as float64."""
 
 
 def scaled(points: Floats, unit: float) -> Floats:
-    """Return points in m from points in units of ``unit`` m: the product with the decimal number of ``unit``, rounded
-    once.
+    """Return points in m from points in units of ``unit`` m. Each coordinate is multiplied by the decimal number of
+    ``unit`` and rounded once.
 
     If this decimal number is not a fraction of integers below 2^53, the product rounds twice.
     """

@@ -1,6 +1,6 @@
-"""Elements of second order, with a node in the middle of each edge.
+"""Elements of second order: each edge has a midside node.
 
-The module computes the volume that straight edges lose, and cuts each tet of ten nodes into eight tets.
+The module computes the volume that is lost if edges are made straight, and cuts each tet of ten nodes into eight tets.
 """
 
 from collections.abc import Sequence
@@ -16,22 +16,22 @@ from .model import FLAT, Floats, Ids, step_lengths, volume_and_area
 Way = Literal["eight", "corners"]
 
 LOST = 1e-3
-"""Share of the volume that straight edges may lose. If more is lost, tets are cut into eight. Chosen value: the mass
-has the same error, and eight tets with half the step cost 16 times as much as one tet."""
+"""Fraction of the volume that may be lost if edges are made straight. If more would be lost, tets are cut into eight.
+Chosen value: the mass has the same error, and eight tets with half the step cost 16 times as much as one tet."""
 _OFF = 0.4
-"""Largest distance of a node from the middle of its edge, divided by the length of the edge. Chosen value: this ratio
-is 0.25 for quarter points, and 0.21 for an arc of 90 degrees. For the middle of another edge of a regular tet the ratio
-is 0.5; such a value means that the file has another order of nodes."""
+"""Largest distance of a midside node from the middle of its edge, divided by the length of the edge. Chosen value: the
+ratio is 0.25 for quarter points, and 0.21 for an arc of 90 degrees. A ratio of 0.5 means that the file has another
+order of nodes: the node is in the middle of another edge of a regular tet."""
 _CORNERS = ((0, 4, 6, 7), (4, 1, 5, 8), (6, 5, 2, 9), (7, 8, 9, 3))
 _LONG = ((4, 9), (6, 8), (7, 5))
-"""Opposite corners of the octahedron that remains between the four corner tets."""
+"""Pairs of opposite corners of the octahedron that remains when the four corner tets are cut off."""
 _AT = np.array([[0.0, 0, 0], [2, 0, 0], [0, 2, 0], [0, 0, 2], [1, 0, 0], [1, 1, 0], [0, 1, 0], [0, 0, 1],
                        [1, 0, 1], [0, 1, 1]])  # fmt: skip
-"""Indices of the nodes of a tet of ten nodes."""
+"""Indices of the nodes of a tet with ten nodes."""
 
 
 def checked(cells: Cells, points: Floats, tags: Ids) -> None:
-    """Raise MeshError if a node is not near the middle of its edge. The nodes of ``cells`` are indices into
+    """Raise MeshError if a midside node is not near the middle of its edge. The nodes of ``cells`` are indices into
     ``points``.
     """
     for (a, b), middle in zip(cells.kind.edges, cells.middles.T, strict=True):
@@ -47,11 +47,11 @@ def checked(cells: Cells, points: Floats, tags: Ids) -> None:
 
 
 def lost(cells: Cells, points: Floats) -> float:
-    """Return the approximate volume between curved elements and elements with straight edges, in the unit of
-    ``points``.
+    """Return the approximate volume between curved elements and the same elements with straight edges, in cubic units
+    of ``points``.
 
-    A node in the middle of an edge has a third of the area of each face with this edge: the integral of its shape
-    function. The third is exact on triangles and on quadrilaterals of eight nodes.
+    The weight of a midside node is a third of the area of each face at its edge, which is the integral of its shape
+    function. The third is exact for triangles and for quadrilaterals of eight nodes.
     """
     total = 0.0
     for side in sides(cells.kind.form):
@@ -72,8 +72,8 @@ def _area(corners: Sequence[Floats]) -> Floats:
 def eight(nodes: Ids, points: Floats) -> Ids:
     """Return (m, 8, 4) the eight tets of each of the tets (m, 10).
 
-    Four of the tets are at the corners. Four tets surround one of three diagonals of the octahedron between the corner
-    tets. The chosen diagonal has the longest stable step; most often it is the shortest diagonal.
+    Four of the eight tets are at the corners. The other four surround one of the three diagonals of the octahedron
+    between the corner tets. The diagonal with the longest stable step is used; most often it is the shortest diagonal.
     """
     every = np.stack([nodes[:, [*_CORNERS, *_inner(*long)]] for long in _LONG], axis=1)
     volume, area = volume_and_area(points, every)
@@ -83,7 +83,7 @@ def eight(nodes: Ids, points: Floats) -> Ids:
 
 
 def _inner(one: int, other: int) -> list[tuple[int, int, int, int]]:
-    """Return the positive tets round the diagonal between two nodes in the middle of edges."""
+    """Return the positive tets around the diagonal between the midside nodes ``one`` and ``other``."""
     ring, found = [k for k in range(4, 10) if k not in (one, other)], []
     for p, q in combinations(ring, 2):
         volume = (np.cross(_AT[other] - _AT[one], _AT[p] - _AT[one]) * (_AT[q] - _AT[one])).sum()
@@ -93,7 +93,7 @@ def _inner(one: int, other: int) -> list[tuple[int, int, int, int]]:
 
 
 def refuse_halves(cells: Cells, tags: Ids) -> None:
-    """Raise MeshError if two elements have a common edge with different middle nodes."""
+    """Raise MeshError if two elements with a common edge have different midside nodes there."""
     rows = np.concatenate([
         np.column_stack([np.sort(cells.corners[:, edge], axis=1), middle])
         for edge, middle in zip(cells.kind.edges, cells.middles.T, strict=True)

@@ -1,4 +1,4 @@
-"""Sets of nodes and surfaces in a file, to which a case refers by ``on``."""
+"""Sets of nodes and surfaces in a mesh file, to which the key ``on`` of a case refers."""
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
@@ -13,20 +13,20 @@ from .model import Ids, Ints, NodeSet
 
 @dataclass(frozen=True, eq=False)
 class Named:
-    """A set as defined in its file, with indices of nodes of the whole file."""
+    """A set as its file defines it, with indices of nodes of the whole file."""
 
     names: tuple[str, ...]
-    """Names of the set in a case."""
+    """Names of the set that a case may use."""
     nodes: Ids
-    """(k,) nodes of a set of nodes."""
+    """(k,) nodes of the set, if it is a set of nodes."""
     faces: tuple[Ids, ...] | None = None
-    """Triangles (n, 3) and quadrilaterals (n, 4) of a surface, by their corners; None for a set of nodes."""
+    """Triangles (n, 3) and quadrilaterals (n, 4) of a surface, given by their corners; None for a set of nodes."""
     free: bool = False
-    """Whether the surface has only faces that are outer faces of the mesh."""
+    """Whether all faces of the surface are outer faces of the mesh."""
 
 
 def surface(names: tuple[str, ...], faces: Iterable[Ids], free: bool = False) -> Named:
-    """Return a surface of faces (n, 3) and (n, 4). Faces of four corners may repeat a corner."""
+    """Return a surface made of faces (n, 3) and (n, 4). A face of four corners may repeat a corner."""
     threes, fours = [np.zeros((0, 3), np.int64)], [np.zeros((0, 4), np.int64)]
     for each in faces:
         if each.shape[1] == 3:
@@ -49,7 +49,7 @@ def joined(names: tuple[str, ...], several: Sequence[Named]) -> Named:
 
 
 class Members:
-    """The members of the sets of a file that are in a mesh."""
+    """The members of the sets of a file that belong to a mesh."""
 
     def __init__(self, used: Ids, tets: Ints, edges: Ids) -> None:
         """``used``: (n,) the index in the file of each node of the mesh, ascending; ``tets``: (m, 4) indices into
@@ -61,7 +61,9 @@ class Members:
         self._edges = edges[np.lexsort((edges[:, 1], edges[:, 0]))]
 
     def of(self, named: Named) -> NodeSet:
-        """Return the nodes of a set that are in the mesh, and the faces of a surface that are outer faces."""
+        """Return the nodes of a set that are in the mesh. For a surface, also return its faces that are outer faces of
+        the mesh.
+        """
         if named.faces is None:
             nodes, there = self._indices(named.nodes)
             return NodeSet(named.names, np.unique(nodes[there]))
@@ -79,22 +81,20 @@ class Members:
         )
 
     def _indices(self, places: Ids) -> tuple[Ints, NDArray[np.bool_]]:
-        """Return the indices in the mesh of nodes of the file, and which of these nodes are in the mesh."""
+        """Return the indices in the mesh of nodes of the file, and whether each node is in the mesh."""
         if not len(self._used):
             return np.zeros(places.shape, np.int32), np.zeros(places.shape, bool)
         found = np.minimum(np.searchsorted(self._used, places), len(self._used) - 1)
         return found.astype(np.int32), self._used[found] == places
 
     def _whole(self, faces: Ids) -> Ids:
-        """Return the faces with all corners in the mesh; each face once."""
+        """Return the faces whose corners are all in the mesh; each face once."""
         there = self._indices(faces)[1].all(axis=1)
         _, first = np.unique(np.sort(faces[there], axis=1), axis=0, return_index=True)
         return faces[there][np.sort(first)]
 
     def _parted(self, faces: Ids) -> tuple[Ints, NDArray[np.bool_]]:
-        """Return (n, k, 3) the triangles of each face, and whether all triangles of a face are outer faces of the
-        mesh.
-        """
+        """Return (n, k, 3) the triangles of each face, and whether all its triangles are outer faces of the mesh."""
         if faces.shape[1] == 4:
             ways = [halves(faces).reshape(-1, 2, 3), _other_halves(faces)]
         else:
@@ -114,14 +114,14 @@ class Members:
         return np.asarray(known[of[len(self._outer) :]].reshape(triangles.shape[:2]).all(axis=1))
 
     def _quarters(self, faces: Ids) -> Ids:
-        """Return (n, 4, 3) the triangles of faces whose edges have a node in their middle."""
+        """Return (n, 4, 3) the triangles of faces that have midside nodes."""
         a, b, c = faces.T
         p, q, r = (self._middle(one, other) for one, other in ((a, b), (b, c), (c, a)))
         rows = [(a, p, r), (p, b, q), (r, q, c), (p, q, r)]
         return np.stack([np.stack(row, axis=1) for row in rows], axis=1)
 
     def _middle(self, one: Ids, other: Ids) -> Ids:
-        """Return (n,) the nodes between pairs of nodes; a node of the pair if there is no node between."""
+        """Return (n,) the midside nodes between pairs of nodes; a node of the pair if there is no midside node."""
         low, high = np.minimum(one, other), np.maximum(one, other)
         every = np.concatenate([self._edges[:, :2], np.column_stack([low, high])])
         _, of = np.unique(every, axis=0, return_inverse=True)
@@ -133,7 +133,9 @@ class Members:
 
 
 def _other_halves(quads: Ids) -> Ids:
-    """Return (n, 2, 3) the triangles of quadrilaterals by their other diagonal, for tets with such a triangle."""
+    """Return (n, 2, 3) the two triangles of each quadrilateral for its other diagonal, because tets may have these
+    triangles as faces.
+    """
     odd = (quads.argmin(axis=1) % 2 == 0)[:, None]
     rolled = np.where(odd, np.roll(quads, -1, axis=1), quads)
     return rolled[:, [[0, 1, 2], [0, 2, 3]]]

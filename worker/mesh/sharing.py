@@ -1,4 +1,4 @@
-"""Parts from one file with common nodes. Without a bond such parts would separate at these nodes."""
+"""Check of parts that share nodes of one file without a bond. Such parts would separate at the shared nodes."""
 
 from collections.abc import Iterator, Sequence
 from itertools import combinations
@@ -12,16 +12,18 @@ from conoid.cases.model.schema import Case
 from .model import Floats, Ids, Origin
 
 _SAME = 1e-9
-"""Distance, as a share of the largest coordinate, below which two nodes coincide. Chosen value: round-off in files
-is a millionth."""
+"""Distance, divided by the largest coordinate, below which two nodes coincide. Chosen value: the round-off in files is
+a millionth."""
 
 Placed = tuple[int, Origin, Floats]
-"""Number of a part, origin of its mesh, and its nodes (n, 3), m, after the rotation of the part."""
+"""A part: its number, the origin of its mesh, and its nodes (n, 3), m, after its rotation."""
 
 
 def shared_nodes(case: Case, parts: Sequence[Placed]) -> Iterator[str]:
-    """Return an error for every two parts of different bodies that share coincident nodes of a file. A tied bond of a
-    rigid and a deformable part joins such parts: each part has its own copy of the nodes.
+    """Return an error for every two parts of different bodies that share coincident nodes of a file.
+
+    A tied bond between a rigid and a deformable part is allowed, because each of the two parts has its own copy of the
+    nodes.
     """
     body, tied = bodies(case), {frozenset(bond.parts) for bond in case.bond if isinstance(bond, TiedBond)}
     for (i, one, x), (j, other, y) in combinations(parts, 2):
@@ -34,8 +36,8 @@ def shared_nodes(case: Case, parts: Sequence[Placed]) -> Iterator[str]:
 
 
 def same_places(one: Origin, x: Floats, other: Origin, y: Floats) -> tuple[Ids, Ids]:
-    """Return the common nodes of two meshes, by their indices in each mesh. Common nodes have one number in one file
-    and coincide.
+    """Return the common nodes of two meshes, as indices in each mesh. A common node has the same number in one file and
+    the same position.
     """
     if one.file != other.file:
         return np.zeros(0, np.int64), np.zeros(0, np.int64)

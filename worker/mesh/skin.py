@@ -1,5 +1,5 @@
-"""Constraints that keep the shape of a body when nodes move: nodes of a flat face stay in the face, nodes of a round
-face on it.
+"""Constraints that keep the shape of a body when nodes move. A node of a flat face stays in the face; a node of a round
+face stays on that face.
 """
 
 from dataclasses import dataclass
@@ -16,16 +16,16 @@ from .frame import block
 from .model import Floats, TetMesh
 
 _NEAR = 1e-9
-"""Largest distance of a node from a surface of the body at which the node counts as on the surface, in lengths that
-``scale`` makes of order one."""
+"""Largest distance between a node and a surface of the body, in units of ``scale``, at which the node counts as lying
+on the surface."""
 
 
 @dataclass(frozen=True)
 class Skin:
     """Constraints on the nodes of a body.
 
-    ``held``: (n, 3), fixed coordinates of a node. ``radius``: (n,), fixed distance from the axis (from the centre
-    for a sphere), 0 for a free node. ``round``: number of the coordinates a, b, c from which this distance is
+    ``held``: (n, 3), whether each coordinate of a node is fixed. ``radius``: (n,), fixed distance from the axis (from
+    the centre for a sphere), 0 for a free node. ``round``: number of coordinates a, b, c from which the radius is
     computed.
     """
 
@@ -35,8 +35,8 @@ class Skin:
 
     @classmethod
     def of(cls, body: Generated, mesh: TetMesh, scale: float) -> tuple[Self, Floats]:
-        """Return the skin of a ``mesh`` in the frame of the body, and the points of the mesh, projected onto the
-        skin. Lengths are divided by ``scale``.
+        """Return the constraints of a ``mesh`` in the frame of the body, and the points of the mesh, projected onto the
+        surface of the body. Lengths are divided by ``scale``.
         """
         points, round_in = mesh.points.copy(), 3 if isinstance(body, Sphere) else 2
         skin = np.zeros(len(points), bool)
@@ -57,7 +57,7 @@ class Skin:
         return int(self.held[node].sum()) + int(self.radius[node] > 0) < 3
 
     def allowed(self, node: int, start: Floats, places: Floats) -> Floats:
-        """Return the allowed positions (k, 3) of ``node``, now at ``start``, nearest to ``places``."""
+        """Return the allowed positions (k, 3) of ``node`` nearest to ``places``; ``start`` is its present position."""
         places = np.where(self.held[node], start, places)
         if self.radius[node] > 0:
             places[:, : self.round] *= (self.radius[node] / np.linalg.norm(places[:, : self.round], axis=1))[:, None]
@@ -65,7 +65,7 @@ class Skin:
 
 
 def _planes(body: Generated) -> dict[int, tuple[float, ...]]:
-    """Return the flat faces of a body: their positions, m, for each direction."""
+    """Return the positions, m, of the flat faces of a body, for each direction."""
     low, high = block(body)
     if isinstance(body, Box | Plate):
         return {i: (low[i], high[i]) for i in range(3)}

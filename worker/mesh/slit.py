@@ -1,4 +1,4 @@
-"""Initial cracks: the nodes on a slit are doubled, so that the faces on both sides are exposed."""
+"""Initial cracks. The nodes on a slit are doubled, so that the faces on both sides of the slit become outer faces."""
 
 import numpy as np
 
@@ -8,14 +8,16 @@ from conoid.cases.shapes.geometry import across, bounds, index
 from .model import TetMesh
 
 _NEAR = 1e-6
-"""Distance from a plane, as a share of the element size, below which a node is on the plane."""
+"""Distance between a node and the plane of a slit, divided by the element size, below which the node lies on the
+plane."""
 
 
 def opened(body: Box | Plate, mesh: TetMesh) -> TetMesh:
-    """Return the mesh with the nodes of the body's slit doubled. The copies belong to the tets on the positive side.
+    """Return the mesh with the nodes on the slit of the body doubled. The copies belong to the tets on the positive
+    side of the slit.
 
-    Nodes on the border of the slit are not doubled and connect both sides, unless this border is on the surface of
-    the body.
+    A node on the border of the slit is not doubled, so it connects both sides. A border node on the surface of the body
+    is doubled.
     """
     slit = body.slit
     if slit is None:

@@ -13,33 +13,34 @@ import numpy as np
 from .model import Floats, Ids, TetMesh, step_lengths
 
 _MOVES = np.array([0.6, 0.3, 0.15, 0.07, 0.03])
-"""Lengths of the tried moves of a node, divided by the step length of the worst tet."""
+"""Tried distances of the move of a node, divided by the step length of the worst tet."""
 
 _GAIN = 1.01
-"""Smallest ratio of the new to the old step length of the worst tet at the node for which a move is made."""
+"""Smallest ratio of the new to the old step length of the worst tet at a node. A move with a smaller ratio is not
+made."""
 
 
 _MOST, _PATIENCE = 10_000, 4
-"""Limits of the number of processed tets: in all, and for each tet with a step length that is too small at the
-start."""
+"""Limits of the number of processed tets: the total number, and the number for each tet whose initial step length is
+too small."""
 
 _AHEAD = 1.25
-"""Largest ratio of the step length of a processed tet to that of a tet that cannot be improved. Tets above this
-ratio are not processed, because the other tet limits the time step already."""
+"""Largest ratio of the step length of a processed tet to that of a tet that cannot be improved. A tet above this ratio
+is not processed, because the tet that cannot be improved limits the time step."""
 
 
 class Slides(Protocol):
-    """Constraints on the nodes that keep the shape of a body."""
+    """Constraints on the nodes of a body, which keep its shape."""
 
     def movable(self, node: int) -> bool:
         """Return whether ``node`` can move."""
 
     def allowed(self, node: int, start: Floats, places: Floats) -> Floats:
-        """Return the allowed positions (k, 3) of ``node``, now at ``start``, nearest to ``places``."""
+        """Return the allowed positions (k, 3) of ``node`` nearest to ``places``; ``start`` is its present position."""
 
 
 def smoothed(mesh: TetMesh, skin: Slides, wanted: float) -> TetMesh:
-    """Return the mesh with step lengths below ``wanted``, m, raised where possible within a bounded number of moves."""
+    """Return the mesh after a bounded number of moves that raise step lengths below ``wanted``, m."""
     work = _Smoothing(mesh, skin, wanted)
     waiting = [(length, tet) for tet, length in enumerate(work.lengths.tolist()) if length < wanted]
     heapq.heapify(waiting)
@@ -57,7 +58,7 @@ def smoothed(mesh: TetMesh, skin: Slides, wanted: float) -> TetMesh:
 
 
 class _Smoothing:
-    """Points of the mesh, which move, and the step lengths of the tets."""
+    """State of the smoothing: the moved points of the mesh, and the step lengths of the tets."""
 
     def __init__(self, mesh: TetMesh, skin: Slides, wanted: float) -> None:
         self.points = mesh.points.copy()
@@ -92,14 +93,16 @@ class _Smoothing:
         return True
 
     def _slope(self, node: int, tet: int, small: float) -> Floats:
-        """Return the gradient of the step length of ``tet`` in the position of ``node``, by central differences."""
+        """Return the gradient of the step length of ``tet`` with respect to the position of ``node``, by central
+        differences.
+        """
         shifts = small * np.concatenate([np.eye(3), -np.eye(3)])
         lengths = self._lengths_at(node, np.array([tet]), self.points[node] + shifts)[:, 0]
         slope: Floats = (lengths[:3] - lengths[3:]) / (2 * small)
         return slope
 
     def _lengths_at(self, node: int, tets: Ids, places: Floats) -> Floats:
-        """Return (k, s) step lengths of the s ``tets`` for ``node`` at each of the k ``places``."""
+        """Return (k, s) step lengths of the s tets in ``tets``, for each of the k positions ``places`` of ``node``."""
         corners = np.repeat(self.points[self.tets[tets]][None], len(places), axis=0)
         corners[:, self.tets[tets] == node] = places[:, None]
         return step_lengths(corners.reshape(-1, 3), np.arange(corners.size // 3).reshape(*corners.shape[:2], 4))

@@ -1,4 +1,4 @@
-"""Conversion of the elements of a file into a mesh of tets. The conversion is the same for all formats."""
+"""Conversion of the elements of a file into a mesh of tets, for all file formats."""
 
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -19,41 +19,41 @@ _SEEN = 1e-6
 
 @dataclass(frozen=True, eq=False)
 class Content:
-    """Data that a reader takes from a file, in the unit of the file."""
+    """Data that a reader gets from a file, in the unit of the file."""
 
     tags: Ids
     """(n,) numbers of the nodes in the file, for messages."""
     points: Floats
     """(n, 3) positions of the nodes."""
     cells: list[Cells]
-    """Volume elements, by indices into these arrays. The order of the indices determines how faces are cut."""
+    """Volume elements; their nodes are indices into ``points``. Faces are cut according to the order of the indices."""
     named: list[Named] = field(default_factory=list)
     notes: tuple[str, ...] = ()
     included: tuple[Path, ...] = ()
     """Further files that were read for the mesh."""
     length: str = ""
-    """Unit of lengths that the file states; empty if it states none."""
+    """Unit of length that the file gives; empty if the file gives no unit."""
 
 
 @dataclass(frozen=True, eq=False)
 class _Tets:
-    """Tets with the elements from which they were made."""
+    """Tets, with the elements from which the tets were made."""
 
     nodes: Ids
     numbers: Ids
     lines: Ids
     middles: Floats = field(default_factory=lambda: np.zeros((0, 3)))
-    """(j, 3) positions of the nodes in the middle of elements. The indices of the added nodes follow those of the nodes
-    of the file."""
+    """(j, 3) positions of the added nodes in the middle of elements. The indices of these nodes follow the indices of
+    the nodes of the file."""
     of: Ids = field(default_factory=lambda: np.zeros(0, np.int64))
-    """(j,) element of each middle node."""
+    """(j,) element of each added node."""
 
 
 def solid(content: Content, way: Way | None = None) -> NamedMesh:
     """Return the mesh of all elements: positive tets with matching faces, not yet checked.
 
-    ``way``: how tets of ten nodes are cut, into ``eight`` tets or into one tet of their ``corners``. Raises
-    MeshError for an element that is inverted, flat or too distorted.
+    ``way``: treatment of a tet of ten nodes, which is cut into ``eight`` tets or becomes one tet of its ``corners``.
+    Raises MeshError for an element that is inverted, flat or too distorted.
     """
     tets = [each for each in content.cells if each.kind.form is Form.TET]
     chosen, remarks = _ordered(content, tets, way)
@@ -88,7 +88,7 @@ def _gathered(content: Content, made: list[_Tets], edges: Ids, notes: tuple[str,
 
 
 def _ordered(content: Content, tets: list[Cells], way: Way | None) -> tuple[Way, list[str]]:
-    """Return the tets that are made from tets of ten nodes, and notes for the user."""
+    """Return the tets that are made from tets of ten nodes, and notes for the user about the cut."""
     curved = [each for each in tets if each.kind.edges and len(each.numbers)]
     if not curved:
         return "corners", []
@@ -127,13 +127,13 @@ def _tets(cells: Cells, points: Floats, tags: Ids, way: Way) -> _Tets:
 
 
 def _sorted(cells: Cells) -> Ids:
-    """Return (m, 6) the nodes in the middle of edges, in the order of ``TET10``."""
+    """Return (m, 6) the midside nodes, in the order of ``TET10``."""
     places = {frozenset(edge): k for k, edge in enumerate(cells.kind.edges)}
     return cells.middles[:, [places[frozenset(edge)] for edge in TET10.edges]]
 
 
 def _edges(tets: list[Cells]) -> Ids:
-    """Return (k, 3) two corners, ascending, and the node between the corners."""
+    """Return (k, 3) the two corners of each edge, ascending, and its midside node."""
     rows = [
         np.column_stack([np.sort(each.corners[:, edge], axis=1), middle])
         for each in tets

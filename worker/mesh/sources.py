@@ -14,17 +14,19 @@ from conoid.cases.reading.problems import dotted
 from ..errors import MeshError
 
 Sources = Mapping[str, Path]
-"""Absolute paths of files, by the key of the table that names the file, such as ``parts[0].mesh.of[1]``."""
+"""Absolute paths of files, keyed by the table in the case that names the file, such as ``parts[0].mesh.of[1]``."""
 
 
 def sources(mesh: Mesh, folder: Path, key: str) -> dict[str, Path]:
-    """Return the files of the mesh at ``key``, for a case in ``folder``. Raises MeshError for a missing file."""
+    """Return the files of the mesh at ``key``. ``folder`` is the folder of the case. Raises MeshError if a file is
+    missing.
+    """
     return {named: _there(file, folder, named) for named, file in _named(mesh, key)}
 
 
 def digests(mesh: Mesh, found: Sources, key: str) -> list[str]:
-    """Return the suffix of each file and its sha256. Raises MeshError for a file whose hash differs from the hash in
-    the case.
+    """Return the suffix and the sha256 of each file. Raises MeshError if the sha256 differs from the value in the
+    case.
     """
     return [f"{found[named].suffix.lower()} {_digest(found[named], file, named)}" for named, file in _named(mesh, key)]
 
@@ -34,7 +36,7 @@ def _named(mesh: Mesh, key: str) -> list[tuple[str, File]]:
 
 
 def below(key: str, place: Place) -> str:
-    """Return the key of a table below another table."""
+    """Return the key of the table ``place`` inside of the table ``key``."""
     return f"{key}.{dotted(place)}" if place else key
 
 

@@ -1,5 +1,5 @@
-"""Storage of a mesh as an .npz file. The file is written under another name and renamed, so readers find complete
-files only.
+"""Storage of a mesh as an .npz file. The file is written under a temporary name and then renamed, so a reader never
+finds an incomplete file.
 """
 
 import os
@@ -30,7 +30,7 @@ def save(mesh: TetMesh, path: Path) -> None:
 
 
 def load(path: Path) -> TetMesh | None:
-    """Return the mesh in ``path``; None if there is no file, or if the file is damaged (every array has a checksum)."""
+    """Return the mesh in ``path``; None if the file is missing or damaged. Each array in the file has a checksum."""
     try:
         with path.open("rb") as file, np.load(file, allow_pickle=False) as arrays:
             return TetMesh(arrays["points"], arrays["tets"], _origin(arrays), _sets(arrays))
@@ -53,7 +53,7 @@ def _origin(arrays: Mapping[str, NDArray[Any]]) -> Origin | None:
 
 
 def _of_sets(sets: tuple[NodeSet, ...]) -> dict[str, Any]:
-    """Return all sets in few arrays. The number of faces of a set of nodes is -1."""
+    """Return all sets as a few arrays. A set of nodes has -1 as its number of faces."""
     if not sets:
         return {}
     faces = [_no_faces() if each.faces is None else each.faces for each in sets]

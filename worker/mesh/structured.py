@@ -1,7 +1,8 @@
 """Regular meshes for verification: hexahedra cut into 5 or 6 tets, in plain numpy.
 
-A block is cut into cells by planes. A solid cylinder is a square grid, mapped to the disk, times planes. A tube is
-rings times sectors times planes. ``element_size`` is rounded to a whole number of divisions, at least one.
+A block is cut into cells by planes. The cells of a solid cylinder are made by a square grid, mapped to the disk, and by
+planes across the axis. The cells of a tube are made by rings, sectors and planes. ``element_size`` is rounded to a
+whole number of divisions, at least one.
 """
 
 import itertools
@@ -20,13 +21,13 @@ from .model import Floats, Ints, TetMesh
 from .slit import opened
 
 Cells = tuple[NDArray[np.int64], NDArray[np.int64]]
-"""Near and far node number of each cell along one direction."""
+"""Numbers of the near and the far node of each cell along one direction."""
 
 Lines = NDArray[np.int64]
 
 
 def structured(body: Generated, key: str = "mesh") -> TetMesh:
-    """Return the regular mesh of a body, except a sphere. Raises MeshError, naming ``key``."""
+    """Return the regular mesh of a body. Raises MeshError, naming ``key``; a sphere has no regular mesh."""
     refuse_impossible(body, key)
     if body.grading is not None:
         raise MeshError(f"{key}.grading: the structured generator has one element size; remove it, or use gmsh")
@@ -53,11 +54,11 @@ def divisions(length: float, size: float) -> int:
 
 
 def disk(u: Floats, v: Floats) -> tuple[Floats, Floats]:
-    """Return the square [-1, 1]^2 mapped to the unit disk: squares become circles, cut into equal angles (Shirley and
-    Chiu 1997).
+    """Return points of the square [-1, 1]^2 mapped to the unit disk. Concentric squares become circles with equal
+    angles between points (Shirley and Chiu 1997).
 
-    The ratio of areas is the same everywhere. The corners of the square become smooth, so a cell at a corner needs
-    its diagonal through this corner, which ``_mirrored`` provides.
+    The ratio of areas is the same everywhere. A corner of the square lies on the smooth circle, so the cell at this
+    corner must have its diagonal through the corner; ``_mirrored`` numbers the nodes accordingly.
     """
     x, y = np.abs(u), np.abs(v)
     radius, less = np.maximum(x, y), np.minimum(x, y)
@@ -98,7 +99,7 @@ def _tube(body: Tube) -> tuple[Floats, list[int], list[Cells]]:
 
 
 def _circle(step: Lines, n: int) -> Floats:
-    """Return the cosine of ``step`` quarter turns / n, with exact zeros and ones."""
+    """Return the cosine of ``step`` / n quarter turns, with exact values 0 and 1."""
     turn, rest = np.divmod(step, n)
     sine, cosine = sines_and_cosines(np.pi / 2 * rest / n)
     return np.choose(turn % 4, [cosine, -sine, -cosine, sine]) + 0.0
@@ -114,8 +115,8 @@ def _plain(count: int) -> Cells:
 
 
 def _mirrored(line: Lines) -> Cells:
-    """Return cells of a line of node numbers around 0. The near node is the node closer to 0, so that both sides are
-    mirror images.
+    """Return the cells between successive nodes of ``line``, which is centred at 0. The near node of a cell is the one
+    closer to 0, so the two sides are mirror images.
     """
     low, high = np.arange(len(line) - 1), np.arange(1, len(line))
     inside = line[:-1] >= 0
@@ -125,7 +126,7 @@ def _mirrored(line: Lines) -> Cells:
 def _cut(shape: list[int], cells: list[Cells], split: int) -> Ints:
     """Return (m, 4) tets of all cells.
 
-    Corner p + 2 q + 4 r of a cell is far along a, b, c if p, q, r is 1.
+    Corner p + 2 q + 4 r of a cell is at the far end along a if p is 1, along b if q is 1, and along c if r is 1.
     """
     strides = (shape[1] * shape[2], shape[2], 1)
     ends = [[end * stride for end in cell] for cell, stride in zip(cells, strides, strict=True)]
@@ -147,13 +148,13 @@ def _cut(shape: list[int], cells: list[Cells], split: int) -> Ints:
 
 
 def _odd(numbers: list[Lines]) -> NDArray[np.bool_]:
-    """Return for each cell whether its three numbers, one per direction, have an odd sum."""
+    """Return for each cell whether the sum of its three cell numbers (one for each direction) is odd."""
     a, b, c = np.ix_(*numbers)
     return np.asarray((a + b + c) % 2 == 1).ravel()
 
 
 def _six() -> list[tuple[int, int, int, int]]:
-    """Return the six paths from corner 0 to corner 7, one direction after the other (Kuhn). All six tets share the
+    """Return the six paths along edges from corner 0 to corner 7 (Kuhn). Each path gives a tet; all six tets share the
     long diagonal.
     """
     tets = []
@@ -166,5 +167,5 @@ def _six() -> list[tuple[int, int, int, int]]:
 
 _SIX = _six()
 _FIVE = [(0, 5, 3, 6), (0, 1, 3, 5), (0, 3, 2, 6), (0, 5, 6, 4), (3, 6, 5, 7)]
-"""Cut into five tets: the middle tet, and one tet at each of the corners 1, 2, 4, 7. Neighbouring cells use the
-mirror image, with corner 7 - i in place of corner i."""
+"""Nodes of the five tets of a cell: the middle tet, and one tet at each of the corners 1, 2, 4, 7. In each neighbouring
+cell the mirror image is used: corner i is replaced by corner 7 - i."""

@@ -1,7 +1,7 @@
 """Meshing of several bodies together, with common nodes at their interfaces. The module runs in the child process.
 
-OpenCASCADE cuts the bodies with each other (fragments), so that a face of two bodies is one face with one mesh. Each
-part has its element size in its own volume; at the interface the smaller size is used.
+OpenCASCADE cuts the bodies with each other (fragments), so that two touching bodies have one common face with one mesh.
+Each part has its own element size; the smaller of two sizes is used at an interface.
 """
 
 import math
@@ -39,7 +39,7 @@ _TURN = 2.0 * math.pi / 3.0
 
 _Solid = Cad | Combination
 Joint = Generated | _Solid
-"""Types of bodies that can be meshed together."""
+"""Types of bodies that several parts can be meshed from together."""
 
 
 @dataclass(frozen=True)
@@ -48,17 +48,18 @@ class _Model:
 
     gmsh: Any
     bodies: Mapping[str, Joint]
-    """Bodies by the keys of their meshes."""
+    """Bodies, keyed by the keys of their meshes in the case."""
     frame: Frame
-    """Frame of all bodies: x, y, z from the origin."""
+    """Frame of all bodies: the directions x, y, z from the origin."""
     volumes: Sequence[Sequence[int]]
     """Numbers of the volumes of each body."""
 
 
 def together(bodies: Mapping[str, Joint], sources: Sources, name: str) -> list[TetMesh]:
-    """Return the meshes of ``bodies``, by the keys of their meshes, with nodes of one numbering.
+    """Return the meshes of ``bodies``, keyed by the keys of their meshes. All meshes use one numbering of nodes.
 
-    ``name``: file name in the origin of the meshes. Raises MeshError, naming a key, if gmsh cannot make the meshes.
+    ``name``: file name that the origin of each mesh gets. Raises MeshError, naming a key, if gmsh cannot make the
+    meshes.
     """
     for key, body in bodies.items():
         if not isinstance(body, _Solid):
@@ -75,7 +76,7 @@ def together(bodies: Mapping[str, Joint], sources: Sources, name: str) -> list[T
 
 
 def _scale(gmsh: Any, bodies: Mapping[str, Joint], sources: Sources) -> float:
-    """Return the approximate extent of all bodies, which is the scale of lengths."""
+    """Return the approximate extent of all bodies, m. The extent is the unit of length of the model."""
     known = [corners for body in bodies.values() if not isinstance(body, _Solid) and (corners := bounds(body))]
     sizes = [extent(gmsh, body, sources, key) for key, body in bodies.items() if isinstance(body, _Solid)]
     return scale_of(max([*sizes, *np.ptp(np.array(known).reshape(-1, 3), axis=0).tolist()] if known else sizes))
@@ -107,7 +108,7 @@ def _cuts(body: Joint, frame: Frame) -> list[Cut]:
 
 
 def _fragments(occ: Any, drawn: list[Solids], keys: list[str]) -> list[list[int]]:
-    """Return the numbers of the volumes of each body. The volumes are cut so that they have faces in common.
+    """Cut the volumes so that touching volumes have common faces. Return the numbers of the volumes of each body.
 
     Raises MeshError if two bodies overlap.
     """
@@ -140,7 +141,7 @@ def _sizes(model: _Model) -> None:
 
 
 def _size(gmsh: Any, body: Joint, frame: Frame, volumes: Sequence[int]) -> int:
-    """Return the number of the field of the element size of a body: one value, or a grading."""
+    """Return the number of the gmsh field with the element size of a body. The size is constant or a grading."""
     if body.grading is not None:
         return graded(gmsh, body.element_size, body.grading, frame, volumes, _cuts(body, frame))
     field = gmsh.model.mesh.field
@@ -150,7 +151,9 @@ def _size(gmsh: Any, body: Joint, frame: Frame, volumes: Sequence[int]) -> int:
 
 
 def _part(model: _Model, sources: Sources, made: TetMesh, names: Names, k: int, name: str) -> TetMesh:
-    """Return the mesh of body ``k`` from all tets that are ``made``; ``names``: gmsh's numbers of nodes and tets."""
+    """Return the mesh of body ``k``, selected from the tets ``made`` of all bodies; ``names``: numbers that gmsh gives
+    to nodes and tets.
+    """
     elements = [model.gmsh.model.mesh.getElements(3, tag)[1] for tag in model.volumes[k]]
     own = np.concatenate([np.concatenate(each).astype(np.int64) for each in elements if len(each)])
     nodes, tets = np.unique(made.tets[np.isin(names.tets, own)], return_inverse=True)
@@ -159,7 +162,7 @@ def _part(model: _Model, sources: Sources, made: TetMesh, names: Names, k: int, 
 
 
 def _notes(model: _Model, sources: Sources, k: int) -> list[str]:
-    """Return notes about a body of CAD files or a combination."""
+    """Return notes about a body that is made of CAD files or is a combination."""
     key, body = list(model.bodies.items())[k]
     if not isinstance(body, _Solid):
         return []

@@ -1,4 +1,4 @@
-"""Parts from mesh files whose surfaces coincide with surfaces of other parts, without a gap."""
+"""Search for parts from mesh files whose surfaces coincide with the surface of another part, without a gap."""
 
 from collections.abc import Iterator, Mapping
 from itertools import combinations
@@ -15,18 +15,18 @@ from .faces import normals
 from .model import Floats, Ids, Ints
 
 _MOST = 20_000
-"""Largest number of faces inside of the bounding box of a generated body for which it is tested whether they lie on
-the surface of this body. Chosen value: the test takes half a second."""
+"""Largest number of faces that are tested against the surface of a generated body. The faces are inside of its bounding
+box. With the chosen value the test takes half a second."""
 
 Surface = tuple[Floats, Ints]
-"""Surface of a part: nodes (n, 3), m, and faces (k, 3) with outward normals."""
+"""Surface of a part: its nodes (n, 3), m, and its faces (k, 3) with outward normals."""
 
 
 def touches(case: Case, surfaces: Mapping[int, Surface]) -> Iterator[Touch]:
     """Yield the pairs of parts that touch without a bond. At least one part of a pair has a mesh from a file.
 
-    ``surfaces``: surfaces of these parts, by part. Two meshes from files touch in faces with the same corners. For a
-    generated body all faces on its surface count.
+    ``surfaces``: surfaces of the parts, keyed by part. Two meshes from files touch in faces with equal corners. A mesh
+    from a file touches a generated body in faces that lie on the surface of the body.
     """
     for (i, one), (j, other) in combinations(surfaces.items(), 2):
         if not bonded(case, i, j) and (area := _matched(one, other)):
@@ -51,14 +51,14 @@ def _matched(one: Surface, other: Surface) -> float:
 
 
 def _corners(points: Floats, faces: Ints, grain: float) -> Ids:
-    """Return (k, 9) corners of faces in integer multiples of the tolerance. The corners of a face are sorted."""
+    """Return (k, 9) the corners of faces as integer multiples of the tolerance. The corners of each face are sorted."""
     cells = np.floor(points / grain + 0.5).astype(np.int64)[faces]
     order = np.lexsort((cells[..., 2], cells[..., 1], cells[..., 0]), axis=1)
     return np.take_along_axis(cells, order[..., None], axis=1).reshape(len(faces), 9)
 
 
 def _lying(surface: Surface, body: Placed) -> float:
-    """Return the area, m^2, of the faces that are on the surface of a generated body."""
+    """Return the total area, m^2, of the faces that lie on the surface of a generated body."""
     points, faces = surface
     margin = NEAR * min(size(body), float(np.ptp(points, axis=0).max()))
     centres, across = points[faces].mean(axis=1), normals(points, faces)

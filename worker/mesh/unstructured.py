@@ -1,9 +1,9 @@
 """Unstructured meshes of the primitives by gmsh (OpenCASCADE bodies, HXT Delaunay). The meshes are made in the child
 process.
 
-HXT with an optimisation threshold of 0.45, followed by ``smooth``, was the best of all settings tried: Delaunay and
-frontal with the Netgen optimiser left worse tets and took two to four times as long. gmsh runs on one thread with a
-fixed seed, so the same request gives the same bits.
+The best of all tested settings is HXT with an optimisation threshold of 0.45, followed by ``smooth``. The Delaunay and
+frontal meshers with the Netgen optimiser left worse tets and took two to four times as long. gmsh runs on one thread
+with a fixed seed, so equal requests give bit-identical meshes.
 """
 
 import math
@@ -47,7 +47,7 @@ def unstructured(body: Generated, key: str = "mesh") -> TetMesh:
 
 
 def draw(gmsh: Any, body: Generated, scale: float) -> None:
-    """Draw the body in its frame, with lengths divided by ``scale``, because the tolerances of gmsh are absolute."""
+    """Draw the body in its own frame. Lengths are divided by ``scale``, because the tolerances of gmsh are absolute."""
     if isinstance(body, Plate | Cylinder | Tube | Sphere) and body.aligned and body.sector != "quarter":
         _draw_quarters(gmsh, body, scale)
     elif isinstance(body, Box | Plate):
@@ -62,9 +62,10 @@ def draw(gmsh: Any, body: Generated, scale: float) -> None:
 
 
 def _draw_quarters(gmsh: Any, body: Plate | Cylinder | Tube | Sphere, scale: float) -> None:
-    """Draw a half or a whole body as a quarter and its images, with common faces.
+    """Draw a quarter of a body and its mirror images, with common faces; they form a half or the whole body.
 
-    gmsh puts nodes on these faces and on the axis. Smoothing leaves most of these nodes near the faces and the axis.
+    gmsh puts nodes on the common faces and on the axis. After the smoothing most of these nodes are still near the
+    faces and the axis.
     """
     occ = gmsh.model.occ
     draw(gmsh, body.model_copy(update={"sector": "quarter"}), scale)
@@ -77,8 +78,8 @@ def _draw_quarters(gmsh: Any, body: Plate | Cylinder | Tube | Sphere, scale: flo
 
 
 def _draw_sphere(occ: Any, body: Sphere, scale: float) -> None:
-    """Draw a sphere. A half sphere has its pole in the middle of the dome, because gmsh leaves short edges at poles
-    on the rim.
+    """Draw a sphere. The pole of a half sphere is in the middle of the dome, because at a pole on the rim gmsh leaves
+    short edges.
     """
     radius, right = body.radius / scale, math.pi / 2
     if body.sector == "half":

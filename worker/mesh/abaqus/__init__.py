@@ -1,1 +1,3 @@
-"""Reader of Abaqus input files: text, keywords, element types, definitions of a file, and the chosen mesh."""
+"""Reader of Abaqus input files. The modules read the text, the keywords, the element types and the definitions of a
+file, and select the mesh.
+"""

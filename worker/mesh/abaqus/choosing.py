@@ -12,7 +12,7 @@ from .labels import label
 from .scopes import OWN, ElementSet, Instance, Piece, Scope
 
 Chosen = dict[int, Ids]
-"""Numbers of the chosen elements, sorted, by piece."""
+"""Sorted numbers of the chosen elements, for each piece of the model."""
 
 
 def everything(pieces: list[Piece]) -> Chosen:
@@ -25,7 +25,7 @@ def _every(mesh: Scope) -> Ids:
 
 
 def grouped(deck: Deck, pieces: list[Piece], group: str, key: str) -> Chosen:
-    """Return the elements of a name in a case. Raises MeshError for an unknown or ambiguous name."""
+    """Return the elements to which the name ``group`` refers. Raises MeshError if the name is unknown or ambiguous."""
     meant = list(_meant(deck, pieces, group))
     if not meant:
         known = ", ".join(sorted(_known(deck, pieces), key=str.casefold)) or "none"
@@ -41,8 +41,8 @@ def grouped(deck: Deck, pieces: list[Piece], group: str, key: str) -> Chosen:
 
 
 def _meant(deck: Deck, pieces: list[Piece], group: str) -> Iterator[tuple[str, Chosen]]:
-    """Return the candidates for a name. A set of the model or the assembly hides sets of the same name in parts, as
-    in Abaqus.
+    """Return the candidates for a name. As in Abaqus, a set of the model or of the assembly hides the sets of parts
+    with an equal name.
     """
     outer = [(name.text, one) for name, one in deck.root.sets.meant(group)]
     for text, one in outer:
@@ -85,8 +85,8 @@ def _part(scope: Scope) -> Scope:
 
 
 def _sets(scope: Scope, wanted: str) -> list[tuple[str, ElementSet]]:
-    """Return the sets to which ``wanted`` may refer in an instance or a part. The sets of an instance hide the sets
-    of its part.
+    """Return the sets to which ``wanted`` may refer in an instance or a part. A set of an instance hides a set of its
+    part with an equal name.
     """
     for each in (scope, _part(scope)):
         if found := each.sets.meant(wanted):
@@ -95,7 +95,9 @@ def _sets(scope: Scope, wanted: str) -> list[tuple[str, ElementSet]]:
 
 
 def _members(pieces: list[Piece], scope: Scope, one: ElementSet, text: str, first: int = 0) -> Chosen:
-    """Return the elements of a set, by piece (numbered from ``first``). Raises MeshError for an undefined element."""
+    """Return the elements of a set for each piece of the model; the pieces are numbered from ``first``. Raises
+    MeshError for an undefined element.
+    """
     chosen: Chosen = {}
     places = {piece.scope.name.key: place for place, piece in enumerate(pieces)}
     for owner, numbers in one.members.items():
@@ -119,8 +121,8 @@ def _same(one: Chosen, other: Chosen) -> bool:
 
 
 def _known(deck: Deck, pieces: list[Piece]) -> set[str]:
-    """Return every name that a group may have. A set of a name that occurs in several parts is written with the name
-    of its part.
+    """Return every name that a group may have. If several parts have a set of one name, the name of the part is
+    added.
     """
     names = {name.text for name, _ in deck.root.sets}
     owners = {_part(piece.scope).name.key: piece.scope for piece in pieces if piece.scope.line}

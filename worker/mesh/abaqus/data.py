@@ -13,12 +13,13 @@ from .elements import ElementType, Kind
 _AXIS = 7
 """Number of values of a rotation: two points and an angle."""
 _MOST_MADE = 20_000_000
-"""Largest number of members that one line of GENERATE may make. Chosen value: more than the elements of a mesh that
-a machine of some 100 GB can run."""
+"""Largest number of members that one GENERATE line may make. The chosen value is more than the elements of a mesh that
+fits into some 100 GB of memory."""
 
 
 def element_rows(lines: Iterator[tuple[int, str]], kind: ElementType) -> Iterator[tuple[int, list[str]]]:
-    """Yield the first line and the fields of each element: its number and its nodes, which may take several lines.
+    """Yield the first line and the fields of each element: the number of the element, then the numbers of its nodes. An
+    element may take several lines.
 
     An omitted node represents the ground. Only elements without volume may have an omitted node. Raises MeshError.
     """
@@ -50,7 +51,7 @@ def _expected(kind: ElementType) -> str:
 
 
 def numbers_of(line: int, text: str) -> "array[int]":
-    """Return the numbers that GENERATE makes from a first number, a last number and a step. Raises MeshError."""
+    """Return the numbers that GENERATE makes from a first number, a last number and an increment. Raises MeshError."""
     items = fields(text)
     while len(items) > 2 and not items[-1]:
         items.pop()
@@ -68,7 +69,9 @@ def numbers_of(line: int, text: str) -> "array[int]":
 
 
 def _step(line: int, items: list[str]) -> int:
-    """Return the third number of the line, which may be 0; 1 if there is no third number. Raises MeshError."""
+    """Return the increment, which is the third number of the line and may be 0; 1 if the line has no third number.
+    Raises MeshError.
+    """
     if not items[2:]:
         return 1
     return int(items[2]) if is_whole(items[2]) else whole(line, items[2])

@@ -1,4 +1,6 @@
-"""Keywords of an Abaqus input file that define a mesh, each read into its scope."""
+"""Keywords of an Abaqus input file that define a mesh. Each keyword is read into the part, instance or model to which
+it belongs.
+"""
 
 from array import array
 from collections import Counter
@@ -21,24 +23,24 @@ _NODE_VALUES = 6
 
 
 class Deck:
-    """The model of one file: definitions outside of parts, the parts, and the instances."""
+    """The definitions of one file: parts, instances, and definitions outside of parts."""
 
     def __init__(self, path: Path) -> None:
-        """Read all of ``path``. Raises MeshError with the number of the line that is not understood."""
+        """Read all of ``path``. Raises MeshError with the number of a line that cannot be read."""
         self.root = Scope(_ROOT, 0)
         self.parts: Labelled[Scope] = Labelled()
         self.instances: Labelled[Instance] = Labelled()
         self.joining: Counter[str] = Counter()
-        """Counts of keywords that join, hold or remove bodies."""
+        """Counts of the keywords that join, hold or remove bodies."""
         self.unread: list[str] = []
-        """Names of surfaces that are not made of elements or nodes."""
+        """Names of surfaces that are made neither of elements nor of nodes."""
         self._here: Scope = self.root
         self._assembly = self._step = False
         self._source = Source(path)
         for block in self._source.blocks():
             self._take(block)
         self.files = self._source.included.files
-        """The file, and the files that it includes."""
+        """The file itself, and the files that it includes."""
         if self._here is not self.root:
             raise MeshError(f"the file ends inside of {_named(self._here)}; is it cut off?")
 
@@ -192,8 +194,8 @@ class Deck:
         return instance
 
     def _member(self, one: ElementSet, instance: Instance | None, item: str, line: int, of_nodes: bool) -> None:
-        """Add members to a set: an element, or the elements of a set, of an instance or of this scope. Add nodes to a
-        set of nodes.
+        """Add members to a set. A member of a set of elements is an element or a set of elements, of this scope or of
+        an instance. Members of a set of nodes are nodes.
         """
         owner = OWN if instance is None else instance.name.key
         if is_whole(item):
@@ -230,8 +232,8 @@ class Deck:
         self._here.surfaces.append(Surface(label(name), block.line, kind == "NODE", rows))
 
     def _qualified(self, item: str) -> tuple[Instance | None, str]:
-        """Return the instance and the rest of a name such as ``Bar-1.5`` or ``Bar-1.Set-1``, at the level of the
-        assembly.
+        """Return the instance and the rest of a qualified name, such as ``Bar-1.5`` or ``Bar-1.Set-1``, in the scope of
+        the assembly.
         """
         if self._here is self.root:
             for at in (i for i, sign in enumerate(item) if sign == "."):
@@ -259,7 +261,7 @@ _READERS: dict[str, Callable[[Deck, Block, dict[str, str]], None]] = {
 
 
 def _named(scope: Scope) -> str:
-    """Return the name for messages: ``the part 'Bar' (line 7)``."""
+    """Return the name of a scope for messages: ``the part 'Bar' (line 7)``."""
     if not scope.line:
         return "the assembly"
     kind = "instance" if isinstance(scope, Instance) else "part"

@@ -1,6 +1,6 @@
-"""Element types of Abaqus and CalculiX: volumes that are read, other volumes, and elements without volume.
+"""Element types of Abaqus and CalculiX: volumes that are read, volumes that are not read, and elements without volume.
 
-The names are those of the Elements Guide: a family, its number of nodes, and letters for variants.
+A name of a type consists of a family, the number of nodes, and letters for variants (Abaqus Elements Guide).
 """
 
 import re
@@ -12,7 +12,7 @@ from ..cells import HEX8, HEX20, PYRAMID5, TET4, TET10, WEDGE6, WEDGE15, Form
 
 
 class Kind(Enum):
-    """Use of an element in a mesh of tets."""
+    """Use of an element type in a mesh of tets."""
 
     SOLID = "a volume that is read"
     VOLUME = "another volume"
@@ -21,14 +21,14 @@ class Kind(Enum):
 
 
 FORMS = {4: TET4, 5: PYRAMID5, 6: WEDGE6, 8: HEX8, 10: TET10, 15: WEDGE15, 20: HEX20}
-"""Kinds of the volumes that are read, by their number of nodes."""
+"""Kinds of the volumes that are read, keyed by the number of nodes."""
 FACES = {
     Form.TET: ((0, 1, 2), (0, 3, 1), (1, 3, 2), (2, 3, 0)),
     Form.PYRAMID: ((0, 1, 2, 3), (0, 4, 1), (1, 4, 2), (2, 4, 3), (3, 4, 0)),
     Form.WEDGE: ((0, 1, 2), (3, 5, 4), (0, 3, 4, 1), (1, 4, 5, 2), (2, 5, 3, 0)),
     Form.HEXAHEDRON: ((0, 1, 2, 3), (4, 7, 6, 5), (0, 4, 5, 1), (1, 5, 6, 2), (2, 6, 7, 3), (3, 7, 4, 0)),
 }
-"""Corners of the faces S1, S2, ... of each form (Elements Guide, "Three-dimensional solid element library")."""
+"""Corners of the faces S1, S2, ... of each element form (Elements Guide, "Three-dimensional solid element library")."""
 
 
 @dataclass(frozen=True)
@@ -63,12 +63,12 @@ _PAIR = re.compile(
     r"(?:SPRING2|SPRINGA|DASHPOT2|DASHPOTA|JOINTC|JOINT[23]D|GAPUNIT?|GAPCYL|GAPSPHER|ITSUNI|ITSCYL|DRAG[23]D|FLINK)"
 )
 _NODES = {"STRI65": 6, "S4R5": 4, "S8R5": 8, "S9R5": 9}
-"""Families with a name that ends with the number of degrees of freedom of a node."""
+"""Families of element types with a name that ends with the number of degrees of freedom of a node."""
 
 
 @cache
 def element_type(name: str) -> ElementType:
-    """Return the element type of this ``name``."""
+    """Return the element type with this ``name``."""
     name = "".join(name.split()).upper()
     if found := _SOLID.fullmatch(name):
         return ElementType(name, Kind.SOLID, int(found[1]))

@@ -1,7 +1,7 @@
 """Keywords of Abaqus and CalculiX input files, by their effect on a mesh.
 
-A word may be shortened as long as no other word has the same beginning (Analysis User's Guide, "Input syntax
-rules"). A word that is not listed is an error: it could make or move nodes.
+A keyword may be shortened as long as no other keyword begins with the same letters (Analysis User's Guide, "Input
+syntax rules"). A keyword that is not listed is an error, because this keyword could make or move nodes.
 """
 
 from conoid.cases.reading.inp import Block
@@ -32,8 +32,8 @@ MESH: dict[str, dict[str, bool]] = {
         "UNSORTED": False,
     },
 }
-"""Keywords that are read, with their parameters. The value of a parameter is True if it has a value in the file.
-``*SURFACE`` is read, too: its other parameters do not affect a mesh."""
+"""Keywords that are read, with their parameters. The value of a parameter is True if the parameter has a value in the
+file. ``*SURFACE`` is also read; its parameters that are missing here do not affect a mesh."""
 SURFACE = "SURFACE"
 
 REFUSED = _words(
@@ -43,7 +43,7 @@ REFUSED = _words(
     SUBSTRUCTURELOADCASE SYMMETRICMODELGENERATION SYMMETRICRESULTSTRANSFER SYSTEM
     """
 )
-"""Keywords that make, move or fetch nodes and elements, or change numbers, and are not supported."""
+"""Keywords that make, move or copy nodes and elements, or change their numbers. These keywords are not supported."""
 
 ANALYSIS = _words(
     """
@@ -123,7 +123,7 @@ ANALYSIS = _words(
     VOIDNUCLEATION VOLUMETRICTESTDATA WAVE WEARCONTROLS WIND XFEM
     """
 )
-"""Keywords of materials, loads, steps and output. These keywords and their data lines are skipped."""
+"""Keywords of materials, loads, steps and output. The reader skips these keywords and their data lines."""
 
 
 JOINING = {
@@ -167,12 +167,13 @@ JOINING = {
         "TIE",
     )
 }
-"""Keywords of ``ANALYSIS``, as they are written, that join bodies, hold bodies together, move nodes of bodies to each
-other, crack bodies or remove bodies. These keywords have no effect on the mesh."""
+"""Keywords of ``ANALYSIS``, in full, that join, hold, crack or remove bodies, or move nodes of bodies to each other.
+These keywords have no effect on the mesh."""
 
 
 def known(block: Block, in_step: bool = False) -> str:
-    """Return the whole word of a keyword of the three kinds. Raises MeshError for an unknown or ambiguous keyword.
+    """Return the full word of a keyword of one of the three kinds. Raises MeshError if the keyword is unknown or
+    ambiguous.
 
     In a step, where no mesh is defined, an unknown word counts as a keyword of the analysis.
     """
@@ -191,7 +192,8 @@ def known(block: Block, in_step: bool = False) -> str:
 
 
 def options(block: Block, word: str) -> dict[str, str]:
-    """Return the parameters of a mesh keyword by their whole names. A parameter without value has an empty text.
+    """Return the parameters of a mesh keyword, keyed by their full names. The value of a parameter without value is an
+    empty text.
 
     Raises MeshError.
     """

@@ -14,14 +14,16 @@ T = TypeVar("T")
 
 @dataclass(frozen=True)
 class Label:
-    """A name: ``text`` as written, without quotation marks; ``key`` by which names are compared."""
+    """A name: ``text`` as written in the file, without quotation marks; ``key``, the text that is compared with other
+    names.
+    """
 
     text: str
     key: str
 
 
 def label(written: str) -> Label:
-    """Return the name from the text ``written`` in a file."""
+    """Return the name that the text ``written`` of a file contains."""
     bare = written.strip()
     if len(bare) > 1 and bare[0] == bare[-1] == '"':
         return Label(bare[1:-1], bare[1:-1])
@@ -30,10 +32,10 @@ def label(written: str) -> Label:
 
 
 class Labelled(Generic[T]):
-    """Named values of one scope of a file, in the order of the file."""
+    """Named values of one scope of a file, in the order in which the file defines them."""
 
     def __init__(self) -> None:
-        """Start without any value."""
+        """Start with no value."""
         self._found: dict[str, tuple[Label, T]] = {}
 
     def __iter__(self) -> Iterator[tuple[Label, T]]:
@@ -46,8 +48,8 @@ class Labelled(Generic[T]):
         return value
 
     def get(self, name: Label) -> T | None:
-        """Return the value of ``name``. Without this name, return the value of the only name that differs in the
-        case of letters alone.
+        """Return the value of ``name``. If this name is missing, return the value of the only name that differs from it
+        in the case of letters alone.
         """
         if name.key in self._found:
             return self._found[name.key][1]

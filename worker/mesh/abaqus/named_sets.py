@@ -1,4 +1,6 @@
-"""Node sets, surfaces and sets of surface elements of an Abaqus input file, for use by ``on`` in a case."""
+"""Node sets, surfaces and sets of surface elements of an Abaqus input file, to which the key ``on`` of a case may
+refer.
+"""
 
 from array import array
 from collections.abc import Iterator
@@ -22,8 +24,8 @@ _NONE = np.zeros(0, np.int64)
 def named_sets(model: Placed) -> tuple[list[Named], list[str]]:
     """Return the sets, and remarks on the sets that are not read.
 
-    A set of a part or an instance has the name ``Bar.CLAMP`` or ``Bar-1.CLAMP``. The set also has the name ``CLAMP`` if
-    the assembly has no set of this name.
+    The set ``CLAMP`` of the part ``Bar`` has the name ``Bar.CLAMP``, or ``Bar-1.CLAMP`` in an instance. It also has the
+    name ``CLAMP`` if the assembly has no set of this name.
     """
     remarks, lost = nodes_of_elements(model.deck), dict[str, Ids]()
     found = list(_sets(model, model.deck.root, None, remarks, lost))
@@ -45,8 +47,8 @@ def named_sets(model: Placed) -> tuple[list[Named], list[str]]:
 
 
 def _sets(model: Placed, scope: Scope, place: int | None, remarks: list[str], lost: dict[str, Ids]) -> Iterator[Named]:
-    """Yield the sets of a scope for the piece ``place``. ``place`` is None for the model outside of parts, or for
-    the assembly. ``lost`` gets the members that are not defined.
+    """Yield the sets of a scope for the piece ``place``. ``place`` is None for the model outside of parts, or for the
+    assembly. The undefined members are added to ``lost``.
     """
     for name, one in scope.node_sets:
         owners = list(_owners(model, scope, one, place))
@@ -87,7 +89,7 @@ def _surface(model: Placed, scope: Scope, given: Surface, place: int | None) -> 
 
 
 def _owners(model: Placed, scope: Scope, one: ElementSet, place: int | None) -> Iterator[tuple[str, int]]:
-    """Yield the scopes of the members of a set, and the pieces of each."""
+    """Yield the scopes that own members of a set, and the pieces of the model in each scope."""
     for owner in one.members:
         if owner == OWN and place is not None:
             yield owner, place
@@ -101,7 +103,7 @@ def _ids(one: ElementSet, owner: str) -> Ids:
 
 
 def nodes_of_elements(deck: Deck) -> list[str]:
-    """Fill the sets of nodes that are defined by sets of elements. Return remarks on undefined sets."""
+    """Fill each set of nodes that is defined by a set of elements. Return remarks on undefined sets of elements."""
     remarks = []
     for scope in (deck.root, *(part for _, part in deck.parts), *(each for _, each in deck.instances)):
         for one, name, line in scope.node_sets_of:

@@ -16,7 +16,7 @@ from .scopes import Piece
 
 @dataclass(frozen=True, eq=False)
 class Tags:
-    """Nodes of a piece: their numbers, ascending, and the index of its first node among all nodes."""
+    """Nodes of a piece of the model: their numbers, ascending, and the index of its first node among all nodes."""
 
     numbers: Ids
     first: int
@@ -24,14 +24,14 @@ class Tags:
 
 @dataclass(frozen=True, eq=False)
 class Placed:
-    """The pieces of a model, and their nodes among all nodes."""
+    """The pieces of a model, and the indices of their nodes among all nodes of the model."""
 
     deck: Deck
     pieces: list[Piece]
     tags: list[Tags]
 
     def solids(self, place: int, wanted: Ids | None = None) -> Iterator[Cells]:
-        """Return the volume elements of a piece, all or the ``wanted`` numbers. Raises MeshError."""
+        """Return the volume elements of a piece: the ``wanted`` numbers, or all. Raises MeshError."""
         tags = self.tags[place]
         for kind, rows in self.pieces[place].mesh.solids.items():
             made = cells(FORMS[kind.nodes or 0], _ids(rows.numbers), _ids(rows.nodes), _ids(rows.lines))
@@ -41,11 +41,10 @@ class Placed:
                 yield cells(made.kind, made.numbers, nodes, made.lines)
 
     def faces(self, place: int, wanted: Ids, side: str) -> Iterator[Ids]:
-        """Return the corners (n, 3) or (n, 4) of the faces ``side`` of elements, such as ``S3``; all faces if ``side``
-        is empty.
+        """Return the corners (n, 3) or (n, 4) of the faces ``side`` of elements, such as ``S3``. If ``side`` is empty,
+        return all faces.
 
-        The face of a surface element is the element itself. Raises MeshError for a face that an element does not
-        have.
+        The face of a surface element is the element itself. Raises MeshError for a face that an element does not have.
         """
         for each in self.solids(place, wanted):
             known = FACES[each.kind.form]
@@ -62,13 +61,13 @@ class Placed:
             yield placed(tags.numbers, nodes[chosen], _called(kind, numbers[chosen])) + tags.first
 
     def nodes(self, place: int, numbers: Ids) -> Ids:
-        """Return the indices of nodes of a piece. Undefined nodes are omitted."""
+        """Return the indices of the nodes ``numbers`` of a piece. Undefined nodes are omitted."""
         tags = self.tags[place]
         there = tags.numbers[np.isin(tags.numbers, numbers)]
         return np.asarray(np.searchsorted(tags.numbers, there) + tags.first, np.int64)
 
     def undefined(self, place: int, numbers: Ids) -> Ids:
-        """Return the numbers that no node of a piece has."""
+        """Return the ``numbers`` that belong to no node of a piece."""
         return np.setdiff1d(numbers, self.tags[place].numbers)
 
 

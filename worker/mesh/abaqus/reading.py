@@ -23,12 +23,12 @@ from .scopes import Piece, Scope
 
 
 def read_inp(path: Path, group: str | None, key: str) -> Content:
-    """Return the elements of an .inp file, all or the elements of ``group``, in the unit of the file, and the sets of
-    the file.
+    """Return the elements of ``group`` in an .inp file, or all elements, in the unit of the file. Also return the sets
+    of the file.
 
-    ``group`` is an element set of the model or of the assembly, ``Bar-1.Set-1`` (a set of an instance or of a part),
-    an instance, a part, or a set that one part alone has. Raises MeshError, with the number of the line if there is
-    one. Nodes and elements have the numbers of the file.
+    ``group`` is an element set of the model or of the assembly, ``Bar-1.Set-1`` (a set of an instance or of a part), an
+    instance, a part, or a set that one part alone has. Nodes and elements have the numbers of the file. Raises
+    MeshError with the number of the line, if one line has the error.
     """
     try:
         deck = Deck(path)
@@ -49,7 +49,9 @@ def read_inp(path: Path, group: str | None, key: str) -> Content:
 
 
 def _nodes(pieces: list[Piece]) -> tuple[Ids, Floats, list[Tags]]:
-    """Return the nodes of all pieces, each piece by ascending number, and the positions of these nodes."""
+    """Return the nodes of all pieces of the model and their positions. The nodes of a piece are ordered by their
+    numbers.
+    """
     tags, points, places, first = [], [], list[Tags](), 0
     for piece in pieces:
         numbers = np.array(piece.mesh.nodes, np.int64)
@@ -62,7 +64,7 @@ def _nodes(pieces: list[Piece]) -> tuple[Ids, Floats, list[Tags]]:
 
 
 def _pieces(deck: Deck) -> Iterator[Piece]:
-    """Return the pieces of the model. In a file without instances each part is a piece."""
+    """Return the pieces of the model. In a file without instances each part is a piece of the model."""
     if not deck.root.empty:
         yield Piece(deck.root, deck.root, _points(deck.root))
     for _, part in deck.parts if not list(deck.instances) else ():
@@ -77,7 +79,7 @@ def _points(scope: Scope) -> Floats:
 
 
 def _turned(points: Floats, axis: tuple[float, ...]) -> Floats:
-    """Return points rotated about a line (Rodrigues)."""
+    """Return points rotated about a line (formula of Rodrigues)."""
     start, end = np.array(axis[:3]), np.array(axis[3:6])
     along, arm = (end - start) / math.sqrt(((end - start) ** 2).sum()), points - start
     sine, cosine = sine_and_cosine(math.radians(axis[6]))
@@ -90,7 +92,7 @@ def _turned(points: Floats, axis: tuple[float, ...]) -> Floats:
 
 
 def _refuse_volumes(pieces: list[Piece], chosen: Chosen) -> None:
-    """Raise MeshError if volume elements are chosen that cannot be cut into tets."""
+    """Raise MeshError if the chosen volume elements include an element that cannot be cut into tets."""
     for place, wanted in chosen.items():
         for kind, numbers in pieces[place].mesh.others.items():
             if kind.kind is Kind.EMPTY:
@@ -135,7 +137,7 @@ def _notes(deck: Deck, pieces: list[Piece], group: str | None) -> Iterator[str]:
 
 
 def _counted(counts: "Counter[ElementType]", kind: Kind) -> str:
-    """Return counts by type: ``12 S6, 1 CONN3D2``."""
+    """Return the counts of the element types as text: ``12 S6, 1 CONN3D2``."""
     return ", ".join(f"{n} {each.name}" for each, n in sorted(counts.items(), key=_by_name) if each.kind is kind)
 
 

@@ -76,12 +76,12 @@ class Scope:
     plates: dict[ElementType, Rows] = field(default_factory=dict)
     """Surface elements by type. The numbers of elements without volume are also in ``others``."""
     others: "dict[ElementType, array[int]]" = field(default_factory=dict)
-    """Numbers of the elements without volume, or of a type that is not read, by type."""
+    """Numbers of the elements without volume or with an unsupported type, keyed by type."""
     sets: Labelled[ElementSet] = field(default_factory=Labelled)
     node_sets: Labelled[ElementSet] = field(default_factory=Labelled)
     node_sets_of: list[tuple[ElementSet, Label, int]] = field(default_factory=list)
-    """Sets with the nodes of a set of elements: the set of nodes, the name of the set of elements, and the number of
-    the line."""
+    """Sets of nodes that are made from a set of elements: the set of nodes, the name of the set of elements, and the
+    line number."""
     surfaces: list[Surface] = field(default_factory=list)
 
     @property
@@ -95,14 +95,14 @@ class Scope:
         return sum(len(rows.numbers) for rows in self.solids.values())
 
     def numbers(self) -> Ids:
-        """Numbers of all elements, in the order of their types."""
+        """Numbers of all elements, ordered by element type."""
         every = (*(rows.numbers for rows in self.solids.values()), *self.others.values())
         return np.concatenate([np.zeros(0, np.int64), *(np.array(each, np.int64) for each in every)])
 
     def named_set(self, name: Label, among: Labelled[ElementSet] | None = None) -> ElementSet:
-        """Return the set of elements with this name, or the set of nodes ``among`` these.
+        """Return the set ``name`` of ``among``, which are the sets of elements or the sets of nodes of the scope.
 
-        An empty set is made if there is none: a second definition adds to the first.
+        An empty set is made if the name is new, so a second definition of a set adds to the first.
         """
         sets = self.sets if among is None else among
         found = sets.get(name)
@@ -116,7 +116,7 @@ class Scope:
 
 @dataclass
 class Instance(Scope):
-    """A part in its position: the mesh of ``part`` or a mesh of the instance itself, first translated and then
+    """A part in its position. The mesh of ``part``, or a mesh of the instance itself, is first translated and then
     rotated.
     """
 
@@ -131,7 +131,7 @@ class Instance(Scope):
         return self.part if self.empty else self
 
     def set_named(self, name: Label, of_nodes: bool = False) -> ElementSet | None:
-        """Return a set of the instance, or a set of its part if the instance has none of this name."""
+        """Return a set of the instance, or the set of its part if the instance has no set of this name."""
         if of_nodes:
             return self.node_sets.get(name) or self.part.node_sets.get(name)
         return self.sets.get(name) or self.part.sets.get(name)

@@ -1,1 +1,3 @@
-"""Reader of LS-DYNA keyword decks: keywords, definitions of a deck, sets, and the chosen mesh."""
+"""Reader of LS-DYNA keyword decks. The modules read the keywords, the definitions and the sets of a deck, and select
+the mesh.
+"""

@@ -1,4 +1,4 @@
-"""Contents of the sets of a keyword deck, and selection of elements by a name in a case."""
+"""Contents of the sets of a keyword deck, and selection of the elements to which a name in a case refers."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -11,9 +11,9 @@ from .deck import Deck
 from .sets import Set
 
 DEEPEST = 20
-"""Largest depth of sets within sets. Chosen value: decks have up to three levels."""
+"""Largest depth of sets that contain sets. The chosen value is above the three levels that decks have."""
 _KINDS = {"part": "PART", "set_part": "PART", "set_solid": "SOLID"}
-"""Words before a colon that select the kind of a name."""
+"""Words before a colon, in a name such as ``part:NAME``, that select what the name refers to."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -25,10 +25,10 @@ class Content:
     numbers: Ids
     parts: Ids
     of_part: Callable[[Ids], Ids] = field(repr=False)
-    """Return the nodes of some parts."""
+    """Function that returns the nodes of the given parts."""
 
     def members(self, kind: str, number: int, depth: int = 0) -> Ids:
-        """Return the ids in a set that belong to defined nodes, parts or elements. Raises MeshError."""
+        """Return the ids in a set that are ids of defined nodes, parts or elements. Raises MeshError."""
         one = self.deck.sets.found[kind].get(number)
         if one is None or depth > DEEPEST or one.unread:
             why = "is not defined" if one is None else one.unread or "has itself among its members"
@@ -42,7 +42,7 @@ class Content:
         return every[found]
 
     def undefined(self) -> dict[str, Ids]:
-        """Return the members of sets that are no defined nodes, parts or solid elements, by the set."""
+        """Return, for each set, its members that are not defined as nodes, parts or solid elements."""
         known = {"NODE": self.tags, "PART": self._parts(), "ELEM": self.numbers}
         found = dict[str, Ids]()
         for kind, own in (("NODE", "NODE"), ("PART", "PART"), ("SOLID", "ELEM")):
@@ -70,8 +70,8 @@ class Content:
         return np.union1d(np.array(list(self.deck.titles), np.int64), self.parts)
 
     def chosen(self, group: str, key: str) -> "np.ndarray":
-        """Return (m,) which elements a name contains: the name of a part, a set of parts or a set of solids, by
-        title or id.
+        """Return (m,) whether each element belongs to ``group``: the title or id of a part, of a set of parts or of a
+        set of solids.
         """
         meant = list(self._meant(group))
         if not meant:
@@ -119,8 +119,8 @@ class Content:
 
 
 def _ranged(numbers: Ids, every: Ids) -> Ids:
-    """Return the ids of ``every`` that are in ranges. In the list each range begins with the count of its numbers,
-    two or three.
+    """Return the ids of ``every`` that are in the ranges of the list ``numbers``. Each range begins with the count of
+    its numbers, two or three.
     """
     step, found = int(numbers[0]), np.zeros(len(every), bool)
     for k in range(1, len(numbers) - step + 1, step):

@@ -15,12 +15,12 @@ from .sets import Sets
 _NODE = (8, 16, 16, 16, 8, 8)
 _TEN = (8,) * 10
 _EIGHT = (10,) * 8
-"""Widths of the fields: of a node, of the nodes of an element, of other cards (the manual, "*NODE",
+"""Widths of the fields of a node, of the nodes of an element, and of other cards (the manual, "*NODE",
 "*ELEMENT_SOLID")."""
 _OPTIONS = ("INERTIA", "CONTACT", "PRINT", "REPOSITION", "ATTACHMENT_NODES", "FIELD")
-"""Options of ``*PART`` that add cards after the cards of the part."""
+"""Options of ``*PART`` that add cards to the two cards of a part."""
 _MOST = 2**53
-"""Upper bound of the numbers of nodes and elements."""
+"""Upper bound of the number that identifies a node or an element."""
 
 
 @dataclass
@@ -35,22 +35,22 @@ class Solids:
 
 
 class Deck:
-    """The contents of a deck and of the files that it includes."""
+    """The definitions of a deck and of the files that it includes."""
 
     def __init__(self, path: Path) -> None:
-        """Read the deck. Raises MeshError with the line that is not understood, CardError."""
+        """Read the deck. Raises MeshError with a line that cannot be read, or CardError."""
         self.nodes, self.points = array("q"), array("d")
         self.solids: dict[int, Solids] = {}
-        """Elements by the number of nodes: 4, 8, 10, 20, 27."""
+        """Solid elements, keyed by the number of their nodes: 4, 8, 10, 20, 27."""
         self.titles: dict[int, str] = {}
-        """Titles of parts by their ids."""
+        """Titles of the parts, keyed by the ids of the parts."""
         self.sets = Sets()
         self.passed, self.volumes, self.joining = Counter[str](), Counter[str](), Counter[str]()
-        """Counts, by keyword, of cards of elements that are not read, and of keywords that join bodies."""
+        """Counts, for each keyword, of element cards that are not read, and of keywords that join bodies."""
         self.held = 0
-        """Number of nodes with constraints on the card of the node."""
+        """Number of nodes that have constraints on their own card."""
         self.length = ""
-        """Unit of lengths that the deck states (the manual, "*CONTROL_UNITS"); empty if it states none."""
+        """Unit of length that the deck gives (the manual, "*CONTROL_UNITS"); empty if the deck gives no unit."""
         deck = cards.Deck(path)
         for block in deck.blocks():
             self._take(block)
@@ -121,7 +121,7 @@ class Deck:
         rows.lines.append(0 if block.file else card.number)
 
     def _part(self, block: Block, single: bool) -> None:
-        """Read parts of two cards each. With options read one part and further cards."""
+        """Read parts. A part has two cards; with options it has further cards, and the block has one part only."""
         rows = list(block.cards)
         while rows and not rows[-1].text.strip():
             rows.pop()

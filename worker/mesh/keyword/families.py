@@ -12,19 +12,18 @@ def _words(text: str) -> frozenset[str]:
 
 
 SOLIDS = {"": 8, "ORTHO": 8, "DOF": 8, "H20": 20, "H27": 27}
-"""Options of ``*ELEMENT_SOLID`` that are read, and the number of nodes of an element."""
+"""Options of ``*ELEMENT_SOLID`` that are read, with the number of nodes of an element."""
 FURTHER = {"ORTHO": 2, "DOF": 1}
-"""Number of further cards of an element after its nodes, for each of these options."""
+"""Number of cards of an element after the cards with its nodes, for each option."""
 REFUSED = (
     "NODE_TRANSFORM", "NODE_MERGE", "NODE_REFLECT", "PART_DUPLICATE", "PART_MOVE", "PART_STACKED", "ELEMENT_GENERATE",
     "ELEMENT_SOLID", "ELEMENT_BLANKING", "STRUCTURED_MESH", "ALE_STRUCTURED_MESH", "MESH", "IGA",
 )  # fmt: skip
-"""Beginnings of keywords that make, move or join nodes and elements, and are not supported."""
+"""Beginnings of the keywords that make, move or join nodes and elements. These keywords are not supported."""
 VOLUMES = ("ELEMENT_TSHELL", "ELEMENT_SPH", "ELEMENT_LANCING")
-"""Keywords of volume elements, or particles, that are not read."""
+"""Keywords of volume elements or particles that are not read."""
 JOINING = ("CONSTRAINED", "CONTACT", "RIGIDWALL", "RIGID", "ELEMENT_MASS", "ELEMENT_INERTIA")
-"""Beginnings of keywords that join bodies, hold bodies, or give mass to bodies. These keywords have no effect on the
-mesh."""
+"""Beginnings of the keywords that join or hold bodies, or give them mass. These keywords have no effect on the mesh."""
 FAMILIES = _words(
     """
     AIRBAG ALE BATTERY BOUNDARY CASE CHEMISTRY CESE COMMENT COMPONENT CONSTRAINED CONTACT CONTROL CPM DAMPING DATABASE
@@ -33,7 +32,7 @@ FAMILIES = _words(
     STOCHASTIC TERMINATION TITLE UNIT USER
     """
 )
-"""First words of keywords. A keyword that is not listed is an error: it could make or move nodes."""
+"""First words of known keywords. A keyword that is not listed is an error, because it could make or move nodes."""
 
 
 def refuse(block: Block, read: Container[str]) -> None:

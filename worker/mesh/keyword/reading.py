@@ -17,15 +17,16 @@ from .choosing import DEEPEST, Content
 from .deck import Deck, Solids
 
 _KINDS = {4: TET4, 8: HEX8, 10: TET10, 20: Kind(Form.HEXAHEDRON, 20), 27: Kind(Form.HEXAHEDRON, 27)}
-"""Kinds by number of nodes. Of hexahedra of more than eight nodes the first eight nodes are the corners."""
+"""Kinds of elements, keyed by the number of nodes. The first eight nodes of a hexahedron of second order are its
+corners."""
 
 
 def read_keyword(path: Path, group: str | None, key: str) -> solid.Content:
-    """Return the solid elements of a deck, all or the elements of ``group``, and the sets of nodes and segments of the
-    deck.
+    """Return the solid elements of ``group``, or all solid elements of a deck. Also return the sets of nodes and
+    segments of the deck.
 
     ``group`` is a part, a ``*SET_PART`` or a ``*SET_SOLID``, by its title or id. A group that is a number is the id of
-    a part, if a part with this id exists. Raises MeshError, with the number of the line if there is one.
+    a part, if a part with this id exists. Raises MeshError with the number of the line, if one line has the error.
     """
     try:
         deck = Deck(path)
@@ -70,7 +71,7 @@ def _content(deck: Deck, tags: Ids, every: list[Cells]) -> Content:
 
 
 def _named(content: Content) -> tuple[list[Named], list[str]]:
-    """Return the sets of nodes and of segments by title and id, and remarks on the sets that are not read."""
+    """Return the sets of nodes and of segments by title and id, and remarks on the sets that cannot be read."""
     found, remarks = list[Named](), list[str]()
     for kind in ("NODE", "SEGMENT"):
         for number, one in content.deck.sets.found[kind].items():
@@ -87,7 +88,9 @@ def _named(content: Content) -> tuple[list[Named], list[str]]:
 
 
 def _segments(content: Content, number: int, depth: int = 0) -> Iterator[Ids]:
-    """Return the faces (1 or more, 3 or 4) of a set. A fourth node of 0 repeats the third node."""
+    """Return the faces of a set of segments: one or several arrays of faces with 3 or 4 corners. A fourth node of 0
+    repeats the third node.
+    """
     one = content.deck.sets.found["SEGMENT"].get(number)
     if one is None or one.unread or depth > DEEPEST:
         why = "is not defined" if one is None else one.unread or "has itself among its members"

@@ -8,33 +8,34 @@ _WIDTHS = (10,) * 8
 _KINDS = ("NODE", "SEGMENT", "PART", "SOLID")
 _OPTIONS = ("TITLE", "LIST", "GENERATE", "INCREMENT", "COLUMN", "GENERAL", "ADD", "COLLECT", "SMOOTH")
 _FIRST = 1
-"""Number of cards before the members of a set: a card with the id of the set and its attributes."""
+"""Number of cards before the members of a set. The card has the id of the set and its attributes."""
 _GENERAL = {"NODE": ("ALL", "NODE", "DNODE", "PART", "DPART"), "PART": ("ALL", "PART", "DPART"),
             "SOLID": ("ALL", "ELEM", "DELEM", "PART", "DPART"), "SEGMENT": ("SEG",)}  # fmt: skip
-"""First words of cards of a set with the option ``_GENERAL`` that are supported. A word that begins with ``D``
+"""First words of the cards of a set with the option ``_GENERAL`` that are supported. A word that begins with ``D``
 removes members."""
 MOST = 20_000_000
-"""Largest count of numbers of one range. Chosen value: more than the elements of a mesh that a machine of some 100
-GB can run."""
+"""Largest count of the numbers of one range. The chosen value is more than the elements of a mesh that fits into some
+100 GB of memory."""
 
 
 @dataclass
 class Set:
-    """A set as it is written in the deck: steps that add and remove members, in order."""
+    """A set as the deck defines it: an ordered list of steps that add or remove members."""
 
     id: int
     title: str
     steps: list[tuple[str, list[int]]] = field(default_factory=list)
-    """Steps: a word (``NODE``, ``DNODE``, ``RANGE``, ``PART``, ``ALL``, ``SET``, ``SEG``) and its numbers."""
+    """Steps that add or remove members: a word (``NODE``, ``DNODE``, ``RANGE``, ``PART``, ``ALL``, ``SET``, ``SEG``)
+    and its numbers."""
     unread: str = ""
-    """Reason for which the set is not read; empty if it is read."""
+    """Reason why the set is not read; empty if the set is read."""
 
 
 class Sets:
-    """Sets of a deck by kind and id."""
+    """Sets of a deck, keyed by their kind and id."""
 
     def __init__(self) -> None:
-        """Start without any set."""
+        """Start with no set."""
         self.found: dict[str, dict[int, Set]] = {kind: {} for kind in _KINDS}
 
     def take(self, block: Block) -> bool:

@@ -19,7 +19,7 @@ _TYPES = {
         92: 64, 93: 125, 94: 216, 95: 343, 96: 512, 97: 729, 98: 1000, 99: 32, 106: 126, 107: 196, 108: 288, 109: 405,
         110: 550, 111: 24, 118: 30, 119: 55, 120: 91, 121: 140, 122: 204, 123: 285, 124: 385, 125: 21, 132: 1},
 }  # fmt: skip
-"""Number of nodes of gmsh's element types, by dimension (its source, GmshDefines.h)."""
+"""Number of nodes of each element type of gmsh, keyed by the dimension of the type (source of gmsh, GmshDefines.h)."""
 _RING = ((0, 1), (0, 3), (0, 4), (1, 2), (1, 5), (2, 3), (2, 6), (3, 7), (4, 5), (4, 7), (5, 6), (6, 7))
 _OF_WEDGE = ((0, 1), (0, 2), (0, 3), (1, 2), (1, 4), (2, 5), (3, 4), (3, 5), (4, 5))
 _OF_PYRAMID = ((0, 1), (0, 3), (0, 4), (1, 2), (1, 4), (2, 3), (2, 4), (3, 4))
@@ -30,15 +30,16 @@ KINDS = {
     18: Kind(Form.WEDGE, 15, _OF_WEDGE), 13: Kind(Form.WEDGE, 18, _OF_WEDGE),
     19: Kind(Form.PYRAMID, 13, _OF_PYRAMID), 14: Kind(Form.PYRAMID, 14, _OF_PYRAMID),
 }  # fmt: skip
-"""Kinds of volume elements that are read (order of nodes: gmsh reference manual, "Node ordering")."""
+"""Kinds of volume elements that are read; their node order is given in the gmsh reference manual, "Node ordering"."""
 TRIANGLES = frozenset((2, 9, 20, 21, 22, 23, 24, 25, 42, 43, 44, 45, 46))
 QUADRILATERALS = frozenset((3, 10, 16, 36, 37, 38, 39, 40, 41, 47, 48, 49, 50, 51))
-"""Numbers of gmsh's types of triangles and quadrilaterals. The first three or four nodes are the corners."""
+"""Numbers by which gmsh identifies triangles and quadrilaterals. The first three or four nodes of an element are its
+corners."""
 
 
 @dataclass(frozen=True)
 class Block:
-    """Elements of one type and with the same groups."""
+    """Elements of one type that belong to the same physical groups."""
 
     kind: int
     numbers: Ids
@@ -46,7 +47,7 @@ class Block:
     nodes: Ids
     """(m, k) numbers of the nodes of each element."""
     groups: frozenset[int]
-    """Physical groups of the dimension of the elements."""
+    """Physical groups of the elements."""
 
     @property
     def dimension(self) -> int:
@@ -61,7 +62,9 @@ class Block:
 
 @dataclass(frozen=True)
 class Read:
-    """The contents of a file: ``nodes`` (n,) and ``points`` (n, 3), elements, and remarks on omitted contents."""
+    """The contents of a file: ``nodes`` (n,) are the numbers of its nodes, ``points`` (n, 3) their positions; then
+    elements, and remarks on omitted contents.
+    """
 
     nodes: Ids
     points: Floats
@@ -70,7 +73,7 @@ class Read:
 
 
 def shape_of(kind: int) -> tuple[int, int]:
-    """Return the dimension and number of nodes of an element type. Raises MeshError."""
+    """Return the dimension and the number of nodes of an element type. Raises MeshError if the type is unknown."""
     for dimension, types in _TYPES.items():
         if kind in types:
             return dimension, types[kind]

@@ -1,4 +1,4 @@
-"""Selection from a .msh file: all of its volume elements, or the elements of a physical group."""
+"""Selection of elements from a .msh file: all volume elements, or the volume elements of a physical group."""
 
 import re
 from collections.abc import Iterator
@@ -24,14 +24,14 @@ _LISTED = {
     "MeshFormat", "NodeData", "Nodes", "ParametricNodes", "Parametrizations", "PartitionedEntities", "Periodic",
     "PhysicalNames",
 }  # fmt: skip
-"""Sections of the format. Sections without data of the mesh are skipped."""
+"""Sections that the format defines. Sections without mesh data are skipped."""
 
 
 def read_msh(path: Path, group: str | None, key: str) -> Content:
-    """Return the elements of an .msh file, all or the elements of a physical group of volumes. The physical groups of
+    """Return all volume elements of a .msh file, or the volume elements of a physical group. The physical groups of
     points, curves and surfaces are returned as sets.
 
-    ``group`` is the name of the physical group, or its number. Groups with the same name are united. Raises
+    ``group`` is the name of the physical group, or its number. Physical groups with equal names are united. Raises
     MeshError.
     """
     file = read_sections(path)
@@ -56,7 +56,7 @@ def _cells(block: Block, tags: Ids) -> Cells:
 
 
 def _names(file: Sections) -> dict[tuple[int, int], str]:
-    """Return the names of physical groups by dimension and number."""
+    """Return the names of the physical groups, keyed by dimension and number."""
     count, *lines = file.parts.get("PhysicalNames", b"0").decode("utf-8", "replace").strip().splitlines()
     read = [_NAME.fullmatch(line) for line in lines]
     found = {(int(line[1]), int(line[2])): line[3] for line in read if line is not None}
@@ -66,7 +66,7 @@ def _names(file: Sections) -> dict[tuple[int, int], str]:
 
 
 def _wanted(names: dict[tuple[int, int], str], volumes: list[Block], group: str, key: str) -> frozenset[int]:
-    """Return the numbers of the physical groups of the name ``group``. Raises MeshError."""
+    """Return the numbers of the physical groups with the name ``group``. Raises MeshError if there is no such group."""
     used = frozenset[int]().union(*(block.groups for block in volumes))
     here = {tag: name for (dimension, tag), name in names.items() if dimension == VOLUME}
     by_name = frozenset(tag for tag, name in here.items() if name == group)
@@ -92,7 +92,7 @@ def _refuse_others(chosen: list[Block]) -> None:
 
 
 def _once(chosen: list[Block]) -> list[Block]:
-    """Return the blocks with each element once. In the format 2.2 an element is repeated for each of its groups."""
+    """Remove repeated elements from the blocks. In the format 2.2 an element is written once for each of its groups."""
     found = []
     for kind in dict.fromkeys(block.kind for block in chosen):
         alike = [block for block in chosen if block.kind == kind]
@@ -107,7 +107,7 @@ def _once(chosen: list[Block]) -> list[Block]:
 
 
 def _notes(file: Sections, content: Read, wanted: frozenset[int] | None, group: str | None) -> Iterator[str]:
-    """Return remarks on contents of the file that are not in the mesh, or are united."""
+    """Return remarks for the user: contents of the file that are not in the mesh, and groups that are united."""
     yield from content.notes
     if wanted is not None and len(wanted) > 1:
         yield f"the name {group!r} is that of the groups {', '.join(map(str, sorted(wanted)))}; they are taken together"

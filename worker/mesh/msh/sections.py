@@ -1,6 +1,7 @@
-"""Sections of a .msh file, and the numbers in a section. Layout: gmsh reference manual, "MSH file format".
+"""Sections of a .msh file, and readers of their numbers. Layout: gmsh reference manual, "MSH file format".
 
-A section is between ``$Name`` and ``$EndName``; in a binary file numbers are stored as in memory, names are text.
+A section is between ``$Name`` and ``$EndName``. In a binary file the numbers have their binary form in memory; names
+are text.
 """
 
 import warnings
@@ -18,14 +19,14 @@ from ..model import Floats, Ids
 VERSIONS = ("4.1", "2.2")
 _MARK = b"\xef\xbb\xbf"
 _SINGLE = ("MeshFormat", "PhysicalNames", "Entities", "PartitionedEntities", "Nodes", "ParametricNodes", "Elements")
-"""Sections that occur only once in a file."""
+"""Sections that may occur only once in a file."""
 _LARGEST = 2**53
-"""Largest integer up to which all integers are exact as float64."""
+"""Integers up to this bound are exact as float64."""
 
 
 @dataclass(frozen=True)
 class Sections:
-    """A file: its version, its sections by name, and the byte order if the file is binary (else empty)."""
+    """A file: its version, its sections by name, and the byte order of a binary file (empty for a text file)."""
 
     version: str
     parts: dict[str, bytes]
@@ -40,7 +41,7 @@ class Sections:
 
 
 def read_sections(path: Path) -> Sections:
-    """Divide a file into sections. Raises MeshError for a file that is no .msh file, is damaged, or has another
+    """Divide a file into sections. Raises MeshError if the file is no .msh file, is damaged, or has an unsupported
     version.
     """
     data = path.read_bytes().removeprefix(_MARK)
@@ -98,10 +99,12 @@ def _formatted(parts: dict[str, bytes]) -> Sections:
 
 
 class Numbers(ABC):
-    """Sequential reader of the numbers of a section. Raises MeshError if the contents do not agree with the format."""
+    """Sequential reader of the numbers of a section. Raises MeshError if the contents of the section do not agree with
+    its counts.
+    """
 
     def __init__(self, name: str, content: bytes, order: str) -> None:
-        """``content``: bytes of the section ``name``; ``order``: byte order of these bytes."""
+        """Start to read the section ``name``. ``content``: bytes of the section; ``order``: byte order."""
         self.name, self.content, self.order, self.at = name, content, order, 0
 
     def count(self) -> int:
@@ -114,7 +117,7 @@ class Numbers(ABC):
 
     @abstractmethod
     def sizes(self, n: int) -> Ids:
-        """Read (n,) counts, or numbers of nodes and elements, of 8 bytes each."""
+        """Read (n,) numbers of 8 bytes each, such as counts or numbers of nodes and elements."""
 
     @abstractmethod
     def floats(self, n: int) -> Floats:
@@ -130,7 +133,7 @@ class Numbers(ABC):
 
 
 class Written(Numbers):
-    """Reader of numbers that are text."""
+    """Reader of a section whose numbers are text."""
 
     def __init__(self, name: str, content: bytes) -> None:
         """Read all numbers of the section."""
@@ -164,7 +167,7 @@ class Written(Numbers):
 
 
 class Stored(Numbers):
-    """Reader of numbers that are stored as in memory. In the format 2.2 the counts are text (``line``)."""
+    """Reader of a section whose numbers are binary. In the format 2.2 the counts of a section are text (``line``)."""
 
     def line(self) -> int:
         """Read a count that is text on a separate line."""
@@ -175,7 +178,7 @@ class Stored(Numbers):
         return int(text)
 
     def rows(self, n: int, layout: Any) -> NDArray[Any]:
-        """Read (n,) records of a numpy layout."""
+        """Read (n,) records with the given numpy layout."""
         kind = np.dtype(layout).newbyteorder(self.order)
         if n < 0 or self.at + n * kind.itemsize > len(self.content):
             raise self.damaged("has fewer numbers than its counts")

@@ -1,4 +1,4 @@
-"""Physical groups of points, curves and surfaces as sets."""
+"""Sets made from the physical groups of points, curves and surfaces."""
 
 from collections.abc import Iterator, Mapping
 
@@ -10,12 +10,12 @@ from ..sets import Named, surface
 from .blocks import QUADRILATERALS, TRIANGLES, VOLUME, Block
 
 _SURFACE = 2
-"""Dimension of a surface in gmsh."""
+"""Number by which gmsh identifies a surface."""
 
 
 def named_sets(blocks: list[Block], names: Mapping[tuple[int, int], str], tags: Ids) -> Iterator[Named]:
-    """Yield the physical groups: for each name, or number of a group without a name, the nodes of points and curves,
-    or the faces of a surface.
+    """Yield each physical group as a set. The set of points or curves has their nodes, the set of a surface has its
+    faces. A group without a name has its number as name.
     """
     groups = sorted({(each.dimension, tag) for each in blocks if each.dimension < VOLUME for tag in each.groups})
     called: dict[tuple[int, str], list[int]] = {}

@@ -1,4 +1,4 @@
-"""Nodes and elements of the format 2.2. An element has one physical group and is repeated for each further group."""
+"""Nodes and elements of the .msh format 2.2. An element with several physical groups is written once for each group."""
 
 from collections import defaultdict
 
@@ -10,11 +10,11 @@ from .blocks import Block, Read, shape_of
 from .sections import Numbers, Sections, Stored
 
 _PARAMETERS = {0: 0, 1: 1, 2: 2, 3: 0}
-"""Number of parametric coordinates of a node on an entity of each dimension."""
+"""Number of parametric coordinates of a node, for each dimension of the geometric entity on which the node lies."""
 
 
 def read_version2(file: Sections) -> Read:
-    """Return all nodes and elements. Raises MeshError."""
+    """Read the file; return all nodes and elements. Raises MeshError."""
     if "ParametricNodes" in file.parts:
         nodes, points = _parametric(file.numbers("ParametricNodes"))
     else:
@@ -41,7 +41,7 @@ def _nodes(numbers: Numbers) -> tuple[Ids, Floats]:
 
 
 def _parametric(numbers: Numbers) -> tuple[Ids, Floats]:
-    """Read nodes with their entities and their parametric coordinates."""
+    """Read the nodes; each node has a geometric entity and parametric coordinates."""
     many = numbers.line() if isinstance(numbers, Stored) else numbers.count()
     tags, points = np.zeros(many, np.int64), np.zeros((many, 3))
     for i in range(many):
@@ -62,7 +62,8 @@ def _tags(numbers: Numbers, values: Floats) -> Ids:
 
 
 Rows = dict[tuple[int, ...], tuple[list[int], list[list[int]]]]
-"""Numbers and nodes of elements, by type and physical group. An element without a group has no group number."""
+"""Numbers and nodes of elements, keyed by element type and physical group. An element without a group has no group
+number."""
 
 
 def _elements(numbers: Numbers) -> Rows:

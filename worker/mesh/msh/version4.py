@@ -1,5 +1,5 @@
-"""Nodes and elements of the format 4.1. The format has a block for each geometric entity, and entities have the
-physical groups.
+"""Nodes and elements of the .msh format 4.1. The file has one block for each geometric entity; a physical group is a
+property of an entity.
 """
 
 from collections import defaultdict
@@ -11,11 +11,11 @@ from .blocks import VOLUME, Block, Read, shape_of
 from .sections import Numbers, Sections
 
 Groups = dict[tuple[int, int], frozenset[int]]
-"""Physical groups by dimension and number of an entity."""
+"""Physical groups, keyed by the dimension and number of a geometric entity."""
 
 
 def read_version4(file: Sections) -> Read:
-    """Return all nodes and elements. Raises MeshError."""
+    """Read the file; return all nodes and elements. Raises MeshError."""
     groups: Groups = {}
     partitions: dict[int, frozenset[int]] = {}
     ghosts = frozenset[int]()
@@ -43,8 +43,8 @@ def _entities(numbers: Numbers) -> Groups:
 
 
 def _partitioned(numbers: Numbers) -> tuple[Groups, dict[int, frozenset[int]], frozenset[int]]:
-    """Return the groups of the parts of entities, the partitions of each part of a volume, and the entities of ghost
-    cells.
+    """Read the section of partitioned entities. Return the groups of each entity, the partitions of each volume, and
+    the entities of ghost cells.
     """
     found: Groups = {}
     partitions: dict[int, frozenset[int]] = {}
@@ -65,7 +65,9 @@ def _partitioned(numbers: Numbers) -> tuple[Groups, dict[int, frozenset[int]], f
 
 
 def _listed(numbers: Numbers) -> frozenset[int]:
-    """Return the physical groups of an entity. A negative number is the same group with reversed orientation."""
+    """Return the physical groups of an entity. A negative number is the same physical group with reversed
+    orientation.
+    """
     return frozenset(np.abs(numbers.ints(numbers.count())).tolist())
 
 
@@ -85,9 +87,9 @@ def _nodes(numbers: Numbers) -> tuple[Ids, Floats]:
 
 
 def _elements(numbers: Numbers, groups: Groups, ghosts: frozenset[int]) -> tuple[list[Block], set[int]]:
-    """Return the blocks, and the volumes with elements.
+    """Return the blocks of elements, and the volumes that have elements.
 
-    Ghost cells are copies of elements of another file, and are omitted.
+    Ghost cells are omitted, because they are copies of elements of another file.
     """
     many, total, *_ = numbers.sizes(4)
     found: list[Block] = []
@@ -110,7 +112,7 @@ def _elements(numbers: Numbers, groups: Groups, ghosts: frozenset[int]) -> tuple
 
 
 def _lacking(partitions: dict[int, frozenset[int]], filled: set[int]) -> list[str]:
-    """Return a remark on partitions without elements in the file."""
+    """Return a remark if the file has no elements of some partitions."""
     volumes = defaultdict(set)
     for tag, each in partitions.items():
         for partition in each:

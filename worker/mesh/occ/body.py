@@ -1,4 +1,4 @@
-"""Primitives that OpenCASCADE draws: cones, ogives, caps, ring sectors."""
+"""Cones, ogives, caps and ring sectors, drawn with OpenCASCADE."""
 
 import math
 from typing import Any
@@ -20,7 +20,7 @@ _SECTORS: dict[str, Angles] = {"full": ROUND, "half": (-0.5 * math.pi, 0.5 * mat
 
 
 def primitive(body: Revolved | RingSector, key: str) -> TetMesh:
-    """Return the mesh of a body. Raises MeshError, naming ``key``, if gmsh cannot make it."""
+    """Return the mesh of a body. Raises MeshError, naming ``key``, if gmsh cannot make the mesh."""
     refuse_impossible(body, key)
     low, high = bounds(body) or ((0.0,) * 3, (0.0,) * 3)
     frame = Frame(body.base, body.axis, scale_of(max(b - a for a, b in zip(low, high, strict=True))))
@@ -33,5 +33,5 @@ def primitive(body: Revolved | RingSector, key: str) -> TetMesh:
 
 
 def draw(occ: Any, body: Revolved | RingSector, frame: Frame) -> Solids:
-    """Draw its sector, in the ``frame`` of the model."""
+    """Draw the sector of a body in the ``frame`` of the model."""
     return drawn(occ, body, frame, ring.angles(body) if isinstance(body, RingSector) else [_SECTORS[body.sector]])

@@ -1,7 +1,7 @@
 """Solids of STEP and BREP files, read with gmsh's OpenCASCADE kernel.
 
-The checked bytes are copied into the empty folder of the child process and read from there. A name inside of the
-file therefore cannot refer to another file.
+The checked bytes of a file are copied into the empty folder of the child process and read there. Therefore a file name
+inside of the file cannot refer to another file.
 """
 
 import re
@@ -24,26 +24,27 @@ from .printed import captured
 from .step import length_units, solids_in, surfaces_in
 
 MOST_BYTES = 256 * 2**20
-"""Largest size of a file. Chosen value: the text of an assembly of thousands of parts. OpenCASCADE needs some ten
-times as much memory."""
+"""Largest size of a CAD file, bytes. The chosen value is the size of an assembly of thousands of parts. OpenCASCADE
+needs some ten times as much memory."""
 _MILLIMETRE = Fraction(1, 1000)
 """Unit into which OpenCASCADE converts STEP files."""
 _STEP = b"ISO-10303-21;"
 _SYNTAX = b"Incorrect Syntax"
-"""Text of an error after which OpenCASCADE continues."""
+"""Text of the OpenCASCADE error for incorrect syntax. OpenCASCADE continues after this error."""
 _BREP, _BREP_END = b"CASCADE Topology V", re.compile(rb"\*\s*[+-]\d+ \d+\s*$")
-"""Beginning of a BREP file, within its first lines, and its end: the last shape, and the shape that contains all
-others."""
+"""Texts by which a BREP file is recognised: one within its first lines, and its end, which is the last shape and the
+shape that contains all others."""
 _READING = 120
-"""Time that OpenCASCADE may take to read a file, s; a damaged file can take for ever. Chosen value."""
+"""Time that OpenCASCADE may take to read a file, s, because the reading of a damaged file may never end. Chosen
+value."""
 
 
 def imported(gmsh: Any, form: CadForm, path: Path, frame: Frame, head: str, *, exact: bool = False) -> Solids:
     """Return the chosen solids of a file in the frame of the model. Raises MeshError with a message that begins with
     ``head``.
 
-    ``exact``: spheres, cylinders and cones keep their surfaces; otherwise they become splines, because gmsh scales a
-    drawn body by a general transformation.
+    ``exact``: whether spheres, cylinders and cones keep their surfaces. Without ``exact`` gmsh scales the drawn body by
+    a general transformation, which makes splines of all surfaces.
     """
     occ = gmsh.model.occ
     every, unit = _read(gmsh, form, path, head)
@@ -63,8 +64,8 @@ def imported(gmsh: Any, form: CadForm, path: Path, frame: Frame, head: str, *, e
 def _scaled(
     gmsh: Any, form: CadForm, path: Path, head: str, factor: float, numbers: list[int]
 ) -> tuple[Solids, Solids]:  # fmt: skip
-    """Read a file again, scaled by ``factor``; return all solids and those of ``numbers``. gmsh forgets the names of
-    solids that it scales as it reads them.
+    """Read a file again, scaled by ``factor``. Return all solids, and the solids with the given ``numbers``. The
+    numbers are needed because gmsh loses the names of solids that it scales.
     """
     gmsh.model.occ.remove(gmsh.model.occ.getEntities(3), recursive=True)
     gmsh.option.setNumber("Geometry.OCCScaling", factor)
@@ -76,7 +77,9 @@ def _scaled(
 
 
 def size_of(gmsh: Any, form: CadForm, path: Path, head: str) -> float:
-    """Return the largest extent of the chosen solids of a file, m, in the position of the file."""
+    """Return the largest extent of the chosen solids of a file, m. The solids keep the position that they have in the
+    file.
+    """
     gmsh.model.add("size")
     every, unit = _read(gmsh, form, path, head)
     chosen = _chosen(gmsh, form, every, head)
@@ -87,8 +90,8 @@ def size_of(gmsh: Any, form: CadForm, path: Path, head: str) -> float:
 
 
 def left_out(form: Solid, sources: Sources, key: str) -> Iterator[str]:
-    """Yield a note for each STEP file of the body at ``key`` with surface bodies, which are not in the mesh. The note
-    is omitted if the case names the solids.
+    """Yield a note for each STEP file of the body at ``key`` that has surface bodies, because surface bodies are not in
+    the mesh. If the case names the solids of a file, no note is given.
     """
     for named, path in sources.items():
         if named == key or named.startswith(f"{key}."):
@@ -100,7 +103,7 @@ def left_out(form: Solid, sources: Sources, key: str) -> Iterator[str]:
 
 
 def _place(occ: Any, solids: Solids, factor: float, frame: Frame) -> None:
-    """Move solids from the coordinates of the file into the frame."""
+    """Move solids from the coordinates of the CAD file into the frame of the model."""
     if factor != 1.0:
         occ.dilate(solids, 0, 0, 0, factor, factor, factor)
     steps = -("xyz".index(frame.axis) + 1) % 3
@@ -155,7 +158,9 @@ def _bytes(path: Path, head: str) -> bytes:
 
 
 def _step_unit(form: CadForm, data: bytes, head: str) -> Fraction:
-    """Return the unit of the coordinates. OpenCASCADE converts the units of the file into the requested unit."""
+    """Return the unit of the coordinates, m. OpenCASCADE converts the coordinates of a STEP file into the unit that the
+    reader requests.
+    """
     declared = length_units(data, head)
     if form.unit is not None and any(abs(float(unit) - form.unit) > 1e-9 * form.unit for unit in declared):
         units = choices(sorted(si(float(unit), "m") for unit in declared))
@@ -189,8 +194,8 @@ def _chosen(gmsh: Any, form: CadForm, solids: Solids, head: str) -> Solids:
 
 
 def _names(label: str) -> list[str]:
-    """Return the names of a solid: its label, such as ``Shapes/Bullet/Core``, and every end and every part of this
-    label.
+    """Return the names of a solid, which are made from its label. From ``Shapes/Bullet/Core`` they are the label, every
+    end of the label, and every part of it.
     """
     steps = label.split("/")
     return [*("/".join(steps[n:]) for n in range(len(steps))), *steps[1:]]

@@ -19,21 +19,23 @@ AnyForm = Operand | CadForm | CombinedForm
 
 @dataclass(frozen=True)
 class Drawing:
-    """Draws forms into the current model of ``gmsh``, in ``frame``; files are in ``sources``.
+    """Drawing of forms into the current model of ``gmsh``, in the coordinates ``frame``; ``sources`` has the files of
+    the forms.
 
-    Several parts can be drawn into one model by several calls of ``solids``, which returns the volumes of a part.
-    ``occ.fragment`` of all volumes, with its map from old to new volumes, gives their meshes common nodes.
+    Several parts can be drawn into one model by several calls of ``solids``, which returns the volumes of a part. The
+    function ``occ.fragment``, applied to all volumes, gives their meshes common nodes and returns a map from old to new
+    volumes.
     """
 
     gmsh: Any
     frame: Frame
     sources: Sources
     exact: bool = False
-    """Whether bodies of CAD files keep their surfaces (``cad.imported``); for a single file only."""
+    """Whether bodies of CAD files keep their surfaces (``cad.imported``). Possible for a single file only."""
 
     def solids(self, form: AnyForm, key: str) -> Solids:
-        """Draw the form at ``key`` of its case, with its rotation. Return the volumes of the result, or no volume if
-        the result is empty.
+        """Draw the form at the key ``key`` of the case, with its rotation. Return the volumes of the form, or no volume
+        if the form is empty.
         """
         occ = self.gmsh.model.occ
         if isinstance(form, CombinedForm):
@@ -72,7 +74,9 @@ def _three(made: Any) -> Solids:
 
 
 def extent(gmsh: Any, form: AnyForm, sources: Sources, key: str) -> float:
-    """Return an upper estimate of the largest extent of a form, m. The extent is the scale of lengths."""
+    """Return an upper estimate of the largest extent of a form, m. The estimate is used as the unit of lengths of the
+    model.
+    """
     if isinstance(form, CadForm):
         return size_of(gmsh, form, sources[key], f"{key}.path = {form.path!r}")
     if isinstance(form, StlForm):

@@ -1,8 +1,8 @@
-"""Triangles of a surface that cross each other: candidate pairs by cells, then the test of separating axes.
+"""Triangles of a surface that cross each other. Candidate pairs are found by cells and tested by separating axes.
 
-Two convex bodies do not overlap if their projections on some axis do not overlap. For two triangles these axes are
-their normals, the cross products of an edge of one with an edge of the other, and the normals of their edges in the
-planes of both (Gottschalk, Lin and Manocha 1996, SIGGRAPH, 171).
+Two convex bodies do not overlap if their projections on some axis do not overlap. For two triangles it is sufficient to
+test their normals, the cross products of an edge of one with an edge of the other, and the normals of the edges in the
+planes of both triangles (Gottschalk, Lin and Manocha 1996, SIGGRAPH, 171).
 """
 
 import math
@@ -13,11 +13,11 @@ from numpy.typing import NDArray
 from ..model import Floats
 
 _DEEP = 1e-6
-"""Tolerance, as a share of the extent of the surface: projections that overlap by less than this share only touch.
-Chosen value: files have six or seven digits."""
+"""Largest overlap of the projections of two triangles that only touch, divided by the extent of the surface. Chosen
+value: the coordinates in files have six or seven digits."""
 _MOST = 10_000_000
-"""Largest number of entries of cells. The cells are enlarged until the number is below this limit. Chosen value: a
-quarter of a GiB."""
+"""Largest number of cell entries. The cells are enlarged until the number of entries is below this limit. The chosen
+value needs a quarter of a GiB."""
 _CHUNK = 200_000
 """Number of pairs that are tested at once."""
 
@@ -39,8 +39,8 @@ def crossing(points: Floats, faces: Pairs) -> Pairs:
 
 
 def _near(corners: Floats, deep: float) -> Pairs:
-    """Yield (k, 2) pairs of triangles with overlapping boxes, each pair once. The pairs are found by the cells that
-    the boxes touch.
+    """Yield (k, 2) pairs of triangles whose bounding boxes overlap, each pair once. The boxes of a pair touch a common
+    cell.
     """
     low, high = corners.min(axis=1), corners.max(axis=1)
     start, extent = low.min(axis=0), float((high.max(axis=0) - low.min(axis=0)).max())
@@ -75,8 +75,8 @@ def _near(corners: Floats, deep: float) -> Pairs:
 
 
 def _overlap(a: Floats, b: Floats, deep: float) -> NDArray[np.bool_]:
-    """Return (k,) whether triangles (k, 3, 3) overlap by more than ``deep`` along every axis that could separate
-    them.
+    """Return (k,) whether the triangles (k, 3, 3) of each pair overlap by more than ``deep`` along every axis that
+    could separate the two triangles.
     """
     sides_a, sides_b = (np.roll(t, -1, axis=1) - t for t in (a, b))
     normal_a, normal_b = (_unit(np.cross(s[:, 0], s[:, 1])) for s in (sides_a, sides_b))

@@ -1,4 +1,4 @@
-"""Forms drawn into the current model. Each form is drawn in its own frame and then moved into the frame of the
+"""Drawing of forms into the current model. Each form is drawn in its own frame and then moved into the frame of the
 model.
 """
 
@@ -25,7 +25,7 @@ from conoid.cases.shapes.profile import Arc, Profile, Segment, profile
 from .frame import Frame, Vector
 
 Solids = list[tuple[int, int]]
-"""Identification of entities in gmsh: dimension and number."""
+"""Entities of gmsh; each is given by its dimension and its number."""
 Angles = tuple[float, float]
 Form = (
     BoxForm | PlateForm | CylinderForm | TubeForm | SphereForm | ConeForm | OgiveForm | BallPiece
@@ -37,8 +37,8 @@ ROUND: Angles = (0.0, 2.0 * math.pi)
 
 
 def drawn(occ: Any, form: Form, frame: Frame, ranges: Sequence[Angles] = (ROUND,)) -> Solids:
-    """Draw the form in the ``frame`` of the model. A body of revolution or a ring sector is drawn in the ``ranges``
-    of angles.
+    """Draw the form in the ``frame`` of the model. ``ranges`` are the angles in which a body of revolution or a ring
+    sector is drawn.
     """
     scale, made = frame.scale, Solids()
     if isinstance(form, BoxForm):
@@ -59,7 +59,9 @@ def drawn(occ: Any, form: Form, frame: Frame, ranges: Sequence[Angles] = (ROUND,
 
 
 def into(occ: Any, solids: Solids, axis: Axis, start: Vector, frame: Frame) -> None:
-    """Move solids whose own frame has its origin at ``start``, m, and its third direction along ``axis``."""
+    """Move solids into the frame of the model. In the frame of the solids the origin is at ``start``, m, and the third
+    direction is along ``axis``.
+    """
     steps = ((index(axis) + 1) - (index(frame.axis) + 1)) % 3
     if steps:
         occ.rotate(solids, 0, 0, 0, 1, 1, 1, steps * 2.0 * math.pi / 3.0)
@@ -108,7 +110,7 @@ def _ring(occ: Any, form: RingSectorForm, scale: float, begin: float, end: float
 
 
 def _revolved(occ: Any, outline: Profile, scale: float, begin: float, end: float) -> Solids:
-    """Revolve the area between the outline and the axis about the axis."""
+    """Draw the solid that the area between the outline and the axis sweeps in a rotation about the axis."""
     segments = outline.segments
     low, high = (radius / scale for radius in outline.ends)
     start = occ.addPoint(0, 0, 0)
@@ -136,8 +138,8 @@ def _side(occ: Any, each: Segment, first: int, last: int, scale: float) -> int:
 
 
 def _in_thirds(occ: Any, sides: list[int]) -> Solids:
-    """Draw a body whose surface has three faces with a common tip. With one face gmsh makes two triangles on the same
-    three nodes where the tip is slender.
+    """Draw a body of revolution with a surface of three faces that have a common tip. If a slender tip has one face
+    only, gmsh makes two triangles with the same three nodes.
     """
     third = _swept(occ, sides, 0.0, ROUND[1] / 3.0)
     others = [occ.copy(third) for _ in range(2)]
@@ -148,9 +150,7 @@ def _in_thirds(occ: Any, sides: list[int]) -> Solids:
 
 
 def _swept(occ: Any, sides: list[int], begin: float, end: float) -> Solids:
-    """Return the volume that the area within ``sides`` sweeps between two angles, rad. The plane area itself is removed
-    afterwards.
-    """
+    """Return the volume that the area within ``sides`` sweeps between two angles, rad. The drawn area is removed."""
     area = occ.addPlaneSurface([occ.addCurveLoop(sides)])
     if begin:
         occ.rotate([(2, area)], 0, 0, 0, 0, 0, 1, begin)

@@ -1,4 +1,6 @@
-"""Closed surfaces of triangles as solids of OpenCASCADE, for combinations: each triangle is a plane face."""
+"""Closed surfaces of triangles as solids of OpenCASCADE, for combinations of bodies. Each triangle is a plane face of
+the solid.
+"""
 
 from pathlib import Path
 from typing import Any
@@ -15,12 +17,12 @@ from .stl import read_stl
 
 _MOST = 1500
 """Largest number of facets. Chosen value: OpenCASCADE takes 10 s to intersect a ball of 1,500 facets with a box; the
-time grows with the square of the number."""
+time is proportional to the square of the number of facets."""
 
 
 def faceted(gmsh: Any, form: StlForm, path: Path, frame: Frame, head: str) -> Solids:
-    """Return the solids inside of the surface in a file, in the frame of the model. Raises MeshError with a message
-    that begins with ``head``.
+    """Return the solids inside of the closed surface in a file, in the frame of the model. Raises MeshError with a
+    message that begins with ``head``.
     """
     surface = read_stl(path, head)
     if len(surface.faces) > _MOST:
@@ -42,7 +44,7 @@ def extent_of(form: StlForm, path: Path, head: str) -> float:
 
 
 def _shells(occ: Any, surface: Surface, points: list[int]) -> dict[int, int]:
-    """Return the surface loop of each shell."""
+    """Return the surface loop of each closed surface."""
     lines, faces = dict[tuple[int, int], int](), dict[int, list[int]]()
     for corners in surface.faces.tolist():
         loop = []

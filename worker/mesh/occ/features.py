@@ -1,5 +1,5 @@
-"""Edges and rounds of a model that are smaller than its elements. Such edges and radii lead to tets of the same small
-size."""
+"""Short edges and small radii of a model. Edges and radii that are smaller than the elements lead to tets of the same
+small size."""
 
 from collections.abc import Iterator
 from typing import Any
@@ -12,12 +12,14 @@ from .draw import Solids
 from .frame import Frame
 
 _SHORT = 0.5
-"""Length, as a share of the element size, below which edges are reported. Chosen value: a tet at such an edge has
-half the time step."""
+"""Length of an edge, divided by the element size, below which the edge is reported. Chosen value: a tet at an edge of
+this length has half the time step."""
 
 
 def small_features(gmsh: Any, element_size: float, frame: Frame, solids: Solids) -> Iterator[str]:
-    """Yield lines about short edges of ``solids``, and about fillets with a radius too small for the elements."""
+    """Yield notes about short edges of ``solids`` and about fillets with a radius that is too small for the
+    elements.
+    """
     least = _SHORT * frame.length(element_size)
     faces = sorted(set(gmsh.model.getBoundary(solids, combined=False, oriented=False)))
     edges = sorted(set(gmsh.model.getBoundary(faces, combined=False, oriented=False)))
@@ -38,7 +40,7 @@ def small_features(gmsh: Any, element_size: float, frame: Frame, solids: Solids)
 
 
 def _radius(gmsh: Any, number: int) -> float:
-    """Return the smallest radius of curvature in the middle of a face; infinite for a plane."""
+    """Return the smallest radius of curvature at the middle of a face; infinite for a plane."""
     if gmsh.model.getType(2, number) == "Plane":
         return float("inf")
     low, high = gmsh.model.getParametrizationBounds(2, number)

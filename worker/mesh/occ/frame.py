@@ -1,7 +1,7 @@
-"""Coordinates in which a model is drawn: the origin is the point where sectors are cut, and the third direction is
+"""Coordinates in which a model is drawn. The origin is the point where sectors are cut, and the third direction is
 along an axis.
 
-Lengths are of order one, because the tolerances of gmsh and OpenCASCADE are absolute.
+Lengths in these coordinates are of order one, because the tolerances of gmsh and OpenCASCADE are absolute.
 """
 
 import math
@@ -19,8 +19,8 @@ Vector = tuple[float, float, float]
 
 @dataclass(frozen=True)
 class Frame:
-    """Frame (a, b, c): the cyclic order of ``across(axis)`` and ``axis``, from ``origin``, m, in lengths of
-    ``scale``, m.
+    """Coordinates (a, b, c) in which a model is drawn: the directions of ``across(axis)`` and ``axis`` in cyclic order.
+    The origin is ``origin``, m; the unit of length is ``scale``, m.
     """
 
     origin: Vector
@@ -33,12 +33,12 @@ class Frame:
         return [*across(self.axis), index(self.axis)]
 
     def place(self, point: Vector) -> Vector:
-        """Return a point of space, m, in the frame."""
+        """Return the coordinates (a, b, c) of a point in space, m."""
         a, b, c = ((point[d] - self.origin[d]) / self.scale for d in self.directions)
         return a, b, c
 
     def length(self, length: float) -> float:
-        """Return a length, m, in the scale of the frame."""
+        """Return a length, m, in the unit of the frame."""
         return length / self.scale
 
     def direction(self, axis: Axis) -> int:
@@ -46,7 +46,9 @@ class Frame:
         return self.directions.index(AXES.index(axis))
 
     def to_space(self, points: Floats) -> Floats:
-        """Return points (n, 3) of the frame in x, y, z, m. A zero becomes exactly the coordinate of the origin."""
+        """Return points (n, 3) of the frame in x, y, z, m. A coordinate of zero becomes exactly the coordinate of the
+        origin.
+        """
         turned = np.empty_like(points)
         turned[:, self.directions] = points * self.scale
         moved: Floats = turned + np.array(self.origin)
@@ -54,5 +56,5 @@ class Frame:
 
 
 def scale_of(extent: float) -> float:
-    """Return a power of two near a length, m. Division by this power is exact and gives lengths of order one."""
+    """Return a power of two near a length, m. A division by this power is exact."""
     return 2.0 ** round(math.log2(extent))

@@ -1,5 +1,5 @@
-"""Solids of one body that touch in edges or points only. The solids have common nodes at these edges and points, and
-such a joint carries no moment.
+"""Solids of one body that touch in edges or points only. These solids have common nodes there, and such a joint carries
+no moment.
 """
 
 from collections.abc import Iterator
@@ -10,7 +10,7 @@ from .draw import Solids
 
 
 def hinges(gmsh: Any, solids: Solids) -> Iterator[str]:
-    """Yield a line if some solids of a body have no common face with the other solids of the body."""
+    """Yield a note if some solids of a body have no common face with the other solids of that body."""
     faces = [_boundary(gmsh, [each]) for each in solids]
     lines = [_boundary(gmsh, sorted(each)) for each in faces]
     points = [_boundary(gmsh, sorted(each)) for each in lines]

@@ -1,4 +1,4 @@
-"""Meshing of a drawn model whose element sizes are set. gmsh makes the tets. Then the nodes are moved to increase the
+"""Meshing of a drawn model whose element sizes are set. First gmsh makes the tets. Then nodes are moved to increase the
 smallest step lengths.
 """
 
@@ -15,22 +15,25 @@ from .frame import Frame
 from .sliding import Cut, Sliding
 
 WANTED = 0.75
-"""Step length, as a share of the step length of a regular tet with edge ``element_size``, below which step lengths
-are raised where possible."""
+"""Step length, divided by the step length of a regular tet with edge ``element_size``. Smaller step lengths are raised
+where possible."""
 _CHORD = 0.25
-"""Largest mean distance of flat faces from a round surface, over the element size: faces of edges e are e^2 / (8 r)
-from a sphere of radius r on average, e / 8 where e = r."""
+"""Largest mean distance of flat faces from a round surface, divided by the element size. Faces with edges e are on
+average e^2 / (8 r) from a sphere of radius r, which is e / 8 for e = r."""
 _OTHERS = ({"Mesh.Algorithm3D": 1}, {"Mesh.Algorithm3D": 1, "Mesh.Algorithm": 1})
-"""Further attempts if gmsh fails: first its Delaunay mesher in place of HXT, then also triangles by MeshAdapt."""
+"""Further attempts after a failure of gmsh: first the Delaunay mesher in place of HXT, then the Delaunay mesher with
+triangles by MeshAdapt."""
 
 
 def meshed(gmsh: Any, frame: Frame, element_size: float, cuts: Sequence[Cut]) -> TetMesh:
-    """Return the tets of the current model, m, in space. The model is cut on the planes ``cuts`` of the frame."""
+    """Return the tets of the current model, with points in space, m. The model is cut on the planes ``cuts`` of the
+    frame.
+    """
     return with_names(gmsh, frame, element_size, cuts)[0]
 
 
 def with_names(gmsh: Any, frame: Frame, element_size: float, cuts: Sequence[Cut]) -> tuple[TetMesh, Names]:
-    """Return the tets of the current model, and gmsh's numbers of its nodes and tets."""
+    """Return the tets of the current model, and the numbers that gmsh gives to nodes and tets."""
     _generate(gmsh)
     found = named_mesh(gmsh)
     mesh = found.mesh
@@ -43,7 +46,9 @@ def with_names(gmsh: Any, frame: Frame, element_size: float, cuts: Sequence[Cut]
 
 
 def _generate(gmsh: Any) -> None:
-    """Make tets in every volume, by another of gmsh's meshers if one fails. Raises MeshError if all fail."""
+    """Make tets in every volume. If one mesher of gmsh fails, another one is used. Raises MeshError if all meshers
+    fail.
+    """
     problem = "gmsh leaves a volume without tets; is the surface of it damaged, or element_size too large?"
     for n, options in enumerate(({}, *_OTHERS)):
         for name, value in options.items():
@@ -63,15 +68,16 @@ def _generate(gmsh: Any) -> None:
 
 
 def _off(gmsh: Any) -> str:
-    """Return a message if the tets do not have the volume of the model, within what flat faces can change; else "".
+    """Return a message if the volume of the tets differs from the volume of the model by more than flat faces can
+    explain; else "".
 
-    gmsh meshes some closed surfaces inside out or only in part, without an error.
+    The test is needed because gmsh meshes some closed surfaces inside out or only in part, without an error.
     """
     occ, volumes, filled = gmsh.model.occ, gmsh.model.getEntities(3), 0.0
     try:
         whole = sum(occ.getMass(*each) for each in volumes)
         skin = sum(occ.getMass(*each) for each in gmsh.model.getBoundary(volumes, oriented=False))
-    except Exception:  # a volume inside of triangles, of which OpenCASCADE has no surface
+    except Exception:  # a volume within triangles: OpenCASCADE has no surface for it
         return ""
     for volume in volumes:
         for tags in gmsh.model.mesh.getElements(*volume)[1]:

@@ -8,7 +8,7 @@ from contextlib import contextmanager
 
 @contextmanager
 def captured() -> Iterator[bytearray]:
-    """Collect the bytes that this process prints within the block. The bytes are available after the block."""
+    """Collect the bytes that this process prints within the ``with`` block. The bytes are available after the block."""
     text = bytearray()
     with tempfile.TemporaryFile() as file:
         before = os.dup(1)

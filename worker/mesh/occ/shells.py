@@ -1,4 +1,6 @@
-"""Closed surfaces of a set of triangles: outer surfaces, and surfaces of cavities, which face inwards."""
+"""Closed surfaces (shells) of a set of triangles. An outer shell faces outwards; the shell of a cavity faces
+inwards.
+"""
 
 import math
 from dataclasses import dataclass
@@ -11,17 +13,17 @@ from ..model import Floats
 Triangles = NDArray[np.int64]
 
 _LOOKED_AT = 64
-"""Number of facets of a shell that are tested for their position relative to other shells. Chosen value."""
+"""Number of facets of a shell whose position relative to other shells is tested. Chosen value."""
 _IN = 1e-6
-"""Depth of the tested point inside of its own shell, divided by the extent of the surface."""
+"""Depth at which a tested point is inside of its own shell, divided by the extent of the surface."""
 
 
 @dataclass(frozen=True)
 class Surface:
     """Triangles of a surface.
 
-    ``points`` (n, 3) in units of the file, ``faces`` (k, 3) nodes of the triangles, ``shell`` (n,) closed surface of
-    each point.
+    ``points`` (n, 3) in units of the file, ``faces`` (k, 3) nodes of the triangles, ``shell`` (n,) the number of the
+    closed surface of each point.
     """
 
     points: Floats
@@ -29,22 +31,22 @@ class Surface:
     shell: Triangles
 
     def volume(self) -> float:
-        """Enclosed volume, cubic units of the file, without cavities."""
+        """Enclosed volume without cavities, in cubic units of the file."""
         return _volume(self.points[self.faces])
 
     def corners(self, shell: int) -> Floats:
-        """Return (k, 3, 3) the corners of the facets of a shell."""
+        """Return (k, 3, 3) the corners of the facets of a closed surface."""
         found: Floats = self.points[self.faces[self.shell[self.faces[:, 0]] == shell]]
         return found
 
     def volumes(self) -> list[float]:
-        """Volume of each shell, cubic units of the file; negative for a cavity."""
+        """Volume of each closed surface, in cubic units of the file; negative for a cavity."""
         return [_volume(self.corners(shell)) for shell in range(int(self.shell.max()) + 1)]
 
 
 def shells(n: int, faces: Triangles) -> Triangles:
-    """Return (n,) the number of the closed surface of each point, from 0. The surfaces are ordered by their smallest
-    point.
+    """Return (n,) the number of the closed surface of each point, from 0. The closed surfaces are ordered by their
+    smallest point.
     """
     least = np.arange(n)
     while True:
@@ -56,7 +58,7 @@ def shells(n: int, faces: Triangles) -> Triangles:
 
 
 def nested(surface: Surface) -> list[list[int]]:
-    """Return the shells of each body: the outer shell, and the shells of its cavities."""
+    """Return the closed surfaces of each body: the outer shell, and the shells of the cavities."""
     volumes = surface.volumes()
     outer = [shell for shell, volume in enumerate(volumes) if volume > 0.0]
     bodies = {shell: [shell] for shell in outer}
@@ -69,10 +71,10 @@ def nested(surface: Surface) -> list[list[int]]:
 
 
 def astray(surface: Surface) -> Floats | None:
-    """Return a point of a shell in a wrong position, None if all positions are right.
+    """Return a point of a shell in a wrong position; None if all positions are right.
 
-    A position is wrong for an outer shell inside of another body, and for a cavity outside of all bodies. A sample
-    of facets is tested.
+    An outer shell is wrong if it is inside of another body. The shell of a cavity is wrong if it is outside of all
+    bodies. Only a sample of facets is tested.
     """
     volumes = surface.volumes()
     if len(volumes) == 1:
@@ -101,8 +103,8 @@ def _winds(corners: Floats, point: Floats) -> bool:
 
 
 def _winding(corners: Floats, point: Floats) -> float:
-    """Return the winding number of a shell about a point: the solid angle of the shell (van Oosterom and Strackee
-    1983, IEEE Trans. Biomed. Eng. 30, 125) divided by 4 pi.
+    """Return the winding number of a closed surface about a point: its solid angle (van Oosterom and Strackee 1983,
+    IEEE Trans. Biomed. Eng. 30, 125) divided by 4 pi.
     """
     a, b, c = (corners - point).transpose(1, 0, 2)
     p, q, r = (np.sqrt((x * x).sum(axis=1)) for x in (a, b, c))

@@ -1,4 +1,4 @@
-"""Sizes of elements in the current model: one size, or a grading."""
+"""Element sizes in the current model: one size, or a grading (a size that depends on the position)."""
 
 import math
 from collections.abc import Sequence
@@ -10,20 +10,20 @@ from .frame import Frame
 from .sliding import Cut
 
 GMSH_SIZE = 0.87
-"""gmsh's size divided by ``element_size``. HXT makes 4 tets in the cube of its size. With this factor it makes 6
+"""Size given to gmsh, divided by ``element_size``. In a cube of this size HXT makes 4 tets. With this factor it makes 6
 tets in element_size^3, as the structured generator does, and the mean edge is 1.15 element_size."""
 _FINEST = 400
-"""Largest number of points of a face, in each direction, from which distances are measured. Chosen value: 160,000
-points of a face take gmsh a second."""
+"""Largest number of points of a face, in each direction, from which distances are measured. With the chosen value gmsh
+needs a second for the 160,000 points of a face."""
 _FLAT = 1e-6
-"""Largest extent across a plane, in the scale of the model, of a face on the cut of a sector: above the tolerance of
-OpenCASCADE, 1e-7."""
+"""Largest thickness, in units of the model, of a face that counts as lying on a cut plane of a sector. The value is
+above the tolerance of OpenCASCADE, 1e-7."""
 
 
 def set_size(
     gmsh: Any, element_size: float, grading: Grading | None, frame: Frame, cuts: Sequence[Cut] = ()
 ) -> None:  # fmt: skip
-    """Set the size of the whole model, which is cut on the planes ``cuts`` of the frame."""
+    """Set the element size of the whole model. The model is cut on the planes ``cuts`` of the frame."""
     sizes = [element_size] if grading is None else [element_size, grading.far_size]
     if grading is not None:
         volumes = [tag for _, tag in gmsh.model.getEntities(3)]
@@ -35,9 +35,9 @@ def set_size(
 def graded(
     gmsh: Any, element_size: float, grading: Grading, frame: Frame, volumes: Sequence[int], cuts: Sequence[Cut]
 ) -> int:  # fmt: skip
-    """Return the number of a field of gmsh. The field is a size that is a linear function of a distance.
+    """Return the number of a gmsh field: the element size as a linear function of a distance.
 
-    ``volumes``: numbers of the volumes of the body; ``cuts``: planes of the frame on which it is cut.
+    ``volumes``: numbers of the volumes of the body; ``cuts``: planes of the frame on which the body is cut.
     """
     field = gmsh.model.mesh.field
     if grading.surface:
@@ -55,7 +55,9 @@ def graded(
 
 
 def _distance(grading: Grading, frame: Frame) -> str:
-    """Return the distance from a point, a line along an axis, a plane, a sphere or a cylinder, in gmsh's words."""
+    """Return the gmsh expression of the distance from a point, a line along an axis, a plane, a sphere or a
+    cylinder.
+    """
     origin = frame.place(grading.origin)
     if grading.normal is not None:
         d = frame.direction(grading.normal)
@@ -66,9 +68,11 @@ def _distance(grading: Grading, frame: Frame) -> str:
 
 
 def _depth(gmsh: Any, fine: float, volumes: Sequence[int], cuts: Sequence[Cut]) -> int:
-    """Return the number of a field: the distance from the surface of ``volumes``, measured from points of its faces.
+    """Return the number of a gmsh field: the distance from the surface of ``volumes``, measured from points on the
+    faces.
 
-    The points are half of ``fine`` apart, so that the distance of a node on the surface is below ``fine``.
+    The distance between points is half of ``fine``, so that the distance computed for a node on the surface is below
+    ``fine``.
     """
     field, model = gmsh.model.mesh.field, gmsh.model
     faces = [abs(tag) for _, tag in model.getBoundary([(3, tag) for tag in volumes], combined=True, oriented=False)]
@@ -82,6 +86,6 @@ def _depth(gmsh: Any, fine: float, volumes: Sequence[int], cuts: Sequence[Cut]) 
 
 
 def _lies_on(box: Sequence[float], cut: Cut) -> bool:
-    """Return whether a face with the bounding ``box``, low and high corner, lies on a plane of the frame."""
+    """Return whether a face lies on a plane of the frame; ``box``: lowest and highest corner of the face."""
     d, at = cut
     return max(abs(box[d] - at), abs(box[3 + d] - at)) < _FLAT

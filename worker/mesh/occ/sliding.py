@@ -1,5 +1,5 @@
-"""Constraints that keep the shape of a drawn body when nodes move. Nodes slide along the faces and edges of the
-model of the body.
+"""Constraints that keep the shape of a drawn body when nodes move. Nodes slide along the faces and edges of the drawn
+model.
 """
 
 from collections.abc import Callable, Sequence
@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from ..model import Floats, Ids
 
 NEAR = 1e-9
-"""Largest distance of a node from a plane on which a body is cut at which the node counts as on the plane, in
-lengths of order one."""
+"""Largest distance between a node and a cut plane, in units of the model, at which the node counts as lying on the
+plane."""
 
 Cut = tuple[int, float]
 """A plane on which a body is cut: its direction and its position."""
@@ -25,8 +25,8 @@ Nearest = Callable[[Floats], Floats]
 class Sliding:
     """Constraints on the nodes of a body.
 
-    ``entity``: (n,) index in ``nearest`` of the entity of each node, -1 inside of the body, -2 at a corner.
-    ``held``: (n, 3) fixed coordinates of a node on the planes on which the body is cut.
+    ``entity``: (n,) index in ``nearest`` of the face or edge of each node, -1 inside of the body, -2 at a corner.
+    ``held``: (n, 3) whether each coordinate of a node is fixed by a cut plane.
     """
 
     entity: NDArray[np.int32]
@@ -35,9 +35,8 @@ class Sliding:
 
     @classmethod
     def of(cls, gmsh: Any, tags: Ids, points: Floats, cuts: Sequence[Cut]) -> tuple[Self, Floats]:
-        """Return the constraints of the current model with its mesh, for nodes ``tags`` at ``points``, and the points.
-
-        The points are projected onto the planes of ``cuts``.
+        """Return the constraints on the nodes ``tags`` of the current model, and the ``points`` of the nodes, projected
+        onto the planes of ``cuts``.
         """
         entity, nearest = np.full(len(tags), -1, np.int32), list[Nearest]()
         for dimension, number in gmsh.model.getEntities():
@@ -59,7 +58,7 @@ class Sliding:
         return bool(self.entity[node] != -2)
 
     def allowed(self, node: int, start: Floats, places: Floats) -> Floats:
-        """Return the allowed positions (k, 3) of ``node``, now at ``start``, nearest to ``places``."""
+        """Return the allowed positions (k, 3) of ``node`` nearest to ``places``; ``start`` is its present position."""
         on = self.entity[node]
         if on >= 0:
             places = self.nearest[on](places)
@@ -76,8 +75,8 @@ def _nearest(gmsh: Any, dimension: int, number: int) -> Nearest:
 
 
 def _flat(gmsh: Any, number: int) -> Nearest:
-    """Return the point at the middle of the parameters of a plane, and the normal of the plane. For other faces the
-    nearest point is searched.
+    """Return a point of a plane face (the middle of its parameters) and the normal of the face. For a curved face gmsh
+    searches the nearest point.
     """
     low, high = gmsh.model.getParametrizationBounds(2, number)
     middle = 0.5 * (np.asarray(low) + np.asarray(high))

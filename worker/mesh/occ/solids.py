@@ -26,9 +26,9 @@ from .stl import read_stl
 from .surface import enclose
 
 _CLOSED = "Impossible to mesh periodic surface"
-"""Text of gmsh's error for a closed surface that it cannot mesh."""
+"""Text of the gmsh error for a closed surface that gmsh cannot mesh."""
 _TETS_PER_CUBE = 6.0
-"""Number of tets in a volume of element_size^3."""
+"""Number of tets that gmsh makes in a volume of element_size^3."""
 
 
 @dataclass(frozen=True)
@@ -38,7 +38,7 @@ class _Made:
 
 
 def measured(mesh: Measured, sources: Sources, key: str) -> TetMesh:
-    """Return the mesh of a body with a size that is known only from its geometry. Raises MeshError, naming ``key``."""
+    """Return the mesh of a body whose size is computed from its geometry. Raises MeshError, naming ``key``."""
     if isinstance(mesh, Stl):
         made = _of_surface(mesh, sources, key)
     elif isinstance(mesh, Cad | Combination):
@@ -51,7 +51,7 @@ def measured(mesh: Measured, sources: Sources, key: str) -> TetMesh:
 
 
 def _of_solid(mesh: Cad | Combination, sources: Sources, key: str) -> _Made:
-    """Mesh a solid. If gmsh cannot mesh a closed spline surface, the surfaces of a CAD file are kept as they are."""
+    """Mesh a solid. If gmsh cannot mesh a closed spline surface, mesh again with the exact surfaces of the CAD file."""
     try:
         return _meshed(mesh, sources, key, exact=False)
     except MeshError as error:
@@ -78,11 +78,11 @@ def _meshed(mesh: Cad | Combination, sources: Sources, key: str, *, exact: bool)
 def draw_solid(
     gmsh: Any, mesh: Cad | Combination, frame: Frame, sources: Sources, key: str, *, exact: bool = False
 ) -> Solids:  # fmt: skip
-    """Draw a body in the ``frame`` of the model, which has the centre and the axis of the body. Return the volumes of
-    the sector of a body.
+    """Draw a body in the coordinates ``frame`` of the model; the origin and the axis of ``frame`` are the centre and
+    the axis of the body. Return the volumes of its sector.
 
-    Solids that touch have common faces. ``exact``: see ``cad.imported``. Raises MeshError if no solid is left, or if
-    the mesh would have too many tets.
+    Solids that touch get common faces. ``exact``: see ``cad.imported``. Raises MeshError if no solid is left, or if the
+    mesh would have too many tets.
     """
     occ = gmsh.model.occ
     solids = joined(occ, sector(occ, Drawing(gmsh, frame, sources, exact).solids(mesh, key), mesh), key)
@@ -106,7 +106,7 @@ def _of_surface(mesh: Stl, sources: Sources, key: str) -> _Made:
 
 
 def sector(occ: Any, solids: Solids, mesh: Solid) -> Solids:
-    """Return the part of a solid on the positive sides of the planes at which it is cut."""
+    """Return the sector of a solid: the part on the positive sides of the cut planes."""
     cuts = cut_by(mesh.sector, mesh.axis)
     if not cuts or not solids:
         return solids

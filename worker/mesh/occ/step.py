@@ -1,4 +1,4 @@
-"""Text of a STEP file (ISO 10303-21): completeness, unit and references to other files."""
+"""Checks of the text of a STEP file (ISO 10303-21): completeness, unit of length, references to other files."""
 
 import re
 from fractions import Fraction
@@ -6,7 +6,7 @@ from fractions import Fraction
 from ...errors import MeshError
 
 _TEXT = re.compile(rb"'(?:[^']|'')*'|/\*.*?\*/", re.DOTALL)
-"""Pattern of strings and comments, with any contents."""
+"""Pattern of the strings and comments of a STEP file, which may contain any text."""
 _UNITS = re.compile(rb"GLOBAL_UNIT_ASSIGNED_CONTEXT\s*\(\s*\(([^)]*)\)")
 _NAME = re.compile(rb"#(\d+)")
 _DEFINED = re.compile(rb"[;\s]#(\d+)\s*=")
@@ -16,7 +16,7 @@ _SI = re.compile(rb"SI_UNIT\s*\(\s*(?:\.(\w+)\.|\$)\s*,\s*\.METRE\.\s*\)")
 _BASED = re.compile(rb"CONVERSION_BASED_UNIT\s*\([^,]*,\s*#(\d+)\s*\)")
 _MEASURE = re.compile(rb"LENGTH_MEASURE\s*\(\s*([-+0-9.Ee]+)\s*\)\s*,\s*#(\d+)")
 _ELSEWHERE = re.compile(rb"\b(DOCUMENT_FILE|EXTERNAL_SOURCE|EXTERNALLY_DEFINED_\w+)\s*\(|;\s*(REFERENCE)\s*;")
-"""References to geometry in other files: documents (AP 203, 214, 242), and the section of edition 3."""
+"""Patterns of references to geometry in other files: documents (AP 203, 214, 242), and the section of edition 3."""
 _PREFIXES = {
     b"EXA": 18, b"PETA": 15, b"TERA": 12, b"GIGA": 9, b"MEGA": 6, b"KILO": 3, b"HECTO": 2, b"DECA": 1, b"": 0,
     b"DECI": -1, b"CENTI": -2, b"MILLI": -3, b"MICRO": -6, b"NANO": -9, b"PICO": -12,
@@ -24,7 +24,7 @@ _PREFIXES = {
 
 
 def length_units(data: bytes, head: str) -> set[Fraction]:
-    """Return the lengths of one unit in the file, m, for each context of the file.
+    """Return the unit of length, m, of each context of the file.
 
     Raises MeshError with a message that begins with ``head`` if the file is cut off, is damaged or refers to other
     files.
@@ -50,7 +50,7 @@ def solids_in(data: bytes) -> int:
 
 
 def surfaces_in(data: bytes) -> int:
-    """Return the number of surface bodies that the file defines: surfaces without a volume."""
+    """Return the number of surface bodies that the file defines. A surface body has no volume."""
     return len(_OPEN.findall(_TEXT.sub(b"''", data)))
 
 
@@ -60,7 +60,9 @@ def _entity(text: bytes, name: bytes) -> bytes:
 
 
 def _length(text: bytes, name: bytes, depth: int) -> Fraction | None:
-    """Return the unit of an entity, m; None if the unit is not a length. An inch is defined by another unit."""
+    """Return the unit of an entity, m; None if the unit is no unit of length. An inch is defined by means of another
+    unit, which is read first.
+    """
     entity = _entity(text, name)
     if found := _SI.search(entity):
         power = _PREFIXES.get(found[1] or b"", 0)

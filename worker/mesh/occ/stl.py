@@ -1,5 +1,5 @@
-"""STL files, text and binary: one closed surface. The triangles of the surface face outwards and have only edges and
-corners in common.
+"""Reader of STL files, text and binary. A file has closed surfaces of triangles that face outwards; two triangles may
+have only edges and corners in common.
 """
 
 import struct
@@ -13,9 +13,9 @@ from .crossing import crossing
 from .shells import Surface, Triangles, astray, shells
 
 MOST_FACETS = 1_000_000
-"""Largest number of facets. Chosen value: the search for crossing facets takes a minute."""
+"""Largest number of facets. With the chosen value the search for crossing facets takes a minute."""
 _HEAD, _FACET = 84, 50
-"""Number of bytes of a binary file before its facets, and number of bytes of each facet."""
+"""Number of bytes of a binary STL file before its facets, and number of bytes of each facet."""
 
 
 def read_stl(path: Path, head: str) -> Surface:
@@ -48,10 +48,10 @@ def read_stl(path: Path, head: str) -> Surface:
 
 
 def _is_binary(data: bytes) -> bool:
-    """Return whether a file is binary.
+    """Return whether a STL file is binary.
 
-    The decision uses the size of the file, or bytes that no text has, because the head of a binary file may begin
-    with ``solid``, too.
+    The test uses the size of the file, or bytes that no text has. The first word is not sufficient, because the head of
+    a binary file may also begin with ``solid``.
     """
     if len(data) < _HEAD:
         return False
@@ -85,7 +85,9 @@ def _text(data: bytes, head: str) -> Floats:
 
 
 def _refuse_open(points: Floats, faces: Triangles, head: str) -> None:
-    """Raise MeshError unless each edge belongs to two facets with opposite directions of the edge."""
+    """Raise MeshError unless each edge belongs to exactly two facets, which run through the edge in opposite
+    directions.
+    """
     if not len(faces):
         raise MeshError(f"{head}: the STL file has no facet")
     same = np.unique(np.sort(faces, axis=1), axis=0, return_counts=True)[1]

@@ -1,5 +1,5 @@
-"""Conversion of a closed surface of triangles into a model of gmsh: faces between the edges of the surface, and the
-volumes inside.
+"""Conversion of a closed surface of triangles into a gmsh model, which has faces between the sharp edges of the
+surface, and the volumes inside.
 """
 
 import math
@@ -10,13 +10,13 @@ import numpy as np
 from .shells import Surface, nested
 
 _TRIANGLE = 2
-"""Number of the element type of the 3-node triangle in gmsh."""
+"""Number by which gmsh identifies the 3-node triangle."""
 
 
 def enclose(gmsh: Any, surface: Surface, factor: float, edge_angle: float) -> None:
-    """Put a surface, with lengths times ``factor``, into the current model.
+    """Add a surface to the current model; its lengths are multiplied by ``factor``.
 
-    The model gets smooth faces, cut at edges sharper than ``edge_angle``, rad, that gmsh can parametrise. The model
+    The surface is cut at edges sharper than ``edge_angle``, rad, into smooth faces that gmsh can parametrise. The model
     gets one volume inside of each outer shell.
     """
     tags = np.arange(1, len(surface.points) + 1)

@@ -1,1 +1,3 @@
-"""Reader of Radioss starter decks: blocks, definitions of a deck, groups and surfaces, and the chosen mesh."""
+"""Reader of Radioss starter decks. The modules read the blocks, the definitions, the groups and the surfaces of a deck,
+and select the mesh.
+"""

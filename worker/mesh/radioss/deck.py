@@ -16,20 +16,21 @@ def _words(text: str) -> frozenset[str]:
 
 
 SOLIDS = {"BRICK": 8, "TETRA4": 4, "TETRA10": 10, "PENTA6": 6, "BRIC20": 20}
-"""Elements that are read, and their number of nodes (Reference Guide, "Elements")."""
+"""Volume elements that are read, with the number of their nodes (Reference Guide, "Elements")."""
 NODES_A_LINE = {"TETRA10": 10, "BRIC20": 8}
-"""Number of nodes in a line of elements that take several lines. The nodes of a tet are in the line below its
-number."""
+"""Number of nodes in one line, for elements that take several lines. The nodes of a tet are in the line after the
+number of the tet."""
 VOLUMES = ("SHEL16", "SPHCEL", "QUAD", "TRIA")
-"""Keywords of volume elements, or particles, that are not read."""
+"""Keywords of volume elements or particles that are not read."""
 PLATES = ("SHELL", "SH3N", "BEAM", "TRUSS", "SPRING", "XELEM", "RIVET")
 """Keywords of elements without volume."""
 REFUSED = ("TRANSFORM", "CNODE", "MERGE", "SUBMODEL", "ADMESH", "MADYMO", "XREF", "REFSTA", "EREF", "INISTA")
-"""Keywords that make, move or join nodes and elements, or fetch their state, and are not supported."""
+"""Keywords that make, move or join nodes and elements, or read their state from a file. These keywords are not
+supported."""
 JOINING = ("INTER", "RBODY", "RBE2", "RBE3", "RWALL", "RLINK", "MPC", "GJOINT", "CYL_JOINT", "BCS", "ADMAS", "LAG_MUL")
-"""Keywords that join bodies, hold bodies, or give mass to bodies. These keywords have no effect on the mesh."""
+"""Keywords that join or hold bodies, or give them mass. These keywords have no effect on the mesh."""
 GROUPS = ("GRNOD", "SURF")
-"""First words of groups of nodes and of surfaces."""
+"""First words of the keywords of groups of nodes and of surfaces."""
 FAMILIES = _words(
     """
     ACCEL ACTIV ADYREL ALE AMS ANALY ANIM ARCH BEGIN BEM BOX CAA CLOAD CLUSTER CONVEC DAMP DEFAULT DEF_INTER DEF_SHELL
@@ -41,7 +42,7 @@ FAMILIES = _words(
     STAMPING STATE TABLE TH THERM_STRESS TITLE UNIT UPWIND USERW VEL VERS VISC
     """
 )
-"""First words of keywords. A keyword that is not listed is an error: it could make or move nodes."""
+"""First words of known keywords. A keyword that is not listed is an error, because it could make or move nodes."""
 
 
 @dataclass
@@ -56,9 +57,7 @@ class Solids:
 
 @dataclass
 class Group:
-    """A group of nodes or a surface as it is written in the deck: ``kind`` (``GRNOD/NODE``) and the numbers of its
-    lines.
-    """
+    """A group of nodes or a surface as the deck defines it: ``kind`` (``GRNOD/NODE``) and the numbers in its lines."""
 
     kind: str
     title: str
@@ -69,23 +68,23 @@ class Deck:
     """The contents of a deck."""
 
     def __init__(self, path: Path) -> None:
-        """Read the deck. Raises MeshError with the line that is not understood."""
+        """Read the deck. Raises MeshError with a line that cannot be read."""
         self.nodes, self.points = array("q"), array("d")
         self.solids: dict[str, Solids] = {}
         self.titles: dict[int, str] = {}
-        """Titles of parts by their numbers."""
+        """Titles of the parts, keyed by the numbers of the parts."""
         self.subset_of: dict[int, int] = {}
-        """Subset to which each part belongs."""
+        """Number of the subset of each part."""
         self.subsets: dict[int, tuple[str, list[int]]] = {}
-        """Title and inner subsets of each subset."""
+        """Title of each subset, and the numbers of the subsets inside of it."""
         self.groups: dict[tuple[str, int], Group] = {}
-        """Groups of a deck by first word and number."""
+        """Groups of a deck, keyed by the first word and the number."""
         self.passed, self.volumes, self.joining = Counter[str](), Counter[str](), Counter[str]()
-        """Counts, by first word, of lines of elements that are not read, and of keywords that join bodies."""
+        """Counts, for each first word, of lines of elements that are not read, and of keywords that join bodies."""
         self.included = Included(path)
-        """The deck, and the files that it includes."""
+        """Paths of the deck and of the files that it includes."""
         self.length = ""
-        """Unit of lengths that ``/BEGIN`` states; empty if it states none."""
+        """Unit of length that the block ``/BEGIN`` gives; empty if the block gives no unit."""
         for block in blocks(self.included):
             self._take(block)
 
@@ -119,7 +118,9 @@ class Deck:
                 self.points.extend(point(line, text))
 
     def _begin(self, block: Block) -> None:
-        """Read the unit of input: a title, the version, and mass, length and time in fields of 20 columns."""
+        """Read the unit of length of the deck. The block has a title, the version, and the units of mass, length and
+        time in fields of 20 columns.
+        """
         filled = [text for _, text in block.rows if text.strip()]
         self.length = filled[2][REAL : 2 * REAL].strip() if len(filled) > 2 else ""
 
@@ -169,4 +170,4 @@ KNOWN = frozenset(
         "SURF/SEG", "SURF/SURF", "SURF/PART", "SURF/PART/EXT", "SURF/SUBSET", "SURF/SUBSET/EXT",
     )
 )  # fmt: skip
-"""Kinds of groups that are read."""
+"""Kinds of groups that the reader supports."""

@@ -1,7 +1,8 @@
-"""Text of a Radioss starter deck: blocks that begin with ``/``, and their lines.
+"""Text of a Radioss starter deck. The text consists of blocks; a block is a keyword line that begins with ``/`` and the
+lines after it.
 
-Rules of the Altair Radioss Reference Guide, "Starter input": a line that begins with ``/`` is a keyword, and its
-words are divided by ``/``. A line that begins with ``#`` or ``$`` is a comment. Fields are 10 columns wide for
+Rules of the Altair Radioss Reference Guide, "Starter input": a line that begins with ``/`` is a keyword, and the words
+of the keyword are divided by ``/``. A line that begins with ``#`` or ``$`` is a comment. Fields are 10 columns wide for
 integers and 20 columns for other values.
 """
 
@@ -14,14 +15,14 @@ from conoid.cases.reading.problems import shown
 from ...errors import MeshError
 
 NUMBER, REAL = 10, 20
-"""Number of columns of an integer and of another number."""
+"""Width of the field of an integer and of a floating point number, in columns."""
 _LARGEST = 2**53
 """Upper bound of integers in a deck."""
 
 
 @dataclass
 class Block:
-    """A keyword: its words in upper case, its line, and the following lines with their numbers."""
+    """A keyword: its words in upper case, the number of its line, and the following lines with their numbers."""
 
     words: list[str]
     line: int
@@ -35,7 +36,7 @@ class Block:
 
     @property
     def id(self) -> int:
-        """First number among the words. Raises MeshError if no word is a number."""
+        """First number among the words. Raises MeshError if no word of the keyword is a number."""
         found = next((word for word in self.words if word.isdecimal()), None)
         if found is None or not 0 < int(found) < _LARGEST:
             raise MeshError(f"line {self.line}: /{'/'.join(self.words)} has no number")
@@ -72,7 +73,7 @@ def blocks(deck: Included) -> Iterator[Block]:
 
 
 def wholes(line: int, text: str) -> list[int]:
-    """Return the integers of a line of fields of 10 columns; 0 for an empty field. Raises MeshError."""
+    """Return the integers of a line with fields of 10 columns; an empty field gives 0. Raises MeshError."""
     if "\t" in text:
         raise MeshError(f"line {line}: a tab among fields of fixed widths; write blanks")
     items = [text[k : k + NUMBER].strip() for k in range(0, len(text.rstrip()), NUMBER)]
@@ -83,7 +84,7 @@ def wholes(line: int, text: str) -> list[int]:
 
 
 def number(line: int, text: str, what: str) -> int:
-    """Return the number of a node, an element or a part, which is positive. Raises MeshError."""
+    """Return the number of a node, an element or a part. Raises MeshError if the number is not positive."""
     found = wholes(line, text[:NUMBER])
     if not found or not 0 < found[0] < _LARGEST:
         raise MeshError(f"line {line}: {shown(text[:NUMBER].strip())} is no number of {what}; the first one is 1")
@@ -91,7 +92,9 @@ def number(line: int, text: str, what: str) -> int:
 
 
 def point(line: int, text: str) -> list[float]:
-    """Return three coordinates in fields of 20 columns after the number of a node. Raises MeshError."""
+    """Return the three coordinates of a node, in fields of 20 columns after the number of the node. Raises
+    MeshError.
+    """
     items = [text[k : k + REAL].strip() for k in range(NUMBER, NUMBER + 3 * REAL, REAL)]
     if "\t" in text or text[NUMBER + 3 * REAL :].strip():
         raise MeshError(f"line {line}: a node has a number of 10 columns and three coordinates of 20")

@@ -16,15 +16,17 @@ from .deck import KNOWN, Deck, Group
 
 _KINDS = {"BRICK": HEX8, "TETRA4": TET4, "TETRA10": TET10, "PENTA6": WEDGE6, "BRIC20": Kind(Form.HEXAHEDRON, 20)}
 _DEEPEST = 20
-"""Largest depth of groups within groups, and of subsets within subsets. Chosen value: decks have up to five levels."""
+"""Largest depth of groups within groups, and of subsets within subsets. The chosen value is above the five levels that
+decks have."""
 
 
 def read_radioss(path: Path, group: str | None, key: str) -> Content:
-    """Return the volume elements of a starter deck, all or the elements of ``group``. The groups of nodes and the
+    """Return the volume elements of ``group``, or all volume elements of a starter deck. The groups of nodes and the
     surfaces of the deck are returned as sets.
 
     ``group`` is a part, or a subset with its inner subsets, by title or number. A group that is a number is the number
-    of a part, if a part with this number exists. Raises MeshError, with the number of the line if there is one.
+    of a part, if a part with this number exists. Raises MeshError with the number of the line, if one line has the
+    error.
     """
     deck = Deck(path)
     numbers = np.array(deck.nodes, np.int64)
@@ -54,7 +56,7 @@ class _Reader:
         self.cells = [self._cells(word) for word in deck.solids]
         self.of = [np.array(rows.parts, np.int64) for rows in deck.solids.values()]
         self.lost = dict[str, Ids]()
-        """Members of groups of nodes that are no defined nodes, by the group."""
+        """Undefined nodes in groups of nodes, keyed by group."""
 
     def _cells(self, word: str) -> Cells:
         rows = self.deck.solids[word]
@@ -63,11 +65,11 @@ class _Reader:
         return cells(made.kind, made.numbers, placed(self.tags, made.nodes, made.called), made.lines)
 
     def both(self) -> Iterator[tuple[Cells, Ids]]:
-        """Return elements and the part of each element."""
+        """Return the nodes of the elements, and the part of each element."""
         return zip(self.cells, self.of, strict=True)
 
     def parts(self, group: str, key: str) -> Ids:
-        """Return the parts that a name contains. Raises MeshError for an unknown or ambiguous name."""
+        """Return the parts to which the name ``group`` refers. Raises MeshError if the name is unknown or ambiguous."""
         word, colon, name = group.partition(":")
         kinds = [word] if colon and word in ("part", "subset") else ["part", "subset"]
         name = name if len(kinds) == 1 and colon else group
@@ -91,14 +93,14 @@ class _Reader:
         return [self.within(number) for number in _named(titles, name)]
 
     def within(self, subset: int, depth: int = 0) -> set[int]:
-        """Return the parts of a subset and of its inner subsets. Raises MeshError."""
+        """Return the parts of a subset and of all subsets inside of it. Raises MeshError."""
         if subset not in self.deck.subsets or depth > _DEEPEST:
             raise MeshError(f"the subset {subset} {'is not defined' if depth <= _DEEPEST else 'is within itself'}")
         own = {part for part, of in self.deck.subset_of.items() if of == subset}
         return own.union(*(self.within(each, depth + 1) for each in self.deck.subsets[subset][1]))
 
     def named(self) -> tuple[list[Named], list[str]]:
-        """Return the groups of nodes and surfaces, and remarks on the groups and surfaces that are not read."""
+        """Return the groups of nodes and the surfaces, and remarks on those groups and surfaces that cannot be read."""
         found, remarks = list[Named](), list[str]()
         for (word, number), group in self.deck.groups.items():
             names = tuple(filter(None, (group.title, str(number))))
@@ -146,8 +148,8 @@ class _Reader:
         return np.concatenate([_NONE, *(each.nodes[np.isin(of, parts)].ravel() for each, of in self.both())])
 
     def _faces(self, number: int, depth: int = 0) -> list[Ids]:
-        """Return corners (n, 3) and (n, 4) of the faces of a surface. A surface of parts has all faces of their
-        elements.
+        """Return corners (n, 3) and (n, 4) of the faces of a surface. A surface that is defined by parts has all faces
+        of their elements.
         """
         group, found = self._group("SURF", number, depth), list[Ids]()
         if group.kind == "SURF/SEG":
@@ -175,6 +177,8 @@ def _named(titles: dict[int, str], name: str) -> list[int]:
 
 
 def _notes(deck: Deck, chosen: list[Cells]) -> Iterator[str]:
-    """Return remarks on contents of the deck that are not in the mesh or are interpreted in an unexpected way."""
+    """Return remarks on contents of the deck that are not in the mesh, or that the reader interprets in an unexpected
+    way.
+    """
     yield from omitted.notes(deck.passed, deck.volumes, deck.joining, "/")
     yield from omitted.by_corners(chosen)

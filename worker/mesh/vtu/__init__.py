@@ -1,1 +1,1 @@
-"""Reader of VTK's XML files of unstructured grids, .vtu: arrays in their encodings, and the chosen mesh."""
+"""Reader of .vtu files, VTK's XML files of unstructured grids. The modules decode the arrays and select the mesh."""

@@ -1,7 +1,7 @@
-"""Arrays of a .vtu file: text, base64 or bytes, compressed or not.
+"""Arrays of a .vtu file. An array is text, base64 or bytes, and may be compressed.
 
-Layout: VTK user's guide, "XML file formats". An array is in its XML element or after ``_`` in ``AppendedData``. The
-data of an array follows a count of bytes or a table of compressed blocks.
+Layout: VTK user's guide, "XML file formats". The data of an array is in its XML element, or in ``AppendedData`` after
+the character ``_``. Before the data is a count of bytes, or a table of compressed blocks.
 """
 
 import base64
@@ -28,10 +28,10 @@ _START, _END = b"<AppendedData", b"</AppendedData>"
 
 
 class Grid:
-    """Content of one piece of an unstructured grid."""
+    """Contents of the one piece of an unstructured grid."""
 
     def __init__(self, path: Path) -> None:
-        """Read the file. Raises MeshError for a file that is no .vtu file, is damaged, or has several pieces."""
+        """Read the file. Raises MeshError if the file is no .vtu file, is damaged, or has several pieces."""
         text, self._appended, self._encoding = _divided(path.read_bytes())
         if b"<!DOCTYPE" in text or b"<!ENTITY" in text:
             raise MeshError("the file defines XML entities, which are not supported")
@@ -60,7 +60,7 @@ class Grid:
         return int(found)
 
     def array(self, place: str, name: str | None, count: int | None, kind: str) -> "np.ndarray":
-        """Return ``count`` values of an array in ``Points``, ``Cells`` or data, or all values if ``count`` is None.
+        """Return ``count`` values of an array in ``Points``, ``Cells`` or data; all values if ``count`` is None.
 
         ``kind``: ``i`` for integers, ``f`` for any numbers. Raises MeshError.
         """
@@ -110,7 +110,7 @@ class Grid:
         raise MeshError(f"the array {node.get('Name')!r} has the format {form!r}, which is not read")
 
     def _decoded(self, data: bytes, coded: bool) -> bytes:
-        """Return the bytes of an array after its count, or after the table of its blocks."""
+        """Return the bytes of an array, decoded and decompressed, without the count of bytes or the table of blocks."""
         size = int(str(self._head)[1])
         if not self._compressed:
             (many,) = self._sizes(_bytes(data, size, coded), 1)
@@ -147,7 +147,9 @@ class Grid:
 
 
 def _divided(data: bytes) -> tuple[bytes, bytes, bytes]:
-    """Return the XML of a file without the appended bytes, the appended bytes after ``_``, and their encoding."""
+    """Return the XML of a file without the appended bytes. Also return the appended bytes after ``_`` and their
+    encoding.
+    """
     start = data.find(_START)
     if start < 0:
         return data, b"", b""
@@ -160,10 +162,10 @@ def _divided(data: bytes) -> tuple[bytes, bytes, bytes]:
 
 
 def _coded(size: int) -> int:
-    """Return the number of base64 characters for a number of bytes."""
+    """Return the number of base64 characters that encode ``size`` bytes."""
     return -(-size // 3) * 4
 
 
 def _bytes(data: bytes, size: int, coded: bool) -> bytes:
-    """Return the first bytes of data, decoded from base64 if ``coded``."""
+    """Return the first ``size`` bytes of data, decoded from base64 if ``coded``."""
     return base64.b64decode(data[: _coded(size)], validate=True)[:size] if coded else data[:size]

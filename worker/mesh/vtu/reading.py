@@ -1,7 +1,7 @@
-"""Selection from a .vtu file: all volume elements, or the elements with a value in an array of cells.
+"""Selection of elements from a .vtu file: all volume elements, or the elements with a given value in an array of cells.
 
-Conoid has a reader of its own: the reader of VTK reports a damaged file on a stream and continues with partial
-contents, and meshio ends on unknown arrays.
+Conoid has a reader of its own: the reader of VTK only prints an error for a damaged file and continues with partial
+contents, and meshio ends if an array is unknown.
 """
 
 from collections.abc import Iterator
@@ -23,23 +23,23 @@ _KINDS = {
 }  # fmt: skip
 """Numbers of the VTK volume types that are read (vtkCellType.h), and their kinds."""
 _FACES = {5: 3, 9: 4, 22: 3, 23: 4, 28: 4, 8: 4}
-"""Numbers of the types of surfaces, and the number of their corners."""
+"""Numbers of the VTK surface types, with the number of their corners."""
 _EMPTY = frozenset((0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 21, 22, 23, 28, 30, 34, 35, 36))
-"""Numbers of the types without volume."""
+"""Numbers of the VTK types without volume."""
 _VOXEL, _PIXEL = 11, 8
-"""Numbers of the types voxel and pixel. The corners of these cells are ordered x first, then y, then z."""
+"""Numbers of the VTK types voxel and pixel. The corners of these cells are ordered first by x, then by y, then by z."""
 _ORDER = {_VOXEL: [0, 1, 3, 2, 4, 5, 7, 6], _PIXEL: [0, 1, 3, 2]}
 _MIRRORED = {6: [0, 2, 1, 3, 5, 4], 15: [0, 2, 1, 3, 5, 4, 8, 7, 6, 11, 10, 9, 12, 14, 13]}
-"""Order of the nodes of wedges. In VTK's documentation the first triangle of a wedge faces outwards, but most
+"""Order of the nodes of a wedge. In the documentation of VTK the first triangle of a wedge faces outwards, but most
 programs write it facing inwards."""
 
 
 def read_vtu(path: Path, group: str | None, key: str) -> Content:
-    """Return the volume elements of a .vtu file, all or the elements of ``group``, and its sets.
+    """Return the volume elements of ``group``, or all volume elements of a .vtu file. Also return the sets of the file.
 
-    ``group`` is ``array:value``, or a value if one array of cells alone has integers. Integer arrays of points are
-    sets of nodes (nodes with a value other than 0), and the values of arrays of cells are surfaces. Nodes and
-    elements have indices from 0 as names. Raises MeshError.
+    ``group`` is ``array:value``, or only a value if exactly one array of cells has integers. An integer array of points
+    is a set of the nodes with a value other than 0. Each value of an array of cells is a surface. In messages nodes and
+    elements are numbered from 0. Raises MeshError.
     """
     grid = Grid(path)
     n, m = grid.points_count, grid.cells_count
@@ -90,7 +90,7 @@ def _rows(
 
 
 def _of(ends: Ids, nodes: Ids, some: Ids, size: int, kind: int) -> Ids:
-    """Return (k, size) nodes of cells of one type. Raises MeshError if a cell has another number of nodes."""
+    """Return (k, size) nodes of the cells of one type. Raises MeshError if a cell has a wrong number of nodes."""
     sizes = np.diff(ends, prepend=0)[some]
     if (sizes != size).any():
         k = np.flatnonzero(sizes != size)[0]
