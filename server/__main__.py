@@ -1,5 +1,6 @@
-"""``python -m conoid.server``: runs the server. ``token add | list | revoke`` manages access; ``adopt`` registers a
-folder of runs that was moved or restored."""
+"""``python -m conoid.server``: runs the server. The command ``token add | list | revoke`` manages access; the command
+``adopt`` registers a folder of runs that was moved or restored.
+"""
 
 import argparse
 import logging
@@ -23,7 +24,8 @@ from .settings import Caps, Settings, SettingsError, StartError, capped, command
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Runs the command line and returns the exit code: 0 for success, 2 for a wrong command line, 1 for any other
-    failure. A failure is explained in one line for people."""
+    failure. A failure prints one line of text for people.
+    """
     options = _parser().parse_args(arguments)
     logging.basicConfig(format="%(asctime)s %(levelname)s %(message)s", level=logging.INFO)
     try:
@@ -156,13 +158,14 @@ def _check_programs(settings: Settings) -> None:
 
 
 def _untouched(settings: Settings) -> bool:
-    """Whether the folder has no database yet: neither a server nor ``token add`` has used it."""
+    """Whether the folder of runs has no database yet: neither a server nor ``token add`` has used the folder."""
     return not settings.database and not settings.database_file.exists()
 
 
 def _store(options: argparse.Namespace) -> Store:
-    """Returns the database with the tokens. Raises SettingsError if the database does not exist: ``--runs`` may name
-    another folder."""
+    """Returns the database with the tokens. Raises SettingsError if the database does not exist, because ``--runs`` may
+    name a wrong folder.
+    """
     settings = _settings(options)
     if _untouched(settings):
         raise SettingsError(f"--runs {settings.runs}: no server has used this folder, and it has no tokens")
@@ -171,8 +174,9 @@ def _store(options: argparse.Namespace) -> Store:
 
 
 def _add(options: argparse.Namespace) -> None:
-    """Adds a token. If the folder and its database do not exist, creates them like the server and reports the new
-    database."""
+    """Adds a token. If the folder of runs and its database do not exist, creates the folder and the database, and
+    prints that the database is new.
+    """
     settings = _settings(options)
     new = _untouched(settings)
     os.umask(0o077)
@@ -187,7 +191,9 @@ def _add(options: argparse.Namespace) -> None:
 
 
 def _adopt(options: argparse.Namespace) -> None:
-    """Binds folder and database. Raises SettingsError if another server uses the folder, or if it does not exist."""
+    """Binds the folder of runs to its database. Raises SettingsError if another server uses the folder of runs, or if
+    the folder does not exist.
+    """
     settings = _settings(options)
     if not settings.runs.is_dir():
         raise SettingsError(f"--runs {settings.runs}: there is no such folder")

@@ -17,9 +17,10 @@ class AloneError(StartError):
 
 @contextmanager
 def only_one(runs: Path) -> Iterator[None]:
-    """Takes the lock of a folder of runs. Two servers on one folder would start every run twice. Two locks are
-    taken: one on the folder itself, because a lock file could be deleted, and one on a lock file, for file systems
-    that lock files only."""
+    """Takes the lock of a folder of runs. Without the lock, two servers on one folder would start every run twice. The
+    lock of the folder itself is needed because a lock file could be deleted; the lock file is needed for file systems
+    that cannot lock folders.
+    """
     with ExitStack() as stack:
         folder = os.open(runs, os.O_RDONLY | os.O_DIRECTORY)
         stack.callback(os.close, folder)

@@ -1,4 +1,4 @@
-"""The application: makes the parts of the server and the FastAPI application."""
+"""Makes the parts of the server and the FastAPI application."""
 
 import asyncio
 from collections.abc import AsyncIterator, Iterator
@@ -86,8 +86,8 @@ _SAFE_HEADERS = {
 
 @contextmanager
 def opened(settings: Settings) -> Iterator[Service]:
-    """Opens the parts of a server in order of dependence, the supervisor last, and closes them in reverse order.
-    Workers continue after the close. Raises StoreError, IdentityError, TelemetryError, OSError.
+    """Opens the parts of a server in the order of their dependence, the supervisor last; closes the parts in reverse
+    order. Workers continue after the server is closed. Raises StoreError, IdentityError, TelemetryError or OSError.
     """
     settings.runs.mkdir(0o700, parents=True, exist_ok=True)
     with ExitStack() as stack:
@@ -155,7 +155,7 @@ def launcher_of(settings: Settings) -> Launcher:
 
 
 def build_app(service: Service) -> FastAPI:
-    """Returns the FastAPI application that uses open parts."""
+    """Returns the FastAPI application for parts that are open."""
 
     @asynccontextmanager
     async def lifespan(_: FastAPI) -> AsyncIterator[None]:
@@ -190,7 +190,7 @@ def build_app(service: Service) -> FastAPI:
 
 
 class _SafeHeaders:
-    """Middleware that adds security headers to every answer; streams pass through unchanged."""
+    """Middleware that adds security headers to every answer; streamed answers are sent unchanged."""
 
     def __init__(self, app: ASGIApp) -> None:
         self._app = app

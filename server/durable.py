@@ -1,5 +1,6 @@
-"""Writing of files that survives a power cut: first the data is flushed to disk, then the name of the file, then the
-folder of the file."""
+"""Writing of files that survives a power failure: first the data is flushed to disk, then the name of the file, then
+the folder of the file.
+"""
 
 import os
 import shutil
@@ -8,13 +9,13 @@ from pathlib import Path
 from conoid.cases.reading import whole
 
 _PROBE = 1 << 16
-"""Number of bytes that are written to test whether a folder can be written (chosen value). The files that a launch
-writes have fewer bytes."""
+"""Number of bytes that are written to test whether a folder can be written (chosen value)."""
 
 
 def write(path: Path, content: bytes, mode: int = 0o600) -> None:
-    """Writes ``content`` to ``path`` completely or not at all, by a temporary name, fsync, rename, and fsync of the
-    folder."""
+    """Writes ``content`` to ``path`` completely or not at all: writes a temporary file, calls fsync, renames the file,
+    and calls fsync for the folder.
+    """
     beside = path.with_name(f".{path.name}.new")
     with whole.named(path), open(os.open(beside, os.O_WRONLY | os.O_CREAT | os.O_TRUNC, mode), "wb") as file:
         file.write(content)
@@ -36,7 +37,9 @@ def probe(folder: Path) -> None:
 
 
 def write_new(path: Path, content: bytes) -> None:
-    """Creates a file in a folder that no process reads yet. The caller syncs the folder. Raises FileExistsError."""
+    """Creates a file in a folder that no process reads yet. The caller must flush the folder to disk. Raises
+    FileExistsError if the file exists.
+    """
     with whole.named(path), open(os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600), "wb") as file:
         file.write(content)
         file.flush()
@@ -44,7 +47,9 @@ def write_new(path: Path, content: bytes) -> None:
 
 
 def copy(source: Path, target: Path) -> None:
-    """Creates a file with the bytes of a regular file. The caller syncs the folder. Raises OSError."""
+    """Creates a file with the bytes of another file, which is a regular file. The caller must flush the folder to disk.
+    Raises OSError if the file cannot be copied.
+    """
     flags = os.O_WRONLY | os.O_CREAT | os.O_EXCL
     with whole.named(target), whole.opened(source) as file, open(os.open(target, flags, 0o400), "wb") as made:
         shutil.copyfileobj(file, made, 1 << 20)

@@ -1,4 +1,4 @@
-"""Refusals and failures of the server as RFC 9457 problem+json, one form for all.
+"""Refusals and failures of the server as RFC 9457 problem+json.
 
 ::
 
@@ -31,7 +31,9 @@ _CODES = {400: "bad_request", 401: "unauthorized", 404: "not_found", 405: "metho
 
 
 class ServiceError(Exception):
-    """An error answer. ``detail`` is one line for people, ``code`` a constant word for programs."""
+    """An HTTP answer with an error. The field ``detail`` is one line for people; ``code`` is a constant word for
+    programs.
+    """
 
     def __init__(
         self,
@@ -46,8 +48,8 @@ class ServiceError(Exception):
         headers: Mapping[str, str] | None = None,
         outcome: Mapping[str, Any] | None = None,
     ) -> None:
-        """Creates the error. ``pointer``: a JSON pointer into the body, or the name of a parameter or header;
-        ``outcome``: the record of a removed run.
+        """Creates the error. ``pointer``: a JSON pointer into the request body, or the name of a parameter or header;
+        ``outcome``: the stored record of a removed run.
         """
         super().__init__(detail)
         self.status, self.headers = status, dict(headers or {})
@@ -75,7 +77,9 @@ class ServiceError(Exception):
 
 
 def invalid_case(problems: Sequence[Problem]) -> ServiceError:
-    """Returns 422 with every problem; ``detail`` and ``pointer`` are the fields of the first problem."""
+    """Returns an answer with status 422 and every problem of the case; ``detail`` and ``pointer`` are the fields of the
+    first problem.
+    """
     more = f" (and {len(problems) - 1} more)" if len(problems) > 1 else ""
     first = problems[0]
     return ServiceError(
@@ -84,7 +88,7 @@ def invalid_case(problems: Sequence[Problem]) -> ServiceError:
 
 
 def not_found(what: str) -> ServiceError:
-    """Returns 404, with the same text for an unknown run and for a run of another user."""
+    """Returns an answer with status 404; the text is the same for an unknown run and for a run of another user."""
     return ServiceError(404, "not_found", f"{what}: there is none")
 
 
@@ -96,13 +100,15 @@ def entry(problem: Problem) -> dict[str, str]:
 
 
 def json_pointer(key: str) -> str:
-    """Returns ``parts[0].mesh.radius`` as the JSON pointer ``#/parts/0/mesh/radius``; ``#`` for the whole body."""
+    """Returns the JSON pointer of a key, for example ``#/parts/0/mesh/radius`` for ``parts[0].mesh.radius``; ``#`` for
+    the whole body.
+    """
     items = [item for item in re.split(r"[.\[\]]+", key) if item]
     return "#" + "".join(f"/{item}" for item in items)
 
 
 def install(app: FastAPI) -> None:
-    """Sends every error of ``app`` in the form problem+json."""
+    """Answers every error of ``app`` as problem+json."""
     app.add_exception_handler(ServiceError, _service_error)
     app.add_exception_handler(HTTPException, _http_error)
     app.add_exception_handler(RequestValidationError, _parameter_error)
@@ -127,8 +133,8 @@ async def _http_error(request: Request, error: Exception) -> Response:
 
 
 def allowed(app: FastAPI, path: str) -> str:
-    """Returns the methods of all routes for a path. If several patterns match, the longest pattern counts. Empty
-    without a match.
+    """Returns the HTTP methods of all routes for a path. If the patterns of several routes match the path, the longest
+    pattern counts. The result is empty if no route matches the path.
     """
     found: dict[str, set[str]] = {}
     for router in app.state.routers:
@@ -156,8 +162,8 @@ async def _storage(request: Request, error: Exception) -> Response:
 
 
 async def _database(request: Request, error: Exception) -> Response:
-    """Returns the error for a database that is locked by another process, full, or not reachable. A repetition of the
-    request may succeed later.
+    """Returns the error for a database that is locked by another process, full, or not reachable. The client may repeat
+    the request later.
     """
     _log.error("%s %s: the database cannot be used: %s", request.method, request.url.path, error)
     return database_away(error).response()
@@ -173,7 +179,7 @@ def database_away(error: Exception) -> ServiceError:
 
 
 async def _crash(request: Request, error: Exception) -> Response:
-    """Returns 500; the traceback is in the server's log."""
+    """Returns an answer with status 500; the log of the server has the traceback."""
     _log.error("%s %s failed", request.method, request.url.path, exc_info=error)
     detail = "the server failed to answer; its log has the reason"
     return ServiceError(500, "internal", detail, retryable=True).response()

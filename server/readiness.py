@@ -14,17 +14,17 @@ from .requests.thread_pool import ThreadPool
 from .settings import Settings
 
 _FRESH = 1.0
-"""Time in s for which the result of a check is used again (chosen value). Reason: /readyz needs no token, and each
-check writes to the disk."""
+"""Time in s for which the result of a check is used again (chosen value), because /readyz needs no token and each check
+writes to the disk."""
 _LIMIT = 2.0
-"""Time in s after which a check has failed. The value was chosen because a disk that works answers within 0.1 s."""
+"""Time in s after which a check has failed; a disk that works answers within 0.1 s (reason of the chosen value)."""
 
 
 class Readiness:
-    """Checks of the disk and the database. The class is used in the thread of the event loop."""
+    """Checks of the disk and the database. The class is used only in the thread of the event loop."""
 
     def __init__(self, settings: Settings, store: Store) -> None:
-        """Creates the object; no check is made yet."""
+        """Creates the object without making a check."""
         self._settings, self._store = settings, store
         self._checks = {
             name: _Check(look)
@@ -32,8 +32,9 @@ class Readiness:
         }
 
     async def checks(self) -> dict[str, bool]:
-        """Results of the checks: ``database``, ``runs`` (files can be written), ``disk`` (the free space that the
-        site reserves)."""
+        """Results of the checks, by name: ``database``; ``runs``, whether files can be written; ``disk``, whether the
+        disk has the free space that the site reserves.
+        """
         passed = await asyncio.gather(*(check.passes() for check in self._checks.values()))
         return dict(zip(self._checks, passed, strict=True))
 
@@ -59,7 +60,7 @@ class Readiness:
 
 
 class _Check:
-    """Makes one check in a separate thread; all requests at the same time share its result."""
+    """Makes one check in a separate thread; all simultaneous requests share the result of the check."""
 
     def __init__(self, look: Callable[[], bool]) -> None:
         self._look, self._thread = look, ThreadPool(each=1, waiting=1, patience=_LIMIT, most=1)
@@ -67,7 +68,9 @@ class _Check:
         self._asked: asyncio.Task[None] | None = None
 
     async def passes(self) -> bool:
-        """Returns the result of a check, at most ``_FRESH`` s old; False if the check takes longer than ``_LIMIT``."""
+        """Returns the result of a check, at most ``_FRESH`` s old; returns False if the check takes longer than
+        ``_LIMIT`` s.
+        """
         if time.monotonic() >= self._until:
             if self._asked is None or self._asked.done():
                 self._asked = asyncio.create_task(self._ask())

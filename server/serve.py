@@ -1,4 +1,6 @@
-"""The server as a process: one for each folder of runs, its address in server.json, a clean end after SIGTERM."""
+"""The server as a process: one process for each folder of runs, its address in server.json, a clean end after
+SIGTERM.
+"""
 
 import asyncio
 import json
@@ -23,11 +25,10 @@ from .settings import Settings, StartError
 _log = logging.getLogger("conoid.server")
 ADDRESS_FILE = "server.json"
 _AGAIN = 5.0
-"""Time in s after which a failed write of the address is tried again (chosen value)."""
+"""Time in s after which a failed write of the server's address is tried again (chosen value)."""
 _SWITCH = 0.001
-"""Time in s after which a computing thread must let another thread run. The event loop waits so long for each busy
-thread, several times an answer. The value was chosen: it is a fifth of Python's default.
-"""
+"""Time in s after which a computing thread must let another thread run: a fifth of Python's default (chosen value). The
+event loop waits for this time for each busy thread, several times in an answer."""
 _FAREWELL = 3
 """Longest time in s to wait for open requests when the server stops."""
 
@@ -37,8 +38,8 @@ class ServeError(StartError):
 
 
 def serve(settings: Settings) -> None:
-    """Runs the server until SIGTERM or SIGINT. Files of the server and its workers are readable for their user only.
-    Raises ServeError, and the errors of ``opened``.
+    """Runs the server until SIGTERM or SIGINT. Only the user of the server can read the files of the server and its
+    workers. Raises ServeError, and the errors of ``opened``.
     """
     os.umask(0o077)
     sys.setswitchinterval(_SWITCH)
@@ -62,8 +63,8 @@ def _answer(settings: Settings, listener: socket.socket) -> None:
 
 class _Server(uvicorn.Server):
     """Writes the address of the server when the server answers, and ends open streams before it waits for open
-    requests. On a full disk the server runs without server.json, so that runs can be read and removed. The file is
-    written when the disk has space again.
+    requests. On a full disk the server runs without server.json, so that runs can be read and removed. The file
+    server.json is written when the disk has space again.
     """
 
     def __init__(self, service: Service) -> None:
@@ -101,7 +102,7 @@ class _Server(uvicorn.Server):
             await asyncio.sleep(_AGAIN)
 
     def handle_exit(self, sig: int, frame: FrameType | None) -> None:
-        """Stores the reason for which the server ended."""
+        """Stores the reason why the server ended."""
         self._why = signal.Signals(sig).name
         super().handle_exit(sig, frame)
 
@@ -115,7 +116,9 @@ class _Server(uvicorn.Server):
 
 
 def announce(service: Service, listener: socket.socket, page_problem: str | None) -> bytes:
-    """Prints one line and, with a page, the address to open; None: no page. Returns the content of server.json."""
+    """Prints one line and, if there is a page, the address of the page; None: no page. Returns the content of
+    server.json.
+    """
     host, port = listener.getsockname()[:2]
     url = f"http://{f'[{host}]' if ':' in host else host}:{port}"
     endpoint = service.telemetry.local_endpoint if service.telemetry else None
@@ -132,14 +135,14 @@ def announce(service: Service, listener: socket.socket, page_problem: str | None
 
 
 def _leave(_signal: int, _frame: FrameType | None) -> None:
-    """Handles the signal that uvicorn raises again after its shutdown, and ends the process with code 0."""
+    """Handles the signal that uvicorn raises again after its shutdown: ends the process with code 0."""
     raise SystemExit(0)
 
 
 @contextmanager
 def _listening(settings: Settings) -> Iterator[socket.socket]:
-    """Creates the socket with protocol TCP explicitly. Only with this setting asyncio disables Nagle's delay of 40 ms
-    for an answer.
+    """Creates the socket with the protocol TCP given explicitly; otherwise asyncio keeps Nagle's algorithm, which
+    delays an answer by 40 ms.
     """
     family = socket.AF_INET6 if ":" in settings.host else socket.AF_INET
     with socket.socket(family, socket.SOCK_STREAM, socket.IPPROTO_TCP) as listener:

@@ -1,4 +1,4 @@
-"""Parts of a running server, as the routes use them. ``app`` creates the parts."""
+"""Parts of a running server that the routes use; the module ``app`` creates the parts."""
 
 from dataclasses import dataclass
 from typing import Annotated
@@ -47,10 +47,10 @@ class Service:
     readers: ThreadPool
     """Pool of threads that wait for the reading of cases."""
     surveyors: ThreadPool
-    """Pool of threads for cases that may name files, and for restarts, whose case may name files. Reading these
-    cases takes seconds."""
+    """Pool of threads for cases that may name files, and for restarts, whose case may name files. Reading a case with
+    files takes seconds."""
     sweepers: ThreadPool
-    """Pool of threads for sweeps, whose reading takes seconds. Submissions of single runs do not wait for these
+    """Pool of threads for sweeps, whose reading takes seconds; submissions of single runs do not wait for these
     threads."""
     reporters: Reporters
     """Pool of threads for reports of runs, which take minutes."""

@@ -24,7 +24,9 @@ class StartError(Exception):
 
 
 class SettingsError(StartError):
-    """Error: a setting cannot be used. The text names the setting, its value and the allowed values."""
+    """Error: a setting cannot be used. The message of this error names the setting, its value and the allowed
+    values.
+    """
 
     exit_code = 2
 
@@ -36,7 +38,7 @@ def memory_bytes() -> int:
 
 @dataclass(frozen=True)
 class Caps:
-    """Limits of an accepted case, by its estimate; None: no limit."""
+    """Limits of an accepted case, compared with the estimate of the case; None: no limit."""
 
     elements: int | None = 100_000_000
     steps: int | None = 100_000_000
@@ -44,7 +46,7 @@ class Caps:
     """Memory limit of all ranks together, bytes."""
     core_seconds: float | None = None
     wall_time: float | None = None
-    """Limit of the wall time of a run, s. A case with a smaller ``run.max_wall_time`` is stopped at that time."""
+    """Limit of the wall time of a run, s. A case with a smaller ``run.max_wall_time`` is stopped at its own limit."""
     queued: int = 1000
     """Largest number of open runs of one owner."""
     output_bytes: int | None = None
@@ -62,9 +64,10 @@ class Settings:
     port: int = 8750
     """Port of HTTP; 0: any free port."""
     zenoh_port: int | None = 7447
-    """Port of Zenoh; 0: any free port; None: no Zenoh router, clients follow runs over SSE."""
+    """Port of Zenoh; 0: any free port; None: no Zenoh router, so that clients follow runs over SSE."""
     slots: int = field(default_factory=usable_cores)
-    """Largest number of cores that all runs together use at a time; a run uses its ranks times its threads."""
+    """Largest number of cores that all runs together use at a time; a run uses its number of ranks times its number of
+    threads."""
     auth: bool = True
     web: Path | None = None
     """Folder of the live page, served at ``/``."""
@@ -74,10 +77,10 @@ class Settings:
     """Launcher of the site; empty: the launcher beside this Python, else the launcher in PATH."""
     worker: tuple[str, ...] = WORKER
     grace: float = 30.0
-    """Time in s between the request to stop a worker and the kill."""
+    """Time in s between the request to stop a worker and the forced kill of the worker."""
     end_runs: bool = False
-    """Whether all runs are cancelled when the server stops. Without this option the workers continue, and the next
-    server supervises them."""
+    """Whether all runs are cancelled when the server stops. If runs are not cancelled, the workers continue, and the
+    next server supervises them."""
     caps: Caps = field(default_factory=Caps)
     site: Site = field(default_factory=Site)
     """Site settings: launcher, and profiles of batch systems."""
@@ -99,8 +102,9 @@ class Settings:
 
     @property
     def database_url(self) -> str | URL:
-        """Returns the database URL in use. The URL is built from parts, because a file name with ``%``, ``?`` or
-        ``#`` would be misread in a text."""
+        """Returns the database URL in use. The URL is built from parts, because ``%``, ``?`` or ``#`` in a file name
+        would be misread in a URL text.
+        """
         return self.database or URL.create("sqlite", database=str(self.database_file))
 
     @property
@@ -110,7 +114,7 @@ class Settings:
 
 
 def loopback(host: str) -> bool:
-    """True if ``host`` can be reached from this machine only."""
+    """True if ``host`` can be reached only from this machine."""
     if host == "localhost":
         return True
     try:
@@ -126,7 +130,9 @@ def capped(site: Site) -> dict[str, float]:
 
 
 def site_of(path: Path | None) -> Site:
-    """Returns the site settings in a file; without a file, runs are started on this machine. Raises SettingsError."""
+    """Returns the site settings in a file; without a file, runs are started on this machine. Raises SettingsError if
+    the file is invalid.
+    """
     try:
         return Site() if path is None else read_site(path)
     except SiteError as error:
@@ -134,7 +140,9 @@ def site_of(path: Path | None) -> Site:
 
 
 def command(text: str, option: str = "--worker") -> tuple[str, ...]:
-    """Returns a command line as a list of arguments; no shell is used. Raises SettingsError."""
+    """Returns a command line as a list of arguments; no shell is used. Raises SettingsError if the command line is
+    invalid.
+    """
     try:
         words = tuple(shlex.split(text))
     except ValueError as error:

@@ -1,8 +1,8 @@
-"""The Zenoh router inside the server: workers publish to it, native clients subscribe to it.
+"""The Zenoh router inside the server: workers publish to the router, native clients subscribe to it.
 
-No other module of the server imports zenoh. Every token is a Zenoh user of its own and may subscribe to its owner's
-runs; every owner has one more user for the workers, which may publish there. Zenoh reads users and rules once, so the
-session is closed and opened again when the tokens change; clients reconnect by themselves and read missed messages from
+No other module of the server imports zenoh. Every token is a Zenoh user that may subscribe to the runs of its owner;
+every owner has one more Zenoh user with which the workers publish. Zenoh reads users and rules once; therefore the
+session is closed and opened again when the tokens change. Clients reconnect automatically and read missed messages from
 the journal.
 """
 
@@ -35,22 +35,22 @@ from .settings import StartError, loopback
 _log = logging.getLogger("conoid.server")
 _SECRET, _USERS = "server.secret", ".zenoh-users"
 _HANDSHAKE = 3000
-"""Time in ms in which a new connection must authenticate. The value was chosen because authentication takes two
-round trips."""
+"""Time in ms in which a new connection must authenticate; authentication takes two round trips (reason of the chosen
+value)."""
 _SECRET_BYTES, _SECRET_MOST = 32, 1 << 16
-"""Smallest length of the secret in bytes, and largest number of bytes that are read of its file."""
+"""Smallest length of the secret in bytes, and largest number of bytes that are read from its file."""
 _HEARS = ["put", "delete", "reply", "declare_queryable", "liveliness_token"]
 _ASKS = ["declare_subscriber", "query", "liveliness_query", "declare_liveliness_subscriber"]
 _ANSWERS = ["query", "declare_subscriber"]
 
 
 class TelemetryError(StartError):
-    """Error: the router cannot be opened. The text of the error is one line."""
+    """Error: the Zenoh router cannot be opened. The text of the error is one line."""
 
 
 @dataclass(frozen=True)
 class Reader:
-    """Access of a client to Zenoh. ``user`` is empty for a router without access control."""
+    """Access of a client to Zenoh. The user name ``user`` is empty for a router without access control."""
 
     port: int
     prefix: str
@@ -59,20 +59,20 @@ class Reader:
 
 
 class Telemetry:
-    """An open router session. Methods may be called from any thread."""
+    """An open session of the Zenoh router. Methods of the router may be called from any thread."""
 
     def __init__(
         self, runs: Path, host: str, port: int, tokens: Iterable[Token] | None, nodes: Slurm | None = None
     ) -> None:
-        """Opens the router. ``tokens`` is None for a router without access control; ``nodes``: endpoints for the
-        nodes of a cluster. On a full disk there is no router until ``follow`` can open one. Raises TelemetryError,
-        and OSError if the secret cannot be made.
+        """Opens the Zenoh router. ``tokens`` is None for a router without access control; ``nodes``: network endpoints
+        for the nodes of a cluster. On a full disk the server has no router until ``follow`` can open the router. Raises
+        TelemetryError; raises OSError if the secret cannot be made.
         """
         self._runs, self._host, self._nodes = runs, host, nodes
         self.port = port or _free_port(host)
         self._secret = _read_secret(runs)
         self._places = raise_limit()
-        """Largest number of sessions, and of connections that have not authenticated, at a time."""
+        """Largest number of simultaneous sessions, and largest number of connections that have not authenticated."""
         self._lock = threading.Lock()
         self._tokens = None if tokens is None else frozenset((token.id, token.owner) for token in tokens)
         self._session: zenoh.Session | None = None
@@ -83,7 +83,7 @@ class Telemetry:
 
     @property
     def local_endpoint(self) -> str:
-        """Endpoint of the router for the workers of this machine."""
+        """Network endpoint of the Zenoh router for the workers of this machine."""
         host = self._host if loopback(self._host) else _local(self._host)
         return f"tcp/{_bracketed(host)}:{self.port}"
 
@@ -96,7 +96,9 @@ class Telemetry:
         return Access(self.local_endpoint, prefix, user, self._password(user))
 
     def reader(self, owner: str, token: Token | None) -> Reader:
-        """Returns the credentials of a client, which are valid on return. Raises TelemetryError."""
+        """Returns the credentials of a client, which are valid on return. Raises TelemetryError if the router cannot be
+        opened.
+        """
         prefix = keys.owner_prefix(owner)
         if self._tokens is None or token is None:
             return Reader(self.port, prefix, "", "")
@@ -105,13 +107,14 @@ class Telemetry:
         return Reader(self.port, prefix, token.id, self._password(token.id))
 
     def follow(self, tokens: Iterable[Token]) -> None:
-        """Opens the router again if the tokens have changed."""
+        """Opens the Zenoh router again if the tokens have changed."""
         if self._tokens is not None:
             self.admit({(token.id, token.owner) for token in tokens})
 
     def admit(self, tokens: Iterable[tuple[str, str]]) -> None:
-        """Admits exactly the clients with these tokens (token id, owner). Raises TelemetryError; the next call tries
-        again."""
+        """Admits exactly the clients with the given tokens (token id, owner). Raises TelemetryError if the router
+        cannot be opened; the next call tries again.
+        """
         with self._lock:
             wanted = frozenset(tokens)
             if wanted == self._tokens and self._session is not None:
@@ -124,7 +127,9 @@ class Telemetry:
                 raise TelemetryError(f"the Zenoh router cannot be opened: {error.filename}: {error.strerror}") from None
 
     def publish(self, owner: str, status: Status) -> None:
-        """Publishes a message on Zenoh. The journal already has the message, so a lost sample loses no data."""
+        """Publishes a message on Zenoh. The journal already has the message, so that a lost Zenoh sample loses no
+        data.
+        """
         key = keys.message_key(keys.run_prefix(owner, status.run), status.channel)
         with self._lock:
             try:
@@ -134,7 +139,7 @@ class Telemetry:
                 _log.warning("a message of run %s was not published: %s", status.run, error)
 
     def close(self) -> None:
-        """Closes the router."""
+        """Closes the Zenoh router."""
         with self._lock:
             self._close()
 
@@ -147,7 +152,9 @@ class Telemetry:
         return hmac.new(self._secret, user.encode(), hashlib.sha256).hexdigest()
 
     def _open(self) -> zenoh.Session:
-        """Opens a session. Raises TelemetryError, OSError if the file of users cannot be written."""
+        """Opens a session of the Zenoh router. Raises TelemetryError; raises OSError if the file of users cannot be
+        written.
+        """
         users = self._runs / _USERS
         config = zenoh.Config()
         for key, value in self._config(users).items():
@@ -190,15 +197,16 @@ class Telemetry:
 
 
 def access_rules(tokens: Iterable[tuple[str, str]]) -> dict[str, Any]:
-    """Returns the access rules of Zenoh. The tokens of an owner may subscribe to the owner's keys, and the user of
-    the owner's workers may publish under these keys. Nothing else is allowed."""
+    """Returns the access rules of Zenoh. The tokens of an owner may subscribe to the owner's keys, and the Zenoh user
+    of the owner's workers may publish under these keys. The rules forbid everything else.
+    """
     readers: dict[str, list[str]] = {}
     for token, owner in tokens:
         readers.setdefault(owner, []).append(token)
     rules, subjects, policies = [], [], []
     for owner, users in readers.items():
         below = keys.everything(keys.owner_prefix(owner))
-        # `**` does not match the `@adv` chunk that carries the history of an advanced publisher.
+        # The key pattern `**` does not match the `@adv` chunk, which carries the history of an advanced publisher.
         expressions = [below, f"{below}/@adv/**"]
         for name, flow, messages in (
             ("asks", "ingress", _ASKS),
@@ -230,8 +238,9 @@ def _worker_user(owner: str) -> str:
 
 
 def _read_secret(runs: Path) -> bytes:
-    """Returns the secret from which all passwords are derived; it is made at the first start. Raises TelemetryError
-    for a file that is too short or that others can read, and OSError if the secret cannot be made.
+    """Returns the secret from which all passwords are derived; the secret is made at the first start. Raises
+    TelemetryError if the file of the secret is too short or if other users can read it; raises OSError if the secret
+    cannot be made.
     """
     path = runs / _SECRET
     remedy = "remove it, and the server makes a new one; clients that watch a run request a new password automatically"

@@ -22,19 +22,18 @@ from ..runs.journal import DAMAGED
 FORM = 1
 """Version of the stored form of a card. A card of another version is made again."""
 _KEYS, _LETTERS = 1000, 200
-"""Largest number of values of a case, and of characters of one value. The values were chosen because a case of ten
-parts has 500 values."""
+"""Largest number of values of a case, and largest number of characters of one value. A case of ten parts has 500 values
+(reason of the chosen limits)."""
 _RESULTS = 200
-"""Largest number of results of a run. The value was chosen because a run of twenty probes has 100 results."""
+"""Largest number of results of a run; a run of twenty probes has 100 results (reason of the chosen limit)."""
 _MOST_BYTES = 8 << 20
-"""Largest size in bytes of a case file that is read: ten times the largest body of a request, because the file has
-every default (chosen value)."""
+"""Largest size in bytes of a case file that is read (chosen value)."""
 _LEFT_OUT = ("digest", ".passed")
-"""Last words of the names of those results that are not numbers, such as texts."""
+"""Last words of the names of results that are texts, not numbers."""
 
 
 class Card(msgspec.Struct, kw_only=True, frozen=True):
-    """Values and results of one run; ``results`` is None before its end."""
+    """Values and results of one run; ``results`` is None before the end of the run."""
 
     title: str = ""
     values: dict[str, Scalar] = {}
@@ -45,7 +44,7 @@ class Card(msgspec.Struct, kw_only=True, frozen=True):
     references: int = 0
     """Number of reference values with which the run was compared."""
     missed: list[str] = []
-    """Names of the reference values that the run does not reach."""
+    """Names of the reference values from which the results of the run differ by more than the tolerance."""
 
 
 _decoder = msgspec.json.Decoder(Card)
@@ -57,7 +56,9 @@ def packed(card: Card) -> bytes:
 
 
 def unpacked(data: bytes) -> Card:
-    """Returns a card from its stored form. Raises msgspec.MsgspecError, zlib.error for other data."""
+    """Returns a card from its stored form. Raises msgspec.MsgspecError or zlib.error if the data is not a stored
+    card.
+    """
     return _decoder.decode(zlib.decompress(data))
 
 
@@ -80,7 +81,7 @@ def of(path: Path, final: bool) -> Card:
 
 
 def _number(value: float | None) -> float | None:
-    """Converts a result to float; None for an integer that is too large for a float."""
+    """Converts a result to float; returns None for an integer that is too large for a float."""
     try:
         return None if value is None else float(value)
     except OverflowError:

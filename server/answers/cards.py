@@ -1,5 +1,6 @@
-"""Cards of runs in the database. The cards are an index over the folders of runs, and can be made again from the
-folders."""
+"""Cards of runs in the database. The table of cards is an index over the folders of runs, and can be made again from
+the folders.
+"""
 
 import time
 import zlib
@@ -15,8 +16,7 @@ from . import card
 from .card import Card
 
 _PATIENCE = 0.5
-"""Time in s in which one request makes missing cards; the next request makes more. The value was chosen because some
-hundred cards are made in this time."""
+"""Time in s in which one request makes missing cards: some hundred cards (chosen value)."""
 
 
 class Cards:
@@ -41,7 +41,7 @@ class Cards:
         return found
 
     def _keep(self, made: list[KeptCard], found: dict[str, Card]) -> None:
-        """Stores cards. After a failure the same cards are made again for the next request."""
+        """Stores cards. If the cards cannot be stored, the next request makes the cards again."""
         try:
             self._store.keep_cards(made, {each.run: found[each.run].title for each in made})
         except SQLAlchemyError:
@@ -49,7 +49,7 @@ class Cards:
 
 
 def _read(kept: KeptCard | None, run: Run) -> Card | None:
-    """Returns the stored card if it belongs to the present state of the run, else None."""
+    """Returns the stored card of a run; None if the card was made before the run reached its present state."""
     if kept is None or kept.form != card.FORM or kept.final != run.state.final:
         return None
     try:

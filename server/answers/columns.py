@@ -1,8 +1,8 @@
 """Columns of history.csv for charts, reduced so that no peak is lost.
 
-Lines are gathered in groups of equal size. For each group the minimum and the maximum of each column are stored, in the
-order in which they occurred. When there are too many groups, pairs of groups are merged. The merging limits memory and
-the size of answers, and a file of any length is read once.
+The lines of history.csv are divided into groups of equal size. For each group of lines the minimum and the maximum of
+each column are stored, in the order in which they occurred. When there are too many groups of lines, pairs of groups
+are merged. The merging limits the memory and the size of answers.
 """
 
 import csv
@@ -19,28 +19,28 @@ from conoid.cases.reading import whole
 from ..runs.journal import Tail
 
 _GROUPS = 4096
-"""Largest number of groups of lines (chosen value). The number is larger than the number of pixels across a screen."""
+"""Largest number of groups of lines: more than the number of pixels across a screen (chosen value)."""
 _NUMBERS = 400_000
-"""Largest product of groups and columns. The value was chosen because so many numbers need 6 MB."""
+"""Largest product of the number of groups and the number of columns: 6 MB of numbers (chosen value)."""
 _SENT = 200_000
-"""Largest number of values in an answer. The value was chosen because so many values are 4 MB of JSON."""
+"""Largest number of values in an answer: 4 MB of JSON (chosen value)."""
 _BLOCK = 1 << 20
 """Number of bytes of one read (chosen value)."""
 _AT_ONCE = 32
-"""Largest number of blocks that are read for one answer (chosen value). This number of blocks has some 100,000 lines
-and takes half a second to read."""
+"""Largest number of blocks of history.csv that are read for one answer: some 100,000 lines, half a second (chosen
+value)."""
 _MOST_COLUMNS = 4000
-"""Largest number of columns that are read; further columns are ignored. The value was chosen because a case with a
-thousand probes has slightly more than a thousand columns."""
+"""Largest number of columns that are read; further columns are ignored. A case with a thousand probes has slightly more
+than a thousand columns (reason of the chosen limit)."""
 _TEXT = frozenset({"limiter"})
-"""Names of columns of text."""
+"""Names of columns that contain text."""
 csv.field_size_limit(1 << 30)
-"""Largest length of a field. The csv module refuses fields above this length. A field that is not a number becomes
-NaN."""
+"""Largest length in characters of a field of history.csv. The csv module refuses fields above this length. A field that
+is not a number becomes NaN."""
 
 
 class Columns:
-    """Content of a history.csv as far as the file has been read. The caller holds a lock."""
+    """Content of a history.csv file as far as the file has been read. The caller must hold the lock of this object."""
 
     def __init__(self, path: Path) -> None:
         self._path = path
@@ -50,22 +50,22 @@ class Columns:
         self._tail = Tail(self._path)
         self._file = self._size = 0
         self.units: dict[str, str] = {}
-        """Units of the columns of numbers, by name."""
+        """Units of the numeric columns, by name."""
         self.lines = 0
         self.behind = False
-        """True while the file has lines that have not been read."""
+        """True while history.csv has lines that have not been read."""
         self._width, self._every = 0, 1
         self._places: list[int] = []
-        """Positions of the columns of numbers in a line."""
+        """Positions of the numeric columns in a line."""
         self._kept: list[array[float]] = []
-        """Minimum and maximum of each group of ``_every`` lines, by column."""
+        """Minimum and maximum of each group of ``_every`` lines, by name of the column."""
         self._open: list[list[float]] = []
-        """Values of the lines of the last group, which is incomplete, by column."""
+        """Values of the lines of the last group, which is incomplete, by name of the column."""
         self._extremes: list[tuple[float, float]] = []
         self._last: list[float] = []
 
     def catch_up(self) -> None:
-        """Reads new lines, at most ``_AT_ONCE`` blocks of them. A file that was replaced is read from its beginning."""
+        """Reads at most ``_AT_ONCE`` blocks of new lines. A file that was replaced is read from its beginning."""
         if self._is_another():
             self._begin()
             self._is_another()
@@ -79,7 +79,8 @@ class Columns:
 
     def _is_another(self) -> bool:
         """Whether the file was replaced since the last call: a run that continues from a checkpoint writes a new
-        one."""
+        file.
+        """
         try:
             with whole.opened(self._path, links=False) as file:
                 now = os.fstat(file.fileno())
@@ -106,7 +107,7 @@ class Columns:
         pairs = [history.split(name) for name in names]
         self._width = len(names)
         places = {name: k for k, (name, _) in reversed([*enumerate(pairs)]) if name not in _TEXT}
-        self._places = sorted(places.values())[:_MOST_COLUMNS]  # a repeated name means its first column
+        self._places = sorted(places.values())[:_MOST_COLUMNS]  # a repeated name is its first column
         self.units = dict(pairs[k] for k in self._places)
         number = len(self._places)
         self._kept = [array("d") for _ in range(number)]
@@ -141,9 +142,9 @@ class Columns:
         }
 
     def values(self, names: Sequence[str], points: int) -> dict[str, list[float]]:
-        """Returns columns by name, of about ``points`` values at most. A short file gives all values. A file with more
-        lines gives the minimum and the maximum of each group of lines, in the order of their occurrence, and the last
-        value.
+        """Returns the columns, by name, with about ``points`` values each at most. A file with fewer lines than
+        ``points`` gives all values. A longer file gives the minimum and the maximum of each group of lines in the order
+        of occurrence, and the last value.
         """
         chosen = frozenset(names)
         places = {name: at for at, name in enumerate(self.units) if name in chosen}
@@ -161,7 +162,9 @@ class Columns:
 
 
 def extremes(values: Sequence[float]) -> tuple[float, float]:
-    """Returns the minimum and the maximum in the order of their first occurrence. NaN is ignored."""
+    """Returns the minimum and the maximum of the values, in the order of their first occurrence. NaN values are
+    ignored.
+    """
     total = sum(values)
     if total != total:
         values = [value for value in values if value == value]

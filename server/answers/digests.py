@@ -1,5 +1,4 @@
-"""SHA-256 of files. The hash is computed in slices, and is computed again only when the state of the file has
-changed."""
+"""SHA-256 of files. A hash is computed in slices of the file, and is computed again only if the file has changed."""
 
 import asyncio
 import hashlib
@@ -15,8 +14,8 @@ State = tuple[int, int, int, int, int]
 _KEPT = 10_000
 """Largest number of stored digests, 32 bytes each (chosen value)."""
 _SLICE, _CHUNK = 1 << 25, 1 << 18
-"""Number of bytes that one task hashes, and number of bytes of one read. The values were chosen because such a task
-takes 0.1 s, and the server handles other requests of the user between two tasks."""
+"""Number of bytes that one task hashes, and number of bytes of one read. The chosen number takes 0.1 s, so that the
+server handles other requests of the user between two tasks."""
 
 
 def state_of(file: BinaryIO) -> State:
@@ -26,7 +25,9 @@ def state_of(file: BinaryIO) -> State:
 
 
 class Digests:
-    """Cache of SHA-256 digests by the state of the file. The class is used in the thread of the event loop."""
+    """Cache of SHA-256 digests; the key of a digest is the state of its file. The class is used only in the thread of
+    the event loop.
+    """
 
     def __init__(self, pool: ThreadPool) -> None:
         """Creates an empty cache of digests."""
@@ -35,7 +36,9 @@ class Digests:
         self._locks: WeakValueDictionary[State, asyncio.Lock] = WeakValueDictionary()
 
     async def of(self, file: BinaryIO, state: State) -> bytes:
-        """Returns the SHA-256 of the first ``size`` bytes of a file. Raises OSError, ServiceError 503."""
+        """Returns the SHA-256 of the first ``size`` bytes of a file. Raises OSError; raises ServiceError with status
+        503 if the server is busy.
+        """
         lock = self._locks.setdefault(state, asyncio.Lock())
         async with lock:
             if state not in self._known:

@@ -1,4 +1,6 @@
-"""Download of files from a run's folder, whole or in part. No file outside the folder is ever sent."""
+"""Download of whole files, or parts of files, from the folder of a run. No file outside the folder of the run is ever
+sent.
+"""
 
 import base64
 import hashlib
@@ -21,10 +23,9 @@ from ..requests.user_limits import place_of
 from .digests import Digests, State, state_of
 
 _CHUNK = 1 << 18
-"""Number of bytes of one read and one send. The value was chosen because larger blocks are not faster."""
+"""Number of bytes of one read and of one send; larger blocks were not faster (measured)."""
 _SMALL = 1 << 20
-"""Largest size in bytes of a file that is sent and hashed in one step. The value was chosen because such a file
-takes 1 ms of CPU time."""
+"""Largest size in bytes of a file that is sent and hashed in one step: 1 ms of CPU time (chosen value)."""
 _RANGE = re.compile(r"bytes=(\d{0,18})-(\d{0,18})")
 _TYPES = {
     ".json": "application/json", ".jsonl": "application/x-ndjson", ".toml": "application/toml",
@@ -35,8 +36,9 @@ _TYPES = {
 
 @dataclass(frozen=True)
 class Entry:
-    """A file of a run. ``path`` is relative to the run's folder; ``modified`` is the time of its last change, Unix
-    s."""
+    """A file of a run. The field ``path`` is relative to the run's folder; ``modified`` is the Unix time of the last
+    change of the file, s.
+    """
 
     path: str
     size: int
@@ -44,7 +46,7 @@ class Entry:
 
 
 def listing(folder: Path) -> list[Entry]:
-    """Lists the regular files below ``folder`` by path, without links and hidden names."""
+    """Lists the regular files below ``folder``, sorted by path; links and hidden names are left out."""
     entries = []
     for here, folders, names in os.walk(folder):
         folders[:] = [name for name in folders if not name.startswith(".")]
@@ -60,9 +62,9 @@ def listing(folder: Path) -> list[Entry]:
 def open_inside(folder: Path, relative: str) -> BinaryIO:
     """Opens a regular file below ``folder``.
 
-    Raises ServiceError 404 for any other path. Each part of the path is opened relative to the folder before it, and
-    links are not followed. Therefore neither ``..`` nor a link leads to a file outside of the folder, even if the link
-    is created during the call.
+    Raises ServiceError with status 404 if the path is not a regular file below ``folder``. Each part of the path is
+    opened relative to its parent folder, and links are not followed. Therefore neither ``..`` nor a link leads to a
+    file outside of ``folder``, even if the link is created during the call.
     """
     parts = relative.split("/")
     if any(part in {"", ".", ".."} or part.startswith(".") or "\0" in part for part in parts):
@@ -89,18 +91,18 @@ def _walk(folder: Path, parts: list[str]) -> int:
 
 
 class Downloads:
-    """Sends files. The class is used in the thread of the event loop."""
+    """Sends files of runs as HTTP answers. The class is used only in the thread of the event loop."""
 
     def __init__(self, pool: ThreadPool) -> None:
-        """``pool`` has the threads that read files, with limits for each user."""
+        """``pool``: pool of threads that read files; the pool limits the threads of each user."""
         self._pool, self._digests = pool, Digests(pool)
 
     async def respond(self, request: Request, folder: Path, relative: str, ended: bool) -> Response:
-        """Sends the present content of a file, with Range, If-Range and If-None-Match; Repr-Digest has its sha256.
+        """Sends the present content of a file; handles the headers Range, If-Range and If-None-Match.
 
-        The header Repr-Digest is omitted for a large file of an open run, because such a file may grow faster than it
-        can be read. A growing file is sent up to its size at the time of the request. Raises ServiceError 404, 416,
-        429, 503.
+        The header Repr-Digest contains the sha256 of the file; the header is omitted for a large file of a run that has
+        not ended, because the file may grow faster than the server can hash it. A growing file is sent up to its size
+        at the time of the request. Raises ServiceError with status 404, 416, 429 or 503.
         """
         file, state = await self._pool.run(_opened, folder, relative)
         try:
@@ -132,9 +134,9 @@ class Downloads:
     async def whole(
         self, request: Request, folder: Path, relative: str, size: int, headers: Mapping[str, str], media_type: str
     ) -> Response:
-        """Sends a file that never changes and has ``size`` bytes, with headers of the caller. Raises ServiceError
-        404 for a missing file and for a file of another size, which is damaged and would be cached by the browser;
-        429, 503.
+        """Sends a file of ``size`` bytes that never changes, with the ``headers`` of the caller. Raises ServiceError
+        with status 404 if the file is missing or has another size, because a browser would cache a damaged file; raises
+        ServiceError with status 429 or 503 if the server is busy.
         """
         file, state = await self._pool.run(_opened, folder, relative)
         try:
@@ -154,14 +156,15 @@ def _opened(folder: Path, relative: str) -> tuple[BinaryIO, State]:
 
 
 def is_known(etag: str, text: str) -> bool:
-    """Whether an If-None-Match header contains this ETag or ``*``. A weak ETag, which proxies make, is equal to the
-    strong one here."""
+    """Whether the header If-None-Match contains this ETag or ``*``. A weak ETag, which proxies make from a strong ETag,
+    is treated as equal to the strong ETag.
+    """
     known = {tag.strip().removeprefix("W/") for tag in text.split(",")}
     return etag in known or known == {"*"}
 
 
 def tagged(body: bytes, known: str) -> Response:
-    """Returns JSON with an ETag, or 304 if the client has this ETag."""
+    """Returns the JSON body with an ETag; returns status 304 if the client already has this ETag."""
     etag = f'"{hashlib.sha256(body).hexdigest()[:32]}"'
     headers = {"ETag": etag, "Cache-Control": "private, no-cache"}
     if is_known(etag, known):
@@ -170,7 +173,9 @@ def tagged(body: bytes, known: str) -> Response:
 
 
 def _part(request: Request, size: int, etag: str) -> tuple[int, int, int]:
-    """Returns first byte, end and status of the answer. A request for several ranges gets the whole file."""
+    """Returns the first byte, the end, and the HTTP status of the answer. A request for several ranges gets the whole
+    file.
+    """
     match = _RANGE.fullmatch(request.headers.get("range", "").replace(" ", ""))
     if match is None or match[0] == "bytes=-" or request.headers.get("if-range", etag) != etag:
         return 0, size, 200
@@ -185,7 +190,7 @@ def _part(request: Request, size: int, etag: str) -> tuple[int, int, int]:
 
 
 class _FileResponse(StreamingResponse):
-    """Yields a part of an open file. Closes the file at the end, also when the client disconnects."""
+    """Yields a part of an open file. The file is closed at the end, even if the client disconnects."""
 
     def __init__(
         self, pool: ThreadPool, file: BinaryIO, begin: int, end: int, status: int, headers: Mapping[str, str]

@@ -1,4 +1,4 @@
-"""Filters of a list of runs as conditions of SQL: state, label, case, words and time."""
+"""Filters of a list of runs as SQL conditions: state, label, case, words and time."""
 
 import re
 from collections.abc import Iterator, Mapping, Sequence
@@ -19,26 +19,27 @@ _Column = sa.ColumnElement[str]
 
 @dataclass(frozen=True)
 class Chosen:
-    """Filters of a list of runs. A filter without a value excludes nothing. Times are Unix s."""
+    """Filters of a list of runs. A filter without a value excludes no run. All times are Unix times in s."""
 
     states: Sequence[State] = ()
     labels: Mapping[str, str] = field(default_factory=dict)
     case: str = ""
     """Name of the case; ``*`` stands for any characters."""
     words: Sequence[str] = ()
-    """Words of a search. Each word must occur in the case's name or title, in a label, state, cause or message, or
-    at the start of the id."""
+    """Words of a search. Each word must occur in the case's name or title, in a label, state, cause or message, or at
+    the start of the id."""
     since: float | None = None
     """Earliest time of submission (inclusive), Unix s."""
     until: float | None = None
     """Latest time of submission (exclusive), Unix s."""
     runs: Sequence[str] | None = None
-    """Runs with these ids; None: no filter."""
+    """Ids of the wanted runs; None: no filter by id."""
     changed: float | None = None
-    """Time, Unix s: the list has open runs, and runs that were submitted or ended at this time or later."""
+    """Unix time, s: the list contains all open runs, and the runs that were submitted or ended at this time or
+    later."""
 
     def where(self, owner: str) -> Iterator[sa.ColumnElement[bool]]:
-        """Yields the SQL conditions; a run must fulfil all of them."""
+        """Yields the SQL conditions; a run is in the list if it fulfils all conditions."""
         runs = RUNS.c
         yield runs.owner == owner
         if self.states:
@@ -64,7 +65,7 @@ def _literal(text: str) -> str:
 
 
 def _like(column: _Column, pattern: str) -> sa.ColumnElement[bool]:
-    """Compares without case in every database. Without this setting databases differ in how they compare capitals."""
+    """Compares texts without case in every database; databases differ in their default."""
     return sa.func.lower(column).like(pattern.lower(), escape=_ESCAPE)
 
 

@@ -13,23 +13,24 @@ from . import download
 from .schemas.history import FragmentCourse
 
 MOST = 200
-"""Largest number of snapshots that are read for the history of a fragment; the snapshots are evenly spaced. The
-value was chosen because so many snapshots take 0.2 s without cached tables."""
+"""Largest number of snapshots that are read for the history of a fragment; the snapshots are evenly spaced. The chosen
+number of snapshots takes 0.2 s without cached tables."""
 _KNOWN = 512
-"""Largest number of cached tables of fragments of all runs. Such a number of tables needs at most 50 MB."""
+"""Largest number of cached tables of fragments of all runs: at most 50 MB of memory."""
 _HEADER = 16
-"""Bytes at the start of a snapshot that contain the length of the header."""
+"""Number of bytes at the start of a snapshot that contain the length of the header."""
 _LONGEST = 1 << 24
 """Largest size in bytes of the header of a snapshot: a hundred times the longest header of a shipped case (chosen
 value)."""
 _DAMAGE = ValueError, IndexError, TypeError, OverflowError, RecursionError
-"""Errors that are raised while a header with wrong numbers or a truncated file is read."""
+"""Errors that are raised if a header has wrong numbers or a file is truncated."""
 _COLUMNS = "fragment_id", "fragment_mass", "fragment_velocity", "fragment_size", "fragment_tets"
 
 
 def course(folder: Path, snapshots: Sequence[Snapshot], label: int) -> FragmentCourse:
-    """Returns the history of the fragment ``label`` of the run in ``folder``. A snapshot that is damaged, or does
-    not contain the fragment, gives no row."""
+    """Returns the history of the fragment ``label`` of the run in ``folder``. A snapshot that is damaged, or does not
+    contain the fragment, adds no row to the history.
+    """
     most = min(MOST, len(snapshots))
     chosen = sorted({round(k * (len(snapshots) - 1) / max(most - 1, 1)) for k in range(most)})
     rows = [row for k in chosen for row in _found(folder, snapshots[k], label)]
@@ -50,7 +51,7 @@ def _found(folder: Path, message: Snapshot, label: int) -> Iterator[tuple[float,
 @lru_cache(maxsize=_KNOWN)
 def _table(folder: Path, path: str, _sha256: str) -> tuple[memoryview, ...]:
     """Returns the requested columns of the table of fragments; no other column is read from the file. Raises
-    ServiceError, OSError, ValueError.
+    ServiceError, OSError or ValueError.
     """
     with download.open_inside(folder, path) as file:
         start = file.read(_HEADER)

@@ -1,9 +1,9 @@
-"""History of a run from its journal, with a limited number of reports, so that a run of a million events is shown at
-once.
+"""History of a run from its journal, with a limited number of reports, so that the history of a run with a million
+events is shown at once.
 
-The journal is read once; later calls read only its new lines. For most lines only the message type is decoded. Every
-n-th report is kept unchanged, and n doubles when the limit is reached. All rare events (balance events, snapshots,
-states) are kept.
+The journal is read once; later calls read only the new lines of the journal. For most lines of the journal only the
+message type is decoded. Every n-th report is kept unchanged, and n doubles when the number of reports reaches the
+limit. All rare events are kept: balance events, snapshots and states.
 """
 
 import re
@@ -25,16 +25,16 @@ from .log_messages import KINDS, Notes
 _SAMPLES = 4096
 """Largest number of reports that are kept of a run: a few times the number of pixels of a chart (chosen value)."""
 _BYTES = 16 << 20
-"""Largest size of the kept reports of a run, bytes. The value was chosen because all reports of a run of some
-hundred ranks fit in it."""
+"""Largest size of the kept reports of a run, bytes: enough for all reports of a run of some hundred ranks (chosen
+value)."""
 _CUTS = 10_000
 """Number of newest balance events that are kept (chosen value)."""
 _RUNS = 16
-"""Number of runs whose history is cached, the most recently requested (chosen value)."""
+"""Number of most recently requested runs whose history is cached (chosen value)."""
 _BLOCK = 4 << 20
 """Number of bytes of one read of the journal (chosen value)."""
 _TYPE = slice(9, 13)
-"""The bytes of a journal line before the type of its message."""
+"""Bytes of a journal line before the type of its message."""
 
 _SHA256 = re.compile("[0-9a-f]{64}")
 _snapshot = msgspec.json.Decoder(Snapshot)
@@ -43,7 +43,9 @@ _status = msgspec.json.Decoder(Status)
 
 @dataclass(frozen=True)
 class Sample:
-    """A report: the newest line of each type at this time; b"" for a type without a line yet."""
+    """A report: at one simulated time, the newest journal line of each message type; b"" for a type without a line
+    yet.
+    """
 
     progress: bytes
     load: bytes
@@ -58,13 +60,13 @@ class Sample:
 
 @dataclass
 class History:
-    """History of a run, up to the part of its journal that has been read."""
+    """History of a run, from the part of the journal that has been read."""
 
     path: Path
     last: int = 0
-    """``seq`` of the last event."""
+    """``seq`` of the last event of the journal."""
     wall: float = 0.0
-    """Unix time of the last status, s."""
+    """Unix time of the last status message, s."""
     began: float | None = None
     """Unix time of the start of the worker process, s."""
     state: State = State.ACCEPTED
@@ -75,18 +77,19 @@ class History:
     """Lines of the journal about snapshots, by the number of the snapshot."""
     notes: Notes = field(default_factory=Notes)
     answers: dict[int, tuple[int, bytes]] = field(default_factory=dict)
-    """Answers for a run that has ended, by number of points: ``seq`` of the last event, and the body."""
+    """Cached answers for a run that has ended, by number of points: ``seq`` of the last event, and the HTTP body."""
 
     def __post_init__(self) -> None:
         self.lock = threading.Lock()
         self.columns = Columns(self.path.with_name(layout.HISTORY))
-        """Columns of history.csv. The file is read separately, under the same lock."""
+        """Columns of history.csv. The file history.csv is read separately from the journal, under the lock of the
+        history."""
         self._tail = Tail(self.path)
         self._progress = self._counts = self._snapshot = b""
         self._every, self._reports, self._size = 1, 0, 0
 
     def catch_up(self) -> None:
-        """Reads new lines of the journal. The caller holds the lock of the history."""
+        """Reads the new lines of the journal. The caller must hold the lock of the history."""
         while block := self._tail.block(_BLOCK):
             lines = block.split(b"\n")
             for line in lines:
@@ -139,7 +142,7 @@ _RARE = frozenset({b"stat", b"snap", b"bala"})
 
 
 class Histories:
-    """Cache of the most recently requested histories. The object may be used from any thread."""
+    """Cache of the most recently requested histories. The cache may be used from any thread."""
 
     def __init__(self) -> None:
         """Creates an empty cache."""
@@ -147,8 +150,9 @@ class Histories:
         self._known: OrderedDict[Path, History] = OrderedDict()
 
     def of(self, path: Path) -> History:
-        """Returns the history of the journal at ``path``. The caller takes the lock of the history and calls
-        ``catch_up``."""
+        """Returns the history of the journal at ``path``. The caller must take the lock of the history and call
+        ``catch_up``.
+        """
         with self._lock:
             found = self._known.setdefault(path, History(path))
             self._known.move_to_end(path)

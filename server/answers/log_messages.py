@@ -12,24 +12,24 @@ from ..runs.journal import DAMAGED
 _FIRST, _NEWEST = 200, 800
 """Number of log lines that are kept from the beginning and from the end of a log (chosen value)."""
 _LONGEST = 2000
-"""Largest number of characters of a message. The value was chosen because the longest warning of a shipped case has
-500 characters."""
+"""Largest number of characters of a message; the longest warning of a shipped case has 500 (reason of the chosen
+limit)."""
 _WARNINGS = 200
-"""Largest number of warnings (chosen value); later ones are dropped."""
+"""Largest number of warnings (chosen value); later warnings are dropped."""
 KINDS = frozenset({b'log"', b"stat", b"chec"})
-"""First letters of the types of the messages that this log shows."""
+"""First letters of the message types that the log shows."""
 
 _decode = msgspec.json.Decoder(Log | Status | Checkpoint).decode
 
 
 @dataclass
 class Notes:
-    """A bounded log: of a long log the lines in the middle are dropped and counted."""
+    """A log of limited length: the lines in the middle of a long log are dropped and counted."""
 
     first: list[bytes] = field(default_factory=list)
     newest: deque[bytes] = field(default_factory=lambda: deque(maxlen=_NEWEST))
     warnings: dict[str, bytes] = field(default_factory=dict)
-    """Lines of warnings and errors by text; a repeated text is stored once."""
+    """Journal lines of warnings and errors, by text; a repeated text is stored once."""
     left_out: int = 0
 
     def take(self, line: bytes) -> None:
@@ -49,13 +49,13 @@ class Notes:
             self.newest.append(line)
 
     def shown(self) -> dict[str, object]:
-        """Returns the log as it is sent, oldest message first."""
+        """Returns the messages of the log as they are sent to the page, oldest first."""
         lines = [msgspec.Raw(line) for line in (*self.first, *self.newest)]
         return {"log": lines, "log_left_out": self.left_out, "warnings": list(map(msgspec.Raw, self.warnings.values()))}
 
 
 def _shortened(message: Log | Status | Checkpoint, line: bytes) -> bytes:
-    """Shortens long texts of a line, and removes fields that its message type does not have."""
+    """Shortens long texts of a journal line, and removes fields that its message type does not have."""
     if len(line) <= _LONGEST:
         return line
     texts = {name: text for name in message.__struct_fields__ if isinstance(text := getattr(message, name), str)}

@@ -14,13 +14,13 @@ from conoid.cases.run import State
 from ..service import Service
 
 _BUCKETS = (0.005, 0.01, 0.025, 0.05, 0.1, 0.2, 0.5, 1.0, 5.0, 30.0)
-"""Bounds of the classes of the histogram of durations, s. The values were chosen around 50 and 200 ms, which are the
-limits for the duration of an answer."""
+"""Upper bounds of the bins of the histogram of durations, s. The chosen bounds are close to 50 and 200 ms, which are
+the required limits for the duration of an answer."""
 
 
 _METHODS = frozenset({"GET", "HEAD", "POST", "PUT", "PATCH", "DELETE", "OPTIONS"})
-"""HTTP methods that are counted separately. All other methods are counted together, because a client may send any
-word as a method and each count is kept for ever."""
+"""HTTP methods that are counted separately. All other HTTP methods are counted together, because a client may send any
+word as a method and each counter stays for ever."""
 
 
 class Metrics:
@@ -51,7 +51,7 @@ class Metrics:
 
 
 class _Runs(Collector):
-    """Gauges that are read from the parts of the server for each request of /metrics."""
+    """Gauges, whose values are read from the parts of the server at each request of /metrics."""
 
     def __init__(self, service: Service) -> None:
         self._service = service
@@ -91,8 +91,9 @@ class Timed:
         self._app, self._metrics = app, metrics
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Measures the time until the answer begins. An exception is passed on; an outer middleware answers it with
-        500."""
+        """Measures the time until the answer begins. An exception is raised again, so that an outer middleware answers
+        with status 500.
+        """
         if scope["type"] != "http":
             await self._app(scope, receive, send)
             return

@@ -1,5 +1,6 @@
-"""The OpenAPI document of the routes: the body of a case, which FastAPI takes as bytes, and the schema of each
-answer."""
+"""The OpenAPI document of the routes: the schema of a case, which FastAPI receives as bytes, and the schema of each
+answer.
+"""
 
 import math
 from functools import cache
@@ -100,7 +101,7 @@ ANSWERS: dict[tuple[str, str], dict[int, tuple[str, str]]] = {
     ("get", "/readyz"): {200: (_JSON, "Health"), 503: (_JSON, "Health")},
     ("get", "/metrics"): {200: (_TEXT, "")},
 }
-"""Answer of each route on success: status, media type, and the schema of a JSON answer."""
+"""Successful answer of each route: status, media type, and the schema of a JSON answer."""
 _OPEN = {"/v1/case.schema.json", "/healthz", "/readyz"}
 _REFUSALS = {
     400: "a parameter is wrong", 401: "no valid token", 403: "the token lacks the scope", 404: "there is none",
@@ -138,8 +139,9 @@ def refusals(method: str, path: str) -> set[int]:
 
 
 def install(app: FastAPI) -> None:
-    """Completes the OpenAPI document of ``app``: schema of a case, schema of each answer, each status, and the
-    token."""
+    """Completes the OpenAPI document of ``app``: adds the schema of a case, the schema of each answer, each status, and
+    the token.
+    """
     own = app.openapi
 
     @cache
@@ -162,7 +164,7 @@ def install(app: FastAPI) -> None:
 
 
 def _mark_null(properties: dict[str, dict[str, Any]]) -> None:
-    """Marks numbers with the default NaN as nullable. JSON has no NaN; an unknown number is null."""
+    """Marks numbers with the default NaN as nullable, because JSON has no NaN and an unknown number is null."""
     for schema in properties.values():
         default = schema.get("default")
         if isinstance(default, float) and math.isnan(default):

@@ -1,8 +1,8 @@
-"""The live page: its own files, and two JavaScript libraries from an installed wheel.
+"""The live page: the files of Conoid, and two JavaScript libraries from an installed Python package.
 
-three.js and ECharts are ES modules inside the package ``nicegui``. The metadata of the package has the paths of the
-files; the package is never imported, so its dependencies are not needed. All files are read once, at the start: no
-request opens a file.
+The libraries three.js and ECharts are ES modules inside the Python package ``nicegui``. The metadata of ``nicegui`` has
+the paths of the files; the package is never imported, so its dependencies are not needed. All files of the page are
+read once, at the start of the server: no request opens a file.
 """
 
 import gzip
@@ -39,24 +39,25 @@ TESTED = {
         "f55227d12dac0eb037cae13b1992091746fc017a275748e4a1bebd0f6244e7e5",
     ),
 }
-"""Path in the address below the version -> path in the package, and its sha256 in the wheel of ``VERSION`` on PyPI."""
+"""Maps the path of a library in its address to the path in the package, and to its sha256 in the wheel of ``VERSION``
+on PyPI."""
 _FOREVER = "public, max-age=31536000, immutable"
-"""Caching header of a file whose address contains its version: the file is cached for a year, the longest time that
-RFC 9111 allows."""
+"""Caching header of a file whose address contains its version. The file is cached for a year, the longest time that RFC
+9111 allows."""
 _WORTH = 1 << 10
-"""Smallest size in bytes of a file that is compressed: the size of one packet (chosen value)."""
+"""Smallest size in bytes of a file that is compressed: the size of one network packet (chosen value)."""
 _TYPES = {
     ".js": "text/javascript", ".css": "text/css", ".html": "text/html", ".json": "application/json",
     ".svg": "image/svg+xml", ".png": "image/png",
 }  # fmt: skip
 _FILE = re.compile(r'((?:href|src)=)"([^"]*)"')
-"""Address of a file in index.html."""
+"""Pattern of the address of a file in index.html."""
 _LEVEL = 6
-"""Compression level of gzip. At this level 1.1 MB are compressed to 0.37 MB in 50 ms, once for each file."""
+"""Compression level of gzip. At this level 1.1 MB of files are compressed to 0.37 MB in 50 ms."""
 
 
 class LibraryError(Exception):
-    """Error: the libraries cannot be served. The text of the error is one line."""
+    """Error: the JavaScript libraries cannot be served. The text of the error is one line."""
 
 
 @dataclass(frozen=True)
@@ -67,7 +68,7 @@ class Library:
 
     @cached_property
     def zipped(self) -> bytes:
-        """Returns the compressed file; it is made at the first request."""
+        """Returns the compressed file, which is made at the first request."""
         return gzip.compress(self.plain, _LEVEL, mtime=0)
 
     @cached_property
@@ -75,13 +76,14 @@ class Library:
         return hashlib.sha256(self.plain).hexdigest()[:32]
 
     def tag(self, zipped: bool) -> str:
-        """Returns the ETag of the plain or the compressed form."""
+        """Returns the ETag of the plain or the compressed file."""
         return f'"{self._digest}{"-gzip" if zipped else ""}"'
 
 
 def libraries() -> dict[str, Library]:
-    """Returns the files of the libraries by address. Raises LibraryError if the package is missing or has another
-    version."""
+    """Returns the files of the JavaScript libraries by address. Raises LibraryError if the package with the libraries
+    is missing or has another version.
+    """
     cure = f"pip install --no-deps {PACKAGE}=={VERSION}"
     try:
         installed = metadata.distribution(PACKAGE)
@@ -105,8 +107,8 @@ def _tested(path: Path, digest: str) -> Library:
 
 
 def install(app: FastAPI, web: Path, *, auth: bool) -> str:
-    """Mounts the page at ``/`` and the libraries at ``/lib``. Returns the problem with the libraries, or an empty
-    text. Raises OSError if the page cannot be read.
+    """Mounts the page at ``/`` and the JavaScript libraries at ``/lib``. Returns a text with the problem if the
+    libraries cannot be served, else an empty text. Raises OSError if the page cannot be read.
     """
     found: Mapping[str, Library] = {}
     problem = ""
@@ -124,9 +126,9 @@ def install(app: FastAPI, web: Path, *, auth: bool) -> str:
 
 
 def _addressed(page: Mapping[str, Library]) -> tuple[dict[str, Library], dict[str, Library]]:
-    """Returns the files of the page by address, then the same files by addresses that contain a hash of all of them.
-    index.html names the second addresses: a browser that has been here before requests no script again. index.html also
-    names all scripts, because a browser finds the imports of a script only when the script has arrived.
+    """Returns the files of the page by address, and again by addresses that contain a hash of all files. The file
+    index.html names all scripts with their hashed addresses, because a browser finds the imports of a script only when
+    the script has arrived.
     """
     if "index.html" not in page:
         return dict(page), {}
@@ -141,21 +143,21 @@ def _addressed(page: Mapping[str, Library]) -> tuple[dict[str, Library], dict[st
 
 
 def _is_shown(path: Path) -> bool:
-    """Whether a file belongs to the page, not to the Python package around it."""
+    """Whether a file belongs to the page, not to the Python package in the same folder."""
     return path.is_file() and not path.parent.name.startswith("_") and not path.name.startswith(("_", "."))
 
 
 class _Files:
-    """Serves files from memory by address. Browsers revalidate the files in ``fresh`` at each request, since the
-    server may have a newer version; files outside ``fresh`` never change.
+    """Serves files from memory by address. Browsers revalidate the files in ``fresh`` at each request, since the server
+    may have a newer version.
     """
 
     def __init__(self, fresh: Mapping[str, Library], lasting: Mapping[str, Library]) -> None:
         self._fresh, self._lasting = fresh, lasting
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Raises HTTPException 405 for other methods and 404 for unknown addresses. Every address without a route is
-        handled here.
+        """Raises HTTPException 405 if the method is not GET or HEAD, and 404 if the address is unknown. This object
+        handles every address without a route.
         """
         address = scope["path"].removeprefix(scope["root_path"]).removeprefix("/")
         file, lasts = self._fresh.get(address) or self._lasting.get(address), address in self._lasting

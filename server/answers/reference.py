@@ -1,4 +1,4 @@
-"""docs/reference/http.md, the reference of the HTTP interface, made from the OpenAPI document.
+"""Makes docs/reference/http.md, the reference of the HTTP interface, from the OpenAPI document.
 
 ``python -m conoid.server.answers.reference`` prints the page.
 """
@@ -24,13 +24,12 @@ _TITLES = (
     ("Cases", ("/v1/cases", "/v1/case.schema.json", "/v1/materials")), ("Runs", ("/v1/runs", "/v1/table")),
     ("Sweeps", ("/v1/sweeps",)), ("Files that cases name", ("/v1/files",)), ("The server", ("/",)),
 )  # fmt: skip
-"""Title of each section and the beginnings of its paths. A route belongs to the first section with a beginning of
-its path."""
+"""Title of each section, and the beginnings of the route paths that belong to the section."""
 Operation = dict[str, Any]
 
 
 def page() -> str:
-    """Returns the whole page."""
+    """Returns the whole reference page."""
     found: dict[str, list[str]] = {title: [] for title, _ in _TITLES}
     for path, operations in document()["paths"].items():
         title = next(title for title, starts in _TITLES if path.startswith(starts))

@@ -1,6 +1,6 @@
 """Rows of the table of runs as JSON.
 
-The values of similar cases are sent once for all their runs; a row has only the values that differ from these common
+The common values of similar cases are sent once; each table row contains only the values that differ from the common
 values.
 """
 
@@ -17,13 +17,13 @@ from conoid.cases.reference.key_units import unit_of_key
 from .card import Card
 
 MOST_BYTES = 4 << 20
-"""Largest size in bytes of the rows and cases of an answer. The value was chosen because 2,000 runs of a case with
-fifty results fit in it."""
+"""Largest size in bytes of the table rows and cases of an answer. The limit is enough for 2,000 runs of a case with
+fifty results (reason of the chosen value)."""
 _ALIKE = 0.8
-"""Smallest share of common keys for which two cases are similar (chosen value)."""
+"""Two cases are similar if at least this fraction of their keys is common (chosen value)."""
 _GROUPS = 50
-"""Largest number of groups of similar cases in an answer. Runs of further groups have no values. The value was
-chosen because 50 cases of 300 values are 0.6 MB."""
+"""Largest number of groups of similar cases in an answer; runs of further groups have no values. The values of 50
+groups of 300 values each are 0.6 MB (reason of the chosen number)."""
 
 
 @dataclass
@@ -41,14 +41,14 @@ class Group:
         return both >= _ALIKE * (len(self.values) + len(keys) - both)
 
     def shown(self) -> dict[str, Any]:
-        """Returns the group as it is sent."""
+        """Returns the group in the form in which it is sent."""
         units = {key: unit for key in self.values if (unit := unit_of_key(key))}
         results = [{"name": name, "unit": unit} for name, unit in self.results.items()]
         return {"values": self.values, "units": units, "results": results}
 
 
 class Table:
-    """A table that is filled run by run up to a size of ``MOST_BYTES``."""
+    """A table of runs, filled until it has ``MOST_BYTES``."""
 
     def __init__(self) -> None:
         """Creates a table without rows."""
@@ -59,7 +59,9 @@ class Table:
         self._bytes = 0
 
     def add(self, line: dict[str, Any], card: Card | None) -> bool:
-        """Adds the row of a run. ``line``: line of the run in a list. Returns False if the answer is full."""
+        """Adds the table row of a run. ``line``: data of the run as in the list of runs. Returns False if the answer is
+        full.
+        """
         groups = len(self.groups)
         row = msgspec.json.encode({**line, **self._of_card(card)})
         size = len(row) + sum(len(msgspec.json.encode(group.values)) for group in self.groups[groups:])
@@ -93,14 +95,18 @@ class Table:
 
 
 def _others(common: Mapping[str, Scalar], values: Mapping[str, Scalar]) -> Iterator[tuple[str, Scalar | None]]:
-    """Yields values that differ from ``common``; None for a key that is missing in ``values``."""
+    """Yields the values that differ from ``common``; yields None for a key of ``common`` that is missing in
+    ``values``.
+    """
     for key in {**common, **values}:
         if common.get(key) != values.get(key):
             yield key, values.get(key)
 
 
 def short(ids: Sequence[str], least: int) -> dict[str, str]:
-    """Returns the shortest unique prefix of each of the sorted ``ids``, of at least ``least`` characters."""
+    """Returns, for each of the sorted ``ids``, the shortest prefix that is unique, with at least ``least``
+    characters.
+    """
     shared = [0, *starmap(_shared, pairwise(ids)), 0]
     return {each: each[: max(least, 1 + max(about))] for each, about in zip(ids, pairwise(shared), strict=True)}
 

@@ -1,4 +1,4 @@
-"""History of a run as an answer: columns over the reports, reduced to the requested number of points."""
+"""The history of a run as an HTTP answer: columns over the reports, reduced to the requested number of points."""
 
 import time
 from collections.abc import Sequence
@@ -14,8 +14,7 @@ from .history import History, Sample
 
 T = TypeVar("T")
 _NUMBERS = 100_000
-"""Largest product of ranks, phases and times in an answer. The value was chosen because so many numbers are a
-megabyte of JSON."""
+"""Largest product of ranks, phases and times in an answer: a megabyte of JSON (chosen value)."""
 _ANSWERS = 4
 """Number of cached answers of a run, with different numbers of points (chosen value)."""
 _progress = msgspec.json.Decoder(Progress)
@@ -25,8 +24,9 @@ _snapshot = msgspec.json.Decoder(Snapshot)
 
 
 def body(history: History, points: int) -> bytes:
-    """Returns the whole answer. For a run that has ended the answer is made once and cached. The caller holds the
-    lock of the history."""
+    """Returns the whole history as an HTTP answer. The answer for a run that has ended is made once and cached. The
+    caller must hold the lock of the history.
+    """
     last, known = history.answers.get(points, (-1, b""))
     if last == history.last and history.state.final:
         return known
@@ -56,7 +56,7 @@ def _body(history: History, points: int) -> bytes:
 
 
 def listed(history: History) -> list[msgspec.Raw]:
-    """Returns the messages about snapshots, by number."""
+    """Returns the journal messages about snapshots, by number."""
     return [msgspec.Raw(history.snapshots[n]) for n in sorted(history.snapshots)]
 
 
@@ -74,7 +74,9 @@ class _Report(msgspec.Struct, frozen=True):
 
 
 def _read(sample: Sample) -> _Report | None:
-    """Decodes a report; None if its line with the load is damaged. All other damaged lines are omitted."""
+    """Decodes a report; returns None if the journal line with the load is damaged. Damaged journal lines of all other
+    types are omitted.
+    """
     load = _sound(_load, sample.load)
     if load is None:
         return None
@@ -84,7 +86,7 @@ def _read(sample: Sample) -> _Report | None:
 
 
 def _sound(decoder: msgspec.json.Decoder[T], line: bytes) -> T | None:
-    """Decodes a line; None for an empty or damaged line."""
+    """Decodes a journal line; returns None for an empty or damaged line."""
     try:
         return decoder.decode(line) if line else None
     except DAMAGED:
@@ -106,7 +108,7 @@ def _spread(items: Sequence[Any], most: int) -> list[Any]:
 
 
 def _columns(reports: list[_Report], began: float) -> dict[str, list[Any]]:
-    """Returns the columns by name."""
+    """Returns the columns of the history by name."""
     columns: dict[str, list[Any]] = {
         "t": [r.load.t for r in reports],
         "step": [r.load.step for r in reports],
@@ -137,7 +139,7 @@ def _sizes(message: Counts | Snapshot | None) -> dict[str, Any]:
 
 
 def _parts(reports: list[_Report]) -> dict[str, dict[str, list[float | None]]]:
-    """Returns energies by part and name, one value for each report; empty for a case with one part."""
+    """Returns energies by part and name, one value for each report; the result is empty for a case with one part."""
     parts = [report.progress.parts if report.progress is not None else {} for report in reports]
     names = {part: None for each in parts for part in each}
     return {
@@ -147,7 +149,8 @@ def _parts(reports: list[_Report]) -> dict[str, dict[str, list[float | None]]]:
 
 def _once(reports: list[_Report]) -> list[_Report]:
     """Removes repeated times. A run that continued from a checkpoint reports some steps twice; the later report is
-    kept."""
+    kept.
+    """
     kept: list[_Report] = []
     for report in reversed(reports):
         if not kept or report.load.step < kept[-1].load.step:
@@ -156,14 +159,15 @@ def _once(reports: list[_Report]) -> list[_Report]:
 
 
 def _shares(load: Load) -> dict[str, float]:
-    """Returns the share of each phase in the CPU time of all ranks."""
+    """Returns the fraction of CPU time that each phase takes, over all ranks."""
     total = sum(map(sum, load.phases.values()))
     return {name: sum(seconds) / total if total > 0.0 else 0.0 for name, seconds in load.phases.items()}
 
 
 def _ranks(loads: list[Load]) -> dict[str, Any]:
-    """Returns CPU seconds of each rank and phase over the steps of a report, and the waiting time within
-    ``exchange``."""
+    """Returns the CPU time of each rank and phase over the steps of a report, and the waiting time within ``exchange``,
+    s.
+    """
     names = {name: None for load in loads for name in load.phases}
     return {
         "t": [load.t for load in loads], "steps": [load.steps for load in loads],

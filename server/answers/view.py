@@ -1,4 +1,4 @@
-"""A run as JSON. A time is Unix s unless its name has another unit."""
+"""A run as JSON. A time is a Unix time in s unless its name contains another unit."""
 
 import base64
 import hashlib
@@ -31,12 +31,12 @@ class Snapshot:
 
     @property
     def etag(self) -> str:
-        """ETag that changes with any change of the body."""
+        """ETag of the body; a change of the body changes the ETag."""
         return f'"{hashlib.sha256(self.body).hexdigest()[:32]}"'
 
 
 def snapshot(service: Service, run: Run) -> Snapshot:
-    """Returns everything about a run: state, progress and, after its end, the outcome."""
+    """Returns all data of a run: state, progress and, after the end of the run, the outcome."""
     path = service.settings.runs / run.id
     made = _submission(path)
     progress = service.supervisor.progress(run.id)
@@ -53,7 +53,9 @@ def snapshot(service: Service, run: Run) -> Snapshot:
 
 
 def _submission(path: Path) -> folder.Submission | None:
-    """Returns None if the file is missing or damaged, because the state of the run does not depend on this file."""
+    """Returns the decoded file; None if the file is missing or damaged, because the state of the run does not depend on
+    this file.
+    """
     try:
         return folder.submission(path)
     except (OSError, msgspec.MsgspecError):
@@ -61,7 +63,7 @@ def _submission(path: Path) -> folder.Submission | None:
 
 
 def outcome(path: Path) -> Outcome | None:
-    """Returns None if the file is missing, damaged or not readable."""
+    """Returns the content of the file; None if the file is missing, damaged or not readable."""
     try:
         return folder.outcome(path)
     except OSError:
@@ -69,7 +71,9 @@ def outcome(path: Path) -> Outcome | None:
 
 
 def brief(service: Service, run: Run, labels: Mapping[str, str] | None = None) -> dict[str, Any]:
-    """Returns the line of a run in a list. Labels that are not given are read from the run's folder."""
+    """Returns the data of a run for the list of runs. Labels that the caller does not give are read from the run's
+    folder.
+    """
     return {
         "id": run.id,
         "owner": run.owner,
@@ -90,7 +94,9 @@ def brief(service: Service, run: Run, labels: Mapping[str, str] | None = None) -
 
 
 def briefs(service: Service, runs: Sequence[Run]) -> list[dict[str, Any]]:
-    """Returns the lines of a list with the present states. Labels are read from the database, so no file is opened."""
+    """Returns the data of several runs for the list, with the present states. The labels of runs are read from the
+    database, so that no file is opened.
+    """
     labels = service.store.labels([run.id for run in runs])
     shorts = short_ids(service, runs)
     return [
@@ -108,12 +114,12 @@ def short_ids(service: Service, runs: Sequence[Run]) -> dict[str, str]:
 
 
 def to_cursor(run: Run) -> str:
-    """Returns the start of the next page as an opaque word for the client."""
+    """Returns the cursor of the next page: an opaque text for the client."""
     return base64.urlsafe_b64encode(run.id.encode()).decode().rstrip("=")
 
 
 def from_cursor(cursor: str) -> str:
-    """Returns the id in a cursor. Raises ServiceError 400."""
+    """Returns the id that a cursor contains. Raises ServiceError with status 400 if the cursor is invalid."""
     try:
         run_id = base64.urlsafe_b64decode(cursor + "=" * (-len(cursor) % 4)).decode("ascii")
     except ValueError:

@@ -13,8 +13,8 @@ _BUSY = 2000
 """Time in ms for which SQLite waits for a lock of another process (chosen value). The time is longer than any
 transaction of this server, and shorter than the time limit of a request."""
 _TABLES = 1 << 16
-"""Bytes of free disk space below which SQLite cannot open a database, because its log and its shared memory need
-space. Measured: 32 KiB."""
+"""Bytes of free disk space below which SQLite cannot open a database, because SQLite needs space for its log and its
+shared memory. Measured: 32 KiB."""
 
 
 class StoreError(StartError):
@@ -22,8 +22,9 @@ class StoreError(StartError):
 
 
 def failure(url: str | sa.URL, error: Exception, deed: str = "used") -> StoreError:
-    """Returns the message for a database that failed: its file, or its address without the password, and the error.
-    ``deed``: the operation that failed."""
+    """Returns the message for a failed database: the file, or the address without the password, and the error.
+    ``deed``: name of the operation that failed.
+    """
     try:
         made = sa.make_url(url)
         sqlite = made.get_backend_name() == "sqlite" and made.database
@@ -44,7 +45,7 @@ def _full(folder: Path) -> bool:
 
 
 def engine_of(url: str | sa.URL) -> sa.Engine:
-    """Opens the database. Raises SQLAlchemyError, and ImportError if the driver is not installed."""
+    """Opens the database. Raises SQLAlchemyError; raises ImportError if the driver of the database is not installed."""
     made = sa.make_url(url)
     engine = sa.create_engine(made, pool_pre_ping=made.get_backend_name() != "sqlite")
     if engine.dialect.name == "sqlite":
@@ -53,20 +54,21 @@ def engine_of(url: str | sa.URL) -> sa.Engine:
 
 
 def _tune(connection: Any, _record: object) -> None:
-    """Switches SQLite to write-ahead logging (WAL), so that readers do not wait for a writer, and replaces its
-    lower() by a function that converts all letters."""
+    """Switches SQLite to write-ahead logging (WAL), so that readers do not wait for a writer."""
     for pragma in ("journal_mode=wal", f"busy_timeout={_BUSY}"):
         connection.execute(f"pragma {pragma}").close()
     connection.create_function("lower", 1, _lower, deterministic=True)
 
 
 def _lower(text: str | None) -> str | None:
-    """Lower case of all letters. SQLite's own function converts ASCII only."""
+    """Converts all letters to lower case; the function of SQLite converts only ASCII letters."""
     return text if text is None else str(text).lower()
 
 
 def identity_of(engine: sa.Engine) -> tuple[int, int] | None:
-    """Returns device and inode of the file of an SQLite database; None for other databases and for a missing file."""
+    """Returns the device and the inode of the file of an SQLite database; returns None for other databases or a missing
+    file.
+    """
     place = engine.url.database if engine.dialect.name == "sqlite" else None
     try:
         status = os.stat(place) if place else None

@@ -1,8 +1,8 @@
-"""Identity of a server: one folder of runs and one database, each with the name of the other.
+"""Identity of a server: the folder of runs and the database each store the identity of the other.
 
-Two wrong settings are refused. A second server on the same database would mark the runs of the first server as lost. A
-server on a copy of a folder would stop the workers of the original. ``adopt`` binds a folder and a database that were
-moved, or restored from a backup.
+The server refuses to start with the folder or the database of another server. A second server on the same database
+would mark the runs of the first server as lost. A server on a copy of a folder would stop the workers of the original
+folder. The command ``adopt`` binds a folder and a database that were moved, or restored from a backup.
 """
 
 import secrets
@@ -19,18 +19,19 @@ from .store import Bond, Store
 
 FILE = "server.identity"
 _MOST = 1 << 16
-"""Largest number of bytes of the identity file that are read. The value was chosen because the file has some hundred
-bytes."""
+"""Largest number of bytes of the identity file that are read; the file has some hundred bytes (reason of the chosen
+limit)."""
 
 
 class IdentityError(SettingsError):
-    """Error: folder and database do not belong together, or belong to another place. The text of the error is one
-    line."""
+    """Error: folder and database do not belong together, or were moved from another place. The text of the error is one
+    line.
+    """
 
 
 @dataclass(frozen=True)
 class Pair:
-    """The identities in folder and database; None for a new folder or database."""
+    """The identities that folder and database store; None for a new folder or database."""
 
     place: str
     folder: Bond | None
@@ -38,8 +39,8 @@ class Pair:
 
 
 def require(runs: Path, store: Store) -> None:
-    """Binds a new folder and a new database. Raises IdentityError if folder and database do not belong together,
-    OSError, SQLAlchemyError.
+    """Binds a new folder of runs and a new database to each other. Raises IdentityError if folder and database do not
+    belong together; raises OSError or SQLAlchemyError.
     """
     found = _look(runs, store)
     if why := _wrong(found):
@@ -52,8 +53,8 @@ def require(runs: Path, store: Store) -> None:
 
 
 def adopt(runs: Path, store: Store) -> str:
-    """Binds folder and database to each other at their present place. Returns the previous identities in one line.
-    Raises OSError, SQLAlchemyError.
+    """Binds folder and database to each other at their present place. Returns the previous identities of folder and
+    database as one line of text. Raises OSError or SQLAlchemyError.
     """
     try:
         found = _look(runs, store)
@@ -67,7 +68,7 @@ def adopt(runs: Path, store: Store) -> str:
 
 
 def _look(runs: Path, store: Store) -> Pair:
-    """Reads the identity file of the folder. Raises IdentityError for a damaged file."""
+    """Reads the identity file of the folder of runs. Raises IdentityError if the identity file is damaged."""
     place = str(runs.resolve())
     try:
         folder = msgspec.json.decode(whole.read(runs / FILE, _MOST), type=Bond)
@@ -81,8 +82,9 @@ def _look(runs: Path, store: Store) -> Pair:
 
 
 def _wrong(found: Pair) -> str:
-    """Returns the reason for which folder and database do not belong together; empty if they belong together or can
-    be bound."""
+    """Returns the reason why folder and database do not belong together; empty if they belong together or can be
+    bound.
+    """
     if found.folder is not None and found.folder.place != found.place:
         return f"this folder is a copy of {found.folder.place}, or was moved from there"
     if found.database is None:

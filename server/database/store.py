@@ -25,7 +25,7 @@ from .tables import BONDS, CARDS, KEYS, LABELS, META, RUNS, TOKENS
 _ONLY = 1
 """Key of the single row in the table that binds the database to a server."""
 _AT_ONCE = 500
-"""Largest number of ids in one SQL statement. The value was chosen because older versions of SQLite allow 999."""
+"""Largest number of ids in one SQL statement; older versions of SQLite allow 999 (reason of the chosen value)."""
 
 
 @dataclass(frozen=True)
@@ -41,7 +41,7 @@ class Token:
 
 
 class Bond(msgspec.Struct, frozen=True):
-    """The server to which a database and the folder of runs at ``place`` belong."""
+    """Identity that the database stores: the server, and the path ``place`` of the folder of runs."""
 
     server: str
     place: str
@@ -49,7 +49,7 @@ class Bond(msgspec.Struct, frozen=True):
 
 @dataclass(frozen=True)
 class KeptCard:
-    """A stored card of a run (card.py). ``final``: the card was made after the end of the run."""
+    """A stored card of a run (card.py). ``final``: whether the card was made after the end of the run."""
 
     run: str
     form: int
@@ -58,11 +58,12 @@ class KeptCard:
 
 
 class Store:
-    """The database. Methods may be called from any thread. Each method is one transaction, and raises
-    SQLAlchemyError on failure."""
+    """The database of the server. Methods of the database may be called from any thread. Each method of the database is
+    one transaction, and raises SQLAlchemyError on failure.
+    """
 
     def __init__(self, url: str | sa.URL) -> None:
-        """Opens the database and creates missing tables. Raises StoreError."""
+        """Opens the database and creates missing tables. Raises StoreError if the database cannot be opened."""
         try:
             self._engine = engine_of(url)
             self.unlabelled = not sa.inspect(self._engine).has_table(LABELS.name)
@@ -79,8 +80,7 @@ class Store:
         self._engine.dispose()
 
     def probe(self) -> None:
-        """Checks that the database can be written. Raises SQLAlchemyError if a write fails, or if the file of the
-        database was removed."""
+        """Raises SQLAlchemyError if the database cannot be written, or if its file was removed."""
         if identity_of(self._engine) != self._file:
             raise SQLAlchemyError("the file of the database has been removed or replaced")
         with self._engine.connect() as connection:
@@ -93,19 +93,20 @@ class Store:
     # The server -------------------------------------------------------------------------------------------------------
 
     def bond(self) -> "Bond | None":
-        """Returns the server and folder of runs of the database; None for a new database."""
+        """Returns the server and the folder of runs that the database stores; None for a new database."""
         with self._engine.connect() as connection:
             row = connection.execute(sa.select(BONDS.c.server, BONDS.c.place)).first()
         return None if row is None else Bond(row[0], row[1])
 
     def bind(self, bond: "Bond") -> None:
-        """Stores server and folder in a new database. If another server has stored its own before, nothing is
-        changed."""
+        """Stores server and folder of runs in a new database. If the database already belongs to another server, the
+        database is not changed.
+        """
         with suppress(sa.exc.IntegrityError), self._engine.begin() as connection:
             connection.execute(sa.insert(BONDS).values(number=_ONLY, server=bond.server, place=bond.place))
 
     def rebind(self, bond: "Bond") -> None:
-        """Replaces the server and folder of the database."""
+        """Replaces the server and the folder of runs that the database stores."""
         with self._engine.begin() as connection:
             connection.execute(sa.delete(BONDS))
             connection.execute(sa.insert(BONDS).values(number=_ONLY, server=bond.server, place=bond.place))
@@ -113,7 +114,7 @@ class Store:
     # Runs -------------------------------------------------------------------------------------------------------------
 
     def add(self, run: Run, key: str | None, labels: Mapping[str, str] | None = None) -> None:
-        """Adds a run, its labels, and its idempotency key. For a known run, changes state and labels."""
+        """Adds a run, its labels, and its idempotency key. If the run exists, changes its state and labels."""
         known = sa.select(KEYS.c.run).where(KEYS.c.owner == run.owner, KEYS.c.key == key)
         with self._engine.begin() as connection:
             self._put(connection, run)
@@ -144,7 +145,7 @@ class Store:
         return found
 
     def save(self, run: Run) -> None:
-        """Updates the row of a run."""
+        """Updates the table row of a run."""
         with self._engine.begin() as connection:
             self._put(connection, run)
 
@@ -160,20 +161,21 @@ class Store:
             return [_run(row) for row in connection.execute(sa.select(RUNS)).mappings()]
 
     def get(self, run_id: str) -> Run | None:
-        """Returns a run of any owner."""
+        """Returns a run by its id, for any owner."""
         with self._engine.connect() as connection:
             row = connection.execute(sa.select(RUNS).where(RUNS.c.id == run_id)).mappings().first()
         return None if row is None else _run(row)
 
     def some(self, run_ids: Sequence[str]) -> dict[str, Run]:
-        """Returns the known runs among these ids, of any owner, by id."""
+        """Returns the runs with the given ids by id, of any owner; unknown ids are left out."""
         with self._engine.connect() as connection:
             rows = (connection.execute(sa.select(RUNS).where(RUNS.c.id.in_(some))) for some in _parts(run_ids))
             return {row["id"]: _run(row) for found in rows for row in found.mappings()}
 
     def page(self, owner: str, chosen: Chosen, before: str | None, limit: int) -> list[Run]:
-        """Returns at most ``limit`` runs of ``owner`` that match the filters ``chosen``, newest first, older than
-        the run ``before``."""
+        """Returns at most ``limit`` runs of ``owner`` that match the filters ``chosen``, newest first; all are older
+        than the run ``before``.
+        """
         query = sa.select(RUNS).where(*chosen.where(owner)).order_by(RUNS.c.id.desc()).limit(limit)
         if before is not None:
             query = query.where(RUNS.c.id < before)
@@ -181,8 +183,9 @@ class Store:
             return [_run(row) for row in connection.execute(query).mappings()]
 
     def ids_about(self, owner: str, first: str, last: str) -> list[str]:
-        """Returns the sorted ids of all runs of ``owner`` from ``first`` to ``last``, and the next id before and
-        after this range."""
+        """Returns the sorted ids of the runs of ``owner`` from ``first`` to ``last``, and one id before and after
+        them.
+        """
         own = sa.select(RUNS.c.id).where(RUNS.c.owner == owner)
         before = own.where(RUNS.c.id < first).order_by(RUNS.c.id.desc()).limit(1)
         after = own.where(RUNS.c.id > last).order_by(RUNS.c.id).limit(1)
@@ -191,13 +194,13 @@ class Store:
             return [run_id for query in (before, within, after) for (run_id,) in connection.execute(query)]
 
     def cards(self, run_ids: Sequence[str]) -> list[KeptCard]:
-        """Returns the stored cards of these runs."""
+        """Returns the stored cards of the given runs."""
         with self._engine.connect() as connection:
             found = (connection.execute(sa.select(CARDS).where(CARDS.c.run.in_(some))) for some in _parts(run_ids))
             return [KeptCard(*row) for rows in found for row in rows]
 
     def keep_cards(self, cards: Sequence[KeptCard], titles: Mapping[str, str]) -> None:
-        """Stores cards and replaces earlier cards of the same runs. Runs of an older database get their ``titles``."""
+        """Stores cards; replaces earlier cards of the same runs. Runs of an older database get their ``titles``."""
         with self._engine.begin() as connection:
             for card in cards:
                 connection.execute(sa.delete(CARDS).where(CARDS.c.run == card.run))
@@ -225,7 +228,7 @@ class Store:
             return {row["id"]: _run(row) for row in connection.execute(query).mappings()}
 
     def taken(self) -> list[Took]:
-        """Returns the use of cores of every run that has ended."""
+        """Returns, for every run that has ended, how many cores it used and when."""
         query = sa.select(RUNS.c.owner, RUNS.c.ranks * RUNS.c.threads, RUNS.c.started, RUNS.c.finished)
         ended = query.where(RUNS.c.state.not_in(OPEN), RUNS.c.started > 0.0)
         with self._engine.connect() as connection:
@@ -252,7 +255,7 @@ class Store:
             connection.execute(sa.insert(TOKENS).values(values))
 
     def token(self, token_id: str) -> Token | None:
-        """Returns a token if it is not revoked."""
+        """Returns a token by its hash; None if the token is unknown or revoked."""
         query = sa.select(TOKENS).where(TOKENS.c.id == token_id, TOKENS.c.revoked.is_(False))
         with self._engine.connect() as connection:
             row = connection.execute(query).mappings().first()
@@ -265,15 +268,14 @@ class Store:
             return [_token(row) for row in connection.execute(query).mappings()]
 
     def revoke(self, token_id: str) -> bool:
-        """Revokes a token; returns False for an unknown one."""
+        """Revokes a token; returns False if the token is unknown."""
         query = sa.update(TOKENS).where(TOKENS.c.id == token_id, TOKENS.c.revoked.is_(False)).values(revoked=True)
         with self._engine.begin() as connection:
             return connection.execute(query).rowcount == 1
 
 
 def _complete(engine: sa.Engine) -> None:
-    """Adds the columns that are missing in the table of runs of an older server; existing runs get the default
-    value."""
+    """Adds missing columns to the table of runs of an older server; the columns get their default value."""
     there = {column["name"] for column in sa.inspect(engine).get_columns(RUNS.name)}
     with engine.begin() as connection:
         for column in (each for each in RUNS.columns if each.name not in there):

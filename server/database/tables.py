@@ -1,4 +1,4 @@
-"""Tables of the server's database for SQLAlchemy. ``store`` reads and writes the tables."""
+"""Tables of the server's database for SQLAlchemy. The module ``store`` reads and writes the tables."""
 
 import sqlalchemy as sa
 
@@ -23,7 +23,7 @@ RUNS = sa.Table(
     sa.Index("runs_of_owner", "owner", "id"),
     sa.Index("runs_by_state", "state"),
 )
-"""Table of runs: every accepted run, as it was last saved."""
+"""Table of runs: every accepted run, in the state that was last saved."""
 KEYS = sa.Table(
     "idempotency",
     META,
@@ -32,7 +32,7 @@ KEYS = sa.Table(
     sa.Column("run", sa.String(22), nullable=False),
     sa.UniqueConstraint("owner", "key"),
 )
-"""Table of idempotency keys: the run of each owner and key."""
+"""Table of idempotency keys: for each owner and key, the run that was made with the key."""
 LABELS = sa.Table(
     "labels",
     META,
@@ -52,7 +52,7 @@ CARDS = sa.Table(
     sa.Column("final", sa.Boolean, nullable=False),
     sa.Column("body", sa.LargeBinary, nullable=False),
 )
-"""Table of the cards of runs (card.py), which can be made again from the folders."""
+"""Table of the cards of runs (card.py); the cards can be made again from the folders of the runs."""
 BONDS = sa.Table(
     "bond",
     META,
@@ -71,4 +71,4 @@ TOKENS = sa.Table(
     sa.Column("created", sa.Float(53), nullable=False),
     sa.Column("revoked", sa.Boolean, nullable=False),
 )
-"""Table of tokens by hash."""
+"""Table of tokens; the key is the hash of the token."""

@@ -1,4 +1,4 @@
-"""A run's own copies of the files that its case names: hard links to files that never change."""
+"""Copies, in a run's folder, of the files that the case names: hard links to files that never change."""
 
 import re
 import secrets
@@ -21,7 +21,8 @@ from .uploads import Uploads, give
 _LACKING = "you have sent no such file, or it has been removed since; send it first (PUT /v1/files/{sha256})"
 _NAMING = re.compile(rb"""path["']?[ \t]*[=:]|\\[uUx]""")
 Source = Callable[[FileName, Path], None]
-"""Writes a file that a case names to a path. Raises FileNotFoundError, OSError."""
+"""Function that writes a file, which the case names, to a path. Raises FileNotFoundError if the file does not exist;
+raises OSError."""
 
 
 def of_owner(sent: Uploads, owner: str) -> Source:
@@ -30,8 +31,9 @@ def of_owner(sent: Uploads, owner: str) -> Source:
 
 
 def of_run(folder: Path) -> Source:
-    """Source of files for a run: the files of another run of the same user. Raises ServiceError 409 if that run has
-    lost a file."""
+    """Source of files for a run: the files of another run of the same user. Raises ServiceError with status 409 if the
+    other run has lost a file.
+    """
 
     def put(file: FileName, target: Path) -> None:
         try:
@@ -44,8 +46,9 @@ def of_run(folder: Path) -> Source:
 
 
 def fill(files: Sequence[FileName], source: Source, folder: Path) -> None:
-    """Adds a copy of each file to a folder; the copies are on disk on return. Raises CaseError for missing files,
-    OSError."""
+    """Adds a copy of each file to a folder; flushes the copies to disk before it returns. Raises CaseError if files are
+    missing; raises OSError.
+    """
     place = folder / layout.FILES
     if files:
         place.mkdir(0o700)
@@ -65,8 +68,8 @@ def fill(files: Sequence[FileName], source: Source, folder: Path) -> None:
 
 @contextmanager
 def apart(runs: Path, files: Sequence[FileName], source: Source) -> Iterator[Path]:
-    """Creates a temporary folder with the files, as in the folder of a run. If the server is killed, the next server
-    removes the temporary folder. Raises the errors of ``fill``.
+    """Creates a temporary folder with copies of the files, arranged as in the folder of a run. If the server is killed,
+    the next server removes the temporary folder. Raises the errors of ``fill``.
     """
     place = runs / f"{APART}{secrets.token_hex(8)}"
     place.mkdir(0o700)
@@ -79,5 +82,5 @@ def apart(runs: Path, files: Sequence[FileName], source: Source) -> Iterator[Pat
 
 
 def names_files(body: bytes) -> bool:
-    """Whether the text of a case may name files: whether it contains a key ``path``, or escaped characters."""
+    """Whether the text of a case may name files: the text contains a key ``path``, or escaped characters."""
     return _NAMING.search(body) is not None

@@ -1,4 +1,6 @@
-"""Stored sweeps. Each sweep is a plain file ``<runs>/sweeps/<id>.json``, and a copy of all sweeps is in memory."""
+"""Stored sweeps. Each sweep is a plain file ``<runs>/sweeps/<id>.json``, and the server keeps a copy of all sweeps in
+memory.
+"""
 
 from collections.abc import Iterator
 from typing import Any
@@ -16,7 +18,7 @@ FOLDER = "sweeps"
 
 
 class Plan(msgspec.Struct, kw_only=True, frozen=True):
-    """A stored sweep. ``runs`` is empty until all runs are accepted; ``submitted`` is a Unix time in s."""
+    """A stored sweep. The field ``runs`` is empty until all runs are accepted; ``submitted`` is a Unix time in s."""
 
     id: str
     owner: str
@@ -25,23 +27,23 @@ class Plan(msgspec.Struct, kw_only=True, frozen=True):
     key: str | None
     digest: str
     at_once: int | None
-    """Largest number of runs of the sweep at a time; None: only the number of cores of the server limits it."""
+    """Largest number of concurrent runs of the sweep; None: only the number of cores of the server is a limit."""
     points: list[dict[str, Any]]
     runs: list[str] = []
     case: dict[str, Any] | None = None
-    """Changed values of each point, until all runs are accepted."""
+    """Changed values of each point; kept until all runs are accepted."""
     tries: list[int] = []
-    """Number of repetitions of each point; empty: no point was repeated."""
+    """Number of repetitions of each point; empty if no point was repeated."""
     repeated: list[int] = []
-    """Points that are being repeated, until all new runs are accepted; ``earlier`` has the previous runs."""
+    """Points that are repeated, until all new runs are accepted; the field ``earlier`` has the previous runs."""
     earlier: list[str] = []
     search: Search | None = None
     """Last report of an adaptive sweep, whose client chooses the points."""
     reported: float = 0.0
     """Time of the last report of an adaptive sweep, Unix s."""
     cancelled: float = 0.0
-    """Start time (``began``) of the command whose runs were cancelled on the server. The command that sent this report
-    must submit no more runs."""
+    """Start time ``began`` of the client command that was cancelled on the server. A command whose start time equals
+    this value must submit no more runs."""
 
     @property
     def whole(self) -> bool:
@@ -50,7 +52,7 @@ class Plan(msgspec.Struct, kw_only=True, frozen=True):
 
     @property
     def keys(self) -> list[str]:
-        """Returns the idempotency keys of the runs."""
+        """Returns the idempotency keys of the runs of the sweep."""
         tries = self.tries or [0] * len(self.points)
         return [f"sweep-{self.id}-{n}" + (f"-{again}" if again else "") for n, again in enumerate(tries)]
 
@@ -61,11 +63,12 @@ class Plan(msgspec.Struct, kw_only=True, frozen=True):
 
 
 class Plans:
-    """All sweeps of a server. Methods may be called from any thread. The caller makes sure that one sweep is changed
-    by one thread at a time."""
+    """All sweeps of a server. Methods may be called from any thread. The caller makes sure that only one thread at a
+    time changes a sweep.
+    """
 
     def __init__(self, settings: Settings) -> None:
-        """Reads the stored sweeps; an unreadable file is ignored."""
+        """Reads the stored sweeps; ignores a file that cannot be read."""
         self._folder = settings.runs / FOLDER
         self._all: dict[str, Plan] = {}
         for path in sorted(self._folder.glob("*.json")):
@@ -79,7 +82,7 @@ class Plans:
         return iter(tuple(self._all.values()))
 
     def get(self, sweep_id: str) -> Plan | None:
-        """Returns the sweep of any owner."""
+        """Returns a sweep by its id, for any owner."""
         return self._all.get(sweep_id)
 
     def of(self, owner: str) -> list[Plan]:
@@ -87,11 +90,11 @@ class Plans:
         return sorted((plan for plan in self if plan.owner == owner), key=lambda plan: plan.id, reverse=True)
 
     def put(self, plan: Plan) -> None:
-        """Adds a sweep in memory only."""
+        """Adds a sweep to memory only, not to the disk."""
         self._all[plan.id] = plan
 
     def write(self, plan: Plan) -> None:
-        """Writes a sweep to disk and memory. Raises ServiceError 507."""
+        """Writes a sweep to disk and memory. Raises ServiceError with status 507 if the disk is full."""
         try:
             self._folder.mkdir(0o700, exist_ok=True)
             durable.write(self._folder / f"{plan.id}.json", msgspec.json.encode(plan))
@@ -100,6 +103,6 @@ class Plans:
         self.put(plan)
 
     def remove(self, plan: Plan) -> None:
-        """Removes a sweep from memory and disk. Raises OSError."""
+        """Removes a sweep from memory and disk. Raises OSError if the file cannot be removed."""
         self._all.pop(plan.id, None)
         (self._folder / f"{plan.id}.json").unlink(missing_ok=True)

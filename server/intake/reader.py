@@ -1,4 +1,4 @@
-"""Reads cases in separate processes with limits (``reading``); the users take turns."""
+"""Reads cases in separate processes with limits (module ``reading``); users are served in turn."""
 
 import atexit
 import logging
@@ -21,46 +21,50 @@ from .reading import CPU, PID, WALL, Answer, Question, Reading, WrongCaseError
 
 _log = logging.getLogger("conoid.server")
 _LOAD = 30.0
-"""Time in s in which the program must load its modules. The value was chosen because loading takes half a second."""
+"""Time in s in which the reading program must load its modules; loading takes half a second (reason of the chosen
+limit)."""
 _FORK = 10.0
-"""Time in s in which the program must begin with a case; a slower program is replaced. The value was chosen because
-this step takes 10 ms."""
+"""Time in s in which the reading program must begin with a case; a slower program is replaced. A program usually begins
+with a case within 10 ms (reason of the chosen limit)."""
 _REST = 5.0
-"""Time in s beyond ``WALL`` after which the server kills the process of a case (chosen value)."""
+"""Time in s, in addition to ``WALL``, after which the server kills the process that reads a case (chosen value)."""
 _WAITING = 100
-"""Largest number of waiting bodies of one owner. The value was chosen because each body may have 1 MiB."""
+"""Largest number of waiting request bodies of one owner; each body may have 1 MiB (reason of the chosen limit)."""
 CASE, SWEEP, FILES = 120.0, 900.0, 300.0
-"""Longest times in s, with the waiting time (chosen values): for a case, for all cases of a sweep, and for a case
-with files."""
+"""Longest times in s for reading, including the waiting time (chosen values): for a case, for all cases of a sweep, and
+for a case with files."""
 
 
 def pool(patience: float) -> ThreadPool:
-    """Returns a pool of threads that reads as many cases at a time as there are cores. Therefore a single owner never
-    uses all threads.
+    """Returns a pool of threads; the pool reads as many cases at a time as the machine has cores. The pool limits each
+    owner, so that a single owner never uses all threads.
     """
     places = max(2, usable_cores())
     return ThreadPool(each=places - 1, waiting=_WAITING, patience=patience, most=places)
 
 
 def surveyors() -> ThreadPool:
-    """Returns a pool of threads that reads one case with files of an owner at a time, and as many cases of all
-    owners as there are cores."""
+    """Returns a pool of threads for cases with files: one case of each owner at a time, and as many cases of all owners
+    as the machine has cores.
+    """
     return ThreadPool(each=1, waiting=_WAITING, patience=FILES, most=max(2, usable_cores()))
 
 
 class Reader:
-    """A program that reads cases. The program is started at the first case, and again if it has ended or hangs.
-    Methods may be called from any thread.
+    """Client of a program that reads cases. The reading program is started at the first case, and is started again if
+    it has ended or hangs. Methods may be called from any thread.
     """
 
     def __init__(self) -> None:
-        """Creates the object; no program is started yet."""
+        """Creates the object without starting the reading program."""
         self._lock = threading.Lock()
         self._program: _Program | None = None
 
     def read(self, question: Question) -> Reading:
-        """Reads a case. Raises CaseError with every problem, ServiceError 422 for a case that takes too much time or
-        memory, 503; RuntimeError."""
+        """Reads a case. Raises CaseError with every problem of the case; raises ServiceError with status 422 if the
+        case takes too much time or memory, with 503 if the server is busy; raises RuntimeError if the reading program
+        fails.
+        """
         data = self._ask(msgspec.msgpack.encode(question))
         if not data:
             detail = f"the case takes too long to be read: more than {CPU} s, or too much memory"
@@ -73,7 +77,9 @@ class Reader:
         return answer.reading
 
     def _ask(self, question: bytes) -> bytes:
-        """Returns a connection to the program, or to a new one. Raises ServiceError 503."""
+        """Returns a connection to the reading program; starts a new program if necessary. Raises ServiceError with
+        status 503 if the program does not start.
+        """
         error: OSError | None = None
         for _ in range(2):
             try:
@@ -94,7 +100,7 @@ class Reader:
             return self._program
 
     def close(self) -> None:
-        """Ends the program. A case that is being read is completed."""
+        """Ends the reading program. A process that reads a case at this time completes the case."""
         with self._lock:
             if self._program is not None:
                 self._program.close()
@@ -102,12 +108,12 @@ class Reader:
 
 
 class _Program:
-    """A running program that reads cases. The program receives a connection for each case, and forks a process for each
-    connection.
+    """A running program that reads cases. The reading program receives a connection for each case, and forks a process
+    for each connection.
     """
 
     def __init__(self) -> None:
-        """Starts the program. Raises OSError."""
+        """Starts the reading program. Raises OSError if the program cannot be started."""
         self._control, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
         with theirs:
             command = [sys.executable, "-P", "-m", "conoid.server.intake.reading"]
@@ -122,7 +128,9 @@ class _Program:
         self._control.settimeout(_FORK)
 
     def begun(self) -> tuple[socket.socket, int]:
-        """Returns a connection to a process that waits for a case, and its process number. Raises OSError."""
+        """Returns a connection to a process that waits for a case, and the process number. Raises OSError if the
+        connection fails.
+        """
         ours, theirs = socket.socketpair()
         try:
             with theirs:
@@ -137,14 +145,16 @@ class _Program:
             raise
 
     def close(self) -> None:
-        """Ends the program."""
+        """Ends the reading program."""
         self._control.close()
         self._child.kill()
         self._child.wait()
 
 
 def _answer(connection: socket.socket, pid: int, question: bytes) -> bytes:
-    """Returns the answer of a process; empty if the process reached its limits. Raises ServiceError 503."""
+    """Returns the answer of the process that reads a case; empty if the process reached its limits. Raises ServiceError
+    with status 503 if no process could be forked.
+    """
     with connection:
         connection.settimeout(WALL + _REST)
         chunks = []

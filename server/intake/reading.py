@@ -1,9 +1,9 @@
-"""``python -m conoid.server.intake.reading``: reads cases, each in a process of its own with limits.
+"""``python -m conoid.server.intake.reading``: reads cases, each in a separate process with limits.
 
-The cost of reading a body is unknown beforehand. The program loads all modules once and forks for each case. Therefore
-a case costs milliseconds, and a case that needs too much time or memory ends its own process only. Standard input is a
-socket that carries a connection for each case, and ends with the server. The program has one thread, since a fork
-copies one thread only.
+The time and memory that a case needs for reading are unknown beforehand. The reading program loads all modules once and
+forks a process for each case. Therefore reading a case takes milliseconds, and a case that needs too much time or
+memory ends only its own process. Standard input of the reading program is a socket that carries a connection for each
+case; the program ends with the server. The reading program has one thread, since a fork copies one thread only.
 """
 
 import os
@@ -32,29 +32,30 @@ from ..requests import limits
 from ..requests.limits import Limits
 
 CPU, WALL, MEMORY = 5, 20, 1 << 30
-"""Limits for reading a case: CPU time in s, wall-clock time in s, memory in bytes. The values were chosen because
-the largest shipped case takes 0.1 s and 100 MB, and a machine may be busy."""
+"""Limits for reading a case: CPU time in s, wall time in s, memory in bytes. The largest shipped case takes 0.1 s and
+100 MB, and a machine may be busy (reason of the chosen limits)."""
 _NICE = 5
-"""Increment of the nice value of the process (chosen value): its priority is below that of the server, so that the
-server can answer."""
+"""Increment of the nice value of a process that reads a case (chosen value), so that the server has a higher
+priority."""
 _SHIPPED = "demo"
-"""Name of a shipped case that is read before all others. Chosen case: it is small and has a material of the library."""
+"""Name of a shipped case that is read before all other cases. The chosen case is small and has a material of the
+library."""
 _MOST_FILES = 1000
 """Largest number of files in the list of a case with problems (chosen value)."""
 _UNREAD = "was not read yet: its run reads it"
 PID = 4
-"""Number of bytes of the process number, which each process sends first."""
+"""Number of bytes of the process number, which each forked process sends first."""
 
 
 class Question(msgspec.Struct, frozen=True, kw_only=True):
-    """A request body with a case, its type, and the resources that the case may use."""
+    """A request body with a case, the content type of the body, and the resources that the case may use."""
 
     body: bytes
     json: bool
     limits: Limits
     survey: bytes | None = None
-    """Survey of the mesh files that the case names (conoid.cases.reading.survey). Empty: no survey could be made.
-    None: no survey was made yet; then a case with files is read and checked, but not estimated."""
+    """Survey of the mesh files that the case names (conoid.cases.reading.survey). Empty: no survey could be made. None:
+    no survey was made yet; a case with files is read and checked, but not estimated."""
     folder: str = ""
     """Folder of the files that the case names."""
 
@@ -68,7 +69,7 @@ class FileName(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class WrongCaseError(CaseError):
-    """A case with problems, and the files that it names."""
+    """Error: a case has problems; the error has the problems and the files that the case names."""
 
     def __init__(self, problems: Iterable[Problem], files: Sequence[FileName]) -> None:
         """Creates the error with the ``problems`` of the case and its ``files``."""
@@ -77,29 +78,30 @@ class WrongCaseError(CaseError):
 
 
 class Reading(msgspec.Struct, frozen=True, kw_only=True):
-    """A case that can be run on this server, with the data that the server needs of it."""
+    """A case that can be run on this server, with the data that the server needs."""
 
     name: str
     title: str
     ranks: int
     threads: int
     profile: str
-    """Profile of a batch system that the case names; empty for the default of the site."""
+    """Profile of a batch system that the case names; empty for the default profile of the site."""
     wall_time: float | None
     estimate: dict[str, int | float]
     resolved: bytes
-    """Content of case.resolved.json"""
+    """Content of the file case.resolved.json."""
     case: bytes
     """The case with every default, as JSON."""
     doubts: list[Problem]
     files: list[FileName] = []
     survey: bytes = b""
-    """Survey of the files as JSON; empty if no survey was made."""
+    """Survey of the mesh files as JSON; empty if no survey was made."""
 
 
 class Answer(msgspec.Struct, frozen=True, kw_only=True):
-    """Answer of the program: a case that was read, or every problem. ``crash`` is the traceback of an error in this
-    program."""
+    """Answer of the reading program: a case that was read, or every problem of the case. ``crash``: traceback of an
+    error in the reading program.
+    """
 
     reading: Reading | None = None
     problems: list[Problem] = []
@@ -142,7 +144,7 @@ def _files(case: Case) -> list[FileName]:
 
 
 def _named(question: Question) -> list[FileName]:
-    """Returns the files of a case with problems; none if its text cannot be read."""
+    """Returns the files of a case with problems; empty if the text of the case cannot be read."""
     try:
         text = _text(question.body)
         return _names(json_data(text) if question.json else toml_data(text))[:_MOST_FILES]
@@ -155,12 +157,14 @@ def _names(data: Mapping[str, Any]) -> list[FileName]:
 
 
 def _weighed(case: Case, data: Mapping[str, Any], question: Question) -> tuple[dict[str, int | float], list[Problem]]:
-    """Returns the needs and the warnings of a case. Raises CaseError if the case cannot be run on this server."""
+    """Returns the needed resources and the warnings of a case. Raises CaseError if the case cannot be run on this
+    server.
+    """
     survey = from_json(question.survey) if question.survey else Survey()
     if survey.refused:
         raise CaseError(Problem("", "", line) for line in survey.refused)
     expected = _estimate(case, question, survey)
-    # Contact of parts is reported for files only: for other bodies the search takes seconds.
+    # Contact between parts is reported for mesh files only: for other shapes the search takes seconds.
     unread = [problem((file.key, "path"), file.path, _UNREAD) for file in _files(case) if question.survey == b""]
     odd = [*unread, *bare_numbers(data), *warned(case, expected, survey, survey.touching)]
     return limits.figures(expected), odd
@@ -187,7 +191,7 @@ def _text(body: bytes) -> str:
 
 
 def main() -> int:
-    """Answers requests until standard input ends. The program sends one byte when it is ready for requests."""
+    """Answers requests until standard input ends. The reading program sends one byte when it is ready for requests."""
     signal.signal(signal.SIGCHLD, signal.SIG_IGN)
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     os.nice(_NICE)
@@ -200,7 +204,9 @@ def main() -> int:
 
 
 def _next(control: socket.socket) -> bool:
-    """Answers one case; False at the end of standard input. If no process can be forked, the answer is empty."""
+    """Answers one case; returns False at the end of standard input. If no process can be forked, the answer is
+    empty.
+    """
     message, descriptors, _, _ = socket.recv_fds(control, 1, 1)
     for descriptor in descriptors:
         with socket.socket(fileno=descriptor) as connection, suppress(OSError):
@@ -210,14 +216,18 @@ def _next(control: socket.socket) -> bool:
 
 
 def _warm() -> None:
-    """Reads a shipped case, so that each fork has what the first case makes (validators, materials)."""
+    """Reads a shipped case, so that each forked process starts with the objects that the first case creates
+    (validators, materials).
+    """
     none = Limits(slots=1 << 20, elements=None, steps=None, memory=None, core_seconds=None, wall_time=None)
     answer = read(Question(body=shipped_path(_SHIPPED).read_bytes(), json=False, limits=none))
     assert answer.reading is not None, answer
 
 
 def _child(connection: socket.socket) -> None:
-    """Answers one case, then exits without the clean-up of the interpreter, which only the parent process must do."""
+    """Answers one case, then exits without the clean-up of the interpreter, because only the parent process may clean
+    up.
+    """
     code = 1
     try:
         _limit()

@@ -1,9 +1,9 @@
-"""Receives uploaded files: streams them to disk, from the first missing byte, and verifies their sha256.
+"""Receives uploaded files: writes the files to disk, from the first missing byte, and verifies the sha256.
 
 A PUT with ``Content-Range: bytes FIRST-LAST/SIZE`` is a partial PUT of RFC 9110, 14.5. A transfer continues at the end
 of the stored part; the header ``Upload-Offset`` (draft-ietf-httpbis-resumable-upload) of HEAD and of every answer gives
-this position. A PUT without the header sends the file from its first byte. Stored bytes are kept when a connection
-breaks or the server is killed.
+this position. A PUT without the header ``Content-Range`` sends the file from its first byte. Stored bytes of an upload
+are kept when a connection breaks or the server is killed.
 """
 
 import asyncio
@@ -24,21 +24,22 @@ from .uploads import Part, Upload, Uploads
 
 _RANGE = re.compile(r"bytes (?:(\d{1,18})-(\d{1,18})|\*)/(\d{1,18})")
 _GATHERED = 1 << 18
-"""Number of bytes that are collected before a write. The value was chosen because larger writes are not faster."""
+"""Number of bytes that are collected before a write; larger writes were not faster (measured)."""
 _SLICE = 1 << 25
-"""Number of bytes that are hashed in one task. The value was chosen because such a task takes 0.1 s; other requests
-of the user are served between two tasks."""
+"""Number of bytes that are hashed in one task, which takes 0.1 s; other requests of the user are served between two
+tasks (chosen value)."""
 _SILENCE = 30.0
-"""Time in s within which the next part of a body must arrive: the same limit as for other bodies (chosen value)."""
+"""Time in s within which the next piece of an upload must arrive: the limit of all request bodies (chosen value)."""
 _STALLED = 5.0
-"""Time in s without data after which another connection may continue with a file. The value was chosen for files
-whose connection broke."""
+"""Time in s without data after which another connection may continue with a file (chosen value for broken
+connections)."""
 
 
 @dataclass(frozen=True)
 class Span:
-    """Range of a file of ``total`` bytes: from ``first`` to ``end``, exclusive. ``anew``: whether the body replaces
-    the stored bytes."""
+    """Byte range of a file of ``total`` bytes, from ``first`` to ``end`` (exclusive). ``anew``: whether the request
+    body replaces the stored bytes.
+    """
 
     first: int
     end: int
@@ -61,12 +62,14 @@ class _Transfer:
         """Stops this transfer at once, because another connection continues with the file."""
         self.given_up = True
         if self.patience is not None:
-            with suppress(RuntimeError):  # this transfer does not wait for its body any more
+            with suppress(RuntimeError):  # this transfer stops waiting for its request body
                 self.patience.reschedule(0.0)
 
 
 class Receiver:
-    """Receives files. Used in the thread of the event loop; files are written in threads of the user."""
+    """Receives uploaded files. The class is used in the thread of the event loop; threads of the user write the
+    files.
+    """
 
     def __init__(self, sent: Uploads, pool: ThreadPool) -> None:
         """Creates the object without transfers."""
@@ -76,8 +79,9 @@ class Receiver:
     async def receive(
         self, request: Request, owner: str, sha256: str, check: Callable[[], Awaitable[None]]
     ) -> tuple[Upload, bool]:
-        """Receives the body; returns the stored file, and whether it has become complete. ``check`` raises when the
-        token is no longer valid. Raises ServiceError: 400, 408, 409, 411, 413, 415, 422, 429, 503, 507.
+        """Receives the request body; returns the stored file, and whether the file is complete now. ``check`` raises an
+        error if the token is no longer valid. Raises ServiceError with status 400, 408, 409, 411, 413, 415, 422, 429,
+        503 or 507.
         """
         span = span_of(request)
         place_of(request).lengthen()
@@ -102,8 +106,9 @@ class Receiver:
             transfer.over.set()
 
     async def _begun(self, owner: str, sha256: str) -> _Transfer:
-        """Registers the connection that sends bytes of a file. A file has one such connection at a time. Raises
-        ServiceError 409."""
+        """Registers the connection that sends bytes of a file. Only one connection at a time may send bytes of a file.
+        Raises ServiceError with status 409 if another connection sends bytes of the file.
+        """
         while (other := self._open.get((owner, sha256))) is not None:
             if other.busy or time.monotonic() - other.received < _STALLED:
                 raise _in_progress()
@@ -114,7 +119,7 @@ class Receiver:
 
     def _opened(self, owner: str, sha256: str, span: Span) -> Part | Upload:
         """Returns the incomplete file, open at the first byte of the body, or the complete file if it exists. Raises
-        ServiceError 409, 413, 429, 507, OSError.
+        ServiceError with status 409, 413, 429 or 507; raises OSError.
         """
         known = self._sent.find(owner, sha256)
         if known is not None and known.whole:
@@ -124,8 +129,8 @@ class Receiver:
     async def _taken(
         self, request: Request, transfer: _Transfer, part: Part, check: Callable[[], Awaitable[None]]
     ) -> None:
-        """Writes the body as it arrives. Stored bytes are kept after any error. Raises ServiceError 400, 401, 408,
-        409, OSError, and the errors of ``check``.
+        """Writes the request body while it arrives. Stored bytes are kept after any error. Raises ServiceError with
+        status 400, 401, 408 or 409, OSError, and the errors of ``check``.
         """
         gathered, chunks = bytearray(), aiter(request.stream())
         try:
@@ -141,8 +146,9 @@ class Receiver:
                 await self._pool.run(part.write, bytes(gathered))
 
     async def _verify(self, owner: str, sha256: str, part: Part) -> None:
-        """Gives the verified file its final name; the file is on disk on return. Raises ServiceError 422 if the hash
-        differs; then the bytes are removed."""
+        """Renames the verified file to its final name; flushes the file to disk before it returns. Raises ServiceError
+        with status 422, and removes the bytes, if the hash differs.
+        """
         total, offset = hashlib.sha256(), 0
         while offset < part.size:
             offset = await self._pool.run(_hashed, total, part, offset)
@@ -154,7 +160,9 @@ class Receiver:
 
 
 async def _next(chunks: AsyncIterator[bytes], transfer: _Transfer) -> bytes | None:
-    """Returns the next piece of a body; None at its end. Raises ServiceError 400, 408, 409."""
+    """Returns the next piece of a request body; None at the end of the body. Raises ServiceError with status 400, 408
+    or 409.
+    """
     try:
         async with asyncio.timeout(_SILENCE) as transfer.patience:
             return await anext(chunks, None)
@@ -173,7 +181,9 @@ def _in_progress() -> ServiceError:
 
 
 def _hashed(total: "hashlib._Hash", part: Part, offset: int) -> int:
-    """Adds a slice of the file to the digest; returns the end of the slice. Raises OSError."""
+    """Adds a slice of the file to the digest; returns the end of the slice. Raises OSError if the file cannot be
+    read.
+    """
     end = min(part.size, offset + _SLICE)
     while offset < end:
         data = part.read(min(_GATHERED, end - offset), offset)
@@ -185,7 +195,9 @@ def _hashed(total: "hashlib._Hash", part: Part, offset: int) -> int:
 
 
 def span_of(request: Request) -> Span:
-    """Returns the range of bytes of a PUT from its headers. Raises ServiceError 400, 411, 415."""
+    """Returns the range of bytes of a PUT request, from its headers. Raises ServiceError with status 400, 411 or
+    415.
+    """
     check_encoding(request)
     length, content_range = request.headers.get("content-length", ""), request.headers.get("content-range")
     if not length.isdecimal():

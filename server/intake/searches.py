@@ -1,5 +1,6 @@
-"""Adaptive sweeps. The client selects the points, submits each point as a run, and sends a report; the server stores
-the report."""
+"""Adaptive sweeps. The client of an adaptive sweep selects the points, submits each point as a run, and sends a report;
+the server stores the report.
+"""
 
 import re
 import threading
@@ -17,14 +18,13 @@ from ..runs import folder
 from .plans import Plan, Plans
 
 _NAME = re.compile(r"[0-9a-f]{16,64}")
-"""Pattern of the name of an adaptive sweep. The client computes the name from its request, so that the same command
-has the same name."""
+"""Pattern of the name of an adaptive sweep. The client computes the name from its request, so that the same command has
+the same name."""
 _MOST_BYTES = 256 << 10
-"""Largest size in bytes of a report. The value was chosen because a report with the largest number of points, and
-three keys for each point, fits in it."""
+"""Largest size in bytes of a report: the largest number of points with three keys for each point (chosen value)."""
 _MOST = 100
-"""Largest number of adaptive sweeps of a user. A new sweep replaces the oldest one, whose runs stay. The value was
-chosen because so many sweeps need 25 MB of memory."""
+"""Largest number of adaptive sweeps of a user: 25 MB of memory (chosen value). A new adaptive sweep replaces the oldest
+one; the runs of the replaced sweep stay."""
 
 
 class Searches:
@@ -35,7 +35,9 @@ class Searches:
         self._plans, self._store, self._lock = plans, store, threading.Lock()
 
     def report(self, owner: str, name: str, body: bytes) -> Plan:
-        """Stores a report. The first report with a new name creates the sweep. Raises ServiceError."""
+        """Stores a report of an adaptive sweep. The first report with a new name creates the sweep. Raises ServiceError
+        if the report is refused.
+        """
         if not _NAME.fullmatch(name):
             raise not_found(f"adaptive sweep {name[:40]!r}")
         search = _read(body)
@@ -51,7 +53,7 @@ class Searches:
         return plan
 
     def cancel(self, plan: Plan) -> None:
-        """Cancels an adaptive sweep: the command that selects its points at present must submit no more runs."""
+        """Cancels an adaptive sweep: the client command that selects the points must submit no more runs."""
         with self._lock:
             plan = self._plans.get(plan.id) or plan
             if plan.search is not None and not plan.search.over:
@@ -63,7 +65,7 @@ class Searches:
 
 
 def _read(body: bytes) -> Search:
-    """Decodes a report. Raises ServiceError 413, 422."""
+    """Decodes a report of an adaptive sweep. Raises ServiceError with status 413 or 422."""
     if len(body) > _MOST_BYTES:
         raise ServiceError(413, "too_large", f"the report has {size(len(body))}; allowed: {size(_MOST_BYTES)}")
     try:
@@ -78,8 +80,8 @@ def _begun(owner: str, name: str, search: Search) -> Plan:
 
 
 def _reported(plan: Plan, search: Search) -> Plan:
-    """Returns the plan with the report. The lists ``points`` and ``runs`` contain only points with an existing run, as
-    for other sweeps.
+    """Returns the stored sweep with the new report. The lists ``points`` and ``runs`` of the sweep contain only points
+    whose run exists.
     """
     there = [point for point in search.points if point.run]
     return msgspec.structs.replace(

@@ -1,5 +1,6 @@
-"""Submission: the steps from a request body to an accepted run. The run is read, checked, estimated and written to
-disk before it is acknowledged."""
+"""Submission: the steps from a request body to an accepted run. A case is read, checked, estimated and written to disk
+before the server acknowledges the run.
+"""
 
 import hashlib
 import logging
@@ -47,15 +48,15 @@ class Wishes:
 
     labels: Mapping[str, str] = field(default_factory=dict)
     profile: str = ""
-    """Profile of a batch system; empty: the profile in the case, or the default of the site."""
+    """Profile of a batch system; empty: the profile in the case, or the default profile of the site."""
     priority: int = 0
     """Priority of the run among the runs of its owner."""
     restart: str = ""
-    """Id of a run of the same owner. The new run continues from the newest checkpoint of that run."""
+    """Id of a run of the same owner, from whose newest checkpoint the new run continues."""
 
     @property
     def digest(self) -> str:
-        """Hash of all these parameters."""
+        """Hash of all parameters of the submission."""
         return hashlib.sha256(msgspec.json.encode(self, order="sorted")).hexdigest()
 
 
@@ -63,20 +64,21 @@ class Desk:
     """Accepts submissions. Methods may be called from any thread."""
 
     def __init__(self, settings: Settings, store: Store, supervisor: Supervisor, sent: Uploads) -> None:
-        """Creates the only object of this class in a server: its lock makes two requests with one key into one run.
-        ``sent``: uploaded files."""
+        """Creates the submissions object. A server has only one such object, whose lock makes one run from two requests
+        with the same key; ``sent``: uploaded files.
+        """
         self._settings, self._store, self._supervisor, self._sent = settings, store, supervisor, sent
         self._reader, self._limits = the_reader(), limits.of(settings)
         self._lock = threading.Lock()
         self.kept: Callable[[str], int] = lambda owner: 0
-        """Function that returns the bytes of the folders of an owner's runs."""
+        """Function that returns the total size in bytes of the folders of an owner's runs."""
 
     def read(
         self, body: bytes, content_type: str, source: Source, surveys: dict[bytes, bytes] | None = None
     ) -> Reading:
-        """Reads the case in ``body`` with the files that it names, from ``source``. ``surveys``: content of files
-        that were read before, by the bodies made of them. Raises CaseError with every problem, ServiceError 415,
-        422, 503.
+        """Reads the case in ``body``, and the files that the case names from ``source``. ``surveys``: content of mesh
+        files that were read before, by the bodies that are made of the files. Raises CaseError with every problem of
+        the case; raises ServiceError with status 415, 422 or 503.
         """
         kind = _file_name(content_type)
         question = Question(body=body, json=kind == "case.json", limits=self._limits)
@@ -91,17 +93,19 @@ class Desk:
             raise WrongCaseError(error.problems, reading.files) from None
 
     def source(self, owner: str, restart: str = "") -> Source:
-        """Returns the source of the files that a case of an owner names: uploads, or the run that is continued."""
+        """Returns the source of the files that a case names: uploaded files, or the run from which the new run
+        continues.
+        """
         return of_run(self._settings.runs / restart) if restart else of_owner(self._sent, owner)
 
     def submit(
         self, owner: str, body: bytes, content_type: str, key: str | None, wishes: Wishes | None = None,
         reading: Reading | None = None,
     ) -> dict[str, Any]:  # fmt: skip
-        """Accepts a run and returns its receipt; the same key and body give the same receipt.
+        """Accepts a run and returns its receipt; the same idempotency key and body give the same receipt.
 
-        ``reading``: the case, if it has been read already. Raises ServiceError. The case and the first line of the
-        journal are on disk on return.
+        ``reading``: the case, if the case has been read already. Raises ServiceError if the run is refused. The case
+        and the first line of the journal are on disk when the method returns.
         """
         if key is not None and not _KEY.fullmatch(key):
             raise ServiceError(
@@ -131,14 +135,15 @@ class Desk:
             )
 
     def check_room(self, owner: str, keys: Sequence[str]) -> None:
-        """Raises ServiceError 422, 429, 507 if the owner may not submit a run for each of ``keys`` that has no run
-        yet."""
+        """Raises ServiceError with status 422, 429 or 507 if the owner may not submit the runs for those ``keys`` that
+        have no run yet.
+        """
         more = sum(self._store.run_of_key(owner, key) is None for key in keys)
         if more:
             self._check_room(owner, more)
 
     def check_output(self, owner: str) -> None:
-        """Raises ServiceError 429 if the runs of the owner have reached their limit of bytes."""
+        """Raises ServiceError with status 429 if the runs of the owner have reached the limit of bytes."""
         limits.check_output(self.kept(owner), self._settings.site.quota)
 
     def _check_room(self, owner: str, more: int = 1) -> None:
@@ -146,19 +151,19 @@ class Desk:
         limits.check_room(self._settings.runs, self._store.open_runs(owner), self._settings.caps, more)
 
     def runs_of(self, owner: str, keys: Sequence[str]) -> list[str]:
-        """Returns the runs that were made with these idempotency keys."""
+        """Returns the runs that were made with the given idempotency keys."""
         return [run_id for key in keys if (run_id := self._store.run_of_key(owner, key)) is not None]
 
     def take_back(self, run_id: str) -> None:
-        """Cancels a run; if this fails, logs the error and does not raise it."""
+        """Cancels a run; logs an error instead of raising it."""
         try:
             self._supervisor.cancel(run_id)
         except Exception as error:
             _log.error("run %s is not taken back: %s", run_id, words(error))
 
     def _profile(self, name: str, *, named: bool = False) -> str:
-        """Returns the profile of the run; empty without a batch system. ``named``: the profile in the request.
-        Raises ServiceError 400.
+        """Returns the batch-system profile of the run; empty if the site has no batch system. ``named``: the profile in
+        the request. Raises ServiceError with status 400 if the profile is unknown.
         """
         site = self._settings.site
         try:
@@ -229,8 +234,9 @@ class Desk:
 
 
 def _surveyed(reading: Reading, place: Path, known: dict[bytes, bytes]) -> bytes:
-    """Returns the content of the files of a case. The content is read once for all cases that make the same bodies
-    from the files."""
+    """Returns the content of the mesh files of a case. A mesh file is read once for all cases that make the same bodies
+    from the file.
+    """
     case = msgspec.json.decode(reading.case)
     bodies = msgspec.json.encode([(part["mesh"], part["turn"]) for part in case["parts"]])
     if bodies not in known:
@@ -239,7 +245,7 @@ def _surveyed(reading: Reading, place: Path, known: dict[bytes, bytes]) -> bytes
 
 
 def labels_of(texts: Sequence[str]) -> dict[str, str]:
-    """Returns the labels from texts ``NAME=VALUE``. Raises ServiceError 400."""
+    """Returns the labels from texts ``NAME=VALUE``. Raises ServiceError with status 400 if a label is invalid."""
     found = [_LABEL.fullmatch(word) for word in texts]
     if None in found or len(texts) > _MOST_LABELS:
         wrong = next((word for word, read in zip(texts, found, strict=True) if read is None), f"{len(texts)} of them")
@@ -256,7 +262,7 @@ def labels_of(texts: Sequence[str]) -> dict[str, str]:
 
 
 def receipt(made: Submission) -> dict[str, Any]:
-    """Returns the answer to a submission; it does not depend on the time of the request."""
+    """Returns the answer to a submission; the answer does not depend on the time of the request."""
     return {
         "id": made.id, "owner": made.owner, "name": made.name, "title": made.title, "state": "accepted",
         "ranks": made.ranks, "threads": made.threads, "submitted": made.submitted, "estimate": made.estimate,

@@ -1,4 +1,6 @@
-"""Survey of the files of a case before it is accepted: a program of the worker reads them in a process with limits."""
+"""Survey of the mesh files of a case before the case is accepted: a program of the worker reads the files in a process
+with limits.
+"""
 
 import logging
 from collections.abc import Mapping
@@ -14,15 +16,15 @@ from ..launch.bounded import Bounds
 
 _log = logging.getLogger("conoid.server")
 BOUNDS = Bounds(cpu=200, wall=240, memory=8 << 30, file=4 << 30)
-"""Limits of the program that reads mesh files. The values were chosen because 16 MB of text (384,000 tets) take some
-10 s. A file above this size is not read before the run."""
+"""Limits of the program that reads mesh files. The program needs some 10 s for 16 MB of text, 384,000 tets (reason of
+the chosen limits). A mesh file above the size limit is not read before the run."""
 
 
 def surveyed(case: Mapping[str, object], folder: Path) -> bytes:
     """Returns the survey of a case's mesh files in ``folder`` as JSON (conoid.cases.reading.survey).
 
-    Blocks. Empty if the files cannot be read on this machine or within the limits. The run is not refused in this
-    case, because it has limits of its own.
+    The function blocks until the survey is made. The survey is empty if the mesh files cannot be read on this machine
+    or within the limits. A run with an empty survey is not refused, because the run has limits of its own.
     """
     if not survey.installed():
         return b""

@@ -1,4 +1,4 @@
-"""Request for a sweep: the case, the points, the limit; the case of each point."""
+"""Request for a sweep: the case, the points and the limit; makes the case of each point."""
 
 import json
 from typing import Any
@@ -12,7 +12,7 @@ from ..errors import ServiceError, invalid_case
 
 
 class Wish(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=True):
-    """Request for a sweep: a case as plain data, the changes of each point, the largest number of runs at a time."""
+    """Request for a sweep: a case as JSON, the changes of each point, and the largest number of concurrent runs."""
 
     case: dict[str, Any]
     points: list[dict[str, Any]]
@@ -20,7 +20,7 @@ class Wish(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=True
 
 
 def wish_of(body: bytes) -> Wish:
-    """Reads a request. Raises ServiceError."""
+    """Reads the request for a sweep. Raises ServiceError if the request is invalid."""
     try:
         wish = msgspec.convert(json_data(body), Wish)
     except CaseError as error:
@@ -35,7 +35,7 @@ def wish_of(body: bytes) -> Wish:
 
 
 def changed(case: dict[str, Any], point: dict[str, Any], n: int) -> bytes:
-    """Returns the case at point ``n`` as JSON. Raises ServiceError."""
+    """Returns the case at point ``n`` as JSON. Raises ServiceError if the changes of the point are invalid."""
     try:
         return json.dumps(apply_overrides(case, point)).encode()
     except CaseError as error:
@@ -45,5 +45,5 @@ def changed(case: dict[str, Any], point: dict[str, Any], n: int) -> bytes:
 
 
 def at_point(n: int, error: CaseError) -> ServiceError:
-    """Returns the error at point ``n``."""
+    """Returns the error at point ``n`` of the sweep."""
     return invalid_case([Problem(each.key, each.value, f"{each.message} (point {n})") for each in error.problems])

@@ -1,9 +1,10 @@
-"""Sweeps: one case at many points, each a run of its own. A sweep is one plain file, ``<runs>/sweeps/<id>.json``.
+"""Sweeps: one case at many points; each point is a separate run. A sweep is one plain file,
+``<runs>/sweeps/<id>.json``.
 
-The file is written before the first run is made, and the idempotency key of each run contains the id of the sweep and
-the number of the point. Therefore a client can send an interrupted request again: the sweep is completed, and no run is
-made twice. A server that was killed in the middle completes the sweep at its next start, or removes it if it has no
-key. No run starts before all runs are accepted.
+The file of a sweep is written before the first run is made, and the idempotency key of each run contains the sweep id
+and the point number. Therefore a client can send an interrupted request again: the server completes the sweep, and
+makes no run twice. If a server was killed while it accepted a sweep, the next server completes the sweep, or removes a
+sweep without idempotency key. No run of a sweep starts before all runs of the sweep are accepted.
 """
 
 import hashlib
@@ -29,10 +30,10 @@ from .sweep_request import Wish, at_point, changed, wish_of
 
 _log = logging.getLogger("conoid.server")
 _AGAIN = 2.0
-"""Time in s after which an incomplete sweep is tried again (chosen value)."""
+"""Time in s after which the server tries again to complete an incomplete sweep (chosen value)."""
 _MOST_BYTES = 16 << 20
-"""Largest number of values of all cases of a sweep. The value was chosen because so many values are computed in a
-second."""
+"""Largest number of values of all cases of a sweep; the values are computed in one second (reason of the chosen
+limit)."""
 _JSON = "application/json"
 _HASHES = re.compile(r"[0-9a-f]{64}")
 
@@ -44,15 +45,16 @@ class Sweeps:
         """Reads the stored sweeps."""
         self.plans, self._desk = Plans(settings), desk
         self._locks: dict[str, threading.Lock] = {}
-        """Locks by owner, so that a large sweep does not delay other users."""
+        """Locks by owner, so that a large sweep of one user does not delay other users."""
         self._filling: set[str] = set()
         self._cancelled: set[str] = set()
         self._left = [plan for plan in self.plans if not plan.whole]
         self._filling |= {plan.id for plan in self._left}
 
     def complete(self) -> None:
-        """Completes the incomplete sweeps of an earlier server in a thread. The runs of a sweep wait until the sweep is
-        complete."""
+        """Completes, in a thread, the incomplete sweeps of an earlier server. The runs of a sweep wait until the sweep
+        is complete.
+        """
         for plan in self._left:
             runs = plan.earlier or self._desk.runs_of(plan.owner, plan.keys)
             self.plans.put(msgspec.structs.replace(plan, runs=runs))
@@ -68,9 +70,9 @@ class Sweeps:
                 time.sleep(_AGAIN)
 
     def _completed(self, plan: Plan) -> bool:
-        """Completes a sweep; False if it must be tried again. A sweep that cannot be completed is removed. An
-        incomplete sweep without an idempotency key is also removed, because its sender got no answer and will send
-        another sweep.
+        """Completes a sweep; returns False if the server must try again later. A sweep that cannot be completed is
+        removed. An incomplete sweep without an idempotency key is also removed, because the client got no answer and
+        will send a new sweep.
         """
         with self._locks.setdefault(plan.owner, threading.Lock()):
             there = self.plans.get(plan.id)
@@ -93,19 +95,19 @@ class Sweeps:
             return True
 
     def cancel(self, plan: Plan) -> list[str]:
-        """Returns the runs of the sweep that exist. During a submission no other run of it can start."""
+        """Returns the existing runs of the sweep. During a submission no other run of the sweep can start."""
         if not plan.whole:
             self._cancelled.add(plan.id)
         return (self.plans.get(plan.id) or plan).runs
 
     def get(self, sweep_id: str, owner: str) -> Plan | None:
-        """Returns the sweep if it belongs to the owner."""
+        """Returns the sweep if the sweep belongs to the owner."""
         plan = self.plans.get(sweep_id)
         return plan if plan is not None and plan.owner == owner else None
 
     def submit(self, owner: str, body: bytes, key: str | None) -> Plan:
-        """Accepts all runs of a sweep, or none. A request with the same key and body returns the same sweep. Raises
-        ServiceError.
+        """Accepts all runs of a sweep, or none. A request with the same idempotency key and body returns the same
+        sweep. Raises ServiceError if the sweep is refused.
         """
         digest = hashlib.sha256(body).hexdigest()
         with self._locks.setdefault(owner, threading.Lock()):
@@ -116,8 +118,8 @@ class Sweeps:
             return self._accepted(fresh)
 
     def again(self, plan: Plan, body: bytes, failed: Mapping[int, str]) -> Plan:
-        """Repeats points of a sweep. ``failed``: number and present run of each point to repeat; ``body``: the
-        request of the sweep. Raises ServiceError; then the sweep is unchanged.
+        """Repeats points of a sweep. ``failed``: number and present run of each point to repeat; ``body``: the request
+        of the sweep. Raises ServiceError, and leaves the sweep unchanged, if the repetition is refused.
         """
         with self._locks.setdefault(plan.owner, threading.Lock()):
             plan = self.plans.get(plan.id) or plan
@@ -134,7 +136,9 @@ class Sweeps:
             return self._accepted(fresh)
 
     def _accepted(self, plan: Plan) -> Plan:
-        """Returns the plan with its missing runs: all of these runs are accepted, or none. Raises ServiceError."""
+        """Returns the sweep with its missing runs; either all missing runs are accepted, or none. Raises ServiceError
+        if the runs are refused.
+        """
         cases = self._cases(plan)
         self._desk.check_room(plan.owner, [plan.keys[n] for n in plan.wanted])
         self.plans.write(plan)
@@ -148,12 +152,12 @@ class Sweeps:
             self._complete_later([plan])
             raise
         self._filling.discard(plan.id)
-        self._cancelled.discard(plan.id)  # all runs exist now: a later cancel cancels the runs
+        self._cancelled.discard(plan.id)  # all runs of the sweep exist now: a later cancel cancels the runs
         return filled
 
     def held(self, need: Need, active: Iterable[Need]) -> str:
-        """Returns why a run waits for its sweep: until all runs of the sweep exist, or while its ``active`` runs are
-        as many as allowed. The label of the run has the id of the sweep.
+        """Returns why a run waits: its sweep is incomplete, or the number ``active`` of running runs of the sweep has
+        reached the limit of the sweep. The label of the run contains the id of the sweep.
         """
         plan = self.get(need.sweep, need.owner)
         if plan is None:
@@ -166,8 +170,9 @@ class Sweeps:
         return f"{own} runs of its sweep are running, as many as may at a time" if own >= plan.at_once else ""
 
     def needed(self) -> set[str]:
-        """Returns the hashes of files in sweeps that are being accepted, because future runs of these sweeps may
-        name the files."""
+        """Returns the hashes of files that sweeps need while the sweeps are being accepted, because future runs of the
+        sweeps may name the files.
+        """
         plans = [plan for plan in self.plans if not plan.whole]
         return {
             word for plan in plans for word in _HASHES.findall(msgspec.json.encode([plan.case, plan.points]).decode())
@@ -181,7 +186,7 @@ class Sweeps:
         return found[0] if found else None
 
     def _cases(self, plan: Plan) -> dict[int, tuple[bytes, Reading]]:
-        """Returns the case of each point that gets a run. Raises ServiceError with the problems."""
+        """Returns the case of each point that gets a run. Raises ServiceError with the problems of the cases."""
         made = {n: changed(plan.case or {}, plan.points[n], n) for n in plan.wanted}
         if sum(map(len, made.values())) > _MOST_BYTES:
             raise ServiceError(413, "too_large", f"the cases have more than {size(_MOST_BYTES)} together")
@@ -215,8 +220,8 @@ class Sweeps:
         return plan
 
     def _take_back(self, plan: Plan) -> None:
-        """Cancels the runs of a refused sweep before any of the runs has started. If the sweep was repeated, its
-        other runs stay unchanged.
+        """Cancels the runs of a refused sweep before any of the runs has started. If points of the sweep were repeated,
+        the earlier runs stay unchanged.
         """
         for run_id in self._desk.runs_of(plan.owner, [plan.keys[n] for n in plan.wanted]):
             self._desk.take_back(run_id)

@@ -1,13 +1,13 @@
-"""Uploaded files: plain files in ``<runs>/uploads/<owner>/``, each under its sha256.
+"""Uploaded files: plain files in ``<runs>/uploads/<owner>/``, each named by its sha256.
 
 ::
 
     <sha256>              complete: the content has this hash, and never changes
     <sha256>.<size>.part  incomplete: its length is the number of arrived bytes, of ``size``
 
-Each user has separate files, and every request names its user, so the uploads of other users cannot be found out. A
-run gets a hard link of each file in its own folder (``give``), which stays when the upload is removed. The time of
-access of a file is the time of its last request; it is set explicitly.
+Each user has separate files, and every request names its user, so that no user can find out the uploads of other users.
+The folder of a run gets a hard link to each file (``give``); the link stays when the upload is removed. The access time
+of an uploaded file is set explicitly to the time of its last request.
 """
 
 import os
@@ -30,14 +30,15 @@ from ..requests.limits import later
 FOLDER = "uploads"
 _PART = ".part"
 _SYNCED = 1 << 26
-"""Number of bytes after which arrived data is flushed to disk. The value was chosen because a slow disk takes a
-second for so many bytes, which is the longest delay of a write."""
+"""Number of bytes after which arrived data is flushed to disk. A slow disk takes one second for this number of bytes,
+which is the longest delay of a write (chosen value)."""
 
 
 @dataclass(frozen=True)
 class Upload:
-    """A file of a user: ``size`` bytes, of which ``offset`` bytes have arrived; ``asked``: time of the last request,
-    Unix s."""
+    """An uploaded file of a user: ``size`` bytes, of which ``offset`` bytes have arrived; ``asked``: Unix time of the
+    last request for the file, s.
+    """
 
     sha256: str
     size: int
@@ -47,12 +48,12 @@ class Upload:
 
 
 class Part:
-    """An incomplete file, open for writing. The file is closed when no reference to this object is left, because a
-    thread may still write to a hanging disk after its request was given up.
+    """An incomplete uploaded file, open for writing. The file is closed only when all references to this object are
+    released, because a thread may write to a hanging disk after its request has ended.
     """
 
     def __init__(self, path: Path, size: int, *, anew: bool) -> None:
-        """Opens the file. Raises OSError, also for a link."""
+        """Opens the file. Raises OSError if the file cannot be opened or is a link."""
         flags = os.O_RDWR | os.O_CREAT | os.O_NOFOLLOW | os.O_CLOEXEC | (os.O_TRUNC if anew else 0)
         self._fd = os.open(path, flags, 0o600)
         self.path, self.size = path, size
@@ -81,27 +82,29 @@ class Part:
         self._unsynced = 0
 
     def read(self, most: int, offset: int) -> bytes:
-        """Returns bytes that have arrived. Raises OSError."""
+        """Returns a range of the arrived bytes. Raises OSError if the file cannot be read."""
         return os.pread(self._fd, most, offset)
 
 
 class Uploads:
-    """Uploaded files. Methods may be called from any thread. No state is kept in memory: the folder is read each
-    time."""
+    """Uploaded files of all users. Methods may be called from any thread. No state is kept in memory: the folder of
+    uploads is read each time.
+    """
 
     def __init__(self, runs: Path, rules: Files, free_disk: int) -> None:
-        """Creates the object; no folder is created yet. ``free_disk``: bytes of the disk that uploads may not use."""
+        """Creates the object without a folder. ``free_disk``: bytes of the disk that uploads may not use."""
         self._runs, self._folder, self._rules, self._free_disk = runs, runs / FOLDER, rules, free_disk
         self._locks: dict[str, threading.Lock] = {}
         self.left: Callable[[str], int | None] = lambda owner: None
-        """Function that returns the bytes that an owner may still add; None: only the limit of ``rules`` applies."""
+        """Function that returns the number of bytes that an owner may still upload; None: only the limit of ``rules``
+        applies."""
 
     def _lock(self, owner: str) -> threading.Lock:
-        """Returns the lock of an owner, so that users do not wait for each other's files."""
+        """Returns the lock of an owner; each owner has a separate lock, so that users do not wait for each other."""
         return self._locks.setdefault(owner, threading.Lock())
 
     def of(self, owner: str) -> list[Upload]:
-        """Returns all files of an owner, by hash. Raises OSError."""
+        """Returns all uploaded files of an owner, by hash. Raises OSError if the folder cannot be read."""
         try:
             with os.scandir(self._folder / owner) as entries:
                 found = [sent for entry in entries if (sent := _sent(entry)) is not None]
@@ -110,7 +113,9 @@ class Uploads:
         return sorted(found, key=lambda sent: sent.sha256)
 
     def find(self, owner: str, sha256: str) -> Upload | None:
-        """Returns a file of an owner, complete or incomplete, and sets the time of its last request. Raises OSError."""
+        """Returns an uploaded file of an owner, complete or incomplete, and sets the time of its last request. Raises
+        OSError if the file cannot be read.
+        """
         with self._lock(owner):
             for path in self._paths(owner, sha256):
                 with suppress(FileNotFoundError):
@@ -120,7 +125,7 @@ class Uploads:
         return None
 
     def _paths(self, owner: str, sha256: str) -> list[Path]:
-        """Returns the paths that the file may have, complete and incomplete."""
+        """Returns the paths of the complete and the incomplete file."""
         folder = self._folder / owner
         return [folder / sha256, *(p for p in folder.glob(f"{sha256}.*{_PART}") if _size_of(p.name) is not None)]
 

@@ -1,6 +1,6 @@
 """Disk usage of runs and uploaded files.
 
-A file that several cases name is one file on disk; it counts once for each user.
+A file that several cases name is one file on disk; the file counts once for each user.
 """
 
 import os
@@ -17,8 +17,9 @@ Copies = dict[tuple[int, int], int]
 
 
 def size(folder: Path) -> int:
-    """Returns the bytes of all files except the copies of files that the case names. A file that disappears during
-    the call counts 0."""
+    """Returns the size of all files of a run in bytes, without the copies of files that the case names. A file that
+    disappears during the call counts as 0 bytes.
+    """
     total = 0
     for place, folders, names in os.walk(folder):
         if place == os.fspath(folder) and layout.FILES in folders:
@@ -30,7 +31,9 @@ def size(folder: Path) -> int:
 
 
 def copies(folder: Path) -> Copies:
-    """Returns the bytes of each file that the case names, by device and inode: several runs may share a file."""
+    """Returns the size in bytes of each file that the case names, by device and inode, because several runs may share a
+    file.
+    """
     found: Copies = {}
     with suppress(FileNotFoundError, NotADirectoryError), os.scandir(folder / layout.FILES) as entries:
         for entry in entries:
@@ -42,7 +45,7 @@ def copies(folder: Path) -> Copies:
 
 @dataclass
 class DiskUsage:
-    """Sizes of folders and files at the last pass. The class is not thread-safe."""
+    """Sizes of folders and files, measured at the last pass. The class is not thread-safe."""
 
     sizes: dict[str, int] = field(default_factory=dict)
     """Size in bytes of the folder of each run, without the files that its case names."""
@@ -58,19 +61,19 @@ class DiskUsage:
         self.sizes[run], self.files[run], self.owners[run] = its, copies, owner
 
     def keep(self, there: Set[str], sent: dict[str, Copies]) -> None:
-        """Drops runs without a folder, and records the uploaded files."""
+        """Drops runs whose folder is missing, and records the uploaded files."""
         for run in self.sizes.keys() - there:
             self.drop(run)
         self.sent = sent
 
     def drop(self, run: str) -> None:
-        """Drops a run whose folder is removed."""
+        """Drops a run whose folder has been removed."""
         self.sizes.pop(run, None)
         self.files.pop(run, None)
         self.owners.pop(run, None)
 
     def by_owner(self) -> Counter[str]:
-        """Returns the bytes of each user: folders of runs, and files; each file counts once."""
+        """Returns the bytes of each user: folders of runs and uploaded files; each file counts once."""
         found, files = Counter[str](), {owner: dict(copies) for owner, copies in self.sent.items()}
         for run, owner in self.owners.items():
             found[owner] += self.sizes[run]
@@ -79,10 +82,10 @@ class DiskUsage:
 
 
 class Left:
-    """Number of bytes that remain if runs are removed one after the other."""
+    """Number of bytes that remain while runs are removed one after the other."""
 
     def __init__(self, weights: DiskUsage) -> None:
-        """Begins with the bytes of all runs: ``total``."""
+        """Begins with ``total``, the bytes of all runs."""
         self._sizes, self._files = dict(weights.sizes), dict(weights.files)
         held = [*self._files.values(), *weights.sent.values()]
         self._names = Counter(inode for copies in held for inode in copies)
@@ -90,7 +93,7 @@ class Left:
         self.total = sum(self._sizes.values()) + sum(files.values())
 
     def drop(self, run: str) -> None:
-        """Subtracts a run, and those of its files that no other run and no user has."""
+        """Subtracts a run, and the files of the run that no other run and no user has."""
         self.total -= self._sizes.pop(run, 0)
         for inode, size in self._files.pop(run, {}).items():
             self._names[inode] -= 1

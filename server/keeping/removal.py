@@ -25,49 +25,53 @@ from .removed_runs import RemovedRuns
 _log = logging.getLogger("conoid.server")
 _PATIENCE = 5.0
 """Time in s from the start of the server to the first pass over the folders (chosen value). Requests may cause further
-passes, but not sooner than this time after the last pass."""
+passes; the time between two passes is at least this time."""
 
 
 class Removal:
     """Measures and removes folders in a separate thread. Methods may be called from any thread. Folders are measured
-    if the site has [retention] or quota.output_bytes."""
+    only if the site has the table [retention] or the key quota.output_bytes.
+    """
 
     def __init__(
         self, settings: Settings, store: Store, lines: RemovedRuns, is_open: Callable[[str], bool], sent: Uploads
     ) -> None:
-        """Creates the object without starting its thread. ``is_open``: whether a run may still change."""
+        """Creates the object without starting its thread. ``is_open``: function that returns whether a run may still
+        change.
+        """
         self._settings, self._store, self._lines, self._is_open, self._sent = settings, store, lines, is_open, sent
         self._rules = settings.site.retention
         asked = self._rules.oldest is not None or self._rules.bytes is not None
         self._weighs = asked or settings.site.quota.output_bytes is not None
         self.needed: Callable[[], Set[str]] = frozenset
-        """Function that returns the hashes of files that must not be removed now."""
+        """Function that returns the hashes of uploaded files that must not be removed now."""
         self._lock, self._asking = threading.Lock(), threading.Lock()
         self._asked_again = 0.0
         self._usage = DiskUsage()
         self._settled: set[str] = set()
-        """Runs whose size was measured after their end."""
+        """Runs that have ended and whose final size was measured."""
         self._kept: Counter[str] = Counter()
         self._leave = threading.Event()
         self._thread = threading.Thread(target=self._work, name="removal", daemon=True)
 
     def start(self) -> None:
-        """Starts the thread."""
+        """Starts the thread that removes folders."""
         self._thread.start()
 
     def close(self) -> None:
-        """Stops the thread."""
+        """Stops the thread that removes folders."""
         self._leave.set()
         if self._thread.is_alive():
             self._thread.join(_PATIENCE)
 
     def kept(self, owner: str) -> int:
-        """Returns the bytes of an owner's runs and files at the last pass."""
+        """Returns the bytes of an owner's runs and uploaded files at the last pass."""
         return self._kept[owner]
 
     def kept_now(self, owner: str) -> int:
-        """Returns the bytes of an owner's runs and files. If the site has no limit of size, the thread measures
-        nothing, and the folders are measured here, at most every ``_PATIENCE`` s. Raises SQLAlchemyError."""
+        """Returns the bytes of an owner's runs and uploaded files. If the site has no limit of size, the thread
+        measures nothing; this method then measures the folders, at most every ``_PATIENCE`` s. Raises SQLAlchemyError.
+        """
         with self._asking:
             if not self._weighs and time.monotonic() >= self._asked_again:
                 with suppress(OSError):
@@ -76,8 +80,9 @@ class Removal:
         return self._kept[owner]
 
     def remove(self, run: Run, why: str) -> None:
-        """Removes the folder of a run that has ended; the record of the run is written to disk first. Raises
-        OSError."""
+        """Removes the folder of a run that has ended, after the record of the run is on disk. Raises OSError if the
+        folder cannot be removed.
+        """
         path = self._settings.runs / run.id
         if not path.is_dir():
             raise FileNotFoundError(path)
@@ -88,7 +93,7 @@ class Removal:
             self._kept = self._usage.by_owner()
 
     def look(self) -> None:
-        """Makes one pass over the uploaded files and over all folders. Raises OSError, SQLAlchemyError."""
+        """Makes one pass over the uploaded files and over all folders. Raises OSError or SQLAlchemyError."""
         for line in self._sent.purge(time.time(), self.needed()):
             _log.info("%s is removed: no run uses it, and it was not requested lately", line)
         if not self._weighs:
@@ -101,12 +106,12 @@ class Removal:
                 _log.info("run %s of %s is removed: %s", run.id, run.owner, why)
 
     def _all(self) -> tuple[list[Path], dict[str, Run]]:
-        """Returns the folders of all runs in the database, and these runs by id."""
+        """Returns the folders of all runs in the database, and the runs of the folders by id."""
         known = {run.id: run for run in self._store.all()}
         return [path for path in folder.runs_in(self._settings.runs) if path.name in known], known
 
     def _weigh(self, paths: list[Path], known: dict[str, Run]) -> None:
-        """Measures the folders that may have changed, and the uploaded files."""
+        """Measures the folders that may have changed since the last pass, and the uploaded files."""
         for path in paths:
             if path.name not in self._settled:
                 weighed = size(path), copies(path)
@@ -122,7 +127,7 @@ class Removal:
             self._kept = self._usage.by_owner()
 
     def _due(self, runs: list[Run], now: float) -> Iterator[tuple[Run, str]]:
-        """Yields the runs to remove, oldest first, each with the rule that removes it."""
+        """Yields the runs to remove, oldest first, each with the rule of the site that removes the run."""
         left, most, oldest = Left(self._usage), self._rules.bytes, self._rules.oldest
         for run in sorted(runs, key=lambda run: run.finished):
             old = oldest is not None and now - run.finished > oldest
@@ -147,7 +152,9 @@ class Removal:
 
 
 def restore(store: Store, lines: RemovedRuns) -> None:
-    """Marks removed runs as removed in a new database that replaces a lost one. Raises SQLAlchemyError, OSError."""
+    """Marks removed runs as removed in a new database, which replaces a lost database. Raises SQLAlchemyError or
+    OSError.
+    """
     ended = store.ended()
     for run_id in lines:
         line = lines.get(run_id)

@@ -1,4 +1,4 @@
-"""purged.jsonl: one line for each run whose folder has been removed, with its outcome."""
+"""File purged.jsonl: one line with the outcome of each run whose folder has been removed."""
 
 import io
 import os
@@ -24,7 +24,7 @@ FILE = "purged.jsonl"
 
 
 class RemovedRun(msgspec.Struct, kw_only=True, frozen=True):
-    """The stored record of a removed run. Times are Unix s."""
+    """The stored record of a removed run. All times of the record are Unix times in s."""
 
     id: str
     owner: str
@@ -38,7 +38,7 @@ class RemovedRun(msgspec.Struct, kw_only=True, frozen=True):
     message: str
     removed: float
     why: str
-    """User or rule that has removed the run."""
+    """User that removed the run, or rule of the site that removed it."""
     steps: int | None = None
     """Number of the last step, and simulated time reached, s; None if unknown."""
     time: float | None = None
@@ -48,7 +48,7 @@ class RemovedRun(msgspec.Struct, kw_only=True, frozen=True):
 
     @property
     def run(self) -> Run:
-        """Returns the record as a row of the table of runs."""
+        """Returns the record of a removed run in the form of a row of the table of runs."""
         cause = Cause(self.cause) if self.cause else None
         return Run(
             self.id, self.owner, self.name, self.ranks, self.submitted, State(self.state), cause, self.message,
@@ -60,7 +60,7 @@ _record = msgspec.json.Decoder(RemovedRun)
 
 
 def of(run: Run, path: Path, why: str) -> RemovedRun:
-    """Returns the record of a run that has ended. The record is made while the folder of the run exists."""
+    """Returns the record of a run that has ended."""
     ended = folder.outcome(path)
     results: dict[str, Any] = (
         {} if ended is None else {"steps": ended.steps, "time": known(ended.time), "digest": ended.digest}
@@ -74,12 +74,12 @@ def of(run: Run, path: Path, why: str) -> RemovedRun:
 
 
 class RemovedRuns:
-    """The records of all removed runs. Methods may be called from any thread. The memory contains only the offset of
-    each line.
+    """The records of all removed runs. Methods may be called from any thread. Memory contains only the offset of each
+    line of purged.jsonl.
     """
 
     def __init__(self, runs: Path) -> None:
-        """Reads the file once; an incomplete last line is ignored. Raises OSError."""
+        """Reads purged.jsonl once; an incomplete last line is ignored. Raises OSError if the file cannot be read."""
         self._path, self._lock = runs / FILE, threading.Lock()
         self._at: dict[str, int] = {}
         self._end = 0
@@ -98,8 +98,9 @@ class RemovedRuns:
         return iter(tuple(self._at))
 
     def add(self, line: RemovedRun) -> None:
-        """Appends a record; the record is on disk on return. A second record of a run replaces the first. Raises
-        OSError."""
+        """Appends a record; flushes the record to disk before it returns. A second record of the same run replaces the
+        first record. Raises OSError if the record cannot be written.
+        """
         with self._lock, whole.appended(self._path, 0o600) as file:
             end = os.fstat(file.fileno()).st_size
             begin = b"" if not end or _last(self._path, end) == b"\n" else b"\n"
@@ -113,7 +114,9 @@ class RemovedRuns:
         durable.sync_folder(self._path.parent)
 
     def get(self, run_id: str) -> RemovedRun | None:
-        """Returns the record of a run; None without a record. Raises OSError."""
+        """Returns the record of a removed run; None if the run has no record. Raises OSError if the file cannot be
+        read.
+        """
         place = self._at.get(run_id)
         if place is None:
             return None

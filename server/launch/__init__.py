@@ -1,4 +1,4 @@
-"""Launchers: the protocol by which workers are started and stopped. Each launcher has its own module."""
+"""Launchers: the protocol by which workers are started and stopped. Each launcher of workers has its own module."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -7,10 +7,10 @@ from typing import Literal, Protocol
 from conoid.cases.run import Cause, State
 
 Phase = Literal["unknown", "waits", "runs"]
-"""State of a worker as its launcher reports it: waiting for cores, or running. If a batch system does not answer,
-the state is unknown, and nothing is changed."""
+"""State of a worker as its launcher reports it: waiting for cores, running, or unknown. If a batch system does not
+answer, the state of the worker is unknown, and the server changes nothing."""
 Reading = tuple[State, Cause, str]
-"""End of a worker without an outcome: state, cause, message."""
+"""End of a worker that wrote no outcome: state, cause, message."""
 
 
 class LaunchError(Exception):
@@ -23,8 +23,9 @@ class DamagedError(LaunchError):
 
 @dataclass(frozen=True)
 class Access:
-    """Address and credentials with which the worker publishes on Zenoh. The user is empty for a router without
-    access control."""
+    """Address and credentials with which a worker publishes on Zenoh. The user name is empty for a router without
+    access control.
+    """
 
     endpoint: str
     prefix: str
@@ -34,7 +35,7 @@ class Access:
 
 @dataclass(frozen=True)
 class Job:
-    """A run or job that a launcher has started."""
+    """Record of a run or job that a launcher has started."""
 
     run: str
     ranks: int
@@ -42,42 +43,47 @@ class Job:
     folder: Path
     telemetry: Access | None
     profile: str = ""
-    """Profile of the batch system; empty: the default of the site."""
+    """Profile of the batch system; empty: the default profile of the site."""
     wall_time: float | None = None
     """Time limit of the run from its start, s."""
     group: str = ""
-    """Name of a group of runs that may be submitted as one job array, such as a sweep; empty: none."""
+    """Name of a group of runs that may be submitted as one job array, such as a sweep; empty: no group."""
     threads: int = 1
     """Number of threads of each rank."""
 
 
 @dataclass(frozen=True)
 class Exit:
-    """End of a worker's processes. ``code``: the exit code, or minus the number of the signal; None if this server
-    is not the parent process."""
+    """End of a worker's processes. ``code``: the exit code, or the negative signal number; None if this server is not
+    the parent process of the worker.
+    """
 
     code: int | None
     out_of_memory: bool
     last_words: str
     reading: Reading | None = None
-    """State, cause and message of the end from a batch system. These records have priority over the exit code."""
+    """State, cause and message of the end of a worker, from a batch system. Data of the batch system has priority over
+    the exit code."""
 
 
 class Worker(Protocol):
-    """A started worker with all its ranks, or a job that was submitted to a batch system. No method blocks."""
+    """A started worker with all its ranks, or a job that was submitted to a batch system. No method of a worker
+    blocks.
+    """
 
     def phase(self) -> Phase:
         """Returns the present state."""
 
     def began(self) -> float:
-        """Returns the Unix time at which the worker got its cores, s; 0 before that time."""
+        """Returns the Unix time at which the worker got its cores, s; 0 if the worker still waits for cores."""
 
     def note(self) -> str:
-        """Returns a remark for users, such as the reason for which the worker waits, or the service that does not
-        answer; empty without a remark."""
+        """Returns a remark for users, for example why the worker waits, or which service does not answer; empty without
+        a remark.
+        """
 
     def exited(self) -> Exit | None:
-        """Returns the end of the worker; None while any of its processes runs."""
+        """Returns the end of the worker; None while any process of the worker runs."""
 
     def stop(self) -> None:
         """Requests the worker to stop at its next step."""
@@ -88,8 +94,9 @@ class Worker(Protocol):
 
 @dataclass(frozen=True)
 class Trace:
-    """Result of the search for an earlier launch of a run: the worker if it runs, whether there was a launch, and
-    whether the launch was before the last boot."""
+    """Result of the search for an earlier launch of a run. The result contains the worker if it still runs, whether
+    there was a launch, and whether the launch was before the last boot.
+    """
 
     worker: Worker | None
     launched: bool
@@ -103,10 +110,14 @@ class Launcher(Protocol):
     """True when workers wait for cores in the queue of a batch system."""
 
     def start(self, job: Job) -> Worker:
-        """Starts the ranks and records them in the run's folder. Raises LaunchError."""
+        """Starts the ranks of a worker and records them in the run's folder. Raises LaunchError if the worker cannot be
+        started.
+        """
 
     def find(self, run: str, folder: Path) -> Trace:
         """Returns the worker that an earlier server started for the run."""
 
     def tidy(self) -> None:
-        """Removes data that killed workers may have left outside of their folders, such as shared memory."""
+        """Removes data that killed workers may have left outside of the folders of their runs, such as shared
+        memory.
+        """

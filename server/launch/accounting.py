@@ -1,4 +1,4 @@
-"""Queries of Slurm's accounting database, in a separate thread, so that no other work waits for the database."""
+"""Queries of Slurm's accounting database, in a separate thread, so that the server never waits for the database."""
 
 import logging
 import queue
@@ -14,21 +14,23 @@ class Taker(Protocol):
     """A run whose job has ended."""
 
     def took(self, found: dict[str, str]) -> None:
-        """Stores the answer of the accounting database. Raises OSError."""
+        """Stores the answer of the accounting database. Raises OSError if the answer cannot be stored."""
 
 
 class Accounting:
     """Queries of the accounting database. Methods may be called from any thread."""
 
     def __init__(self, place: str = "") -> None:
-        """Creates the object. ``place``: the folder of Slurm's commands. The thread starts with the first job."""
+        """Creates the object without a thread; the thread starts with the first job. ``place``: the folder of Slurm's
+        commands.
+        """
         self._place = place
         self._waiting: queue.SimpleQueue[tuple[Taker, str]] = queue.SimpleQueue()
         self._thread = threading.Thread(target=self._work, name="sacct", daemon=True)
         self._lock = threading.Lock()
 
     def note(self, run: Taker, job: str) -> None:
-        """Sends the queries one after the other, and stores the answers."""
+        """Sends the queries one after the other, and stores the answers of the accounting database."""
         self._waiting.put((run, job))
         with self._lock:
             if not self._thread.is_alive():

@@ -1,4 +1,4 @@
-"""A program of another house in a process with limits. The server waits for the program in a thread."""
+"""Runs another program of Conoid in a process with limits. A thread of the server waits for the program."""
 
 import os
 import signal
@@ -22,8 +22,9 @@ _SECRET = ("CONOID_DATABASE", "CONOID_TOKEN")
 
 @dataclass(frozen=True, kw_only=True)
 class Bounds:
-    """Limits of a program: CPU time in s, memory in bytes, and size of a file in bytes of each process; wall time in
-    s of all processes together."""
+    """Limits of a program. Limits of each process: CPU time in s, memory in bytes, size of a file in bytes; limit of
+    all processes together: wall time in s.
+    """
 
     cpu: int
     wall: int
@@ -33,12 +34,13 @@ class Bounds:
 
 @dataclass(frozen=True)
 class Ended:
-    """Output of a program that has ended, and its exit code. A code below 0 is minus the number of the signal that
-    ended the program."""
+    """Output and exit code of a program that has ended. A negative exit code is minus the number of the signal that
+    ended the program.
+    """
 
     output: bytes
     errors: str
-    """Text of the standard error output. If the time limit was exceeded, it is the message about this."""
+    """Text of the standard error output; a message about the time limit if the program exceeded it."""
     code: int
 
     @property
@@ -52,8 +54,8 @@ def run(
     **more: str,
 ) -> Ended:  # fmt: skip
     """Runs the module ``program`` in ``folder``. ``question``: bytes of its standard input; ``more``: variables that
-    are added to its environment. Blocks until the program, and every process that shares its standard output, has
-    ended.
+    are added to its environment. The function blocks until the program, and every process that shares its standard
+    output, has ended.
     """
     limits = [str(most) for most in (bounds.memory, bounds.cpu, bounds.file)]
     env = {name: value for name, value in os.environ.items() if name not in _SECRET} | more

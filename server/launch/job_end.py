@@ -1,4 +1,4 @@
-"""The end of a Slurm job, from its record, the run's folder, and Slurm's list."""
+"""The end of a Slurm job, from the record of the job, the run's folder, and the job list of Slurm."""
 
 from pathlib import Path
 
@@ -21,12 +21,16 @@ _READINGS: dict[str, Reading] = {
 
 
 def exit_of(folder: Path, job: Job, entry: Entry) -> Exit:
-    """Returns the end of the job ``entry`` of the run in ``folder``. ``job``: its record with the accounting data."""
+    """Returns the end of the job ``entry`` of the run in ``folder``. ``job``: record of the job with the accounting
+    data.
+    """
     return Exit(_code(job), False, _last_words(folder, job), _reading(entry))
 
 
 def _code(job: Job) -> int | None:
-    """Returns the exit code of the job's script, or minus the number of its signal; None if unknown."""
+    """Returns the exit code of the job script, or minus the number of the signal that ended the script; None if
+    unknown.
+    """
     code, _, number = job.accounting.get("ExitCode", "").partition(":")
     if not code.isdigit() or not number.isdigit():
         return None
@@ -34,8 +38,9 @@ def _code(job: Job) -> int | None:
 
 
 def _last_words(folder: Path, job: Job) -> str:
-    """Returns the exit code of the ranks. For a task of an array that ended before its ranks started, returns that
-    of its script."""
+    """Returns the exit code of the ranks. For a task of a job array that ended before its ranks started, returns the
+    exit code of the job script.
+    """
     own = launcher_log.last_words(folder)
     if own or not job.array:
         return own

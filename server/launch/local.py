@@ -1,5 +1,4 @@
-"""Workers on this machine: Runs ``mpiexec`` in a separate session, so that workers continue after the end of the server
-that started them."""
+"""Workers on this machine: runs ``mpiexec`` in a separate session, so that workers continue after the server ends."""
 
 import os
 import shutil
@@ -25,16 +24,16 @@ from . import DamagedError, Exit, Job, LaunchError, Phase, Trace, Worker, memory
 _ONE_THREAD = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
 _NOT_FOR_WORKERS = ("CONOID_DATABASE", "CONOID_TOKEN")
 _CROWDED = 4
-"""Number of ranks per core from which waiting ranks of MPICH sleep instead of polling."""
+"""Number of ranks per core at and above which waiting ranks of MPICH sleep instead of polling."""
 _KILL_WAIT = 1.0
-"""Time in s to wait for a killed launcher, so that no zombie process stays. The value was chosen because the end
-takes milliseconds."""
+"""Time in s to wait for the end of a killed launcher, so that no zombie process stays (chosen value; the end takes
+milliseconds)."""
 _FRESH = 1.0
-"""Time in s for which a list of all processes is used again (chosen value). The list is used for processes that an
-ended server has started."""
+"""Time in s for which a list of all processes is used again (chosen value). The list of processes is used for workers
+that an ended server started."""
 _HOUR = 3600.0
-"""Age in s from which shared memory that no process has mapped is removed (chosen value). A new run maps its shared
-memory much sooner."""
+"""Age in s at which shared memory that no process has mapped is removed (chosen value). A new run maps its shared
+memory much sooner than at this age."""
 
 
 class LocalLauncher:
@@ -43,14 +42,16 @@ class LocalLauncher:
     queues = False
 
     def __init__(self, settings: Settings) -> None:
-        """Takes the two commands from ``settings``."""
+        """Reads the launcher command and the worker command from ``settings``."""
         self._mpiexec, self._worker = settings.mpiexec, settings.worker
         self._living: dict[str, set[int]] = {}
         self._looked = -_FRESH
         self._kills = memory.Kills()
 
     def start(self, job: Job) -> Worker:
-        """Starts the ranks; their terminal output goes to log/launcher.log. Raises LaunchError."""
+        """Starts the ranks, whose terminal output goes to log/launcher.log. Raises LaunchError if the ranks cannot be
+        started.
+        """
         bound = [] if self._mpiexec else binding(job.ranks, job.threads, core_numbers())
         argv = [*find_mpiexec(self._mpiexec), *bound, "-n", str(job.ranks), *self._worker, *_arguments(job)]
         with _log_of(job.folder) as log:
@@ -70,8 +71,9 @@ class LocalLauncher:
         return worker
 
     def find(self, run: str, folder: Path) -> Trace:
-        """Finds the worker by its record, or by its environment where a server was killed before it wrote the
-        record."""
+        """Finds the worker by its record, or by the environment of its processes if a server was killed before it wrote
+        the record.
+        """
         process = run_folder.process(folder)
         if process is None:
             leader = processes.leader_of(self._members(run))
@@ -85,19 +87,21 @@ class LocalLauncher:
         return Trace(worker if not rebooted and worker.alive() else None, True, rebooted)
 
     def _members(self, run: str) -> set[int]:
-        """Returns the processes of a run. One list of all processes is read for all runs, also for a thousand runs."""
+        """Returns the processes of a run. All runs use one list of all processes, so that a thousand runs cause one
+        reading of /proc.
+        """
         if time.monotonic() > self._looked + _FRESH:
             self._living, self._looked = processes.of_all_runs(), time.monotonic()
         return self._living.get(run, set())
 
     def tidy(self) -> None:
-        """Removes shared memory of MPICH that killed ranks have left, 2 MB each."""
+        """Removes shared memory of MPICH, 2 MB for each run, that killed ranks have left."""
         for path in processes.unused_shared_memory(Path("/dev/shm"), "mpich_shm_", _HOUR):
             path.unlink(missing_ok=True)
 
 
 def _log_of(folder: Path) -> BinaryIO:
-    """Opens the log of the launcher. A missing folder of the log is created again."""
+    """Opens the log of the launcher; creates the folder of the log if it is missing."""
     try:
         (folder / layout.LOGS).mkdir(0o700, exist_ok=True)
         return whole.appended(folder / layout.LOGS / layout.LAUNCHER_LOG)
@@ -107,7 +111,8 @@ def _log_of(folder: Path) -> BinaryIO:
 
 def find_mpiexec(chosen: str) -> tuple[str, ...]:
     """Returns the launcher of the site, else the launcher beside this Python, else the launcher in PATH. Raises
-    LaunchError."""
+    LaunchError if no launcher is found.
+    """
     if chosen:
         return command(chosen, "--mpiexec")
     beside = Path(sys.executable).with_name("mpiexec")
@@ -118,8 +123,8 @@ def find_mpiexec(chosen: str) -> tuple[str, ...]:
 
 
 def binding(ranks: int, threads: int, cores: Sequence[int]) -> list[str]:
-    """Returns the options of MPICH's mpiexec that bind each rank to cores of its own. Empty if the run does not use
-    all ``cores``, because other runs may use the rest.
+    """Returns the options of MPICH's mpiexec that bind each rank to separate cores. The options are empty if the run
+    does not use all ``cores``, because other runs may use the remaining cores.
     """
     if ranks == 1 or threads == 1 or ranks * threads != len(cores):
         return []
@@ -128,8 +133,8 @@ def binding(ranks: int, threads: int, cores: Sequence[int]) -> list[str]:
 
 
 def environment(base: Mapping[str, str], job: Job) -> dict[str, str]:
-    """Returns the environment of a worker: libraries with one thread, the id of the run, its Zenoh credentials.
-    Variables of the server itself are removed.
+    """Returns the environment of a worker: libraries with one thread, the id of the run, and Zenoh credentials.
+    Variables of the server itself are removed from the environment of a worker.
     """
     env = {name: value for name, value in base.items() if name not in _NOT_FOR_WORKERS}
     env.update(dict.fromkeys(_ONE_THREAD, "1"))
@@ -158,7 +163,7 @@ def _record(pid: int) -> Process:
 
 
 class LocalWorker:
-    """A worker on this machine, started by this server or an earlier one."""
+    """A worker on this machine, started by this server or by an earlier server."""
 
     def __init__(
         self, run: str, folder: Path, process: Process, kills: memory.Kills,
@@ -187,8 +192,9 @@ class LocalWorker:
         return ""
 
     def exited(self) -> Exit | None:
-        """Returns the end of the worker; None while ``mpiexec`` runs. Ranks that still run after the end of
-        ``mpiexec`` are killed, so that no process writes any more."""
+        """Returns the end of the worker; None while ``mpiexec`` runs. Ranks that still run after the end of ``mpiexec``
+        are killed, so that no process writes into the run's folder any more.
+        """
         self._kills.count()
         if self.alive() or processes.end_run(self._run):
             return None
@@ -202,7 +208,7 @@ class LocalWorker:
                 os.kill(self.process.pid, signal.SIGTERM)
 
     def kill(self) -> None:
-        """Sends SIGKILL to the process group of ``mpiexec``, then to the rest of the run."""
+        """Sends SIGKILL to the process group of ``mpiexec``, then to all other processes of the run."""
         if self.alive():
             with suppress(ProcessLookupError):
                 os.killpg(self.process.pid, signal.SIGKILL)

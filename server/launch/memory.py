@@ -1,8 +1,8 @@
-"""Processes that the kernel has killed for lack of memory.
+"""Detects processes that the kernel has killed for lack of memory.
 
-The kernel counts these processes, for the machine and for each control group, and writes the process numbers into its
-log. A service may not be allowed to read this log. An end is reported as lack of memory only where one of the two
-proves it.
+The kernel counts the processes that it killed, for the machine and for each control group, and writes their process
+numbers into its log. A service may not be allowed to read the log of the kernel. The end of a run is reported as lack
+of memory only if the counts or the log of the kernel prove it.
 """
 
 import ctypes
@@ -16,16 +16,16 @@ _READ_ALL, _LOG = 3, 1 << 20
 """Arguments of klogctl(3): command, and number of bytes that are read at the end of the kernel's log."""
 _KILLED = re.compile(rb"Killed process (\d+) \(")
 _PAUSE, _RECENT = 0.25, 3.0
-"""Time in s between two counts; and time in s before the end of the ranks in which a count must have grown. The
-values were chosen because Hydra ends the other ranks within a second."""
+"""Time in s between two counts of killed processes. A count must have grown within this time before the end of the
+ranks; Hydra ends the other ranks within a second (reason of the chosen value)."""
 _FIRST_NAMESPACE = "pid:[4026531836]"
-"""Inode of the initial namespace of process numbers. The process numbers in the kernel's log are valid in this
+"""Inode of the initial namespace of process numbers. The process numbers in the kernel's log are valid in the initial
 namespace (linux/proc_ns.h, PROC_PID_INIT_INO)."""
 
 
 def kills() -> int:
-    """Returns the number of processes that the kernel has killed for lack of memory: of this control group if the
-    kernel counts them there, else of the machine.
+    """Returns the number of processes that the kernel has killed for lack of memory. The number is that of this control
+    group if the kernel counts processes by group, else that of the machine.
     """
     own = _of_the_group()
     return own if own is not None else _count(_PROC / "vmstat") or 0
@@ -54,14 +54,14 @@ def _count(path: Path) -> int | None:
 
 
 class Kills:
-    """Detects workers that were killed for lack of memory. The class is used in the supervisor's thread."""
+    """Detects workers that were killed for lack of memory. The class is used only in the supervisor's thread."""
 
     def __init__(self) -> None:
-        """Makes the first count."""
+        """Makes the first count of killed processes."""
         self._counts: deque[tuple[float, int]] = deque([(time.monotonic(), kills())])
 
     def count(self) -> None:
-        """Makes a new count; called repeatedly while workers run."""
+        """Makes a new count of killed processes; called repeatedly while workers run."""
         now = time.monotonic()
         if now < self._counts[-1][0] + _PAUSE:
             return
@@ -70,8 +70,8 @@ class Kills:
             self._counts.popleft()
 
     def ended(self, pid: int | None) -> bool:
-        """Whether the kernel has just killed process ``pid``, by its log. If the log cannot be read, the change of
-        the count decides.
+        """Whether the kernel has just killed process ``pid`` for lack of memory, by the kernel's log. If the log cannot
+        be read, the change of the count of killed processes decides.
         """
         if kills() == self._counts[0][1]:
             return False
@@ -80,8 +80,9 @@ class Kills:
 
 
 def logged() -> set[int] | None:
-    """Returns the process numbers in the kernel's log; None if the log cannot be read, or if this process has
-    another namespace."""
+    """Returns the process numbers in the kernel's log; None if the log cannot be read, or if this process has another
+    namespace of process numbers.
+    """
     room = ctypes.create_string_buffer(_LOG)
     size = ctypes.CDLL(None).klogctl(_READ_ALL, room, _LOG)
     if size <= 0 or (_PROC / "self/ns/pid").readlink().name != _FIRST_NAMESPACE:

@@ -1,4 +1,4 @@
-"""Processes in /proc of Linux: which processes exist, and to which run each belongs."""
+"""Processes in /proc of Linux: which processes exist, and to which run each process belongs."""
 
 import os
 import signal
@@ -8,9 +8,8 @@ from contextlib import suppress
 from pathlib import Path
 
 RUN_VARIABLE = "CONOID_RUN"
-"""Variable in the environment of every process of a run. MPI launchers start ranks in separate sessions, so a process
-group does not contain all processes of a run. The variable identifies all processes of a run, including the processes
-that a rank starts."""
+"""Environment variable of every process of a run, including the processes that a rank starts. MPI launchers start ranks
+in separate sessions, so a process group does not contain all processes of a run."""
 
 _PROC = Path("/proc")
 _AFTER_NAME_STATE, _AFTER_NAME_PARENT, _AFTER_NAME_START = 0, 1, 19
@@ -23,8 +22,7 @@ def boot() -> str:
 
 
 def start_time(pid: int) -> int | None:
-    """Returns the time from the boot to the start of process ``pid`` in clock ticks; None when the process has
-    ended."""
+    """Returns the time from the boot to the start of process ``pid`` in clock ticks; None if the process has ended."""
     fields = _stat(pid)
     if fields is None or fields[_AFTER_NAME_STATE] in {"Z", "X"}:
         return None
@@ -32,7 +30,7 @@ def start_time(pid: int) -> int | None:
 
 
 def parent(pid: int) -> int:
-    """Returns the parent of process ``pid``; 0 when the process has ended."""
+    """Returns the parent of process ``pid``; 0 if the process has ended."""
     fields = _stat(pid)
     return 0 if fields is None else int(fields[_AFTER_NAME_PARENT])
 
@@ -46,7 +44,7 @@ def _stat(pid: int) -> list[str] | None:
 
 
 def of_run(run: str) -> list[int]:
-    """Returns the running processes of a run that belong to this user, smallest number first."""
+    """Returns the running processes of a run that belong to this user, smallest process number first."""
     marker = f"{RUN_VARIABLE}={run}".encode()
     found = []
     for entry in _PROC.iterdir():
@@ -58,12 +56,12 @@ def of_run(run: str) -> list[int]:
 
 
 def leader_of(members: Collection[int]) -> int | None:
-    """Returns the process of a run whose parent does not belong to the run: the process that the server started."""
+    """Returns the first process of a run, which the server started: its parent does not belong to the run."""
     return next((pid for pid in sorted(members) if parent(pid) not in members), None)
 
 
 def of_all_runs() -> dict[str, set[int]]:
-    """Returns the running processes of every run that belong to this user."""
+    """Returns the running processes of all runs of this user, by run."""
     found: dict[str, set[int]] = {}
     marker = f"{RUN_VARIABLE}=".encode()
     for entry in _PROC.iterdir():
@@ -85,7 +83,7 @@ def end_run(run: str) -> int:
 
 
 def unused_shared_memory(folder: Path, prefix: str, age: float) -> list[Path]:
-    """Returns the files of this user in ``folder`` that are older than ``age`` s and that no process has mapped."""
+    """Returns the files of this user in ``folder`` that are older than ``age`` s and are mapped by no process."""
     old = time.time() - age
     found = {}
     for path in folder.glob(f"{prefix}*"):

@@ -1,5 +1,6 @@
-"""Workers as jobs of Slurm. The commands of Slurm run in a separate thread, so a controller that does not answer
-blocks nothing else."""
+"""Workers as jobs of Slurm. The commands of Slurm run in a separate thread, so that a Slurm controller that does not
+answer blocks nothing else.
+"""
 
 import logging
 import sys
@@ -27,21 +28,21 @@ _log = logging.getLogger("conoid.server")
 
 
 class SlurmLauncher:
-    """Launcher for Slurm. ``start`` writes the record of a job to disk. After the record is written, the thread submits
-    exactly one job for it, and tries again after failures.
+    """Launcher for Slurm. The method ``start`` writes the record of a job to disk. The thread of the launcher then
+    submits exactly one job for each record, and tries again after failures.
     """
 
     queues = True
 
     def __init__(self, settings: Settings, site: batch.Slurm) -> None:
-        """Creates the launcher. The thread starts with the first run."""
+        """Creates the launcher without a thread; the thread starts with the first run."""
         self._mpiexec, self._worker, self._site = settings.mpiexec, settings.worker, site
         self._arrays, self._accounting = Arrays(settings.runs, site), Accounting(site.bin)
         self._workers: dict[str, SlurmWorker] = {}
         self._lock, self._thread = threading.Lock(), threading.Thread(target=self._work, name="slurm", daemon=True)
 
     def start(self, job: Job) -> SlurmWorker:
-        """Writes the record of the job to submit. Raises LaunchError."""
+        """Writes the record of the job to submit. Raises LaunchError if the record cannot be written."""
         try:
             profile = batch.profile_of(self._site, job.profile)
             starter = batch.starter(profile[1], job.ranks, partial(find_mpiexec, self._mpiexec), job.threads)
@@ -59,8 +60,9 @@ class SlurmLauncher:
         return self._take(job.run, SlurmWorker(job.folder, record, self._site, job.group, self._accounting))
 
     def find(self, run: str, folder: Path) -> Trace:
-        """Finds the job of a run by its record. The job was submitted by an earlier server, or was about to be.
-        Raises OSError, ValueError."""
+        """Finds the job of a run by its record. An earlier server submitted the job, or wrote the record but was
+        stopped before it submitted the job. Raises OSError or ValueError.
+        """
         try:
             record = batch.read_job(folder)
         except msgspec.MsgspecError as error:
@@ -105,7 +107,7 @@ class SlurmLauncher:
             time.sleep(self._site.poll)
 
     def _round(self) -> None:
-        """Gets one list for all runs, then performs the next action of each."""
+        """Gets one job list from Slurm for all runs, then performs the next action of each run."""
         with self._lock:
             self._workers = {run: worker for run, worker in self._workers.items() if not worker.over}
             workers = list(self._workers.items())
@@ -136,8 +138,9 @@ class SlurmLauncher:
             return {worker.name for worker in workers if worker.fresh or worker.waits_for_array}
 
     def _attend(self, run: str, worker: SlurmWorker, entries: list[Entry], arrays: Set[str]) -> bool:
-        """Performs the action of one run. False when the controller has not answered, so that no other run waits for
-        it. A command that hangs is not repeated at once, and does not delay other runs.
+        """Performs the next action of one run. Returns False if the Slurm controller has not answered, so that the
+        launcher does not wait again for another run. A command that hangs is not repeated at once, and does not delay
+        other runs.
         """
         try:
             worker.turn(entries, arrays)

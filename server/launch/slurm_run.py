@@ -1,5 +1,6 @@
-"""A run that was submitted to Slurm. The job name identifies the run. The run's folder shows how the run ends, and
-Slurm shows why it waits."""
+"""A run that was submitted to Slurm. The job name identifies the run. The run's folder shows how the run ended; Slurm
+shows why the run waits.
+"""
 
 import time
 from collections.abc import Mapping, Set
@@ -22,29 +23,29 @@ _LAG = 5.0
 """Time in s after the end of a job in which the last files of the job may still arrive over a network file system
 (chosen value)."""
 _LATE = 10.0
-"""Time in s without new writes in a folder with an outcome (chosen value). After this time the run ends with its
-outcome, for any state that Slurm reports."""
+"""Time in s without new writes in a folder with an outcome, after which the run ends with this outcome for any state in
+Slurm (chosen value)."""
 _MOST = 20
-"""Largest number of jobs that are submitted for one run (chosen value). A further job is submitted only if the job
-before was lost."""
+"""Largest number of jobs that are submitted for one run (chosen value). A further job is submitted only if Slurm lost
+the previous job."""
 _RELEASES = 3
 """Number of times that a job is released after a node failed to start it (chosen value). A busy or restarting node
-recovers, a broken node does not."""
+recovers, but a broken node does not recover."""
 _POLITE, _LONGEST_PAUSE = 2.0, 60.0
-"""Time in s until Slurm is asked again after a temporary refusal: the first time, and the largest one (chosen
-values)."""
+"""Delays in s until a request to Slurm is repeated after a temporary refusal: the first delay and the largest delay
+(chosen values)."""
 
 
 class SlurmWorker:
-    """A run as a job of Slurm. The methods before ``turn`` may be called from any thread and do not block; ``turn`` is
-    called from the launcher's thread.
+    """A run as a job of Slurm. The methods before ``turn`` may be called from any thread and do not block; only the
+    launcher's thread calls ``turn``.
     """
 
     def __init__(
         self, folder: Path, job: Job, site: batch.Slurm, group: str = "", accounting: Accounting | None = None
     ) -> None:  # fmt: skip
-        """``job``: a job that an earlier server has submitted or was about to submit, or a new one. ``group``: runs
-        to submit as one array, for runs that were never submitted.
+        """``job``: a new job, or a job that an earlier server submitted or recorded for submission. ``group``: runs to
+        submit as one job array; only for runs that were never submitted.
         """
         self.folder = self._folder = folder
         self._job, self._site, self._accounting = job, site, accounting or Accounting()
@@ -58,7 +59,7 @@ class SlurmWorker:
 
     @property
     def name(self) -> str:
-        """Name of the job and index in an array; no other job has both."""
+        """Name of the job, and its index in a job array; the pair is unique."""
         return self._job.key
 
     @property
@@ -68,19 +69,19 @@ class SlurmWorker:
 
     @property
     def fresh(self) -> bool:
-        """True while the run may become a task of an array, because it was never submitted."""
+        """True while the run may become a task of a job array, because the run was never submitted."""
         return bool(self.group) and not self._job.job and not self._stop
 
     @property
     def waits_for_array(self) -> bool:
-        """True when the run will be submitted as a task of an array."""
+        """True if the run will be submitted as a task of a job array."""
         waits = not self._job.job and self._job.task is not None and not self._stop and self._exit is None
         return waits and time.monotonic() >= self._not_before
 
     # From any thread --------------------------------------------------------------------------------------------------
 
     def phase(self) -> Phase:
-        """Returns the state in the last list of Slurm."""
+        """Returns the state of the job in the last job list of Slurm."""
         entry = self._entry
         if entry is None:
             return "unknown" if self._job.job else "waits"
@@ -92,7 +93,7 @@ class SlurmWorker:
         return entry.start if entry is not None and entry.state not in slurm.PENDING else 0.0
 
     def note(self) -> str:
-        """Returns the reason for which the job waits, or the time since which Slurm does not answer."""
+        """Returns the reason why the job waits, or the time since which Slurm does not answer."""
         entry, number = self._entry, self._job.job
         if self._away:
             last = f"; job {number} was {entry.state.lower()} then" if entry else ""
@@ -104,8 +105,8 @@ class SlurmWorker:
         return f"Slurm job {number} is pending: {entry.reason}" if entry.state in slurm.PENDING else ""
 
     def exited(self) -> Exit | None:
-        """Returns the end of the run; None while its job waits or runs. An outcome in a folder without new writes is
-        an end also when Slurm does not answer.
+        """Returns the end of the run; None while its job waits or runs. If the folder has an outcome and no new writes,
+        the run has ended even if Slurm does not answer.
         """
         return self._exit or (Exit(None, False, "") if self._complete() else None)
 
@@ -118,7 +119,8 @@ class SlurmWorker:
 
     def stop(self) -> None:
         """Asks the run to stop, by a file in its folder. Slurm cancels a waiting job and sends a signal to a running
-        one. Raises OSError."""
+        job. Raises OSError if the file cannot be written.
+        """
         (self._folder / layout.STOP_REQUEST).touch()
         self._stop = True
 
@@ -134,14 +136,15 @@ class SlurmWorker:
         return self._exit is not None
 
     def silent(self, why: str) -> None:
-        """Records that Slurm does not answer; the last known state stays."""
+        """Records that Slurm does not answer; the last known state of the job stays."""
         self._away, self._why = self._away or time.monotonic(), why
 
     def turn(self, entries: list[Entry], arrays: Set[str] = frozenset()) -> None:
-        """Performs the next action. ``entries``: the jobs of this name in Slurm's list; ``arrays``: the ids of all
-        arrays with a task in the list. Raises SlurmError, OSError.
+        """Performs the next action of the run. ``entries``: the jobs with this name in the job list of Slurm;
+        ``arrays``: the ids of all job arrays with a task in the list. Raises SlurmError or OSError.
 
-        A controller that has crashed may have lost the start of a job, which then waits for ever.
+        A Slurm controller that has crashed may have lost the start of a job; without this action the job would wait for
+        ever.
         """
         self._away = 0.0
         if self.waits_for_array or (self._job.task is not None and not self._job.job and not self._stop):
@@ -169,7 +172,7 @@ class SlurmWorker:
             self._notified = entry.state
 
     def _launch_again(self, entry: Entry) -> None:
-        """Releases a job that Slurm holds after a failed start on a node."""
+        """Releases a job that Slurm holds because a node failed to start the job."""
         if self._released < _RELEASES:
             self._released += 1
             slurm.release(self._site.bin, entry.job)
@@ -198,12 +201,12 @@ class SlurmWorker:
             self._exit = Exit(None, False, "", (State.FAILED, Cause.LAUNCH, f"Slurm refuses the job: {error}"))
 
     def wait(self, why: str) -> None:
-        """Delays the next request after Slurm has refused a job for now; the delay doubles."""
+        """Delays the next request after Slurm has temporarily refused a job; the delay doubles at each refusal."""
         self._later, self._not_before = why, time.monotonic() + self._pause
         self._pause = min(2.0 * self._pause, _LONGEST_PAUSE)
 
     def leave_array(self) -> None:
-        """Submits the run as a single job with its own name, after its array was refused. Raises OSError."""
+        """Submits the run as a single job, after Slurm refused its job array. Raises OSError."""
         job, self.group = self._job, ""
         profile = batch.profile_of(self._site, job.profile)
         fresh = batch.new_job(
@@ -212,14 +215,15 @@ class SlurmWorker:
         self.write_down(name=fresh.name, task=None, array="")
 
     def write_down(self, **changes: object) -> None:
-        """Writes the record; it is on disk before the next action. Raises OSError."""
+        """Writes the record of the job; flushes the record to disk before the next action. Raises OSError."""
         job = msgspec.structs.replace(self._job, **changes)
         whole.write(self._folder / layout.JOB, batch.to_json(job))
         self._job = job
 
     def _chosen(self, entries: list[Entry]) -> Entry | None:
-        """Returns the running job, else the first job. A second job, which only a crash of the controller can cause,
-        is cancelled."""
+        """Returns the running job, else the first job; cancels a second job, which a crash of the controller can
+        cause.
+        """
         begun = slurm.begun(self._folder, self._job) if len(entries) > 1 else ""
         ordered = sorted(entries, key=lambda entry: (entry.job != begun, entry.state in slurm.FINAL, entry.job))
         for extra in ordered[1:]:
@@ -230,7 +234,7 @@ class SlurmWorker:
         return ordered[0] if ordered else None
 
     def _look_for_it(self, arrays: Set[str]) -> None:
-        """Handles a list of Slurm without a job of this name. An action follows only after two such lists in a row."""
+        """Handles a job list without a job of this name; acts only after two such lists in succession."""
         self._missing += 1
         if self._missing < 2 or slurm.held(self._folder):
             return
@@ -247,13 +251,13 @@ class SlurmWorker:
 
     @property
     def _array_number(self) -> str:
-        """Returns the id of the array that has the job as a task."""
+        """Returns the id of the job array that has the job as a task."""
         number, task, _ = self._job.job.partition("_")
         return number if task else ""
 
     def _others_began(self) -> bool:
-        """Whether another task of the array has started: then Slurm has the whole array on its disk. A task that is
-        cancelled while it waits has no entry in the list.
+        """Whether another task of the job array has started: Slurm then has stored the whole array. A task that is
+        cancelled while it waits has no entry in the job list of Slurm.
         """
         if not self._array_number:
             return False
@@ -277,11 +281,11 @@ class SlurmWorker:
             self._accounting.note(self, entry.job)
 
     def took(self, found: Mapping[str, str]) -> None:
-        """Stores the accounting data of the last job. Raises OSError."""
+        """Stores the accounting data of the last job of the run. Raises OSError if the data cannot be stored."""
         self.write_down(accounting={**self._job.accounting, **found})
 
     def _again(self, why: str) -> None:
-        """Submits another job, which continues from the checkpoint, unless a stop was asked for."""
+        """Submits another job, which continues from the checkpoint, unless a stop of the run was requested."""
         if self._stop or self._job.attempt >= _MOST:
             self._exit = Exit(None, False, "", (State.LOST, Cause.NODE, f"{why}, attempt {self._job.attempt}"))
             return

@@ -1,10 +1,11 @@
-"""Scheduling: which waiting runs start now, and the reason for which each of the others waits. Pure functions.
+"""Scheduling: which waiting runs start now, and why each of the other runs waits. The module has only pure functions.
 
-Order of the queue: users with a higher priority of the site first; then users with the least use for their share;
-among the runs of one user the higher priority, then the earlier run. The first run that does not fit has a
-reservation. A later run may start before it only if this does not delay it: if the later run ends, by its time
-limit, before the first one can start by the estimates of the running ones (Lifka, The ANL/IBM SP scheduling system,
-1995: "EASY"); or if both fit, in whichever order the running ones end.
+Order of the queue: users with a higher priority first; then users with the least use for their share; among the runs of
+one user the higher priority, then the earlier run. The first run of the queue that does not fit into the free cores and
+memory has a reservation. A later run may start before the run with the reservation only if the later run does not delay
+it. The start causes no delay if the later run ends, by its time limit, before the estimated start of the reserved run;
+or if both runs fit, for any order in which the running runs end (Lifka, The ANL/IBM SP scheduling system, 1995:
+"EASY").
 """
 
 import heapq
@@ -19,8 +20,8 @@ from conoid.cases.site.policy import Share
 from ..runs.events import Run
 
 _LEAST = 1.0
-"""Smallest number of core-seconds of a run in the order of the queue (chosen value). This value replaces a smaller or
-missing estimate."""
+"""Smallest number of core-seconds that a run has in the order of the queue (chosen value). The smallest number replaces
+a smaller or missing estimate of core-seconds."""
 
 
 @dataclass(frozen=True)
@@ -31,7 +32,7 @@ class Need:
     owner: str
     cores: int
     memory: float = 0.0
-    """Memory of all ranks by the estimate, bytes; 0: unknown."""
+    """Estimated memory of all ranks, bytes; 0: unknown."""
     seconds: float = 0.0
     """Expected duration of the run, s; 0: unknown."""
     limit: float = math.inf
@@ -43,8 +44,9 @@ class Need:
 
 @dataclass(frozen=True)
 class Busy:
-    """Cores and memory of a running run, and the Unix time of its expected end. Time 0: the end is unknown, and the
-    run may end at any moment."""
+    """Cores and memory of a running run, and the Unix time of its expected end, s. An expected end of 0 is unknown: the
+    run may end at any moment.
+    """
 
     cores: int
     memory: float = 0.0
@@ -63,20 +65,20 @@ class Room:
         return need.cores <= self.cores and need.memory <= self.memory
 
     def less(self, *taken: Need | Busy) -> "Room":
-        """Returns the free cores and memory besides these runs."""
+        """Returns the free cores and the free memory that remain beside the given runs."""
         return Room(self.cores - sum(one.cores for one in taken), self.memory - sum(one.memory for one in taken))
 
 
 @dataclass
 class Plan:
-    """Runs that start now, in order, and the reason for which each of the other runs waits."""
+    """Runs that start now, in order, and the reason why each of the other runs waits."""
 
     start: list[str] = field(default_factory=list)
     why: dict[str, str] = field(default_factory=dict)
 
 
 def in_state(runs: Iterable[Run], state: State) -> list[Run]:
-    """Returns the runs in ``state``, oldest first."""
+    """Returns the runs in the state ``state``, oldest first."""
     return sorted((run for run in runs if run.state is state), key=lambda run: run.id)
 
 
@@ -87,8 +89,9 @@ def stranded(runs: Iterable[Run], looked_after: Set[str]) -> list[str]:
 
 
 def ordered(needs: Iterable[Need], taken: Mapping[str, float], users: Mapping[str, Share]) -> list[Need]:
-    """Returns the queue in the order of starting. ``taken``: core-seconds of each owner so far, including running
-    runs."""
+    """Returns the queue in the order of starting. ``taken``: core-seconds that each owner has used so far, including
+    running runs.
+    """
     of_owner: dict[str, list[Need]] = {}
     for need in sorted(needs, key=lambda need: (-need.priority, need.run)):
         of_owner.setdefault(need.owner, []).append(need)
@@ -118,10 +121,11 @@ def plan(
     now: float,
     blocked: Callable[[Need, Sequence[Need]], str],
 ) -> Plan:
-    """Plans the starts at the Unix time ``now``; ``busy`` runs use a part of ``room``, ``queue`` is in its order.
+    """Plans the starts at the Unix time ``now``, s.
 
-    ``blocked`` returns the reason for which a run may not start, given the runs that start before it. A blocked run,
-    and a run that needs more than ``room``, delay no other run.
+    ``busy``: runs that use cores and memory of ``room``; ``queue``: waiting runs in order; ``blocked``: function that
+    returns why a run may not start, given the runs that start before it. A blocked run, and a run that needs more than
+    ``room``, delay no other run.
     """
     made, starts, holds, first = Plan(), list[Need](), list(busy), None
     waits = 0
@@ -140,7 +144,7 @@ def plan(
 
 
 def _beyond(need: Need, room: Room) -> str:
-    """Returns why a run can never start, for example after a restart of the server with fewer cores."""
+    """Returns why a run can never start, for example because the server was restarted with fewer cores."""
     if need.cores > room.cores:
         return f"it needs {counted(need.cores, 'slot')}, and this server has {room.cores}: it cannot start here"
     if need.memory > room.memory:
@@ -157,12 +161,16 @@ def _reason(need: Need, room: Room, free: Room, waits: int) -> str:
 
 
 def _passes(need: Need, first: Need, busy: Sequence[Busy], free: Room, now: float) -> bool:
-    """Whether ``need`` can start without a delay of ``first``, the run that does not fit into ``free``."""
+    """Whether the run ``need`` can start without a delay of ``first``, the first run that does not fit into
+    ``free``.
+    """
     return now + need.limit <= _earliest(first, busy, free, now) or _beside(need, first, busy, free)
 
 
 def _earliest(first: Need, busy: Sequence[Busy], free: Room, now: float) -> float:
-    """Returns the Unix time at which ``first`` can start by the estimates. An overdue run may end at any moment."""
+    """Returns the estimated Unix time at which ``first`` can start, s. A running run that exceeds its expected end may
+    end at any moment.
+    """
     for one in sorted(busy, key=lambda one: one.ends):
         free = Room(free.cores + one.cores, free.memory + one.memory)
         if free.fits(first):
@@ -171,11 +179,11 @@ def _earliest(first: Need, busy: Sequence[Busy], free: Room, now: float) -> floa
 
 
 def _beside(need: Need, first: Need, busy: Sequence[Busy], free: Room) -> bool:
-    """Whether ``first`` can start at the same moment with ``need`` as without it, for every order of ends of the
-    others.
+    """Whether ``first`` can start at the same moment with and without ``need``, for any order in which the running runs
+    end.
 
-    The numbers of cores that may become free are the sums over subsets of ``busy``. The smallest sum that lets
-    ``first`` start must leave enough cores for ``need``. If ``first`` waits for memory, the answer is no.
+    The numbers of cores that may become free are the sums over subsets of ``busy``. The smallest sum of free cores with
+    which ``first`` can start must leave enough cores for ``need``. If ``first`` waits for memory, the result is False.
     """
     if free.memory - first.memory < need.memory:
         return False

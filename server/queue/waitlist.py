@@ -1,5 +1,6 @@
-"""The queue of the supervisor: cores and memory that each run needs, use of each owner, and selection of the runs
-that start now."""
+"""The queue of the supervisor: cores and memory that each run needs, past use of each owner, and selection of the runs
+that start now.
+"""
 
 import math
 import time
@@ -21,27 +22,30 @@ from .scheduling import Busy, Need, Room
 from .usage import Took, Usage
 
 _REST = 1.0
-"""Longest time in s between two schedulings (chosen value). Scheduling is repeated because past use decays with
-time, and failed starts are tried again."""
+"""Longest time in s between two schedulings (chosen value). Scheduling is repeated because past use decays with time,
+and because failed starts are tried again."""
 
 
 @dataclass(frozen=True)
 class Held:
-    """Conditions outside the queue under which a run waits."""
+    """Conditions outside of the queue under which a run waits."""
 
     now: Callable[[str], bool]
-    """Whether the start of the run was delayed and its next try is later."""
+    """Function that returns whether the start of the run was delayed to a later time."""
     sweep: Callable[[Need, Iterable[Need]], str]
-    """Returns the reason for which a run waits for other runs of its sweep; empty if it does not wait. The argument is
-    the list of the runs with cores."""
+    """Function that returns the reason why a run waits for other runs of its sweep; empty if the run does not wait. The
+    argument of the function is the list of the runs that have cores."""
 
 
 class Waitlist:
-    """The queue. The class is used in the supervisor's thread; ``why`` and ``used`` may be called from any thread."""
+    """The queue of the supervisor. The class is used in the supervisor's thread; the methods ``why`` and ``used`` may
+    be called from any thread.
+    """
 
     def __init__(self, settings: Settings, queues: bool) -> None:
-        """Creates an empty queue. ``queues``: the launcher is a batch system with a queue of its own, which also
-        allocates memory."""
+        """Creates an empty queue. ``queues``: whether the launcher is a batch system with its own queue, which also
+        allocates memory.
+        """
         self._settings, self._queues = settings, queues
         self._rules, self._quota = settings.site.queue, settings.site.quota
         self.usage = Usage(self._rules.forgets)
@@ -54,7 +58,7 @@ class Waitlist:
         self._due = 0.0
 
     def settled(self, before: Run | None, after: Run) -> None:
-        """Records the step of a run. The used core-seconds are added when the run releases its cores."""
+        """Records the step of a run; adds the used core-seconds when the run releases its cores."""
         self._due = 0.0
         if before is not None and before.started and (after.state.final or not after.started):
             self.usage.add(Took(before.owner, before.cores, before.started, after.finished or time.time()))
@@ -63,18 +67,19 @@ class Waitlist:
             self._why.pop(after.id, None)
 
     def why(self, run_id: str) -> str:
-        """Returns the reason for which a run waited at the last scheduling; empty for a run that does not wait."""
+        """Returns the reason why a run waited at the last scheduling; empty for a run that does not wait."""
         return self._why.get(run_id, "")
 
     def used(self, owner: str, runs: Iterable[Run]) -> float:
-        """Returns the decayed core-seconds of an owner, with the use of the running runs among ``runs``."""
+        """Returns the decayed core-seconds of an owner, including the use of the running runs among ``runs``."""
         now = time.time()
         own = (run.cores * (now - run.started) for run in runs if run.owner == owner and run.started)
         return self.usage.of(owner, now) + sum(own)
 
     def turn(self, runs: Sequence[Run], active: Iterable[str], held: Held) -> list[str]:
-        """Returns the runs that start now, in order. ``runs`` are open; ``active`` runs have cores or were submitted
-        to a batch system."""
+        """Returns the runs that start now, in order. ``runs``: all open runs; ``active``: runs that have cores or were
+        submitted to a batch system.
+        """
         if time.monotonic() < self._due:
             return []
         self._due = time.monotonic() + _REST
@@ -93,8 +98,9 @@ class Waitlist:
         return Room(self._settings.slots) if memory is None else Room(self._settings.slots, float(memory))
 
     def _taken(self, working: Iterable[tuple[Run, Need]], now: float) -> dict[str, float]:
-        """Returns core-seconds by owner. A running run counts with its estimated use, or with its use so far if that
-        is larger."""
+        """Returns core-seconds by owner. A running run counts with its estimated core-seconds, or with the core-seconds
+        used so far if these are more.
+        """
         taken = defaultdict(float, self.usage.all(now))
         for run, need in working:
             taken[run.owner] += run.cores * max(need.seconds, now - run.started if run.started else 0.0, 1.0)
@@ -119,8 +125,9 @@ class Waitlist:
         return blocked
 
     def _need(self, run: Run) -> Need:
-        """Returns the cores and memory that a run needs, from the run's folder, which is read once. If the folder is
-        damaged, only the number of cores is known."""
+        """Returns the cores and memory that a run needs, from the run's folder, which is read once. If the folder of
+        the run is damaged, only the number of cores is known.
+        """
         if run.id not in self._needs:
             try:
                 made = folder.submission(self._settings.runs / run.id)
@@ -133,8 +140,8 @@ class Waitlist:
 def need_of(made: Submission, grace: float, room: float = math.inf) -> Need:
     """Returns the cores, memory and time that a submission needs.
 
-    ``grace``: time in s between its time limit and the forced end. For bodies that may break, the memory is that of
-    all tets as separate fragments, unless this exceeds ``room`` bytes.
+    ``grace``: time in s between the time limit of the run and the forced end. For parts that may break, the memory is
+    that of all tets as separate fragments, unless this memory exceeds ``room`` bytes.
     """
     seconds = made.estimate.get("seconds", made.estimate.get("core_seconds", 0.0) / made.cores)
     limit = math.inf if made.wall_time is None else made.wall_time + 2.0 * grace

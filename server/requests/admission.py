@@ -1,5 +1,6 @@
-"""Middleware that finds the token of a request and delays the request until it may begin (``request_order``). Limits
-are in ``user_limits``."""
+"""Middleware that finds the token of a request and delays the request until it may begin (module ``request_order``).
+The limits of requests are in the module ``user_limits``.
+"""
 
 import hashlib
 import time
@@ -18,30 +19,31 @@ from .thread_pool import asking
 from .tokens import check_token
 
 ALIVE = "/healthz"
-"""Address of /healthz. A request to this address waits for its turn (``request_order``) only, and not for a token or
-a limit."""
+"""Path of /healthz. A request for /healthz waits only for its place in the request order, not for a token or a
+limit."""
 LOCAL_OWNER = "local"
 """Owner of all runs on a server without access control."""
 _SEEN = 1000
-"""Number of recently valid tokens that are kept (chosen value)."""
+"""Number of recently valid tokens that are cached (chosen value)."""
 _FRESH = 1.0
-"""Time in s for which a valid token is not looked up again. The value was chosen because a revoked token is refused
-after this time."""
+"""Time in s for which a valid token is not read again from the database; a revoked token is refused after this time
+(chosen value)."""
 
 
 class Admission:
-    """Middleware of all requests. The app reads the token and the entry of the request (``user_limits``) from the
-    state of the scope."""
+    """Middleware of all requests. The application reads the token and the entry of the request (module ``user_limits``)
+    from the state of the ASGI scope.
+    """
 
     def __init__(self, app: ASGIApp, service: Service) -> None:
         self._app, self._service = app, service
         self._seen: OrderedDict[bytes, tuple[float, Token]] = OrderedDict()
-        """Valid tokens, by hash: time until which the token counts as valid, and the token. After that time the
-        database is read again, in a thread of the owner."""
+        """Valid tokens, by hash: time until which the token counts as valid, and the token. After this time a thread of
+        the owner reads the token from the database again."""
         self._turns = RequestOrder()
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Answers refused requests with 429 and 503."""
+        """Answers a refused request with status 429 or 503."""
         if scope["type"] != "http":
             await self._app(scope, receive, send)
             return
@@ -79,7 +81,9 @@ class Admission:
         return token.owner if token is not None else _address(scope)
 
     async def _token(self, scope: Scope) -> Token | None:
-        """Returns the token of the request; None without a valid token. Raises ServiceError 429, 503, 507."""
+        """Returns the token of the request; None if the request has no valid token. Raises ServiceError with status
+        429, 503 or 507.
+        """
         scheme, _, text = Headers(scope=scope).get("authorization", "").partition(" ")
         if not self._service.settings.auth:
             await self._turns.wait(LOCAL_OWNER)
@@ -110,6 +114,8 @@ class Admission:
 
 
 def _address(scope: Scope) -> str:
-    """Returns a name for an address that differs from all user names: user names have no blank."""
+    """Returns a name for a network address; the name differs from all user names, because user names contain no
+    blank.
+    """
     client = scope.get("client")
     return f"address {client[0]}" if client else "address"

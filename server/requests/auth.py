@@ -17,8 +17,8 @@ from .admission import LOCAL_OWNER
 from .tokens import SCOPES
 
 RECHECK = 2.0
-"""Time in s between two checks of the token of a long answer (chosen value). A stream ends at most 5 s after its
-token is revoked."""
+"""Time in s between two checks of the token of a long answer (chosen value). A streamed answer ends at most 5 s after
+its token is revoked."""
 
 
 @dataclass(frozen=True)
@@ -30,13 +30,14 @@ class Identity:
     """Token of the caller; None on a server without access control."""
 
     def allows(self, scope: str) -> bool:
-        """True when the token carries ``scope``."""
+        """True if the token has the scope ``scope``."""
         return self.token is None or scope in self.token.scopes
 
 
 async def identify(request: Request, service: ServiceOf) -> Identity:
-    """Returns the identity of a request; the middleware ``admission`` has looked up the token. Raises ServiceError
-    401."""
+    """Returns the identity of the caller; the middleware ``admission`` has read the token from the database. Raises
+    ServiceError with status 401 without a valid token.
+    """
     if not service.settings.auth:
         _same_machine_page(request)
         return Identity(LOCAL_OWNER, None)
@@ -65,8 +66,9 @@ def _same_machine_page(request: Request) -> None:
 
 
 def requires(scope: str) -> Callable[[Identity], Awaitable[Identity]]:
-    """Returns a dependency that gives the identity of the caller. Raises ServiceError 401, or 403 when the token
-    lacks ``scope``."""
+    """Returns a FastAPI dependency that gives the identity of the caller. The dependency raises ServiceError with
+    status 401, or with 403 if the token lacks the scope ``scope``.
+    """
 
     async def check(identity: Annotated[Identity, Depends(identify)]) -> Identity:
         if not identity.allows(scope):
@@ -82,7 +84,7 @@ Submitter = Annotated[Identity, Depends(requires("submit"))]
 
 
 class Pass:
-    """Limits a long answer to the validity of its token, and to ``seconds`` if given."""
+    """Limits a long answer to the validity of its token, and to ``seconds`` if a value is given."""
 
     def __init__(self, service: Service, identity: Identity, seconds: float | None = None) -> None:
         self._service, self._identity = service, identity
@@ -95,7 +97,7 @@ class Pass:
         return max(0.0, min(RECHECK, self._ends - time.monotonic()))
 
     async def holds(self) -> bool:
-        """False once the token is revoked or the time limit is over."""
+        """False if the token is revoked or the time limit has passed."""
         now = time.monotonic()
         if now >= self._ends:
             return False
@@ -105,7 +107,7 @@ class Pass:
         return await self._service.pool.run(self._valid)
 
     def _valid(self) -> bool:
-        """Reads the token again. If the database does not answer, the stream continues."""
+        """Reads the token again. If the database does not answer, the streamed answer continues."""
         token = self._identity.token
         try:
             return token is None or self._service.store.token(token.id) is not None

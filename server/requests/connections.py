@@ -1,5 +1,6 @@
-"""Protection against slow clients: a time limit for headers and for unread answers, and a limit of the number of
-connections."""
+"""Protection against slow clients: time limits for headers and for unread answers, and a limit of the number of
+connections.
+"""
 
 import asyncio
 import resource
@@ -12,29 +13,27 @@ import h11
 from uvicorn.protocols.http.h11_impl import H11Protocol
 
 BODY = 1 << 20
-"""Largest size of a request body, bytes (``limits``)."""
+"""Largest size of a request body, bytes (module ``limits``)."""
 HEADER = 10.0
-"""Time in s within which the header of a request must arrive (chosen value). The time begins at the first byte of
-the header or at the start of the connection."""
+"""Time in s within which the header of a request must arrive (chosen value). The time begins at the first byte of the
+header or at the start of the connection."""
 _PIECES, _PAUSE = 4, 0.5
-"""Number of pieces of a header that are parsed as they arrive, and time in s between later parses. The values were
-chosen because a normal client sends its header in one piece, and a parse takes 0.1 ms of the event loop.
-"""
+"""Number of pieces of a header that are parsed at arrival, and time in s between later parses (chosen values). A normal
+client sends its header in one piece; a parse takes 0.1 ms of the event loop."""
 READ = 30.0
-"""Time in s within which a client must read part of a waiting answer. The value was chosen because a client that
-does not read for longer, such as a laptop in sleep, can send its request again."""
+"""Time in s within which a client must read part of an answer that waits to be sent (chosen value). A client that does
+not read for longer, such as a laptop in sleep, can send its request again."""
 _SHARE, _MOST = 4, 8192
-"""Number of file descriptors for each allowed connection, and largest number of connections. The values were chosen
-because the remaining descriptors are needed for files."""
+"""Number of file descriptors for each allowed connection, and largest number of connections (chosen values). The server
+needs the remaining file descriptors for files."""
 _FILES = 65_536
-"""Number of file descriptors that the server requests from the system. The value was chosen because the server uses
-fewer descriptors."""
+"""Number of file descriptors that the server requests from the operating system: more than the server uses (chosen
+value)."""
 _SOME = 64
-"""Number of oldest idle connections among which the connection to close is selected. The value was chosen because
-this selection takes 0.1 ms."""
+"""Number of oldest idle connections from which the server selects the connection to close; the selection takes 0.1 ms
+(chosen value)."""
 _ACCEPTED = 4
-"""Number of connections that asyncio accepts in one turn of the event loop. The value was chosen because so many
-connections take 0.5 ms."""
+"""Number of connections that asyncio accepts in one turn of the event loop: 0.5 ms (chosen value)."""
 _FULL = b"HTTP/1.1 503 Service Unavailable\r\nRetry-After: 5\r\nContent-Length: 0\r\nConnection: close\r\n\r\n"
 
 
@@ -48,8 +47,8 @@ def raise_limit() -> int:
 
 
 class Connection(H11Protocol):
-    """A connection that the server closes in three cases: its header is late, its answers are not read, or it is
-    idle when the limit of connections is reached.
+    """An HTTP connection. The server closes a connection if its header is late, if its answers are not read, or if it
+    is idle when the limit of connections is reached.
     """
 
     most = _MOST
@@ -57,13 +56,13 @@ class Connection(H11Protocol):
     idle: dict["Connection", None] = {}  # noqa: RUF012
     """Connections without a complete request, oldest first."""
     owner = ""
-    """User of the last request's token, or the address of the client."""
+    """User of the last request's token; without a token, the network address of the client."""
     _overdue: asyncio.TimerHandle | None = None
     _unread: asyncio.TimerHandle | None = None
     _pieces = 0
-    """Bytes of the incomplete header."""
+    """Bytes of the incomplete request header."""
     _useless = 0
-    """Bytes of request bodies that arrived after their answer."""
+    """Number of bytes of a request body that arrived after the answer to the request."""
     _left = 0
     """Number of bytes that waited to be sent at the previous check."""
 
@@ -77,12 +76,13 @@ class Connection(H11Protocol):
             self._make_room()
 
     def _make_room(self) -> None:
-        """Closes one of the oldest idle connections: a connection without a token, else a connection of the user
-        with most connections."""
+        """Closes one of the oldest idle connections: a connection without a token, else a connection of the user with
+        most connections.
+        """
         some = list(islice(self.idle, _SOME))
         counts = Counter(one.who for one in some)
         oldest = max(some, key=lambda one: (one is not self, not one.owner, counts[one.who]))
-        del self.idle[oldest]  # at once, because each of many connections in one turn of the loop closes another
+        del self.idle[oldest]  # no delay: each of many connections of one loop turn closes another one
         if oldest is self:
             self.transport.write(_FULL)
             self.transport.close()
@@ -91,20 +91,20 @@ class Connection(H11Protocol):
 
     @property
     def who(self) -> str:
-        """Returns the user of a connection, or its address."""
+        """Returns the user of a connection; without a user, the network address of the client."""
         return self.owner or (self.client[0] if self.client else "")
 
     def connection_lost(self, exc: Exception | None) -> None:
-        """Removes the connection from the count."""
+        """Removes the connection from the number of open connections."""
         self.idle.pop(self, None)
         self._unset_timer()
         self._look_no_more()
         super().connection_lost(exc)
 
     def data_received(self, data: bytes) -> None:
-        """Handles received bytes. The time limit of a header begins with its first byte, and further bytes do not
-        extend the limit. A header in many pieces is parsed at intervals. After an answer, the server reads at most
-        ``BODY`` further bytes of the request body.
+        """Handles received bytes. The time limit of a header begins with its first byte; further bytes do not extend
+        the time limit. A header that arrives in many pieces is parsed at intervals. After an answer, the server reads
+        at most ``BODY`` further bytes of the request body.
         """
         if self.conn.our_state is h11.DONE and self.conn.their_state is h11.SEND_BODY:
             self._useless += len(data)
@@ -132,20 +132,21 @@ class Connection(H11Protocol):
             self.transport.resume_reading()
 
     def on_response_complete(self) -> None:
-        """Marks the connection as idle after the request is complete. An idle connection may be closed to make a new
-        one possible."""
+        """Marks the connection as idle after the request is complete. The server may close an idle connection to make a
+        new connection possible.
+        """
         super().on_response_complete()
         if not self.transport.is_closing():
             self.idle[self] = None
 
     def pause_writing(self) -> None:
-        """Starts the time limit of an unread answer, when the client reads more slowly than the server sends."""
+        """Starts the time limit of an unread answer, if the client reads more slowly than the server sends."""
         super().pause_writing()
         self._left = self.transport.get_write_buffer_size()
         self._unread = self.loop.call_later(READ, self._look)
 
     def resume_writing(self) -> None:
-        """Ends the time limit of an unread answer, when the client has read it."""
+        """Ends the time limit of an unread answer, because the client has read the answer."""
         super().resume_writing()
         self._look_no_more()
 
@@ -178,6 +179,7 @@ def options() -> dict[str, Any]:
 
 
 def queue(listener: socket.socket) -> None:
-    """Sets the backlog of the socket to the largest number of open connections. The default of uvicorn would be
-    ``_ACCEPTED``."""
+    """Sets the backlog of the socket to the largest number of open connections; the default of uvicorn would be
+    ``_ACCEPTED``.
+    """
     listener.listen(_MOST)

@@ -1,19 +1,17 @@
-"""HEAD requests for every route with GET. The answer has the headers of GET, is sent at once, and has no body."""
+"""HEAD requests for every route with GET. The answer to HEAD has the headers of the answer to GET and no body."""
 
 import anyio
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 
 class HeadRequests:
-    """Middleware that handles HEAD: it calls the app with GET and ends the answer after the headers, for any length of
-    the body.
-    """
+    """Middleware for HEAD requests: calls the application with GET and ends the answer after the headers."""
 
     def __init__(self, app: ASGIApp) -> None:
         self._app = app
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Handles a HEAD request. Any other request is passed on unchanged."""
+        """Handles a HEAD request; passes any other request on unchanged."""
         if scope["type"] != "http" or scope["method"] != "HEAD":
             await self._app(scope, receive, send)
             return

@@ -1,5 +1,5 @@
-"""Checks of a request before it uses resources: unknown parameters, large bodies, cases above the limits, full
-queues and disks.
+"""Checks of a request before it uses resources: unknown parameters, large bodies, cases above the limits, full queues
+and full disks.
 """
 
 import asyncio
@@ -28,7 +28,7 @@ from ..settings import Caps, Settings
 from .connections import BODY
 
 _BODY_TIMEOUT = 30.0
-"""Time in s for a whole body (chosen value). A body of 1 MiB arrives in this time at 35 kB/s."""
+"""Time in s for a whole request body (chosen value); a body of 1 MiB arrives in this time at 35 kB/s."""
 
 
 _COUNTABLE = 1 << 53
@@ -36,8 +36,8 @@ _COUNTABLE = 1 << 53
 
 
 async def check_query(request: Request) -> None:
-    """Raises ServiceError 400 for an unknown parameter, because a misspelt parameter would count as absent, and for a
-    parameter that is given twice and can have only one value.
+    """Raises ServiceError with status 400 for an unknown parameter, and for a parameter that is given twice but can
+    have only one value. An unknown parameter may be misspelt; without the error it would count as absent.
     """
     if not request.query_params:
         return
@@ -54,20 +54,20 @@ async def check_query(request: Request) -> None:
 
 
 def _many(annotation: Any) -> bool:
-    """Whether a parameter of this type may be given several times."""
+    """Whether a query parameter of this type may be given several times."""
     return any(get_origin(each) is list for each in (annotation, *get_args(annotation)))
 
 
 def _query(dependant: Dependant) -> Iterator[Any]:
-    """Returns the parameters of a route, from FastAPI."""
+    """Returns the query parameters of a route, from FastAPI."""
     yield from dependant.query_params
     for inner in dependant.dependencies:
         yield from _query(inner)
 
 
 async def read_body(request: Request) -> bytes:
-    """Returns the body of a request; at most ``BODY`` bytes are in memory. Raises ServiceError 415 for an encoded
-    body, 413 for a large one, 408 for a slow one, and 400 for an incomplete one.
+    """Returns the body of a request; at most ``BODY`` bytes are in memory. Raises ServiceError with status 415 for an
+    encoded body, 413 for a large body, 408 for a slow body, and 400 for an incomplete body.
     """
     check_encoding(request)
     length = request.headers.get("content-length", "0")
@@ -82,7 +82,9 @@ async def read_body(request: Request) -> bytes:
 
 
 def check_encoding(request: Request) -> None:
-    """Raises ServiceError 415 for an encoded body, because its size is not known before it is decoded."""
+    """Raises ServiceError with status 415 for an encoded request body, because the decoded size is unknown before
+    decoding.
+    """
     encoding = request.headers.get("content-encoding", "identity").strip().lower()
     if encoding not in {"", "identity"}:
         detail = f"Content-Encoding {encoding[:80]!r}: a body is sent as it is"
@@ -104,7 +106,7 @@ def _too_large(length: int) -> ServiceError:
 
 
 class Limits(msgspec.Struct, frozen=True):
-    """Resources that a case needs, with their limits on this server; None: no limit."""
+    """Resources that a case needs, with the limits of this server; None: no limit."""
 
     slots: int
     elements: int | None
@@ -122,7 +124,7 @@ def of(settings: Settings) -> Limits:
 
 
 def check(case: Case, limits: Limits) -> list[Problem]:
-    """Returns all problems of a valid case with the limits of this server."""
+    """Returns all problems that a valid case has with the limits of this server."""
     return [*_cores(case, limits), *_files(case), *_time(case, limits)]
 
 
@@ -151,8 +153,8 @@ def _cores(case: Case, settings: Limits) -> Iterator[Problem]:
 
 
 def _files(case: Case) -> Iterator[Problem]:
-    """Returns problems of files without a hash. The paths in a case are valid on the machine on which the case was
-    written, not on the server.
+    """Returns problems of files for which the case gives no hash. The paths in a case are valid on the machine on which
+    the case was written, not on the server.
     """
     for file in files_of(case.model_dump(include={"parts"})):
         if file.sha256 is None:
@@ -167,8 +169,8 @@ def _time(case: Case, caps: Limits) -> Iterator[Problem]:
 
 
 def figures(estimate: Estimate) -> dict[str, int | float]:
-    """Returns the known numbers of an estimate: elements, nodes, dt, steps, memory_bytes, core_seconds, seconds of
-    wall-clock time; dust_bytes for bodies that may break.
+    """Returns the known numbers of an estimate: elements, nodes, dt, steps, memory_bytes, core_seconds, and seconds
+    (wall time). For parts that may break, the estimate also has dust_bytes.
     """
     values = {
         "elements": estimate.elements,
@@ -184,28 +186,29 @@ def figures(estimate: Estimate) -> dict[str, int | float]:
 
 
 def wall_time(case: Case, caps: Limits) -> float | None:
-    """Returns the time in s after which the run is stopped; None: never."""
+    """Returns the wall time in s after which the run is stopped; None: the run has no time limit."""
     cost = None if caps.core_seconds is None else caps.core_seconds / case.run.cores
     asked = [limit for limit in (case.run.max_wall_time, caps.wall_time, cost) if limit is not None]
     return min(asked) if asked else None
 
 
 def later(code: str, detail: str, hint: str | None = None) -> ServiceError:
-    """Returns 429: the user has reached a limit. The same request may succeed later."""
+    """Returns an error with status 429: the user has reached a limit. A client may repeat the refused request later."""
     return ServiceError(429, code, detail, hint=hint, retryable=True, headers={"Retry-After": "60"})
 
 
 def check_output(kept: int, quota: Quota) -> None:
-    """Raises ServiceError 429 if the folders of the owner's runs have reached their limit. ``kept``: their size in
-    bytes."""
+    """Raises ServiceError with status 429 if the folders of the owner's runs have reached their limit. ``kept``: size
+    in bytes of the folders of the owner's runs.
+    """
     if quota.output_bytes is not None and kept >= quota.output_bytes:
         detail = f"your runs have {size(kept)} on disk; this server allows {size(quota.output_bytes)}: remove some"
         raise later("output_quota", detail)
 
 
 def check_room(runs: Path, open_runs: int, caps: Caps, more: int = 1) -> None:
-    """Raises ServiceError 429 if the owner would have too many open runs with ``more`` new runs, 422 if the new runs
-    alone are too many, 507 if the disk is nearly full.
+    """Raises ServiceError if ``more`` new runs exceed a limit. Status 429: the owner would have too many open runs;
+    422: the new runs alone are too many; 507: the disk is nearly full.
     """
     if more > max(1, caps.queued):
         raise ServiceError(422, "invalid_sweep", f"{more} points; this server allows {caps.queued} open runs of a user")

@@ -1,16 +1,16 @@
-"""Filter that limits repeated lines in the log, so that they do not fill the disk."""
+"""Filter that limits repeated lines in the log, so that the log does not fill the disk."""
 
 import logging
 import threading
 import time
 
 _MOST, _WINDOW = 20, 60.0
-"""Largest number of log lines of one kind, and the time in s in which they are counted. The values were chosen
-because so many lines are enough to see the cause."""
+"""Largest number of log lines of one kind, and the time in s in which the lines are counted. The chosen number of lines
+is enough to see the cause."""
 
 
 class FloodFilter(logging.Filter):
-    """Filter for a handler of the log. All lines that one line of the source code writes are of one kind."""
+    """Filter for a handler of the log. Log lines are of one kind if the same line of the source code writes them."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -18,8 +18,9 @@ class FloodFilter(logging.Filter):
         self._seen: dict[tuple[str, int], tuple[float, int]] = {}
 
     def filter(self, record: logging.LogRecord) -> bool:
-        """Returns False for a line above the limit. The next line of this kind that is written contains the number
-        of dropped lines."""
+        """Returns False if a log line is above the limit. The next written line of the same kind contains the number of
+        dropped lines.
+        """
         place, now = (record.pathname, record.lineno), time.monotonic()
         with self._lock:
             since, count = self._seen.get(place, (now, 0))
@@ -33,6 +34,6 @@ class FloodFilter(logging.Filter):
 
 
 def install() -> None:
-    """Adds the filter to every handler."""
+    """Adds the filter to every handler of the log."""
     for handler in logging.getLogger().handlers:
         handler.addFilter(FloodFilter())

@@ -1,8 +1,8 @@
-"""Order in which requests begin: one in each turn of the event loop, users in rotation.
+"""Order in which requests begin: one request in each turn of the event loop, users in rotation.
 
-An answer that computes nothing takes 0.5 to 0.8 ms of the event loop, and a GET that reads a file waits for the loop
-ten times. If all requests that have arrived began in one turn of the loop, a user with 40 connections would make
-each of these waits 20 ms or more for all other users (docs/reference/load.md, "Beside an attacker").
+An answer without computation takes 0.5 to 0.8 ms of the event loop; a GET that reads a file waits for the event loop
+ten times. If all waiting requests began in one turn of the event loop, a user with 40 connections would delay each wait
+of other users by 20 ms or more (docs/reference/load.md, "Beside an attacker").
 """
 
 import asyncio
@@ -10,11 +10,12 @@ from collections import OrderedDict, deque
 
 
 class RequestOrder:
-    """Queue of requests. The class is used in the thread of the event loop."""
+    """Queue of requests that have not begun. The class is used only in the thread of the event loop."""
 
     def __init__(self) -> None:
         self._lines: OrderedDict[str, deque[asyncio.Future[None]]] = OrderedDict()
-        """Requests that have not begun, by user. The first user in this dictionary is the next whose request begins."""
+        """Requests that have not begun, by user. The next request to begin is a request of the first user in this
+        dictionary."""
         self._called = False
 
     async def wait(self, who: str) -> None:
@@ -28,7 +29,7 @@ class RequestOrder:
         await turn
 
     def _begin(self, loop: asyncio.AbstractEventLoop) -> None:
-        """Begins one request. While others wait, schedules itself for the next turn of the event loop."""
+        """Begins one request. While other requests wait, schedules itself for the next turn of the event loop."""
         while self._lines:
             who, line = self._lines.popitem(last=False)
             turn = line.popleft()

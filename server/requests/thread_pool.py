@@ -1,8 +1,8 @@
-"""Pool of threads for work that may block: disk, database, long computations.
+"""Pool of threads for tasks that may block: disk, database, long computations.
 
-The number of threads is limited for each user. The event loop never waits for a disk. Work that takes too long is
-answered with 503. The thread of such work stays in use until the work ends. Therefore a disk that hangs blocks at most
-as many threads as the limit.
+The number of threads of each user is limited. The event loop never waits for a disk. A request whose task takes too
+long is answered with status 503. The thread of a task that takes too long stays in use until the task ends. Therefore a
+disk that hangs blocks at most as many threads as the limit allows.
 """
 
 import asyncio
@@ -20,10 +20,10 @@ from ..errors import ServiceError
 P = ParamSpec("P")
 T = TypeVar("T")
 THREADS = 64
-"""Largest number of threads for all users. The value was chosen because a disk answers some ten requests at a time,
-and a thread needs some 100 kB."""
+"""Largest number of threads for all users (chosen value). A disk answers some ten requests at a time, and a thread
+needs some 100 kB."""
 asking: ContextVar[str] = ContextVar("asking", default="nobody")
-"""The user of the present request: a user name, or an address."""
+"""The user of the present request: a user name, or a network address."""
 
 
 @dataclass(eq=False)
@@ -36,11 +36,11 @@ class _Job:
 
 
 class ThreadPool:
-    """A pool of threads with a queue for each user. The class is used in the thread of the event loop."""
+    """A pool of threads with a queue for each user. The class is used only in the thread of the event loop."""
 
     def __init__(self, each: int, waiting: int, patience: float, most: int = THREADS) -> None:
         """Creates the pool. ``each``: largest number of threads of one user; ``waiting``: largest number of waiting
-        jobs of one user; ``most``: largest number of threads of all users; ``patience``: longest time in s of a job,
+        tasks of one user; ``most``: largest number of threads of all users; ``patience``: longest time in s of a task,
         including its waiting time.
         """
         self._each, self._waiting, self._patience, self._most = each, waiting, patience, most
@@ -50,8 +50,9 @@ class ThreadPool:
         self._threads = self._busy = 0
 
     async def run(self, work: Callable[P, T], *args: P.args, **words: P.kwargs) -> T:
-        """Returns the result of ``work``, computed in a thread for the user; raises its errors. Raises ServiceError
-        429 if too many jobs of the user wait, 503 if the work takes too long.
+        """Returns the result of the function ``work``, computed in a thread for the user; raises the errors of
+        ``work``. Raises ServiceError with status 429 if too many tasks of the user wait, with 503 if the task takes too
+        long.
         """
         who, loop = asking.get(), asyncio.get_running_loop()
         waiting = self._jobs.setdefault(who, deque())
@@ -74,14 +75,14 @@ class ThreadPool:
         return ServiceError(503, "unavailable", detail, retryable=True, headers={"Retry-After": "5"})
 
     def _forget(self, job: _Job) -> None:
-        """Removes a job from its queue. A job that has started continues."""
+        """Removes a task from its queue; a task that has started continues."""
         if not job.begun:
             self._jobs[job.who].remove(job)
             if not self._jobs[job.who]:
                 del self._jobs[job.who]
 
     def _begin(self) -> None:
-        """Starts waiting jobs; the users take turns."""
+        """Starts waiting tasks; users are served in turn."""
         while self._busy < self._most:
             who = next((who for who, jobs in self._jobs.items() if jobs and self._taken[who] < self._each), None)
             if who is None:
@@ -99,8 +100,9 @@ class ThreadPool:
             self._handed.put(job)
 
     def _work(self) -> None:
-        """Runs jobs in a thread. The thread is a daemon, so a thread that hangs does not keep the server from
-        ending."""
+        """Runs tasks in a thread. The thread is a daemon, so that a thread that hangs does not keep the server from
+        ending.
+        """
         while True:
             job = self._handed.get()
             value, error = None, None
@@ -126,13 +128,14 @@ class ThreadPool:
 
 
 def busy(detail: str) -> ServiceError:
-    """Returns the error 429: too many requests of the same user are in progress."""
+    """Returns the error with status 429: too many requests of the same user are in progress."""
     return ServiceError(429, "busy", detail, retryable=True, headers={"Retry-After": "5"})
 
 
 def blocking(route: Callable[P, T]) -> Callable[P, Awaitable[T]]:
-    """Decorator for a route or a dependency that may block. The decorated function takes ``service`` and runs in a
-    thread of ``service.pool``."""
+    """Decorator for a route or a dependency that may block. The decorated function receives ``service`` and runs in a
+    thread of ``service.pool``.
+    """
 
     @wraps(route)
     async def run(*args: P.args, **words: P.kwargs) -> T:

@@ -1,4 +1,4 @@
-"""Bearer tokens of 256 random bits. A token is shown once, stored as a hash, can be revoked, and has scopes."""
+"""Bearer tokens of 256 random bits. A token is shown once, is stored as a hash, can be revoked, and has scopes."""
 
 import hashlib
 import hmac
@@ -17,17 +17,20 @@ SCOPES = {
 _PREFIX = "conoid"
 _OWNER = re.compile(r"[A-Za-z0-9][A-Za-z0-9_-]{0,62}")
 _NOBODY = Token("", "", "0" * 64, frozenset(), 0.0)
-"""Token of no user: no digest is all zeros. A comparison with this token takes as long as with any other token."""
+"""Stored token that belongs to no user, because no hash is all zeros. A comparison with this token takes as long as a
+comparison with any other token."""
 
 
 class TokenError(StartError):
-    """Error: a token cannot be made or revoked. The text of the error is the reason."""
+    """Error: a token cannot be made or revoked. The text of the error gives the reason."""
 
     exit_code = 2
 
 
 def create_token(store: Store, owner: str, scopes: frozenset[str]) -> str:
-    """Makes a token and returns its text, which cannot be read again. Raises TokenError."""
+    """Makes a token and returns its text, which cannot be read again later. Raises TokenError if the token cannot be
+    made.
+    """
     if not _OWNER.fullmatch(owner):
         raise TokenError(f"{owner!r}: a name starts with a letter or digit and has up to 63 letters, digits, _ or -")
     if unknown := scopes - SCOPES.keys():
@@ -38,7 +41,9 @@ def create_token(store: Store, owner: str, scopes: frozenset[str]) -> str:
 
 
 def check_token(store: Store, text: str) -> Token | None:
-    """Returns the token of ``text``; None for any other text. A wrong id takes as long as a wrong secret."""
+    """Returns the token of ``text``; None if ``text`` is not a valid token. A token with a wrong id takes as long to
+    refuse as a token with a wrong secret.
+    """
     prefix, _, rest = text.partition("_")
     token_id, _, secret = rest.partition("_")
     token = store.token(token_id) if prefix == _PREFIX else None
@@ -47,6 +52,7 @@ def check_token(store: Store, text: str) -> Token | None:
 
 
 def _hash(secret: str) -> str:
-    """Returns the hash of a secret. The secret has 256 random bits, so a plain hash is safe against a search of all
-    secrets."""
+    """Returns the hash of a secret. The secret has 256 random bits, so that a plain hash is safe against a search of
+    all secrets.
+    """
     return hashlib.sha256(secret.encode()).hexdigest()

@@ -1,6 +1,7 @@
 """Limits for each user: number of requests in progress, and number of long answers.
 
-A request is in progress until its answer is sent, so the limit also restricts the bodies and answers in memory.
+A request is in progress until its answer is sent; therefore the limit also bounds the request bodies and answers in
+memory.
 """
 
 import asyncio
@@ -15,7 +16,7 @@ from conoid.cases.site.policy import Http
 from .thread_pool import busy
 
 PATIENCE = 60.0
-"""Longest time in s that a request waits to begin. The value was chosen because most answers take less time."""
+"""Longest time in s that a request waits to begin (chosen value); most answers take less time."""
 
 
 class Place:
@@ -27,9 +28,9 @@ class Place:
         self.is_long = False
 
     def lengthen(self) -> None:
-        """Counts the answer as a long answer from now on, because it lasts as long as a run or a download.
+        """Counts the answer as a long answer from now on, because the answer lasts as long as a run or a download.
 
-        Raises ServiceError 429.
+        Raises ServiceError with status 429 if the user has too many long answers.
         """
         if not self.is_long:
             self._user_limits.lengthen(self._who)
@@ -37,23 +38,24 @@ class Place:
 
 
 class UserLimits:
-    """Counts of requests by user. The class is used in the thread of the event loop."""
+    """Counts of requests by user. The class is used only in the thread of the event loop."""
 
     def __init__(self, limits: Http, connections: int) -> None:
-        """Creates the counters. ``connections``: limit for all users. A single user gets at most half of this limit for
-        waiting requests and long answers.
+        """Creates the counters. ``connections``: limit of connections of all users. A single user gets at most half of
+        the connections for waiting requests and long answers.
         """
         self._requests = limits.requests
         self._waiting, self._streams = min(limits.waiting, connections // 4), min(limits.streams, connections // 4)
         self._turns: dict[str, asyncio.Semaphore] = {}
         self._asked: Counter[str] = Counter()
-        """Number of requests by user that wait or are in progress."""
+        """Number of requests of each user that wait or are in progress."""
         self._long: Counter[str] = Counter()
 
     @asynccontextmanager
     async def place(self, who: str) -> AsyncIterator[Place]:
-        """Waits until the request may begin. Raises ServiceError 429 when too many requests of the user wait, or
-        when the request waits too long."""
+        """Waits until the request may begin. Raises ServiceError with status 429 if too many requests of the user wait,
+        or if the request waits too long.
+        """
         if self._asked[who] >= self._requests + self._waiting:
             raise busy(f"{self._requests} of your requests are in progress and {self._waiting} wait")
         place, turn = Place(self, who), self._turns.setdefault(who, asyncio.Semaphore(self._requests))
@@ -74,7 +76,9 @@ class UserLimits:
                 self._leave(who)
 
     def lengthen(self, who: str) -> None:
-        """Moves a request from the requests in progress to the long answers. Raises ServiceError 429."""
+        """Moves a request from the requests in progress to the long answers. Raises ServiceError with status 429 if the
+        user has too many long answers.
+        """
         if self._long[who] >= self._streams:
             raise busy(
                 f"you have {self._streams} event streams, followed logs, waits or downloads; no more are allowed"

@@ -30,8 +30,9 @@ async def validate(
     body: Body,
     content_type: Annotated[str, Header(include_in_schema=False)] = "",
 ) -> dict[str, Any]:
-    """Checks a case without submitting it. Returns every problem, or warnings, estimate, the case with all defaults,
-    and the content of the files that it names; in both cases ``files``, the list of these files.
+    """Checks a case without submitting it. Returns every problem of an invalid case; for a valid case returns warnings,
+    estimate, the case with all defaults, and a survey of its mesh files. The answer always contains ``files``, the list
+    of the files that the case names.
     """
     try:
         pool, desk = service.surveyors if names_files(body) else service.readers, service.desk
@@ -53,7 +54,9 @@ async def validate(
 @router.get("/v1/case.schema.json")
 @blocking
 def schema(service: ServiceOf) -> Response:
-    """Returns the JSON schema of a case, which the first line of a shipped case names. No token is needed."""
+    """Returns the JSON schema of a case. The first line of a shipped case names the address of the schema; the request
+    needs no token.
+    """
     return Response(_schema(), media_type="application/schema+json")
 
 
@@ -67,7 +70,7 @@ def gallery(service: ServiceOf, identity: Reader) -> Response:
 @router.get("/v1/cases/{name}")
 @blocking
 def shipped_case(service: ServiceOf, identity: Reader, name: str) -> Response:
-    """Returns the TOML of a shipped case, ready to be changed and submitted."""
+    """Returns the TOML text of a shipped case, ready to be changed and submitted."""
     path = shipped().get(name)
     if path is None:
         raise not_found(f"case {name[:80]!r}")
@@ -91,7 +94,7 @@ def _schema() -> str:
 
 @cache
 def _gallery() -> bytes:
-    """Returns the shipped cases. The list is made once, because it does not change while a server runs."""
+    """Returns the shipped cases; the list is made once, because it does not change while a server runs."""
     cases = {name: read_case(path) for name, path in shipped().items()}
     entries = [
         {"name": name, "title": case.title, "description": case.description, "url": f"/v1/cases/{name}"}

@@ -20,8 +20,8 @@ router = APIRouter()
 After = Annotated[int, Query(ge=0, description="the seq of the last event that is known")]
 
 _PAGE = 1 << 20
-"""Largest size in bytes of the events of one answer; an answer has at least one event. The value was chosen because
-the answers of a user are in memory until they are sent."""
+"""Largest size in bytes of the events of one answer; an answer has at least one event. The size is limited because the
+answers of a user are in memory until they are sent (chosen value)."""
 Seconds = Annotated[
     float | None, Query(ge=0, le=86400, allow_inf_nan=False, description="s after which the answer ends; none: never")
 ]
@@ -32,8 +32,9 @@ Seconds = Annotated[
 def replay(
     run: OwnedRun, service: ServiceOf, after: After = 0, limit: Annotated[int, Query(ge=1, le=10_000)] = 1000
 ) -> Response:
-    """Returns the events with ``seq`` above ``after``, oldest first, at most ``limit`` and about 1 MiB. ``last``:
-    seq for the next request; ``more``: true if more events exist now."""
+    """Returns the events with ``seq`` above ``after``, oldest first, at most ``limit`` and about 1 MiB. The field
+    ``last`` is the ``seq`` for the next request; ``more`` is true if more events exist now.
+    """
     path = service.settings.runs / run.id / layout.JOURNAL
     found: list[journal.Line] = []
     size = 0
@@ -46,7 +47,7 @@ def replay(
 
 
 def _page(found: list[journal.Line], after: int, *, more: bool) -> Response:
-    """Returns the lines unchanged, as they are in the journal."""
+    """Returns the journal lines unchanged."""
     last = found[-1].seq if found else after
     body = b'{"events":[%s],"last":%d,"more":%s}' % (
         b",".join(line.raw for line in found),
@@ -66,8 +67,8 @@ async def follow(
     last_event_id: Annotated[str | None, Header(json_schema_extra={"pattern": "^[0-9]{1,18}$"})] = None,
     seconds: Seconds = None,
 ) -> Response:
-    """Sends server-sent events: those after ``Last-Event-ID`` (or ``after``), then the new ones until the run ends.
-    If the run has ended and no event is left, the answer is 204, after which a browser does not reconnect.
+    """Sends server-sent events: past events after ``Last-Event-ID`` (or ``after``), then new events until the run ends.
+    If the run has ended and no event is left, the answer has status 204, after which a browser does not reconnect.
     """
     if last_event_id:
         if not last_event_id.isdecimal() or len(last_event_id) > 18:

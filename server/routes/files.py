@@ -1,4 +1,4 @@
-"""Routes for files of a run's folder: list and download."""
+"""Routes for the files of a run's folder: list and download."""
 
 import os
 from dataclasses import asdict
@@ -16,7 +16,7 @@ from .runs import OwnedRun
 
 
 class _AnyPath(PathConvertor):
-    """Convertor for the rest of an address. This part of the address may contain line feeds, because names of files may
+    """Converter for the rest of an address. The rest of an address may contain line feeds, because names of files may
     contain line feeds.
     """
 
@@ -32,14 +32,17 @@ _BEFORE = 5
 @router.get("/v1/runs/{run_id}/files")
 @blocking
 def listing(run: OwnedRun, service: ServiceOf) -> dict[str, Any]:
-    """Returns every file of the run: path, size in bytes, time of the last change. HEAD of a file returns its
-    sha256."""
+    """Returns every file of the run: path, size in bytes, time of the last change. The answer to HEAD for a file
+    contains the sha256 of the file.
+    """
     entries = download.listing(service.settings.runs / run.id)
     return {"files": [_line(run, entry) for entry in entries]}
 
 
 def _line(run: Run, entry: download.Entry) -> dict[str, Any]:
-    """Returns a name as text. Bytes that are not UTF-8 are shown as ``\xff``; the url has the exact name."""
+    """Returns the name of a file as text. Bytes of a name that are not UTF-8 are shown as ``\xff``; the url has the
+    exact name.
+    """
     name = os.fsencode(entry.path)
     return {
         **asdict(entry), "path": name.decode(errors="backslashreplace"),
@@ -49,7 +52,8 @@ def _line(run: Run, entry: download.Entry) -> dict[str, Any]:
 
 @router.get("/v1/runs/{run_id}/files/{path:path}")
 async def content(request: Request, run: OwnedRun, path: str, service: ServiceOf) -> Response:
-    """Sends one file, whole or a Range of it, with ETag and, in Repr-Digest, its sha256. A large file of an open run
-    has no Repr-Digest."""
+    """Sends one file, whole or in part (header Range), with ETag and, in the header Repr-Digest, its sha256. The answer
+    for a large file of an open run has no Repr-Digest.
+    """
     relative = os.fsdecode(unquote_to_bytes(request.scope["raw_path"]).split(b"/", _BEFORE)[-1])
     return await service.downloads.respond(request, service.settings.runs / run.id, relative, run.state.final)

@@ -22,7 +22,7 @@ async def alive() -> dict[str, str]:
 
 @router.get("/readyz")
 async def ready(service: ServiceOf) -> Response:
-    """Returns 200 if runs can be accepted and supervised, else 503 with the failed checks."""
+    """Returns status 200 if runs can be accepted and supervised, else status 503 with the failed checks."""
     checks = {"supervisor": service.supervisor.alive, **await service.readiness.checks()}
     body: dict[str, Any] = {"status": "ok" if all(checks.values()) else "unavailable", "checks": checks}
     return JSONResponse(body, 200 if all(checks.values()) else 503)
@@ -33,6 +33,6 @@ async def ready(service: ServiceOf) -> Response:
 def metrics(
     request: Request, service: ServiceOf, identity: Annotated[Identity, Depends(requires("metrics"))]
 ) -> Response:
-    """Returns runs, slots, numbers and durations of answers in the text form of Prometheus."""
+    """Returns the metrics in the text form of Prometheus: runs, slots, number of answers and their durations."""
     found: Metrics = request.app.state.metrics
     return Response(found.text(), media_type=CONTENT_TYPE_PLAIN_0_0_4)

@@ -1,5 +1,6 @@
-"""Routes for the history of a run, with a limited number of points. A page draws the history before it reads the
-stream of events."""
+"""Routes for the history of a run, with a limited number of points. A page draws the history before it reads the stream
+of events.
+"""
 
 from typing import Annotated
 
@@ -27,10 +28,11 @@ def history(
     points: Annotated[int, Query(ge=1, le=4096, description="reports, at most")] = 1000,
     if_none_match: Known = "",
 ) -> Response:
-    """Returns the reports of a run, reduced to ``points``: ``series`` by name over ``t`` (step, dt, counts,
-    imbalance, each term of the energy, shares of the phases of a step as ``share_...``), ``ranks`` with CPU seconds
-    by phase and rank, all balance events (``balance``) and ``snapshots``, the ``log`` and its ``warnings``,
-    ``state``, and ``elapsed`` wall time in s. The stream continues after ``last``.
+    """Returns the reports of a run, reduced to about ``points`` times. ``series``: columns by name over the time ``t``:
+    step, dt, counts, imbalance, each term of the energy, and the share of each phase in the time of a step as
+    ``share_...``. ``ranks``: CPU time in s by phase and rank; ``balance``: all balance events; ``elapsed``: wall time
+    in s; ``warnings``: the warnings of the ``log``. ``snapshots``: the messages about snapshots; ``state``: the state
+    of the run. The stream of events continues after the event ``last``.
     """
     found = service.histories.of(service.settings.runs / run.id / layout.JOURNAL)
     with found.lock:
@@ -47,10 +49,11 @@ def columns(
     points: Annotated[int, Query(ge=1, le=8192, description="lines, about as many at most")] = 1000,
     if_none_match: Known = "",
 ) -> Response:
-    """Returns history.csv: unit, last value, minimum and maximum of each column of numbers (``columns``), and the
-    ``values`` of the named columns, with t in s. A file with more ``lines`` than ``points`` is reduced: each group
-    of lines becomes two values of each column, its minimum and maximum in the order of their occurrence. ``behind``:
-    the file is long, and the next answer has more of it. A run without the file has no columns.
+    """Returns history.csv: unit, last value, minimum and maximum of each numeric column (``columns``), and the
+    ``values`` of the named columns, with t in s. A file with more ``lines`` than ``points`` is reduced: each group of
+    lines becomes two values of each column, the minimum and the maximum in the order of their occurrence. ``behind``:
+    whether part of a long file has not been read yet; the next answer contains more of the file. The answer for a run
+    without history.csv has no columns.
     """
     found = service.histories.of(service.settings.runs / run.id / layout.JOURNAL)
     with found.lock:
@@ -59,7 +62,7 @@ def columns(
 
 
 def _columns(found: Columns, names: list[str], points: int) -> bytes:
-    """Raises ServiceError 400 for an unknown name of a column."""
+    """Raises ServiceError with status 400 if the name of a column is unknown."""
     known = found.units
     if known and (strange := next((name for name in names if name not in known and name != "*"), None)):
         detail = f"name = {strange[:80]!r}: columns of numbers are: {', '.join(known)}"

@@ -25,7 +25,7 @@ def chosen(
     since: Annotated[float | None, Query(allow_inf_nan=False, description="submitted then or later, Unix s")] = None,
     until: Annotated[float | None, Query(allow_inf_nan=False, description="submitted before, Unix s")] = None,
 ) -> Chosen:
-    """Returns the filters of a request. Raises ServiceError 400."""
+    """Returns the filters of a request. Raises ServiceError with status 400 if a filter is invalid."""
     words = text.split()
     if len(words) > _MOST_WORDS:
         raise ServiceError(400, "bad_parameter", f"text has {len(words)} words; allowed: {_MOST_WORDS}", pointer="text")

@@ -21,12 +21,12 @@ from .runs import OwnedRun
 
 router = APIRouter()
 _CHUNK = 1 << 16
-"""Number of bytes of a log that are sent at once (chosen value)."""
+"""Number of bytes of a log file that are sent at once (chosen value)."""
 ALIVE = b"\0"
-"""Byte that is sent while no text is added to a followed log, so that proxies keep the connection. The text of a log
-does not contain this byte."""
+"""Byte that is sent while a followed log file gets no new text, so that proxies do not close the connection. The text
+of a log file does not contain this byte."""
 _LOOK = 0.25
-"""Time in s between two reads of a followed log."""
+"""Time in s between two reads of a followed log file."""
 Rank = Annotated[str, PathParameter(pattern="^([0-9]{1,5}|launcher)$", description="a rank, or 'launcher'")]
 
 
@@ -40,8 +40,9 @@ async def log(
     follow: bool = False,
     seconds: Seconds = None,
 ) -> Response:
-    """Sends the log of one rank, or of the launcher; Range as for files. With ``follow`` the answer continues until
-    the run has ended. After each 15 s without new text a byte 0 is sent, which is not part of the log.
+    """Sends the log file of one rank, or of the launcher; the header Range works as for other files. With ``follow``
+    the answer continues until the run has ended. After each 15 s without new text the server sends a byte 0, which is
+    not part of the log file.
     """
     folder = service.settings.runs / run.id
     relative = f"{layout.LOGS}/{layout.LAUNCHER_LOG if rank == 'launcher' else f'rank-{rank}.log'}"
@@ -55,7 +56,9 @@ async def log(
 
 
 async def _follow(service: Service, may: Pass, run_id: str, folder: Path, relative: str) -> AsyncIterator[bytes]:
-    """Yields new bytes of the log without bytes 0, and a byte 0 while no text is added. The log need not exist yet."""
+    """Yields new bytes of the log file without bytes 0; yields a byte 0 while no text is added. The log file may be
+    missing at first.
+    """
     offset, spoke = 0, time.monotonic()
     with service.wakeups.listen(run_id) as listener:
         while await may.holds():

@@ -24,7 +24,9 @@ def materials(service: ServiceOf, identity: Reader) -> Response:
 
 @cache
 def _materials() -> bytes:
-    """Returns the library. The answer is made once, because the library does not change while a server runs."""
+    """Returns the material library; the answer is made once, because the library does not change while a server
+    runs.
+    """
     listed = [
         LibraryMaterial(
             name=name,

@@ -1,4 +1,4 @@
-"""Routes for the user of the request, and for the resources that the server offers."""
+"""Routes for the user of the request, and for the resources that the server offers to the user."""
 
 from typing import Annotated, Any
 
@@ -18,8 +18,8 @@ router = APIRouter()
 @router.get("/v1/me")
 @blocking
 def me(request: Request, service: ServiceOf, identity: Annotated[Identity, Depends(identify)]) -> dict[str, Any]:
-    """Returns name and scopes; access to Zenoh (null: none); slots, caps, limits of requests and long answers, quota
-    and its use.
+    """Returns name and scopes of the user, access to Zenoh (null: no access), slots, limits of a case (``caps``),
+    limits of requests and long answers, quota and used quota.
     """
     caps = service.settings.caps
     return {
@@ -45,7 +45,7 @@ def me(request: Request, service: ServiceOf, identity: Annotated[Identity, Depen
 
 
 def _quota(service: Service) -> dict[str, float | None]:
-    """Returns the quota of one user; null: no limit."""
+    """Returns the quota of the user; null: no limit."""
     quota = service.settings.site.quota
     named = {name: getattr(quota, name) for name in quota.__struct_fields__}
     files = service.settings.site.files
@@ -66,7 +66,7 @@ def _used(service: Service, owner: str) -> dict[str, float]:
 
 
 def _zenoh(request: Request, service: Service, identity: Identity) -> dict[str, Any] | None:
-    """Returns the Zenoh endpoint, at the host name by which the client has reached this server; null without Zenoh."""
+    """Returns the Zenoh endpoint, with the host name that the client has used for this server; null without Zenoh."""
     host = request.url.hostname or "127.0.0.1"
     hidden = loopback(service.settings.host) and not loopback(host)
     if service.telemetry is None or hidden or not identity.allows("read"):

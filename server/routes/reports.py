@@ -1,4 +1,4 @@
-"""The report of a run, as one HTML file."""
+"""The route for the report of a run, which is one HTML file."""
 
 from typing import Any
 
@@ -17,9 +17,10 @@ router = APIRouter()
 
 @router.post("/v1/runs/{run_id}:report")
 async def report(request: Request, run_id: str, service: ServiceOf, identity: Submitter) -> dict[str, Any]:
-    """Makes the report of a run that has ended, one HTML file that needs no server, and answers when it is among the
-    run's files. The report is made once. The server makes one report at a time, with limits of CPU time, memory and
-    size. If the report cannot be made, the reason is the answer for the next ten minutes, without another attempt.
+    """Makes the report of a run that has ended: one HTML file that needs no server; answers when the file is among the
+    run's files. The report of a run is made once. The server makes one report at a time, with limits of CPU time,
+    memory and size. If the report cannot be made, the answer in the next ten minutes is the reason, without another
+    attempt.
     """
     run = await service.pool.run(find, service, identity, run_id)
     if not run.state.final:

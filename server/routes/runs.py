@@ -33,11 +33,11 @@ router = APIRouter()
 Body = Annotated[bytes, Depends(read_body)]
 _MOST_RANKS = _MOST_THREADS = 1_000_000
 _MOST_STEPS = 2**53
-"""Largest value of a number in a request (chosen value). The server has a lower limit of its own."""
+"""Largest value of a number in a request (chosen value). The server has lower limits for most numbers."""
 _LAST = "z" * 22
-"""Text that is added to a prefix of an id; the result sorts after every id with this prefix."""
+"""Text that is added to a prefix of an id; the result sorts after every id that begins with this prefix."""
 MAX_WAIT = 60.0
-"""Largest value of the parameter ``?wait=``, s."""
+"""Largest value of the parameter ``wait`` of a request, s."""
 
 
 @router.post("/v1/runs", status_code=202, openapi_extra=openapi.CASE_BODY)
@@ -51,8 +51,8 @@ async def submit(
     profile: Annotated[str, Query(description="of the site's batch system; the site's default when empty")] = "",
     priority: Annotated[int, Query(ge=-PRIORITY, le=PRIORITY, description="among your own runs")] = 0,
 ) -> Response:
-    """Submits a case as TOML or JSON. A request with the same Idempotency-Key and body returns the same run and the
-    same answer.
+    """Submits a case as TOML or JSON. A request with the same Idempotency-Key and the same body returns the same run
+    and the same answer.
     """
     wishes = Wishes(labels_of(label or ()), profile, priority)
     pool = service.surveyors if names_files(body) else service.readers
@@ -73,8 +73,8 @@ def page(
     limit: Annotated[int, Query(ge=1, le=500)] = 50,
     prefix: Annotated[str, Query(pattern="^[0-9a-z]{0,22}$", description="the beginning of their ids")] = "",
 ) -> dict[str, Any]:
-    """Returns the user's runs, newest first, without those whose folder has been removed. ``next``: cursor of the
-    next page, null on the last page.
+    """Returns the user's runs, newest first, without runs whose folder has been removed. The field ``next`` is the
+    cursor of the next page; ``next`` is null on the last page.
     """
     runs = listed(service, identity.owner, chosen, cursor, limit + 1, prefix)
     following = view.to_cursor(runs[limit - 1]) if len(runs) > limit else None
@@ -82,15 +82,16 @@ def page(
 
 
 def listed(service: Service, owner: str, chosen: Chosen, cursor: str | None, most: int, prefix: str = "") -> list[Run]:
-    """Returns at most ``limit`` runs of an owner that have a folder, newest first, after the cursor. Raises
-    ServiceError 400."""
+    """Returns at most ``limit`` runs of an owner after the cursor, newest first; each run has a folder. Raises
+    ServiceError with status 400 if the cursor is invalid.
+    """
     before = view.from_cursor(cursor) if cursor is not None else prefix + _LAST if prefix else None
     pages = _pages(service, owner, chosen, before, most)
     return list(islice(takewhile(lambda run: run.id.startswith(prefix), pages), most))
 
 
 def _pages(service: Service, owner: str, chosen: Chosen, before: str | None, size: int) -> Iterator[Run]:
-    """Yields the runs of an owner that have a folder, newest first, in blocks from the store."""
+    """Yields the runs of an owner that have a folder, newest first, read from the database in blocks."""
     while some := service.store.page(owner, chosen, before, size):
         yield from service.existing.left(some)
         if len(some) < size:
@@ -100,8 +101,9 @@ def _pages(service: Service, owner: str, chosen: Chosen, before: str | None, siz
 
 @blocking
 def owned_run(run_id: str, service: ServiceOf, identity: Reader) -> Run:
-    """Returns the run if it belongs to the user. Raises the same ServiceError 404 for an unknown run and for a run
-    of another user."""
+    """Returns the run if the run belongs to the user. Raises the same ServiceError with status 404 for an unknown run
+    and for a run of another user.
+    """
     return find(service, identity, run_id)
 
 
@@ -109,8 +111,8 @@ OwnedRun = Annotated[Run, Depends(owned_run)]
 
 
 def find(service: Service, identity: Identity, run_id: str) -> Run:
-    """Returns the present state of the run. Raises ServiceError 404; 410 if it has ended and has no folder; OSError
-    if the folder of all runs is missing.
+    """Returns the present state of the run. Raises ServiceError with status 404 if the run is unknown, or 410 if the
+    run has ended and has no folder. Raises OSError if the folder of all runs is missing.
     """
     run = (service.supervisor.current(run_id) or service.store.get(run_id)) if folder.is_id(run_id) else None
     if run is None or run.owner != identity.owner:
@@ -121,7 +123,7 @@ def find(service: Service, identity: Identity, run_id: str) -> Run:
 
 
 def _gone(service: Service, run: Run) -> ServiceError:
-    """Returns 410 with the record of a removed run."""
+    """Returns an error with status 410 and the record of a removed run."""
     line = service.removed_runs.get(run.id)
     why = f" ({line.why})" if line is not None else ""
     return ServiceError(
@@ -138,8 +140,10 @@ async def show(
     identity: Reader,
     wait: Annotated[float, Query(ge=0, le=MAX_WAIT)] = 0.0,
 ) -> Response:
-    """Returns the run. With ``wait``, the answer is sent when its state has changed, or, with If-None-Match, when
-    anything of it has changed, and at the latest after so many seconds. A run that has ended is answered at once."""
+    """Returns the run. With the parameter ``wait`` the answer is sent when the state of the run has changed, but after
+    ``wait`` seconds at the latest. With ``wait`` and the header If-None-Match, any change of the run counts; a run that
+    has ended is answered at once.
+    """
     known = request.headers.get("if-none-match")
     first = await service.pool.run(view.snapshot, service, run)
     if wait > 0.0 and not first.state.final:
@@ -166,8 +170,8 @@ async def show(
 @router.delete("/v1/runs/{run_id}", status_code=204)
 @blocking
 def purge(run_id: str, service: ServiceOf, identity: Submitter) -> Response:
-    """Removes a run that has ended, with all its files. Later requests for the run are answered with 410. A removal
-    cannot be undone.
+    """Removes a run that has ended, with all its files. Later requests for the removed run are answered with status
+    410. The removal of a run cannot be undone.
     """
     run = find(service, identity, run_id)
     if not run.state.final or service.supervisor.current(run.id) is not None:
@@ -185,14 +189,14 @@ def purge(run_id: str, service: ServiceOf, identity: Submitter) -> Response:
 @router.post("/v1/runs/{run_id}:keep")
 @blocking
 def keep(run_id: str, service: ServiceOf, identity: Submitter) -> Response:
-    """Keeps the run permanently: no rule of the site removes it, only its owner can."""
+    """Keeps the run permanently: only its owner can remove the run, no rule of the site."""
     return _pin(service, find(service, identity, run_id), True)
 
 
 @router.post("/v1/runs/{run_id}:release")
 @blocking
 def release(run_id: str, service: ServiceOf, identity: Submitter) -> Response:
-    """Allows the rules of the site to remove the run, even one that was submitted with the label ``keep``."""
+    """Allows the rules of the site to remove the run, even if the run was submitted with the label ``keep``."""
     return _pin(service, find(service, identity, run_id), False)
 
 
@@ -208,14 +212,16 @@ def _pin(service: Service, run: Run, keep: bool) -> Response:
 @router.post("/v1/runs/{run_id}:cancel", status_code=202)
 @blocking
 def cancel(run_id: str, service: ServiceOf, identity: Submitter) -> Response:
-    """Stops a run at its next step, or kills it if it does not stop. A repeated request changes nothing."""
+    """Stops a run at its next step, or kills the run if it does not stop. A repeated request to stop changes
+    nothing.
+    """
     run = find(service, identity, run_id)
     ask_to_stop(service, run.id)
     return Response(view.snapshot(service, find(service, identity, run_id)).body, 202, media_type="application/json")
 
 
 def ask_to_stop(service: Service, run_id: str) -> None:
-    """Requests the stop. Raises ServiceError 503 if the request cannot be recorded."""
+    """Requests a run to stop. Raises ServiceError with status 503 if the request cannot be recorded."""
     try:
         service.supervisor.cancel(run_id)
     except Exception as error:
@@ -235,9 +241,9 @@ async def restart(
     profile: Annotated[str, Query(description="of the site's batch system")] = "",
     priority: Annotated[int, Query(ge=-PRIORITY, le=PRIORITY, description="among your own runs")] = 0,
 ) -> Response:
-    """Starts a new run of the same case that continues from the newest checkpoint of this run, with the same final
-    answer. The old run is not changed. A run that has reached run.max_steps needs a larger max_steps: without it the
-    answer is 409.
+    """Starts a new run of the same case that continues from the newest checkpoint of this run. The final results of the
+    new run equal those of an uninterrupted run; the old run is not changed. A run that has reached run.max_steps needs
+    a larger max_steps, else the answer has status 409.
     """
     run = await service.pool.run(find, service, identity, run_id)
     wishes = Wishes({restarts.LABEL: run.id}, profile, priority, run.id)
@@ -264,21 +270,23 @@ def _restarted(
 @router.post("/v1/runs/{run_id}:checkpoint", status_code=202)
 @blocking
 def checkpoint(run_id: str, service: ServiceOf, identity: Submitter) -> Response:
-    """Requests a checkpoint; a message of the journal reports it when it is on disk. A repeated request changes
-    nothing."""
+    """Requests a checkpoint of the run; a message of the journal reports the checkpoint when it is on disk. A repeated
+    request before this message changes nothing.
+    """
     return _ask(service, find(service, identity, run_id), layout.CHECKPOINT_REQUEST, "keeps one")
 
 
 @router.post("/v1/runs/{run_id}:snapshot", status_code=202)
 @blocking
 def snapshot(run_id: str, service: ServiceOf, identity: Submitter) -> Response:
-    """Requests a snapshot of the fragments; a message of the journal reports it when it is on disk, with the cause
-    "asked for". A repeated request before that changes nothing."""
+    """Requests a snapshot of the fragments; a message of the journal with the cause "asked for" reports the snapshot
+    when it is on disk. A repeated request before this message changes nothing.
+    """
     return _ask(service, find(service, identity, run_id), layout.SNAPSHOT_REQUEST, "makes one")
 
 
 def _ask(service: Service, run: Run, request: str, words: str) -> Response:
-    """Writes a request file, which the worker reads. Raises ServiceError 409, 503."""
+    """Writes a request file, which the worker reads. Raises ServiceError with status 409 or 503."""
     if run.state is not State.RUNNING:
         raise ServiceError(409, "not_running", f"run {run.id} is {run.state.value}; a run that is running {words}")
     try:

@@ -32,7 +32,7 @@ _decode = msgspec.json.Decoder(Snapshot).decode
 @router.get("/v1/runs/{run_id}/snapshots")
 @blocking
 def listing(run: OwnedRun, service: ServiceOf, if_none_match: Known = "") -> Response:
-    """Returns the snapshots in the journal: n, step, t in s, bytes, triangles, fragments, sha256 and more."""
+    """Returns the snapshots that the journal reports: n, step, t in s, bytes, triangles, fragments, sha256 and more."""
     found = service.histories.of(service.settings.runs / run.id / layout.JOURNAL)
     with found.lock:
         found.catch_up()
@@ -44,8 +44,8 @@ def listing(run: OwnedRun, service: ServiceOf, if_none_match: Known = "") -> Res
 async def content(
     request: Request, run: OwnedRun, service: ServiceOf, n: Number, if_none_match: Known = ""
 ) -> Response:
-    """Returns one snapshot in the form of docs/reference/snapshots.md. The ETag of a snapshot is its sha256; a snapshot
-    never changes.
+    """Returns one snapshot in the format of docs/reference/snapshots.md. The ETag of a snapshot is its sha256; a
+    snapshot never changes.
     """
     announced = await service.pool.run(_announced, service, run, n)
     return await _sent(request, service, run, announced.path, announced.bytes, announced.sha256, if_none_match)
@@ -53,7 +53,7 @@ async def content(
 
 @router.get("/v1/runs/{run_id}/snapshots/{n}/tets", responses=_BYTES, response_class=Response)
 async def tets(request: Request, run: OwnedRun, service: ServiceOf, n: Number, if_none_match: Known = "") -> Response:
-    """Returns all tets of a snapshot for sections, compressed by gzip; 404 if it has none."""
+    """Returns all tets of a snapshot for sections, compressed by gzip; status 404 if the snapshot has no tets."""
     announced = await service.pool.run(_announced, service, run, n)
     if not announced.tets:
         raise not_found(f"the tets of snapshot {n} of run {run.id}")
@@ -64,8 +64,8 @@ async def tets(request: Request, run: OwnedRun, service: ServiceOf, n: Number, i
 @router.get("/v1/runs/{run_id}/fragments/{label}")
 @blocking
 def fragment(run: OwnedRun, service: ServiceOf, label: Label, if_none_match: Known = "") -> Response:
-    """Returns the history of a fragment over at most 200 snapshots of a run: n, t in s, mass in kg, speed in m/s,
-    size in m, tets.
+    """Returns the history of a fragment over at most 200 snapshots of a run: n, t in s, mass in kg, speed in m/s, size
+    in m, number of tets.
     """
     folder = service.settings.runs / run.id
     found = service.histories.of(folder / layout.JOURNAL)
@@ -78,7 +78,7 @@ def fragment(run: OwnedRun, service: ServiceOf, label: Label, if_none_match: Kno
 async def _sent(
     request: Request, service: Service, run: Run, path: str, size: int, tag: str, known: str
 ) -> Response:  # fmt: skip
-    """Returns a file that never changes and has ``size`` bytes; ``tag`` is its ETag."""
+    """Returns a file of ``size`` bytes that never changes; ``tag`` is the ETag of the file."""
     headers = {"ETag": f'"{tag}"', "Cache-Control": "private, max-age=31536000, immutable"}
     if download.is_known(headers["ETag"], known):
         return Response(status_code=304, headers=headers)
@@ -86,7 +86,9 @@ async def _sent(
 
 
 def _announced(service: Service, run: Run, n: int) -> Snapshot:
-    """Returns the message of the journal about a snapshot. Raises ServiceError 404."""
+    """Returns the journal message about a snapshot. Raises ServiceError with status 404 if the run has no such
+    snapshot.
+    """
     found = service.histories.of(service.settings.runs / run.id / layout.JOURNAL)
     with found.lock:
         if n not in found.snapshots:

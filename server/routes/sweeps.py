@@ -30,7 +30,9 @@ Body = Annotated[bytes, Depends(read_body)]
 async def submit(
     service: ServiceOf, identity: Submitter, body: Body, idempotency_key: Annotated[str | None, Header()] = None
 ) -> Response:
-    """Submits a case and the points at which it is run. All runs are accepted, or none."""
+    """Submits a sweep: a case, and the points at which the case is run. Either all runs of the sweep are accepted, or
+    none.
+    """
     plan = await service.sweepers.run(service.sweeps.submit, identity.owner, body, idempotency_key)
     shown = await service.pool.run(_shown, service, plan)
     return JSONResponse(shown, 202, {"Location": f"/v1/sweeps/{plan.id}"})
@@ -39,9 +41,9 @@ async def submit(
 @router.put("/v1/sweeps/adaptive/{name}", openapi_extra=openapi.SEARCH_BODY)
 async def report(service: ServiceOf, identity: Submitter, name: str, body: Body) -> dict[str, Any]:
     """Stores the report of an adaptive sweep, whose client chooses the points and submits them as runs. The first
-    report of a ``name`` (16 to 64 hexadecimal digits) creates the sweep. Runs of other users are ignored. The newest
-    100 adaptive sweeps of a user are kept. ``stop``: the sweep was cancelled on the server, and the command that
-    ``began`` at that time must submit no further point.
+    report with a new ``name`` (16 to 64 hexadecimal digits) creates the sweep. Runs of other users in the report are
+    ignored. The server keeps the newest 100 adaptive sweeps of a user. ``stop``: the sweep was cancelled on the server,
+    and the client command with this start time ``began`` must submit no further point.
     """
     plan = await service.pool.run(service.searches.report, identity.owner, name, body)
     stop = plan.search is not None and plan.cancelled == plan.search.began
@@ -56,8 +58,9 @@ def page(
     before: Annotated[str, Query(description="the id of a sweep; the answer has older sweeps only")] = "",
     limit: Annotated[int, Query(ge=1, le=500)] = 50,
 ) -> dict[str, Any]:
-    """Returns the user's sweeps, newest first. ``next``: parameter ``before`` of the next page, null on the last
-    page."""
+    """Returns the user's sweeps, newest first. The field ``next`` is the parameter ``before`` of the next page;
+    ``next`` is null on the last page.
+    """
     plans = [plan for plan in service.sweeps.plans.of(identity.owner) if not before or plan.id < before]
     following = plans[limit - 1].id if len(plans) > limit else None
     return {"sweeps": [_brief(service, plan) for plan in plans[:limit]], "next": following}
@@ -66,14 +69,14 @@ def page(
 @router.get("/v1/sweeps/{sweep_id}")
 @blocking
 def show(service: ServiceOf, identity: Reader, sweep_id: str) -> dict[str, Any]:
-    """Returns the sweep: number of its runs in each state, and each point with its run."""
+    """Returns the sweep: number of runs in each state, and each point with its run."""
     return _shown(service, find(service, identity, sweep_id))
 
 
 @router.get("/v1/sweeps/{sweep_id}/table")
 @blocking
 def table(service: ServiceOf, identity: Reader, sweep_id: str) -> Response:
-    """Returns CSV with one line for each point: changed values, state of the run, results as far as they exist."""
+    """Returns CSV text with one line for each point: changed values, state of the run, results as far as they exist."""
     plan = find(service, identity, sweep_id)
     points = [_point(service, values, run) for values, run in _pairs(service, plan)]
     return Response(to_csv(points_table(points)), media_type="text/csv; charset=utf-8")
@@ -81,14 +84,14 @@ def table(service: ServiceOf, identity: Reader, sweep_id: str) -> Response:
 
 @router.post("/v1/sweeps/{sweep_id}:cancel", status_code=202)
 async def cancel(service: ServiceOf, identity: Submitter, sweep_id: str) -> dict[str, Any]:
-    """Cancels every open run of the sweep. A repeated request changes nothing."""
+    """Cancels every open run of the sweep. A repeated cancel changes nothing."""
     return await service.sweepers.run(_cancelled, service, identity, sweep_id)
 
 
 @router.post("/v1/sweeps/{sweep_id}:again", status_code=202, openapi_extra=openapi.SWEEP_BODY)
 async def again(service: ServiceOf, identity: Submitter, sweep_id: str, body: Body) -> Response:
-    """Repeats the points whose runs have ended without success or were removed. The body is the original request of
-    the sweep. A repeated request changes nothing while these runs are open.
+    """Repeats the points whose runs have ended without success or were removed. The body is the original request for
+    the sweep. A repeated request changes nothing while the new runs are open.
     """
     plan = await service.pool.run(find, service, identity, sweep_id)
     if plan.search is not None:
@@ -99,7 +102,7 @@ async def again(service: ServiceOf, identity: Submitter, sweep_id: str, body: Bo
 
 
 def _failed(service: Service, plan: Plan) -> dict[int, str]:
-    """Returns the points without a successful or open run, with their present runs."""
+    """Returns the points without a successful or open run, with the present runs of these points."""
     good = {run.id for _, run in _pairs(service, plan) if not run.state.final or run.state is State.SUCCEEDED}
     return {n: run_id for n, run_id in enumerate(plan.runs) if run_id not in good}
 
@@ -115,7 +118,9 @@ def _cancelled(service: Service, identity: Identity, sweep_id: str) -> dict[str,
 
 
 def find(service: Service, identity: Identity, sweep_id: str) -> Plan:
-    """Returns the sweep if it belongs to the user. Raises ServiceError 404."""
+    """Returns the sweep if the sweep belongs to the user. Raises ServiceError with status 404 if the user has no such
+    sweep.
+    """
     plan = service.sweeps.get(sweep_id, identity.owner)
     if plan is None:
         raise not_found(f"sweep {sweep_id[:40]!r}")
@@ -123,7 +128,7 @@ def find(service: Service, identity: Identity, sweep_id: str) -> Plan:
 
 
 def _pairs(service: Service, plan: Plan) -> list[tuple[dict[str, Any], Run]]:
-    """Returns each point with its run, without runs that were removed or are unknown."""
+    """Returns each point with its run; removed and unknown runs are left out."""
     kept = service.store.some(plan.runs)
     found = [run for run_id in plan.runs if (run := service.supervisor.current(run_id) or kept.get(run_id))]
     left = {run.id: run for run in service.existing.left(found)}

@@ -1,4 +1,4 @@
-"""Routes for uploaded files, which cases name. Users cannot see the uploads of other users."""
+"""Routes for uploaded files, which cases may name. Users cannot see the uploads of other users."""
 
 from typing import Annotated, Any
 
@@ -20,7 +20,9 @@ Hash = Annotated[str, PathParameter(pattern="^[0-9a-f]{64}$", description="the s
 @router.get("/v1/files")
 @blocking
 def listing(service: ServiceOf, identity: Submitter) -> dict[str, Any]:
-    """Returns the user's files, complete and incomplete: sha256, size, arrived bytes, time of the last request."""
+    """Returns the user's uploaded files, complete and incomplete: sha256, size, arrived bytes, time of the last
+    request.
+    """
     found = service.uploads.of(identity.owner)
     return {"files": [_shown(sent) for sent in found], "bytes": sum(sent.size for sent in found)}
 
@@ -28,7 +30,9 @@ def listing(service: ServiceOf, identity: Submitter) -> dict[str, Any]:
 @router.get("/v1/files/{sha256}")
 @blocking
 def show(service: ServiceOf, identity: Submitter, sha256: Hash) -> Response:
-    """Returns the state of an upload. ``offset`` (Upload-Offset): the byte with which the next PUT continues."""
+    """Returns the state of an upload. The field ``offset`` (header Upload-Offset) is the byte with which the next PUT
+    continues.
+    """
     found = service.uploads.find(identity.owner, sha256)
     if found is None:
         raise not_found(f"file {sha256} of yours")
@@ -37,8 +41,9 @@ def show(service: ServiceOf, identity: Submitter, sha256: Hash) -> Response:
 
 @router.put("/v1/files/{sha256}", openapi_extra=openapi.FILE_BODY)
 async def put(request: Request, service: ServiceOf, identity: Submitter, sha256: Hash) -> Response:
-    """Receives a file, or its next piece (Content-Range), as raw bytes. 201: the file is complete under its hash;
-    200: it existed before, or is not complete yet. Bytes that have arrived are kept when the connection breaks.
+    """Receives an uploaded file, or the next piece of a file (Content-Range), as raw bytes. Status 201: the file is
+    complete under its hash; 200: the file existed before, or is not complete yet. Bytes that have arrived are kept when
+    the connection breaks.
     """
     may = Pass(service, identity)
 
@@ -53,7 +58,7 @@ async def put(request: Request, service: ServiceOf, identity: Submitter, sha256:
 @router.delete("/v1/files/{sha256}")
 @blocking
 def remove(service: ServiceOf, identity: Submitter, sha256: Hash) -> Response:
-    """Removes a file, complete or incomplete. Runs keep their own copies."""
+    """Removes an uploaded file, complete or incomplete. Runs keep their own copies of the file."""
     if not service.uploads.remove(identity.owner, sha256):
         raise not_found(f"file {sha256} of yours")
     return Response(status_code=204)

@@ -19,17 +19,19 @@ _log = logging.getLogger("conoid.server")
 
 
 class EarlierRuns:
-    """Reads the runs of an earlier server. The class is used in the supervisor's thread."""
+    """Reads the runs of an earlier server. The class is used only in the supervisor's thread."""
 
     def __init__(
         self, runs: Path, store: Store, index: Index, launcher: Launcher, found: Callable[[Left], None]
     ) -> None:
-        """Creates the reader. ``found`` is called with each run that can be read, ended or open."""
+        """Creates the reader of earlier runs. The function ``found`` is called with each run that can be read, ended or
+        open.
+        """
         self._runs, self._store, self._index, self._launcher, self._found = runs, store, index, launcher, found
         self._failed: dict[Path, str] = {}
 
     def all(self) -> None:
-        """Reads every run that is not known to have ended; empty folders count as runs. Raises OSError,
+        """Reads every run that is not known to have ended; an empty folder counts as a run. Raises OSError or
         SQLAlchemyError.
         """
         ended, known, last = self._store.ended(), self._store.open(), ""
@@ -49,17 +51,18 @@ class EarlierRuns:
                 self._store.relabel(run, pins.labels(self._runs / run.id))
 
     def again(self) -> None:
-        """Reads again the runs that could not be read."""
+        """Reads the runs that could not be read before."""
         for path in tuple(self._failed):
             self.take_up(path)
 
     def take_up(self, path: Path) -> None:
-        """Reads a run. An error is logged once; the run is read again at the next pass."""
+        """Reads a run; logs an error once, and reads the run again at the next pass."""
         self._take_up(path, lambda: self._store.get(path.name))
 
     def _take_up(self, path: Path, known_of: Callable[[], Run | None]) -> None:
-        """Reads a run. Writes the database only if its state is older than the state in the folder, so that a
-        thousand unchanged runs cause no writes."""
+        """Reads a run. The database is written only if its state is older than the state in the folder, so that a
+        thousand unchanged runs cause no writes.
+        """
         reason = self._failed.pop(path, "")
         try:
             known = known_of()

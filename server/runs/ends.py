@@ -1,4 +1,4 @@
-"""End of a run without an outcome, from its files: time of the end, last step, energies."""
+"""End of a run without an outcome, from the files of the run: time of the end, last step, energies."""
 
 import math
 from pathlib import Path
@@ -18,11 +18,11 @@ M = TypeVar("M", bound=Message)
 _BLOCK = 4 << 20
 """Number of bytes of one read of a journal (chosen value)."""
 _TYPE = slice(9, 13)
-"""The bytes of a journal line before the type of its message."""
+"""Bytes of a journal line before the type of its message."""
 
 
 class _LastLine(msgspec.Struct):
-    """The field of a message that contains its time."""
+    """Field of a journal message that contains the time of the message."""
 
     wall: float
 
@@ -31,8 +31,8 @@ _decoder = msgspec.json.Decoder(_LastLine)
 
 
 def when(path: Path) -> float:
-    """Returns the Unix time in s of the last sign of the run in ``path``: the time of the last message of its
-    journal, or of its outcome if there is no journal; 0 if neither can be read.
+    """Returns the Unix time of the last sign of life of the run in ``path``, s. The time is that of the last message of
+    the journal, or of the outcome without a journal; 0 if neither file can be read.
     """
     try:
         return _decoder.decode(journal.last(path / layout.JOURNAL)).wall or _written(path)
@@ -48,8 +48,9 @@ def _written(path: Path) -> float:
 
 
 def so_far(outcome: Outcome, run: Run, path: Path) -> Outcome:
-    """Returns ``outcome`` with the last step, time and energies of the journal in ``path``, if the journal has a
-    step."""
+    """Returns ``outcome``, completed with the last step, time and energies of the journal in ``path`` if the journal
+    has a step.
+    """
     started, progress, counts = _newest(path / layout.JOURNAL)
     if started is None:
         return outcome
@@ -67,7 +68,7 @@ def so_far(outcome: Outcome, run: Run, path: Path) -> Outcome:
 
 
 def _newest(path: Path) -> tuple[Started | None, Progress | None, Counts | None]:
-    """Returns the newest message of each type. Lines that cannot be read are skipped."""
+    """Returns the newest journal message of each type; lines that cannot be read are skipped."""
     lines = {b"star": b"", b"prog": b"", b"coun": b""}
     try:
         tail = journal.Tail(path)

@@ -1,5 +1,6 @@
 """The state of a run in the server, the events that change the state, and the resulting actions. The module contains
-only data; the rules are in ``lifecycle``."""
+only data; the rules are in the module ``lifecycle``.
+"""
 
 from dataclasses import dataclass
 from typing import Literal
@@ -10,7 +11,7 @@ from conoid.cases.run import Cause, State
 
 @dataclass(frozen=True)
 class Run:
-    """State of a run in the server. Times are Unix s; an unknown time is 0."""
+    """State of a run in the server. Times are Unix times in s; an unknown time is 0."""
 
     id: str
     owner: str
@@ -23,7 +24,7 @@ class Run:
     started: float = 0.0
     finished: float = 0.0
     stopping_for: Cause | None = None
-    """Reason of the requested stop, as a word."""
+    """Reason of a requested stop, as a word."""
     threads: int = 1
     """Number of threads of each rank."""
     title: str = ""
@@ -40,33 +41,35 @@ class Run:
 
 @dataclass(frozen=True)
 class Admitted:
-    """The run is on disk and may be queued."""
+    """Event: the run is on disk and may be queued."""
 
 
 @dataclass(frozen=True)
 class Granted:
-    """Enough cores are free for the run. ``batch``: the run was submitted to a batch system and waits in its queue."""
+    """Event: enough cores are free for the run. ``batch``: whether the run was submitted to a batch system and waits in
+    its queue.
+    """
 
     batch: bool = False
 
 
 @dataclass(frozen=True)
 class WorkerStarts:
-    """A batch system has started the worker, at the Unix time ``at``."""
+    """Event: a batch system has started the worker, at the Unix time ``at``, s."""
 
     at: float
 
 
 @dataclass(frozen=True)
 class WorkerWaits:
-    """A batch system has stopped the worker. The worker continues from its last checkpoint when the batch system gives
-    it cores again.
+    """Event: a batch system has stopped the worker. The worker continues from its last checkpoint when the batch system
+    gives it cores again.
     """
 
 
 @dataclass(frozen=True)
 class LaunchFailed:
-    """The worker cannot be started and will not be tried again."""
+    """Event: the worker cannot be started and will not be tried again."""
 
     message: str
     cause: Cause = Cause.LAUNCH
@@ -74,15 +77,16 @@ class LaunchFailed:
 
 @dataclass(frozen=True)
 class LaunchPutOff:
-    """The worker could not be started now, for example because the disk is full or no file descriptor is free. The
-    run stays in the queue."""
+    """Event: the worker could not be started now, for example because the disk is full or no file descriptor is free.
+    The run stays in the queue.
+    """
 
     message: str
 
 
 @dataclass(frozen=True)
 class Broken:
-    """The run's folder is missing (``writable`` is False), or no longer has a readable case."""
+    """Event: the run's folder is missing (``writable`` is False), or no longer has a readable case."""
 
     message: str
     writable: bool = False
@@ -90,35 +94,38 @@ class Broken:
 
 @dataclass(frozen=True)
 class WorkerRuns:
-    """The worker has reported that it runs."""
+    """Event: the worker has reported that it runs."""
 
 
 @dataclass(frozen=True)
 class CancelAsked:
-    """The owner has asked for a cancel. ``handed``: a worker runs, or the run was submitted to a batch system."""
+    """Event: the owner has requested a cancel. ``handed``: whether a worker runs, or the run was submitted to a batch
+    system.
+    """
 
     handed: bool = False
 
 
 @dataclass(frozen=True)
 class WallTimeOver:
-    """The run has reached its limit of wall time."""
+    """Event: the run has reached its limit of wall time."""
 
 
 @dataclass(frozen=True)
 class OutputOver:
-    """The run's folder has reached its limit of bytes."""
+    """Event: the run's folder has reached its limit of bytes."""
 
 
 @dataclass(frozen=True)
 class GraceOver:
-    """The worker did not stop within the grace period."""
+    """Event: the worker did not stop within the grace period."""
 
 
 @dataclass(frozen=True)
 class WorkerExited:
-    """The worker's processes have ended. ``code``: the exit code, or minus the number of the signal; None if no
-    process could collect the exit code."""
+    """Event: the worker's processes have ended. ``code``: the exit code, or the negative signal number; None if the
+    exit code is unknown.
+    """
 
     code: int | None
     outcome: Outcome | None
@@ -126,16 +133,17 @@ class WorkerExited:
     disk_failed: bool = False
     """Whether the worker's disk is full, or the worker reported an error of its disk."""
     traces: str = ""
-    """Message of a worker that wrote no outcome."""
+    """Message about a worker that wrote no outcome."""
     reading: tuple[State, Cause, str] | None = None
     """State, cause and message of the end from a batch system, for a run without an outcome."""
     at: float = 0.0
-    """Unix time of the end by the run's files, s. 0: the files do not have the time, and the present time is used."""
+    """Unix time of the end by the run's files, s; 0: the files do not have the time, so that the present time is
+    used."""
 
 
 @dataclass(frozen=True)
 class Found:
-    """A starting server has found an open run of an earlier server."""
+    """Event: a new server has found an open run of an earlier server."""
 
     worker: Literal["none", "alive", "gone"]
     outcome: Outcome | None = None
@@ -144,7 +152,7 @@ class Found:
     """Exit code from the log of the launcher; None if unknown."""
     disk_failed: bool = False
     at: float = 0.0
-    """Unix time of the last sign of the run in its files, s; 0 without a sign."""
+    """Unix time of the last sign of life of the run in its files, s; 0 if no file has a time."""
 
 
 Event = (
@@ -165,14 +173,16 @@ Event = (
 )
 
 ONCE = (LaunchFailed, LaunchPutOff, Broken, Found)
-"""Events that occur only once. If the step of such an event fails, the event is stored for the next try."""
+"""Events that occur only once. If the handling of such an event fails, the event is stored and handled again later."""
 
 # Actions --------------------------------------------------------------------------------------------------------------
 
 
 @dataclass(frozen=True)
 class Journal:
-    """Action: append a Status line to the journal and publish it. Used only while no worker writes the journal."""
+    """Action: append a Status line to the journal and publish the line. The action is used only while no worker writes
+    the journal.
+    """
 
     state: State
     cause: Cause | None = None
@@ -198,8 +208,9 @@ class Adopt:
 
 @dataclass(frozen=True)
 class Stop:
-    """Action: ask the worker to stop at its next step, and kill it if it does not stop. ``why`` is stored in the
-    run's folder."""
+    """Action: ask the worker to stop at its next step, and kill the worker if it does not stop. The reason ``why`` is
+    stored in the run's folder.
+    """
 
     why: Cause
 

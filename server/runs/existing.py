@@ -1,5 +1,6 @@
-"""Runs whose folder exists. A run that has ended and has no folder is in no list, no count and no sweep, and is
-answered with 410; it makes no difference how the folder was removed."""
+"""Runs whose folder exists. A run that has ended and has no folder is in no list, no count and no sweep; requests for
+the run are answered with status 410.
+"""
 
 import errno
 import os
@@ -12,30 +13,34 @@ from ..database.identity import FILE
 from .events import Run
 
 _FRESH = 1.0
-"""Time in s for which a list of folders is used again. A run without a folder stays in lists for at most this time.
-The value was chosen because reading 10,000 names takes 5 ms."""
+"""Time in s for which a list of folders is used again; a run without a folder stays in lists for at most this time.
+Reading 10,000 names takes 5 ms (reason of the chosen value)."""
 
 
 class ExistingRuns:
     """The names of the folders of all runs. Methods may be called from any thread; the content of the folders is not
-    read."""
+    read.
+    """
 
     def __init__(self, runs: Path) -> None:
-        """Creates the object; no name is read yet."""
+        """Creates the object without reading names."""
         self._runs, self._reading = runs, threading.Lock()
         self._names: set[str] = set()
         self._gone: set[str] = set()
-        """Runs that were looked up one by one and not found. Each run is looked up once."""
+        """Runs that were looked up individually and not found; each run is looked up once."""
         self._read = -_FRESH
 
     def left(self, runs: Iterable[Run]) -> list[Run]:
-        """Returns the runs without those that have ended and have no folder. The list of folders is at most
-        ``_FRESH`` s old. Raises OSError."""
+        """Returns the given runs, without runs that have ended and have no folder. The list of folders that is used is
+        at most ``_FRESH`` s old. Raises OSError if the folder of all runs cannot be read.
+        """
         self._refresh()
         return [run for run in runs if not (run.state.final and self._is_gone(run.id))]
 
     def gone(self, ended: Set[str]) -> set[str]:
-        """Returns the ended runs that have no folder. Raises OSError."""
+        """Returns those of the given runs that have ended and have no folder. Raises OSError if the folder of all runs
+        cannot be read.
+        """
         self._refresh()
         return {run_id for run_id in ended - self._names if self._is_gone(run_id)}
 
@@ -53,7 +58,7 @@ class ExistingRuns:
         return run_id not in self._names and (run_id in self._gone or not self.there(run_id))
 
     def _refresh(self) -> None:
-        """Reads the list of folders again if it is old. One thread reads the folder; until it has finished, other
+        """Reads the list of folders again if it is old. One thread reads the folder of all runs; meanwhile other
         threads use the previous list.
         """
         if time.monotonic() < self._read + _FRESH or not self._reading.acquire(blocking=False):
@@ -67,8 +72,8 @@ class ExistingRuns:
             self._reading.release()
 
     def _require(self) -> None:
-        """Raises FileNotFoundError if the folder of all runs lacks the server's file. In this case the path has another
-        folder, or the disk is not mounted, and no run counts as removed.
+        """Raises FileNotFoundError if the folder of all runs lacks the server's file. If the server's file is missing,
+        the disk may not be mounted, and no run counts as removed.
         """
         if not (self._runs / FILE).exists():
             raise FileNotFoundError(errno.ENOENT, "the folder of all runs is not there now", str(self._runs))

@@ -1,4 +1,4 @@
-"""The folder of a run: submission, case, outcome and process record. A reader of these files needs no server."""
+"""The folder of a run: submission, case, outcome and process record. The files can be read without a server."""
 
 import hashlib
 import os
@@ -30,19 +30,19 @@ _ID = re.compile(r"[0-9a-z]{22}")
 _LETTERS = "0123456789abcdefghjkmnpqrstvwxyz"
 _NEW, _GONE = ".new-", ".gone-"
 APART = f"{_NEW}files-"
-"""Beginnings of the names of temporary folders. A server removes such folders when it starts."""
+"""Beginnings of the names of temporary folders, which a server removes when it starts."""
 _TELLING = (layout.SUBMISSION, layout.JOURNAL, layout.WORKER)
 """Names of the files of a run. The folder of a run has at least one of these files, even if the file is damaged."""
 _UNREADABLE = "outcome.unreadable.json"
 _TITLE = 200
-"""Largest number of characters of a title in lists: a line or two of text (chosen value)."""
+"""Largest number of characters of a title in lists: one or two lines of text (chosen value)."""
 DAMAGED = (FileNotFoundError, IsADirectoryError, NotADirectoryError, PermissionError)
 """Errors of the operating system for a file that is missing, not regular (``whole.opened``), or not readable."""
 _NO_FILE = (FileNotFoundError, IsADirectoryError, NotADirectoryError)
 
 
 class Copy(msgspec.Struct, kw_only=True, frozen=True):
-    """A file that the case names. The run has its own copy: ``files/<sha256>`` with the suffix of the name."""
+    """A file that the case names. The run has a copy of the file: ``files/<sha256>`` with the suffix of the name."""
 
     path: str
     """Name of the file in the case."""
@@ -50,7 +50,7 @@ class Copy(msgspec.Struct, kw_only=True, frozen=True):
 
 
 class Submission(msgspec.Struct, kw_only=True, frozen=True):
-    """submission.json: the data of a run that the server needs if its database is lost. Times are Unix s."""
+    """File submission.json: the data of a run that the server needs if its database is lost. Times are Unix s."""
 
     id: str
     owner: str
@@ -71,7 +71,7 @@ class Submission(msgspec.Struct, kw_only=True, frozen=True):
     priority: int = 0
     """Priority of the run among the runs of its owner."""
     wishes_sha256: str = ""
-    """Hash of labels, profile and priority as they were sent. Empty in files of earlier servers."""
+    """Hash of the sent labels, profile and priority; empty in files of earlier servers."""
     threads: int = 1
     """Number of threads of each rank."""
     files: list[Copy] = []
@@ -83,8 +83,7 @@ class Submission(msgspec.Struct, kw_only=True, frozen=True):
 
 
 class Process(msgspec.Struct, kw_only=True, frozen=True):
-    """worker.json: the process of the run. ``started`` and ``boot`` distinguish it from a later process with the
-    same number."""
+    """File worker.json: the process of the run. A later process may have the same number but another ``started``."""
 
     pid: int
     started: int
@@ -99,8 +98,8 @@ _last_stamp, _stamping = 0, threading.Lock()
 
 
 def new_id() -> tuple[str, float]:
-    """An id of 22 letters and digits, and the Unix time in s. The second half of each id is random. Ids sort in the
-    order of their creation, also when the clock is set back.
+    """Returns an id of 22 letters and digits, and the Unix time, s. Later ids sort after earlier ids at any clock
+    time.
     """
     global _last_stamp
     with _stamping:
@@ -118,7 +117,7 @@ def begin_after(run_id: str) -> None:
 
 
 def is_id(text: str) -> bool:
-    """True for a text that ``new_id`` could have returned."""
+    """True if the text has the form of an id of ``new_id``."""
     return _ID.fullmatch(text) is not None
 
 
@@ -129,8 +128,9 @@ def _letters(number: int, length: int) -> str:
 def create(
     runs: Path, submission: Submission, case: bytes, resolved: bytes, fill: Callable[[Path], None] | None = None
 ) -> Path:
-    """Creates the folder of an accepted run; ``fill`` adds further files. The folder appears with all its files at
-    once, and is on disk on return. Raises OSError, and the errors of ``fill``.
+    """Creates the folder of an accepted run; the function ``fill`` adds further files. The folder appears with all its
+    files at once; the files are flushed to disk before the function returns. Raises OSError, and the errors of
+    ``fill``.
     """
     beside, folder = runs / f"{_NEW}{submission.id}", runs / submission.id
     accepted = Status(run=submission.id, seq=1, wall=submission.submitted, state=State.ACCEPTED)
@@ -155,7 +155,7 @@ def discard(runs: Path, run_id: str) -> None:
 
 
 def purge(runs: Path, run_id: str) -> None:
-    """Removes the folder of a run: renames the folder, then removes file by file. Raises OSError."""
+    """Removes the folder of a run: renames the folder, then removes its files one by one. Raises OSError."""
     beside = runs / f"{_GONE}{run_id}"
     os.rename(runs / run_id, beside)
     durable.sync_folder(runs)
@@ -177,7 +177,7 @@ def scan(runs: Path) -> Iterator[Path]:
 
 
 def there(path: Path) -> bool:
-    """Whether the file exists. True also if the folder of the file may not be read."""
+    """Whether the file exists; True if the folder of the file may not be read."""
     try:
         path.lstat()
     except (FileNotFoundError, NotADirectoryError):
@@ -188,7 +188,7 @@ def there(path: Path) -> bool:
 
 
 def submission(folder: Path) -> Submission:
-    """Reads submission.json. Raises OSError, or msgspec.MsgspecError when it is damaged."""
+    """Reads submission.json. Raises OSError, or msgspec.MsgspecError if the file is damaged."""
     try:
         return _submission.decode(whole.read(folder / layout.SUBMISSION, links=False))
     except (UnicodeDecodeError, RecursionError) as error:
@@ -196,12 +196,12 @@ def submission(folder: Path) -> Submission:
 
 
 def run(folder: Path) -> Run:
-    """Returns the run from its folder: submission.json, and the Status lines of the journal."""
+    """Returns the run from the files of its folder: submission.json, and the Status lines of the journal."""
     return replay(first(submission(folder)), journal.statuses(folder / layout.JOURNAL))
 
 
 def first(made: Submission) -> Run:
-    """Returns the run as it was accepted."""
+    """Returns the run in the state in which it was accepted."""
     return Run(
         made.id, made.owner, made.name, made.ranks, made.submitted, threads=made.threads, title=made.title[:_TITLE]
     )  # fmt: skip
@@ -221,7 +221,7 @@ def _after(run: Run, status: Status) -> Run:
 
 
 def outcome(folder: Path) -> Outcome | None:
-    """Returns the outcome of outcome.json; None when the file is missing or damaged."""
+    """Returns the outcome in outcome.json; None if the file is missing or damaged."""
     try:
         return outcome_from_json(whole.read(folder / layout.OUTCOME, links=False))
     except (*_NO_FILE, msgspec.MsgspecError, UnicodeDecodeError, RecursionError):
@@ -229,7 +229,7 @@ def outcome(folder: Path) -> Outcome | None:
 
 
 def outcome_error(folder: Path) -> str:
-    """Returns why outcome.json cannot be read; empty if it can be read or is missing."""
+    """Returns why outcome.json cannot be read; empty if the file can be read or is missing."""
     try:
         outcome_from_json(whole.read(folder / layout.OUTCOME, links=False))
     except FileNotFoundError:
@@ -240,14 +240,14 @@ def outcome_error(folder: Path) -> str:
 
 
 def write_outcome(folder: Path, ended: Outcome) -> None:
-    """Writes outcome.json completely or not at all; a damaged outcome.json is renamed and kept. Raises OSError."""
+    """Writes outcome.json completely or not at all; renames a damaged outcome.json. Raises OSError."""
     if outcome_error(folder):
         put_away(folder / layout.OUTCOME, folder / _UNREADABLE)
     durable.write(folder / layout.OUTCOME, outcome_to_json(ended))
 
 
 def put_away(path: Path, kept: Path | None = None) -> None:
-    """Frees the name of a file that will be written. An existing file is renamed to ``kept``. Raises OSError."""
+    """Renames an existing file to ``kept``, so that a new file can be written. Raises OSError."""
     if kept is not None and not kept.exists():
         os.replace(path, kept)
     elif path.is_dir():
@@ -257,22 +257,22 @@ def put_away(path: Path, kept: Path | None = None) -> None:
 
 
 def is_as_accepted(folder: Path, made: Submission) -> bool:
-    """Whether the case on disk is the case that was checked at the submission. Raises OSError."""
+    """Whether the case on disk equals the case that was checked at the submission. Raises OSError."""
     return made.body_sha256 in {"", digest_of(made.case_file, whole.read(folder / made.case_file, links=False))}
 
 
 def digest_of(case_file: str, body: bytes) -> str:
-    """Returns the hash of a submitted case and of its type."""
+    """Returns the hash of a submitted case and of its content type."""
     return hashlib.sha256(case_file.encode() + b"\0" + body).hexdigest()
 
 
 def write_stop(folder: Path, why: Cause) -> None:
-    """Records that a stop of the run was requested. Raises OSError."""
+    """Records that a stop of the run was requested. Raises OSError if the request cannot be written."""
     durable.write(folder / layout.STOP_REQUEST, why.value.encode())
 
 
 def stop_asked(folder: Path) -> Cause | None:
-    """Returns the reason of the requested stop; None without a request."""
+    """Returns the reason of the requested stop; None if no stop was requested."""
     try:
         return Cause(whole.read(folder / layout.STOP_REQUEST, 80, links=False).decode())
     except (OSError, ValueError):
@@ -288,7 +288,7 @@ def process(folder: Path) -> Process | None:
 
 
 def write_process(folder: Path, started: Process) -> None:
-    """Records the process of the run. Raises OSError."""
+    """Records the process of the run. Raises OSError if the record cannot be written."""
     durable.write(folder / layout.WORKER, msgspec.json.encode(started))
 
 

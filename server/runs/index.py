@@ -1,4 +1,6 @@
-"""The database as an index over the folders of the runs; its rows may be older than the folders."""
+"""The database is an index over the folders of the runs; a row of the database may be older than the folder of its
+run.
+"""
 
 import logging
 import time
@@ -12,21 +14,21 @@ from .retries import words
 
 _log = logging.getLogger("conoid.server")
 _REST = 5.0
-"""Time in s for which a database that failed is not used (chosen value), so that the supervisor does not wait for it
-again."""
+"""Time in s for which a failed database is not used (chosen value), so that the supervisor does not wait for the
+database again."""
 
 
 class Index:
-    """Writes changed runs into the database. The class is used in the supervisor's thread."""
+    """Writes changed runs into the database. The class is used only in the supervisor's thread."""
 
     def __init__(self, store: Store) -> None:
         """Creates the index with no unsaved run."""
         self._store, self._rests_until = store, 0.0
         self.unsaved: set[str] = set()
-        """Runs that changed after they were saved."""
+        """Runs whose latest change is not in the database yet."""
 
     def save(self, run: Run) -> bool:
-        """Adds a run to the database. Returns False, and logs an error, if this fails."""
+        """Adds a run to the database. Returns False, and logs an error, if the run cannot be added."""
         self.unsaved.add(run.id)
         if time.monotonic() < self._rests_until:
             return False
@@ -40,8 +42,9 @@ class Index:
         return True
 
     def add(self, run: Run, key: str | None, labels: Mapping[str, str]) -> None:
-        """Adds a run, or updates its row. A row that cannot be updated keeps its old values for now. Raises
-        SQLAlchemyError if the run is not in the database."""
+        """Adds a run to the database, or updates its row. A row that cannot be updated keeps its old values for now.
+        Raises SQLAlchemyError if the run is not in the database.
+        """
         try:
             self._store.add(run, key, labels)
         except SQLAlchemyError:

@@ -1,5 +1,6 @@
-"""journal.jsonl: all events of a run, from which its state is read. Only one process at a time writes the file: the
-worker while it runs, the server before and after the worker."""
+"""File journal.jsonl: all events of a run; the state of the run is read from the journal. Only one process at a time
+writes the journal: the worker while it runs, the server before and after the worker.
+"""
 
 import os
 from collections.abc import Iterator
@@ -13,19 +14,18 @@ from conoid.cases.reading import whole
 from conoid.cases.run import Cause, State
 
 _CHUNK = 1 << 18
-"""Number of bytes of one read: some hundred lines (chosen value)."""
+"""Number of bytes of one read of a journal: some hundred lines (chosen value)."""
 _LONGEST = 16 << 20
-"""Largest size in bytes of a line that is read; a longer line is skipped. The value was chosen because the report of
-10,000 ranks has 2 MB."""
+"""Largest size in bytes of a journal line that is read; a longer line is skipped. A report of 10,000 ranks has 2 MB
+(reason of the chosen limit)."""
 _PASSED = 256 << 20
-"""Number of bytes of a too long line that are skipped at a time. The value was chosen because so many bytes take 0.1
-s from memory."""
+"""Number of bytes of a too long line that are skipped at a time: 0.1 s from memory (chosen value)."""
 DAMAGED = msgspec.MsgspecError, ValueError, RecursionError
 """Errors of msgspec for damaged JSON, including text that is not UTF-8 and lists that are nested too deeply."""
 
 
 class _Head(msgspec.Struct):
-    """Fields that the server reads of every line. Lines of a newer worker may have other fields too."""
+    """Fields that the server reads from every journal line; lines of a newer worker may have further fields."""
 
     seq: int
     type: str
@@ -37,7 +37,7 @@ _status = msgspec.json.Decoder(Status)
 
 @dataclass(frozen=True)
 class Line:
-    """An event as the bytes of its line in the journal, without the line feed."""
+    """An event as the bytes of its journal line, without the line feed."""
 
     seq: int
     type: str
@@ -45,17 +45,17 @@ class Line:
 
 
 class Tail:
-    """Reads a journal from its beginning while the file grows. The reader returns only complete lines. A journal that
-    does not exist yet is empty.
+    """Reads a journal from its beginning while the file grows. The reader returns only complete lines of the journal. A
+    journal that does not exist yet is treated as empty.
     """
 
     def __init__(self, path: Path, after: int = 0) -> None:
-        """Creates the reader. Lines whose ``seq`` is at most ``after`` are skipped."""
+        """Creates the reader of a journal. Lines whose ``seq`` is at most ``after`` are skipped."""
         self._path, self._after, self._passing = path, after, False
         self._offset = _line_before(path, after) if after else 0
 
     def read(self) -> list[Line]:
-        """Returns the new events, about 256 kB at most; empty without new events."""
+        """Returns the new events, at most about 256 kB; empty without new events."""
         while True:
             chunk = self._chunk()
             if not chunk:
@@ -66,14 +66,15 @@ class Tail:
                 return lines
 
     def block(self, size: int) -> bytes:
-        """Returns the next complete lines unchanged, about ``size`` bytes; empty without new lines."""
+        """Returns the next complete lines of the journal unchanged, about ``size`` bytes; empty without new lines."""
         chunk = self._chunk(size)
         self._offset += len(chunk)
         return chunk
 
     def _chunk(self, size: int = _CHUNK) -> bytes:
-        """Returns the next complete lines. A line that is longer than the chunk is read completely; a line that is
-        longer than ``_LONGEST`` is skipped."""
+        """Returns the next complete lines of the journal. A line that is longer than one read is read completely; a
+        line that is longer than ``_LONGEST`` is skipped.
+        """
         try:
             with whole.opened(self._path, links=False) as file:
                 while not self._passing or self._pass_over(file.fileno()):
@@ -88,8 +89,9 @@ class Tail:
         return b""
 
     def _pass_over(self, descriptor: int) -> bool:
-        """Skips a line that is too long. Returns False while the end of the line has not been reached; the rest of the
-        line is skipped later."""
+        """Skips a line that is too long. Returns False while the end of the too long line has not been reached; the
+        rest of the line is skipped later.
+        """
         for _ in range(_PASSED // _LONGEST):
             data = os.pread(descriptor, _LONGEST, self._offset)
             end = data.find(b"\n") + 1
@@ -103,8 +105,9 @@ class Tail:
 
 
 def _line_before(path: Path, after: int) -> int:
-    """Returns the offset of a line with ``seq`` at most ``after``, close to the last such line. The numbers increase
-    along the file."""
+    """Returns the offset of a line with ``seq`` at most ``after``, close to the last such line. The number ``seq``
+    increases along the journal.
+    """
     if not path.exists():
         return 0
     with whole.opened(path) as file:
@@ -130,13 +133,13 @@ def _line(raw: bytes) -> Line | None:
 
 
 def seq_of(raw: bytes) -> int:
-    """Returns the number of a line; 0 for a damaged line."""
+    """Returns ``seq`` of a journal line; 0 for a damaged line."""
     line = _line(raw)
     return line.seq if line is not None else 0
 
 
 def lines(path: Path, after: int = 0) -> Iterator[Line]:
-    """Yields every complete line with ``seq`` above ``after``, in order."""
+    """Yields every complete journal line with ``seq`` above ``after``, in order."""
     tail = Tail(path, after)
     while batch := tail.read():
         yield from batch
@@ -159,15 +162,17 @@ def _status_in(raw: bytes) -> Status | None:
 
 
 def last(path: Path) -> bytes:
-    """Returns the last complete line, without the line feed; b"" without a line. Raises OSError."""
+    """Returns the last complete line of the journal, without the line feed; b"" if the journal has no line. Raises
+    OSError if the journal cannot be read.
+    """
     with whole.opened(path, links=False) as file:
         known = _last_lines(file.fileno(), os.fstat(file.fileno()).st_size)
         return known[-1].raw if known else b""
 
 
 def _last_lines(descriptor: int, end: int) -> list[Line]:
-    """Returns lines before ``end``. The last returned line is the last complete line before ``end``. Empty if there is
-    no line. At most ``_LONGEST`` bytes are in memory.
+    """Returns journal lines before the offset ``end``. The last returned line is the last complete line before ``end``.
+    The result is empty if there is no line before ``end``. At most ``_LONGEST`` bytes of the journal are in memory.
     """
     window = _CHUNK
     while True:
@@ -181,9 +186,9 @@ def _last_lines(descriptor: int, end: int) -> list[Line]:
 
 
 def append(path: Path, status: Status) -> Status:
-    """Appends ``status`` with the next number and returns it as written; the line is on disk on return. Raises
-    OSError. An incomplete last line of a killed worker is removed first. The new line is removed if it cannot be
-    written completely.
+    """Appends ``status`` with the next number to the journal and returns it with this number; flushes the line to disk
+    before it returns. Raises OSError if the line cannot be written. An incomplete last line, which a killed worker has
+    left, is removed first. The new line is removed if it cannot be written completely.
     """
     with whole.appended(path, 0o600) as file:
         numbered = msgspec.structs.replace(status, seq=_mend(file.fileno()) + 1)
@@ -198,8 +203,8 @@ def append(path: Path, status: Status) -> Status:
 
 
 def _mend(descriptor: int) -> int:
-    """Returns the largest number of the last lines, even if damaged lines follow. Text after the last line feed is
-    completed or removed.
+    """Returns the largest ``seq`` of the last journal lines, even if damaged lines follow. Text after the last line
+    feed is completed or removed.
     """
     size = os.fstat(descriptor).st_size
     end = _after_last_feed(descriptor, size)

@@ -9,8 +9,8 @@ from conoid.cases.output import layout
 from conoid.cases.reading import whole
 
 _TAIL = 1 << 14
-"""Number of bytes at the end of the log in which the launcher's banner is searched for. The value was chosen because
-a banner has 700 bytes."""
+"""Number of bytes at the end of the log in which the launcher's banner is searched for; a banner has 700 bytes (reason
+of the chosen value)."""
 _ABORTS = "Abort("
 """Beginning of the line that MPICH writes for a rank that aborts all others."""
 _LAST_WORDS = 300
@@ -21,25 +21,25 @@ _COMPLAINTS = [
 ]
 _CODE = re.compile(rb"^=   EXIT CODE: (\d{1,3})$", re.MULTILINE)
 _PID = re.compile(rb"^=   PID (\d+) RUNNING AT ", re.MULTILINE)
-"""Banner of Hydra, MPICH's launcher, for a rank that ended before the others. For a killed rank the banner has the
-number of the signal."""
+"""Banner that Hydra, the launcher of MPICH, prints if a rank ends before the other ranks. For a killed rank the banner
+contains the number of the signal."""
 
 
 def exit_code(folder: Path) -> int | None:
-    """Returns the exit code of the rank that ended first, by the newest banner; None without a banner."""
+    """Returns the exit code of the rank that ended first, by the newest banner; None if the log has no banner."""
     found = _CODE.findall(_tail(folder))
     return int(found[-1]) if found else None
 
 
 def rank_killed(folder: Path) -> int | None:
-    """Returns the process number of the rank that ended first, by the newest banner; None without a banner."""
+    """Returns the process number of the rank that ended first, by the newest banner; None if the log has no banner."""
     found = _PID.findall(_tail(folder))
     return int(found[-1]) if found else None
 
 
 def last_words(folder: Path, log: Path | None = None) -> str:
-    """Returns the last line of the launcher's log, or of another ``log``, that is neither the banner nor a line of
-    MPI; empty without such a line.
+    """Returns the last line of the launcher's log, or of the given ``log``, that is neither a banner nor a line of MPI;
+    empty if there is no such line.
     """
     text = _tail(folder, log).decode(errors="replace")
     lines = [line.strip() for line in text.partition("=====")[0].splitlines() if not line.startswith(_ABORTS)]
@@ -47,7 +47,7 @@ def last_words(folder: Path, log: Path | None = None) -> str:
 
 
 def disk_failed(folder: Path) -> bool:
-    """Whether a rank reported an error of its disk, or the disk of the log itself has no space for such a report."""
+    """Whether a rank reported an error of its disk, or the disk of the log has no space for such a report."""
     text = _tail(folder)
     if any(words in text for words in _COMPLAINTS):
         return True

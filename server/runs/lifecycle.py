@@ -1,5 +1,6 @@
-"""The states of a run as a pure function: (run, event) -> (run, actions). The state machine uses no clock, no file and
-no process."""
+"""The state machine of a run as a pure function: (run, event) -> (run, actions). The state machine uses no clock, no
+file and no process.
+"""
 
 from dataclasses import replace
 
@@ -37,14 +38,14 @@ from .events import (
 Next = tuple[Run, tuple[Action, ...]]
 
 _SIGKILL, _SIGTERM = 9, 15
-"""Numbers of signals that are the same on every POSIX system. The module imports no module of the operating system."""
+"""Numbers of signals that are equal on every POSIX system; the module imports no module of the operating system."""
 
 
 def advance(run: Run, event: Event, now: float) -> Next:
-    """Returns the run after ``event`` at the Unix time ``now``, and the actions in order.
+    """Returns the run after ``event`` at the Unix time ``now``, s, and the actions in order.
 
-    An event without meaning in the present state (a cancel of a finished run, a late timer) changes nothing. Every
-    change of state obeys ``FOLLOWERS`` of conoid.cases.run.
+    An event without meaning in the present state, such as a cancel of a finished run, changes nothing. Every change of
+    state obeys ``FOLLOWERS`` of conoid.cases.run.
     """
     if run.state.final:
         return run, ()
@@ -95,7 +96,9 @@ def _enter(run: Run, state: State, message: str = "") -> Next:
 
 
 def _end(run: Run, now: float, outcome: Outcome, *, written: bool = False) -> Next:
-    """Returns the final state of ``outcome``. The outcome file is written before its line in the journal."""
+    """Returns the final state of the run by ``outcome``. The worker writes the outcome file before the final line of
+    the journal.
+    """
     state, cause = State(outcome.state), Cause(outcome.cause) if outcome.cause else None
     ended = replace(run, state=state, cause=cause, message=outcome.message, finished=now)
     write = () if written else (WriteOutcome(outcome),)
@@ -103,8 +106,9 @@ def _end(run: Run, now: float, outcome: Outcome, *, written: bool = False) -> Ne
 
 
 def _broken(run: Run, event: Broken, now: float) -> Next:
-    """Marks the run as lost, or as cancelled if its owner has asked for a cancel. A worker that may still run is
-    killed first."""
+    """Marks the run as lost, or as cancelled if its owner has requested a cancel. A worker that may still run is killed
+    first.
+    """
     asked = run.stopping_for is Cause.CANCELLED
     state, cause = (State.CANCELLED, Cause.CANCELLED) if asked else (State.LOST, Cause.STORAGE)
     message = f"stopped on request, without results: {event.message}" if asked else event.message
@@ -142,13 +146,16 @@ def _exited(run: Run, event: WorkerExited, now: float) -> Next:
 
 
 def _at(run: Run, event: WorkerExited | Found, now: float) -> float:
-    """Returns the time of the end. If no server ran at that time, it is read from the files."""
+    """Returns the time of the end of the run. If no server ran at the end of the run, the time is read from the run's
+    files.
+    """
     return max(event.at, run.started) if event.at else now
 
 
 def _renamed(run: Run, event: WorkerExited, outcome: Outcome) -> Outcome:
-    """Returns the cause of a stop. A worker records that it was stopped, but not why. Without a request for a cancel
-    the stop is no cancel."""
+    """Returns the cause of a stop. A worker records that it was stopped, but not why it was stopped. Without a request
+    for a cancel, a stop does not count as a cancel.
+    """
     if run.stopping_for is Cause.STORAGE:
         state, message = State.FAILED, "its output has passed what this server allows a run"
         return msgspec.structs.replace(outcome, state=state, cause=Cause.STORAGE, message=message)
@@ -163,13 +170,14 @@ def _renamed(run: Run, event: WorkerExited, outcome: Outcome) -> Outcome:
 
 
 def _readable(outcome: Outcome) -> bool:
-    """True when the outcome has a final state and a known cause."""
+    """True if the outcome has a final state and a known cause."""
     return outcome.state in {state for state in State if state.final} and outcome.cause in {None, *Cause}
 
 
 def _without_outcome(run: Run, event: WorkerExited) -> Outcome:
     """Returns the final state of a worker without an outcome. The exit code suggests a cause, but never proves
-    success."""
+    success.
+    """
     state, cause, message = _reading_of(run, event)
     traces = f"; {event.traces}" if event.traces else ""
     return Outcome(state=state, cause=cause, message=f"{message}{traces}", ranks=run.ranks, threads=run.threads)

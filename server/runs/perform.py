@@ -1,4 +1,4 @@
-"""Performs the actions of ``lifecycle``: writes journal and outcome, starts, adopts and stops workers."""
+"""Performs the actions of the module ``lifecycle``: writes journal and outcome; starts, adopts and stops workers."""
 
 import logging
 import os
@@ -36,7 +36,7 @@ class Performer:
         """Workers of an earlier server that are not adopted yet."""
 
     def perform(self, run: Run, action: Action, now: float) -> None:
-        """Performs one action of a step to ``run`` at the Unix time ``now``. Raises LaunchError, OSError and others."""
+        """Performs one action for ``run`` at the Unix time ``now``, s. Raises LaunchError, OSError and other errors."""
         path = self._settings.runs / run.id
         match action:
             case Journal(state, cause, message):
@@ -58,12 +58,13 @@ class Performer:
                 self._kill(run.id, path)
 
     def probe(self, run_id: str) -> None:
-        """Checks that files of the run can be written. Raises OSError."""
+        """Checks that files of the run can be written. Raises OSError if they cannot be written."""
         durable.probe(self._settings.runs / run_id)
 
     def gone(self, run_id: str) -> bool:
         """Whether the run's folder is missing. Returns False if the folder of all runs was replaced because its disk is
-        missing."""
+        missing.
+        """
         try:
             same = os.stat(self._settings.runs).st_ino == self._root
             return same and not (self._settings.runs / run_id).is_dir()
@@ -71,7 +72,7 @@ class Performer:
             return False
 
     def lives(self, run_id: str) -> bool:
-        """Whether a worker of the run is known to run."""
+        """Whether this server has a running worker of the run."""
         watch = self.watches.get(run_id)
         return watch is not None and watch.worker.exited() is None
 
@@ -86,7 +87,7 @@ class Performer:
         return True
 
     def _stop(self, run_id: str, path: Path, why: Cause) -> None:
-        """Records the request to stop. On a full disk the request is in the database only."""
+        """Records the request to stop a run; on a full disk only the database contains the request."""
         try:
             folder.write_stop(path, why)
         except OSError as error:
@@ -126,7 +127,7 @@ class Performer:
 
     def _watch(self, path: Path, worker: Worker, allowed: float | None) -> Watch:
         """Watches a worker up to the time limit of the server. The worker itself ends at ``run.max_wall_time``; the
-        server stops it a grace period later; a batch system stops it at the limit of the job.
+        server stops the worker a grace period later; a batch system stops it at the limit of the job.
         """
         left = (
             None if allowed is None or self._launcher.queues else allowed + self._settings.grace - folder.runs_for(path)
@@ -135,7 +136,7 @@ class Performer:
 
 
 def _allowed(path: Path) -> float | None:
-    """Returns the time limit of a run from its submission. The worker applies its own limit in any case."""
+    """Returns the time limit of a run from its submission, s. The worker applies its own time limit in any case."""
     try:
         return folder.submission(path).wall_time
     except (OSError, msgspec.MsgspecError):
@@ -143,8 +144,9 @@ def _allowed(path: Path) -> float | None:
 
 
 def of_launch(error: LaunchError) -> LaunchFailed | LaunchPutOff:
-    """Returns the event of a failed launch. The launch is delayed if the error is temporary, or if the folder has no
-    readable case because of an error of its disk."""
+    """Returns the event of a failed launch. The launch is delayed if the error is temporary, or if an error of the disk
+    makes the case unreadable.
+    """
     if passing(error):
         return LaunchPutOff(f"the launch is tried again: {error}")
     return LaunchFailed(str(error), Cause.STORAGE if isinstance(error, DamagedError) else Cause.LAUNCH)

@@ -1,5 +1,6 @@
-"""Runs that are kept permanently, by the label ``keep`` or by a later request. The last request is a hidden file in
-the run's folder."""
+"""Runs that are kept permanently, by the label ``keep`` or by a later request. The last request to keep a run is a
+hidden file in the run's folder.
+"""
 
 from pathlib import Path
 
@@ -14,7 +15,7 @@ _PINNED, _YES, _NO = ".keep", "yes", "no"
 
 
 def pinned(folder: Path) -> bool:
-    """Whether the run is kept permanently: by the last request, else by its label ``keep``."""
+    """Whether the run is kept permanently: by the last request, or without a request by its label ``keep``."""
     if request := last_request(folder):
         return request == _YES
     try:
@@ -32,8 +33,8 @@ def last_request(folder: Path) -> str:
 
 
 def labels(folder: Path) -> dict[str, str]:
-    """Returns the labels of the submission, with ``keep`` by the last request. A removed or damaged folder gives no
-    labels.
+    """Returns the labels of the submission; the label ``keep`` follows the last request. A removed or damaged folder
+    gives no labels.
     """
     try:
         made = submission(folder).labels
@@ -44,5 +45,5 @@ def labels(folder: Path) -> dict[str, str]:
 
 
 def pin(folder: Path, keep: bool) -> None:
-    """Keeps a run permanently, or allows its removal again. Raises OSError."""
+    """Keeps a run permanently, or allows its removal again. Raises OSError if the request cannot be written."""
     durable.write(folder / _PINNED, (_YES if keep else _NO).encode())

@@ -1,4 +1,4 @@
-"""The state of a run after a restart of the server, by the run's folder and the processes of the machine."""
+"""The state of a run after a restart of the server, from the run's folder and the processes of the machine."""
 
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -21,7 +21,7 @@ _STOPPABLE = {State.QUEUED, State.STARTING, State.RUNNING, State.STOPPING}
 
 @dataclass(frozen=True)
 class Left:
-    """A run by its folder, its idempotency key, and the traces of its worker."""
+    """A run from its folder, with its idempotency key and the traces of its worker."""
 
     run: Run
     key: str | None
@@ -30,8 +30,8 @@ class Left:
 
 
 def look(path: Path, known: Run | None, launcher: Launcher) -> Left:
-    """Reads a run from its folder. ``known``: its row in the database, which replaces damaged files. Raises OSError,
-    and ValueError if neither has the owner of the run.
+    """Reads a run from its folder. ``known``: the row of the run in the database, which replaces damaged files. Raises
+    OSError; raises ValueError if neither the folder nor the row has the owner of the run.
     """
     made = _submission(path)
     if made is None and known is None:
@@ -63,7 +63,7 @@ def _outcome(path: Path) -> Outcome | None:
 
 
 def _statuses(path: Path) -> list[Status]:
-    """Returns the Status messages of the journal; none if the journal cannot be read."""
+    """Returns the Status messages of the journal; empty if the journal cannot be read."""
     try:
         return journal.statuses(path / layout.JOURNAL)
     except folder.DAMAGED:
@@ -78,15 +78,17 @@ def _as_accepted(known: Run | None) -> Run:
 
 
 def _fate(path: Path, trace: Trace) -> Literal["none", "alive", "gone"]:
-    """Returns the process record. A record that cannot be read still proves that the run was launched."""
+    """Returns the process record of the run. A process record that cannot be read still proves that the run was
+    launched.
+    """
     if trace.worker is not None:
         return "alive"
     return "gone" if trace.launched or folder.there(path / layout.WORKER) else "none"
 
 
 def _mended(run: Run, journal_there: bool, known: Run | None, path: Path, trace: Trace, queues: bool) -> Run:
-    """Returns the status of a run whose journal is missing or older than its processes. A run that was started is
-    never started twice. A run that a batch system ``queues`` may still wait for its cores.
+    """Returns the status of a run whose journal is missing or older than its processes. A run that was started is never
+    started twice. A run that was submitted to a batch system (``queues``) may still wait for its cores.
     """
     if not journal_there and known is not None:
         run = replace(known, message="") if known.state is not State.STOPPING else replace(run, state=State.STARTING)

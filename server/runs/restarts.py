@@ -1,4 +1,4 @@
-"""Restart: a new run that continues from a checkpoint of another run, with links to the files of that run."""
+"""Restart: a new run continues from a checkpoint of another run, and has links to the files of the other run."""
 
 import json
 import os
@@ -15,22 +15,23 @@ from ..errors import ServiceError
 from .folder import outcome
 
 _TRIES = 5
-"""Number of tries to find a newest checkpoint that is not removed meanwhile (chosen value)."""
+"""Number of tries to find the newest checkpoint, because the running run may remove it meanwhile (chosen value)."""
 LABEL = "restart"
-"""Name of the label of a new run that contains the id of the other run."""
+"""Key of the label in which a new run stores the id of the run that it continues."""
 
 
 def body(case: Path, ranks: int | None, threads: int | None = None, max_steps: int | None = None) -> dict[str, object]:
-    """Returns the case of a run with other ranks, threads and ``run.max_steps``; a value of None changes nothing.
-    Raises CaseError, OSError."""
+    """Returns the case of a run with changed ranks, threads and ``run.max_steps``; a value of None changes nothing.
+    Raises CaseError or OSError.
+    """
     whole.check(case)
     wanted = {"run.ranks": ranks, "run.threads": threads, "run.max_steps": max_steps}
     return apply_overrides(read_data(case), {key: value for key, value in wanted.items() if value is not None})
 
 
 def check(source: Path, max_steps: int | None) -> None:
-    """Raises ServiceError 409 if a run that continues ``source`` has no step left. ``max_steps``: None for the value
-    of its case.
+    """Raises ServiceError with status 409 if a run that continues ``source`` has no step left. ``max_steps``: None for
+    the value in the case of ``source``.
     """
     ended = outcome(source)
     spent = ended is not None and ended.cause == Cause.STEPS
@@ -45,8 +46,8 @@ def check(source: Path, max_steps: int | None) -> None:
 def fill(source: Path, folder: Path) -> None:
     """Links the checkpoints, frames and history of ``source`` into the new run.
 
-    The worker takes the newest checkpoint whose files have their sha256, and cuts frames and history at its step.
-    Raises ServiceError 409, 503, OSError.
+    The worker takes the newest checkpoint whose files have the right sha256, and cuts frames and history at its step.
+    Raises ServiceError with status 409 or 503; raises OSError.
     """
     if not any(_taken(source, folder / layout.CHECKPOINTS) for _ in range(_TRIES)):
         detail = f"the checkpoints of run {source.name} are replaced faster than they can be linked"
@@ -59,7 +60,8 @@ def fill(source: Path, folder: Path) -> None:
 
 def _taken(source: Path, target: Path) -> bool:
     """Links every checkpoint with a complete manifest. Returns False if checkpoints were removed during the call,
-    because a running run keeps only its newest checkpoints. Raises ServiceError 409 if there is no checkpoint.
+    because a running run keeps only its newest checkpoints. Raises ServiceError with status 409 if there is no
+    checkpoint.
     """
     damaged: list[str] = []
     taken = 0
@@ -84,8 +86,8 @@ def _taken(source: Path, target: Path) -> bool:
 
 
 def _describe(place: Path, target: Path) -> None:
-    """Copies the two files that describe a damaged checkpoint. The worker reads these two files and warns that the
-    checkpoint is skipped.
+    """Copies the two files that describe a damaged checkpoint, so that the worker can warn that the checkpoint is
+    skipped.
     """
     shutil.rmtree(target, ignore_errors=True)
     target.mkdir(parents=True)
@@ -94,7 +96,7 @@ def _describe(place: Path, target: Path) -> None:
 
 
 def _why(source: Path) -> str:
-    """Returns why the run has no checkpoint, and how the user can get one."""
+    """Returns why the run has no checkpoint, and how the user can get a checkpoint."""
     ended = outcome(source)
     if ended is not None and ended.state == State.SUCCEEDED:
         return "one that has succeeded keeps none"
@@ -121,6 +123,6 @@ def _link(source: str, target: str) -> None:
 
 
 def _copy(source: str, target: str) -> None:
-    """Links a regular file. A missing file, a folder or a link is skipped."""
+    """Links a regular file; skips a missing file, a folder or a link."""
     with suppress(FileNotFoundError, IsADirectoryError), whole.opened(source) as file, open(target, "xb") as copy:
         shutil.copyfileobj(file, copy)

@@ -1,4 +1,4 @@
-"""Timers of the supervisor: steps of runs that failed and are tried again, with the time and the reason."""
+"""Retries of the supervisor: failed steps of runs, with the time of the next try and the reason of the failure."""
 
 import errno
 import logging
@@ -9,7 +9,7 @@ from .events import Event
 
 _log = logging.getLogger("conoid.server")
 _AGAIN, _LONGEST = 1.0, 8.0
-"""Delay in s before a failed step is tried again: the first delay, and the largest one (chosen values). The delay
+"""Delay in s before a failed step is tried again: the first delay and the largest delay (chosen values). The delay
 doubles at each failure."""
 _QUIET = 60.0
 """Time in s for which the same error of the same run is not logged again (chosen value)."""
@@ -18,14 +18,13 @@ _PASSING = frozenset(
      errno.EAGAIN}
 )  # fmt: skip
 _LASTING = 4.0
-"""Delay in s from which an error of a run's own files counts as permanent. The value was chosen because this delay
-is reached at the fourth try, after 7 s."""
+"""Delay in s at which an error of a run's own files counts as permanent: after the fourth try, 7 s (chosen value)."""
 DAMAGE = frozenset({errno.EISDIR, errno.ENOTDIR, errno.EACCES, errno.EPERM, errno.ELOOP, errno.EROFS})
-"""Errors of one folder that are permanent although other folders can be written."""
+"""Errors that are permanent if they concern one folder, while other folders can be written."""
 
 
 def passing(error: BaseException) -> bool:
-    """True for temporary errors of the machine, such as a full disk, anywhere in the chain of causes."""
+    """True if an error, or a cause of the error, is a temporary error of the machine, such as a full disk."""
     cause = error.__cause__ or error.__context__
     if isinstance(error, OSError) and error.errno in _PASSING:
         return True
@@ -33,7 +32,7 @@ def passing(error: BaseException) -> bool:
 
 
 def words(error: BaseException) -> str:
-    """Returns the error in one line."""
+    """Returns the text of the error as one line."""
     reason = error.strerror if isinstance(error, OSError) else str(error)
     return (reason or type(error).__name__).splitlines()[0]
 
@@ -48,8 +47,9 @@ class _Hold:
 
 
 class Retries:
-    """Failed steps and the times of their next try. The class is used in the supervisor's thread; ``why`` may be
-    called from any thread."""
+    """Failed steps and the times of their next try. The class is used in the supervisor's thread; ``why`` may be called
+    from any thread.
+    """
 
     def __init__(self) -> None:
         """Creates the object without failed steps."""
@@ -60,7 +60,7 @@ class Retries:
         return len(self._retries)
 
     def put_off(self, run_id: str, error: Exception, event: Event | None = None) -> Exception:
-        """Schedules another try of the step for which the run waits, or of ``event``, which occurs only once."""
+        """Schedules another try of the failed step, or of the handling of ``event``, which occurs only once."""
         before = self._retries.get(run_id)
         self._hold(run_id, words(error), event or (before.event if before else None))
         return error
@@ -83,7 +83,7 @@ class Retries:
         return hold is not None and hold.until > time.monotonic()
 
     def due(self) -> list[tuple[str, Event]]:
-        """Returns the events whose next try is now."""
+        """Returns the events whose next try is scheduled for now or earlier."""
         now = time.monotonic()
         return [(run_id, hold.event) for run_id, hold in self._retries.items() if hold.event and hold.until <= now]
 
@@ -92,18 +92,18 @@ class Retries:
         return {run_id for run_id, hold in tuple(self._retries.items()) if hold.event is not None}
 
     def done(self, run_id: str, event: Event) -> None:
-        """Removes the entry of a run after a successful step. The entry of a different scheduled event stays."""
+        """Removes the failed step of a run after a successful step. A different scheduled event of the run stays."""
         hold = self._retries.get(run_id)
         if hold is not None and hold.event in (None, event):
             del self._retries[run_id]
 
     def lasts(self, run_id: str) -> bool:
-        """True after several failed tries."""
+        """True if the step has failed several times."""
         hold = self._retries.get(run_id)
         return hold is not None and hold.delay >= _LASTING
 
     def damaged(self, run_id: str, error: Exception) -> bool:
-        """Whether the error is an error of the run's own files, and is permanent."""
+        """Whether the error concerns the run's own files, and is permanent."""
         return isinstance(error, OSError) and error.errno in DAMAGE and self.lasts(run_id)
 
     def forget(self, run_id: str) -> None:
@@ -111,6 +111,6 @@ class Retries:
         self._retries.pop(run_id, None)
 
     def why(self, run_id: str) -> str:
-        """Returns the error of the last step; empty without an error."""
+        """Returns the error of the last step; empty if the last step had no error."""
         hold = self._retries.get(run_id)
         return hold.why if hold is not None else ""

@@ -1,5 +1,4 @@
-"""The supervisor performs what ``lifecycle`` decides. A single thread processes the events of all open runs, one after
-the other."""
+"""The supervisor performs the actions that ``lifecycle`` returns. One thread processes the events of all open runs."""
 
 import logging
 import queue
@@ -38,7 +37,8 @@ _AGAIN = 1.0
 """Time in s between two checks while failed steps wait for their next try."""
 _GONE, _DAMAGED = "the folder of the run has been removed", "the folder of the run cannot be used"
 _ANSWER = 10.0
-"""Time in s in which the supervisor's thread must answer. The value was chosen: the thread checks 50 times a second."""
+"""Time in s in which the supervisor's thread must answer; the thread checks 50 times a second (reason of the chosen
+value)."""
 
 
 @dataclass(frozen=True)
@@ -48,7 +48,7 @@ class _Cancel:
 
 
 class Supervisor:
-    """The supervisor of all open runs. The public methods may be called from any thread."""
+    """The supervisor of all open runs. The public methods of the supervisor may be called from any thread."""
 
     def __init__(
         self,
@@ -58,7 +58,7 @@ class Supervisor:
         telemetry: Telemetry | None,
         ring: Callable[[str], None],
     ) -> None:
-        """Starts no thread yet. ``ring`` is called with the id of a run that has changed."""
+        """Creates the supervisor without its thread; ``ring`` is called with the id of a run that has changed."""
         self._settings, self._store, self._launcher = settings, store, launcher
         self._telemetry, self._ring = telemetry, ring
         self._inbox: queue.SimpleQueue[_Cancel | None] = queue.SimpleQueue()
@@ -78,20 +78,20 @@ class Supervisor:
     # From any thread --------------------------------------------------------------------------------------------------
 
     def start(self) -> None:
-        """Reads the runs of an earlier server, then starts the thread. Raises OSError, SQLAlchemyError."""
+        """Reads the runs of an earlier server, then starts the supervisor's thread. Raises OSError, SQLAlchemyError."""
         self._launcher.tidy()
         self._take_up()
         self._waitlist.usage.begin(self._store.taken())
         self._thread.start()
 
     def close(self) -> None:
-        """Stops the supervision. Workers continue, and the next server adopts them."""
+        """Stops the supervision of runs. Workers continue, and the next server adopts the workers."""
         self._leaving = True
         self._inbox.put(None)
         self._thread.join(_ANSWER)
 
     def end_all(self) -> None:
-        """Cancels every open run. Returns when all runs have ended, or after twice the grace period."""
+        """Cancels every open run; returns when all runs have ended, or after twice the grace period."""
         deadline = time.monotonic() + 2 * self._settings.grace
         for run_id in tuple(self._open):
             self._inbox.put(_Cancel(run_id, Future()))
@@ -100,18 +100,17 @@ class Supervisor:
 
     @property
     def alive(self) -> bool:
-        """False if the thread has ended: runs are not supervised."""
+        """False if the supervisor's thread has ended, so that runs are not supervised."""
         return self._thread.is_alive()
 
     def admit(self, run: Run) -> None:
-        """Adds a new run, which is already on disk and in the store."""
+        """Adds a new run, which is already on disk and in the database."""
         self._open[run.id] = run
         self._waitlist.changed()
         self._inbox.put(None)
 
     def cancel(self, run_id: str) -> None:
-        """Requests a cancel. Returns when the request is recorded. Raises TimeoutError, or the error of the
-        recording."""
+        """Requests a cancel; returns when the request is recorded. Raises TimeoutError or an error of the record."""
         asked = _Cancel(run_id, Future())
         self._inbox.put(asked)
         asked.done.result(_ANSWER)
@@ -121,7 +120,7 @@ class Supervisor:
         return self._open.get(run_id)
 
     def is_open(self, run_id: str) -> bool:
-        """False once the run has ended and its last line is in the journal."""
+        """False if the run has ended and its last line is in the journal."""
         run = self._open.get(run_id)
         return run is not None and not run.state.final
 
@@ -135,7 +134,7 @@ class Supervisor:
         return sum(run.cores for run_id in tuple(self._watches) if (run := self._open.get(run_id)))
 
     def reason(self, run_id: str) -> str:
-        """Returns what a queued run waits for, or the message of a batch system; empty for other runs."""
+        """Returns why a queued run waits, or the message of a batch system; empty for other runs."""
         if why := self._retries.why(run_id):
             return f"tried again soon: {why}"
         watch = self._watches.get(run_id)
@@ -144,12 +143,12 @@ class Supervisor:
         return self._waitlist.why(run_id)
 
     def taken(self, owner: str) -> tuple[int, float]:
-        """Returns the number of an owner's runs with cores or in a batch system, and its decayed core-seconds."""
+        """Returns the number of an owner's runs with cores or in a batch system, and the decayed core-seconds."""
         own = [run for run in tuple(self._open.values()) if run.owner == owner]
         return sum(run.id in self._watches for run in own), self._waitlist.used(owner, own)
 
     def stranded(self) -> list[str]:
-        """Returns open runs without a watch, a queue entry or a timer. Any such run is an error."""
+        """Returns open runs without watch, queue entry and timer; each such run is an error of the server."""
         looked_after = {*self._watches, *self._index.unsaved, *self._retries.timed()}
         return scheduling.stranded(tuple(self._open.values()), looked_after)
 
@@ -199,9 +198,7 @@ class Supervisor:
             self._ring(run_id)
 
     def _grant(self) -> None:
-        """Starts the runs that the queue selects. A failed start delays no other run. A change that could not be
-        written to disk is not announced.
-        """
+        """Starts the runs that the queue selects; a failed start of a run delays no other run."""
         held = Held(self._retries.held, self.held_back)
         for run_id in self._waitlist.turn(tuple(self._open.values()), tuple(self._watches), held):
             try:
@@ -212,11 +209,11 @@ class Supervisor:
                 self._apply(run_id, Granted(self._batch))
 
     def _apply(self, run_id: str, event: Event) -> Exception | None:
-        """Makes one step of a run; returns the error that prevented it, or None.
+        """Makes one step of a run; returns the error that prevented the step, or None.
 
-        A step that fails (a full disk) changes nothing and is tried again: a run in the queue is selected again, the
-        end of a worker is detected again, and an event that occurs only once waits in ``retries``. The next try
-        finds what the first one wrote, so nothing is done twice.
+        A step that fails, for example because of a full disk, changes nothing and is tried again. A queued run is
+        selected again, the end of a worker is detected again, and an event that occurs only once waits in ``retries``.
+        The next try finds the data that the first try wrote, so that nothing is done twice.
         """
         before = self._open.get(run_id)
         if before is None:
@@ -240,7 +237,7 @@ class Supervisor:
         return None
 
     def _fail(self, run: Run, event: Event | None, error: Exception) -> Exception | None:
-        """Handles a failed step. A run without a usable folder has ended; any other one is tried again."""
+        """Handles a failed step. A run without a usable folder has ended; for any other run the step is tried again."""
         if not isinstance(event, Broken):
             if (hands := self._hands).gone(run.id):
                 return self._apply(run.id, Broken(_GONE))
@@ -250,7 +247,7 @@ class Supervisor:
         return self._retries.put_off(run.id, error, event if isinstance(event, ONCE) else None)
 
     def _settle(self, run: Run) -> None:
-        """Completes a step: updates first the memory, then the database, then the waiters for a change."""
+        """Completes a step: updates first the memory, then the database, then wakes the waiters for a change."""
         self._waitlist.settled(self._open.get(run.id), run)
         self._open[run.id] = run
         if run.state.final:
@@ -266,7 +263,7 @@ class Supervisor:
     # Housekeeping -----------------------------------------------------------------------------------------------------
 
     def _tidy(self) -> None:
-        """Repeats failed steps, and gives the router the present tokens."""
+        """Repeats failed steps, and gives the present tokens to the Zenoh router."""
         self._tidied = time.monotonic()
         self._earlier_runs.again()
         for run_id in tuple(self._index.unsaved):
@@ -292,7 +289,7 @@ class Supervisor:
                 self._apply(run_id, Broken(_GONE))
 
     def _found(self, left: Left) -> None:
-        """Adds a run of an earlier server. A run that has ended is kept in memory until the database has its end."""
+        """Adds a run of an earlier server. An ended run is kept in memory until the database has the end of the run."""
         if left.worker is not None:
             self._hands.found[left.run.id] = left.worker
         if not left.run.state.final or left.run.id in self._index.unsaved:

@@ -1,5 +1,6 @@
-"""Wake-up of coroutines that wait for a change of a run. The wake-up carries no data: the waiting coroutine reads
-the run's files again."""
+"""Wake-up of coroutines that wait for a change of a run. A wake-up carries no data: the coroutine reads the run's files
+again.
+"""
 
 import asyncio
 from collections.abc import Iterator
@@ -7,23 +8,25 @@ from contextlib import contextmanager
 
 
 class Listener:
-    """A waiter for changes of a run. Call ``clear``, read the files, and call ``wait`` if nothing is new. In this
-    order no change can be missed."""
+    """A waiter for changes of a run. Call ``clear``, read the files, and call ``wait`` if the files contain nothing
+    new. In this order no change of the files can be missed.
+    """
 
     def __init__(self) -> None:
         self._rung = asyncio.Event()
 
     def clear(self) -> None:
-        """Clears the event."""
+        """Clears the event of the waiter."""
         self._rung.clear()
 
     def ring(self) -> None:
-        """Sets the event of the waiter. Called in the thread of the event loop."""
+        """Sets the event of the waiter; called in the thread of the event loop."""
         self._rung.set()
 
     async def wait(self, timeout: float) -> bool:
-        """Waits. Returns True when the event was set since ``clear``, and False after ``timeout`` seconds without an
-        event."""
+        """Waits for the event. Returns True if the event was set since ``clear``, and False after ``timeout`` seconds
+        without an event.
+        """
         try:
             await asyncio.wait_for(self._rung.wait(), timeout)
         except TimeoutError:
@@ -44,7 +47,7 @@ class Wakeups:
         self._loop = loop
 
     def ring(self, run_id: str) -> None:
-        """Wakes all waiters of a run. Called from any thread."""
+        """Wakes all waiters of a run; called from any thread."""
         if self._loop is not None and not self._loop.is_closed():
             self._loop.call_soon_threadsafe(self._ring, run_id)
 
@@ -53,8 +56,9 @@ class Wakeups:
             listener.ring()
 
     def close(self) -> None:
-        """Wakes all waiters for the last time; the waiters end when they read ``closed``. Called in the thread of
-        the event loop."""
+        """Wakes all waiters for the last time; the waiters end when they read ``closed``. The method is called in the
+        thread of the event loop.
+        """
         self.closed = True
         for run_id in self._listeners:
             self._ring(run_id)
@@ -66,7 +70,7 @@ class Wakeups:
 
     @contextmanager
     def listen(self, run_id: str) -> Iterator[Listener]:
-        """Registers a waiter while the block runs. Called in the thread of the event loop."""
+        """Registers a waiter while the ``with`` block runs. The method is called in the thread of the event loop."""
         listener = Listener()
         self._listeners.setdefault(run_id, set()).add(listener)
         try:

@@ -1,4 +1,4 @@
-"""Supervision of one worker: its journal, its process, its time limits."""
+"""Supervision of one worker: journal, process and time limits."""
 
 import time
 from collections.abc import Iterator
@@ -17,25 +17,25 @@ from . import ends, folder, journal, launcher_log
 from .events import Event, GraceOver, OutputOver, WallTimeOver, WorkerExited, WorkerRuns, WorkerStarts, WorkerWaits
 
 _FAREWELL = 10.0
-"""Time in s in which a worker must exit after its last message. The launcher of a run may hang if one of its helper
-processes was killed from outside."""
+"""Time in s in which a worker must exit after its last message. The launcher of a run may hang if one of its auxiliary
+processes was killed."""
 _PATIENCE = 1.0
-"""Time in s between two checks of a worker in the queue of a batch system (chosen value). There may be a thousand
-such workers."""
+"""Time in s between two checks of a worker in the queue of a batch system, because there may be a thousand such workers
+(chosen value)."""
 _WEIGHED = 5.0
-"""Time in s between two measurements of a run's folder. The value was chosen because measuring some hundred files
-takes milliseconds."""
+"""Time in s between two measurements of the size of a run's folder; measuring some hundred files takes milliseconds
+(reason of the chosen value)."""
 
 _progress = msgspec.json.Decoder(Progress)
 _status = msgspec.json.Decoder(Status)
 
 
 class Watch:
-    """Checks a worker a few dozen times a second, and returns its changes as events."""
+    """Checks a worker a few dozen times a second, and returns the changes of the worker as events."""
 
     def __init__(self, run_folder: Path, worker: Worker, left: float | None, most: int | None = None) -> None:
         """Creates the watch of a worker. ``left``: remaining wall time of the run in s, measured by the monotonic
-        clock; ``most``: largest size of its folder in bytes.
+        clock; ``most``: largest size of the run's folder in bytes.
         """
         self._most, self._weigh_at = most, time.monotonic() + _WEIGHED
         self.worker, self._folder = worker, run_folder
@@ -49,8 +49,9 @@ class Watch:
         """True if the last check found new lines in the journal."""
 
     def look(self) -> Iterator[Event]:
-        """Returns the events since the last check. If the disk was full when the worker ended, the end counts as an
-        error of the disk, even if it is reported later. Raises OSError.
+        """Returns the events since the last check of the worker. If the disk was full when the worker ended, the end
+        counts as an error of the disk, even if the end is reported later. Raises OSError if files of the run cannot be
+        read.
         """
         now = time.monotonic()
         if self._phase == self.worker.phase() == "waits" and now < self._next:
@@ -81,7 +82,7 @@ class Watch:
                 yield OutputOver()
 
     def _turn(self) -> Iterator[Event]:
-        """Yields an event when the worker has received its cores, or waits for cores again."""
+        """Yields an event if the worker has received its cores, or waits for cores again."""
         phase, before = self.worker.phase(), self._phase
         self._phase = phase
         if phase == "waits":
@@ -90,7 +91,7 @@ class Watch:
             yield WorkerWaits() if phase == "waits" else WorkerStarts(self.worker.began())
 
     def stop(self, grace: float) -> None:
-        """Requests the worker to stop, and sets the time at which it is killed."""
+        """Requests the worker to stop, and sets the time at which the server kills the worker."""
         self.worker.stop()
         self._kill_at = min(self._kill_at, time.monotonic() + grace)
 
@@ -99,7 +100,7 @@ class Watch:
         return f"{layout.OUTCOME}: {wrong}" if wrong else f"its last words: {last_words}" if last_words else ""
 
     def _read(self, now: float) -> bool:
-        """Reads new lines of the journal. True if one of the lines reports that the worker runs."""
+        """Reads new lines of the journal. Returns True if one of the new lines reports that the worker runs."""
         runs, self.news = False, False
         while lines := self._tail.read():
             self.news = True

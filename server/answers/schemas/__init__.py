@@ -1,5 +1,6 @@
-"""Schemas of the JSON answers, one module for each subject. The OpenAPI document contains the schemas, and the
-routes build answers with them."""
+"""Schemas of the JSON answers, one module for each subject. The OpenAPI document contains the schemas of the JSON
+answers, and the routes build answers with these schemas.
+"""
 
 from conoid.cases.output.search import Search
 

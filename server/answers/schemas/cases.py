@@ -15,7 +15,7 @@ class NamedFile(msgspec.Struct, kw_only=True):
 
 
 class CaseFile(msgspec.Struct, kw_only=True):
-    """A file that a case names in the table ``key``; ``sha256`` is empty where the case has no hash."""
+    """A file that a case names in the table ``key``; ``sha256`` is empty if the case gives no hash."""
 
     key: str
     path: str
@@ -23,8 +23,8 @@ class CaseFile(msgspec.Struct, kw_only=True):
 
 
 class Validation(msgspec.Struct, kw_only=True):
-    """Result of the check of a case. A valid case has warnings, an estimate, the case with all defaults, and a survey
-    of its mesh files: content by part, loads, bodies in contact.
+    """Result of the check of a case. The answer for a valid case has warnings, an estimate, the case with all defaults,
+    and a survey of the mesh files.
     """
 
     valid: bool
@@ -46,6 +46,6 @@ class GalleryEntry(msgspec.Struct, kw_only=True):
 
 
 class Gallery(msgspec.Struct, kw_only=True):
-    """The shipped cases."""
+    """All shipped cases."""
 
     cases: list[GalleryEntry]

@@ -4,7 +4,7 @@ import msgspec
 
 
 class FileEntry(msgspec.Struct, kw_only=True):
-    """A file of a run; ``modified`` is the time of its last change, Unix s."""
+    """A file of a run; ``modified`` is the Unix time of the last change of the file, s."""
 
     path: str
     size: int
@@ -19,8 +19,9 @@ class Files(msgspec.Struct, kw_only=True):
 
 
 class SentFile(msgspec.Struct, kw_only=True):
-    """A file that a user has uploaded: ``offset`` bytes of its ``size`` bytes have arrived. ``asked``: time of the
-    last request for the file, Unix s."""
+    """An uploaded file of a user: ``offset`` bytes of ``size`` bytes have arrived. ``asked``: Unix time of the last
+    request for the file, s.
+    """
 
     sha256: str
     size: int
@@ -38,7 +39,7 @@ class SentFiles(msgspec.Struct, kw_only=True):
 
 
 class Report(msgspec.Struct, kw_only=True):
-    """The report of a run: its path in the run's folder, its size in bytes, its address."""
+    """The report of a run: path in the run's folder, size in bytes, and address."""
 
     path: str
     size: int

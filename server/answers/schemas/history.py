@@ -8,7 +8,7 @@ from conoid.cases.messages import Snapshot
 
 
 class EventPage(msgspec.Struct, kw_only=True):
-    """Lines of the journal, the number of the last line, and whether more lines exist now."""
+    """Lines of the journal, the number of the last line, and whether the journal has more lines now."""
 
     events: list[dict[str, Any]]
     last: int
@@ -16,14 +16,14 @@ class EventPage(msgspec.Struct, kw_only=True):
 
 
 class Snapshots(msgspec.Struct, kw_only=True):
-    """Messages of the journal about snapshots of the fragments."""
+    """Journal messages about snapshots of the fragments."""
 
     snapshots: list[Snapshot]
 
 
 class FragmentCourse(msgspec.Struct, kw_only=True):
-    """History of one fragment over the snapshots that contain it: number and time in s of the snapshot, mass in kg,
-    speed in m/s, longest side in m, number of tets.
+    """History of one fragment over the snapshots that contain the fragment. Columns: number and time in s of the
+    snapshot, mass in kg, speed in m/s, longest side in m, number of tets.
     """
 
     n: list[int]
@@ -42,16 +42,15 @@ class History(msgspec.Struct, kw_only=True):
     elapsed: float
     series: dict[str, Any]
     parts: dict[str, dict[str, list[float | None]]]
-    """Energies of each part in J at the times of the series; empty for a case with one part."""
+    """Energies of each part in J, for each time of the history; empty for a case with one part."""
     sizes: dict[str, Any]
-    """Newest size distribution of the fragments, from the messages of counts and snapshots."""
+    """Newest size distribution of the fragments."""
     ranks: dict[str, Any]
     balance: list[dict[str, Any]]
     snapshots: list[dict[str, Any]]
     log: list[dict[str, Any]]
-    """Messages of the log, of states and of checkpoints. For a long log only the first and the last messages are
-    here."""
+    """Messages of the log, of states and of checkpoints; of a long log only the first and the last messages."""
     log_left_out: int
-    """Number of messages that ``log`` leaves out."""
+    """Number of log messages that ``log`` leaves out."""
     warnings: list[dict[str, Any]]
-    """Warnings and errors of the whole log; each text occurs once."""
+    """Warnings and errors of the whole log; a repeated text occurs once."""

@@ -4,8 +4,8 @@ import msgspec
 
 
 class LibraryConstant(msgspec.Struct, kw_only=True):
-    """A constant of a material: ``value`` as it is written in a case, such as ``7850 kg/m^3``; ``confidence``: paper,
-    read, derived, memory or assumed; ``source``: text of the source.
+    """A constant of a material: ``value`` in the form of a case, such as ``7850 kg/m^3``; ``confidence``: paper, read,
+    derived, memory or assumed; ``source``: text of the source.
     """
 
     key: str
@@ -15,7 +15,7 @@ class LibraryConstant(msgspec.Struct, kw_only=True):
 
 
 class LibraryMaterial(msgspec.Struct, kw_only=True):
-    """A material of the library; ``law``: ``strength.model``, empty for an elastic material."""
+    """A material of the library; ``law`` is the value of ``strength.model``, empty for an elastic material."""
 
     name: str
     description: str

@@ -1,4 +1,4 @@
-"""JSON schemas of refused requests: each has one line of text for people and one word for programs."""
+"""JSON schemas of refused requests; an error has one line of text for people and a code for programs."""
 
 from typing import Any
 

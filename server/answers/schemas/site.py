@@ -13,14 +13,14 @@ class ZenohAccess(msgspec.Struct, kw_only=True):
 
 
 class Slots(msgspec.Struct, kw_only=True):
-    """Number of cores for runs of this server, and number of cores in use now."""
+    """Number of cores that runs of this server may use, and number of cores in use now."""
 
     total: int
     used: int
 
 
 class Me(msgspec.Struct, kw_only=True):
-    """The user of the request, the scopes of the token, and the limits of the server."""
+    """The user of the request, the scopes of the user's token, and the limits of the server."""
 
     owner: str
     scopes: list[str]
@@ -32,7 +32,7 @@ class Me(msgspec.Struct, kw_only=True):
 
 
 class Health(msgspec.Struct, kw_only=True):
-    """Status of the server, and of each service that the server needs."""
+    """Status of the server, and status of each service that the server needs."""
 
     status: str
     checks: dict[str, bool] = {}

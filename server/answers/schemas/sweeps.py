@@ -9,13 +9,13 @@ from conoid.cases.output.search import Search
 from .runs import ListedRun
 
 MOST_POINTS = 1000
-"""Largest number of points of a sweep. The value was chosen because the cases of so many points are made in a
-second."""
+"""Largest number of points of a sweep; the cases of so many points are made in one second (reason of the chosen
+limit)."""
 
 
 class Wish(msgspec.Struct, kw_only=True, forbid_unknown_fields=True):
-    """Request for a sweep: a case as plain data, the changed values of each point by key, the largest number of runs at
-    a time.
+    """Request for a sweep: a case as JSON, the changed values of each point by key, and the largest number of
+    concurrent runs.
     """
 
     case: dict[str, Any]
@@ -24,7 +24,7 @@ class Wish(msgspec.Struct, kw_only=True, forbid_unknown_fields=True):
 
 
 class SweepLine(msgspec.Struct, kw_only=True):
-    """A sweep in a list: number of runs by state, and number of removed runs."""
+    """A sweep in a list: number of runs in each state, and number of removed runs."""
 
     id: str
     owner: str
@@ -36,13 +36,13 @@ class SweepLine(msgspec.Struct, kw_only=True):
     removed: int
     url: str
     search: Search | None
-    """Last report of an adaptive sweep, as its client sent it."""
+    """Last report of an adaptive sweep, unchanged from its client."""
     reported: float | None
     """Time of the last report of an adaptive sweep, Unix s."""
 
 
 class Reported(msgspec.Struct, kw_only=True):
-    """Answer to a report of an adaptive sweep: the sweep, and whether its client must submit no further point."""
+    """Answer to a report of an adaptive sweep: the sweep, and whether the client must stop submitting points."""
 
     id: str
     url: str
@@ -50,7 +50,9 @@ class Reported(msgspec.Struct, kw_only=True):
 
 
 class SweepPage(msgspec.Struct, kw_only=True):
-    """Sweeps of the user, newest first, and the parameter ``before`` of the next page; null on the last page."""
+    """Sweeps of the user, newest first, and the value of the parameter ``before`` for the next page; null on the last
+    page.
+    """
 
     sweeps: list[SweepLine]
     next: str | None

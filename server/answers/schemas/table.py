@@ -8,8 +8,9 @@ from .runs import ListedRun
 
 
 class TableRow(ListedRun, kw_only=True):
-    """A run in the table: index of its group of similar cases, case values that differ from those of the group, and
-    results."""
+    """A run in the table: index of its group of similar cases, case values that differ from the common values of the
+    group, and results.
+    """
 
     progress: Progress | None
     case: int | None
@@ -18,7 +19,7 @@ class TableRow(ListedRun, kw_only=True):
     references: int
     """Number of reference values with which the run was compared."""
     missed: list[str]
-    """Names of the reference values that the run does not reach."""
+    """Names of the reference values from which the results of the run differ by more than the tolerance."""
 
 
 class Result(msgspec.Struct, kw_only=True):
@@ -29,7 +30,9 @@ class Result(msgspec.Struct, kw_only=True):
 
 
 class AlikeCases(msgspec.Struct, kw_only=True):
-    """A group of similar cases: common values by key in SI units, units by key, and the results of their runs."""
+    """A group of similar cases: common values by key in SI units, units by key, and results of the runs of the
+    group.
+    """
 
     values: dict[str, bool | int | float | str]
     units: dict[str, str]
@@ -37,7 +40,7 @@ class AlikeCases(msgspec.Struct, kw_only=True):
 
 
 class Table(msgspec.Struct, kw_only=True):
-    """Runs, newest first, and the cursor of the next page, which is null on the last page. ``pending``: number of
+    """Runs, newest first, and the cursor of the next page; the cursor is null on the last page. ``pending``: number of
     runs whose case values and results have not been read yet.
     """
 
