@@ -1,1 +1,1 @@
-"""Import of decks of other codes (LS-DYNA, Abaqus/Explicit, Radioss) as cases."""
+"""Import of input files (decks) of LS-DYNA, Abaqus/Explicit and Radioss as cases."""

@@ -1,4 +1,6 @@
-"""The account of an import, keyword by keyword: translated, omitted, or a reason to refuse the import."""
+"""The account of an import: for each keyword, whether it was translated, omitted, or is a reason to refuse the
+import.
+"""
 
 from collections.abc import Collection, Iterable, Iterator
 from dataclasses import dataclass, field
@@ -9,17 +11,17 @@ from conoid.cases.reading.included import Line
 T = TypeVar("T")
 Fate = Literal["taken", "left", "refused"]
 Remark = Literal["left", "differs", "refused"]
-"""Fate of a field of a translated keyword: omitted, with a different meaning in Conoid, or necessary for a right
-answer."""
+"""Fate of a field of a translated keyword: omitted without effect, with a different meaning in Conoid, or not
+translated although the answer needs it."""
 
 
 @dataclass(frozen=True)
 class Detail:
-    """A field of a keyword that was not translated unchanged."""
+    """A field of a keyword that was omitted, changed its meaning, or refuses the import."""
 
     kind: Remark
     what: str
-    """The field as in the deck: ``VP = 1``."""
+    """Field and value as in the deck: ``VP = 1``."""
     why: str
 
 
@@ -34,20 +36,20 @@ class Entry:
     places: list[str] = field(default_factory=list)
     """Keys of the case into which the keyword was translated."""
     reasons: list[str] = field(default_factory=list)
-    """Reason why the keyword was omitted, or why the import is refused."""
+    """Reasons why the keyword was omitted, or why the import is refused."""
     details: list[Detail] = field(default_factory=list)
     barred: bool = False
 
     @property
     def fate(self) -> Fate:
-        """Fate of the keyword as a whole."""
+        """Fate of the keyword: translated, omitted, or a reason to refuse the import."""
         if self.barred:
             return "refused"
         return "taken" if self.places else "left"
 
     @property
     def decided(self) -> bool:
-        """True if the keyword has been decided."""
+        """True if the import has translated, omitted or refused the keyword."""
         return self.barred or bool(self.places or self.reasons)
 
     def take(self, *places: str) -> None:
@@ -55,7 +57,7 @@ class Entry:
         self.places += [place for place in places if place not in self.places]
 
     def leave(self, why: str) -> None:
-        """Records that the keyword is omitted without an effect on the answer, or with a note."""
+        """Records that the keyword is omitted, with the reason; the omission does not change the answer."""
         self.reasons.append(why)
 
     def refuse(self, why: str) -> None:
@@ -92,48 +94,52 @@ class Entry:
 
 
 class Account:
-    """Record of all keyword lines of a deck, each once, in the order of the deck."""
+    """Record of all keyword lines of a deck: each line once, in the order of the deck."""
 
     def __init__(self) -> None:
-        """Starts without entries."""
+        """Starts an account without entries."""
         self.entries: list[Entry] = []
         self.general: list[str] = []
-        """Reasons to refuse without a line of the deck."""
+        """Reasons to refuse the import that belong to no line of the deck."""
         self.remarks: list[str] = []
-        """Decisions without a line of the deck: units, defaults."""
+        """Decisions that belong to no line of the deck, such as units and defaults."""
 
     def open(self, keyword: str, line: int, file: str = "") -> Entry:
-        """Returns the entry of a keyword line, to be decided."""
+        """Adds an entry for a keyword line, not decided yet; returns the entry."""
         self.entries.append(Entry(keyword, line, file))
         return self.entries[-1]
 
     def follow(self, keyword: str, lines: Iterable[Line]) -> None:
-        """Records the lines that include other files, which are read."""
+        """Records the keyword lines that include other files; the import reads the included files."""
         for line in lines:
-            self.open(keyword, int(line), line.file).leave("the file is read as a part of the deck")
+            self.open(keyword, int(line), line.file).leave("the included file is read as a part of the deck")
 
     def close(self) -> None:
-        """Refuses the import for keywords that have not been decided."""
+        """Refuses the import for keywords whose fate is still undecided."""
         for each in self.entries:
             if not each.decided:
                 each.refuse("unknown keyword, which may change the result")
 
     def without(self, solid: Iterable[str], parts: Collection[str]) -> None:
-        """Numbers of parts that have solid elements, and of defined parts: other solids are in no body."""
+        """Refuses the import if a part with solid elements (``solid``) is not defined in the deck: its solids would
+        belong to no body.
+        """
         if lost := sorted({number for number in solid if number not in parts}, key=int):
-            self.general.append(f"solids of the part {', '.join(lost)} would be lost: the deck does not define it")
+            self.general.append(
+                f"solids of the part {', '.join(lost)} would be lost: the deck does not define the part"
+            )
 
     def of(self, fate: Fate) -> list[Entry]:
-        """Returns the keywords of one fate."""
+        """Returns the entries with a given fate."""
         return [each for each in self.entries if each.fate == fate]
 
     def refusals(self) -> list[str]:
-        """Every reason why the import is refused, a line each."""
+        """Reasons why the import is refused, one text line each."""
         return [*self.general, *(line for each in self.entries for line in each.refusals())]
 
 
 def once(known: Collection[T], number: T, what: str) -> T:
-    """Returns a number that no other of its kind has yet. Raises ValueError."""
+    """Returns ``number`` if it is not yet defined. Raises ValueError if ``known`` contains it."""
     if number in known:
         raise ValueError(f"the {what} {number} is defined twice")
     return number

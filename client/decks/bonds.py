@@ -1,4 +1,4 @@
-"""Bonds of a case from joined parts of a deck. The parts have common nodes, or a keyword ties them."""
+"""Bonds of a case between joined parts of a deck: parts with common nodes, or parts that a keyword ties."""
 
 from collections.abc import Iterable, Sequence
 
@@ -7,11 +7,11 @@ from .draft import Body, Draft
 from .topology import Topology
 
 Tie = tuple[tuple[str, str], Entry]
-"""Keys of two bodies, and the keyword that ties the bodies."""
+"""Keys of two tied bodies, and the keyword that ties these bodies."""
 
 
 def join(draft: Draft, topology: Topology, bodies: Sequence[Body], ties: Iterable[Tie]) -> None:
-    """Adds a ``[[bond]]`` for each pair."""
+    """Adds a ``[[bond]]`` for each pair of joined bodies."""
     names = {body.key: body.name for body in bodies}
     shared = topology.joined() if len(bodies) > 1 else []
     for one, other in shared:

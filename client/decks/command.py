@@ -1,4 +1,4 @@
-"""``conoid import``: makes a case and the account of a deck, on the terminal and as files."""
+"""The command ``conoid import``: it makes a case from a deck and writes the account of the import."""
 
 import os
 from dataclasses import replace
@@ -21,7 +21,8 @@ from .toml import NOTE
 
 _FORMATS = ", ".join(DIALECTS)
 _SHOWN = 20
-"""Reasons of a refusal that are printed. Chosen value: a screen; the account has all."""
+"""Number of reasons of a refusal that are printed. Chosen value: they fit on a screen; the account file has all
+reasons."""
 
 
 def import_deck(
@@ -31,27 +32,29 @@ def import_deck(
         typer.Option(
             "--units",
             metavar="L,M,T",
-            help="Of the deck, as 'mm,t,s'; otherwise found from a material with the density of steel.",
+            help="Units of the deck, such as 'mm,t,s'; default: found from a material with the density of steel.",
         ),
     ] = None,
     kind: Annotated[
-        str | None, typer.Option("--format", help=f"{_FORMATS}; otherwise recognised from the file.")
+        str | None, typer.Option("--format", help=f"{_FORMATS}; default: recognised from the file.")
     ] = None,
-    out: Annotated[Path | None, typer.Option("--out", help="The case file; DECK with .toml if not given.")] = None,
+    out: Annotated[
+        Path | None, typer.Option("--out", help="Name of the case file; default: DECK with the ending .toml.")
+    ] = None,
     anyway: Annotated[
         bool,
-        typer.Option("--anyway", help="Write the case without the untranslated keywords, and list them."),
+        typer.Option("--anyway", help="Write the case even if keywords are not translated, and list these keywords."),
     ] = False,
     as_data: Json = False,
 ) -> None:
-    """Make a case of a deck of LS-DYNA, Abaqus/Explicit or Radioss.
+    """Make a case from a deck of LS-DYNA, Abaqus/Explicit or Radioss.
 
-    Beside the case stands the account NAME.import.txt (with --json: NAME.import.json): every keyword of the deck with
-    its key in the case, or the reason why it has none. Parts take their mesh from the deck itself.
+    The command also writes an account of the import, NAME.import.txt (with --json: NAME.import.json). The account has
+    every keyword of the deck with its key in the case, or the reason why it has none. The parts read their mesh from
+    the deck. docs/howto/import.md lists the translated keywords.
 
-    If Conoid lacks a feature without which the case would give a wrong answer, the import is refused and names the
-    feature. --anyway writes the case all the same. Units are given, named by a Radioss deck, or found from a material
-    with the density of steel. docs/howto/import.md lists the translated keywords.
+    The import is refused if Conoid lacks a feature without which the answer would be wrong; the message names the
+    feature. --anyway writes the case even then.
     """
     target = out or deck.with_suffix(".toml")
     if target.suffix != ".toml":
@@ -75,16 +78,16 @@ def import_deck(
 
 
 def _placed(found: Imported, target: Path) -> Imported:
-    """Returns the case with the path of the deck relative to the folder of the case."""
+    """Returns the imported case; its path of the deck is relative to the folder of the case file."""
     away = Path(os.path.relpath(found.deck.resolve(), target.resolve().parent)).as_posix()
     parts = [{**part, "mesh": {**part["mesh"], "path": away}} for part in found.data["parts"]]
     return replace(found, data={**found.data, "parts": parts})
 
 
 def _noted(found: Imported) -> Imported:
-    """Returns the text of the case with its missing features as comments at the top."""
+    """Returns the imported case with its missing features as comments at the top of the text."""
     lacking = [f"NOT TRANSLATED: {line}" for line in found.refusals]
-    head = [f"Of {found.deck.name}, {found.kind}, in {found.system}: {found.why}", *lacking]
+    head = [f"Imported from {found.deck.name}, {found.kind}, in {found.system}: {found.why}", *lacking]
     data: dict[str, Any] = {NOTE: head, **found.data}
     return replace(found, data=data)
 
@@ -94,7 +97,10 @@ def _end(found: Imported, target: Path, written: bool) -> None:
         return
     many = counted(len(found.refusals), "thing")
     if written:
-        complain(f"warning: {target.name} is without {many} and may give wrong results; its first lines list them")
+        complain(
+            f"warning: {target.name} lacks {many} and may give wrong results; the comments at its top list what is "
+            "missing"
+        )
         return
     complain(*found.refusals[:_SHOWN])
     more = f" ({len(found.refusals) - _SHOWN} more in the list)" if len(found.refusals) > _SHOWN else ""

@@ -12,8 +12,8 @@ from .draft import Body, Draft
 
 @dataclass(frozen=True)
 class Meeting:
-    """A contact of a deck: bodies, by their keys, in contact with ``other``, or with each other and themselves
-    (None).
+    """A contact of a deck: the keys of its bodies, which are in contact with ``other``. If ``other`` is None, the
+    bodies are in contact with each other and with themselves.
     """
 
     one: frozenset[str]
@@ -23,17 +23,17 @@ class Meeting:
 
     @property
     def meets(self) -> bool:
-        """True if there are bodies on both sides."""
+        """True if the contact has bodies on both sides."""
         return bool(self.one) and self.other != frozenset()
 
     def pairs(self) -> set[tuple[str, str]]:
-        """Pairs of different bodies in contact, each in order."""
+        """Pairs of different bodies in contact; the two keys of a pair are sorted."""
         every = itertools.combinations(self.one, 2) if self.other is None else itertools.product(self.one, self.other)
         return {(min(pair), max(pair)) for pair in every if pair[0] != pair[1]}
 
 
 def meet(draft: Draft, bodies: Sequence[Body], meetings: Sequence[Meeting]) -> None:
-    """Returns the table ``contact``; "none" for a deck without contact."""
+    """Writes the table ``contact`` of the case: "none" if the deck has no contact."""
     for each in meetings:
         if not each.meets:
             each.entry.leave("one of its surfaces has no part of the case")
@@ -64,7 +64,9 @@ def meet(draft: Draft, bodies: Sequence[Body], meetings: Sequence[Meeting]) -> N
 
 
 def _frictions(meetings: Sequence[Meeting]) -> dict[tuple[str, str], float]:
-    """Returns the friction of each pair; a contact of two named bodies has priority over a contact of all bodies."""
+    """Returns the friction coefficient of each pair. A contact between two named bodies has priority over a contact
+    of all bodies.
+    """
     met: dict[tuple[str, str], float] = {}
     for each in sorted(meetings, key=lambda one: one.other is not None):
         for pair in each.pairs():
@@ -75,7 +77,7 @@ def _frictions(meetings: Sequence[Meeting]) -> dict[tuple[str, str], float]:
 def _more(
     meetings: Sequence[Meeting], met: dict[tuple[str, str], float], inside: list[str], names: dict[str, str]
 ) -> None:
-    """Returns a note on pairs that are in contact in the case but not in the deck."""
+    """Adds a note on pairs of bodies that are in contact in the case but not in the deck."""
     extra = [(a, b) for a, b in itertools.combinations(sorted(inside), 2) if (a, b) not in met]
     if extra:
         shown = ", ".join(f"{names[a]} and {names[b]}" for a, b in extra[:3]) + (" ..." if len(extra) > 3 else "")

@@ -1,4 +1,4 @@
-"""The codes whose decks are read, and the recognition of the code of a file."""
+"""The codes whose decks can be imported, and the recognition of the code from a file."""
 
 import itertools
 from collections.abc import Iterable
@@ -18,27 +18,28 @@ from .radioss.reading import Radioss
 from .units import System, Weighed
 
 _LOOKED = 2000
-"""Lines at the start of a file that are searched. Chosen value: no heading of comments is longer."""
+"""Number of lines at the start of a file that are searched. Chosen value: longer than the comments at the top of any
+deck."""
 
 
 class Dialect(Protocol):
-    """A deck of one code, read."""
+    """A deck of one code after reading."""
 
     kind: str
     account: Account
 
     def __init__(self, path: Path) -> None:
-        """Reads the deck. Raises CardError or InpError, OSError."""
+        """Reads the deck. Raises CardError, InpError, OSError."""
 
     @property
     def own_units(self) -> System | None:
-        """Unit system that the deck names, if any."""
+        """Unit system that the deck names; None if the deck names none."""
 
     def weighed(self) -> Iterable[Weighed]:
-        """Densities of the materials of the deck."""
+        """Densities and Young's moduli of the materials of the deck."""
 
     def draft(self, system: System) -> Draft:
-        """Returns the case; afterwards every keyword of ``account`` is decided."""
+        """Returns the case; afterwards ``account`` has a decision for every keyword."""
 
 
 DIALECTS: dict[str, type[Dialect]] = {"lsdyna": LsDyna, "abaqus": Abaqus, "radioss": Radioss}
@@ -48,7 +49,9 @@ _ABAQUS = ("*HEADING", "*PREPRINT", "*PART,", "*NODE,", "*ASSEMBLY", "*ELEMENT,"
 
 
 def dialect_of(path: Path, wanted: str | None) -> type[Dialect]:
-    """Returns the code of a deck: as given, otherwise by its first lines and its name. Raises UsageError, OSError."""
+    """Returns the code of a deck: the given one, or the one recognised from the first lines and the file name.
+    Raises UsageError, OSError.
+    """
     found = wanted or _detected(path)
     if found not in DIALECTS:
         raise UsageError(f"--format = {shown(found)}: allowed: {choices(list(DIALECTS))}")
@@ -73,5 +76,6 @@ def _detected(path: Path) -> str:
     if first.startswith(_LSDYNA):
         return "lsdyna"
     raise UsageError(
-        f"{path}: neither an LS-DYNA keyword deck, an Abaqus input file nor a Radioss starter; --format gives"
+        f"{path}: not recognised as an LS-DYNA keyword deck, an Abaqus input file or a Radioss starter; "
+        f"allowed with --format: {choices(list(DIALECTS))}"
     )

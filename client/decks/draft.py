@@ -1,4 +1,4 @@
-"""The case made of a deck, as plain data, with the origin of its keys as comments."""
+"""Case made from a deck, as plain data; comments give the origin of its keys."""
 
 import math
 from collections.abc import Iterable, Sequence
@@ -17,17 +17,17 @@ _MOST_FRAMES = 100_000
 
 @dataclass
 class Made:
-    """A material of a deck, converted to keys of a case."""
+    """A material of a deck after conversion to keys of a case."""
 
     material: dict[str, Any]
-    """Keys below ``[materials.NAME]``; empty for a law that Conoid lacks."""
+    """Keys below ``[materials.NAME]``; empty if Conoid lacks the material law."""
     erosion: dict[str, Any] = field(default_factory=dict)
     """Criteria of the material for the deletion of tets. In Conoid these criteria are keys of the part."""
     rigid: bool = False
     temperature: str | float | None = None
-    """Initial temperature."""
+    """Initial temperature of the part that has the material."""
     held: str = ""
-    """Axes along which a rigid body is fixed; it does not rotate either."""
+    """Axes along which a rigid body is fixed; a fixed rigid body does not rotate either."""
 
 
 @dataclass
@@ -40,23 +40,23 @@ class Body:
     material: str
     """Key of the material of the part in the deck."""
     group: str | None
-    """``mesh.group`` of the case; None for the whole file."""
+    """Value of ``mesh.group`` in the case; None if the part is the whole file."""
     entry: Entry
     velocity: tuple[float, float, float] | None = None
-    """Number in units of the deck."""
+    """Initial velocity of the part in units of the deck."""
     spin: dict[str, Any] | None = None
     erosion: dict[str, Any] = field(default_factory=dict)
     temperature: str | float | None = None
     rigid: bool = False
     name: str = ""
-    """Name in the case."""
+    """Name of the part in the case."""
 
 
 class Draft:
     """Tables of a case, which the import fills keyword by keyword."""
 
     def __init__(self, deck: Path, system: System, account: Account) -> None:
-        """Makes an empty case; ``deck``: the file with the mesh of the parts."""
+        """Makes an empty case. ``deck``: the file with the mesh of the parts."""
         self.deck = deck
         self.system = system
         self.account = account
@@ -79,13 +79,13 @@ class Draft:
         return self.system.quantity(value, dimension)
 
     def vector(self, values: tuple[float, ...] | list[float], dimension: Dimension) -> list[str | float]:
-        """Returns three numbers with their unit."""
+        """Returns three numbers of the deck with their unit."""
         return [self.quantity(value, dimension) for value in values]
 
     # Materials and parts ----------------------------------------------------------------------------------------------
 
     def add_material(self, key: str, title: str, made: Made, entry: Entry) -> None:
-        """Adds a material; one without keys stays a name that the case does not define."""
+        """Adds a material to the case. A material without keys is only a name, which the case does not define."""
         found = self._names.give(title, "material", key)
         if made.material:
             self.materials[found] = {NOTE: [f"{entry.keyword}, {entry.place}"], **made.material}
@@ -93,11 +93,13 @@ class Draft:
         self._made[key] = found, made
 
     def material_of(self, key: str) -> tuple[str, Made] | None:
-        """Name and constants of a material of the deck."""
+        """Returns the name and the constants of a material of the deck; None if it was not translated."""
         return self._made.get(key)
 
     def call(self, bodies: Sequence[Body], solid: Iterable[str]) -> Names:
-        """Names the bodies of the case; undefined parts with ``solid`` elements refuse the import."""
+        """Gives the bodies names in the case. Refuses the import if a part with elements in ``solid`` is not
+        defined.
+        """
         self.account.without(solid, [body.key for body in bodies])
         names = Names()
         for body in bodies:
@@ -105,7 +107,7 @@ class Draft:
         return names
 
     def add_part(self, body: Body, names: Names) -> None:
-        """Returns the part of the case for a part of the deck."""
+        """Adds the part of the case that corresponds to a part of the deck."""
         body.name = body.name or names.give(body.title, "part", body.key)
         found = self._made.get(body.material)
         if found is None:
@@ -132,12 +134,12 @@ class Draft:
         self.parts.append(part)
 
     def set_frames(self, count: float, interval: float, end: float, entry: Entry) -> int:
-        """Returns ``run.frames`` for a number, or for an interval up to the end, in the unit of the deck; 0 for
-        none.
+        """Sets ``run.frames`` from a number of frames, or from an interval in the time unit of the deck. Returns the
+        number of frames; 0 if the deck gives none.
         """
         frames = count if count > 0.0 else end / interval if interval > 0.0 and math.isfinite(end) else 0.0
         if not 0.5 <= frames <= _MOST_FRAMES:
-            entry.leave(f"no number of frames from 1 to {_MOST_FRAMES:,}: run.frames is 20")
+            entry.leave(f"the number of frames is not between 1 and {_MOST_FRAMES:,}; run.frames is set to 20")
             return 0
         self.run["frames"] = round(frames)
         entry.take("run.frames")
@@ -147,7 +149,7 @@ class Draft:
     # --------------------------------------------------------------------------------------------------------
 
     def add_boundary(self, table: dict[str, Any], *entries: Entry) -> str:
-        """Adds a boundary with the keywords of its origin; returns its index in the case."""
+        """Adds a boundary and the keywords from which it was made; returns its index in the case."""
         place = f"boundaries[{len(self.boundaries)}]"
         note = ", ".join(dict.fromkeys(f"{each.keyword} ({each.place})" for each in entries))
         self.boundaries.append({NOTE: [note], **table})

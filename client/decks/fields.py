@@ -1,4 +1,4 @@
-"""Named fields of a keyword, and a record of the fields that were read."""
+"""Fields of a keyword by name, and a record of the fields that were read."""
 
 from collections.abc import Sequence
 from typing import Generic, TypeVar
@@ -8,27 +8,27 @@ from conoid.cases.reading.cards import CardError
 from .account import Entry, Remark
 
 Place = TypeVar("Place")
-"""Place of a field: a card, or the number of a line."""
+"""Place of a field in the deck: a card, or the number of a text line."""
 
 
 class Fields(Generic[Place]):
-    """The fields of a keyword by the names of the manual of its code. ``rest`` reports fields that are not 0 and
-    were not read: no field is ignored silently.
+    """Fields of a keyword, by their names in the manual of the code. The method ``rest`` reports fields that are not
+    0 and were not read, so that no field is ignored without a message.
     """
 
     def __init__(self, entry: Entry, found: dict[str, tuple[Place, str]], extra: Sequence[int]) -> None:
-        """Stores the fields; ``extra``: numbers of the lines after the lines with named fields."""
+        """Stores the fields. ``extra``: numbers of the text lines after the lines with named fields."""
         self.entry = entry
         self.extra = list(extra)
         self._found = found
         self._read: set[str] = set()
 
     def _real(self, place: Place, item: str, name: str) -> float:
-        """Reads a required number. Raises CardError."""
+        """Reads a number; the field must not be empty. Raises CardError."""
         raise NotImplementedError
 
     def _whole(self, place: Place, item: str, name: str) -> int:
-        """Reads a required whole number. Raises CardError."""
+        """Reads a whole number; the field must not be empty. Raises CardError."""
         raise NotImplementedError
 
     def given(self, name: str) -> bool:
@@ -36,16 +36,16 @@ class Fields(Generic[Place]):
         return name in self._found and bool(self._found[name][1])
 
     def real(self, name: str, default: float = 0.0) -> float:
-        """Reads a number; ``default`` for an empty field. Raises CardError."""
+        """Reads a number; returns ``default`` for an empty field. Raises CardError."""
         self._read.add(name)
         return self._real(*self._found[name], name) if self.given(name) else default
 
     def nonzero(self, name: str, default: float) -> float:
-        """Reads a number of which 0 means the default. Raises CardError."""
+        """Reads a number; returns ``default`` for an empty field and for 0. Raises CardError."""
         return self.real(name) or default
 
     def whole(self, name: str, default: int = 0) -> int:
-        """Reads a whole number; ``default`` for an empty field. Raises CardError."""
+        """Reads a whole number; returns ``default`` for an empty field. Raises CardError."""
         self._read.add(name)
         return self._whole(*self._found[name], name) if self.given(name) else default
 
@@ -55,15 +55,15 @@ class Fields(Generic[Place]):
         return self._found[name][1] if name in self._found else ""
 
     def forgive(self, names: str, why: str) -> None:
-        """Records fields that are omitted, with the reason; fields that are 0 are not reported."""
+        """Records that the import omits some fields, with the reason; fields that are 0 are not reported."""
         self._tell("left", names.split(), why)
 
     def refuse(self, names: str, why: str) -> None:
-        """Records fields without which the answer would be wrong."""
+        """Refuses the import because of fields without which the answer would be wrong."""
         self._tell("refused", names.split(), why)
 
     def differ(self, name: str, why: str) -> None:
-        """Records a field with another meaning in Conoid."""
+        """Records that a field has a different meaning in Conoid."""
         self._read.add(name)
         self.entry.remark("differs", self._shown(name), why)
 
@@ -71,7 +71,7 @@ class Fields(Generic[Place]):
         """Reports all fields that are not 0 and were not read."""
         self._tell(kind, [name for name in self._found if name not in self._read], why)
         if self.extra:
-            self.entry.remark(kind, f"line {self.extra[0]}", "a line that is not read")
+            self.entry.remark(kind, f"line {self.extra[0]}", "a line of the keyword that is not translated")
 
     def _tell(self, kind: Remark, names: list[str], why: str) -> None:
         for name in names:

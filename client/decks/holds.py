@@ -1,4 +1,6 @@
-"""Restrained and driven nodes of a deck as boundaries of a case: planes of symmetry, whole parts, sets of the mesh."""
+"""Conversion of restrained and driven nodes of a deck to boundaries of a case: planes of symmetry, motions of whole
+parts, motions of node sets.
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -11,10 +13,10 @@ from .units import LENGTH, SPEED, TIME
 
 AXES = ("x", "y", "z")
 Course = tuple[tuple[float, float], ...]
-"""Times, in the unit of the deck, and factors."""
+"""Points of a function of time: time in the unit of the deck, and factor."""
 _NEAR = 1e-6
-"""Tolerance of nodes on one plane, over the size of a body. Chosen value: above the six digits of files, far below
-any tet."""
+"""Tolerance for nodes on one plane, relative to the size of a body. Chosen value: above the rounding of files with
+six digits, far below the size of any tet."""
 
 
 @dataclass
@@ -24,10 +26,10 @@ class Hold:
     chosen: Chosen
     entry: Entry
     speeds: dict[str, float]
-    """Velocity along x, y, z; 0 for a restraint."""
+    """Prescribed velocity by axis (x, y, z); 0 for a restraint."""
     course: Course = ()
     open: set[str] = field(default_factory=set)
-    """Axes without a boundary so far."""
+    """Axes for which the import has not made a boundary yet."""
 
     def __post_init__(self) -> None:
         """Starts with all axes without a boundary."""
@@ -35,15 +37,17 @@ class Hold:
 
 
 class Holding:
-    """Makes boundaries of all restraints of a deck."""
+    """Converter of all restraints of a deck to boundaries."""
 
     def __init__(self, draft: Draft, topology: Topology, bodies: Sequence[Body]) -> None:
-        """Stores the draft; ``bodies``: bodies of the case, with their names."""
+        """``bodies``: bodies of the case, with their names."""
         self._draft, self._topology = draft, topology
         self._names = {body.key: body.name for body in bodies}
 
     def add(self, holds: Sequence[Hold], walls: Sequence[tuple[str, ...]]) -> None:
-        """Makes the boundaries of ``holds``. ``walls``: keys of the parts that each rigid wall stops."""
+        """Makes the boundaries of ``holds``. ``walls``: for each rigid wall, the keys of the parts that the wall
+        stops.
+        """
         partial = [each for each in holds if each.chosen.bodies is None and not each.course]
         for axis in AXES:
             self._planes(axis, [each for each in partial if self._slides(each) and each.speeds.get(axis) == 0.0])
@@ -52,14 +56,14 @@ class Holding:
                 self._one(each, walls)
 
     def _slides(self, hold: Hold) -> bool:
-        """Returns True if the nodes are restrained along some axes and free along others."""
+        """Returns True if the nodes are fixed along some axes and free along the other axes."""
         return 0 < sum(speed == 0.0 for speed in hold.speeds.values()) < 3 and not any(hold.speeds.values())
 
     # Planes of symmetry -----------------------------------------------------------------------------------------------
 
     def _planes(self, axis: str, holds: list[Hold]) -> None:
-        """Makes a boundary for each plane whose nodes are all restrained across it, at an end of the bodies that it
-        cuts.
+        """Makes a symmetry boundary for each plane at an end of the bodies, if all nodes of the plane are fixed
+        along its normal.
         """
         held = set().union(*(self._topology.nodes(each.chosen) for each in holds))
         planes: dict[float, list[str]] = {}
@@ -82,8 +86,8 @@ class Holding:
             each.open.discard(axis)
 
     def _plane(self, axis: str, key: str, held: set[int]) -> float | None:
-        """Returns the coordinate of the restrained nodes of a body if these are all nodes of one plane at an end of
-        the body.
+        """Returns the coordinate of the plane of the restrained nodes ``held`` of a body. The result is None unless
+        these are all nodes of one plane at an end of the body.
         """
         d, mine = AXES.index(axis), self._topology.of[key] & held
         if not mine:
@@ -109,7 +113,7 @@ class Holding:
             return
         table: dict[str, Any] = {"kind": "velocity"}
         if some and hold.chosen.on is None:
-            hold.entry.refuse(f"{hold.chosen.what} are some nodes of a part and no set of the mesh that has a name")
+            hold.entry.refuse(f"{hold.chosen.what} has only some nodes of a part and is not a named set of the mesh")
             return
         if some:
             table["on"] = hold.chosen.on
@@ -118,7 +122,8 @@ class Holding:
                 names = ", ".join(sorted(self._names[key] for key in stopped))
                 hold.entry.remark(
                     "refused", hold.chosen.what,
-                    f"its nodes slide, and a rigid wall stops {names}: in Conoid walls do not stop moved nodes",
+                    f"the nodes are free along one axis and a rigid wall stops {names}; in Conoid walls do not stop "
+                    "nodes with prescribed motion",
                 )  # fmt: skip
         table |= self._parts([*full, *some])
         table |= {axis: self._draft.quantity(hold.speeds[axis], SPEED) for axis in AXES if axis in hold.open}
@@ -127,13 +132,13 @@ class Holding:
         self._draft.add_boundary(table, hold.entry)
 
     def _parts(self, keys: Sequence[str]) -> dict[str, Any]:
-        """Returns the key ``parts``; empty for all parts."""
+        """Returns the key ``parts`` of a boundary; no key if the boundary acts on all parts."""
         return {} if len(keys) == len(self._names) else {"parts": [self._names[key] for key in keys]}
 
 
 def velocity_course(curve: Course, end: float) -> tuple[float, Course]:
-    """Returns speed and course of velocities over time: the largest one, and its factors. Raises ValueError for a
-    missing curve.
+    """Returns the largest prescribed velocity and its factors over time (course). Raises ValueError if the curve is
+    empty or too short.
     """
     if not curve:
         raise ValueError("the curve has no points")
@@ -146,8 +151,8 @@ def velocity_course(curve: Course, end: float) -> tuple[float, Course]:
 
 
 def displacement_speed(curve: Course, end: float) -> float:
-    """Returns the constant velocity of displacements that grow linearly from 0 until the end. Raises ValueError for
-    other displacements.
+    """Returns the constant velocity of displacements that grow linearly from 0 until the end of the run. Raises
+    ValueError for other displacements.
     """
     inside = [(time, value) for time, value in curve if time <= end]
     if curve and curve[-1][0] < end:
@@ -155,9 +160,9 @@ def displacement_speed(curve: Course, end: float) -> float:
     beyond = [(time, value) for time, value in curve if time > end][:1]
     points = [*inside, *beyond]
     if len(points) < 2 or points[0] != (0.0, 0.0):
-        raise ValueError("a displacement must begin at 0 at the time 0")
+        raise ValueError("a prescribed displacement must be 0 at the time 0")
     speed = points[-1][1] / points[-1][0]
     most = max(abs(value) for _, value in points)
     if any(abs(speed * time - value) > 1e-6 * most for time, value in points):
-        raise ValueError("only displacements that are linear in time are translated; give velocities")
+        raise ValueError("only displacements that are linear in time are translated; prescribe velocities instead")
     return speed

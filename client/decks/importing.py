@@ -1,4 +1,4 @@
-"""The import of a deck: a case and the account of its keywords."""
+"""Import of a deck: it makes a case and the account of all keywords of the deck."""
 
 import json
 from dataclasses import dataclass
@@ -19,33 +19,35 @@ from .dialects import Dialect, dialect_of
 from .toml import bare, toml
 
 _ERODING = (
-    "parts that erode lose tets by volume and by time step as well, with the defaults of parts[].erosion, and nodes "
-    "without tets remain as particles until their first contact"
+    "parts that erode also lose tets by volume and by time step, with the defaults of parts[].erosion; "
+    "nodes without tets remain as particles until their first contact"
 )
 
 
 @dataclass(frozen=True)
 class Imported:
-    """A deck as a case: ``data`` with comments, ``account`` of every keyword, ``refusals`` for a wrong answer."""
+    """Result of an import: the case as data with comments, the account of every keyword, and the refusals (reasons
+    why the case would give a wrong answer).
+    """
 
     deck: Path
     kind: str
     system: units.System
     why: str
-    """Reason for the choice of the units."""
+    """Reason for which the import has chosen these units."""
     data: dict[str, Any]
     account: Account
     refusals: list[str]
 
     @property
     def toml(self) -> str:
-        """The text of the case."""
+        """Text of the case file."""
         return toml(self.data)
 
 
 def read_deck(path: Path, wanted: str | None = None, kind: str | None = None) -> Imported:
-    """Imports a deck. ``wanted``: units in the notation of the user; ``kind``: one of DIALECTS, by default
-    recognised. Raises UsageError with one line if units are missing, or for a file that is not a deck.
+    """Imports a deck. ``wanted``: units in the notation of the user; ``kind``: one of DIALECTS, or None to recognise
+    the code from the file. Raises UsageError if units are missing or the file is not a deck.
     """
     try:
         dialect = dialect_of(path, kind)(path)
@@ -69,7 +71,9 @@ def read_deck(path: Path, wanted: str | None = None, kind: str | None = None) ->
 
 
 def _units(dialect: Dialect, wanted: str | None) -> tuple[units.System, str]:
-    """Returns the unit system of the user, of the deck, or the one in which a material is steel; with the reason."""
+    """Returns the unit system and the reason for it. The system is the one of the user, the one of the deck, or the
+    one in which a material is steel.
+    """
     own, system = dialect.own_units, None if wanted is None else units.named(wanted)
     if own is not None:
         if system is not None and system != own:
@@ -81,7 +85,7 @@ def _units(dialect: Dialect, wanted: str | None) -> tuple[units.System, str]:
 
 
 def _checked(data: dict[str, Any]) -> list[str]:
-    """Returns the errors of the imported case, in the words of ``conoid validate``."""
+    """Returns the errors of the imported case, with the same texts as ``conoid validate``."""
     try:
         parse_case(bare(data))
     except CaseError as error:
@@ -93,8 +97,8 @@ def _checked(data: dict[str, Any]) -> list[str]:
 
 
 def lines(found: Imported, target: str) -> list[str]:
-    """Returns the account for users. Each keyword occurs once: a translated keyword with its keys, an omitted
-    keyword with the reason.
+    """Returns the account of the import as text lines. Each keyword occurs once: a translated keyword with its keys
+    in the case, an omitted keyword with the reason.
     """
     account = found.account
     text = [f"{found.deck.name}, {found.kind} -> {target}", f"units: {found.system}: {found.why}"]
@@ -123,7 +127,7 @@ def _entry(entry: Entry, width: int) -> list[str]:
 
 
 def report(found: Imported, target: str) -> dict[str, Any]:
-    """Returns the account as plain data, for JSON."""
+    """Returns the account of the import as plain data, for JSON."""
     return {
         "deck": str(found.deck), "kind": found.kind, "case": target, "units": str(found.system),
         "units_why": found.why, "notes": found.account.remarks, "refused": found.refusals,
@@ -132,12 +136,12 @@ def report(found: Imported, target: str) -> dict[str, Any]:
 
 
 def as_json(found: Imported, target: str) -> str:
-    """``report`` as text."""
+    """Returns the data of ``report`` as JSON text."""
     return json.dumps(report(found, target), indent=2, ensure_ascii=False) + "\n"
 
 
 def size_of(path: Path) -> int:
-    """Returns the bytes of a deck. Raises ClientError if the deck is not a regular file."""
+    """Returns the size of a deck in bytes. Raises ClientError if the deck is not a regular file."""
     try:
         with whole.opened(path) as file:
             return file.seek(0, 2)

@@ -5,27 +5,30 @@ from fractions import Fraction
 from itertools import pairwise
 
 _STRAIGHT = 1e-6
-"""Largest deviation of points from a line, over the largest stress: rounding of decks with six digits or more."""
+"""Largest deviation of points from a straight line, relative to the largest stress. Chosen value: above the rounding
+of decks with six digits."""
 
 
 def young_of(bulk: float, shear: float) -> tuple[float, float]:
-    """Returns Young's modulus and Poisson's ratio of a bulk and a shear modulus: 9KG/(3K+G), (3K-2G)/(6K+2G)."""
+    """Returns Young's modulus and Poisson's ratio from bulk modulus K and shear modulus G: 9KG/(3K+G),
+    (3K-2G)/(6K+2G).
+    """
     return 9.0 * bulk * shear / (3.0 * bulk + shear), (3.0 * bulk - 2.0 * shear) / (6.0 * bulk + 2.0 * shear)
 
 
 def bulk_of(young: float, poisson: float) -> float:
-    """Bulk modulus, E / 3(1 - 2 nu). Raises ZeroDivisionError at nu = 0.5."""
+    """Returns the bulk modulus, E / 3(1 - 2 nu). Raises ZeroDivisionError at nu = 0.5."""
     return young / (3.0 * (1.0 - 2.0 * poisson))
 
 
 def shear_of(young: float, poisson: float) -> float:
-    """Shear modulus, E / 2(1 + nu). Raises ZeroDivisionError at nu = -1."""
+    """Returns the shear modulus, E / 2(1 + nu). Raises ZeroDivisionError at nu = -1."""
     return young / (2.0 * (1.0 + poisson))
 
 
 def hardening_of(young: float, tangent: float) -> float:
-    """Returns the plastic modulus, E Et / (E - Et), of a tangent modulus Et over the total strain. Raises ValueError
-    where the tangent is not below Young's modulus.
+    """Returns the plastic modulus, E Et / (E - Et), from the tangent modulus Et of the total strain. Raises
+    ValueError if Et is not below Young's modulus E.
     """
     if not tangent < young:
         raise ValueError(f"the tangent modulus {tangent:g} is not below Young's modulus {young:g}")
@@ -33,8 +36,8 @@ def hardening_of(young: float, tangent: float) -> float:
 
 
 def line_of(points: Sequence[tuple[float, float]]) -> tuple[float, float] | None:
-    """Returns yield stress and hardening of (plastic strain, stress) points if all lie on one line that begins at
-    strain 0; None otherwise. A table with one point means a constant flow stress.
+    """Returns yield stress and hardening of (plastic strain, stress) points; None unless all points lie on one
+    straight line that begins at strain 0. One single point means a constant flow stress.
     """
     if not points or points[0][0] != 0.0 or any(a[0] >= b[0] for a, b in pairwise(points)):
         return None
@@ -45,5 +48,5 @@ def line_of(points: Sequence[tuple[float, float]]) -> tuple[float, float] | None
 
 
 def _exact(number: float) -> Fraction:
-    """Returns the decimal number of the deck: 0.5 - 0.4 is 0.1."""
+    """Returns the exact decimal number that the deck has, so that 0.5 - 0.4 is 0.1."""
     return Fraction(repr(float(number)))

@@ -1,21 +1,25 @@
-"""Names of a case for names in a deck that a case cannot have: titles with blanks, numbers, repeated titles."""
+"""Names for a case, made from names of a deck that a case does not allow: titles with blanks, numbers, repeated
+titles.
+"""
 
 import re
 import unicodedata
 
 _MOST = 64
-"""Largest number of characters of a name of a case (cases/model/tables.py)."""
+"""Largest number of characters of a name in a case (cases/model/tables.py)."""
 
 
 class Names:
-    """Unique names that are valid in a case."""
+    """Unique names that a case allows."""
 
     def __init__(self) -> None:
         """Starts without names."""
         self._taken: set[str] = set()
 
     def give(self, wanted: str, kind: str, number: object = "") -> str:
-        """Returns a name close to ``wanted``; ``kind`` and ``number`` where none of its characters is valid."""
+        """Returns a valid name close to ``wanted``; the name is made of ``kind`` and ``number`` if no character of
+        ``wanted`` is valid.
+        """
         plain = wanted if name(wanted)[:1] == wanted.strip()[:1] else f"{kind}_{wanted or number}"
         base = name(plain) or kind
         found, count = base, 1
@@ -28,12 +32,14 @@ class Names:
 
 
 def name(text: str) -> str:
-    """Returns letters, digits, ``_`` and ``-`` of a text, from its first letter on; empty if there is none."""
+    """Returns the letters, digits, ``_`` and ``-`` of a text, from the first letter on; empty if the text has no
+    letter.
+    """
     plain = unicodedata.normalize("NFKD", text).encode("ascii", "ignore").decode()
     joined = re.sub(r"[^A-Za-z0-9_-]+", "_", plain).strip("_")
     return re.sub(r"^[^A-Za-z]+", "", joined)[:_MOST].rstrip("_")
 
 
 def name_end(text: str) -> str:
-    """Returns the suffix that distinguishes a name from another."""
+    """Returns the suffix that distinguishes a name from an equal name."""
     return re.sub(r"[^A-Za-z0-9_-]+", "_", text)

@@ -11,21 +11,21 @@ from .units import LENGTH
 
 @dataclass
 class Start:
-    """Initial velocity that a keyword gives to nodes, in units of the deck. A later keyword adds components or
-    replaces the velocity.
+    """Initial velocity that a keyword gives to nodes, in units of the deck. A keyword further down in the deck adds
+    components or replaces the velocity.
     """
 
     chosen: Chosen
     entry: Entry
     velocity: dict[int, float] = field(default_factory=dict)
-    """Velocity by axis, 0 to 2."""
+    """Initial velocity by axis; the axes are 0, 1 and 2."""
     rate: Point = (0.0, 0.0, 0.0)
-    """Rotation vector, per unit of time."""
+    """Rotation vector in radians per unit of time of the deck."""
     centre: Point = (0.0, 0.0, 0.0)
 
 
 def begin(draft: Draft, topology: Topology, bodies: Sequence[Body], starts: Sequence[Start]) -> None:
-    """Sets velocity and spin of each body."""
+    """Sets the initial velocity and the spin of each body."""
     by_key = {body.key: body for body in bodies}
     for each in starts:
         full, some = topology.whole(each.chosen)
@@ -44,11 +44,11 @@ def begin(draft: Draft, topology: Topology, bodies: Sequence[Body], starts: Sequ
 
 def _give(draft: Draft, body: Body, start: Start) -> None:
     if body.spin or (any(start.rate) and body.velocity is not None):
-        why = f"{body.name} has a velocity already; two initial velocities, one of which rotates, are not translated"
+        why = f"{body.name} already has an initial velocity; two initial velocities with a rotation are not translated"
         start.entry.remark("refused", start.chosen.what, why)
     old = body.velocity or (0.0, 0.0, 0.0)
     if any(old[axis] not in (0.0, value) for axis, value in start.velocity.items()):
-        why = f"replaces the velocity that an earlier line of the deck gives {body.name}"
+        why = f"replaces the velocity that an earlier keyword gives to {body.name}"
         start.entry.remark("differs", start.chosen.what, why)
     x, y, z = (start.velocity.get(axis, old[axis]) for axis in range(3))
     body.velocity = (x, y, z)

@@ -1,4 +1,4 @@
-"""The data of a case as readable TOML: a table for each material, part and boundary, nested keys with dots."""
+"""Text of a case as readable TOML: one table for each material, part and boundary, nested keys with dots."""
 
 import json
 from collections.abc import Iterator, Mapping
@@ -7,13 +7,13 @@ from typing import Any
 from conoid.cases.reference import json_schema
 
 NOTE = "#"
-"""Key of the comments above a table, a line each; not a key of a case."""
+"""Key for the comments above a table, one text line each; a case does not have this key."""
 _FIRST = ("name", "title", "description")
 _LAST = ("run",)
 
 
 def toml(data: Mapping[str, Any]) -> str:
-    """Returns the text of a case file; ends in a line feed."""
+    """Returns the text of a case file; the text ends with a line feed."""
     lines = [f"{json_schema.LINE} ./{json_schema.FILE}", *_comment(data.get(NOTE, ()))]
     rest = [key for key in data if key not in (*_FIRST, *_LAST, NOTE)]
     rest.sort(key=lambda key: isinstance(data[key], Mapping | list))
@@ -23,7 +23,7 @@ def toml(data: Mapping[str, Any]) -> str:
 
 
 def bare(value: Any) -> Any:
-    """Returns the data without its comments."""
+    """Returns the data of a case without comments."""
     if isinstance(value, Mapping):
         return {key: bare(each) for key, each in value.items() if key != NOTE}
     return [bare(each) for each in value] if isinstance(value, list | tuple) else value

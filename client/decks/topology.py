@@ -1,4 +1,6 @@
-"""Nodes of the parts of a deck and their positions, read only for keywords that refer to common nodes of bodies."""
+"""Nodes of the parts of a deck and their positions. They are read only if a keyword needs the common nodes of
+bodies.
+"""
 
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
@@ -12,17 +14,17 @@ class Chosen:
     """Target of a load or a motion: whole parts, or nodes."""
 
     what: str
-    """Name in messages: ``node set 3``."""
+    """Name of the target in messages, such as ``node set 3``."""
     bodies: frozenset[str] | None = None
-    """Keys of whole parts; None for nodes."""
+    """Keys of the parts of a target; None if the target consists of nodes."""
     nodes: Callable[[], set[int]] | None = None
-    """Function that reads the nodes."""
+    """Function that reads the nodes of the target."""
     on: str | None = None
-    """Name of the set in the mesh file; None if it has none."""
+    """Name of the target's set in the mesh file; None if the mesh file has no such set."""
 
 
 class Topology:
-    """The parts of a deck by their nodes."""
+    """Parts of a deck with their nodes."""
 
     def __init__(
         self,
@@ -30,15 +32,16 @@ class Topology:
         nodes: Callable[[], Mapping[str, set[int]]],
         points: Callable[[], Mapping[int, Point]],
     ) -> None:
-        """``bodies``: keys of the parts that become parts of the case. ``nodes`` and ``points``: functions that read
-        the nodes of each part, and the positions of nodes, in the unit of the deck, at the first use.
+        """``bodies``: keys of the parts that become parts of the case. ``nodes``: function that reads the nodes of
+        each part. ``points``: function that reads the positions of nodes, in the unit of the deck. Both functions
+        are called at the first use.
         """
         self.bodies = list(bodies)
         self._read_nodes, self._read_points = nodes, points
 
     @cached_property
     def of(self) -> dict[str, set[int]]:
-        """The nodes of each body, by its key."""
+        """Nodes of each body; the keys are the keys of the bodies."""
         found = self._read_nodes()
         return {key: found.get(key, set()) for key in self.bodies}
 
@@ -48,14 +51,14 @@ class Topology:
         return self._read_points()
 
     def nodes(self, chosen: Chosen) -> set[int]:
-        """Returns the nodes of a target, including nodes of no body."""
+        """Returns the nodes of a target, including nodes that belong to no body."""
         if chosen.bodies is not None:
             return set().union(*(self.of.get(key, set()) for key in chosen.bodies))
         return chosen.nodes() if chosen.nodes is not None else set()
 
     def whole(self, chosen: Chosen) -> tuple[list[str], list[str]]:
-        """Returns the bodies whose nodes are all in the target, and the bodies with only some nodes in the target,
-        in order.
+        """Returns the keys of the bodies with all nodes in the target, and of the bodies with only some nodes in the
+        target; both lists are sorted.
         """
         if chosen.bodies is not None:
             return [key for key in self.bodies if key in chosen.bodies], []

@@ -1,7 +1,8 @@
-"""The consistent unit systems of decks: named by the user, by the deck, or found from the density of steel.
+"""The consistent unit systems of decks. The system is named by the user or by the deck, or found from the density of
+steel.
 
-A deck has numbers without units. A number and its dimension become text with a unit, as cases have it: the digits stay
-those of the deck, and ``cases.units`` converts them exactly.
+A deck has numbers without units. The import writes a number with its unit into the case: the digits of the deck
+stay, and ``cases.units`` converts them exactly.
 """
 
 import math
@@ -15,7 +16,7 @@ from conoid.cases.units import LARGEST, UNITS, parse_unit
 from ..errors import UsageError
 
 Dimension = tuple[int, int, int, int]
-"""Exponents of length, mass, time, temperature."""
+"""Exponents of length, mass, time and temperature in a unit."""
 
 ONE: Dimension = (0, 0, 0, 0)
 LENGTH: Dimension = (1, 0, 0, 0)
@@ -31,7 +32,7 @@ MASS: Dimension = (0, 1, 0, 0)
 INERTIA: Dimension = (2, 1, 0, 0)
 
 _SLINCH = Fraction("0.45359237") * Fraction("9.80665") / Fraction("0.0254")
-"""kg in lbf s^2 / in, exact by the agreement of 1959 and standard gravity."""
+"""Mass of one slinch (lbf s^2 / in) in kg, exact by the agreement of 1959 and standard gravity."""
 _ALIASES = {
     "ton": "t", "tonne": "t", "to": "t", "mg": "mg", "sec": "s", "msec": "ms", "usec": "us", "µs": "us", "mus": "us",
     "inch": "in", "kilogram": "kg", "gram": "g", "metre": "m", "meter": "m", "slinch": "lbf*s^2/in",
@@ -41,23 +42,23 @@ _NAMED = {
     STRESS: ("Pa", "kPa", "MPa", "GPa", "Mbar", "psi", "ksi"), SPECIFIC_HEAT: ("J/kg/K",),
     DENSITY: ("kg/m^3",), SPEED: ("m/s",), ACCELERATION: ("m/s^2",),
 }  # fmt: skip
-"""Common units. A common unit is used if it is exactly that of a system."""
+"""Common units. A quantity has a common unit in the case if this unit is exactly the unit of the system."""
 
 
 @dataclass(frozen=True)
 class System:
-    """A consistent system: the units of length, mass and time by their symbols."""
+    """A consistent system of units, given by the symbols of length, mass and time."""
 
     length: str
     mass: str
     time: str
 
     def __str__(self) -> str:
-        """``mm, t, s``."""
+        """Returns the symbols of the system, such as ``mm, t, s``."""
         return f"{self.length}, {self.mass}, {self.time}"
 
     def factor(self, dimension: Dimension) -> Fraction:
-        """SI units in one unit of a dimension, exact."""
+        """Returns the exact value, in SI, of one unit of a dimension in this system."""
         scales = (*(_scale(each) for each in (self.length, self.mass, self.time)), Fraction(1))
         result = Fraction(1)
         for scale, power in zip(scales, dimension, strict=True):
@@ -69,21 +70,21 @@ class System:
         return float(Fraction(repr(float(value))) * self.factor(dimension))
 
     def quantity(self, value: float, dimension: Dimension) -> str | float:
-        """Returns a number of the deck with its unit, as in a case. Raises ValueError for one that a case cannot
-        have.
+        """Returns a number of the deck with its unit, in the notation of a case. Raises ValueError if the number is
+        outside the range of numbers in a case.
         """
         if not math.isfinite(value):
             raise ValueError(f"{value!r} is not finite")
         scaled = Fraction(repr(float(value))) * self.factor(dimension)
         if scaled and not 1 / LARGEST <= abs(scaled) <= LARGEST:
-            raise ValueError(f"{value:g} is in SI units not between {1.0 / LARGEST:g} and {LARGEST:g}")
+            raise ValueError(f"{value:g} converted to SI is not between {1.0 / LARGEST:g} and {LARGEST:g}")
         if dimension == ONE:
             return float(value)
         unit = self._unit(dimension)
         return f"{_digits(float(scaled))} {_si(dimension)}" if unit is None else f"{_digits(value)} {unit}"
 
     def _unit(self, dimension: Dimension) -> str | None:
-        """Returns the text of a unit; None for a unit that cases do not have."""
+        """Returns the text of a unit; None if cases do not have this unit."""
         if dimension == TEMPERATURE:
             return "K"
         factor = self.factor(dimension)
@@ -100,7 +101,7 @@ def _digits(value: float) -> str:
 
 
 def _composed(symbols: tuple[str, str, str, str], dimension: Dimension) -> str:
-    """``kg/mm/ms^2``; ``1/ms``."""
+    """Returns a unit composed of symbols, such as ``kg/mm/ms^2`` or ``1/ms``."""
     above = [s if p == 1 else f"{s}^{p}" for s, p in zip(symbols, dimension, strict=True) if p > 0]
     below = [s if p == -1 else f"{s}^{-p}" for s, p in zip(symbols, dimension, strict=True) if p < 0]
     return "/".join(["*".join(above) or "1", *below])
@@ -119,11 +120,13 @@ USUAL = (
     System("mm", "kg", "s"), System("mm", "mg", "us"), System("mm", "g", "us"), System("cm", "g", "us"),
     System("cm", "g", "s"), System("in", "lbf*s^2/in", "s"),
 )  # fmt: skip
-"""Unit systems in which decks are written."""
+"""Unit systems that are usual for decks."""
 
 
 def named(text: str) -> System:
-    """Returns the system of ``mm,ms,kg``: a length, a mass and a time in any order. Raises UsageError."""
+    """Returns the system for a text such as ``mm,ms,kg``: a length, a mass and a time in any order. Raises
+    UsageError.
+    """
     wanted: dict[Dimension, str] = {}
     for word in re.split(r"[,;\s]+", text.strip()):
         symbol = _ALIASES.get(word, _ALIASES.get(word.lower(), word))
@@ -140,14 +143,16 @@ _WANTED = "expected a length, a mass and a time, such as 'mm,t,s', 'mm,kg,ms', '
 # Found from steel --------------------------------------------------------------------------------------------------
 
 _STEEL, _NEAR = 7850.0, 0.04
-"""Density of steel, kg/m^3, and its tolerance: 7,536 to 8,164, no other common metal is in this range."""
+"""Density of steel, kg/m^3, and its tolerance. The range 7,536 to 8,164 contains no other common metal."""
 _LEAST, _MOST = 1.7e11, 2.3e11
-"""Young's modulus of steels, Pa: 190 to 215 GPa in handbooks, with some margin."""
+"""Limits of Young's modulus of steels, Pa: 190 to 215 GPa in handbooks, with some margin."""
 
 
 @dataclass(frozen=True)
 class Weighed:
-    """A material of a deck: name, density and Young's modulus (None if it has none)."""
+    """Name, density and Young's modulus of a material of a deck; Young's modulus is None if the deck does not give
+    it.
+    """
 
     name: str
     density: float
@@ -155,8 +160,8 @@ class Weighed:
 
 
 def system_of(materials: Iterable[Weighed]) -> tuple[System, str]:
-    """Returns the single usual system in which a material is steel by its density, and Young's modulus if it has
-    one, with the reason. Raises UsageError if there is none, or several.
+    """Returns the only usual system in which a material is steel, with the reason. The test uses the density, and
+    Young's modulus if the deck gives it. Raises UsageError if no system or several systems fit.
     """
     every = list(materials)
     found = [(system, one) for system in USUAL for one in every if _steel(system, one)]
@@ -165,8 +170,8 @@ def system_of(materials: Iterable[Weighed]) -> tuple[System, str]:
         system, one = found[0]
         modulus = "" if one.young is None else f" and Young's modulus {one.young:g} is {_giga(system, one):.3g} GPa"
         density = system.si(one.density, DENSITY)
-        return system, f"of the usual systems only in {system} is {one.name} steel: its density {one.density:g} is " \
-            f"{density:.4g} kg/m^3{modulus}"  # fmt: skip
+        return system, f"{system} is the only usual system in which {one.name} is steel: the density {one.density:g} " \
+            f"is {density:.4g} kg/m^3{modulus}"  # fmt: skip
     if systems:
         fits = " or in ".join(str(each) for each in systems)
         raise UsageError(f'--units is needed: {found[0][1].name} may be steel in {fits}; write --units "{systems[0]}"')

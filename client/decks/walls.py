@@ -11,17 +11,17 @@ from .topology import Chosen, Topology
 
 @dataclass(frozen=True)
 class Stop:
-    """A wall: the nodes that it stops, and its table without ``parts`` and ``name``."""
+    """A rigid wall of a deck: the nodes that it stops, and its table in the case without ``parts`` and ``name``."""
 
     chosen: Chosen
     table: dict[str, Any]
     entry: Entry
     more: list[Entry] = field(default_factory=list)
-    """Further keywords that the table contains."""
+    """Further keywords that were translated into the table."""
 
 
 def stand(draft: Draft, topology: Topology, bodies: Sequence[Body], stops: Sequence[Stop]) -> list[tuple[str, ...]]:
-    """Adds the walls to the case; returns the keys of the bodies that each wall stops."""
+    """Adds walls to the case; returns, for each wall, the keys of the bodies that it stops."""
     names = {body.key: body.name for body in bodies}
     keys: list[tuple[str, ...]] = []
     for each in stops:
@@ -32,7 +32,7 @@ def stand(draft: Draft, topology: Topology, bodies: Sequence[Body], stops: Seque
                 entry.leave(f"{each.chosen.what} has no node of a part of the case")
             continue
         if some:
-            why = "in the deck it stops only some nodes of their parts, in Conoid all nodes"
+            why = "in the deck the wall stops only some nodes of the parts, in Conoid all nodes"
             each.entry.remark("differs", each.chosen.what, why)
         table = {**each.table, "name": "wall" if not keys else f"wall_{len(keys) + 1}"}
         if len(stopped) < len(names):

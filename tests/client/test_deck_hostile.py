@@ -71,9 +71,9 @@ def conoid(*words: object) -> Result:
 
 
 FILES: dict[str, tuple[bytes, str]] = {
-    "empty.k": (b"", "neither an LS-DYNA keyword deck"),
+    "empty.k": (b"", "not recognised as an LS-DYNA keyword deck"),
     "binary.inp": (bytes(range(256)) * 40, "a null byte; this is no text file"),
-    "words.k": (b"to whom it may concern\n", "neither an LS-DYNA keyword deck"),
+    "words.k": (b"to whom it may concern\n", "not recognised as an LS-DYNA keyword deck"),
     "wide.k": (b"*KEYWORD\n" + b"a" * 100_000, "a line of more than 4096 characters"),
     "wide.inp": (b"*HEADING\n" + b"a" * 100_000, "a line of more than"),
     "wide_0000.rad": (b"#RADIOSS STARTER\n/BEGIN\n" + b"1" * 100_000, "a line of more than 4096 characters"),
@@ -83,7 +83,7 @@ FILES: dict[str, tuple[bytes, str]] = {
     "moved.k": (b"*KEYWORD\n*INCLUDE_TRANSFORM\na.k\n", "*INCLUDE_TRANSFORM is not supported"),
     "tabs.k": (lsdyna("*MAT_ELASTIC", "1\t7.85E-9\t2.1E5\t0.3").encode(), "a tab in a card of fixed widths"),
     "generate.k": (lsdyna("*MAT_ELASTIC", row(1, "7.85E-9", 2.1e5, 0.3), "*SET_NODE_LIST_GENERATE", row(1),
-                          row(9, 1)).encode(), "no numbers lead from 9 to 1"),
+                          row(9, 1)).encode(), "the range from 9 to 1 has no numbers"),
 }  # fmt: skip
 
 
@@ -115,7 +115,7 @@ def test_the_case_and_the_list_stand_beside_the_deck(tmp_path: Path) -> None:
     assert "*CONTROL_TIMESTEP -> numerics.dt_safety" in listed
     case = (tmp_path / "bar.toml").read_text()
     assert 'mesh.path = "bar.k"' in case
-    assert "# Of bar.k, LS-DYNA keyword deck, in mm, t, s" in case
+    assert "# Imported from bar.k, LS-DYNA keyword deck, in mm, t, s" in case
     again = conoid("import", tmp_path / "bar.k")
     assert (again.exit_code, (tmp_path / "bar.toml").read_text()) == (1, case)
     assert "already exists; name another file with --out" in again.stderr

@@ -86,8 +86,8 @@ def test_a_wall_of_radioss_has_the_prescribed_motion_of_its_node(tmp_path: Path)
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        ((), "NODE = 3: a wall that moves with its node; give it a mass, or its node a /IMPVEL"),
-        ((*GRIP, *PUSH, *impvel("Y", 1), *impvel("X", 2, 2, 1)), "NODE = 3: the components of its motion have several"),
+        ((), "NODE = 3: the wall moves with a node; give the wall a mass, or the node an /IMPVEL"),
+        ((*GRIP, *PUSH, *impvel("Y", 1), *impvel("X", 2, 2, 1)), "NODE = 3: the components of the motion have several"),
     ],
 )
 def test_a_wall_whose_motion_is_unclear_is_refused(tmp_path: Path, options: tuple[str, ...], message: str) -> None:
@@ -99,7 +99,10 @@ def test_a_wall_whose_motion_is_unclear_is_refused(tmp_path: Path, options: tupl
     ("cards", "message"),
     [
         (("*RIGIDWALL_PLANAR_FINITE", row(0), row(0, 0, -1, 0, 0, 1), row(1, 0, 0, 9, 9)), "a finite rigid wall"),
-        (("*RIGIDWALL_PLANAR_MOVING", row(0), row(0, 0, -1, 0, 0, 1), row(0, 40.0)), "V0 = 40.0: a speed without MASS"),
+        (
+            ("*RIGIDWALL_PLANAR_MOVING", row(0), row(0, 0, -1, 0, 0, 1), row(0, 40.0)),
+            "V0 = 40.0: the wall has a speed and no MASS",
+        ),
         (("*RIGIDWALL_GEOMETRIC_CYLINDER", row(0), row(0, 0, 0, 0, 0, 1), row(2, 9.0)), "LENCYL = 9.0: the cylinder"),
         (("*RIGIDWALL_GEOMETRIC_PRISM", row(0), row(0, 0, 0, 0, 0, 1), row(1, 0, 0, 9)), "a finite rigid wall"),
         (("*CONSTRAINED_NODAL_RIGID_BODY", row(1, 0, 3)), "a rigid body of nodes; parts[].rigid makes a whole part"),
@@ -138,11 +141,11 @@ def test_a_rigid_body_of_all_nodes_of_a_part_is_held_by_its_main_node(tmp_path: 
     assert {axis: moved.get(axis) for axis in "xyz"} == {"x": "0 mm/s", "y": "0 mm/s", "z": None}
     refusals = read(tmp_path, "a_0000.rad", radioss(*rbody(1e-3), *held), None).refusals
     assert len(refusals) == 1
-    assert "MASS = 0.001: mass and inertia beside those of the mesh" in refusals[0]
+    assert "MASS = 0.001: mass and inertia in addition to those of the mesh" in refusals[0]
     refusals = read(
         tmp_path, "a_0000.rad", radioss(*rbody(), held[0], held[1], f"{'110 000':>10}{row(0, 9)}"), None
     ).refusals
-    assert "a rigid body that is held along some axes and turns" in refusals[0]
+    assert "a rigid body with fixed axes and free rotations" in refusals[0]
 
 
 @pytest.mark.parametrize("kind", ["TYPE24", "TYPE25"])
@@ -156,4 +159,4 @@ def test_a_general_contact_of_radioss(tmp_path: Path, kind: str) -> None:
     refusals = read(
         tmp_path, "a_0000.rad", radioss(*ELASTIC, *surface, f"/INTER/{kind}/1", "all", *late), None
     ).refusals
-    assert "TSTART = 1e-06: contact that begins later" in refusals[0]
+    assert "TSTART = 1e-06: the contact begins after the start" in refusals[0]

@@ -170,7 +170,7 @@ REFUSED = {
         "SRC = 40 and SRP = 0 are not both above 0",
     ),
     "a curve of rates": (
-        ("*MAT_024", row(1, "7.85E-9", 2.1e5, 0.3, 350.0), row(0, 0, 0, 7)), "LCSR = 7: a curve of the flow stress"
+        ("*MAT_024", row(1, "7.85E-9", 2.1e5, 0.3, 350.0), row(0, 0, 0, 7)), "LCSR = 7: curve of the flow stress"
     ),
     "a rate that is added": (
         ("*MAT_024", row(1, "7.85E-9", 2.1e5, 0.3, 350.0, 1000.0), row(40.0, 5.0, 0, 0, 1)), "VP = 1: in LS-DYNA"
@@ -211,7 +211,7 @@ def test_walls_and_sliding_nodes_off_a_plane_are_reported(tmp_path: Path) -> Non
     cards = ("*SET_NODE_LIST", row(3), row(1, 2), "*BOUNDARY_SPC_SET", row(3, 0, 1), "*RIGIDWALL_PLANAR", "",
              row(0, 0, 0, 0, 0, 1))  # fmt: skip
     found = read(tmp_path, "a.k", lsdyna(*STEEL, *cards))
-    assert any("walls do not stop moved nodes" in line for line in found.refusals)
+    assert any("walls do not stop nodes with prescribed motion" in line for line in found.refusals)
 
 
 def test_the_list_of_a_deck_is_data_as_well() -> None:
@@ -231,10 +231,10 @@ PUBLIC: dict[str, tuple[str, str, tuple[str, ...]]] = {
     ),
     "a mesh that is generated": ("a.inp", abaqus("*Density\n7.85e-9,\n*Elastic\n2.1e5, 0.3").replace(
         "*Element,", "*Ngen\n1, 2, 1\n*Nfill\n1, 2\n*Element,"
-    ), ("*NGEN: makes or moves nodes", "*NFILL: makes or moves nodes")),
+    ), ("*NGEN: generates or moves nodes", "*NFILL: makes or moves nodes")),
     "units of single options, groups of groups": ("a_0000.rad", radioss(
         "/UNIT/3", "other", r20("kg", "mm", "ms"), "/MAT/ELAST/1/3", "steel", "7.85E-6", r20(2.1e2, 0.3),
-    ), ("units of its own (unit_ID) are not translated",)),
+    ), ("an option with its own units (unit_ID) is not translated",)),
 }  # fmt: skip
 
 

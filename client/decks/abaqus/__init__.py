@@ -1,1 +1,1 @@
-"""Abaqus/Explicit input files."""
+"""Import of Abaqus/Explicit input files."""

@@ -16,15 +16,14 @@ _NAMED = {
     "ENCASTRE": "xyz", "PINNED": "xyz", "XSYMM": "x", "YSYMM": "y", "ZSYMM": "z", "XASYMM": "yz", "YASYMM": "xz",
     "ZASYMM": "xy",
 }  # fmt: skip
-"""Names of restraints, with the translations that each restraint fixes (Analysis User's Guide, "Boundary
-conditions")."""
+"""Translations that each named restraint fixes (Analysis User's Guide, "Boundary conditions")."""
 
 
 class Loads:
-    """Collects restraints, motions, initial velocities and gravity while the keywords are read."""
+    """Collects the restraints, motions, initial velocities and gravity of the keywords of a deck."""
 
     def __init__(self, draft: Draft, amplitudes: Sequence[Keyword], chosen: Callable[[str, Entry], Chosen]) -> None:
-        """``chosen``: returns the node set of a data line."""
+        """``chosen``: function that returns the node set of a data line."""
         self._draft, self._chosen = draft, chosen
         self._amplitudes = {each.key("NAME"): each for each in amplitudes}
         self.adiabatic = False
@@ -33,15 +32,16 @@ class Loads:
         self._temperatures: list[tuple[Chosen, float, Entry]] = []
 
     def end(self, steps: Sequence[Keyword], dynamics: Sequence[Keyword]) -> float:
-        """End of the run, in units of the deck; infinite if unknown."""
+        """End of the run, in units of the deck; infinite if the deck does not give it."""
         for step in steps:
             step.forgive(
-                "NAME, NLGEOM, INC, PERTURBATION, UNSYMM", "how the step is computed: always with large strains"
+                "NAME, NLGEOM, INC, PERTURBATION, UNSYMM",
+                "setting of the analysis; Conoid always computes with large strains",
             )
             step.rest()
             step.entry.take("run")
         for later in steps[1:]:
-            later.entry.refuse("a second step; a case has one")
+            later.entry.refuse("the deck has a second step; a case has one step")
         for each in dynamics:
             try:
                 return self._dynamic(each)
@@ -58,21 +58,25 @@ class Loads:
         scale = each.get("SCALE FACTOR")
         each.forgive(
             "ELEMENT BY ELEMENT, DIRECT USER CONTROL, FIXED TIME INCREMENTATION, IMPROVED DT METHOD",
-            "how the other code finds its time step",
+            "setting of the time step of Abaqus",
         )
         if scale:
             self._draft.numerics["dt_safety"] = _number(scale)
-            each.entry.remark("differs", f"SCALE FACTOR = {scale}", "of the bound of this solver: numerics.dt_safety")
+            each.entry.remark(
+                "differs",
+                f"SCALE FACTOR = {scale}",
+                "in Conoid the factor scales Conoid's own stable step: numerics.dt_safety",
+            )
         each.rest()
         row = numbers(*each.filled()[0]) if each.filled() else []
         if len(row) < 2 or row[1] <= 0.0:
-            raise InpError(f"line {each.line}: *DYNAMIC, EXPLICIT has no period above 0")
+            raise InpError(f"line {each.line}: *DYNAMIC, EXPLICIT needs a time period above 0")
         self._draft.run["end_time"] = self._draft.quantity(row[1], TIME)
         each.entry.take("run.end_time")
         return row[1]
 
     def take(self, each: Keyword, end: float) -> None:
-        """Reads a keyword of this group. Raises InpError, ValueError."""
+        """Reads a keyword of loads or motions. Raises InpError, ValueError."""
         if each.word == "BOUNDARY":
             self._boundary(each, end)
         elif each.word == "INITIAL CONDITIONS":
@@ -87,7 +91,7 @@ class Loads:
     def _boundary(self, each: Keyword, end: float) -> None:
         kind = each.key("TYPE") or "DISPLACEMENT"
         if each.key("OP") == "NEW":
-            raise InpError("OP=NEW takes earlier restraints away")
+            raise InpError("OP=NEW removes earlier restraints")
         course = self._course(each.get("AMPLITUDE"), each.entry)
         each.forgive("LOAD CASE, REGION TYPE", "no meaning in Conoid")
         each.rest()
@@ -103,12 +107,14 @@ class Loads:
         if not speeds:
             each.entry.leave("it holds nothing")
         elif not any(speeds.values()):
-            each.entry.leave("rotations alone: nodes of solids have none")
+            each.entry.leave("only rotations are given; nodes of solids have no rotations")
 
     def _row(
         self, line: int, items: list[str], kind: str, course: Course | None, end: float
     ) -> dict[str, tuple[float, Course]]:
-        """Returns velocities by axis, and their courses, of one data line without its node set."""
+        """Returns the prescribed velocities by axis, with their factors over time (courses), of one data line
+        without its node set.
+        """
         if not items or joined(items[0]) in _NAMED:
             return dict.fromkeys(_NAMED[joined(items[0])] if items else "", (0.0, ()))
         first, last, value = (numbers(line, ",".join(items) + ",") + [0.0] * 3)[:3]
@@ -123,10 +129,12 @@ class Loads:
             return dict.fromkeys(axes, (most, its))
         if kind == "DISPLACEMENT" and course is not None:
             return dict.fromkeys(axes, (displacement_speed(tuple((t, value * f) for t, f in course), end), ()))
-        raise InpError(f"line {line}: TYPE = {kind}: velocities, and displacements by an amplitude, are translated")
+        raise InpError(
+            f"line {line}: TYPE = {kind}: only velocities, and displacements with an amplitude, are translated"
+        )
 
     def _course(self, name: str | None, entry: Entry) -> Course | None:
-        """Returns times and factors of an amplitude. Raises InpError for an amplitude that is not a table."""
+        """Returns times and factors of an amplitude. Raises InpError if the amplitude is not a table."""
         if not name:
             return None
         found = self._amplitudes.get(joined(name))
@@ -134,9 +142,13 @@ class Loads:
             raise InpError(f"the amplitude {name!r} is not defined")
         kind, smooth = found.key("DEFINITION") or "TABULAR", found.get("SMOOTH")
         if kind != "TABULAR" or _number(smooth):
-            raise InpError(f"the amplitude {name!r} is {kind}{' with SMOOTH' if smooth else ''}; TABULAR is translated")
+            raise InpError(
+                f"the amplitude {name!r} is {kind}{' with SMOOTH' if smooth else ''}; only TABULAR is translated"
+            )
         if found.key("VALUE") == "ABSOLUTE" or found.key("TIME") == "TOTALTIME":
-            found.entry.remark("left", "TIME, VALUE", "one step has one time, and values are factors")
+            found.entry.remark(
+                "left", "TIME, VALUE", "in a case with one step all times are total times and all values are factors"
+            )
         found.entry.take(f"of {entry.keyword}, {entry.place}")
         flat = [value for line, text in found.filled() for value in numbers(line, text)]
         return tuple(zip(flat[::2], flat[1::2], strict=False))
@@ -158,10 +170,10 @@ class Loads:
         elif kind == "ROTATINGVELOCITY":
             self._rotating(each)
         else:
-            raise InpError(f"TYPE = {kind}: velocities and temperatures at the start are translated")
+            raise InpError(f"TYPE = {kind}: only initial velocities and temperatures are translated")
 
     def _components(self, each: Keyword) -> dict[str, dict[int, float]]:
-        """Returns velocities by node set and axis, of lines with a set, a direction and a value."""
+        """Returns velocities by node set and axis. Each data line gives a set, a direction and a value."""
         made: dict[str, dict[int, float]] = {}
         for line, items in each.lists():
             axis = numbers(line, items[1] + ",")[0] if len(items) == 3 else 0.0
@@ -171,7 +183,9 @@ class Loads:
         return made
 
     def _rotating(self, each: Keyword) -> None:
-        """Reads a line of set, rate, and translation, and a line with two points of the axis (Keywords Guide)."""
+        """Reads initial rotations: a line with set, rate and translation, then a line with two points of the axis
+        (Keywords Guide).
+        """
         rows = each.lists()
         for (line, items), (second, axis) in zip(rows[::2], rows[1::2], strict=False):
             rate, vx, vy, vz = (numbers(line, ",".join(items[1:]) + ",") + [0.0] * 4)[:4]
@@ -190,7 +204,9 @@ class Loads:
         for chosen, value, entry in self._temperatures:
             full, some = topology.whole(chosen)
             if some:
-                entry.refuse(f"{chosen.what} are some nodes of a part; in Conoid whole parts have a temperature")
+                entry.refuse(
+                    f"{chosen.what} has only some nodes of a part; in Conoid a temperature belongs to a whole part"
+                )
                 continue
             for index, body in enumerate(bodies):
                 if body.key in full:
@@ -201,15 +217,15 @@ class Loads:
 
     def _dload(self, each: Keyword, end: float) -> None:
         course = self._course(each.get("AMPLITUDE"), each.entry)
-        each.forgive("OP", "one step has one set of loads")
+        each.forgive("OP", "a case with one step has one list of loads")
         each.rest()
         for line, items in each.lists():
             if len(items) < 6 or joined(items[1]) != "GRAV" or items[0]:
-                raise InpError(f"line {line}: only gravity of everything (', GRAV, size, x, y, z') is translated")
+                raise InpError(f"line {line}: only gravity on all parts (', GRAV, size, x, y, z') is translated")
             size, *along = numbers(line, ",".join(items[2:6]))
             length = sum(value * value for value in along) ** 0.5
             if length == 0.0:
-                raise InpError(f"line {line}: gravity has no direction")
+                raise InpError(f"line {line}: the direction of gravity has no length")
             most, its = (size, ()) if course is None else velocity_course(tuple((t, size * f) for t, f in course), end)
             pull = [most * value / length for value in along]
             table = {"kind": "gravity", "acceleration": self._draft.vector(pull, ACCELERATION)}
@@ -220,13 +236,13 @@ class Loads:
     def _output(self, each: Keyword, end: float) -> None:
         count, interval = each.get("NUMBER INTERVAL"), each.get("TIME INTERVAL")
         if not each.has("FIELD") or not (count or interval):
-            each.entry.leave("output: a run writes frames, history.csv and probes")
+            each.entry.leave("request of output; a run writes frames, history.csv and probes")
             return
         self._draft.set_frames(_number(count), _number(interval), end, each.entry)
 
 
 def _number(text: str | None) -> float:
-    """Reads the number of a parameter; 0 if it is missing. Raises InpError."""
+    """Reads the number of a parameter; returns 0 if the parameter is missing. Raises InpError."""
     try:
         return float(text or 0.0)
     except ValueError:

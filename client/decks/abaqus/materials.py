@@ -1,6 +1,7 @@
 """Conversion of materials of Abaqus/Explicit to materials of Conoid (Analysis User's Guide, "Materials").
 
-Differences of the formulas are notes of the keyword; docs/howto/import.md compares the formulas.
+Where the formulas of Abaqus and Conoid differ, the account of the import has a note; docs/howto/import.md compares
+the formulas.
 """
 
 from collections.abc import Sequence
@@ -17,8 +18,8 @@ from .keyword import Keyword
 
 @dataclass(frozen=True)
 class Heat:
-    """Two settings of the deck: True if plastic work heats (``*DYNAMIC, EXPLICIT, ADIABATIC``), and the temperature
-    of the deck's absolute zero.
+    """Settings of the deck for heat: True if plastic work heats the material (``*DYNAMIC, EXPLICIT, ADIABATIC``),
+    and the temperature of absolute zero in the deck.
     """
 
     adiabatic: bool
@@ -26,18 +27,20 @@ class Heat:
 
 
 class Material:
-    """The keywords below one ``*MATERIAL``."""
+    """Reader of a ``*MATERIAL``, made of the keywords below it."""
 
     def __init__(self, head: Keyword, below: Sequence[Keyword], system: System, heat: Heat) -> None:
-        """Makes the reader of a material; ``below``: the keywords below ``*MATERIAL``, in the order of the deck."""
+        """``below``: the keywords below ``*MATERIAL``, in the order of the deck."""
         self.head, self._system, self._heat = head, system, heat
         self._below = {each.word: each for each in below}
         self._done: set[str] = set()
         if len(self._below) < len(below):
-            raise InpError(f"line {head.line}: *MATERIAL has a keyword twice, for several conditions or temperatures")
+            raise InpError(
+                f"line {head.line}: *MATERIAL has the same keyword twice (for several conditions or temperatures)"
+            )
 
     def made(self) -> Made:
-        """Returns the material; omitted properties are recorded in the entries. Raises InpError, ValueError."""
+        """Returns the material; the entries record omitted properties. Raises InpError, ValueError."""
         density = self._need("DENSITY").single(1)[0]
         material: dict[str, Any] = {"density": self._system.quantity(density, DENSITY)}
         material |= self._elastic(density)
@@ -50,7 +53,9 @@ class Material:
             elif kind == "ISOTROPIC":
                 material["strength"] = self._linear(plastic)
             else:
-                raise InpError(f"line {plastic.line}: HARDENING = {kind}: ISOTROPIC and JOHNSON COOK are translated")
+                raise InpError(
+                    f"line {plastic.line}: HARDENING = {kind}: only ISOTROPIC and JOHNSON COOK are translated"
+                )
             plastic.rest()
         erosion |= self._failure(material)
         for word in ("CONDUCTIVITY", "DEPVAR"):
@@ -58,14 +63,16 @@ class Material:
         heat = self._take("SPECIFIC HEAT"), self._take("INELASTIC HEAT FRACTION")
         for each in heat:
             if each is not None:
-                each.entry.leave("of no meaning without *DYNAMIC, EXPLICIT, ADIABATIC and a law with a temperature")
+                each.entry.leave(
+                    "no effect without *DYNAMIC, EXPLICIT, ADIABATIC and a strength law with a temperature"
+                )
         for word, keyword in self._below.items():
             if word not in self._done:
                 keyword.entry.refuse("this property of the material is not translated")
         return Made(material, erosion, temperature=temperature)
 
     def taken(self, place: str) -> None:
-        """Records that the keywords of the material became a material of the case."""
+        """Marks the keywords of the material as translated to the material ``place`` of the case."""
         self.head.entry.take(place)
         for word in self._done:
             if not self._below[word].entry.decided:
@@ -97,11 +104,13 @@ class Material:
         elastic.rest()
         if eos is None:
             if kind != "ISOTROPIC":
-                raise InpError(f"line {elastic.line}: TYPE = {kind}; ISOTROPIC is translated, SHEAR with *EOS")
+                raise InpError(
+                    f"line {elastic.line}: TYPE = {kind}; only ISOTROPIC is translated, and SHEAR together with *EOS"
+                )
             young, poisson = elastic.single(2)
             return {"elastic": {"young": self._stress(young), "poisson": poisson}}
         if eos.key("TYPE") != "USUP" or kind != "SHEAR":
-            raise InpError(f"line {eos.line}: *EOS, TYPE=USUP with *ELASTIC, TYPE=SHEAR is translated alone")
+            raise InpError(f"line {eos.line}: only *EOS, TYPE=USUP with *ELASTIC, TYPE=SHEAR is translated")
         eos.rest()
         speed, slope, gamma = eos.single(3)
         young, poisson = young_of(density * speed * speed, elastic.single(1)[0])
@@ -112,17 +121,23 @@ class Material:
 
     def _linear(self, plastic: Keyword) -> dict[str, Any]:
         if plastic.has("RATE") and float(plastic.get("RATE") or 0.0):
-            raise InpError(f"line {plastic.line}: RATE: a table of the flow stress by the rate is not translated")
+            raise InpError(
+                f"line {plastic.line}: RATE: a table of the flow stress for several strain rates is not translated"
+            )
         points = [(strain, stress) for stress, strain in plastic.table(2)]
         found = line_of(points)
         if found is None or found[1] < 0.0:
-            raise InpError(f"line {plastic.line}: stress by plastic strain is no straight line that rises from 0 on")
+            raise InpError(
+                f"line {plastic.line}: the flow stress over the plastic strain is not one straight line that rises "
+                "from strain 0"
+            )
         law: dict[str, Any] = {"model": "linear_hardening", "yield_stress": self._stress(found[0])}
         if found[1]:
             law["hardening"] = self._stress(found[1])
             last = points[-1][0]
-            plastic.entry.remark("differs", f"plastic strain {last:g}", "in Abaqus constant beyond the last row; "
-                                 "in Conoid it continues to rise")  # fmt: skip
+            plastic.entry.remark("differs", f"plastic strain {last:g}", "in Abaqus the flow stress is constant "
+                "beyond the last "
+                                 "point; in Conoid it continues to rise")  # fmt: skip
         return law
 
     def _johnson_cook(self, plastic: Keyword) -> tuple[dict[str, Any], str | float]:
@@ -131,7 +146,7 @@ class Material:
         rate = self._take("RATE DEPENDENT")
         C, reference = (0.0, 0.0) if rate is None else tuple(rate.single(2))
         if rate is not None and rate.key("TYPE") != "JOHNSONCOOK":
-            raise InpError(f"line {rate.line}: TYPE = {rate.key('TYPE')}; JOHNSON COOK is translated")
+            raise InpError(f"line {rate.line}: TYPE = {rate.key('TYPE')}; only JOHNSON COOK is translated")
         if rate is not None:
             rate.rest()
             law |= {"C": C, "reference_rate": self._system.quantity(reference, RATE)}
@@ -148,9 +163,12 @@ class Material:
         return law, self._system.quantity(max(self._kelvin(0.0), 0.0), TEMPERATURE)
 
     def _heating(self, plastic: Keyword) -> dict[str, Any]:
-        """Reads the specific heat, and the fraction of the plastic work that becomes heat: 0 without ADIABATIC."""
+        """Reads the specific heat, and the fraction of the plastic work that becomes heat. The fraction is 0 without
+        ADIABATIC.
+        """
         if not self._heat.adiabatic:
-            plastic.entry.remark("differs", "no heat", "without *DYNAMIC, EXPLICIT, ADIABATIC no work becomes heat "
+            plastic.entry.remark("differs", "no heat", "without *DYNAMIC, EXPLICIT, ADIABATIC no plastic work "
+                                                       "becomes heat "
                                  "(taylor_quinney = 0); specific_heat has no meaning")  # fmt: skip
             return {"specific_heat": "1000 J/kg/K", "taylor_quinney": 0.0}
         heat, share = self._need("SPECIFIC HEAT"), self._take("INELASTIC HEAT FRACTION")
@@ -160,8 +178,8 @@ class Material:
     # Failure ----------------------------------------------------------------------------------------------------------
 
     def _damage(self, law: dict[str, Any]) -> dict[str, Any]:
-        """Reads ``*DAMAGE INITIATION, CRITERION=JOHNSON COOK``: d3 has the opposite sign in Abaqus (exp(-d3
-        triaxiality)).
+        """Reads ``*DAMAGE INITIATION, CRITERION=JOHNSON COOK``. The constant d3 has the opposite sign in Abaqus:
+        exp(-d3 triaxiality).
         """
         found = self._below.get("DAMAGE INITIATION")
         if found is None or found.key("CRITERION") != "JOHNSONCOOK":
@@ -172,11 +190,15 @@ class Material:
         self._same(found, law, melt, room, rate)
         law["damage"] = {"D1": d[0], "D2": d[1], "D3": -d[2] + 0.0, "D4": d[3], "D5": d[4]}
         if d[2]:
-            found.entry.remark("differs", f"d3 = {d[2]:g}", "other sign of D3: Abaqus exp(-d3 t), Conoid exp(D3 t)")
+            found.entry.remark(
+                "differs",
+                f"d3 = {d[2]:g}",
+                "D3 has the opposite sign: exp(-d3 triaxiality) in Abaqus, exp(D3 triaxiality) in Conoid",
+            )
         return self._evolution(found)
 
     def _same(self, found: Keyword, law: dict[str, Any], melt: float, room: float, rate: float) -> None:
-        """Checks that damage has the temperatures and the rate of the strength."""
+        """Checks that the damage law and the strength law have equal temperatures and reference rates."""
         wanted = {
             "melt_temperature": self._system.quantity(self._kelvin(melt), TEMPERATURE) if melt else None,
             "reference_temperature": self._system.quantity(self._kelvin(room), TEMPERATURE) if melt else None,
@@ -184,13 +206,19 @@ class Material:
         }  # fmt: skip
         for key, value in wanted.items():
             if value is not None and law.setdefault(key, value) != value:
-                found.entry.remark("refused", f"{value}", f"in Conoid damage and strength have one {key}, {law[key]}")
+                found.entry.remark(
+                    "refused", f"{value}", f"in Conoid the damage law uses {key} of the strength law, {law[key]}"
+                )
 
     def _evolution(self, found: Keyword) -> dict[str, Any]:
-        """Reads the damage evolution: tets are deleted at once if no displacement or energy is given."""
+        """Reads the damage evolution. Without a displacement or an energy, tets are deleted as soon as the damage is
+        1.
+        """
         evolution = self._take("DAMAGE EVOLUTION")
         if evolution is None:
-            found.entry.remark("differs", "no *DAMAGE EVOLUTION", "damage is computed without effect, as in Conoid")
+            found.entry.remark(
+                "differs", "no *DAMAGE EVOLUTION", "in both codes the damage has no effect before failure"
+            )
             return {}
         for name in ("TYPE", "SOFTENING", "DEGRADATION"):
             evolution.get(name)
@@ -202,13 +230,15 @@ class Material:
         return {"damage": 1.0}
 
     def _failure(self, material: dict[str, Any]) -> dict[str, Any]:
-        """Reads ``*SHEAR FAILURE`` of a plastic strain, and ``*TENSILE FAILURE`` as a cut-off of the pressure."""
+        """Reads ``*SHEAR FAILURE`` as erosion at a plastic strain, and ``*TENSILE FAILURE`` as a cut-off of the
+        pressure.
+        """
         shear, tensile = self._below.get("SHEAR FAILURE"), self._below.get("TENSILE FAILURE")
         found: dict[str, Any] = {}
         if shear is not None and (shear.key("TYPE") or "TABULAR") == "TABULAR":
             row = shear.single(1)
             self._take("SHEAR FAILURE")
-            shear.forgive("ELEMENT DELETION", "in Conoid tets are deleted")
+            shear.forgive("ELEMENT DELETION", "Conoid deletes failed tets")
             found["plastic_strain"] = row[0]
         if tensile is not None:
             self._take("TENSILE FAILURE")
@@ -226,8 +256,8 @@ def _cold(room: str | float) -> dict[str, Any]:
 
 
 def weighed(name: str, below: Sequence[Keyword]) -> Weighed | None:
-    """Returns density and Young's modulus of a material, from which the units are found; None if a value cannot be
-    read.
+    """Returns density and Young's modulus of a material, from which the import finds the units; None if a value
+    cannot be read.
     """
     found = {each.word: each for each in below}
     try:

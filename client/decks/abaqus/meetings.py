@@ -13,7 +13,7 @@ Surface = Callable[[str, Entry], frozenset[str]]
 
 
 class Meetings:
-    """Contacts of a deck, and tied pairs."""
+    """Reader of the contacts and ties of a deck."""
 
     def __init__(self, keywords: Sequence[Keyword], bodies: Sequence[Body], surface: Surface) -> None:
         """Starts without contacts; ``surface``: function that returns the bodies of a surface by its name, or raises
@@ -36,7 +36,7 @@ class Meetings:
             each.entry.refuse(str(error))
 
     def _interactions(self, keywords: Sequence[Keyword]) -> dict[str, tuple[float, list[Keyword]]]:
-        """Friction of each ``*SURFACE INTERACTION``, and its keywords."""
+        """Friction coefficient of each ``*SURFACE INTERACTION``, and the keywords that belong to it."""
         found: dict[str, tuple[float, list[Keyword]]] = {}
         here = ""
         for each in keywords:
@@ -80,7 +80,7 @@ class Meetings:
         if self.made:
             self.made += [Meeting(one, other, mu, entry) for one, other, mu, entry in pairs]
         for head in heads:
-            head.forgive("OP", "one step has one contact")
+            head.forgive("OP", "a case with one step has one contact definition")
             head.rest()
             head.entry.take("contact") if self.made else head.entry.leave("it includes nothing")
 
@@ -100,7 +100,7 @@ class Meetings:
             self.made.append(Meeting(first, None if second == first else second, friction, each.entry))
 
     def _assigned(self, each: Keyword) -> tuple[float, list[tuple[frozenset[str], frozenset[str], float, Entry]]]:
-        """Reads the friction of general contact, and the friction of pairs of surfaces."""
+        """Reads the friction coefficient of general contact, and the coefficients of single pairs of surfaces."""
         friction, pairs = 0.0, []
         each.rest()
         for _, items in each.lists():
@@ -118,7 +118,10 @@ class Meetings:
 
     def _pair(self, each: Keyword) -> None:
         friction = self._of(each.get("INTERACTION"), each.entry)
-        each.forgive("MECHANICAL CONSTRAINT, WEIGHT, CPSET, TYPE, OP, SMALL SLIDING", "how the other code computes it")
+        each.forgive(
+            "MECHANICAL CONSTRAINT, WEIGHT, CPSET, TYPE, OP, SMALL SLIDING",
+            "setting of the contact algorithm of Abaqus",
+        )
         each.rest()
         for _, items in each.lists():
             one = self._surface(items[0], each.entry)
@@ -126,7 +129,9 @@ class Meetings:
             self.made.append(Meeting(one, other, friction, each.entry))
 
     def _tie(self, each: Keyword) -> None:
-        each.forgive("NAME, ADJUST, POSITION TOLERANCE, TYPE, NO ROTATION", "how the other code finds the nodes")
+        each.forgive(
+            "NAME, ADJUST, POSITION TOLERANCE, TYPE, NO ROTATION", "setting with which Abaqus finds the tied nodes"
+        )
         each.rest()
         for _, items in each.lists():
             pairs = Meeting(self._surface(items[0], each.entry), self._surface(items[1], each.entry), 0.0, each.entry)

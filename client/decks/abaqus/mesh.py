@@ -1,4 +1,6 @@
-"""Nodes of the parts and sets of an Abaqus input file. The file is read a second time if keywords need the nodes."""
+"""Nodes of the parts and sets of an Abaqus input file. The import reads the file a second time if keywords need the
+nodes.
+"""
 
 import math
 from array import array
@@ -13,29 +15,30 @@ from .keyword import joined
 from .words import spelt
 
 _SHIFT = 40
-"""Bits of a number in a file; the bits above contain the index of the instance."""
+"""Number of bits for a node or element number; the bits above contain the index of the instance."""
 _MOST = 20_000_000
-"""Largest number of members of one line of GENERATE. Chosen value: more than any mesh that is run has."""
+"""Largest number of members of one line of GENERATE. Chosen value: more than the nodes of any mesh that is run."""
 
 
 @dataclass
 class Scope:
-    """A part, an instance, or the scope outside of both."""
+    """Nodes, elements and sets of a part, of an instance, or of the deck outside of parts and instances."""
 
     place: int
     points: dict[int, Point] = field(default_factory=dict)
     elements: "list[tuple[array[int], array[int], int]]" = field(default_factory=list)
-    """Element numbers, nodes per element, nodes of each."""
+    """Blocks of elements: element numbers, nodes of all elements one after another, and nodes per element."""
     node_sets: dict[str, set[int]] = field(default_factory=dict)
     element_sets: dict[str, set[int]] = field(default_factory=dict)
-    """Numbers with the index of the instance, in the scope outside of parts and instances."""
+    """Sets of the scope outside of parts and instances contain numbers with the index of the instance in their upper
+    bits."""
     part: str = ""
     move: tuple[float, ...] = ()
     axis: tuple[float, ...] = ()
 
 
 class AbaqusMesh:
-    """Nodes, elements and sets by scope."""
+    """Nodes, elements and sets of an input file, by scope."""
 
     def __init__(self, path: Path) -> None:
         """Reads all of ``path``. Raises InpError."""
@@ -87,7 +90,9 @@ class AbaqusMesh:
                 continue
             width = width or len(row) - 1
             if len(row) - 1 != width:
-                raise InpError(f"line {line}: an element with {len(row) - 1} nodes among those with {width}")
+                raise InpError(
+                    f"line {line}: an element with {len(row) - 1} nodes in a block of elements with {width} nodes"
+                )
             ids.append(_number(line, row[0]))
             corners.extend(_number(line, item) for item in row[1:])
             row = []
@@ -96,7 +101,7 @@ class AbaqusMesh:
             here.element_sets.setdefault(joined(given["ELSET"]), set()).update(map(self._own, ids))
 
     def _own(self, number: int) -> int:
-        """Returns a number of this scope as in sets."""
+        """Returns a number of a node or element of this scope in the form that sets contain."""
         return number
 
     def _set(self, word: str, given: dict[str, str]) -> None:
@@ -126,7 +131,9 @@ class AbaqusMesh:
         yield from self.members(scope, rest or item, kind)
 
     def members(self, scope: Scope, name: str, kind: str) -> Iterator[int]:
-        """Returns the members of a set of an instance, or of its part, with the index of the instance."""
+        """Returns the members of a set of an instance or of its part; each number contains the index of the
+        instance.
+        """
         if is_whole(name):
             yield (scope.place << _SHIFT) + int(name)
             return
@@ -152,7 +159,9 @@ class AbaqusMesh:
         return None
 
     def body(self, scope: str, elset: str) -> tuple[set[int], set[int]]:
-        """Returns the elements of a set, in an instance, a part, or neither, and their nodes."""
+        """Returns the elements of a set and the nodes of these elements; the set belongs to an instance, a part or
+        neither.
+        """
         made = self.instances.get(scope) or self.parts.get(scope) or self.root
         holder = made if made.elements else self.parts.get(made.part, made)
         wanted = made.element_sets.get(elset) or holder.element_sets.get(elset) or set()
@@ -166,7 +175,7 @@ class AbaqusMesh:
         return elements, nodes
 
     def points(self) -> dict[int, Point]:
-        """Returns the positions of nodes, by their number with the index of their instance."""
+        """Returns the positions of nodes; the keys are node numbers with the index of the instance."""
         made: dict[int, Point] = dict(self.root.points)
         scopes = self.instances.values() if self.instances else self.parts.values()
         for scope in scopes:
@@ -177,7 +186,7 @@ class AbaqusMesh:
 
 
 def _placed(point: Point, scope: Scope) -> Point:
-    """Returns a point of a part in its instance: moved, then turned about an axis (Rodrigues)."""
+    """Returns a point of a part in its instance: translated, then rotated about an axis (Rodrigues' formula)."""
     moved = [a + b for a, b in zip(point, (*scope.move, 0.0, 0.0, 0.0)[:3], strict=True)]
     if not scope.axis:
         return moved[0], moved[1], moved[2]
@@ -194,10 +203,12 @@ def _placed(point: Point, scope: Scope) -> Point:
 
 def _generated(line: int, items: list[str]) -> range:
     if not 2 <= len(items) <= 3:
-        raise InpError(f"line {line}: GENERATE takes a first number, a last one and a step")
+        raise InpError(f"line {line}: GENERATE needs a first number, a last number and a step")
     first, last, step = (*(_number(line, item) for item in items), 1)[:3]
     if last < first or step < 1 or (last - first) // step > _MOST:
-        raise InpError(f"line {line}: from {first} to {last} by {step} is no range, or longer than {_MOST}")
+        raise InpError(
+            f"line {line}: from {first} to {last} by {step} is not a range, or has more than {_MOST} numbers"
+        )
     return range(first, last + 1, step)
 
 

@@ -26,7 +26,7 @@ _MESH = ("NODE", "ELEMENT")
 
 
 class Abaqus:
-    """The keywords of an input file, with their translation."""
+    """Reader of an input file: its keywords and their translation to a case."""
 
     kind = "Abaqus/Explicit input file"
     own_units: System | None = None
@@ -166,22 +166,22 @@ class Abaqus:
                 yield Body(f"{section.scope}|{elset}", shown, material, group, section.entry)
 
     def _rigid(self, bodies: list[Body]) -> None:
-        """Reads ``*RIGID BODY, ELSET=``: a section of solids is rigid."""
+        """Reads ``*RIGID BODY, ELSET=``: the bodies whose section has the named set become rigid."""
         for each in self.of("RIGID BODY"):
             wanted = self._of_elements(each)
             found = [body for body in bodies if body.key in wanted]
             if not found:
                 each.entry.refuse(REFUSED["RIGID BODY"])
                 continue
-            each.forgive("REF NODE, POSITION", "Conoid uses the centre of mass, no reference node")
+            each.forgive("REF NODE, POSITION", "Conoid uses the centre of mass instead of a reference node")
             each.rest()
             for body in found:
                 body.rigid = True
             each.entry.take("parts[].rigid")
 
     def _of_elements(self, each: Keyword) -> set[str]:
-        """Returns the keys of the bodies that lie in the set with all elements; empty if the set has other elements,
-        or only some of a body.
+        """Returns the keys of the bodies whose elements all lie in a set. The result is empty if the set also has
+        other elements or only some elements of a body.
         """
         name = each.get("ELSET") or ""
         if each.scope:
@@ -209,13 +209,13 @@ class Abaqus:
             elif why := REFUSED.get(each.word):
                 each.entry.refuse(why)
             elif each.word in MATERIAL:
-                each.entry.refuse("it is not below a translated material")
+                each.entry.refuse("the keyword is not below a translated material")
 
     # What keywords name -----------------------------------------------------------------------------------------------
 
     @cached_property
     def mesh(self) -> AbaqusMesh:
-        """Nodes, elements and sets, read at the first use."""
+        """Nodes, elements and sets of the deck, read at the first use."""
         return AbaqusMesh(self.path)
 
     def _nodes_of(self) -> dict[str, set[int]]:
@@ -223,7 +223,7 @@ class Abaqus:
         return {key: self.mesh.body(scope, elset)[1] for key, (scope, _, elset) in pairs.items()}
 
     def chosen(self, name: str, entry: Entry) -> Chosen:
-        """Returns the node set or node of a data line, and marks the keyword of the set as read."""
+        """Returns the node set or the node that a data line names, and marks the keyword of the set as read."""
         plain, _, last = name.strip().strip('"').rpartition(".")
         for each in self.of("NSET"):
             if each.key("NSET") == joined(last) and (not plain or joined(plain) in self._scopes(each)):
@@ -241,18 +241,18 @@ class Abaqus:
         return Chosen(f"node set {name}", nodes=nodes, on=on)
 
     def _scopes(self, each: Keyword) -> set[str]:
-        """Returns the instances in which a set can be named."""
+        """Returns the instances in which a keyword can define a set."""
         if each.scope in self.instances:
             return {each.scope}
         return {name for name, one in self.instances.items() if one.key("PART") == each.scope} | {each.key("INSTANCE")}
 
     def _surface(self, name: str, entry: Entry) -> frozenset[str]:
-        """Returns the bodies that have elements of a surface."""
+        """Returns the bodies that have elements of a named surface."""
         sets: list[str] = []
         for each in self.of("SURFACE"):
             if each.key("NAME") == joined(name):
                 if (each.key("TYPE") or "ELEMENT") != "ELEMENT":
-                    raise InpError(f"the surface {name!r} is of the type {each.key('TYPE')}; ELEMENT is followed")
+                    raise InpError(f"the surface {name!r} is of the type {each.key('TYPE')}; only ELEMENT is supported")
                 each.entry.take(f"of {entry.keyword}, {entry.place}")
                 sets += [items[0] for _, items in each.lists()]
         if not sets:
@@ -261,7 +261,7 @@ class Abaqus:
             return frozenset(self.topology.bodies)
         members = {one: self.mesh.named(one, "element_sets") for one in sets}
         if lost := [one for one, elements in members.items() if not elements]:
-            raise InpError(f"the surface {name[:60]!r} is of the set {lost[0][:60]!r}, which has no elements")
+            raise InpError(f"the surface {name[:60]!r} uses the set {lost[0][:60]!r}, which has no elements")
         wanted = set().union(*(elements or () for elements in members.values()))
         pairs = {key: key.partition("|") for key in self.topology.bodies}
         found = {

@@ -1,8 +1,8 @@
-"""Keywords of Abaqus that are omitted, with the reason, and keywords that change the answer. All known keywords outside
-of these tables are read.
+"""Keywords of Abaqus that are omitted, with the reason, and keywords that change the answer. All known keywords
+outside of these tables are translated.
 """
 
-_OUTPUT = "output: a run writes frames, history.csv and probes"
+_OUTPUT = "request of output; a run writes frames, history.csv and probes"
 _END = "the end of the part, instance, assembly or step"
 _USED = "not used by any translated keyword"
 
@@ -13,22 +13,22 @@ LEFT: dict[str, str] = {
     "DIAGNOSTICS": _OUTPUT, "FILTER": _OUTPUT, "NODE PRINT": _OUTPUT, "EL PRINT": _OUTPUT,
     "INTEGRATED OUTPUT SECTION": _OUTPUT, "TRACER PARTICLE": _OUTPUT,
     "END PART": _END, "END INSTANCE": _END, "END ASSEMBLY": _END, "END STEP": _END,
-    "SECTION CONTROLS": "how elements are integrated and how they are deleted: parts[].erosion",
+    "SECTION CONTROLS": "sets how elements are integrated and deleted; in Conoid: parts[].erosion",
     "HOURGLASS STIFFNESS": "tets have no hourglass modes",
     "BULK VISCOSITY": "Conoid uses its own values (numerics.viscosity)",
     "FIXED MASS SCALING": "Conoid does not scale masses to lengthen the time step",
     "VARIABLE MASS SCALING": "Conoid does not scale masses to lengthen the time step",
-    "CONTACT CONTROLS": "how the other code computes contact",
-    "CONTACT CONTROLS ASSIGNMENT": "how the other code computes contact",
-    "CONTACT FORMULATION": "how the other code computes contact",
-    "CONTACT INITIALIZATION ASSIGNMENT": "bodies that overlap are refused, or pushed apart: contact.overlap",
-    "CONTACT INITIALIZATION DATA": "bodies that overlap are refused, or pushed apart: contact.overlap",
-    "SURFACE PROPERTY ASSIGNMENT": "thickness of shells, of no meaning for solids",
+    "CONTACT CONTROLS": "setting of the other code's contact algorithm",
+    "CONTACT CONTROLS ASSIGNMENT": "setting of the other code's contact algorithm",
+    "CONTACT FORMULATION": "setting of the other code's contact algorithm",
+    "CONTACT INITIALIZATION ASSIGNMENT": "treatment of bodies that overlap at the start; in Conoid: contact.overlap",
+    "CONTACT INITIALIZATION DATA": "treatment of bodies that overlap at the start; in Conoid: contact.overlap",
+    "SURFACE PROPERTY ASSIGNMENT": "thickness of shells; no effect on solids",
     "SURFACE BEHAVIOR": "contact in Conoid has no stiffness",
-    "PHYSICAL CONSTANTS": "only the zero of temperatures is read",
+    "PHYSICAL CONSTANTS": "only the absolute zero of temperatures is read",
     "CONDUCTIVITY": "Conoid computes no conduction of heat",
-    "DEPVAR": "of a subroutine of the user",
-    "ORIENTATION": _USED, "TRANSFORM": "directions of output; restraints with it are refused",
+    "DEPVAR": "belongs to a user subroutine",
+    "ORIENTATION": _USED, "TRANSFORM": "directions of output; restraints in these directions are refused",
     "AMPLITUDE": _USED, "NSET": _USED, "ELSET": _USED, "SURFACE": _USED, "SURFACE INTERACTION": _USED,
     "FRICTION": _USED,
 }  # fmt: skip
@@ -36,26 +36,27 @@ LEFT: dict[str, str] = {
 REFUSED: dict[str, str] = {
     "SHELL SECTION": "shells: Conoid has solids only", "MEMBRANE SECTION": "membranes: Conoid has solids only",
     "BEAM SECTION": "beams: Conoid has solids only", "COHESIVE SECTION": "cohesive elements: give [[bond]]",
-    "CONNECTOR SECTION": "connectors: Conoid has none", "MASS": "masses of nodes: Conoid has none",
-    "ROTARY INERTIA": "masses of nodes: Conoid has none", "SPRING": "springs: Conoid has none",
+    "CONNECTOR SECTION": "connectors: Conoid has none", "MASS": "masses at nodes: Conoid has no such masses",
+    "ROTARY INERTIA": "masses at nodes: Conoid has no such masses", "SPRING": "springs: Conoid has none",
     "DASHPOT": "dashpots: Conoid has none", "COUPLING": "joins nodes in a way that is not translated",
     "KINEMATIC": "joins nodes in a way that is not translated", "MPC": "joins nodes in a way that is not translated",
-    "EQUATION": "joins nodes in a way that is not translated", "EMBEDDED ELEMENT": "embedded bodies: Conoid has none",
-    "RIGID BODY": "a rigid body that is not a whole section of solids",
+    "EQUATION": "joins nodes in a way that is not "
+                "translated", "EMBEDDED ELEMENT": "embedded bodies: Conoid has no such bodies",
+    "RIGID BODY": "a rigid body that is not one whole section of solids",
     "CONTACT EXCLUSIONS": "pairs without contact; in Conoid all parts of contact.parts are in contact",
-    "DSLOAD": "a load on surfaces that is not translated: [[boundaries]] kind = \"traction\"",
-    "CLOAD": "forces on nodes: [[boundaries]] kind = \"traction\" acts on faces",
+    "DSLOAD": "a load on surfaces is not translated; use [[boundaries]] kind = \"traction\"",
+    "CLOAD": "forces on nodes are not translated; [[boundaries]] kind = \"traction\" acts on faces",
     "TEMPERATURE": "prescribed temperatures",
-    "FIELD": "prescribed fields", "IMPORT": "a state of another analysis",
-    "INCLUDE": "it names no file by INPUT",
+    "FIELD": "prescribed fields", "IMPORT": "imports the state of another analysis",
+    "INCLUDE": "the keyword names no file with INPUT",
     "PARAMETER": "computed values; write numbers",
     **dict.fromkeys(
         ("NGEN", "NFILL", "NCOPY", "NMAP", "ELGEN", "ELCOPY", "SYSTEM", "IMPERFECTION"),
-        "makes or moves nodes and elements in a way that is not supported; write the nodes and elements",
+        "generates or moves nodes and elements, which is not supported; write the nodes and elements themselves",
     ),
-    "STATIC": "no step of *DYNAMIC, EXPLICIT", "HEAT TRANSFER": "no step of *DYNAMIC, EXPLICIT",
-    "FREQUENCY": "no step of *DYNAMIC, EXPLICIT", "ANNEAL": "no step of *DYNAMIC, EXPLICIT",
-    "DAMPING": "damping of bodies: Conoid has none",
+    "STATIC": "another analysis than *DYNAMIC, EXPLICIT", "HEAT TRANSFER": "another analysis than *DYNAMIC, EXPLICIT",
+    "FREQUENCY": "another analysis than *DYNAMIC, EXPLICIT", "ANNEAL": "another analysis than *DYNAMIC, EXPLICIT",
+    "DAMPING": "Conoid has no damping of bodies",
 }  # fmt: skip
 
 MATERIAL = {
@@ -75,7 +76,9 @@ _SPELT = {"".join(each.split()): each for each in (*LEFT, *REFUSED, *MATERIAL, *
 
 
 def spelt(word: str) -> str:
-    """Returns a keyword as the manual spells it, also for a shortened one: ``ENDPART`` is ``END PART``."""
+    """Returns a keyword in the spelling of the manual; the deck may have a shortened form: ``ENDPART`` is ``END
+    PART``.
+    """
     if word in _SPELT:
         return _SPELT[word]
     alike = [whole for joined, whole in _SPELT.items() if joined.startswith(word)] if word else []

@@ -1,1 +1,1 @@
-"""LS-DYNA keyword decks."""
+"""Import of LS-DYNA keyword decks."""

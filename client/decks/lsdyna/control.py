@@ -23,84 +23,93 @@ _LAYOUT = (
     "SSID MSID SSTYP MSTYP SBOXID MBOXID SPR MPR", "FS FD DC VC VDC PENCHK BT DT", "SFS SFM SST MST SFST SFMT FSF VSF",
 )  # fmt: skip
 Surface = Callable[[int, int, Entry], frozenset[str]]
-"""Interface that returns the bodies of a surface; arguments: its number, its type, the keyword. Raises ValueError."""
+"""Function that returns the bodies of a surface. Its arguments are the number and the type of the surface, and the
+keyword. The function raises ValueError."""
 
 
 def contact(block: Block, name: str, options: frozenset[str], entry: Entry, surface: Surface) -> Meeting:
-    """Reads a contact from its three cards; bodies of a single surface are in contact with each other and
+    """Reads a contact from its three cards. The bodies of a single surface are in contact with each other and with
     themselves. Raises ValueError.
     """
     fields = Fields(block, entry, _behind(block, options, entry), _LAYOUT)
-    fields.forgive("SPR MPR PENCHK VC VDC SFS SFM SST MST SFST SFMT VSF", "stiffness and output of the penalty method")
+    fields.forgive(
+        "SPR MPR PENCHK VC VDC SFS SFM SST MST SFST SFMT VSF", "setting of the penalty method of LS-DYNA, or of output"
+    )
     fields.refuse("SBOXID MBOXID", "boxes are not translated")
-    fields.refuse("BT", "the contact begins later; in Conoid it acts from the start")
+    fields.refuse("BT", "the contact begins after the start; in Conoid contact acts from the start")
     if 0.0 < fields.real("DT") < 1e19:
-        fields.refuse("DT", "the contact ends; in Conoid it lasts to the end")
+        fields.refuse("DT", "the contact ends before the run; in Conoid contact acts until the end")
     scale = fields.nonzero("FSF", 1.0)
     if scale != 1.0:
         fields.refuse("FSF", "friction is scaled")
     still, sliding, decay = fields.real("FS"), fields.real("FD"), fields.real("DC")
     if still < 0.0 or (decay and still != sliding):
-        entry.remark("refused", f"FS = {still:g}, FD = {sliding:g}", "friction depends on the speed or the part; "
-                     "in Conoid it is one number, FS with --anyway")  # fmt: skip
+        entry.remark("refused", f"FS = {still:g}, FD = {sliding:g}", "friction depends on the speed or on the part; "
+            "in Conoid the friction is one number (FS with --anyway)")  # fmt: skip
     elif sliding != still and sliding:
-        entry.remark("left", f"FD = {sliding:g}", "without DC friction is FS at any speed")
+        entry.remark("left", f"FD = {sliding:g}", "without DC the friction is FS at every speed")
     one = surface(fields.whole("SSID"), fields.whole("SSTYP"), entry)
     other = None if name in SINGLE else surface(fields.whole("MSID"), fields.whole("MSTYP"), entry)
     if name in SINGLE:
-        fields.forgive("MSID MSTYP", "a single surface has no other one")
+        fields.forgive("MSID MSTYP", "a contact of a single surface has no second surface")
     if fields.extra:
-        entry.remark("left", f"line {fields.extra[0]}", "optional cards of the penalty method")
+        entry.remark("left", f"line {fields.extra[0]}", "optional cards with settings of the penalty method")
         fields.extra.clear()
     fields.rest("refused")
     return Meeting(one, other, max(still, 0.0), entry)
 
 
 def _behind(block: Block, options: frozenset[str], entry: Entry) -> list[Card]:
-    """Returns the cards after a title and after the cards of the option MPP. The option has one card, and a second
-    card if that begins with ``&``.
+    """Returns the cards after the title and after the cards of the option MPP. This option has one card, and a
+    second card if the next card begins with ``&``.
     """
     cards = trimmed(block.cards)[bool(options & {"ID", "TITLE"}) :]
     if "MPP" not in options or not cards:
         return cards
-    entry.remark("left", f"line {cards[0].number}", "division of the work of contact in the other code")
+    entry.remark("left", f"line {cards[0].number}", "setting of the parallel contact search of LS-DYNA")
     return cards[1 + (len(cards) > 1 and cards[1].text.lstrip().startswith("&")) :]
 
 
 def termination(block: Block, entry: Entry) -> float:
-    """Reads the end of the run, in units of the deck. Raises ValueError."""
+    """Reads the time at which the run ends, in units of the deck. Raises ValueError."""
     fields = Fields(block, entry, block.cards, ("ENDTIM ENDCYC DTMIN ENDENG ENDMAS NOSOL",))
     end = fields.real("ENDTIM")
     if end <= 0.0:
         raise ValueError(f"ENDTIM = {end:g} is not above 0")
     fields.refuse("NOSOL", "no solution is computed")
-    fields.rest("left", "another end of the run: run.max_steps, run.residual_limit")
+    fields.rest("left", "another condition that ends the run; in Conoid: run.max_steps, run.residual_limit")
     entry.take("run.end_time")
     return end
 
 
 def time_step(draft: Draft, block: Block, entry: Entry) -> None:
-    """Reads ``TSSFAC``, and records what is omitted."""
+    """Reads the factor of the time step, ``TSSFAC``, and records which fields are omitted."""
     layout = ("DTINIT TSSFAC ISDO TSLIMT DT2MS LCTM ERODE MS1ST",)
     fields = Fields(block, entry, block.cards, layout)
     safety = fields.real("TSSFAC")
     if 0.0 < safety <= 1.0:
         draft.numerics["dt_safety"] = safety
-        fields.differ("TSSFAC", "a fraction of Conoid's stable step, which is less than that of the smallest altitude")
+        fields.differ(
+            "TSSFAC",
+            "the factor scales Conoid's own stable step, which is shorter than a step from the smallest altitude",
+        )
         entry.take("numerics.dt_safety")
     else:
-        entry.leave("no TSSFAC: numerics.dt_safety is 0.9")
+        entry.leave("TSSFAC is not given; numerics.dt_safety is set to 0.9")
     fields.forgive("DT2MS", "Conoid does not scale masses to lengthen the time step")
     fields.forgive("DTINIT TSLIMT ISDO LCTM", "limits of the step")
-    fields.forgive("ERODE MS1ST", "treatment of elements with small time steps")
+    fields.forgive("ERODE MS1ST", "setting for elements with small time steps")
     fields.rest("left")
 
 
 def pictures(draft: Draft, block: Block, entry: Entry, end: float) -> None:
-    """Reads ``*DATABASE_BINARY_D3PLOT``: frames."""
+    """Reads the number of frames from ``*DATABASE_BINARY_D3PLOT``."""
     fields = Fields(block, entry, block.cards, ("DT LCDT BEAM NPLTC PSETID",))
     interval, count = fields.real("DT"), fields.whole("NPLTC")
     frames = draft.set_frames(count, interval, end, entry)
     if frames and not count and abs(frames * interval - end) > 1e-6 * end:
-        fields.differ("DT", f"{frames} frames, every {draft.quantity(end / frames, TIME)}: evenly to the end")
+        fields.differ(
+            "DT",
+            f"{frames} frames, every {draft.quantity(end / frames, TIME)}: at equal intervals until the end of the run",
+        )
     fields.rest("left")

@@ -8,14 +8,14 @@ from .. import fields
 from ..account import Entry
 
 _WIDTH = 10
-"""Columns of a field of a card other than nodes and elements (the manual, "Card format")."""
+"""Width of a field, in columns, on all cards except those of nodes and elements (the manual, "Card format")."""
 
 
 class Fields(fields.Fields[Card]):
     """The fields of some cards of a keyword."""
 
     def __init__(self, block: Block, entry: Entry, cards: Sequence[Card], layout: Sequence[str]) -> None:
-        """``layout``: names of the fields of each card, ``-`` for an unused one."""
+        """``layout``: names of the fields of each card; ``-`` stands for an unused field."""
         self.block = block
         found: dict[str, tuple[Card, str]] = {}
         for card, names in zip(cards, layout, strict=False):
@@ -31,7 +31,9 @@ class Fields(fields.Fields[Card]):
 
 
 def trimmed(cards: Sequence[Card]) -> list[Card]:
-    """Returns the cards without empty cards at their end; an empty card between others has empty fields."""
+    """Returns the cards without the empty cards at the end; an empty card between other cards stays, with empty
+    fields.
+    """
     found = list(cards)
     while found and not found[-1].text.strip():
         found.pop()
@@ -39,5 +41,5 @@ def trimmed(cards: Sequence[Card]) -> list[Card]:
 
 
 def numbers(block: Block, cards: Sequence[Card], what: str, width: int = _WIDTH, count: int = 8) -> list[int]:
-    """Reads whole numbers of many cards; empty fields are skipped. Raises CardError."""
+    """Reads whole numbers from many cards; empty fields are skipped. Raises CardError."""
     return [block.whole(card, item, what) for card in cards for item in block.fields(card, *(width,) * count) if item]

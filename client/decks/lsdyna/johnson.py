@@ -10,15 +10,17 @@ from .fields import Fields
 
 
 def _flow(fields: Fields, context: Context) -> dict[str, Any]:
-    """Reads A, B, n, C and the reference rate, which both laws have."""
+    """Reads A, B, n, C and the reference rate of the Johnson-Cook flow stress, for materials 15 and 98."""
     rate = fields.real("EPSO")
     if rate <= 0.0:
         raise ValueError("EPSO, the reference rate, is not above 0")
     if rate == 1.0 and context.system.time != "s" and fields.real("C"):
         shown = context.system.quantity(rate, RATE)
-        fields.differ("EPSO", f"taken as {shown}. Published constants are usually for 1/s; check the deck")
+        fields.differ("EPSO", f"the reference rate is {shown}; published constants usually are for 1/s: check the deck")
     if fields.real("C") and fields.real("VP") == 0.0:
-        fields.differ("VP", "rate of the total strain in LS-DYNA with VP = 0, of the plastic strain in Conoid")
+        fields.differ(
+            "VP", "with VP = 0 LS-DYNA uses the rate of the total strain, Conoid the rate of the plastic strain"
+        )
     return {
         "model": "johnson_cook", "A": context.stress(fields.real("A")), "B": context.stress(fields.real("B")),
         "n": fields.nonzero("N", 1.0), "C": fields.real("C"), "m": fields.nonzero("M", 1.0),
@@ -35,8 +37,8 @@ def simplified(fields: Fields, context: Context) -> Made:
         "m": 1.0, "melt_temperature": "2000 K", "specific_heat": "1000 J/kg/K", "taylor_quinney": 0.0,
     }  # fmt: skip
     fields.entry.remark(
-        "differs", "no heat", "the law has no temperature: no work becomes heat (taylor_quinney = 0), so "
-        "that melt_temperature and specific_heat have no meaning",
+        "differs", "no heat", "the law has no temperature, so no plastic work becomes heat (taylor_quinney = 0); "
+                              "melt_temperature and specific_heat have no effect",
     )  # fmt: skip
     return Made({**elastic(fields, context), "strength": law}, failing(fields.real("PSFAIL")))
 
@@ -44,8 +46,8 @@ def simplified(fields: Fields, context: Context) -> Made:
 def johnson_cook(fields: Fields, context: Context) -> Made:
     """Reads ``*MAT_JOHNSON_COOK``."""
     shear = fields.real("G") or shear_of(fields.real("E"), fields.real("PR"))
-    fields.forgive("E PR", "of shells; solids have G and the equation of state")
-    fields.forgive("DTF", "deletion of elements with a small time step: in Conoid parts[].erosion.time_step")
+    fields.forgive("E PR", "field for shells; solids use G and the equation of state")
+    fields.forgive("DTF", "deletes elements with a small time step; in Conoid: parts[].erosion.time_step")
     fields.forgive("IT NUMINT", "how shells are computed")
     material = with_eos(fields, context, shear)
     law = _flow(fields, context)
@@ -57,8 +59,8 @@ def johnson_cook(fields: Fields, context: Context) -> Made:
     law["specific_heat"] = context.system.quantity(heat, SPECIFIC_HEAT)
     law["taylor_quinney"] = 1.0
     fields.entry.remark(
-        "differs", "taylor_quinney = 1", "in LS-DYNA the whole plastic work becomes heat; "
-        "in Conoid a fraction of 0.9 is usual",
+        "differs", "taylor_quinney = 1", "in LS-DYNA all plastic work becomes heat; in Conoid the usual fraction is "
+                                         "0.9",
     )  # fmt: skip
     _spall(fields, material, context)
     erosion = _damage(fields, law)
@@ -70,23 +72,27 @@ def _spall(fields: Fields, material: dict[str, Any], context: Context) -> None:
     pressure = fields.real("PC")
     if pressure and kind != 1.0:
         fields.entry.remark(
-            "refused", f"SPALL = {kind:g}", "in LS-DYNA spalled material carries no tension; in Conoid the pressure is "
-            "cut off at PC, as with SPALL = 1",
+            "refused", f"SPALL = {kind:g}", "in LS-DYNA spalled material carries no tension; in Conoid the pressure "
+                                            "is cut off at PC, like SPALL = 1",
         )  # fmt: skip
     cut_off(fields, material, context, -abs(pressure), "PC")
 
 
 def _damage(fields: Fields, law: dict[str, Any]) -> dict[str, Any]:
-    """Returns ``strength.damage`` with its erosion; D1 to D5 all 0 mean no failure."""
+    """Returns ``strength.damage`` and the erosion that belongs to this damage. If D1 to D5 are all 0, the material
+    does not fail.
+    """
     values = {f"D{i}": fields.real(f"D{i}") for i in range(1, 6)}
     stays = fields.real("EROD")
     if fields.real("EFMIN") > 1e-6:
-        fields.refuse("EFMIN", "smallest failure strain, 1e-6 in Conoid")
+        fields.refuse("EFMIN", "smallest failure strain; Conoid always uses 1e-6")
     if not any(values.values()):
         return {}
     law["damage"] = values
     if stays:
-        fields.refuse("EROD", "a failed element has no strength in LS-DYNA; in Conoid it is deleted or unchanged")
+        fields.refuse(
+            "EROD", "a failed element has no strength in LS-DYNA; in Conoid the tet is deleted or keeps its strength"
+        )
         return {}
     return {"damage": 1.0}
 
@@ -108,12 +114,12 @@ def holmquist(fields: Fields, context: Context) -> Made:
     if rate > 0.0:
         law["reference_rate"] = context.system.quantity(rate, RATE)
     if fields.real("T") < 0.0:
-        fields.differ("T", "taken without its sign: T is a tension in Conoid")
+        fields.differ("T", "converted without the sign, because T is positive in tension in Conoid")
     if 0.0 < fields.real("SFMAX") < 1e10:
         law["largest_fractured"] = fields.real("SFMAX")
     failure = fields.real("FS")
     if failure < 0.0:
-        fields.refuse("FS", "deletion of elements in tension (p* + T* below 0)")
+        fields.refuse("FS", "deletes elements in tension (p* + T* below 0)")
     material: dict[str, Any] = {"density": context.system.quantity(fields.real("RO"), DENSITY)}
     material |= {"elastic": {"young": context.stress(young), "poisson": poisson}, "strength": law}
     return Made(material, failing(failure))

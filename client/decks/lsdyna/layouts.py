@@ -7,7 +7,7 @@ NUMBERS = {
     "MAT_110": "MAT_JOHNSON_HOLMQUIST_CERAMICS", "EOS_001": "EOS_LINEAR_POLYNOMIAL", "EOS_004": "EOS_GRUNEISEN",
     "MAT_JH2": "MAT_JOHNSON_HOLMQUIST_CERAMICS",
 }  # fmt: skip
-"""Alternative names of keywords."""
+"""Names of material keywords by their numbers in the manual."""
 
 LAYOUTS: dict[str, tuple[str, ...]] = {
     "MAT_ELASTIC": ("MID RO E PR DA DB K",),
@@ -32,4 +32,4 @@ LAYOUTS: dict[str, tuple[str, ...]] = {
     "EOS_GRUNEISEN": ("EOSID C S1 S2 S3 GAMAO A E0", "V0"),
     "EOS_LINEAR_POLYNOMIAL": ("EOSID C0 C1 C2 C3 C4 C5 C6", "E0 V0"),
 }  # fmt: skip
-"""Fields of the cards of each keyword, with the names of the manual."""
+"""Names of the fields on the cards of each keyword, as in the manual."""

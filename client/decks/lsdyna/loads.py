@@ -25,22 +25,22 @@ _CORNERS = "DOFX DOFY DOFZ"
 def velocity(scene: Scene, block: Block, options: frozenset[str], entry: Entry) -> None:
     """Reads ``*INITIAL_VELOCITY``, the initial velocity of a node set or of all nodes."""
     fields = Fields(block, entry, block.cards, ("NSID NSIDEX BOXID IRIGID ICID", "VX VY VZ VXR VYR VZR"))
-    fields.refuse("NSIDEX BOXID ICID", "exceptions, boxes and local axes are not translated")
-    fields.forgive("IRIGID", "whether velocities of rigid bodies are overwritten")
-    fields.refuse("VXR VYR VZR", "solids have no rotations of nodes")
+    fields.refuse("NSIDEX BOXID ICID", "excepted nodes, boxes and local axes are not translated")
+    fields.forgive("IRIGID", "sets whether velocities of rigid bodies are overwritten")
+    fields.refuse("VXR VYR VZR", "nodes of solids have no rotations")
     chosen = scene.nodes(fields.whole("NSID"), entry)
     scene.starts.append(Start(chosen, entry, {axis: fields.real(f"V{'XYZ'[axis]}") for axis in range(3)}))
     fields.rest("refused")
 
 
 def velocity_node(scene: Scene, block: Block, options: frozenset[str], entry: Entry) -> None:
-    """Reads ``*INITIAL_VELOCITY_NODE``, initial velocities of single nodes. Nodes with the same velocity become one
+    """Reads ``*INITIAL_VELOCITY_NODE``, initial velocities of single nodes. Nodes with equal velocity become one
     group.
     """
     groups: dict[tuple[float, ...], set[int]] = {}
     for card in block.filled():
         fields = Fields(block, entry, [card], ("NID VX VY VZ VXR VYR VZR ICID",))
-        fields.refuse("VXR VYR VZR ICID", "solids have no rotations of nodes, and local axes are not translated")
+        fields.refuse("VXR VYR VZR ICID", "nodes of solids have no rotations, and local axes are not translated")
         values = tuple(fields.real(f"V{axis}") for axis in "XYZ")
         groups.setdefault(values, set()).add(fields.whole("NID"))
     for values, nodes in groups.items():
@@ -54,8 +54,8 @@ def generation(scene: Scene, block: Block, options: frozenset[str], entry: Entry
     cards = trimmed(block.cards)
     for one, two in zip(cards[::2], [*cards[1::2], None], strict=False):
         fields = Fields(block, entry, [card for card in (one, two) if card is not None], layout)
-        fields.refuse("ICID PHASE", "local axes and later phases are not translated")
-        fields.forgive("IVATN IRIGID", "how rigid bodies and attached nodes are treated")
+        fields.refuse("ICID PHASE", "local axes and later phases of the analysis are not translated")
+        fields.forgive("IVATN IRIGID", "sets how rigid bodies and attached nodes are treated")
         number, kind = fields.whole("ID"), fields.whole("STYP")
         wanted = {1: scene.bodies, 2: lambda n, _: scene.part(n), 3: scene.nodes}.get(kind)
         if wanted is None and number:
@@ -68,7 +68,7 @@ def generation(scene: Scene, block: Block, options: frozenset[str], entry: Entry
 
 
 def _axis(fields: Fields) -> tuple[tuple[float, float, float], tuple[float, float, float]]:
-    """Returns the rotation vector and a point of the axis."""
+    """Returns the rotation vector of ``*INITIAL_VELOCITY_GENERATION`` and a point of the rotation axis."""
     turn = fields.real("OMEGA")
     centre = fields.real("XC"), fields.real("YC"), fields.real("ZC")
     along = [fields.real(name) for name in ("NX", "NY", "NZ")]
@@ -83,7 +83,7 @@ def velocity_rigid(scene: Scene, block: Block, options: frozenset[str], entry: E
     """Reads ``*INITIAL_VELOCITY_RIGID_BODY``."""
     for card in block.filled():
         fields = Fields(block, entry, [card], ("PID VX VY VZ VXR VYR VZR ICID",))
-        fields.refuse("VXR VYR VZR ICID", "the spin is about the centre of mass; give parts[].spin")
+        fields.refuse("VXR VYR VZR ICID", "the deck rotates the body about its centre of mass; use parts[].spin")
         speed = {axis: fields.real(f"V{'XYZ'[axis]}") for axis in range(3)}
         scene.starts.append(Start(scene.part(fields.whole("PID")), entry, speed))
 
@@ -92,7 +92,7 @@ def velocity_rigid(scene: Scene, block: Block, options: frozenset[str], entry: E
 
 
 def restraint(scene: Scene, block: Block, options: frozenset[str], entry: Entry) -> None:
-    """Reads ``*BOUNDARY_SPC_SET`` and ``_NODE``: nodes fixed along some axes."""
+    """Reads ``*BOUNDARY_SPC_SET`` and ``*BOUNDARY_SPC_NODE``: nodes that are fixed along some axes."""
     single = "NODE" in options
     for card in list(block.filled())["ID" in options :]:
         fields = Fields(block, entry, [card], ("ID CID DOFX DOFY DOFZ DOFRX DOFRY DOFRZ",))
@@ -112,7 +112,7 @@ _TC = {1: "x", 2: "y", 3: "z", 4: "xy", 5: "yz", 6: "xz", 7: "xyz"}
 
 
 def hold_nodes(scene: Scene, held: Sequence[tuple[int, set[int], Entry]]) -> None:
-    """Reads the nodes that ``*NODE`` itself fixes, by their code."""
+    """Reads restraints that are fields of ``*NODE`` itself; ``held``: code TC, its nodes, and the keyword."""
     for code, nodes, entry in held:
         if code not in _TC:
             entry.remark("refused", f"TC = {code}", "a code of translations from 1 to 7 is expected")
@@ -126,24 +126,28 @@ def _single(number: int) -> Chosen:
 
 
 def motion(scene: Scene, block: Block, options: frozenset[str], entry: Entry) -> None:
-    """Reads ``*BOUNDARY_PRESCRIBED_MOTION_SET``, ``_NODE`` and ``_RIGID``: a velocity or a displacement by a curve."""
+    """Reads ``*BOUNDARY_PRESCRIBED_MOTION_SET``, ``_NODE`` and ``_RIGID``: a velocity or a displacement with a
+    curve.
+    """
     for card in list(block.filled())["ID" in options :]:
         fields = Fields(block, entry, [card], ("ID DOF VAD LCID SF VID DEATH BIRTH",))
         number, axis = fields.whole("ID"), _AXES.get(fields.whole("DOF"))
         if axis is None:
-            raise ValueError(f"DOF = {fields.text('DOF')} is not 1, 2 or 3: motions along x, y and z are translated")
+            raise ValueError(
+                f"DOF = {fields.text('DOF')} is not 1, 2 or 3; only motions along x, y and z are translated"
+            )
         scale, kind = fields.nonzero("SF", 1.0), fields.whole("VAD")
         curve = tuple((time, scale * value) for time, value in scene.lasting(fields.whole("LCID")))
         if 0.0 < fields.real("DEATH") < scene.end:
-            fields.refuse("DEATH", "the motion ends before the run; in Conoid it lasts to the end")
-        fields.refuse("BIRTH", "the motion begins later; in Conoid it begins at the start")
-        fields.forgive("VID", "a direction of DOF = 4")
+            fields.refuse("DEATH", "the motion ends before the run; in Conoid a motion lasts until the end")
+        fields.refuse("BIRTH", "the motion begins after the start; in Conoid a motion begins at the start")
+        fields.forgive("VID", "direction vector for DOF = 4")
         if kind == 0:
             speed, course = velocity_course(curve, scene.end)
         elif kind == 2:
             speed, course = displacement_speed(curve, scene.end), ()
         else:
-            raise ValueError(f"VAD = {kind}: velocities (0) and displacements (2) are translated")
+            raise ValueError(f"VAD = {kind}: only velocities (0) and displacements (2) are translated")
         chosen = scene.part(number) if "RIGID" in options else _single(number) if "NODE" in options else None
         scene.holds.append(Hold(chosen or scene.nodes(number, entry), entry, {axis: speed}, course))
         fields.rest("refused")
@@ -153,13 +157,13 @@ def motion(scene: Scene, block: Block, options: frozenset[str], entry: Entry) ->
 
 
 def body_load(scene: Scene, block: Block, options: frozenset[str], entry: Entry) -> None:
-    """Reads ``*LOAD_BODY_X``, ``_Y``, ``_Z``: an acceleration of the base, opposite to the acceleration of the
-    bodies.
+    """Reads ``*LOAD_BODY_X``, ``_Y``, ``_Z``: an acceleration of the base; the bodies accelerate in the opposite
+    direction.
     """
     fields = Fields(block, entry, block.cards, ("LCID SF LCIDDR XC YC ZC CID",))
-    fields.forgive("LCIDDR", "the load of the dynamic relaxation")
+    fields.forgive("LCIDDR", "load of the dynamic relaxation, which Conoid does not have")
     fields.refuse("CID", "local axes are not translated")
-    fields.forgive("XC YC ZC", "a centre of rotation, of no meaning for a translation")
+    fields.forgive("XC YC ZC", "centre of rotation; no effect on a translation")
     (axis,) = options & {"X", "Y", "Z"}
     scale = fields.nonzero("SF", 1.0)
     curve = tuple((time, -scale * value) for time, value in scene.lasting(fields.whole("LCID")))
@@ -184,4 +188,4 @@ HANDLERS: Mapping[str, tuple[Handler, frozenset[str]]] = {
     "RIGIDWALL_GEOMETRIC": (walls.geometric, walls.OPTIONS - {"FORCES", "MOVING"}),
     "LOAD_BODY": (body_load, frozenset({"X", "Y", "Z"})),
 }
-"""Translated keywords, each with the options that may follow."""
+"""Translated keywords, each with the options that may follow its name."""

@@ -1,5 +1,5 @@
-"""Nodes of the parts of an LS-DYNA deck and their positions. The deck is read a second time if keywords need the
-nodes.
+"""Nodes of the parts of an LS-DYNA deck and their positions. The import reads the deck a second time if keywords
+need the nodes.
 """
 
 from pathlib import Path
@@ -9,7 +9,7 @@ from conoid.cases.reading.cards import Block, Card, Deck
 from ..topology import Point
 
 _NODE, _SOLID = (8, 16, 16, 16, 8, 8), (8,) * 10
-"""Columns of the fields (LS-DYNA Keyword User's Manual I, *NODE and *ELEMENT_SOLID)."""
+"""Widths of the fields, in columns (LS-DYNA Keyword User's Manual I, *NODE and *ELEMENT_SOLID)."""
 
 
 def read_points(path: Path) -> dict[int, Point]:
@@ -26,7 +26,7 @@ def read_points(path: Path) -> dict[int, Point]:
 def _point(block: Block, card: Card) -> tuple[int, Point]:
     text = card.text
     if block.least <= _NODE[0] and "," not in text:
-        try:  # for the plain format, ten times as fast as the general reader
+        try:  # Ten times as fast as the general reader.
             return int(text[:8]), (float(text[8:24]), float(text[24:40]), float(text[40:56]))
         except ValueError:
             pass
@@ -36,7 +36,7 @@ def _point(block: Block, card: Card) -> tuple[int, Point]:
 
 
 def held_of(block: Block) -> dict[int, set[int]]:
-    """Returns the nodes that ``*NODE`` itself fixes, by the code of the translations (TC). Raises CardError."""
+    """Returns the nodes that ``*NODE`` itself fixes, by the code of the fixed translations (TC). Raises CardError."""
     found: dict[int, set[int]] = {}
     start = sum(max(width, block.least) for width in _NODE[:4])
     for card in block.filled():
@@ -50,7 +50,7 @@ def held_of(block: Block) -> dict[int, set[int]]:
 
 
 def read_nodes(path: Path) -> dict[str, set[int]]:
-    """Returns the nodes of each part with solids, by its number as text. Raises CardError."""
+    """Returns the nodes of each part with solids; the keys are part numbers as text. Raises CardError."""
     nodes: dict[str, set[int]] = {}
     for block in Deck(path, without=("NODE",)).blocks():
         if block.name == "ELEMENT_SOLID":
@@ -59,7 +59,7 @@ def read_nodes(path: Path) -> dict[str, set[int]]:
 
 
 def parts_of(block: Block) -> set[str]:
-    """Returns the numbers of the parts that have elements in ``*ELEMENT_SOLID``, as text. Raises CardError."""
+    """Returns the numbers, as text, of the parts that have elements in ``*ELEMENT_SOLID``. Raises CardError."""
     heads = _heads(block)
     if any("," in card.text for card in heads[:1]):
         return {str(block.whole(card, "".join(_items(block, card)[1:2]), "pid")) for card in heads}
@@ -69,8 +69,8 @@ def parts_of(block: Block) -> set[str]:
 
 
 def _heads(block: Block) -> list[Card]:
-    """Yields the cards with the numbers of element and part: every one, or every second if the nodes are on another
-    card.
+    """Yields the cards with the numbers of element and part: each card, or each second card if the nodes are on a
+    card of their own.
     """
     cards = list(block.filled())
     two = bool(cards) and len(_items(block, cards[0])) <= 2
@@ -91,7 +91,9 @@ def _solids(block: Block, nodes: dict[str, set[int]]) -> None:
 
 
 def _quick(text: str) -> tuple[str, list[int]] | None:
-    """Returns part and nodes of a card in the plain format without a gap; None for any other."""
+    """Returns part and nodes of an element card in the plain format without empty fields; None for a card in another
+    format.
+    """
     items = text.split()
     if len(items) * 8 < len(text.rstrip()) or len(items) < 6:
         return None

@@ -8,19 +8,19 @@ from . import sets
 
 
 class Numbered:
-    """Sets and curves of a deck by their numbers; a set or curve that is used marks its keyword as translated."""
+    """Sets and curves of a deck by their numbers. When a set or curve is used, its keyword is marked as translated."""
 
     topology: Topology
 
     def __init__(self) -> None:
-        """Starts empty; ``topology`` is set before the first use."""
+        """Starts without sets and curves; ``topology`` must be set before the first use."""
         self.node_sets: dict[int, sets.NodeSet] = {}
         self.segments: dict[int, sets.NodeSet] = {}
         self.part_sets: dict[int, tuple[set[int], Entry]] = {}
         self.curves: dict[int, tuple[sets.Curve, Entry]] = {}
 
     def leave_rest(self) -> None:
-        """Sets and curves that have not been used."""
+        """Records that all sets and curves that were not used are omitted."""
         for number, found in (*self.node_sets.items(), *self.segments.items()):
             if not found.entry.decided:
                 found.entry.leave(f"set {number} is not used by any translated keyword")
@@ -29,7 +29,7 @@ class Numbered:
                 entry.leave("not used by any translated keyword")
 
     def nodes(self, number: int, entry: Entry) -> Chosen:
-        """Returns the node set of a number; 0 means all nodes. Raises ValueError."""
+        """Returns the nodes of a set by the number of the set; 0 means all nodes. Raises ValueError."""
         if number == 0:
             return Chosen("everything", bodies=frozenset(self.topology.bodies))
         found = self._node_set(number, entry)
@@ -39,7 +39,7 @@ class Numbered:
         return Chosen(f"node set {number}", nodes=partial(self._members, found), on=on)
 
     def _node_set(self, number: int, entry: Entry, within: tuple[int, ...] = ()) -> sets.NodeSet:
-        """Returns the node set of a number, with the sets that it consists of. Raises ValueError."""
+        """Returns a node set by its number, merged with the sets that it includes. Raises ValueError."""
         found = self.node_sets.get(number)
         if found is None:
             raise ValueError(f"the node set {number} is not defined")
@@ -64,11 +64,11 @@ class Numbered:
         return found.nodes.union(within if found.ranges else (), *parts)
 
     def part(self, number: int) -> Chosen:
-        """Returns the part of a number."""
+        """Returns a part by its number, as the target of a load."""
         return Chosen(f"part {number}", bodies=frozenset({str(number)}))
 
     def part_set(self, number: int, entry: Entry) -> Chosen:
-        """Returns the part set of a number. Raises ValueError."""
+        """Returns a part set by its number, as the target of a load. Raises ValueError."""
         if number not in self.part_sets:
             raise ValueError(f"the part set {number} is not defined")
         parts, own = self.part_sets[number]
@@ -76,7 +76,7 @@ class Numbered:
         return Chosen(f"part set {number}", bodies=frozenset(map(str, parts)))
 
     def curve(self, number: int) -> sets.Curve:
-        """Returns the curve of a number. Raises ValueError."""
+        """Returns a curve by its number. Raises ValueError."""
         if number not in self.curves:
             raise ValueError(f"the curve {number} is not defined")
         curve, entry = self.curves[number]
@@ -84,7 +84,9 @@ class Numbered:
         return curve
 
     def surface(self, number: int, kind: int, entry: Entry) -> frozenset[str]:
-        """Returns the bodies of a surface by its number and type (the manual, *CONTACT, SSTYP). Raises ValueError."""
+        """Returns the bodies of a surface by the number and the type of the surface (the manual, *CONTACT, SSTYP).
+        Raises ValueError.
+        """
         every = frozenset(self.topology.bodies)
         if kind == 5 or (number == 0 and kind in (0, 2, 3)):
             return every
@@ -94,13 +96,17 @@ class Numbered:
             return frozenset({str(number)}) & every
         if kind in (0, 4):
             return self._of_nodes(number, kind, entry)
-        raise ValueError(f"a surface of the type {kind} is not supported; 0, 2, 3, 4 and 5 are")
+        raise ValueError(f"a surface of the type {kind} is not supported; allowed: 0, 2, 3, 4 and 5")
 
     def _of_nodes(self, number: int, kind: int, entry: Entry) -> frozenset[str]:
         found = self.segments.get(number) if kind == 0 else self._node_set(number, entry)
         if found is None or found.odd:
             raise ValueError(f"the set {number}: {found.odd if found else 'it is not defined'}")
         found.entry.take(f"of {entry.keyword}, {entry.place}")
-        entry.remark("differs", f"set {number}", "the whole surfaces of the parts are in contact, not only the set")
+        entry.remark(
+            "differs",
+            f"set {number}",
+            "in Conoid the whole surfaces of the parts are in contact, not only the faces of the set",
+        )
         members = self._members(found)
         return frozenset(key for key in self.topology.bodies if not self.topology.of[key].isdisjoint(members))

@@ -29,12 +29,12 @@ _SETS = frozenset({"TITLE", "LIST", "GENERATE", "GENERAL", "ADD", "COLUMN", "COL
 
 
 class LsDyna:
-    """The keywords of a deck, with their translation."""
+    """Reader of a deck: its keywords and their translation to a case."""
 
     kind = "LS-DYNA keyword deck"
 
     def __init__(self, path: Path) -> None:
-        """Reads all of ``path`` and its included files. Raises CardError, OSError."""
+        """Reads a deck, ``path``, and the files that it includes. Raises CardError, OSError."""
         self.path, self.account = path, Account()
         self._blocks: list[tuple[Block, Entry]] = []
         self._solid: set[str] = set()
@@ -71,7 +71,7 @@ class LsDyna:
         return entry
 
     def _guarded(self, do: object, block: Block, entry: Entry) -> None:
-        """Translates a keyword; one that cannot be read refuses the import, with its line."""
+        """Translates a keyword. If the keyword cannot be read, it refuses the import, with its line."""
         try:
             do(block, entry)  # type: ignore[operator]
         except (CardError, ValueError) as error:
@@ -135,22 +135,22 @@ class LsDyna:
             fields = Fields(block, entry, [card], ("PID SECID MID EOSID HGID GRAV ADPOPT TMID",))
             number = str(fields.whole("PID"))
             fields.forgive("SECID HGID ADPOPT", "how elements are integrated")
-            fields.refuse("GRAV TMID", "preloaded gravity, and conduction of heat")
+            fields.refuse("GRAV TMID", "settings of preloaded gravity and of conduction of heat")
             eos = fields.whole("EOSID")
             if number not in self._solid:
                 fields.whole("MID")
-                entry.remark("left", f"part {number}", "no solid is of it")
+                entry.remark("left", f"part {number}", "the part has no solid element")
                 continue
             once([body.key for body in self._bodies], number, "part")
             material = f"{fields.whole('MID')}/{eos}" if eos else str(fields.whole("MID"))
             self._bodies.append(Body(number, title.text.strip(), material, number, entry))
         if len(cards) < 2:
-            raise block.error(None, "a part has a title and a card of numbers")
+            raise block.error(None, "a *PART needs a title and a card with numbers")
         if not any(body.entry is entry for body in self._bodies):
-            entry.leave("no solid is of it")
+            entry.leave("the part has no solid element")
 
     def weighed(self) -> Iterator[Weighed]:
-        """Densities of the materials, to find the units."""
+        """Densities and Young's moduli of the materials, from which the import finds the units."""
         for number, (name, fields, title) in self._materials.items():
             shown = f"{title!r}" if title else f"material {number}"
             try:
@@ -241,7 +241,7 @@ class LsDyna:
     def _unknown(self, name: str, entry: Entry) -> None:
         plain = NUMBERS.get(name.removesuffix("_TITLE"), name.removesuffix("_TITLE"))
         if plain in LAYOUTS or name.startswith("MAT_"):
-            entry.leave("no part that is translated has it")
+            entry.leave("no translated part uses the keyword")
         elif why := reason(name, REFUSED):
             entry.refuse(why)
 
@@ -255,11 +255,11 @@ class LsDyna:
             except (CardError, ValueError) as error:
                 entry.refuse(str(error))
         if not found:
-            self.account.general.append("the deck has no *CONTROL_TERMINATION: run.end_time is not known")
+            self.account.general.append("the deck has no *CONTROL_TERMINATION, so run.end_time is unknown")
         return float("inf")
 
     def _leave_rest(self) -> None:
         self._numbered.leave_rest()
         for fields in (*self._eroding.values(), *self._states.values()):
             if not fields.entry.decided:
-                fields.entry.leave("no part that is translated has it")
+                fields.entry.leave("no translated part uses the keyword")

@@ -13,7 +13,7 @@ Curve = tuple[tuple[float, float], ...]
 
 @dataclass
 class NodeSet:
-    """``*SET_NODE`` or ``*SET_SEGMENT``: nodes, or parts whose nodes it contains."""
+    """Node set of ``*SET_NODE`` or ``*SET_SEGMENT``: nodes, and parts whose nodes belong to the set."""
 
     number: int
     title: str
@@ -21,16 +21,16 @@ class NodeSet:
     nodes: set[int] = field(default_factory=set)
     parts: set[int] = field(default_factory=set)
     sets: set[int] = field(default_factory=set)
-    """Sets that a set with ``_ADD`` includes."""
+    """Numbers of other sets that the set includes (option ``_ADD``)."""
     ranges: list[range] = field(default_factory=list)
-    """Ranges of node numbers; nodes of some numbers may be missing."""
+    """Ranges of node numbers; not every number in a range needs to be a node."""
     everything: bool = False
     odd: str = ""
-    """Reason for which the nodes of the set are unknown; empty for known nodes."""
+    """Reason why the nodes of the set are unknown; empty if the nodes are known."""
 
 
 def titled(block: Block, options: frozenset[str]) -> tuple[str, list[Card]]:
-    """Returns the title of a keyword with the option TITLE, and its other cards."""
+    """Returns the title of a keyword with the option TITLE, and the cards after the title."""
     cards = list(block.cards)
     if "TITLE" in options and cards:
         return cards[0].text.strip(), cards[1:]
@@ -49,7 +49,7 @@ def node_set(block: Block, options: frozenset[str], entry: Entry) -> NodeSet:
         ends = numbers(block, rest, "nid")
         for first, last in zip(ends[::2], ends[1::2], strict=False):
             if last < first:
-                raise block.error(rest[0], f"no numbers lead from {first} to {last}")
+                raise block.error(rest[0], f"the range from {first} to {last} has no numbers")
             found.ranges.append(range(first, last + 1))
     elif "ADD" in options and not options - {"TITLE", "ADD"}:
         found.sets.update(numbers(block, rest, "sid"))
@@ -75,7 +75,7 @@ def _general(found: NodeSet, block: Block, cards: list[Card]) -> None:
 
 
 def segment_set(block: Block, options: frozenset[str], entry: Entry) -> NodeSet:
-    """Reads a set of faces, by their nodes. Raises CardError."""
+    """Reads a set of faces as the set of the nodes of these faces. Raises CardError."""
     title, cards = titled(block, options)
     found = NodeSet(Fields(block, entry, cards, ("SID",)).whole("SID"), title, entry)
     if options - {"TITLE"}:
@@ -93,13 +93,13 @@ def curve(block: Block, options: frozenset[str], entry: Entry) -> tuple[int, Cur
     number = head.whole("LCID")
     along, across = head.nonzero("SFA", 1.0), head.nonzero("SFO", 1.0)
     right, up = head.real("OFFA"), head.real("OFFO")
-    head.refuse("SIDR", "a curve of the dynamic relaxation")
-    head.forgive("DATTYP LCINT", "of no meaning for a curve by time or strain")
+    head.refuse("SIDR", "curve for the dynamic relaxation, which Conoid does not have")
+    head.forgive("DATTYP LCINT", "no effect on a curve over time or strain")
     points = []
     for card in cards[1:]:
         if card.text.strip():
             x, y = (block.real(card, item, "value") for item in block.fields(card, 20, 20))
             points.append((along * (x + right), across * (y + up)))
     if any(a[0] >= b[0] for a, b in pairwise(points)):
-        raise block.error(None, f"the points of the curve {number} do not rise")
+        raise block.error(None, f"the abscissas of the curve {number} do not increase")
     return number, tuple(points)

@@ -1,4 +1,6 @@
-"""Rigid walls of an LS-DYNA deck: planes, cylinders and spheres without an end, at rest, driven, or with a mass."""
+"""Rigid walls of an LS-DYNA deck: infinite planes and cylinders, and spheres; at rest, with prescribed motion, or
+with a mass.
+"""
 
 import math
 from collections.abc import Mapping
@@ -15,18 +17,18 @@ from .scene import Scene
 
 _TAIL, _HEAD = ("XT", "YT", "ZT"), ("XH", "YH", "ZH")
 _SHAPES: Mapping[str, str] = {"CYLINDER": "RADCYL LENCYL NSEGS", "SPHERE": "RADSPH"}
-"""Cards of cylinders and spheres (the manual, *RIGIDWALL_GEOMETRIC)."""
+"""Names of the fields on the cards of cylinders and spheres (the manual, *RIGIDWALL_GEOMETRIC)."""
 OPTIONS = frozenset({"ID", "FORCES", "DISPLAY", "MOVING", "MOTION", *_SHAPES})
-"""Options that are translated. The options ORTHO, FINITE, FLAT and PRISM are not translated."""
+"""Options of rigid walls that are translated. The options ORTHO, FINITE, FLAT and PRISM are not translated."""
 
 
 def planar(scene: Scene, block: Block, options: frozenset[str], entry: Entry) -> None:
-    """``*RIGIDWALL_PLANAR``: a plane without end, at rest or with a mass and a speed along its normal."""
+    """Reads ``*RIGIDWALL_PLANAR``: an infinite plane at rest, or with a mass and a speed along its normal."""
     layout = ["NSID NSIDEX BOXID OFFSET BIRTH DEATH RWKSF", "XT YT ZT XH YH ZH FRIC WVEL"]
     layout += ["MASS V0"] if "MOVING" in options else []
     fields = Fields(block, entry, _cards(block, options, len(layout)), layout)
     fields.refuse("OFFSET", "an offset is not translated")
-    fields.forgive("RWKSF WVEL", "how rigid bodies meet the wall, and a threshold of welding")
+    fields.forgive("RWKSF WVEL", "settings of contact with rigid bodies and of welding")
     table: dict[str, Any] = {"kind": "wall", "point": _point(scene, fields), "normal": _direction(fields)}
     if "MOVING" in options:
         _moving(scene, fields, table)
@@ -34,10 +36,12 @@ def planar(scene: Scene, block: Block, options: frozenset[str], entry: Entry) ->
 
 
 def geometric(scene: Scene, block: Block, options: frozenset[str], entry: Entry) -> None:
-    """``*RIGIDWALL_GEOMETRIC_CYLINDER`` without an end and ``_SPHERE``, at rest or moved by a curve (``_MOTION``)."""
+    """Reads ``*RIGIDWALL_GEOMETRIC_CYLINDER`` (infinite) and ``_SPHERE``, at rest or moved by a curve (option
+    ``_MOTION``).
+    """
     shape = next((name for name in _SHAPES if name in options), "")
     if not shape:
-        raise ValueError("a cylinder or a sphere is translated")
+        raise ValueError("only cylinders and spheres are translated")
     layout = ["NSID NSIDEX BOXID BIRTH DEATH", "XT YT ZT XH YH ZH FRIC", _SHAPES[shape]]
     layout += ["LCID OPT VX VY VZ"] if "MOTION" in options else []
     fields = Fields(block, entry, _cards(block, options, len(layout)), layout)
@@ -46,17 +50,17 @@ def geometric(scene: Scene, block: Block, options: frozenset[str], entry: Entry)
     table["radius"] = scene.draft.quantity(radius, LENGTH)
     if shape == "CYLINDER":
         table["axis"] = _direction(fields)
-        fields.refuse("LENCYL", "the cylinder ends; a wall does not, a rigid part of that shape does")
+        fields.refuse("LENCYL", "the cylinder is finite; walls of Conoid are infinite: use a rigid part of this shape")
         fields.forgive("NSEGS", "segments of output")
     else:
-        fields.forgive(" ".join(_HEAD), "of no meaning for a sphere")
+        fields.forgive(" ".join(_HEAD), "no effect on a sphere")
     if "MOTION" in options:
         _driven(scene, fields, table)
     _stand(scene, fields, table)
 
 
 def _cards(block: Block, options: frozenset[str], count: int) -> list[Any]:
-    """Returns the cards of the wall, without the card of its number and cards that only request output."""
+    """Returns the cards of a wall without the card of its identifier and without cards that only request output."""
     cards = list(block.cards["ID" in options :])
     return cards[:count] if options & {"FORCES", "DISPLAY"} else cards
 
@@ -68,12 +72,14 @@ def _point(scene: Scene, fields: Fields) -> list[str | float]:
 def _direction(fields: Fields) -> list[float]:
     along = [fields.real(b) - fields.real(a) for a, b in zip(_TAIL, _HEAD, strict=True)]
     if not any(along):
-        raise ValueError("its direction, from XT YT ZT to XH YH ZH, has no length")
+        raise ValueError("the direction of the wall, from XT YT ZT to XH YH ZH, has no length")
     return along
 
 
 def _moving(scene: Scene, fields: Fields, table: dict[str, Any]) -> None:
-    """Reads the mass of a wall, and its initial speed along the normal. A speed without a mass is refused."""
+    """Reads the mass of a wall and its initial speed along the normal. A wall with a speed and without a mass
+    refuses the import.
+    """
     along, speed, mass = table["normal"], fields.real("V0"), fields.real("MASS")
     length = math.hypot(*along)
     if speed:
@@ -81,14 +87,17 @@ def _moving(scene: Scene, fields: Fields, table: dict[str, Any]) -> None:
     if mass > 0.0:
         table["mass"] = scene.draft.quantity(mass, MASS)
         if fields.real("FRIC"):
-            fields.differ("FRIC", "in LS-DYNA the wall moves only along its normal; in Conoid friction moves it, too")
+            fields.differ(
+                "FRIC",
+                "in LS-DYNA the wall moves only along its normal; in Conoid friction also moves it along the plane",
+            )
     elif speed:
-        fields.refuse("V0", "a speed without MASS; give the wall a mass, or velocity and course")
+        fields.refuse("V0", "the wall has a speed and no MASS; give the wall a mass, or velocity and course")
 
 
 def _driven(scene: Scene, fields: Fields, table: dict[str, Any]) -> None:
-    """Reads a velocity or a displacement from a curve, along a direction. The length of the direction does not scale
-    the motion.
+    """Reads the velocity or the displacement of a wall from a curve, along a direction vector. The length of the
+    vector does not scale the motion.
     """
     along = [fields.real(name) for name in ("VX", "VY", "VZ")]
     length = math.hypot(*along)
@@ -102,10 +111,10 @@ def _driven(scene: Scene, fields: Fields, table: dict[str, Any]) -> None:
 
 
 def _stand(scene: Scene, fields: Fields, table: dict[str, Any]) -> None:
-    """Adds a wall, and reads the fields that all kinds of walls have: stopped nodes, times, and friction."""
-    fields.refuse("NSIDEX BOXID BIRTH", "exceptions, boxes and times are not translated")
+    """Adds a wall, and reads the fields that all walls have: stopped nodes, start and end, friction."""
+    fields.refuse("NSIDEX BOXID BIRTH", "excepted nodes, boxes and times are not translated")
     if 0.0 < fields.real("DEATH") < scene.end:
-        fields.refuse("DEATH", "the wall is removed before the run ends; in Conoid it stays")
+        fields.refuse("DEATH", "the wall is removed before the run ends; in Conoid the wall stays")
     friction = fields.real("FRIC")
     if not 0.0 <= friction < 1.0:
         fields.refuse("FRIC", "in the deck nodes stick to the wall; Conoid has Coulomb friction")

@@ -1,71 +1,77 @@
-"""Keywords of LS-DYNA that are omitted, with the reason; a keyword in no table refuses the import."""
+"""Keywords of LS-DYNA that are omitted, with the reason, and keywords that refuse the import. A keyword in no table
+also refuses the import.
+"""
 
 LEFT: dict[str, str] = {
     "KEYWORD": "the format of the file",
     "END": "the end of the deck",
     "COMMENT": "a comment",
-    "PARAMETER": "its values are inserted where the deck uses them",
-    "INCLUDE": "the file is read as a part of the deck",
-    "DATABASE": "output: a run writes frames, history.csv and probes",
+    "PARAMETER": "the values are inserted where the deck uses them",
+    "INCLUDE": "the included file is read as a part of the deck",
+    "DATABASE": "request of output; a run writes frames, history.csv and probes",
     "HOURGLASS": "tets have no hourglass modes",
-    "SECTION_SOLID": "how elements are integrated: all solids are tets with numerics.pressure",
-    "CONTROL_ACCURACY": "how the other code computes",
+    "SECTION_SOLID": "sets how elements are integrated; in Conoid all solids are tets: numerics.pressure",
+    "CONTROL_ACCURACY": "setting of the other code's algorithms",
     "CONTROL_BULK_VISCOSITY": "Conoid uses its own values (numerics.viscosity)",
-    "CONTROL_CONTACT": "how the other code computes contact",
-    "CONTROL_CPU": "a limit of wall time: run.max_wall_time",
+    "CONTROL_CONTACT": "setting of the other code's contact algorithm",
+    "CONTROL_CPU": "limit of the wall time; in Conoid: run.max_wall_time",
     "CONTROL_ENERGY": "Conoid always writes all energies",
     "CONTROL_HOURGLASS": "tets have no hourglass modes",
-    "CONTROL_MPP": "how the other code divides the work: run.ranks",
+    "CONTROL_MPP": "division of the work among processes; in Conoid: run.ranks",
     "CONTROL_OUTPUT": "output",
-    "CONTROL_PARALLEL": "how the other code divides the work: run.threads",
+    "CONTROL_PARALLEL": "division of the work among threads; in Conoid: run.threads",
     "CONTROL_SHELL": "how shells are computed",
-    "CONTROL_SOLID": "how the other code computes solids",
-    "CONTROL_UNITS": "units are those of --units",
+    "CONTROL_SOLID": "setting of the other code's solid elements",
+    "CONTROL_UNITS": "the import takes the units from --units",
     "INTERFACE_SPRINGBACK": "output for another run",
     "DEFINE_BOX": "not used by any translated keyword",
     "DEFINE_COORDINATE": "not used by any translated keyword",
     "DEFINE_VECTOR": "not used by any translated keyword",
     "DEFINE_TABLE": "not used by any translated keyword",
 }
-"""Omitted keywords, identified by their first words."""
+"""Omitted keywords with the reason. A key of the table is the first words of a keyword."""
 
 REFUSED: dict[str, str] = {
     "ELEMENT_SHELL": "shells: Conoid has solids only",
     "ELEMENT_TSHELL": "thick shells: Conoid has solids only",
     "ELEMENT_BEAM": "beams: Conoid has solids only",
-    "ELEMENT_DISCRETE": "springs and dashpots: Conoid has none",
-    "ELEMENT_MASS": "masses of nodes: Conoid has none",
+    "ELEMENT_DISCRETE": "Conoid has no springs and dashpots",
+    "ELEMENT_MASS": "masses at nodes: Conoid has no such masses",
     "ELEMENT_SEATBELT": "belts: Conoid has none",
     "ELEMENT_SPH": "particles: Conoid has tets only",
     "CONSTRAINED": "joins or holds nodes in a way that is not translated",
-    "DAMPING": "damping of bodies: Conoid has none",
+    "DAMPING": "Conoid has no damping of bodies",
     "CONTROL_IMPLICIT": "an implicit analysis; Conoid is explicit",
-    "CONTROL_THERMAL": "conduction of heat; Conoid computes none",
-    "CONTROL_DYNAMIC_RELAXATION": "a state before the start, which a case does not have",
+    "CONTROL_THERMAL": "Conoid computes no conduction of heat",
+    "CONTROL_DYNAMIC_RELAXATION": "a relaxation before the start, which Conoid does not have",
     "INITIAL_STRESS": "initial stresses; in Conoid bodies start without stress",
     "INITIAL_STRAIN": "initial strains; in Conoid bodies start without strain",
-    "LOAD": "a load that is not translated",
-    "BOUNDARY": "a boundary that is not translated",
-    "INITIAL": "a state at the start that is not translated",
-    "RIGIDWALL": "a finite rigid wall, or friction that depends on the direction: walls of a case are whole planes, "
-    "cylinders and spheres; use a rigid part (parts[].rigid) of its shape instead",
+    "LOAD": "this load is not translated",
+    "BOUNDARY": "this boundary condition is not translated",
+    "INITIAL": "this initial condition is not translated",
+    "RIGIDWALL": "a finite rigid wall, or friction that depends on the direction; walls of a case are infinite planes, "
+    "cylinders and spheres: use a rigid part (parts[].rigid) of this shape instead",
     "CONSTRAINED_NODAL_RIGID_BODY": "a rigid body of nodes; parts[].rigid makes a whole part rigid",
     "CONSTRAINED_EXTRA_NODES": "nodes that move with a rigid body; [[bond]] ties deformable parts to each other",
-    "CONSTRAINED_RIGID_BODIES": "merged rigid bodies; make one part of them",
-    "CONSTRAINED_JOINT": "joints between rigid bodies: Conoid has none",
-    "CONSTRAINED_TIED_NODES_FAILURE": "nodes that separate at a strain; [[bond]] has a strength and an energy",
+    "CONSTRAINED_RIGID_BODIES": "merged rigid bodies; make one part of these bodies",
+    "CONSTRAINED_JOINT": "Conoid has no joints between rigid bodies",
+    "CONSTRAINED_TIED_NODES_FAILURE": "nodes that separate at a plastic strain; a [[bond]] has a strength and an "
+    "energy instead",
     "CONSTRAINED_SPOTWELD": "welds of nodes; [[bond]] ties faces",
-    "CONTACT": "a contact that is not translated",
+    "CONTACT": "this contact is not translated",
     "SECTION": "no section of solids",
     "MAT": "Conoid has no such material law",
     "EOS": "Conoid has no such equation of state",
-    "INCLUDE": "includes that move or change what they bring are not supported",
+    "INCLUDE": "includes that move or change the included nodes and elements are not supported",
 }
-"""Keywords that change the answer, identified by their first words."""
+"""Keywords that change the answer, with the reason for the refusal. A key of the table is the first words of a
+keyword."""
 
 
 def reason(name: str, table: dict[str, str]) -> str | None:
-    """Returns the reason of the longest beginning of a keyword; a beginning ends between words."""
+    """Returns the reason for the longest key of ``table`` with which a keyword begins; the key must end at a word of
+    the keyword.
+    """
     words = name.split("_")
     for count in range(len(words), 0, -1):
         if found := table.get("_".join(words[:count])):

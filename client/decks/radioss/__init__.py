@@ -1,1 +1,1 @@
-"""Radioss starter and engine decks."""
+"""Import of Radioss starter and engine decks."""

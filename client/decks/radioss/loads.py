@@ -1,4 +1,4 @@
-"""Motions, restraints, walls and contacts of a Radioss deck, and the engine file."""
+"""Motions, restraints and contacts of a Radioss starter, and the options of the engine file."""
 
 from collections.abc import Callable
 from typing import Any
@@ -14,7 +14,7 @@ from .walls import WALLS, wall
 
 
 def take(scene: Scene, option: Option, entry: Entry) -> None:
-    """Reads an option of this group. Raises CardError, ValueError."""
+    """Reads an option of loads, motions or output. Raises CardError, ValueError."""
     words = [*option.words, "", ""]
     handler = _HANDLERS.get((words[0], words[1])) or _HANDLERS.get((words[0], ""))
     if handler is not None:
@@ -50,12 +50,14 @@ def _restraint(scene: Scene, option: Option, entry: Entry) -> None:
         fields.refuse("SKEW", "local axes are not translated")
         code = fields.text("CODE").split()
         if not code or len(code[0]) != 3 or set("".join(code)) - set("01"):
-            raise ValueError(f"line {row[0]}: {' '.join(code)!r} is no code of translations and rotations")
+            raise ValueError(f"line {row[0]}: {' '.join(code)!r} is not a code of translations and rotations")
         chosen = scene.nodes(fields.whole("GRNOD"), entry)
         speeds = {axis: 0.0 for axis, held in zip("xyz", code[0], strict=True) if held == "1"}
         if chosen.bodies and chosen.bodies & scene.rigid:
             if code[1:] != ["111"] or not speeds:
-                raise ValueError("a rigid body that is held along some axes and turns is not supported (111)")
+                raise ValueError(
+                    "a rigid body with fixed axes and free rotations is not supported; fix all rotations (111)"
+                )
         elif len(code) > 1 and "1" in code[1]:
             entry.remark("left", f"rotations {code[1]}", "nodes of solids have none")
         if speeds:
@@ -65,7 +67,7 @@ def _restraint(scene: Scene, option: Option, entry: Entry) -> None:
 
 
 def _scaled(scene: Scene, fields: Fields, entry: Entry, names: tuple[str, str]) -> Course:
-    """Returns times and values of a function, with its scales. Raises ValueError."""
+    """Returns times and values of a function, multiplied by their scale factors. Raises ValueError."""
     along, across = fields.nonzero(names[0], 1.0), fields.nonzero(names[1], 1.0)
     return tuple((along * time, across * value) for time, value in scene.curve(fields.whole("FCT"), entry))
 
@@ -75,7 +77,7 @@ def _motion(scene: Scene, option: Option, entry: Entry) -> None:
     fields = Fields(option, entry, option.rows[1:], layout)
     fields.refuse("SKEW SENS FRAME ICOOR TSTART", "local axes, sensors and later starts are not translated")
     if 0.0 < fields.real("TSTOP") < scene.end:
-        fields.refuse("TSTOP", "the motion ends before the run; in Conoid it lasts to the end")
+        fields.refuse("TSTOP", "the motion ends before the run; in Conoid a motion lasts until the end")
     axis = fields.text("DIR").lower()
     if axis not in ("x", "y", "z"):
         raise ValueError(f"Dir = {axis!r} is not X, Y or Z")
@@ -110,34 +112,37 @@ def _gravity(scene: Scene, option: Option, entry: Entry) -> None:
 
 
 def _values(option: Option) -> list[float]:
-    """Reads the numbers of the engine file, between blanks. Raises CardError."""
+    """Reads the numbers of an option of the engine file; blanks separate the numbers. Raises CardError."""
     return [real(line, item, option.shown) for line, text in option.rows for item in text.split()]
 
 
 def _frames(scene: Scene, option: Option, entry: Entry) -> None:
-    """Reads ``/ANIM/DT`` and ``/H3D/DT``: a start and an interval."""
+    """Reads the start and the interval of frames from ``/ANIM/DT`` or ``/H3D/DT``."""
     values = _values(option)
     scene.draft.set_frames(0.0, values[1] if len(values) > 1 else 0.0, scene.end, entry)
 
 
 def _step(scene: Scene, option: Option, entry: Entry) -> None:
-    """Reads ``/DT``: the factor of the stable step; ``/DT/...`` are limits of elements and nodes."""
+    """Reads ``/DT``, the factor of the stable time step. An option ``/DT/...`` sets limits for elements and nodes."""
     values = _values(option) if len(option.words) == 1 else []
     if len(option.words) > 1 or not values or not 0.0 < values[0] <= 1.0:
         entry.leave("limits of the time step: Conoid does not scale masses, and only parts[].erosion deletes tets")
         return
     scene.draft.numerics["dt_safety"] = values[0]
-    entry.remark("differs", f"{values[0]:g}", "of the bound of this solver: numerics.dt_safety")
+    entry.remark(
+        "differs", f"{values[0]:g}", "in Conoid the factor scales Conoid's own stable step: numerics.dt_safety"
+    )
     entry.take("numerics.dt_safety")
 
 
-_PENALTY = "stiffness, gap and damping of the penalty method"
+_PENALTY = "setting of stiffness, gap or damping of the penalty method"
 _GENERAL = (
     "SURF1: SURF2: ISTF: ITHE: IGAP: IREM_I2: -: IDEL: IEDGE: IPSTIF:", "GRNOD: -: GAP_SCALE MESH_SIZE GAP_S GAP_M",
     "STMIN STMAX IGAP0: IPEN0: IPEN_MAX STFAC_MDT", "STFAC FRIC - TSTART TSTOP",
     "IBC: -: IVIS2: INACTI: VIS_S ITHICK: -: PMAX", "IFRIC: IFILTR: XFREQ -: SENS: DTSTIF -: FRIC_ID:",
 )  # fmt: skip
-"""Lines of TYPE24 and TYPE25, whose settings of the penalty method differ (Reference Guide, /INTER/TYPE24)."""
+"""Names of the fields on the lines of TYPE24 and TYPE25. The lines differ in settings of the penalty method
+(Reference Guide, /INTER/TYPE24)."""
 _LAYOUTS: dict[str, tuple[str, ...]] = {
     "TYPE2": ("GRNOD: SURF: IGNORE: SPOTFLAG: LEVEL: ISEARCH: IDEL: -: DSEARCH",),
     "TYPE7": (
@@ -153,16 +158,18 @@ Surface = Callable[[str, int, Entry], frozenset[str]]
 
 
 def contact(option: Option, entry: Entry, surface: Surface) -> Meeting:
-    """Reads ``/INTER/TYPE7`` and ``TYPE2``: nodes of a group on faces of a surface; ``TYPE24`` and ``TYPE25``:
-    surfaces on each other, and self-contact. Raises CardError, ValueError.
+    """Reads ``/INTER``: contact between nodes of a group and faces of a surface (``TYPE7``, ``TYPE2``), or between
+    surfaces and of a surface with itself (``TYPE24``, ``TYPE25``). Raises CardError, ValueError.
     """
     kind = option.words[1]
     fields = Fields(option, entry, option.rows[1:], _LAYOUTS[kind])
     if kind == "TYPE2":
-        fields.forgive("IGNORE SPOTFLAG LEVEL ISEARCH IDEL DSEARCH", "how the other code ties nodes")
+        fields.forgive("IGNORE SPOTFLAG LEVEL ISEARCH IDEL DSEARCH", "setting with which Radioss ties nodes")
         fields.extra.clear()
         return _meeting(fields, surface, ("GRNOD", "SURF"), 0.0)
-    fields.refuse("TSTART SENS IFRIC FRIC_ID ITHE IVIS2 PMAX", "contact that begins later, or with another friction")
+    fields.refuse(
+        "TSTART SENS IFRIC FRIC_ID ITHE IVIS2 PMAX", "the contact begins after the start, or has another friction law"
+    )
     names = tuple(name for name in ("GRNOD", "SURF", "SURF1", "SURF2") if fields.whole(name))
     friction = fields.real("FRIC")
     fields.rest("left", _PENALTY)
@@ -170,12 +177,12 @@ def contact(option: Option, entry: Entry, surface: Surface) -> Meeting:
 
 
 def _meeting(fields: Fields, surface: Surface, names: tuple[str, ...], friction: float) -> Meeting:
-    """Returns the bodies of one or two given surfaces; a single surface has self-contact. Raises ValueError."""
+    """Returns a contact of one or two surfaces; a single surface is in contact with itself. Raises ValueError."""
     entry = fields.entry
     if not names or names == ("GRNOD",):
         raise ValueError("no surface is named")
     if len(names) > 2:
-        raise ValueError("a group of nodes beside two surfaces is not translated")
+        raise ValueError("a group of nodes in addition to two surfaces is not translated")
     sides = [surface(name.rstrip("12"), fields.whole(name), entry) for name in names]
     return Meeting(sides[0], None if sides[0] == sides[-1] else sides[-1], friction, entry)
 

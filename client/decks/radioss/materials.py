@@ -1,6 +1,7 @@
 """Conversion of materials, equations of state and failure of Radioss to Conoid (Reference Guide, "Material laws").
 
-Differences of the formulas are notes of the option; docs/howto/import.md compares the formulas.
+Where the formulas of Radioss and Conoid differ, the account of the import has a note; docs/howto/import.md compares
+the formulas.
 """
 
 from collections.abc import Callable
@@ -13,7 +14,7 @@ from ..units import DENSITY, RATE, SPECIFIC_HEAT, SPEED, STRESS, TEMPERATURE, Sy
 from .text import Fields
 
 NAMES = {"ELAST": "LAW1", "PLAS_JOHNS": "LAW2", "HYD_JCOOK": "LAW4", "JOHN_HOLM": "LAW79"}
-"""Alternative names of laws."""
+"""Numbers of material laws (LAW1, ...) by their names in the guide."""
 
 LAYOUTS: dict[str, tuple[str, ...]] = {
     "LAW1": ("RHO_I RHO_0", "E NU"),
@@ -31,25 +32,25 @@ LAYOUTS: dict[str, tuple[str, ...]] = {
     "GRUNEISEN": ("C S1 S2 S3", "GAMMA0 ALPHA E0 RHO_0"),
     "JOHNSON": ("D1 D2 D3 D4 D5", "EPS_DOT_0 IFAIL_SH: IFAIL_SO: - DADV IXFEM:"),
 }  # fmt: skip
-"""Fields of the lines after the title of an option, with the names of the guide."""
+"""Names of the fields on the lines after the title of an option, as in the guide."""
 
 
 @dataclass
 class Context:
-    """The context of a material besides its own lines."""
+    """Data of the deck that the conversion of a material needs in addition to the material's own lines."""
 
     system: System
     eos: Fields | None = None
     failure: Fields | None = None
 
     def stress(self, value: float) -> str | float:
-        """Returns a number with its unit."""
+        """Returns a stress of the deck with its unit."""
         return self.system.quantity(value, STRESS)
 
 
 def translated(law: str, fields: Fields, context: Context) -> Made | None:
-    """Returns the material of an option; None, with the reason in its entry, for one that Conoid lacks. Raises
-    CardError.
+    """Returns the material of an option. Returns None, and writes the reason into the entry, if Conoid lacks the
+    material law. Raises CardError.
     """
     make = _LAWS.get(law)
     if make is None:
@@ -58,20 +59,20 @@ def translated(law: str, fields: Fields, context: Context) -> Made | None:
     try:
         made = make(fields, context)
     except (ValueError, ZeroDivisionError) as error:
-        fields.entry.refuse(f"its constants cannot be used: {error}")
+        fields.entry.refuse(f"the constants of the material cannot be used: {error}")
         return None
     if fields.real("RHO_0") not in (0.0, fields.real("RHO_I")):
-        fields.refuse("RHO_0", "the material starts compressed or stretched in the deck, unstrained in Conoid")
+        fields.refuse("RHO_0", "in the deck the material starts compressed or stretched, in Conoid without strain")
     fields.rest()
     return made
 
 
 def _elastic(fields: Fields, context: Context, law: str) -> dict[str, Any]:
-    """Returns density, elasticity, and the equation of state if there is one."""
+    """Returns density, elastic constants, and the equation of state if the deck has one."""
     density, young, poisson = fields.real("RHO_I"), fields.real("E"), fields.real("NU")
     material: dict[str, Any] = {"density": context.system.quantity(density, DENSITY)}
     if context.eos is not None and law != "LAW4":
-        context.eos.entry.refuse(f"{law} takes its pressure from E and NU; with an equation of state give LAW4")
+        context.eos.entry.refuse(f"{law} computes the pressure from E and NU; use LAW4 with an equation of state")
     elif context.eos is not None:
         shear = shear_of(young, poisson)
         speed = context.eos.real("C")
@@ -100,17 +101,21 @@ def _law1(fields: Fields, context: Context) -> Made:
 
 def _law2(fields: Fields, context: Context) -> Made:
     if fields.whole("IFLAG"):
-        raise ValueError("IFLAG = 1: give A, B and N, not yield and ultimate stress")
-    fields.refuse("CHARD", "partly kinematic hardening; Conoid has isotropic hardening")
-    fields.forgive("ICC FSMOOTH FCUT", "how the rate is filtered")
+        raise ValueError("IFLAG = 1: give A, B and N instead of yield and ultimate stress")
+    fields.refuse("CHARD", "partly kinematic hardening; Conoid has only isotropic hardening")
+    fields.forgive("ICC FSMOOTH FCUT", "setting of the filter of the strain rate")
     return _plastic(fields, context, 298.0, "LAW2")
 
 
 def _law4(fields: Fields, context: Context) -> Made:
-    fields.forgive("TMAX", "a temperature from which on nothing changes") if fields.real("TMAX") >= 1e9 else None
+    fields.forgive("TMAX", "temperature above which the flow stress is constant") if fields.real(
+        "TMAX"
+    ) >= 1e9 else None
     if context.eos is None:
         fields.entry.remark(
-            "differs", "no /EOS", "p = K (V0/V - 1) in Radioss, K ln(V0/V) in Conoid: 1 % less at 2 % compression"
+            "differs",
+            "no /EOS",
+            "p = K (V0/V - 1) in Radioss, K ln(V0/V) in Conoid: Conoid's pressure is 1 % lower at 2 % compression",
         )
     made = _plastic(fields, context, 300.0, "LAW4")
     pressure = fields.real("PMIN")
@@ -121,7 +126,7 @@ def _law4(fields: Fields, context: Context) -> Made:
 
 
 def _plastic(fields: Fields, context: Context, room: float, kind: str) -> Made:
-    """Reads Johnson-Cook's law; linear hardening if it has neither rate nor heat and n is 1."""
+    """Reads the Johnson-Cook law. The result is linear hardening if the law has neither rate nor heat and n is 1."""
     if 0.0 < fields.real("SIG_MAX") < 1e20:
         fields.refuse("SIG_MAX", "Conoid has no limit of the flow stress")
     material = _elastic(fields, context, kind)
@@ -131,7 +136,7 @@ def _plastic(fields: Fields, context: Context, room: float, kind: str) -> Made:
         law: dict[str, Any] = {"model": "linear_hardening", "yield_stress": context.stress(A)}
         if B:
             law["hardening"] = context.stress(B)
-        fields.forgive("M TMELT TR EPS_DOT_0", "of no meaning without rate and heat")
+        fields.forgive("M TMELT TR EPS_DOT_0", "no effect without strain rate and heat")
         return Made({**material, "strength": law}, _limit(fields))
     law = {"model": "johnson_cook", "A": context.stress(A), "B": context.stress(B), "n": n, "C": C}
     law |= _rate(fields, context) | _heat(fields, context, heats, room)
@@ -145,23 +150,27 @@ def _rate(fields: Fields, context: Context) -> dict[str, Any]:
         raise ValueError("EPS_DOT_0, the reference rate, is not above 0")
     if not fields.real("C"):
         return {}
-    fields.differ("C", "rate of the total strain in Radioss, of the plastic strain in Conoid")
+    fields.differ("C", "Radioss uses the rate of the total strain, Conoid the rate of the plastic strain")
     return {"reference_rate": context.system.quantity(rate, RATE)}
 
 
 def _heat(fields: Fields, context: Context, heats: bool, room: float) -> dict[str, Any]:
-    """Reads thermal softening; no heating if the heat capacity or the exponent is 0."""
+    """Reads thermal softening. Plastic work does not heat the material if the heat capacity or the exponent is 0."""
     cold = context.system.quantity(fields.nonzero("TR", room), TEMPERATURE)
     if not fields.real("TR") and heats:
-        fields.differ("TR", f"{room:g} K, the default of Radioss")
+        fields.differ("TR", f"not given; {room:g} K, the default of Radioss, is used")
     if not heats:
-        fields.forgive("M TMELT RHOCP", "of no meaning without both M and RHOCP")
-        fields.entry.remark("differs", "no heat", "no work becomes heat (taylor_quinney = 0): melt_temperature and "
-                            "specific_heat have no meaning")  # fmt: skip
+        fields.forgive("M TMELT RHOCP", "no effect without both M and RHOCP")
+        fields.entry.remark(
+            "differs",
+            "no heat",
+            "no plastic work becomes heat (taylor_quinney = 0); melt_temperature and specific_heat have no effect",
+        )
         return {"m": 1.0, "reference_temperature": cold, "melt_temperature": "2000 K", "specific_heat": "1000 J/kg/K",
                 "taylor_quinney": 0.0}  # fmt: skip
-    fields.entry.remark("differs", "taylor_quinney = 1", "in Radioss the whole internal energy becomes heat, "
-                        "in Conoid the whole plastic work")  # fmt: skip
+    fields.entry.remark(
+        "differs", "taylor_quinney = 1", "in Radioss all internal energy heats the material, in Conoid all plastic work"
+    )
     heat = fields.real("RHOCP") / fields.real("RHO_I")
     return {
         "m": fields.real("M"), "reference_temperature": cold,
@@ -171,7 +180,9 @@ def _heat(fields: Fields, context: Context, heats: bool, room: float) -> dict[st
 
 
 def _limit(fields: Fields) -> dict[str, Any]:
-    """Reads a failure strain of the law. In Radioss a failed tet keeps its pressure; in Conoid the tet is deleted."""
+    """Reads the failure strain of a strength law. In Radioss a failed tet keeps its pressure; in Conoid the tet is
+    deleted.
+    """
     strain = fields.real("EPS_MAX")
     if not 0.0 < strain < 1e20:
         return {}
@@ -180,7 +191,7 @@ def _limit(fields: Fields) -> dict[str, Any]:
 
 
 def _damage(law: dict[str, Any], context: Context) -> dict[str, Any]:
-    """Reads ``/FAIL/JOHNSON``: D3 has the same sign as in Conoid."""
+    """Reads ``/FAIL/JOHNSON``. Its constant D3 has the same sign in Radioss and Conoid."""
     found = context.failure
     if found is None:
         return {}
@@ -189,10 +200,13 @@ def _damage(law: dict[str, Any], context: Context) -> dict[str, Any]:
     if rate > 0.0:
         wanted = context.system.quantity(rate, RATE)
         if law.setdefault("reference_rate", wanted) != wanted:
-            found.refuse("EPS_DOT_0", f"in Conoid damage and strength have one reference rate, {law['reference_rate']}")
+            found.refuse(
+                "EPS_DOT_0",
+                f"in Conoid the damage law uses the reference rate of the strength law, {law['reference_rate']}",
+            )
     found.forgive("IFAIL_SH IXFEM DADV", "of shells")
     if found.whole("IFAIL_SO") not in (0, 1):
-        found.refuse("IFAIL_SO", "in Radioss a failed element keeps no strength; in Conoid its tet is deleted")
+        found.refuse("IFAIL_SO", "in Radioss a failed element keeps no strength; in Conoid the tet is deleted")
     found.rest()
     return {"damage": 1.0}
 
@@ -207,15 +221,15 @@ def _law79(fields: Fields, context: Context) -> Made:
     }  # fmt: skip
     law["reference_rate"] = context.system.quantity(fields.nonzero("EPS_DOT_0", 1.0), RATE)
     if fields.real("T") < 0.0:
-        fields.differ("T", "taken without its sign: T is a tension in Conoid")
+        fields.differ("T", "converted without the sign, because T is positive in tension in Conoid")
     if 0.0 < fields.real("SIG_FMAX") < 1e19:
         law["largest_fractured"] = fields.real("SIG_FMAX")
-    fields.forgive("FCUT", "how the rate is filtered")
+    fields.forgive("FCUT", "setting of the filter of the strain rate")
     if fields.whole("IDEL"):
-        fields.refuse("IDEL", "a criterion by which elements leave: give parts[].erosion")
+        fields.refuse("IDEL", "criterion for the deletion of elements; in Conoid: parts[].erosion")
         fields.real("EPSMAX")
     else:
-        fields.forgive("EPSMAX", "of no meaning without IDEL")
+        fields.forgive("EPSMAX", "no effect without IDEL")
     material = {"density": context.system.quantity(fields.real("RHO_I"), DENSITY)}
     return Made({**material, "elastic": {"young": context.stress(young), "poisson": poisson}, "strength": law})
 

@@ -1,5 +1,5 @@
-"""Nodes of the parts of a Radioss starter and their positions. The starter is read a second time if keywords need
-the nodes.
+"""Nodes of the parts of a Radioss starter and their positions. The import reads the starter a second time if
+keywords need the nodes.
 """
 
 from pathlib import Path
@@ -25,7 +25,7 @@ def read_points(path: Path) -> dict[int, Point]:
 
 
 def read_nodes(path: Path) -> dict[str, set[int]]:
-    """Returns the nodes of each part with solids, by its number as text. Raises CardError."""
+    """Returns the nodes of each part with solids; the keys are part numbers as text. Raises CardError."""
     nodes: dict[str, set[int]] = {}
     for option in options(Included(path)):
         if option.words[0] in SOLIDS:
@@ -34,8 +34,8 @@ def read_nodes(path: Path) -> dict[str, set[int]]:
 
 
 def _solids(option: Option) -> set[int]:
-    """Yields the nodes of elements of a fixed number of nodes, over as many lines as needed: a number, then the
-    nodes.
+    """Yields the nodes of each element of an option. An element takes as many lines as needed: first its number,
+    then its nodes.
     """
     count, found = SOLIDS[option.words[0]], set[int]()
     row: list[int] = []

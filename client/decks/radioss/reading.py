@@ -25,12 +25,14 @@ from .words import LEFT, REFUSED, SOLIDS
 
 
 class Radioss:
-    """The options of a starter and its engine file, with their translation."""
+    """Reader of a starter and its engine file: their options and the translation to a case."""
 
     kind = "Radioss starter"
 
     def __init__(self, path: Path) -> None:
-        """Reads all of ``path``, and ``NAME_0001.rad`` beside ``NAME_0000.rad``. Raises CardError, OSError."""
+        """Reads a starter, ``path``, and the engine file ``NAME_0001.rad`` beside ``NAME_0000.rad``. Raises
+        CardError, OSError.
+        """
         self.path, self.account = path, Account()
         self.own_units: System | None = None
         self.title = ""
@@ -43,7 +45,7 @@ class Radioss:
         self._groups: dict[tuple[str, int], tuple[Option, Entry]] = {}
         self._curves: dict[int, tuple[Option, Entry]] = {}
         self._mains: dict[int, str] = {}
-        """Main nodes of rigid bodies, and the keys of these: a load on the node acts on the body."""
+        """Keys of rigid bodies by their main nodes. A load on the main node acts on the rigid body."""
         self._read_all(path, "")
         self._engine()
         for option, entry in self._options:
@@ -65,7 +67,7 @@ class Radioss:
             self._options.append((option, entry))
 
     def _engine(self) -> None:
-        """Returns the path of the engine file, from the name of the starter."""
+        """Returns the path of the engine file, made from the name of the starter."""
         stem = self.path.stem
         engine = self.path.with_name(f"{stem[:-4]}0001{self.path.suffix}") if stem.endswith("_0000") else None
         if engine is None or not engine.is_file():
@@ -112,11 +114,11 @@ class Radioss:
     def _part(self, option: Option, entry: Entry) -> None:
         title = option.rows[0][1].strip() if option.rows else ""
         fields = Fields(option, entry, option.rows[1:], ("PROP: MAT: SUBSET: THICK",))
-        fields.forgive("PROP SUBSET THICK", "how elements are integrated, and groups for people")
+        fields.forgive("PROP SUBSET THICK", "sets how elements are integrated, or groups parts")
         number = str(option.number())
         if number not in self._solid:
             fields.whole("MAT")
-            entry.leave("no solid is of it")
+            entry.leave("the part has no solid element")
             return
         once([body.key for body in self._bodies], number, "part")
         self._bodies.append(Body(number, title, str(fields.whole("MAT")), number, entry))
@@ -124,7 +126,7 @@ class Radioss:
     def _law(self, option: Option, entry: Entry) -> None:
         kind = materials.NAMES.get(option.words[1], option.words[1]) if len(option.words) > 1 else ""
         if option.local:
-            entry.refuse("units of its own (unit_ID) are not translated")
+            entry.refuse("an option with its own units (unit_ID) is not translated")
         if option.words[0] == "FAIL":
             self._failures[option.number()] = Fields(option, entry, option.rows, materials.LAYOUTS.get(kind, ()))
             if kind != "JOHNSON":
@@ -140,7 +142,7 @@ class Radioss:
             self._mats[once(self._mats, option.number(), "material")] = kind, fields, title
 
     def weighed(self) -> Iterator[Weighed]:
-        """Densities of the materials, to find the units."""
+        """Densities and Young's moduli of the materials, from which the import finds the units."""
         for number, (_, fields, title) in self._mats.items():
             try:
                 young = fields.real("E") or None
@@ -190,7 +192,7 @@ class Radioss:
         used = {body.material for body in self._bodies}
         for number, (kind, fields, title) in self._mats.items():
             if str(number) not in used:
-                fields.entry.leave("no part that is translated has it")
+                fields.entry.leave("no translated part uses the option")
                 continue
             eos, failure = self._states.get(number), self._failures.get(number)
             made = Made({})
@@ -217,8 +219,8 @@ class Radioss:
                     self._draft.run["end_time"] = self._draft.quantity(end, TIME)
                     entry.take("run.end_time")
                     return end
-                entry.refuse("the line below has no time above 0")
-        self.account.general.append("there is no /RUN in an engine file: run.end_time is not known")
+                entry.refuse("the line below the option needs an end time above 0")
+        self.account.general.append("no engine file has the option /RUN, so run.end_time is unknown")
         return float("inf")
 
     # Contact ----------------------------------------------------------------------------------------------------------
@@ -241,7 +243,7 @@ class Radioss:
         meet(draft, self._bodies, meetings)
 
     def _surface(self, word: str, number: int, entry: Entry) -> frozenset[str]:
-        """Returns the bodies of ``/SURF/PART`` or of a group of nodes. Raises ValueError."""
+        """Returns the bodies of a surface: ``/SURF/PART``, or a group of nodes. Raises ValueError."""
         if word == "GRNOD":
             full, some = self._topology.whole(self._nodes(number, entry))
             return frozenset((*full, *some))
@@ -250,7 +252,7 @@ class Radioss:
             raise ValueError(f"the surface {number} is not defined")
         option, own = found
         if option.words[1] not in ("PART", "MAT") or option.words[1] == "MAT":
-            raise ValueError(f"the surface {number} is a /SURF/{option.words[1]}; PART is followed")
+            raise ValueError(f"the surface {number} is a /SURF/{option.words[1]}; only /SURF/PART is supported")
         own.take(f"of {entry.keyword}, {entry.place}")
         parts = {str(part) for part in numbers(option.rows[1:], "part")}
         return frozenset(parts & set(self._topology.bodies))
@@ -258,11 +260,11 @@ class Radioss:
     # What options name ------------------------------------------------------------------------------------------------
 
     def _nodes(self, number: int, entry: Entry, within: tuple[int, ...] = ()) -> Chosen:
-        """Returns the nodes of a group; ``within``: numbers of the groups that contain this group. Raises
+        """Returns the nodes of a group. ``within``: numbers of the groups that include this group. Raises
         ValueError.
         """
         if number in within:
-            raise ValueError(f"the group of nodes {number} is within itself")
+            raise ValueError(f"the group of nodes {number} includes itself")
         found = self._groups.get(("GRNOD", number))
         if found is None:
             raise ValueError(f"the group of nodes {number} is not defined")
@@ -271,7 +273,7 @@ class Radioss:
         own.take(f"of {entry.keyword}, {entry.place}")
         items = numbers(option.rows[1:], "node")
         if any(item < 0 for item in items):
-            raise ValueError(f"the group of nodes {number} takes some away by numbers below 0, which is not supported")
+            raise ValueError(f"the group of nodes {number} removes nodes by negative numbers, which is not supported")
         if kind == "PART":
             return Chosen(what, bodies=frozenset(map(str, items)))
         if kind == "NODE" and items and set(items) <= self._mains.keys():
@@ -282,10 +284,10 @@ class Radioss:
         if kind == "GRNOD":
             groups = [self._nodes(item, entry, (*within, number)) for item in items]
             return Chosen(what, nodes=lambda: set().union(*(self._topology.nodes(each) for each in groups)))
-        raise ValueError(f"the group of nodes {number} is a /GRNOD/{kind}; NODE, PART and GRNOD are followed")
+        raise ValueError(f"the group of nodes {number} is a /GRNOD/{kind}; only NODE, PART and GRNOD are supported")
 
     def _curve(self, number: int, entry: Entry) -> tuple[tuple[float, float], ...]:
-        """Returns a function by its number, and marks its keyword as translated. Raises ValueError."""
+        """Returns a function by its number, and marks its option as translated. Raises ValueError."""
         if number not in self._curves:
             raise ValueError(f"the function {number} is not defined")
         option, own = self._curves[number]

@@ -23,15 +23,15 @@ class Moved:
 
 @dataclass
 class Scene:
-    """The parts of the deck that its loads use."""
+    """Parts, nodes and bodies of the deck that its loads use, and the case that the loads change."""
 
     draft: Draft
     nodes: Callable[[int, Entry], Chosen]
     curve: Callable[[int, Entry], Course]
     points: Callable[[], Mapping[int, Point]]
-    """Positions of nodes, in the unit of the deck."""
+    """Function that returns the positions of nodes, in the unit of the deck."""
     rigid: frozenset[str]
-    """Keys of the rigid bodies."""
+    """Keys of the bodies that are rigid."""
     end: float
     starts: list[Start] = field(default_factory=list)
     holds: list[Hold] = field(default_factory=list)

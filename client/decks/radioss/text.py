@@ -1,7 +1,7 @@
 """Text of a Radioss starter or engine file: options with their lines, and named fields of these lines.
 
-Reference Guide, "Block format": a line that begins with ``/`` is an option, a line that begins with ``#`` or ``$``
-is a comment. Whole numbers take 10 columns, other fields 20.
+A line that begins with ``/`` is an option; a line that begins with ``#`` or ``$`` is a comment. A whole number takes
+10 columns, any other field 20 (Reference Guide, "Block format").
 """
 
 import re
@@ -22,28 +22,28 @@ Row = tuple[int, str]
 
 @dataclass
 class Option:
-    """An option such as ``/MAT/LAW2/1``: its words in upper case, and its lines with their numbers."""
+    """An option such as ``/MAT/LAW2/1``: its words in upper case, and its text lines with their numbers."""
 
     shown: str
-    """Text of the option in the file."""
+    """Option as it is written in the file."""
     words: list[str]
     line: int
     rows: list[Row]
     file: str = ""
 
     def number(self) -> int:
-        """Identifier: the first number among its words; 0 if there is none."""
+        """Identifier of the option: the first number among its words; 0 if the option has none."""
         return next((int(word) for word in self.words if _WHOLE.fullmatch(word)), 0)
 
     @property
     def local(self) -> bool:
-        """True if the identifier has a second number, which selects other units."""
+        """True if a second number follows the identifier; this number selects units for the option."""
         return sum(_WHOLE.fullmatch(word) is not None and int(word) > 0 for word in self.words) > 1
 
 
 def options(deck: Included, file: str = "") -> Iterator[Option]:
-    """Yields every option of a deck, with its included files, up to ``/END``; empty lines are among their lines.
-    ``file``: name of the deck in messages. Raises CardError, OSError.
+    """Yields every option of a deck and of its included files, up to ``/END``; the lines of an option include empty
+    lines. ``file``: name of the deck in messages. Raises CardError, OSError.
     """
     option: Option | None = None
     try:
@@ -74,7 +74,7 @@ def whole(line: int, item: str, what: str) -> int:
 
 
 def real(line: int, item: str, what: str) -> float:
-    """Reads a number, also ``1.5-3`` and ``1D5``. Raises CardError."""
+    """Reads a number; allowed notations include ``1.5-3`` and ``1D5``. Raises CardError."""
     found = _REAL.fullmatch(item)
     if found is None or abs(value := float(f"{found[1]}e{found[2] or found[3] or 0}")) == float("inf"):
         raise CardError(f"line {line}: {what} = {shown(item)} is not a number (fields have fixed widths)")
@@ -85,13 +85,13 @@ def cut(row: Row, *widths: int) -> list[str]:
     """Returns the fields of a line. Raises CardError for a tab, and for text after the last field."""
     line, text = row
     if "\t" in text:
-        raise CardError(f"line {line}: a tab in a line of fixed widths; write blanks")
+        raise CardError(f"line {line}: a tab in a line with fixed columns; use blanks")
     found, at = [], 0
     for width in widths:
         found.append(text[at : at + width].strip())
         at += width
     if rest := text[at:].strip():
-        raise CardError(f"line {line}: {shown(rest)} stands behind the last field, beyond column {at}")
+        raise CardError(f"line {line}: {shown(rest)} stands after the last field, beyond column {at}")
     return found
 
 
@@ -99,8 +99,8 @@ class Fields(fields.Fields[int]):
     """Named fields of the lines of an option."""
 
     def __init__(self, option: Option, entry: Entry, rows: Sequence[Row], layout: Sequence[str]) -> None:
-        """Stores the fields; ``layout``: the names of the fields of each line. A field whose name ends in ``:`` has
-        10 columns, another field 20; ``-`` is an unused field.
+        """Stores the fields; ``layout``: names of the fields of each line. A name with ``:`` at its end means a
+        field of 10 columns, any other name a field of 20 columns; ``-`` means an unused field.
         """
         self.option = option
         found: dict[str, tuple[int, str]] = {}
@@ -118,5 +118,5 @@ class Fields(fields.Fields[int]):
 
 
 def numbers(rows: Sequence[Row], what: str) -> list[int]:
-    """Reads whole numbers of 10 columns, ten in a line. Raises CardError."""
+    """Reads whole numbers from lines with ten fields of 10 columns. Raises CardError."""
     return [whole(row[0], item, what) for row in rows for item in cut(row, *(10,) * 10) if item]

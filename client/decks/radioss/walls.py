@@ -15,24 +15,24 @@ from .text import Fields, Option
 
 _SHAPES = {"PLANE": "plane", "CYL": "cylinder", "SPHER": "sphere"}
 WALLS = [("RWALL", word) for word in _SHAPES]
-"""The first two words of translated options."""
+"""The first two words of wall options that are translated."""
 
 
 def wall(scene: Scene, option: Option, entry: Entry) -> None:
-    """Reads ``/RWALL/PLANE``, ``CYL`` and ``SPHER``, which stop a group of nodes. Raises CardError, ValueError."""
+    """Reads ``/RWALL/PLANE``, ``CYL`` and ``SPHER``, walls that stop a group of nodes. Raises CardError, ValueError."""
     shape = _SHAPES[option.words[1]]
     row = option.rows[1][1] if len(option.rows) > 1 else ""
     moves = bool(row[:10].strip(" 0"))
     layout = ["NODE: SLIDE: GRNOD1: GRNOD2:", "D FRIC DIAMETER FFAC IFQ:", "MASS VX0 VY0 VZ0" if moves else "XM YM ZM"]
     fields = Fields(option, entry, option.rows[1:], layout + ["XM1 YM1 ZM1"] * (shape != "sphere"))
-    fields.refuse("GRNOD2", "nodes that are left out are not translated")
+    fields.refuse("GRNOD2", "excepted nodes are not translated")
     fields.forgive("FFAC IFQ", "a filter of friction")
     start = _start(scene, fields, moves)
     table: dict[str, Any] = {"kind": "wall", "point": scene.draft.vector(start, LENGTH)}
     if shape != "plane":
         table |= {"shape": shape, "radius": scene.draft.quantity(0.5 * fields.real("DIAMETER"), LENGTH)}
     else:
-        fields.forgive("DIAMETER", "without meaning for a plane")
+        fields.forgive("DIAMETER", "no effect on a plane")
     if shape != "sphere":
         table["normal" if shape == "plane" else "axis"] = _direction(fields, start)
     stop = Stop(scene.nodes(_group(fields), entry), table, entry)
@@ -49,7 +49,7 @@ def wall(scene: Scene, option: Option, entry: Entry) -> None:
 
 
 def drive(scene: Scene, draft: Draft, topology: Topology) -> None:
-    """Gives each wall the prescribed motion of its node; a wall without such a motion needs a mass."""
+    """Gives each wall the prescribed motion of its node. A wall whose node has no prescribed motion needs a mass."""
     for wall in scene.moved:
         holds = [each for each in scene.holds if topology.nodes(each.chosen) == {wall.node}]
         if holds:
@@ -57,19 +57,21 @@ def drive(scene: Scene, draft: Draft, topology: Topology) -> None:
             wall.stop.more.extend(each.entry for each in holds)
             _prescribe(draft, wall, holds)
         elif "mass" in wall.stop.table:
-            why = "the wall moves with the mass of the option; other loads on its node are ignored"
+            why = "the wall moves with its own mass; other loads on its node are ignored"
             wall.fields.differ("NODE", why)
         else:
-            why = "a wall that moves with its node; give it a mass, or its node a /IMPVEL"
+            why = "the wall moves with a node; give the wall a mass, or the node an /IMPVEL"
             wall.fields.refuse("NODE", why)
 
 
 def _prescribe(draft: Draft, wall: Moved, holds: list[Hold]) -> None:
-    """Writes velocity and course of ``holds``, of the node of a wall, into its table."""
+    """Writes the velocity and the course of a wall's node into the table of the wall; ``holds``: prescribed motions
+    of the node.
+    """
     table, axes = wall.stop.table, [axis for each in holds for axis in each.speeds]
     courses = {each.course for each in holds if any(each.speeds.values())}
     if len(set(axes)) < len(axes) or len(courses) > 1:
-        why = "the components of its motion have several courses; a wall has one"
+        why = "the components of the motion have several courses; a wall has one course"
         wall.fields.refuse("NODE", why)
         return
     table.pop("mass", None)
@@ -77,11 +79,11 @@ def _prescribe(draft: Draft, wall: Moved, holds: list[Hold]) -> None:
     table["velocity"] = draft.vector([speeds.get(axis, 0.0) for axis in AXES], SPEED)
     if course := next(iter(courses), ()):
         table["course"] = [[draft.quantity(time, TIME), factor] for time, factor in course]
-    wall.fields.differ("NODE", "the wall has the prescribed motion of its node, and none along other axes")
+    wall.fields.differ("NODE", "the wall has the prescribed motion of its node and does not move along other axes")
 
 
 def _start(scene: Scene, fields: Fields, moves: bool) -> list[float]:
-    """Returns the position of the wall. A moving wall has the position of its node. Raises ValueError."""
+    """Returns the position of a wall. A moving wall has the position of its node. Raises ValueError."""
     if not moves:
         return [fields.real(name) for name in ("XM", "YM", "ZM")]
     number = fields.whole("NODE")
@@ -93,7 +95,7 @@ def _start(scene: Scene, fields: Fields, moves: bool) -> list[float]:
 def _direction(fields: Fields, start: list[float]) -> list[float]:
     along = [fields.real(name) - at for name, at in zip(("XM1", "YM1", "ZM1"), start, strict=True)]
     if not any(along):
-        raise ValueError("its direction, from M to M1, has no length")
+        raise ValueError("the direction of the wall, from M to M1, has no length")
     return along
 
 
@@ -111,6 +113,6 @@ def _group(fields: Fields) -> int:
     if not group and not reach:
         raise ValueError("neither grnd_ID1 nor d: the wall stops no node")
     if not group:
-        raise ValueError("the wall stops the nodes within d of it; name a group of nodes, grnd_ID1")
-    fields.forgive("D", "how near nodes are that the wall stops besides")
+        raise ValueError("the wall stops the nodes within the distance d; name a group of nodes (grnd_ID1) instead")
+    fields.forgive("D", "distance within which the wall also stops nodes outside of the group")
     return group
