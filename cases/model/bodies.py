@@ -28,38 +28,40 @@ class Primitive(Model):
     """Keys of all primitives."""
 
     element_size: Annotated[Length, Positive]
-    """Edge length of the tets, approximately. The value is at most the smallest extent of the body. Use a quarter of
-    the thickness or less where a body bends: with 4 tets through the thickness ``nodal`` and ``split`` are 13 % too
-    stiff, with 2 tets 50 % (``standard``: 26 and 100 %). The time step is proportional to it, the number of tets to its
-    third power."""
+    """Approximate edge length of the tets. The edge length is at most the smallest extent of the body. Use a quarter of
+    the thickness or less where a body bends: with 4 tets through the thickness the pressure forms ``nodal`` and
+    ``split`` are 13 % too stiff, with 2 tets 50 % (``standard``: 26 and 100 %). The time step is proportional to
+    ``element_size``; the number of tets is proportional to ``1 / element_size^3``."""
     generator: Literal["gmsh", "structured"] = "gmsh"
     """Mesh generator. ``gmsh``: unstructured, for all shapes. ``structured``: cells of a regular grid, each cut into
-    tets; for box, plate, cylinder and tube, for verification and for ``slit``."""
+    tets; for verification and for ``slit``, with the shapes box, plate, cylinder and tube."""
     split: Literal[5, 6] = 6
-    """With ``generator = "structured"``: tets per hexahedral cell."""
+    """With ``generator = "structured"``: number of tets per hexahedral cell."""
     sector: Literal["full", "half", "quarter"] = "full"
-    """Modelled part of the body, for scenes with planes of symmetry. ``half``: the positive side of its centre (box:
-    of the origin) in the first direction across ``axis``; ``quarter``: in both. The directions across ``axis`` in
-    cyclic order are x, y for z; y, z for x; z, x for y. Each plane also needs a boundary ``symmetry``."""
+    """Modelled part of the body, for scenes with planes of symmetry. ``half``: the positive side of the centre (box: of
+    the origin) in the first direction across ``axis``; ``quarter``: the positive side in both directions across
+    ``axis``. The directions across ``axis`` in cyclic order are x, y for z; y, z for x; z, x for y. Each plane of
+    symmetry also needs a boundary ``symmetry``."""
     grading: Grading | None = None
-    """Coarser tets away from a region of interest, with ``generator = "gmsh"``."""
+    """Coarser tets far from a region of interest, with ``generator = "gmsh"``."""
 
 
 class Slit(Model):
-    """An initial crack: a rectangle normal to ``axis``, on a plane of nodes of the structured generator. A border of
-    the rectangle inside the body is a crack front.
+    """An initial crack: a rectangle normal to ``axis``, on a plane of nodes of the structured generator. Each side of
+    the rectangle that lies inside the body is a crack front.
 
-    ``low`` and ``high`` are its corners in the two directions across ``axis`` (x, y for z; y, z for x; z, x for y).
+    ``low`` and ``high`` are the corners of the rectangle in the two directions across ``axis`` (x, y for z; y, z for x;
+    z, x for y).
     """
 
     axis: Axis
-    """Normal of the rectangle."""
+    """Normal of the crack."""
     at: Length
-    """Coordinate of the rectangle along ``axis``: a plane of nodes inside the body."""
+    """Coordinate of the crack along ``axis``: a plane of nodes inside the body."""
     low: tuple[Length, Length]
-    """Corner with the lowest coordinates."""
+    """Corner of the crack with the lowest coordinates."""
     high: tuple[Length, Length]
-    """Corner with the highest coordinates."""
+    """Corner of the crack with the highest coordinates."""
 
 
 class Box(BoxForm, Primitive):
@@ -75,14 +77,14 @@ class Symmetric(Primitive):
     """Keys of primitives that are symmetric about the planes of a sector."""
 
     aligned: bool | None = None
-    """Whether a half or a full body is meshed as quarters with common faces, with ``generator = "gmsh"``: tets on
-    the axis are then as small as those of a quarter, otherwise up to twice as large. Default: ``true`` for parts
-    with ``erosion``, so that a rod penetrates equally deep in a full model and in a quarter
+    """Whether a half or a full body is meshed as quarters with common faces, with ``generator = "gmsh"``. With ``true``
+    the tets on the axis are as small as those of a quarter; with ``false`` up to twice as large. Default: ``true`` for
+    parts with ``erosion``, so that a rod penetrates equally deep in a full model and in a quarter
     (docs/theory/erosion.md)."""
 
 
 class Plate(PlateForm, Symmetric):
-    """A rectangular plate: ``thickness`` along ``axis``, ``width`` and ``height`` across it.
+    """A rectangular plate with ``thickness`` along ``axis``, ``width`` and ``height`` across ``axis``.
 
     ``base`` is the centre of the face at the low end of ``axis``.
     """
@@ -104,10 +106,10 @@ class Sphere(SphereForm, Symmetric):
 
 
 class Drawn(Primitive):
-    """A primitive for which gmsh is the only mesh generator."""
+    """A primitive that only gmsh can mesh."""
 
     generator: Literal["gmsh"] = "gmsh"
-    """Mesh generator; gmsh is the only one for this shape."""
+    """Mesh generator; gmsh is the only generator for this shape."""
 
 
 class Cone(ConeForm, Drawn):
@@ -115,10 +117,11 @@ class Cone(ConeForm, Drawn):
 
 
 class Ogive(OgiveForm, Drawn):
-    """A projectile: a cylindrical shank with an ogival nose, whose outline is an arc of a circle.
+    """A projectile: a cylindrical shank with an ogival nose; the outline of the nose is an arc of a circle.
 
-    With one of ``crh`` and ``nose`` given, the nose is a tangent ogive: its arc continues the shank smoothly, and its
-    length is D sqrt(crh - 1/4), D the diameter. With both given the nose is a secant ogive, with an edge at the shank.
+    If only one of ``crh`` and ``nose`` is given, the nose is a tangent ogive: its arc continues the shank smoothly, and
+    its length is D sqrt(crh - 1/4), D the diameter. If both ``crh`` and ``nose`` are given, the nose is a secant ogive,
+    with an edge at the shank.
     """
 
 
@@ -136,20 +139,23 @@ class RingSector(RingSectorForm, Drawn):
 
 
 class Loose(Primitive):
-    """Single tets of edge ``element_size``: without sectors, grading and choice of the generator."""
+    """Single tets with edges of length ``element_size``; sectors, grading and choice of the generator are not
+    available.
+    """
 
     generator: Literal["structured"] = "structured"
     """The key has no effect on this shape."""
     sector: Literal["full"] = "full"
-    """Always the full body."""
+    """Value ``full``: the whole body is always modelled."""
     grading: None = None
     """This key is not available for this shape."""
 
 
 class TwoTets(Loose):
-    """Two tets with a common face, for verification. ``centre`` is the centre of the face, ``axis`` its normal; one
-    corner of the face lies in the first direction across ``axis``. With ``lean`` the line from the centre to the
-    free corners is inclined in that direction."""
+    """Two tets with a common face, for verification. ``centre`` is the centre of the common face, and ``axis`` is the
+    normal of this face; one corner of the face lies in the first direction across ``axis``. With ``lean`` the line from
+    the centre to the free corners is inclined in the first direction across ``axis``.
+    """
 
     shape: Literal["two_tets"]
     """Selects this shape."""
@@ -158,13 +164,14 @@ class TwoTets(Loose):
     axis: Axis = "z"
     """Normal of the common face."""
     lean: Annotated[Angle, Field(ge=0, le=1.1)] = 0.0
-    """Inclination of the tets, such as ``"30 deg"``. The altitude of the tets stays the same; with 0 the tets are
+    """Inclination of the tets, such as ``"30 deg"``. The altitude of the tets stays unchanged; with 0 the tets are
     regular."""
 
 
 class Shards(Loose):
-    """Separate tets, for verification: ``count`` of them along x, y, z from the corner ``base``, each in a cube of
-    its own and in a random orientation."""
+    """Separate tets, for verification: ``count`` tets along x, y, z from the corner ``base``; each tet has a separate
+    cube and a random orientation.
+    """
 
     shape: Literal["shards"]
     """Selects this shape."""
@@ -173,41 +180,42 @@ class Shards(Loose):
     count: tuple[Edge, Edge, Edge]
     """Number of tets along x, y, z."""
     gap: Annotated[Length, Field(ge=0)] = 0.0
-    """Smallest distance between neighbouring tets in any orientation."""
+    """Smallest distance between neighbouring tets for any orientation of the tets."""
     perturbation: Annotated[Ratio, Field(ge=0, le=0.15)] = 0.0
-    """Largest random displacement of each coordinate of a node, over the edge length."""
+    """Largest random displacement of each coordinate of a node, divided by the edge length."""
     seed: Annotated[Count, Field(ge=0, lt=2**63)] = 0
     """Seed of the random orientations and displacements."""
 
     @property
     def axis(self) -> Axis:
-        """Axis of the shape. All shapes have this attribute; it has no effect here."""
+        """Axis of the shape. All shapes have this attribute; the axis of single tets has no effect."""
         return "z"
 
 
 class MeshFile(Measured):
     """A tet mesh from a file: gmsh .msh 4.1 or 2.2, Abaqus .inp, LS-DYNA .k, .key or .dyn, Radioss .rad, VTK .vtu.
-    docs/howto/meshes.md describes which elements and sets are read.
+    docs/howto/meshes.md describes which elements and sets are read. The page docs/howto/meshes.md describes which
+    elements and sets are read.
     """
 
     shape: Literal["file"]
     """Selects a mesh file."""
     path: str
-    """Path of the file, relative to the folder of the case. Commands that submit the case to a server send the file
-    too; ``sha256`` identifies it there (docs/howto/meshes.md)."""
+    """Path of the file, relative to the folder of the case. Commands that submit the case to a server also send the
+    file; ``sha256`` identifies the file there (docs/howto/meshes.md)."""
     unit: Annotated[Length, Positive]
     """Length unit of the coordinates in the file, such as ``"1 mm"``."""
     group: str | None = None
-    """Group of elements that is the part; all elements when absent. gmsh: a physical group by name or number.
+    """Group of elements of which the part consists; all elements if absent. gmsh: a physical group by name or number.
     Abaqus: an element set (``Bar-1.Set-1`` for a set of an instance or a part), an instance or a part. LS-DYNA and
     Radioss: a part, a set or a subset."""
     second_order: Literal["auto", "corners", "eight"] = "auto"
     """Treatment of tets with 10 nodes. ``corners``: one tet of its 4 corners. ``eight``: eight tets of 4 nodes.
-    ``auto``: ``eight`` where the corners alone would lose more than 0.1 % of the volume, otherwise ``corners``; a
-    warning reports the choice."""
+    ``auto``: ``eight`` if the corners alone would lose more than 0.1 % of the volume, otherwise ``corners``; a warning
+    reports the choice."""
     sha256: Sha256 | None = None
-    """SHA-256 hash of the file, 64 hexadecimal digits. A file with another hash is refused. Commands that send the
-    file add the key; a server requires it. Default: not checked."""
+    """SHA-256 hash of the file, 64 hexadecimal digits. A file with another hash is refused. Commands that send the file
+    add ``sha256``; a server requires ``sha256``. Default: the hash is not checked."""
 
 
 Mesh = Annotated[

@@ -9,26 +9,28 @@ from ..units import FractureEnergy, Length, Stress
 from .tables import Model, Name, Positive
 
 GAP = 0.1
-"""Largest bonded distance over the size of the smaller of two faces (square root of twice its area), if the case
-gives no distance. The value was chosen because the chords of a circle of 16 sides are 0.05 of a side from the
-circle."""
+"""Largest bonded distance divided by the size of the smaller of two faces (square root of twice its area), if the case
+gives no distance. The chosen value is twice the distance between the chords of a circle of 16 sides and the circle,
+0.05 of a side."""
 
 
 class Bonded(Model):
-    """Keys of all bonds: the two parts, strength and fracture energy of the interface."""
+    """Keys of all bonds: the two parts, and the strength and fracture energy of the interface."""
 
     parts: tuple[Name, Name]
-    """Names of the two parts. A pair of parts has at most one bond; a part may have bonds with several others."""
+    """Names of the two parts of the bond. A pair of parts has at most one bond; a part may have bonds with several
+    others."""
     strength: Annotated[Stress, Positive] | None = None
-    """Tensile strength: normal traction at which the interface breaks. Default: the bond never breaks."""
+    """Tensile strength: the interface breaks at this normal traction. Default: the bond never breaks."""
     shear_strength: Annotated[Stress, Positive] | None = None
-    """Shear strength of the interface. Default: ``strength``. Tension and shear together break it where ``(t_n /
-    strength)^2 + (t_s / shear_strength)^2`` reaches 1; compression has no effect."""
+    """Shear strength of the interface. Default: ``strength``. Under tension and shear together the interface breaks
+    where ``(t_n / strength)^2 + (t_s / shear_strength)^2`` reaches 1; compression has no effect."""
     energy: Annotated[FractureEnergy, Field(ge=0)] = 0.0
-    """Fracture energy in tension, per area of the interface: the traction falls linearly with the opening. 0: the
-    traction is 0 as soon as the interface breaks."""
+    """Fracture energy in tension, per area of the interface: after the break the traction falls linearly with the
+    opening. 0: the traction is 0 as soon as the interface breaks."""
     shear_energy: Annotated[FractureEnergy, Field(ge=0)] | None = None
-    """Fracture energy in shear. Default: ``energy``. The two energies are both 0 or both above 0."""
+    """Fracture energy in shear, per area of the interface. Default: ``energy``. The fracture energies in tension and in
+    shear are either both 0 or both above 0."""
 
     @property
     def breaks(self) -> bool:
@@ -42,44 +44,44 @@ class Bonded(Model):
 
     @property
     def strengths(self) -> tuple[float, float]:
-        """Returns the strength in tension and in shear, Pa, of a bond that can break."""
+        """Returns the strength in tension and the strength in shear, Pa, of a bond that can break."""
         assert self.strength is not None
         return self.strength, self.strength if self.shear_strength is None else self.shear_strength
 
     @property
     def energies(self) -> tuple[float, float]:
-        """Returns the fracture energy in tension and in shear, J/m^2."""
+        """Returns the fracture energy in tension and the fracture energy in shear, J/m^2."""
         return self.energy, self.energy if self.shear_energy is None else self.shear_energy
 
 
 class SharedBond(Bonded):
     """A bond of two parts whose meshes have the nodes of the interface in common: one body of two materials, without
-    contact at the interface. The parts are groups of one mesh file that share nodes, or shapes, combinations and CAD
-    solids that touch and are meshed together. This bond is cheaper and more accurate than a tied bond.
+    contact at the interface. The parts are groups of one mesh file that share nodes; or shapes, combinations and CAD
+    solids that touch and are meshed together. A bond with common nodes is cheaper and more accurate than a tied bond.
     """
 
     kind: Literal["shared"]
-    """Selects common nodes."""
+    """Selects a bond with common nodes."""
 
 
 class TiedBond(Bonded):
-    """A bond of two parts whose meshes do not match at the interface: the nodes of the part with the smaller faces
-    there are tied to faces of the other, and moved onto them at the start. One of the parts may be rigid: the nodes of
-    the other part are then tied to its faces of any size, and follow its motion. Meshes that match may be tied as well,
-    such as two groups of one file with common nodes of which one is rigid.
+    """A bond of two parts whose meshes do not match at the interface. The nodes of the part with the smaller faces are
+    tied to faces of the other part, and are moved onto these faces at the start. One of the parts may be rigid: the
+    nodes of the deformable part are then tied to the faces of the rigid part, and follow its motion. Meshes that match
+    may be tied as well, such as two groups of one file with common nodes, one of them rigid.
 
     After the interface has broken, the fracture energy G of mixed tension and shear is given by ``1 / G = (1 - B) /
-    energy + B / shear_energy``, B the share of the work done in shear. An open interface closes without resistance,
-    and carries tension again beyond its largest opening; slip is permanent. Contact ignores the pairs that the bond
-    ties.
+    energy + B / shear_energy``, where B is the fraction of the work that is done in shear. An open interface closes
+    without resistance, and carries tension again beyond its largest opening; slip is permanent. Contact ignores the
+    pairs of nodes and faces that the bond ties.
     """
 
     kind: Literal["tied"]
-    """Selects tied nodes."""
+    """Selects a bond with tied nodes."""
     gap: Annotated[Length, Field(ge=0)] | None = None
-    """Largest distance between bonded faces; the nodes of one part are moved by it onto the other. Default: a tenth
-    of the size of the smaller face (square root of twice its area). Faces further apart are not bonded, and a
-    warning gives their number."""
+    """Largest distance between bonded faces; the nodes of one part are moved by this distance onto the other part.
+    Default: a tenth of the size of the smaller face (square root of twice its area). Faces at a larger distance are not
+    bonded, and a warning gives their number."""
 
 
 Bond = Annotated[SharedBond | TiedBond, Field(discriminator="kind")]

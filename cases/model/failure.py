@@ -9,57 +9,58 @@ from .tables import Model, Positive
 
 
 class Erosion(Model):
-    """Erosion: tets that exceed a limit are deleted, and the free faces of their neighbours become contact surface.
-    Must not be combined with ``fracture``.
+    """Erosion: tets that exceed a limit are deleted, and the free faces of their neighbours become contact surface. The
+    table ``erosion`` must not be combined with ``fracture``.
 
-    A tet is deleted when it exceeds any of the limits: within ten time steps for strain and damage, at once for the
-    others. The elastic energy of a deleted tet is booked as eroded.
+    A tet that exceeds a limit of strain or damage is deleted within ten time steps; a tet that exceeds another limit is
+    deleted at once. The elastic energy of a deleted tet is booked as eroded energy.
     """
 
     plastic_strain: Annotated[Ratio, Positive] | None = None
-    """Largest effective plastic strain. Default: no limit."""
+    """Largest effective plastic strain of a tet. Default: no limit."""
     damage: Annotated[Ratio, Field(gt=0, le=1)] | None = None
-    """Largest damage; needs a law with damage (Johnson-Cook: 1 is complete damage). Default: no limit."""
+    """Largest damage of a tet; needs a law with damage (Johnson-Cook: 1 is complete damage). Default: no limit."""
     volume: tuple[Annotated[Ratio, Field(gt=0, lt=1)], Annotated[Ratio, Field(gt=1)]] = (0.1, 10.0)
-    """Smallest and largest volume of a tet over its initial volume."""
+    """Smallest and largest volume of a tet divided by its initial volume."""
     time_step: Annotated[Ratio, Field(gt=0, lt=1)] = 0.02
-    """Smallest stable time step of a tet over the first time step of the run. Larger values make the run cheaper and
-    delete more tets."""
+    """Smallest stable time step of a tet divided by the first time step of the run. A larger value makes the run
+    cheaper and deletes more tets."""
     nodes: Literal["strike", "particles", "remove"] = "strike"
     """Treatment of free nodes, which have lost all tets and are particles with mass and without volume. ``strike``: a
-    free node moves on, and is deleted after a face has pushed it. ``particles``: it is never deleted; many of them can
-    gather on a line and dig a hole that real material would not dig. ``remove``: a node without tets is deleted at
-    once. Mass, momentum and energy of deleted nodes are booked."""
+    free node moves on, and is deleted after a face has pushed it. ``particles``: a free node is never deleted; many
+    free nodes can gather on a line and dig a hole that real material would not dig. ``remove``: a node without tets is
+    deleted at once. Mass, momentum and energy of deleted nodes are booked."""
 
 
 class Fracture(Model):
-    """Fracture: facets between tets break, nodes separate, and the fragments are in contact with each other. Needs
-    ``brittle`` in the material; not together with ``erosion``.
+    """Fracture: facets between tets break, nodes separate, and the fragments are in contact with each other. The table
+    ``fracture`` needs ``brittle`` in the material, and must not be combined with ``erosion``.
     """
 
     model: Literal["instant", "cohesive"] = "instant"
-    """Behaviour of a broken facet. ``instant``: a broken facet carries no traction. ``cohesive``: its traction falls
-    linearly with the opening and absorbs the fracture energy (Camacho and Ortiz 1996)."""
+    """Behaviour of a broken facet. ``instant``: a broken facet carries no traction. ``cohesive``: the traction of a
+    broken facet falls linearly with the opening and absorbs the fracture energy (Camacho and Ortiz 1996)."""
     shear_weight: Annotated[Ratio, Field(ge=0)] | None = None
     """Weight beta_tau of the shear traction in the effective traction ``sqrt(<t_n>^2 + beta_tau t_s^2)``, which is
-    compared with the strength. Default: 0 (largest normal traction) for ``instant``, 1 for ``cohesive``, which needs
-    a value above 0. With 1, shear alone breaks a facet at the tensile strength: material that is compressed across
-    the crack, such as a disc between platens, breaks early unless ``friction`` prevents it."""
+    compared with the strength. Default: 0 (largest normal traction) for ``instant``, 1 for ``cohesive``, which needs a
+    value above 0. With the weight 1, shear alone breaks a facet at the tensile strength: material that is compressed
+    across the crack, such as a disc between platens, breaks early unless ``friction`` prevents it."""
     friction: Annotated[Ratio, Field(ge=0)] = 0.0
     """Coefficient of internal friction: under a compressive traction |t_n| the shear traction is reduced by
     ``friction * |t_n|``."""
     traction: Literal["tets", "nodes"] = "tets"
-    """Traction of a facet. ``tets``: from the stress of its two tets. ``nodes``: also from the stress of its three
-    nodes, each a volume-weighted mean over the tets around it; both must exceed the strength. Smoother."""
+    """Method that computes the traction of a facet. ``tets``: from the stress of the two tets of the facet. ``nodes``:
+    from the stress of the two tets, and from the stress of the three nodes, each a volume-weighted mean over the tets
+    around the node; both tractions must exceed the strength. The method ``nodes`` gives smoother fracture."""
     delay: Annotated[Ratio, Field(ge=0)] = 1.0
     """Factor of the delay ``t_c = delay * density * c * energy / strength^2`` during which a facet must be
-    overstressed. 0: it breaks in the step in which it exceeds the strength. The published criterion is printed with
-    0.5; its own equations give 1."""
+    overstressed. 0: the facet breaks in the step in which it exceeds the strength. The published criterion is printed
+    with the factor 0.5; the equations of the same paper give 1."""
     order: Literal["simultaneous", "local_maximum"] = "simultaneous"
-    """Facets that break in one time step. ``simultaneous``: all facets that fulfil the criterion break.
-    ``local_maximum``: of facets with a common node only the one with the largest overstress."""
+    """Choice of the facets that break in one time step. ``simultaneous``: all facets that fulfil the criterion break.
+    ``local_maximum``: of all facets with a common node only the facet with the largest overstress breaks."""
     resolve: Literal["none", "strength"] = "none"
-    """Adaptation to the mesh. ``strength``: reduce the strength until ``resolution`` elements fit in the cohesive
-    zone, at the same fracture energy."""
+    """Adaptation of the strength to the mesh. ``strength``: reduces the strength until ``resolution`` elements fit in
+    the cohesive zone; the fracture energy is unchanged."""
     resolution: Annotated[Ratio, Positive] = 3.0
     """With ``resolve = "strength"``: number of elements in the cohesive zone."""

@@ -1,4 +1,4 @@
-"""The shapes of bodies without their meshes: common to mesh primitives and to operands of combinations."""
+"""The shapes of bodies without their meshes, for mesh primitives and for operands of combinations."""
 
 from typing import Annotated, Literal
 
@@ -16,26 +16,26 @@ class BoxForm(Model):
     low: Point
     """Corner with the lowest coordinates."""
     high: Point
-    """Corner with the highest coordinates; above ``low`` in every direction."""
+    """Corner with the highest coordinates, which are above those of ``low`` in every direction."""
 
 
 class PlateForm(Model):
-    """A rectangular plate: ``thickness`` along ``axis``, ``width`` and ``height`` across it."""
+    """A rectangular plate with ``thickness`` along ``axis``, ``width`` and ``height`` across ``axis``."""
 
     shape: Literal["plate"]
     """Selects this shape."""
     base: Point = (0.0, 0.0, 0.0)
-    """Centre of the face at the low end of ``axis``; the plate extends from it by ``thickness``."""
+    """Centre of the face at the low end of ``axis``; the plate extends from this face by ``thickness``."""
     axis: Axis = "z"
     """Direction of the thickness."""
     width: Annotated[Length, Positive]
-    """Extent in the first direction across ``axis`` (x for z, y for x, z for y), half of it to each side of
+    """Extent in the first direction across ``axis`` (x for z, y for x, z for y), half of it on each side of
     ``base``."""
     height: Annotated[Length, Positive]
-    """Extent in the second direction across ``axis`` (y for z, z for x, x for y), half of it to each side of
+    """Extent in the second direction across ``axis`` (y for z, z for x, x for y), half of it on each side of
     ``base``."""
     thickness: Annotated[Length, Positive]
-    """Extent along ``axis``."""
+    """Extent of the plate along ``axis``."""
 
 
 class CylinderForm(Model):
@@ -44,7 +44,7 @@ class CylinderForm(Model):
     shape: Literal["cylinder"]
     """Selects this shape."""
     base: Point = (0.0, 0.0, 0.0)
-    """Centre of the end face at the low end of ``axis``; the cylinder extends from it by ``length``."""
+    """Centre of the end face at the low end of ``axis``; the cylinder extends from this face by ``length``."""
     axis: Axis = "z"
     """Direction of the cylinder's axis."""
     radius: Annotated[Length, Positive]
@@ -59,13 +59,13 @@ class TubeForm(Model):
     shape: Literal["tube"]
     """Selects this shape."""
     base: Point = (0.0, 0.0, 0.0)
-    """Centre of the end face at the low end of ``axis``; the tube extends from it by ``length``."""
+    """Centre of the end face at the low end of ``axis``; the tube extends from this face by ``length``."""
     axis: Axis = "z"
     """Direction of the tube's axis."""
     inner_radius: Annotated[Length, Positive]
-    """Inner radius; below ``radius``."""
+    """Inner radius of the tube; below ``radius``."""
     radius: Annotated[Length, Positive]
-    """Outer radius."""
+    """Outer radius of the tube."""
     length: Annotated[Length, Positive]
     """Length of the tube, along ``axis``."""
 
@@ -89,13 +89,14 @@ class ConeForm(Model):
     shape: Literal["cone"]
     """Selects this shape."""
     base: Point = (0.0, 0.0, 0.0)
-    """Centre of the end at the low end of ``axis``; the cone extends from it by ``length``."""
+    """Centre of the end at the low end of ``axis``; the cone extends from this end by ``length``."""
     axis: Axis = "z"
     """Direction of the cone's axis."""
     radius: Annotated[Length, Field(ge=0)]
-    """Radius at ``base``; 0: the tip is there."""
+    """Radius of the cone at ``base``; 0: the tip of the cone is at ``base``."""
     top_radius: Annotated[Length, Field(ge=0)] = 0.0
-    """Radius at the high end of ``axis``; 0: the tip is there. At least one of the two radii is above 0."""
+    """Radius of the cone at the high end of ``axis``; 0: the tip of the cone is at the high end. At least one of the
+    two radii is above 0."""
     length: Annotated[Length, Positive]
     """Height of the cone, along ``axis``."""
 
@@ -106,7 +107,7 @@ class OgiveForm(Model):
     shape: Literal["ogive"]
     """Selects this shape."""
     base: Point = (0.0, 0.0, 0.0)
-    """Centre of the low end of ``axis``: of the rear face, or of the tip with ``pointing = "low"``."""
+    """Centre of the low end of ``axis``: centre of the rear face, or the tip with ``pointing = "low"``."""
     axis: Axis = "z"
     """Direction of the projectile's axis."""
     pointing: Literal["high", "low"] = "high"
@@ -116,33 +117,34 @@ class OgiveForm(Model):
     shank: Annotated[Length, Field(ge=0)] = 0.0
     """Length of the cylinder behind the nose."""
     crh: Annotated[Ratio, Field(ge=0.5, le=1000)] | None = None
-    """Calibre radius head: radius of the arc over the diameter. At 0.5 a tangent ogive is a hemisphere."""
+    """Calibre radius head: radius of the arc of the ogive divided by the diameter. At 0.5 a tangent ogive is a
+    hemisphere."""
     nose: Annotated[Length, Positive] | None = None
-    """Length of the nose up to its sharp tip. At least one of ``crh`` and ``nose`` is required. With both, ``crh``
-    must be at least that of the tangent ogive, (nose / D)^2 + 1/4."""
+    """Length of the nose up to its sharp tip. At least one of ``crh`` and ``nose`` is required. If both are given,
+    ``crh`` must be at least that of the tangent ogive, (nose / D)^2 + 1/4, D the diameter."""
     tip_radius: Annotated[Length, Field(ge=0)] = 0.0
-    """Radius of a sphere that rounds the tip, tangent to the arc; it shortens the nose. 0: no rounding. Must not be
-    combined with ``meplat``."""
+    """Radius of a sphere that rounds the tip, tangent to the arc; the sphere shortens the nose. 0: no rounding. The key
+    ``tip_radius`` must not be combined with ``meplat``."""
     meplat: Annotated[Length, Field(ge=0)] = 0.0
-    """Diameter of a flat face that cuts off the tip (meplat); it shortens the nose. 0: none. Must not be combined with
-    ``tip_radius``."""
+    """Diameter of a flat face that cuts off the tip (meplat); the flat face shortens the nose. 0: no flat face. The key
+    ``meplat`` must not be combined with ``tip_radius``."""
 
 
 class BallPiece(Model):
     """Keys of segments of a sphere."""
 
     base: Point = (0.0, 0.0, 0.0)
-    """Centre of the low end of ``axis``: of the flat face, or of the pole with ``pointing = "low"``."""
+    """Centre of the low end of ``axis``: centre of the flat face, or the pole with ``pointing = "low"``."""
     axis: Axis = "z"
     """Normal of the flat face."""
     pointing: Literal["high", "low"] = "high"
-    """End of ``axis`` at which the pole is."""
+    """End of ``axis`` at which the pole of the spherical surface is."""
     radius: Annotated[Length, Positive]
     """Radius of the sphere."""
 
     @property
     def rise(self) -> float:
-        """Extent along ``axis``, m."""
+        """Extent of the segment along ``axis``, m."""
         return self.radius
 
 
@@ -159,11 +161,11 @@ class SphericalCapForm(BallPiece):
     shape: Literal["spherical_cap"]
     """Selects this shape."""
     height: Annotated[Length, Positive]
-    """Extent along ``axis``; below 2 ``radius``."""
+    """Extent of the segment along ``axis``; below 2 ``radius``."""
 
     @property
     def rise(self) -> float:
-        """Extent along ``axis``, m."""
+        """Extent of the segment along ``axis``, m."""
         return self.height
 
 
@@ -173,17 +175,17 @@ class RingSectorForm(Model):
     shape: Literal["ring_sector"]
     """Selects this shape."""
     base: Point = (0.0, 0.0, 0.0)
-    """Point of the axis at the low end of ``axis``; the body extends from it by ``length``."""
+    """Point of the tube's axis at the low end of ``axis``; the body extends from this point by ``length``."""
     axis: Axis = "z"
     """Direction of the tube's axis."""
     inner_radius: Annotated[Length, Field(ge=0)] = 0.0
-    """Inner radius; below ``radius``. 0: a segment of a solid cylinder."""
+    """Inner radius of the segment; below ``radius``. 0: a segment of a solid cylinder."""
     radius: Annotated[Length, Positive]
-    """Outer radius."""
+    """Outer radius of the segment."""
     length: Annotated[Length, Positive]
     """Length of the segment, along ``axis``."""
     start: Angle = 0.0
-    """Angle at which the segment starts, measured from the first direction across ``axis`` (x for z, y for x, z for
-    y) to the second."""
+    """Angle at which the segment starts, measured from the first direction across ``axis`` (x for z, y for x, z for y)
+    towards the second direction."""
     angle: Annotated[Angle, Field(gt=0, lt=6.283185307179586)]
-    """Angle from the start to the end of the segment, below a full turn, such as ``"60 deg"``."""
+    """Angle from the start to the end of the segment, below 360 degrees, such as ``"60 deg"``."""

@@ -22,8 +22,9 @@ class Joined(Protocol):
 
 
 def shared_bonds(case: Joined) -> list[tuple[int, SharedBond, int, int]]:
-    """Returns the bonds with shared nodes: index of each bond in ``bond``, and the indices of its two parts, the
-    lower one first."""
+    """Returns the bonds with shared nodes: the index of each such bond in ``bond``, and the indices of its two parts,
+    the lower index first.
+    """
     numbers = {part.name: i for i, part in enumerate(case.parts)}
     found = [(k, bond, sorted(numbers[name] for name in bond.parts)) for k, bond in enumerate(case.bond)
              if isinstance(bond, SharedBond)]  # fmt: skip
@@ -31,8 +32,9 @@ def shared_bonds(case: Joined) -> list[tuple[int, SharedBond, int, int]]:
 
 
 def bodies(case: Joined) -> list[int]:
-    """Returns an array (parts,) with the body of each part: the lowest index of the parts that are joined to it by
-    shared nodes."""
+    """Returns an array (parts,) with the body of each part. The index of a body is the lowest index of the parts that
+    are joined by shared nodes.
+    """
     of = list(range(len(case.parts)))
     for _, _, i, j in shared_bonds(case):
         low, high = sorted((of[i], of[j]))
@@ -51,7 +53,7 @@ def breakable(case: Joined) -> list[bool]:
 
 
 def cohesive(case: Joined) -> set[int]:
-    """Returns the indices of the parts that can have cohesive facets, of their own or of a bond."""
+    """Returns the indices of the parts that can have cohesive facets, inside of the part or at a bond."""
     own = {i for i, part in enumerate(case.parts) if part.fracture is not None and part.fracture.model == "cohesive"}
     return own.union(*({i, j} for _, bond, i, j in shared_bonds(case) if bond.cohesive))
 

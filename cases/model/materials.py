@@ -1,5 +1,6 @@
 """The models of materials: density, elasticity, strength, equation of state, fracture. All constants are in SI units
-once read."""
+after the case has been read.
+"""
 
 from typing import Annotated, Literal
 
@@ -63,47 +64,50 @@ class Scatter(Model):
     """
 
     modulus: Annotated[Ratio, Positive]
-    """Weibull modulus: the larger, the less scatter."""
+    """Weibull modulus: a larger value gives less scatter of the strength."""
     area: Annotated[Area, Positive] | None = None
-    """Area of the specimens on which ``strength`` was measured. Default: no size effect, area / A = 1."""
+    """Area of the specimens on which ``strength`` was measured. Default: the strength has no size effect, area / A =
+    1."""
     minimum: Annotated[Stress, Field(ge=0)] = 0.0
     """Smallest strength of a facet."""
     seed: Annotated[Count, Field(ge=0)] = 0
-    """Seed of the random strengths: another seed distributes the weak facets differently."""
+    """Seed of the random strengths: another seed gives other weak facets."""
 
 
 class Brittle(Model):
-    """Fracture of facets between tets. Without ``strength`` (a law of plastic flow) in the same material it can
-    break in tension only, and resists any compression."""
+    """Fracture of facets between tets. If the material has no ``strength`` (a law of plastic flow), it can break in
+    tension only, and resists any compression.
+    """
 
     strength: Annotated[Stress, Positive]
     """Tensile strength: normal traction at which a facet breaks."""
     energy: Annotated[FractureEnergy, Positive]
     """Fracture energy G_c per area of crack."""
     scatter: Scatter | None = None
-    """Scatter of the strength between facets. Default: none."""
+    """Scatter of the strength between facets. Default: all facets have the strength of the key ``strength``."""
 
 
 class Material(Model):
-    """A material: elasticity, and optionally strength (default: elastic only), equation of state (default: linear)
-    and fracture (default: cannot fracture)."""
+    """A material: elasticity, and optionally strength (default: elastic only), equation of state (default: linear) and
+    fracture (default: cannot fracture).
+    """
 
     density: Annotated[Density, Positive]
-    """Density at the start."""
+    """Density of the material at the start."""
     elastic: Elastic
     """Young's modulus and Poisson's ratio."""
     strength: Strength | None = None
-    """Law of the flow stress; ``model`` selects which. Default: none, the material stays elastic."""
+    """Law of the flow stress; the key ``model`` selects the law. Default: no law, the material stays elastic."""
     eos: MieGruneisen | None = None
-    """Equation of state. Default: pressure linear in the volume strain, with the bulk modulus of ``elastic``. Use an
-    equation of state above pressures of some percent of the bulk modulus. Not with ``johnson_holmquist``, which has its
-    own."""
+    """Equation of state. Default: the pressure is linear in the volume strain, with the bulk modulus of ``elastic``.
+    Use an equation of state for pressures above some percent of the bulk modulus. The key ``eos`` must not be combined
+    with ``johnson_holmquist``, which has its own equation of state."""
     spall: Annotated[Stress, Positive] | None = None
-    """Spall strength: largest tensile pressure. Beyond this tension pores open, which absorb the work; the pores close
-    again without resistance before the material is compressed. Default: no limit. Not with ``johnson_holmquist``, which
-    has its own."""
+    """Spall strength: largest tensile pressure. At this tension pores open, and the opening absorbs work; the pores
+    close again without resistance before the material is compressed. Default: the tensile pressure has no limit. The
+    key ``spall`` must not be combined with ``johnson_holmquist``, which has its own limit."""
     brittle: Brittle | None = None
-    """Fracture of facets; needed by parts with ``fracture``. Default: the material cannot fracture."""
+    """Fracture of facets; required for parts with the table ``fracture``. Default: the material cannot fracture."""
     description: str = ""
     """Description of the material, with the sources of its constants."""
 

@@ -18,9 +18,9 @@ ProbeField = Literal[
     "damage_max", "temperature_max",
 ]  # fmt: skip
 SUMS = ("mass", "momentum", "kinetic_energy", "centre", "centre_velocity", "residual_velocity", "residual_mass")
-"""Fields that are sums over nodes, without their components."""
+"""Fields that are sums over nodes, without their component."""
 PEAKS = ("pressure_max", "pressure_min", "mises_max", "plastic_strain_max", "damage_max", "temperature_max")
-"""Fields that are the largest or smallest value over tets."""
+"""Fields that are largest or smallest values over tets."""
 FRAGMENTS = ("fragment_velocity", "fragment_mass")
 """Fields of the heaviest fragment beyond a plane."""
 BEYOND = ("residual_velocity", "residual_mass", *FRAGMENTS)
@@ -28,21 +28,21 @@ BEYOND = ("residual_velocity", "residual_mass", *FRAGMENTS)
 SHAPES = ("penetration", "hole_diameter", "hole_width", "cone_angle")
 """Fields that are lengths and angles of a body, around or along a line."""
 PUSHES = ("contact_force", "contact_impulse", "wall_force", "wall_impulse")
-"""Fields of forces and impulses on a part, without their components."""
+"""Fields of forces and impulses on a part, without their component."""
 COURSES = ("wall_position", "wall_velocity")
-"""Fields of the motion of a wall, without their components."""
+"""Fields of the motion of a wall, without their component."""
 WHOLE = (*PUSHES, *COURSES, *SHAPES, *FRAGMENTS)
-"""Fields that are measured on whole parts: without ``low``, ``high`` and ``on``."""
+"""Fields that are measured on whole parts: they do not use the keys ``low``, ``high`` and ``on``."""
 
 
 def kind(field: str) -> str:
-    """Returns the field without its component: ``momentum`` of ``momentum_x``."""
+    """Returns a field without its component, such as ``momentum`` for ``momentum_x``."""
     bare = field[:-2] if field[-2:] in ("_x", "_y", "_z") else field
     return bare if bare in (*SUMS, *PUSHES, *COURSES, "velocity") else field
 
 
 class Beyond(Model):
-    """A side of a fixed plane ``axis = at``."""
+    """A half-space: one side of a fixed plane ``axis = at``."""
 
     axis: Axis
     """Normal of the plane."""
@@ -58,65 +58,66 @@ class Probe(Model):
 
     **Means**, mass-weighted over the tets whose centre starts in the region: ``stress_*`` (tension positive),
     ``pressure`` (compression positive), ``mises``, ``plastic_strain``, ``damage``, ``temperature``, ``density``,
-    ``internal_energy`` (J/kg), ``velocity_*``. Tets and nodes up to a hundredth of the shortest edge of the part
-    outside the box count as inside.
+    ``internal_energy`` (J/kg), ``velocity_*``. Tets and nodes outside of the box count as inside if their distance is
+    at most a hundredth of the shortest edge of the part.
 
-    **Peaks**, largest and smallest values over the same tets: ``pressure_max``, ``pressure_min`` (negative: the largest
-    tension), ``mises_max``, ``plastic_strain_max``, ``damage_max``, ``temperature_max``. Of the tets that exist at the
-    time of the line: removed tets do not count.
+    **Peaks**, largest and smallest values over the tets whose centre starts in the region: ``pressure_max``,
+    ``pressure_min`` (negative: the largest tension), ``mises_max``, ``plastic_strain_max``, ``damage_max``,
+    ``temperature_max``. Peaks include only the tets that exist at the time of the line: deleted tets do not count.
 
-    **Forces** on the whole part: ``contact_force_*``, of all other bodies or of the part ``by``, normal forces and
-    friction, N, as a mean since the previous line; ``wall_force_*``, the same of walls. ``contact_impulse_*`` and
-    ``wall_impulse_*``, N s, are the integrals since the start. These integrals include the whole last time step, but
-    the velocities include only half of this step.
+    **Forces** on the whole part, N, as a mean since the previous line: ``contact_force_*``, normal forces and friction
+    from all other bodies or from the part ``by``; ``wall_force_*``, the forces from walls. ``contact_impulse_*`` and
+    ``wall_impulse_*``, N s, are the integrals of the forces since the start. The impulses include the whole last time
+    step, but the velocities include only half of this step.
 
-    **Motion of a wall**: ``wall_position_*``, m, of its ``point``, and ``wall_velocity_*``, m/s, of the wall that
-    ``wall`` names; without ``part``. The force of the bodies on the wall is minus ``wall_force_*`` without ``part``.
+    **Motion of a wall**, which the key ``wall`` names; without ``part``: ``wall_position_*``, m, of the ``point`` of
+    the wall, and ``wall_velocity_*``, m/s. The force of the bodies on the wall is minus ``wall_force_*`` without
+    ``part``.
 
-    **Sums** over the nodes that start in the region, with ``beyond`` only those that are at present on that side of a
-    plane: ``mass``, ``momentum_*``, ``kinetic_energy`` (from the velocities at the time of the line; the energy ledger
-    uses products of two steps, which differ by the square of the time step), ``centre_*`` and ``centre_velocity_*``
-    (centre of mass). Free nodes count until they are deleted. For a whole rigid part the sums are computed from the
-    body, with its mass, centre and inertia.
+    **Sums** over the nodes that start in the region, with ``beyond`` only the nodes that are at present on that side of
+    a plane: ``mass``, ``momentum_*``, ``kinetic_energy`` (from the velocities at the time of the line; the energy
+    ledger uses products of two steps, which differ by the square of the time step), ``centre_*`` and
+    ``centre_velocity_*`` (centre of mass). Sums include free nodes until these are deleted. For a whole rigid part the
+    sums are computed from the mass, the centre of mass and the inertia of the part.
 
-    **Behind a target**: ``residual_mass`` is the mass of the part ``beyond`` a plane, ``residual_velocity`` its
+    **Behind a target**: ``residual_mass`` is the mass of the part ``beyond`` a plane, ``residual_velocity`` is its
     mass-weighted mean velocity along the normal, positive away from the plane, 0 without mass. ``fragment_mass`` and
-    ``fragment_velocity`` are those of the heaviest fragment whose centre is beyond the plane; a fragment is joined by
-    faces.
+    ``fragment_velocity`` are the mass and the velocity of the heaviest fragment whose centre is beyond the plane; the
+    tets of a fragment are joined by faces.
 
-    **Shapes**: ``penetration``: depth along ``axis``, defined as the reference of that name (below). ``hole_width``
-    and ``hole_diameter``: free opening of the part in the plane ``axis = at`` around the line through ``centre``:
-    twice the smallest distance from the line to material, and the diameter of a circle with the area visible from
-    the line. Both use 360 rays, without those that met no material at the start (behind planes of symmetry); their
-    error is about a tet; 0 while material is on the line, not a number where the opening reaches the edge of the
-    body. ``cone_angle``: full angle of the cone broken out of a plate, 2 arctan((R - r) / thickness) in radians, R
-    and r the radii of circles with the area, at the faces of the plate at the high and the low end of ``axis``, that
-    is damaged by more than half or separated from the heaviest fragment; negative where the wide end is at the low
-    one; for one cone per plate.
+    **Shapes**: ``penetration``: depth along ``axis``, defined as for the reference ``penetration``. ``hole_width`` and
+    ``hole_diameter``: free opening of the part in the plane ``axis = at`` around the line through ``centre``: twice the
+    smallest distance from the line to material, and the diameter of a circle with the area that is visible from the
+    line. The hole fields use 360 rays, without rays that met no material at the start (behind planes of symmetry); the
+    error is about a tet; 0 while material is on the line, not a number if the opening reaches the edge of the body.
+    ``cone_angle``: full angle of the cone broken out of a plate, 2 arctan((R - r) / thickness) in radians, for one cone
+    per plate. At the high end of ``axis`` (R) and at the low end (r), the radius is that of a circle with the area of
+    the face of the plate that is damaged by more than half or separated from the heaviest fragment; the angle is
+    negative if the wide end is at the low end.
     """
 
     name: Name
     """Name of the column. Columns that every run has (such as ``kinetic`` or ``dt``) cannot be used."""
     part: Name = ""
-    """Name of the part that is measured. Absent with ``wall_position_*`` and ``wall_velocity_*``; with
-    ``wall_force_*`` and ``wall_impulse_*`` all parts when absent."""
+    """Name of the part that is measured. The key ``part`` must be absent with ``wall_position_*`` and
+    ``wall_velocity_*``; with ``wall_force_*`` and ``wall_impulse_*`` an absent key means all parts."""
     field: ProbeField
-    """The measured field; the groups of fields are described above."""
+    """The measured field; the description of the table ``probes`` lists the fields."""
     wall: Name | None = None
-    """Name of the wall: with ``wall_force_*`` and ``wall_impulse_*``, all walls when absent; with ``wall_position_*``
-    and ``wall_velocity_*``, required."""
+    """Name of the wall. With ``wall_force_*`` and ``wall_impulse_*`` an absent key means all walls; with
+    ``wall_position_*`` and ``wall_velocity_*`` the key is required."""
     by: Name | None = None
-    """With ``contact_force_*`` and ``contact_impulse_*``: name of the part that pushes; all other bodies when
+    """With ``contact_force_*`` and ``contact_impulse_*``: name of the part that exerts the force; all other bodies if
     absent."""
     low: Point | None = None
-    """With means, peaks and sums: corner of the box with the lowest coordinates; together with ``high``. The probe
-    measures the whole part if this key is absent."""
+    """With means, peaks and sums: corner of the box with the lowest coordinates; must be combined with ``high``. The
+    probe measures the whole part if ``low`` is absent."""
     high: Point | None = None
-    """With means, peaks and sums: corner of the box with the highest coordinates; together with ``low``."""
+    """With means, peaks and sums: corner of the box with the highest coordinates; must be combined with ``low``."""
     on: SetName | None = None
     """With means, peaks and sums: name of a node set or a surface in the mesh file of the part (docs/howto/meshes.md).
-    Means and peaks use the tets that have a node in it, sums use its nodes. Together with a box: only nodes or tets in
-    both."""
+    Means and peaks use the tets that have a node in the set; sums use the nodes of the set. If a box is also given,
+    only nodes or tets that are in the set and in the box count."""
     beyond: Beyond | None = None
     """With sums and fields behind a target: side of a plane, such as ``{ axis = "z", at = "8 mm" }``."""
     axis: Axis | None = None
@@ -124,7 +125,7 @@ class Probe(Model):
     at: Length | None = None
     """With ``hole_width`` and ``hole_diameter``: coordinate along ``axis`` of the plane of the hole."""
     centre: Point | None = None
-    """With ``hole_width``, ``hole_diameter`` and ``cone_angle``: any point of the line; the origin when absent."""
+    """With ``hole_width``, ``hole_diameter`` and ``cone_angle``: any point of the line; the origin if absent."""
 
 
 Quantity = Literal[
@@ -135,26 +136,26 @@ Quantity = Literal[
 
 
 class Reference(Model):
-    """A published or derived value with which the finished run is compared. ``conoid run --check`` fails where the
-    difference exceeds ``tolerance``.
+    """A published or derived value with which the finished run is compared. ``conoid run --check`` fails if the
+    difference between result and value exceeds ``tolerance``.
 
-    ``extent``: largest minus smallest coordinate of a part along ``axis``, m. ``radius``: largest distance of a node
-    of the part from the line through the origin along ``axis``, m. ``plastic_strain_max``, ``temperature_max`` (K),
-    ``stress_max`` (largest |stress component|, Pa): over the part. ``speed_mean``: mass-weighted mean velocity of a
-    part along ``axis``, m/s. ``probe_mean``, ``probe_max``, ``probe_min``, ``probe_last``: time mean, largest,
-    smallest and last value of a probe between ``since`` and ``until``. ``contact_time``: last time at which a wall
-    or another body pushes, s. ``contact_loss``: energy dissipated by contact over the initial energy.
-    ``penetration``: thickness of all other parts along ``axis`` in front of the end of the hole that the part has
-    made around the axis through the origin, m; cavities ahead of the hole do not count. ``worst_residual``: largest
+    ``extent``: largest minus smallest coordinate of a part along ``axis``, m. ``radius``: largest distance of a node of
+    the part from the line through the origin along ``axis``, m. ``plastic_strain_max``, ``temperature_max`` (K),
+    ``stress_max`` (largest |stress component|, Pa): largest value over the part. ``speed_mean``: mass-weighted mean
+    velocity of a part along ``axis``, m/s. ``probe_mean``, ``probe_max``, ``probe_min``, ``probe_last``: time mean,
+    largest, smallest and last value of a probe between ``since`` and ``until``. ``contact_time``: last time at which a
+    wall or another body exerts a force, s. ``contact_loss``: energy dissipated by contact divided by the initial
+    energy. ``penetration``: thickness of all other parts along ``axis`` in front of the end of the hole that the part
+    has made around the axis through the origin, m; cavities ahead of the hole do not count. ``worst_residual``: largest
     residual of the energy ledger. Free nodes do not count for ``extent`` and ``radius``.
     """
 
     quantity: Quantity
     """The measured quantity."""
     value: Annotated[float, Written(QUANTITY)]
-    """Expected value, in the unit of the quantity."""
+    """Expected value, in the unit of ``quantity``."""
     tolerance: Annotated[float, Written(QUANTITY), Positive]
-    """Largest allowed difference from ``value``, absolute, in the same unit."""
+    """Largest allowed absolute difference from ``value``, in the unit of ``quantity``."""
     source: str
     """Source of the value: publication, derivation or measurement."""
     part: Name | None = None
@@ -162,11 +163,12 @@ class Reference(Model):
     probe: Name | None = None
     """With ``probe_mean``, ``probe_max``, ``probe_min`` and ``probe_last``: name of the probe."""
     axis: Axis | None = None
-    """With ``extent``, ``radius``, ``speed_mean`` and ``penetration``: direction."""
+    """With ``extent``, ``radius``, ``speed_mean`` and ``penetration``: direction along which the quantity is
+    measured."""
     since: Time = 0.0
     """With ``probe_*``: start of the time window."""
     until: Time | None = None
-    """With ``probe_*``: end of the time window; the end of the run when absent."""
+    """With ``probe_*``: end of the time window; the end of the run if absent."""
 
     @property
     def title(self) -> str:

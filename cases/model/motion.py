@@ -1,23 +1,25 @@
-"""Orientation and motion of a body at the start."""
+"""Orientation and motion of a body at the start of the run."""
 
 from ..units import Angle, AngularSpeed, Rate
 from .tables import Axis, Model, Point
 
 
 class Spin(Model):
-    """Rigid rotation about a line through ``centre``."""
+    """Rigid rotation of a body about a line through ``centre``."""
 
     centre: Point
     """Point of the axis of rotation."""
     rate: tuple[AngularSpeed, AngularSpeed, AngularSpeed]
-    """Rotation vector: its direction is the axis (right-handed), its length the angular velocity."""
+    """Rotation vector: its direction is the axis (right-handed), its length is the angular velocity."""
 
 
 class Stretch(Model):
-    """Uniform stretching: the velocity along each of x, y, z is ``rate`` times the distance from ``centre``."""
+    """Uniform stretching of a body: the velocity along each of x, y, z is ``rate`` times the distance from
+    ``centre``.
+    """
 
     centre: Point = (0.0, 0.0, 0.0)
-    """Point without velocity."""
+    """Point of the body that has no velocity."""
     rate: tuple[Rate, Rate, Rate]
     """Stretching rate along x, y, z: positive values lengthen, negative values shorten."""
 

@@ -1,4 +1,4 @@
-"""Operands of a combination: shapes that are placed and turned, solids of CAD files, and combinations of these."""
+"""Operands of a combination: shapes that are placed and turned, solids of CAD files, and combinations of operands."""
 
 from collections.abc import Iterator
 from typing import Annotated, Literal
@@ -31,14 +31,15 @@ class CadForm(Model):
     """Path of the file, STEP (ISO 10303-21) or BREP (OpenCASCADE), relative to the folder of the case."""
     unit: Annotated[Length, Positive] | None = None
     """Length unit of the coordinates in the file, such as ``"1 mm"``. A BREP file requires this key. A STEP file
-    contains its unit: the key may be absent, and another value than that of the file is refused."""
+    contains its unit: ``unit`` may be absent, and a value that differs from the unit of the file is refused."""
     solids: tuple[str | Annotated[Count, Field(ge=1)], ...] = ()
-    """Solids to use, by their names in the file or by their numbers from 1 in its order; all when empty. Several
+    """Solids to use, by their names in the file or by their numbers from 1 in its order; all solids if empty. Several
     solids are one body: their meshes have common nodes where the solids touch."""
     heal: bool = False
     """Whether OpenCASCADE repairs the file first: short edges, small faces, gaps between faces."""
     sha256: Sha256 | None = None
-    """SHA-256 hash of the file, 64 hexadecimal digits. A file with another hash is refused. Default: not checked."""
+    """SHA-256 hash of the file, 64 hexadecimal digits. A file with another hash is refused. Default: the hash is not
+    checked."""
 
 
 class StlForm(Model):
@@ -51,41 +52,42 @@ class StlForm(Model):
     unit: Annotated[Length, Positive]
     """Length unit of the coordinates in the file, such as ``"1 mm"``."""
     sha256: Sha256 | None = None
-    """SHA-256 hash of the file, 64 hexadecimal digits. A file with another hash is refused. Default: not checked."""
+    """SHA-256 hash of the file, 64 hexadecimal digits. A file with another hash is refused. Default: the hash is not
+    checked."""
 
 
 class UnionForm(Model):
-    """The union of bodies: all that lies in at least one of them."""
+    """The union of bodies: all points that lie in at least one of the bodies."""
 
     shape: Literal["union"]
     """Selects this shape."""
     of: Annotated[tuple["Operand", ...], Field(min_length=2, max_length=100)]
-    """The bodies."""
+    """The bodies that are united."""
 
 
 class DifferenceForm(Model):
-    """The first body without the others."""
+    """The difference of bodies: the first body without the other bodies."""
 
     shape: Literal["difference"]
     """Selects this shape."""
     of: Annotated[tuple["Operand", ...], Field(min_length=2, max_length=100)]
-    """The body, followed by the bodies that are removed from it."""
+    """The first body, followed by the bodies that are removed from it."""
 
 
 class IntersectionForm(Model):
-    """The intersection of bodies: all that lies in every one of them."""
+    """The intersection of bodies: all points that lie in every one of the bodies."""
 
     shape: Literal["intersection"]
     """Selects this shape."""
     of: Annotated[tuple["Operand", ...], Field(min_length=2, max_length=100)]
-    """The bodies."""
+    """The bodies that are intersected."""
 
 
 class Turned(Model):
     """Keys of all operands."""
 
     turn: Turn | None = None
-    """Rotation of this body before it is combined with the others."""
+    """Rotation of this body before it is combined with other bodies."""
 
 
 class BoxOperand(BoxForm, Turned):
@@ -93,7 +95,7 @@ class BoxOperand(BoxForm, Turned):
 
 
 class PlateOperand(PlateForm, Turned):
-    """A rectangular plate: ``thickness`` along ``axis``, ``width`` and ``height`` across it."""
+    """A rectangular plate with ``thickness`` along ``axis``, ``width`` and ``height`` across ``axis``."""
 
 
 class CylinderOperand(CylinderForm, Turned):
@@ -133,20 +135,21 @@ class CadOperand(CadForm, Turned):
 
 
 class StlOperand(StlForm, Turned):
-    """The interior of a closed surface of triangles (STL). Each triangle stays a face of the body: elements are not
-    larger than triangles. The surface has at most 1,500 triangles."""
+    """The interior of a closed surface of triangles (STL). Each triangle stays a face of the body, so that elements are
+    not larger than triangles. The surface has at most 1,500 triangles.
+    """
 
 
 class UnionOperand(UnionForm, Turned):
-    """The union of bodies: all that lies in at least one of them."""
+    """The union of bodies: all points that lie in at least one of the bodies."""
 
 
 class DifferenceOperand(DifferenceForm, Turned):
-    """The first body without the others."""
+    """The difference of bodies: the first body without the other bodies."""
 
 
 class IntersectionOperand(IntersectionForm, Turned):
-    """The intersection of bodies: all that lies in every one of them."""
+    """The intersection of bodies: all points that lie in every one of the bodies."""
 
 
 Operand = Annotated[
@@ -171,14 +174,16 @@ for _form in (UnionForm, DifferenceForm, IntersectionForm, UnionOperand, Differe
     _form.model_rebuild()
 
 FileForm = CadForm | StlForm
-"""Forms that are read from a file; their dimensions are known only then."""
+"""Shapes that are read from a file; their dimensions are known only after the file has been read."""
 CombinedForm = UnionForm | DifferenceForm | IntersectionForm
 
 Place = tuple[int | str, ...]
 
 
 def leaves(form: CombinedForm, place: Place = (), depth: int = 1) -> Iterator[tuple[Place, int, Operand]]:
-    """Yields all operands that are not combinations: the place of each below ``place``, its depth, and the operand."""
+    """Yields all operands that are not combinations: the key of each operand below ``place``, its depth, and the
+    operand.
+    """
     for n, each in enumerate(form.of):
         if isinstance(each, CombinedForm):
             yield from leaves(each, (*place, "of", n), depth + 1)

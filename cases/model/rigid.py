@@ -11,40 +11,40 @@ from ..units import Inertia, Mass
 from .tables import Model, Point
 
 Tensor = tuple[Inertia, Inertia, Inertia, Inertia, Inertia, Inertia]
-"""Names of the components of the inertia: xx, yy, zz, yz, zx, xy."""
+"""Names of the components of the inertia tensor: xx, yy, zz, yz, zx, xy."""
 _ROUNDING = 1e-9
-"""Tolerance of the check of the inertia, relative to its trace. The tolerance is needed because a plate has one moment
-equal to the sum of the other two, and numbers in text are rounded."""
+"""Tolerance of the check of the inertia tensor, relative to its trace. The tolerance is needed because a plate has one
+moment of inertia equal to the sum of the other two, and numbers in text are rounded."""
 
 
 class Rigid(Model):
-    """Mass properties of a rigid part, where they differ from those of its mesh and density."""
+    """Mass properties of a rigid part that differ from those of its mesh and density."""
 
     mass: Annotated[Mass, Field(gt=0)] | None = None
-    """Mass of the modelled part of the body (with a sector: of the sector). Default: that of the mesh. Without
-    ``inertia`` the mass scales the inertia of the mesh."""
+    """Mass of the modelled part of the body (with a sector: mass of the sector). Default: the mass of the mesh. Without
+    ``inertia``, ``mass`` scales the inertia of the mesh."""
     centre: Point | None = None
-    """Centre of mass at the start, in the coordinates of the case; together with ``inertia``. Default: that of the
-    mesh."""
+    """Centre of mass at the start, in the coordinates of the case; must be combined with ``inertia``. Default: the
+    centre of mass of the mesh."""
     inertia: Tensor | None = None
     """Moments of inertia about the centre of mass, along the axes of the case, at the start: xx, yy, zz, yz, zx, xy,
-    the integrals of density times y^2 + z^2, z^2 + x^2, x^2 + y^2, -yz, -zx, -xy. The tensor must be positive definite,
-    with no principal moment above the sum of the other two moments. Default: the sum over the nodes of the mesh, each
-    with a quarter of the mass of its tets; it exceeds that of the smooth body by a share of the order of (tet size /
-    body size)^2."""
+    the integrals of density times y^2 + z^2, z^2 + x^2, x^2 + y^2, -yz, -zx, -xy. The inertia tensor must be positive
+    definite, with no principal moment above the sum of the other two moments. Default: the sum over the nodes of the
+    mesh, each with a quarter of the mass of its tets; the sum exceeds the inertia of the smooth body by a relative
+    amount of the order of (tet size / body size)^2."""
 
 
 class Flag:
-    """Addition to the JSON schema of a key: ``true`` and ``false`` are allowed as well."""
+    """Addition to the JSON schema of a key: ``true`` and ``false`` are also allowed."""
 
     def __get_pydantic_json_schema__(self, core: CoreSchema, handler: GetJsonSchemaHandler) -> dict[str, Any]:
-        """The JSON schema with the addition; pydantic calls this method."""
+        """Returns the JSON schema with the addition; pydantic calls this method."""
         schema = handler(core)
         return {**schema, "anyOf": [*schema["anyOf"], {"type": "boolean"}]}
 
 
 def read_rigid(value: Any) -> Any:
-    """``true`` as a table without keys, ``false`` as absent."""
+    """Returns ``true`` as a table without keys, and ``false`` as an absent key."""
     if isinstance(value, bool):
         return {} if value else None
     return value
@@ -63,7 +63,9 @@ def tensor_problems(inertia: Tensor) -> Iterator[str]:
 
 
 def _minors_above(tensor: tuple[float, ...], least: float) -> bool:
-    """Whether all principal minors of a symmetric matrix are above ``least``; above 0 means positive definite."""
+    """Whether all principal minors of a symmetric matrix are above ``least``; with ``least`` 0 the matrix is positive
+    definite.
+    """
     xx, yy, zz, yz, zx, xy = tensor
     diagonal, off = (xx, yy, zz), {(1, 2): yz, (0, 2): zx, (0, 1): xy}
     pairs = (diagonal[i] * diagonal[j] - off[i, j] ** 2 for i, j in combinations(range(3), 2))

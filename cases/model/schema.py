@@ -1,7 +1,7 @@
-"""The models of a case: frozen, without unknown keys, every quantity in SI units once read.
+"""The models of a case: immutable, without unknown keys; every quantity is in SI units after reading.
 
-``parse_case`` in ``cases/load.py`` reads TOML or JSON and reports every error at once. Beside this module:
-``bodies`` (bodies and their meshes), ``motion``, ``materials``, ``boundaries``, ``bonds``, ``failure`` and
+``parse_case`` in ``cases/load.py`` reads TOML or JSON and reports every error at once. Further models are in the
+modules ``bodies`` (bodies and their meshes), ``motion``, ``materials``, ``boundaries``, ``bonds``, ``failure`` and
 ``measures`` (probes and references).
 """
 
@@ -33,7 +33,7 @@ __all__ = [
 
 
 class Part(Model):
-    """A body: its material, its mesh, its motion at the start, and how it fails."""
+    """A body: its material, its mesh, its motion at the start, and its criteria of failure."""
 
     name: Name
     """Name of the part in messages, results and other keys of the case. No two parts have the same name."""
@@ -43,64 +43,66 @@ class Part(Model):
     mesh: Mesh
     """Shape, place and element size of the body. ``shape`` selects one of the tables ``parts[].mesh`` below."""
     turn: Turn | None = None
-    """Rotation of the mesh before the run starts, for bodies that are inclined to the axes. Requires
+    """Rotation of the mesh before the run starts, for bodies that are inclined to the axes. A rotation requires
     ``sector = "full"``."""
     velocity: Velocity = (0.0, 0.0, 0.0)
     """Initial velocity of the whole body along x, y, z."""
     spin: Spin | None = None
-    """Initial rigid rotation, added to ``velocity``."""
+    """Initial rigid rotation of the body, added to ``velocity``."""
     stretch: Stretch | None = None
-    """Initial uniform stretching, added to ``velocity``."""
+    """Initial uniform stretching of the body, added to ``velocity``."""
     jitter: Annotated[Speed, Field(ge=0)] = 0.0
     """Amplitude of a random initial velocity, added to ``velocity``: each component of each node is uniform between
-    minus and plus this value. Every run has the same random values. The key is meant for tests of energy
-    conservation."""
+    minus and plus this value. Every run of the case has the same random velocities. The key is meant for tests of
+    energy conservation."""
     temperature: Annotated[Temperature, Field(ge=0)] = 293.15
-    """Initial temperature. Used by ``strength`` with ``model = "johnson_cook"`` only."""
+    """Initial temperature of the body. The temperature is used only by ``strength`` with ``model = "johnson_cook"``."""
     erosion: Erosion | None = None
-    """Criteria for the deletion of tets. Without this table no tet of the part is deleted. Must not be combined with
-    ``fracture``."""
+    """Criteria for the deletion of tets. Without the table ``erosion`` no tet of the part is deleted. The table
+    ``erosion`` must not be combined with ``fracture``."""
     fracture: Fracture | None = None
-    """Criteria for the fracture of facets between tets. Without this table the part does not fracture. Needs
-    ``brittle`` in its material; not together with ``erosion``."""
+    """Criteria for the fracture of facets between tets. Without the table ``fracture`` the part does not fracture. The
+    table ``fracture`` needs ``brittle`` in the material of the part, and must not be combined with ``erosion``."""
     rigid: Annotated[Rigid | None, BeforeValidator(read_rigid), Flag()] = None
-    """Whether the part is rigid: ``true``, or a table with its mass, centre of mass and inertia. A rigid part has six
+    """Whether the part is rigid: ``true``, or a table with mass, centre of mass and inertia. A rigid part has six
     degrees of freedom and no stress; it costs only the contact of its surface and does not limit the time step. Gravity
-    acts on a rigid part. A plane of symmetry on which the body has nodes, and a boundary that drives all of its nodes,
-    restrict the motion of the body. With one prescribed velocity component the body can still rotate about this axis;
-    with two or three components it cannot rotate. A plane of symmetry that it does not touch at the start acts on it as
-    a wall without friction, with ``contact.restitution``."""
+    acts on a rigid part. A plane of symmetry on which a rigid part has nodes, and a boundary that drives all nodes of a
+    rigid part, restrict the motion of the part. A rigid part with one prescribed velocity component can still rotate
+    about the axis of this component; with two or three prescribed components it cannot rotate. A plane of symmetry that
+    a rigid part does not touch at the start acts on the part as a wall without friction, with
+    ``contact.restitution``."""
 
 
 MOST_PARTS = 256
-"""Largest number of parts of a case. The value was chosen far above the number of parts in any run so far."""
+"""Largest number of parts of a case: far above the number of parts in any run so far (chosen value)."""
 
 
 Kind = TypeVar("Kind", Symmetry, Wall, Prescribed, Rotation, Gravity, Traction)
 
 
 class Case(Model):
-    """The top level of the file."""
+    """The top level of a case file."""
 
     name: Name
     """Name of the case and of its runs."""
     title: Annotated[str, Field(max_length=200)] = ""
     """Title: one line about the case."""
     description: Annotated[str, Field(max_length=20_000)] = ""
-    """Description of the case, as long as needed."""
+    """Description of the case, of any length."""
     materials: dict[Name, Material] = Field(default_factory=dict)
-    """Materials of this case, each a table ``[materials.NAME]``. A name that the library also has replaces the
-    material of the library."""
+    """Materials of this case, each a table ``[materials.NAME]``. A material of the case replaces the material of the
+    library with the same name."""
     parts: Annotated[tuple[Part, ...], Field(min_length=1, max_length=MOST_PARTS)]
     """The bodies, in TOML one ``[[parts]]`` each."""
     boundaries: tuple[Boundary, ...] = ()
-    """Planes of symmetry, walls, prescribed motions, gravity and loads, in TOML one ``[[boundaries]]`` each;
+    """Planes of symmetry, walls, prescribed motions, gravity and loads, in TOML one ``[[boundaries]]`` each; the key
     ``kind`` selects which."""
     bond: tuple[Bond, ...] = ()
-    """Bonds between parts, in TOML one ``[[bond]]`` each; ``kind`` selects how the meshes are joined. Parts without
-    a bond are separate bodies, also where their surfaces coincide."""
+    """Bonds between parts, in TOML one ``[[bond]]`` each; the key ``kind`` selects how the meshes are joined. Parts
+    without a bond are separate bodies, even if their surfaces coincide."""
     contact: Annotated[Contact | None, BeforeValidator(off), Switch()] = Contact()
-    """Contact between bodies, on by default. ``"none"`` switches it off: bodies then pass through each other."""
+    """Contact between bodies, switched on by default. The value ``"none"`` switches contact off: bodies then pass
+    through each other."""
     probes: tuple[Probe, ...] = ()
     """Probes, in TOML one ``[[probes]]`` each: additional columns of history.csv."""
     numerics: Numerics = Numerics()
@@ -118,7 +120,7 @@ class Case(Model):
 
     @property
     def erodes(self) -> bool:
-        """Whether a part has ``erosion``."""
+        """Whether a part of the case has ``erosion``."""
         return any(part.erosion is not None for part in self.parts)
 
     @property
@@ -133,7 +135,7 @@ class Case(Model):
 
     @property
     def dt_growth(self) -> float:
-        """Returns the largest ratio of one time step to the step before."""
+        """Returns the largest ratio of a time step to the previous time step."""
         rebounds = self.contact is not None and self.contact.restitution > 0.0
         return self.numerics.dt_growth or (1.002 if rebounds else 1.05)
 

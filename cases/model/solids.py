@@ -18,10 +18,10 @@ class Meshed(Measured):
     """A body that gmsh meshes."""
 
     element_size: Annotated[Length, Positive]
-    """Edge length of the tets, approximately. Edges and faces of the body that are shorter have smaller tets, which
-    reduce the time step; ``conoid validate`` lists them."""
+    """Approximate edge length of the tets. Edges and faces of the body that are shorter than ``element_size`` have
+    smaller tets, which reduce the time step; ``conoid validate`` lists these edges and faces."""
     grading: Grading | None = None
-    """Coarser tets away from a region of interest."""
+    """Coarser tets far from a region of interest."""
 
     @property
     def generator(self) -> Literal["gmsh"]:
@@ -30,12 +30,13 @@ class Meshed(Measured):
 
 
 class Solid(Meshed):
-    """A body whose geometry OpenCASCADE makes."""
+    """A body whose geometry is made by OpenCASCADE."""
 
     sector: Literal["full", "half", "quarter"] = "full"
-    """Modelled part of the body, for scenes with planes of symmetry. ``half``: the positive side of ``centre`` in
-    the first direction across ``axis``; ``quarter``: in both. The directions across ``axis`` in cyclic order are x,
-    y for z; y, z for x; z, x for y. Each plane also needs a boundary ``symmetry``."""
+    """Modelled part of the body, for scenes with planes of symmetry. ``half``: the positive side of ``centre`` in the
+    first direction across ``axis``; ``quarter``: the positive side in both directions across ``axis``. The directions
+    across ``axis`` in cyclic order are x, y for z; y, z for x; z, x for y. Each plane of symmetry also needs a boundary
+    ``symmetry``."""
     centre: Point = (0.0, 0.0, 0.0)
     """Point through which the planes of a sector pass."""
     axis: Axis = "z"
@@ -43,15 +44,17 @@ class Solid(Meshed):
 
 
 class Union(UnionForm, Solid):
-    """The union of several bodies: all that lies in at least one of them."""
+    """The union of several bodies: all points that lie in at least one of the bodies."""
 
 
 class Difference(DifferenceForm, Solid):
-    """The first of several bodies without the others: a plate with holes, a jacket around a core."""
+    """The difference of several bodies: the first body without the other bodies, such as a plate with holes, or a
+    jacket around a core.
+    """
 
 
 class Intersection(IntersectionForm, Solid):
-    """The intersection of several bodies: all that lies in every one of them."""
+    """The intersection of several bodies: all points that lie in every one of the bodies."""
 
 
 class Cad(CadForm, Solid):
@@ -59,7 +62,9 @@ class Cad(CadForm, Solid):
 
 
 class Stl(Meshed):
-    """The interior of a closed surface of triangles (STL). The surface is meshed again with ``element_size``."""
+    """The interior of a closed surface of triangles (STL). The surface is meshed again with edges of length
+    ``element_size``.
+    """
 
     shape: Literal["stl"]
     """Selects this shape."""
@@ -68,9 +73,10 @@ class Stl(Meshed):
     unit: Annotated[Length, Positive]
     """Length unit of the coordinates in the file, such as ``"1 mm"``."""
     edge_angle: Annotated[Angle, Field(gt=0, lt=3.1)] = 0.6981317007977318
-    """Largest angle between neighbouring triangles of a smooth surface; a larger angle is an edge of the body."""
+    """Largest angle between neighbouring triangles of a smooth surface; at a larger angle the body has an edge."""
     sha256: Sha256 | None = None
-    """SHA-256 hash of the file, 64 hexadecimal digits. A file with another hash is refused. Default: not checked."""
+    """SHA-256 hash of the file, 64 hexadecimal digits. A file with another hash is refused. Default: the hash is not
+    checked."""
 
 
 Combination = Union | Difference | Intersection

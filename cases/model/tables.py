@@ -43,15 +43,15 @@ Sha256 = Annotated[str, AfterValidator(_hash), Field(json_schema_extra={"pattern
 
 
 def off(value: Any) -> Any:
-    """Returns None for ``"none"``, other values unchanged."""
+    """Returns None for ``"none"``; returns other values unchanged."""
     return None if value == "none" else value
 
 
 class Switch:
-    """Addition to the JSON schema of a key: ``"none"`` is allowed as well."""
+    """Addition to the JSON schema of a key: ``"none"`` is also allowed."""
 
     def __get_pydantic_json_schema__(self, core: CoreSchema, handler: GetJsonSchemaHandler) -> dict[str, Any]:
-        """The JSON schema with the addition; pydantic calls this method."""
+        """Returns the JSON schema with the addition; pydantic calls this method."""
         schema = handler(core)
         return {**schema, "anyOf": [*schema["anyOf"], {"const": "none"}]}
 
