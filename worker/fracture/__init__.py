@@ -1,1 +1,3 @@
-"""Fracture: breaking of facets between tets, separation of nodes, cohesive tractions, fragments."""
+"""Fracture: facets between tets break, nodes separate, cohesive tractions act between crack surfaces, fragments are
+counted.
+"""

@@ -21,13 +21,15 @@ class Breaking:
 
     @property
     def rows(self) -> Ints:
-        """(m, 2) place of the tet and local face of each facet, as in the table of the body."""
+        """(m, 2) place of the tet and local face of each facet, which are the indices into the facet table of the
+        body.
+        """
         one, two = self.facets.sides[:, 0, 1:], self.facets.sides[:, 1, 1:]
         return np.where(one[:, :1] >= 0, one, two).astype(np.int64)
 
     @property
     def load(self) -> Floats:
-        """(m,) effective traction over the strength of the facet."""
+        """(m,) ratio of the effective traction to the strength of each facet."""
         place, face = self.rows.T
         return np.asarray(self.facets.traction[:, 3] / self.body.facets.strength[place, face])
 
@@ -37,7 +39,7 @@ class Breaking:
 
 
 def gathered(body: Body, found: Candidates, shared: InterfaceFacets) -> Breaking | None:
-    """Collects the data of the facets ``found``; None if no facet breaks."""
+    """Collects the data of the facets ``found``. Returns None if no facet breaks."""
     facets: BreakingFacets = _gather(found, shared, body.mesh, body.index)
     return Breaking(body, facets) if len(facets.mass) else None
 
@@ -49,7 +51,7 @@ def _mass(mesh, e):  # type: ignore[no-untyped-def]
 
 @njit(types.void(BREAKING, types.int64, types.int64, CANDIDATES, INTERFACE, MESH, types.int64), cache=True)
 def _fill(out, m, i, found, shared, mesh, block):  # type: ignore[no-untyped-def]
-    """Fills row ``m`` of ``out`` with the data of candidate ``i``."""
+    """Fills row ``m`` of ``out`` with the data of the candidate facet ``i``."""
     place, face, row = found.place[i], found.face[i], found.shared[i]
     behind, mass = mesh.across[place, face], _mass(mesh, place)
     first = row < 0 or shared.first[row]
@@ -73,8 +75,8 @@ def _fill(out, m, i, found, shared, mesh, block):  # type: ignore[no-untyped-def
 
 @njit(BREAKING(CANDIDATES, INTERFACE, MESH, types.int64), cache=True)
 def _gather(found, shared, mesh, block):  # type: ignore[no-untyped-def]
-    """See ``gathered``; ``block``: index of the block of the body. A facet between two blocks of this rank is
-    collected once, with the block of its first side.
+    """Fills the table for ``gathered``; ``block``: index of the block of tets of the body. A facet between two blocks
+    of this rank is collected once, with the block of its first side.
     """
     n = len(found.place)
     out = BreakingFacets(

@@ -12,8 +12,8 @@ from .records import Candidates
 
 
 class CandidateSearch:
-    """Finds the candidates of bodies: a pass counts the overstressed facets of each task, a second pass writes the
-    candidates among them.
+    """Finds the candidate facets of bodies. A first pass counts the overstressed facets of each task; a second pass
+    writes the candidates among the overstressed facets.
     """
 
     def __init__(self, bodies: int, interface: Interface, team: Team) -> None:
@@ -23,11 +23,12 @@ class CandidateSearch:
         self._search = Pass(team, tasks.search, *tasks.SEARCH, size=tasks.TETS_OF_A_TASK)
         self._scratch = Scratch()
         self._rooms = [Candidates.of(0) for _ in range(bodies)]
-        """Arrays for the candidates of each body; the content is valid until the next search in the body."""
+        """Arrays for the candidates of each body. The content is valid until the next search in the same body."""
 
     def find(self, k: int, body: Body, x: Floats, step: int, t: float) -> Candidates:
-        """Returns the candidates of the ``body`` with number ``k`` that break by their clocks in step number ``step``
-        at time ``t``, s; all candidates if ``step`` is 0. ``x`` (nodes, 3): positions, m.
+        """Returns the candidate facets of the ``body`` with number ``k`` that break in step number ``step`` at time
+        ``t``, s, because their clock has run long enough. If ``step`` is 0, returns all candidates. ``x`` (nodes, 3):
+        positions, m.
         """
         rows, mesh, table, law, hot = self._interface.of_body[k], body.mesh, body.facets, body.law, body.hot
         many = self._count.many(len(hot))

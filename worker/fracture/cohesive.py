@@ -1,4 +1,4 @@
-r"""Cohesive facets: a traction that falls linearly with the opening, irreversible (Camacho and Ortiz 1996).
+r"""Cohesive facets with an irreversible law: the traction decreases linearly with the opening (Camacho and Ortiz 1996).
 
 ::
 
@@ -17,19 +17,22 @@ r"""Cohesive facets: a traction that falls linearly with the opening, irreversib
                     .        +-> e.         sides, e a unit vector along its first edge:
      first side    0-------------1              d_n = n . d,   d_t = (e . d, (n x e) . d)
 
-With e = 0 this is the usual law, whose stiffness is unbounded just after insertion: rounding would determine the
-direction of the traction, and unloading would require a time step of zero. The offset reproduces the traction at
-insertion in size and direction, leaves the area under the curve unchanged, and bounds the stiffness by strength / e; e
-is the smallest size that leaves the stable time step unchanged. With three pairs of nodes every mode of opening has a
-stiffness. Under pressure only d_t counts; contact prevents penetration.
+With e = 0 this is the usual cohesive law. The stiffness of the usual law is unbounded just after insertion: rounding
+would determine the direction of the traction, and unloading would require a time step of zero. The offset e reproduces
+the traction at insertion in size and direction. The offset leaves the area under the curve unchanged and bounds the
+stiffness by strength / e. The size of e is the smallest size that leaves the stable time step unchanged. With three
+pairs of nodes every mode of opening has a stiffness. Under pressure only d_t counts, because contact prevents
+penetration.
 
-At insertion the spring is under tension: it stores strength e / 2 per area, for which no work was done. That energy is
-a loan: while D >= e (column ``lent``), the pair has absorbed at least as much energy as it would release by closing. A
-pair that would close further is unloaded, partly or completely: its offset is shortened, so that it follows the law
-again from its present position. The stiffness of the pair is unchanged; strength and critical opening are set so that
-the area under the remaining law is the remaining energy (formulas in law.py; when, in unloading.py).
+At insertion a cohesive facet is under tension: it stores the energy strength e / 2 per area, although no work was done
+on it. While D >= e (column ``lent``), a pair of nodes has absorbed at least as much energy as it would release by
+closing. A pair that would close further is unloaded, partly or completely: its offset is shortened, so that it obeys
+the law again from its present position. The unloading does not change the stiffness of the pair. Strength and critical
+opening are set so that the area under the remaining law is the remaining energy (formulas: law.py; time of unloading:
+unloading.py).
 
-A facet whose nodes have not separated has no opening: the two nodes of a pair are one, on which its tractions cancel.
+A facet whose nodes have not separated has no opening: the two nodes of a pair are the same node, so the tractions on
+this node cancel.
 """
 
 import numpy as np
@@ -45,11 +48,11 @@ from .columns import FacetConstants, Facets, PairState, Softening
 
 
 class Cohesion:
-    """Cohesive facets of one rank: updates their openings and tractions, and sums their work."""
+    """Cohesive facets of one rank. Updates their openings and tractions, and sums the work done on them."""
 
     def __init__(self, energy: float, threads: Team) -> None:
-        """``energy``: order of magnitude of the work on a facet, J; it sets the quantum of the sums; ``threads``: of
-        the rank.
+        """``energy``: order of magnitude of the work on a facet, J, from which the quantum of the sums is chosen;
+        ``threads``: number of threads of the rank.
         """
         self.facets = Facets.none()
         self._open, self._unload, self._foresee = (
@@ -57,15 +60,15 @@ class Cohesion:
             for kernel, kinds in ((law.open_facets, law.OPEN), (law.unload, law.UNLOAD), (law.foresee, law.FORESEE))
         )
         self.gone = Tally(np.array([energy, energy]))
-        """Sums over the failed facets: work done on the facets, J, and fracture energy of the facets, J."""
+        """Two sums over the failed facets: work done on the facets, J, and fracture energy of the facets, J."""
 
     def insert(self, new: Facets) -> None:
-        """Adds facets that have just broken."""
+        """Adds facets that broke in this step."""
         self.facets = self.facets.and_more(new)
 
     def follow(self, split: Split, ids: Ints) -> Ints:
-        """Replaces the nodes of facets by their copies; ``ids``: global ids of the local nodes. Returns the rows of
-        the facets with a node that separated.
+        """Replaces nodes of facets by the copies of these nodes; ``ids``: global ids of the local nodes. Returns the
+        rows of the facets with a node that separated.
         """
         f = self.facets
         moved: Ints = law.touching(f.nodes, split.copies.parents, len(ids))
@@ -88,14 +91,16 @@ class Cohesion:
             self.facets = f.take(kept)
 
     def unload(self, change: Ints, nodes: Nodes, steps: Floats, whole: bool) -> None:
-        """Lowers the tractions of pairs that would release more than they absorbed in the next step; adds the change
-        of the nodal forces, quanta, to ``change`` (nodes, 3). See law.unload.
+        """Lowers the tractions of pairs that would release more energy in the next step than they absorbed. Adds the
+        change of the nodal forces, quanta, to ``change`` (nodes, 3). See law.unload.
         """
         of = nodes.x, nodes.v, nodes.force, nodes.mass
         self._unload.run(len(self.facets.tets), *self.facets, change.reshape(-1), *of, steps, nodes.scale, whole)
 
     def foresee(self, nodes: Nodes, mean_dt: float) -> None:
-        """Stores the opening velocities in the next step that the present nodal forces alone would cause."""
+        """Stores the opening velocities that the pairs would have in the next step if only the present nodal forces
+        acted.
+        """
         of = nodes.v, nodes.force, nodes.mass
         self._foresee.run(len(self.facets.tets), *self.facets, *of, mean_dt / nodes.scale)
 
@@ -113,14 +118,14 @@ class Cohesion:
         self.gone.words, self.gone.scale = parcel.sums["cohesive.gone"], parcel.known["cohesive"]
 
     def scatter(self, force: Ints, scale: float) -> int:
-        """Adds the cohesive forces, in quanta of 1 / ``scale`` N, to the nodal sums; returns the bits of the
-        largest.
+        """Adds the cohesive forces, in quanta of 1 / ``scale`` N, to the nodal sums. Returns the largest force as its
+        bit pattern (integer).
         """
         return int(law.scatter(force, self.facets.nodes, self.facets.state.pull, scale))
 
     def columns(self) -> Floats:
         """(m, 3) energies of each facet, J: work done on the facet, recoverable energy (released if the facet closes),
-        and fracture energy.
+        fracture energy.
         """
         f, s = self.facets.softening, self.facets.state
         beyond = np.maximum(s.top - f.knee, 0.0)
@@ -131,8 +136,8 @@ class Cohesion:
 
     @staticmethod
     def energies(sums: Floats, gone: Floats) -> tuple[float, float, float]:
-        """Returns energies, J: dissipated energy, energy recoverable by closing, and fracture energy of all facets
-        inserted so far; from the sums of ``columns`` and of ``gone`` over all ranks.
+        """Returns three energies of all facets inserted so far, J: dissipated energy, energy recoverable by closing,
+        and fracture energy. ``sums`` and ``gone`` are sums over all ranks.
         """
         work, reversible, whole = sums
         gone_work, gone_whole = gone
@@ -145,12 +150,14 @@ def _whole(facets: Facets) -> Floats:
 
 
 def sizes(offset: Floats, shear: Floats) -> Floats:
-    """(m,) sizes D of offsets (m, 3), m."""
+    """(m,) effective openings D that belong to offsets (m, 3), m."""
     return np.asarray(np.sqrt(offset[:, 0] ** 2 + shear * (offset[:, 1] ** 2 + offset[:, 2] ** 2)))
 
 
 def frames(x: Floats, nodes: Indices) -> Floats:
-    """(m, 3, 3) of facets ``nodes`` (m, 6): unit normal n, unit vector e of the first edge, and n x e, as rows."""
+    """(m, 3, 3) local axes of the facets ``nodes`` (m, 6), as rows: unit normal n, unit vector e of the first edge, and
+    n x e.
+    """
     out = np.empty((len(nodes), 3, 3))
     for m in range(len(nodes)):
         law.turn(out[m], x, nodes[m])
@@ -161,8 +168,8 @@ def fresh(
     tets: Ints, nodes: Indices, strength: Floats, energy: Floats, area: Floats, shear: Floats, offset: Floats,
     force: Floats,
 ) -> Facets:  # fmt: skip
-    """Returns facets whose three pairs have the same state: ``offset`` and ``force`` are (m, 3), the others (m,) as
-    in ``Facets``.
+    """Returns facets whose three pairs of nodes have the same state. ``offset`` and ``force`` are (m, 3), the other
+    arguments (m,) as in ``Facets``.
     """
     e, strength, critical = sizes(offset, shear), strength[:, None], (2.0 * energy / strength)[:, None]
     thrice, offset, force = np.ones((1, 3)), offset[:, None, :], force[:, None, :]

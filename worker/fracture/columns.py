@@ -1,5 +1,5 @@
-"""Columns of the cohesive facets and their numba types: constants, columns that unloading changes, columns that every
-step changes.
+"""Columns of the cohesive facets and their numba types. There are three groups: constants, columns that unloading
+changes, and columns that every step changes.
 """
 
 from collections.abc import Mapping
@@ -12,18 +12,18 @@ from ..model.state import Flags, Floats, Indices, Ints, extended
 
 
 class FacetConstants(NamedTuple):
-    """Constants of a facet since its insertion, SI."""
+    """Values of a facet that are constant after its insertion, in SI units."""
 
     energy: Floats
     """(m,) fracture energy per area, J/m^2."""
     area: Floats
     """(m,) area at insertion, m^2."""
     shear: Floats
-    """(m,) weight of shear b^2."""
+    """(m,) weight b^2 of shear in the effective opening."""
 
 
 class Softening(NamedTuple):
-    """Traction-separation law of each pair of nodes; only unloading changes it (law.py)."""
+    """Traction-separation law of each pair of nodes. Only unloading changes the law (law.py)."""
 
     strength: Floats
     """(m, 3) traction at which softening begins, Pa."""
@@ -32,19 +32,21 @@ class Softening(NamedTuple):
     knee: Floats
     """(m, 3) size D of the opening at which softening begins, m."""
     lent: Floats
-    """(m, 3) size D at insertion, e, m: a pair that closes below this size would release more energy than it
-    absorbed. The value decreases, possibly to 0, when the pair is unloaded."""
+    """(m, 3) effective opening D at insertion, e, m. A pair that closes below this value would release more energy than
+    it absorbed. Unloading of the pair decreases the value, possibly to 0."""
     offset: Floats
-    """(m, 3, 3) offset of the opening, m: along the normal, along the first edge, and across both."""
+    """(m, 3, 3) offset of the opening, m, in three components: along the normal, along the first edge, and across both
+    directions."""
 
 
 class PairState(NamedTuple):
-    """Present state of each pair; every step changes it."""
+    """Present state of each pair of nodes. Every step changes the state."""
 
     top: Floats
-    """(m, 3) largest size D so far, with the offset, m; at least the size at which softening begins."""
+    """(m, 3) largest effective opening D so far, including the offset, m. The value is never below the opening at which
+    softening begins."""
     size: Floats
-    """(m, 3) present size D, m."""
+    """(m, 3) present effective opening D, m."""
     opening: Floats
     """(m, 3, 3) position of the node of the second side relative to the node of the first side, m."""
     pull: Floats
@@ -52,24 +54,24 @@ class PairState(NamedTuple):
     work: Floats
     """(m, 3) work done on the pair so far, J."""
     foreseen: Floats
-    """(m, 3, 3) opening velocity, m/s, that the nodal forces of the last step alone would have caused."""
+    """(m, 3, 3) opening velocity, m/s, that would result if only the nodal forces of the last step acted."""
 
 
 class Facets(NamedTuple):
-    """Cohesive facets of one rank: the facets whose tet of smaller id is on this rank."""
+    """Cohesive facets of one rank. A facet belongs to the rank that has its tet of smaller id."""
 
     tets: Ints
     """(m, 2) global ids of the tets of the two sides."""
     nodes: Indices
-    """(m, 6) local nodes of the first side, counter-clockwise seen from outside of its tet, and the opposite nodes
-    of the second side."""
+    """(m, 6) local nodes: three nodes of the first side, counter-clockwise seen from outside of its tet, then the
+    opposite nodes of the second side."""
     constants: FacetConstants
     softening: Softening
     state: PairState
 
     @classmethod
     def of(cls, columns: Mapping[str, Any]) -> "Facets":
-        """Builds the records from all columns by name."""
+        """Builds the records from all columns, keyed by name."""
         constants = FacetConstants(*(columns[name] for name in FacetConstants._fields))
         softening = Softening(*(columns[name] for name in Softening._fields))
         state = PairState(*(columns[name] for name in PairState._fields))
@@ -77,7 +79,7 @@ class Facets(NamedTuple):
 
     @classmethod
     def none(cls) -> "Facets":
-        """Returns a table without rows."""
+        """Returns a table with no facet."""
         one, three, nine = np.zeros(0), np.zeros((0, 3)), np.zeros((0, 3, 3))
         return cls(
             np.zeros((0, 2), np.int64), np.zeros((0, 6), np.int32), FacetConstants(one, one, one),
@@ -85,7 +87,7 @@ class Facets(NamedTuple):
         )  # fmt: skip
 
     def columns(self) -> dict[str, Any]:
-        """Returns all columns by name."""
+        """Returns all columns, keyed by name."""
         records = (self.constants, self.softening, self.state)
         columns = {name: column for each in records for name, column in each._asdict().items()}
         return {"tets": self.tets, "nodes": self.nodes, **columns}
@@ -95,7 +97,7 @@ class Facets(NamedTuple):
         return Facets.of({name: column[chosen] for name, column in self.columns().items()})
 
     def and_more(self, new: "Facets") -> "Facets":
-        """Returns these facets, followed by the ``new`` facets."""
+        """Returns a table of these facets, followed by the ``new`` facets."""
         rows = new.columns()
         return Facets.of({name: extended(column, rows[name]) for name, column in self.columns().items()})
 
@@ -105,5 +107,5 @@ COLUMNS = (
     types.int64[:, ::1], types.int32[:, ::1], record(FacetConstants, _F1, _F1, _F1),
     record(Softening, _F2, _F2, _F2, _F2, _F3), record(PairState, _F2, _F2, _F3, _F3, _F2, _F3),
 )  # fmt: skip
-"""Types of the fields of Facets."""
+"""Numba types of the fields of Facets."""
 FACETS = record(Facets, *COLUMNS)

@@ -1,7 +1,7 @@
-"""Connected components of tets: pieces on each rank, joined across ranks to fragments.
+"""Connected components of tets. Pieces are found on each rank and then joined across ranks to fragments.
 
-Union-find by Rem's algorithm: each tet points to a tet of smaller id, and the paths of two tets to their roots are
-merged while they are walked (Patwary, Blair and Manne, Experiments on union-find algorithms, 2010).
+The union-find algorithm is Rem's: each tet points to a tet of smaller id, and the paths from two tets to their roots
+are merged while the algorithm follows them (Patwary, Blair and Manne, Experiments on union-find algorithms, 2010).
 """
 
 import numpy as np
@@ -16,13 +16,13 @@ from ..parallel.passes import Pass
 from ..parallel.team import TASK, Team, team
 
 _PART = 1 << 62
-"""Offset above all tet ids. The offset plus the number of a part is the name of a node of the graph that connects
-all tets of a part without facets."""
+"""Offset above all tet ids. The graph has one more node for each part without facets, which connects all tets of the
+part; the number of this node is the offset plus the number of the part."""
 _TETS = 4096
-"""Number of tets in a task. Chosen value: 7 % of the facets of a bar of 55,000 tets are between tets of two tasks; one
-thread joins these tets."""
+"""Number of tets in a task. Chosen value: in a bar of 55,000 tets, 7 % of the facets are between tets of two tasks; a
+single thread joins the tets at these facets."""
 _NOWHERE, _ELSEWHERE = -1, -2
-"""Places of no tet and of a tet on another rank."""
+"""Values for the place of a tet: no tet, and a tet on another rank."""
 _I, _I1, _N1, _N2 = types.int64, types.int64[::1], types.int32[::1], types.int32[:, ::1]
 _BIND = _N1, _I1, _N1, _I1, _N2, _N2, types.uint8[:, ::1], _I
 _NAME = _I1, _N1, _I1
@@ -30,8 +30,8 @@ _read_bind, _read_name = reader(*_BIND), reader(*_NAME)
 
 
 class Connectivity:
-    """Connectivity of the tets of one rank, as passes of the threads. It keeps the places of the tets behind all faces
-    while the tets of the rank stay the same.
+    """Connectivity of the tets of one rank, computed by the threads. The places of the neighbour tets are stored until
+    the tets of the rank change.
     """
 
     def __init__(self, model: Model, comm: Comm, threads: Team) -> None:
@@ -41,12 +41,12 @@ class Connectivity:
         self._scratch, self._of = Scratch(), [(-1, -1)]
 
     def labels(self, held: Ints) -> list[Ints]:
-        """Labels of fragments, (n,) for each block, a label for each tet: the smallest global id of its tets.
-        Collective.
+        """Returns the label of the fragment of each tet, (n,) for each block of tets. A label is the smallest global id
+        of the tets of the fragment. Collective.
 
-        Tets are connected through faces whose bond is intact, and through ``held``, (m, 2) global ids of tets of
-        cohesive facets; a pair is given on a rank that has at least one of the two tets. A block without the array
-        ``across`` is one piece.
+        Two tets are connected if the facet between them is intact, or if they are a pair of ``held``: (m, 2) global ids
+        of the tets of cohesive facets. A rank gives a pair if it has at least one of the two tets. A block of tets
+        without the array ``across`` is a single piece.
         """
         blocks = self._model.blocks
         self._look_up()
@@ -61,7 +61,7 @@ class Connectivity:
         return np.split(names, np.cumsum([block.n for block in blocks])[:-1]) if blocks else []
 
     def _look_up(self) -> None:
-        """Finds the places of the tets behind all faces, if the tets of the rank have changed."""
+        """Finds the places of the neighbour tets behind all faces, if the tets of the rank have changed."""
         blocks = self._model.blocks
         if self._of == (now := [(block.n, block.moved) for block in blocks]):
             return
@@ -71,8 +71,8 @@ class Connectivity:
         self._beside = [_beside(self._where, block) for block in blocks]
 
     def _bind_block(self, root: Indices, block: Block, beside: Indices, first: int) -> Ints:
-        """Joins the tets of a block, whose places begin at ``first``, through their intact faces; returns (k, 2) as
-        ``_bind_held``.
+        """Joins the tets of a block through their intact faces; the places of the tets begin at ``first``. Returns the
+        pairs across ranks, (k, 2), see ``_bind_held``.
         """
         if not block.n:
             return np.zeros((0, 2), np.int64)
@@ -89,7 +89,9 @@ class Connectivity:
 
 
 def labels(model: Model, held: Ints, comm: Comm) -> list[Ints]:
-    """Labels of fragments of one model, by one thread; see ``Connectivity.labels``. Collective."""
+    """Returns the labels of the fragments of a model, computed by one thread; see ``Connectivity.labels``.
+    Collective.
+    """
     return Connectivity(model, comm, team(1)).labels(held)
 
 
@@ -100,15 +102,17 @@ def _beside(where: IdIndex, block: Block) -> Indices:
 
 
 def count(model: Model, labels: list[Ints], comm: Comm) -> int:
-    """Returns the number of fragments with these labels: exactly one tet of each has the label as its id.
-    Collective.
+    """Returns the number of fragments. The number is counted by the tets whose id is the label of their fragment: each
+    fragment has exactly one. Collective.
     """
     named = sum(int((block.id == of).sum()) for block, of in zip(model.blocks, labels, strict=True))
     return int(comm.sum(np.array([named]))[0])
 
 
 def components(n: int, edges: Ints | Indices) -> Ints:
-    """(n,) the smallest number in the connected component of each of the numbers 0 to n - 1; ``edges`` (m, 2)."""
+    """(n,) the smallest number in the connected component of each number from 0 to n - 1; ``edges`` (m, 2): connected
+    pairs of numbers.
+    """
     root = np.arange(n, dtype=np.int32)
     _bind(root, np.ascontiguousarray(edges, np.int64), np.arange(n))
     _settle(root)
@@ -116,8 +120,8 @@ def components(n: int, edges: Ints | Indices) -> Ints:
 
 
 def _bind_held(root: Indices, ids: Ints, where: IdIndex, pairs: Ints) -> Ints:
-    """Joins pairs of tets (m, 2); returns, for pairs across ranks, (k, 2) the ids of the tet on this rank and of the
-    other tet.
+    """Joins pairs of tets (m, 2). Returns the pairs across ranks, (k, 2): id of the tet on this rank, id of the other
+    tet.
     """
     if not len(pairs):
         return np.zeros((0, 2), np.int64)
@@ -132,8 +136,8 @@ def _bind_held(root: Indices, ids: Ints, where: IdIndex, pairs: Ints) -> Ints:
 def _joined(border: Ints, names: Ints, root: Indices, ids: Ints, where: IdIndex, comm: Comm) -> Ints:
     """(n,) labels of all tets, after the pieces of all ranks have been joined.
 
-    ``border`` (k, 2): ids of tets of this rank, and ids of the tets of other ranks that they are connected with;
-    ``names`` (n,): labels of the pieces of this rank. Collective.
+    ``border`` (k, 2): pairs of connected tets, first the id of a tet of this rank, then the id of a tet of another
+    rank. ``names`` (n,): labels of the pieces of this rank. Collective.
     """
     asking, asked = comm.join(np.column_stack([names[where.places(border[:, 0])], border[:, 1]])).reshape(-1, 2).T
     if not len(asked):
@@ -155,7 +159,7 @@ def _joined(border: Ints, names: Ints, root: Indices, ids: Ints, where: IdIndex,
 
 @njit("void(int32[::1], int64[::1], int64, int64)", cache=True)
 def _unite(root, ids, a, b):  # type: ignore[no-untyped-def]
-    """Joins the trees ``root`` (n,) of two places of tets."""
+    """Joins the trees that contain the tet places ``a`` and ``b``; ``root`` (n,): parent of each tet."""
     while root[a] != root[b]:
         if ids[root[a]] < ids[root[b]]:
             a, b = b, a
@@ -168,16 +172,18 @@ def _unite(root, ids, a, b):  # type: ignore[no-untyped-def]
 
 @njit("void(int32[::1], int64[:, ::1], int64[::1])", cache=True)
 def _bind(root, pairs, ids):  # type: ignore[no-untyped-def]
-    """Joins the trees ``root`` (n,) of pairs (m, 2) of places of tets."""
+    """Joins the trees of each pair of tet places, (m, 2); ``root`` (n,): parent of each tet."""
     for m in range(len(pairs)):
         _unite(root, ids, pairs[m, 0], pairs[m, 1])
 
 
 @njit(TASK, cache=True)
 def _bind_range(table, first, stop, thread):  # type: ignore[no-untyped-def]
-    """Task: joins the tets of a range of a block through the intact faces between them, and lists in ``outer`` the
-    faces, 4 * tet + face, whose other tet is beyond the range. Of the two faces between two tets of a block it uses the
-    first one; two blocks may differ in the state of a facet.
+    """Task: joins the tets of a range of a block through the intact faces between them. Lists in ``outer`` the faces, 4
+    * tet + face, whose other tet is outside of the range.
+
+    A face between two tets of a block is used once, from its first tet. A face between two blocks is used from both
+    sides, because its facet may have a different state in each block.
     """
     root, ids, outer, counts, beside, across, bond, begin = _read_bind(table)
     n = 4 * first
@@ -195,8 +201,8 @@ def _bind_range(table, first, stop, thread):  # type: ignore[no-untyped-def]
 
 @njit("int64(int32[::1], int64[::1], int32[::1], int64[::1], int32[:, ::1], int64)", cache=True)
 def _bind_outer(root, ids, outer, counts, beside, begin):  # type: ignore[no-untyped-def]
-    """Joins the tets of the listed faces; writes the faces whose other tet is on another rank to the begin of
-    ``outer``, and returns their number.
+    """Joins the tets of the listed faces. Writes the faces whose other tet is on another rank to the first elements of
+    ``outer``, and returns the number of these faces.
     """
     rest = 0
     for k in range(len(counts)):
@@ -211,7 +217,7 @@ def _bind_outer(root, ids, outer, counts, beside, begin):  # type: ignore[no-unt
 
 @njit(TASK, cache=True)
 def _name_range(table, first, stop, thread):  # type: ignore[no-untyped-def]
-    """Task: sets the ``names`` of tets to the ids of their roots."""
+    """Task: sets the ``names`` of tets to the ids of the roots of their trees."""
     names, root, ids = _read_name(table)
     for a in range(first, stop):
         b = root[a]
@@ -222,7 +228,7 @@ def _name_range(table, first, stop, thread):  # type: ignore[no-untyped-def]
 
 @njit("void(int32[::1])", cache=True)
 def _settle(root):  # type: ignore[no-untyped-def]
-    """Sets the parent of every tet to the root of its piece."""
+    """Sets the parent of every tet to the root of its tree."""
     for a in range(len(root)):
         b = root[a]
         while root[b] != b:

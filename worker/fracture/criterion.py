@@ -1,18 +1,19 @@
 """Fracture criterion: compares the traction on a facet, the mean of the tractions of its two tets, with the strength of
 the facet.
 
-A facet breaks where sqrt(<t_n>^2 + w t_s^2) reaches the strength, with the Macaulay bracket that the paper's eq. (1)
-lacks; under pressure, where sqrt(w) <t_s - mu |t_n|> reaches the strength (Camacho and Ortiz 1996). ::
+Under tension a facet breaks where sqrt(<t_n>^2 + w t_s^2) reaches the strength; the Macaulay bracket <> is missing in
+eq. (1) of the paper. Under pressure a facet breaks where sqrt(w) <t_s - mu |t_n|> reaches the strength (Camacho and
+Ortiz 1996). ::
 
                   n                              t = (stress_1 + stress_2) / 2 n
           tet 2   ^    t                         t_n = t . n, positive in tension
         +---------|--/------+  facet             t_s = |t - t_n n|
           tet 1   | /                            n: outward normal of the tet of smaller id, tet 1
 
-The first form is an upper bound of the second form and is convex: the mean of two tractions reaches the strength only
-if one of the two reaches it. The pass over the elements therefore marks the overstressed faces of each tet
-(elements/hot.py), and the mean traction is computed only for facets with a marked face. A facet whose mean traction
-reaches the strength is a candidate.
+The formula for tension is convex and is an upper bound of the formula for pressure. Therefore the mean of two tractions
+reaches the strength only if one of the two tractions reaches it. The pass over the elements marks the overstressed
+faces of each tet (elements/hot.py), and the mean traction is computed only for facets with a marked face. A facet whose
+mean traction reaches the strength is a candidate.
 """
 
 import numpy as np
@@ -28,13 +29,13 @@ _SXX, _SYY, _SZZ = S_XX * CHUNK, S_YY * CHUNK, S_ZZ * CHUNK
 _SYZ, _SZX, _SXY = S_YZ * CHUNK, S_ZX * CHUNK, S_XY * CHUNK
 _P = PRESSURE * CHUNK
 _TOGETHER = 64
-"""Number of facets whose stresses are read in one loop."""
+"""Number of facets whose stresses are read together in one loop."""
 _I1, _F1 = types.int64[::1], types.float64[::1]
 
 
 @njit(types.void(_F1, MESH, types.int64), cache=True)
 def _stress(s, mesh, e):  # type: ignore[no-untyped-def]
-    """Sets ``s`` (6,): stress xx, yy, zz, yz, zx, xy of tet ``e`` without the viscous part, Pa."""
+    """Sets ``s`` (6,) to the stress xx, yy, zz, yz, zx, xy of tet ``e``, Pa, without the viscous part."""
     state, at = mesh.state, (e // CHUNK) * mesh.columns * CHUNK + e % CHUNK
     p = state[at + _P]
     s[0], s[1], s[2] = state[at + _SXX] - p, state[at + _SYY] - p, state[at + _SZZ] - p
@@ -43,7 +44,7 @@ def _stress(s, mesh, e):  # type: ignore[no-untyped-def]
 
 @njit("void(float64[::1], float64[::1], float64[::1])", cache=True)
 def _traction(t, s, normal):  # type: ignore[no-untyped-def]
-    """Sets ``t`` (3,): stress ``s`` (6,) times ``normal``, Pa."""
+    """Sets ``t`` (3,) to the product of the stress ``s`` (6,) and the ``normal``, Pa."""
     nx, ny, nz = normal[0], normal[1], normal[2]
     t[0] = s[0] * nx + s[5] * ny + s[4] * nz
     t[1] = s[5] * nx + s[1] * ny + s[3] * nz
@@ -54,7 +55,8 @@ def _traction(t, s, normal):  # type: ignore[no-untyped-def]
 def outward(normal, x, tet, face):  # type: ignore[no-untyped-def]
     """Sets the unit outward ``normal`` of a face of a tet at the positions ``x``; returns the area, m^2.
 
-    Computed in the order of the ids of the nodes, so that the two sides have the same bits with opposite signs.
+    The nodes are used in the order of their ids, so the normals of the two sides of a facet are bit-identical except
+    for the sign.
     """
     a, b, c = tet[FACES[face, 0]], tet[FACES[face, 1]], tet[FACES[face, 2]]
     sign = 1.0
@@ -75,7 +77,7 @@ def outward(normal, x, tet, face):  # type: ignore[no-untyped-def]
 
 @njit(types.float64[::1](types.uint32[:, ::1], _I1, _I1, POINTS), cache=True, error_model="numpy")
 def areas(tets, places, faces, x):  # type: ignore[no-untyped-def]
-    """(m,) areas of faces, m^2; the same bits from either side."""
+    """(m,) areas of faces, m^2. The area of a facet is bit-identical for its two sides."""
     out, normal = np.empty(len(places)), np.empty(3)
     for m in range(len(places)):
         out[m] = outward(normal, x, tets[places[m]], faces[m])
@@ -84,7 +86,7 @@ def areas(tets, places, faces, x):  # type: ignore[no-untyped-def]
 
 @njit("float64(float64[::1], float64[::1], float64, float64)", cache=True)
 def effective(t, normal, weight, friction):  # type: ignore[no-untyped-def]
-    """Returns the effective traction, Pa, of a traction ``t`` on a facet."""
+    """Returns the effective traction, Pa, that belongs to the traction ``t`` on a facet."""
     along = t[0] * normal[0] + t[1] * normal[1] + t[2] * normal[2]
     across = max(t[0] * t[0] + t[1] * t[1] + t[2] * t[2] - along * along, 0.0)
     if along >= 0.0:
@@ -94,8 +96,9 @@ def effective(t, normal, weight, friction):  # type: ignore[no-untyped-def]
 
 @njit(types.int64(CANDIDATES, types.int64, types.int64, types.int64, types.uint8[::1], MESH), cache=True)
 def _of_tet(out, n, end, e, hot, mesh):  # type: ignore[no-untyped-def]
-    """Writes the overstressed facets of tet ``e`` to the rows of ``out`` from ``n`` on, below ``end``; a facet with two
-    overstressed sides is written once, from its first side. Returns the next row, also beyond ``end``.
+    """Writes the overstressed facets of tet ``e`` to the rows of ``out`` from ``n`` on, but not to ``end`` or beyond. A
+    facet with two overstressed sides is written once, from its first side. Returns the next row, which may be beyond
+    ``end``.
     """
     for k in range(4):
         if not (hot[e] & mesh.intact[e]) >> k & 1:
@@ -112,9 +115,10 @@ def _of_tet(out, n, end, e, hot, mesh):  # type: ignore[no-untyped-def]
 
 @njit(types.int64(CANDIDATES, types.int64, types.int64, types.uint8[::1], MESH, types.int64, types.int64), cache=True)
 def overstressed(out, begin, end, hot, mesh, first, stop):  # type: ignore[no-untyped-def]
-    """Writes the overstressed facets within this rank, of the tets from ``first`` to ``stop``, to the rows of ``out``
-    from ``begin`` to ``end``; returns the number of these facets, even if it is larger than the number of rows.
-    ``hot`` (tets,): bit k for an overstressed face k, read eight tets at a time.
+    """Writes the overstressed facets between tets of this rank, for the tets from ``first`` to ``stop``, to the rows of
+    ``out`` from ``begin`` to ``end``. Returns the number of these facets, even if it is larger than the number of rows.
+
+    ``hot`` (tets,): bit k is set if face k is overstressed. The values of eight tets are read at once.
     """
     n, words = begin, (stop - first) // 8
     one, two = hot[first : first + 8 * words].view(np.uint64), mesh.intact[first : first + 8 * words].view(np.uint64)
@@ -129,7 +133,7 @@ def overstressed(out, begin, end, hot, mesh, first, stop):  # type: ignore[no-un
 @njit(types.int64(CANDIDATES, MESH, TABLE, POINTS, LAW, types.int64, types.int64), cache=True)
 def within(out, mesh, table, x, law, first, stop):  # type: ignore[no-untyped-def]
     """Moves the candidates among the facets of ``out`` from ``first`` to ``stop`` to the front of this range; returns
-    their number. The stresses of several facets are read in one loop, so that many reads of memory overlap.
+    their number. The stresses of several facets are read in one loop, so that the waiting times for memory overlap.
     """
     normal, one, two, m = np.empty(3), np.empty(3), np.empty(3), first
     near, far = np.empty((_TOGETHER, 6)), np.empty((_TOGETHER, 6))
@@ -166,8 +170,8 @@ def _copy(place, face, shared, traction, m, i):  # type: ignore[no-untyped-def]
 
 @njit(types.int64(CANDIDATES, _I1, _I1), cache=True)
 def _joined(out, begins, counts):  # type: ignore[no-untyped-def]
-    """Moves the ``counts[k]`` rows of ``out`` from each of ``begins`` on to the front of ``out``; returns the number of
-    these rows.
+    """Moves the rows of several ranges of ``out`` to the front of ``out``: ``counts[k]`` rows from row ``begins[k]``
+    on. Returns the total number of these rows.
     """
     m = 0
     for k in range(len(counts)):
@@ -179,8 +183,9 @@ def _joined(out, begins, counts):  # type: ignore[no-untyped-def]
 
 @njit(types.void(INTERFACE, _I1, MESH, types.uint8[::1]), cache=True)
 def mark_shared(shared, chosen, mesh, hot):  # type: ignore[no-untyped-def]
-    """Marks the neighbours with which this rank shares an intact facet of the ``chosen`` ones, of one body, that is
-    overstressed on this side; ``hot`` (tets,) as in ``search``.
+    """Marks each neighbour rank with which this rank shares a facet that is among the ``chosen`` rows, intact, and
+    overstressed on this side. The chosen facets are of one body. ``hot`` (tets,): marks of overstressed faces, as in
+    ``search``.
     """
     for m in chosen:
         e, face = shared.sides[m, 0], shared.sides[m, 1]
@@ -190,8 +195,8 @@ def mark_shared(shared, chosen, mesh, hot):  # type: ignore[no-untyped-def]
 
 @njit(types.void(INTERFACE, _I1, MESH, POINTS), cache=True)
 def own_tractions(shared, chosen, mesh, x):  # type: ignore[no-untyped-def]
-    """Computes the tractions of this rank's tets on the intact ``chosen`` shared facets, of one body, for ranks with
-    which an overstressed facet is shared.
+    """Computes the tractions of this rank's tets on the intact ``chosen`` shared facets of one body. Only facets shared
+    with ranks with which an overstressed facet is shared are computed.
     """
     normal, stress = np.empty(3), np.empty(6)
     for m in chosen:
@@ -206,8 +211,8 @@ def own_tractions(shared, chosen, mesh, x):  # type: ignore[no-untyped-def]
 
 @njit(types.int64(CANDIDATES, types.int64, INTERFACE, _I1, MESH, TABLE, POINTS, LAW), cache=True)
 def _across(out, n, shared, chosen, mesh, table, x, law):  # type: ignore[no-untyped-def]
-    """Appends the candidates among the ``chosen`` shared facets, of one body, to the ``n`` of ``out``, by the mean
-    of the tractions of both ranks. Returns the new number.
+    """Appends the candidates among the ``chosen`` shared facets of one body to the ``n`` candidates in ``out``. The
+    traction of a facet is the mean of the tractions from its two ranks. Returns the new number of candidates.
     """
     normal, mean, bound = np.empty(3), np.empty(3), max(1.0, law.weight) * (1.0 + 1e-9)
     for m in chosen:
@@ -234,11 +239,11 @@ def _across(out, n, shared, chosen, mesh, table, x, law):  # type: ignore[no-unt
 
 @njit(types.int64(CANDIDATES, types.int64, TABLE, LAW, types.int64, types.float64), cache=True, error_model="numpy")
 def clock(found, n, table, law, step, t):  # type: ignore[no-untyped-def]
-    """Updates the clocks of the ``n`` candidates, and moves the facets that break by the delayed criterion to the
-    front; returns the number of these facets.
+    """Updates the clocks of the ``n`` candidates. Moves the facets that break by the delayed criterion to the front;
+    returns the number of these facets.
 
-    The clock of an overstressed facet continues if it ran in the last step, number ``step`` - 1; else it starts at the
-    time ``t``. With nodal tractions, some candidates are not overstressed and have no clock.
+    If the clock of an overstressed facet ran in the last step, number ``step`` - 1, the clock continues; else it starts
+    at the time ``t``. With nodal tractions a candidate may be not overstressed; such a candidate has no clock.
     """
     m = 0
     for i in range(n):
@@ -261,9 +266,11 @@ def clock(found, n, table, law, step, t):  # type: ignore[no-untyped-def]
     cache=True,
 )  # fmt: skip
 def breaking(out, begins, counts, shared, chosen, mesh, table, x, law, step, t):  # type: ignore[no-untyped-def]
-    """Moves the facets that break by their clocks in step number ``step`` to the front of ``out``; all candidates if
-    the number is 0. ``out``: candidates within the rank, ``counts[k]`` rows from each of ``begins`` on;
-    ``chosen``: rows of the ``shared`` facets of the body. Returns the number of these facets.
+    """Moves the facets that break in step number ``step`` by their clocks to the front of ``out``; if ``step`` is 0,
+    all candidates. Returns the number of these facets.
+
+    ``out``: candidates within the rank, ``counts[k]`` rows from row ``begins[k]`` on; ``chosen``: rows of the
+    ``shared`` facets of the body.
     """
     n = _across(out, _joined(out, begins, counts), shared, chosen, mesh, table, x, law)
     return clock(out, n, table, law, step, t) if step > 0 else n

@@ -1,4 +1,6 @@
-"""Facets of the parts that fracture, on one rank: a table over the faces of the tets of each body."""
+"""Facets of the parts that fracture, on one rank. The facets are stored in a table over the faces of the tets of each
+body.
+"""
 
 from dataclasses import dataclass
 
@@ -15,42 +17,42 @@ from .records import FacetTable, Law, Mesh
 from .strength import Toughness
 
 _BATCH = 10_000
-"""Number of tets that are initialised in one call; it limits the temporary memory."""
+"""Number of tets that are initialised in one call. The number limits the temporary memory."""
 ELSEWHERE = -2
-"""Value for the place of a tet that is on another rank; -1 is the value for no tet."""
+"""Value for the place of a tet that is on another rank. The value -1 means that there is no tet."""
 
 
 @dataclass
 class Body:
-    """Body: the facets of a block that break by one law. The facets of the bond are either all facets between tets of
-    the block, or all facets between the block and another part.
+    """The facets of a block of tets that break by one law. These are either all facets between tets of the block, or
+    all facets between the block and another part that a bond joins.
     """
 
     index: int
-    """Index of the block among the blocks of the rank."""
+    """Index of the block of tets among the blocks of the rank."""
     block: Block
     spec: Spec
     tough: Toughness
     behind: tuple[int, int]
-    """Range of the global ids of the tets on the other side of the facets: first id, and one past the last id."""
+    """Range of the global ids of the tets on the other side of the facets: first id, and last id plus 1."""
     mesh: Mesh
     facets: FacetTable
-    """The tets of the block; all bodies of a block share it, and ``facets``."""
+    """The tets of the block. All bodies of the block share this record and the record ``facets``."""
     law: Law
     own: bool = True
-    """True if the facets are within the part."""
+    """True if the two tets of each facet are in the same part."""
 
     def has(self, across: Indices) -> Flags:
-        """Returns which faces are facets of the body, by the entries of ``across``."""
+        """Returns whether each face is a facet of the body; ``across``: neighbours of the faces."""
         return np.asarray((across >= 4 * self.behind[0]) & (across < 4 * self.behind[1]))
 
     @property
     def hot(self) -> Bits:
-        """(n,) marks of overstressed faces, see Block.hot, if the facets are within the part; else (0,)."""
+        """(n,) marks of overstressed faces, see Block.hot. The array is empty if the facets are between two parts."""
         return self.block.hot if self.own else self.block.hot[:0]
 
     def set_strengths(self, places: Ints, x0: Floats) -> None:
-        """Sets the strengths, Pa, of all its facets of the tets at ``places`` (k,); ``x0`` (nodes, 3): initial
+        """Sets the strengths, Pa, of all facets of the body at the tets ``places`` (k,); ``x0`` (nodes, 3): initial
         positions.
         """
         here, face = np.nonzero(self.has(self.block.across[places]))
@@ -59,8 +61,8 @@ class Body:
         self.facets.strength[place, face] = self.tough.strengths(facet_ids(self.block, place, face), area)
 
     def follow(self, split: Split, x0: Floats) -> None:
-        """Recomputes strengths that depend on areas, at tets whose nodes separated: the order of the nodes changes the
-        last bit of an area, and a run that resumes from a checkpoint has the present nodes only.
+        """Recomputes strengths that depend on areas, at tets whose nodes separated. The order of the nodes changes the
+        last bit of an area, and a run that resumes from a checkpoint has the present order of the nodes only.
         """
         scatter = self.tough.scatter
         if scatter is not None and scatter.area is not None:
@@ -68,12 +70,12 @@ class Body:
 
 
 Terms = tuple[Spec, Toughness, tuple[int, int]]
-"""Fracture specification, constants, and the range of ids of the tets on the other side of the facets."""
+"""Fracture specification, constants, and the range of the global ids of the tets on the other side of the facets."""
 
 
 def bodies_of(index: int, block: Block, own: Terms, bonds: list[Terms], x0: Floats) -> list[Body]:
-    """Adds the arrays for fracture to a block, if it has none yet; returns the bodies: one for the ``own`` facets of
-    the block, and one for each of its ``bonds``. ``x0`` (nodes, 3): initial positions.
+    """Adds the arrays for fracture to a block of tets that has none yet. Returns the bodies: one for the ``own`` facets
+    within the block, and one for each of its ``bonds``. ``x0`` (nodes, 3): initial positions.
     """
     begins = not len(block.bond)
     if begins:
@@ -94,14 +96,14 @@ def bodies_of(index: int, block: Block, own: Terms, bonds: list[Terms], x0: Floa
 
 
 def shear_weight(spec: Spec) -> float:
-    """Returns the weight of shear against normal traction: the given weight, else 1 for cohesive facets and 0 for other
-    facets.
+    """Returns the weight of shear traction relative to normal traction. If no weight is given, the weight is 1 for
+    cohesive facets and 0 for other facets.
     """
     return spec.shear_weight if spec.shear_weight is not None else float(spec.model == "cohesive")
 
 
 def mesh_of(block: Block) -> Mesh:
-    """Returns the record of a block for kernels."""
+    """Returns the record of a block of tets that the kernels read."""
     beside, state = _beside(block), block.state.reshape(-1)
     intact = np.packbits((block.bond == INTACT) & (beside >= 0), axis=1, bitorder="little")[:, 0].copy()
     return Mesh(block.tets, block.id, block.across, beside, block.bond, intact, state, block.state.shape[1])
@@ -118,13 +120,13 @@ def _beside(block: Block) -> Indices:
 
 
 def facet_ids(block: Block, places: "np.ndarray", faces: "np.ndarray") -> Ints:
-    """(m,) ids of facets: 4 * id + local face of the tet of smaller id."""
+    """(m,) ids of facets: 4 * id of the tet of smaller id + its local face."""
     return np.asarray(np.minimum(4 * block.id[places] + faces, block.across[places, faces]))
 
 
 def clocks(body: Body, step: int) -> Table:
-    """Returns the clocks that ran in step number ``step``: one row for each tet on this rank, with the id of the
-    facet.
+    """Returns the clocks that ran in step number ``step``: one row for each tet at the facet on this rank, with the id
+    of the facet.
     """
     place, face = np.nonzero(body.facets.seen == step)
     since, key, block = body.facets.since[place, face], facet_ids(body.block, place, face), body.block
@@ -136,7 +138,7 @@ def clocks(body: Body, step: int) -> Table:
 
 
 def set_clocks(body: Body, table: Table, step: int) -> None:
-    """Restores the clocks of step number ``step`` from the ``table`` of all bodies."""
+    """Restores the clocks of step number ``step``; ``table`` has the clocks of all bodies."""
     index = IdIndex(body.block.id)
     mine = index.places(table["tet"]) >= 0
     facet, tet = table["key"][mine], table["tet"][mine]

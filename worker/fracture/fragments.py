@@ -1,15 +1,18 @@
-"""Fragments: tets connected through intact and cohesive facets; their mass, motion, energy and new surface.
+"""Fragments: tets connected through intact and cohesive facets. The module computes their mass, motion, energy and new
+surface.
 
-The label of a fragment is the smallest global id of its tets. Each rank finds its own connected pieces; then all ranks
-solve the small graph of the pieces that are connected across ranks, in the same way (connectivity.py).
+The label of a fragment is the smallest global id of its tets. Each rank finds its own connected pieces. Then every rank
+solves the small graph of the pieces that are connected across ranks (connectivity.py).
 
-A tet gives a quarter of its mass to each of its nodes, at the position and with the velocity of the node: so mass,
-momentum, angular momentum and energy of all fragments together are equal to the sums over the nodes. (The inertia is
-the inertia of lumped masses. This inertia is larger than the inertia of the solid; for a single tet it is five times as
-large.) Nodes without tets belong to no fragment. The values of tets are summed by fragment as integers; the quantum of
-each fragment is 2^-60 of its largest term, so that the result is independent of order and ranks, and small fragments
-keep their digits beside a large one. Centre and velocity are summed first, and quantities relative to them in a second
-pass: sums about the origin would lose the digits of r^2 / extent^2.
+A tet gives a quarter of its mass to each of its nodes, at the position and with the velocity of the node. Therefore
+mass, momentum, angular momentum and energy, summed over all fragments, are equal to the sums over the nodes. The
+inertia is that of the lumped masses, which is larger than the inertia of the solid; for a single tet it is five times
+as large. Nodes without tets belong to no fragment.
+
+The values of the tets of a fragment are summed as integers. The quantum of each fragment is 2^-60 of its largest term,
+so the sums do not depend on order and ranks, and a small fragment keeps its digits beside a large one. Centre and
+velocity are summed first, and quantities relative to them in a second pass: sums about the origin would lose the digits
+of r^2 / extent^2.
 """
 
 import csv
@@ -31,9 +34,10 @@ from ..parallel.comm import Comm
 _NODE_BITS = 40
 """Number of bits of a global node id."""
 _LIMB = 2.0**30
-"""Number of quanta in a limb, see parallel/fixed_point.py."""
+"""Number of quanta in a limb of an exact sum, see parallel/fixed_point.py."""
 _FLAT = 1e-10
-"""An axis counts as without inertia if its principal moment of inertia is below this share of the largest one."""
+"""Smallest ratio of a principal moment of inertia to the largest one. Below this ratio the axis counts as without
+inertia."""
 
 FRAGMENT = np.dtype([
     ("label", np.int64), ("part", np.int64), ("tets", np.int64), ("nodes", np.int64), ("mass", float),
@@ -41,29 +45,30 @@ FRAGMENT = np.dtype([
     ("translation", float), ("rotation", float), ("deformation", float), ("low", float, 3), ("high", float, 3),
     ("extent", float), ("new_surface", float),
 ])  # fmt: skip
-"""Row of the table of fragments; cases/output/fragments.py describes the columns."""
+"""Data type of a row in the table of fragments; cases/output/fragments.py describes the columns."""
 
 
 class Groups:
-    """Fragments of the tets of one rank, and sums over them that are independent of order. All methods are
-    collective.
+    """Fragments of the tets of one rank, and sums over each fragment. The sums do not depend on the order of the terms.
+    All methods are collective.
     """
 
     def __init__(self, labels: Ints, comm: Comm) -> None:
         """``labels`` (n,): label of the fragment of each tet."""
         self._comm = comm
         self.label, self.of = np.unique(labels, return_inverse=True)
-        """(g,) labels of the fragments with a tet on this rank, ascending; (n,) for each tet the place of its label."""
+        """Labels (g,) of the fragments with a tet on this rank, ascending; and for each tet the index (n,) of its
+        label."""
         self._order = np.argsort(self.of, kind="stable")
         self._starts = np.searchsorted(self.of[self._order], np.arange(len(self.label)))
         everywhere, ranks = np.unique(np.concatenate(comm.share(self.label)), return_counts=True)
         self.split = everywhere[ranks > 1]
-        """(s,) labels of fragments with tets on several ranks; the array is equal on every rank."""
+        """(s,) labels of the fragments with tets on several ranks. All ranks have the same array."""
         at = places(self.split, self.label)
         self._here, self._at = np.flatnonzero(at >= 0), at[at >= 0]
 
     def largest(self, values: Floats) -> Floats:
-        """(g, k) maximum of each column of ``values``, (n, k), in every fragment."""
+        """(g, k) maximum in each fragment of the columns of ``values``, (n, k)."""
         found = np.maximum.reduceat(values[self._order], self._starts, axis=0)
         if len(self.split):
             parts = np.full((len(self.split), values.shape[1]), -np.inf)
@@ -72,11 +77,13 @@ class Groups:
         return np.asarray(found)
 
     def count(self, words: Ints) -> Ints:
-        """(g, k) sums of the columns of ``words``, (n, k), in every fragment."""
+        """(g, k) sum in each fragment of the columns of ``words``, (n, k)."""
         return self.complete(np.add.reduceat(words[self._order], self._starts, axis=0))
 
     def complete(self, found: Ints, elsewhere: Ints | None = None) -> Ints:
-        """Sums ``found`` (g, k) over the ranks; ``elsewhere`` (s, k) is added to the fragments of several ranks."""
+        """Adds up ``found`` (g, k) over the ranks. ``elsewhere`` (s, k) is added to the fragments that are on several
+        ranks.
+        """
         if len(self.split):
             parts = np.zeros((len(self.split), found.shape[1]), np.int64) if elsewhere is None else elsewhere
             parts[self._at] += found[self._here]
@@ -84,7 +91,7 @@ class Groups:
         return found
 
     def sums(self, values: Floats) -> Floats:
-        """(g, k) sums of the columns of ``values``, (n, k), in every fragment; the error is at most n quanta."""
+        """(g, k) sum in each fragment of the columns of ``values``, (n, k). The error is at most n quanta."""
         exponent = np.maximum(np.frexp(self.largest(np.abs(values)))[1], -900)
         scaled = values * np.ldexp(1.0, 30 - exponent)[self.of]
         high = np.rint(scaled)
@@ -94,11 +101,11 @@ class Groups:
 
 
 def table(model: Model, labels: list[Ints], comm: Comm) -> "np.ndarray | None":
-    """(fragments,) of ``FRAGMENT``, by ascending label, on rank 0, elsewhere None; with the velocities of the nodes.
-    Collective.
+    """Returns the table of fragments, (fragments,) of ``FRAGMENT``, by ascending label, on rank 0; None on other ranks.
+    The velocities are those of the nodes. Collective.
 
-    The results are the same to the bit for any number of ranks: the values of a tet result from the same operations on
-    every rank, sums over tets are exact, and quantities derived from these sums are computed once.
+    The results are bit-identical for any number of ranks, because every rank computes the values of a tet by the same
+    operations, sums over tets are exact, and rank 0 computes the quantities derived from the sums.
     """
     blocks, nodes = model.blocks, model.nodes
     tets = np.concatenate([np.zeros((0, 4), np.int64), *(block.tets for block in blocks)]).astype(np.int64)
@@ -107,7 +114,7 @@ def table(model: Model, labels: list[Ints], comm: Comm) -> "np.ndarray | None":
     rows = np.zeros(len(groups.label), FRAGMENT)
     rows["label"] = groups.label
     part = np.concatenate([np.zeros(0), *(np.full(block.n, float(block.part)) for block in blocks)])
-    rows["part"] = -groups.largest(-part[:, None])[:, 0]  # the first part, if parts share nodes
+    rows["part"] = -groups.largest(-part[:, None])[:, 0]  # the first of the parts that share the node
     rows["tets"] = groups.count(np.ones((len(tets), 1), np.int64))[:, 0]
     rows["nodes"] = _node_counts(model, tets, groups, comm)
     _move(rows, groups, tets, mass, nodes.x, nodes.v)
@@ -121,8 +128,8 @@ def table(model: Model, labels: list[Ints], comm: Comm) -> "np.ndarray | None":
 
 
 def _move(rows: "np.ndarray", groups: Groups, tets: Ints, mass: Floats, x: Floats, v: Floats) -> None:
-    """Fills in mass, centre, velocity and box; then, relative to these, angular momentum, inertia and kinetic
-    energy.
+    """Fills in mass, centre, velocity and bounding box. Then fills in angular momentum, inertia and kinetic energy
+    relative to centre and velocity.
     """
     quarter, corners = mass / 4.0, tets.T
     moment, momentum = np.zeros((2, len(tets), 3))
@@ -143,10 +150,10 @@ def _move(rows: "np.ndarray", groups: Groups, tets: Ints, mass: Floats, x: Float
 
 
 def _about(r: Floats, w: Floats) -> Floats:
-    """(n, 10) angular momentum, inertia and kinetic energy per mass, at ``r``, m, with velocity ``w``, m/s.
+    """(n, 10) angular momentum, inertia and kinetic energy per mass of points at ``r``, m, with velocity ``w``, m/s.
 
-    Inertia in the order xx, yy, zz, yz, zx, xy. Written out, since the sums of a library of linear algebra may
-    depend on the length of the arrays.
+    The inertia has the order xx, yy, zz, yz, zx, xy. The products are written out, because sums of a linear algebra
+    library may depend on the length of the arrays.
     """
     x, y, z = r.T
     u, v, o = w.T
@@ -158,7 +165,7 @@ def _about(r: Floats, w: Floats) -> Floats:
 
 
 def _broken_area(block: Block, x0: Floats) -> Floats:
-    """(n,) initial area of the broken faces of each tet, m^2."""
+    """(n,) initial area, m^2, of the broken faces of each tet."""
     area = np.zeros(block.n)
     if len(block.bond):
         for face in range(4):
@@ -168,7 +175,9 @@ def _broken_area(block: Block, x0: Floats) -> Floats:
 
 
 def _node_counts(model: Model, tets: Ints, groups: Groups, comm: Comm) -> Ints:
-    """(g,) number of nodes of each fragment. The nodes of a fragment of several ranks are counted by their owners."""
+    """(g,) number of nodes of each fragment. If a fragment has tets on several ranks, each of its nodes is counted by
+    the owner of the node.
+    """
     nodes = model.nodes
     group, node = np.divmod(np.unique(groups.of[:, None] * np.int64(nodes.n) + tets), max(nodes.n, 1))
     place = places(groups.split, groups.label).astype(np.int64)[group]
@@ -182,9 +191,10 @@ def _node_counts(model: Model, tets: Ints, groups: Groups, comm: Comm) -> Ints:
 
 
 def _finished(rows: "np.ndarray") -> "np.ndarray":
-    """Fills in the quantities that follow from the sums: energies and extent. Rotation is 1/2 L . I^-1 L.
+    """Fills in the quantities that are computed from the sums: energies and extent. The energy of rotation is 1/2 L .
+    I^-1 L.
 
-    Axes without inertia have no angular momentum and are omitted. On entry ``deformation`` is the kinetic energy
+    Axes without inertia have no angular momentum and are omitted. Before the call ``deformation`` is the kinetic energy
     relative to the centre.
     """
     xx, yy, zz, yz, zx, xy = rows["inertia"].T
@@ -202,7 +212,7 @@ def _finished(rows: "np.ndarray") -> "np.ndarray":
 def write(folder: Path, index: int, t: float, parts: list[str], rows: "np.ndarray") -> str:
     """Writes the table of frame ``index``, atomically, and returns its path relative to the run's folder.
 
-    Numbers are written so that they read back to the same bits.
+    The text of each number gives the bit-identical number when it is read.
     """
     path = tables.path(folder, index)
     path.parent.mkdir(exist_ok=True)

@@ -1,4 +1,4 @@
-"""Transfer of nodal forces from separated nodes to their copies, in integers: the forces of tets and cohesive
+"""Transfer of nodal forces, as integers, from separated nodes to their copies: the forces of tets and of cohesive
 facets.
 """
 
@@ -22,15 +22,15 @@ from .records import MESH, POINTS, Mesh
 from .separation import common
 
 _ROWS = VISCOUS + 1
-"""Rows of the state from which the forces are computed."""
+"""Rows of the element state from which the forces are computed."""
 _I1, _I2, _N1 = types.int64[::1], types.int64[:, ::1], types.int32[::1]
 
 
 class Room(NamedTuple):
-    """Scratch for a chunk of tets (elements/scratch.py)."""
+    """Scratch memory for a chunk of tets (elements/scratch.py)."""
 
     w: Floats
-    """(SCRATCH,) scratch rows of the elements."""
+    """(SCRATCH,) scratch rows of the element kernels."""
     forces: Ints
     """(9 * CHUNK,) forces on nodes 1, 2, 3, quanta."""
     state: Floats
@@ -43,21 +43,21 @@ _ROOM = record(Room, types.float64[::1], _I1, types.float64[::1], types.uint32[:
 
 
 class Handover:
-    """Force transfer on one rank."""
+    """Transfer of forces to the copies of separated nodes, on one rank."""
 
     def __init__(self, model: Model, meshes: dict[int, Mesh], neighbours: list[Neighbour], comm: Comm) -> None:
-        """``meshes``: of the parts that fracture, by index of the block."""
+        """``meshes``: meshes of the parts that fracture, by index of the block of tets."""
         self._model, self._meshes, self._neighbours, self._comm = model, meshes, neighbours, comm
         self._room = Room(
             np.zeros(SCRATCH), np.zeros(9 * CHUNK, np.int64), np.zeros(_ROWS * CHUNK), np.zeros((CHUNK, 4), np.uint32)
         )
 
     def hand_over(self, split: Split, cohesion: Cohesion | None, fresh: list[Facets]) -> None:
-        """Moves the forces of the tets and facets of each copy from the parent to the copy; ``fresh``: new cohesive
-        facets. Collective among the ranks that share copies.
+        """Moves the forces of the tets and facets of each copy from the parent node to the copy; ``fresh``: new
+        cohesive facets. Collective among the ranks that share copies.
 
         The force that a copy receives is subtracted exactly from its parent, because copy and parent were one node
-        before.
+        before the separation.
         """
         nodes, copies = self._model.nodes, split.copies
         change = np.zeros((copies.n, 3), np.int64)
@@ -76,7 +76,7 @@ class Handover:
         _apply(nodes.force, change, copies.parents, split.first)
 
     def _complete(self, change: Ints, parents: Ints) -> None:
-        """Adds the changes of the forces from other ranks to the changes at shared copies."""
+        """Adds the force changes that other ranks computed to the changes at shared copies."""
         shared = {o.rank: at for o in self._neighbours if len(at := common(parents, o.nodes))}
         if shared:
             received = self._comm.trade({rank: change[at] for rank, at in shared.items()}, shared)
@@ -86,9 +86,7 @@ class Handover:
 
 @njit(types.void(_I2, _I2, _I1, types.int64), cache=True)
 def _apply(force, change, parents, first):  # type: ignore[no-untyped-def]
-    """Adds ``change`` (copies, 3) to the forces of the copies and subtracts ``change`` from the forces of the
-    ``parents``.
-    """
+    """Adds ``change`` (copies, 3) to the forces of the copies, and subtracts it from the forces of the ``parents``."""
     for c in range(len(parents)):
         for k in range(3):
             force[first + c, k] += change[c, k]
@@ -97,8 +95,8 @@ def _apply(force, change, parents, first):  # type: ignore[no-untyped-def]
 
 @njit(types.void(_ROOM, _N1, _I1, types.int64, MESH, POINTS, types.float64), cache=True, error_model="numpy")
 def _forces(room, place, chosen, n, mesh, x, scale):  # type: ignore[no-untyped-def]
-    """Computes the forces of the present stress of the tets of ``n`` rows, on their nodes 1, 2, 3
-    (elements/forces.py), in ``room.forces``.
+    """Computes the forces on nodes 1, 2, 3 of the chosen tets from their present stress (elements/forces.py), and
+    stores them in ``room.forces``. ``n``: number of tets.
     """
     for i in range(n):
         e = place[chosen[i]]
@@ -118,8 +116,8 @@ def _forces(room, place, chosen, n, mesh, x, scale):  # type: ignore[no-untyped-
     error_model="numpy",
 )
 def _of_tets(change, node, place, corner, blocks, block, first, mesh, x, room, scale):  # type: ignore[no-untyped-def]
-    """Adds the forces of the tets of one ``block`` whose ``node`` (r,) is now a copy to the forces of the copies;
-    ``first``: local index of the first copy.
+    """Adds the forces of tets to the forces of copies. The tets are the tets of one ``block`` whose ``node`` (r,) is
+    now a copy; ``first``: local index of the first copy.
     """
     chosen, n = np.empty(CHUNK, np.int64), 0
     for r in range(len(node)):

@@ -1,4 +1,4 @@
-"""Fracture initiation: candidates by their tractions, the delayed criterion, and the order of breaking."""
+"""Fracture initiation. The steps are: candidates by tractions, the delayed criterion, and the order of breaking."""
 
 import numpy as np
 
@@ -23,20 +23,21 @@ from .stars import Stars
 
 
 class Initiation:
-    """Finds the facets that break on one rank, and stores the clocks of the delayed criterion."""
+    """Search for the facets of one rank that break. Stores the clocks of the delayed criterion."""
 
     def __init__(
         self, model: Model, bodies: list[Body], specs: dict[int, Fracture], stars: dict[int, Stars],
         neighbours: list[Neighbour], comm: Comm, clock: Clock, team: Team,
     ) -> None:  # fmt: skip
-        """``specs``: of all parts that fracture, by number, also of parts that have no tet on this rank; ``stars``:
-        by index of the block; ``team``: threads of the rank. Collective.
+        """``specs``: specifications of all parts that fracture, by number of the part; parts without a tet on this rank
+        are included. ``stars``: stars of the nodes, by index of the block of tets; ``team``: threads of the rank.
+        Collective.
         """
         self._model, self._neighbours, self._comm, self._clock = model, neighbours, comm, clock
         self.bodies = bodies
         smooth = [part for part, spec in specs.items() if spec.traction == "nodes"]
         self._averaged = [[part] for part in smooth] if len(model.nodes.shares.rank) else [smooth]
-        """Groups of parts with nodal tractions; no two parts of a group have a node in common."""
+        """Groups of parts with nodal tractions. Two parts of a group have no node in common."""
         self.one_by_one = any(spec.order == "local_maximum" for spec in specs.values())
         self._stars = stars
         self.interface = Interface(bodies, neighbours, comm)
@@ -47,22 +48,22 @@ class Initiation:
         self._heaviest = comm.maximum(heaviest)
         """(parts,) mass of the heaviest tet of all ranks, kg; 0 for a part that does not fracture."""
         self._step = 1
-        """Number of the step, as stored with the clocks; the first step has number 1."""
+        """Number of the step, as stored with the clocks. The number of the first step is 1."""
 
     @property
     def smooth(self) -> bool:
-        """True if a part uses nodal tractions."""
+        """True if the tractions of a part are nodal tractions."""
         return any(self._averaged)
 
     def begin_step(self, many: int = 1) -> None:
-        """Starts a new step, the last of ``many`` steps. The clock of a facet stops if the facet is not overstressed in
-        a step.
+        """Starts a new step, which is the last of ``many`` steps. If a facet is not overstressed in a step, its clock
+        stops.
         """
         self._step += many
 
     def breaking(self, hot: bool) -> list[Breaking]:
-        """Returns the facets that break by the present stress, by body; ``hot``: a face of this rank is
-        overstressed. Collective among neighbours, and with nodal tractions among all ranks.
+        """Returns the facets of each body that break by the present stress; ``hot``: whether a face of this rank is
+        overstressed. Collective among neighbours; with nodal tractions among all ranks.
         """
         if not (hot or self.interface.hot or self.smooth):
             return []
@@ -70,12 +71,12 @@ class Initiation:
         return [some for some in every if some is not None]
 
     def candidates(self) -> list[tuple[Body, Candidates]]:
-        """Returns the bodies with candidates, and the candidates. Called once a step, since it advances the clocks;
-        collective as ``breaking``.
+        """Returns the bodies with candidates, and their candidates. Must be called once a step, because it advances the
+        clocks. Collective in the same way as ``breaking``.
         """
         self.interface.exchange(self._model.nodes.x)
         x, t = self._model.nodes.x, self._clock.t
-        # With nodal tractions, _of_nodes applies the delayed criterion later.
+        # With nodal tractions the delayed criterion is applied later, in _of_nodes.
         steps = [self._step if body.spec.traction == "tets" else 0 for body in self.bodies]
         found = [(body, self._search.find(k, body, x, steps[k], t)) for k, body in enumerate(self.bodies)]
         if self.smooth:
@@ -83,8 +84,8 @@ class Initiation:
         return [(body, some) for body, some in found if len(some.place)]
 
     def strongest(self, broken: list[Breaking]) -> list[Breaking]:
-        """Returns the facets that have the largest traction over strength at all of their nodes, in parts with
-        ``order = "local_maximum"``, and all facets of other parts. Collective.
+        """Filters the facets that break. In parts with ``order = "local_maximum"`` a facet is kept if it has the
+        largest ratio of traction to strength at all of its nodes. All facets of other parts are kept. Collective.
         """
         waiting = [b for b in broken if b.body.spec.order == "local_maximum"]
         none = np.zeros(0, np.int64)
@@ -99,7 +100,7 @@ class Initiation:
         return [b.take(next(left)) if b.body.spec.order == "local_maximum" else b for b in broken]
 
     def follow(self, split: Split) -> None:
-        """Updates the bodies after a split."""
+        """Updates the bodies after a separation of nodes."""
         for body in self.bodies:
             body.follow(split, self._model.nodes.x0)
 
@@ -120,14 +121,16 @@ class Initiation:
         self.interface.free()
 
     def _smoothed(self, found: list[tuple[Body, Candidates]]) -> list[tuple[Body, Candidates]]:
-        """Replaces the tractions by tractions from nodal stress, in parts that use nodal tractions. Collective."""
+        """In parts that use nodal tractions, replaces the tractions by tractions from nodal stress. Collective."""
         left = dict[int, Candidates]()
         for parts in self._averaged:
             left |= self._of_nodes([(body, each) for body, each in found if body.own and body.block.part in parts])
         return [(body, left.get(body.index, each) if body.own else each) for body, each in found]
 
     def _of_nodes(self, some: list[tuple[Body, Candidates]]) -> dict[int, Candidates]:
-        """Returns, by index of the block, the remaining candidates of bodies with nodal tractions. Collective."""
+        """Returns the candidates that remain in bodies with nodal tractions, by index of the block of tets.
+        Collective.
+        """
         nodes, left = self._model.nodes, dict[int, Candidates]()
         wanted = np.zeros(nodes.n, bool)
         for body, each in some:

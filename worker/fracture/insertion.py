@@ -1,4 +1,6 @@
-"""Insertion of cohesive facets: with the traction at which they broke, and the stiffness that the time step allows."""
+"""Insertion of cohesive facets. A new facet has the traction at which it broke, and the largest stiffness that the time
+step allows.
+"""
 
 import numpy as np
 
@@ -10,23 +12,25 @@ from .cohesive import frames, fresh
 from .columns import Facets
 
 _LEAST = 0.05
-"""Smallest share of the square of the highest frequency resolved by the time step that cohesive facets may use."""
+"""Smallest fraction of the square of the highest frequency resolved by the time step that cohesive facets may use."""
 _SHARES = 24.0
 """Factor 4 * 3 * 2: a node has a quarter of the mass of its tet, up to three faces of the tet open at the node, and
 both nodes of a pair move."""
 
 
 class Insertion:
-    """Makes the cohesive facets of one rank."""
+    """Creation of the cohesive facets of one rank."""
 
     def __init__(self, safety: float) -> None:
         """``safety``: safety factor of the time step."""
         self._unused = max(1.0 - safety**2, _LEAST)
         self.longest = 0.0
-        """Longest stable step so far in which a face was overstressed, s."""
+        """Longest stable step so far, s, among the steps in which a face was overstressed."""
 
     def facets(self, b: Breaking, nodes: Nodes, split: Split) -> Facets:
-        """Returns the cohesive facets of ``b`` whose first side is on this rank, at the present positions."""
+        """Returns the cohesive facets that replace the broken facets ``b``, at the present positions. Only facets whose
+        first side is on this rank are returned.
+        """
         f = b.facets
         before = np.concatenate([f.nodes, f.nodes], axis=1)
         after = split.followed_sides(before, nodes.id, f.tets)
@@ -44,7 +48,7 @@ class Insertion:
 
 
 def shear_share(along: Floats, traction: Floats, weight: float) -> Floats:
-    """(m,) share of shear in the square of the effective traction: w t_s^2 / (<t_n>^2 + w t_s^2); ``along`` (m,):
+    """(m,) fraction of shear in the square of the effective traction: w t_s^2 / (<t_n>^2 + w t_s^2); ``along`` (m,):
     component of the ``traction`` (m, 3) along the normal, Pa.
     """
     shear = weight * np.maximum((traction * traction).sum(axis=1) - along * along, 0.0)
@@ -58,16 +62,16 @@ def inserted(
 ) -> Facets:  # fmt: skip
     """Returns new facets at the present positions.
 
-    ``before`` and ``after`` (m, 6): nodes of the first side and the opposite nodes, before and after separation;
-    ``traction`` (m, 3) on the outward normal of the first side and its ``effective`` size (m,), Pa; ``weight`` of
-    shear; ``stiffness`` (m,) that the time step allows, Pa/m.
+    ``before`` and ``after`` (m, 6): nodes of the first side and the opposite nodes, before and after the separation of
+    nodes; ``traction`` (m, 3) on the outward normal of the first side and its ``effective`` size (m,), Pa; ``weight``
+    of shear; ``stiffness`` (m,) that the time step allows, Pa/m.
     """
     frame = frames(nodes.x, before)
     along = (frame * traction[:, None]).sum(axis=2)
     along[:, 0] = np.maximum(along[:, 0], 0.0)
     shear = 1.0 / weight
-    # T = strength / e (<d_n> n + b^2 d_t) is the traction where d_n = e t_n / strength, d_t = e t_t / (b^2 strength);
-    # under pressure the effective traction contains only the shear beyond friction.
+    # T = strength / e (<d_n> n + b^2 d_t) is the traction at insertion if d_n = e t_n / strength and d_t = e t_t / (b^2
+    # strength). Under pressure the effective traction contains only the shear beyond friction.
     e = np.maximum(1.0, shear) * effective / stiffness
     pressed = along[:, 0] == 0.0
     across = np.sqrt(along[:, 1] ** 2 + along[:, 2] ** 2)

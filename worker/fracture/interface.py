@@ -1,8 +1,9 @@
-"""Shared facets: facets whose two tets are on different ranks, or in two blocks of one rank. The two ranks at a facet
-compute the same mean traction.
+"""Shared facets: facets whose two tets are on different ranks, or in two blocks of tets of one rank. The two ranks at a
+facet compute the same mean traction.
 
-A facet breaks only if one of its tets alone would break it, so two ranks exchange tractions only in steps in which a
-facet shared by the two ranks is overstressed. A flag for this is sent with the forces of shared nodes.
+A facet breaks only if the traction of one of its tets reaches the strength. Therefore two ranks exchange tractions only
+in steps in which a facet shared by them is overstressed. A flag that shows this is sent with the forces of shared
+nodes.
 """
 
 import numpy as np
@@ -19,10 +20,10 @@ from .records import InterfaceFacets
 
 
 class Interface:
-    """Facets that this rank shares with others, and the exchange of their tractions."""
+    """Facets that this rank shares with other ranks, and the exchange of their tractions."""
 
     def __init__(self, bodies: list[Body], neighbours: list[Neighbour], comm: Comm) -> None:
-        """Collective."""
+        """Finds the shared facets. Collective."""
         mine = np.concatenate([np.zeros((0, 5), np.int64), *(_rows(b, body) for b, body in enumerate(bodies))])
         received = comm.swap({other.rank: mine[:, [0, 2]] for other in neighbours}) if comm.size > 1 else {}
         met = {rank: _met(mine, words.reshape(-1, 2)) for rank, words in received.items()}
@@ -32,9 +33,9 @@ class Interface:
         index = {other.rank: k for k, other in enumerate(neighbours)} | {comm.rank: last}
         of = np.repeat(np.array([index[rank] for rank in met], np.int64), [len(rows) for rows in met.values()])
         self._inner: Ints = np.flatnonzero(of == last)
-        """Rows of facets between two blocks of this rank."""
+        """Rows of the facets between two blocks of tets of this rank."""
         self._partner = _partners(table[self._inner])
-        """Place of the other side of each of these facets, among the facets between two blocks of this rank."""
+        """Index of the other side of each facet between two blocks of this rank, among these facets."""
         self.facets = InterfaceFacets(
             np.column_stack([table[:, 3], table[:, 0] % 4]).astype(np.int32), table[:, 0] < table[:, 1],
             np.ascontiguousarray(table[:, 5]).view(np.float64), np.zeros((m, 3)), np.zeros((m, 3)),
@@ -45,7 +46,7 @@ class Interface:
         self.facets.there[self._inner] = here[self._partner]
         self._bodies = bodies
         self.of_body: list[Ints] = [np.flatnonzero(table[:, 4] == b) for b in range(len(bodies))]
-        """Rows of the facets of each body."""
+        """Rows of the shared facets of each body."""
         self._outer = [rows[of[rows] != last] for rows in self.of_body]
         ends = np.cumsum([0, *map(len, met.values())])
         own, theirs = self.facets.own.view(np.int64), self.facets.theirs.view(np.int64)
@@ -53,13 +54,13 @@ class Interface:
             index[rank]: comm.exchange([(rank, own[a:b])], [(rank, theirs[a:b])], Tag.TRACTION)
             for rank, a, b in zip(met, ends[:-1], ends[1:], strict=True) if b > a and rank != comm.rank
         }  # fmt: skip
-        """Facets shared with each neighbour, by the index of the neighbour."""
+        """Exchanges of shared facets, keyed by the index of the neighbour rank."""
         self.hot = False
-        """True if a shared facet is overstressed on either side."""
+        """True if a shared facet is overstressed on at least one side."""
 
     def words(self, hot: bool) -> Ints:
-        """(neighbours,) flags to send: 1 if a facet shared with that rank is overstressed on this side; ``hot``: a
-        tet of a shared node has an overstressed face.
+        """(neighbours,) flags to send. A flag is 1 if a facet shared with that neighbour is overstressed on this side.
+        ``hot``: whether a tet of a shared node has an overstressed face.
         """
         self.facets.hot[:] = 0
         for body, rows in zip(self._bodies, self._outer, strict=True):
@@ -68,13 +69,13 @@ class Interface:
         return self.facets.hot[:-1]
 
     def receive(self, words: Ints) -> None:
-        """Merges the flags received from the neighbours."""
+        """Combines the flags received from the neighbours with the flags of this rank."""
         np.maximum(self.facets.hot[:-1], words, out=self.facets.hot[:-1])
         self.hot = bool(self.facets.hot.any())
 
     def mark_inner(self, hot: bool) -> None:
-        """Marks the overstressed facets between two blocks of this rank, after all its tets; ``hot``: a face of the
-        rank is overstressed.
+        """Marks the overstressed facets between two blocks of this rank. Must be called when all tets of the rank have
+        their stress. ``hot``: whether a face of the rank is overstressed.
         """
         if len(self._inner):
             self.facets.hot[-1] = 0
@@ -85,8 +86,8 @@ class Interface:
             self.hot = bool(self.facets.hot.any())
 
     def exchange(self, x: Floats) -> None:
-        """Computes and exchanges the tractions of both sides at the positions ``x`` (nodes, 3), if a shared facet is
-        overstressed. Collective among neighbours.
+        """Computes the tractions of this rank at the positions ``x`` (nodes, 3) and exchanges them with the neighbours.
+        Nothing is done if no shared facet is overstressed. Collective among neighbours.
         """
         if not self.hot:
             return
@@ -107,8 +108,8 @@ class Interface:
 
 
 def _rows(index: int, body: Body) -> Ints:
-    """(k, 5) own side, other side (4 * tet + face), bits of the mass of the tet, its place, and the body, of facets
-    whose other tet is not in the block.
+    """(k, 5) facets of the block whose other tet is not in the block. Columns: own side, other side (4 * tet + face),
+    bit pattern of the mass of the tet, its place, and the body.
     """
     block = body.block
     place, face = np.nonzero((body.mesh.beside == ELSEWHERE) & body.has(block.across))
@@ -117,8 +118,8 @@ def _rows(index: int, body: Body) -> Ints:
 
 
 def _met(mine: Ints, theirs: Ints) -> Ints:
-    """(m, 6) rows of ``mine`` whose facet is among ``theirs`` (k, 2), which another rank sent, by id of the facet,
-    with the bits of the other mass.
+    """(m, 6) rows of ``mine`` whose facet is among ``theirs`` (k, 2), ordered by facet id, with the bit pattern of the
+    other tet's mass. ``theirs`` was sent by another rank.
     """
     theirs = theirs[np.argsort(theirs[:, 0])]
     at = places(theirs[:, 0], mine[:, 1])
@@ -128,6 +129,6 @@ def _met(mine: Ints, theirs: Ints) -> Ints:
 
 
 def _partners(table: Ints) -> Ints:
-    """(m,) the row of the other side, for rows (m, 6) of ``_met`` that contain both sides of each facet."""
+    """(m,) row of the other side of each facet. ``table`` (m, 6) of ``_met`` contains both sides of each facet."""
     order = np.argsort(table[:, 0])
     return np.asarray(order[np.searchsorted(table[order, 0], table[:, 1])])

@@ -1,14 +1,15 @@
 r"""Kernels of the traction-separation law of cohesive facets; cohesive.py draws the law.
 
 A pair is a node of the first side of a facet and the opposite node; each facet has three pairs. T = k d with the secant
-stiffness k = s(top) / top; by closing, a pair can release k (D^2 - lent^2) / 2 per area. If D decreased below ``lent``,
-the pair would release more energy than it absorbed. In that case the offset of the pair is shortened first, by the
-factor q:
+stiffness k = s(top) / top; a pair that closes can release the energy k (D^2 - lent^2) / 2 per area. If D decreased
+below ``lent``, the pair would release more energy than it absorbed. In that case the offset of the pair is first
+multiplied by a factor q below 1:
 
     d -> q d,   lent^2 -> max(lent^2 - (1 - q^2) D^2, 0),   k unchanged,
 
-so that the recoverable energy k (D^2 - lent^2) / 2 stays the same (q = 0: nothing is recoverable). The remaining
-energy is the area under the law from ``lent`` on, a triangle up to the knee and one beyond it:
+With these values the recoverable energy k (D^2 - lent^2) / 2 does not change; with q = 0 no energy is recoverable. The
+remaining energy is the area under the law from ``lent`` on. The area consists of a triangle up to the knee and a
+triangle beyond the knee:
 
     left = k (knee^2 - lent^2) / 2 + k knee critical / 2,   knee = top, or less if critical would be below 0.
 """
@@ -23,10 +24,10 @@ from ..parallel.words import add
 from .columns import COLUMNS, FACETS, Facets
 
 _SLACK = 1e-6
-"""Largest energy, as a share of the fracture energy, that a pair may release beyond the energy that it absorbed.
-Chosen value, above rounding."""
+"""Largest energy, divided by the fracture energy, that a pair may release beyond the energy that it absorbed. The
+chosen value is above round-off."""
 _EXHAUSTED = 1e-6
-"""Smallest share of the fracture energy that remains to a pair after unloading. Chosen value."""
+"""Smallest energy, divided by the fracture energy, that remains to a pair after unloading. Chosen value."""
 
 
 _F1, _F2, _F3 = types.float64[::1], types.float64[:, ::1], types.float64[:, :, ::1]
@@ -41,7 +42,9 @@ FACETS_OF_A_TASK = 256
 
 @njit(types.void(_F2, _F2, types.int32[::1]), cache=True, error_model="numpy")
 def turn(frame, x, nodes):  # type: ignore[no-untyped-def]
-    """Sets ``frame`` to the normal n, first edge e, and n x e, of the triangle in the middle between the two sides."""
+    """Sets ``frame`` to three axes of the triangle in the middle between the two sides: normal n, first edge e, and n x
+    e.
+    """
     for i in range(3):
         a = x[nodes[0], i] + x[nodes[3], i]
         frame[1, i] = x[nodes[1], i] + x[nodes[4], i] - a
@@ -62,7 +65,7 @@ def turn(frame, x, nodes):  # type: ignore[no-untyped-def]
 
 @njit(_F(FACETS, _I, _I), cache=True, error_model="numpy")
 def _share(f, m, p):  # type: ignore[no-untyped-def]
-    """Returns the remaining share s / strength of the traction."""
+    """Returns the remaining traction of a pair divided by its initial strength, s / strength."""
     law, s = f.softening, f.state
     beyond = s.top[m, p] - law.knee[m, p]
     return 1.0 if beyond <= 0.0 else max(1.0 - beyond / law.critical[m, p], 0.0)
@@ -70,7 +73,9 @@ def _share(f, m, p):  # type: ignore[no-untyped-def]
 
 @njit(_F(_F1, _F2, _F1, _F1, _F), cache=True, error_model="numpy")
 def _opened(d, frame, apart, offset, shear):  # type: ignore[no-untyped-def]
-    """Sets ``d`` to the opening of a pair whose nodes are ``apart`` (3,), and returns its size D."""
+    """Sets ``d`` to the opening of a pair of nodes; returns the effective opening D. ``apart`` (3,): position of one
+    node relative to the other.
+    """
     for c in range(3):
         d[c] = offset[c] + frame[c, 0] * apart[0] + frame[c, 1] * apart[1] + frame[c, 2] * apart[2]
     d[0] = max(d[0], 0.0)
@@ -79,7 +84,9 @@ def _opened(d, frame, apart, offset, shear):  # type: ignore[no-untyped-def]
 
 @njit(types.void(FACETS, _I, _I, _F2, _F1, _F), cache=True, error_model="numpy")
 def _shorten(f, m, p, frame, d, kept):  # type: ignore[no-untyped-def]
-    """Multiplies the present opening ``d`` of a pair by ``kept``, by changing its offset; see the formulas above."""
+    """Multiplies the present opening ``d`` of a pair by ``kept``, by a change of its offset. The formulas are at the
+    top of the file.
+    """
     law, s = f.softening, f.state
     k = law.strength[m, p] * _share(f, m, p) / s.top[m, p]
     for c in range(3):
@@ -95,7 +102,7 @@ def _shorten(f, m, p, frame, d, kept):  # type: ignore[no-untyped-def]
     left = max(f.constants.energy[m] - 3.0 * s.work[m, p] / f.constants.area[m], _EXHAUSTED * f.constants.energy[m])
     left = (
         2.0 / k * left + s.size[m, p] ** 2 - lent
-    )  # squares of openings: each is twice an energy over k, as are the areas of the triangles
+    )  # Squares of openings. Each square is twice an energy divided by k, as are the areas of the triangles.
     knee = min(s.top[m, p], np.sqrt(lent + left))
     law.strength[m, p] = k * knee
     law.critical[m, p] = max(left - (knee * knee - lent), 0.0) / knee
@@ -104,8 +111,8 @@ def _shorten(f, m, p, frame, d, kept):  # type: ignore[no-untyped-def]
 
 @njit(TASK, cache=True, error_model="numpy")
 def open_facets(table, first, stop, thread):  # type: ignore[no-untyped-def]
-    """Task: computes openings, tractions and work of facets at the positions ``x``, and counts the facets that have
-    failed at all three pairs in ``failed`` (tasks,). The work is computed with the mean of the old and the new force.
+    """Task: computes openings, tractions and work of facets at the positions ``x``. Counts in ``failed`` (tasks,) the
+    facets that have failed at all three pairs. The work is computed with the mean of the old and the new force.
     """
     tets, nodes, constants, softening, state, x, failed = _read_open(table)
     f, many = Facets(tets, nodes, constants, softening, state), 0
@@ -138,7 +145,9 @@ def open_facets(table, first, stop, thread):  # type: ignore[no-untyped-def]
 
 @njit(types.void(_F1, FACETS, _I, _I, _F2, _I2, _F1, _F), cache=True, error_model="numpy")
 def _foresee(ahead, f, m, p, v, force, mass, quantum):  # type: ignore[no-untyped-def]
-    """Sets ``ahead`` to the opening velocity of a pair at n+1/2 that the present nodal forces alone would cause."""
+    """Sets ``ahead`` to the opening velocity of a pair at n+1/2 that would result if only the present nodal forces
+    acted.
+    """
     a, b = f.nodes[m, p], f.nodes[m, 3 + p]
     for i in range(3):
         ahead[i] = v[b, i] - v[a, i] + quantum * (force[b, i] / mass[b] - force[a, i] / mass[a])
@@ -146,12 +155,13 @@ def _foresee(ahead, f, m, p, v, force, mass, quantum):  # type: ignore[no-untype
 
 @njit(TASK, cache=True, error_model="numpy")
 def unload(table, first, stop, thread):  # type: ignore[no-untyped-def]
-    """Task: unloads pairs that would release more than they absorbed in the next step: lowers the traction of each as
-    far as needed, or to zero if ``whole``, and adds the change of the nodal forces to ``change`` (3 nodes,), quanta.
-    Two tasks may add to one node, so the additions are atomic; only pairs that unload add.
+    """Task: unloads pairs that would release more energy in the next step than they absorbed. The traction of a pair is
+    lowered as far as needed, or to zero if ``whole``.
 
-    ``steps``: dt(n-1/2), their mean, dt(n+1/2), s. Velocity changes by other causes than nodal forces, mainly
-    contact, are extrapolated from the last step.
+    The change of the nodal forces, quanta, is added to ``change`` (3 nodes,). Two tasks may add to one node, so the
+    additions are atomic; only pairs that unload add to the array. ``steps``: dt(n-1/2), the mean of both steps,
+    dt(n+1/2), s. Velocity changes by other causes than nodal forces, mainly contact, are extrapolated from the last
+    step.
     """
     tets, nodes, constants, softening, state, change, x, v, force, mass, steps, scale, whole = _read_unload(table)
     f = Facets(tets, nodes, constants, softening, state)
@@ -171,8 +181,8 @@ def unload(table, first, stop, thread):  # type: ignore[no-untyped-def]
             short = law.lent[m, p] - _opened(d, frame, apart, law.offset[m, p], f.constants.shear[m])
             if short <= _SLACK * f.constants.energy[m] / law.strength[m, p]:
                 continue
-            # A traction lowered by dF opens the pair by dt^2 dF (1 / m_a + 1 / m_b) more along it, and increases its
-            # size D by that times |T| / (k D).
+            # A traction that is lowered by dF opens the pair along the traction by dt^2 dF (1 / m_a + 1 / m_b) more.
+            # The effective opening D increases by this amount times |T| / (k D).
             size = _opened(d, frame, s.opening[m, p], law.offset[m, p], f.constants.shear[m])
             strength = np.sqrt(pull[0] ** 2 + pull[1] ** 2 + pull[2] ** 2)
             slope = 3.0 * strength / (f.constants.area[m] * law.strength[m, p] * share / s.top[m, p] * size)
@@ -190,8 +200,8 @@ def unload(table, first, stop, thread):  # type: ignore[no-untyped-def]
 
 @njit(TASK, cache=True, error_model="numpy")
 def foresee(table, first, stop, thread):  # type: ignore[no-untyped-def]
-    """Task: stores the opening velocities of pairs that the present nodal forces alone would cause; ``quantum``: mean
-    time step over the force scale, N s.
+    """Task: stores the opening velocities of pairs that would result if only the present nodal forces acted;
+    ``quantum``: mean time step divided by the force scale, N s.
     """
     tets, nodes, constants, softening, state, v, force, mass, quantum = _read_foresee(table)
     f = Facets(tets, nodes, constants, softening, state)
@@ -203,7 +213,9 @@ def foresee(table, first, stop, thread):  # type: ignore[no-untyped-def]
 
 @njit(_I(_I2, types.int32[:, ::1], _F3, _F), cache=True)
 def scatter(force, nodes, pull, scale):  # type: ignore[no-untyped-def]
-    """Adds the forces in quanta of 1 / ``scale`` N to the nodal sums; returns the bits of the largest."""
+    """Adds the forces, in quanta of 1 / ``scale`` N, to the nodal sums. Returns the largest force as its bit pattern
+    (integer).
+    """
     peak = 0
     for m in range(len(nodes)):
         for p in range(3):
@@ -218,8 +230,8 @@ def scatter(force, nodes, pull, scale):  # type: ignore[no-untyped-def]
 
 @njit("void(int64[:, ::1], int64, int32[:, ::1], float64[:, :, ::1], float64)", cache=True)
 def scatter_copies(change, first, nodes, pull, scale):  # type: ignore[no-untyped-def]
-    """Adds the forces ``pull`` on facets ``nodes`` (m, 6), in quanta, to the rows ``change`` of the nodes from
-    ``first`` on.
+    """Adds the forces ``pull`` on facets ``nodes`` (m, 6), in quanta, to ``change``, which has one row for each node
+    from ``first`` on.
     """
     for m in range(len(nodes)):
         for k in range(6):
@@ -231,7 +243,9 @@ def scatter_copies(change, first, nodes, pull, scale):  # type: ignore[no-untype
 
 @njit("int64[::1](int32[:, ::1], int64[::1], int64)", cache=True)
 def touching(table, some, n):  # type: ignore[no-untyped-def]
-    """Returns the rows of ``table`` (m, 6) that contain one of the nodes ``some``; ``n``: number of nodes."""
+    """Returns the indices of the rows of ``table`` (m, 6) that contain one of the nodes ``some``; ``n``: number of
+    nodes.
+    """
     flags, rows, found = np.zeros(n, np.bool_), np.empty(len(table), np.int64), 0
     for a in some:
         flags[a] = True

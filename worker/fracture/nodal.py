@@ -1,8 +1,9 @@
-"""Facet tractions from nodal stress: mean over the stars of the three nodes, smoother than the mean of the two tets.
+"""Facet tractions from nodal stress. The stress is a mean over the stars of the three nodes of a facet, which is
+smoother than the mean of its two tets.
 
-The stress of a node is the mean over its tets, weighted with their initial volumes. Integers are summed, so that both
-sides of a facet compute the same traction on any ranks. A facet must pass the criterion of its two tets as
-well: only such facets are candidates (criterion.py).
+The stress of a node is the mean stress of its tets, weighted with their initial volumes. The sums are sums of integers,
+so that the two sides of a facet compute the same traction on any ranks. A facet is a candidate only if it also passes
+the criterion with the stress of its two tets (criterion.py).
 """
 
 import numpy as np
@@ -34,11 +35,11 @@ def stresses(
     neighbours: list[Neighbour],
     comm: Comm,
 ) -> Floats:
-    """(nodes, 6) mean Cauchy stress xx, yy, zz, yz, zx, xy without the viscous part, Pa, of the ``wanted`` (nodes,) and
-    the shared nodes of these bodies; zero at other nodes.
+    """(nodes, 6) mean Cauchy stress xx, yy, zz, yz, zx, xy of nodes, Pa, without the viscous part. Computed for the
+    ``wanted`` nodes and for the shared nodes of the bodies; zero at other nodes.
 
-    ``heaviest`` (parts,): mass of the heaviest tet of each part on all ranks, kg. The quanta of the sums depend on
-    it and on the strength of the part; so no two of the bodies have a node in common. Collective.
+    ``heaviest`` (parts,): mass of the heaviest tet of each part on all ranks, kg. The quantum of a sum depends on this
+    mass and on the strength of the part, so two of the bodies must not have a common node. Collective.
     """
     sums, strength = np.zeros((nodes.n, 7), np.int64), np.zeros(nodes.n)
     for other in neighbours:
@@ -63,7 +64,7 @@ def stresses(
     error_model="numpy",
 )  # fmt: skip
 def _add(sums, nodes, first, count, pool, mesh, of_stress, of_mass):  # type: ignore[no-untyped-def]
-    """Adds stress times mass of the tets of the stars of ``nodes``, and the masses, to ``sums``."""
+    """Adds the products of stress and mass of the tets in the stars of ``nodes`` to ``sums``, and also their masses."""
     state, rows = mesh.state, mesh.columns
     for a in nodes:
         for e in pool[first[a] : first[a] + count[a]]:
@@ -80,8 +81,8 @@ def _add(sums, nodes, first, count, pool, mesh, of_stress, of_mass):  # type: ig
 
 
 def replace(found: Candidates, shared: InterfaceFacets, body: Body, stress: Floats, x: Floats) -> None:
-    """Sets the tractions of candidates of ``body`` from the ``stress`` (nodes, 6) of their nodes, reduced to the
-    effective traction of the two tets if they exceed it; at the positions ``x`` (nodes, 3).
+    """Sets the tractions of candidates of ``body`` from the ``stress`` (nodes, 6) of their nodes, at the positions
+    ``x`` (nodes, 3). A traction that exceeds the effective traction of the two tets is reduced to it.
     """
     _replace(found, shared, body.mesh, stress, x, body.law.weight, body.spec.friction)
 

@@ -1,4 +1,6 @@
-"""Numbers of fragments: the largest piece of a fragment keeps its number, each other piece gets a new number."""
+"""Numbers of fragments. If a fragment breaks, its largest piece keeps the number, and each other piece gets a new
+number.
+"""
 
 import numpy as np
 
@@ -11,12 +13,12 @@ UNKNOWN = -1
 
 
 def numbered(before: Ints, labels: Ints, first: int, comm: Comm) -> tuple[Ints, Ints]:
-    """(n,) the number of the fragment of each tet, and (k, 3) old number, new number, and number of tets with both,
-    ascending; the rows are equal on all ranks. Collective.
+    """Returns two arrays: (n,) the fragment number of each tet; and (k, 3) old number, new number, and number of tets
+    with both, ascending. The second array is equal on all ranks. Collective.
 
-    ``before`` (n,): the old numbers of tets, or UNKNOWN; ``labels`` (n,): label of the fragment of each; new numbers
-    start at ``first``, in the order of the labels. Of pieces with the same number of tets, the piece with the smallest
-    label keeps the number.
+    ``before`` (n,): old fragment numbers of the tets, or UNKNOWN; ``labels`` (n,): label of the fragment of each tet.
+    New numbers start at ``first`` and have the order of the labels. Of pieces with equally many tets, the piece with
+    the smallest label keeps the number.
     """
     rows = _in_common(before, labels, comm)
     names = np.unique(rows[:, 1])
@@ -32,7 +34,7 @@ def numbered(before: Ints, labels: Ints, first: int, comm: Comm) -> tuple[Ints, 
 
 
 def _in_common(before: Ints, labels: Ints, comm: Comm) -> Ints:
-    """(k, 3) old number, label, and number of tets of all ranks with both."""
+    """(k, 3) old number, label, and the number of tets on all ranks that have this number and this label."""
     old, of_old = np.unique(before, return_inverse=True)
     new, of_new = np.unique(labels, return_inverse=True)
     both, tets = np.unique(of_old * len(new) + of_new, return_counts=True)

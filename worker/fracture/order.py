@@ -1,6 +1,6 @@
 """Order of breaking ``local_maximum``: a facet breaks only if no facet at its nodes is loaded more strongly.
 
-In a uniform field all facets reach the criterion in the same step, although the first facet that breaks would relieve
+In a uniform stress field all facets reach the criterion in the same step, although the first broken facet would relieve
 its neighbours. With ``local_maximum`` a facet does not break in a step if another facet that passes the criterion
 shares a node with it and has a larger load.
 """
@@ -13,11 +13,11 @@ from ..parallel.ownership import Neighbour
 
 
 def strongest(facets: Ints, load: Floats, nodes: Indices, ids: Ints, neighbours: list[Neighbour], comm: Comm) -> Flags:
-    """(m,) which facets have the largest load at all of their nodes; of equal loads, the facet of smaller id counts as
-    larger.
+    """(m,) whether each facet has the largest load at all of its nodes. If two loads are equal, the load of the facet
+    with the smaller id counts as larger.
 
-    ``facets`` (m,) their ids; ``load`` (m,) positive; ``nodes`` (m, 3) local; ``ids`` (nodes,) global ids.
-    Collective.
+    ``facets`` (m,): ids of the facets; ``load`` (m,): positive; ``nodes`` (m, 3): local nodes; ``ids`` (nodes,): global
+    ids. Collective.
     """
     order = -np.ascontiguousarray(load).view(np.int64)
     mine = np.column_stack([ids[nodes].reshape(-1), np.repeat(order, 3), np.repeat(facets, 3)])

@@ -1,4 +1,6 @@
-"""Record of the fragments of a run: persistent numbers, one table a frame, and the genealogy."""
+"""Record of the fragments of a run: persistent fragment numbers, one table for each frame, and the genealogy of the
+fragments.
+"""
 
 import csv
 from pathlib import Path
@@ -19,23 +21,24 @@ from .stage import Fracture
 
 
 class Record:
-    """The fragments of a run, from frame to frame. All methods are collective."""
+    """The fragments of a run; their numbers persist from frame to frame. All methods are collective."""
 
     def __init__(self, model: Model, fracture: Fracture, comm: Comm, threads: Team) -> None:
         self._connectivity = Connectivity(model, comm, threads)
         self._model, self._fracture, self._comm = model, fracture, comm
         self.labels: list[Ints] = []
-        """Label of the fragment of each tet (``connectivity``), (n,) for each block, of the last ``update``."""
+        """Label of the fragment of each tet (``connectivity``) at the last ``update``: one array (n,) for each block of
+        tets."""
         self.numbers: list[Ints] = []
-        """Number of the fragment of each tet in the last frame, (n,) for each block; a fragment keeps its number
-        while it exists."""
+        """Number of the fragment of each tet in the last frame: one array (n,) for each block of tets. A fragment keeps
+        its number while it exists."""
         self._before: tuple[Ints, Ints] = np.zeros(0, np.int64), np.zeros(0, np.int64)
-        """Ids of tets, ascending, and their numbers in the last frame."""
+        """Ids of the tets, ascending, and their fragment numbers in the last frame."""
         self._family: Ints = np.zeros((0, 3), np.int64)
         self.count = 0
-        """Number of fragments, of the last ``update``."""
+        """Number of fragments at the last ``update``."""
         self.initial = self.next = 0
-        """Number of fragments at the start, which have the smallest numbers, and the next free number."""
+        """Number of fragments at the start, which have the smallest numbers; then the next free number."""
 
     def keep(self, parcel: Parcel) -> None:
         """Adds the numbers of the last frame to a parcel (a checkpoint or migration message)."""
@@ -52,15 +55,15 @@ class Record:
             self._remember(_flat([table["id"] for table in tables]), _flat([table["fragment"] for table in tables]))
 
     def update(self) -> None:
-        """Finds the present fragments."""
+        """Finds the present fragments, by their labels."""
         cohesion = self._fracture.cohesion
         held = cohesion.facets.tets if cohesion is not None else np.zeros((0, 2), np.int64)
         self.labels = self._connectivity.labels(held)
         self.count = count(self._model, self.labels, self._comm)
 
     def number(self) -> None:
-        """Numbers the fragments of the last ``update``. The method is called at the start and at frames only. Frames
-        are at the same times in every run of a case, so the numbers are reproducible.
+        """Numbers the fragments that the last ``update`` found. The method must be called at the start and at frames
+        only. Frames are at the same times in every run of a case, so the numbers are reproducible.
         """
         ids = _flat([block.id for block in self._model.blocks])
         found, self._family = numbered(self._last(ids), _flat(self.labels), self.next, self._comm)
@@ -70,11 +73,11 @@ class Record:
         self.numbers = np.split(found, np.cumsum([block.n for block in self._model.blocks])[:-1])
 
     def of_frame(self) -> list[Ints]:
-        """Returns, (n,) for each block, the number of the fragment of each tet in the last frame."""
+        """Returns the fragment number of each tet in the last frame: one array (n,) for each block of tets."""
         return [self._last(block.id) for block in self._model.blocks]
 
     def write(self, folder: Path, index: int, t: float) -> None:
-        """Writes the table of frame ``index`` and appends to the genealogy."""
+        """Writes the fragment table of frame ``index`` and appends the changes to the genealogy."""
         rows = fragments.table(self._model, self.numbers, self._comm)
         if rows is not None:
             fragments.write(folder, index, t, self._model.parts, rows)

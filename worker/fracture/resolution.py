@@ -1,4 +1,6 @@
-"""Resolution of fracture by the mesh: size of the tets against the cohesive zone, and opening in one time step."""
+"""Resolution of fracture by the mesh. Two ratios are checked: element size to cohesive zone, and opening in one time
+step to critical opening.
+"""
 
 import logging
 import math
@@ -9,23 +11,23 @@ from ..materials.elementary import power
 from .strength import Toughness
 
 _RESOLVED = 1.0 / 3.0
-"""Largest ratio of element size to cohesive zone at which the dissipated energy is equal to the fracture energy of
-the law."""
+"""Largest ratio of element size to cohesive zone at which the dissipated energy equals the fracture energy of the
+law."""
 _STEP = 1.0 / math.sqrt(6.0)
-"""Stable step of a regular tet, as a multiple of its edge over the wave speed."""
+"""Stable time step of a regular tet, times the wave speed, divided by the edge."""
 _REGULAR = 6.0 * math.sqrt(2.0)
-"""Cube of the edge of a regular tet over its volume."""
+"""Cube of the edge of a regular tet, divided by its volume."""
 _ROUNDING = 1e-9
-"""Relative tolerance of the ratio of element size to cohesive zone. A strength that was lowered for a given ratio
-reaches this ratio only up to rounding."""
+"""Relative tolerance of the ratio of element size to cohesive zone. If a strength was lowered to reach a given ratio,
+the ratio has round-off."""
 _NAMED = 5
-"""Largest number of parts that a warning names. Chosen value."""
+"""Largest number of parts named in a warning. Chosen value."""
 
 log = logging.getLogger("conoid.worker")
 
 
 def edge(volume: float) -> float:
-    """Returns the edge of a regular tet of this ``volume``, m^3; m."""
+    """Returns the edge, m, of a regular tet of this ``volume``, m^3."""
     return float(power(_REGULAR * volume, 1.0 / 3.0))
 
 
@@ -59,7 +61,7 @@ def warnings(part: Part, tough: Toughness, size: float, safety: float) -> list[s
 
 
 def unresolved(tough: Toughness, size: float) -> str:
-    """Returns a warning if elements of edge ``size``, m, do not resolve the cohesive zone, else an empty text."""
+    """Returns a warning if elements with the edge ``size``, m, do not resolve the cohesive zone, else an empty text."""
     ratio = size / tough.zone
     if ratio <= _RESOLVED * (1.0 + _ROUNDING):
         return ""
@@ -70,7 +72,9 @@ def unresolved(tough: Toughness, size: float) -> str:
 
 
 def merged(found: dict[str, list[str]]) -> list[str]:
-    """Returns one line for each warning, with the names of the parts; of many parts only the first few."""
+    """Merges equal warnings of several parts. Returns one line for each warning, with the names of the first few
+    parts.
+    """
     return [f"{_listed(names)}: {text}" for text, names in found.items()]
 
 

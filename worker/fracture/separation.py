@@ -1,10 +1,10 @@
-"""Node separation: a node gets copies if broken facets have cut its star (the tets round the node) into pieces. The ids
-of the copies are independent of the number of ranks.
+"""Node separation: a node gets copies if broken facets have cut its star (the tets around the node) into pieces. The
+ids of the copies are independent of the number of ranks.
 
 A rank that has a node has all copies of the node. The completed sums of a shared node are therefore available on both
-sides of a facet, on any rank that computes one of the sides. The following steps are executed by the ranks that have a
-node of a broken facet. All ranks receive the list of these ranks in the reduction of the step; the other ranks continue
-with their next step.
+sides of a facet, on any rank that computes one of the sides. Only the ranks that have a node of a broken facet execute
+the steps 1 to 6. All ranks receive the list of these ranks in the reduction of the step; a rank that is not in the list
+continues with its next step.
 
     1. mark the broken facets and their nodes                  survey
     2. exchange the touched nodes with neighbours              _touched
@@ -13,7 +13,7 @@ with their next step.
     5. exchange the list of new pieces (node, smallest tet)    _number: sorted, so that ids do not depend on ranks
     6. new nodes, masses, shared nodes, connectivity           _separated
 
-(The paper's eqs 17 and 18 count new nodes per rank: there ids depend on the partition.)
+Eqs 17 and 18 of the paper count new nodes on each rank, so the ids in the paper depend on the partition.
 """
 
 import math
@@ -37,31 +37,31 @@ _NO_NODES = np.zeros(0, np.int64)
 
 
 class Separation:
-    """Node separation in the parts that fracture, on one rank."""
+    """Node separation on one rank, for the parts that fracture."""
 
     def __init__(
         self, model: Model, neighbours: list[Neighbour], meshes: dict[int, Mesh], comm: Comm, threads: Team
     ) -> None:
-        """``meshes``: of the parts that fracture, by index of the block."""
+        """``meshes``: meshes of the parts that fracture, by index of the block of tets."""
         self._model, self._neighbours, self._comm = model, neighbours, comm
         self.stars = {b: Stars(mesh.tets, model.nodes.n, threads) for b, mesh in meshes.items()}
-        """Stars of the nodes, by index of the block."""
+        """Stars of the nodes, by index of the block of tets."""
         for star in self.stars.values():
             model.nodes.columns.declare(star, **Stars.COLUMNS)
         self._pieces = Pieces(threads)
         self._meshes = meshes
         self.broken = 0
-        """Number of broken facets of all ranks."""
+        """Number of broken facets on all ranks."""
         self.first = math.nan
-        """Time at which the first of them broke, s."""
+        """Time at which the first facet broke, s."""
         self._mine = _NO_NODES
         """Local nodes, ascending, of the facets that break in this step."""
 
     def survey(self, broken: list[Indices], count: int, touched: Ints) -> None:
-        """Marks the facets broken, and sets ``touched`` (ranks,) for the ranks that have a node of a broken facet: 1,
-        and for this rank 1 + ``count``, the number of facets whose first side is here.
+        """Marks facets as broken. Sets ``touched`` (ranks,) to 1 for each rank that has a node of a broken facet. The
+        value for this rank is 1 + ``count``, where ``count`` is the number of broken facets whose first side is here.
 
-        ``broken``: tables (m, 2, 3) of block, place and face of either side, -1 for a side of another rank.
+        ``broken``: tables (m, 2, 3) of block, place and face of each side; -1 for a side on another rank.
         """
         found = [_broken(mesh, b, sides) for sides in broken for b, mesh in self._meshes.items()]
         mine = found[0] if len(found) == 1 else distinct(np.concatenate([_NO_NODES, *found]))
@@ -75,9 +75,9 @@ class Separation:
     def separate(self, touched: Ints) -> Split:
         """Separates the nodes of the broken facets; returns the topology change.
 
-        ``touched``: the maximum over all ranks; collective among the ranks that it marks. Changes connectivity, masses
-        and shared nodes; the caller moves the forces. Ranks without a changed node receive the new number of nodes in
-        the reduction of the next step.
+        ``touched``: maximum over all ranks. Collective among the ranks with a value above 0. The method changes
+        connectivity, masses and shared nodes; the caller moves the forces. Ranks without a changed node receive the new
+        number of nodes in the reduction of the next step.
         """
         self.broken += int(touched.sum() - np.count_nonzero(touched))
         if not touched[self._comm.rank]:
@@ -85,7 +85,7 @@ class Separation:
         return self._separated(self._touched(touched), touched)
 
     def _separated(self, some: Ints, touched: Ints) -> Split:
-        """Separates nodes; ``some``: local nodes of the broken facets of any rank."""
+        """Separates nodes; ``some``: local nodes of the facets that broke on any rank."""
         model = self._model
         rows, places, begins = self._stars(some)
         of, mine, node, owner, mass = self._pieces.of(rows, begins)
@@ -104,8 +104,8 @@ class Separation:
         return Split(copies, new, touched, *_leaving(rows, places, of, new))
 
     def _split_shares(self, rows: Ints, of: Ints, some: Ints, new: int) -> None:
-        """Updates the shares of the parts in nodes of several parts and in their copies, by the ``rows`` of the
-        stars of ``some`` nodes.
+        """Updates the mass that each part has in a node of several parts, and in the copies of this node. ``rows``:
+        rows of the stars of the nodes ``some``.
         """
         nodes = self._model.nodes
         node = np.where(of >= 0, new + of, some[np.searchsorted(nodes.id[some], rows[:, stars.NODE])])
@@ -115,7 +115,7 @@ class Separation:
         nodes.part[touched] = stands
 
     def _touched(self, touched: Ints) -> Ints:
-        """Returns the local nodes of the facets that break on any rank, ascending. Collective among the marked
+        """Returns the local nodes, ascending, of the facets that break on any rank. Collective among the touched
         ranks.
         """
         ids, mine, self._mine = self._model.nodes.id, self._mine, _NO_NODES
@@ -129,8 +129,8 @@ class Separation:
         return every
 
     def _stars(self, touched: Ints) -> tuple[Ints, Ints, Ints]:
-        """Returns the rows of the complete stars of the touched nodes, by node and tet, their places, and the start of
-        the rows of each node.
+        """Returns the rows of the complete stars of the touched nodes, ordered by node and tet. Also returns the places
+        of the tets, and the first row of each node.
         """
         ids, rank = self._model.nodes.id, self._comm.rank
         found = [star.describe(touched, ids, self._meshes[b], b, rank) for b, star in self.stars.items()]
@@ -142,8 +142,8 @@ class Separation:
         return rows, places, stars.node_begins(rows)
 
     def _received(self, touched: Ints, found: list[tuple[Ints, Ints, Ints]]) -> list[Ints]:
-        """Exchanges the rows of stars of shared touched nodes: sends the rows ``found`` on this rank, returns the rows
-        of other ranks.
+        """Exchanges the star rows of shared touched nodes. Sends the rows ``found`` on this rank; returns the rows of
+        other ranks.
         """
         shared = {other.rank: common(touched, other.nodes) for other in self._neighbours}
         sends = {
@@ -153,7 +153,7 @@ class Separation:
         return [words.reshape(-1, stars.COLUMNS) for words in self._comm.trade(sends, sends).values() if len(words)]
 
     def _number(self, mine: Ints, touched: Ints) -> Ints:
-        """(k, 2) node and label of every piece of all ranks that gets a copy, in the order of the new ids."""
+        """(k, 2) node and label of every piece that gets a copy, of all ranks, in the order of the new node ids."""
         others = [rank for rank in np.flatnonzero(touched).tolist() if rank != self._comm.rank]
         if not others:
             return mine
@@ -163,14 +163,14 @@ class Separation:
         return every[np.lexsort((every[:, 1], every[:, 0]))]
 
     def _share(self, copies: Copies, first: int) -> None:
-        """Adds the copies to the shared nodes: a rank that has a node has all its copies."""
+        """Adds the copies to the shared nodes, because a rank that has a node has all its copies."""
         for other in self._neighbours:
             new = first + common(copies.parents, other.nodes)
             other.nodes = extended(other.nodes, new.astype(np.int32))
 
 
 def _positions(every: Ints, mine: Ints) -> Ints:
-    """(k,) places of the rows of ``mine`` (k, 2) among the rows of ``every``; both are sorted."""
+    """(k,) indices of the rows ``mine`` (k, 2) among the rows ``every``; both arrays are sorted."""
     return np.arange(len(mine)) if len(every) == len(mine) else np.searchsorted(keys(*every.T), keys(*mine.T))
 
 
@@ -187,7 +187,9 @@ def distinct(values):  # type: ignore[no-untyped-def]
 
 @njit(types.int64[::1](MESH, types.int64, types.int32[:, :, ::1]), cache=True)
 def _broken(mesh, block, sides):  # type: ignore[no-untyped-def]
-    """Marks the facets of the ``sides`` (m, 2, 3) in this ``block`` broken; returns their nodes, each once."""
+    """Marks the facets of the ``sides`` (m, 2, 3) in this ``block`` of tets as broken. Returns the nodes of the facets,
+    each node once.
+    """
     nodes, n = np.empty(6 * len(sides), np.int64), 0
     for m in range(len(sides)):
         for s in range(2):
@@ -203,7 +205,7 @@ def _broken(mesh, block, sides):  # type: ignore[no-untyped-def]
 
 @njit(types.int64[::1](_I1, types.int32[::1]), cache=True)
 def common(some, others):  # type: ignore[no-untyped-def]
-    """Returns the places in ``some`` of values that are among the ascending ``others``."""
+    """Returns the indices of the elements of ``some`` that are among ``others``; ``others`` is ascending."""
     out, n = np.empty(len(some), np.int64), 0
     for i in range(len(some)):
         at = np.searchsorted(others, some[i])
@@ -215,7 +217,7 @@ def common(some, others):  # type: ignore[no-untyped-def]
 
 @njit(types.boolean(_I1, types.int32[::1]), cache=True)
 def intersects(some, others):  # type: ignore[no-untyped-def]
-    """Returns True if any value of ``some`` is among the ascending ``others``."""
+    """Returns True if any element of ``some`` is among ``others``; ``others`` is ascending."""
     for value in some:
         at = np.searchsorted(others, value)
         if at < len(others) and others[at] == value:
@@ -225,7 +227,7 @@ def intersects(some, others):  # type: ignore[no-untyped-def]
 
 @njit(types.int64[:, ::1](_I2, _I1, _I1), cache=True)
 def _stretches(rows, begin, end):  # type: ignore[no-untyped-def]
-    """Returns the concatenated ranges of rows from ``begin[i]`` to ``end[i]``; ``begin``, ``end`` (k,)."""
+    """Returns the concatenation of the ranges of rows from ``begin[i]`` to ``end[i]``; ``begin``, ``end`` (k,)."""
     out, n = np.empty(((end - begin).sum(), rows.shape[1]), np.int64), 0
     for i in range(len(begin)):
         out[n : n + end[i] - begin[i]] = rows[begin[i] : end[i]]
@@ -235,8 +237,8 @@ def _stretches(rows, begin, end):  # type: ignore[no-untyped-def]
 
 @njit(several(_I1, _N1, _N1, _N1, _N1)(_I2, _I2, _I1, types.int64), cache=True)
 def _leaving(rows, places, of, new):  # type: ignore[no-untyped-def]
-    """Returns, for the rows whose node becomes a copy: key of node and tet, the copy, and place, corner and block of
-    the tet.
+    """Selects the rows whose node becomes a copy. Returns for each row: key of node and tet, the copy, and place,
+    corner and block of the tet.
     """
     m = (of >= 0).sum()
     key, found, n = np.empty(m, np.int64), np.empty((4, m), np.int32), 0

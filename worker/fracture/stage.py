@@ -1,14 +1,13 @@
 """Fracture in the time step: initiation, separation of nodes, and update of all tables that depend on the topology.
 
-At the end of a step, with the stress of n+1: facets that pass the criterion break; nodes whose star is no longer
-connected get copies; the forces of the tets of a copy are moved from the parent to the copy, in integers; and every
-table by node is extended by the copies. In ``cohesive`` parts a broken facet keeps its traction, which decreases with
-the opening.
+The stage acts at the end of a step, with the stress at n+1. Facets that pass the criterion break. A node whose star is
+no longer connected gets copies. The forces of the tets of a copy are moved, as integers, from the parent to the copy.
+Every table by node is extended by the copies. In ``cohesive`` parts a broken facet keeps its traction, which decreases
+with the opening.
 
-The reduction of the step contains whether a facet breaks, and on which ranks: ``find`` precedes it, ``advance`` follows
-it. A rank without overstressed facets receives flags from its neighbours, which show whether a shared facet is
-overstressed. A rank without a node of a broken facet, and without ghosts of a rank that has such a node, continues with
-the next step immediately.
+The reduction of the step contains whether a facet breaks, and on which ranks. The method ``find`` is called before the
+reduction, and ``advance`` after it. Flags from the neighbour ranks show whether a shared facet is overstressed. A rank
+continues immediately with the next step if it has no node of a broken facet, and no ghosts of a rank with such a node.
 """
 
 import math
@@ -40,12 +39,12 @@ from .unloading import Unloading
 from .update import TopologyUpdate
 
 NOTHING, OVERSTRESSED, BREAKS = range(3)
-"""State of the facets in a step, reduced by maximum over the ranks. NOTHING: no face is overstressed; OVERSTRESSED:
+"""State of the facets in a step, of which all ranks use the maximum. NOTHING: no face is overstressed; OVERSTRESSED:
 some faces are; BREAKS: facets break, or may break."""
 
 
 class Fracture:
-    """Fracture of a case on one rank."""
+    """The fracture stage of a case on one rank."""
 
     def __init__(
         self, case: Case, model: Model, neighbours: list[Neighbour], elements: Elements, by_node: list[KeptByNode],
@@ -72,16 +71,18 @@ class Fracture:
 
     @property
     def broken(self) -> int:
-        """Number of broken facets of all ranks."""
+        """Number of broken facets on all ranks."""
         return self.separation.broken
 
     @property
     def first(self) -> float:
-        """Time at which the first facet of all ranks broke, s; NaN before."""
+        """Time at which the first facet of all ranks broke, s; NaN if no facet has broken."""
         return self.separation.first
 
     def unload(self) -> None:
-        """Before the kick: unloads cohesive facets that would release more than they absorbed. Collective."""
+        """Unloads cohesive facets that would release more energy than they absorbed. Must be called before the kick.
+        Collective.
+        """
         if self.cohesion is not None and self.broken:
             self._unloading.apply(self._clock)
 
@@ -95,9 +96,9 @@ class Fracture:
         self.initiation.begin_step(steps)
 
     def find(self, touched: Ints) -> int:
-        """Returns the contribution of this rank to the reduction of the step: NOTHING, OVERSTRESSED or BREAKS; with
-        nodal tractions BREAKS if a facet may break. Sets ``touched`` (ranks,) for the ranks that have a node of a facet
-        that breaks. Collective among neighbours.
+        """Returns the value of this rank for the reduction of the step: NOTHING, OVERSTRESSED or BREAKS. With nodal
+        tractions the value is BREAKS if a facet may break. Sets ``touched`` (ranks,) for the ranks that have a node of
+        a facet that breaks. Collective among neighbours.
         """
         self.initiation.begin_step()
         hot, self._found, touched[:] = self._elements.hot, None, 0
@@ -112,8 +113,8 @@ class Fracture:
         return BREAKS
 
     def advance(self, agreed: int, touched: Ints) -> None:
-        """Breaks the facets; ``agreed``, ``touched``: the maxima over the ranks of the results of ``find``. Called on
-        all ranks; collective among all ranks with nodal tractions or ``order = "local_maximum"``, else among the
+        """Breaks the facets. ``agreed``, ``touched``: maxima over the ranks of the results of ``find``. All ranks must
+        call the method. Collective among all ranks with nodal tractions or ``order = "local_maximum"``, else among the
         touched ranks.
         """
         if agreed >= OVERSTRESSED:
@@ -145,7 +146,7 @@ class Fracture:
             self.cohesion.keep(parcel)
 
     def resume(self, parcel: Parcel) -> None:
-        """Restores the state from a parcel (a checkpoint or migration message)."""
+        """Restores the state of fracture from a parcel (a checkpoint or migration message)."""
         self.separation.broken, self._insertion.longest = parcel.known["fracture"]
         self.separation.first = parcel.known.get("first_break", math.nan)
         self.initiation.resume(parcel)
@@ -159,7 +160,9 @@ class Fracture:
             self._unloading.free()
 
     def _bodies(self, case: Case) -> tuple[list[Body], float, list[str]]:
-        """Returns the bodies, the order of magnitude of the work on a facet, J, and warnings about the mesh."""
+        """Returns three values: the bodies, the order of magnitude of the work on a facet, J, and warnings about the
+        mesh.
+        """
         model, bodies, terms = self._model, list[Body](), Terms(case, self._model)
         for index, may in enumerate(breakable(case)):
             here = [(i, block) for i, block in enumerate(model.blocks) if may and block.part == index]

@@ -1,7 +1,7 @@
-r"""Stars of nodes: the tets round a node, and the pieces into which broken facets cut them.
+r"""Stars of nodes. The star of a node is the set of tets around it. Broken facets cut a star into pieces.
 
 Two tets of a star are in one piece if a chain of tets leads from one to the other through intact facets that contain
-the node. A connection through an edge or through the node alone is a hinge; it carries no moment, and is separated.
+the node. A connection through an edge or through the node alone is a hinge; a hinge carries no moment and is separated.
 ::
 
              +-------+                  +-------+
@@ -14,9 +14,8 @@ the node. A connection through an edge or through the node alone is a hinge; it 
             \ / t4  # /                \ / t4  \  +
              +-------+                  +-------+
 
-If a star has more than one piece, the piece with the smallest tet id keeps the node and each other piece gets a copy of
-it. A single broken facet inside a body separates no node; a node separates if broken facets divide its star into
-pieces.
+If a star has more than one piece, the piece with the smallest tet id keeps the node, and each other piece gets a copy
+of the node. A single broken facet inside of a body separates no node.
 """
 
 from typing import ClassVar
@@ -36,13 +35,13 @@ from ..parallel.team import TASK, Team
 from .records import MESH, Mesh
 
 NODE, TET, RANK, MASS, BEHIND = 0, 1, 2, 3, 4
-"""Columns of the table of stars, one row for each node and tet of its star: global ids of node and tet, rank of the
-tet, bits of its mass, kg; for each of the three faces that contain the node the id of the tet behind it, -1 if the
-face is not an intact facet."""
+"""Columns of the table of stars. The table has one row for each node and each tet of its star: global ids of node and
+tet, rank of the tet, bit pattern of its mass, kg. For each of the three faces that contain the node, the row has the id
+of the tet behind the face; -1 if the face is not an intact facet."""
 COLUMNS = 7
 PLACE, CORNER, BLOCK = 0, 1, 2
-"""Columns of the place of a row's tet: place in its block, corner that is the node, index of the block; all -1 for a
-tet of another rank."""
+"""Columns of the place of the tet of a row: place in its block, corner that is the node, index of the block; all are -1
+for a tet of another rank."""
 _I1, _I2, _N1 = types.int64[::1], types.int64[:, ::1], types.int32[::1]
 
 
@@ -56,17 +55,17 @@ _NODES = 8
 class Stars:
     """Stars of all nodes of one block: a pool of tets in which the tets of each node are contiguous.
 
-    When a node separates, its range of the pool is divided among it and its copies.
+    When a node separates, its range of the pool is divided among the node and its copies.
     """
 
     COLUMNS: ClassVar = {"first": ZERO, "count": ZERO}
-    """Columns by node (model/columns.py)."""
+    """Columns with one value for each node (model/columns.py)."""
 
     def __init__(self, tets: Tets, nodes: int, threads: Team) -> None:
         """``tets`` (n, 4): local nodes of the tets; ``nodes``: number of local nodes."""
         corners = tets.reshape(-1)
         self.pool: Indices = (np.argsort(corners, kind="stable") // 4).astype(np.int32)
-        """Places of the tets of the stars, node after node."""
+        """Places of the tets of the stars, ordered by node."""
         self.count: Indices = np.bincount(corners, minlength=nodes).astype(np.int32)
         """(nodes,) number of tets of each node."""
         self.first: Indices = (np.cumsum(self.count) - self.count).astype(np.int32)
@@ -74,9 +73,9 @@ class Stars:
         self._describe, self._scratch = Pass(threads, _describe, *_DESCRIBE, size=_NODES), Scratch()
 
     def describe(self, nodes: Ints, ids: Ints, mesh: Mesh, block: int, rank: int) -> tuple[Ints, Ints, Ints]:
-        """Returns the rows (r, COLUMNS) and places (r, 3) of the stars of ascending local ``nodes`` (k,) in this block,
-        by node and tet, and (k + 1,) the start of the rows of each; they are valid until the next call. ``ids``: global
-        ids of all local nodes.
+        """Returns three arrays that are valid until the next call: the rows (r, COLUMNS) of the stars of ``nodes`` in
+        this block, ordered by node and tet; the places (r, 3) of the tets; and (k + 1,) the first row of each node.
+        ``nodes`` (k,): local nodes, ascending; ``ids``: global ids of all local nodes.
         """
         begins = _begins(nodes, self.count)
         n = int(begins[-1])
@@ -86,18 +85,18 @@ class Stars:
         return rows, places, begins
 
     def reconnect(self, tets: Tets, nodes: Ints, rows: Ints, places: Ints, of: Ints, new: int, block: int) -> None:
-        """Sets the separated nodes in the tets (n, 4) of this block, and divides the ranges of the pool.
+        """Replaces separated nodes in the tets (n, 4) of this block, and divides the ranges of the pool.
 
-        ``rows`` (r, COLUMNS) of the complete stars of the local ``nodes`` (k,), sorted, and their ``places`` (r, 3);
-        ``of`` (r,) the piece, -1 for the piece that keeps its node: piece 0 gets the local node ``new``; ``block``:
-        index of this block.
+        ``rows`` (r, COLUMNS): complete stars of the local ``nodes`` (k,), sorted; ``places`` (r, 3): places of their
+        tets. ``of`` (r,): number of the piece; -1 for the piece that keeps its node; piece 0 gets the local node
+        ``new``. ``block``: index of this block.
         """
         _reconnect(self.pool, self.first, self.count, tets, nodes, rows, places, of, new, block)
 
 
 @njit(_I1(_I1, _N1), cache=True)
 def _begins(nodes, count):  # type: ignore[no-untyped-def]
-    """(k + 1,) start of the rows of each of the ``nodes`` (k,)."""
+    """(k + 1,) first row of each of the ``nodes`` (k,)."""
     begins = np.zeros(len(nodes) + 1, np.int64)
     for i in range(len(nodes)):
         begins[i + 1] = begins[i] + count[nodes[i]]
@@ -106,7 +105,7 @@ def _begins(nodes, count):  # type: ignore[no-untyped-def]
 
 @njit(TASK, cache=True)
 def _describe(table, begin, stop, thread):  # type: ignore[no-untyped-def]
-    """Task: Stars.describe."""
+    """Task: writes the rows of Stars.describe."""
     rows, places, begins, nodes, first, count, pool, ids, mesh, block, rank = _read_describe(table)
     for i in range(begin, stop):
         a = nodes[i]
@@ -125,7 +124,7 @@ def _describe(table, begin, stop, thread):  # type: ignore[no-untyped-def]
     types.void(_I2, _I2, types.int64, types.int64, types.int64, _I1, MESH, types.int64, types.int64), cache=True
 )  # fmt: skip
 def _row(rows, places, r, e, a, ids, mesh, block, rank):  # type: ignore[no-untyped-def]
-    """Writes row ``r``: node ``a`` and tet ``e``."""
+    """Writes row ``r``, for node ``a`` and tet ``e``."""
     corner = 0
     while mesh.tets[e, corner] != a:
         corner += 1
@@ -140,7 +139,7 @@ def _row(rows, places, r, e, a, ids, mesh, block, rank):  # type: ignore[no-unty
 
 
 def ordered(rows: Ints, places: Ints) -> tuple[Ints, Ints]:
-    """Sorts rows by node and tet; ``places`` (p, 3) belong to the first p rows; the others get -1."""
+    """Sorts the rows by node and tet. ``places`` (p, 3) belong to the first p rows; the other rows get -1."""
     order = np.argsort(keys(rows[:, NODE], rows[:, TET]))
     every = np.concatenate([places, np.full((len(rows) - len(places), 3), -1)])
     return rows[order], every[order]
@@ -156,14 +155,14 @@ def _root(parent, i):  # type: ignore[no-untyped-def]
 
 @njit("boolean(int64[::1], int64[:, ::1], int64, int64)", cache=True)
 def _join(parent, rows, begin, end):  # type: ignore[no-untyped-def]
-    """Joins the rows of one star that are connected through intact facets; the root of each piece is its smallest row.
-    Returns True if the star is a single piece.
+    """Joins the rows of one star whose tets are connected through intact facets. The root of each piece is its row with
+    the smallest number. Returns True if the star is a single piece.
     """
     apart = end - begin - 1
     for i in range(begin, end):
         for m in range(BEHIND, COLUMNS):
             behind, j = rows[i, m], i + 1
-            if behind <= rows[i, TET]:  # no facet, or a facet that was joined from the other side
+            if behind <= rows[i, TET]:  # the face is no facet, or its facet was joined from the other side
                 continue
             while j < end and rows[j, TET] < behind:
                 j += 1
@@ -179,18 +178,18 @@ def _join(parent, rows, begin, end):  # type: ignore[no-untyped-def]
 
 
 class Pieces:
-    """Pass that cuts stars into pieces."""
+    """Cuts stars into pieces, by the threads of a rank."""
 
     def __init__(self, threads: Team) -> None:
         self._cut, self._scratch = Pass(threads, _cut, *_CUT, size=_NODES), Scratch()
 
     def of(self, rows: Ints, begins: Ints) -> tuple[Ints, Ints, Ints, Indices, Floats]:
-        """Returns the pieces that separate from their nodes, by node and smallest tet; ``rows`` by node and tet,
-        ``begins`` (k + 1,): start of the rows of each node.
+        """Returns the pieces that separate from their nodes, ordered by node and smallest tet. ``rows``: star rows,
+        ordered by node and tet; ``begins`` (k + 1,): first row of each node.
 
-        (r,) the piece of each row, -1 in the piece with the smallest tet of its node, which keeps the node; valid until
-        the next call. For each piece: ids of the node and of its smallest tet, place of the node among the nodes of
-        ``rows``, rank of that tet, and a quarter of the mass of its tets, kg.
+        The first result (r,) is the piece of each row, valid until the next call; -1 in the piece with the smallest
+        tet, which keeps the node. Further results for each piece: ids of its node and of its smallest tet, index of the
+        node among the nodes of ``rows``, rank of the smallest tet, and a quarter of the mass of its tets, kg.
         """
         n = len(begins) - 1
         of, parent, many = (self._scratch.of(name, m) for name, m in (("of", len(rows)), ("p", len(rows)), ("m", n)))
@@ -201,7 +200,9 @@ class Pieces:
 
 @njit(TASK, cache=True)
 def _cut(table, first, stop, thread):  # type: ignore[no-untyped-def]
-    """Task: numbers the pieces of each star, ``of`` (r,) and ``many`` (k,)."""
+    """Task: numbers the pieces of each star. ``of`` (r,): number of the piece of each row; ``many`` (k,): number of
+    pieces of each star.
+    """
     of, many, parent, rows, begins = _read_cut(table)
     for i in range(first, stop):
         begin, end, k = begins[i], begins[i + 1], 0
@@ -221,7 +222,7 @@ def _cut(table, first, stop, thread):  # type: ignore[no-untyped-def]
 
 @njit(several(_I2, _I1, _N1, types.float64[::1])(_I1, _I1, _I2, _I1), cache=True)
 def _numbered(of, many, rows, begins):  # type: ignore[no-untyped-def]
-    """Numbers the pieces of all stars; returns their labels, nodes, ranks and masses (Pieces.of)."""
+    """Numbers the pieces of all stars. Returns the labels, nodes, ranks and masses of the pieces (Pieces.of)."""
     total = many.sum()
     labels, node = np.empty((total, 2), np.int64), np.empty(total, np.int64)
     ranks, mass, k = np.empty(total, np.int32), np.zeros(total), 0
@@ -232,7 +233,7 @@ def _numbered(of, many, rows, begins):  # type: ignore[no-untyped-def]
         for r in range(begins[i], begins[i + 1]):
             if of[r] < 0:
                 continue
-            if of[r] > last:  # the smallest tet of the next piece
+            if of[r] > last:  # this is the smallest tet of the next piece
                 last = of[r]
                 labels[k + last, 0], labels[k + last, 1] = rows[r, NODE], rows[r, TET]
                 ranks[k + last], node[k + last] = rows[r, RANK], i
@@ -244,7 +245,7 @@ def _numbered(of, many, rows, begins):  # type: ignore[no-untyped-def]
 
 @njit(_I1(_I2), cache=True)
 def node_begins(rows):  # type: ignore[no-untyped-def]
-    """(k + 1,) start of the rows of each node in the ``rows`` of stars, by node."""
+    """(k + 1,) first row of each node in ``rows``, which are the rows of stars, ordered by node."""
     begins, n = np.empty(len(rows) + 1, np.int64), 0
     for r in range(len(rows)):
         if r == 0 or rows[r, NODE] != rows[r - 1, NODE]:
@@ -255,8 +256,8 @@ def node_begins(rows):  # type: ignore[no-untyped-def]
 
 @njit(types.void(_N1, _N1, _N1, types.uint32[:, ::1], _I1, _I2, _I2, _I1, types.int64, types.int64), cache=True)
 def _reconnect(pool, first, count, tets, nodes, rows, places, of, new, block):  # type: ignore[no-untyped-def]
-    """See Stars.reconnect. The range of a node in the pool: first the tets that keep the node, then the tets of each
-    copy, by id.
+    """Divides the pool ranges of separated nodes for Stars.reconnect. After the division the range of a node has first
+    the tets that keep the node, then the tets of each copy, ordered by id.
     """
     begin, n, k = 0, len(rows), 0
     while begin < n:

@@ -1,9 +1,9 @@
-"""Strength of facets, from material, mesh and a hash of the facet id; and the delayed criterion.
+"""Strength of facets and the delayed criterion. The strength depends on material, mesh and a hash of the facet id.
 
-The paper's eqs (2) to (4): a facet is fully open at the time t after its traction first reached the strength if the
-incident stress is strength * e^(t/t_c) / (e^(t/t_c) - 1). The formula is derived for two half-spaces with a traction
-that decreases linearly with the opening. With the fracture energy as the area under the traction t_c = density * c *
-energy / strength^2, twice the printed value.
+Eqs (2) to (4) of the paper: if the incident stress is strength * e^(t/t_c) / (e^(t/t_c) - 1), a facet is fully open at
+the time t after its traction first reached the strength. The formula is derived for two half-spaces with a traction
+that decreases linearly with the opening. If the fracture energy is the area under the traction, t_c = density * c *
+energy / strength^2, which is twice the value printed in the paper.
 """
 
 import math
@@ -25,13 +25,14 @@ from ..model.state import Floats, Ints
 
 @dataclass(frozen=True)
 class Toughness:
-    """Constants of a part that fractures, SI."""
+    """Constants of a part that fractures, in SI units."""
 
     strength: float
     energy: float
     scatter: Scatter | None
     delay: float
-    """t_c times the square of the strength, Pa^2 s: t_c of a facet is this over the square of its own strength."""
+    """Characteristic time t_c times the square of the strength, Pa^2 s. The time t_c of a facet is this value divided
+    by the square of its own strength."""
     zone: float
     """Length of the cohesive zone, m, 9 pi / 32 E' G_c / strength^2 with E' = E / (1 - nu^2)."""
     speed: float
@@ -51,31 +52,30 @@ class Toughness:
         return 2.0 * self.energy / self.strength
 
     def energies(self, share: Floats) -> Floats:
-        """(m,) fracture energies, J/m^2, of facets that break with a ``share`` (m,) of shear in the square of the
-        effective traction.
+        """(m,) fracture energies, J/m^2; ``share`` (m,): fraction of shear in the square of the effective traction.
 
-        For a proportional opening it is the share of shear in the work, and facets break at w_n / energy + w_s /
-        shear_energy = 1 (Wu and Reuter 1965, exponent 1; docs/theory/bonds.md, Bonds).
+        For a proportional opening ``share`` is the fraction of the work that is done in shear. Facets break at w_n /
+        energy + w_s / shear_energy = 1 (Wu and Reuter 1965, exponent 1; docs/theory/bonds.md, Bonds).
         """
         if self.shear_energy is None:
             return np.full(len(share), self.energy)
         return np.asarray(1.0 / ((1.0 - share) / self.energy + share / self.shear_energy))
 
     def strengths(self, face: Ints, area: Floats) -> Floats:
-        """(n,) strengths, Pa, of facets with these ids ``face`` and areas, m^2."""
+        """(n,) strengths, Pa, of facets with the ids ``face`` and the areas ``area``, m^2."""
         scatter = self.scatter
         if scatter is None:
             return np.full(len(face), self.strength)
         share = np.ones(len(face)) if scatter.area is None else scatter.area / area
         drawn = _weibull(uniform(face, scatter.seed), share, scatter.modulus)
-        with np.errstate(over="ignore"):  # modulus far below 1: infinite strengths, such facets never break
+        with np.errstate(over="ignore"):  # a modulus far below 1 gives infinite strengths
             return np.asarray(scatter.minimum + (self.strength - scatter.minimum) * drawn)
 
 
 @njit("float64[::1](float64[::1], float64[::1], float64)", cache=True, error_model="numpy")
 def _weibull(random, share, modulus):  # type: ignore[no-untyped-def]
-    """(n,) Weibull variates of scale 1 from ``random`` numbers in [0, 1); ``share``: reference area of the scatter
-    over the area of each facet.
+    """(n,) Weibull variates of scale 1, made from ``random`` numbers in [0, 1). ``share``: reference area of the
+    scatter divided by the area of each facet.
     """
     drawn = np.empty(len(random))
     for i in range(len(random)):
@@ -85,7 +85,7 @@ def _weibull(random, share, modulus):  # type: ignore[no-untyped-def]
 
 @njit("float64(float64, float64, float64)", cache=True, error_model="numpy")
 def required(strength, since, delay):  # type: ignore[no-untyped-def]
-    """Returns the traction, Pa, that breaks a facet, at the time ``since`` it first reached its strength, s;
+    """Returns the traction, Pa, that breaks a facet. ``since``: time since the facet first reached its strength, s;
     ``delay``: see records.Law.
     """
     if delay <= 0.0:
@@ -113,8 +113,8 @@ UNBREAKABLE = Toughness(math.inf, 0.0, None, 0.0, math.inf, 1.0, 1.0)
 
 
 def of_bond(bond: SharedBond, materials: Sequence[Material]) -> Toughness:
-    """Returns the constants of a bond between parts of two ``materials``; the cohesive zone is that of the softer
-    material.
+    """Returns the constants of a bond between parts of two ``materials``. The length of the cohesive zone is that of
+    the softer material.
     """
     (strength, _), (energy, shear_energy) = bond.strengths, bond.energies
     soft = min(materials, key=_plane)
@@ -125,8 +125,8 @@ def of_bond(bond: SharedBond, materials: Sequence[Material]) -> Toughness:
 
 
 def terms(bond: SharedBond) -> Fracture:
-    """Returns the fracture specification of the facets of a bond: without delay, with both strengths and the given
-    energies.
+    """Returns the fracture specification of the facets of a bond: no delay, the strengths in tension and shear, and the
+    given energies.
     """
     normal, shear = bond.strengths
     model: Literal["cohesive", "instant"] = "cohesive" if bond.cohesive else "instant"
@@ -134,7 +134,7 @@ def terms(bond: SharedBond) -> Fracture:
 
 
 def _plane(material: Material) -> float:
-    """Returns E / (1 - nu^2), Pa."""
+    """Returns the modulus of plane strain E / (1 - nu^2), Pa."""
     return material.elastic.young / (1.0 - material.elastic.poisson**2)
 
 
@@ -150,7 +150,7 @@ def _zone(plane: float, energy: float) -> float:
 
 
 def _scaled(brittle: Brittle, strength: float) -> Scatter | None:
-    """Returns the scatter for a strength that was lowered for the mesh."""
+    """Returns the scatter that belongs to a strength that was lowered for the mesh."""
     if brittle.scatter is None:
         return None
     lowest = brittle.scatter.minimum * strength / brittle.strength

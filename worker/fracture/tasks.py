@@ -7,7 +7,7 @@ from . import criterion
 from .records import CANDIDATES, LAW, MESH, POINTS, TABLE
 
 TETS_OF_A_TASK = 4096
-"""Number of tets in a task. Chosen value: a task takes 5 us where no facet is overstressed."""
+"""Number of tets in a task. With the chosen value a task takes 5 us if no facet is overstressed."""
 _I1, _U1 = types.int64[::1], types.uint8[::1]
 COUNT = CANDIDATES, _U1, MESH, _I1
 SEARCH = CANDIDATES, _I1, _I1, _U1, MESH, TABLE, POINTS, LAW
@@ -16,15 +16,15 @@ _count, _search = reader(*COUNT), reader(*SEARCH)
 
 @njit(TASK, cache=True)
 def count(table, first, stop, thread):  # type: ignore[no-untyped-def]
-    """Task: writes the number of overstressed facets to ``counts`` (tasks,)."""
+    """Task: writes the number of overstressed facets of each task to ``counts`` (tasks,)."""
     out, hot, mesh, counts = _count(table)
     counts[first // TETS_OF_A_TASK] = criterion.overstressed(out, 0, 0, hot, mesh, first, stop)
 
 
 @njit(TASK, cache=True)
 def search(table, first, stop, thread):  # type: ignore[no-untyped-def]
-    """Task: ``criterion.overstressed`` and ``criterion.within``, in the ``counts`` (tasks,) rows of ``out`` from
-    ``begins`` (tasks,) on; replaces the count by the number of candidates.
+    """Task: runs ``criterion.overstressed`` and ``criterion.within`` in its own rows of ``out``: ``counts[k]`` rows
+    from row ``begins[k]`` on. Then replaces the count by the number of candidates.
     """
     out, begins, counts, hot, mesh, facets, x, law = _search(table)
     k = first // TETS_OF_A_TASK

@@ -1,6 +1,4 @@
-"""Fracture specifications and constants of a case: for the facets within each part, and for the facets of bonds between
-parts.
-"""
+"""Fracture specifications and constants of a case, for the facets within each part and for the facets of bonds."""
 
 from conoid.cases.model.joined import shared_bonds
 from conoid.cases.model.schema import Case, Fracture
@@ -12,11 +10,11 @@ from . import facets, resolution
 from .strength import UNBREAKABLE, Toughness, of_bond, terms, toughness
 
 _LAST = 2**28
-"""Upper bound of the ids of tets."""
+"""Upper bound of the global ids of tets."""
 
 
 class Terms:
-    """Specifications and constants of one case, and warnings about its mesh."""
+    """Fracture specifications and constants of one case, and warnings about its mesh."""
 
     def __init__(self, case: Case, model: Model) -> None:
         self._case, self._model = case, model
@@ -28,11 +26,13 @@ class Terms:
         self._bonds = [self._of_bond(number) for number in range(len(case.bond))]
 
     def own(self, index: int) -> facets.Terms:
-        """Returns specification and constants of the facets within a part."""
+        """Returns the specification and the constants of the facets within a part."""
         return *self._own[index], self._ids(index)
 
     def bonds(self, index: int) -> list[facets.Terms]:
-        """Returns specifications and constants of the facets between a part and other parts, for bonds that break."""
+        """Returns the specifications and constants of the facets between a part and other parts. Only bonds that can
+        break are included.
+        """
         found = []
         for number, bond, i, j in shared_bonds(self._case):
             if bond.breaks and index in (i, j):
@@ -45,7 +45,7 @@ class Terms:
         return resolution.merged(self._found)
 
     def _ids(self, index: int) -> tuple[int, int]:
-        """Returns the range of ids of the tets of a part: first, and one past the last."""
+        """Returns the range of the global ids of the tets of a part: first id, and last id plus 1."""
         ends = [*self._model.part_starts.tolist(), _LAST]
         return ends[index], ends[index + 1]
 

@@ -1,9 +1,10 @@
 """Unloading of cohesive facets that would release more energy in the next step than they absorbed.
 
-Nodal forces are complete, so the opening of a pair of nodes in the next step is known, except the change by contact.
-Unloading of one facet changes the openings of the neighbouring facets. There are therefore two passes over all facets,
-each with the forces at its beginning. The first pass lowers the traction of each pair as far as this pair alone
-requires. The second pass completely unloads the pairs that still close too far.
+When the module is called, nodal forces are complete. Therefore the opening of a pair of nodes in the next step is
+known, except for the change by contact. Unloading of one facet changes the openings of the neighbouring facets.
+Therefore two passes over all facets are made; each pass uses the forces from before the pass. The first pass lowers the
+traction of each pair as far as this pair alone requires. The second pass completely unloads the pairs that still close
+too far.
 """
 
 import numpy as np
@@ -19,8 +20,8 @@ from .cohesive import Cohesion
 
 @njit("void(int64[:, ::1], int64[:, ::1], int32[::1])", cache=True)
 def _move(force, change, rows):  # type: ignore[no-untyped-def]
-    """Adds the ``change`` of the nodes ``rows`` (k,) to their forces, and sets it to zero. A node may occur several
-    times in the list.
+    """Adds the ``change`` of the nodes ``rows`` (k,) to the forces of these nodes, and sets the change to zero. A node
+    may occur several times in ``rows``.
     """
     for a in rows:
         for i in range(3):
@@ -29,13 +30,13 @@ def _move(force, change, rows):  # type: ignore[no-untyped-def]
 
 
 class Unloading:
-    """Unloading on one rank; the forces of shared nodes are completed after each pass."""
+    """Unloading of cohesive facets on one rank. The forces of shared nodes are completed after each pass."""
 
     def __init__(self, cohesion: Cohesion, nodes: Nodes, neighbours: list[Neighbour], comm: Comm) -> None:
         self._cohesion, self._nodes, self._neighbours, self._comm = cohesion, nodes, neighbours, comm
         self._shared: SharedSum | None = None
         self._room: Ints = np.zeros((0, 3), np.int64)
-        """(room, 3) changes of the nodal forces in a pass, quanta; zero between passes."""
+        """(rows, 3) changes of the nodal forces in a pass, quanta; zero between passes."""
 
     def apply(self, clock: Clock) -> None:
         """Corrects the present nodal forces. Collective."""

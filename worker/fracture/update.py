@@ -1,4 +1,4 @@
-"""Update of all tables after facets broke: arrays by node, forces, cohesive facets, contact."""
+"""Update of all tables after facets broke: arrays by node, forces, cohesive facets and contact."""
 
 from ..contact.stage import Contact
 from ..elements.forms import Elements
@@ -25,8 +25,8 @@ class TopologyUpdate:
     def apply(
         self, broken: list[Breaking], split: Split, fresh: list[Facets], cohesion: Cohesion | None
     ) -> None:  # fmt: skip
-        """Applies the ``broken`` facets, the new cohesive facets ``fresh`` among them, and the separated nodes.
-        Collective among the ranks that share copies or have ghosts of their surface.
+        """Updates all tables for the ``broken`` facets, the new cohesive facets ``fresh`` among them, and the separated
+        nodes. Collective among the ranks that share copies or have ghosts of their surface.
         """
         if split.copies.n:
             self._grow(split)

@@ -16,7 +16,7 @@ NEAR = 1e-9
 plane."""
 
 Cut = tuple[int, float]
-"""A plane on which a body is cut: its direction and its position."""
+"""A plane on which a body is cut: index of its normal direction, and its position."""
 Nearest = Callable[[Floats], Floats]
 """Callback that returns the points (k, 3) of an entity nearest to given points."""
 
