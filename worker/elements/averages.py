@@ -1,11 +1,10 @@
-"""Rows of the nodal means of the averaged pressure forms, if nodes have tets of several materials. The table has one
+"""Table of the nodal means of the averaged pressure forms, for nodes with tets of several materials. The table has one
 row for each material of a node.
 
-A mean over the tets round a node is a value of the material there. At an interface of two materials the stress is
-continuous, so the volume strains of the two materials differ. A single mean over both materials would give each
-material the strain, and therefore the pressure, of the other material. Therefore a node has one mean for each material
-of its tets, and a tet contributes only to the means of its own material. If no node has several materials, the rows of
-the means are the nodes.
+At an interface of two materials the stress is continuous, so the volume strains of the two materials differ. A single
+mean over the tets of both materials around a node would mix the two strains, and the pressure of each material would be
+wrong. Therefore a node has one mean for each material of its tets, and a tet contributes only to the means of its own
+material. If no node has several materials, the rows of the means are the nodes.
 """
 
 from collections.abc import Iterator, Sequence
@@ -23,13 +22,13 @@ from ..parallel.ownership import Neighbour
 
 
 def kinds(case: Case) -> Indices:
-    """Returns (parts,) for each part the first part that has the same material."""
+    """Returns (parts,) a part that represents the material of each part: the first part with this material."""
     names = [part.material for part in case.parts]
     return np.array([names.index(name) for name in names], np.int32)
 
 
 class Averages:
-    """Rows of the means of one rank. A rank that has a node has all means of the node."""
+    """Rows of the nodal means on one rank. A rank that has a node has all rows of the node."""
 
     def __init__(self, model: Model, neighbours: list[Neighbour], kinds: Indices) -> None:
         """``kinds`` (parts,): for each part the part that represents its material."""
@@ -44,12 +43,12 @@ class Averages:
         for block in model.blocks:
             block.own_averages = self._rows(block)
         self.neighbours = [Neighbour(other.rank, self._shared(other.nodes)) for other in neighbours]
-        """Neighbouring ranks, and the rows that this rank has in common with each of these ranks."""
+        """Neighbour ranks, each with the rows that this rank shares with it."""
 
     @classmethod
     def of(cls, case: Case, model: Model, neighbours: list[Neighbour]) -> "Averages | None":
-        """Returns the rows of a case; None if no bond joins two materials. In that case each node has exactly one
-        row.
+        """Returns the table of rows of a case. Returns None if no bond joins two materials, because each node then has
+        exactly one row.
         """
         found = kinds(case)
         mixed = any(found[i] != found[j] for _, _, i, j in shared_bonds(case))
@@ -62,18 +61,20 @@ class Averages:
 
     @property
     def further(self) -> Ints:
-        """Number of rows at the start in addition to the first row of each node."""
+        """Number of rows at the start that are not the first row of a node."""
         return np.arange(self._model.nodes.n, self.n)
 
     def at(self, node: "np.ndarray", part: "np.ndarray | int") -> Ints:
-        """Returns the rows of local nodes for the materials of parts; -1 if there is no such row."""
+        """Returns the rows of local nodes for the materials of parts; -1 if there is no row of a node and a
+        material.
+        """
         wanted = np.asarray(node, np.int64) * MOST_PARTS + self._kinds[part]
         at = places(self._keys, wanted)
         return np.where(at >= 0, self._order[at], -1)
 
     def grow(self, split: Split) -> Ints:
-        """Adds the rows of the copies of a split, whose tets have their new nodes already; returns the parent row of
-        each new row.
+        """Adds the rows of the copies of separated nodes. The tets must already have their new nodes. Returns the
+        parent row of each new row.
         """
         nodes, first = self._model.nodes, split.first
         copies, (node, part) = split.copies, nodes.of_parts()
@@ -93,7 +94,7 @@ class Averages:
         return parents
 
     def layers(self) -> Iterator[Ints]:
-        """Yields the rows in groups such that a node occurs at most once in each group."""
+        """Yields groups of rows; a node occurs at most once in each group."""
         left = np.arange(self.n)
         while len(left):
             _, first = np.unique(self.node[left], return_index=True)
@@ -101,16 +102,16 @@ class Averages:
             left = np.delete(left, first)
 
     def of_nodes(self, columns: dict[str, "np.ndarray"]) -> dict[str, "np.ndarray"]:
-        """Returns, (nodes, ...), the values of ``columns`` (rows, ...) for the material of the part that represents
-        each node.
+        """Returns (nodes, ...) values of ``columns`` (rows, ...). The value of a node is that of one of its materials:
+        the material of the part that represents the node.
         """
         nodes = self._model.nodes
         rows = self.at(np.arange(nodes.n), nodes.part)
         return {name: column[rows] for name, column in columns.items()}
 
     def keep(self, columns: dict[str, "np.ndarray"]) -> Table:
-        """Returns the table of a parcel (a checkpoint or migration message) for the means of nodes of several
-        materials; ``columns`` (rows, ...).
+        """Returns the parcel table (for a checkpoint or migration message) of the means at nodes of several materials;
+        ``columns`` (rows, ...).
         """
         nodes = self._model.nodes
         node, part = nodes.of_parts()
@@ -139,7 +140,9 @@ class Averages:
         return np.ascontiguousarray(self.at(block.tets, block.part), np.uint32)
 
     def _shared(self, nodes: Indices) -> Indices:
-        """Rows of ``nodes``, by id of the node and then by material: the same order on both ranks."""
+        """Rows of ``nodes``, ordered by node id and then by material. The order is the same on the two ranks that share
+        the nodes.
+        """
         mine = np.isin(self.node, nodes)
         rows = np.flatnonzero(mine)
         ids = self._model.nodes.id[self.node[rows]]
@@ -147,15 +150,15 @@ class Averages:
 
 
 def _more(nodes: Nodes, kinds: Indices) -> Ints:
-    """(k, 2) nodes and their further materials: all except the material of the part that represents the node."""
+    """(k, 2) nodes and their further materials. The material of the part that represents a node is omitted."""
     shares = nodes.shares
     pairs = np.column_stack([shares.node, kinds[shares.part]]).astype(np.int64)
     return np.unique(pairs[pairs[:, 1] != kinds[nodes.part[shares.node]]], axis=0)
 
 
 def volumes(averages: "Averages | None", nodes: Nodes, node_volume: Floats, density: Sequence[float]) -> Floats:
-    """(rows,) reference volumes at the start, m^3: ``node_volume`` (nodes,); for nodes of several materials the volume
-    of each material, from the ``density`` of the parts, kg/m^3.
+    """(rows,) reference volumes at the start, m^3. They are ``node_volume`` (nodes,), or for nodes of several materials
+    the volume of each material, computed with the ``density`` of the parts, kg/m^3.
     """
     if averages is None:
         return node_volume

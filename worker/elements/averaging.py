@@ -1,4 +1,4 @@
-"""Pressure forms that average over nodes, ``nodal`` and ``split``, as the time step calls them."""
+"""The pressure forms ``nodal`` and ``split``, which average over nodes, with the methods that the time step calls."""
 
 import numpy as np
 
@@ -23,17 +23,19 @@ from .passes import BlockPass, Values
 
 
 class AveragedElements(Elements):
-    """Elements in the ``nodal`` or ``split`` form: two passes, with the completed nodal volume sums between them."""
+    """Elements in the ``nodal`` or ``split`` pressure form. A step makes two passes over the tets; the nodal volume
+    sums are completed between the passes.
+    """
 
     def __init__(
         self, model: Model, comm: Comm, neighbours: list[Neighbour], timers: Timers, team: Team,
         averages: Averages | None, weight: Floats, params: Floats, kinds: Ints, scene: list[Boundary], split: bool,
         more: bool,
     ) -> None:  # fmt: skip
-        """``averages``: rows of the means, None if they are the nodes; ``weight`` (rows,): one over the reference
-        volume, 1/m^3; ``params`` (parts, SIZE): constants of each part; ``kinds`` (parts,): TETS or LINEAR
-        (matter.py); ``scene``: boundaries, among them planes of symmetry, which mirror means; ``more``: True if an
-        equation of state of the case averages heat or bulking as well.
+        """``averages``: table of the rows of the means; None if the rows are the nodes. ``weight`` (rows,): 1 /
+        reference volume, 1/m^3; ``params`` (parts, SIZE): material constants of each part; ``kinds`` (parts,): TETS or
+        LINEAR (matter.py). ``scene``: boundaries, among them symmetry planes, which mirror the means. ``more``: whether
+        an equation of state of the case also averages heat or bulking.
         """
         self._averages, self._columns, self.split = averages, 3 if more else 2, split
         super().__init__(model, comm, neighbours, timers, team)
@@ -49,7 +51,7 @@ class AveragedElements(Elements):
 
     @property
     def _kind(self) -> Indices:
-        """(rows,) for each row a part that has the material of the row."""
+        """(rows,) a part that has the material of the row."""
         return self.model.nodes.part if self._averages is None else self._averages.kind
 
     @property
@@ -137,7 +139,7 @@ class AveragedElements(Elements):
                 self._mirror(boundary)
 
     def _mirror(self, boundary: Boundary) -> None:
-        """Applies the boundary to the projected gradients of all rows of its nodes."""
+        """Applies a boundary to the projected gradients of all rows of the nodes of the boundary."""
         projected = self.means.projected
         if self._averages is None:
             boundary.mirror(projected)
@@ -152,5 +154,5 @@ class AveragedElements(Elements):
         return self.means.fields
 
     def _constants(self) -> Values:
-        """Returns the arguments of ``nodal.complete`` except means and volumes."""
+        """Returns the arguments of ``nodal.complete``, without means and volumes."""
         return self._columns > 2, self.means.bulk, self.means.pressed, self._kind, self._kinds, self._params

@@ -2,12 +2,12 @@
 
 The averaged pressure of a tet depends on the mean volume strain of its nodes; only the deviatoric stress resists a
 change of the own volume of the tet. After yield, the volume of a tet at an edge of a body, whose nodes have few other
-tets, may decrease to zero while the mean volume strain stays constant. If the volume of a tet is below the fraction
-SQUEEZED of its initial volume, the additional pressure b acts in the tet:
+tets, may decrease to zero while the mean volume strain stays constant. If the volume V of a tet is below SQUEEZED times
+its initial volume V0, the additional pressure b acts in the tet (K: bulk modulus):
 
     b(J) = STIFF K (SQUEEZED / J - 1)^2,    J = V / V0 < SQUEEZED
 
-The energy of the barrier is elastic. Parts with erosion have no barrier: there squeezed tets are removed
+The energy of the barrier is elastic. Parts with erosion have no barrier, because erosion removes squeezed tets
 (docs/theory/elements.md, Pressure forms).
 """
 
@@ -20,21 +20,21 @@ from ..model.state import CHUNK
 from .scratch import CHANGE, LIMIT, MODULUS, VOLUME
 
 SQUEEZED = 0.2
-"""Volume of a tet over its initial volume below which the barrier acts. Chosen value: the smallest ratio of tets in
-Taylor bars is 0.56, in a long rod without erosion 0.28."""
+"""Ratio of the volume of a tet to its initial volume below which the barrier acts. Chosen value: the smallest ratio of
+tets is 0.56 in Taylor bars, and 0.28 in a long rod without erosion."""
 STIFF = 0.1
-"""Stiffness of the barrier over the bulk modulus. Chosen value: compression to half of SQUEEZED requires a pressure
-of 10 % of the bulk modulus, far more than the yield stress of metals."""
+"""Stiffness of the barrier, divided by the bulk modulus. Chosen value: compression to half of SQUEEZED requires a
+pressure of 10 % of the bulk modulus, which is far more than the yield stress of metals."""
 
 _ROUNDING = 1e-9
-"""Relative tolerance of a volume ratio. The tolerance is far above the rounding difference between two ways of
+"""Relative tolerance of a volume ratio. The tolerance is far above the round-off difference between two ways of
 computing the same ratio."""
 _Q, _MASS, _WORK, _WORK_VISCOUS = VISCOUS * CHUNK, MASS * CHUNK, WORK * CHUNK, WORK_VISCOUS * CHUNK
 
 
 @njit("UniTuple(float64, 2)(float64, float64)", cache=True, error_model="numpy")
 def _barrier(ratio, bulk):  # type: ignore[no-untyped-def]
-    """Returns b and -J db/dJ, Pa; zero for a volume that is not positive, as the limit of such a tet is NaN."""
+    """Returns b and -J db/dJ, Pa. Both are zero if the volume is not positive; the stable step of such a tet is NaN."""
     if not 0.0 < ratio < SQUEEZED:
         return 0.0, 0.0
     times = SQUEEZED / ratio
@@ -44,8 +44,8 @@ def _barrier(ratio, bulk):  # type: ignore[no-untyped-def]
 
 @njit("boolean(float64[::1], float64[::1], float64, int64)", cache=True, error_model="numpy")
 def _any_squeezed(w, s, density, n):  # type: ignore[no-untyped-def]
-    """Returns True if a tet has, or had before the step, a volume below SQUEEZED or equal to SQUEEZED up to rounding.
-    The loop uses vector instructions.
+    """Returns True if the volume of a tet, before or after the step, is below SQUEEZED or equal to SQUEEZED within
+    round-off. The loop uses vector instructions.
     """
     per_mass, found = density / (SQUEEZED * (1.0 + _ROUNDING)), 0
     for i in range(n):
@@ -56,11 +56,11 @@ def _any_squeezed(w, s, density, n):  # type: ignore[no-untyped-def]
 
 @njit("void(float64[::1], float64[::1], float64[::1], int64)", cache=True, error_model="numpy")
 def resist(w, s, params, n):  # type: ignore[no-untyped-def]
-    """Adds the barrier to the row VISCOUS, which is recomputed in every step, the work of the barrier to WORK, and its
-    stiffness to LIMIT.
+    """Adds the barrier pressure to the row VISCOUS, which is recomputed in every step. Adds the work of the barrier to
+    the row WORK, and the stiffness of the barrier to the row LIMIT.
 
-    The viscosity has booked half of the work of the old row VISCOUS; the share of the barrier in this work is
-    subtracted again.
+    The function for the viscosity has added half of the work of the old row VISCOUS to its own account. The barrier's
+    share in this work is subtracted.
     """
     if not _any_squeezed(w, s, params[DENSITY], n):
         return

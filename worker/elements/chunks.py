@@ -33,31 +33,31 @@ from .records import BODY, HOT, LARGEST_FORCE, LARGEST_LIMIT, LIMITING_TET, MARK
 from .wear import SOUND, mark_worn
 
 _NO_TET = 2**62
-"""Value above any global id of a tet."""
+"""Value that is larger than any global id of a tet."""
 _F, _I, _B, _B1, _T2 = types.float64, types.int64, types.boolean, types.boolean[::1], types.uint32[:, ::1]
 _F1, _F2, _I1, _I2 = types.float64[::1], types.float64[:, ::1], types.int64[::1], types.int64[:, ::1]
 
 
 @njit(types.void(_F1, _F2, _T2, _I, _F), cache=True, error_model="numpy")
 def rates(w, v, t, n, dt):  # type: ignore[no-untyped-def]
-    """Computes rates of deformation from the edges of a chunk and the velocities of its nodes."""
+    """Computes the rates of deformation of a chunk of tets from its edges and the velocities of its nodes."""
     tet4.gather(w[scratch.RATE :], v, t, w[:0], n)
     tet4.kinematics(w, n, dt)
 
 
 @njit(types.void(_F1, _F2, _T2, _I), cache=True, error_model="numpy")
 def first_speeds(w, v, t, n):  # type: ignore[no-untyped-def]
-    """Sets SPEED of tets whose volume before the step is not stored, from the velocities of their nodes."""
+    """Sets SPEED from the velocities of the nodes, for tets whose volume before the step is not stored."""
     tet4.gather(w[scratch.RATE :], v, t, w[:0], n)
     tet4.speeds(w, n)
 
 
 @njit(types.void(_I, _F1, _F1, _F1, _I, _F), cache=True, error_model="numpy")
 def from_rates(strength, w, s, params, n, dt):  # type: ignore[no-untyped-def]
-    """Computes the deviatoric stress of a chunk and its work: rotation, elastic trial, plastic return.
+    """Computes the deviatoric stress of a chunk and its work. The steps are rotation, elastic trial and plastic return.
 
-    For a law that acts after the pressure, this function computes only the trial stress; ``return_at_pressure``
-    completes the step.
+    For a law that acts after the pressure, this function computes only the trial stress; ``return_at_pressure`` then
+    does the plastic return.
     """
     predict(w, s, n, params[SHEAR], dt)
     if params[ORDER] == BEFORE_PRESSURE:
@@ -67,8 +67,8 @@ def from_rates(strength, w, s, params, n, dt):  # type: ignore[no-untyped-def]
 
 @njit(types.void(_I, _F1, _F1, _F1, _I, _F), cache=True, error_model="numpy")
 def return_at_pressure(strength, w, s, params, n, dt):  # type: ignore[no-untyped-def]
-    """Returns the deviatoric stress of a chunk to a strength that depends on the new pressure; books the work of the
-    new stress.
+    """Returns the deviatoric stress of a chunk to a strength that depends on the new pressure. Adds the work of the new
+    stress to the energies of the tets.
     """
     if params[ORDER] == AFTER_PRESSURE:
         strengthen(strength, w, s, params, n, dt)
@@ -77,9 +77,9 @@ def return_at_pressure(strength, w, s, params, n, dt):  # type: ignore[no-untype
 
 @njit(types.void(_F1, _F1, _F1, _I, _F, _B), cache=True, error_model="numpy")
 def viscosity_and_limit(w, s, params, n, dt, averaged):  # type: ignore[no-untyped-def]
-    """Computes bulk viscosity and stable step of a chunk at its new pressure; ``averaged``: True in the averaged
-    pressure forms, in which the viscosity resists the averaged volume rate. Exception: for materials that dilate the
-    viscosity resists the rate of the tet itself.
+    """Computes bulk viscosity and stable step of a chunk at its new pressure. ``averaged`` is True in the averaged
+    pressure forms, in which the viscosity resists the averaged volume rate. For materials that dilate the viscosity
+    always resists the volume rate of the tet itself.
     """
     if params[ORDER] == FROM_SHAPE:
         stiffen(w, s, params, n)
@@ -95,8 +95,8 @@ def viscosity_and_limit(w, s, params, n, dt, averaged):  # type: ignore[no-untyp
 
 @njit(types.void(_I1, _I1, _I1, _I, _I), cache=True)
 def note_peaks(peaks, bits, ids, n, force):  # type: ignore[no-untyped-def]
-    """Raises the peaks to the peaks of a chunk of tets with these global ids, whose largest force has the bits
-    ``force``.
+    """Raises the peaks of a thread to the peaks of a chunk of tets. ``ids``: global ids of the tets; ``force``: bit
+    pattern of the largest force of the chunk.
     """
     peaks[LARGEST_FORCE] = max(peaks[LARGEST_FORCE], force)
     limit = 0
@@ -112,7 +112,7 @@ def note_peaks(peaks, bits, ids, n, force):  # type: ignore[no-untyped-def]
 
 @njit(types.void(_I2), cache=True)
 def gather_peaks(threads):  # type: ignore[no-untyped-def]
-    """Raises the peaks of the first of the ``threads`` (threads, 8) to the maximum over all."""
+    """Raises the peaks of the first thread to the maximum over all ``threads`` (threads, 8)."""
     peaks = threads[0]
     for t in range(1, len(threads)):
         mine = threads[t]
@@ -126,8 +126,8 @@ def gather_peaks(threads):  # type: ignore[no-untyped-def]
 
 @njit(_I(_I2, _F1, _I1, _I1, _I1, _T2, _F1, _I1, _I, _F), cache=True, error_model="numpy")
 def sum_forces(force, w, wi, bits, peaks, t, s, ids, n, scale):  # type: ignore[no-untyped-def]
-    """Adds the forces of a chunk of tets with these global ids to the nodal sums; returns the bits of the largest
-    force.
+    """Adds the forces of a chunk of tets to the nodal sums; ``ids``: global ids of the tets. Returns the largest force
+    as its bit pattern (integer).
     """
     largest = forces.internal_forces(wi, w, s, n, scale)
     forces.scatter_forces(force, wi, t, n)
@@ -137,8 +137,8 @@ def sum_forces(force, w, wi, bits, peaks, t, s, ids, n, scale):  # type: ignore[
 
 @njit(_I(_I2, _F1, _F1, _I1, _I1, _B1, _T2, _I, _F), cache=True, error_model="numpy")
 def sum_fluxes(gradient, pressure, w, wi, peaks, flat, t, n, scale):  # type: ignore[no-untyped-def]
-    """Adds the pressure gradient of a chunk to the nodal sums, without ``flat`` tets; returns the bits of the largest
-    contribution.
+    """Adds the pressure gradient of a chunk to the nodal sums, without ``flat`` tets. Returns the largest contribution
+    as its bit pattern (integer).
     """
     largest = averaged.pressure_fluxes(wi, w, pressure, t, n, scale)
     if len(flat) > 0:
@@ -150,9 +150,10 @@ def sum_fluxes(gradient, pressure, w, wi, peaks, flat, t, n, scale):  # type: ig
 
 @njit(_B(MARKS, _I, _I, _F1, _I1, _F1, _F1, _I), cache=True, error_model="numpy", forceinline=True)
 def mark(marks, first, last, w, peaks, s, params, rows):  # type: ignore[no-untyped-def]
-    """Marks the worn tets ``first`` to ``last`` of a block and their overstressed faces; returns True if there are any.
+    """Marks the tets from ``first`` to ``last`` of a block that erosion will remove, and the overstressed faces of the
+    tets. Returns True if any tet or face is marked.
 
-    ``w``, ``s``: of their chunk.
+    ``w``, ``s``: scratch and state of the chunk of these tets.
     """
     found, some_hot, n = SOUND, False, last - first
     if len(marks.worn) > 0:
@@ -166,7 +167,7 @@ def mark(marks, first, last, w, peaks, s, params, rows):  # type: ignore[no-unty
 
 @njit(types.void(_F1, _F2, _T2, _F1, _B, _I), cache=True, error_model="numpy")
 def volumes_at_rest(w, x, t, s, shape, n):  # type: ignore[no-untyped-def]
-    """Sets VOLUME_MID and DILATATION of a chunk at rest; ``shape``: True if the law computes the stress from the
+    """Sets VOLUME_MID and DILATATION of a chunk at rest. ``shape``: whether the law computes the stress from the
     undeformed shape.
     """
     if shape:
@@ -178,7 +179,7 @@ def volumes_at_rest(w, x, t, s, shape, n):  # type: ignore[no-untyped-def]
 
 @njit(types.void(_F1, _F1, BODY, MEANS, _T2, _B1, _I), cache=True, error_model="numpy", forceinline=True)
 def take_means(w, s, body, means, means_of, flat, n):  # type: ignore[no-untyped-def]
-    """Sets SEEN from the nodal means of a chunk, and adds the nodal means of heat or bulking to the state of the
+    """Sets SEEN to the nodal means for a chunk, and adds the nodal means of heat or bulking to the state of the
     chunk.
     """
     averaged.gather_strains(w, means.strain, means_of, n)
@@ -190,7 +191,7 @@ def take_means(w, s, body, means, means_of, flat, n):  # type: ignore[no-untyped
 
 @njit(types.void(_F1, _F1, _F2, _T2, _B, _I, _F), cache=True, error_model="numpy")
 def own_change(w, s, v, t, shape, n, dt):  # type: ignore[no-untyped-def]
-    """Sets CHANGE and SPEED of a chunk after the first pass; ``shape``: True if the law computes the stress from the
+    """Sets CHANGE and SPEED of a chunk after the first pass. ``shape``: whether the law computes the stress from the
     undeformed shape.
     """
     if shape:
@@ -203,9 +204,9 @@ def own_change(w, s, v, t, shape, n, dt):  # type: ignore[no-untyped-def]
 
 @njit(types.void(_F1, _F1, BODY, _F2, _T2, _B1, _I), cache=True, error_model="numpy", forceinline=True)
 def averaged_pressure(w, s, body, matter, means_of, flat, n):  # type: ignore[no-untyped-def]
-    """Computes pressure, work of the pressure and MODULUS of a chunk in the averaged pressure forms (`nodal`, `split`):
-    from the volume strains of its tets or from the means of its nodes. The pressure of ``flat`` tets is computed from
-    their own strain.
+    """Computes pressure, work of the pressure and MODULUS of a chunk in the averaged pressure forms (`nodal`, `split`).
+    The pressure is computed from the volume strains of the tets or is a mean over their nodes. The pressure of ``flat``
+    tets is computed from their own strain.
     """
     params, eos, rows = body.params, body.eos, body.rows
     if len(flat) > 0:

@@ -1,7 +1,8 @@
-"""Tasks of a pass over a block: ranges of chunks with colours. Chunks of one colour share no node.
+"""Tasks of a pass over a block of tets. A task is a range of chunks, and each chunk has a colour. Chunks of one colour
+share no node.
 
 Greedy colouring in the order of the chunks: each chunk gets the first colour that no earlier chunk with a common node
-has. The colours stay valid until tets move from chunk to chunk; separation of nodes only removes neighbours.
+has. The colours stay valid until tets move from chunk to chunk; a separation of nodes only removes common nodes.
 """
 
 from dataclasses import dataclass
@@ -15,23 +16,24 @@ from ..parallel.arguments import Arguments
 from ..parallel.team import Team
 
 _BITS = 63
-"""Number of colours in a word of bits. A chunk for which no colour is free gets an additional colour of its own."""
+"""Number of colours whose bits fit into an integer. A chunk for which no colour is free gets a further colour that no
+other chunk has."""
 
 
 @dataclass(frozen=True)
 class Coloured:
-    """Tasks sorted by colour."""
+    """Tasks of a pass, sorted by colour."""
 
     tasks: Ints
-    """(k, 2) first chunk of each task, and one past the last chunk."""
+    """(k, 2) for each task its first chunk, and its last chunk plus 1."""
     starts: Ints
     """(colours + 1,) first task of each colour; the last value is the number of tasks."""
 
 
 @njit("void(uint32[:, ::1], int64, int64, int64[::1], int64[::1])", cache=True)
 def _give(tets, begin, end, used, colour):  # type: ignore[no-untyped-def]
-    """Sets the ``colour`` (end - begin,) of each chunk; ``used`` (nodes,), zero on entry: bits of the colours of the
-    chunks of a node.
+    """Sets the ``colour`` (end - begin,) of each chunk. ``used`` (nodes,), zero on entry: bit k is set if a chunk of
+    the node has the colour k.
     """
     single = _BITS
     for c in range(begin, end):
@@ -53,7 +55,9 @@ def _give(tets, begin, end, used, colour):  # type: ignore[no-untyped-def]
 
 
 def coloured(block: Block, begin: int, end: int, nodes: int) -> Coloured:
-    """Returns the chunks ``begin`` to ``end`` of a block, one a task; ``nodes``: number of nodes of the rank."""
+    """Returns the chunks from ``begin`` to ``end`` of a block as tasks of one chunk each; ``nodes``: number of nodes of
+    the rank.
+    """
     colour = np.zeros(end - begin, np.int64)
     _give(block.tets[: block.n], begin, end, np.zeros(nodes, np.int64), colour)
     order = np.argsort(colour, kind="stable")
@@ -62,20 +66,24 @@ def coloured(block: Block, begin: int, end: int, nodes: int) -> Coloured:
 
 
 def whole(begin: int, end: int) -> Coloured:
-    """Returns the chunks as one task."""
+    """Returns the chunks from ``begin`` to ``end`` as one task."""
     return Coloured(np.array([[begin, end]]), np.array([0, 1]))
 
 
 class TetPass:
-    """A kernel that adds to the sums of the nodes of tets, to be run over the chunks of blocks."""
+    """A kernel that is run over the chunks of blocks and adds to sums of nodes."""
 
     def __init__(self, team: Team, kernel: Kernel, *kinds: Any) -> None:
-        """``kernel``: of the signature team.TASK, over chunks; ``kinds``: numba types of its arguments."""
+        """``kernel``: kernel with the signature team.TASK, whose range is a range of chunks; ``kinds``: numba types of
+        its arguments.
+        """
         self._team, self._kernel, self._arguments = team, kernel, Arguments(*kinds)
         self._known: dict[int, tuple[Block, int, Coloured]] = {}
 
     def run(self, block: Block, nodes: int, *values: Any) -> None:
-        """Runs over the chunks of a block of a rank with so many ``nodes``; ``values``: the arguments."""
+        """Runs the kernel over the chunks of a block. ``nodes``: number of nodes of the rank; ``values``: arguments of
+        the kernel.
+        """
         if block.n:
             some = self._tasks(block, nodes)
             self._team.run(self._kernel, self._arguments.set(*values), some.tasks, some.starts)

@@ -1,11 +1,11 @@
-"""Largest compression of brittle materials without a law of compressive failure, in every step, over Griffith's
-criterion (cases/warnings/compression.py).
+"""Largest compression of brittle materials that have no law of compressive failure, divided by Griffith's criterion. It
+is computed in every step, for a warning (cases/warnings/compression.py).
 
 A material without a law of compressive failure breaks in tension only and bears any compression. Each stress is
-compared with the criterion of Griffith (1924): (s1 - s3)^2 / (8 T (s1 + s3)) for the largest and the smallest pressure,
-s1 and s3, and the tensile strength T. A material of this strength cracks at a ratio of 1. The ratio is proportional to
-the stress. Tension, s3 < 0, counts as zero: the tensile criterion covers it. The stress is the stress of the tets at
-the end of a step, without its viscous part.
+compared with the criterion of Griffith (1924): the ratio (s1 - s3)^2 / (8 T (s1 + s3)), with the largest principal
+pressure s1, the smallest principal pressure s3 and the tensile strength T. A material of this strength cracks at a
+ratio of 1. The ratio is proportional to the stress. A tension s3 < 0 counts as zero, because the tensile criterion
+covers tension. The stress is that of the tets at the end of a step, without its viscous part.
 """
 
 from dataclasses import astuple, dataclass, replace
@@ -31,13 +31,14 @@ _SXX, _SYY, _SZZ = S_XX * CHUNK, S_YY * CHUNK, S_ZZ * CHUNK
 _SYZ, _SZX, _SXY = S_YZ * CHUNK, S_ZX * CHUNK, S_XY * CHUNK
 _P = PRESSURE * CHUNK
 _MOST = 100
-"""Largest number of Newton steps. Chosen value: in general 6 steps are enough. If two principal stresses are nearly
-equal, each step only halves the error, and 30 steps reduce it to rounding."""
+"""Largest number of Newton iterations. Chosen value: in general 6 iterations are enough. If two principal stresses are
+nearly equal, each iteration only halves the error, and 30 iterations reduce the error to round-off."""
 _ROUNDING = 1e-15
-"""Residual over the cube of the root at which the iteration ends: a few last bits of a float64. The relative error
-of a double root is then the square root of this value."""
+"""Residual, divided by the cube of the root, at which the Newton iteration ends: a few last bits of a float64. The
+relative error of a double root is then the square root of this value."""
 CHUNKS_OF_A_TASK = 16
-"""Number of chunks in a task. Chosen value: a task takes at least 10 us; to start a parallel region takes 2 us."""
+"""Number of chunks in a task. Chosen value: a task takes at least 10 us, compared with 2 us to start a parallel
+region."""
 _I, _F, _I1, _F1, _F3 = types.int64, types.float64, types.int64[::1], types.float64[::1], types.float64[:, :, ::1]
 _LOOK = _I1, _F1, _F3, _I1, _I, _F, _F
 _COUNT = _I1, _F3, _I, _F
@@ -46,9 +47,9 @@ _of_look, _of_count = reader(*_LOOK), reader(*_COUNT)
 
 @njit("float64(float64, float64)", cache=True, error_model="numpy")
 def _largest_root(j2, j3):  # type: ignore[no-untyped-def]
-    """Returns the largest principal value of a deviator with these invariants: the largest root of x^3 - j2 x - j3 =
-    0, by Newton's method from above. The root is at least sqrt(j2 / 3), where the slope is zero: rounding must not
-    take a step below it.
+    """Returns the largest principal value of a deviator with these invariants: the largest root of x^3 - j2 x - j3 = 0,
+    by Newton's method from above. The root is at least sqrt(j2 / 3), where the slope is zero, so an iterate below this
+    value is replaced by it.
     """
     least = np.sqrt(j2 / 3.0)
     x = 2.0 * least
@@ -62,7 +63,7 @@ def _largest_root(j2, j3):  # type: ignore[no-untyped-def]
 
 @njit("UniTuple(float64, 2)(float64[::1], int64)", cache=True, error_model="numpy")
 def principal(s, i):  # type: ignore[no-untyped-def]
-    """Returns the largest and the smallest pressure of tet ``i`` of a chunk, Pa."""
+    """Returns the largest and the smallest principal pressure of tet ``i`` of a chunk, Pa."""
     xx, yy, zz, yz, zx, xy = s[_SXX + i], s[_SYY + i], s[_SZZ + i], s[_SYZ + i], s[_SZX + i], s[_SXY + i]
     j2 = 0.5 * (xx * xx + yy * yy + zz * zz) + yz * yz + zx * zx + xy * xy
     j3 = xx * (yy * zz - yz * yz) - xy * (xy * zz - yz * zx) + zx * (xy * yz - yy * zx)
@@ -71,16 +72,16 @@ def principal(s, i):  # type: ignore[no-untyped-def]
 
 @njit("float64(float64, float64, float64)", cache=True, error_model="numpy")
 def _beyond(s1, s3, strength):  # type: ignore[no-untyped-def]
-    """Returns the ratio of these pressures to the criterion."""
+    """Returns the ratio of Griffith's criterion for the principal pressures s1 and s3."""
     s3 = max(s3, 0.0)
     return (s1 - s3) ** 2 / (8.0 * strength * (s1 + s3)) if s1 > 0.0 else 0.0
 
 
 @njit("boolean(float64[::1], int64, float64)", cache=True, error_model="numpy", forceinline=True)
 def _below(s, i, least):  # type: ignore[no-untyped-def]
-    """Returns True if 8 T times the ratio of tet ``i`` of a chunk is below ``least``, Pa, by two bounds from the
-    invariants. The ratio is at most s1 / 8 T, and s1 <= p + 2 r, r = sqrt(J2 / 3). In addition s1 - s3 <= 2 sqrt(J2)
-    and s1 + s3 >= 2 p - r.
+    """Returns True if two bounds show that 8 T times the ratio of tet ``i`` of a chunk is below ``least``, Pa. The
+    bounds are computed from the invariants of the stress. First, the ratio is at most s1 / 8 T, and s1 <= p + 2 r with
+    r = sqrt(J2 / 3). Second, s1 - s3 <= 2 sqrt(J2) and s1 + s3 >= 2 p - r.
     """
     xx, yy, zz, yz, zx, xy = s[_SXX + i], s[_SYY + i], s[_SZZ + i], s[_SYZ + i], s[_SZX + i], s[_SXY + i]
     j2 = 0.5 * (xx * xx + yy * yy + zz * zz) + yz * yz + zx * zx + xy * xy
@@ -90,8 +91,8 @@ def _below(s, i, least):  # type: ignore[no-untyped-def]
 
 @njit("boolean(float64[::1], int64, float64)", cache=True, error_model="numpy", forceinline=True)
 def _above(s, i, least):  # type: ignore[no-untyped-def]
-    """Returns True if 8 T times the ratio of tet ``i`` of a chunk is above ``least``, Pa, by two bounds: s1 - s3 >=
-    sqrt(3 J2), s1 + s3 <= 2 p + r; and s1 >= p + r, also if s3 is tension, which counts as zero.
+    """Returns True if two bounds show that 8 T times the ratio of tet ``i`` of a chunk is above ``least``, Pa. First,
+    s1 - s3 >= sqrt(3 J2) and s1 + s3 <= 2 p + r. Second, s1 >= p + r, even if s3 is a tension and counts as zero.
     """
     xx, yy, zz, yz, zx, xy = s[_SXX + i], s[_SYY + i], s[_SZZ + i], s[_SYZ + i], s[_SZX + i], s[_SXY + i]
     j2 = 0.5 * (xx * xx + yy * yy + zz * zz) + yz * yz + zx * zx + xy * xy
@@ -101,8 +102,8 @@ def _above(s, i, least):  # type: ignore[no-untyped-def]
 
 @njit("int64(float64[::1], int64, float64)", cache=True, error_model="numpy")
 def _not_below(s, n, least):  # type: ignore[no-untyped-def]
-    """Returns the number of the ``n`` tets of a chunk that are not below. The loop has no branch: it uses vector
-    instructions.
+    """Returns the number of the ``n`` tets of a chunk for which ``_below`` is not true. The loop has no branch, so that
+    it uses vector instructions.
     """
     some = 0
     for i in range(n):
@@ -113,9 +114,9 @@ def _not_below(s, n, least):  # type: ignore[no-untyped-def]
 @njit("Tuple((int64, float64))(float64[:, :, ::1], int64[::1], int64, float64, float64, int64, int64)", cache=True,
       error_model="numpy")  # fmt: skip
 def hardest(state, ids, n, strength, known, first, stop):  # type: ignore[no-untyped-def]
-    """Returns the place of the tet with the largest ratio, and the ratio, if it is above ``known``; else -1. Of tets
-    with equal ratio, the tet with the smallest id is returned. Checks the tets, of the ``n`` tets of the block, that
-    are in the chunks from ``first`` to ``stop``.
+    """Returns the place of the tet with the largest ratio, and the ratio. Returns -1 if no ratio is above ``known``. Of
+    tets with equal ratio, the tet with the smallest id is returned. Only tets in the chunks from ``first`` to ``stop``
+    are checked; ``n``: number of tets of the block.
 
     Bounds exclude most chunks, and most tets of the remaining chunks.
     """
@@ -136,8 +137,8 @@ def hardest(state, ids, n, strength, known, first, stop):  # type: ignore[no-unt
 
 @njit("UniTuple(int64, 2)(float64[::1], int64, float64)", cache=True, error_model="numpy")
 def _decided(s, n, least):  # type: ignore[no-untyped-def]
-    """Returns the number of the ``n`` tets of a chunk that are ``_above``, and the number that are neither
-    ``_above`` nor ``_below``.
+    """Returns two numbers for a chunk of ``n`` tets: the number of tets that are ``_above``, and the number of tets
+    that are neither ``_above`` nor ``_below``.
     """
     above, open_ = 0, 0
     for i in range(n):
@@ -149,8 +150,8 @@ def _decided(s, n, least):  # type: ignore[no-untyped-def]
 
 @njit("int64(float64[:, :, ::1], int64, float64, int64, int64)", cache=True, error_model="numpy")
 def crushed(state, n, strength, first, stop):  # type: ignore[no-untyped-def]
-    """Returns the number of tets above the criterion, among the tets as for ``hardest``. Principal pressures are
-    computed only where the bounds do not decide.
+    """Returns the number of tets above the criterion, in the chunks from ``first`` to ``stop``. Principal pressures are
+    computed only for tets that the bounds do not decide.
     """
     found, least = 0, 8.0 * strength
     for c in range(first, stop):
@@ -166,7 +167,7 @@ def crushed(state, n, strength, first, stop):  # type: ignore[no-untyped-def]
 
 @njit(TASK, cache=True)
 def _look(table, first, stop, thread):  # type: ignore[no-untyped-def]
-    """Task: ``hardest`` of its chunks."""
+    """Task: runs ``hardest`` on the chunks of the task."""
     places, times, state, ids, n, strength, known = _of_look(table)
     k = first // CHUNKS_OF_A_TASK
     places[k], times[k] = hardest(state, ids, n, strength, known, first, stop)
@@ -174,14 +175,16 @@ def _look(table, first, stop, thread):  # type: ignore[no-untyped-def]
 
 @njit(TASK, cache=True)
 def _count(table, first, stop, thread):  # type: ignore[no-untyped-def]
-    """Task: ``crushed`` of its chunks."""
+    """Task: runs ``crushed`` on the chunks of the task."""
     counts, state, n, strength = _of_count(table)
     counts[first // CHUNKS_OF_A_TASK] = crushed(state, n, strength, first, stop)
 
 
 @dataclass(frozen=True)
 class Met:
-    """Largest compression of a tet: ratio to the criterion, pressures, Pa, its id, its centre, m, and the time, s."""
+    """The most compressed tet: ratio to the criterion, principal pressures, Pa, id and centre, m, of the tet, and the
+    time, s.
+    """
 
     times: float = 0.0
     most: float = 0.0
@@ -192,8 +195,8 @@ class Met:
 
 
 class Crushing:
-    """Largest compression so far in each part of a brittle material without a law of compressive failure. The values
-    belong to this rank; ``keep`` and ``found`` compute the maximum over the ranks.
+    """Largest compression so far in each part of a brittle material that has no law of compressive failure. The stored
+    values are those of this rank; ``keep`` and ``found`` compute the maximum over the ranks.
     """
 
     def __init__(self, model: Model, strengths: Floats, comm: Comm, clock: Clock, team: Team) -> None:
@@ -203,7 +206,7 @@ class Crushing:
         self._counting = Pass(team, _count, *_COUNT, size=CHUNKS_OF_A_TASK)
         self._met = [Met() for _ in model.parts]
         self._most = np.zeros(len(model.parts), np.int64)
-        """(parts,) largest number of tets above the criterion at one time so far."""
+        """(parts,) largest number of tets above the criterion at one time, so far."""
 
     @classmethod
     def of(cls, case: Case, model: Model, comm: Comm, clock: Clock, team: Team) -> "Crushing | None":
@@ -216,14 +219,14 @@ class Crushing:
         return cls(model, np.array(strengths), comm, clock, team) if any(strengths) else None
 
     def update(self) -> None:
-        """Updates the largest compression by the present stresses."""
+        """Raises the largest compressions to those of the present stresses."""
         for block in self._blocks():
             place, times = self._hardest(block, self._met[block.part].times)
             if place >= 0:
                 self._met[block.part] = self._of(block, place, times)
 
     def _blocks(self) -> list[Block]:
-        """Blocks of brittle materials without a law of compressive failure."""
+        """Blocks of brittle materials that have no law of compressive failure."""
         return [block for block in self._model.blocks if self._strengths[block.part] > 0.0]
 
     def _hardest(self, block: Block, known: float) -> tuple[int, float]:
@@ -238,7 +241,7 @@ class Crushing:
         return int(places[best]), float(times[best])
 
     def count(self) -> None:
-        """Counts the tets above the criterion at present. Collective."""
+        """Counts the tets that are above the criterion at present. Collective."""
         found = np.zeros(len(self._most), np.int64)
         for block in self._blocks():
             counts = np.zeros(self._counting.many(block.chunks), np.int64)
@@ -254,23 +257,25 @@ class Crushing:
         return Met(times, most, least, int(block.id[place]), (x, y, z), self._clock.t)
 
     def _of_all(self) -> list[Met]:
-        """Returns the largest compression of each part over all ranks; of equal compressions the earliest.
+        """Returns the largest compression of each part over all ranks. Of equal compressions the earliest is returned.
         Collective.
         """
         shared = self._comm.share(self._met)
         return [min(found, key=lambda met: (-met.times, met.time, met.tet)) for found in zip(*shared, strict=True)]
 
     def keep(self) -> tuple[list[tuple[Any, ...]], list[int]]:
-        """Returns the state, equal on all ranks. Collective."""
+        """Returns the state for a checkpoint; it is equal on all ranks. Collective."""
         return [astuple(met) for met in self._of_all()], self._most.tolist()
 
     def resume(self, known: tuple[list[tuple[Any, ...]], list[int]]) -> None:
-        """Restores the state."""
+        """Restores the state from a checkpoint."""
         self._met = [replace(Met(*met), centre=tuple(met[4])) for met in known[0]]
         self._most = np.array(known[1], np.int64)
 
     def found(self) -> list[Compressed]:
-        """Returns the results of each part of such a material, the largest ratio first. Collective."""
+        """Returns the results of each part of a brittle material that has no law of compressive failure, the largest
+        ratio first. Collective.
+        """
         met = [
             Compressed(
                 part=name, times=each.times, most=each.most, least=each.least, tet=each.tet,

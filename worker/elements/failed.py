@@ -1,4 +1,4 @@
-"""Reason for which a tet ends the run, from its state; the text is the same on all ranks."""
+"""Reason why a tet ends the run, found from the state of the tet. The text is the same on all ranks."""
 
 import numpy as np
 
@@ -10,7 +10,7 @@ from ..simulation import Simulation
 
 
 def why(sim: Simulation) -> str:
-    """Returns the reason for which the limit of the limiting tet is NaN. Collective."""
+    """Returns the reason why the stable step of the limiting tet is NaN. Collective."""
     tet = sim.limiting_id()
     compression, bound = sim.comm.maximum(np.max([_compression(block, tet) for block in sim.model.blocks], axis=0))
     if compression >= bound > 0.0:
@@ -19,8 +19,8 @@ def why(sim: Simulation) -> str:
 
 
 def _compression(block: Block, tet: int) -> Floats:
-    """(2,) compression in the equation of state of a tet, and the compression at the pole of the equation of state;
-    -inf if the block does not contain the tet.
+    """(2,) compression in the equation of state of a tet, and compression at the pole of that equation; -inf if the
+    block does not contain the tet.
     """
     places = np.flatnonzero(block.id == tet)
     if EQUATIONS[block.eos] is not GRUNEISEN or not len(places):

@@ -1,4 +1,4 @@
-r"""Internal forces of the four-node tetrahedron, in integer quanta, and their sums at the nodes.
+r"""Internal forces of the four-node tetrahedron, in integer quanta, and the sums of these forces at the nodes.
 
 ::
 
@@ -17,30 +17,30 @@ _SXX, _SYY, _SZZ = S_XX * CHUNK, S_YY * CHUNK, S_ZZ * CHUNK
 _SYZ, _SZX, _SXY = S_YZ * CHUNK, S_ZX * CHUNK, S_XY * CHUNK
 _P, _Q = PRESSURE * CHUNK, VISCOUS * CHUNK
 _NEAREST_BITS = 0x4338000000000000
-"""Bits of NEAREST."""
+"""Bit pattern of NEAREST."""
 MAGNITUDE = 0x7FFFFFFFFFFFFFFF
-"""Mask of the bits of a float64 without the sign bit. Compared as integers, the masked bits have the order of
-absolute values, and NaN is above all numbers."""
+"""Mask that removes the sign bit of a float64. As integers, the masked bit patterns have the order of the absolute
+values, and NaN is above all numbers."""
 
 
 @njit("int64(float64)", cache=True, error_model="numpy", forceinline=True)
 def _whole(x):  # type: ignore[no-untyped-def]
     """Returns the integer nearest to x, |x| < 2^51; of two equally near integers the even one. The integer is read from
-    the last bits of a sum. Many processors have no instruction that converts a vector of float64 to integers.
+    the last bits of a sum, because many processors have no instruction that converts a vector of float64 to integers.
     """
     return np.float64(x + NEAREST).view(np.int64) - _NEAREST_BITS
 
 
 @njit("UniTuple(int64, 3)(float64, float64, float64, float64)", cache=True, error_model="numpy")
 def quanta(a, b, c, scale):  # type: ignore[no-untyped-def]
-    """Returns three numbers in quanta of 1/scale, rounded to the nearest integer; undefined beyond
-    fixed_point.CONTRIBUTION_BITS."""
+    """Returns three numbers in quanta of 1 / ``scale``, rounded to the nearest integer. The result is undefined for
+    numbers above fixed_point.CONTRIBUTION_BITS."""
     return _whole(a * scale), _whole(b * scale), _whole(c * scale)
 
 
 @njit("int64(float64, float64, float64)", cache=True, error_model="numpy")
 def largest_of(a, b, c):  # type: ignore[no-untyped-def]
-    """Returns the bits of the largest magnitude; NaN is above all numbers."""
+    """Returns the bit pattern of the largest magnitude of three numbers; NaN is above all numbers."""
     return max(
         max(np.float64(a).view(np.int64) & MAGNITUDE, np.float64(b).view(np.int64) & MAGNITUDE),
         np.float64(c).view(np.int64) & MAGNITUDE,
@@ -49,8 +49,8 @@ def largest_of(a, b, c):  # type: ignore[no-untyped-def]
 
 @njit("int64(int64[::1], float64[::1], float64[::1], int64, float64)", cache=True, error_model="numpy")
 def internal_forces(wi, w, s, n, scale):  # type: ignore[no-untyped-def]
-    """Sets nine rows of -V stress grad N of nodes 1, 2, 3, N, in quanta of 1/scale; returns the bits of the largest
-    force.
+    """Sets nine rows of -V stress grad N of nodes 1, 2, 3, N, in quanta of 1 / ``scale``. Returns the largest force as
+    its bit pattern (integer).
 
     ``scatter_forces`` adds minus the sum of these forces to node 0.
     """
@@ -87,8 +87,8 @@ def internal_forces(wi, w, s, n, scale):  # type: ignore[no-untyped-def]
 
 @njit("void(int64[:, ::1], int64[::1], uint32[:, ::1], int64)", cache=True)
 def scatter_forces(force, wi, tets, n):  # type: ignore[no-untyped-def]
-    """Adds the quantised forces to the nodal sums; node 0 gets minus the sum, so that the four forces of a tet add up
-    to exactly zero.
+    """Adds the forces, in quanta, to the nodal sums. Node 0 gets minus the sum of the other three forces, so that the
+    four forces of a tet add up to exactly zero.
     """
     first, second, third = wi, wi[3 * CHUNK :], wi[6 * CHUNK :]
     for i in range(n):

@@ -1,8 +1,8 @@
-"""The ``standard`` pressure form as the time step calls it: advances the elements by a step, and starts the completion
-of shared nodes; averaging.py has the other forms.
+"""The ``standard`` pressure form, with the methods that the time step calls. The methods advance the elements by a step
+and start the completion of shared nodes; averaging.py has the other forms.
 
-Border chunks come first: they contain every tet of a shared node, so that the exchange runs during the pass over the
-interior chunks.
+Border chunks are computed before interior chunks. Border chunks contain every tet of a shared node, so the exchange
+runs during the pass over the interior chunks.
 """
 
 from collections.abc import Callable
@@ -28,21 +28,21 @@ from .records import Means, Scratches
 
 
 class Bridges(Protocol):
-    """Forces between nodes other than the forces of tets: cohesive facets."""
+    """Forces between nodes that are not forces of tets: those of cohesive facets."""
 
     def open(self, x: Floats) -> None:
-        """Computes the forces at the positions at the end of the step."""
+        """Computes the forces at the positions ``x``, which are those at the end of the step."""
 
     def scatter(self, force: Ints, scale: float) -> int:
-        """Adds the forces in quanta of 1 / ``scale`` N; returns the bits of the largest force."""
+        """Adds the forces, in quanta of 1 / ``scale`` N. Returns the largest force as its bit pattern (integer)."""
 
 
 class FlagExchange(Protocol):
-    """Flags for the neighbours that are sent with the forces of shared nodes."""
+    """Flags for the neighbour ranks. The flags are sent together with the forces of shared nodes."""
 
     def words(self, hot: bool) -> Ints:
-        """(neighbours,) flags to send, computed after the tets of shared nodes; ``hot``: one of their faces is
-        overstressed.
+        """(neighbours,) flags to send, computed after the tets of shared nodes. ``hot``: whether a face of these tets
+        is overstressed.
         """
 
     def receive(self, words: Ints) -> None:
@@ -58,7 +58,7 @@ class Elements:
         self.model = model
         self._timers, self.team = timers, team
         self.scratches = Scratches.of(team.threads)
-        """Scratch and peaks of each thread."""
+        """Scratch memory and peaks of each thread."""
         self.peaks: Ints = self.scratches.peaks[0, : records.PEAKS]
         """(5,) peaks over all tets of the rank, see elements/records.py."""
         self._words = self.peaks.data
@@ -66,8 +66,8 @@ class Elements:
         self._standard = BlockPass(tasks.standard, tasks.STANDARD)
         self._again = BlockPass(tasks.again, tasks.AGAIN, marked=False)
         self._coloured: dict[tuple[int, int], tuple[int, Coloured]] = {}
-        """Tasks by part and first chunk, and the count of moved tets (``Block.moved``) for which the tasks are
-        valid."""
+        """Tasks of a range of chunks, keyed by part and first chunk. Each entry has the count of moved tets
+        (``Block.moved``) for which its tasks are valid."""
         self._comm, self._neighbours = comm, neighbours
         self._flags: FlagExchange | None = None
         self._connect()
@@ -76,32 +76,34 @@ class Elements:
 
     @property
     def pressure(self) -> Floats:
-        """(rows,) nodal pressure, Pa, in the ``split`` form; else one row."""
+        """(rows,) nodal pressure, Pa, in the ``split`` form; in other forms an array with one row."""
         return np.zeros(1)
 
     @property
     def limit_bits(self) -> int:
-        """Bits of the largest one-over-stable-step of this rank's tets."""
+        """Bit pattern of the largest 1 / stable step of this rank's tets."""
         return self._words[records.LARGEST_LIMIT]
 
     @property
     def limit(self) -> float:
-        """The largest one-over-stable-step of this rank's tets, 1/s; NaN when a tet is inverted or not a number."""
+        """The largest 1 / stable step of this rank's tets, 1/s. The value is NaN if a tet is inverted or has a value
+        that is not a number.
+        """
         return self._reals[records.LARGEST_LIMIT]
 
     @property
     def limiting(self) -> int:
-        """Smallest global id of the tets of this rank whose one-over-stable-step is equal to ``limit``."""
+        """Smallest global id of the tets of this rank whose 1 / stable step equals ``limit``."""
         return self._words[records.LIMITING_TET]
 
     @property
     def force(self) -> float:
-        """Largest contribution to a nodal force of this rank, N."""
+        """Largest magnitude of a contribution of this rank to a nodal force, N."""
         return self._reals[records.LARGEST_FORCE]
 
     @property
     def worn(self) -> int:
-        """State of the worn tets: SOUND, TIRED or BROKEN (elements/wear.py)."""
+        """State of the tets that erosion will remove: SOUND, TIRED or BROKEN (elements/wear.py)."""
         return self._words[records.WORN]
 
     @property
@@ -111,11 +113,11 @@ class Elements:
 
     @property
     def nodal(self) -> list[Floats]:
-        """Nodal state of the form, (nodes,) each, for the digest."""
+        """Nodal arrays of the pressure form, (nodes,) each, for the digest."""
         return []
 
     def advance(self, dt: float, scale: float) -> None:
-        """Computes stress and forces at n+1; adds the forces to nodal sums that are zero on entry. On return the
+        """Computes stress and forces at n+1. Adds the forces to nodal sums, which must be zero on entry. On return the
         completion of shared nodes is in progress.
         """
         self.scratches.peaks[:] = 0
@@ -123,20 +125,22 @@ class Elements:
         self._over(self._standard, (), (dt, scale), self._send)
 
     def advancing(self, dt: Follow, scale: Follow) -> list[tuple[Stage, Block | None]]:
-        """Returns ``advance`` on a single rank as stages of a program, with the block of each; ``scratches.peaks`` must
-        be zero before the stages.
+        """Returns the work of ``advance`` on a single rank as stages of a program, with the block of each stage.
+        ``scratches.peaks`` must be zero before the stages.
         """
         return self._staged(self._standard, (), (dt, scale))
 
     def ending(self, scale: Follow) -> list[Stage] | None:
-        """Returns ``finish`` on a single rank as stages of a program; None if other code is needed."""
+        """Returns the work of ``finish`` on a single rank as stages of a program; None if code outside of the program
+        is needed.
+        """
         return []
 
     def went_on(self, scale: float) -> None:
-        """Sets the scale of the last sum of forces after a program."""
+        """Sets the scale of the last sum of forces, after a program of steps."""
 
     def again(self, scale: float) -> None:
-        """Sums the forces of the present stress again, in a quantum above the previous one."""
+        """Sums the forces of the present stress again, in a larger quantum than before."""
         limit = self.peaks[[records.LARGEST_LIMIT, records.LIMITING_TET]]
         self.scratches.peaks[:] = 0
         self.model.nodes.force[:] = 0
@@ -155,27 +159,27 @@ class Elements:
         self.peaks[records.LARGEST_FORCE] = max(int(self.peaks[records.LARGEST_FORCE]), largest)
 
     def grow(self, split: Split) -> None:
-        """Updates the exchange after a node separation. The copies must already be shared nodes, and the tets must have
-        their new nodes.
+        """Extends the exchange after a separation of nodes. Before the call, the copies must be shared nodes and the
+        tets must have their new nodes.
         """
         if not self.shared_forces.serves(self._neighbours):
             self.free()
             self._connect()
 
     def keep(self, parcel: Parcel) -> None:
-        """Adds the state of the form, except the state of the tets, to a parcel (a checkpoint or migration message).
-        Collective.
+        """Adds the state of the pressure form to a parcel (a checkpoint or migration message), without the state of the
+        tets. Collective.
         """
         limit = fixed_point.bits_of(float(self._comm.maximum(np.array([self.limit]))[0]))
         mine = -float(self.limiting) if self.limit_bits == limit else -np.inf
         parcel.known["peaks"] = limit, -int(self._comm.maximum(np.array([mine]))[0])
 
     def resume(self, parcel: Parcel) -> None:
-        """Restores the state from a parcel (a checkpoint or migration message)."""
+        """Restores the state of the pressure form from a parcel (a checkpoint or migration message)."""
         self.peaks[[records.LARGEST_LIMIT, records.LIMITING_TET]] = parcel.known["peaks"]
 
     def attach(self, flags: FlagExchange) -> None:
-        """From now on sends the given flags with the forces. Collective among neighbours."""
+        """Sends the given flags with the forces from now on. Collective among neighbours."""
         self.free()
         self._flags = flags
         self._connect()
@@ -203,7 +207,7 @@ class Elements:
         self.shared_forces.begin(self.model.nodes.force, words)
 
     def _over(self, work: BlockPass, means: Values, numbers: Values, send: Callable[[], None]) -> None:
-        """Passes over all tets; calls ``send`` after the border chunks."""
+        """Passes over all tets. Calls ``send`` after the border chunks."""
         if self._neighbours:
             self._over_blocks(work, means, numbers, border=True)
             send()

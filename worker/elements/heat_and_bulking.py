@@ -1,8 +1,8 @@
 """Nodal means of heat and bulking in the averaged pressure forms.
 
-An equation of state with heat uses energy averaged in the same way as the volume strain: the heat of a single tet would
-increase its pressure relative to its neighbours, and the averaged volume strain would not reduce this pressure. Bulking
-is averaged in the same way.
+An equation of state with heat uses an energy that is averaged in the same way as the volume strain. The own heat of a
+tet would increase its pressure relative to its neighbours, and the averaged volume strain would not reduce this
+pressure. Bulking is averaged in the same way as heat.
 """
 
 import numpy as np
@@ -18,15 +18,16 @@ _WORK, _WORK_VISCOUS, _TAKEN = WORK * CHUNK, WORK_VISCOUS * CHUNK, WORK_AVERAGED
 _MASS, _HEAT, _NODAL_WORK = MASS * CHUNK, HEAT * CHUNK, NODAL_WORK * CHUNK
 _BULKING, _BULKING_STEP, _CORNERS = BULKING * CHUNK, BULKING_STEP * CHUNK, CORNERS * CHUNK
 HEATED = NODAL_WORK + 1
-"""Number of state rows of a tet with heat; a tet with bulking has more rows."""
+"""Number of state rows of a tet with heat. A tet with bulking has more rows."""
 
 
 @njit("void(float64[::1], float64[::1], int64, float64)", cache=True, error_model="numpy", forceinline=True)
 def take_bulking(s, params, i, more):  # type: ignore[no-untyped-def]
-    """Adds ``more`` to the bulking of tet ``i``, Pa, and books the change of the stored energy, because the law has
-    booked the energy that its own bulking would store at the nodes. As in materials/johnson_holmquist.py, the stored
-    energy is (K m + bulking)^2 / 2K per volume, with a quarter of the volume at each corner; it is zero if the material
-    is expanded beyond zero stress.
+    """Adds ``more`` to the bulking of tet ``i``, Pa. Corrects the row TAKEN by the change of the stored energy, because
+    the law has used the energy that its own bulking would store at the nodes.
+
+    As in materials/johnson_holmquist.py, the stored energy per volume is (K m + bulking)^2 / 2K, with a quarter of the
+    volume at each corner. The stored energy is zero if the material is expanded beyond zero stress.
     """
     bulk, stored = params[BULK], 0.0
     for k in range(4):
@@ -40,10 +41,10 @@ def take_bulking(s, params, i, more):  # type: ignore[no-untyped-def]
 
 @njit("void(int64[:, ::1], float64[::1], float64[::1], float64[::1], float64[::1], uint32[:, ::1], int64)", cache=True)
 def scatter_heat(sums, w, s, params, weight, tets, n):  # type: ignore[no-untyped-def]
-    """Adds a quarter of the work of each tet since the last step, over its mass, to the sums of its nodes.
+    """Adds the specific work of each tet since the last step to the sums of its nodes; a node gets a quarter.
 
-    The heat is weighted by volume, as the volume change is, in units of the bulk modulus over the density; ``sums``
-    (nodes, 3).
+    The heat has the unit bulk modulus / density and is weighted by volume, as the volume change is; ``sums`` (nodes,
+    3).
     """
     unit = params[DENSITY] / params[BULK]
     for i in range(n):
@@ -79,7 +80,7 @@ def scatter_bulking(sums, w, s, params, weight, tets, n):  # type: ignore[no-unt
     cache=True,
 )
 def scatter_more(sums, w, s, params, weight, tets, rows, n):  # type: ignore[no-untyped-def]
-    """Adds heat or bulking to the sums, depending on the number of state ``rows``."""
+    """Adds heat or bulking to the sums of the nodes. The number of state ``rows`` determines which of the two."""
     if rows == HEATED:
         scatter_heat(sums, w, s, params, weight, tets, n)
     else:
@@ -88,14 +89,16 @@ def scatter_more(sums, w, s, params, weight, tets, rows, n):  # type: ignore[no-
 
 @njit("void(float64[::1], float64[::1], uint32[:, ::1], int64)", cache=True)
 def gather_heat(s, heat, tets, n):  # type: ignore[no-untyped-def]
-    """Adds the mean of the four nodes to HEAT, the heat in the pressure of each tet."""
+    """Adds the mean heat of the four nodes to HEAT, which is the heat in the pressure of each tet."""
     for i in range(n):
         s[_HEAT + i] += 0.25 * ((heat[tets[i, 0]] + heat[tets[i, 1]]) + (heat[tets[i, 2]] + heat[tets[i, 3]]))
 
 
 @njit("void(float64[::1], float64[::1], float64[::1], uint32[:, ::1], boolean[::1], int64)", cache=True)
 def gather_bulking(s, params, bulking, tets, flat, n):  # type: ignore[no-untyped-def]
-    """Adds the mean of the four nodes to BULKING; tets that are ``flat``, (n,) or (0,), keep their own bulking."""
+    """Adds the mean bulking of the four nodes to BULKING. Tets that are ``flat``, (n,) or (0,), keep their own
+    bulking.
+    """
     quarter = 0.25 * params[BULK]
     for i in range(n):
         if len(flat) == 0 or not flat[i]:
@@ -105,7 +108,7 @@ def gather_bulking(s, params, bulking, tets, flat, n):  # type: ignore[no-untype
 
 @njit("void(float64[::1], float64[::1], int64, int64, float64)", cache=True, error_model="numpy", forceinline=True)
 def stretch_corner(w, s, i, k, strain):  # type: ignore[no-untyped-def]
-    """Updates the volume ratio at corner ``k`` of tet ``i`` by a volume strain; sets CORNER_CHANGE."""
+    """Updates the volume ratio at corner ``k`` of tet ``i`` by a volume strain. Sets CORNER_CHANGE."""
     half, before = 0.5 * strain, s[_CORNERS + k * CHUNK + i]
     after = before * (1.0 + half) / (1.0 - half)
     s[_CORNERS + k * CHUNK + i], w[CORNER_CHANGE + k * CHUNK + i] = after, after - before
@@ -116,7 +119,8 @@ def stretch_corner(w, s, i, k, strain):  # type: ignore[no-untyped-def]
     cache=True,
 )
 def gather_corners(w, s, params, bulking, tets, strain, flat, n):  # type: ignore[no-untyped-def]
-    """Updates bulking as a mean over nodes, the volume ratio at each node, and CORNER_CHANGE, the change of that ratio.
+    """Updates bulking as a mean over nodes, the volume ratio at each node, and CORNER_CHANGE, which is the change of
+    the volume ratio.
 
     Heat stays at the nodes (matter.py).
     """

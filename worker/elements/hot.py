@@ -1,5 +1,5 @@
-"""Overstressed faces of a tet by the stress of the tet alone: the inexpensive test before the fracture criterion
-(fracture/criterion.py).
+"""Faces of a tet that are overstressed by the stress of the tet alone. This inexpensive test is made before the
+fracture criterion (fracture/criterion.py).
 """
 
 from ..kernels.jit import njit
@@ -15,8 +15,8 @@ _P = PRESSURE * CHUNK
 @njit("boolean(float64, float64, float64, float64, float64, float64, float64, float64, float64, float64, float64)",
       cache=True, error_model="numpy")  # fmt: skip
 def _passes(bx, by, bz, xx, yy, zz, yz, zx, xy, weight, square):  # type: ignore[no-untyped-def]
-    """Returns True if the traction on the area vector b has a ``square`` of the criterion's first form, Pa^2, or
-    more.
+    """Returns True if the square of the first form of the criterion is at least ``square``, Pa^2, for the traction on
+    the area vector b.
     """
     tx, ty, tz = xx * bx + xy * by + zx * bz, xy * bx + yy * by + yz * bz, zx * bx + yz * by + zz * bz
     area = bx * bx + by * by + bz * bz
@@ -27,10 +27,10 @@ def _passes(bx, by, bz, xx, yy, zz, yz, zx, xy, weight, square):  # type: ignore
 
 @njit("boolean(uint8[::1], float64[::1], float64[::1], float64[::1], float64, int64)", cache=True, error_model="numpy")
 def mark_hot(hot, w, s, weakest, weight, n):  # type: ignore[no-untyped-def]
-    """Sets bit k of ``hot`` if face k of a tet is overstressed by the stress of the tet without the viscous part;
-    returns True if any face does.
+    """Sets bit k of ``hot`` if face k of a tet is overstressed by the stress of the tet without the viscous part.
+    Returns True if any face is overstressed.
 
-    ``w`` holds the area vectors b1, b2, b3 of a chunk (elements/tet4.py).
+    ``w`` has the area vectors b1, b2, b3 of a chunk (elements/tet4.py).
     """
     some = 0
     for i in range(n):

@@ -9,19 +9,19 @@ from .scratch import AREAS, LIMIT, MODULUS, SPEED, VOLUME
 
 _MASS = MASS * CHUNK
 CLOSING = 4.0
-"""Smallest number of steps in which the volume of a tet may change by its whole value, at the rate of the last step.
-Chosen value: close to 4.3, the value that the default viscosity requires; after a step of this size the error of p =
--K ln J is 0.5 % (docs/theory/time_integration.md)."""
+"""Smallest number of steps in which the volume of a tet may go to zero at the rate of the last step. Chosen value:
+close to 4.3, which the default viscosity requires. After a step of this size the error of p = -K ln J is 0.5 %
+(docs/theory/time_integration.md)."""
 LENGTH_FACTOR = 1.2009369551760027
-"""V^(1/3) times sqrt(sum |grad N|^2) of a regular tet, sqrt(6) / (6 sqrt(2))^(1/3): the length l, LENGTH_FACTOR over
-that root, is V^(1/3) for a regular tet and decreases with the altitude of a flat one."""
+"""Value of V^(1/3) sqrt(sum |grad N|^2) for a regular tet: sqrt(6) / (6 sqrt(2))^(1/3). The length LENGTH_FACTOR /
+sqrt(sum |grad N|^2) is V^(1/3) for a regular tet, and decreases with the altitude of a flat tet."""
 
 
 @njit("void(float64[::1], float64[::1], int64)", cache=True, error_model="numpy")
 def step_limit(w, s, n):  # type: ignore[no-untyped-def]
-    """Sets LIMIT: c sqrt(sum |grad N|^2), one over the largest stable step, 1/s; NaN if the volume is not positive.
+    """Sets LIMIT to c sqrt(sum |grad N|^2), which is 1 / largest stable step, 1/s; NaN if the volume is not positive.
 
-    Twice this is at least the highest frequency of a tet with lumped mass (derived in
+    Twice this value is at least the highest frequency of a tet with lumped mass (derived in
     docs/theory/time_integration.md).
     """
     for i in range(n):
@@ -31,7 +31,9 @@ def step_limit(w, s, n):  # type: ignore[no-untyped-def]
 
 @njit("void(float64[::1], int64)", cache=True)
 def motion_limit(w, n):  # type: ignore[no-untyped-def]
-    """Raises LIMIT to CLOSING times the rate of change of the volume, SPEED, 1/s; NaN stays NaN."""
+    """Raises LIMIT to CLOSING times SPEED, the rate of change of the volume divided by the volume, 1/s. A NaN does not
+    change.
+    """
     for i in range(n):
         rate = CLOSING * abs(w[SPEED + i])
         limit = w[LIMIT + i]

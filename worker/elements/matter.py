@@ -1,14 +1,14 @@
 """Material state at the nodes, in the averaged pressure forms: for pressures that are not linear in the volume strain.
 
-The volume strain of a node is a mean over its tets; so each node has its own volume ratio and pores, and a pressure
-computed from volume ratio and pores. The pressure of a tet is the mean of its four nodes. The work of the forces on the
-volumes of the tets is then the work of the nodal pressures on the nodal volumes:
+The volume strain of a node is a mean over its tets. Therefore each node has its own volume ratio and pores, and a
+pressure that is computed from volume ratio and pores. The pressure of a tet is the mean of its four nodes. The work of
+the forces on the volumes of the tets is then the work of the nodal pressures on the nodal volumes:
 
     sum_e V_e e_e mean_a(p_a) = sum_a p_a V_a e_a,    V_a e_a = sum_e V_e e_e / 4
 
-so that the mean neither creates nor dissipates energy (docs/theory/elements.md, "Matter at the nodes"). Nodal pressures
-are used for a linear material with a tension cut-off. If the pressure is linear in the strain, the mean of the strain
-gives the mean of the pressure, and the pressure is computed in the tet. The pressure of an equation of state with heat
+Therefore the mean neither creates nor dissipates energy (docs/theory/elements.md, "Matter at the nodes"). Nodal
+pressures are used for a linear material with a tension cut-off. If the pressure is linear in the strain, the mean
+strain gives the mean pressure, so the pressure is computed in the tet. The pressure of an equation of state with heat
 is also computed in the tet.
 """
 
@@ -22,14 +22,14 @@ from ..model.state import CHUNK, Floats
 from .scratch import CHANGE, MODULUS
 
 RATIO, PORES_AT, PRESSURE_AT, WORKED, TORN, OPENED, STIFF = range(7)
-"""Columns by node. State: volume ratio; pores as in state.PORES; pressure, Pa. Values of the step per initial volume:
-work of the pressure, J/m^3; the part of this work that is dissipated in pores, J/m^3; volume of new pores. Modulus of
-the wave speed, Pa."""
+"""Columns of the nodal material state. State: volume ratio; pores as in state.PORES; pressure, Pa. Values of the step
+per initial volume: work of the pressure, J/m^3; the part of this work that is dissipated in pores, J/m^3; volume of new
+pores. Last column: modulus of the wave speed, Pa."""
 COLUMNS = 8
-"""Number of columns: one more than the columns that are used, so that a row is a cache line."""
+"""Number of columns. It is one more than the number of used columns, so that a row is a cache line."""
 TETS, LINEAR = range(2)
-"""Place where the pressure is computed. TETS: in the tets; LINEAR: at the nodes, for a linear pressure with a
-tension cut-off."""
+"""Places where the pressure is computed. TETS: in the tets; LINEAR: at the nodes, for a linear pressure with a tension
+cut-off."""
 
 _P, _MASS, _WORK, _PORES = (row * CHUNK for row in (PRESSURE, MASS, WORK, PORES))
 _TAKEN, _PLASTIC = WORK_AVERAGED * CHUNK, WORK_PLASTIC * CHUNK
@@ -37,18 +37,18 @@ _TAKEN, _PLASTIC = WORK_AVERAGED * CHUNK, WORK_PLASTIC * CHUNK
 
 @njit("int64(int64, float64[::1])", cache=True)
 def pressure_place(eos, params):  # type: ignore[no-untyped-def]
-    """Returns TETS or LINEAR for the number of the equation of state and the constants of a part.
+    """Returns TETS or LINEAR for a part; ``eos``: number of its equation of state; ``params``: its constants.
 
-    With heat it is TETS: a node at the surface of a strong shock is compressed more than the mean of four (at 10 km/s
-    more than a step resolves). With dilation the value is also TETS, because the pressure then contains a part of the
-    plastic flow of the tet.
+    The value is TETS for an equation of state with heat, because at the surface of a strong shock a node is compressed
+    more than the mean of four nodes (at 10 km/s more than a step resolves). With dilation the value is also TETS,
+    because the pressure then contains a part of the plastic flow of the tet.
     """
     return LINEAR if eos == 0 and params[SPALL] < np.inf and params[DILATES] == 0.0 else TETS
 
 
 @njit("void(float64[::1], float64, float64, float64, float64, float64)", cache=True, error_model="numpy")
 def _book(at, params_bulk, old, before, after, opened):  # type: ignore[no-untyped-def]
-    """Sets WORKED, TORN and OPENED of a node whose volume ratio changes from ``before`` to ``after``; ``opened``:
+    """Sets WORKED, TORN and OPENED of a node whose volume ratio changes from ``before`` to ``after``. ``opened``:
     volume of new pores.
     """
     new = at[PRESSURE_AT]
@@ -60,8 +60,8 @@ def _book(at, params_bulk, old, before, after, opened):  # type: ignore[no-untyp
 
 @njit("void(float64[::1], float64[::1], float64)", cache=True, error_model="numpy")
 def _linear(at, params, strain):  # type: ignore[no-untyped-def]
-    """Updates the pressure of a node by p -= K d(volume strain), limited from below by minus the spall pressure and,
-    while there are pores, from above by zero.
+    """Updates the pressure of a node by p -= K d(volume strain). The pressure is limited from below by minus the spall
+    pressure; while the node has pores, the pressure is limited from above by zero.
     """
     bulk, spall = params[BULK], params[SPALL]
     old, pores, before, half = at[PRESSURE_AT], at[PORES_AT], at[RATIO], 0.5 * strain
@@ -96,8 +96,8 @@ def _mean(matter, tets, i, k):  # type: ignore[no-untyped-def]
     error_model="numpy",
 )
 def from_nodes(w, s, params, matter, tets, n):  # type: ignore[no-untyped-def]
-    """Sets pressure, its work and MODULUS of ``n`` tets from the state at their nodes; WORK_AVERAGED: work on the
-    volume of the tet less the work at the nodes.
+    """Sets pressure, work of the pressure, and MODULUS of ``n`` tets from the state at their nodes. Sets WORK_AVERAGED
+    to the work on the volume of the tet less the work at the nodes.
     """
     porous, shaped = params[SPALL] < np.inf, params[ORDER] == FROM_SHAPE
     for i in range(n):
@@ -116,7 +116,7 @@ def from_nodes(w, s, params, matter, tets, n):  # type: ignore[no-untyped-def]
 
 
 def at_start(nodes: int) -> Floats:
-    """(nodes, COLUMNS) unstrained state."""
+    """(nodes, COLUMNS) nodal material state of unstrained material."""
     made = np.zeros((nodes, COLUMNS))
     made[:, RATIO] = 1.0
     return made

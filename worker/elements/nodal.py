@@ -1,5 +1,5 @@
-"""Nodal part of the averaged pressure forms, as tasks: from the sums of the first pass over the tets to the means
-for the second.
+"""Nodal part of the averaged pressure forms, as tasks. The tasks compute the nodal means for the second pass from the
+sums of the first pass over the tets.
 """
 
 from ..kernels.jit import njit, types
@@ -11,18 +11,19 @@ from .records import MEANS
 
 _FLAG, _F1 = types.boolean, types.float64[::1]
 COMPLETE = (MEANS, _F1, _FLAG, _F1, _FLAG, types.int32[::1], types.int64[::1], types.float64[:, ::1])
-"""Types of the arguments: means; (nodes,) array for volumes; whether heat or bulking is averaged; (nodes,) bulk
-modulus, Pa; whether there are nodal pressures; (nodes,) part of each node; (parts,) TETS or LINEAR; (parts, SIZE)
-constants."""
+"""Types of the arguments of ``complete``: means; (nodes,) array for volumes; whether heat or bulking is averaged;
+(nodes,) bulk modulus, Pa; whether there are nodal pressures; (nodes,) part of each node; (parts,) TETS or LINEAR;
+(parts, SIZE) constants."""
 PROJECT = (MEANS, _F1, types.float64)
-"""Types of the arguments: means, nodal volumes, and the quanta per newton of the sums."""
+"""Types of the arguments of ``project``: means, nodal volumes, and the quanta per newton of the sums."""
 _complete, _project = reader(*COMPLETE), reader(*PROJECT)
 
 
 @njit(TASK, cache=True, error_model="numpy")
 def complete(table, begin, end, thread):  # type: ignore[no-untyped-def]
-    """Task: computes from completed sums the volume strain of the step, and heat or bulking, of nodes, zero for a
-    node without tets; nodal pressures of n+1; and nodal volumes, m^3, for ``project``. Sets the sums to zero.
+    """Task: computes nodal values from completed sums, and sets the sums to zero. The values are the volume strain of
+    the step, heat or bulking, nodal pressures at n+1, and nodal volumes, m^3, for ``project``. A node without tets has
+    the strain zero.
     """
     means, volumes, more, bulk, pressed, part, kinds, params = _complete(table)
     sums, strain, extra, split, matter = means.sums, means.strain, means.more, means.split, means.matter
@@ -45,7 +46,7 @@ def complete(table, begin, end, thread):  # type: ignore[no-untyped-def]
 
 @njit(TASK, cache=True, error_model="numpy")
 def project(table, begin, end, thread):  # type: ignore[no-untyped-def]
-    """Task: computes the projected pressure gradient of nodes from their completed sums."""
+    """Task: computes the projected pressure gradient of nodes from the completed sums."""
     means, volumes, scale = _project(table)
     gradient, projected = means.gradient, means.projected
     for a in range(begin, end):

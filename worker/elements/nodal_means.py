@@ -1,6 +1,4 @@
-"""Arrays of the averaged pressure forms: sums and means by row, one row for each node, and one row for each further
-material of a node.
-"""
+"""Arrays of the averaged pressure forms: sums and means with one row for each material of a node."""
 
 import numpy as np
 
@@ -9,15 +7,16 @@ from . import matter
 from .passes import Values
 
 _STORED = {"_weight": "weight", "pressure": "pressure", "_projected": "projected", "_matter": "matter"}
-"""Names of the columns in a checkpoint, and names of the attributes."""
+"""Names of the stored columns in a checkpoint, with the names of their attributes."""
 
 
 class NodalMeans:
-    """Sums and means of a rank; ``fields`` is the record that kernels take (records.Means)."""
+    """Sums and means of a rank. ``fields`` is the record that kernels take as argument (records.Means)."""
 
     def __init__(self, weight: Floats, bulk: Floats, columns: int, *, split: bool, pressed: bool) -> None:
-        """``weight`` (rows,): one over the reference volume, 1/m^3; ``bulk`` (rows,): bulk modulus, Pa; ``columns``: of
-        the sums; ``split``: whether pressure gradients stabilise; ``pressed``: whether there are nodal pressures.
+        """``weight`` (rows,): 1 / reference volume, 1/m^3; ``bulk`` (rows,): bulk modulus, Pa; ``columns``: number of
+        columns of the sums; ``split``: whether pressure gradients stabilise; ``pressed``: whether there are nodal
+        pressures.
         """
         n, of_split = len(weight), len(weight) if split else 1
         self.weight, self.bulk, self.split, self.pressed = weight, bulk, split, pressed
@@ -26,7 +25,7 @@ class NodalMeans:
         self.pressure, self.projected = np.zeros(of_split), np.zeros((of_split, 3))
         self.gradient: Ints = np.zeros((of_split, 3), np.int64)
         self.volumes = np.zeros(of_split)
-        """(rows,) nodal volumes of the step, m^3; the array has one row if the form is not ``split``."""
+        """(rows,) nodal volumes of the step, m^3. If the form is not ``split``, the array has one row."""
         self.matter = matter.at_start(n if pressed else 1)
 
     @property
@@ -36,14 +35,14 @@ class NodalMeans:
 
     @property
     def fields(self) -> Values:
-        """Returns the fields of records.Means."""
+        """Returns the fields for records.Means."""
         return (
             self.sums, self.weight, self.strain, self.more, self.split, self.pressure, self.projected, self.gradient,
             self.matter,
         )  # fmt: skip
 
     def grow(self, parents: Ints) -> None:
-        """Appends copies of the rows ``parents``."""
+        """Appends one row for each of ``parents``, with the values of the parent row."""
         names = ["weight", "bulk", "sums", "strain", "more"]
         names += ["gradient", "projected", "pressure", "volumes"] if self.split else []
         names += ["matter"] if self.pressed else []
@@ -53,11 +52,11 @@ class NodalMeans:
 
     @property
     def stored(self) -> dict[str, "np.ndarray"]:
-        """Returns the columns for a checkpoint, by name."""
+        """Returns the columns for a checkpoint, keyed by name."""
         names = ["_weight", *(["pressure", "_projected"] if self.split else []), *(["_matter"] if self.pressed else [])]
         return {name: getattr(self, _STORED[name]) for name in names}
 
     def restore(self, columns: dict[str, "np.ndarray"]) -> None:
-        """Sets the columns of a checkpoint."""
+        """Sets the columns to those of a checkpoint."""
         for name, column in columns.items():
             setattr(self, _STORED[name], column)

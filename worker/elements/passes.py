@@ -11,24 +11,26 @@ Values = tuple[Any, ...]
 
 
 class BlockPass:
-    """Pass of a kernel with the arguments ``kinds``: Motion, Body, Marks if ``marked``, Scratches, Means if it has
-    any, numbers.
+    """Pass of a kernel whose arguments have the types ``kinds``: Motion, Body, Marks if ``marked``, Scratches, Means if
+    the form has means, numbers.
     """
 
     def __init__(self, kernel: Kernel, kinds: tuple[object, ...], *, marked: bool = True) -> None:
         self.kernel = kernel
         self._kinds, self._marked = kinds, marked
         self._tables: dict[int, Arguments] = {}
-        """Tables of arguments, by part."""
+        """Tables of arguments, keyed by part."""
 
     def address(self, nodes: Nodes, block: Block, scratches: Scratches, means: Values, numbers: Values) -> int:
-        """Returns the address of the arguments for a block; ``means``: the fields of Means, or none."""
+        """Returns the address of the table of arguments for a block; ``means``: the fields of Means, or no fields."""
         return self._table(block).set(*self._records(nodes, block), scratches, means, *numbers)
 
     def bind(
         self, nodes: Nodes, block: Block, scratches: Scratches, means: Values, numbers: Values
     ) -> tuple[int, tuple[Tie, ...]]:  # fmt: skip
-        """Returns ``address`` for a program, and the words that follow its numbers (arguments.py)."""
+        """Returns the address of the table for use in a program of stages, and the words that follow its numbers
+        (arguments.py).
+        """
         return self._table(block).bind(*self._records(nodes, block), scratches, means, *numbers)
 
     def _table(self, block: Block) -> Arguments:

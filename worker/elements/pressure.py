@@ -1,15 +1,16 @@
-"""Averaged pressure forms: the volume strain in the pressure of a tet is averaged over its nodes.
+"""Averaged pressure forms. The pressure of a tet is computed from a volume strain that is averaged over its nodes.
 
 One-point tets with their own pressure lock in plastic flow. ``nodal`` replaces the volume strain of a tet by the mean
-of the values of its nodes; the value of a node is the volume-weighted mean over the tets round the node (averaged nodal
-pressure, Bonet and Burton 1998, in rate form; the pressure is stored by tet, so that any equation of state works and
-the separation of a node changes no pressure). ``split`` adds the projection form of the operator split for pressure
-gradients to the nodal balance (Zienkiewicz et al. 1998): an Oñate-Codina stabilisation, proportional to the difference
-between the pressure gradient of a tet and the mean of the projected gradients of its nodes; it vanishes for a linear
-pressure. Heat and bulking are averaged in the same way (heat_and_bulking.py).
+of the values of its nodes; the value of a node is the volume-weighted mean over the tets around the node (averaged
+nodal pressure, Bonet and Burton 1998, in rate form). The pressure is stored for each tet, so that any equation of state
+can be used and the separation of a node changes no pressure. ``split`` adds the projection form of the operator split
+for pressure gradients to the nodal balance (Zienkiewicz et al. 1998). This is an Oñate-Codina stabilisation: it is
+proportional to the difference between the pressure gradient of a tet and the mean of the projected gradients of its
+nodes. The stabilisation vanishes for a linear pressure. Heat and bulking are averaged in the same way as the volume
+strain (heat_and_bulking.py).
 
-Nodal sums are integers. Each contribution is relative to the reference volume of the node and so of order one, for
-any size of tets: one fixed scale, QUANTA, serves every case.
+Nodal sums are integers. Each contribution is divided by the reference volume of the node and is therefore of order one
+for any size of tets. For this reason one fixed scale, QUANTA, is sufficient for all cases.
 """
 
 import numpy as np
@@ -22,7 +23,7 @@ from .forces import largest_of, quanta
 from .scratch import CHANGE, DILATATION, EDGE, NODAL, SEEN, SPEED, VOLUME, VOLUME_MID, VOLUME_SEEN
 
 QUANTA = float(2**52)
-"""Quanta per unit of volume strain, and per unit of relative nodal volume."""
+"""Number of quanta for a volume strain of 1, and for a relative nodal volume of 1."""
 
 _FLUX, _VOLUME, _MASS = VOLUME_FLUX * CHUNK, TET_VOLUME * CHUNK, MASS * CHUNK
 _WORK, _P, _GROWN = WORK * CHUNK, PRESSURE * CHUNK, DILATION * CHUNK
@@ -31,7 +32,7 @@ STABILISE = NODAL
 _PROJECTED = NODAL + 4 * CHUNK
 """First scratch row of the mean projected pressure gradient, Pa/m."""
 _DIFFERENCE = NODAL + 7 * CHUNK
-"""First scratch row of the nodal pressures less the pressure of node 0, Pa."""
+"""First scratch row of the pressures of nodes 1, 2, 3 less the pressure of node 0, Pa."""
 
 
 @njit("void(float64[::1], float64[::1], int64)", cache=True)
@@ -43,11 +44,11 @@ def keep_flux(w, s, n):  # type: ignore[no-untyped-def]
 
 @njit("void(float64[::1], float64[::1], float64[::1], int64, float64)", cache=True, error_model="numpy")
 def subtract_dilation(w, s, params, n, dt):  # type: ignore[no-untyped-def]
-    """Subtracts the dilation of the last step from the pressure of tets, which then contains the nodal mean of the
+    """Subtracts the tet's own dilation of the last step from its pressure. The pressure contains the nodal mean of the
     dilation instead.
 
-    The law has added its own dilation to the pressure at once, so that the stress lies on the yield surface; this
-    function subtracts that dilation and its work again. Afterwards DILATATION is the trace of the elastic strain rate.
+    In the last step the law added the tet's own dilation to the pressure, so that the stress was on the yield surface.
+    This function subtracts the dilation and its work. Afterwards DILATATION is the trace of the elastic strain rate.
     """
     if dt <= 0.0:
         return
@@ -62,7 +63,9 @@ def subtract_dilation(w, s, params, n, dt):  # type: ignore[no-untyped-def]
 
 @njit("void(float64[::1], float64[::1], int64, float64)", cache=True, error_model="numpy")
 def recall_flux(w, s, n, dt):  # type: ignore[no-untyped-def]
-    """Sets CHANGE: change of the tet's own volume in the step, m^3; SPEED: its rate over the volume at the end, 1/s."""
+    """Sets CHANGE to the change of the tet's own volume in the step, m^3, and SPEED to its rate divided by the volume
+    at the end, 1/s.
+    """
     for i in range(n):
         w[CHANGE + i] = s[_FLUX + i] * dt
         w[SPEED + i] = s[_FLUX + i] / w[VOLUME + i]
@@ -70,7 +73,7 @@ def recall_flux(w, s, n, dt):  # type: ignore[no-untyped-def]
 
 @njit("void(float64[::1], float64[::1], int64, float64)", cache=True, error_model="numpy")
 def recall_growth(w, s, n, dt):  # type: ignore[no-untyped-def]
-    """Variant of the previous function for tets that store their volume; also stores the present volume."""
+    """Does the same as ``recall_flux`` for tets that store their volume. Also stores the present volume."""
     frequency = 1.0 / dt if dt > 0.0 else 0.0
     for i in range(n):
         volume = w[VOLUME + i]
@@ -82,9 +85,9 @@ def recall_growth(w, s, n, dt):  # type: ignore[no-untyped-def]
 
 @njit("void(int64[:, ::1], float64[::1], float64[::1], uint32[:, ::1], int64, float64)", cache=True)
 def scatter_volumes(sums, w, weight, tets, n, dt):  # type: ignore[no-untyped-def]
-    """Adds a quarter of each tet's volume change and of its volume to the sums of its nodes.
+    """Adds a quarter of the volume change and a quarter of the volume of each tet to the sums of its nodes.
 
-    ``weight`` (nodes,): one over the reference volume, 1/m^3; ``sums`` (nodes, 2).
+    ``weight`` (nodes,): 1 / reference volume, 1/m^3; ``sums`` (nodes, 2).
     """
     for i in range(n):
         volume = 0.25 * w[VOLUME_MID + i]
@@ -98,8 +101,8 @@ def scatter_volumes(sums, w, weight, tets, n, dt):  # type: ignore[no-untyped-de
 
 @njit("void(int64[:, ::1], float64[::1], float64[::1], uint32[:, ::1], int64, float64)", cache=True)
 def scatter_stabilised(sums, w, weight, tets, n, dt):  # type: ignore[no-untyped-def]
-    """Adds a quarter of each tet's volume change, including the stabilising fluxes of ``stabilise``, and of its volume
-    to the sums of its nodes.
+    """Adds a quarter of the volume change and a quarter of the volume of each tet to the sums of its nodes. The volume
+    change includes the stabilising fluxes of ``stabilise``.
     """
     for i in range(n):
         volume = 0.25 * w[VOLUME_MID + i]
@@ -127,11 +130,11 @@ def gather_projection(w, pressure, projected, tets, n):  # type: ignore[no-untyp
 
 @njit("void(float64[::1], float64[::1], int64, float64)", cache=True, error_model="numpy")
 def stabilise(w, s, n, dt):  # type: ignore[no-untyped-def]
-    """Sets the stabilising volume fluxes dt/2 V / rho grad N_a . (grad p - mean projected grad p), with b at the end of
-    the step.
+    """Sets the stabilising volume fluxes dt/2 V / rho grad N_a . (grad p - mean projected grad p), with the area
+    vectors b = V grad N at the end of the step.
 
-    Half a step is the characteristic time of the split (Zienkiewicz and Codina 1995), and the largest that the
-    stable step of the tets allows. The four fluxes sum to zero: the volume of the body does not change.
+    The characteristic time of the split is half a step (Zienkiewicz and Codina 1995), which is the largest value that
+    the stable step of the tets allows. The four fluxes of a tet sum to zero, so the volume of the body does not change.
     """
     for i in range(n):
         volume, mass = w[VOLUME + i], s[_MASS + i]
@@ -154,14 +157,16 @@ def stabilise(w, s, n, dt):  # type: ignore[no-untyped-def]
 
 @njit("void(float64[::1], float64[::1], uint32[:, ::1], int64)", cache=True)
 def gather_strains(w, strain, tets, n):  # type: ignore[no-untyped-def]
-    """Sets SEEN: mean volume strain of the step over the four nodes."""
+    """Sets SEEN to the mean over the four nodes of the volume strain of the step."""
     for i in range(n):
         w[SEEN + i] = 0.25 * ((strain[tets[i, 0]] + strain[tets[i, 1]]) + (strain[tets[i, 2]] + strain[tets[i, 3]]))
 
 
 @njit("void(float64[::1], int64, float64)", cache=True)
 def own_strains(w, n, dt):  # type: ignore[no-untyped-def]
-    """Sets SEEN, VOLUME_SEEN, CHANGE and SPEED in the ``standard`` form: each tet uses its own volume strain."""
+    """Sets SEEN, VOLUME_SEEN, CHANGE and SPEED in the ``standard`` form, in which each tet uses its own volume
+    strain.
+    """
     for i in range(n):
         w[VOLUME_SEEN + i] = w[VOLUME_MID + i]
         w[SPEED + i] = w[DILATATION + i]
@@ -171,7 +176,7 @@ def own_strains(w, n, dt):  # type: ignore[no-untyped-def]
 
 @njit("void(float64[::1], float64[::1], int64, float64)", cache=True, error_model="numpy")
 def own_growth(w, s, n, dt):  # type: ignore[no-untyped-def]
-    """Variant of the previous function for tets that store their volume; also stores the present volume."""
+    """Does the same as ``own_strains`` for tets that store their volume. Also stores the present volume."""
     frequency = 1.0 / dt if dt > 0.0 else 0.0
     for i in range(n):
         volume = w[VOLUME + i]
@@ -188,7 +193,9 @@ def own_growth(w, s, n, dt):  # type: ignore[no-untyped-def]
 
 @njit("int64(int64[::1], float64[::1], float64[::1], uint32[:, ::1], int64, float64)", cache=True)
 def pressure_fluxes(wi, w, pressure, tets, n, scale):  # type: ignore[no-untyped-def]
-    """Sets three rows of V grad p / 4 of the tet, N, in quanta of 1/scale; returns the bits of the largest value."""
+    """Sets three rows of V grad p / 4 of each tet, N, in quanta of 1 / ``scale``. Returns the largest value as its bit
+    pattern (integer).
+    """
     b1, b2, b3 = w[EDGE:], w[EDGE + 3 * CHUNK :], w[EDGE + 6 * CHUNK :]
     peak = 0
     for i in range(n):
@@ -204,7 +211,7 @@ def pressure_fluxes(wi, w, pressure, tets, n, scale):  # type: ignore[no-untyped
 
 @njit("void(int64[:, ::1], int64[::1], uint32[:, ::1], int64)", cache=True)
 def scatter_fluxes(gradient, wi, tets, n):  # type: ignore[no-untyped-def]
-    """Adds the quantised V grad p / 4 to the sums of the four nodes of each tet."""
+    """Adds V grad p / 4, in quanta, to the sums of the four nodes of each tet."""
     for i in range(n):
         a, b, c, d = tets[i, 0], tets[i, 1], tets[i, 2], tets[i, 3]
         for k in range(3):

@@ -1,4 +1,4 @@
-"""Records of arrays that the passes over the elements take, and their numba types for signatures."""
+"""Records of arrays that are arguments of the passes over the elements, and their numba types for signatures."""
 
 from operator import attrgetter
 from typing import NamedTuple
@@ -10,10 +10,11 @@ from ..model.state import CHUNK, Bits, Flags, Floats, Ints, Tets
 from . import scratch
 
 LARGEST_LIMIT, LIMITING_TET, LARGEST_FORCE, WORN, HOT = range(5)
-"""Places in ``Scratch.peaks``: bits of the largest one-over-stable-step, 1/s; smallest global id of the tets that
-have it; bits of the largest force, N; state of the worn tets (wear.py); whether faces are overstressed (hot.py)."""
+"""Indices in ``Scratch.peaks``: bit pattern of the largest 1 / stable step, 1/s; smallest global id of the tets that
+have this value; bit pattern of the largest force, N; state of the tets that erosion will remove (wear.py); whether
+faces are overstressed (hot.py)."""
 PEAKS = 5
-"""Number of places in ``Scratch.peaks``."""
+"""Number of values in ``Scratch.peaks``."""
 _LINE = 8
 """Number of float64 in a cache line."""
 
@@ -32,73 +33,73 @@ class Motion(NamedTuple):
 
 
 class Body(NamedTuple):
-    """Elements of a block."""
+    """Elements of a block of tets of one part."""
 
     tets: Tets
     """(n, 4) local nodes of each tet."""
     id: Ints
     """(n,) global ids of the tets."""
     state: Floats
-    """State of the whole block, flat."""
+    """State of all tets of the block, as a flat array."""
     rows: int
     """Number of state rows."""
     params: Floats
     """Constants of the material of the block."""
     strength: int
-    """Number of the strength law (materials/models.py)."""
+    """Number that selects the strength law (materials/models.py)."""
     eos: int
-    """Number of the equation of state."""
+    """Number that selects the equation of state (materials/models.py)."""
     quiet: Ints
-    """(chunks, 3) marks of chunks at rest, see rest.py."""
+    """(chunks, 3) marks of the chunks that are at rest, see rest.py."""
     flat: Flags
-    """(n,) flat tets, whose volume strain is not averaged; (0,) if there is none."""
+    """(n,) whether a tet is flat, so that its volume strain is not averaged; (0,) if no tet is flat."""
     averages: Tets
-    """(n, 4) for each corner the row of the Means."""
+    """(n, 4) for each corner of a tet the row of its node in Means."""
 
 
 class Marks(NamedTuple):
-    """Limits that the passes compare the tets of a block with, and the tets that they mark."""
+    """Limits with which the passes compare the tets of a block, and the marks of tets beyond a limit."""
 
     worn: Flags
-    """(n,) worn tets, which will be removed; (0,) if the part does not erode."""
+    """(n,) whether erosion will remove a tet; (0,) if the part does not erode."""
     life: Floats
-    """(5,) limits of worn tets, see wear.py."""
+    """(5,) limits beyond which erosion removes a tet, see wear.py."""
     hot: Bits
-    """(n,) overstressed faces as bits, see hot.py; (0,) if the part does not fracture."""
+    """(n,) one bit for each overstressed face, see hot.py; (0,) if the part does not fracture."""
     weakest: Floats
     """(n,) smallest strength of the faces of each tet, Pa."""
     shear: float
-    """Weight of shear against normal traction."""
+    """Weight of shear traction relative to normal traction."""
 
 
 class Scratch(NamedTuple):
-    """Scratch for one chunk, and the peaks over all tets of a thread."""
+    """Scratch memory of a thread for one chunk of tets, and the peaks over all tets that the thread has computed."""
 
     w: Floats
     """Scratch rows of CHUNK numbers each, see scratch.py."""
     wi: Ints
     """Nine rows of nodal forces of the tets of the chunk, quanta."""
     bits: Ints
-    """Same memory as ``w``, as integers."""
+    """Integer view of the memory of ``w``."""
     peaks: Ints
-    """(5,) peaks of the thread: see LARGEST_LIMIT and the following names."""
+    """(5,) peaks of the thread; the indices are LARGEST_LIMIT and the following names."""
 
 
 class Scratches(NamedTuple):
-    """A scratch for each thread."""
+    """Scratch memory of all threads."""
 
     w: Floats
     """(threads, SCRATCH) scratch rows of each thread."""
     wi: Ints
     """(threads, 9 * CHUNK) force rows of each thread."""
     bits: Ints
-    """Same memory as ``w``, as integers."""
+    """Integer view of the memory of ``w``."""
     peaks: Ints
-    """(threads, 8) a cache line for each thread."""
+    """(threads, 8) peaks of each thread, one cache line each."""
 
     @classmethod
     def of(cls, threads: int) -> "Scratches":
-        """Returns rows that start on a cache line, so that the speed does not depend on the address."""
+        """Returns scratch memory whose rows start on a cache line, so that the speed does not depend on the address."""
         room = np.zeros(threads * scratch.SCRATCH + _LINE)
         first = -(room.ctypes.data // room.itemsize) % _LINE
         w = room[first:][: threads * scratch.SCRATCH].reshape(threads, -1)
@@ -106,42 +107,42 @@ class Scratches(NamedTuple):
 
 
 class Means(NamedTuple):
-    """Sums and means of the averaged pressure forms: a row for each node, and for each further material of a node
+    """Sums and means of the averaged pressure forms. The arrays have one row for each material of a node
     (elements/averages.py).
     """
 
     sums: Ints
-    """(rows, 2 or 3) sums of volume change and volume, and of heat or bulking if averaged, quanta."""
+    """(rows, 2 or 3) sums of volume change, of volume, and of heat or bulking if the form averages it, quanta."""
     weight: Floats
-    """(rows,) one over the reference volume, 1/m^3."""
+    """(rows,) 1 / reference volume, 1/m^3."""
     strain: Floats
-    """(rows,) mean volume strain of each row in the step."""
+    """(rows,) mean volume strain of the step."""
     more: Floats
-    """(rows,) heat or bulking of the step."""
+    """(rows,) mean heat or bulking of the step."""
     split: bool
-    """True if pressure gradients stabilise; else the arrays below have one row."""
+    """True if pressure gradients stabilise. If False, the arrays after this field have one row."""
     pressure: Floats
-    """(rows,) nodal pressure of each row, Pa."""
+    """(rows,) nodal pressure, Pa."""
     projected: Floats
     """(rows, 3) projected gradient of the pressure, Pa/m."""
     gradient: Ints
     """(rows, 3) sums of the pressure gradient, quanta."""
     matter: Floats
-    """(rows, COLUMNS) material state at the nodes, see matter.py; one row if there are no nodal pressures."""
+    """(rows, COLUMNS) nodal material state, see matter.py; one row if there are no nodal pressures."""
 
     @classmethod
     def none(cls) -> "Means":
-        """Returns the means of the ``standard`` form."""
+        """Returns the empty record that the ``standard`` form uses."""
         row, lines = np.zeros(1), np.zeros((1, 3), np.int64)
         return cls(lines, row, row, row, False, row, np.zeros((1, 3)), lines, np.zeros((1, 8)))
 
 
 motion_of = attrgetter("x0", "x", "v", "force")
-"""Function of ``Nodes``: the fields of their Motion."""
+"""Returns the fields for Motion from a ``Nodes``."""
 body_of = attrgetter("tets", "id", "flat_state", "rows", "params", "kind", "eos", "quiet", "flat", "averages")
-"""Function of a block: the fields of its Body."""
+"""Returns the fields for Body from a block."""
 marks_of = attrgetter("worn", "life", "hot", "weakest", "shear_weight")
-"""Function of a block: the fields of its Marks."""
+"""Returns the fields for Marks from a block."""
 _F1, _F2, _I1, _I2 = types.float64[::1], types.float64[:, ::1], types.int64[::1], types.int64[:, ::1]
 _B1, _INT, _FLAG, _T2 = types.boolean[::1], types.int64, types.boolean, types.uint32[:, ::1]
 MOTION = record(Motion, _F2, _F2, _F2, _I2)

@@ -1,10 +1,10 @@
 """Chunks at rest: chunks of tets that no wave has reached yet. A pass over a chunk at rest changes no value. Therefore
 the pass is omitted, and the results are identical.
 
-A chunk is noted as at rest after a complete pass that found zero velocity at all its nodes, left every bit of its
-state unchanged and made no force. A pass is a function of that state, the nodal velocities, the positions, which are
-constant at rest, and the time step, which is multiplied by zeros only: a further pass would have the same result,
-and the same stable step.
+A chunk is noted as at rest after a complete pass under three conditions: all its nodes had zero velocity, every bit of
+its state was unchanged, and the pass made no force. A further pass would have the same result and the same stable step.
+The reason is that a pass depends only on the state, the nodal velocities, the positions, which are constant at rest,
+and the time step, which is multiplied by zeros.
 """
 
 import numpy as np
@@ -14,13 +14,14 @@ from .forces import MAGNITUDE
 from .scratch import LIMIT
 
 NOTED, TET, STEADY = range(3)
-"""Places of a chunk in ``Block.quiet``: bits of its largest one-over-stable-step, 1/s, 0 if the chunk is not noted;
-the smallest global id of its tets that have this limit; 1 if the first of two passes left its state unchanged."""
+"""Indices in the row of a chunk in ``Block.quiet``. NOTED: bit pattern of its largest 1 / stable step, 1/s; 0 if the
+chunk is not noted as at rest. TET: smallest global id of its tets that have this limit. STEADY: 1 if the first of two
+passes left its state unchanged."""
 
 
 @njit("boolean(float64[:, ::1], uint32[:, ::1], int64)", cache=True)
 def at_rest(v, tets, n):  # type: ignore[no-untyped-def]
-    """Returns True if all nodes of a chunk have zero velocity, to the bit."""
+    """Returns True if the velocity of all nodes of a chunk is exactly zero."""
     for i in range(n):
         for j in range(4):
             a = tets[i, j]
@@ -42,7 +43,7 @@ def without(strain, tets, n):  # type: ignore[no-untyped-def]
 
 @njit("boolean(float64[::1], float64[::1])", cache=True)
 def same(before, after):  # type: ignore[no-untyped-def]
-    """Returns True if two states are equal, to the bit."""
+    """Returns True if two states are bit-identical."""
     differ = np.int64(0)
     for i in range(len(before)):
         differ |= np.float64(before[i]).view(np.int64) ^ np.float64(after[i]).view(np.int64)
@@ -51,7 +52,9 @@ def same(before, after):  # type: ignore[no-untyped-def]
 
 @njit("void(int64[::1], int64[::1], int64[::1], int64)", cache=True)
 def note(quiet, bits, ids, n):  # type: ignore[no-untyped-def]
-    """Notes a chunk as at rest, with the limit from its pass and the smallest id of the tets with this limit."""
+    """Notes a chunk as at rest. Stores the limit from the pass over the chunk, and the smallest id of the tets with
+    this limit.
+    """
     limit, first = 0, 0
     for i in range(n):
         own = bits[LIMIT + i] & MAGNITUDE
@@ -62,8 +65,8 @@ def note(quiet, bits, ids, n):  # type: ignore[no-untyped-def]
 
 @njit("void(int64[::1], int64[::1], int64, int64)", cache=True)
 def pass_over(peaks, quiet, place, tet):  # type: ignore[no-untyped-def]
-    """Raises the ``peaks`` to the limit of a noted chunk at ``place``, and to the smallest id of the tets with this
-    limit at ``tet``.
+    """Raises the ``peaks`` to the values of a chunk that is noted as at rest: its limit goes to index ``place``, the
+    smallest id of the tets with this limit to index ``tet``.
     """
     if quiet[NOTED] > peaks[place]:
         peaks[place], peaks[tet] = quiet[NOTED], quiet[TET]

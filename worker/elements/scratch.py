@@ -1,15 +1,15 @@
-"""Rows of the scratch of a thread: CHUNK float64 numbers each, starting at these places.
+"""First places of the rows in the scratch memory of a thread. A row has CHUNK float64 numbers.
 
-The rows from NODAL to MOVED are used by each pass and each law for itself; the four from CORNER_CHANGE on by the second
-pass of the averaged pressure forms.
+Each pass and each law uses the rows from NODAL to MOVED for its own values. The second pass of the averaged pressure
+forms uses the four rows from CORNER_CHANGE on.
 """
 
 from ..model.state import CHUNK
 
 EDGE = 0
-"""9 rows: edges e1, e2, e3, m; later b1, b2, b3 of the end of the step, m^2 (tet4.py)."""
+"""9 rows: edges e1, e2, e3, m; later area vectors b1, b2, b3 at the end of the step, m^2 (tet4.py)."""
 RATE = 9 * CHUNK
-"""9 rows: velocity differences, m/s; later rate of deformation D and SPIN."""
+"""9 rows: velocity differences, m/s; later rate of deformation D, and SPIN."""
 D_XX, D_YY, D_ZZ, D_YZ, D_ZX, D_XY = (RATE + k * CHUNK for k in range(6))
 SPIN = RATE + 6 * CHUNK
 """3 rows: axial vector of dt/2 times the spin."""
@@ -20,7 +20,7 @@ DILATATION = 19 * CHUNK
 VOLUME = 20 * CHUNK
 """Volume at the end of the step, m^3."""
 AREAS = 21 * CHUNK
-"""Sum of |b|^2 over the four nodes, m^4."""
+"""Sum of |b|^2 of the four nodes, m^4."""
 MODULUS = 22 * CHUNK
 """Density times the square of the wave speed, Pa."""
 LIMIT = 23 * CHUNK
@@ -28,16 +28,17 @@ LIMIT = 23 * CHUNK
 TRIAL = 24 * CHUNK
 """Von Mises equivalent of the trial stress, Pa."""
 SEEN = 25 * CHUNK
-"""Volume strain of the step from which the pressure is computed: the strain of the tet, or the mean over its nodes."""
+"""Volume strain of the step from which the pressure is computed. The strain is that of the tet, or the mean over its
+nodes."""
 CHANGE = 26 * CHUNK
 """Change of the volume of the tet in the step, m^3."""
 NODAL = 27 * CHUNK
 CORNER_CHANGE = 36 * CHUNK
 """4 rows: change of the volume ratio at each corner."""
 MOVED = 40 * CHUNK
-"""9 rows: differences of the displacements of nodes 1, 2, 3 to node 0, m."""
+"""9 rows: displacements of nodes 1, 2, 3 less the displacement of node 0, m."""
 SPEED = 49 * CHUNK
-"""Rate of change of the volume over the volume, 1/s."""
+"""Rate of change of the volume divided by the volume, 1/s."""
 VOLUME_SEEN = 50 * CHUNK
 """Volume from which the pressure is computed, m^3."""
 CHANGE_SEEN = 51 * CHUNK
@@ -45,4 +46,4 @@ CHANGE_SEEN = 51 * CHUNK
 BEFORE = 52 * CHUNK
 """Pressure before the step, Pa."""
 SCRATCH = 53 * CHUNK
-"""Size of the scratch."""
+"""Number of float64 in the scratch memory of a thread."""

@@ -22,7 +22,8 @@ def elements_of(
     case: Case, model: Model, neighbours: list[Neighbour], scene: list[Boundary], node_volume: Floats, comm: Comm,
     timers: Timers, threads: Team,
 ) -> Elements:  # fmt: skip
-    """Returns the elements of a model in the pressure form of the case; ``node_volume`` (nodes,): at the start, m^3.
+    """Returns the elements of a model in the pressure form that the case selects. ``node_volume`` (nodes,): volumes at
+    the start, m^3.
 
     Collective.
     """

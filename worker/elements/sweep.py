@@ -1,4 +1,4 @@
-r"""Passes over the elements of a block, chunk by chunk, as the time step calls them.
+r"""Passes over the elements of a block of tets, chunk by chunk. The time step calls the passes.
 
 ::
 
@@ -9,12 +9,13 @@ r"""Passes over the elements of a block, chunk by chunk, as the time step calls 
                                                                     v
                         nodal means --> pressure, (stress), viscosity --> forces --> nodal sums     force_pass
 
-``standard_pass`` does everything in one pass. The averaged pressure forms need two passes, with the completed nodal
-sums between them. ``forces_again`` repeats only the sum of forces, in a coarser quantum.
+``standard_pass`` does all work of the ``standard`` form in one pass. The averaged pressure forms need two passes, and
+the nodal sums are completed between the passes. ``forces_again`` repeats only the sum of forces, in a coarser quantum.
 
-The deviatoric stress is computed where its law allows (materials/law.py): a law that does not depend on the pressure in
-the first pass; one that does, in the second, after the equation of state, which then computes the velocity gradient
-again; one from the undeformed shape has no velocity gradient: the first of two passes computes volumes only.
+The material law (materials/law.py) determines the pass in which the deviatoric stress is computed. For a law that does
+not depend on the pressure it is the first pass. For a law that depends on the pressure it is the second pass, after the
+equation of state; this pass computes the velocity gradient again. A law that computes the stress from the undeformed
+shape has no velocity gradient, so the first of two passes computes volumes only.
 
 A pass over a chunk at rest, which no wave has reached, is omitted (rest.py).
 """
@@ -39,7 +40,7 @@ _F, _I = types.float64, types.int64
 
 @njit(types.void(MOTION, BODY, MARKS, SCRATCH, _I, _I, _F, _F), cache=True, error_model="numpy")
 def standard_pass(motion, body, marks, room, begin, end, dt, scale):  # type: ignore[no-untyped-def]
-    """Stress and forces at n+1 of chunks ``begin`` to ``end``, each tet with its own pressure."""
+    """Computes stress and forces at n+1 of the chunks from ``begin`` to ``end``. Each tet has its own pressure."""
     x0, x, v, force = motion.x0, motion.x, motion.v, motion.force
     tets, state, params, rows, strength, eos = body.tets, body.state, body.params, body.rows, body.strength, body.eos
     w, wi, bits, peaks, noted = room.w, room.wi, room.bits, room.peaks, body.quiet
@@ -48,19 +49,19 @@ def standard_pass(motion, body, marks, room, begin, end, dt, scale):  # type: ig
         t, s = tets[c * CHUNK : (c + 1) * CHUNK], state[c * rows * CHUNK : (c + 1) * rows * CHUNK]
         first, last, n = c * CHUNK, c * CHUNK + len(t), len(t)
         ids, quiet = body.id[first:last], noted[c]
-        # 1. Skip a chunk whose nodes have not moved: its arrays hold the result of its last pass.
+        # 1. Skip a chunk whose nodes have not moved: its arrays have the result of its last pass.
         still = dt > 0.0 and rest.at_rest(v, t, n)
         if still and quiet[rest.NOTED] > 0:
             rest.pass_over(peaks, quiet, LARGEST_LIMIT, LIMITING_TET)
             continue
         before = s.copy() if still else s[:0]
-        # 2. Compute the edges at n+1, and from the shape also the displacements.
+        # 2. Compute the edges at n+1. A law from the undeformed shape also needs the displacements.
         if shape:
             tet4.gather_moved(w, x0, x, t, s, n)
         else:
             tet4.gather(w[scratch.EDGE :], x, t, s, n)
         upset = s.copy() if erodes and any_inverted(w, n) else s[:0]
-        # 3. Compute the deviatoric stress (trial stress, if the law needs the pressure) and the volume strain.
+        # 3. Compute the volume strain and the deviatoric stress (only the trial stress, if the law needs the pressure).
         if shape:
             tet4.end_gradients(w, n)
             strengthen(strength, w, s, params, n, dt)
@@ -72,13 +73,13 @@ def standard_pass(motion, body, marks, room, begin, end, dt, scale):  # type: ig
             chunks.from_rates(strength, w, s, params, n, dt)
             tet4.end_gradients(w, n)
             averaged.own_strains(w, n, dt)
-        # 4. Compute pressure, viscosity and stable step; do the plastic return at that pressure.
+        # 4. Compute pressure, viscosity and stable step. Then do the plastic return at the new pressure.
         press(eos, w, s, params, n)
         chunks.viscosity_and_limit(w, s, params, n, dt, False)
         chunks.return_at_pressure(strength, w, s, params, n, dt)
         if len(upset) > 0:
             reset_inverted(w, s, upset, x, v, t, rows, n, dt)
-        # 5. Mark worn tets and overstressed faces; compute the forces.
+        # 5. Mark tets that meet the erosion criterion and overstressed faces; compute the forces.
         marked = chunks.mark(marks, first, last, w, peaks, s, params, rows)
         largest = chunks.sum_forces(force, w, wi, bits, peaks, t, s, ids, n, scale)
         quiet[rest.NOTED] = 0
@@ -88,11 +89,11 @@ def standard_pass(motion, body, marks, room, begin, end, dt, scale):  # type: ig
 
 @njit(types.void(MOTION, BODY, MARKS, SCRATCH, MEANS, _I, _I, _F), cache=True, error_model="numpy")
 def strain_pass(motion, body, marks, room, means, begin, end, dt):  # type: ignore[no-untyped-def]
-    """Nodal sums of volume and volume change, with ``split`` stabilised; deviatoric stress at n+1, if the law does not
-    need the pressure.
+    """Computes the nodal sums of volume and volume change, which include the stabilising fluxes if the form is
+    ``split``. Computes the deviatoric stress at n+1, if the law does not need the pressure.
 
-    A law from the shape acts here if the nodes need its work, for their heat; else in ``force_pass``. A chunk noted as
-    at rest only adds its volumes, which the nodal means need.
+    A law from the undeformed shape is applied here if the nodes need its work for their heat, else in ``force_pass``.
+    For a chunk noted as at rest only the volumes are computed, because the nodal means need them.
     """
     x0, x, v, w = motion.x0, motion.x, motion.v, room.w
     tets, state, params, rows, strength = body.tets, body.state, body.params, body.rows, body.strength
@@ -110,7 +111,8 @@ def strain_pass(motion, body, marks, room, means, begin, end, dt):  # type: igno
                 exclude_flat(w, flat, n)
             averaged.scatter_volumes(sums, w, weight, means_of, n, dt)
             continue
-        # 2. Compute the edges at n+1; from the shape, if its law acts here, also the displacements.
+        # 2. Compute the edges at n+1. Compute also the displacements, if a law from the undeformed shape is applied in
+        # this pass.
         if shape and more:
             tet4.gather_moved(w, x0, x, t, s, n)
         else:
@@ -133,7 +135,7 @@ def strain_pass(motion, body, marks, room, means, begin, end, dt):  # type: igno
             averaged.keep_flux(w, s, n)
         if params[DILATES] > 0.0:
             averaged.subtract_dilation(w, s, params, n, dt)
-        # 4. Add heat or bulking, and volumes, to the nodal sums, without flat tets.
+        # 4. Add volumes, and heat or bulking, to the nodal sums. Flat tets are left out.
         if len(flat) > 0:
             exclude_flat(w, flat, n)
         if more:
@@ -154,7 +156,9 @@ def strain_pass(motion, body, marks, room, means, begin, end, dt):  # type: igno
 
 @njit(types.void(MOTION, BODY, MARKS, SCRATCH, MEANS, _I, _I, _F, _F), cache=True, error_model="numpy")
 def force_pass(motion, body, marks, room, means, begin, end, dt, scale):  # type: ignore[no-untyped-def]
-    """Pressure from the nodal means, viscosity and forces at n+1; with ``split``, pressure gradients."""
+    """Computes pressure from the nodal means, viscosity and forces at n+1. If the form is ``split``, also computes
+    pressure gradients.
+    """
     x0, x, v, force = motion.x0, motion.x, motion.v, motion.force
     tets, state, params, rows, strength = body.tets, body.state, body.params, body.rows, body.strength
     w, wi, bits, peaks, noted = room.w, room.wi, room.bits, room.peaks, body.quiet
@@ -164,7 +168,8 @@ def force_pass(motion, body, marks, room, means, begin, end, dt, scale):  # type
         t, s = tets[c * CHUNK : (c + 1) * CHUNK], state[c * rows * CHUNK : (c + 1) * rows * CHUNK]
         first, last, n = c * CHUNK, c * CHUNK + len(t), len(t)
         ids, flat, quiet, means_of = body.id[first:last], body.flat[first:last], noted[c], body.averages[first:last]
-        # 1. Keep the last result of a chunk at rest, unchanged by the first pass and without strain at its nodes.
+        # 1. Keep the last result of a chunk at rest, if the first pass did not change the chunk and its nodes have no
+        # strain.
         still = quiet[rest.STEADY] != 0 and rest.without(means.strain, means_of, n)
         if still and more:
             still = rest.without(means.more, means_of, n)
@@ -178,19 +183,19 @@ def force_pass(motion, body, marks, room, means, begin, end, dt, scale):  # type
         else:
             tet4.gather(w[scratch.EDGE :], x, t, s, n)
         upset = s.copy() if erodes and any_inverted(w, n) else s[:0]
-        # 3. Compute the trial stress of a law that needs the pressure, and the deviatoric stress from the shape, unless
-        # it was computed before.
+        # 3. Compute the trial stress of a law that needs the pressure. Compute the deviatoric stress from the
+        # undeformed shape, unless the first pass did.
         if params[ORDER] == AFTER_PRESSURE:
             chunks.rates(w, v, t, n, dt)
             chunks.from_rates(strength, w, s, params, n, dt)
         tet4.end_gradients(w, n)
         if shape and not more:
             strengthen(strength, w, s, params, n, dt)
-        # 4. Compute volume strain, heat and bulking from the nodal means, then the pressure.
+        # 4. Compute volume strain, heat and bulking from the nodal means; then compute the pressure.
         chunks.take_means(w, s, body, means, means_of, flat, n)
         chunks.own_change(w, s, v, t, shape, n, dt)
         chunks.averaged_pressure(w, s, body, means.matter, means_of, flat, n)
-        # 5. Compute viscosity, stable step and inversion barrier, then the plastic return at the pressure of 4.
+        # 5. Compute viscosity, stable step and inversion barrier. Then do the plastic return at the new pressure.
         chunks.viscosity_and_limit(w, s, params, n, dt, True)
         if not erodes:
             resist(w, s, params, n)
@@ -199,7 +204,7 @@ def force_pass(motion, body, marks, room, means, begin, end, dt, scale):  # type
             book_averaged(w, s, params, n)
         if len(upset) > 0:
             reset_inverted(w, s, upset, x, v, t, rows, n, 0.0)
-        # 6. Mark worn tets and overstressed faces; compute forces and pressure gradients.
+        # 6. Mark tets that meet the erosion criterion and overstressed faces; compute forces and pressure gradients.
         marked = chunks.mark(marks, first, last, w, peaks, s, params, rows)
         largest = chunks.sum_forces(force, w, wi, bits, peaks, t, s, ids, n, scale)
         if means.split:
@@ -212,7 +217,7 @@ def force_pass(motion, body, marks, room, means, begin, end, dt, scale):  # type
 
 @njit(types.void(MOTION, BODY, SCRATCH, MEANS, _I, _I, _F), cache=True, error_model="numpy")
 def forces_again(motion, body, room, means, begin, end, scale):  # type: ignore[no-untyped-def]
-    """Sums the forces of the present stress again, in another quantum; changes no state and no limit."""
+    """Sums the forces of the present stress again, in another quantum. State and stable step do not change."""
     w, wi, bits, peaks, rows = room.w, room.wi, room.bits, room.peaks, body.rows
     for c in range(begin, end):
         t, s = body.tets[c * CHUNK : (c + 1) * CHUNK], body.state[c * rows * CHUNK : (c + 1) * rows * CHUNK]

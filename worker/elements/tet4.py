@@ -1,4 +1,4 @@
-r"""Geometry and kinematics of the four-node tetrahedron, a chunk of tets at a time.
+r"""Geometry and kinematics of the four-node tetrahedron. Each function computes a chunk of tets.
 
 ::
 
@@ -16,8 +16,9 @@ r"""Geometry and kinematics of the four-node tetrahedron, a chunk of tets at a t
 
                                  velocity gradient  L = sum_a u_a (x) b_a / V,   D = (L + L^T) / 2,   W = (L - L^T) / 2
 
-``w`` is the scratch of a thread (rows of CHUNK numbers, scratch.py), ``s`` the state of the chunk, ``n`` its tets.
-Loops over a chunk use no function that could round differently in a vector lane and in a scalar.
+``w`` is the scratch memory of a thread (rows of CHUNK numbers, scratch.py), ``s`` the state of the chunk, ``n`` the
+number of its tets. Loops over a chunk use no function whose vector version may round differently from its scalar
+version.
 """
 
 from ..kernels.jit import njit, prefetch
@@ -44,23 +45,24 @@ from .scratch import (
 _VOLUME = TET_VOLUME * CHUNK
 _SIXTH = 1.0 / 6.0
 _LINE = 8
-"""Number of float64 in a cache line of 64 bytes. On processors with lines of 128 bytes some lines are fetched twice."""
+"""Number of float64 in a cache line of 64 bytes. On a processor with cache lines of 128 bytes some cache lines are
+fetched twice."""
 
 
 @njit("void(float64[::1], int64, int64)", cache=True, forceinline=True)
 def _prefetch_tet(ahead, i, rows):  # type: ignore[no-untyped-def]
-    """Prefetches the ``rows`` numbers of tet ``i`` from ``ahead``, which the next kernel reads, while others are
-    gathered."""
+    """Prefetches ``rows`` numbers of tet ``i`` from the array ``ahead``, which the next kernel reads. The prefetch
+    overlaps with the reading of other arrays."""
     for j in range(0, rows, _LINE):
         prefetch(ahead, i * rows + j)
 
 
 @njit("void(float64[::1], float64[:, ::1], uint32[:, ::1], float64[::1], int64)", cache=True, error_model="numpy")
 def gather(rows, values, tets, ahead, n):  # type: ignore[no-untyped-def]
-    """Sets nine ``rows``: the differences of nodes 1, 2, 3 to node 0 in nodal ``values`` (nodes, 3).
+    """Sets nine ``rows`` to the values of nodes 1, 2, 3 less the value of node 0; ``values`` (nodes, 3): nodal values.
 
-    The edges, from x, in the rows from EDGE on; the velocity differences, from v, in the rows from RATE on. ``ahead``:
-    rows of the state that are prefetched into the cache, or none.
+    With positions the result is the edges, in the rows from EDGE on. With velocities it is the velocity differences, in
+    the rows from RATE on. ``ahead``: state rows to be prefetched into the cache, or an empty array.
     """
     first, second, third = rows, rows[3 * CHUNK :], rows[6 * CHUNK :]
     near = len(ahead) // CHUNK
@@ -80,11 +82,11 @@ def gather(rows, values, tets, ahead, n):  # type: ignore[no-untyped-def]
     error_model="numpy",
 )
 def gather_moved(w, x0, x, tets, ahead, n):  # type: ignore[no-untyped-def]
-    """Sets EDGE: the edges, and MOVED: the differences of the displacements of nodes 1, 2, 3 to node 0; ``ahead`` as in
-    ``gather``.
+    """Sets EDGE to the edges, and MOVED to the displacements of nodes 1, 2, 3 less the displacement of node 0.
+    ``ahead``: see ``gather``.
 
-    The two groups of nine rows are written one after the other, because 18 rows at once are more write streams than a
-    processor can store at full speed.
+    The two groups of nine rows are written one after the other, because a processor cannot store 18 streams at once at
+    full speed.
     """
     gather(w[EDGE:], x, tets, ahead, n)
     gather(w[MOVED:], x0, tets, ahead[:0], n)
@@ -96,7 +98,7 @@ def gather_moved(w, x0, x, tets, ahead, n):  # type: ignore[no-untyped-def]
 
 @njit("UniTuple(float64, 9)(float64[::1], int64)", cache=True, error_model="numpy", forceinline=True)
 def _rates(w, i):  # type: ignore[no-untyped-def]
-    """Returns the differences of the velocities of nodes 1, 2, 3 to node 0 of tet ``i``."""
+    """Returns the velocities of nodes 1, 2, 3 less the velocity of node 0, of tet ``i``."""
     return (
         w[RATE + i], w[RATE + CHUNK + i], w[RATE + 2 * CHUNK + i],
         w[RATE + 3 * CHUNK + i], w[RATE + 4 * CHUNK + i], w[RATE + 5 * CHUNK + i],
@@ -106,8 +108,8 @@ def _rates(w, i):  # type: ignore[no-untyped-def]
 
 @njit("UniTuple(float64, 10)(float64[::1], int64, float64)", cache=True, error_model="numpy", forceinline=True)
 def _middle(w, i, h):  # type: ignore[no-untyped-def]
-    """Returns 6 V, and 6 V grad N of nodes 1, 2 and 3, of tet ``i`` at mid-step, a time ``h`` before the end of the
-    step."""
+    """Returns 6 V, and 6 V grad N of nodes 1, 2 and 3, of tet ``i`` at mid-step. Mid-step is the time ``h`` before the
+    end of the step."""
     ax, ay, az, bx, by, bz, cx, cy, cz = _rates(w, i)
     e1x, e1y, e1z = w[EDGE + i] - h * ax, w[EDGE + CHUNK + i] - h * ay, w[EDGE + 2 * CHUNK + i] - h * az
     e2x, e2y = w[EDGE + 3 * CHUNK + i] - h * bx, w[EDGE + 4 * CHUNK + i] - h * by
@@ -124,8 +126,8 @@ def kinematics(w, n, dt):  # type: ignore[no-untyped-def]
     """Sets rate of deformation and spin at mid-step, from the edges at the end of the step and the velocities at
     mid-step.
 
-    The gradient is taken at x(n+1/2) = x(n+1) - dt/2 v: a rigid rotation then has exactly zero rate of deformation
-    (the paper's modified central difference). SPIN: axial vector of dt/2 times the spin; VOLUME_MID: volume;
+    The gradient is taken at x(n+1/2) = x(n+1) - dt/2 v, so that a rigid rotation has exactly zero rate of deformation
+    (the paper's modified central difference). Results: SPIN: axial vector of dt/2 times the spin; VOLUME_MID: volume;
     DILATATION: trace of the rate of deformation.
     """
     h = 0.5 * dt
@@ -153,7 +155,7 @@ def kinematics(w, n, dt):  # type: ignore[no-untyped-def]
 
 @njit("void(float64[::1], int64)", cache=True, error_model="numpy")
 def at_rest(w, n):  # type: ignore[no-untyped-def]
-    """Sets VOLUME_MID and DILATATION of tets at rest, as ``kinematics`` would."""
+    """Sets VOLUME_MID and DILATATION of tets at rest to the values that ``kinematics`` would give."""
     for i in range(n):
         e1x, e1y, e1z = w[EDGE + i], w[EDGE + CHUNK + i], w[EDGE + 2 * CHUNK + i]
         e2x, e2y, e2z = w[EDGE + 3 * CHUNK + i], w[EDGE + 4 * CHUNK + i], w[EDGE + 5 * CHUNK + i]
@@ -165,7 +167,7 @@ def at_rest(w, n):  # type: ignore[no-untyped-def]
 
 @njit("void(float64[::1], int64)", cache=True, error_model="numpy")
 def volumes(w, n):  # type: ignore[no-untyped-def]
-    """Sets VOLUME from the edges, to the same bits as ``end_gradients``."""
+    """Sets VOLUME from the edges, bit-identical to the result of ``end_gradients``."""
     for i in range(n):
         e1x, e1y, e1z = w[EDGE + i], w[EDGE + CHUNK + i], w[EDGE + 2 * CHUNK + i]
         e2x, e2y, e2z = w[EDGE + 3 * CHUNK + i], w[EDGE + 4 * CHUNK + i], w[EDGE + 5 * CHUNK + i]
@@ -177,11 +179,11 @@ def volumes(w, n):  # type: ignore[no-untyped-def]
 
 @njit("void(float64[::1], float64[::1], int64, float64)", cache=True, error_model="numpy")
 def growth(w, s, n, dt):  # type: ignore[no-untyped-def]
-    """Sets VOLUME_MID, the mean of VOLUME and the volume before the step, and DILATATION, the difference of the two
-    volumes over VOLUME_MID and dt.
+    """Sets VOLUME_MID to the mean of VOLUME and the volume before the step. Sets DILATATION to the difference of the
+    two volumes divided by VOLUME_MID and dt.
 
-    The values are equal to the values of ``kinematics`` up to terms of third order in the step. With dt = 0 the change
-    is zero.
+    The values are equal to those of ``kinematics`` up to terms of third order in the step. With dt = 0 the change is
+    zero.
     """
     frequency = 1.0 / dt if dt > 0.0 else 0.0
     for i in range(n):
@@ -201,7 +203,7 @@ def unchanged(w, s, n):  # type: ignore[no-untyped-def]
 
 @njit("void(float64[::1], int64)", cache=True, error_model="numpy")
 def end_gradients(w, n):  # type: ignore[no-untyped-def]
-    """Replaces the edges by b1, b2, b3 (m^2), and sets VOLUME (m^3) and AREAS, the sum of |b|^2 over the four nodes."""
+    """Replaces the edges by b1, b2, b3 (m^2). Sets VOLUME (m^3), and AREAS to the sum of |b|^2 over the four nodes."""
     for i in range(n):
         e1x, e1y, e1z = w[EDGE + i], w[EDGE + CHUNK + i], w[EDGE + 2 * CHUNK + i]
         e2x, e2y, e2z = w[EDGE + 3 * CHUNK + i], w[EDGE + 4 * CHUNK + i], w[EDGE + 5 * CHUNK + i]
@@ -226,7 +228,9 @@ def end_gradients(w, n):  # type: ignore[no-untyped-def]
 
 @njit("void(float64[::1], int64)", cache=True, error_model="numpy")
 def speeds(w, n):  # type: ignore[no-untyped-def]
-    """Sets SPEED, the rate of change of the volume over the volume, 1/s, from V grad N and the velocity differences."""
+    """Sets SPEED to the rate of change of the volume divided by the volume, 1/s. The rate is computed from V grad N and
+    the velocity differences.
+    """
     for i in range(n):
         ax, ay, az, bx, by, bz, cx, cy, cz = _rates(w, i)
         first = ax * w[EDGE + i] + ay * w[EDGE + CHUNK + i] + az * w[EDGE + 2 * CHUNK + i]

@@ -1,9 +1,9 @@
-"""Worn tets, which erosion removes: by plastic strain, damage, volume or stable step.
+"""Tets that erosion will remove, because of their plastic strain, damage, volume or stable step.
 
-A tet that becomes flat or inverted must be removed before it collapses: its velocity gradient is proportional to one
-over its altitude, and a single tet whose altitude passes zero would accelerate its nodes without bound. A marked tet is
-removed in the next step. The removal of a tet that exceeds only a strain or damage limit is delayed until several tets
-are removed together (worker/erosion.py).
+A tet that becomes flat or inverted must be removed before its altitude passes zero. Its velocity gradient is
+proportional to 1 / altitude, so a single such tet would accelerate its nodes without bound. A marked tet is removed in
+the next step. The removal of a tet that exceeds only a strain or damage limit is delayed until several tets are removed
+together (worker/erosion.py).
 """
 
 import math
@@ -33,18 +33,20 @@ from ..model.state import CHUNK, Floats
 from .scratch import EDGE, LIMIT, VOLUME, VOLUME_MID
 
 STRAIN, LOW, HIGH, FREQUENCY, DAMAGED = range(5)
-"""Places in ``life`` of a block: largest plastic strain, smallest and largest volume over the initial one, largest
-one-over-stable-step, 1/s, damage."""
+"""Indices of the erosion limits in ``life`` of a block: largest plastic strain, smallest and largest ratio of volume to
+initial volume, largest 1 / stable step, 1/s, largest damage."""
 SOUND, TIRED, BROKEN = range(3)
-"""Results of a check. SOUND: no worn tet; TIRED: worn tets whose removal can be delayed; BROKEN: worn tets that must
-be removed in the next step."""
+"""Results of a check. SOUND: no tet has to be removed; TIRED: the removal of all marked tets can be delayed; BROKEN:
+some marked tets must be removed in the next step."""
 
 _SIXTH = 1.0 / 6.0
 _MASS, _STRAIN, _DAMAGE = MASS * CHUNK, PLASTIC_STRAIN * CHUNK, DAMAGE * CHUNK
 
 
 def life(erosion: Erosion | None) -> Floats:
-    """(5,) limits of the tets of a part; the limit of the stable step is set after the first step."""
+    """(5,) limits beyond which erosion removes tets of a part. The limit of the stable step is set after the first
+    step.
+    """
     if erosion is None:
         return np.full(5, math.inf)
     strain = math.inf if erosion.plastic_strain is None else erosion.plastic_strain
@@ -70,8 +72,8 @@ def _release(s, i):  # type: ignore[no-untyped-def]
 
 @njit("boolean(float64[::1], int64)", cache=True, error_model="numpy")
 def any_inverted(w, n):  # type: ignore[no-untyped-def]
-    """Sets VOLUME at the end of the step, as tet4.end_gradients does; returns True if a tet of the chunk is
-    inverted.
+    """Sets VOLUME to the volume at the end of the step, as tet4.end_gradients does. Returns True if a tet of the chunk
+    is inverted.
     """
     least = np.inf
     for i in range(n):
@@ -88,10 +90,10 @@ def any_inverted(w, n):  # type: ignore[no-untyped-def]
 
 @njit("UniTuple(float64, 2)(float64[::1], float64[:, ::1], float64[:, ::1], uint32[::1], int64, float64)", cache=True)
 def _half_of_last(s, x, v, tet, i, dt):  # type: ignore[no-untyped-def]
-    """Returns half of the work of the nodes of tet ``i`` against the forces of the tet at n, on the way from n to n+1,
-    J: the part without viscosity, and the part of viscosity.
+    """Returns half of the work that the nodes of tet ``i`` do against the forces of the tet at n, on the way from n to
+    n+1, J. The work is returned in two parts: without viscosity, and of viscosity.
 
-    1/2 dt sum v_a . (stress b_a), b_a = V grad N_a at x(n) = x(n+1) - dt v.
+    The formula is 1/2 dt sum v_a . (stress b_a), b_a = V grad N_a at x(n) = x(n+1) - dt v.
     """
     e, u = np.empty((3, 3)), np.empty((3, 3))
     for k in range(3):
@@ -122,7 +124,8 @@ def reset_inverted(w, s, before, x, v, tets, rows, n, dt):  # type: ignore[no-un
     """Resets inverted tets of a chunk to their state ``before`` the step, with zero stress.
 
     The stress at the end of the step never acts on a node. The stress at the start of the step has done half of its
-    work in the step ``dt``; this half is booked here. These tets do not contribute to the nodal means.
+    work in the step ``dt``; this function adds this half to the energies of the tet. The reset tets do not contribute
+    to the nodal means.
     """
     for i in range(n):
         if w[VOLUME + i] <= 0.0:
@@ -141,8 +144,8 @@ def reset_inverted(w, s, before, x, v, tets, rows, n, dt):  # type: ignore[no-un
     error_model="numpy",
 )
 def mark_worn(worn, w, s, params, life, rows, n):  # type: ignore[no-untyped-def]
-    """Marks the worn tets of a chunk. A tet whose removal cannot be delayed no longer limits the time step. Returns
-    SOUND, TIRED or BROKEN.
+    """Marks the tets of a chunk that erosion will remove. If the removal of a tet cannot be delayed, the tet no longer
+    limits the time step. Returns SOUND, TIRED or BROKEN.
 
     The stress of an inverted tet is set to zero before it acts on a node. A tet whose stress is not a number is not
     removed: its limit becomes NaN, which ends the run with an error that names the tet.

@@ -1,4 +1,4 @@
-"""Work of the elements by part, as exact sums."""
+"""Work of the elements of each part, as exact sums."""
 
 import numpy as np
 
@@ -9,7 +9,7 @@ from ..parallel.fixed_point import limbs, magnitude, most
 
 
 class ElementWork:
-    """Sums of the columns WORKS over all tets, by part, J, computed from the state."""
+    """Sums over all tets of each part of the columns WORKS of the state, J."""
 
     def __init__(self, blocks: list[Block], parts: int) -> None:
         self._blocks, self._parts = blocks, parts
@@ -29,7 +29,7 @@ class ElementWork:
 
 @njit("void(float64[::1], float64[:, :, ::1], int64)", cache=True, error_model="numpy")
 def _largest_work(largest, state, n):  # type: ignore[no-untyped-def]
-    """Raises ``largest`` (4,) to the magnitudes of WORKS of the ``n`` tets."""
+    """Raises ``largest`` (4,) to the magnitudes of the columns WORKS of the ``n`` tets."""
     for j in range(len(WORKS)):
         found = 0
         for c in range((n + CHUNK - 1) // CHUNK if WORKS[j] < state.shape[1] else 0):
@@ -39,7 +39,7 @@ def _largest_work(largest, state, n):  # type: ignore[no-untyped-def]
 
 @njit("void(int64[:, ::1], float64[:, :, ::1], int64, float64[::1])", cache=True, error_model="numpy")
 def _limbs_of_work(words, state, n, scale):  # type: ignore[no-untyped-def]
-    """Adds the limbs of WORKS of the ``n`` tets to ``words`` (2, 4)."""
+    """Adds the columns WORKS of the ``n`` tets, divided into limbs, to the exact sums ``words`` (2, 4)."""
     for j in range(len(WORKS)):
         for c in range((n + CHUNK - 1) // CHUNK if WORKS[j] < state.shape[1] else 0):
             high, low = limbs(state[c, WORKS[j], : min(CHUNK, n - c * CHUNK)], scale[j])

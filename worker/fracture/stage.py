@@ -63,7 +63,7 @@ class Fracture:
         if neighbours:
             elements.attach(self.initiation.interface)
         self._found: list[Breaking] | None = None
-        """Facets that break in this step; None before they have been found."""
+        """Facets that break in this step; None before the search for these facets."""
         self.cohesion: Cohesion | None = None
         if cohesive(case):
             self.cohesion = elements.cohesion = Cohesion(work, team)
