@@ -1,1 +1,1 @@
-"""Tied bonds between non-matching meshes: nodes of one surface tied to faces of another."""
+"""Tied bonds between non-matching meshes: nodes of one surface are tied to faces of another surface."""

@@ -1,5 +1,5 @@
-"""Energy account of the tied bonds: half of the work of each impulse is booked with the velocity before the impulse,
-half with the velocity after it.
+"""Energy account of the tied bonds. Half of the work of an impulse is computed with the velocity before the impulse,
+and half with the velocity after it.
 """
 
 import numpy as np
@@ -14,27 +14,30 @@ class BondAccount:
     """Work of the impulses of tied bonds on the nodes of a rank."""
 
     def __init__(self, nodes: Nodes, scale: float) -> None:
-        """``nodes``: the local nodes; ``scale``: quanta per N s."""
+        """``nodes``: local nodes of the rank; ``scale``: quanta per N s."""
         self.scale = scale
         self.loss, self.external = np.zeros((2, nodes.n))
-        """(nodes,) energy dissipated by the bonds, and work from outside by prescribed velocities against them, J."""
-        nodes.columns.declare(self, loss=ZERO, external=ZERO)  # booked values stay with the parent of a copy
+        """(nodes,) energy dissipated by the bonds, J, and external work, J: work of prescribed velocities against the
+        bonds."""
+        nodes.columns.declare(self, loss=ZERO, external=ZERO)  # a copy of a node starts with zero
         self.mobility: Floats = np.zeros((0, 3))
-        """(nodes, 3) inverse mass by component, 1/kg, as the sweeps use it; 0 for a component with prescribed
+        """(nodes, 3) inverse mass for each component, 1/kg, as the sweeps use it; 0 for a component with prescribed
         velocity."""
         self._local: Indices = np.zeros(0, np.int32)
         """(h,) nodes on which the last impulses act."""
         self._total, self._before = np.zeros((0, 3), np.int64), np.zeros((0, 3))
-        """(h, 3) last impulses, quanta, and v(n-1/2) of their nodes, m/s."""
+        """(h, 3) last impulses, quanta, and velocities v(n-1/2) of the nodes on which they act, m/s."""
 
     def note(self, v: Floats, local: Indices) -> None:
-        """Before the kick: books the second half of the last impulses; stores v(n-1/2) of the nodes ``local``."""
+        """Adds the second half of the work of the last impulses, and stores v(n-1/2) of the nodes ``local``. Must be
+        called before the kick.
+        """
         self._before = v[self._local]
         self._book()
         self._local, self._before = local, v[local]
 
     def add(self, total: Ints) -> None:
-        """Books the first half of the impulses ``total`` (h, 3) of the step, quanta."""
+        """Adds the first half of the work of the impulses of the step; ``total`` (h, 3): impulses, quanta."""
         self._total = total
         self._book()
 

@@ -1,4 +1,5 @@
-r"""Common area of two triangles, the mortar one projected onto the plane of the tied one, and integrals over it.
+r"""Common area of a tied face and a mortar face, and integrals over this area. The mortar face is projected onto the
+plane of the tied face.
 
 ::
 
@@ -13,7 +14,7 @@ r"""Common area of two triangles, the mortar one projected onto the plane of the
        /|##########\    \          The shape functions N and M are linear, their products quadratic: three points, in
      m0-a-----------b----m1        the middles of the sides of each triangle, integrate them exactly.
         |             \
-        0---------------1          The normals point towards each other: seen from outside the tied face, the mortar
+        0---------------1          The normals of the two faces are opposed: seen from outside the tied face, the mortar
                                    triangle runs clockwise.
 """
 
@@ -22,10 +23,10 @@ import numpy as np
 from ..kernels.jit import njit, types
 
 _MOST = 9
-"""Length of arrays of polygon corners; a triangle cut by three lines has at most six corners."""
+"""Length of the arrays of polygon corners. A triangle that is cut by three lines has at most six corners."""
 OPPOSED = -0.5
-"""Largest cosine between the normals of two faces that may be bonded; the angle to exactly opposed normals is then
-at most 60 degrees. Chosen value."""
+"""Largest cosine between the normals of two faces that may be bonded. With the chosen value the normals may differ by
+at most 60 degrees from exactly opposed normals."""
 _F1, _F2, _F3, _N2, _I = (
     types.float64[::1], types.float64[:, ::1], types.float64[:, :, ::1], types.int32[:, ::1], types.int64,
 )  # fmt: skip
@@ -33,7 +34,7 @@ _F1, _F2, _F3, _N2, _I = (
 
 @njit(types.boolean(_F2, _F2, types.int32[::1]), cache=True, error_model="numpy")
 def _frame(frame, x, face):  # type: ignore[no-untyped-def]
-    """Sets the rows of ``frame``: two unit vectors in the plane of a face, and its normal; returns False if the face
+    """Sets the rows of ``frame`` to two unit vectors in the plane of a face, and its normal. Returns False if the face
     has no area.
     """
     for i in range(3):
@@ -58,8 +59,8 @@ def _frame(frame, x, face):  # type: ignore[no-untyped-def]
 
 @njit(types.void(_F2, _F2, _F2, types.int32[::1], _I), cache=True)
 def _project(flat, frame, x, face, origin):  # type: ignore[no-untyped-def]
-    """Sets ``flat`` to the corners of a face in the ``frame`` of another face, whose first corner is ``origin``: two
-    coordinates in its plane, and the height.
+    """Sets ``flat`` to the corners of a face in the ``frame`` of another face, whose first corner is ``origin``. The
+    coordinates of a corner are two in the plane of the other face, and the height above it.
     """
     for k in range(3):
         for a in range(3):
@@ -70,7 +71,7 @@ def _project(flat, frame, x, face, origin):  # type: ignore[no-untyped-def]
 
 @njit(types.void(_F1, _F2, types.float64, types.float64), cache=True, error_model="numpy")
 def _shares(shares, flat, p, q):  # type: ignore[no-untyped-def]
-    """Sets ``shares`` to the area coordinates of a point of the plane in a triangle."""
+    """Sets ``shares`` to the area coordinates in a triangle of a point of the plane."""
     e, f = flat[1, 0] - flat[0, 0], flat[1, 1] - flat[0, 1]
     g, h = flat[2, 0] - flat[0, 0], flat[2, 1] - flat[0, 1]
     area, r, s = e * h - f * g, p - flat[0, 0], q - flat[0, 1]
@@ -80,8 +81,8 @@ def _shares(shares, flat, p, q):  # type: ignore[no-untyped-def]
 
 @njit(_I(_F2, _F2, _I, _F2), cache=True, error_model="numpy")
 def _cut(polygon, room, n, flat):  # type: ignore[no-untyped-def]
-    """Cuts the ``polygon`` of ``n`` corners by the three lines of a triangle that runs clockwise; returns the new
-    number of corners.
+    """Cuts the ``polygon`` of ``n`` corners by the three lines of a triangle whose corners run clockwise. Returns the
+    new number of corners.
     """
     for k in range(3):
         a, b = (k + 1) % 3, k
@@ -107,11 +108,12 @@ def _cut(polygon, room, n, flat):  # type: ignore[no-untyped-def]
 
 @njit(types.void(_F1, _F2, _F3, _F3, _F3, _F2, _N2, _N2, _N2), cache=True, error_model="numpy")
 def common(area, far, own, both, corner, x, slaves, masters, pairs):  # type: ignore[no-untyped-def]
-    """Computes, for each of the ``pairs`` (p, 2) of a tied face (of ``slaves``) and a mortar face (of ``masters``):
+    """Computes the common area of each of the ``pairs`` (p, 2) of a tied face (index in ``slaves``) and a mortar face
+    (index in ``masters``), and the integrals over it.
 
-    ``area`` (p,): common area, m^2; ``far`` (p, 2): smallest and largest height of the mortar face over the tied one
-    there, m; ``own``, ``both`` (p, 3, 3): the integrals drawn above, m^2; ``corner`` (p, 3, 3): area coordinates of the
-    corners of the tied face in the mortar face.
+    ``area`` (p,): common area, m^2; ``far`` (p, 2): smallest and largest height of the mortar face above the tied face
+    in the common area, m; ``own``, ``both`` (p, 3, 3): the integrals that the drawing of the file defines, m^2;
+    ``corner`` (p, 3, 3): area coordinates of the corners of the tied face in the mortar face.
 
     1. Frames of both faces; they must have an area and face each other.
     2. Both faces in the frame of the tied one.

@@ -1,4 +1,4 @@
-"""Corner nodes, after all separations so far, of the faces of a bonded interface."""
+"""Corner nodes of the faces of a bonded interface, after all separations of nodes so far."""
 
 import numpy as np
 
@@ -9,17 +9,20 @@ from ..parallel.comm import Comm
 
 
 class Faces:
-    """Faces of all bonds on one rank, by name: 4 * global tet id + local face."""
+    """Faces of all bonds on one rank. The name of a face is 4 * global tet id + local face."""
 
     def __init__(self, names: Ints, model: Model) -> None:
-        """``names``: ascending, the same on all ranks."""
+        """``names``: names of the faces, ascending; all ranks have the same names."""
         self.names, self._model = names, model
         self.corners: Ints = np.full((len(names), 3), -1)
-        """(f, 3) global ids of the corners at the last ``follow``, equal on all ranks; -1 for removed faces."""
+        """(f, 3) global ids of the corners after the last call of ``follow``; -1 for removed faces. The array is equal
+        on all ranks."""
         self._block, self._place = np.full((2, len(names)), -1)
 
     def changed(self) -> bool:
-        """Returns True if a face of this rank has other corners than at the last ``follow``, or was removed."""
+        """Returns True if a face of this rank has been removed, or has other corners than after the last call of
+        ``follow``.
+        """
         lost = (self._block >= 0) & ~self._stay()
         here = (self._block >= 0) & ~lost
         return bool(lost.any() or (self._here(here) != self.corners[here]).any())
@@ -34,16 +37,16 @@ class Faces:
         self.corners[every[:, 0]] = every[:, 1:]
 
     def here(self, names: Ints) -> Flags:
-        """Returns which faces belong to tets of this rank."""
+        """Returns whether each face belongs to a tet of this rank."""
         return np.asarray(self._block[np.searchsorted(self.names, names)] >= 0)
 
     def of(self, names: Ints) -> Ints:
-        """(k, 3) corners of faces."""
+        """(k, 3) corners of the faces with the given names."""
         return self.corners[np.searchsorted(self.names, names)]
 
     def _stay(self) -> Flags:
-        """Returns a mask of the faces whose tets are still in the same rows of their blocks; False for faces of other
-        ranks.
+        """Returns a mask: True for faces whose tets are in the same rows of their blocks as before; False for other
+        faces and for faces of other ranks.
         """
         found = np.zeros(len(self.names), bool)
         for b, block in enumerate(self._model.blocks):

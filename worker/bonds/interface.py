@@ -1,4 +1,5 @@
-"""Tied interface at the start: the nodes of one part that are tied to faces of another, and their weights.
+"""Tied interface at the start: the nodes of one part that are tied to faces of another part, and the weights of the
+ties.
 
 The nodes of the finer surface, the tied side, are tied to faces of the other surface, the mortar side; a rigid part is
 always the mortar side. The velocities
@@ -7,9 +8,10 @@ v_i of the tied side and v_j of the mortar side fulfil
     D_i v_i = sum_j M_ij v_j,   D_i = int psi_i dA,   M_ij = int psi_i N_j dA,
 
 with the shape functions N of the mortar side, and functions psi that are dual to the shape functions of the tied side
-on every tied face (dual mortar method, Wohlmuth 2000). A constant stress is transmitted exactly, and each row contains
-one tied node. On a tied face that the mortar side covers only in part, the nodes that lie on the mortar side are tied
-to the point of the face below them (collocation), with the shares of these nodes of the covered area.
+on every tied face (dual mortar method, Wohlmuth 2000). A constant stress is transmitted exactly, and each of the
+equations contains only one tied node. If the mortar side covers only a part of a tied face, each node of the tied face
+that lies on the mortar side is tied to the mortar point below it (collocation). The weight of such a node is its share
+of the covered area.
 """
 
 from dataclasses import dataclass
@@ -30,24 +32,24 @@ from .pieces import Pieces
 from .rows import assembled
 
 _NEAR = 10.0
-"""A warning counts the nodes that are not tied and whose distance is below this multiple of the largest bonded
-distance."""
+"""Factor of the largest bonded distance. Below this distance, nodes that are not tied are counted in a warning."""
 _COVERED = 0.95
-"""Share of the area of a tied face that the mortar side must cover for the face to count as covered. Chosen value:
-between curved surfaces, whose faces are not parallel, gaps and overlaps of 1 or 2 % of the area occur."""
+"""Smallest covered fraction of the area of a tied face at which the face counts as covered. Chosen value: between
+curved surfaces, whose faces are not parallel, gaps and overlaps of 1 or 2 % of the area occur."""
 _LEAST = 1e-9
-"""A common area below this share of the area of the tied face is ignored."""
+"""Smallest ratio of a common area to the area of the tied face. Smaller common areas are ignored."""
 _ON = 1e-6
-"""Tolerance of the area coordinates: a node that lies outside a face by less counts as on the face."""
+"""Tolerance of the area coordinates. A node that is outside of a face by less than the tolerance counts as lying on the
+face."""
 
 
 @dataclass
 class Found:
-    """Tied bonds at the start, and warnings."""
+    """Tied bonds at the start of a run, and warnings about them."""
 
     pieces: Pieces
     x: Floats
-    """(nodes, 3) positions with the tied nodes moved onto the mortar side, m."""
+    """(nodes, 3) positions of all nodes, m. The tied nodes have been moved onto the mortar side."""
     warnings: list[str]
 
 
@@ -58,16 +60,16 @@ class _Faces:
     name: Ints
     """(f,) name of each face: 4 * tet + local face."""
     nodes: Indices
-    """(f, 3) nodes of each face."""
+    """(f, 3) corner nodes of each face."""
     size: Floats
-    """(f,) size of each face, the square root of twice the area, m."""
+    """(f,) size of each face, m: the square root of twice its area."""
 
     def take(self, chosen: Flags | Ints) -> "_Faces":
         return _Faces(self.name[chosen], self.nodes[chosen], self.size[chosen])
 
 
 def tied_pairs(case: Case) -> list[tuple[int, int, int]]:
-    """Returns number of the bond and numbers of its two parts, for every tied bond."""
+    """Returns the number of the bond and the numbers of its two parts, for every tied bond."""
     names = [part.name for part in case.parts]
     return [
         (k, names.index(bond.parts[0]), names.index(bond.parts[1]))
@@ -77,11 +79,13 @@ def tied_pairs(case: Case) -> list[tuple[int, int, int]]:
 
 
 def find(case: Case, x: Floats, tets: Indices, tet_part: Indices, exposed: Flags) -> Found:
-    """Returns the pieces of all tied bonds; ``exposed`` (tets, 4). Raises InputError if a bond ties no node."""
+    """Returns the pieces (common areas of two faces) of all tied bonds; ``exposed`` (tets, 4): which faces are exposed.
+    Raises InputError if a bond ties no node.
+    """
     found, warnings, x = list[Pieces](), list[str](), x.copy()
     for bond, one, two in tied_pairs(case):
         if not ((tet_part == one).any() and (tet_part == two).any()):
-            continue  # before a run, a mesh may be missing
+            continue  # a check before a run may have no mesh for some parts
         pieces, more = _bonded(
             case, bond, x, [_surface(x, tets, exposed & (tet_part == part)[:, None]) for part in (one, two)]
         )
@@ -93,7 +97,7 @@ def find(case: Case, x: Floats, tets: Indices, tet_part: Indices, exposed: Flags
 
 
 def _surface(x: Floats, tets: Indices, exposed: Flags) -> _Faces:
-    """Returns the ``exposed`` (tets, 4) faces."""
+    """Returns the exposed faces; ``exposed`` (tets, 4): which faces are exposed."""
     tet, face = np.nonzero(exposed)
     nodes = np.ascontiguousarray(tets[tet[:, None], FACES[face]], np.int32)
     return _Faces(4 * tet + face, nodes, np.sqrt(2.0 * face_areas(x, nodes)))
@@ -102,7 +106,7 @@ def _surface(x: Floats, tets: Indices, exposed: Flags) -> _Faces:
 def _bonded(
     case: Case, bond: int, x: Floats, sides: list[_Faces]
 ) -> tuple[Pieces, list[str]]:  # fmt: skip
-    """Returns the pieces of one bond, and warnings."""
+    """Returns the pieces (common areas of two faces) of one bond, and warnings."""
     spec = case.bond[bond]
     assert isinstance(spec, TiedBond)
     reach = [_NEAR * (np.full(len(s.size), spec.gap) if spec.gap is not None else GAP * s.size) for s in sides]
@@ -129,7 +133,7 @@ def _rigid(case: Case, name: str) -> bool:
 
 
 def _near(x: Floats, one: _Faces, two: _Faces, reach: Floats, other: Floats) -> Indices:
-    """(p, 2) pairs of faces of the two parts that may lie near each other."""
+    """(p, 2) pairs of a face of each part that may lie near each other."""
     faces, part = np.concatenate([one.nodes, two.nodes]), np.zeros(len(x), np.int32)
     part[two.nodes] = 1
     corners, many = np.ascontiguousarray(faces), len(one.nodes)
@@ -143,7 +147,7 @@ def _near(x: Floats, one: _Faces, two: _Faces, reach: Floats, other: Floats) -> 
 
 @dataclass
 class _Cut:
-    """Pairs of faces with their common areas and integrals, see clipping.common."""
+    """Pairs of faces with their common areas and integrals (clipping.common)."""
 
     slave: Ints
     master: Ints
@@ -169,7 +173,9 @@ class _Cut:
 
 
 def _weighted(bond: int, slave: _Faces, master: _Faces, cut: _Cut) -> Pieces:
-    """Returns the pieces with their weights: dual shape functions on covered tied faces, collocation on others."""
+    """Returns the pieces with their weights. Covered tied faces use dual shape functions; other tied faces use
+    collocation.
+    """
     own, area = np.zeros((len(slave.name), 3, 3)), np.zeros(len(slave.name))
     np.add.at(own, cut.slave, cut.own)
     np.add.at(area, cut.slave, cut.area)
@@ -191,8 +197,8 @@ def _weighted(bond: int, slave: _Faces, master: _Faces, cut: _Cut) -> Pieces:
 
 
 def _dual(own: Floats, lumped: Floats) -> Floats:
-    """(f, 3, 3) dual shape functions of faces, as combinations of the shape functions: ``lumped`` times the inverse
-    of ``own``, by cofactors.
+    """(f, 3, 3) dual shape functions of faces, as linear combinations of the shape functions. The matrix is ``lumped``
+    times the inverse of ``own``, which is computed by cofactors.
     """
     inverse = np.empty_like(own)
     for i in range(3):
@@ -204,8 +210,8 @@ def _dual(own: Floats, lumped: Floats) -> Floats:
 
 
 def _collocate(weights: Floats, cut: _Cut, some: Flags, lumped: Floats) -> None:
-    """Sets the weights on tied faces that are covered in part: for each corner the weights in the piece in which the
-    corner lies deepest.
+    """Sets the weights on tied faces that are covered in part. The weights of a corner are those in the piece in which
+    the corner lies deepest.
     """
     rows = np.flatnonzero(some)
     inside = cut.corner[rows].min(axis=2)
@@ -220,7 +226,7 @@ def _collocate(weights: Floats, cut: _Cut, some: Flags, lumped: Floats) -> None:
 
 
 def _settle(x: Floats, pieces: Pieces, tets: Indices) -> None:
-    """Moves the tied nodes to their points on the mortar side."""
+    """Moves the tied nodes to the points on the mortar side to which they are tied."""
     rows = assembled(pieces, corners(pieces.slave, tets), corners(pieces.master, tets))
     where = np.zeros((len(rows.node), 3))
     for i in range(3):
@@ -229,7 +235,7 @@ def _settle(x: Floats, pieces: Pieces, tets: Indices) -> None:
 
 
 def corners(names: Ints, tets: Indices) -> Ints:
-    """(p, 3) nodes of faces, by their names."""
+    """(p, 3) corner nodes of faces that are given by their names."""
     return np.asarray(tets[names // 4][np.arange(len(names))[:, None], FACES[names % 4]].astype(np.int64))
 
 
@@ -245,7 +251,7 @@ def _refuse_inverted(bond: int, x: Floats, tets: Indices) -> None:
 def _missed(
     bond: int, x: Floats, slave: _Faces, cut: _Cut, near: Flags, limit: Floats | float, names: tuple[str, str]
 ) -> list[str]:
-    """Returns a warning about nodes that face the other part and are too far from it."""
+    """Returns a warning about nodes that face the other part but are too far from it to be tied."""
     tied = np.unique(slave.nodes[cut.slave[near]])
     aside = ~near & (cut.least > 0.0) & (cut.distance > limit) & (cut.distance <= _NEAR * limit)
     left = np.setdiff1d(np.unique(slave.nodes[cut.slave[aside]]), tied)
@@ -264,7 +270,7 @@ def _worded(limit: Floats | float) -> str:
 
 
 def _nothing(bond: int, spec: TiedBond, cut: _Cut, limit: Floats | float) -> str:
-    """Returns the reason for which a bond ties no node."""
+    """Returns the reason why a bond ties no node."""
     one, two = spec.parts
     if not len(cut.area):
         return f"bond[{bond}].parts: no faces of {one!r} and {two!r} lie face to face; move the parts to each other"

@@ -2,11 +2,11 @@
 
     (<t_n> / s_n)^2 + (|t_s| / s_s)^2 <= (1 - D)^2,   dD = d(delta) / delta_c,   delta_c = 2 G / |T|,
 
-with T the traction on the initial ellipse in the present direction, and G the fracture energy per area, 1 / G = (1 - B)
-/ G_n + B / G_s, B the share of shear in the work. The traction therefore decreases linearly with the opening delta, and
-opening in one direction dissipates the energy G. Below the strength the bond does not open. An open bond closes without
-resistance, transmits pressure when it is closed, and transmits tension again at its widest opening: the open bond
-stores no energy. Sliding is permanent.
+Here T is the traction on the initial ellipse in the present direction. G is the fracture energy per area: 1 / G = (1 -
+B) / G_n + B / G_s, where B is the fraction of the work that is done in shear. The traction therefore decreases linearly
+with the opening delta, and opening in one direction dissipates the energy G. Below the strength the bond does not open.
+An open bond closes without resistance and transmits pressure when it is closed. It transmits tension again at its
+widest opening, so an open bond stores no energy. Sliding is permanent.
 """
 
 import numpy as np
@@ -31,18 +31,19 @@ from .records import (
 from .records import NODES as _NODES
 
 _FULL = 1.0 - 1e-6
-"""A traction above this share of the size of the ellipse opens the bond."""
+"""Ratio of a traction to the size of the ellipse. Above this ratio the traction opens the bond."""
 _F, _I = types.float64, types.int64
 _VECTOR = types.UniTuple(_F, 3)  # type: ignore[no-untyped-call]
 
 
 @njit(_VECTOR(_VECTOR, _VECTOR, _VECTOR, _F, _F, _F, _F, _F, _F, _F), cache=True, error_model="numpy")
 def project(push, speed, out, closed, play, step, normal_limit, shear_limit, dt, stiff):  # type: ignore[no-untyped-def]
-    """Returns the impulse ``push`` of a row minus ``step``, kg, times the relative ``speed``, projected onto the
-    ellipse of the largest impulses across and along the interface. ``out``: normal out of the tied side.
+    """Returns a new impulse of a tied row: ``push`` minus ``step``, kg, times the relative velocity ``speed``,
+    projected onto the ellipse of the largest impulses across and along the interface. ``out``: outward normal of the
+    tied side.
 
-    ``closed``: distance by which the bond may close, and ``play``: by which it may open, m, without resistance;
-    ``dt``: time step, s; ``stiff``: remaining share of the strength.
+    ``closed``: distance by which the bond may close without resistance, m; ``play``: distance by which it may open
+    without resistance, m; ``dt``: time step, s; ``stiff``: remaining fraction of the strength.
     """
     along, opening = dot(push, out), -dot(speed, out)
     x = push[0] - along * out[0] - step * (speed[0] + opening * out[0])
@@ -58,7 +59,7 @@ def project(push, speed, out, closed, play, step, normal_limit, shear_limit, dt,
 
 @njit(_VECTOR(ROWS, _NODES, _I), cache=True, error_model="numpy")
 def normal(rows, nodes, r):  # type: ignore[no-untyped-def]
-    """Returns the mean normal of the tied faces at the node of row ``r``."""
+    """Returns the mean normal of the tied faces at the node of the tied row ``r``."""
     x, face = nodes.x, rows.face
     p, q, w = 0.0, 0.0, 0.0
     for s in range(rows.side[r], rows.side[r + 1]):
@@ -71,9 +72,10 @@ def normal(rows, nodes, r):  # type: ignore[no-untyped-def]
 
 @njit(_I(ROWS, _NODES, _F, _F, _I, _I), cache=True, error_model="numpy")
 def open_bonds(rows, nodes, mean_dt, dt, first, stop):  # type: ignore[no-untyped-def]
-    """Opens the rows from ``first`` to ``stop`` whose traction is at its limit; returns the number that have failed.
+    """Opens the tied rows from ``first`` to ``stop`` whose traction is at its limit. Returns the number of tied rows
+    that have failed.
 
-    ``mean_dt``: duration of the impulses, ``dt``: time step, s.
+    ``mean_dt``: time in which the impulses act, s; ``dt``: time step, s.
 
     1. Relative velocity at the end of the step, stored for the next one.
     2. Tension and shear of the impulse, opening velocity, power.
@@ -85,7 +87,7 @@ def open_bonds(rows, nodes, mean_dt, dt, first, stop):  # type: ignore[no-untype
     for r in range(first, stop):
         if state[r, DAMAGE] >= 1.0:
             continue
-        # 1. Compute the relative velocity at the end of the step.
+        # 1. Compute the relative velocity of the tied row at the end of the step.
         for i in range(3):
             speed = v[rows.node[r], i]
             for e in range(rows.begin[r], rows.begin[r + 1]):
@@ -106,7 +108,7 @@ def open_bonds(rows, nodes, mean_dt, dt, first, stop):  # type: ignore[no-untype
             work -= slide * state[r, SPEED + i]
         across = max(along, 0.0)
         work += across * opening
-        # 3. Update the damage, if the impulse is at the ellipse.
+        # 3. Update the damage, if the impulse is on the ellipse.
         force, tension = mean_dt * rows.area[r], across * across
         size = np.sqrt(tension / (force * laws[b, STRENGTH]) ** 2 + shear / (force * laws[b, SHEAR_STRENGTH]) ** 2)
         full = size > 0.0 and size >= _FULL * (1.0 - state[r, DAMAGE])
@@ -118,7 +120,7 @@ def open_bonds(rows, nodes, mean_dt, dt, first, stop):  # type: ignore[no-untype
             length = np.sqrt(tension + shear)
             critical = 2.0 * energy * size * force / length
             state[r, DAMAGE] = min(state[r, DAMAGE] + max(dt * work / length, 0.0) / critical, 1.0)
-        # 4. Update the present and the largest opening.
+        # 4. Update the present and the largest opening of a damaged row.
         if state[r, DAMAGE] > 0.0:
             state[r, OPENING] = max(state[r, OPENING] + dt * opening, 0.0)
             state[r, WIDEST] = max(state[r, WIDEST], state[r, OPENING])

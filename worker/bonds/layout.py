@@ -1,9 +1,9 @@
-"""Rows of tied nodes on one rank: each rank has the rows of the tied nodes that it owns, and a table of the nodes to
-which these rows apply impulses.
+"""Tied rows on one rank. A tied row is a tied node with its mortar nodes and weights. Each rank computes the rows of
+the tied nodes that it owns, and has a table of the nodes to which these rows apply impulses.
 
 The table contains the nodes of the rows, and all tied and mortar nodes on this rank, because rows of other ranks may
-apply impulses to them. Positions and velocities of nodes of other ranks are copied from their owners; sums of impulses
-are sent to all ranks with the node in their table. Every rank has the list of all rows (rows.py); the messages are
+apply impulses to them. Positions and velocities of nodes of other ranks are copied from their owners. Sums of impulses
+are sent to all ranks that have the node in their table. Every rank has the list of all rows (rows.py); the messages are
 planned once, when the rows change.
 """
 
@@ -21,13 +21,14 @@ from .records import BREAKS, KEPT, NORMAL, STATE, TiedNodes, TiedRows
 from .rows import Rows, chain
 
 _SETTLED = 1e-7
-"""Residual of the sweeps of a step over the change of the impulses in the step. Chosen value: the energy dissipated
-by the bond is then below 1e-9 of the energy transmitted through the bond (docs/theory/bonds.md)."""
+"""Ratio of the residual of the sweeps of a step to the change of the impulses in the step. Chosen value: the energy
+dissipated by the bond is then below 1e-9 of the energy transmitted through the bond (docs/theory/bonds.md)."""
 _SLOWEST = 0.02
-"""Smallest value used for the bound of the smallest over the largest eigenvalue of the rows; it gives 60 sweeps.
-Chosen value: it is needed because the bound is zero for tied nodes with prescribed motion."""
+"""Smallest value that is used as ratio of the smallest to the largest eigenvalue of the tied rows; it gives 60 sweeps.
+Chosen value: a smallest value is needed because the bound of the ratio is zero for tied nodes with prescribed
+motion."""
 _WORDS = 6
-"""Number of words of a node in a message: position and velocity."""
+"""Number of words for a node in a message. The words are its position and velocity."""
 
 
 @dataclass
@@ -37,24 +38,24 @@ class Layout:
     rows: TiedRows
     nodes: TiedNodes
     number: Ints
-    """(r,) number of each row among all rows."""
+    """(r,) number of each tied row of this rank among the tied rows of all ranks."""
     held: Indices
-    """(h,) places in the table of the nodes on this rank."""
+    """(h,) places in the table of the nodes that are on this rank."""
     local: Indices
-    """(h,) local indices of the nodes of the table that are on this rank."""
+    """(h,) local indices of the nodes that are in the table and on this rank."""
     sweeps: int
     """Number of sweeps in a step."""
     momentum: float
     """Nesterov's extrapolation factor of the impulses."""
     messages: "Messages"
     rigid: Rigid | None
-    """Rigid bodies; None if no row, on any rank, is tied to a rigid body."""
+    """Rigid bodies; None if no tied row on any rank has a rigid body on its mortar side."""
 
 
 def momentum(least: float) -> tuple[float, int]:
-    """Returns the extrapolation factor, and the number of sweeps that leave _SETTLED; ``least``: bound of the
-    smallest eigenvalue of the rows over the largest. With q its square root the factor is (1 - q) / (1 + q), and a
-    sweep reduces the residual by 1 - q (Nesterov 2004, 2.2.1).
+    """Returns the extrapolation factor, and the number of sweeps that reduce the residual to _SETTLED. ``least``: bound
+    of the ratio of the smallest to the largest eigenvalue of the tied rows. With q = sqrt(``least``) the factor is (1 -
+    q) / (1 + q), and a sweep multiplies the residual by 1 - q (Nesterov 2004, 2.2.1).
     """
     root, sweeps, left = math.sqrt(max(least, _SLOWEST)), 1, 1.0
     while left > _SETTLED:
@@ -66,8 +67,8 @@ def laid_out(
     rows: Rows, states: Floats, laws: Floats, nodes: Nodes, mobility: Floats, planes: Flags, rigid: Rigid | None,
     scale: float, comm: Comm,
 ) -> Layout:  # fmt: skip
-    """Returns the layout of ``rows`` with their ``states`` (r, KEPT); ``mobility`` (nodes, 3): 1/kg; ``planes``
-    (nodes, 3): components held by planes of symmetry; ``scale``: quanta per N s. Collective.
+    """Returns the layout of the tied ``rows`` with their ``states`` (r, KEPT). ``mobility`` (nodes, 3): 1/kg;
+    ``planes`` (nodes, 3): components that symmetry planes hold; ``scale``: quanta per N s. Collective.
     """
     points = rigid.points(rows.row, rows.master, rows.weight, nodes.id, comm) if rigid is not None else Points.none()
     rows = _at_points(rows, points)
@@ -102,12 +103,14 @@ def laid_out(
 
 
 def _name(row: Ints) -> Ints:
-    """Returns the id in the table of the point of a rigid body to which each row is tied; nodes have ids from 0."""
+    """Returns, for each tied row, the table id of the point of a rigid body to which the row is tied. Nodes have ids
+    from 0.
+    """
     return -1 - row
 
 
 def _at_points(rows: Rows, points: Points) -> Rows:
-    """Returns the rows in which one point of a rigid body replaces all mortar nodes."""
+    """Returns the tied rows after one point of a rigid body has replaced all their mortar nodes."""
     others = ~np.isin(rows.row, points.row)
     row = np.concatenate([rows.row[others], points.row])
     order = np.argsort(row, kind="stable")
@@ -119,11 +122,13 @@ def _at_points(rows: Rows, points: Points) -> Rows:
 def _norms(
     rows: Rows, mine: Flags, ids: Ints, table: Floats, planes: Flags, of_bodies: Floats, comm: Comm
 ) -> tuple[float, Floats]:  # fmt: skip
-    """Returns a bound of the smallest eigenvalue of all rows over the largest, and (r, 3) one over the bounds of the l1
-    norms of the rows of this rank, kg: sum_k |w_k| S_k / m_k, S_k the sum of |w_k| over all rows. The values are 0
-    where nothing moves, and across ``planes`` (r, 3) of symmetry that contain the tied node, because the mirror image
-    of the mortar side keeps the node on the plane. ``of_bodies`` (r,): the parts of the norms that are due to rigid
-    bodies, 1/kg.
+    """Returns a bound of the ratio of the smallest to the largest eigenvalue of all tied rows. Also returns (r, 3) 1 /
+    bound of the l1 norm of each row of this rank, kg; the l1 norm is sum_k |w_k| S_k / m_k, where S_k is the sum of
+    |w_k| over all rows.
+
+    The values of a row are 0 if none of its nodes can move. They are also 0 across ``planes`` (r, 3) of symmetry that
+    contain the tied node, because the mirror image of the mortar side keeps the node on the plane. ``of_bodies`` (r,):
+    contribution of rigid bodies to the norms, 1/kg.
     """
     known = np.unique(np.concatenate([rows.node, rows.master]))
     sums = np.bincount(np.searchsorted(known, rows.master), np.abs(rows.weight), len(known))
@@ -162,7 +167,9 @@ def _rows(rows: Rows, mine: Flags, ids: Ints, inverse: Floats, states: Floats, l
 
 
 def _nodes(rows: TiedRows, ids: Ints, mobility: Floats) -> TiedNodes:
-    """Returns the table of nodes, and the entries of each node: weights of mortar nodes, and NaN for the tied node."""
+    """Returns the table of nodes, and the weights of each node in the tied rows: the weight of a mortar node, and NaN
+    for the tied node.
+    """
     n = len(ids)
     of = np.repeat(np.arange(len(rows.node)), np.diff(rows.begin))
     at = np.concatenate([rows.master, rows.node])
@@ -177,24 +184,25 @@ def _nodes(rows: TiedRows, ids: Ints, mobility: Floats) -> TiedNodes:
 
 @dataclass
 class Messages:
-    """Messages between ranks, in every step."""
+    """Messages between ranks that are sent in every step."""
 
     sums: Exchange
     copies: Exchange
     sends: Indices
-    """``sends``: places in the table of the sums that are sent, rank by rank; ``receives``: places of the received
-    sums."""
+    """``sends``: table places of the sums that this rank sends, ordered by rank; ``receives``: table places of the sums
+    that it receives."""
     receives: Indices
     gives: Indices
-    """``gives``: places of the copies of nodes that are sent; ``takes``: places of the received copies."""
+    """``gives``: table places of the nodes whose copies this rank sends; ``takes``: table places of the nodes whose
+    copies it receives."""
     takes: Indices
     buffers: tuple[Ints, Ints, Ints, Ints]
-    """Buffers of the sent sums, the received sums, the sent copies and the received copies."""
+    """Buffers of four kinds: sent sums, received sums, sent copies, received copies."""
 
     @classmethod
     def of(cls, ids: Ints, pushed: Flags, local: Indices, nodes: Nodes, comm: Comm) -> "Messages":
-        """Plans the messages for the table ``ids`` with the ``local`` indices; ``pushed``: by rows of this rank.
-        Collective.
+        """Plans the messages for the table ``ids`` of nodes; ``local``: local indices of the nodes. ``pushed``: whether
+        a row of this rank applies an impulse to a node. Collective.
         """
         owned = (local >= 0) & nodes.owned[local]
         tables = comm.share((ids, pushed, local >= 0, owned))
@@ -220,11 +228,11 @@ class Messages:
 
     @property
     def alone(self) -> bool:
-        """True if no message is needed."""
+        """True if this rank needs no message."""
         return not (len(self.sends) or len(self.receives) or len(self.gives) or len(self.takes))
 
     def copy(self, x: Floats, v: Floats) -> None:
-        """Copies the rows of ``x`` and ``v`` (n, 3) of nodes that this rank does not have from their owners."""
+        """Copies ``x`` and ``v`` (n, 3) of the nodes that this rank does not have from the owners of these nodes."""
         out, into = self.buffers[2], self.buffers[3]
         out[:, :3], out[:, 3:] = x[self.gives].view(np.int64), v[self.gives].view(np.int64)
         self.copies.begin()
@@ -232,7 +240,7 @@ class Messages:
         x[self.takes], v[self.takes] = into[:, :3].copy().view(np.float64), into[:, 3:].copy().view(np.float64)
 
     def complete(self, words: Ints) -> None:
-        """Adds the contributions of rows of other ranks to the sums ``words`` (n, 3)."""
+        """Adds the impulses of rows of other ranks to the sums ``words`` (n, 3)."""
         self.buffers[0][:] = words[self.sends]
         self.sums.begin()
         self.sums.finish()

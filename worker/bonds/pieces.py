@@ -1,4 +1,6 @@
-"""Pieces of a bonded interface: common areas of a tied face and a mortar face, known to every rank."""
+"""Pieces of a bonded interface. A piece is the common area of a tied face and a mortar face. Every rank has all
+pieces.
+"""
 
 from dataclasses import dataclass
 from typing import Self
@@ -11,24 +13,26 @@ from ..model.state import Flags, Floats, Ints
 
 @dataclass
 class Pieces:
-    """Pieces by bond, tied face (column ``slave``) and mortar face (column ``master``); a face has the name 4 *
-    global tet id + local face, and its corners the order of mesh/faces.py.
+    """Pieces, sorted by bond, tied face (column ``slave``) and mortar face (column ``master``). The name of a face is 4
+    * global tet id + local face. The corners of a face have the order of mesh/faces.py.
     """
 
     bond: Ints
     """(p,) number of the bond in the case."""
     slave: Ints
-    """(p,) tied face."""
+    """(p,) name of the tied face."""
     master: Ints
-    """(p,) mortar face to which the tied face is tied."""
+    """(p,) name of the mortar face."""
     weights: Floats
-    """(p, 9) weight of each corner of the tied face with each of the mortar face, row by row, m^2."""
+    """(p, 9) weight of each pair of a corner of the tied face and a corner of the mortar face, m^2. The three weights
+    of a tied corner are successive."""
     of_face: Ints
-    """(p,) number of pieces of the tied face at the start: a face that has lost one of its pieces is no longer tied."""
+    """(p,) number of pieces of the tied face at the start. A tied face that has lost one of its pieces is no longer
+    tied."""
 
     @classmethod
     def none(cls) -> Self:
-        """Returns no pieces."""
+        """Returns a table with no pieces."""
         words = np.zeros(0, np.int64)
         return cls(words, words, words, np.zeros((0, 9)), words)
 

@@ -1,4 +1,6 @@
-"""Rows of tied nodes, from the pieces of the interface: the tied node, its mortar nodes, and their weights."""
+"""Tied rows, made from the pieces of the interface. A tied row is a tied node with its mortar nodes and their
+weights.
+"""
 
 from dataclasses import dataclass
 
@@ -9,27 +11,27 @@ from ..model.state import Flags, Floats, Ints
 from .pieces import Pieces
 
 _NOTHING = 1e-12
-"""Share of the area of a row; weights below this share are treated as rounding errors."""
+"""Fraction of the area of a row. Smaller weights are treated as round-off."""
 
 
 @dataclass
 class Rows:
-    """Rows of tied nodes, sorted by bond and node."""
+    """Tied rows, sorted by bond and node."""
 
     bond: Ints
     """(r,) number of the bond."""
     node: Ints
     """(r,) global id of the tied node."""
     area: Floats
-    """(r,) area of the interface that belongs to the row, m^2."""
+    """(r,) area of the interface that belongs to each row, m^2."""
     row: Ints
-    """(e,) row of each weight, ascending."""
+    """(e,) number of the row of each weight, ascending."""
     master: Ints
     """(e,) global id of the mortar node of each weight."""
     weight: Floats
     """(e,) weights; the weights of a row add up to one."""
     side: Ints
-    """(s,) row of each tied face at its node."""
+    """(s,) number of the row of each tied face at its node."""
     face: Ints
     """(s, 3) global ids of the corners of each tied face."""
 
@@ -43,10 +45,10 @@ class Rows:
 
 
 def one_each(rows: Rows, intact: Flags) -> Flags:
-    """Returns (r,) the ``intact`` rows (r,) that act: of several rows of a node, the one with the largest area.
+    """(r,) whether each row acts. If a node has several ``intact`` (r,) rows, only the row with the largest area acts.
 
-    On a line where three parts are tied to each other, a node has a row of two bonds. The parts are joined by one of
-    them, and both are nearly linearly dependent (docs/theory/bonds.md, "Lines of three parts").
+    On a line where three parts are tied to each other, a node has rows of two bonds. One of the rows is sufficient to
+    join the parts, and two rows are nearly linearly dependent (docs/theory/bonds.md, "Lines of three parts").
     """
     order = np.lexsort((rows.bond, -rows.area, ~intact, rows.node))
     node, first = rows.node[order], np.ones(len(order), bool)
@@ -57,8 +59,8 @@ def one_each(rows: Rows, intact: Flags) -> Flags:
 
 
 def chain(rows: Rows) -> float:
-    """Returns a bound of the spectral norm of the weights of mortar nodes that are tied nodes of other rows; 0 without
-    such nodes: sqrt(largest sum of a row times largest sum of a column) of the absolute weights.
+    """Returns a bound of the spectral norm of the weights of those mortar nodes that are tied nodes of other rows; 0 if
+    there are no such nodes. The bound is sqrt(largest row sum times largest column sum) of the absolute weights.
     """
     among = np.isin(rows.master, rows.node)
     if not among.any():
@@ -69,14 +71,14 @@ def chain(rows: Rows) -> float:
 
 
 def assembled(pieces: Pieces, slaves: Ints, masters: Ints) -> Rows:
-    """Returns the rows of ``pieces`` whose tied faces have the corners ``slaves`` and mortar faces the corners
-    ``masters`` (p, 3), global ids.
+    """Returns the rows that belong to ``pieces``. ``slaves``, ``masters`` (p, 3): global ids of the corners of the tied
+    face and the mortar face of each piece.
     """
     p, many = len(pieces), int(max(slaves.max(initial=0), masters.max(initial=0))) + 1
     key = np.repeat(pieces.bond[:, None] * many + slaves, 3, axis=1).reshape(-1)
     other, value = np.tile(masters, (1, 3)).reshape(-1), pieces.weights.reshape(-1)
     names, of = np.unique(key, return_inverse=True)
-    area = np.bincount(of, value, len(names)).astype(np.float64)  # without pieces bincount returns integers
+    area = np.bincount(of, value, len(names)).astype(np.float64)  # bincount returns integers if there are no pieces
     some = area > _NOTHING * area.max(initial=0.0)
     renumbered = np.cumsum(some) - 1
     kept = some[of]

@@ -1,9 +1,10 @@
 """Tied bonds between non-matching meshes, in the time step.
 
 The rows (rows.py) are computed from the pieces of the interface (interface.py) and the present corners of their faces:
-copies of a separated node are tied by their own faces, and faces of removed tets are no longer tied. Every rank has the
-list of all pieces and rows (ties.py); the state of a row is on the rank that owns its node (layout.py), and is sent to
-all ranks when rows change. Contact ignores pairs whose nodes are tied by one bond (``Ties.bits``).
+copies of a separated node are tied by the faces of their tets, and faces of removed tets are no longer tied. Every rank
+has the list of all pieces and rows (ties.py). The state of a row is stored on the rank that owns its node (layout.py).
+When rows change, the states are sent to all ranks. Contact ignores a candidate pair if one bond ties its nodes
+(``Ties.bits``).
 """
 
 import numpy as np
@@ -37,8 +38,8 @@ class Bonds:
         self, case: Case, model: Model, pieces: Pieces, bounds: list[Boundary], rigid: Rigid | None, comm: Comm,
         clock: Clock, team: Team, impulse: float,
     ) -> None:  # fmt: skip
-        """``pieces``: the pieces of all ranks; none for a run that resumes. ``impulse``: bound of the impulse on one
-        node in a step, N s. Collective.
+        """``pieces``: pieces of the interface on all ranks; empty for a run that resumes. ``impulse``: bound of the
+        impulse on one node in a step, N s. Collective.
         """
         self._rigid = rigid
         self._model, self._bounds, self._comm, self._clock = model, bounds, comm, clock
@@ -46,27 +47,29 @@ class Bonds:
         self.account = BondAccount(model.nodes, fixed_point.scale_for(impulse))
         self.ties = Ties(pieces, model, comm)
         self.apart = False
-        """True if a row of this rank has failed in the step."""
+        """True if a tied row of this rank has failed in this step."""
         self._mean_dt = 0.0
-        """Duration of the last impulses, s."""
+        """Time in which the last impulses acted, s."""
         self._layout: Layout | None = None
         if len(pieces):
             self._rebuild()
 
     @property
     def tied(self) -> int:
-        """Number of tied nodes of all ranks."""
+        """Number of tied nodes on all ranks."""
         return self.ties.tied
 
     # The step ------------------------------------------------------------------------------------------------------
 
     def note(self, state: Nodes) -> None:
-        """Before the kick: books the second half of the work of the last impulses, and stores v(n-1/2)."""
+        """Adds the second half of the work of the last impulses to the account, and stores v(n-1/2). Must be called
+        before the kick.
+        """
         self.account.note(state.v, self._laid.local)
 
     def predict(self, state: Nodes) -> None:
-        """After the kick: applies the impulses of the last step (warm start), so that contact starts from velocities
-        that nearly fulfil the conditions of the bonds. Collective.
+        """Applies the impulses of the last step (warm start), so that contact starts from velocities that nearly
+        satisfy the bonds. Must be called after the kick. Collective.
         """
         layout, mean_dt = self._laid, self._clock.mean_dt
         ratio = mean_dt / self._mean_dt if self._mean_dt > 0.0 else 0.0
@@ -82,8 +85,8 @@ class Bonds:
             layout.rigid.tied(state)
 
     def solve(self, state: Nodes, *, touched: bool) -> None:
-        """Solves for the impulses of the tied nodes in v(n+1/2); ``touched``: True if velocities have changed since
-        ``predict``. Collective.
+        """Computes the impulses of the tied nodes and changes v(n+1/2). ``touched``: whether velocities have changed
+        since ``predict``. Collective.
         """
         layout, clock = self._laid, self._clock
         if touched:
@@ -97,7 +100,7 @@ class Bonds:
         self.account.add(layout.nodes.total[layout.held])
 
     def follow(self) -> None:
-        """Updates the rows after a node of a face has separated, a tet of a face was removed, or a row has failed.
+        """Updates the tied rows after a node of a face has separated, a tet of a face was removed, or a row has failed.
         Collective.
         """
         changed = np.array([float(self.apart or self.ties.faces.changed())])
@@ -107,13 +110,13 @@ class Bonds:
     # Checkpoint and migration --------------------------------------------------------------------------------------
 
     def keep(self, parcel: Parcel) -> None:
-        """Adds the state to a parcel (a checkpoint or migration message)."""
+        """Adds the state of the bonds to a parcel (a checkpoint or migration message)."""
         self.account.keep(parcel)
         parcel.known["bonds"] = self.account.scale, self._mean_dt
         self.ties.keep(parcel, self._layout)
 
     def resume(self, parcel: Parcel) -> None:
-        """Restores the state from a parcel (a checkpoint or migration message). Collective."""
+        """Restores the state of the bonds from a parcel (a checkpoint or migration message). Collective."""
         scale, self._mean_dt = parcel.known["bonds"]
         self.account.resume(parcel, scale)
         self.ties.resume(parcel)
@@ -144,7 +147,7 @@ class Bonds:
         self._lay_out()
 
     def _lay_out(self) -> None:
-        """Makes the layout of the intact rows. Collective."""
+        """Makes the layout of the intact tied rows. Collective."""
         self.free()
         intact = self.ties.states[:, DAMAGE] < 1.0
         acts = one_each(self.ties.rows, intact)
@@ -160,7 +163,7 @@ class Bonds:
 
 
 class _Passes:
-    """Sweeps of the threads of a rank over a layout."""
+    """Sweeps over a layout, by the threads of a rank."""
 
     def __init__(self, team: Team) -> None:
         some = sweeps.TASK_SIZE
@@ -181,7 +184,7 @@ class _Passes:
             self.apply(layout, scale, walls=True)
 
     def apply(self, layout: Layout, scale: float, *, walls: bool) -> None:
-        """Converts the changes of the impulses to velocities; ``walls``: True if walls stop the rigid bodies.
+        """Adds the changes of the impulses to the velocities. ``walls``: whether walls stop the rigid bodies.
         Collective.
         """
         n = len(layout.nodes.v)
@@ -194,7 +197,7 @@ class _Passes:
 
 
 def _laws(case: Case) -> Floats:
-    """(bonds, 5) see records.TiedRows."""
+    """Returns the table ``laws`` (bonds, 5), see records.TiedRows."""
     laws = np.zeros((len(case.bond), 5))
     for k, bond in enumerate(case.bond):
         if isinstance(bond, TiedBond) and bond.breaks:

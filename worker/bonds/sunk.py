@@ -1,4 +1,4 @@
-"""Overlap, at the start, of two parts with a tied bond, which contact does not detect."""
+"""Overlap at the start of two parts with a tied bond. Contact does not detect this overlap."""
 
 from collections.abc import Iterator
 
@@ -17,9 +17,9 @@ from .pieces import Pieces
 
 
 def sunk(case: Case, x: Floats, tets: Indices, tet_part: Indices, exposed: Flags, tied: Pieces) -> Iterator[str]:
-    """Yields a warning for each bond whose parts still have nodes inside each other, after the nodes that are
-    ``tied`` have been moved onto the mortar side; ``exposed`` (tets, 4). Raises InputError if a node of either part
-    is deeper than the gap of the bond.
+    """Yields a warning for each bond whose parts have nodes inside of each other after the ``tied`` nodes have been
+    moved onto the mortar side. ``exposed`` (tets, 4): which faces are exposed. Raises InputError if a node of one part
+    is deeper in the other part than the gap of the bond.
     """
     for k, one, two in tied_pairs(case):
         spec = case.bond[k]
@@ -53,7 +53,7 @@ def sunk(case: Case, x: Floats, tets: Indices, tet_part: Indices, exposed: Flags
 
 
 def _both(case: Case, one: int, two: int) -> Flags:
-    """(parts, parts) True for this pair of parts only."""
+    """(parts, parts) True for the pair of the parts ``one`` and ``two`` only."""
     allowed = np.zeros((len(case.parts), len(case.parts)), bool)
     allowed[one, two] = allowed[two, one] = True
     return allowed

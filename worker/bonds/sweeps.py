@@ -1,14 +1,14 @@
-"""Impulses of tied nodes: Jacobi sweeps, independent of order.
+"""Impulses of tied nodes, computed by Jacobi sweeps whose result does not depend on the order of the rows.
 
-A row requires zero relative velocity between its node s and the point of the mortar side, v_s - sum_j W_j v_j = 0,
-along all axes. The impulse J of a row acts on the tied node s, and -W_j J acts on the mortar nodes j. The impulses of
-the mortar nodes are rounded to quanta, and the tied node gets minus the sum of these quanta, so that momentum is
-conserved exactly. A sweep changes every impulse by the remaining relative velocity over a bound of the l1 norm of its
-row, and extrapolates the change (Nesterov 1983 for a strongly convex problem; factor in layout.momentum). In every
+A tied row requires zero relative velocity between its tied node s and the point of the mortar side, v_s - sum_j W_j v_j
+= 0, along all axes. The impulse J of a row acts on the tied node s, and -W_j J acts on the mortar nodes j. The impulses
+of the mortar nodes are rounded to quanta, and the tied node gets minus the sum of these quanta, so that momentum is
+conserved exactly. A sweep changes every impulse by the remaining relative velocity divided by a bound of the l1 norm of
+its row, and extrapolates the change (Nesterov 1983 for a strongly convex problem; factor in layout.momentum). In every
 sweep a row that may break is projected onto its limit (law.py).
 
-A pass over rows computes the impulses; a pass over nodes sums them by the rows of each node: no task reads what
-another task of the same pass writes, and the sums are of integers.
+A pass over the rows computes the impulses; a pass over the nodes sums the impulses on each node. No task reads data
+that another task of the same pass writes, and the sums are sums of integers.
 """
 
 import numpy as np
@@ -34,7 +34,8 @@ from .records import (
 _F1 = types.float64[::1]
 _F, _I, _F2, _I2, _N1 = types.float64, types.int64, types.float64[:, ::1], types.int64[:, ::1], types.int32[::1]
 TASK_SIZE = 256
-"""Number of rows or nodes in a task. Chosen value: a task takes about 20 us; to start a parallel region takes 2 us."""
+"""Number of rows or nodes in a task. Chosen value: a task takes about 20 us, compared with 2 us to start a parallel
+region."""
 ACT = ROWS, NODES, _F, _F, _F, _F
 GIVE = ROWS, NODES, _F
 MOVE = NODES, _F
@@ -43,8 +44,8 @@ _act, _give, _move = reader(*ACT), reader(*GIVE), reader(*MOVE)
 
 @njit(types.void(ROWS, NODES, _F, _F, _F, _F, _I, _I), cache=True, error_model="numpy")
 def act(rows, nodes, ahead, mean_dt, dt, scale, first, stop):  # type: ignore[no-untyped-def]
-    """Corrects the impulses of the rows from ``first`` to ``stop``; ``ahead``: extrapolation factor; ``mean_dt``:
-    duration of the impulses, ``dt``: time step, s; ``scale``: quanta per N s.
+    """Corrects the impulses of the rows from ``first`` to ``stop``. ``ahead``: extrapolation factor; ``mean_dt``: time
+    in which the impulses act, s; ``dt``: time step, s; ``scale``: quanta per N s.
     """
     v, state, laws, inverse, change, own = nodes.v, rows.state, rows.laws, rows.inverse, rows.change, rows.own
     node, begin, master, weight = rows.node, rows.begin, rows.master, rows.weight
@@ -77,7 +78,7 @@ def act(rows, nodes, ahead, mean_dt, dt, scale, first, stop):  # type: ignore[no
 
 @njit(types.void(ROWS, NODES, _F, _F, _I, _I), cache=True)
 def resume(rows, nodes, ratio, scale, first, stop):  # type: ignore[no-untyped-def]
-    """Warm start: the rows from ``first`` to ``stop`` start with ``ratio`` times their last impulses, and with the
+    """Warm start. The rows from ``first`` to ``stop`` start with ``ratio`` times their last impulses, and with the
     present normals of their faces.
     """
     state, laws, begin = rows.state, rows.laws, rows.begin
@@ -96,7 +97,7 @@ def resume(rows, nodes, ratio, scale, first, stop):  # type: ignore[no-untyped-d
 
 @njit(types.void(ROWS, NODES, _F, _I, _I), cache=True)
 def give(rows, nodes, scale, first, stop):  # type: ignore[no-untyped-def]
-    """Sums the impulses of the rows of this rank on the nodes from ``first`` to ``stop``, in quanta."""
+    """Sums the impulses, in quanta, that the rows of this rank apply to the nodes from ``first`` to ``stop``."""
     words, share, row, change, own = nodes.words, nodes.share, nodes.row, rows.change, rows.own
     for a in range(first, stop):
         for i in range(3):
@@ -112,7 +113,7 @@ def give(rows, nodes, scale, first, stop):  # type: ignore[no-untyped-def]
 
 @njit(types.void(NODES, _F, _I, _I), cache=True)
 def move(nodes, scale, first, stop):  # type: ignore[no-untyped-def]
-    """Converts the impulses of all ranks on the nodes from ``first`` to ``stop`` to velocities."""
+    """Adds the impulses of the rows of all ranks to the velocities of the nodes from ``first`` to ``stop``."""
     v, words, total, mobility = nodes.v, nodes.words, nodes.total, nodes.mobility
     for a in range(first, stop):
         for i in range(3):
@@ -122,7 +123,7 @@ def move(nodes, scale, first, stop):  # type: ignore[no-untyped-def]
 
 @njit(types.void(ROWS, NODES, _F, _F, _F, _F, _I), cache=True)
 def sweep_all(rows, nodes, ahead, mean_dt, dt, scale, many):  # type: ignore[no-untyped-def]
-    """Runs ``many`` sweeps of all rows, on a rank to whose nodes no other rank applies impulses."""
+    """Runs ``many`` sweeps of all rows. Used if no row of another rank applies impulses to the nodes of this rank."""
     for k in range(many):
         act(rows, nodes, ahead if k + 1 < many else 0.0, mean_dt, dt, scale, 0, len(rows.node))
         give(rows, nodes, scale, 0, len(nodes.v))
@@ -131,29 +132,30 @@ def sweep_all(rows, nodes, ahead, mean_dt, dt, scale, many):  # type: ignore[no-
 
 @njit(TASK, cache=True)
 def act_task(table, first, stop, thread):  # type: ignore[no-untyped-def]
-    """Task: ``act``."""
+    """Task: runs ``act``."""
     rows, nodes, ahead, mean_dt, dt, scale = _act(table)
     act(rows, nodes, ahead, mean_dt, dt, scale, first, stop)
 
 
 @njit(TASK, cache=True)
 def give_task(table, first, stop, thread):  # type: ignore[no-untyped-def]
-    """Task: ``give``."""
+    """Task: runs ``give``."""
     rows, nodes, scale = _give(table)
     give(rows, nodes, scale, first, stop)
 
 
 @njit(TASK, cache=True)
 def move_task(table, first, stop, thread):  # type: ignore[no-untyped-def]
-    """Task: ``move``."""
+    """Task: runs ``move``."""
     nodes, scale = _move(table)
     move(nodes, scale, first, stop)
 
 
 @njit(types.void(_F1, _F1, _N1, _F2, _I2, _F2, _F), cache=True)
 def book(loss, external, local, before, total, mobility, scale):  # type: ignore[no-untyped-def]
-    """Books half of the work of the impulses ``total`` (n, 3) on ``local`` (n,) nodes with the velocities ``before``
-    (n, 3): energy dissipated by the bonds, and work from outside where the velocity is prescribed.
+    """Adds half of the work of the impulses ``total`` (n, 3) on the nodes ``local`` (n,), computed with the velocities
+    ``before`` (n, 3). The work is energy dissipated by the bonds; where the velocity is prescribed, a part of it is
+    external work.
     """
     for k in range(len(local)):
         a = local[k]

@@ -1,4 +1,4 @@
-"""Tied rows of all ranks, updated from the pieces of the interface and the present corners of their faces."""
+"""Tied rows of all ranks. They are updated from the pieces of the interface and the present corners of their faces."""
 
 import numpy as np
 
@@ -13,19 +13,19 @@ from .records import DAMAGE, KEPT, PUSH
 from .rows import Rows, assembled
 
 _BITS = 62
-"""Number of bonds that contact distinguishes; further bonds have a common bit."""
+"""Number of bonds that contact distinguishes by a bit of their own. Further bonds share one bit."""
 Known = tuple[Ints, Ints, Floats]
-"""Type of bonds (r,), nodes (r,) and states (r, KEPT) of rows."""
+"""Bonds (r,), nodes (r,) and states (r, KEPT) of tied rows."""
 
 
 class Ties:
-    """Pieces, rows and states of the tied bonds of a case, equal on all ranks."""
+    """Pieces, tied rows and states of the tied bonds of a case. All ranks have equal values."""
 
     def __init__(self, pieces: Pieces, model: Model, comm: Comm) -> None:
-        """``pieces``: the pieces of all ranks."""
+        """``pieces``: pieces of the interface on all ranks."""
         self._model, self._comm = model, comm
         self.version = 0
-        """Number that increases when rows change."""
+        """Number that increases when tied rows change."""
         self._set(pieces)
 
     def _set(self, pieces: Pieces) -> None:
@@ -33,22 +33,22 @@ class Ties:
         self.faces = Faces(np.unique(np.concatenate([pieces.slave, pieces.master])), self._model)
         self.rows = assembled(Pieces.none(), np.zeros((0, 3), np.int64), np.zeros((0, 3), np.int64))
         self.states = np.zeros((0, KEPT))
-        """(rows, KEPT) states when the rows last changed."""
+        """(rows, KEPT) states at the last change of the tied rows."""
         self._tied = self._bits = np.zeros(0, np.int64)
 
     @property
     def tied(self) -> int:
-        """Number of tied nodes of all ranks."""
+        """Number of tied nodes on all ranks."""
         return int((self.states[:, DAMAGE] < 1.0).sum())
 
     def bits(self, ids: Ints) -> Ints:
-        """(k,) bonds that tie each node, as bits."""
+        """(k,) bonds that tie each node, one bit for each bond."""
         at = places(self._tied, ids)
         return np.where(at >= 0, self._bits[at], 0) if len(self._tied) else np.zeros(len(ids), np.int64)
 
     def rebuild(self, layout: Layout | None, known: list[Known] | None = None) -> None:
-        """Makes the rows from the pieces and present corners; ``layout``: present rows of this rank; ``known``: states
-        of rows from a parcel (a checkpoint or migration message). Collective.
+        """Makes the tied rows from the pieces and the present corners of their faces. ``layout``: present rows of this
+        rank; ``known``: states of rows from a parcel (a checkpoint or migration message). Collective.
         """
         pieces, old, states = self._pieces, self.faces.of(self._pieces.slave), self._joined_states(layout)
         self.faces.follow(self._comm)
@@ -64,8 +64,8 @@ class Ties:
         self.rows, self.states = rows, carried
 
     def mark(self, rows: Rows) -> None:
-        """Sets the bits by which contact ignores pairs of nodes: nodes of the intact ``rows``, and corners of tied
-        faces that lie beside the mortar side.
+        """Sets the bits by which contact ignores pairs of tied nodes. Bits are set at the nodes of the intact ``rows``,
+        and at corners of tied faces that lie beside the mortar side.
         """
         corner, bond = rows.face.reshape(-1), np.repeat(rows.bond[rows.side], 3)
         beside = ~np.isin(corner, self.rows.node)
@@ -77,7 +77,7 @@ class Ties:
         self.version += 1
 
     def keep(self, parcel: Parcel, layout: Layout | None) -> None:
-        """Adds the pieces and rows of this rank to a parcel (a checkpoint or migration message)."""
+        """Adds the pieces, and the tied rows of this rank, to a parcel (a checkpoint or migration message)."""
         nodes, rows = self._model.nodes, self.rows
         pieces = self._pieces.take(self.faces.here(self._pieces.slave))
         parcel.rows["bonds.pieces"] = {"tet": pieces.slave // 4, **pieces.table()}
@@ -87,21 +87,21 @@ class Ties:
         parcel.rows["bonds.rows"] = {"node": rows.node[mine], "bond": rows.bond[mine], "state": states[mine]}
 
     def resume(self, parcel: Parcel) -> None:
-        """Restores the pieces and rows from a parcel (a checkpoint or migration message). Collective."""
+        """Restores the pieces and the tied rows from a parcel (a checkpoint or migration message). Collective."""
         self._set(Pieces.of(self._comm.share(parcel.rows["bonds.pieces"])))
         tables = [table for table in self._comm.share(parcel.rows["bonds.rows"]) if table]
         none = np.zeros(0, np.int64), np.zeros(0, np.int64), np.zeros((0, KEPT))
         self.rebuild(None, [none, *((table["bond"], table["node"], table["state"]) for table in tables)])
 
     def _own_states(self, layout: Layout | None) -> Floats:
-        """(rows, KEPT) states of all rows; up to date for the rows of this rank."""
+        """(rows, KEPT) states of all tied rows. Only the states of the rows of this rank are up to date."""
         states = self.states.copy()
         if layout is not None:
             states[layout.number] = layout.rows.state[:, :KEPT]
         return states
 
     def _joined_states(self, layout: Layout | None) -> Floats:
-        """(rows, KEPT) states of all rows, up to date, on all ranks. Collective."""
+        """(rows, KEPT) up-to-date states of the tied rows of all ranks. Collective."""
         if layout is None:
             return self.states
         words = np.column_stack([layout.number, layout.rows.state[:, :KEPT].copy().view(np.int64)])
@@ -110,7 +110,7 @@ class Ties:
         return states
 
     def _left(self, pieces: Pieces) -> Flags:
-        """Returns which pieces belong to tied faces that still have all their pieces."""
+        """Returns whether the tied face of each piece still has all its pieces."""
         whole = (self.faces.of(pieces.slave)[:, 0] >= 0) & (self.faces.of(pieces.master)[:, 0] >= 0)
         _, of = np.unique(np.column_stack([pieces.bond, pieces.slave]), axis=0, return_inverse=True)
         of = of.reshape(-1)
@@ -118,8 +118,8 @@ class Ties:
 
 
 def _of(bonds: Ints, nodes: Ints, bond: Ints, node: Ints, states: Floats) -> Floats:
-    """Returns states by ``bonds`` and ``nodes`` (k,), taken from the states of each ``bond`` and ``node`` (r,); zero
-    for rows without a known state.
+    """Returns the states of the rows with the given ``bonds`` and ``nodes`` (k,). They are selected from ``states``,
+    whose rows belong to ``bond`` and ``node`` (r,); zero if a row is not found.
     """
     many = int(max(nodes.max(initial=0), node.max(initial=0))) + 1
     keys, wanted = bond * many + node, bonds * many + nodes
@@ -131,8 +131,9 @@ def _of(bonds: Ints, nodes: Ints, bond: Ints, node: Ints, states: Floats) -> Flo
 
 
 def _carried(rows: Rows, old: Rows, states: Floats, bond: Ints, now: Ints, before: Ints) -> Floats:
-    """Returns states of ``rows`` from the states of the ``old`` rows: a copy inherits from its parent, found by the
-    corners of tied faces ``now`` and ``before`` (p, 3); the impulse in proportion to the area.
+    """Returns the states of the new ``rows``, copied from the ``states`` of the ``old`` rows. A copy of a node inherits
+    from its parent, which is found by the corners of the tied faces ``now`` and ``before`` (p, 3). The inherited
+    impulse is proportional to the area.
     """
     pairs = np.unique(np.column_stack([np.repeat(bond, 3), now.reshape(-1), before.reshape(-1)]), axis=0)
     parents = _of(pairs[:, 0], pairs[:, 2], old.bond, old.node, np.column_stack([states, old.area]))

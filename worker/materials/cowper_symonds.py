@@ -1,8 +1,9 @@
-"""J2 plasticity with linear hardening and the rate factor of Cowper and Symonds: radial return.
+"""J2 plasticity with linear hardening and the rate factor of Cowper and Symonds. The stress is returned radially to the
+yield surface.
 
 sigma = (Y + H e) (1 + (rate / D)^(1/q)). Cowper and Symonds 1957. Derived in docs/theory/materials.md.
 
-The yielding tets of a chunk are copied side by side into the scratch and solved together, as in johnson_cook.py.
+The yielding tets of a chunk are copied side by side into the scratch memory and solved together, as in johnson_cook.py.
 """
 
 from conoid.cases.laws.cowper_symonds import CowperSymonds
@@ -18,20 +19,21 @@ from .plastic import FACTOR, equivalent_stress, return_radially
 _HARDENING, _RATE, _Q = FIRST, FIRST + 1, FIRST + 2
 _STRAIN, _YIELD = PLASTIC_STRAIN * CHUNK, YIELD * CHUNK
 PLACE, OVER, STATIC, ROOT, STEP = (NODAL + k * CHUNK for k in range(1, 6))
-"""Scratch rows, by yielding tet: place in the chunk; trial stress less static flow stress, Pa; static flow stress
-before the step, Pa; u = (d / (dt D))^(1/q); last Newton step in u, positive while u has not converged, then 0."""
+"""Scratch rows with one value for each yielding tet: place in the chunk; trial stress less static flow stress, Pa;
+static flow stress before the step, Pa; u = (d / (dt D))^(1/q); last Newton step in u, which is positive while u has not
+converged, and then 0."""
 _MOST_ITERATIONS = 60
-"""Largest number of iterations; random states need at most 11 (tests/worker/test_cowper_symonds.py)."""
+"""Largest number of iterations. Random states need at most 11 iterations (tests/worker/test_cowper_symonds.py)."""
 _CLOSE = 1e-6
 """Relative Newton step at which the iteration ends. The relative error of the strain increment is then q^2/2 times the
 square of this step: 1e-11 with q = 5."""
 _LARGE = 1e300
-"""Largest start value of u^q; it replaces the infinite one of a step without time."""
+"""Largest start value of u^q. It replaces the infinite start value of a step with dt = 0."""
 
 
 @njit("int64(float64[::1], float64[::1], int64)", cache=True, error_model="numpy")
 def _gather(w, s, n):  # type: ignore[no-untyped-def]
-    """Copies the tets above their static flow stress side by side; returns their number."""
+    """Copies the tets above their static flow stress side by side into the scratch memory; returns their number."""
     m = 0
     for i in range(n):
         w[FACTOR + i] = 1.0
@@ -86,7 +88,9 @@ def increments(w, params, m, fast):  # type: ignore[no-untyped-def]
 
 @njit("void(float64[::1], float64[::1], float64[::1], int64, float64)", cache=True, error_model="numpy")
 def cowper_symonds(w, s, params, n, dt):  # type: ignore[no-untyped-def]
-    """Returns the trial stress of tets above their static flow stress to the flow stress at the rate of the step."""
+    """Returns the trial stress of the tets above their static flow stress to the flow stress at the strain rate of the
+    step.
+    """
     equivalent_stress(w, s, n)
     m = _gather(w, s, n)
     if m == 0:
@@ -109,4 +113,4 @@ LAW = Law(
     "cowper_symonds", BEFORE_PRESSURE, lambda _: YIELD + 1, lambda law: (law.hardening, law.D, law.q), _begin,
     cowper_symonds,
 )  # fmt: skip
-"""J2 strength law with linear hardening and a power of the strain rate; the static flow stress is a state row."""
+"""J2 strength law with linear hardening and a power of the strain rate. The static flow stress is a state row."""

@@ -1,4 +1,4 @@
-"""Hypoelastic deviatoric stress with an exact rotation. For materials with a strength law the elastic stress is the
+"""Hypoelastic deviatoric stress with an exact rotation. For a material with a strength law the elastic stress is the
 trial stress.
 """
 
@@ -18,7 +18,7 @@ _THIRD = 1.0 / 3.0
 
 @njit("float64(float64[::1], float64[::1], int64)", cache=True, error_model="numpy", forceinline=True)
 def sheared(s, params, i):  # type: ignore[no-untyped-def]
-    """Returns the energy of the deviatoric stress of tet ``i``, s:s / 4G, J/m^3."""
+    """Returns the energy density of the deviatoric stress s of tet ``i``, s:s / 4G, J/m^3."""
     sxx, syy, szz = s[_SXX + i], s[_SYY + i], s[_SZZ + i]
     syz, szx, sxy = s[_SYZ + i], s[_SZX + i], s[_SXY + i]
     square = sxx * sxx + syy * syy + szz * szz + 2.0 * (syz * syz + szx * szx + sxy * sxy)
@@ -27,16 +27,16 @@ def sheared(s, params, i):  # type: ignore[no-untyped-def]
 
 @njit("float64(float64[::1], float64[::1], int64)", cache=True, error_model="numpy", forceinline=True)
 def squeezed(s, params, i):  # type: ignore[no-untyped-def]
-    """Returns the energy of a linear pressure in tet ``i``, p^2 / 2K, J/m^3."""
+    """Returns the energy density of a linear pressure in tet ``i``, p^2 / 2K, J/m^3."""
     return 0.5 * s[_P + i] * s[_P + i] / params[BULK]
 
 
 @njit("void(float64[::1], int64)", cache=True, error_model="numpy")
 def turn_rate(w, n):  # type: ignore[no-untyped-def]
-    """Rotates the rate of deformation from mid-step to the end of the step: by half of the rotation angle of Q.
+    """Rotates the rate of deformation from mid-step to the end of the step, which is half of the rotation angle of Q.
 
-    If a is the axial vector of W dt/2, with |a| = tan(angle / 2), the axial vector of half of the angle is b = a / (1 +
-    sqrt(1 + a.a)).
+    If a is the axial vector of W dt/2, with |a| = tan(angle / 2), the axial vector for half of the angle is b = a / (1
+    + sqrt(1 + a.a)).
     """
     for i in range(n):
         ax, ay, az = w[SPIN + i], w[SPIN + CHUNK + i], w[SPIN + 2 * CHUNK + i]
@@ -62,12 +62,12 @@ def turn_rate(w, n):  # type: ignore[no-untyped-def]
 
 @njit("void(float64[::1], float64[::1], int64, float64, float64)", cache=True, error_model="numpy")
 def predict(w, s, n, shear, dt):  # type: ignore[no-untyped-def]
-    """Rotates the deviatoric stress, adds 2 G dt dev D, and books the first half of its work: the trial stress.
+    """Computes the trial stress: rotates the deviatoric stress and adds 2 G dt dev D. Adds the first half of the work.
 
     s becomes Q s Q^T with Q = (I - W dt/2)^-1 (I + W dt/2), a rotation to round-off (Hughes and Winget 1980); in closed
-    form, where a is the axial vector of W dt/2, Q = I + 2 (A + A^2) / (1 + a.a). The work is V s : D over the step by
-    the trapezoidal rule: here the half with the rotated old stress; ``deviatoric_work`` adds the half with the new
-    stress.
+    form, where a is the axial vector of W dt/2, Q = I + 2 (A + A^2) / (1 + a.a). The work of a step is V s : D,
+    integrated by the trapezoidal rule. This function adds the half with the rotated old stress; ``deviatoric_work``
+    adds the half with the new stress.
     """
     turn_rate(w, n)
     twice_shear_dt = 2.0 * shear * dt
@@ -97,7 +97,7 @@ def predict(w, s, n, shear, dt):  # type: ignore[no-untyped-def]
             tzx * qxx + tzy * qxy + tzz * qxz,
             txx * qyx + txy * qyy + txz * qyz,
         )
-        # 3. Book the work of the rotated stress; compute the trial stress s + 2 G dt dev D.
+        # 3. Add the work of the rotated stress; compute the trial stress s + 2 G dt dev D.
         mean = w[DILATATION + i] * _THIRD
         dxx, dyy, dzz = w[D_XX + i] - mean, w[D_YY + i] - mean, w[D_ZZ + i] - mean
         dyz, dzx, dxy = w[D_YZ + i], w[D_ZX + i], w[D_XY + i]
@@ -117,7 +117,7 @@ def predict(w, s, n, shear, dt):  # type: ignore[no-untyped-def]
 
 @njit("void(float64[::1], float64[::1], int64, float64)", cache=True, error_model="numpy")
 def deviatoric_work(w, s, n, dt):  # type: ignore[no-untyped-def]
-    """Adds V dt/2 s : D, the half of the step's work with the new stress."""
+    """Adds V dt/2 s : D, which is the half of the step's work with the new stress."""
     for i in range(n):
         mean = w[DILATATION + i] * _THIRD
         power = (

@@ -1,7 +1,8 @@
-"""Functions log and exp with the same bits on any processor, for loops over a chunk that the compiler vectorises.
+"""Functions log and exp whose results are bit-identical on any processor. They are used in loops over a chunk that the
+compiler vectorises.
 
-The functions use only + - * / and the bits of a float64 as an integer. These operations give the same result in vector
-code and in scalar code, and no result depends on a C library. Derived in docs/theory/sums.md.
+The functions use only + - * / and the bit pattern of a float64 as an integer. These operations give the same result in
+vector code and in scalar code, and no result depends on a C library. Derived in docs/theory/sums.md.
 """
 
 import numpy as np
@@ -10,17 +11,19 @@ from ..kernels.jit import njit
 from ..model.state import CHUNK
 
 _LN2_HIGH, _LN2_LOW = 0.693147180369123816490, 1.90821492927058770002e-10
-"""ln 2 in two parts: the first has 33 bits, so that its product with an exponent is exact; together they have 86."""
+"""The number ln 2 as a sum of two float64. The first has 33 bits, so that its product with an exponent is exact;
+together they have 86 bits."""
 _INVERSE_LN2 = 1.4426950408889634
-"""Constant 1 / ln 2."""
+"""The number 1 / ln 2."""
 NEAREST = 6755399441055744.0
 """1.5 times 2^52. If this constant is added to a smaller number, the last bits of the sum contain the nearest
 integer."""
 _ROOT_HALF = 0x3FE6A09E667F3BCD
-"""Bits of sqrt(1/2). An argument is divided by a power of two such that the result is between sqrt(1/2) and sqrt(2)."""
+"""Bit pattern of sqrt(1/2). An argument is divided by a power of two such that the result is between sqrt(1/2) and
+sqrt(2)."""
 _WHOLE, _OFFSET, _BIASED = 0x4330000000000000, 4096, 4503599627374592.0
-"""Constants that convert integers to float64: the bits of 2^52, an offset that makes exponents positive, and the sum
-of both as a float64."""
+"""Constants that convert integers to float64: the bit pattern of 2^52, an offset that makes exponents positive, and the
+sum of the two as a float64."""
 LEAST, MOST = -700.0, 700.0
 """Range of arguments of ``exp`` in which the result is a normal number, 1e-304 to 1e304."""
 
@@ -29,8 +32,8 @@ LEAST, MOST = -700.0, 700.0
 def log(x):  # type: ignore[no-untyped-def]
     """Returns ln x of a positive normal number; relative error 4e-16.
 
-    With x = 2^k f, f between sqrt(1/2) and sqrt(2), and s = (f - 1) / (f + 1) it is k ln 2 + 2 (s + s^3/3 + s^5/5
-    ...).
+    With x = 2^k f, f between sqrt(1/2) and sqrt(2), and s = (f - 1) / (f + 1), the logarithm is k ln 2 + 2 (s + s^3/3 +
+    s^5/5 ...).
     """
     bits = np.float64(x).view(np.int64)
     k = (bits - _ROOT_HALF) >> 52
@@ -48,7 +51,7 @@ def log(x):  # type: ignore[no-untyped-def]
 
 @njit("UniTuple(float64, 2)(float64)", cache=True, error_model="numpy", forceinline=True)
 def _reduced(x):  # type: ignore[no-untyped-def]
-    """Returns k, in the last bits of a float64, and e^r - 1 in 12 terms, with r = x - k ln 2."""
+    """Returns k, as the last bits of a float64, and e^r - 1, computed with 12 terms, where r = x - k ln 2."""
     shifted = x * _INVERSE_LN2 + NEAREST
     k = shifted - NEAREST
     r = (x - k * _LN2_HIGH) - k * _LN2_LOW
@@ -62,20 +65,22 @@ def _reduced(x):  # type: ignore[no-untyped-def]
 
 @njit("float64(float64, float64)", cache=True, error_model="numpy", forceinline=True)
 def _doubled(x, shifted):  # type: ignore[no-untyped-def]
-    """Returns 2^k x, where the last bits of ``shifted`` contain k."""
+    """Returns 2^k x. The last bits of ``shifted`` contain k."""
     return np.int64(np.float64(x).view(np.int64) + (np.float64(shifted).view(np.int64) << 52)).view(np.float64)
 
 
 @njit("float64(float64)", cache=True, error_model="numpy", forceinline=True)
 def exp(x):  # type: ignore[no-untyped-def]
-    """Returns e^x for x from LEAST to MOST; relative error 3e-16: 2^k e^r."""
+    """Returns e^x for x from LEAST to MOST, computed as 2^k e^r; relative error 3e-16."""
     shifted, grown = _reduced(x)
     return _doubled(1.0 + grown, shifted)
 
 
 @njit("float64(float64)", cache=True, error_model="numpy")
 def exp_less_one(x):  # type: ignore[no-untyped-def]
-    """Returns e^x - 1 for x up to MOST; relative error 4e-16: 2^k (e^r - 1) + (2^k - 1); -1 below LEAST."""
+    """Returns e^x - 1 for x up to MOST, computed as 2^k (e^r - 1) + (2^k - 1); relative error 4e-16. The result is -1
+    for x below LEAST.
+    """
     if x < LEAST:
         return -1.0
     shifted, grown = _reduced(x)
@@ -85,15 +90,15 @@ def exp_less_one(x):  # type: ignore[no-untyped-def]
 
 @njit("float64(float64, float64)", cache=True, error_model="numpy")
 def power(x, exponent):  # type: ignore[no-untyped-def]
-    """Returns x to the ``exponent``, for x zero or a positive normal number and a positive exponent; limited to
-    e^LEAST and e^MOST, except 0.
+    """Returns x to the power ``exponent``, for a positive exponent. x must be zero or a positive normal number. The
+    result is limited to the range from e^LEAST to e^MOST, or is 0 for x = 0.
     """
     return exp(max(min(exponent * log(x), MOST), LEAST)) if x > 0.0 else 0.0
 
 
 @njit("void(float64[::1], int64, int64)", cache=True, error_model="numpy")
 def logarithms(w, row, n):  # type: ignore[no-untyped-def]
-    """Replaces the ``n`` numbers from ``row`` on in the scratch by their logarithms."""
+    """Replaces ``n`` numbers in the scratch memory, from ``row`` on, by their logarithms."""
     values = w[row : row + CHUNK]
     for i in range(n):
         values[i] = log(values[i])
@@ -101,7 +106,7 @@ def logarithms(w, row, n):  # type: ignore[no-untyped-def]
 
 @njit("void(float64[::1], int64, int64, float64)", cache=True, error_model="numpy")
 def powers(w, row, n, exponent):  # type: ignore[no-untyped-def]
-    """Replaces the ``n`` logarithms from ``row`` on by the powers of their arguments, exp(exponent * logarithm)."""
+    """Replaces ``n`` logarithms in the scratch memory, from ``row`` on, by powers: exp(exponent * logarithm)."""
     values = w[row : row + CHUNK]
     for i in range(n):
         values[i] = exp(max(exponent * values[i], LEAST))

@@ -1,7 +1,7 @@
-"""Equations of state: pressure from the volume strain, and the tangent modulus for the wave speed.
+"""Equations of state. They compute the pressure from the volume strain, and the tangent modulus for the wave speed.
 
-The volume strain of the step (of the tet, or averaged over its nodes) is in row SEEN of the scratch, the change of the
-volume of the tet in CHANGE, so that the booked work is equal to the work of the nodal forces.
+The scratch row SEEN has the volume strain of the step, which is that of the tet or a mean over its nodes. The scratch
+row CHANGE has the change of the volume of the tet, so that the computed work is equal to the work of the nodal forces.
 """
 
 import numpy as np
@@ -32,10 +32,10 @@ _P, _MASS, _WORK, _RATIO = PRESSURE * CHUNK, MASS * CHUNK, WORK * CHUNK, VOLUME_
 _WORK_VISCOUS, _WORK_PLASTIC, _PORES = WORK_VISCOUS * CHUNK, WORK_PLASTIC * CHUNK, PORES * CHUNK
 _HEAT, _GROWN = HEAT * CHUNK, DILATION * CHUNK
 _OLD, _KNOWN, _FACTOR = NODAL, NODAL + CHUNK, NODAL + 2 * CHUNK
-"""Scratch rows: pressure before the step, Pa; coefficients ``factor``, ``cold part`` and ``known`` of the energy
-equation factor * (new pressure) = cold part + known."""
+"""Scratch rows: pressure before the step, Pa; and coefficients of the energy equation factor * (new pressure) = cold
+part + known."""
 _LEAST = 0.05
-"""Smallest bulk modulus in the wave speed, as a share of the bulk modulus at rest. Chosen value; this limit can only
+"""Smallest bulk modulus in the wave speed, divided by the bulk modulus at rest. Chosen value. This limit can only
 decrease the stable step."""
 
 
@@ -55,9 +55,9 @@ def linear(w, s, params, n):  # type: ignore[no-untyped-def]
 
 @njit("void(float64[::1], float64[::1], float64[::1], int64, float64, float64)", cache=True, error_model="numpy")
 def _book_pores(w, s, params, i, strain, mean):  # type: ignore[no-untyped-def]
-    """Books the plastic work of pores that have grown by the volume strain ``strain``: the ``mean`` pressure of the
-    step times ``strain``, as for the total work. The elastic energy is corrected because its density then belongs to a
-    larger or smaller volume.
+    """Adds the plastic work of pores that have grown by the volume strain ``strain``. As for the total work, it is the
+    ``mean`` pressure of the step times ``strain``. Corrects the elastic energy, because after the growth its density
+    belongs to another volume.
     """
     stored = squeezed(s, params, i)
     if params[ORDER] != FROM_SHAPE:
@@ -67,9 +67,9 @@ def _book_pores(w, s, params, i, strain, mean):  # type: ignore[no-untyped-def]
 
 @njit("void(float64[::1], float64[::1], float64[::1], int64)", cache=True, error_model="numpy")
 def _tear_linear(w, s, params, n):  # type: ignore[no-untyped-def]
-    """Limits the pressure by the tension cut-off, by moving volume strain between solid and pores: p >= -spall, and p
-    <= 0 while there are pores. If the averaged forms have subtracted a dilation (row DILATION below zero), the pressure
-    before the step contains this dilation.
+    """Limits the pressure to p >= -spall, and to p <= 0 while the tet has pores, by moving volume strain between solid
+    and pores. If the averaged pressure forms have subtracted a dilation (row DILATION below zero), the pressure before
+    the step contains this dilation.
     """
     bulk, spall, dilates = params[BULK], params[SPALL], params[DILATES] > 0.0
     for i in range(n):
@@ -86,7 +86,7 @@ def _tear_linear(w, s, params, n):  # type: ignore[no-untyped-def]
 
 @njit("void(float64[::1], float64[::1], float64[::1], int64)", cache=True, error_model="numpy")
 def volumes_by_ratio(w, s, params, n):  # type: ignore[no-untyped-def]
-    """Sets VOLUME_SEEN of n, m^3, for tets that store the volume ratio of their solid."""
+    """Sets VOLUME_SEEN at step n, m^3, for tets that store the volume ratio of their solid."""
     per_density, porous = 1.0 / params[DENSITY], params[SPALL] < np.inf
     for i in range(n):
         whole = 1.0 + s[_PORES + i] if porous else 1.0
@@ -95,7 +95,7 @@ def volumes_by_ratio(w, s, params, n):  # type: ignore[no-untyped-def]
 
 @njit("void(float64[::1], float64[::1], float64[::1], int64)", cache=True, error_model="numpy")
 def volumes_by_pressure(w, s, params, n):  # type: ignore[no-untyped-def]
-    """Sets VOLUME_SEEN of n for the linear pressure, m^3: V0 exp(pores - p / K)."""
+    """Sets VOLUME_SEEN at step n, m^3, for the linear pressure: V0 exp(pores - p / K)."""
     per_density, per_bulk, porous = 1.0 / params[DENSITY], 1.0 / params[BULK], params[SPALL] < np.inf
     for i in range(n):
         pores = s[_PORES + i] if porous else 0.0
@@ -106,8 +106,8 @@ def volumes_by_pressure(w, s, params, n):  # type: ignore[no-untyped-def]
 def cold(params, ratio):  # type: ignore[no-untyped-def]
     """Returns the pressure without heat at a volume ratio, p = p_H (1 - gamma chi / 2), and its derivative dp/dchi.
 
-    NaN where the Hugoniot does not exist: from the pole of p_H on, chi = 1 / S, and for a volume that is not
-    positive.
+    The result is NaN if the Hugoniot curve does not exist: at and beyond the pole of p_H, chi = 1 / S, and for a volume
+    that is not positive.
     """
     gamma, slope = params[_GAMMA], params[_SLOPE]
     stiffness = params[DENSITY] * params[_C0] * params[_C0]
@@ -123,8 +123,8 @@ def cold(params, ratio):  # type: ignore[no-untyped-def]
 
 @njit("float64(float64[::1], float64, float64, float64)", cache=True, error_model="numpy", forceinline=True)
 def modulus(params, ratio, tangent, pressure):  # type: ignore[no-untyped-def]
-    """Returns rho c^2, Pa: with a bulk modulus of at least _LEAST times the bulk modulus at rest, because strong
-    tension makes the tangent negative; NaN stays NaN.
+    """Returns rho c^2, Pa, computed with a bulk modulus of at least _LEAST times the bulk modulus at rest, because
+    strong tension makes the tangent negative. A NaN does not change.
     """
     bulk, least = ratio * (tangent + params[_GAMMA] * pressure), _LEAST * params[BULK]
     return (least if bulk < least else bulk) + 4.0 / 3.0 * params[SHEAR]
@@ -132,13 +132,13 @@ def modulus(params, ratio, tangent, pressure):  # type: ignore[no-untyped-def]
 
 @njit("void(float64[::1], float64[::1], float64[::1], int64)", cache=True, error_model="numpy")
 def mie_gruneisen(w, s, params, n):  # type: ignore[no-untyped-def]
-    """Mie-Grueneisen: p = p_H(chi) (1 - gamma chi / 2) + gamma rho_0 e, chi = 1 - V/V0; in tension p_H is rho_0 c0^2
-    chi.
+    """Computes the Mie-Grueneisen pressure p = p_H(chi) (1 - gamma chi / 2) + gamma rho_0 e, with chi = 1 - V/V0. In
+    tension p_H is rho_0 c0^2 chi.
 
-    e is the work so far (stress, plastic and viscous) over the mass. The energy equation with the mean pressure of the
-    step is linear in the new pressure, and solved in closed form. The factor 1 - gamma chi / 2 applies to compression
-    only. In the averaged forms e is HEAT, a mean over nodes except for flat tets, up to the work of the pressure in
-    this step; the work of the pressure is then the work on the averaged volume.
+    The specific energy e is the work so far (of stress, plastic and viscous) divided by the mass. The energy equation
+    uses the mean pressure of the step, is linear in the new pressure, and is solved in closed form. The factor 1 -
+    gamma chi / 2 applies to compression only. In the averaged pressure forms e is HEAT, a mean over nodes except for
+    flat tets, plus the work of the pressure in this step, which is then the work on the averaged volume.
     """
     gamma, heating = params[_GAMMA], params[_GAMMA] * params[DENSITY]
     averaged, bulk = len(s) > NODAL_WORK * CHUNK, params[BULK]
@@ -167,9 +167,9 @@ def mie_gruneisen(w, s, params, n):  # type: ignore[no-untyped-def]
 
 @njit("void(float64[::1], float64[::1], float64[::1], int64)", cache=True, error_model="numpy")
 def _tear(w, s, params, n):  # type: ignore[no-untyped-def]
-    """Limits the pressure as ``_tear_linear``: at the cut-off, and at zero while pores close, the cold pressure is
-    linear in the volume ratio of the solid, and the ratio is computed from the pressure. After the pores have closed,
-    the pressure is computed from the ratio.
+    """Limits the pressure of Mie-Grueneisen in the same way as ``_tear_linear``. At the cut-off, and at zero pressure
+    while pores close, the cold pressure is linear in the volume ratio of the solid, and the ratio is computed from the
+    pressure. After the pores have closed, the pressure is computed from the ratio.
     """
     spall, stiffness = params[SPALL], params[BULK]
     for i in range(n):
@@ -195,11 +195,13 @@ def _gruneisen(eos: MieGruneisen) -> tuple[float, ...]:
 
 
 def pole(params: Floats) -> float:
-    """Returns the compression 1 - V/V0 at which p_H is infinite, 1 / S; at most 1, zero volume."""
+    """Returns the compression 1 - V/V0 at which p_H is infinite, which is 1 / S; at most 1, where the volume is
+    zero.
+    """
     return 1.0 / max(float(params[_SLOPE]), 1.0)
 
 
 ELASTIC = Equation("", 0, lambda _: (), linear, volumes_by_pressure)
-"""Linear pressure with the bulk modulus of the elasticity."""
+"""Linear pressure with the bulk modulus of the elastic constants."""
 GRUNEISEN = Equation("mie_gruneisen", VOLUME_RATIO + 1, _gruneisen, mie_gruneisen, volumes_by_ratio, NODAL_WORK + 1)
-"""Mie-Grueneisen equation of state: pressure of compression and heat."""
+"""Mie-Grueneisen equation of state, with pressure from compression and from heat."""

@@ -1,8 +1,9 @@
 """Hyperelastic shear of materials without a strength law: the deviatoric stress has a potential, so that its energy is
 conserved.
 
-W = V0 G/4 (tr b + tr b^-1 - 6), b = J^(-2/3) F F^T: the Mooney-Rivlin form with equal constants, equal to Hencky's,
-G (ln V : ln V), up to the fourth order in strain. Derived in docs/theory/materials.md.
+The potential is W = V0 G/4 (tr b + tr b^-1 - 6), with b = J^(-2/3) F F^T. It is the Mooney-Rivlin form with equal
+constants. Up to the fourth order in strain it is equal to Hencky's potential, G (ln V : ln V). Derived in
+docs/theory/materials.md.
 """
 
 import numpy as np
@@ -18,21 +19,21 @@ _SYZ, _SZX, _SXY = S_YZ * CHUNK, S_ZX * CHUNK, S_XY * CHUNK
 _WORK, _MASS, _DISTORTION = WORK * CHUNK, MASS * CHUNK, DISTORTION * CHUNK
 _THIRD = 1.0 / 3.0
 _ONE = 0x3FF0000000000000
-"""Bits of 1.0."""
-# Scratch rows; the rows of rate of deformation and spin are not needed by this law and are used again.
+"""Bit pattern of 1.0."""
+# Scratch rows of this law. The law uses the rows of rate of deformation and spin again, because it does not need them.
 _AXX, _AYY, _AZZ, _AYZ, _AZX, _AXY = (RATE + k * CHUNK for k in range(6))
 _MORE, _LESS, _HALF_SHEAR, _K = RATE + 6 * CHUNK, RATE + 7 * CHUNK, RATE + 8 * CHUNK, TRIAL
 
 
 @njit("float64(float64)", cache=True, error_model="numpy", forceinline=True)
 def inverse_sixth_root(u):  # type: ignore[no-untyped-def]
-    """Returns u^(-1/6), to round-off for u from 1e-24 to 1e24: y (1 - r)^(-1/6), 1 - r = u y^6, by its series, three
-    times.
+    """Returns u^(-1/6), accurate to round-off for u from 1e-24 to 1e24. The formula y (1 - r)^(-1/6), 1 - r = u y^6, is
+    applied three times, as a power series.
 
-    The computation uses only + - * and the bits of a float64 as an integer, with equal results in vector code and in
-    scalar code. It uses no root and no quotient, because each takes as long as ten products. The bits are a piecewise
-    linear logarithm; a sixth of the distance of the bits from the bits of 1, computed by shifts, gives the first y,
-    which is exact at 1.
+    The computation uses only + - * and the bit pattern of a float64 as an integer, with equal results in vector code
+    and in scalar code. It uses no root and no quotient, because each of them takes as long as ten products. The bit
+    pattern is a piecewise linear logarithm. The first y is found by shifts: a sixth of the distance from the bit
+    pattern of 1. This y is exact at 1.
     """
     far = np.float64(u).view(np.int64) - _ONE
     y = np.int64(_ONE - ((far >> 3) + (far >> 5) + (far >> 7) + (far >> 9) + (far >> 11))).view(np.float64)
@@ -76,10 +77,10 @@ def _strains(w, n):  # type: ignore[no-untyped-def]
 
 @njit("void(float64[::1], int64, float64)", cache=True, error_model="numpy")
 def _roots(w, n, shear):  # type: ignore[no-untyped-def]
-    """Sets rows k = det(1 + A)^(-1/3), k - 1 without cancellation, and G / 2J. This computation is a separate loop, so
-    that the long chains of operations of several tets overlap.
+    """Sets the rows k = det(1 + A)^(-1/3), k - 1 without cancellation, and G / 2J. A separate loop computes these rows,
+    so that the long chains of operations of several tets overlap.
 
-    NaN if round-off leaves no positive determinant.
+    The result is NaN if the determinant is not positive because of round-off.
     """
     half = 0.5 * shear
     for i in range(n):
@@ -95,11 +96,13 @@ def _roots(w, n, shear):  # type: ignore[no-untyped-def]
 
 @njit("void(float64[::1], float64[::1], float64[::1], int64, float64)", cache=True, error_model="numpy")
 def hyperelastic(w, s, params, n, dt):  # type: ignore[no-untyped-def]
-    """Computes the deviatoric stress G / 2J dev(b - b^-1) of a chunk, Pa; its work is the change of its potential.
+    """Computes the deviatoric stress G / 2J dev(b - b^-1) of a chunk, Pa. The work of this stress is the change of its
+    potential.
 
-    ``w`` holds V grad N of the end of the step, and from MOVED on the displacements. The stress is computed from A, and
-    therefore from the displacement gradient: small strains keep their digits, and zero strain gives exactly zero
-    stress. b^-1 = k (1 + A), so that b^-1 - 1 = k A + (k - 1); b is the adjugate of b^-1, as its determinant is one.
+    ``w`` has V grad N at the end of the step, and from MOVED on the displacements. The stress is computed from A, and
+    therefore from the displacement gradient, so that small strains keep their digits, and zero strain gives exactly
+    zero stress. b^-1 = k (1 + A), so that b^-1 - 1 = k A + (k - 1). b is the adjugate of b^-1, because the determinant
+    of b^-1 is one.
     """
     _strains(w, n)
     _roots(w, n, params[SHEAR])
@@ -132,7 +135,7 @@ def hyperelastic(w, s, params, n, dt):  # type: ignore[no-untyped-def]
 def stiffen(w, s, params, n):  # type: ignore[no-untyped-def]
     """Raises MODULUS from K + 4/3 G to an upper bound for a strained tet: K + 4/3 (G + 2 W / V0) / |J|.
 
-    The value is positive for an inverted tet too: limits.step_limit detects it by its volume.
+    The value is positive even for an inverted tet; limits.step_limit detects an inverted tet by its volume.
     """
     shear = params[SHEAR]
     of_mass = shear / params[DENSITY]
@@ -142,4 +145,4 @@ def stiffen(w, s, params, n):  # type: ignore[no-untyped-def]
 
 
 LAW = Law("", FROM_SHAPE, lambda _: TET_VOLUME + 1, lambda _: (), lambda *_: {}, hyperelastic)
-"""Law of materials without a strength law."""
+"""Law for materials that have no strength law."""

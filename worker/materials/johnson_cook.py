@@ -1,11 +1,11 @@
-"""Johnson-Cook flow stress: radial return with adiabatic heating.
+"""Johnson-Cook strength law: radial return to the flow stress, with adiabatic heating.
 
-sigma = (A + B e^n) (1 + C ln max(rate / rate_0, 1)) (1 - T*^m). Johnson and Cook 1983. With ``softening`` s this is
-multiplied by 1 - s D, with the damage D at the start of the step. Borvik and others 2001.
+sigma = (A + B e^n) (1 + C ln max(rate / rate_0, 1)) (1 - T*^m). Johnson and Cook 1983. With ``softening`` s the flow
+stress is multiplied by 1 - s D, where D is the damage at the start of the step (Borvik and others 2001).
 
-The yielding tets of a chunk are copied side by side into the scratch and solved together, loop after loop, with own
-logarithms and powers. Converged tets are moved to the end of the list and are not changed any more, so that no result
-depends on which tets are in the same chunk.
+The yielding tets of a chunk are copied side by side into the scratch memory and solved together, loop after loop, with
+the logarithms and powers of elementary.py. Converged tets are moved to the end of the list and are not changed again,
+so that no result depends on the other tets of the chunk.
 """
 
 from conoid.cases.laws.johnson_cook import JohnsonCook
@@ -38,45 +38,45 @@ _SXX, _SYY, _SZZ = S_XX * CHUNK, S_YY * CHUNK, S_ZZ * CHUNK
 _SYZ, _SZX, _SXY = S_YZ * CHUNK, S_ZX * CHUNK, S_XY * CHUNK
 _STRAIN, _WORK, _YIELD, _FLOW = PLASTIC_STRAIN * CHUNK, WORK_PLASTIC * CHUNK, YIELD * CHUNK, FLOW * CHUNK
 _TEMPERATURE, _MASS, _P, _DAMAGE = TEMPERATURE * CHUNK, MASS * CHUNK, PRESSURE * CHUNK, DAMAGE * CHUNK
-# Scratch rows, by yielding tet: place in the chunk; known quantities; share of the strength that
-# damage leaves; bracket, increment, whether it is not converged; flow stress without rate; e, T* and the
-# relative rate; then the logarithms and powers of these.
+# Scratch rows with one value for each yielding tet: place in the chunk; known quantities; fraction of the strength that
+# damage leaves; bracket, increment, whether the increment has not converged; flow stress without rate; e, T* and the
+# relative rate; then the logarithms and powers of e, T* and the rate.
 _PLACE, _Q, _KNOWN, _HOT, _WARM, _LEFT, _LOW, _HIGH, _D, _OPEN, _STATIC, _SUM, _FAST, _SOFT, _T = (
     NODAL + k * CHUNK for k in range(15)
 )
 _MOST = 140
-"""Largest number of iterations. Largest number of iterations. Every second iteration halves the bracket at least, so
-the bracket reaches the last bit of a float64 (52 bits)."""
+"""Largest number of iterations. At least every second iteration halves the bracket, so the bracket reaches the last bit
+of a float64 (52 bits)."""
 _CLOSE = 1e-4
 """Relative Newton step at which the iteration ends. The remaining error is the square of this step, below 1e-8 of
 the stress."""
 _PATIENT = 20
-"""Number of iterations after which every second iteration is a halving, because with softening Newton's method may
-alternate between two values. The first yield, with increments between 1e-2 and 1e-21, takes up to 20 iterations
-without halving. Smaller increments, for a trial stress less than 1e5 Pa above the flow stress, take up to 100 with
-the halvings."""
+"""Number of iterations after which every second iteration halves the bracket, because with softening Newton's method
+may alternate between two values. First yield, with increments between 1e-2 and 1e-21, takes up to 20 iterations without
+halving. Smaller increments, for a trial stress less than 1e5 Pa above the flow stress, take up to 100 iterations with
+halving."""
 _BELOW = 1.0 - 2.0**-40
-"""Factor slightly below 1: its product with the increment at which the rate term begins is just below this kink of
-the flow stress."""
+"""Factor slightly below 1. The rate term begins at a certain increment, where the flow stress has a kink; the product
+of the factor and this increment is just below the kink."""
 _NARROW = 1e-12
-"""Relative width of a bracket that ends the iteration."""
+"""Relative width of the bracket at which the iteration ends."""
 _STEEPEST = 600.0
-"""Largest magnitude of the exponent of e in the fracture strain; the strain is then between 0 and 1e260."""
+"""Largest magnitude of the exponent of e in the fracture strain, which is then between 0 and 1e260."""
 _MOST_TENSE = 1.5
-"""Largest ratio of tension to flow stress in the fracture strain; for larger ratios Johnson and Cook 1985 have no
-measurements."""
+"""Largest ratio of tension to flow stress in the formula for the fracture strain. Johnson and Cook 1985 have no
+measurements at larger ratios."""
 _LEAST_STRAIN = 1e-6
 """Smallest fracture strain. Chosen value: if the constants give a negative fracture strain, a tet breaks at first
 yield."""
 _TWO_THIRDS = 2.0 / 3.0
 _TINY = 1e-300
-"""Smallest argument of a logarithm; it replaces zero."""
+"""Smallest argument of a logarithm; an argument of zero is replaced by this value."""
 
 
 @njit("int64(float64[::1], float64[::1], float64[::1], int64)", cache=True, error_model="numpy")
 def gather(w, s, params, n):  # type: ignore[no-untyped-def]
-    """Copies the tets above their rate-free flow stress side by side; returns their number. The root is in [0, q / 3
-    G].
+    """Copies the tets above their rate-free flow stress side by side into the scratch memory; returns their number. The
+    increment of each tet is in the bracket [0, q / 3 G].
     """
     m, shear3, softening = 0, 3.0 * params[SHEAR], params[_SOFTENING]
     for i in range(n):
@@ -98,7 +98,7 @@ def gather(w, s, params, n):  # type: ignore[no-untyped-def]
 
 @njit("void(float64[::1], float64[::1], int64, float64)", cache=True, error_model="numpy")
 def _factors(w, params, m, dt):  # type: ignore[no-untyped-def]
-    """Computes e^n, the logarithm of the relative rate, at least 0, and T*^m, at the present increments."""
+    """Computes e^n, the logarithm of the relative rate (at least 0), and T*^m, at the present increments."""
     shear3, fast, cold = 3.0 * params[SHEAR], 1.0 / (dt * params[_RATE]), params[_T0]
     per_span = 1.0 / (params[_MELT] - params[_T0])
     for j in range(m):
@@ -121,16 +121,13 @@ def _newton(w, params, m, dt, halve):  # type: ignore[no-untyped-def]
     """Executes one iteration of q - 3 G d = flow stress(d) for ``m`` tets; returns the number of tets that have not
     converged.
 
-    The left side decreases with d, and the right side increases until the metal softens: the root stays in its bracket.
+    The left side decreases with d, and the right side increases until the metal softens, so the root stays in its
+    bracket.
 
-    1. Residual and slope at d.
-    2. New bracket.
-    3. Newton step in d. The step is in ln d instead, to second order, where the flow stress increases more steeply
-       than the trial stress decreases (as the logarithm or a power of d: by the rate, or on first yield), and where a
-       step in d would cross the kink at which the rate term begins: steps in d would alternate between 1e-9 and 1e-5.
-       A step that crosses the kink in ln d as well ends there.
-    4. Halving instead, if the step leaves the bracket, and always with ``halve``.
-    5. Convergence, by the step or by the width of the bracket.
+    The step is in ln d, to second order, if the flow stress increases more steeply than the trial stress decreases (as
+    the logarithm or a power of d: by the rate, or on first yield). The step is also in ln d if a step in d would cross
+    the kink at which the rate term begins, because such steps would alternate between 1e-9 and 1e-5. A step in ln d
+    that crosses the kink ends at the kink. With ``halve`` the bracket is always halved.
     """
     shear3, going, kink = 3.0 * params[SHEAR], 0, _BELOW * dt * params[_RATE]
     a, b, n, c, per_span = params[_A], params[_B], params[_N], params[_C], params[_M] / (params[_MELT] - params[_T0])
@@ -177,7 +174,7 @@ def _newton(w, params, m, dt, halve):  # type: ignore[no-untyped-def]
 
 @njit("int64(float64[::1], int64)", cache=True)
 def _open_first(w, m):  # type: ignore[no-untyped-def]
-    """Moves the tets among the ``m`` tets that have not converged to the front; returns the number of these tets."""
+    """Moves those of the ``m`` tets that have not converged to the front; returns their number."""
     n = 0
     for j in range(m):
         if w[_OPEN + j] > 0.0:
@@ -190,7 +187,7 @@ def _open_first(w, m):  # type: ignore[no-untyped-def]
 
 @njit("int64(float64[::1], float64[::1], int64, float64)", cache=True, error_model="numpy")
 def increments(w, params, m, dt):  # type: ignore[no-untyped-def]
-    """Solves for the strain increments of the ``m`` tets in the scratch; returns the total number of iterations."""
+    """Computes the strain increments of ``m`` tets in the scratch memory; returns the total number of iterations."""
     sought, steps = m, 0
     for k in range(_MOST):
         steps += sought
@@ -204,9 +201,9 @@ def increments(w, params, m, dt):  # type: ignore[no-untyped-def]
 
 @njit("void(float64[::1], float64[::1], float64[::1], int64, int64, float64)", cache=True, error_model="numpy")
 def _return(w, s, params, m, n, dt):  # type: ignore[no-untyped-def]
-    """Scales the deviatoric stress to the flow stress; books strain, heat, and the work of the mean of the rotated old
-    stress and the new one (as in mohr_coulomb.py), so that the remaining work is equal to the elastic energy of the
-    stress.
+    """Scales the deviatoric stress to the flow stress. Adds plastic strain, heat, and the plastic work, which is the
+    work of the mean of the rotated old stress and the new stress (as in mohr_coulomb.py). With this mean the remaining
+    work is equal to the elastic energy of the stress.
     """
     shear3, shear2 = 3.0 * params[SHEAR], 2.0 * params[SHEAR]
     for i in range(n):
@@ -236,10 +233,11 @@ def _return(w, s, params, m, n, dt):  # type: ignore[no-untyped-def]
 
 @njit("void(float64[::1], float64[::1], float64[::1], int64, float64)", cache=True, error_model="numpy")
 def _wear(w, s, params, m, dt):  # type: ignore[no-untyped-def]
-    """Adds d over the fracture strain, (D1 + D2 e^(D3 t)) (1 + D4 ln rate) (1 + D5 T*), to the damage, at most 1.
+    """Adds d / fracture strain to the damage, which is at most 1. The fracture strain is (D1 + D2 e^(D3 t)) (1 + D4 ln
+    rate) (1 + D5 T*).
 
-    t is the tension -p over the flow stress, at most _MOST_TENSE, with the pressure at the start of the step.
-    Johnson and Cook 1985.
+    t is the ratio of the tension -p to the flow stress, at most _MOST_TENSE, computed with the pressure at the start of
+    the step. Johnson and Cook 1985.
     """
     fast, per_span = 1.0 / (dt * params[_RATE]), 1.0 / (params[_MELT] - params[_T0])
     for j in range(m):
@@ -260,7 +258,7 @@ def _wear(w, s, params, m, dt):  # type: ignore[no-untyped-def]
 
 @njit("void(float64[::1], float64[::1], float64[::1], int64, float64)", cache=True, error_model="numpy")
 def johnson_cook(w, s, params, n, dt):  # type: ignore[no-untyped-def]
-    """Returns the trial stress of the tets above their rate-free flow stress; heats them by the plastic work."""
+    """Returns the trial stress to the flow stress, for tets above their rate-free flow stress, and heats these tets."""
     equivalent_stress(w, s, n)
     m = gather(w, s, params, n)
     if m == 0:
@@ -296,4 +294,4 @@ def _begin(law: JohnsonCook, temperature: float) -> dict[int, float]:
 
 
 LAW = Law("johnson_cook", BEFORE_PRESSURE, _rows, _constants, _begin, johnson_cook)
-"""Johnson-Cook strength law with heat from plastic work, and with damage, at which erosion removes tets."""
+"""Johnson-Cook strength law with heat from plastic work and with damage. Erosion removes tets by their damage."""

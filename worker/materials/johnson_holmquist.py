@@ -1,8 +1,8 @@
-"""Johnson-Holmquist 2: strength of a brittle material by pressure, rate and damage; pressure with bulking; tension
-cut-off.
+"""Johnson-Holmquist 2 law of brittle materials. The strength depends on pressure, rate and damage; the pressure has
+bulking and a tension cut-off.
 
-Johnson and Holmquist 1994. Order of the computation in a step (docs/theory/materials.md): pressure at n+1, with bulking
-and damage at n; strength at that pressure; return to the strength; damage and bulking at n+1.
+Source: Johnson and Holmquist 1994. A step computes in this order (docs/theory/materials.md): pressure at n+1, with
+bulking and damage at n; strength at this pressure; return of the stress to the strength; damage and bulking at n+1.
 """
 
 import math
@@ -63,12 +63,12 @@ _P, _STRAIN, _PLASTIC, _WORK = PRESSURE * CHUNK, PLASTIC_STRAIN * CHUNK, WORK_PL
 _DAMAGE, _BULKING, _RATIO = DAMAGE * CHUNK, BULKING * CHUNK, VOLUME_RATIO * CHUNK
 _BULKING_STEP, _CORNERS = BULKING_STEP * CHUNK, CORNERS * CHUNK
 _AVERAGED, _MASS = WORK_AVERAGED * CHUNK, MASS * CHUNK
-# Scratch rows: (p* + T*)^N; (p* + T*)^D2; p*^M; logarithm of the relative rate.
+# Scratch rows of the law: (p* + T*)^N; (p* + T*)^D2; p*^M; logarithm of the relative rate.
 _INTACT, _FRACTURE, _CRUMBLED, _FAST = (NODAL + k * CHUNK for k in range(4))
 _TINY = 1e-300
-"""Smallest argument of a logarithm; it replaces zero."""
+"""Smallest argument of a logarithm; an argument of zero is replaced by this value."""
 _LEAST = 0.05
-"""Smallest bulk modulus in the wave speed, as a share of the bulk modulus at rest. Chosen value; this limit can only
+"""Smallest bulk modulus in the wave speed, divided by the bulk modulus at rest. Chosen value. This limit can only
 decrease the stable step."""
 _THIRD, _TWO_THIRDS = 1.0 / 3.0, 2.0 / 3.0
 
@@ -77,8 +77,8 @@ _THIRD, _TWO_THIRDS = 1.0 / 3.0, 2.0 / 3.0
     "UniTuple(float64, 2)(float64[::1], float64, float64, float64)", cache=True, error_model="numpy", forceinline=True
 )
 def _pressed(params, ratio, bulking, least):  # type: ignore[no-untyped-def]
-    """Returns p = K m + K2 m^2 + K3 m^3 + bulking, m = V0/V - 1; in tension K m + bulking, at least ``least`` = -T
-    (1 - D); and the tangent bulk modulus.
+    """Returns the pressure and the tangent bulk modulus, with m = V0/V - 1. Under compression p = K m + K2 m^2 + K3 m^3
+    + bulking. In tension p = K m + bulking, but at least ``least`` = -T (1 - D).
     """
     bulk, second, third = params[BULK], params[_K2], params[_K3]
     m = 1.0 / ratio - 1.0
@@ -90,9 +90,9 @@ def _pressed(params, ratio, bulking, least):  # type: ignore[no-untyped-def]
 
 @njit("float64(float64[::1], float64, float64, float64, float64)", cache=True, error_model="numpy")
 def _stored(params, ratio, p, bulking, least):  # type: ignore[no-untyped-def]
-    """Returns the elastic energy of the pressure ``p`` of ``_pressed``, per initial volume, Pa: the integral of -p over
-    the volume ratio, from the ratio at zero pressure. Above the volume ratio at which the pressure is ``least``, the
-    energy is constant; under compression it is computed as a triangle.
+    """Returns the elastic energy of the pressure ``p`` of ``_pressed``, per initial volume, Pa. It is the integral of
+    -p over the volume ratio, from the ratio at zero pressure. Above the volume ratio at which the pressure is
+    ``least``, the energy is constant; under compression the energy is computed as a triangle.
     """
     bulk = params[BULK]
     stiff = bulk - bulking
@@ -105,8 +105,8 @@ def _stored(params, ratio, p, bulking, least):  # type: ignore[no-untyped-def]
 
 @njit("float64(float64[::1], float64, float64, float64, float64, float64, float64)", cache=True, error_model="numpy")
 def _beyond(params, before, after, old, new, bulking, least):  # type: ignore[no-untyped-def]
-    """Returns the part of the mean pressure's work between two ratios that is not stored, per initial volume, Pa:
-    non-zero only where the tension cut-off acts.
+    """Returns the part of the work of the mean pressure between two volume ratios that is not stored, per initial
+    volume, Pa. The part is not zero only if the tension cut-off acts.
     """
     if (new > least or not after > before) and (old > least or not before > after):
         return 0.0
@@ -116,7 +116,7 @@ def _beyond(params, before, after, old, new, bulking, least):  # type: ignore[no
 
 @njit("float64(float64[::1], float64, float64, float64, float64)", cache=True, error_model="numpy", forceinline=True)
 def _opened(params, before, after, bulking, least):  # type: ignore[no-untyped-def]
-    """Returns the increase of the volume ratio of a tet from ``before`` to ``after`` that lies beyond the tension
+    """Returns the increase of the volume ratio of a tet from ``before`` to ``after``, counted only beyond the tension
     cut-off.
     """
     end = params[BULK] / (params[BULK] - bulking + least)
@@ -125,13 +125,14 @@ def _opened(params, before, after, bulking, least):  # type: ignore[no-untyped-d
 
 @njit("void(float64[::1], float64[::1], float64[::1], int64)", cache=True, error_model="numpy")
 def crumbling(w, s, params, n):  # type: ignore[no-untyped-def]
-    """Computes the pressure of ``_pressed``; in the averaged forms the mean over the four nodes, each with its own
-    cut-off, and with the energy summed over them (elements/heat_and_bulking.py).
+    """Computes the pressure of ``_pressed`` for a chunk. In the averaged pressure forms the pressure is the mean over
+    the four nodes, each with its own cut-off, and the energy is summed over the nodes (elements/heat_and_bulking.py).
 
-    Booked as plastic work: the difference between the work of the pressure of n and that at the same ratio with the
-    present bulking and damage, and the work of the expansion beyond the tension cut-off. Beyond the cut-off the
-    pressure does not determine a volume ratio. The work is therefore computed from the opening of the tet itself, not
-    from the ratio at its nodes, which also contains the opening of neighbours without tension.
+    The plastic work has two parts. The first part is the difference between the work of the pressure of step n and the
+    work at the same ratio with the present bulking and damage. The second part is the work of the expansion beyond the
+    tension cut-off. Beyond the cut-off the pressure does not determine a volume ratio. The work is therefore computed
+    from the opening of the tet itself, not from the ratio at its nodes, which also contains the opening of neighbours
+    without tension.
     """
     bulk, averaged = params[BULK], len(s) > _BULKING_STEP
     for i in range(n):
@@ -139,7 +140,8 @@ def crumbling(w, s, params, n):  # type: ignore[no-untyped-def]
         half = 0.5 * w[SEEN + i]
         ratio = s[_RATIO + i] * (1.0 + half) / (1.0 - half)
         least = -params[_T] * (1.0 - s[_DAMAGE + i])
-        # 2. Compute pressure and work beyond the cut-off at n+1: mean over the corners, or value of the tet.
+        # 2. Compute pressure and work beyond the cut-off at n+1. The pressure is the mean over the corners, or the
+        # value of the tet.
         if averaged:
             new, stiff, stored, beyond = 0.0, 0.0, 0.0, 0.0
             whole = s[_MASS + i] / params[DENSITY]
@@ -164,7 +166,7 @@ def crumbling(w, s, params, n):  # type: ignore[no-untyped-def]
             old, _ = _pressed(params, s[_RATIO + i], s[_BULKING + i], least)
             s[_PLASTIC + i] -= 0.5 * (s[_P + i] - old) * w[CHANGE + i]
             beyond = _beyond(params, s[_RATIO + i], ratio, old, new, s[_BULKING + i], least)
-        # 3. Book the work, update the state, compute the modulus.
+        # 3. Add the work, update the state, compute the modulus.
         s[_PLASTIC + i] += s[_MASS + i] / params[DENSITY] * beyond
         s[_WORK + i] -= 0.5 * (s[_P + i] + new) * w[CHANGE + i]
         s[_P + i], s[_RATIO + i] = new, ratio
@@ -173,8 +175,8 @@ def crumbling(w, s, params, n):  # type: ignore[no-untyped-def]
 
 @njit("void(float64[::1], float64[::1], float64[::1], int64)", cache=True, error_model="numpy")
 def _factors(w, s, params, n):  # type: ignore[no-untyped-def]
-    """Computes powers of the pressure, which are about zero if the pressure is zero, and the logarithm of the squared
-    relative rate, at least 0.
+    """Computes powers of the pressure, which are nearly zero if the pressure is zero. Computes the logarithm of the
+    squared relative rate, at least 0.
     """
     per_pressure, tension = 1.0 / params[_PHEL], params[_T] / params[_PHEL]
     per_rate = _TWO_THIRDS / (params[_RATE] * params[_RATE])
@@ -214,12 +216,13 @@ def _tension_lost(s, params, i, damage, grown, averaged):  # type: ignore[no-unt
 
 @njit("void(float64[::1], float64[::1], float64[::1], int64, float64)", cache=True, error_model="numpy")
 def johnson_holmquist(w, s, params, n, dt):  # type: ignore[no-untyped-def]
-    """Returns the trial stress to the strength at the new pressure; updates damage and bulking; books the plastic work.
+    """Returns the trial stress to the strength at the new pressure. Updates damage and bulking, and adds the plastic
+    work.
 
     The strength uses the damage at n, so that the return to the strength needs no iteration. The plastic work is the
-    work of the mean of the rotated old stress and the new stress (as in mohr_coulomb.py), also where damage or pressure
-    lower the strength; the energy that is converted to bulking is stored, and therefore subtracted from the plastic
-    work. In the averaged forms new bulking is distributed to the nodes first (elements/heat_and_bulking.py).
+    work of the mean of the rotated old stress and the new stress (as in mohr_coulomb.py), even if damage or pressure
+    lower the strength. Energy that is converted to bulking is stored, and is therefore subtracted from the plastic
+    work. In the averaged pressure forms new bulking is first distributed to the nodes (elements/heat_and_bulking.py).
     """
     equivalent_stress(w, s, n)
     _factors(w, s, params, n)
@@ -236,11 +239,11 @@ def johnson_holmquist(w, s, params, n, dt):  # type: ignore[no-untyped-def]
         strength = intact - damage * (intact - crumbled)
         if q <= strength:
             continue
-        # 2. Compute plastic strain, and damage as plastic strain over fracture strain.
+        # 2. Compute the plastic strain, and the damage: plastic strain divided by fracture strain.
         strain = (q - strength) / (3.0 * shear)
         fracture = params[_D1] * w[_FRACTURE + i] if p > -tension else 0.0
         grown = damage + strain / fracture if strain < (1.0 - damage) * fracture else 1.0
-        # 3. Return the stress to the strength, and book the work.
+        # 3. Return the stress to the strength, and add the work.
         factor = strength / q
         mean = w[DILATATION + i] * _THIRD
         moved = (
@@ -254,7 +257,7 @@ def johnson_holmquist(w, s, params, n, dt):  # type: ignore[no-untyped-def]
             s[row * CHUNK + i] *= factor
         s[_STRAIN + i] += strain
         s[_PLASTIC + i] += w[VOLUME_MID + i] * max(lost, 0.0)
-        # 4. Damage reduces tension, and adds bulking by the deviatoric energy that the lower strength releases.
+        # 4. Lower the tension by the damage. Add bulking from the deviatoric energy that the lower strength releases.
         s[_DAMAGE + i] = grown
         s[_PLASTIC + i] += s[_MASS + i] / params[DENSITY] * _tension_lost(s, params, i, damage, grown, averaged)
         m = 1.0 / s[_RATIO + i] - 1.0
@@ -278,11 +281,12 @@ def _constants(law: JohnsonHolmquist) -> tuple[float, ...]:
 
 
 PRESSURE_LAW = Equation("johnson_holmquist", DAMAGE + 1, lambda _: (), crumbling, volumes_by_ratio, CORNERS + 4)
-"""Equation of state of the law. The pressure contains bulking (a nodal mean in the averaged forms) and the tension
-cut-off of the law."""
+"""Equation of state of the Johnson-Holmquist law. The pressure contains bulking (a nodal mean in the averaged pressure
+forms) and the tension cut-off of the law."""
 LAW = Law(
     "johnson_holmquist", AFTER_PRESSURE, lambda _: DAMAGE + 1, _constants,
     lambda *_: {CORNERS + k: 1.0 for k in range(4)}, johnson_holmquist,
     PRESSURE_LAW.model,
 )  # fmt: skip
-"""Tension is limited to T (1 - D), so fully damaged material has no tensile strength."""
+"""Johnson-Holmquist strength law. Tension is limited to T (1 - D), so fully damaged material has no tensile
+strength."""

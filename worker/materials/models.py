@@ -1,7 +1,8 @@
 """Lists of the strength laws and equations of state, and the kernels that call the law or equation of a block.
 
-``LAWS`` and ``EQUATIONS`` number them by their places; a block stores both numbers and one vector of constants. A new
-law needs a line in LAWS and a branch below; tests/worker/test_laws.py checks that every law has a branch.
+The number of a law is its place in ``LAWS``; the number of an equation of state is its place in ``EQUATIONS``. A block
+stores the two numbers and one vector of constants. A new law needs a line in LAWS and a branch in ``strengthen``;
+tests/worker/test_laws.py checks that every law has a branch.
 """
 
 import math
@@ -42,7 +43,9 @@ EQUATIONS = (equation_of_state.ELASTIC, equation_of_state.GRUNEISEN, johnson_hol
 
 @njit("void(int64, float64[::1], float64[::1], float64[::1], int64, float64)", cache=True, error_model="numpy")
 def strengthen(law, w, s, params, n, dt):  # type: ignore[no-untyped-def]
-    """Calls the kernel of number ``law`` in LAWS: deviatoric stress of a chunk, and the state of the law."""
+    """Calls the kernel of number ``law`` in LAWS. The kernel computes the deviatoric stress of a chunk, and the state
+    of the law.
+    """
     if law == 0:
         hyperelastic.hyperelastic(w, s, params, n, dt)
     elif law == 1:
@@ -59,7 +62,9 @@ def strengthen(law, w, s, params, n, dt):  # type: ignore[no-untyped-def]
 
 @njit("void(int64, float64[::1], float64[::1], float64[::1], int64)", cache=True, error_model="numpy")
 def press(equation, w, s, params, n):  # type: ignore[no-untyped-def]
-    """Calls the kernel of number ``equation`` in EQUATIONS: pressure of a chunk, its work, and MODULUS."""
+    """Calls the kernel of number ``equation`` in EQUATIONS. The kernel computes the pressure of a chunk, the work of
+    the pressure, and MODULUS.
+    """
     if equation == 0:
         equation_of_state.linear(w, s, params, n)
     elif equation == 1:
@@ -70,7 +75,7 @@ def press(equation, w, s, params, n):  # type: ignore[no-untyped-def]
 
 @njit("void(int64, float64[::1], float64[::1], float64[::1], int64)", cache=True, error_model="numpy")
 def swell(equation, w, s, params, n):  # type: ignore[no-untyped-def]
-    """Sets VOLUME_SEEN of a chunk before the step, for number ``equation`` in EQUATIONS."""
+    """Sets VOLUME_SEEN of a chunk before the step, by the kernel of number ``equation`` in EQUATIONS."""
     if equation == 0:
         equation_of_state.volumes_by_pressure(w, s, params, n)
     else:
@@ -104,8 +109,8 @@ def moduli(material: Material) -> tuple[float, float]:
 
 
 def parameters(material: Material, viscosity: Viscosity | None, *, breaks: bool = False) -> Floats:
-    """(SIZE,) constants of a material, SI; ``viscosity`` None: no bulk viscosity; ``breaks``: True if the part
-    fractures.
+    """(SIZE,) constants of a material, SI units. ``viscosity``: None for no bulk viscosity; ``breaks``: True if the
+    part fractures.
     """
     law, params = law_of(material), np.zeros(SIZE)
     params[DENSITY], params[ORDER] = material.density, law.order
@@ -129,6 +134,6 @@ def rows_of(material: Material, pressure: str) -> int:
 
 
 def beginning(material: Material, temperature: float) -> dict[int, float]:
-    """Returns the initial values of the state rows whose initial value is not zero, for the rows that a block has."""
+    """Returns the initial values of the state rows that a block has. Rows whose initial value is zero are omitted."""
     own = law_of(material).begin(material.strength, temperature)
     return {rows.VOLUME_RATIO: 1.0, rows.TEMPERATURE: temperature, **own}

@@ -1,9 +1,9 @@
 """Mohr-Coulomb strength of brittle materials: return of the deviatoric stress at constant pressure, or with dilation.
 
 f = (s1 - s3) + (s1 + s3) sin(phi) - 2 c cos(phi) <= 0 with s1 >= s2 >= s3, tension positive, and s1 - s3 <= cap.
-Plastic flow either keeps the volume, or has the same form with the dilation angle psi in place of phi; the flow then
-increases the pressure. Derived in docs/theory/materials.md. The functions of the return are inlined, because calls
-would take three times as long.
+Plastic flow either keeps the volume, or is given by f with the dilation angle psi in place of phi; in the second case
+the flow increases the pressure. Derived in docs/theory/materials.md. The functions that return the stress are inlined,
+because function calls would take three times as long.
 """
 
 import math
@@ -36,16 +36,17 @@ from .turning import sine_and_cosine
 
 _SINE, _COHESION, _CAP, _FAILURE = FIRST, FIRST + 1, FIRST + 4, FIRST + 5
 _RESIDUAL = 2
-"""Offset in the constants from _SINE and _COHESION of intact material to the same constants of failed material."""
+"""Offset between two groups of constants: from _SINE and _COHESION of intact material to the values of failed
+material."""
 _SXX, _SYY, _SZZ = S_XX * CHUNK, S_YY * CHUNK, S_ZZ * CHUNK
 _SYZ, _SZX, _SXY = S_YZ * CHUNK, S_ZX * CHUNK, S_XY * CHUNK
 _P, _STRAIN, _WORK = PRESSURE * CHUNK, PLASTIC_STRAIN * CHUNK, WORK_PLASTIC * CHUNK
 _WHOLE_WORK, _GROWN, _PORES = WORK * CHUNK, DILATION * CHUNK, PORES * CHUNK
 _THIRD, _TWO_THIRDS = 1.0 / 3.0, 2.0 / 3.0
 _MISES = 2.0 / math.sqrt(3.0)
-"""Largest s1 - s3 at a von Mises stress of one, in pure shear."""
+"""Largest value of s1 - s3 at a von Mises stress of one, which occurs in pure shear."""
 _SHEAR, _AXIAL = 1.0 / math.sqrt(3.0), 2.0 / 3.0
-"""Largest principal deviatoric stress at a von Mises stress of one, in pure shear and in tension along an axis."""
+"""Largest principal deviatoric stress at a von Mises stress of one: in pure shear, and in tension along an axis."""
 
 
 @njit(
@@ -55,12 +56,12 @@ _SHEAR, _AXIAL = 1.0 / math.sqrt(3.0), 2.0 / 3.0
     forceinline=True,
 )
 def principal(xx, yy, zz, yz, zx, xy):  # type: ignore[no-untyped-def]
-    """Returns the principal values, the largest first, of a deviator with von Mises stress one; the error is of the
-    order of round-off, also for equal values.
+    """Returns the principal values, the largest first, of a deviator with von Mises stress one. The error is of the
+    order of round-off, even for equal principal values.
 
-    The isolated value x solves x^3 - x / 3 = det s, which is well conditioned: three Newton steps from the chord. The
-    distance between the other two principal values follows from s without x and its projector (s^2 + x s + x^2 - 1/3) /
-    (3 x^2 - 1/3).
+    The isolated principal value x solves x^3 - x / 3 = det s. This equation is well conditioned and is solved by three
+    Newton steps from the chord. The distance between the other two principal values follows from s without x and its
+    projector (s^2 + x s + x^2 - 1/3) / (3 x^2 - 1/3).
     """
     det = xx * (yy * zz - yz * yz) + xy * (yz * zx - xy * zz) + zx * (xy * yz - yy * zx)
     size = abs(det)
@@ -91,9 +92,9 @@ def returned(d1, d2, d3, strength, sine, cap):  # type: ignore[no-untyped-def]
     """Returns the principal deviatoric stresses d1 >= d2 >= d3 projected onto the yield surface; unchanged if they are
     below the surface.
 
-    (1 + sine) d1 - (1 - sine) d3 <= strength and d1 - d3 <= cap. Flow is along (1, 0, -1), at constant d2, for both
-    planes; where such a flow would change the order of the three values, two of them are equal, which leaves a single
-    point.
+    The yield surface is (1 + sine) d1 - (1 - sine) d3 <= strength and d1 - d3 <= cap. For the two planes the flow is
+    along (1, 0, -1), at constant d2. If this flow would change the order of the three values, two of the values are set
+    equal, which gives a single point.
     """
     new = min(0.5 * (strength - (1.0 - sine) * d2), 0.5 * (cap - d2))
     if not new < d1:
@@ -115,10 +116,10 @@ def returned(d1, d2, d3, strength, sine, cap):  # type: ignore[no-untyped-def]
 )
 def dilated(d1, d2, d3, strength, sine, cap, psi, shear2, bulk):  # type: ignore[no-untyped-def]
     """Returns the principal deviatoric stresses projected onto the yield surface with flow along (1 + psi, 0, psi - 1),
-    which increases volume, pressure and strength; psi: sine of the dilation angle. The kernel also returns the amount
-    of flow; the plastic volume strain is 2 psi times this amount.
+    which increases volume, pressure and strength. psi is the sine of the dilation angle. The function also returns the
+    amount of flow; the plastic volume strain is 2 psi times this amount.
 
-    The cap is applied first, at constant volume. Flow ends where the deviator is zero.
+    The cap is applied first, at constant volume. Flow ends if the deviator becomes zero.
     """
     d1, d2, d3 = returned(d1, d2, d3, np.inf, sine, cap)
     up, down, stiff = 1.0 + psi * _THIRD, 1.0 - psi * _THIRD, 4.0 * bulk * sine * psi
@@ -142,10 +143,10 @@ def dilated(d1, d2, d3, strength, sine, cap, psi, shear2, bulk):  # type: ignore
 @njit("void(float64[::1], float64[::1], int64, float64, float64, float64)", cache=True, error_model="numpy",
       forceinline=True)  # fmt: skip
 def grow(w, s, i, grown, subtracted, bulk):  # type: ignore[no-untyped-def]
-    """Adds a plastic volume strain ``grown`` to the pressure of tet ``i``, and books its work with the mean pressure of
-    the step.
+    """Adds a plastic volume strain ``grown`` to the pressure of tet ``i``, and adds its work, computed with the mean
+    pressure of the step.
 
-    ``subtracted``: strain of the last step that the averaged forms have subtracted from the old pressure.
+    ``subtracted``: strain of the last step that the averaged pressure forms have subtracted from the old pressure.
     """
     more = bulk * grown
     s[_P + i] += more
@@ -162,11 +163,12 @@ def grow(w, s, i, grown, subtracted, bulk):  # type: ignore[no-untyped-def]
     forceinline=True,
 )
 def with_values(xx, yy, zz, yz, zx, xy, d1, d2, d3, e1, e2, e3):  # type: ignore[no-untyped-def]
-    """Returns the tensor with the principal directions of the given one, and the values e in place of its values d.
+    """Returns a tensor with the principal directions of the given tensor, and with the principal values e in place of
+    d.
 
-    e2 + [e2, e3] (s - d2) + [e1, e2, e3] (s - d2) (s - d3), by Newton's interpolation, which needs no principal
-    directions. After ``returned`` the first differences are between 0 and 1, so that equal values cause no error: where
-    two values d are equal, the two values e are equal too.
+    The formula is e2 + [e2, e3] (s - d2) + [e1, e2, e3] (s - d2) (s - d3), Newton's interpolation, which needs no
+    principal directions. After ``returned`` the first differences are between 0 and 1, so equal values cause no error:
+    if two values d are equal, the two values e are also equal.
     """
     upper = (e1 - e2) / (d1 - d2) if e1 > e2 else 0.0
     lower = (e2 - e3) / (d2 - d3) if e2 > e3 else 0.0
@@ -187,13 +189,14 @@ def with_values(xx, yy, zz, yz, zx, xy, d1, d2, d3, e1, e2, e3):  # type: ignore
 
 @njit("void(float64[::1], float64[::1], float64[::1], int64, float64)", cache=True, error_model="numpy")
 def mohr_coulomb(w, s, params, n, dt):  # type: ignore[no-untyped-def]
-    """Returns the trial stress of tets above the yield surface at their new pressure; books the plastic work.
+    """Returns the trial stress of tets above the yield surface to the yield surface at their new pressure. Adds the
+    plastic work.
 
     The plastic work is the work of the mean of the rotated old stress and the new stress, as for the total work. The
-    remaining work is equal to the change of the elastic energy of the stress, also if the strength decreases by lower
-    pressure or by failure. If the volume increases by dilation, the elastic energy density belongs to a larger volume
-    afterwards; this energy is subtracted from the work of the flow. With open pores there is no dilation: the
-    additional volume would go into the pores, and the pressure would not increase.
+    remaining work is equal to the change of the elastic energy of the stress, even if lower pressure or failure
+    decreases the strength. If the volume increases by dilation, the elastic energy density belongs to a larger volume
+    afterwards; the additional energy is subtracted from the work of the flow. With open pores there is no dilation,
+    because the additional volume would go into the pores, and the pressure would not increase.
     """
     equivalent_stress(w, s, n)
     shear2, cap, dilates = 2.0 * params[SHEAR], params[_CAP], params[DILATES] > 0.0
@@ -216,7 +219,7 @@ def mohr_coulomb(w, s, params, n, dt):  # type: ignore[no-untyped-def]
         sxx, syy, szz = r * (s[_SXX + i] - mean), r * (s[_SYY + i] - mean), r * (s[_SZZ + i] - mean)
         syz, szx, sxy = r * s[_SYZ + i], r * s[_SZX + i], r * s[_SXY + i]
         d1, d2, d3 = principal(sxx, syy, szz, syz, szx, sxy)
-        # 3. Compute the values e on the yield surface; with dilation also the pressure.
+        # 3. Compute the values e on the yield surface. With dilation, compute also the pressure.
         if dilates and k == 0 and not (porous and s[_PORES + i] > 0.0):
             e1, e2, e3, flow = dilated(d1, d2, d3, r * strength, sine, r * cap, params[DILATES], shear2, params[BULK])
             grown = 2.0 * params[DILATES] * q * flow
@@ -227,7 +230,7 @@ def mohr_coulomb(w, s, params, n, dt):  # type: ignore[no-untyped-def]
             e1, e2, e3 = returned(d1, d2, d3, max(r * strength, 0.0), sine, r * cap)
         if e1 == d1:
             continue
-        # 4. Compute the tensor with the values e; book plastic strain and work.
+        # 4. Compute the tensor with the values e; add plastic strain and work.
         nxx, nyy, nzz, nyz, nzx, nxy = with_values(sxx, syy, szz, syz, szx, sxy, d1, d2, d3, e1, e2, e3)
         s[_SXX + i], s[_SYY + i], s[_SZZ + i] = q * nxx, q * nyy, q * nzz
         s[_SYZ + i], s[_SZX + i], s[_SXY + i] = q * nyz, q * nzx, q * nxy
@@ -270,4 +273,4 @@ LAW = Law(
     dilates=lambda law: sine_and_cosine(law.dilation_angle)[0],
 )  # fmt: skip
 """Mohr-Coulomb strength law. For tension beyond the apex of the yield surface the deviator is zero; the pressure
-stays tensile until facets break."""
+remains a tension until facets break."""

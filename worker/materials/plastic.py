@@ -11,7 +11,7 @@ from ..model.state import CHUNK
 from .law import BEFORE_PRESSURE, FIRST, SHEAR, Law
 
 FACTOR = NODAL
-"""Row of the scratch: the new deviatoric stress over the trial stress."""
+"""Scratch row: ratio of the new deviatoric stress to the trial stress."""
 _HARDENING = FIRST
 _SXX, _SYY, _SZZ = S_XX * CHUNK, S_YY * CHUNK, S_ZZ * CHUNK
 _SYZ, _SZX, _SXY = S_YZ * CHUNK, S_ZX * CHUNK, S_XY * CHUNK
@@ -20,7 +20,7 @@ _STRAIN, _WORK, _YIELD = PLASTIC_STRAIN * CHUNK, WORK_PLASTIC * CHUNK, YIELD * C
 
 @njit("void(float64[::1], float64[::1], int64)", cache=True, error_model="numpy")
 def equivalent_stress(w, s, n):  # type: ignore[no-untyped-def]
-    """Sets TRIAL: the von Mises stress sqrt(3/2 s : s), Pa."""
+    """Sets TRIAL to the von Mises stress sqrt(3/2 s : s), Pa."""
     for i in range(n):
         sxx, syy, szz = s[_SXX + i], s[_SYY + i], s[_SZZ + i]
         syz, szx, sxy = s[_SYZ + i], s[_SZX + i], s[_SXY + i]
@@ -29,7 +29,7 @@ def equivalent_stress(w, s, n):  # type: ignore[no-untyped-def]
 
 @njit("void(float64[::1], float64[::1], float64[::1], int64, float64)", cache=True, error_model="numpy")
 def return_radially(w, s, params, n, dt):  # type: ignore[no-untyped-def]
-    """Multiplies the trial stress by row FACTOR and adds the plastic work; TRIAL has the von Mises stress of the trial
+    """Multiplies the trial stress by row FACTOR and adds the plastic work. TRIAL has the von Mises stress of the trial
     stress. The plastic work is the work of the mean of the rotated old stress and the new stress (as in
     mohr_coulomb.py).
     """
@@ -54,7 +54,9 @@ def return_radially(w, s, params, n, dt):  # type: ignore[no-untyped-def]
 
 @njit("void(float64[::1], float64[::1], float64[::1], int64, float64)", cache=True, error_model="numpy")
 def linear_hardening(w, s, params, n, dt):  # type: ignore[no-untyped-def]
-    """Returns the trial stress to the yield surface; strain increment (q - yield) / (3 G + H), exact for this law."""
+    """Returns the trial stress to the yield surface. The strain increment (q - yield) / (3 G + H) is exact for this
+    law.
+    """
     equivalent_stress(w, s, n)
     shear3, hardening = 3.0 * params[SHEAR], params[_HARDENING]
     for i in range(n):
@@ -75,4 +77,4 @@ def _begin(law: LinearHardening, _: float) -> dict[int, float]:
 LAW = Law(
     "linear_hardening", BEFORE_PRESSURE, lambda _: YIELD + 1, lambda law: (law.hardening,), _begin, linear_hardening
 )  # fmt: skip
-"""J2 strength law with linear hardening; the yield stress is a state row."""
+"""J2 strength law with linear hardening. The yield stress is a state row."""

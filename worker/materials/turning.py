@@ -1,5 +1,5 @@
-"""Sine and cosine, correct to the last bit. The functions of C libraries differ between processors, and digests would
-then differ too.
+"""Sine and cosine, correct to the last bit. The functions of C libraries differ between processors, so digests of runs
+would differ, too.
 """
 
 from decimal import Context, Decimal
@@ -8,13 +8,12 @@ import numpy as np
 import numpy.typing as npt
 
 _DIGITS = Context(prec=60)
-"""Number of decimal digits in the computation: more than a float64 needs after the cancellation of terms for an
+"""Number of decimal digits in the computation. It is more than a float64 needs after the cancellation of terms for an
 angle of a whole turn."""
 _MANY = Context(prec=120)
-"""Number of decimal digits for the largest angle of a case: the same number of digits is added before the decimal
-point."""
+"""Number of additional decimal digits: as many as the largest angle of a case has before the decimal point."""
 _SMALL = Decimal("1e-40")
-"""Size of a term that no longer changes a float64."""
+"""Size of a term of a power series that no longer changes a float64."""
 
 
 def _arc_tangent(n: int) -> Decimal:
@@ -27,12 +26,12 @@ def _arc_tangent(n: int) -> Decimal:
 
 
 _TURN = _MANY.subtract(_MANY.multiply(Decimal(32), _arc_tangent(5)), _MANY.multiply(Decimal(8), _arc_tangent(239)))
-"""2 pi, by Machin's formula."""
+"""The number 2 pi, computed by Machin's formula."""
 
 
 def sine_and_cosine(angle: float) -> tuple[float, float]:
-    """Returns sine and cosine of an ``angle``, radians, below 1e60: remainder of whole turns, power series in
-    decimals, then rounded.
+    """Returns sine and cosine of an ``angle``, radians, below 1e60. The computation takes the remainder of whole turns,
+    sums power series in decimals, and rounds the sums.
     """
     x = _MANY.remainder(Decimal(angle), _TURN)
     sums, term, k = [Decimal(0), Decimal(1)], Decimal(1), 0
@@ -44,7 +43,7 @@ def sine_and_cosine(angle: float) -> tuple[float, float]:
 
 
 def sines_and_cosines(angles: npt.NDArray[np.float64]) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]]:
-    """Returns sines and cosines of many angles, in their shape."""
+    """Returns sines and cosines of an array of angles, in the shape of the array."""
     some, which = np.unique(angles, return_inverse=True)
     parts = np.array([sine_and_cosine(angle) for angle in some.tolist()]).reshape(-1, 2)
     return parts[which, 0].reshape(angles.shape), parts[which, 1].reshape(angles.shape)
