@@ -72,7 +72,7 @@ class Draft:
         self.missing: list[str] = []
         """Keys that the case lacks and the user must write."""
         self._names, self._made = Names(), dict[str, tuple[str, Made]]()
-        self._places: dict[str, Entry] = {}
+        self._rigid: list[tuple[str, str]] = []
 
     def quantity(self, value: float, dimension: Dimension) -> str | float:
         """Returns a number of the deck with its unit."""
@@ -128,10 +128,15 @@ class Draft:
             part["temperature"] = temperature
         if made.rigid or body.rigid:
             part["rigid"] = True
+            self._rigid.append((body.key, body.name))
         if erosion := {**made.erosion, **body.erosion}:
             part["erosion"] = erosion
         body.entry.take(f"parts[{len(self.parts)}]")
         self.parts.append(part)
+
+    def rigid_parts(self) -> list[tuple[str, str]]:
+        """Returns key and name of each rigid part."""
+        return self._rigid
 
     def set_frames(self, count: float, interval: float, end: float, entry: Entry) -> int:
         """Sets ``run.frames`` from a number of frames, or from an interval in the time unit of the deck. Returns the

@@ -28,6 +28,8 @@ class Hold:
     speeds: dict[str, float]
     """Prescribed velocity by axis (x, y, z); 0 for a restraint."""
     course: Course = ()
+    still: str = ""
+    """Axes about which a rigid body does not rotate in the deck."""
     open: set[str] = field(default_factory=set)
     """Axes for which the import has not made a boundary yet."""
 
@@ -54,6 +56,20 @@ class Holding:
         for each in holds:
             if each.open:
                 self._one(each, walls)
+        self._compare(holds)
+
+    def _compare(self, holds: Sequence[Hold]) -> None:
+        """Records the axes about which each held rigid body turns, if they differ. In a case a body with one prescribed
+        component turns about this axis alone, and a body with two or three does not turn (parts[].rigid).
+        """
+        for key, name in self._draft.rigid_parts():
+            mine = [each for each in holds if key in self._topology.whole(each.chosen)[0]]
+            moved = {axis for each in mine for axis in each.speeds}
+            deck = set(AXES) - {axis for each in mine for axis in each.still}
+            case = set[str]() if len(moved) > 1 else moved or set(AXES)
+            if mine and deck != case:
+                why = f"{name} turns about {_shown(deck)} in the deck, about {_shown(case)} in Conoid"
+                mine[-1].entry.remark("differs", "rotation", why)
 
     def _slides(self, hold: Hold) -> bool:
         """Returns True if the nodes are fixed along some axes and free along the other axes."""
@@ -134,6 +150,10 @@ class Holding:
     def _parts(self, keys: Sequence[str]) -> dict[str, Any]:
         """Returns the key ``parts`` of a boundary; no key if the boundary acts on all parts."""
         return {} if len(keys) == len(self._names) else {"parts": [self._names[key] for key in keys]}
+
+
+def _shown(axes: set[str]) -> str:
+    return "any axis" if len(axes) == 3 else " and ".join(sorted(axes)) or "no axis"
 
 
 def velocity_course(curve: Course, end: float) -> tuple[float, Course]:

@@ -22,12 +22,14 @@ class Start:
     rate: Point = (0.0, 0.0, 0.0)
     """Rotation vector in radians per unit of time of the deck."""
     centre: Point = (0.0, 0.0, 0.0)
+    rank: int = 0
+    """A velocity of higher rank replaces those of lower rank, also if it is earlier in the deck."""
 
 
 def begin(draft: Draft, topology: Topology, bodies: Sequence[Body], starts: Sequence[Start]) -> None:
     """Sets the initial velocity and the spin of each body."""
     by_key = {body.key: body for body in bodies}
-    for each in starts:
+    for each in sorted(starts, key=lambda start: start.rank):
         full, some = topology.whole(each.chosen)
         if some:
             names = ", ".join(by_key[key].name for key in some)
@@ -48,7 +50,7 @@ def _give(draft: Draft, body: Body, start: Start) -> None:
         start.entry.remark("refused", start.chosen.what, why)
     old = body.velocity or (0.0, 0.0, 0.0)
     if any(old[axis] not in (0.0, value) for axis, value in start.velocity.items()):
-        why = f"replaces the velocity that an earlier keyword gives to {body.name}"
+        why = f"replaces the velocity that another keyword gives to {body.name}"
         start.entry.remark("differs", start.chosen.what, why)
     x, y, z = (start.velocity.get(axis, old[axis]) for axis in range(3))
     body.velocity = (x, y, z)

@@ -19,6 +19,10 @@ def row(*values: object) -> str:
     return "".join(f"{value:>10}" for value in values)
 
 
+STEEL = ("*MAT_ELASTIC", row(1, "7.85E-9", 210000.0, 0.3))
+"""Steel, in mm, t, s."""
+
+
 def r20(*values: object) -> str:
     """Returns a line of Radioss with fields of 20 columns."""
     return "".join(f"{value:>20}" for value in values)
@@ -72,3 +76,14 @@ def material(found: Imported) -> Material:
 def part(found: Imported) -> Any:
     """Returns the first part of the case as plain data."""
     return bare(found.data["parts"][0])
+
+
+INSTANCES = (
+    "*Part, name=P\n*Node\n1, 0, 0, 0\n2, 1, 0, 0\n3, 0, 1, 0\n4, 0, 0, 1\n"
+    "*Element, type=C3D4, elset=All\n1, 1, 2, 3, 4\n"
+    "*Solid Section, elset=All, material=M\n,\n*End Part\n*Assembly, name=A\n*Instance, name=one, part=P\n"
+    "*End Instance\n*Instance, name=two, part=P\n0, 0, 5\n*End Instance\n{sets}*End Assembly\n"
+    "*Material, name=M\n*Density\n7.85e-9,\n"
+    "*Elastic\n2.1e5, 0.3\n*Step\n*Dynamic, Explicit\n, 1e-5\n*End Step\n"
+)
+"""Two instances of a part of one tet, with a place for sets of the assembly."""

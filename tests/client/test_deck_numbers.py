@@ -8,9 +8,8 @@ from conoid.cases.model.bodies import MeshFile
 from conoid.client.decks.toml import bare
 from conoid.worker.mesh.read import read as read_mesh
 
-from .deck_texts import abaqus, lsdyna, r20, radioss, read, row
+from .deck_texts import INSTANCES, STEEL, abaqus, lsdyna, r20, radioss, read, row
 
-STEEL = ("*MAT_ELASTIC", row(1, "7.85E-9", 210000.0, 0.3))
 HELD = "*BOUNDARY_SPC_SET"
 OTHER = "".join(f"{n:8}" for n in (2, 7, 1, 2, 3, 4, 4, 4, 4, 4))
 
@@ -101,7 +100,7 @@ def test_a_second_velocity_of_a_body_that_turns_refuses(tmp_path: Path) -> None:
 def test_a_velocity_that_replaces_another_one_is_in_the_account(tmp_path: Path) -> None:
     """Two loads of one body are more often a mistake than a wish."""
     push = ["*INITIAL_VELOCITY_GENERATION", row(1, 2, 0.0, 5.0), row(0)]
-    for speed, expected in ((7.0, ["replaces the velocity that an earlier keyword gives to body"]), (5.0, [])):
+    for speed, expected in ((7.0, ["replaces the velocity that another keyword gives to body"]), (5.0, [])):
         again = ["*INITIAL_VELOCITY_GENERATION", row(1, 2, 0.0, speed), row(0)]
         found = read(tmp_path, "a.k", lsdyna(*STEEL, *push, *again))
         assert found.refusals == []
@@ -152,14 +151,6 @@ def test_a_number_means_the_part_of_that_number_not_of_that_title(tmp_path: Path
     assert [read_mesh(file, path).points.max() for file in files] == [1.0, 7.0]
 
 
-INSTANCES = (
-    "*Part, name=P\n*Node\n1, 0, 0, 0\n2, 1, 0, 0\n3, 0, 1, 0\n4, 0, 0, 1\n"
-    "*Element, type=C3D4, elset=All\n1, 1, 2, 3, 4\n"
-    "*Solid Section, elset=All, material=M\n,\n*End Part\n*Assembly, name=A\n*Instance, name=one, part=P\n"
-    "*End Instance\n*Instance, name=two, part=P\n0, 0, 5\n*End Instance\n{sets}*End Assembly\n"
-    "*Material, name=M\n*Density\n7.85e-9,\n"
-    "*Elastic\n2.1e5, 0.3\n*Step\n*Dynamic, Explicit\n, 1e-5\n*End Step\n"
-)
 RIGID = {
     "*Rigid Body, ref node=1, elset=one.All\n": [True, False],
     "*Elset, elset=All, instance=two\n1,\n*Rigid Body, ref node=1, elset=All\n": [False, True],

@@ -231,7 +231,7 @@ PUBLIC: dict[str, tuple[str, str, tuple[str, ...]]] = {
     ),
     "a mesh that is generated": ("a.inp", abaqus("*Density\n7.85e-9,\n*Elastic\n2.1e5, 0.3").replace(
         "*Element,", "*Ngen\n1, 2, 1\n*Nfill\n1, 2\n*Element,"
-    ), ("*NGEN: generates or moves nodes", "*NFILL: makes or moves nodes")),
+    ), ("*NGEN: generates or moves nodes", "*NFILL: generates or moves nodes")),
     "units of single options, groups of groups": ("a_0000.rad", radioss(
         "/UNIT/3", "other", r20("kg", "mm", "ms"), "/MAT/ELAST/1/3", "steel", "7.85E-6", r20(2.1e2, 0.3),
     ), ("an option with its own units (unit_ID) is not translated",)),

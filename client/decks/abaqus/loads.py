@@ -17,6 +17,11 @@ _NAMED = {
     "ZASYMM": "xy",
 }  # fmt: skip
 """Translations that each named restraint fixes (Analysis User's Guide, "Boundary conditions")."""
+_STILL = {
+    "ENCASTRE": "xyz", "PINNED": "", "XSYMM": "yz", "YSYMM": "xz", "ZSYMM": "xy", "XASYMM": "x", "YASYMM": "y",
+    "ZASYMM": "z",
+}  # fmt: skip
+"""The rotations that each restraint fixes."""
 
 
 class Loads:
@@ -96,14 +101,19 @@ class Loads:
         each.forgive("LOAD CASE, REGION TYPE", "no meaning in Conoid")
         each.rest()
         speeds: dict[str, dict[str, tuple[float, Course]]] = {}
+        turns: dict[str, dict[str, float]] = {}
         for line, items in each.lists():
             speeds.setdefault(items[0], {}).update(self._row(line, items[1:], kind, course, end))
+            turns.setdefault(items[0], {}).update(_turns(line, items[1:]))
         for name, by_axis in speeds.items():
             groups: dict[Course, dict[str, float]] = {}
             for axis, (speed, its) in by_axis.items():
                 groups.setdefault(its, {})[axis] = speed
-            for its, group in groups.items():
-                self.holds.append(Hold(self._chosen(name, each.entry), each.entry, group, its))
+            chosen = self._chosen(name, each.entry)
+            if chosen.bodies and any(turns[name].values()):
+                raise InpError('a prescribed rotation of a rigid body: [[boundaries]] kind = "rotation"')
+            for its, group in groups.items() or [((), {})]:
+                self.holds.append(Hold(chosen, each.entry, group, its, "".join(turns[name])))
         if not speeds:
             each.entry.leave("it holds nothing")
         elif not any(speeds.values()):
@@ -239,6 +249,14 @@ class Loads:
             each.entry.leave("request of output; a run writes frames, history.csv and probes")
             return
         self._draft.set_frames(_number(count), _number(interval), end, each.entry)
+
+
+def _turns(line: int, items: list[str]) -> dict[str, float]:
+    """Returns the rotations of one data line without its node set, by axis."""
+    if not items or joined(items[0]) in _NAMED:
+        return dict.fromkeys(_STILL[joined(items[0])] if items else "", 0.0)
+    first, last, value = (numbers(line, ",".join(items) + ",") + [0.0] * 3)[:3]
+    return {axis: value for d, axis in enumerate(AXES, 4) if first <= d <= (last or first)}
 
 
 def _number(text: str | None) -> float:

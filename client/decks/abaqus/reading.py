@@ -37,6 +37,8 @@ class Abaqus:
         self.keywords: list[Keyword] = []
         self._scope, self._material, self._step = "", "", 0
         self._steps = 0
+        self._references: dict[int, set[str]] = {}
+        """Reference nodes of rigid bodies, and the keys of these: a load on the node acts on the body."""
         self._source = Source(path)
         for block in self._source.blocks():
             self._take(block)
@@ -173,11 +175,24 @@ class Abaqus:
             if not found:
                 each.entry.refuse(REFUSED["RIGID BODY"])
                 continue
-            each.forgive("REF NODE, POSITION", "Conoid uses the centre of mass instead of a reference node")
+            each.forgive("POSITION", "where the other code puts the reference node")
+            for body in found:
+                for number in self._reference(each, body):
+                    self._references.setdefault(number, set()).add(body.key)
             each.rest()
             for body in found:
                 body.rigid = True
             each.entry.take("parts[].rigid")
+
+    def _reference(self, each: Keyword, body: Body) -> set[int]:
+        """Returns the reference node of a rigid body: a number or a set of its instance, or of the whole deck."""
+        name, owner = each.get("REF NODE") or "", body.key.partition("|")[0]
+        shown = f"{owner}.{name}" if each.scope and owner in self.instances else name
+        return (self.mesh.named(shown, "node_sets") or set()) if name else set()
+
+    def _owners(self, scope: str) -> set[str]:
+        """Returns a part or an instance, and the instances of the part."""
+        return {scope, *(one for one, made in self.instances.items() if made.key("PART") == scope)}
 
     def _of_elements(self, each: Keyword) -> set[str]:
         """Returns the keys of the bodies whose elements all lie in a set. The result is empty if the set also has
@@ -185,8 +200,7 @@ class Abaqus:
         """
         name = each.get("ELSET") or ""
         if each.scope:
-            owners = {each.scope, *(one for one, made in self.instances.items() if made.key("PART") == each.scope)}
-            return {f"{owner}|{joined(name)}" for owner in owners}
+            return {f"{owner}|{joined(name)}" for owner in self._owners(each.scope)}
         wanted = self.mesh.named(name, "element_sets") or set()
         parts = {key: self.mesh.body(*key.split("|"))[0] for key in self.topology.bodies}
         found = {key for key, elements in parts.items() if elements and elements <= wanted}
@@ -232,13 +246,22 @@ class Abaqus:
         def nodes() -> set[int]:
             found = self.mesh.named(name, "node_sets")
             if found is None:
-                raise InpError(f"the node set {name[:60]!r} is not defined")
+                raise InpError(f"{entry.place}: the node set {name[:60]!r} is not defined")
             return found
 
+        if self._references and not self._references.keys().isdisjoint(nodes()):
+            return self._rigid_bodies(name, nodes())
         on = None if name.strip().isdigit() else name.strip().strip('"')
         if on is not None and any(each.key("NAME") == joined(last) for each in self.of("SURFACE")):
             on = f"nodes:{on}"
         return Chosen(f"node set {name}", nodes=nodes, on=on)
+
+    def _rigid_bodies(self, name: str, nodes: set[int]) -> Chosen:
+        """Returns the rigid bodies whose reference nodes are in a set. Raises InpError for other nodes in it."""
+        keys = set[str]().union(*(self._references.get(node, ()) for node in nodes))
+        if not nodes <= self._references.keys() | set[int]().union(*(self.topology.of[key] for key in keys)):
+            raise InpError(f"the node set {name[:60]!r} has reference nodes of rigid bodies and other nodes")
+        return Chosen(f"node set {name}", bodies=frozenset(keys))
 
     def _scopes(self, each: Keyword) -> set[str]:
         """Returns the instances in which a keyword can define a set."""

@@ -34,8 +34,8 @@ def velocity(scene: Scene, block: Block, options: frozenset[str], entry: Entry) 
 
 
 def velocity_node(scene: Scene, block: Block, options: frozenset[str], entry: Entry) -> None:
-    """Reads ``*INITIAL_VELOCITY_NODE``, initial velocities of single nodes. Nodes with equal velocity become one
-    group.
+    """Reads ``*INITIAL_VELOCITY_NODE``, initial velocities of single nodes, which replace those of
+    ``*INITIAL_VELOCITY`` in any order (the manual, volume I). Nodes with equal velocity become one group.
     """
     groups: dict[tuple[float, ...], set[int]] = {}
     for card in block.filled():
@@ -45,7 +45,7 @@ def velocity_node(scene: Scene, block: Block, options: frozenset[str], entry: En
         groups.setdefault(values, set()).add(fields.whole("NID"))
     for values, nodes in groups.items():
         chosen = Chosen(f"{len(nodes)} nodes", nodes=lambda nodes=nodes: nodes)  # type: ignore[misc]
-        scene.starts.append(Start(chosen, entry, dict(enumerate(values))))
+        scene.starts.append(Start(chosen, entry, dict(enumerate(values)), rank=1))
 
 
 def generation(scene: Scene, block: Block, options: frozenset[str], entry: Entry) -> None:
@@ -80,12 +80,12 @@ def _axis(fields: Fields) -> tuple[tuple[float, float, float], tuple[float, floa
 
 
 def velocity_rigid(scene: Scene, block: Block, options: frozenset[str], entry: Entry) -> None:
-    """Reads ``*INITIAL_VELOCITY_RIGID_BODY``."""
+    """Reads ``*INITIAL_VELOCITY_RIGID_BODY``, which replaces all other velocities of the body (volume I)."""
     for card in block.filled():
         fields = Fields(block, entry, [card], ("PID VX VY VZ VXR VYR VZR ICID",))
         fields.refuse("VXR VYR VZR ICID", "the deck rotates the body about its centre of mass; use parts[].spin")
         speed = {axis: fields.real(f"V{'XYZ'[axis]}") for axis in range(3)}
-        scene.starts.append(Start(scene.part(fields.whole("PID")), entry, speed))
+        scene.starts.append(Start(scene.part(fields.whole("PID")), entry, speed, rank=1))
 
 
 # Restraints and motions -----------------------------------------------------------------------------------------------

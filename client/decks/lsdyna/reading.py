@@ -182,7 +182,7 @@ class LsDyna:
             if found is not None and found[1].held:
                 entry = self._materials[int(body.material.partition("/")[0])][1].entry
                 held = dict.fromkeys(found[1].held, 0.0)
-                self._scene.holds.append(Hold(named.part(int(body.key)), entry, held))
+                self._scene.holds.append(Hold(named.part(int(body.key)), entry, held, still="xyz"))
         begin(self._draft, self._topology, self._bodies, self._scene.starts)
         for body in self._bodies:
             self._draft.add_part(body, names)
@@ -247,7 +247,9 @@ class LsDyna:
 
     def _end(self) -> float:
         found = [(block, entry) for block, entry in self._blocks if block.name == "CONTROL_TERMINATION"]
-        for block, entry in found:
+        for _, entry in found[1:]:
+            entry.refuse("the end of the run is given twice")
+        for block, entry in found[:1]:
             try:
                 end = control.termination(block, entry)
                 self._draft.run["end_time"] = self._draft.quantity(end, TIME)

@@ -8,6 +8,7 @@ LEFT: dict[str, str] = {
     "COMMENT": "a comment",
     "PARAMETER": "the values are inserted where the deck uses them",
     "INCLUDE": "the included file is read as a part of the deck",
+    "CONTACT_FORCE_TRANSDUCER": "request of output; probes of contact_force_* measure the force on a part",
     "DATABASE": "request of output; a run writes frames, history.csv and probes",
     "HOURGLASS": "tets have no hourglass modes",
     "SECTION_SOLID": "sets how elements are integrated; in Conoid all solids are tets: numerics.pressure",
@@ -58,6 +59,8 @@ REFUSED: dict[str, str] = {
     "CONSTRAINED_TIED_NODES_FAILURE": "nodes that separate at a plastic strain; a [[bond]] has a strength and an "
     "energy instead",
     "CONSTRAINED_SPOTWELD": "welds of nodes; [[bond]] ties faces",
+    "PART_INERTIA": "a body with given mass properties; parts[].rigid takes a mass, a centre and an inertia",
+    "PART_MOVE": "parts that are moved before the start; write the moved nodes",
     "CONTACT": "this contact is not translated",
     "SECTION": "no section of solids",
     "MAT": "Conoid has no such material law",

@@ -53,6 +53,7 @@ def _restraint(scene: Scene, option: Option, entry: Entry) -> None:
             raise ValueError(f"line {row[0]}: {' '.join(code)!r} is not a code of translations and rotations")
         chosen = scene.nodes(fields.whole("GRNOD"), entry)
         speeds = {axis: 0.0 for axis, held in zip("xyz", code[0], strict=True) if held == "1"}
+        still = "".join(axis for axis, held in zip("xyz", "".join(code[1:2]), strict=False) if held == "1")
         if chosen.bodies and chosen.bodies & scene.rigid:
             if code[1:] != ["111"] or not speeds:
                 raise ValueError(
@@ -61,7 +62,7 @@ def _restraint(scene: Scene, option: Option, entry: Entry) -> None:
         elif len(code) > 1 and "1" in code[1]:
             entry.remark("left", f"rotations {code[1]}", "nodes of solids have none")
         if speeds:
-            scene.holds.append(Hold(chosen, entry, speeds))
+            scene.holds.append(Hold(chosen, entry, speeds, still=still))
         else:
             entry.leave("no translation is held")
 

@@ -260,9 +260,7 @@ class Radioss:
     # What options name ------------------------------------------------------------------------------------------------
 
     def _nodes(self, number: int, entry: Entry, within: tuple[int, ...] = ()) -> Chosen:
-        """Returns the nodes of a group. ``within``: numbers of the groups that include this group. Raises
-        ValueError.
-        """
+        """Returns a group of nodes; ``within``: groups that contain it. Raises ValueError."""
         if number in within:
             raise ValueError(f"the group of nodes {number} includes itself")
         found = self._groups.get(("GRNOD", number))
@@ -278,6 +276,8 @@ class Radioss:
             return Chosen(what, bodies=frozenset(map(str, items)))
         if kind == "NODE" and items and set(items) <= self._mains.keys():
             return Chosen(what, bodies=frozenset(self._mains[item] for item in items))
+        if kind == "NODE" and not self._mains.keys().isdisjoint(items):
+            raise ValueError(f"the group of nodes {number} has main nodes of rigid bodies and other nodes")
         if kind == "NODE":
             on = f"nodes:{number}" if ("SURF", number) in self._groups else str(number)
             return Chosen(what, nodes=lambda: set(items), on=on)
