@@ -1,6 +1,8 @@
-"""Numbers and times in words for users: ``33.7 µs``, ``1.24 M``, ``2 min 05 s``. All houses use this module.
+"""Numbers and times in words for users: ``33.7 µs``, ``1.24 M``, ``2 min 05 s``. All packages of Conoid use this
+module.
 
-``client/web/figures.js`` does the same for the page; ``tests/figures.json`` has inputs and texts that hold for both.
+The module ``client/web/figures.js`` writes numbers in the same way for the page; ``tests/figures.json`` has inputs and
+texts that hold for both modules.
 """
 
 import math
@@ -9,11 +11,12 @@ from datetime import datetime
 from decimal import ROUND_HALF_UP, Decimal
 
 _Ladder = Sequence[tuple[float, str]]
-"""Factors and their units, the largest first: a value gets the first one whose factor it reaches."""
+"""Factors and their units, the largest factor first: a value gets the first unit whose factor it reaches."""
 _UP: _Ladder = ((1e12, "T"), (1e9, "G"), (1e6, "M"), (1e3, "k"))
 _DOWN: _Ladder = ((1.0, ""), (1e-3, "m"), (1e-6, "µ"), (1e-9, "n"), (1e-12, "p"))
 _PREFIXED = ("m", "g", "J", "Pa", "N", "W", "B", "Hz", "m/s", "N s", "N m", "J/m^2", "B/s")
-"""Units that accept every SI prefix. All other units have a prefix already, or a power, or are no units."""
+"""Units that accept every SI prefix. All other units already have a prefix, contain a power, or are no physical
+units."""
 _LADDERS: dict[str, _Ladder] = {
     **{unit: [(factor, prefix + unit) for factor, prefix in (*_UP, *_DOWN)] for unit in _PREFIXED},
     "s": [(factor, f"{prefix}s") for factor, prefix in _DOWN],
@@ -22,62 +25,63 @@ _LADDERS: dict[str, _Ladder] = {
     "m^3": [(1e-3, "m^3"), (1e-12, "mm^3"), (1e-18, "µm^3")],
 }
 _WORTH = {"m^2": 1.0, "mm^2": 1e-6, "µm^2": 1e-12, "m^3": 1.0, "mm^3": 1e-9, "µm^3": 1e-18}
-"""Threshold, not factor, of some units in these tables: the value from which the unit is used."""
+"""Value from which a unit of the tables is used, for units whose value differs from their factor."""
 _PLAIN = 1e-3, 5
 """Exponents between which a number is written without a power of ten (chosen values). The larger exponent limits the
 number of digits before the point."""
 _MOST = 1e12
-"""Value from which a whole number is written with a power of ten. The value was chosen because five groups of digits
-are hard to read."""
+"""Value from which a whole number is written with a power of ten, because five groups of digits are hard to read
+(chosen value)."""
 _MOST_HOURS = 10_000
 """Wall time from which minutes are omitted: a year (chosen value)."""
 UNKNOWN = "–"
-"""Text of an unknown number."""
+"""Text that stands for an unknown number."""
 
 
 # Numbers with a unit --------------------------------------------------------------------------------------------------
 
 
 def si(value: float | None, unit: str = "", digits: int = 3) -> str:
-    """Returns ``value`` with ``digits`` significant digits and its unit, with a fitting SI prefix if the unit
-    accepts one; a number without a unit has no prefix. An unknown value is shown as a dash.
+    """Returns ``value`` with ``digits`` significant digits and its unit, with a fitting SI prefix if the unit accepts a
+    prefix. A number without a unit has no prefix; an unknown value is shown as a dash.
     """
     return alike([value], unit, digits)[0]
 
 
 def exact(value: float | None, unit: str = "", digits: int = 6) -> str:
-    """Returns the text of ``si`` without zeros at the end."""
+    """Returns the text of the function ``si`` without zeros at the end."""
     return _trimmed(si(value, unit, digits))
 
 
 def alike(values: Iterable[float | None], unit: str = "", digits: int = 3) -> list[str]:
-    """Returns the texts of values that belong together, such as a column of a table: all have the prefix of the
-    largest magnitude."""
+    """Returns the texts of values that belong together, such as a column of a table; all texts have the prefix of the
+    largest value.
+    """
     known = [math.nan if value is None else float(value) for value in values]
     worth, name = _unit(known, unit, digits)
     return [_with(_number(value / worth, digits), name) if not math.isnan(value) else UNKNOWN for value in known]
 
 
 def exacts(values: Iterable[float | None], unit: str = "", digits: int = 6) -> list[str]:
-    """Returns the texts of ``si_all`` without zeros at the end."""
+    """Returns the texts of the function ``si_all`` without zeros at the end."""
     return [_trimmed(text) for text in alike(values, unit, digits)]
 
 
 def vector(values: Iterable[float | None], unit: str = "", digits: int = 3, between: str = ", ") -> str:
-    """Returns the components of a vector, with their unit once: ``1, 200 mm``."""
+    """Returns the components of a vector with the unit written once: ``1, 200 mm``."""
     return vectors([values], unit, digits, between)[0]
 
 
 def vectors(rows: Iterable[Iterable[float | None]], unit: str = "", digits: int = 3, between: str = ", ") -> list[str]:
-    """Returns the texts of several vectors, such as a column of a table: all have the same prefix."""
+    """Returns the texts of several vectors, such as a column of a table; all texts have the same prefix."""
     known = [[math.nan if value is None else float(value) for value in row] for row in rows]
     worth, name = _unit([value for row in known for value in row], unit, digits)
     return [_with(between.join(_trimmed(_number(value / worth, digits)) for value in row), name) for row in known]
 
 
 def large(value: float | None) -> str:
-    """Returns a number without a unit, with k, M, G or T if large: ``1.24 M``. A small prefix (such as m) is never
-    used.
+    """Returns a number without a unit, with k, M, G or T if the number is large: ``1.24 M``. A small prefix, such as m,
+    is never used.
     """
     known = math.nan if value is None else float(value)
     worth, name = _step(abs(known), (*_UP, (1.0, "")), 3)
@@ -85,7 +89,7 @@ def large(value: float | None) -> str:
 
 
 def _unit(values: Sequence[float], unit: str, digits: int) -> tuple[float, str]:
-    """Returns the factor of the unit of all values, and its name."""
+    """Returns the common factor of the unit of all values, and the name of the unit."""
     most = max((abs(value) for value in values if math.isfinite(value)), default=0.0)
     if unit not in _LADDERS or most == 0.0:
         return 1.0, unit
@@ -94,7 +98,7 @@ def _unit(values: Sequence[float], unit: str, digits: int) -> tuple[float, str]:
 
 
 def _step(most: float, ladder: _Ladder, digits: int) -> tuple[float, str]:
-    """Returns the first step that ``most`` reaches after rounding; the last one if it reaches none."""
+    """Returns the first unit whose factor ``most`` reaches after rounding; the last unit if ``most`` reaches none."""
     return next((step for step in ladder if most >= step[0] * (1.0 - 0.5 * 10.0**-digits)), ladder[-1])
 
 
@@ -106,31 +110,32 @@ def _with(text: str, unit: str) -> str:
 
 
 def number(value: float | None) -> str:
-    """Returns six significant digits, for tables; a dash for an unknown value."""
+    """Returns a number with six significant digits, for tables; a dash for an unknown value."""
     return exact(value)
 
 
 def rough(value: float | None) -> str:
-    """Returns two significant digits and the power of ten, for residuals; a dash for an unknown value."""
+    """Returns a number with two significant digits and the power of ten, for residuals; a dash for an unknown value."""
     if value is None or not math.isfinite(value) or value == 0.0:
         return _number(math.nan if value is None else value, 2)
     return _power(value, 2)
 
 
 def fixed(value: float | None, decimals: int = 2) -> str:
-    """Returns a fixed number of decimals, for ratios; a dash for an unknown value."""
+    """Returns a number with a fixed number of decimals, for ratios; a dash for an unknown value."""
     return UNKNOWN if value is None or not math.isfinite(value) else _fixed(value, decimals)
 
 
 def percent(share: float | None, decimals: int = 1) -> str:
-    """Returns a share as ``12.3 %``."""
+    """Returns a fraction as a percentage: ``12.3 %``."""
     text = fixed(None if share is None else 100.0 * share, decimals)
     return text if text == UNKNOWN else f"{text} %"
 
 
 def count(value: float | None) -> str:
-    """Returns a whole number with spaces between thousands: ``12 400``, from 10^12 on ``2.40e21``; a dash for an
-    unknown value."""
+    """Returns a whole number with spaces between thousands: ``12 400``. From 10^12 on the text has a power of ten,
+    ``2.40e21``; an unknown value is a dash.
+    """
     if value is None or not math.isfinite(value):
         return UNKNOWN
     if abs(value) >= _MOST:
@@ -139,22 +144,26 @@ def count(value: float | None) -> str:
 
 
 def counted(value: float | None, noun: str, plural: str = "") -> str:
-    """Returns ``1 fragment``, ``12 400 fragments``; ``plural`` if it is not the noun with an s."""
+    """Returns a count with its noun: ``1 fragment``, ``12 400 fragments``; ``plural`` is needed if the plural is not
+    the noun with an s.
+    """
     return f"{count(value)} {noun if value == 1 else plural or f'{noun}s'}"
 
 
 def crew(ranks: int, threads: int = 1) -> str:
-    """``2 ranks``, ``1 rank x 16 threads``."""
+    """Returns the ranks and threads of a run as text: ``2 ranks``, ``1 rank x 16 threads``."""
     return counted(ranks, "rank") + (f" x {counted(threads, 'thread')}" if threads > 1 else "")
 
 
 def size(value: float | None) -> str:
-    """Returns a number of bytes: ``38.2 GB``."""
+    """Returns a number of bytes as text: ``38.2 GB``."""
     return si(value, "B")
 
 
 def _number(value: float, digits: int) -> str:
-    """Returns ``digits`` significant digits, with a power of ten for very small or large numbers (_PLAIN)."""
+    """Returns a number with ``digits`` significant digits, with a power of ten if the number is very small or large
+    (_PLAIN).
+    """
     if not math.isfinite(value):
         return UNKNOWN if math.isnan(value) else "∞" if value > 0 else "-∞"
     if value == 0.0:
@@ -166,7 +175,7 @@ def _number(value: float, digits: int) -> str:
 
 
 def _fixed(value: float, decimals: int) -> str:
-    """Rounds half away from zero, as JavaScript's toFixed on the page."""
+    """Rounds half away from zero, as the function toFixed of JavaScript does on the page."""
     if abs(value) >= 1e20:
         return _power(value, 3)
     text = f"{Decimal(value).quantize(Decimal(1).scaleb(-decimals), ROUND_HALF_UP):f}"
@@ -174,7 +183,7 @@ def _fixed(value: float, decimals: int) -> str:
 
 
 def _power(value: float, digits: int) -> str:
-    """``5.43e-6``."""
+    """Returns a number with a power of ten: ``5.43e-6``."""
     exact = Decimal(value)
     power = exact.adjusted()
     first = exact.scaleb(-power).quantize(Decimal(1).scaleb(1 - digits), ROUND_HALF_UP)
@@ -184,13 +193,13 @@ def _power(value: float, digits: int) -> str:
 
 
 def _trimmed(text: str) -> str:
-    """Removes zeros behind the point at the end of the number."""
+    """Removes zeros at the end of a number behind the decimal point."""
     digits, power, unit = _parts(text)
     return f"{digits.rstrip('0').rstrip('.') if '.' in digits else digits}{power}{unit}"
 
 
 def _parts(text: str) -> tuple[str, str, str]:
-    """Returns the digits, the power of ten with its e, and the unit with its space."""
+    """Returns the digits, the power of ten with its letter e, and the unit with its space."""
     shown, space, unit = text.partition(" ")
     digits, e, power = shown.partition("e")
     return digits, e + power, space + unit
@@ -200,7 +209,7 @@ def _parts(text: str) -> tuple[str, str, str]:
 
 
 def duration(seconds: float | None) -> str:
-    """Returns a wall time: ``0.4 s``, ``42 s``, ``2 min 05 s``, ``3 h 04 min``; a dash for an unknown value."""
+    """Returns a wall time as text: ``0.4 s``, ``42 s``, ``2 min 05 s``, ``3 h 04 min``; a dash for an unknown value."""
     if seconds is None or not math.isfinite(seconds) or seconds < 0:
         return UNKNOWN
     if seconds < 9.95:
@@ -216,17 +225,19 @@ def duration(seconds: float | None) -> str:
 
 
 def clock(wall: float) -> str:
-    """Returns the time of day of a Unix time, in the local zone: ``14:03:27``."""
+    """Returns the time of day of a Unix time, in the local time zone: ``14:03:27``."""
     return _moment(wall, "%H:%M:%S")
 
 
 def day(wall: float) -> str:
-    """Returns date and time of a Unix time, in the local zone: ``21 Nov 14:03``, of another year ``2025-11-21``."""
+    """Returns date and time of a Unix time, in the local time zone: ``21 Nov 14:03``; for another year
+    ``2025-11-21``.
+    """
     return _moment(wall, "%d %b %H:%M" if _moment(wall, "%Y") == f"{datetime.now().year}" else "%Y-%m-%d")
 
 
 def _moment(wall: float, form: str) -> str:
-    """Returns a dash for a time outside the calendar."""
+    """Returns a dash for a time outside of the calendar."""
     try:
         return datetime.fromtimestamp(wall).strftime(form)
     except (OverflowError, OSError, ValueError):

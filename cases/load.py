@@ -27,8 +27,8 @@ __all__ = [
 _KEY = re.compile(r"[A-Za-z_][A-Za-z0-9_-]*(?:\[\d{1,6}\])*(?:\.[A-Za-z_][A-Za-z0-9_-]*(?:\[\d{1,6}\])*)*")
 _ITEM = re.compile(r"([A-Za-z_][A-Za-z0-9_-]*)|\[(\d+)\]")
 _DEEPEST = 32
-"""Largest number of words of a dotted key in TOML, whose cost grows with the square of this number. The value was
-chosen because keys of a case have up to 6 words."""
+"""Largest number of words of a dotted key in TOML, because the cost grows with the square of this number. Keys of a
+case have up to 6 words (reason of the chosen limit)."""
 _DEEP = re.compile(rf"""(?<![\w"'.-])(?:(?:[\w-]++|"[^"\n]*+"|'[^'\n]*+')[ \t]*+\.[ \t]*+){{{_DEEPEST}}}""", re.ASCII)
 _MARK = "\ufeff"
 """Byte order mark that some editors write at the start of a file in UTF-8."""
@@ -36,7 +36,7 @@ _LINE = re.compile(r"\(at line (\d+), column \d+\)")
 
 
 def parse_case(data: Mapping[str, Any]) -> Case:
-    """Returns the case of plain data, as TOML or JSON gives it. Raises CaseError with every problem."""
+    """Returns the case of plain data, as TOML or JSON gives it. Raises CaseError with every problem of the case."""
     if not isinstance(data, Mapping):
         raise CaseError([problem((), data, "a case is a table of keys")])
     read, problems = read_references(data)
@@ -53,22 +53,24 @@ def parse_case(data: Mapping[str, Any]) -> Case:
 
 
 def parse_toml(text: str) -> Case:
-    """Returns the case of a TOML text. Raises CaseError; for broken TOML with the line."""
+    """Returns the case of a TOML text. Raises CaseError; for broken TOML the error has the line number."""
     return parse_case(toml_data(text))
 
 
 def parse_json(text: str | bytes) -> Case:
-    """Returns the case of a JSON text. Raises CaseError; for broken JSON with the line."""
+    """Returns the case of a JSON text. Raises CaseError; for broken JSON the error has the line number."""
     return parse_case(json_data(text))
 
 
 def read_case(path: Path) -> Case:
-    """Returns the case of a file that ends in .toml or .json. Raises CaseError."""
+    """Returns the case in a file whose name ends in .toml or .json. Raises CaseError if the file has no valid case."""
     return parse_case(read_data(path))
 
 
 def read_data(path: Path) -> dict[str, Any]:
-    """Returns the plain data of a file that ends in .toml or .json, before any check. Raises CaseError."""
+    """Returns the plain data of a file whose name ends in .toml or .json, before any check. Raises CaseError if the
+    file cannot be read.
+    """
     if path.suffix not in {".toml", ".json"}:
         raise CaseError([Problem("case", shown(str(path)), "a case file ends in .toml or .json")])
     try:
@@ -81,7 +83,7 @@ def read_data(path: Path) -> dict[str, Any]:
 
 
 def toml_data(text: str) -> dict[str, Any]:
-    """Returns the tables of a TOML text. Raises CaseError with the line."""
+    """Returns the tables of a TOML text. Raises CaseError with the line number if the TOML is broken."""
     if _DEEP.search(text):
         raise CaseError([Problem("", "", f"a key of more than {_DEEPEST} words with dots between")])
     try:
@@ -95,7 +97,9 @@ def toml_data(text: str) -> dict[str, Any]:
 
 
 def json_data(text: str | bytes) -> dict[str, Any]:
-    """Returns the object of a JSON text; a repeated key is an error. Raises CaseError with the line."""
+    """Returns the object of a JSON text; a repeated key is an error. Raises CaseError with the line number if the JSON
+    is broken.
+    """
     try:
         bare = text.removeprefix(_MARK) if isinstance(text, str) else text.removeprefix(_MARK.encode())
         data = json.loads(bare, object_pairs_hook=_no_repeats)
@@ -144,14 +148,15 @@ def _at_line(number: int, text: str, message: str) -> Problem:
 
 
 Overrides = Iterable[str] | Mapping[str, Any]
-"""Assignments such as ``run.ranks=2``, or values by key: ``{"run.ranks": 2}``, ``{"run": {"ranks": 2}}``."""
+"""Assignments such as ``run.ranks=2``, or a mapping from keys to values: ``{"run.ranks": 2}``, ``{"run": {"ranks":
+2}}``."""
 
 
 def apply_overrides(data: Mapping[str, Any], overrides: Overrides) -> dict[str, Any]:
     """Returns a copy of ``data`` with assignments such as ``run.ranks=2`` or ``parts[0].mesh.element_size=0.5 mm``.
 
-    The value of an assignment is read as TOML where it is valid TOML, otherwise as text; a value by key is used
-    unchanged, a mapping key by key. Missing tables are added; list items must exist. Raises CaseError with every
+    The value of an assignment is read as TOML if it is valid TOML, otherwise as text; the value in a mapping is used
+    unchanged, a nested mapping key by key. Missing tables are added; list items must exist. Raises CaseError with every
     assignment that cannot be made, and with every key that has two values.
     """
     if isinstance(overrides, str) or not isinstance(overrides, Iterable):
@@ -177,7 +182,7 @@ def apply_overrides(data: Mapping[str, Any], overrides: Overrides) -> dict[str, 
 
 
 def _assignments(overrides: Overrides, path: str = "") -> Iterator[tuple[str, str, Any]]:
-    """Key, value as text for messages, and value; Ellipsis for an assignment without a value."""
+    """Key, text of the value for messages, and value; Ellipsis for an assignment without a value."""
     if isinstance(overrides, Mapping):
         for name, value in overrides.items():
             key = f"{path}.{name}" if path else str(name)
@@ -231,20 +236,21 @@ def _entry(target: Any, item: int | str) -> Any:
 
 
 def resolved_json(case: Case) -> bytes:
-    """Returns the case as JSON with every default, in SI units, with every material of its parts; ends in a line
-    feed."""
+    """Returns the case as JSON with every default, in SI units, with every material of its parts; the text ends in a
+    line feed.
+    """
     used = {part.material: material(case, part.material) for part in case.parts}
     full = case.model_copy(update={"materials": {**case.materials, **used}})
     return full.model_dump_json(indent=2).encode() + b"\n"
 
 
 def shipped() -> dict[str, Path]:
-    """The shipped cases: name to file."""
+    """The shipped cases: file of each case by name."""
     return {path.stem: path for path in sorted((Path(__file__).parent / "shipped").glob("*.toml"))}
 
 
 def shipped_path(name: str) -> Path:
-    """Returns the file of a shipped case. Raises CaseError with the nearest names."""
+    """Returns the file of a shipped case. Raises CaseError with the nearest names if the name is unknown."""
     known = shipped()
     if name not in known:
         raise CaseError([Problem("case", shown(name), f"no shipped case of this name; {nearest(name, known)}")])

@@ -1,7 +1,8 @@
 """The messages of a run: lines of journal.jsonl, and samples on Zenoh and SSE.
 
-``seq`` numbers the messages of a run 1, 2, 3 ... without gaps, so a reader detects a missing message and reads it
-from the journal. JSON in the journal and on SSE, MessagePack on Zenoh. A reader ignores unknown fields.
+The field ``seq`` numbers the messages of a run 1, 2, 3 ... without gaps, so that a reader detects a missing message and
+reads it from the journal. Messages are JSON in the journal and on SSE, and MessagePack on Zenoh. A reader ignores
+unknown fields of a message.
 """
 
 from typing import ClassVar
@@ -16,7 +17,7 @@ VERSION = 1
 
 
 class Message(msgspec.Struct, tag_field="type", tag=str.lower, kw_only=True, frozen=True):
-    """Envelope of all messages. ``wall`` is Unix time in s, ``t`` simulated time in s."""
+    """Envelope of all messages. The field ``wall`` is the Unix time in s; ``t`` is the simulated time in s."""
 
     channel: ClassVar[str] = "event"
     """Class of the Zenoh key under which the message is published (cases/output/keys.py)."""
@@ -39,7 +40,7 @@ class Status(Message, frozen=True):
 
 
 class Started(Message, frozen=True):
-    """Size of the model, before the first step. ``setup``: time since the start of the worker, s."""
+    """Size of the model before the first step. ``setup``: wall time since the start of the worker, s."""
 
     ranks: int
     elements: int
@@ -61,18 +62,18 @@ class Progress(Message, frozen=True):
     energy: Energy
     updates_per_second: float
     parts: dict[str, PartEnergy] = {}
-    """Energies of each part; empty with a single part."""
+    """Energies of each part; empty for a case with a single part."""
     worst_residual: float | None = None
-    """Largest residual of all ledger lines so far, of which some lie between two messages."""
+    """Largest energy residual of all history lines so far; some of these lines lie between two messages."""
     sampled: float | None = None
-    """Simulated time of the history line with ``energy``, ``parts`` and ``probes``, s."""
+    """Simulated time of the history line from which ``energy``, ``parts`` and ``probes`` are taken, s."""
     probes: dict[str, float | None] = {}
     """Values of the probes by name, in SI units; None for a probe without a value."""
 
 
 class Load(Message, frozen=True):
-    """Load of the ranks since the last Load message: CPU seconds per rank and phase, maximum over mean of the work,
-    and communication. Lists have one number per rank.
+    """Load of the ranks since the last Load message: CPU seconds per rank and phase, maximum of the work over its mean,
+    and communication. Each list has one number per rank.
     """
 
     channel: ClassVar[str] = "load"
@@ -80,31 +81,33 @@ class Load(Message, frozen=True):
     imbalance: float
     steps: int = 0
     waiting: list[float] = []
-    """Share of the phase ``exchange``: CPU seconds in calls that wait for other ranks."""
+    """CPU seconds of the phase ``exchange`` that are spent in calls that wait for other ranks."""
     messages: list[int] = []
-    """Number of messages from each rank to single ranks."""
+    """Number of point-to-point messages that each rank sends."""
     bytes: list[int] = []
-    """Bytes of the messages to single ranks."""
+    """Bytes of the point-to-point messages that each rank sends."""
     collectives: list[int] = []
     """Number of collective calls."""
     collective_bytes: list[int] = []
-    """Bytes that the rank contributes to calls of all ranks."""
+    """Bytes that the rank contributes to collective calls."""
     outside: list[int] = []
     """Surface nodes that each rank owns."""
     serial: list[float] = []
-    """Wall time in which a single thread of the rank works, s, without waiting for other ranks."""
+    """Wall time in which only one thread of the rank works, s, without waiting for other ranks."""
     parallel: list[float] = []
     """Wall time in parallel regions, whose tasks are divided among the threads of the rank, s."""
     helped: list[float] = []
-    """Working time of all threads of the rank except the first, together, s."""
+    """Working time of all threads of the rank except the first, summed, s."""
     threads: int = 1
     """Number of threads of each rank."""
     projected: dict[int, dict[str, list[float]]] = {}
-    """By number of threads: estimated CPU seconds of each phase with so many threads, without waiting."""
+    """Estimated CPU seconds of each phase without waiting, by number of threads."""
 
 
 class Counts(Message, frozen=True):
-    """Present size of the model. ``shared``: nodes on more than one rank; ``particles``: free nodes, without tets."""
+    """Present size of the model. ``shared``: number of nodes on more than one rank; ``particles``: number of free
+    nodes, without tets.
+    """
 
     channel: ClassVar[str] = "counts"
     elements: int
@@ -116,12 +119,12 @@ class Counts(Message, frozen=True):
     facets: int = 0
     """Number of broken facets."""
     smallest: int = 0
-    """Exponent of the first class of ``sizes``."""
+    """Exponent of the first class of the size distribution ``sizes``."""
     sizes: list[int] = []
-    """Numbers of fragments by length, from 2^((smallest + i) / 2) m to the next class; empty where no facet can
-    break."""
+    """Numbers of fragments by length; class i begins at 2^((smallest + i) / 2) m and ends at the next class. Empty if
+    no facet can break."""
     counted: int = -1
-    """Step of the state of ``fragments`` and ``sizes``: the present one or an earlier one; -1 if unknown."""
+    """Step at which ``fragments`` and ``sizes`` were counted: the present step or an earlier step; -1 if unknown."""
 
 
 class Balance(Message, frozen=True):
@@ -130,22 +133,22 @@ class Balance(Message, frozen=True):
     channel: ClassVar[str] = "load"
     cause: str
     before: dict[str, list[float]]
-    """Load before the decomposition: CPU seconds per step, by phase, one number per rank, of the last Load message."""
+    """Load before the decomposition, from the last Load message: CPU seconds per step by phase, one number per rank."""
     predicted: list[float]
-    """Share of each rank in the balanced quantity: CPU seconds per step, outside nodes, or tets."""
+    """Share of each rank in the quantity that is balanced: CPU seconds per step, outside nodes, or tets."""
     tets: int
     nodes: int
     """Number of tets that have moved to other ranks."""
     cost: float
     """Wall time of the decomposition, s."""
     saved: float
-    """Wall time saved by the decompositions before, s: estimate with the imbalance from before each, less the time
-    used."""
+    """Wall time saved by the earlier decompositions, s: estimate with the imbalance before each decomposition, less the
+    time used."""
 
 
 class Groups(Message, frozen=True):
-    """Cost of groups of tets since the last Groups message, on any number of ranks. Tets of a group are neighbours
-    at the start and stay together. The first message of a worker has no loads yet: all are 0.
+    """Cost of groups of tets since the last Groups message, on any number of ranks. Tets of a group are neighbours at
+    the start and stay in the group. In the first message of a worker all loads are 0.
     """
 
     channel: ClassVar[str] = "load"
@@ -156,15 +159,16 @@ class Groups(Message, frozen=True):
     rank: int = 0
     """CPU time of a rank without any group, ns per step."""
     centres: list[tuple[float, float, float]] = []
-    """Centres of the groups at the start, m. The fields with centres and tets are in the first message only."""
+    """Centres of the groups at the start, m. Only the first message contains the centres and the numbers of tets of the
+    groups."""
     tets: list[int] = []
     """Number of tets of each group at the start."""
     cost: float = 0.0
-    """Assumed cost of a decomposition before the first one, wall time, s."""
+    """Assumed cost of a decomposition before the first decomposition, wall time, s."""
 
 
 class Checkpoint(Message, frozen=True):
-    """A complete checkpoint is on disk. ``path`` is relative to the run's folder, ``seconds`` wall time."""
+    """A complete checkpoint is on disk. ``path`` is relative to the run's folder; ``seconds`` is wall time."""
 
     path: str
     bytes: int
@@ -173,7 +177,7 @@ class Checkpoint(Message, frozen=True):
 
 
 class Frame(Message, frozen=True):
-    """A frame is on disk. ``path`` is relative to the run's folder."""
+    """A frame is on disk. The ``path`` of the frame is relative to the run's folder."""
 
     index: int
     path: str
@@ -181,7 +185,7 @@ class Frame(Message, frozen=True):
 
 class Snapshot(Message, frozen=True):
     """A snapshot of the fragments (cases/output/snapshot.py) is in the run's folder. ``step`` and ``t`` are the step
-    and the time of the snapshot.
+    and the simulated time of the snapshot.
     """
 
     channel: ClassVar[str] = "fragments"
@@ -195,19 +199,19 @@ class Snapshot(Message, frozen=True):
     cause: str = ""
     """Reason of the snapshot: ``run.snapshots``, ``asked for``, ``start`` or ``end``."""
     dropped: int = 0
-    """Number of scheduled snapshots since the previous snapshot that were not made."""
+    """Number of scheduled snapshots that were not made since the previous snapshot."""
     smallest: int = 0
-    """Exponent of the first class of ``sizes``."""
+    """Exponent of the first class of the size distribution ``sizes``."""
     sizes: list[int] = []
-    """Numbers of fragments by length, from 2^((smallest + i) / 2) m to the next class."""
+    """Numbers of fragments by length; class i begins at 2^((smallest + i) / 2) m and ends at the next class."""
     tets: int = 0
     """Size of the file with all tets of the snapshot, bytes; 0 without such a file."""
     fields: dict[str, list[float]] = {}
-    """Minimum, 0.5 % and 99.5 % quantiles over the triangles, and maximum of each field."""
+    """Statistics of each field over the triangles: minimum, 0.5 % quantile, 99.5 % quantile, maximum."""
 
 
 class Fragments(Snapshot, tag="snapshot", kw_only=True, frozen=True):
-    """The message of a snapshot with the snapshot itself, on Zenoh."""
+    """The message about a snapshot together with the snapshot itself, on Zenoh."""
 
     blob: bytes
 
@@ -222,7 +226,7 @@ class Log(Message, frozen=True):
 
 
 class Finished(Message, frozen=True):
-    """The outcome is on disk. The last message of a worker."""
+    """Message: the outcome is on disk. This message is the last message of a worker."""
 
     state: str
     digest: str
@@ -241,35 +245,37 @@ _fragments = msgspec.msgpack.Decoder(Fragments)
 
 
 def to_json(message: AnyMessage) -> bytes:
-    """Returns a journal line without the line feed."""
+    """Returns a message as a journal line without the line feed."""
     return _to_json.encode(message)
 
 
 def to_msgpack(message: AnyMessage | Fragments) -> bytes:
-    """Returns the payload of a Zenoh sample."""
+    """Returns a message as the payload of a Zenoh sample."""
     return _to_msgpack.encode(message)
 
 
 def with_blob(message: Snapshot, blob: bytes) -> Fragments:
-    """Returns the message of a snapshot with its bytes."""
+    """Returns the message about a snapshot with the bytes of the snapshot."""
     return Fragments(**msgspec.structs.asdict(message), blob=blob)
 
 
 def without_blob(message: Fragments) -> Snapshot:
-    """Returns the message without the snapshot."""
+    """Returns the message about a snapshot without the snapshot."""
     return Snapshot(**{name: getattr(message, name) for name in Snapshot.__struct_fields__})
 
 
 def from_json(line: bytes | str) -> AnyMessage:
-    """Reads a journal line. Raises msgspec.ValidationError for another content, msgspec.DecodeError for broken JSON."""
+    """Reads a message from a journal line. Raises msgspec.ValidationError for other content, msgspec.DecodeError for
+    broken JSON.
+    """
     return _from_json.decode(line)
 
 
 def from_msgpack(payload: bytes) -> AnyMessage:
-    """Reads a Zenoh sample. Raises the same errors as ``from_json``."""
+    """Reads a message from a Zenoh sample. Raises the same errors as ``from_json``."""
     return _from_msgpack.decode(payload)
 
 
 def fragments_from_msgpack(payload: bytes) -> Fragments:
-    """Reads a Zenoh sample of the class ``fragments``. Raises the same errors as ``from_json``."""
+    """Reads a message from a Zenoh sample of the class ``fragments``. Raises the same errors as ``from_json``."""
     return _fragments.decode(payload)

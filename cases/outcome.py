@@ -1,4 +1,4 @@
-"""outcome.json: the last file that a run writes, and the only proof of its end."""
+"""The outcome file outcome.json: the last file that a run writes, and the only proof of the end of the run."""
 
 import math
 from typing import Any
@@ -9,7 +9,7 @@ from .ledger import Energy
 
 
 class Check(msgspec.Struct, kw_only=True, frozen=True):
-    """The measured value of a ``[[reference]]``."""
+    """Result of the comparison with a ``[[reference]]``."""
 
     name: str
     value: float
@@ -21,7 +21,7 @@ class Check(msgspec.Struct, kw_only=True, frozen=True):
 
 
 class Measured(msgspec.Struct, kw_only=True, frozen=True):
-    """Values of a probe: the last one, and the extremes over all lines of the history (NaN: unknown)."""
+    """Values of a probe: the last value, and the extremes over all lines of the history (NaN: unknown)."""
 
     name: str
     value: float
@@ -31,7 +31,9 @@ class Measured(msgspec.Struct, kw_only=True, frozen=True):
 
 
 class Made(msgspec.Struct, kw_only=True, frozen=True):
-    """The largest energy that a ledger line has created, over the largest energy until then, at ``time``, s."""
+    """The largest energy that a term of the energy ledger has created, divided by the largest energy until then, at
+    ``time``, s.
+    """
 
     line: str
     share: float
@@ -43,25 +45,25 @@ class Compressed(msgspec.Struct, kw_only=True, frozen=True):
 
     part: str
     times: float
-    """Compression over the limit of Griffith's criterion (cases/warnings/compression.py)."""
+    """Compression divided by the limit of Griffith's criterion (cases/warnings/compression.py)."""
     most: float
     """Largest principal pressure, Pa; negative in tension."""
     least: float
     """Smallest principal pressure, Pa."""
     tets: int
-    """Largest number of tets of the part beyond the criterion at the same time, of all history lines."""
+    """Largest number of tets of the part that are beyond the criterion at the same time, of all history lines."""
     tet: int
     """The tet with the largest compression."""
     x: float
-    """Position of the tet at that time, m."""
+    """Position of the tet at the time of the largest compression, m."""
     y: float
     z: float
     time: float
-    """Simulated time, s."""
+    """Simulated time of the largest compression, s."""
 
 
 class Sharing(msgspec.Struct, kw_only=True, frozen=True):
-    """Statistics of the regions of rank 0, and the assumed cost of sharing them among threads
+    """Statistics of the parallel regions of rank 0, and the assumed cost of dividing them among threads
     (worker/parallel/projecting.py); times in s.
     """
 
@@ -70,16 +72,16 @@ class Sharing(msgspec.Struct, kw_only=True, frozen=True):
     colours: int
     tasks: int
     turn: float
-    """Cost of a colour."""
+    """Cost of one colour of a parallel region."""
     call: float
-    """Cost for the caller of waking a sleeping thread."""
+    """Cost of waking a sleeping thread, for the calling thread."""
     wake: float
-    """Time until the woken thread works."""
+    """Time until a woken thread works."""
 
 
 class Outcome(msgspec.Struct, kw_only=True, frozen=True):
-    """The end of a run; times in s, energies in J. An unknown count is None, another unknown number NaN: null in the
-    file. The outcome of a run that was lost, or never started, has only what its journal contains
+    """The end of a run; times in s, energies in J. An unknown count is None and any other unknown number is NaN; both
+    are null in the file. The outcome of a run that was lost, or that never started, has only data of its journal
     (server/runs/ends.py).
     """
 
@@ -90,45 +92,48 @@ class Outcome(msgspec.Struct, kw_only=True, frozen=True):
     time: float = math.nan
     ranks: int = 1
     threads: int = 1
-    """Threads of each rank."""
+    """Number of threads of each rank."""
     elapsed: float = math.nan
     setup: float = math.nan
-    """Time from the start of the worker to its first step, s."""
+    """Wall time from the start of the worker to its first step, s."""
     cpu: float = math.nan
-    """CPU time of all ranks and their threads in the step loop, s; of threads while they work."""
+    """CPU time of all ranks and their threads in the step loop, s; threads count only while they work."""
     digest: str = ""
-    """SHA-256 of the state of nodes and tets in the order of global ids: equal for any number of ranks."""
+    """SHA-256 of the state of nodes and tets in the order of global ids; the hash is equal for any number of ranks."""
     elements: int | None = None
     eroded: int | None = None
     """Number of deleted tets."""
     eroded_mass: float = math.nan
-    """Mass of nodes deleted with the last of their tets, kg."""
+    """Mass of nodes that were deleted with the last of their tets, kg."""
     nodes_initial: int | None = None
     nodes: int | None = None
     fragments: int | None = None
     broken: int | None = None
     """Number of broken facets."""
     first_break: float = math.nan
-    """Time at which the first facet broke, s; NaN if none broke."""
+    """Simulated time at which the first facet broke, s; NaN if no facet broke."""
     inside: int | None = None
-    """Nodes that end inside another body or fragment (free nodes: also inside their own part), deeper than 0.05 of
-    the typical face size."""
+    """Number of nodes that end inside another body or fragment, deeper than 0.05 of the typical face size; free nodes
+    count also inside of their own part."""
     deepest: float = math.nan
-    """Depth of the deepest penetrating node that has not passed the outermost tets, over the typical face size."""
+    """Depth of the deepest penetrating node that has not passed the outermost tets, divided by the typical face
+    size."""
     overlapping: int | None = None
     """Number of surface tets that end with more than a tenth of their volume in other bodies or fragments."""
     overlap: float = math.nan
-    """Common volume of penetrating bodies and fragments over the volume of all surface tets."""
+    """Common volume of penetrating bodies and fragments divided by the volume of all surface tets."""
     rebalances: int | None = None
     balancing_cost: float = math.nan
     """Wall time of all decompositions, s."""
     balancing_saved: float = math.nan
-    """Wall time saved by the decompositions, s: estimate with the imbalance from before each, less the time used."""
+    """Wall time saved by the decompositions, s: estimate with the imbalance before each decomposition, less the time
+    used."""
     energy: Energy | None = None
     worst_residual: float = math.nan
-    """Largest energy residual of all ledger lines of the run."""
+    """Largest energy residual of all history lines of the run."""
     made: list[Made] = []
-    """Energy created by ledger lines (``run.made_limit``), the largest first; only lines that have created any."""
+    """Energy created by terms of the energy ledger (``run.made_limit``), the largest first; only terms that have
+    created energy."""
     compressed: list[Compressed] = []
     """Largest compression of each part that breaks in tension only and was compressed; the part with the largest value
     comes first."""
@@ -136,23 +141,24 @@ class Outcome(msgspec.Struct, kw_only=True, frozen=True):
     """CPU seconds per phase, one number per rank; only the first thread of the rank counts."""
     serial: dict[str, list[float]] = {}
     """Serial wall time of each phase, s, one number per rank: work of a single thread of the rank, without waiting for
-    other ranks. This time limits the gain of more threads. Other programs on the same cores increase this time."""
+    other ranks. The serial wall time limits the gain of more threads. Other programs on the same cores increase the
+    serial wall time."""
     parallel: dict[str, list[float]] = {}
-    """Parallel wall time of each phase, s: in regions, whose tasks the threads of a rank share; with one thread, the
-    time that more threads could share."""
+    """Wall time of each phase in parallel regions, whose tasks are divided among the threads of a rank, s. With one
+    thread, this is the time that more threads could share."""
     projected: dict[int, dict[str, list[float]]] = {}
-    """By number of threads: estimated seconds per phase and rank with so many threads, without waiting; only of a
-    run with this option (docs/performance/scaling.md)."""
+    """Estimated seconds per phase and rank without waiting, by number of threads; only for a run with this option
+    (docs/performance/scaling.md)."""
     sharing: "Sharing | None" = None
     """Measurements from which the estimates for other numbers of threads are computed."""
     helped: list[float] = []
-    """Working time of all threads of the rank except the first, together, s; at most threads - 1 times ``parallel``."""
+    """Working time of all threads of the rank except the first, summed, s; at most threads - 1 times ``parallel``."""
     without: list[str] = []
-    """Stages that the case does not have (cases/estimates/stages.py); no phase has computed them."""
+    """Stages that the case does not have (cases/estimates/stages.py); no phase has computed these stages."""
     peak_memory: list[int] = []
     """Largest resident memory, bytes, one number per rank."""
     element_updates_per_second: float = math.nan
-    """Steps of a tet per CPU second and core."""
+    """Number of tets times steps, per CPU second and core."""
     reference: list[Check] = []
     probes: list[Measured] = []
     """Last, smallest and largest value of each probe."""
@@ -165,7 +171,7 @@ def known(value: float | None) -> float | None:
 
 
 def last_message(outcome: Outcome) -> dict[str, Any]:
-    """Returns the fields of the message of the outcome (messages.Finished); 0 for unknown values."""
+    """Returns the fields of the message about the outcome (messages.Finished); 0 for unknown values."""
     steps = outcome.steps or 0
     return {
         "step": steps, "t": known(outcome.time) or 0.0, "state": outcome.state, "digest": outcome.digest,
@@ -179,8 +185,8 @@ def to_json(outcome: Outcome) -> bytes:
 
 
 def from_json(text: bytes | str) -> Outcome:
-    """Reads an outcome. Raises msgspec.ValidationError or msgspec.DecodeError. JSON has no NaN: it is written as
-    null and read back as NaN.
+    """Reads an outcome. Raises msgspec.ValidationError or msgspec.DecodeError if the data is no outcome. JSON has no
+    NaN, so that NaN is written as null and null is read as NaN.
     """
     data = msgspec.json.decode(text)
     if isinstance(data, dict):

@@ -1,10 +1,10 @@
-"""States of a run, their order, and the causes of its end."""
+"""States of a run, the order of the states, and the causes of the end."""
 
 from enum import StrEnum
 
 
 class State(StrEnum):
-    """State of a run. The later members are final."""
+    """State of a run. The last members of the enumeration are final states."""
 
     ACCEPTED = "accepted"
     QUEUED = "queued"
@@ -19,7 +19,7 @@ class State(StrEnum):
 
     @property
     def final(self) -> bool:
-        """Whether the state cannot change any more."""
+        """Whether the state is final, so that it cannot change any more."""
         return self in FINAL
 
 
@@ -33,11 +33,12 @@ FOLLOWERS: dict[State, frozenset[State]] = {
     State.STOPPING: FINAL,
     **dict.fromkeys(FINAL, frozenset()),
 }
-"""The states that may follow each state; none for a final one. An interrupted job of a batch system waits again."""
+"""The states that may follow each state; a final state has no follower. An interrupted job of a batch system waits
+again."""
 
 
 class Cause(StrEnum):
-    """Cause of the end of a run: a closed list."""
+    """Cause of the end of a run, from a closed list."""
 
     INPUT = "input"
     MESH = "mesh"
@@ -46,7 +47,7 @@ class Cause(StrEnum):
     MEMORY = "memory"
     WALLTIME = "walltime"
     STEPS = "steps"
-    """``run.max_steps`` was reached before ``run.end_time``."""
+    """Cause: ``run.max_steps`` was reached before ``run.end_time``."""
     PREEMPTED = "preempted"
     NODE = "node"
     LAUNCH = "launch"
@@ -56,8 +57,9 @@ class Cause(StrEnum):
 
 
 class ExitCode:
-    """Exit codes of ``python -m conoid.worker``. The outcome file is decisive; the exit code is only additional
-    information."""
+    """Exit codes of ``python -m conoid.worker``. The outcome file decides how a run has ended; the exit code is only
+    additional information.
+    """
 
     SUCCEEDED = 0
     CRASHED = 1
@@ -65,4 +67,4 @@ class ExitCode:
     PHYSICS = 3
     INTERRUPTED = 4
     STORAGE = 5
-    """A file could not be written: the disk is full or defective."""
+    """Cause: a file could not be written, because the disk is full or defective."""

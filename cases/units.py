@@ -5,8 +5,8 @@ The grammar is closed (no evaluation of any kind)::
     quantity = number [ unit { ("*" | "/" | " ") unit } ]
     unit     = symbol [ "^" integer ]
 
-A bare number is taken as SI. Factors are exact and a quantity is rounded once: ``0.4 mm`` and ``400 um`` are equal to
-the bit, and so are the runs. Errors name the text, what was wrong and what would be allowed.
+A bare number is taken as SI. Factors are exact and a quantity is rounded once: ``0.4 mm`` and ``400 um`` give the same
+bit pattern, and therefore the same run. Errors contain the text of the quantity, the reason, and the allowed form.
 """
 
 import math
@@ -21,19 +21,19 @@ from pydantic_core import CoreSchema
 from .reading.similar import meant
 
 Dimension = tuple[int, int, int, int]
-"""Exponents of metre, kilogram, second, kelvin."""
+"""Exponents of metre, kilogram, second and kelvin."""
 
 _LENGTH, _MASS, _TIME, _TEMPERATURE = (1, 0, 0, 0), (0, 1, 0, 0), (0, 0, 1, 0), (0, 0, 0, 1)
 _FORCE, _STRESS, _ENERGY, _POWER = (1, 1, -2, 0), (-1, 1, -2, 0), (2, 1, -2, 0), (2, 1, -3, 0)
 _NONE, _FREQUENCY = (0, 0, 0, 0), (0, 0, -1, 0)
-"""Dimensions: exponents of m, kg, s, K."""
+"""Dimensions of the units: exponents of m, kg, s, K."""
 
 _ONE, _KILO, _MEGA, _GIGA = Fraction(1), Fraction(1000), Fraction(10**6), Fraction(10**9)
 _CENTI, _MILLI, _MICRO = Fraction(1, 100), Fraction(1, 1000), Fraction(1, 10**6)
 _NANO, _PICO = Fraction(1, 10**9), Fraction(1, 10**12)
-"""SI prefixes, exact."""
+"""SI prefixes with their exact factors."""
 _INCH, _POUND = Fraction("0.0254"), Fraction("0.45359237")
-"""Inch and pound in m and kg; exact by the agreement of 1959."""
+"""Inch and pound in m and kg; exact by the international agreement of 1959."""
 _PSI = _POUND * Fraction("9.80665") / _INCH**2
 """Pound-force per square inch, Pa; exact, with standard gravity."""
 UNITS: dict[str, tuple[Fraction, Dimension]] = {
@@ -72,23 +72,25 @@ NUMBER = r"^\s*[+-]?(\d+\.?\d*|\.\d+)"
 """Start of the text of a quantity, as a pattern for the JSON schema."""
 _FACTOR = re.compile(r"\s*([*/·]?)\s*([A-Za-zµ%]+|1)(?:\^([+-]?\d))?")
 QUANTITY = "the quantity's"
-"""Placeholder for the unit of a number whose unit another key determines."""
+"""Placeholder for the unit of a number if another key determines the unit."""
 _LONGEST = 80
-"""Largest number of characters of a quantity (chosen value). Any number with its unit is shorter. Text above this
-length is refused before it is parsed."""
+"""Largest number of characters of a quantity (chosen value). Any number with its unit is shorter than this limit. Text
+above this length is refused before it is parsed."""
 LARGEST = 1e30
-"""Largest quantity in SI units; its inverse is the smallest quantity. The value was chosen because the energy of any
-such mass and speed is a finite number."""
+"""Largest quantity in SI units; the smallest quantity is its inverse. The energy of any mass and speed below this limit
+is a finite number (reason of the chosen value)."""
 
 
 _WRITTEN = str.maketrans({
     "\N{GREEK SMALL LETTER MU}": "\N{MICRO SIGN}", "\N{SUPERSCRIPT TWO}": "^2", "\N{SUPERSCRIPT THREE}": "^3",
 })  # fmt: skip
-"""Two other spellings are accepted: the Greek mu for the micro sign, and raised exponents."""
+"""Two other spellings of units are accepted: the Greek mu for the micro sign, and raised exponents."""
 
 
 def parse_unit(text: str) -> tuple[Fraction, Dimension]:
-    """Returns the exact factor to SI and the dimension of a unit such as ``kg/m^3``. Raises ValueError."""
+    """Returns the exact factor to SI and the dimension of a unit such as ``kg/m^3``. Raises ValueError if the unit is
+    unknown.
+    """
     text = text.translate(_WRITTEN)
     factor, dimension, position = _ONE, [0, 0, 0, 0], 0
     while position < len(text):
@@ -109,8 +111,8 @@ def parse_unit(text: str) -> tuple[Fraction, Dimension]:
 def parse_quantity(value: object, unit: str) -> float:
     """Returns the SI value of ``value``, a number (already SI) or text with a unit of the same dimension as ``unit``.
 
-    Raises ValueError for another dimension, an unknown unit, NaN, infinity, and values beyond LARGEST or below its
-    inverse.
+    Raises ValueError if the dimension differs, if the unit is unknown, for NaN and infinity, and for values beyond
+    LARGEST or below its inverse.
     """
     if isinstance(value, bool) or not isinstance(value, int | float | str):
         raise ValueError(f"expected a quantity in {unit or 'plain numbers'}, got {value!r}")
@@ -121,8 +123,8 @@ def parse_quantity(value: object, unit: str) -> float:
 
 
 def written(value: object) -> tuple[str, str] | None:
-    """Returns number and unit of a quantity as they are written, the unit empty if there is none; None for other
-    text. Does not check that the unit exists.
+    """Returns number and unit of a quantity as they are written, with an empty unit if there is none; None for other
+    text. The function does not check that the unit exists.
     """
     if isinstance(value, bool) or not isinstance(value, int | float | str):
         return None
@@ -131,8 +133,9 @@ def written(value: object) -> tuple[str, str] | None:
 
 
 def usable(number: float, what: str = "it") -> float:
-    """Returns the number if it is within LARGEST and its inverse. Raises ValueError; ``what``: words for the number
-    in the error message."""
+    """Returns the number if it is between the inverse of LARGEST and LARGEST. Raises ValueError for any other number;
+    ``what``: words for the number in the error message.
+    """
     if number and not 1.0 / LARGEST <= abs(number) <= LARGEST:
         raise ValueError(f"{what} is not between {1.0 / LARGEST:g} and {LARGEST:g}")
     return number
@@ -180,7 +183,7 @@ class Written:
     unit: str
 
     def __get_pydantic_json_schema__(self, core: CoreSchema, handler: GetJsonSchemaHandler) -> dict[str, Any]:
-        """The JSON schema with the addition; pydantic calls this method."""
+        """Returns the JSON schema with the addition; pydantic calls this method."""
         return {**handler(core), "type": ["number", "string"], "unit": self.unit}
 
 

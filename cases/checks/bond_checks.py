@@ -19,7 +19,7 @@ def check_bonds(case: Case) -> Iterator[Problem]:
 
 
 def _each(case: Case) -> Iterator[Problem]:
-    """Yields the problems of one bond, and of two bonds of the same parts."""
+    """Yields the problems of one bond, and of two bonds between the same parts."""
     parts = {part.name: part for part in case.parts}
     for i, bond in enumerate(case.bond):
         location: Location = ("bond", i)
@@ -38,7 +38,7 @@ def _each(case: Case) -> Iterator[Problem]:
 
 
 def _wearing(case: Case) -> Iterator[Problem]:
-    """Yields a problem for parts that erode in a body with another part that fractures."""
+    """Yields a problem if a part that erodes and a part that fractures belong to the same body."""
     breaks = breakable(case)
     for k, _, one, other in shared_bonds(case):
         worn = [case.parts[i].name for i in (one, other) if case.parts[i].erosion is not None and breaks[i]]
@@ -51,8 +51,9 @@ def _wearing(case: Case) -> Iterator[Problem]:
 
 
 def _pulled(case: Case) -> Iterator[Problem]:
-    """Yields a problem for gravity on a part of a body only: a node of the interface has one acceleration for all of
-    its mass."""
+    """Yields a problem for gravity on only some parts of a body: a node of the interface has one acceleration for all
+    of its mass.
+    """
     body = bodies(case)
     for k, spec in enumerate(case.boundaries):
         if isinstance(spec, Gravity) and spec.parts:
@@ -91,7 +92,7 @@ def _twice(case: Case, number: int) -> Iterator[Problem]:
 
 
 def _meshes(one: Part, other: Part, breaks: bool, location: Location) -> Iterator[Problem]:
-    """Yields a problem for parts whose meshes cannot have common nodes, or that cannot separate."""
+    """Yields a problem for bonded parts whose meshes cannot have common nodes, or whose bond cannot break."""
     names, pair = f"{one.name}, {other.name}", (one.mesh, other.mesh)
     way = "set kind = 'tied'"
     loose = [part.name for part in (one, other) if isinstance(part.mesh, Loose)]

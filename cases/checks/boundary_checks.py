@@ -1,5 +1,6 @@
-"""Checks of boundaries that the models cannot make: existing parts, boxes that contain something, walls in front of
-parts."""
+"""Checks of boundaries that the models cannot make: existing parts, boxes that contain nodes or faces, walls in front
+of parts.
+"""
 
 import itertools
 import math
@@ -18,8 +19,8 @@ from ..warnings.idle import idle
 from .drives import clash
 
 ROUNDING = 1e-9
-"""Relative tolerance of two lengths or times that are meant to be equal. The value was chosen far above the rounding
-of units (1e-16) and far below any tolerance of a drawing."""
+"""Relative tolerance of two lengths or times that are meant to be equal. The tolerance is far above the rounding of
+units (1e-16) and far below any tolerance of a drawing (chosen value)."""
 
 
 def check_boundaries(case: Case) -> Iterator[Problem]:
@@ -40,8 +41,8 @@ def check_boundaries(case: Case) -> Iterator[Problem]:
 
 
 def _out_of_reach(case: Case, number: int) -> Iterator[Problem]:
-    """Yields a problem for a plane or a box outside of all its bodies, and for a traction inside of them; the worker
-    checks boxes between the nodes of a body.
+    """Yields a problem for a plane or a box outside of all bodies of the boundary, and for the box of a traction that
+    is completely inside of a body. The worker checks boxes that lie between the nodes of a body.
     """
     boundary = case.boundaries[number]
     parts = [part for part in case.parts if not boundary.parts or part.name in boundary.parts]
@@ -87,7 +88,9 @@ def _meet(box: list[tuple[float, float]], body: tuple[Vector, Vector]) -> bool:
 
 
 def _surrounds(body: Placed, box: list[tuple[float, float]]) -> bool:
-    """Whether a box lies in a body, tested at its corners, which is exact for bodies without hole and slit."""
+    """Whether a box lies in a body, tested at the corners of the box, which is exact for bodies without hole and
+    slit.
+    """
     if isinstance(body.mesh, Tube) or (isinstance(body.mesh, Box | Plate) and body.mesh.slit is not None):
         return False
     first, second, third = box
@@ -95,7 +98,9 @@ def _surrounds(body: Placed, box: list[tuple[float, float]]) -> bool:
 
 
 def _comes(case: Case, part: Part, axis: int, way: float) -> bool:
-    """Whether a part moves along ``axis`` to its target by the displacement ``way``, m, as far as that is known."""
+    """Whether a part moves along ``axis`` to the boundary ``target`` by the displacement ``way``, m, as far as the
+    motion is known.
+    """
     pulls = [boundary.acceleration[axis] for boundary in case.boundaries if isinstance(boundary, Gravity)]
     unknown = part.spin is not None or part.stretch is not None or part.jitter > 0.0
     driven = any(isinstance(boundary, Prescribed | Rotation | Traction) for boundary in case.boundaries)
@@ -103,7 +108,9 @@ def _comes(case: Case, part: Part, axis: int, way: float) -> bool:
 
 
 def _two_drives(case: Case) -> Iterator[Problem]:
-    """Yields a problem for two boundaries that drive a whole part differently; the worker checks the nodes of boxes."""
+    """Yields a problem for two boundaries that prescribe different motions of a whole part; the worker checks the nodes
+    of boxes.
+    """
     drives = [(i, each) for i, each in enumerate(case.boundaries) if isinstance(each, Rotation) or _whole(each)]
     drives = [(i, each) for i, each in drives if getattr(each, "on", None) is None]
     names = [part.name for part in case.parts]
@@ -165,14 +172,16 @@ def _box(boundary: Prescribed | Traction, location: Location) -> Iterator[Proble
 
 
 def ordered(low: tuple[float, ...], high: tuple[float, ...], location: Location) -> Iterator[Problem]:
-    """Yields a problem for corners of a box of which ``high`` is below ``low``."""
+    """Yields a problem for corners of a box if ``high`` is below ``low``."""
     for d, (a, b) in enumerate(zip(low, high, strict=True)):
         if a > b:
             yield problem((*location, "high", d), b, f"must not be below low[{d}], {a}")
 
 
 def check_walls(case: Case) -> Iterator[Problem]:
-    """Yields a problem for walls of the same name, without a normal, or with a part behind them at the start."""
+    """Yields a problem for walls with the same name, for a wall without a normal, and for a part behind a wall at the
+    start.
+    """
     walls = [(i, boundary) for i, boundary in enumerate(case.boundaries) if isinstance(boundary, Wall)]
     seen: set[str] = set()
     for i, wall in walls:
@@ -186,7 +195,7 @@ def check_walls(case: Case) -> Iterator[Problem]:
 
 
 def _shape(wall: Wall, location: Location) -> Iterator[Problem]:
-    """Yields the keys of a wall that its shape needs, or does not have."""
+    """Yields the keys of a wall that its shape requires but the case lacks, or that its shape does not have."""
     needed = {"plane": ("normal",), "cylinder": ("axis", "radius"), "sphere": ("radius",)}[wall.shape]
     for key in ("normal", "axis", "radius"):
         value = getattr(wall, key)

@@ -1,5 +1,6 @@
-"""Checks between the keys of a case, which the models cannot make: existing names, sizes that fit, needed planes of
-symmetry."""
+"""Checks between the keys of a case, which the models cannot make: existing names, sizes that fit, required planes of
+symmetry.
+"""
 
 import math
 from collections.abc import Callable, Iterable, Iterator, Mapping
@@ -41,13 +42,13 @@ NEEDED: dict[str, frozenset[str]] = {
     "penetration": frozenset({"part", "axis"}),
     "worst_residual": frozenset(),
 }
-"""Keys that each reference quantity needs. All other keys of part, probe and axis are refused."""
+"""Keys that each reference quantity needs. A reference quantity refuses all other keys of part, probe and axis."""
 
 Read = TypeVar("Read", bound=BaseModel)
 
 
 def check(case: Case) -> list[Problem]:
-    """Yields every problem between keys of a case, in the order of its keys."""
+    """Yields every problem between keys of a case, in the order of the keys."""
     checks: tuple[Callable[[Case], Iterable[Problem]], ...] = (
         _materials, _parts, _overlaps, _sectors, check_boundaries, check_ons, check_walls, check_bonds, check_rigid,
         _contact, check_probes, _fields, _references,
@@ -74,7 +75,7 @@ def check_parts(data: Mapping[str, Any]) -> Iterator[Problem]:
 
 
 def _tied(bonds: object) -> dict[frozenset[str], float]:
-    """Names in bonds: their overlap is checked after the case has been read."""
+    """Names of the bonded parts; the overlap of bonded parts is checked after the case has been read."""
     listed = bonds if isinstance(bonds, list | tuple) else ()
     names = [each.get("parts") for each in listed if isinstance(each, Mapping)]
     pairs = [pair for pair in names if isinstance(pair, list | tuple) and all(isinstance(name, str) for name in pair)]
@@ -173,7 +174,7 @@ def _sectors(case: Case) -> Iterator[Problem]:
 
 
 def _cuts(mesh: Mesh) -> Iterator[tuple[int, float]]:
-    """Planes at which a body is cut: directions and coordinates, m."""
+    """Planes at which a body is cut by its sector: directions and coordinates, m."""
     if isinstance(mesh, Solid):
         yield from ((d, mesh.centre[d]) for d in cut_by(mesh.sector, mesh.axis))
     elif not isinstance(mesh, Measured):

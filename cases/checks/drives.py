@@ -5,13 +5,13 @@ from ..model.tables import Axis
 from ..shapes.geometry import AXES, across
 
 Motion = tuple[object, ...]
-"""Motion of a component over time; two motions are the same if the tuples are equal."""
+"""Motion of a velocity component over time; two motions are equal if the tuples are equal."""
 REST: Motion = (0.0,)
-"""Motion of a component that stays zero."""
+"""Motion of a velocity component that stays zero."""
 
 
 def motions(boundary: Boundary) -> dict[Axis, Motion]:
-    """Returns the motion of each component that a boundary prescribes; empty without prescribed motion."""
+    """Returns the motion of each velocity component that a boundary prescribes; empty without prescribed motion."""
     if isinstance(boundary, Prescribed):
         given = {axis: getattr(boundary, axis) for axis in AXES}
         return {axis: _straight(speed, boundary.course) for axis, speed in given.items() if speed is not None}
@@ -21,7 +21,9 @@ def motions(boundary: Boundary) -> dict[Axis, Motion]:
 
 
 def clash(one: Boundary, other: Boundary) -> tuple[Axis, ...]:
-    """Returns the components that both prescribe differently: a node cannot follow both."""
+    """Returns the velocity components for which two boundaries prescribe different motions: a node cannot follow
+    both.
+    """
     first, second = motions(one), motions(other)
     return tuple(axis for axis in AXES if axis in first and axis in second and first[axis] != second[axis])
 
@@ -31,7 +33,7 @@ def _straight(speed: float, course: Course) -> Motion:
 
 
 def _round(boundary: Rotation, axis: Axis) -> Motion:
-    """Returns the motion of a rotation; along its axis it is zero."""
+    """Returns the motion of a rotation; the component along its axis is zero."""
     i, j = across(axis)
     rate = boundary.spin.rate
     return (boundary.spin.centre, rate) if rate[i] or rate[j] else REST

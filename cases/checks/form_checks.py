@@ -8,8 +8,8 @@ from ..reading.problems import Location, Problem, problem
 from ..shapes.profile import tangent
 
 _LEAST = 1e-6
-"""Smallest size over the radius of a body; a smaller size, except 0, is an error. The value was chosen because no
-element is so small."""
+"""Smallest size divided by the radius of a body (chosen value); a smaller size, except 0, is an error. No element is as
+small as this size."""
 _ROUNDED = "shank", "tip_radius", "meplat", "top_radius", "inner_radius", "radius"
 
 
@@ -32,7 +32,7 @@ def check_form(form: Model, location: Location) -> Iterator[Problem]:
 
 
 def _slips(form: Model, location: Location) -> Iterator[Problem]:
-    """Yields lengths that may be 0 and are nearly 0."""
+    """Yields lengths that may be 0 and that are nearly 0."""
     if not isinstance(form, ConeForm | OgiveForm | RingSectorForm):
         return
     most = max(form.radius, form.top_radius) if isinstance(form, ConeForm) else form.radius

@@ -1,4 +1,4 @@
-"""Checks of a body with measured sizes (combination, CAD, STL, mesh file), and of the files that it names."""
+"""Checks of a body with measured sizes (combination, CAD, STL, mesh file), and of the files that the body names."""
 
 from collections.abc import Iterator
 
@@ -9,15 +9,15 @@ from ..reading.problems import Location, Problem, problem
 from .form_checks import check_form
 
 _DEEPEST, _MOST = 8, 200
-"""Largest depth of nested combinations, and largest number of shapes in a combination. The values were chosen larger
-than any user needs."""
+"""Largest depth of nested combinations, and largest number of shapes in a combination: larger than any user needs
+(chosen values)."""
 
 File = MeshFile | FileForm | Stl
-"""Models that name a file by ``path`` and ``sha256``."""
+"""Models that name a file by the keys ``path`` and ``sha256``."""
 
 
 def files_in(mesh: Mesh) -> Iterator[tuple[Place, File]]:
-    """Yields every file that a mesh names, and its place below the mesh."""
+    """Yields every file that a mesh names, and the key of its table below the mesh."""
     if isinstance(mesh, File):
         yield (), mesh
     elif isinstance(mesh, CombinedForm):

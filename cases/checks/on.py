@@ -1,5 +1,6 @@
-"""Sets of mesh files that boundaries and probes select by the key ``on``, and those that frames contain: their numbers
-and their parts."""
+"""Sets of mesh files that boundaries and probes select by the key ``on``, and sets that frames contain: numbers and
+parts of the sets.
+"""
 
 from collections.abc import Iterator
 from typing import NamedTuple
@@ -11,7 +12,7 @@ from ..model.schema import Case, Part
 from ..reading.problems import Location, Problem, problem
 
 MOST = 62
-"""Largest number of sets of a case. Each node has one bit for each set in an integer of 64 bits."""
+"""Largest number of sets of a case: each node has one bit for each set in an integer of 64 bits."""
 
 
 class Framed(NamedTuple):
@@ -24,12 +25,12 @@ class Framed(NamedTuple):
 Held = Prescribed | Rotation | Symmetry | Traction
 """Kinds of boundaries that may have a set."""
 Selecting = Held | Probe | Framed
-"""All that selects a set."""
+"""Every object of a case that may select a set."""
 
 
 def ons(case: Case) -> list[tuple[Location, Selecting]]:
-    """Returns the boundaries and probes with a set and the sets of frames, each with the place of the name of the set
-    in the case.
+    """Returns the boundaries and probes that select a set, and the sets of frames, each with the location of the set's
+    name in the case.
     """
     boundaries: list[tuple[Location, Selecting]] = [
         (("boundaries", i, "on"), each)
@@ -41,7 +42,7 @@ def ons(case: Case) -> list[tuple[Location, Selecting]]:
 
 
 def bits(case: Case) -> dict[str, int]:
-    """Returns a number for each set of the case, from 0."""
+    """Returns a number for each set of the case, beginning with 0."""
     return {name: bit for bit, name in enumerate(dict.fromkeys(each.on or "" for _, each in ons(case)))}
 
 
@@ -51,16 +52,16 @@ def named(spec: Selecting) -> tuple[str, ...]:
 
 
 def parts(case: Case, spec: Selecting) -> list[Part]:
-    """Returns the parts whose sets a boundary or probe selects: the named parts, or all parts with a mesh from a file
-    if no part is named.
+    """Returns the parts whose sets a boundary or probe selects: the named parts, or all parts with a mesh file if no
+    part is named.
     """
     names = named(spec)
     return [part for part in case.parts if (part.name in names if names else isinstance(part.mesh, MeshFile))]
 
 
 def check_ons(case: Case) -> Iterator[Problem]:
-    """Yields a problem for each boundary, probe or frame with a set of a part that has none; only mesh files have
-    sets.
+    """Yields a problem for each boundary, probe or frame that selects a set of a part without sets; only mesh files
+    have sets.
     """
     for location, spec in ons(case):
         generated = [part.name for part in parts(case, spec) if not isinstance(part.mesh, MeshFile)]

@@ -1,4 +1,4 @@
-"""Overlap of primitives, before meshes are made."""
+"""Overlap of primitives, checked before meshes are made."""
 
 import math
 from collections.abc import Iterable, Iterator, Mapping
@@ -15,24 +15,24 @@ from ..shapes.placed import Placed, lattice
 from ..shapes.profile import Revolved, profile
 
 _POINTS = 12
-"""Number of sampling points per direction in the box that two bodies have in common. The value was chosen because
-the worker, which checks the nodes, finds slices that are thinner than a twelfth of this box."""
+"""Number of sampling points per direction in the common bounding box of two bodies (chosen value). The worker, which
+checks the nodes, finds overlaps that are thinner than a twelfth of this box."""
 _PAIRS = 32
-"""Largest number of pairs of bodies that are checked. The value was chosen because the check takes a second at most;
-the worker checks all pairs."""
+"""Largest number of pairs of bodies that are checked: a second at most (chosen value). The worker checks all pairs of
+bodies."""
 _TOUCH = 1e-9
-"""Depth of contact that is not an overlap, over the size of a body. The value is far above rounding and far below
-any gap."""
+"""Depth of contact that does not count as an overlap, divided by the size of a body. The depth is far above rounding
+errors and far below any gap (chosen value)."""
 
 
 def overlaps(
     parts: Iterable[tuple[int, Part]], contact: Contact | None, tied: Mapping[frozenset[str], float]
 ) -> Iterator[Problem]:
-    """Yields a problem for each of the numbered ``parts`` that overlaps an earlier one with which it is in contact.
+    """Yields a problem for each of the numbered ``parts`` that overlaps an earlier part with which it is in contact.
 
-    ``tied``: allowed overlap of parts with a tied bond, m, by their names: their nodes are moved onto each other's
-    faces. Curved bodies are reduced by what the facets of their mesh can cut off; loose tets and mesh files are
-    ignored.
+    ``tied``: allowed overlap of two parts with a tied bond, m, by the names of the parts; tied nodes are moved onto the
+    faces of the other part. Curved bodies are reduced by the depth that the facets of their mesh can cut off; single
+    tets and mesh files are ignored.
     """
     if contact is None or contact.overlap != "refuse":
         return
@@ -54,7 +54,7 @@ def overlaps(
 
 
 def bond_gaps(case: Case) -> dict[frozenset[str], float]:
-    """Returns the allowed overlap of two parts with a tied bond, m, by their names: the gap of the bond."""
+    """Returns the allowed overlap of two parts with a tied bond, m, by the names of the parts: the gap of the bond."""
     sizes = {part.name: getattr(part.mesh, "element_size", math.inf) for part in case.parts}
     found = dict[frozenset[str], float]()
     for bond in case.bond:
@@ -65,9 +65,9 @@ def bond_gaps(case: Case) -> dict[frozenset[str], float]:
 
 
 def grazes(case: Case) -> Iterator[Problem]:
-    """Yields a warning for each part that fills the hole of another within the facets of the tube: two circles of
-    the same radius become polygons that overlap. Parts of one body have these facets in common, and tied nodes are
-    moved onto the faces.
+    """Yields a warning for each part that fills the hole of another part within the depth of the facets of the tube.
+    Two circles of the same radius become polygons that overlap. Parts of one body have common facets, and tied nodes
+    are moved onto the faces.
     """
     contact, body = case.contact, bodies(case)
     if contact is None or contact.overlap != "refuse":
@@ -97,7 +97,7 @@ def grazes(case: Case) -> Iterator[Problem]:
 
 
 def _core(mesh: Generated) -> Generated:
-    """Returns a body reduced by what facets of its element size can cut off its curved surface."""
+    """Returns a body reduced by the depth that facets of its element size can cut off its curved surface."""
     if not isinstance(mesh, Cylinder | Tube | Sphere):
         return mesh
     left = max(0.5 * mesh.radius, mesh.radius - _cut_off(mesh.radius, mesh.element_size))
@@ -113,12 +113,12 @@ def _rim(mesh: Generated) -> float:
 
 
 def _cut_off(radius: float, size: float) -> float:
-    """Returns the height of the arc over a chord of this ``size``, m: h^2 / 8 R."""
+    """Returns the height of the arc above a chord of the length ``size``, m: h^2 / 8 R."""
     return size**2 / (8.0 * radius)
 
 
 def _common(one: tuple[Vector, Vector], other: tuple[Vector, Vector]) -> tuple[Vector, Vector] | None:
-    """Returns the common box of two bodies with these corners."""
+    """Returns the common box of two bodies with the given corners."""
     (low, high), (low2, high2) = one, other
     (a, b, c), (d, e, f) = map(max, low, low2), map(min, high, high2)
     size = max(y - x for x, y in zip(low + low2, high + high2, strict=True))
@@ -126,15 +126,16 @@ def _common(one: tuple[Vector, Vector], other: tuple[Vector, Vector]) -> tuple[V
 
 
 def _round(point: Vector, margin: float) -> Iterator[Vector]:
-    """Returns six points around a point. Where turned bodies touch, rounding can put the middle point inside both
-    bodies."""
+    """Returns six points around a point. Six points are needed because, where turned bodies touch, rounding can put the
+    middle point inside both bodies.
+    """
     x, y, z = point
     for off in (-margin, margin):
         yield from ((x + off, y, z), (x, y + off, z), (x, y, z + off))
 
 
 def _depth(one: Placed, other: Placed, low: Vector, high: Vector) -> float:
-    """Returns the smallest extent, m, of the common volume of both in a box; 0 without one."""
+    """Returns the smallest extent, m, of the common volume of two bodies in a box; 0 if there is no common volume."""
     both = [point for point in lattice(low, high, _POINTS) if one.holds(point) and other.holds(point)]
     margin = _TOUCH * max(b - a for body in (one, other) for a, b in zip(*body.bounds(), strict=True))
     margin = max(margin, _rim(one.mesh), _rim(other.mesh))

@@ -50,7 +50,7 @@ def check_probes(case: Case) -> Iterator[Problem]:
 
 
 def _keys(probe: Probe, location: Location) -> Iterator[Problem]:
-    """Yields keys that the field of a probe needs, and keys that it does not use."""
+    """Yields keys that the field of a probe requires but the probe lacks, and keys that the field does not use."""
     field = kind(probe.field)
     for key, fields in _USED.items():
         if field not in fields and getattr(probe, key) is not None:
@@ -67,7 +67,7 @@ def _whole(field: str) -> str:
 
 
 def _part(probe: Probe, parts: list[str], location: Location) -> Iterator[Problem]:
-    """Yields a problem for the part of a probe: absent, unknown, or given for a wall."""
+    """Yields a problem for the part of a probe if it is absent, unknown, or given for a wall."""
     if kind(probe.field) in COURSES:
         if probe.part:
             yield problem((*location, "part"), probe.part, f"{kind(probe.field)} is that of a wall; remove part")
@@ -79,7 +79,7 @@ def _part(probe: Probe, parts: list[str], location: Location) -> Iterator[Proble
 
 
 def _pushes(case: Case, number: int, probe: Probe) -> Iterator[Problem]:
-    """Yields a problem for the force of a wall or part that does not exist, or cannot push."""
+    """Yields a problem for a probe of the force of a wall or part that does not exist, or cannot exert a force."""
     location, names = ("probes", number), [wall.name for _, wall in case.boundaries_of(Wall)]
     if probe.field.startswith("wall_"):
         if not names:

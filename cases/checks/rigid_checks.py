@@ -1,5 +1,6 @@
-"""Checks of rigid parts that the models cannot make: keys that have no effect on them, and boundaries on some of
-their nodes."""
+"""Checks of rigid parts that the models cannot make: keys that have no effect on rigid parts, and boundaries on some of
+their nodes.
+"""
 
 from collections.abc import Iterator
 
@@ -11,7 +12,7 @@ from .on import parts
 
 
 def check_rigid(case: Case) -> Iterator[Problem]:
-    """Yields the problems of the rigid parts of a case, and of the boundaries on them."""
+    """Yields the problems of the rigid parts of a case, and of the boundaries on rigid parts."""
     for i in case.rigid:
         part = case.parts[i]
         yield from _part(part, ("parts", i))

@@ -1,4 +1,6 @@
-"""Load balance: the criteria for a new decomposition of the mesh, used by a run and by the replay of its loads."""
+"""Load balance: the criteria for a new decomposition of the mesh, used by a run and by the replay of the loads of a
+run.
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -7,28 +9,28 @@ from itertools import pairwise
 from ..model.schema import Balance
 
 WORK = ("elements", "nodes", "contact", "fracture")
-"""Phases of a step whose work is distributed over the ranks; the others wait or write."""
+"""Phases of a step whose work is distributed over the ranks; all other phases wait or write."""
 MOVED = ("elements", "nodes", "contact")
-"""Phases whose work moves with tets. Fracture consists of many small tasks on every rank that has a facet to break,
-for any number of such facets.
-"""
+"""Phases whose work moves with the tets. Fracture is not among these phases: it consists of many small tasks on every
+rank that has a facet to break, for any number of such facets."""
 
 
 def lost(loads: Sequence[float]) -> float:
-    """Returns the time of the most loaded rank beyond the mean."""
+    """Returns the time of the most loaded rank in excess of the mean time of all ranks."""
     return max(loads) - sum(loads) / len(loads)
 
 
 def imbalance(loads: Sequence[float]) -> float:
-    """Returns the largest load over the mean."""
+    """Returns the largest load of a rank divided by the mean load."""
     mean = sum(loads) / len(loads)
     return max(loads) / mean if mean > 0.0 else 1.0
 
 
 @dataclass
 class Guard:
-    """Number of outside nodes of a rank compared with that at the last decomposition (the paper's criterion, its
-    fig. 9)."""
+    """Number of outside nodes of each rank, compared with the number at the last decomposition (the paper's criterion,
+    its fig. 9).
+    """
 
     alpha: float
     at_cut: int | None = None
@@ -41,7 +43,7 @@ class Guard:
 
 
 _MOMENTS = 32
-"""Largest number of stored moments of the work since a decomposition (chosen value)."""
+"""Largest number of stored times for which the work since a decomposition is recorded (chosen value)."""
 
 
 @dataclass
@@ -49,9 +51,9 @@ class Stretch:
     """The work of each rank since the last decomposition."""
 
     _moments: list[tuple[int, list[float]]] = field(default_factory=list)
-    """Steps and work of each rank, s, from the decomposition up to the end of each of several time windows."""
+    """Time windows that begin at the decomposition; for each window the steps, and the work of each rank, s."""
     _apart: float = 0.0
-    """Steps between two stored moments, except the last."""
+    """Number of steps between two stored times, except the last time."""
 
     def add(self, loads: Sequence[float], steps: int) -> None:
         """Adds the ``loads`` of all ranks, s per step, over some steps."""
@@ -75,7 +77,7 @@ class Stretch:
 
     @property
     def halves(self) -> tuple[float, float]:
-        """Returns the imbalance in the first half of the steps, and in the second half."""
+        """Returns the imbalance in the first half of the steps, and the imbalance in the second half."""
         if not self._moments:
             return 1.0, 1.0
         half, moments = 0.5 * self.steps, [(0, [0.0] * len(self.work)), *self._moments]
@@ -87,18 +89,18 @@ class Stretch:
 
 @dataclass
 class Trigger:
-    """The decision for a new decomposition, by the policy of a case; the same on all ranks."""
+    """The decision for a new decomposition, by the policy of a case; all ranks reach the same decision."""
 
     spec: Balance
     cost: float
-    """Cost of the last decomposition, s; at first that of a comparable operation."""
+    """Cost of the last decomposition, s; before the first decomposition, the cost of a comparable operation."""
     step: int = 0
     """Step of the last decomposition."""
     stretch: Stretch = field(default_factory=Stretch)
     """Work of each rank since the last decomposition."""
     fruitless: int = 0
-    """Number of consecutive decompositions that saved less than they cost. Each such decomposition doubles the loss
-    that triggers the next one."""
+    """Number of consecutive decompositions that saved less time than they cost. Each decomposition that saves less than
+    it costs doubles the lost time that triggers the next decomposition."""
 
     def look(self, loads: Sequence[float], steps: int) -> None:
         """Adds the ``loads`` of all ranks, s per step, over some steps."""
@@ -111,17 +113,18 @@ class Trigger:
 
     @property
     def bearable(self) -> float:
-        """Returns the loss that triggers the next decomposition, s."""
+        """Returns the lost time that triggers the next decomposition, s."""
         return self.cost * 2.0**self.fruitless
 
     @property
     def half_way(self) -> bool:
-        """Whether half of the loss that triggers a decomposition is reached."""
+        """Whether half of the lost time that triggers a decomposition is reached."""
         return self.lost > 0.5 * self.bearable
 
     def cause(self, step: int, grown: bool) -> str | None:
-        """Returns the reason for a decomposition before ``step``, empty for none; ``grown``: whether the outside
-        nodes of a rank have grown beyond the limit."""
+        """Returns the reason for a decomposition before ``step``; empty for no decomposition. ``grown``: whether the
+        outside nodes of a rank have grown beyond the limit.
+        """
         spec = self.spec
         if spec.policy == "never" or step == self.step:
             return None
@@ -132,8 +135,8 @@ class Trigger:
         return "time lost exceeds the cost" if self.lost > self.bearable else None
 
     def settle(self, step: int, cost: float, paid: bool = True) -> None:
-        """Resets the counters after a decomposition before ``step`` that took ``cost``, s; ``paid``: whether the one
-        before has saved its cost.
+        """Resets the counters after a decomposition before ``step`` that took ``cost``, s. ``paid``: whether the
+        previous decomposition has saved its cost.
         """
         self.fruitless = 0 if paid else self.fruitless + 1
         self.step, self.cost, self.stretch = step, cost, Stretch()

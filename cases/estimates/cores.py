@@ -1,4 +1,4 @@
-"""Number of cores that this process may use: by its affinity, and by the CPU quota of its control groups."""
+"""Number of cores that this process may use, by its CPU affinity and by the CPU quota of its control groups."""
 
 import os
 from pathlib import Path
@@ -7,21 +7,22 @@ _GROUPS, _OWN = Path("/sys/fs/cgroup"), Path("/proc/self/cgroup")
 
 
 def usable_cores() -> int:
-    """Returns the number of usable cores, at least one; the machine can have more."""
+    """Returns the number of usable cores, at least one; the machine can have more cores."""
     quotas = _quotas(_GROUPS, _OWN)
     return max(1, min([len(core_numbers()), *(int(quota) for quota in quotas)]))
 
 
 def core_numbers() -> list[int]:
-    """Numbers of the cores on which this process may run, as the system gives them."""
+    """Numbers of the cores on which this process may run, as the operating system gives them."""
     if hasattr(os, "sched_getaffinity"):
         return sorted(os.sched_getaffinity(0))
     return list(range(os.cpu_count() or 1))
 
 
 def _quotas(groups: Path, own: Path) -> list[float]:
-    """Yields the CPU quota, in cores, of each control group of a process that has one: cpu.max of version 2,
-    cpu.cfs_quota_us of version 1. Includes the root group, which is that of the container inside of one.
+    """Yields the CPU quota, in cores, of each control group of a process that has a quota: cpu.max of version 2,
+    cpu.cfs_quota_us of version 1. The root group is included, because it is the group of the container inside of a
+    container.
     """
     found = []
     for line in _text(own).splitlines():

@@ -1,7 +1,7 @@
 """Estimate of the cost of a case before a run: tets, time step, steps, memory, core time.
 
-Numbers of tets are exact for the structured generator and within about 10 % for gmsh, steps within a factor of two;
-core time depends on the constants below, which were measured on one machine.
+Numbers of tets are exact for the structured generator and within about 10 % for gmsh; numbers of steps are within a
+factor of two. The core time depends on the constants of this module, which were measured on one machine.
 """
 
 import math
@@ -24,69 +24,73 @@ from .shrinkage import shrinkage
 from .stages import AVERAGED, CONTACT, STATE, STEPS, STRENGTH, TETS
 
 NANOSECONDS = {"tet": 80.0, "nodal": 45.0, "split": 90.0, "eos": 15.0}
-"""Core time per tet and step: for every tet, and for each feature; laws of strength have their own (cases/laws).
-Measured at 10,000 to 750,000 tets."""
+"""Core time per tet and step: for every tet, and for each feature; laws of strength have separate times (cases/laws).
+Measured with 10,000 to 750,000 tets."""
 FACE_NANOSECONDS = {"contact": 50.0, "erosion": 1400.0}
-"""Core time per surface face and step; the second value where parts erode, stay in contact and are searched often."""
+"""Core time per surface face and step; the second value is for parts that erode, stay in contact, and are searched
+often."""
 STEP_OVERHEAD = 0.3e-3
-"""Core seconds of a rank per step, in addition to its tets."""
+"""Core time of a rank per step, s, in addition to the core time of its tets."""
 START = 2.0
-"""Core seconds of a rank before its first step, with a warm kernel cache."""
+"""Core time of a rank before its first step, s, with a warm kernel cache."""
 
 BROKEN_NANOSECONDS = 15_000.0
-"""Core time per tet and step of a body that has turned to dust whose pieces touch each other. Measured: 3 to 14 us in
-the ten hard cases that break without being driven (docs/verification/accuracy.md: CPU s less the estimate without dust,
-by steps and tets that can break), 10 to 20 us in a glass plate under an eroding cylinder, on aluminium, with friction.
-A broken facet costs 7 us, and completely fragmented material has two broken facets for each tet."""
+"""Core time per tet and step of a body that has turned to dust, whose fragments touch each other. Measured: 3 to 14 us
+in the ten hard cases that break without a prescribed motion (docs/verification/accuracy.md: CPU s less the estimate
+without dust, divided by steps and by tets that can break); 10 to 20 us in a glass plate under an eroding cylinder, on
+aluminium, with friction. A broken facet costs 7 us, and completely fragmented material has two broken facets for each
+tet."""
 PRESSED_NANOSECONDS = 26_000.0
-"""The cost of dust that is enclosed and pressed, where every tet is in contact on all sides and sweeps are many.
-Measured: a plug of glass under a ram (tests/bench/press.py) 17,000 to 20,000 on one rank; a block of 3,600 tets
-between walls, compressed by a ram to four fifths and two thirds of its height, 18,000 and 26,000; less where it can
-move aside."""
+"""Core time per tet and step of dust that is enclosed and pressed; every tet is then in contact on all sides, and
+contact needs many sweeps. Measured: a plug of glass under a ram (tests/bench/press.py) 17,000 to 20,000 on one rank; a
+block of 3,600 tets between walls, compressed by a ram to four fifths and two thirds of its height, 18,000 and 26,000;
+less where the dust can move aside."""
 BREAKING_OVERHEAD = 2e-3
-"""Core seconds of a rank per step in which any facet breaks: 1 to 4 ms in twelve scenes of 150 to 24,000 tets."""
+"""Core time of a rank per step in which any facet breaks, s: 1 to 4 ms in twelve scenes of 150 to 24,000 tets."""
 
 RIGID_STEPS = 1000.0
-"""Number of steps of a run with rigid parts only, unless their rotation needs more steps (worker/rigid/stage.py)."""
+"""Number of steps of a run with rigid parts only; more steps if the rotation of the parts needs more
+(worker/rigid/stage.py)."""
 
 RANK_BYTES = 280_000_000
 """Memory of a rank without a mesh: interpreter, libraries and the kernels of a single body. Rank 0, which writes all
-files, uses 260 MB, and 300 MB where pyarrow also writes a history as Parquet; the other ranks use 240 MB."""
+files, uses 260 MB, and 300 MB if pyarrow also writes a history as Parquet; each other rank uses 240 MB."""
 STAGE_BYTES = {"contact": 20_000_000, "fracture": 30_000_000}
-"""Additional memory of a rank for kernels and tables of a stage: bar_on_bar used 276 MB in all, the tile of
-docs/tutorial/first_case.md before fracture 301 MB."""
+"""Additional memory of a rank for kernels and tables of a stage. The case bar_on_bar used 276 MB in all; the tile of
+docs/tutorial/first_case.md used 301 MB before fracture."""
 TET_BYTES = {"tet": 330, "nodal": 110, "split": 140, "strength": 50, "facets": 130}
-"""Memory per tet with its share of the nodes, at the peak during the setup of the model (docs/performance/bench.md)."""
+"""Memory per tet, including the tet's share of the nodes, at the peak during the setup of the model
+(docs/performance/bench.md)."""
 DUST_BYTES = 38_000
 """Additional memory per tet of a body that has turned to dust: copies of nodes, surface, candidate pairs and their
-tables. Measured as the peak of a rank with half of the facets broken, less its memory before: 20 kB in the tile of
-docs/tutorial/first_case.md with 3,900 tets, 35 and 40 kB with the 57 MB that rank 0 needs at the end to write the
-history as Parquet; 20 kB in glass_ball_cohesive on two ranks. Glass bars with a quarter of the facets broken,
+tables. Measured as the peak of a rank with half of the facets broken, less its memory before fracture: 20 kB in the
+tile of docs/tutorial/first_case.md with 3,900 tets, 35 and 40 kB with the 57 MB that rank 0 needs at the end to write
+the history as Parquet; 20 kB in glass_ball_cohesive on two ranks. Glass bars with a quarter of the facets broken,
 glass_steel_bar with 9,000 and 39,000 tets, had 7 and 5 kB."""
 FILE_BYTES = {".msh": 42, ".inp": 48}
-"""Bytes per tet of a mesh file in text, with its share of the node lines."""
+"""Bytes per tet of a mesh file in text, including the tet's share of the node lines."""
 
 
 @dataclass(frozen=True)
 class PartEstimate:
-    """Estimate of a part; None where a mesh file is not known."""
+    """Estimate of a part; None if its mesh file is not known."""
 
     name: str
     elements: int | None
     nodes: int | None
     dt: float | None
-    """Stable time step of its smallest tet at the start, s; infinite for a rigid part."""
+    """Stable time step of the smallest tet of the part at the start, s; infinite for a rigid part."""
     bulk: Bulk | None = None
 
 
 @dataclass(frozen=True)
 class Estimate:
-    """Estimate of the case; None where the mesh file of a part is not known."""
+    """Estimate of a case; None if the mesh file of a part is not known."""
 
     elements: int | None
     nodes: int | None
     dt: float | None
-    """First time step, s."""
+    """First time step of the run, s."""
     steps: int | None
     memory_bytes: int | None
     """Memory of all ranks together without fracture, bytes."""
@@ -95,7 +99,7 @@ class Estimate:
     clock: ClockTime | None
     """Wall time of the case on its ranks and threads."""
     costs: dict[str, float]
-    """Core time of each stage of the case (cases/estimates/stages.py), s; empty if unknown. Breakage costs more, by an
+    """Core time of each stage of the case (cases/estimates/stages.py), s; empty if unknown. Fracture costs more, by an
     amount that cannot be estimated."""
     breaking: float
     """Additional CPU time, s, if the parts that can fracture break as far as they can; 0 without fracture."""
@@ -105,8 +109,8 @@ class Estimate:
 
 
 def estimate(case: Case, folder: Path | None = None, survey: Survey = Survey()) -> Estimate:  # noqa: B008
-    """Returns the estimate of ``case``. Relative paths of mesh files start in ``folder`` (without it no file is
-    read); ``survey``: the survey of the mesh files. Raises CaseError for an unknown material.
+    """Returns the estimate of ``case``. Relative paths of mesh files start in ``folder`` (without ``folder`` no file is
+    read); ``survey``: the survey of the mesh files. Raises CaseError if a material is unknown.
     """
     known = [survey.of(index) for index in range(len(case.parts))]
     sizes = [_size(part, folder, found) for part, found in zip(case.parts, known, strict=True)]
@@ -136,12 +140,12 @@ def estimate(case: Case, folder: Path | None = None, survey: Survey = Survey()) 
 
 
 def _at_most(case: Case, dt: float | None) -> float | None:
-    """Time step with rigid parts only, s: a run has at least a fixed number of steps."""
+    """Time step of a case with rigid parts only, s: such a run has at least a fixed number of steps."""
     return case.run.end_time / RIGID_STEPS if dt == math.inf else dt
 
 
 def _size(part: Part, folder: Path | None, found: Surveyed | None) -> MeshSize | int | None:
-    """Returns the known data of the mesh of a part: all sizes, only the number of tets, or None."""
+    """Returns the known data of the mesh of a part: all sizes, or only the number of tets, or None."""
     if found is not None:
         return MeshSize(found.elements, found.nodes, found.step_length)
     if not isinstance(part.mesh, Measured):
@@ -171,7 +175,7 @@ def _part(case: Case, part: Part, size: MeshSize | int | None, found: Surveyed |
 
 
 def _viscous_factor(case: Case) -> float:
-    """Reduction of the time step by the linear bulk viscosity."""
+    """Factor by which the linear bulk viscosity reduces the time step."""
     viscosity = case.numerics.viscosity
     linear = viscosity.linear if viscosity is not None else 0.0
     return linear + math.hypot(1.0, linear)
@@ -195,8 +199,7 @@ def _tet_bytes(case: Case, part: Part) -> int:
 
 
 def _costs(case: Case, parts: tuple[PartEstimate, ...], steps: int | None, faces: int) -> dict[str, float]:
-    """Returns core seconds by stage, for mesh files with so many ``faces``; empty where the number of tets is
-    unknown."""
+    """Returns core seconds by stage, for mesh files with ``faces`` faces; empty if the number of tets is unknown."""
     if steps is None or any(size.elements is None for size in parts):
         return {}
     found = {STEPS: steps * case.run.ranks * STEP_OVERHEAD + case.run.ranks * START}
@@ -209,7 +212,8 @@ def _costs(case: Case, parts: tuple[PartEstimate, ...], steps: int | None, faces
 
 def _breaking(case: Case, parts: tuple[PartEstimate, ...], steps: int | None) -> float:
     """Returns the largest core time of fracture, and of contact between fragments, s. A part that moves freely is
-    assumed to break as far as its motion can break it; a driven part is assumed to become dust and to be pressed.
+    assumed to break as far as its kinetic energy allows; a part with a prescribed motion is assumed to become dust and
+    to be pressed.
     """
     pressed = case.in_contact and driven_together(case)
     dust = 0.0
@@ -224,10 +228,10 @@ def _breaking(case: Case, parts: tuple[PartEstimate, ...], steps: int | None) ->
 def broken_share(case: Case, part: Part, speed: float) -> float:
     """Returns the largest share of the facets of a part that can break in an impact at ``speed``, m/s.
 
-    Fragments are as large as the kinetic energy of their stretching can pay for in crack surface: s^3 = 24 G /
-    (density rate^2), Grady 1982 (J. Appl. Phys. 53, 322); facets are one element apart. The rate is that of its
-    stretch or spin, the speed over the length of the part, or the rate that strains the part to its strength while a
-    wave crosses it. 1 for mesh files.
+    Fragments are as large as the kinetic energy of their stretching can pay for in crack surface: s^3 = 24 G / (density
+    rate^2), Grady 1982 (J. Appl. Phys. 53, 322); facets are one element apart. The rate is the largest of three: the
+    rate of the part's stretch or spin; the speed divided by the length of the part; the rate that strains the part to
+    its strength while a wave crosses it. The share is 1 for mesh files.
     """
     made, body = material(case, part.material), bounds(part.mesh)
     if made.brittle is None or body is None or isinstance(part.mesh, Measured):
@@ -246,7 +250,9 @@ def _tets_that_break(case: Case, parts: tuple[PartEstimate, ...]) -> int:
 
 
 def _contact(case: Case, faces: int) -> float:
-    """Returns the nanoseconds of contact per step; ``faces``: of the parts from mesh files, as far as known."""
+    """Returns the core time of contact per step, ns; ``faces``: number of faces of the parts from mesh files, as far as
+    known.
+    """
     if not case.in_contact:
         return 0.0
     faces += sum(surface_faces(part.mesh) for part in case.parts if not isinstance(part.mesh, Measured))
@@ -254,7 +260,7 @@ def _contact(case: Case, faces: int) -> float:
 
 
 def _nanoseconds(case: Case, part: Part) -> dict[str, float]:
-    """Returns nanoseconds per tet and step, by stage."""
+    """Returns the core time per tet and step by stage, ns."""
     if part.rigid is not None:
         return {}
     made = material(case, part.material)

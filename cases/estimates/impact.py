@@ -15,27 +15,28 @@ from ..shapes.geometry import Vector
 from ..shapes.placed import Placed, driven, velocity
 
 FEW, MANY, FULL, MOST = 5, 10, 40, 80
-"""Number of contact sweeps per step: minimum, minimum at high impact speed, minimum for driven rubble and with
-restitution, and maximum. Reasons: docs/theory/contact.md, "Contact", "Driven rubble", "Sweeps by need" and
+"""Numbers of contact sweeps per step: minimum, minimum at high impact speed, minimum for driven rubble and with
+restitution, and maximum. The reasons are in docs/theory/contact.md, "Contact", "Driven rubble", "Sweeps by need" and
 "Restitution"."""
 FAST = 0.2
-"""Impact speed over the wave speed of the target from which the minimum of sweeps is MANY. The value was chosen
+"""Impact speed divided by the wave speed of the target, above which the minimum number of sweeps is MANY. The value is
 below half of the speed at which few sweeps failed for columns of metal (docs/theory/contact.md, "Plates under 100
 GPa")."""
 PRESSING = 0.1
-"""Impact speed over the wave speed from which flat surfaces buckle. The value was chosen as half of the speed at
-which irregular copper plates lost their pressure (docs/theory/contact.md, "Ridges under pressure")."""
+"""Impact speed divided by the wave speed, above which flat surfaces buckle. The value is half of the speed at which
+irregular copper plates lost their pressure (docs/theory/contact.md, "Ridges under pressure")."""
 
 
 def wave_speed(made: Material) -> float:
-    """Returns the speed of plane waves at rest, m/s: sqrt((K + 4 G / 3) / density), K from the equation of state if
-    given."""
+    """Returns the speed of plane waves at rest, m/s: sqrt((K + 4 G / 3) / density), K from the equation of state if the
+    material has one.
+    """
     return math.sqrt((made.bulk + 4.0 / 3.0 * made.elastic.shear) / made.density)
 
 
 def impact_speeds(case: Case, walls: bool = True) -> list[float]:
-    """Returns the largest speed, m/s, at which each part can hit another part, or a wall if ``walls``. The result is
-    computed from the bounds of the velocities, and may be up to sqrt(3) times too large if a body rotates.
+    """Returns the largest speed, m/s, at which each part can hit another part, or also a wall if ``walls`` is true. The
+    speed is computed from the bounds of the velocities, and may be up to sqrt(3) times too large if a body rotates.
     """
     bounds = [velocities(case, part) for part in case.parts]
     there = Counter(bounds)
@@ -48,13 +49,13 @@ def impact_speeds(case: Case, walls: bool = True) -> list[float]:
 
 
 def apart(low: Vector, high: Vector, low2: Vector, high2: Vector) -> float:
-    """Returns the largest distance of a point of one box from a point of another."""
+    """Returns the largest distance between a point of one box and a point of another box, m."""
     return math.hypot(*(max(b - c, d - a) for a, b, c, d in zip(low, high, low2, high2, strict=True)))
 
 
 def velocities(case: Case, part: Part) -> tuple[Vector, Vector]:
-    """Returns bounds of the velocities, m/s, of the nodes of a part at the start or as prescribed; without spin and
-    stretch of a mesh file.
+    """Returns bounds of the velocities, m/s, of the nodes of a part at the start or as prescribed; spin and stretch of
+    a mesh file are not included.
     """
     if isinstance(part.mesh, Measured):
         found = [part.velocity]
@@ -88,7 +89,7 @@ def _shifted(vector: Sequence[float], by: float) -> Vector:
 
 
 def _fast(case: Case, share: float) -> bool:
-    """Whether two parts collide at more than a ``share`` of the wave speed of one of them."""
+    """Whether two parts collide at more than ``share`` times the wave speed of one of them."""
     speeds = impact_speeds(case, walls=False)
     return any(
         speed > share * wave_speed(material(case, part.material))
@@ -99,8 +100,9 @@ def _fast(case: Case, share: float) -> bool:
 def pressed(case: Case) -> list[bool]:
     """Returns the parts that are pressed together beyond their strength, so that flat surfaces buckle.
 
-    All parts where two collide at more than PRESSING of the wave speed of one of them; otherwise parts that yield
-    without fracture, where an impact on the same material exceeds their flow stress: density c v / 2.
+    All parts are returned if two of them collide at more than PRESSING times the wave speed of one of them. Otherwise
+    the function returns the parts that yield without fracture, if an impact on the same material exceeds their flow
+    stress: density c v / 2.
     """
     if _fast(case, PRESSING):
         return [True] * len(case.parts)
@@ -111,13 +113,13 @@ def pressed(case: Case) -> list[bool]:
 
 
 def flows(made: Material, speed: float) -> bool:
-    """Whether an impact on the same material at ``speed``, m/s, exceeds its flow stress."""
+    """Whether an impact of a material on the same material at ``speed``, m/s, exceeds its flow stress."""
     return made.strength is not None and 0.5 * made.density * wave_speed(made) * speed > made.strength.flow_stress()
 
 
 def driven_together(case: Case) -> bool:
-    """Whether contact is possible while a motion or a traction drives a part: a drive presses for its whole
-    duration, an impact only until the bodies have stopped.
+    """Whether contact is possible while a prescribed motion or a traction acts on a part. A prescribed motion presses
+    for its whole duration; an impact presses only until the bodies have stopped.
     """
     if case.boundaries_of(Traction):
         return len(case.parts) > 1 or bool(case.boundaries_of(Wall))
@@ -126,14 +128,16 @@ def driven_together(case: Case) -> bool:
 
 
 class Sweeps(NamedTuple):
-    """Bounds of the sweeps over the active contacts of a step; the first step has the minimum."""
+    """Bounds of the number of sweeps over the active contacts of a step; the first step has the minimum."""
 
     least: int
     most: int
 
 
 def sweeps(case: Case) -> Sweeps:
-    """Returns ``contact.sweeps``; if absent, the bounds of the adaptive number from the properties of the scene."""
+    """Returns ``contact.sweeps``; if the key is absent, the bounds of the adaptive number of sweeps, from the
+    properties of the scene.
+    """
     assert case.contact is not None
     if case.contact.sweeps is not None:
         return Sweeps(case.contact.sweeps, case.contact.sweeps)

@@ -23,38 +23,40 @@ from ..shapes.profile import Revolved, tips
 
 TETS_PER_VOLUME, TETS_PER_SURFACE = 5.55, 1.42
 NODES_PER_VOLUME, NODES_PER_SURFACE = 0.87, 1.23
-"""Coefficients a and b: gmsh makes a V / h^3 + b S / h^2 tets and nodes for a body with volume V, surface S and
-element size h. The values were fitted to seven bodies."""
+"""Coefficients a and b: gmsh makes a V / h^3 + b S / h^2 tets and nodes for a body with volume V, surface S and element
+size h. The coefficients were fitted to seven bodies."""
 
 FACES_PER_SURFACE = 1.8
-"""Number of faces of a surface S over S / h^2, with element size h; a structured mesh has the value 2."""
+"""Number of faces of a surface S divided by S / h^2, with the element size h; a structured mesh has the value 2."""
 
 REGULAR = 6**-0.5
-"""Step length 1 / sqrt(sum |grad N|^2) of the regular tet, and of the tets of a cut cube, over the edge h."""
+"""Step length 1 / sqrt(sum |grad N|^2) divided by the edge h: of the regular tet, and of the tets of a cut cube."""
 WORST_UNSTRUCTURED = 0.68
-"""Step length of the worst tet of gmsh over that of a regular tet: 0.64 to 0.74 for the bodies of the fit."""
+"""Step length of the worst tet of gmsh divided by that of a regular tet: 0.64 to 0.74 for the seven bodies of the
+fit."""
 SHARP, BLUNT = 1.3, 0.9
-"""Largest step length at the tip of a cone or an ogive: the first value times the tangent of half its angle; with a
-flat or round tip, the second times its radius over h. Measured: cones of half an angle of 9 and 27 degrees 0.16 to 0.25
-and 0.40 to 0.68, tips of a radius of h/4 and h/2 0.20 to 0.24 and 0.20 to 0.64, full bodies and sectors."""
+"""Largest step length at the tip of a cone or an ogive, divided by h. For a sharp tip: the first value times the
+tangent of half the angle of the tip; for a flat or round tip: the second value times the radius of the tip over h.
+Measured for full bodies and sectors: 0.16 to 0.25 and 0.40 to 0.68 for cones with half an angle of 9 and 27 degrees;
+0.20 to 0.24 and 0.20 to 0.64 for tips with a radius of h/4 and h/2."""
 WORST_CYLINDER, WORST_TUBE = 0.81, 0.78
-"""The step length of structured cylinders cut into 6, and of tubes."""
+"""Step length of structured cylinders whose cells are cut into 6 tets, and of structured tubes."""
 WORST_FIVE = 0.54
-"""The step length of structured cylinders cut into 5, times the cells along the radius: they flatten on the
-diagonal."""
+"""Step length of structured cylinders whose cells are cut into 5 tets, times the number of cells along the radius:
+these tets flatten on the diagonal."""
 WORST_SHARD = 1.7
-"""Reduction of the step length of the worst shard over the displacement of its nodes: 1.5 to 1.9 among 1,000 and
-10,000."""
+"""Reduction of the step length of the worst separate tet divided by the displacement of its nodes: 1.5 to 1.9 among
+1,000 and 10,000 tets."""
 
 _LATTICE = 20
-"""Number of sampling points per direction for the mean of a graded size. The value was chosen because it gives 8,000
-points in all."""
+"""Number of sampling points per direction for the mean of a graded element size: 8,000 points in all (chosen value)."""
 
 
 @dataclass(frozen=True)
 class MeshSize:
-    """Numbers of tets and nodes, and the step length, m, of the worst tet: the stable time step is this over the
-    wave speed."""
+    """Number of tets, number of nodes, and step length of the worst tet, m. The stable time step is the step length
+    divided by the wave speed.
+    """
 
     elements: int
     nodes: int
@@ -72,7 +74,7 @@ def mesh_size(mesh: Generated) -> MeshSize:
 
 
 def _worst(mesh: Generated) -> float:
-    """Returns the step length of the worst tet of gmsh over that of a regular tet."""
+    """Returns the step length of the worst tet of gmsh divided by that of a regular tet."""
     if not isinstance(mesh, Revolved):
         return WORST_UNSTRUCTURED
     at_tips = [SHARP * slope if radius == 0.0 else BLUNT * radius / mesh.element_size for radius, slope in tips(mesh)]
@@ -80,14 +82,14 @@ def _worst(mesh: Generated) -> float:
 
 
 def surface_faces(mesh: Generated) -> int:
-    """Returns the estimated number of surface faces of a primitive, with the cuts of its sector."""
+    """Returns the estimated number of surface faces of a primitive, including the cuts of its sector."""
     return round(FACES_PER_SURFACE * _covering(mesh))
 
 
 def _covering(mesh: Generated) -> float:
-    """Returns the integral of 1 / h^2 over the surface, with the cuts of the sector, for the element size h. Where the
-    size depends on the depth below the skin, the skin has the ``element_size``; other surfaces have the mean over the
-    volume.
+    """Returns the integral of 1 / h^2 over the surface, with the cuts of the sector, for the element size h. If the
+    element size depends on the depth below the surface, the surface has the ``element_size``; otherwise the mean over
+    the volume is used.
     """
     if mesh.grading is None or not mesh.grading.surface:
         return surface(mesh) * _mean_powers(mesh)[1]
@@ -106,7 +108,7 @@ def _mean_powers(mesh: Generated) -> tuple[float, float]:
 
 
 def _sizes(mesh: Generated, grading: Grading) -> list[float]:
-    """Returns element sizes, m, in equal shares of the volume of a graded primitive."""
+    """Returns the element sizes, m, of equal fractions of the volume of a graded primitive."""
     if grading.surface:
         whole = mesh.model_copy(update={"sector": "full"})
         return sizes_by_depth(mesh.element_size, grading, volume(whole), surface(whole))
@@ -135,14 +137,16 @@ def _structured(mesh: Box | Plate | Cylinder | Tube | TwoTets | Shards) -> MeshS
 
 @dataclass(frozen=True)
 class Row:
-    """Planes of nodes of the structured generator across one direction: ``start`` and ``spacing`` in m."""
+    """Planes of nodes of the structured generator across one direction; ``start`` and ``spacing`` in m."""
 
     start: float
     spacing: float
     cells: int
 
     def place(self, x: float) -> float:
-        """Number of the plane at ``x``, m; a whole number within round-off counts as one."""
+        """Number of planes up to the coordinate ``x``, m; a number that is whole within rounding errors counts as
+        whole.
+        """
         place = (x - self.start) / self.spacing
         return round(place) if abs(place - round(place)) < 1e-6 else place
 
@@ -155,7 +159,9 @@ def grid(mesh: Box | Plate) -> list[Row]:
 
 
 def slit_lines(mesh: Box | Plate) -> tuple[int, int]:
-    """Numbers of lines of doubled nodes of a slit, in the two directions across its axis; 0, 0 without a slit."""
+    """Numbers of lines of doubled nodes of a slit, in the two directions across the slit's axis; 0, 0 without a
+    slit.
+    """
     if mesh.slit is None:
         return 0, 0
     rows = [grid(mesh)[d] for d in across(mesh.slit.axis)]
@@ -167,7 +173,9 @@ def slit_lines(mesh: Box | Plate) -> tuple[int, int]:
 
 
 def _doubled(row: Row, low: float, high: float) -> int:
-    """Number of planes between two places: a border on the surface of the body counts, one inside does not."""
+    """Number of planes between two coordinates; a border on the surface of the body counts, a border inside of the body
+    does not.
+    """
     first = 0 if low <= 0 else math.floor(low) + 1
     last = row.cells if high >= row.cells else math.ceil(high) - 1
     return last - first + 1
@@ -202,7 +210,7 @@ def _structured_tube(mesh: Tube) -> MeshSize:
 
 
 def _cell_step(cell: list[float]) -> float:
-    """Step length of a tet of a cut box-shaped cell: 1 / sqrt(2 sum 1 / a^2), for every way of cutting."""
+    """Step length of a tet of a cut box-shaped cell: 1 / sqrt(2 sum 1 / a^2), for every way of cutting the cell."""
     return 1.0 / math.sqrt(2.0 * sum(1.0 / length**2 for length in cell))
 
 

@@ -1,4 +1,4 @@
-"""Reduction of the mean time step below the first one: impact and pressure flatten tets and make waves faster."""
+"""Reduction of the mean time step below the first time step: impact and pressure flatten tets and make waves faster."""
 
 import math
 from collections.abc import Sequence
@@ -14,23 +14,24 @@ from ..shapes.geometry import AXES, bounds
 from .impact import wave_speed
 
 DEEPEST, DEEPEST_ERODING = 12.0, 4.0
-"""Largest reduction of the time step of a crushed body: the flattest tets of a part that erodes are deleted."""
+"""Largest reduction of the time step of a crushed body; the limit holds because the flattest tets of a part that erodes
+are deleted."""
 FOOT, SLENDER = 0.9, 4.5
 """Constant of the function ``shrinkage``."""
 CROSSINGS = 2.0
-"""Duration of a shock in a part, over its extent divided by the impact speed. Measured: the step of two copper balls
-of 1 mm that collide at 10 km/s (cases/hard/head_on_10km.toml) is short for 0.2 us."""
+"""Duration of a shock in a part, divided by the ratio of its extent and the impact speed. Measured: the time step of
+two copper balls of 1 mm that collide at 10 km/s (cases/hard/head_on_10km.toml) is short for 0.2 us."""
 
 
 def shrinkage(case: Case, part: Part, speed: float) -> float:
-    """Returns the initial over the mean time step of a part that is hit at a ``speed``, m/s: impact flattens the tets,
-    and compression makes waves faster.
+    """Returns the initial time step divided by the mean time step of a part that is hit at a ``speed``, m/s: impact
+    flattens the tets, and compression makes waves faster.
 
-    A metal that can flow and stops from the speed v takes the mean strain density v^2 / (2 yield stress); its foot,
-    about as long as wide, takes the strain of the whole length: the mean step falls as exp(k strain) with k = 0.9
-    length / width, at most 4 (``slenderness``). Measured: square bars that are 1, 2 and 4 times as long as wide have
-    k up to 0.9, 1.8 and 2.8, less with strong hardening (``python -m tests.bench.flattening``), Taylor bars of
-    copper and steel 4. A part that is enclosed is compressed by a shock.
+    A metal that can flow and stops from the speed v takes the mean strain density v^2 / (2 yield stress). Its foot,
+    about as long as wide, takes the strain of the whole length: the mean time step falls as exp(k strain) with k = 0.9
+    length / width, at most 4 (``slenderness``). Measured: square bars that are 1, 2 and 4 times as long as wide have k
+    up to 0.9, 1.8 and 2.8, less with strong hardening (``python -m tests.bench.flattening``), Taylor bars of copper and
+    steel 4. A part that is enclosed is compressed by a shock.
     """
     made = material(case, part.material)
     deepest = DEEPEST if part.erosion is None else DEEPEST_ERODING
@@ -47,9 +48,9 @@ def shrinkage(case: Case, part: Part, speed: float) -> float:
 
 
 def _shocked(case: Case, part: Part, made: Material, speed: float, flattened: float) -> float:
-    """Returns the reduction for a part that an impact shocks or flattens. Material behind a shock moves at u = speed
-    / 2, and waves there are about 2 S u faster than c0, while the part crosses its own extent. During this time a
-    tet that erodes flattens up to its limit strain; later such tets are deleted.
+    """Returns the reduction of the time step of a part that an impact shocks or flattens. Material behind a shock moves
+    at u = speed / 2, and waves behind the shock are about 2 S u faster than c0, while the part crosses its own extent.
+    During this time a tet that erodes flattens up to its limit strain; later such tets are deleted.
     """
     body = None if isinstance(part.mesh, Measured) else bounds(part.mesh)
     if part.erosion is None:
@@ -70,11 +71,11 @@ def _on_part(case: Case, part: Part) -> list[Traction]:
 
 
 def _imploded(case: Case, part: Part, made: Material, load: Traction) -> float:
-    """Returns the reduction for a tube under an external ``load`` above its collapse pressure, Y ln(outer / inner
-    radius).
+    """Returns the reduction of the time step of a tube under an external ``load`` above its collapse pressure, Y
+    ln(outer / inner radius).
 
     The wall moves inwards freely at constant area; material at the bore takes the hoop strain ln(first / present
-    radius). A bore that closes flattens its tets without limit.
+    radius). A bore that closes flattens the tets of the tube without limit.
     """
     tube, flow = part.mesh, made.strength.flow_stress() if made.strength is not None else math.inf
     if not isinstance(tube, Tube) or load.pressure is None or not _outside(tube, load.cylinder):
@@ -88,19 +89,19 @@ def _imploded(case: Case, part: Part, made: Material, load: Traction) -> float:
 
 
 def _outside(tube: Tube, region: Around | None) -> bool:
-    """Whether a region contains the outside of a tube, and not its bore."""
+    """Whether a region contains the outside of a tube, and not the bore of the tube."""
     return region is not None and tube.inner_radius < region.inner_radius <= tube.radius <= region.radius
 
 
 def _moved(course: Course, until: float) -> float:
-    """Displacement, s^2, per acceleration of 1 m/s^2 with the factor of a course."""
+    """Displacement, s^2, per acceleration of 1 m/s^2 that acts with the factor of a course."""
     times = [until * n / 100 for n in range(101)]
     factors = [_factor(course, time) for time in times]
     return sum((until - time) * factor for time, factor in zip(times, factors, strict=True)) * until / 100
 
 
 def _factor(course: Course, time: float) -> float:
-    """Factor of a force at a time: linear between the pairs, constant before and after them."""
+    """Factor of a force at a time: linear between the pairs, constant before the first pair and after the last pair."""
     if not course or time <= course[0][0]:
         return course[0][1] if course else 1.0
     for (start, low), (end, high) in pairwise(course):
@@ -110,8 +111,9 @@ def _factor(course: Course, time: float) -> float:
 
 
 def slenderness(case: Case) -> float:
-    """Returns the largest length over width of the parts, 1 to SLENDER: the longest extent over the mean of the
-    other two; SLENDER with a mesh file. A slender part also strains the part that it hits.
+    """Returns the largest ratio of length to width of the parts, between 1 and SLENDER; SLENDER with a mesh file. The
+    length is the longest extent of a part, the width is the mean of the other two extents; a slender part also strains
+    the part that it hits.
     """
     most = 1.0
     for part in case.parts:

@@ -14,21 +14,21 @@ class CowperSymonds(Law):
     """J2 plasticity with isotropic linear hardening and the rate factor of Cowper and Symonds: flow stress
     ``(yield_stress + hardening * plastic strain) * (1 + (rate/D)^(1/q))``.
 
-    ``rate`` is the plastic strain rate; no heat is computed. Published pairs of D and q: mild steel 40.4 1/s and 5
+    The rate is the plastic strain rate; no heat is computed. Published pairs of D and q: mild steel 40.4 1/s and 5
     (Cowper and Symonds 1957), aluminium alloys 6500 1/s and 4, stainless steel 304 100 1/s and 10 (Jones, Structural
-    Impact). D and q are C and P of LS-DYNA.
+    Impact). The constants D and q are the constants C and P of LS-DYNA.
     """
 
     model: Literal["cowper_symonds"]
     """Selects this law."""
     yield_stress: Annotated[Stress, Positive]
-    """Initial yield stress at vanishing rate."""
+    """Initial yield stress at vanishing strain rate."""
     hardening: Annotated[Stress, Field(ge=0)] = 0.0
-    """Plastic modulus at vanishing rate: increase of the flow stress per effective plastic strain."""
+    """Plastic modulus at vanishing strain rate: increase of the flow stress per effective plastic strain."""
     D: Annotated[Rate, Positive]
-    """Plastic strain rate at which the flow stress is twice that at vanishing rate."""
+    """Plastic strain rate at which the flow stress is twice that at vanishing strain rate."""
     q: Annotated[Ratio, Field(ge=1)]
-    """Exponent: the larger, the less the flow stress depends on the rate."""
+    """Exponent of the rate factor: with a larger exponent the flow stress depends less on the strain rate."""
 
     nanoseconds: ClassVar[float] = 40.0
 

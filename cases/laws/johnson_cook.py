@@ -15,8 +15,9 @@ class JohnsonCookDamage(Model):
     """Johnson-Cook damage: sum of plastic strain increments over the fracture strain ``(D1 + D2 e^(D3 t)) (1 + D4 ln
     max(rate/reference_rate, 1)) (1 + D5 T*)``, t the mean stress over the flow stress.
 
-    A tet is deleted at ``erosion.damage``. The flow stress is multiplied by ``1 - softening * damage``. Sources:
-    Johnson and Cook 1985; softening: Borvik, Hopperstad, Berstad and Langseth 2001.
+    A tet is deleted when its damage reaches ``erosion.damage``. The flow stress is multiplied by ``1 - softening *
+    damage``. Sources: Johnson and Cook 1985 for the damage; Borvik, Hopperstad, Berstad and Langseth 2001 for the
+    softening.
     """
 
     D1: Ratio
@@ -24,18 +25,18 @@ class JohnsonCookDamage(Model):
     D2: Ratio
     """Increase of the fracture strain without tension."""
     D3: Ratio
-    """Exponent of the tension; negative where tension reduces the fracture strain."""
+    """Exponent of the mean stress; negative if tension reduces the fracture strain."""
     D4: Ratio = 0.0
-    """Coefficient of the strain rate."""
+    """Coefficient of the strain rate in the fracture strain."""
     D5: Ratio = 0.0
-    """Coefficient of the temperature."""
+    """Coefficient of the temperature in the fracture strain."""
     softening: Annotated[Ratio, Field(ge=0, lt=1)] = 0.0
-    """Share of the flow stress that is lost at damage 1 (critical damage of Borvik and others). 0: damage does not
+    """Fraction of the flow stress that is lost at damage 1 (critical damage of Borvik and others). 0: damage does not
     change the flow stress."""
 
     @property
     def in_tension(self) -> float:
-        """Fracture strain of a tensile test, t = 1/3, at the reference rate and temperature."""
+        """Fracture strain of a tensile test, t = 1/3, at the reference rate and the reference temperature."""
         return self.D1 + self.D2 * math.exp(min(self.D3 / 3.0, 300.0))
 
 
@@ -56,21 +57,21 @@ class JohnsonCook(Law):
     n: Annotated[Ratio, Field(gt=0, le=1)]
     """Hardening exponent."""
     C: Annotated[Ratio, Field(ge=0)]
-    """Coefficient of the strain rate."""
+    """Coefficient of the strain rate in the flow stress."""
     m: Annotated[Ratio, Positive]
     """Exponent of the thermal softening."""
     reference_rate: Annotated[Rate, Positive] = 1.0
-    """Plastic strain rate at which A, B and n were measured. Below this rate the rate of strain has no effect."""
+    """Plastic strain rate at which A, B and n were measured. Below the reference rate the strain rate has no effect."""
     reference_temperature: Annotated[Temperature, Field(ge=0)] = 293.15
-    """Temperature at which A, B and n were measured; below it there is no softening."""
+    """Temperature at which A, B and n were measured; below this temperature the flow stress has no softening."""
     melt_temperature: Annotated[Temperature, Positive]
-    """Temperature at which the strength is 0; above ``reference_temperature``."""
+    """Temperature at which the flow stress is 0; above ``reference_temperature``."""
     specific_heat: Annotated[SpecificHeat, Positive]
     """Specific heat, for the temperature rise by plastic work."""
     taylor_quinney: Annotated[Ratio, Field(ge=0, le=1)] = 0.9
-    """Taylor-Quinney coefficient: share of the plastic work that becomes heat."""
+    """Taylor-Quinney coefficient: fraction of the plastic work that becomes heat."""
     damage: JohnsonCookDamage | None = None
-    """Damage. Default: no damage is computed."""
+    """Damage of the material. Default: no damage is computed."""
 
     nanoseconds: ClassVar[float] = 40.0
 

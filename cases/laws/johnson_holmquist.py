@@ -11,26 +11,27 @@ from .law import Law, Wrong
 
 
 class JohnsonHolmquist(Law):
-    """Johnson-Holmquist 2 (JH-2), for ceramics and glass under high pressure: pressure-dependent strength that falls
+    """Johnson-Holmquist 2 (JH-2), for ceramics and glass under high pressure: the pressure-dependent strength falls
     with damage D from intact, ``A (p* + T*)^N``, to fractured, ``B p*^M``, with bulking.
 
-    ``p*`` and ``T*`` are pressure and ``tension`` over ``pressure_hel``; strengths are over that at the Hugoniot
-    elastic limit, ``3/2 (hel - pressure_hel)``, and are multiplied by ``1 + C ln max(rate/reference_rate, 1)``. The
-    fractured strength is never above the intact one. D is the sum of plastic strain increments over ``D1 (p* +
-    T*)^D2``. The largest tensile pressure is ``tension * (1 - D)``.
+    ``p*`` and ``T*`` are pressure and ``tension`` divided by ``pressure_hel``; strengths are divided by the strength at
+    the Hugoniot elastic limit, ``3/2 (hel - pressure_hel)``, and are multiplied by ``1 + C ln max(rate/reference_rate,
+    1)``. The fractured strength is never above the intact strength. The damage D is the sum of plastic strain
+    increments over ``D1 (p* + T*)^D2``. The largest tensile pressure is ``tension * (1 - D)``.
 
-    The pressure is ``K m + K2 m^2 + K3 m^3`` with ``m = V0/V - 1`` and K from ``elastic``; in tension K m. The share
-    ``beta`` of the elastic energy that damage releases becomes pressure. Source: Johnson and Holmquist 1994.
+    The pressure is ``K m + K2 m^2 + K3 m^3`` with ``m = V0/V - 1`` and K from ``elastic``; in tension the pressure is K
+    m. The fraction ``beta`` of the elastic energy that damage releases becomes pressure. Source: Johnson and Holmquist
+    1994.
     """
 
     model: Literal["johnson_holmquist"]
     """Selects this law."""
     hel: Annotated[Stress, Positive]
-    """Hugoniot elastic limit: axial stress."""
+    """Axial stress at the Hugoniot elastic limit."""
     pressure_hel: Annotated[Stress, Positive]
     """Pressure at the Hugoniot elastic limit; below ``hel``."""
     tension: Annotated[Stress, Positive]
-    """T: largest tensile pressure of intact material."""
+    """Constant T: largest tensile pressure of intact material."""
     A: Annotated[Ratio, Positive]
     """Coefficient of the intact strength."""
     N: Annotated[Ratio, Positive]
@@ -40,21 +41,22 @@ class JohnsonHolmquist(Law):
     M: Annotated[Ratio, Positive]
     """Exponent of the pressure in the fractured strength."""
     C: Annotated[Ratio, Field(ge=0)] = 0.0
-    """Coefficient of the strain rate."""
+    """Coefficient of the strain rate in the strengths."""
     reference_rate: Annotated[Rate, Positive] = 1.0
-    """Strain rate at which A and B were measured. Below this rate the rate of strain has no effect."""
+    """Strain rate at which A and B were measured. Below the reference rate the strain rate has no effect."""
     largest_fractured: Annotated[Ratio, Positive] | None = None
-    """Largest fractured strength, over that at the Hugoniot elastic limit. Default: no limit."""
+    """Largest fractured strength, divided by the strength at the Hugoniot elastic limit. Default: the fractured
+    strength has no limit."""
     D1: Annotated[Ratio, Positive]
     """Plastic strain to fracture at ``p* + T* = 1``."""
     D2: Annotated[Ratio, Field(ge=0)]
     """Exponent of the pressure in the plastic strain to fracture."""
     K2: Stress = 0.0
-    """Second coefficient of the pressure."""
+    """Second coefficient of the pressure, K2."""
     K3: Stress = 0.0
-    """Third coefficient of the pressure."""
+    """Third coefficient of the pressure, K3."""
     beta: Annotated[Ratio, Field(ge=0, le=1)] = 1.0
-    """Bulking: share of the deviatoric elastic energy released by damage that becomes pressure."""
+    """Bulking: fraction of the deviatoric elastic energy released by damage that becomes pressure."""
 
     nanoseconds: ClassVar[float] = 60.0
     own_pressure: ClassVar[bool] = True

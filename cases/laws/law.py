@@ -1,8 +1,8 @@
-"""The base of the laws of strength: cost, estimates and checks that every law provides besides its constants.
+"""The base class of the laws of strength: cost, estimates and checks that every law provides besides its constants.
 
-A law has two files of the same name: one in this folder with its constants in SI, its checks and its estimates, and one
-in worker/materials with its kernel. ``Strength`` in cases/model/materials.py and ``LAWS`` in worker/materials/models.py
-list them.
+A law has two files of the same name: one in cases/laws with its constants in SI, its checks and its estimates, and one
+in worker/materials with its kernel. The lists of laws are ``Strength`` in cases/model/materials.py and ``LAWS`` in
+worker/materials/models.py.
 """
 
 import math
@@ -19,14 +19,14 @@ Wrong = tuple[str, float, str]
 
 
 class Law(Model):
-    """A law of strength. A subclass has a ``model`` that names it."""
+    """A law of strength. A subclass names the law in its attribute ``model``."""
 
     model: str
     """Name of the law."""
     nanoseconds: ClassVar[float]
-    """Core time per tet and step of the law where the material flows, ns. Measured at 10,000 to 750,000 tets."""
+    """Core time per tet and step of the law in flowing material, ns. Measured with 10,000 to 750,000 tets."""
     own_pressure: ClassVar[bool] = False
-    """Whether the law has an equation of state and a largest tensile pressure of its own."""
+    """Whether the law has its own equation of state and its own largest tensile pressure."""
 
     @property
     def linear_pressure(self) -> bool:
@@ -35,7 +35,7 @@ class Law(Model):
 
     @property
     def melting(self) -> float:
-        """Temperature from which the strength is 0, K; infinity by default."""
+        """Temperature from which on the strength is 0, K; infinity by default."""
         return math.inf
 
     @property
@@ -48,10 +48,11 @@ class Law(Model):
         raise NotImplementedError
 
     def problems(self) -> Iterator[Wrong]:
-        """Yields errors for constants that contradict each other; none by default."""
+        """Yields errors for constants of the law that contradict each other; none by default."""
         yield from ()
 
     def likely(self, young: float) -> Iterator[Likely]:
-        """Yields values for the comparison with the usual range of solids; ``young``: Young's modulus, Pa. None by
-        default."""
+        """Yields values for the comparison with the usual range of solids; ``young``: Young's modulus, Pa. By default a
+        law yields no values.
+        """
         yield from ()

@@ -21,10 +21,10 @@ class MohrCoulomb(Law):
     """Mohr-Coulomb strength of brittle materials: ``(s1 - s3) + (s1 + s3) sin(friction_angle) <= 2 cohesion
     cos(friction_angle)``, with principal stresses s1 >= s2 >= s3, tension positive.
 
-    Flow preserves the volume, except with ``dilation_angle``. Tension beyond the apex removes the deviatoric stress
-    and leaves the pressure unchanged. Next to a face at which a shock starts, the first 20 tets flow too much: up to
-    half of their plastic strain is an error where the pressure is averaged, less with ``pressure = "standard"`` and
-    with a load that rises over some time steps.
+    Plastic flow preserves the volume, except with ``dilation_angle``. Tension above the apex of the yield surface
+    removes the deviatoric stress and leaves the pressure unchanged. Next to a face at which a shock starts, the first
+    20 tets flow too much: up to half of their plastic strain is an error with averaged nodal pressure; the error is
+    smaller with ``pressure = "standard"`` and with a load that rises over some time steps.
     """
 
     model: Literal["mohr_coulomb"]
@@ -34,17 +34,20 @@ class MohrCoulomb(Law):
     friction_angle: Annotated[Angle, AfterValidator(_acute)]
     """Angle of internal friction, such as ``"55 deg"``; at least 0 and below 90 deg."""
     dilation_angle: Annotated[Angle, AfterValidator(_acute)] = 0.0
-    """Dilation angle psi: flow increases the volume by sin(psi) of the shear, until failure. 0: no volume change; equal
-    to ``friction_angle`` (the largest value): associated flow. Must not be combined with ``eos``."""
+    """Dilation angle psi: plastic flow increases the volume by sin(psi) of the shear, until failure. 0: no volume
+    change; equal to ``friction_angle`` (the largest value): associated flow. The key ``dilation_angle`` must not be
+    combined with ``eos``."""
     strength_cap: Annotated[Stress, Positive] | None = None
-    """Largest s1 - s3 at any pressure. Default: no limit."""
+    """Largest s1 - s3 at any pressure. Default: s1 - s3 has no limit."""
     failure_strain: Annotated[Ratio, Positive] | None = None
-    """Effective plastic strain at failure; beyond it the residual values apply. Default: no failure."""
+    """Effective plastic strain at failure; at larger strains the residual values apply. Default: the material has no
+    failure."""
     residual_cohesion: Annotated[Stress, Field(ge=0)] | None = None
-    """Cohesion after failure; at most ``cohesion``. Default: 0. Needs ``failure_strain``."""
+    """Cohesion after failure; at most ``cohesion``. Default: 0. The key ``residual_cohesion`` needs
+    ``failure_strain``."""
     residual_friction_angle: Annotated[Angle, AfterValidator(_acute)] | None = None
-    """Angle of internal friction after failure; at most ``friction_angle``. Default: 30 deg, or ``friction_angle``
-    if that is smaller. Needs ``failure_strain``."""
+    """Angle of internal friction after failure; at most ``friction_angle``. Default: 30 deg, or ``friction_angle`` if
+    that is smaller. The key ``residual_friction_angle`` needs ``failure_strain``."""
 
     nanoseconds: ClassVar[float] = 60.0
 

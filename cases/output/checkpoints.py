@@ -19,16 +19,16 @@ from ..reading import whole
 from . import layout
 
 FORMAT = 18
-"""Version of the files; 17 added the compression of brittle parts and the heat of deleted tets. Checkpoints of other
-versions cannot be read."""
+"""Version of the checkpoint files; 17 added the compression of brittle parts and the heat of deleted tets. Checkpoints
+of other versions cannot be read."""
 MANIFEST, SEAL = "manifest.json", "manifest.sha256"
 _FILE = re.compile(r"rank-[0-9]+\.h5")
 _PIECE = 1 << 24
-"""Bytes that are hashed at a time."""
+"""Number of bytes that are hashed at a time."""
 
 
 class DamagedError(ValueError):
-    """A damaged or incomplete checkpoint; the text gives the reason, in one line."""
+    """Error: a damaged or incomplete checkpoint; the text gives the reason in one line."""
 
 
 class File(msgspec.Struct, frozen=True):
@@ -40,7 +40,7 @@ class File(msgspec.Struct, frozen=True):
 
 
 class Manifest(msgspec.Struct, frozen=True):
-    """The content of a checkpoint; ``t`` in s."""
+    """The content of a checkpoint; the simulated time ``t`` in s."""
 
     format: int
     step: int
@@ -48,11 +48,11 @@ class Manifest(msgspec.Struct, frozen=True):
     case: dict[str, Any]
     files: list[File]
     known: dict[str, Any]
-    """State common to all ranks; arrays as ``{"dtype", "values"}``."""
+    """State that all ranks have in common; arrays as ``{"dtype", "values"}``."""
 
 
 def found(folder: Path) -> list[Path]:
-    """Returns the checkpoints of the run in ``folder``, the latest first, without reading them."""
+    """Returns the checkpoints of the run in ``folder``, the latest first, without reading the checkpoints."""
     try:
         places = [p for p in (folder / layout.CHECKPOINTS).iterdir() if _numbered(p.name) and p.is_dir()]
     except (FileNotFoundError, NotADirectoryError):
@@ -71,7 +71,9 @@ def sealed(manifest: Manifest) -> tuple[bytes, bytes]:
 
 
 def manifest_of(place: Path) -> Manifest:
-    """Returns the manifest of a checkpoint whose files exist with the right size. Raises DamagedError."""
+    """Returns the manifest of a checkpoint whose files exist with the right size. Raises DamagedError if the checkpoint
+    is damaged or incomplete.
+    """
     try:
         text = whole.read(place / MANIFEST)
         seal = whole.read(place / SEAL, 80)
@@ -101,7 +103,7 @@ def _check(place: Path, made: Manifest) -> None:
 
 
 def check_bytes(place: Path, made: Manifest) -> None:
-    """Checks the sha256 of each file. Raises DamagedError."""
+    """Checks the sha256 of each file of a checkpoint. Raises DamagedError if a file is damaged."""
     for file in made.files:
         try:
             digest = sha256(place / file.name)
@@ -112,7 +114,7 @@ def check_bytes(place: Path, made: Manifest) -> None:
 
 
 def sha256(path: Path) -> str:
-    """Returns the sha256 of a regular file. Raises OSError."""
+    """Returns the sha256 of a regular file. Raises OSError if the file cannot be read."""
     h = hashlib.sha256()
     with whole.opened(path) as file:
         while piece := file.read(_PIECE):

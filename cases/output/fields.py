@@ -1,5 +1,4 @@
-"""The optional fields of frames that a case has: The fields are ``damage``, ``fragment``, and the fields of
-``run.fields``."""
+"""The optional fields of frames that a case has: ``damage``, ``fragment``, and the fields of ``run.fields``."""
 
 from ..model.joined import cohesive
 from ..model.schema import Case
@@ -13,7 +12,9 @@ def counting(case: Case) -> set[int]:
 
 
 def damageable(case: Case) -> bool:
-    """Whether the case has damage: of a law, of cohesive facets, or on the way to the erosion strain."""
+    """Whether the case has damage: damage of a law, damage of cohesive facets, or the fraction of the erosion strain
+    that is reached.
+    """
     strained = any(part.erosion is not None and part.erosion.plastic_strain is not None for part in case.parts)
     return bool(cohesive(case)) or strained or bool(counting(case))
 

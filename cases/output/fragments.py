@@ -26,13 +26,14 @@ COLUMNS: dict[str, str] = {
     **{f"high_{i}": "m" for i in _AXES},
     "extent": "m", "new_surface": "m^2",
 }  # fmt: skip
-"""Columns and their units. ``label``: number of the fragment, from 0. When a fragment breaks, the piece with the most
-tets keeps the number, and the other pieces get new numbers. Angular momentum and inertia are about the centre.
-Translation, rotation and deformation are shares of the kinetic energy. ``extent``: longest side of the box from low to
-high. ``new_surface``: initial area of broken faces, both sides of a crack."""
+"""Columns of the table of fragments and their units. ``label``: number of the fragment, beginning with 0. When a
+fragment breaks, the piece with the most tets keeps the number, and the other pieces get new numbers. Angular momentum
+and inertia are about the centre of the fragment. Translation, rotation and deformation are fractions of the kinetic
+energy. ``extent``: longest side of the bounding box from ``low`` to ``high``. ``new_surface``: initial area of broken
+faces, both sides of a crack."""
 _WHOLE = ("label", "tets", "nodes")
 DUST = 10
-"""Number of tets below which a fragment has no shape of its own and counts as dust."""
+"""Number of tets below which a fragment counts as dust, because its shape is that of its tets."""
 
 
 def path(folder: Path, index: int) -> Path:
@@ -41,21 +42,23 @@ def path(folder: Path, index: int) -> Path:
 
 
 GENEALOGY = ("frame", "parent", "child", "tets")
-"""Columns of the genealogy."""
+"""Columns of the genealogy of fragments."""
 
 
 def genealogy(folder: Path) -> Path:
-    """Path of the genealogy in the run folder ``folder``."""
+    """Path of the genealogy of fragments in the run folder ``folder``."""
     return folder / FOLDER / "genealogy.csv"
 
 
 def header() -> list[str]:
-    """The first line: ``mass [kg]``."""
+    """Returns the first line of the table, with names and units such as ``mass [kg]``."""
     return [f"{name} [{unit}]" if unit else name for name, unit in COLUMNS.items()]
 
 
 def read(table: Path) -> list[dict[str, float | int | str]]:
-    """Returns the lines of a table, by the names of ``COLUMNS``. Raises ValueError for a file with other columns."""
+    """Returns the lines of a table of fragments, by the names of ``COLUMNS``. Raises ValueError if the file has other
+    columns.
+    """
     with table.open(newline="", encoding="utf-8") as file:
         lines = list(csv.reader(file))
     if not lines or lines[0] != header():
@@ -71,23 +74,24 @@ def _value(name: str, text: str) -> float | int | str:
 
 @dataclass(frozen=True)
 class Fit:
-    """A distribution with its maximum-likelihood parameter: of distributions fitted to the same values, the larger
-    likelihood fits better."""
+    """A distribution with its maximum-likelihood parameter. Of two distributions that are fitted to the same values,
+    the one with the larger likelihood fits better.
+    """
 
     law: str
     """``rayleigh``, ``exponential`` or ``power``."""
     parameter: float
     """Parameter of the distribution: mode, mean, or exponent of the density."""
     log_likelihood: float
-    """Sum of ln(density), with the values in SI."""
+    """Sum of ln(density) over the values, with the values in SI."""
 
 
 def fits(values: Sequence[float]) -> list[Fit]:
-    """Returns Rayleigh, exponential and power law by maximum likelihood; empty for fewer than two distinct positive
-    values.
+    """Returns the Rayleigh, exponential and power-law distributions fitted by maximum likelihood; empty for fewer than
+    two distinct positive values.
 
-    Densities x / s^2 exp(-x^2 / 2 s^2), exp(-x / mu) / mu, and (a - 1) / x_0 (x / x_0)^-a above x_0, the smallest
-    value, which is a second parameter of the last.
+    Densities: x / s^2 exp(-x^2 / 2 s^2), exp(-x / mu) / mu, and (a - 1) / x_0 (x / x_0)^-a above x_0, where x_0 is the
+    smallest value.
     """
     n = len(values)
     if n < 2 or min(values) <= 0.0 or min(values) == max(values):
@@ -105,21 +109,21 @@ def fits(values: Sequence[float]) -> list[Fit]:
 
 @dataclass(frozen=True)
 class Summary:
-    """Statistics of a table; dust is in the masses, not in the distributions."""
+    """Statistics of a table of fragments; dust is included in the masses, not in the distributions."""
 
     fragments: int
     dust: int
     dust_share: float
-    """Share of the dust in the mass of all fragments."""
+    """Fraction of the mass of all fragments that is dust."""
     largest_share: float
-    """Share of the largest fragment in the mass of all fragments."""
+    """Fraction of the mass of all fragments that is in the largest fragment."""
     sizes: list[Fit]
     """Distributions fitted to the extents of the fragments."""
     masses: list[Fit]
 
 
 def summary(tets: Sequence[int], masses: Sequence[float], extents: Sequence[float]) -> Summary:
-    """Returns the statistics of the columns of one table, kg and m."""
+    """Returns the statistics of the columns of one table; masses in kg, extents in m."""
     whole = [k for k, count in enumerate(tets) if count >= DUST]
     total = math.fsum(masses)
     dust = math.fsum(m for m, count in zip(masses, tets, strict=True) if count < DUST)

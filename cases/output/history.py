@@ -1,4 +1,4 @@
-"""The columns of history.csv: ``t [s]`` with a unit, ``step`` without."""
+"""The columns of history.csv: a column with a unit is ``t [s]``, a column without a unit is ``step``."""
 
 import re
 from collections.abc import Mapping, Sequence
@@ -12,20 +12,23 @@ MOMENTA: dict[str, str] = {
 }  # fmt: skip
 """Columns of the momentum. The angular momentum is about the origin."""
 COLUMNS: dict[str, str] = {**CLOCK, **LEDGER, **MOMENTA}
-"""Columns and units of every run, followed by the columns of its parts and of its probes."""
+"""Columns and units that every run has; the columns of parts and of probes follow."""
 OF_PARTS = PartEnergy.__struct_fields__
 """Columns of the energies of each part, J."""
 _HEADER = re.compile(r"(.*?)(?: \[([^\]]*)\])?")
 
 
 def of_parts(parts: Sequence[str]) -> dict[str, str]:
-    """Columns and units of the parts: ``kinetic.bar``. The list is empty for a case with a single part."""
+    """Columns and units of the parts, such as ``kinetic.bar``. The list of columns is empty for a case with a single
+    part.
+    """
     return {f"{name}.{part}": "J" for part in parts for name in OF_PARTS} if len(parts) > 1 else {}
 
 
 def part_of(column: str) -> tuple[str, str] | None:
-    """Returns energy and part of a column; None for a column of the whole model. The name of a probe contains no
-    point."""
+    """Returns the energy and the part of a column; None for a column of the whole model. The name of a probe contains
+    no point.
+    """
     name, point, part = column.partition(".")
     return (name, part) if point and name in OF_PARTS else None
 
@@ -36,6 +39,6 @@ def header(columns: Mapping[str, str]) -> list[str]:
 
 
 def split(text: str) -> tuple[str, str]:
-    """Returns name and unit of a column as it is written; the unit is empty if there is none."""
+    """Returns name and unit of a column from the text in the first line; the unit is empty if the column has none."""
     found = _HEADER.fullmatch(text)
     return (found[1], found[2] or "") if found is not None else (text, "")

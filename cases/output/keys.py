@@ -1,7 +1,7 @@
 """Zenoh key expressions: ``conoid/v1/<owner>/<run>/<class>``.
 
-The key contains the owner so that access rules are per user. The version is a plain ``v1``, because wildcards do not
-match a chunk that starts with ``@``.
+The key contains the owner, so that access rules apply to each user. The version is a plain ``v1``, because wildcards do
+not match a chunk that starts with ``@``.
 """
 
 import re
@@ -23,19 +23,21 @@ def run_prefix(owner: str, run: str) -> str:
 
 
 def message_key(prefix: str, kind: str) -> str:
-    """Returns the key of a message class below a run's prefix. Raises ValueError for an unknown class."""
+    """Returns the key of a message class below a run's prefix. Raises ValueError if the message class is unknown."""
     if kind not in CLASSES:
         raise ValueError(f"unknown message class {kind!r}; known: {', '.join(CLASSES)}")
     return f"{prefix}/{kind}"
 
 
 def everything(prefix: str) -> str:
-    """Returns the key expression of all messages of a run; with the prefix of an owner, of all runs of the owner."""
+    """Returns the key expression of all messages of a run; with the prefix of an owner, of all messages of the owner's
+    runs.
+    """
     return f"{prefix}/**"
 
 
 def alive(prefix: str) -> str:
-    """Returns the key of the liveliness token that exists as long as the worker of the run."""
+    """Returns the key of the Zenoh liveliness token that exists as long as the worker of the run."""
     return f"{prefix}/alive"
 
 

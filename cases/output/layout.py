@@ -29,34 +29,36 @@ FRAMES = "frames"
 FRAME_SERIES = "frames.vtkhdf.series"
 CHECKPOINTS = "checkpoints"
 CHECKPOINT_REQUEST = "checkpoint.request"
-"""Request for a checkpoint; the worker removes the file."""
+"""Name of the file that requests a checkpoint; the worker removes the file."""
 SNAPSHOTS = "snapshots"
 TETS_SUFFIX = ".tets"
 SNAPSHOT_REQUEST = "snapshot.request"
-"""Request for a snapshot; the worker removes the file."""
+"""Name of the file that requests a snapshot; the worker removes the file."""
 FILES = "files"
 LOGS = "log"
 LAUNCHER_LOG = "launcher.log"
 SUBMISSION = "submission.json"
-"""Name of a file that only the server writes, as is ``worker.json``. A run without a server has neither of these
-files."""
+"""Name of a file that only the server writes, like ``worker.json``. The folder of a run without a server has neither of
+these two files."""
 WORKER = "worker.json"
 JOB = "job.json"
 """Name of a file that the server or the command line writes at the submission to a batch system."""
 JOB_SCRIPT = "job.sh"
 ACCESS = ".telemetry.json"
-"""Hidden file, readable by its owner only: address and token with which the ranks of a job publish."""
+"""Name of a hidden file that only its owner can read: network address and token with which the ranks of a job
+publish."""
 STOP_REQUEST = "stop.request"
-"""Request to stop the run finally; the file stays. The server writes the cause into it, as a word. If this file does
-not exist, the stop of a job is an interruption."""
+"""Name of the file that requests the final stop of the run; the file stays. The server writes the cause of the stop
+into this file, as a word. If this file does not exist, the stop of a job is an interruption."""
 INTERRUPTED = "interrupted.json"
-"""Preliminary outcome of a run that was interrupted and will continue."""
+"""Name of the preliminary outcome of a run that was interrupted and will continue."""
 ARRAYS = ".arrays"
-"""Folder beside the folders of the runs: one folder per job array, with its script and the list of its runs."""
+"""Folder beside the folders of the runs: one folder per job array, with the script and the list of runs of the
+array."""
 ARRAY = "folders.json"
-"""The run's folder of each task, in order."""
+"""Name of the list of the run folders of the tasks, in order."""
 LOCK = ".lock"
-"""Lock that rank 0 holds while it writes into the folder."""
+"""Name of the lock that rank 0 holds while it writes into the folder."""
 
 
 def frame(folder: Path, index: int) -> Path:
@@ -65,8 +67,8 @@ def frame(folder: Path, index: int) -> Path:
 
 
 def set_array(name: str) -> str:
-    """Name of the point array of a set of nodes in a frame. HDF5 separates groups by "/"; the name has U+2215
-    instead.
+    """Name of the point array of a set of nodes in a frame. HDF5 separates groups by "/"; therefore the name has U+2215
+    instead of "/".
     """
     return "set_" + name.replace("/", "\u2215")
 
@@ -77,17 +79,17 @@ def checkpoint(folder: Path, step: int) -> Path:
 
 
 def snapshot(folder: Path, n: int) -> Path:
-    """Path of snapshot ``n`` in the run folder ``folder``."""
+    """Path of the snapshot with number ``n`` in the run folder ``folder``."""
     return folder / SNAPSHOTS / f"{n:06d}.snap"
 
 
 def snapshot_tets(folder: Path, n: int) -> Path:
-    """Path of all tets of snapshot ``n`` in the run folder ``folder``."""
+    """Path of the file with all tets of snapshot ``n`` in the run folder ``folder``."""
     return snapshot(folder, n).with_suffix(TETS_SUFFIX)
 
 
 def share(folder: Path, n: int, rank: int) -> Path:
-    """Path of the contribution of ``rank`` to snapshot ``n``; it exists until the snapshot is made."""
+    """Path of the contribution of ``rank`` to snapshot ``n``; the file exists until the snapshot is made."""
     return folder / SNAPSHOTS / f".{n:06d}.{rank}"
 
 
@@ -97,5 +99,7 @@ def rank_log(folder: Path, rank: int) -> Path:
 
 
 def claim(folder: Path, job_name: str) -> Path:
-    """Path of the file that the first job of that name creates, with its number. A second job of that name ends."""
+    """Path of the file that the first job with a given name creates, with the number of the job. A second job with the
+    same name ends.
+    """
     return folder / f".claim-{job_name}"

@@ -1,6 +1,7 @@
-"""The table of a sweep: one line per point, one column per changed key, property of the run or result.
+"""The table of a sweep: one line per point; one column per changed key, property of the run, or result.
 
-Values are numbers; the header of a column has the name and the unit. Server, client and page use the same table.
+Values of the table are numbers; the header of a column has the name and the unit. Server, client and page use the same
+table.
 """
 
 import csv
@@ -23,7 +24,7 @@ from ..units import parse_unit, written
 from .history import header
 
 Cell = int | float | str | None
-"""Value of a cell of the table; None if unknown."""
+"""Value of a cell of the table of a sweep; None if unknown."""
 Named = tuple[str, str]
 """Name of a column and its unit; the unit is empty if there is none."""
 _VERDICTS = "no", "yes"
@@ -32,12 +33,13 @@ KEY, RUN, RESULT = "key", "run", "result"
 _COUNTS = ("fragments", "broken", "eroded")
 _COSTS = {"first_break": "s", "time": "s", "elapsed": "s", "cpu": "s", "steps": "", "elements": "", "nodes": ""}
 _FORMULA = re.compile(r"[=@\t\r]|[+-](?!(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?( [^\W\d][\w*/^ -]*)?$)")
-"""Start of a text that a spreadsheet would compute. A number with a sign, and perhaps a unit, does not match."""
+"""Pattern of the start of a text that a spreadsheet program would compute. A number with a sign, and perhaps a unit,
+does not match."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Point:
-    """A point of a sweep: the changed keys, the run, and its ``results``, empty before its end."""
+    """A point of a sweep: the changed keys, the run, and its ``results``, which are empty before the end of the run."""
 
     values: Mapping[str, Any]
     run: str = ""
@@ -47,7 +49,7 @@ class Point:
 
 
 class Column(msgspec.Struct, kw_only=True, frozen=True):
-    """A column of the table; ``kind`` is KEY, RUN or RESULT."""
+    """A column of the table of a sweep; ``kind`` is KEY, RUN or RESULT."""
 
     name: str
     unit: str = ""
@@ -56,12 +58,12 @@ class Column(msgspec.Struct, kw_only=True, frozen=True):
 
     @property
     def title(self) -> str:
-        """The name with the unit in brackets, as in the header."""
+        """The name of the column with the unit in brackets, as in the header."""
         return header({self.name: self.unit})[0]
 
 
 def table(points: Sequence[Point]) -> list[Column]:
-    """Returns the columns: keys, run, results. A result that no run has gets no column."""
+    """Returns the columns of the table: keys, run, results. A result that no run has gets no column."""
     keys = dict.fromkeys(key for point in points for key in point.values)
     return [
         *(_key(key, [point.values.get(key) for point in points]) for key in keys),
@@ -82,8 +84,8 @@ def _results(points: Sequence[Point]) -> list[Column]:
 
 
 def results(ended: Outcome | None) -> dict[Named, Cell]:
-    """Returns the results of a run, by name and unit: references, the last, smallest and largest value of each
-    probe, counts, terms of the energy, cost.
+    """Returns the results of a run, by name and unit: references; the last, smallest and largest value of each probe;
+    counts, terms of the energy ledger, cost.
     """
     if ended is None:
         return {}
@@ -116,7 +118,7 @@ def names(case: Case) -> dict[str, str]:
 
 
 def _references(ended: Outcome) -> dict[Named, Cell]:
-    """Value and verdict of each reference; references with the same title are numbered."""
+    """Value and verdict of each reference; references with equal titles are numbered."""
     found: dict[Named, Cell] = {}
     for n, check in enumerate(ended.reference):
         before = sum(each.name == check.name for each in ended.reference[:n])
@@ -137,15 +139,16 @@ def _probes(ended: Outcome) -> dict[Named, Cell]:
 
 
 def _key(key: str, values: Sequence[Any]) -> Column:
-    """Returns numbers in the unit in which they are written, if all are quantities of one kind; otherwise as they
-    are written."""
+    """Returns the values as numbers in the unit in which they are written if all are quantities of one kind; otherwise
+    as they are written.
+    """
     unit, numbers = in_one_unit(key, values)
     return Column(name=key, unit=unit, kind=KEY, values=numbers)
 
 
 def in_one_unit(key: str, values: Sequence[Any]) -> tuple[str, list[Cell]]:
-    """Returns the unit of the values of a key, and the values in it: the unit of the first value that is written
-    with one, otherwise that of a bare number. Values of several kinds, or without a number, stay text.
+    """Returns the unit of the values of a key, and the values in this unit. The unit is that of the first value with a
+    unit, otherwise that of a bare number; values of several kinds, or without a number, stay text.
     """
     texts: list[Cell] = [None if value is None else _text(value) for value in values]
     read = {n: written(value) for n, value in enumerate(values) if value is not None}
@@ -163,7 +166,9 @@ def in_one_unit(key: str, values: Sequence[Any]) -> tuple[str, list[Cell]]:
 
 
 def _scale(unit: str, target: str) -> Fraction:
-    """Returns the factor of ``unit`` over ``target``; a bare number is in SI. Raises ValueError."""
+    """Returns the factor of ``unit`` over ``target``; a bare number is in SI. Raises ValueError if the units have
+    different dimensions.
+    """
     factor, dimension = parse_unit(unit)
     whole, kind = parse_unit(target)
     if unit and dimension != kind:
@@ -184,7 +189,7 @@ def _text(value: Any) -> str:
 
 
 def to_csv(columns: Sequence[Column]) -> str:
-    """Returns the table as CSV, with a line of names and units; unknown values are empty."""
+    """Returns the table as CSV text, with a line of names and units; unknown values are empty."""
     out = io.StringIO()
     writer = csv.writer(out, lineterminator="\n")
     writer.writerow(safe(column.title) for column in columns)
@@ -198,6 +203,7 @@ def rows(columns: Sequence[Column]) -> Iterable[tuple[Cell, ...]]:
 
 
 def safe(value: Cell) -> Cell:
-    """Returns the value of a CSV table. A text that a spreadsheet would compute gets an apostrophe, which keeps it a
-    text."""
+    """Returns a value of the table in CSV form. A text that a spreadsheet program would compute gets an apostrophe, so
+    that it stays a text.
+    """
     return f"'{value}" if isinstance(value, str) and _FORMULA.match(value) else value

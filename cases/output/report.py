@@ -1,10 +1,11 @@
-"""Report of a run as one HTML file: a program of the client makes the file, and a server stores it in the run's
-folder."""
+"""Report of a run as one HTML file: a program of the client makes the report, and a server stores it in the run's
+folder.
+"""
 
 import importlib.util
 
 PROGRAM = "conoid.client.reports"
-"""The program: ``python -m conoid.client.reports FOLDER OUT``, one run a process."""
+"""The program that makes a report: ``python -m conoid.client.reports FOLDER OUT``, one process for each run."""
 NAME = "report.html"
 """Name of the report in the folder of a run."""
 
@@ -13,6 +14,5 @@ _NEEDS = "conoid.client", "h5py", "matplotlib", "pyvista"
 
 
 def missing() -> list[str]:
-    """Returns the names of the packages that the program needs and that are missing here; empty if the program can
-    be started."""
+    """Returns the names of the missing packages that the report program needs; empty if the program can be started."""
     return [name for name in _NEEDS if importlib.util.find_spec(name) is None]

@@ -1,4 +1,4 @@
-"""A snapshot of the fragments of a run as one block of bytes, the same in the run's folder, over Zenoh and over HTTP.
+"""A snapshot of the fragments of a run as one block of bytes, equal in the run's folder, over Zenoh and over HTTP.
 
 ::
 
@@ -8,8 +8,8 @@
           16 to 16+H  the header, JSON, padded with spaces
           from there  the arrays, each at a multiple of 8 given in the header; little-endian
 
-Vertices belong to one fragment each, so that fragments can be drawn apart. ``docs/reference/snapshots.md`` has the
-arrays.
+Each vertex belongs to one fragment, so that fragments can be drawn apart. The page ``docs/reference/snapshots.md``
+describes the arrays.
 """
 
 from collections.abc import Mapping
@@ -19,21 +19,21 @@ import msgspec
 
 MAGIC = b"CONOSNAP"
 VERSION = 1
-"""Version of the layout; a reader refuses other versions."""
+"""Version of the layout of snapshots; a reader refuses other versions."""
 TYPES = {"uint8": "B", "uint16": "H", "uint32": "I", "int64": "q", "float32": "f", "float64": "d"}
-"""Types of arrays, and their letters in Python's ``struct``."""
+"""Types of arrays, and the letters of the types in Python's module ``struct``."""
 REST = -1
-"""``fragment_id`` of the last row, if it is the sum of all fragments without a row of their own."""
+"""``fragment_id`` of the last table row if this row is the sum of all fragments without a row."""
 FIELD = "field:"
 """Prefix of the names of field arrays."""
 _START = 16
-"""Bytes before the header."""
+"""Number of bytes before the header."""
 _FAR = 1 << 40
-"""An offset with more digits than any other: its header is the longest."""
+"""An array offset with more digits than any other offset, so that its header is the longest possible."""
 
 
 class Field(msgspec.Struct, kw_only=True, frozen=True):
-    """A field of triangles in 8 bits: 0 is ``low``, 255 is ``high``."""
+    """A field of triangles in 8 bits: 0 means ``low``, 255 means ``high``."""
 
     unit: str
     low: float
@@ -41,7 +41,7 @@ class Field(msgspec.Struct, kw_only=True, frozen=True):
 
 
 class Array(msgspec.Struct, kw_only=True, frozen=True):
-    """An array; ``offset`` counts from the beginning of the block."""
+    """An array of a snapshot; ``offset`` counts from the beginning of the block of bytes."""
 
     dtype: str
     shape: list[int]
@@ -49,31 +49,31 @@ class Array(msgspec.Struct, kw_only=True, frozen=True):
 
 
 class Header(msgspec.Struct, kw_only=True, frozen=True):
-    """The header of a snapshot. ``t`` in s, ``box`` in m."""
+    """The header of a snapshot. The simulated time ``t`` is in s, ``box`` in m."""
 
     n: int
     step: int
     t: float
     box: tuple[tuple[float, float, float], tuple[float, float, float]]
-    """Low and high corner: 0 and 65535 of ``positions``."""
+    """Low and high corner of the box: values 0 and 65535 of ``positions``."""
     ranks: int
     parts: list[str]
     tets: int
     """Number of tets of the whole model."""
     surface_triangles: int
-    """Number of fragments before some were merged or omitted."""
+    """Number of fragments before some fragments were merged or omitted."""
     fragments_total: int
     fragments_listed: int
-    """Rows of the table except the last one, if that is the sum of the others."""
+    """Rows of the table without the last row if this row is the sum of other fragments."""
     fields: dict[str, Field]
     walls: list[tuple[float, float, float]] = []
-    """Positions of the walls of the case, m; empty if none of them moves."""
+    """Positions of the walls of the case, m; empty if no wall moves."""
     arrays: dict[str, Array] = {}
 
 
 @dataclass(frozen=True)
 class Column:
-    """An array to be written: a type of ``TYPES``, its shape, its bytes in C order."""
+    """An array to be written: a type of ``TYPES``, the shape, and the bytes in C order."""
 
     dtype: str
     shape: tuple[int, ...]
@@ -84,7 +84,7 @@ _decoder = msgspec.json.Decoder(Header)
 
 
 def pack(header: Header, columns: Mapping[str, Column]) -> bytes:
-    """Returns the block of bytes; fills in ``header.arrays``."""
+    """Returns the block of bytes of a snapshot; fills in ``header.arrays``."""
     places = {name: Array(dtype=c.dtype, shape=list(c.shape), offset=_FAR) for name, c in columns.items()}
     room = _rounded(len(_encoded(header, places)))
     blob, size = [], _START + room
@@ -98,8 +98,8 @@ def pack(header: Header, columns: Mapping[str, Column]) -> bytes:
 
 
 def header_of(blob: bytes | memoryview, size: int | None = None) -> Header:
-    """Returns the header of a block, or of its beginning if ``size`` gives the number of all its bytes. Raises
-    ValueError for other data, or an incomplete block.
+    """Returns the header of a block of bytes, or of the beginning of a block if ``size`` gives the size of the whole
+    block. Raises ValueError if the data is no snapshot, or is incomplete.
     """
     data = memoryview(blob)
     size = len(data) if size is None else size
@@ -119,13 +119,13 @@ def header_of(blob: bytes | memoryview, size: int | None = None) -> Header:
 
 
 def view(blob: bytes | memoryview, array: Array) -> memoryview:
-    """Returns one array of a block, flat, without a copy; on little-endian machines."""
+    """Returns one array of a block as a flat array, without a copy; works on little-endian machines."""
     flat: memoryview = memoryview(blob)[array.offset : array.offset + size_of(array)]
     return flat.cast(TYPES[array.dtype])  # type: ignore[call-overload, no-any-return]
 
 
 def size_of(array: Array) -> int:
-    """Bytes of an array."""
+    """Size of an array in bytes."""
     items = 1
     for length in array.shape:
         items *= length

@@ -1,9 +1,10 @@
 """The text of an LS-DYNA keyword deck: keywords, their cards, and the fields of a card.
 
-Rules of the LS-DYNA Keyword User's Manual, "Getting started": a line that begins with ``*`` is a keyword, one that
-begins with ``$`` a comment, every other one a card of the last keyword. A card has fields of fixed widths, or fields
-between commas. Widths below 20 are 20 in the long format (``*KEYWORD LONG=Y``, or ``+`` behind a keyword), those below
-10 are 10 in the format I10 (``*KEYWORD I10=Y``, or ``%`` behind a keyword); ``-`` behind a keyword is the standard one.
+The rules are those of the LS-DYNA Keyword User's Manual, "Getting started": a line that begins with ``*`` is a keyword,
+a line that begins with ``$`` is a comment, every other line is a card of the last keyword. A card has fields of fixed
+widths, or fields between commas. A width below 20 becomes 20 in the long format (``*KEYWORD LONG=Y``, or ``+`` behind a
+keyword); a width below 10 becomes 10 in the format I10 (``*KEYWORD I10=Y``, or ``%`` behind a keyword); ``-`` behind a
+keyword selects the standard format.
 """
 
 import re
@@ -18,7 +19,7 @@ from .problems import ConoidError, shown
 Widths = tuple[int, ...]
 
 _STANDARD, _I10, _LONG = 0, 10, 20
-"""Smallest width of a field in the three formats (the manual, "General card format")."""
+"""Smallest width of a field in each of the three formats (the manual, "General card format")."""
 _SUFFIXES = {"+": _LONG, "%": _I10, "-": _STANDARD}
 _KEYWORD = re.compile(r"\*\s*([A-Za-z0-9_\-/&.]*[A-Za-z0-9_/&.])\s*([+%-])?\s*(.*)", re.ASCII)
 _REMARK = re.compile(r"\(.*\)")
@@ -29,7 +30,7 @@ _PARAMETER = re.compile(r"([IiRrCc])\s*([A-Za-z_][A-Za-z0-9_]*)", re.ASCII)
 
 
 class CardError(ConoidError, ValueError):
-    """Error in a deck. The text of the error is one line, which begins with the place of the error."""
+    """Error in a deck. The text of the error is one line, which begins with the place of the error in the deck."""
 
 
 class Card(NamedTuple):
@@ -38,7 +39,7 @@ class Card(NamedTuple):
     number: int
     """Number of the line in its file."""
     text: str
-    """The line without its end."""
+    """Text of the line without its line end."""
 
 
 @dataclass(frozen=True)
@@ -46,16 +47,16 @@ class Block:
     """A keyword and its cards, including empty ones."""
 
     name: str
-    """Name in upper case, without ``*``: ``ELEMENT_SOLID``, ``SET_NODE_LIST_TITLE``."""
+    """Name of the keyword in upper case, without ``*``: ``ELEMENT_SOLID``, ``SET_NODE_LIST_TITLE``."""
     number: int
-    """Line of the keyword in its file."""
+    """Number of the keyword's line in its file."""
     file: str = ""
     """Name of the included file in the deck; empty for the deck itself."""
     cards: list[Card] = field(default_factory=list)
     least: int = _STANDARD
-    """Smallest width of a field: 0, 10 or 20."""
+    """Smallest width of a field in characters: 0, 10 or 20."""
     remark: str = ""
-    """The text in brackets behind the keyword: ``ten nodes format``."""
+    """Text in brackets behind the keyword, such as ``ten nodes format``."""
     parameters: Mapping[str, str] = field(default_factory=dict)
     """Values of ``*PARAMETER`` by name, in lower case."""
 
@@ -64,8 +65,9 @@ class Block:
         return (card for card in self.cards if card.text.strip())
 
     def parted(self, options: Collection[str]) -> tuple[str, frozenset[str]]:
-        """Returns the name without the words of ``options`` at its end, and these words: ``("SET_NODE",
-        {"TITLE"})``."""
+        """Returns the name of a keyword without the words of ``options`` at its end, and these words: ``("SET_NODE",
+        {"TITLE"})``.
+        """
         name, found = self.name, set[str]()
         while (last := name.rpartition("_"))[2] in options and last[0]:
             name = last[0]
@@ -73,23 +75,26 @@ class Block:
         return name, frozenset(found)
 
     def place(self, number: int | None = None) -> str:
-        """Returns the place of a card, or of the keyword: ``line 7`` or ``'sub/mesh.k', line 7``."""
+        """Returns the place of a card, or of the keyword, as text: ``line 7`` or ``'sub/mesh.k', line 7``."""
         return placed(self.file, self.number if number is None else number)
 
     def error(self, card: Card | None, text: str) -> CardError:
-        """Returns the error at a card, or at the keyword."""
+        """Returns the error with the place of a card, or of the keyword."""
         return CardError(f"{self.place(card.number if card else None)}: {text}")
 
     def fields(self, card: Card, *widths: int) -> list[str]:
-        """Returns the fields of a card without outer blanks, with parameters replaced; empty fields beyond its end.
+        """Returns the fields of a card without outer blanks, with parameters replaced by their values; fields beyond
+        the end of the card are empty.
 
-        Raises CardError for a card with more fields, and for an undefined parameter.
+        Raises CardError if the card has more fields, or if a parameter is undefined.
         """
         found = self._between_commas(card, widths) if "," in card.text else self._cut(card, widths)
         return [self._valued(card, item) for item in found] if "&" in card.text else found
 
     def whole(self, card: Card, item: str, what: str) -> int:
-        """Reads a whole number; 0 for an empty field. Raises CardError; ``what``: the name of the field in it."""
+        """Reads a whole number from a field; 0 for an empty field. Raises CardError with ``what``, the name of the
+        field, if the field is not a whole number.
+        """
         if not item:
             return 0
         if not _WHOLE.fullmatch(item):
@@ -97,7 +102,9 @@ class Block:
         return int(item.partition(".")[0])
 
     def real(self, card: Card, item: str, what: str) -> float:
-        """Reads a number, also ``1.5-3`` and ``1D5``; 0 for an empty field. Raises CardError."""
+        """Reads a number from a field, also in the forms ``1.5-3`` and ``1D5``; 0 for an empty field. Raises CardError
+        if the field is not a number.
+        """
         if not item:
             return 0.0
         found = _REAL.fullmatch(item)
@@ -141,26 +148,26 @@ def _crossed(card: Card) -> str:
 
 
 def placed(file: str, number: int) -> str:
-    """Returns ``line 7`` or ``'sub/mesh.k', line 7``."""
+    """Returns the place of a line as text: ``line 7`` or ``'sub/mesh.k', line 7``."""
     return f"{shown(file)}, line {number}" if file else f"line {number}"
 
 
 class Deck:
-    """The keywords of a deck and of the files that it includes, read once from the start."""
+    """The keywords of a deck and of the files that the deck includes, read once from the start."""
 
     def __init__(self, path: Path, without: Collection[str] = ()) -> None:
-        """Creates the object; no file is opened yet. ``without``: keywords whose cards are not stored."""
+        """Creates the object without opening a file. ``without``: names of keywords whose cards are not stored."""
         self._without = without
         self.included = Included(path)
-        """The files that have been read; the deck itself is the first."""
+        """The files that have been read; the first file is the deck itself."""
         self.followed: list[Block] = []
-        """The keywords that ``blocks`` has not yielded so far: ``*COMMENT``, ``*INCLUDE``, ``*PARAMETER`` and
-        ``*END``."""
+        """The keywords that ``blocks`` has processed itself and not yielded: ``*COMMENT``, ``*INCLUDE``, ``*PARAMETER``
+        and ``*END``."""
         self._parameters: dict[str, str] = {}
 
     def blocks(self) -> Iterator[Block]:
         """Yields every keyword up to ``*END``, except ``*COMMENT``, ``*INCLUDE`` and ``*PARAMETER``, which are
-        processed in order. Raises CardError; OSError where the deck itself cannot be opened.
+        processed in their order in the deck. Raises CardError; raises OSError if the deck itself cannot be opened.
         """
         return self._of(self.included.start(), "", _STANDARD)
 
@@ -184,7 +191,7 @@ class Deck:
                 yield block
 
     def _plain(self, path: Path, file: str, standing: int) -> Iterator[Block]:
-        """Yields the keywords of one file; ``standing``: smallest width of a field of a keyword without suffix."""
+        """Yields the keywords of one file; ``standing``: smallest width of a field for keywords without suffix."""
         block: Block | None = None
         for number, text in _text(path, file):
             if text.startswith("*"):
@@ -232,8 +239,9 @@ class Deck:
 
 
 def _formatted(block: Block, rest: str) -> Block:
-    """Returns the width of ``*KEYWORD``: ``LONG=Y`` and ``LONG=K`` mean long input, ``LONG=S`` standard input and
-    long output."""
+    """Returns the smallest field width that a line ``*KEYWORD`` sets: ``LONG=Y`` and ``LONG=K`` mean long input,
+    ``LONG=S`` means standard input and long output.
+    """
     found = {word.upper(): letter.upper() for word, letter in _SETTING.findall(rest)}
     if found.get("LONG", "S") not in "YKS" or found.get("I10", "Y") not in "YN":
         raise block.error(None, f"*KEYWORD {rest}: expected LONG = Y, K or S, and I10 = Y or N")
@@ -243,7 +251,7 @@ def _formatted(block: Block, rest: str) -> Block:
 
 
 def _names(block: Block) -> Iterator[tuple[str, int]]:
-    """Yields file names and their lines; a name that ends with `` +`` continues in the next line."""
+    """Yields file names and the numbers of their lines; a name that ends with `` +`` continues in the next line."""
     whole, first = "", 0
     for card in block.filled():
         first = first if whole else card.number

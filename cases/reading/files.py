@@ -1,8 +1,8 @@
-"""The files that a case names: path and hash, and the place of the file for a run.
+"""The files that a case names: path, hash, and the location of the file for a run.
 
-Every table below ``parts[].mesh`` that has a ``path`` names a file; ``sha256`` beside it is the hash of its content.
-The path is valid on the machine of the case's author. A run of a server, or of ``conoid batch``, has its own copies
-in its folder, named by their hashes; there the path is only a name.
+Every table below ``parts[].mesh`` that has a ``path`` names a file; the key ``sha256`` of the table is the hash of its
+content. The path is valid on the machine of the case's author. A run of a server, or of ``conoid batch``, has copies of
+the files in its folder, named by their hashes; for such a run the path is only a name.
 """
 
 import re
@@ -16,12 +16,12 @@ from ..output import layout
 HASH = re.compile(r"[0-9a-f]{64}")
 """A SHA-256 hash as it is written in names and addresses."""
 _ENDING = re.compile(r"\.[a-z0-9]{1,8}")
-"""Ending of a file's name, which gives its format."""
+"""Pattern of the ending of a file name, which gives the format of the file."""
 
 
 @dataclass(frozen=True)
 class Named:
-    """A file that a case names, and the table that names it, as ``("parts", 0, "mesh")``."""
+    """A file that a case names, and the location of its table in the case, such as ``("parts", 0, "mesh")``."""
 
     table: tuple[int | str, ...]
     path: str
@@ -29,13 +29,14 @@ class Named:
 
     @property
     def copy(self) -> str:
-        """Name of the copy in a run's folder; empty where the case has no hash of the file."""
+        """Name of the copy in a run's folder; empty if the case has no hash of the file."""
         return copy_of(self.path, self.sha256)
 
 
 def files_of(case: Mapping[str, Any]) -> list[Named]:
-    """Returns all files that a case in plain data names, in its order. Ignores values that are not tables, lists or
-    text."""
+    """Returns all files that a case in plain data names, in the order of the case. Ignores values that are not tables,
+    lists or text.
+    """
     parts = case.get("parts")
     meshes = ((n, part.get("mesh")) for n, part in enumerate(_listed(parts)) if isinstance(part, Mapping))
     return [file for n, mesh in meshes for file in _below(mesh, ("parts", n, "mesh"))]
@@ -57,7 +58,9 @@ def _listed(value: Any) -> list[Any]:
 
 
 def copy_of(path: str, sha256: str | None) -> str:
-    """Returns the name of the copy of a file: its hash and the ending of its name. Empty without a hash."""
+    """Returns the name of the copy of a file: the hash of the file and the ending of its name. The name is empty for a
+    file without a hash.
+    """
     if sha256 is None or not HASH.fullmatch(sha256.lower()):
         return ""
     ending = PurePath(path).suffix.lower()
@@ -67,8 +70,9 @@ def copy_of(path: str, sha256: str | None) -> str:
 def located(path: str, sha256: str | None, folder: Path) -> Path:
     """Returns the path of a file for a run whose case is in ``folder``.
 
-    In the folder of a run of a server it is the run's own copy, so that no case reads another path of the server;
-    elsewhere the copy if there is one, otherwise ``path``, relative to the folder.
+    In the folder of a run of a server, the result is the copy of the file in this folder, so that no case reads another
+    path of the server. Elsewhere the result is the copy if it exists, otherwise ``path``, relative to the folder of the
+    case.
     """
     copy = folder / layout.FILES / (copy_of(path, sha256) or "none")
     return copy if (folder / layout.SUBMISSION).exists() or copy.exists() else folder / path

@@ -1,4 +1,4 @@
-"""The files of a deck: the deck itself and the files that it includes, all below its folder."""
+"""The files of a deck: the deck itself and the files that it includes, all below the folder of the deck."""
 
 import io
 from collections.abc import Callable, Iterator
@@ -8,26 +8,26 @@ from typing import Self
 from . import whole
 
 _DEEPEST, _MOST = 8, 1000
-"""Largest depth of includes, and largest number of files. The values were chosen because decks of whole vehicles
-have some hundred files, three deep."""
+"""Largest depth of includes, and largest number of files. Decks of whole vehicles have some hundred files, three levels
+deep (reason of the chosen limits)."""
 _UTF_16 = (b"\xff\xfe", b"\xfe\xff")
 LONGEST = 4096
-"""Largest number of characters of a line of cards. The value was chosen because the longest format has 200
-characters."""
+"""Largest number of characters of a line of cards; the longest format has 200 characters (reason of the chosen
+limit)."""
 LONGEST_LINE = 65_536
-"""Largest number of characters of a line of values between commas. The value was chosen because Abaqus allows 256
-characters, and programs that write a set in one line write some thousand."""
+"""Largest number of characters of a line of values between commas (chosen value). Abaqus allows 256 characters;
+programs that write a set in one line write some thousand characters."""
 
 
 class Included:
     """The files of a deck that have been read, and the files that are being read."""
 
     def __init__(self, path: Path) -> None:
-        """``path``: path of the deck."""
+        """Creates the object; ``path``: path of the deck."""
         self.files: list[Path] = []
-        """Every file that has been opened, once, in order."""
+        """Every file that has been opened, listed once, in the order of opening."""
         self.followed: list[Line] = []
-        """The lines that have included other files."""
+        """The lines that include the files that are being read."""
         self._path = path
         self._open: list[Path] = []
         self._count = 0
@@ -39,8 +39,9 @@ class Included:
         return self._path
 
     def enter(self, name: str, including: Path) -> Path:
-        """Opens a file that ``including`` names, relative to the folder of the deck, otherwise to its own. Raises
-        ValueError if the file does not exist, is not below the folder of the deck, or includes itself.
+        """Opens a file that the file ``including`` names, relative to the folder of the deck, otherwise relative to the
+        folder of ``including``. Raises ValueError if the file does not exist, is not below the folder of the deck, or
+        includes itself.
         """
         folder = self._path.resolve().parent
         places = [(start / name.replace("\\", "/")) for start in (folder, including.resolve().parent)]
@@ -63,7 +64,7 @@ class Included:
         return there[0]
 
     def follow(self, name: str, including: Path, line: "Line") -> Path:
-        """Calls ``enter`` for the file that a ``line`` includes. Raises ValueError, with that line."""
+        """Calls ``enter`` for the file that a ``line`` includes. Raises ValueError with the number of the line."""
         self.followed.append(line)
         try:
             return self.enter(name, including)
@@ -76,18 +77,18 @@ class Included:
 
 
 class Line(int):
-    """Number of a line in its file; as text ``7``, or ``7 of mesh.inc`` for an included file."""
+    """Number of a line in its file; the text of the number is ``7``, or ``7 of mesh.inc`` for an included file."""
 
     file: str
 
     def __new__(cls, number: int, file: str = "") -> Self:
-        """``file``: name of the file in the deck, empty for the deck itself."""
+        """Creates the number; ``file``: name of the included file, empty for the deck itself."""
         made = super().__new__(cls, number)
         made.file = file
         return made
 
     def __str__(self) -> str:
-        """Returns the number of the line, and the file that has the line."""
+        """Returns the number of the line, and the name of the file that has the line."""
         return f"{int(self)} of {self.file}" if self.file else f"{int(self)}"
 
 
@@ -99,8 +100,8 @@ def own(line: int) -> int:
 def flattened(deck: Included, named: Callable[[str], str | None], longest: int = LONGEST) -> Iterator[tuple[Line, str]]:
     """Yields the lines of a deck; the lines of an included file replace the line that includes it.
 
-    ``named``: returns the file that a line includes, None for any other line; ``longest``: largest number of
-    characters of a line. Raises ValueError, OSError.
+    ``named``: function that returns the file that a line includes, None for any other line; ``longest``: largest number
+    of characters of a line. Raises ValueError or OSError.
     """
     return _flat(deck, deck.start(), "", named, longest)
 
@@ -123,8 +124,8 @@ def _flat(
 
 
 def lines(path: Path, longest: int = LONGEST) -> Iterator[tuple[int, str]]:
-    """Yields the lines of a text file with their numbers, without their ends; UTF-8 if valid, otherwise Latin-1.
-    Raises ValueError for a file that is not text, OSError where there is no regular file.
+    """Yields the lines of a text file without their line ends, with their numbers; the text is UTF-8 if valid,
+    otherwise Latin-1. Raises ValueError if the file is not text, OSError if there is no regular file.
     """
     with whole.opened(path) as raw, io.BufferedReader(raw) as data:
         if data.peek(2)[:2] in _UTF_16:

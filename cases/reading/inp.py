@@ -1,8 +1,8 @@
 """The text of an Abaqus input file: keyword lines with their parameters, and data lines.
 
-Rules of the Analysis User's Guide, "Input syntax rules": a line that begins with ``*`` is a keyword line, one that
-begins with ``**`` a comment; case and blanks have no meaning outside of quotation marks; a keyword line that ends with
-a comma continues in the next line; the exponent of a number may begin with D; an empty field is 0.
+The rules are those of the Analysis User's Guide, "Input syntax rules": a line that begins with ``*`` is a keyword line,
+a line that begins with ``**`` is a comment. Case and blanks have no meaning outside of quotation marks; a keyword line
+that ends with a comma continues in the next line; the exponent of a number may begin with D; an empty field is 0.
 """
 
 import math
@@ -28,13 +28,14 @@ _UTF_8 = b"\xef\xbb\xbf"
 
 
 class InpError(ConoidError, ValueError):
-    """Error in an input file. The text of the error is one line, with the number of the line in the file."""
+    """Error in an Abaqus input file. The text of the error is one line, with the number of the line in the file."""
 
 
 @dataclass(frozen=True)
 class Block:
-    """A keyword line: word in upper case without blanks or hyphens, parameters as (word, value or None), line
-    number."""
+    """A keyword line: keyword in upper case without blanks or hyphens, parameters as (word, value or None), line
+    number.
+    """
 
     word: str
     parameters: list[tuple[str, str | None]]
@@ -42,16 +43,18 @@ class Block:
 
 
 class Source:
-    """The lines of a file, read once from the start: a block, then its data lines."""
+    """The lines of an Abaqus input file, read once from the start: a keyword line, then its data lines."""
 
     def __init__(self, path: Path) -> None:
-        """Opens the file ``path``. Raises InpError for a file that is not text."""
+        """Opens the file ``path``. Raises InpError if the file is not text."""
         self.included = Included(path)
-        """The files that are read: the first is ``path``, the others are included (``*INCLUDE, INPUT=``)."""
+        """The files that are read: the first file is ``path``, the others are included (``*INCLUDE, INPUT=``)."""
         self._ahead: tuple[int, str] | None = None
 
     def blocks(self) -> Iterator[Block]:
-        """Yields every keyword line; data lines that were not read are skipped. Raises InpError."""
+        """Yields every keyword line; data lines that were not read are skipped. Raises InpError if a line is
+        invalid.
+        """
         self._lines = self._useful(self.included.start(), "")
         for number, text in self.data():
             if text.strip():
@@ -66,7 +69,7 @@ class Source:
                 pass
 
     def data(self) -> Iterator[tuple[int, str]]:
-        """Yields (line number, text) of the data lines up to the next keyword, including empty ones."""
+        """Yields the line number and the text of each data line up to the next keyword, including empty data lines."""
         if self._ahead is not None:
             return
         for number, text in self._lines:
@@ -80,8 +83,8 @@ class Source:
         return ((number, text) for number, text in self.data() if text.strip())
 
     def _useful(self, path: Path, name: str) -> Iterator[tuple[int, str]]:
-        """Yields the lines that are not comments; the lines of an included file replace the line that includes it.
-        ``name``: name of the file in the deck, empty for the deck itself.
+        """Yields the lines that are not comments; the lines of an included file replace the line that includes the
+        file. ``name``: name of the included file, empty for the deck itself.
         """
         for line, text in _read(path, name):
             if (wanted := included_by(text)) is None:
@@ -135,7 +138,7 @@ def included_by(text: str) -> str | None:
 
 
 def _decoded(text: str) -> str:
-    """Decodes UTF-8 if valid, otherwise Latin-1."""
+    """Decodes bytes as UTF-8 if valid, otherwise as Latin-1."""
     try:
         return text.encode("latin-1").decode("utf-8")
     except UnicodeDecodeError:
@@ -156,7 +159,9 @@ def _parameter(item: str) -> tuple[str, str | None]:
 
 
 def fields(text: str) -> list[str]:
-    """Returns the fields between commas, without outer blanks; a comma in quotation marks does not separate."""
+    """Returns the fields of a line between commas, without outer blanks; a comma in quotation marks does not separate
+    fields.
+    """
     if '"' not in text:
         return [item.strip() for item in text.split(",")]
     found, at = [], 0
@@ -170,8 +175,9 @@ def fields(text: str) -> list[str]:
 
 
 def numbers(line: int, text: str) -> list[float]:
-    """Returns the numbers of a data line; 0 for an empty field, none for the field after a last comma. Raises
-    InpError."""
+    """Returns the numbers of a data line; 0 for an empty field; a comma at the end of the line adds no field. Raises
+    InpError if a field is not a number.
+    """
     if _NUMBERS.fullmatch(text):
         try:
             items = text.translate(_D).split(",")
@@ -186,14 +192,14 @@ def numbers(line: int, text: str) -> list[float]:
 
 
 def whole(line: int, item: str) -> int:
-    """Returns the number of a node or element. Raises InpError."""
+    """Returns the number of a node or element. Raises InpError if the field is not such a number."""
     if not _WHOLE.fullmatch(item) or not int(item):
         raise InpError(f"line {line}: {shortened(item)} is not a number of a node or element; the first one is 1")
     return int(item)
 
 
 def wholes(line: int, items: list[str]) -> list[int]:
-    """Returns the numbers of nodes or elements in several fields. Raises InpError."""
+    """Returns the numbers of nodes or elements in several fields. Raises InpError if a field is not such a number."""
     if _WHOLES.fullmatch(",".join(items)):
         with suppress(ValueError):
             found = [int(item) for item in items]

@@ -1,4 +1,4 @@
-"""The material library: ``materials.toml``, every constant with its confidence and source."""
+"""The material library ``materials.toml``: every constant with its confidence and source."""
 
 import tomllib
 from collections.abc import Iterator
@@ -14,9 +14,9 @@ from .similar import nearest
 
 PATH = Path(__file__).parents[1] / "materials.toml"
 Confidence = Literal["paper", "read", "derived", "memory", "assumed"]
-"""Confidence of a constant of a material: given in the paper on which this project is based; read in the named
-source; computed from other constants; remembered from the literature and not read again; chosen without evidence for
-this alloy."""
+"""Confidence of a constant of a material, in the order of the words: given in the paper on which this project is based;
+read in the named source; computed from other constants; remembered from the literature and not read again; chosen
+without evidence for this alloy."""
 CONFIDENCES: tuple[str, ...] = get_args(Confidence)
 
 
@@ -28,30 +28,34 @@ def library() -> dict[str, Material]:
 
 @cache
 def sources() -> dict[str, str]:
-    """Returns the sources by their keys in the library."""
+    """Returns the sources of the library by their keys."""
     return dict(tomllib.loads(PATH.read_text(encoding="utf-8"))["sources"])
 
 
 def provenance(name: str) -> dict[str, tuple[str, str]]:
-    """Confidence and source key of each constant of a material: ``{"elastic.young": ("read", "uintah"), ...}``."""
+    """Returns the confidence and the source key of each constant of a material: ``{"elastic.young": ("read", "uintah"),
+    ...}``.
+    """
     return {key: (confidence, source) for key, (_, confidence, source) in _entries(_tables()[name], "")}
 
 
 @dataclass(frozen=True)
 class Constant:
-    """A number of the library as its text, such as ``7850 kg/m^3``."""
+    """A number of the library as text, such as ``7850 kg/m^3``."""
 
     key: str
     value: str
     confidence: Confidence
     source: str
-    """A key of the sources."""
+    """Key of a source of the library."""
     cited: str
     """Text of the source."""
 
 
 def constants(name: str) -> list[Constant]:
-    """Returns every constant of a material of the library. Raises CaseError with the nearest names."""
+    """Returns every constant of a material of the library. Raises CaseError with the nearest names if the material is
+    unknown.
+    """
     if name not in library():
         raise CaseError([problem(("material",), name, f"unknown material; {nearest(name, sorted(library()))}")])
     return [
@@ -61,8 +65,9 @@ def constants(name: str) -> list[Constant]:
 
 
 def material(case: Case, name: str) -> Material:
-    """Returns the material ``name``: that of the case, otherwise that of the library. Raises CaseError with the
-    nearest names."""
+    """Returns the material ``name`` of the case; if the case has no such material, that of the library. Raises
+    CaseError with the nearest names if the material is unknown.
+    """
     known = {**library(), **case.materials}
     if name not in known:
         raise CaseError([problem(("material",), name, f"unknown material; {nearest(name, sorted(known))}")])
@@ -86,7 +91,7 @@ def _value(entry: Any) -> Any:
 
 
 def _entries(table: dict[str, Any], prefix: str) -> Iterator[tuple[str, list[Any]]]:
-    """Yields the dotted key, and value, confidence and source key of each constant in a table."""
+    """Yields the dotted key, the value, the confidence and the source key of each constant in a table."""
     for key, entry in table.items():
         if isinstance(entry, dict):
             yield from _entries(entry, f"{prefix}{key}.")

@@ -1,4 +1,4 @@
-"""Errors of a case: one line each, under the keys that the user wrote."""
+"""Errors of a case: one line for each error, with the key that the user wrote."""
 
 import re
 from collections.abc import Iterable, Iterator, Mapping
@@ -20,13 +20,13 @@ _DISCRIMINATORS = ("kind", "shape", "model")
 _LONGEST = 80
 """Largest number of characters of a value in a message: a line of a terminal (chosen value)."""
 _MOST = 100
-"""Largest number of problems that are reported at once (chosen value). A user corrects fewer errors at once."""
+"""Largest number of problems that are reported at once, because a user corrects fewer errors at once (chosen value)."""
 
 
 @dataclass(frozen=True)
 class Problem:
-    """An error of a case: the key as the user wrote it, its value as text (empty if the key has no value), the allowed
-    values.
+    """An error of a case: the key as the user wrote it, its value as text (empty if the key has no value), and the
+    allowed values.
     """
 
     key: str
@@ -34,7 +34,7 @@ class Problem:
     message: str
 
     def __str__(self) -> str:
-        """``parts[0].mesh.radius = '3 s': expected a length ...``."""
+        """Returns the error as one line: ``parts[0].mesh.radius = '3 s': expected a length ...``."""
         head = " = ".join(text for text in (self.key, self.value) if text)
         return f"{head}: {self.message}" if head else self.message
 
@@ -44,20 +44,22 @@ class ConoidError(Exception):
 
 
 class CaseError(ConoidError, ValueError):
-    """A case is not valid; ``problems`` lists every error, the text has one line for each."""
+    """Error: a case is not valid. The field ``problems`` lists every error; the text has one line for each error."""
 
     def __init__(self, problems: Iterable[Problem]) -> None:
-        """Creates the error with at most a hundred problems, in the order given."""
+        """Creates the error with at most a hundred problems, in the given order."""
         self.problems: tuple[Problem, ...] = tuple(problems)[:_MOST]
         super().__init__("\n".join(str(problem) for problem in self.problems))
 
     def __reduce__(self) -> tuple[type["CaseError"], tuple[tuple[Problem, ...]]]:
-        """Returns the problems, and not the text, for pickle."""
+        """Returns the arguments of the error for pickle: the problems, not the text."""
         return CaseError, (self.problems,)
 
 
 def problem(location: Location, value: object, message: str) -> Problem:
-    """Returns the problem at ``location``; ``value`` is shown as written, shortened; Ellipsis for no value."""
+    """Returns the problem at ``location``; ``value`` is shown as written, but shortened; Ellipsis stands for no
+    value.
+    """
     return Problem(dotted(location), "" if value is ... else shown(value), message)
 
 
@@ -78,8 +80,8 @@ def shown(value: object) -> str:
 
 
 def from_pydantic(error: ValidationError, data: Mapping[str, Any]) -> list[Problem]:
-    """Returns the errors of pydantic in ``error`` under the keys of ``data``, in this module's own words where these
-    are clearer. At most a hundred errors are returned, because the search for similar names takes time.
+    """Returns the errors of pydantic in ``error`` with the keys of ``data``, in clearer words of this module where it
+    has them. At most a hundred errors are returned, because the search for similar names takes time.
     """
     details = error.errors(include_url=False, include_context=True)
     places = [detail["loc"] for detail in details]
@@ -88,8 +90,9 @@ def from_pydantic(error: ValidationError, data: Mapping[str, Any]) -> list[Probl
 
 
 def _follows_from_others(detail: ErrorDetails, places: Iterable[Location]) -> bool:
-    """Whether pydantic reports a list as too short only because entries of the list have errors. ``places``: places
-    of all errors."""
+    """Whether pydantic reports a list as too short only because entries of the list have errors. ``places``: locations
+    of all errors.
+    """
     own = detail["loc"]
     return detail["type"] == "too_short" and any(len(other) > len(own) and other[: len(own)] == own for other in places)
 
@@ -148,7 +151,7 @@ def _list_wanted(location: Location, lengths: set[int]) -> str:
 
 
 def _table_wanted(location: Location) -> str:
-    """Returns what a key can have: a table, and ``true``, ``false`` or ``"none"`` where the model allows them."""
+    """Returns what a key can have: a table; also ``true``, ``false`` or ``"none"`` if the model allows these values."""
     marks = {
         type(mark)
         for model in _models_at(location[:-1])
@@ -160,7 +163,7 @@ def _table_wanted(location: Location) -> str:
 
 
 def _written(location: Location, data: Any) -> Location:
-    """Returns the location without the union tags that pydantic adds."""
+    """Returns the location of an error without the union tags that pydantic adds."""
     kept: list[int | str] = []
     for item in location:
         if isinstance(data, Mapping) and item in _values(data):
@@ -190,7 +193,7 @@ def _keys(location: Location) -> list[str]:
 
 
 def _lengths(location: Location) -> set[int]:
-    """Returns the largest length of a list at a pydantic location; None without a limit."""
+    """Returns the largest length of the list at a pydantic location; None if the length has no limit."""
     fields = [
         model.model_fields[str(location[-1])]
         for model in _models_at(location[:-1])
@@ -213,7 +216,7 @@ def _tags_of(model: type[BaseModel]) -> Iterator[str]:
 
 
 def _models_at(location: Location) -> list[type[BaseModel]]:
-    """Returns the models that are possible at a pydantic location (several for a union that is not decided)."""
+    """Returns the models that are possible at a pydantic location; several models for a union that is not decided."""
     models: list[type[BaseModel]] = [Case]
     named = False
     for item in location:

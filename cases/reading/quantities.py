@@ -34,7 +34,9 @@ QUANTITY_UNITS: dict[str, str] = {
 
 
 def unit_of(quantity: str, field: str | None = None) -> str:
-    """Returns the unit of a reference quantity; ``field``: field of its probe. Raises KeyError for an unknown one."""
+    """Returns the unit of a reference quantity; ``field``: field of the probe of the reference. Raises KeyError if the
+    quantity or the field is unknown.
+    """
     return FIELD_UNITS[field or ""] if quantity.startswith("probe_") else QUANTITY_UNITS[quantity]
 
 
@@ -45,9 +47,10 @@ def unit_of_reference(data: Mapping[str, Any], location: Location) -> str:
 
 
 def read_references(data: Mapping[str, Any]) -> tuple[dict[str, Any], list[Problem]]:
-    """Returns ``data`` with values and tolerances such as ``"21.47 mm"`` in SI units, and the errors.
+    """Returns ``data`` with reference values and tolerances such as ``"21.47 mm"`` converted to SI units, and the
+    errors.
 
-    A value that cannot be read is replaced by 1.0, so that each error is reported once.
+    A value that cannot be read is replaced by 1.0, so that pydantic does not report the same error again.
     """
     listed = data.get("reference")
     if not isinstance(listed, Sequence) or isinstance(listed, str):

@@ -4,17 +4,19 @@ import difflib
 from collections.abc import Iterable
 
 _LONGEST = 80
-"""Number of characters of a word that are compared. The value was chosen because no allowed name has more
-characters."""
+"""Number of characters of a word that are compared; no allowed name has more characters (reason of the chosen
+value)."""
 _CUTOFF, _MOST = 0.6, 3
 """Smallest similarity of a suggested name (default of difflib), and number of suggestions (chosen value)."""
 _PART = 3
-"""Shortest prefix, in letters, for which a name is suggested. Chosen value: shorter prefixes are in too many names."""
+"""Shortest prefix, in letters, for which a name is suggested; shorter prefixes occur in too many names (reason of the
+chosen value)."""
 
 
 def close(word: str, known: Iterable[str]) -> list[str]:
-    """Returns the names that may be meant, the most similar first: capitals, blanks, ``-`` and ``_`` make no
-    difference."""
+    """Returns the allowed names that a misspelt name may mean, the most similar first; capitals, blanks, ``-`` and
+    ``_`` make no difference.
+    """
     names: dict[str, str] = {}
     for name in known:
         names.setdefault(_plain(name), name)
@@ -25,8 +27,9 @@ def close(word: str, known: Iterable[str]) -> list[str]:
 
 
 def meant(word: object, known: Iterable[str]) -> str:
-    """Returns ``; did you mean 'mises'?`` for the end of a message that lists the allowed names; empty without a
-    similar one."""
+    """Returns ``; did you mean 'mises'?`` for the end of a message that lists the allowed names; empty if no name is
+    similar.
+    """
     found = close(word, known) if isinstance(word, str) else []
     return f"; {_asked(found)}" if found else ""
 
@@ -45,7 +48,7 @@ def nearest(word: str, known: Iterable[str]) -> str:
 
 
 def choices(names: Iterable[str]) -> str:
-    """Returns the allowed words as ``'a', 'b'``, in the order given."""
+    """Returns the allowed words as ``'a', 'b'``, in the given order."""
     return ", ".join(repr(name) for name in names) or "none"
 
 

@@ -10,18 +10,20 @@ from io import BytesIO, FileIO, TextIOWrapper
 from pathlib import Path
 
 MOST = 256 << 20
-"""Largest size of a file that is read as a whole, bytes. The value was chosen because a case, an outcome and a
-manifest have some MB at most."""
+"""Largest size of a file that is read as a whole, bytes; a case, an outcome and a manifest have some MB at most (reason
+of the chosen limit)."""
 _NO_LINK = getattr(os, "O_NOFOLLOW", 0)
 _AT_ONCE = getattr(os, "O_NONBLOCK", 0)
-"""Flags of open(2) with which a pipe without a writer is opened without blocking."""
+"""Flags of open(2) with which opening a pipe without a writer does not block."""
 _NO_FILE = frozenset({errno.ELOOP, errno.ENXIO, errno.ENODEV, errno.EOPNOTSUPP})
 """Errors of open(2) for a link to itself, a socket, and a device without a driver."""
 
 
 @contextmanager
 def named(path: str | Path) -> Iterator[None]:
-    """Adds ``path`` to an OSError of the block without a file name: write(2) and fsync(2) do not set it."""
+    """Adds ``path`` to an OSError of the ``with`` block that has no file name, because write(2) and fsync(2) do not set
+    the name.
+    """
     try:
         yield
     except OSError as error:
@@ -31,8 +33,8 @@ def named(path: str | Path) -> Iterator[None]:
 
 
 def write(path: Path, content: bytes, mode: int = 0o644) -> None:
-    """Replaces a file atomically: writes beside it, flushes to disk, renames; removes an incomplete file. Raises
-    OSError, also where a link lies beside it.
+    """Replaces a file atomically: writes a temporary file in the same folder, flushes it to disk, renames it; removes
+    an incomplete temporary file. Raises OSError, also if the temporary name is a link.
     """
     beside = path.with_name(f"{path.name}.part")
     flags = os.O_WRONLY | os.O_CREAT | os.O_TRUNC | _NO_LINK
@@ -49,16 +51,18 @@ def write(path: Path, content: bytes, mode: int = 0o644) -> None:
 
 
 def touch(path: Path) -> None:
-    """Creates an empty file if there is none. Raises OSError, also for a link, whose target is not changed."""
+    """Creates an empty file if the file does not exist. Raises OSError, also for a link; the target of the link is not
+    changed.
+    """
     os.close(os.open(path, os.O_WRONLY | os.O_CREAT | _NO_LINK | _AT_ONCE, 0o666))
 
 
 def opened(path: str | Path, *, folder: int | None = None, links: bool = True) -> FileIO:
     """Opens a regular file for reading, unbuffered.
 
-    ``folder``: descriptor of the directory to which ``path`` is relative; ``links``: whether the file may be a
-    symbolic link. A pipe, a socket or a device could block the reader, or never end: each is refused like a
-    directory, with IsADirectoryError. Raises OSError.
+    ``folder``: descriptor of the directory to which ``path`` is relative; ``links``: whether the file may be a symbolic
+    link. A pipe, a socket or a device could block the reader, or never end; each of them is refused like a directory,
+    with IsADirectoryError. Raises OSError.
     """
     try:
         handle = os.open(path, os.O_RDONLY | os.O_CLOEXEC | _AT_ONCE | (0 if links else _NO_LINK), dir_fd=folder)
@@ -68,8 +72,8 @@ def opened(path: str | Path, *, folder: int | None = None, links: bool = True) -
 
 
 def appended(path: str | Path, mode: int = 0o666) -> FileIO:
-    """Opens a regular file, unbuffered, for reading and appending; creates it if there is none. Raises
-    IsADirectoryError for a pipe, a socket or a device, OSError.
+    """Opens a regular file, unbuffered, for reading and appending; creates the file if it does not exist. Raises
+    IsADirectoryError if the file is a pipe, a socket or a device; raises OSError.
     """
     try:
         handle = os.open(path, os.O_RDWR | os.O_APPEND | os.O_CREAT | os.O_CLOEXEC | _AT_ONCE, mode)
@@ -86,9 +90,10 @@ def _regular(handle: int, path: str | Path, mode: str) -> FileIO:
 
 
 def read(path: str | Path, most: int = MOST, *, links: bool = True) -> bytes:
-    """Returns the bytes of a regular file of at most ``most`` bytes; ``links`` as for ``opened``.
+    """Returns the bytes of a regular file of at most ``most`` bytes; ``links``: whether the file may be a symbolic
+    link.
 
-    Raises IsADirectoryError for anything else, OSError.
+    Raises IsADirectoryError if the file is not regular; raises OSError.
     """
     with opened(path, links=links) as file:
         left = _size(file, path, most)
@@ -106,7 +111,7 @@ def read_text(path: str | Path) -> str:
 
 
 def check(path: str | Path, most: int = MOST) -> None:
-    """Raises the errors that ``read`` would raise."""
+    """Raises the errors that the function ``read`` would raise."""
     with opened(path) as file:
         _size(file, path, most)
 

@@ -1,4 +1,4 @@
-"""Rows of keys in the reference: value, default and meaning as text of a Markdown table."""
+"""Table rows of keys in the reference of a case: value, default and meaning as text of a Markdown table."""
 
 import json
 import re
@@ -13,13 +13,15 @@ BAR = r"\|"
 
 
 class Cells:
-    """Rows of the keys of a schema. ``paths``: path of the table of each definition, by its id."""
+    """Table rows of the keys of a schema. ``paths``: path of the table of each definition in the schema, by the id of
+    the definition.
+    """
 
     def __init__(self, whole: Schema, paths: Mapping[int, str]) -> None:
         self._whole, self._paths = whole, paths
 
     def row(self, key: str, schema: Schema, required: bool) -> str:
-        """Returns the row of a key: ``| key | value | default | meaning |``."""
+        """Returns the table row of a key: ``| key | value | default | meaning |``."""
         default = "required" if required else _default(schema)
         cells = (f"`{key}`", self._value(schema), default, " ".join(schema["description"].split()))
         return f"| {' | '.join(cell.replace('|', BAR) for cell in cells)} |"
@@ -104,5 +106,5 @@ def _range(schema: Schema) -> str:
 
 
 def _bound(value: float) -> str:
-    """Returns a bound in few digits: a full turn has seventeen."""
+    """Returns a bound as a short number, because the exact number of a full turn has seventeen digits."""
     return f"{value:.6g}" if isinstance(value, float) and not value.is_integer() else f"{value}"

@@ -1,4 +1,4 @@
-"""Examples of the reference of keys: the smallest complete case, and pieces that can be added to it."""
+"""Examples of the reference of keys: the smallest complete case, and pieces that can be added to this case."""
 
 SMALLEST = """\
 name = "ball_on_plate"
@@ -29,7 +29,7 @@ element_size = "1 mm"
 [run]
 end_time = "50 us"
 """
-"""A case without any key that has a default, except the velocity and the places of the bodies."""
+"""A case with no key that has a default, except the velocity and the positions of the bodies."""
 
 EXAMPLES = {
     "`parts[].erosion`": """\
@@ -186,5 +186,5 @@ frames = 50
 max_wall_time = "8 h"
 """,
 }
-"""Pieces that change the smallest case, by the title of their section. For a part that the example has, these lines set
-other keys of this part."""
+"""Pieces that change the smallest case, by the title of their section. A piece for a part that the smallest case
+already has sets further keys of this part."""

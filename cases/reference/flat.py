@@ -1,18 +1,18 @@
-"""A case with every default as a flat table: ``parts[0].velocity[2]`` to -210.0, in SI units."""
+"""A case with every default as a flat mapping, for example from ``parts[0].velocity[2]`` to -210.0, in SI units."""
 
 from collections.abc import Iterator
 from itertools import islice
 from typing import Any
 
 Scalar = bool | int | float | str
-"""A value of a key."""
+"""Value of a key of a case."""
 _WITHOUT_EFFECT = frozenset({"name", "title", "description", "reference"})
-"""Keys of a case without an effect on the answer."""
+"""Keys of a case that have no effect on the answer."""
 
 
 def flat(case: dict[str, Any], most: int, longest: int) -> dict[str, Scalar]:
-    """Returns the values of the keys of a case, by key, at most ``most`` of them; texts of at most ``longest``
-    characters. Omits keys without an effect on the answer: names, descriptions, references.
+    """Returns the values of the keys of a case by key, at most ``most`` values; texts are cut to ``longest``
+    characters. Keys without an effect on the answer are left out: names, descriptions, references.
     """
     entries = ((key, value) for key, value in case.items() if key not in _WITHOUT_EFFECT)
     pairs = (pair for key, value in entries for pair in _scalars(key, value))

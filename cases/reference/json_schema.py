@@ -1,4 +1,4 @@
-"""The JSON schema of a case, made from the models and their texts, for editors and OpenAPI."""
+"""The JSON schema of a case, made from the models and their docstrings, for editors and OpenAPI."""
 
 import json
 import re
@@ -12,7 +12,8 @@ from ..units import NUMBER
 Schema = dict[str, Any]
 
 _BOUNDS = {"gt": "exclusiveMinimum", "ge": "minimum", "lt": "exclusiveMaximum", "le": "maximum"}
-"""Names of bounds in pydantic, where a function reads the value first, and in JSON schema."""
+"""Names of bounds in pydantic, where a function reads the value first, and the names of the same bounds in JSON
+schema."""
 LINE = "#:schema"
 """Start of the line of a TOML file that names the schema for editors."""
 FILE = "case.schema.json"
@@ -20,27 +21,28 @@ FILE = "case.schema.json"
 
 
 def json_schema(refs: str = "#/$defs/{model}") -> Schema:
-    """The JSON schema of a case; ``refs``: the place of its definitions."""
+    """Returns the JSON schema of a case; ``refs``: location of the definitions in the schema."""
     made = _tidy(Case.model_json_schema(ref_template=refs))
     return {"$schema": "https://json-schema.org/draft/2020-12/schema", **made, "title": "Conoid case"}
 
 
 @cache
 def shipped_schema() -> Schema:
-    """The JSON schema of a case, read from ``FILE``: 2 ms, instead of 60 ms for a schema made from the models."""
+    """Returns the JSON schema of a case, read from ``FILE`` in 2 ms; making the schema from the models takes 60 ms."""
     schema: Schema = json.loads((Path(__file__).parents[1] / FILE).read_bytes())
     return schema
 
 
 @cache
 def schema_text() -> str:
-    """The JSON schema as text, the content of ``FILE``."""
+    """Returns the JSON schema as text, the content of ``FILE``."""
     return json.dumps(json_schema(), indent=1, ensure_ascii=False) + "\n"
 
 
 def _tidy(schema: Any, named: bool = False) -> Any:
-    """Returns a schema with the bounds of JSON schema, plain texts and no titles; ``named``: its keys are keys of a
-    case."""
+    """Returns a schema with the bounds of JSON schema, plain texts and no titles; ``named``: whether the keys of the
+    schema are keys of a case.
+    """
     if isinstance(schema, list):
         return [_tidy(each) for each in schema]
     if not isinstance(schema, dict):
@@ -59,19 +61,19 @@ def _tidy(schema: Any, named: bool = False) -> Any:
 
 
 def plain(text: str) -> str:
-    """A docstring as plain text: one line per paragraph, single backquotes."""
+    """Returns a docstring as plain text: one line per paragraph, single backquotes."""
     paragraphs = re.split(r"\n\s*\n", text.strip())
     return "\n\n".join(" ".join(paragraph.split()) for paragraph in paragraphs).replace("``", "`")
 
 
 def definition(schema: Schema, whole: Schema) -> Schema:
-    """The definition in ``whole`` to which a schema refers, or the schema itself."""
+    """Returns the definition in ``whole`` to which a schema refers, or the schema itself."""
     reference = schema.get("$ref")
     return whole["$defs"][reference.rpartition("/")[2]] if reference else schema
 
 
 def variants(schema: Schema) -> list[Schema]:
-    """The alternatives that a value may match, without that of an absent key."""
+    """Returns the alternatives that a value may match, without the alternative of an absent key."""
     listed = schema.get("anyOf") or schema.get("oneOf") or [schema]
     return [each for one in listed for each in (variants(one) if one is not schema else [one]) if not _absent(each)]
 

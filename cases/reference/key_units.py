@@ -1,4 +1,4 @@
-"""The SI unit of a bare number of a key of a case, from the model behind the key."""
+"""The SI unit of a bare number of a key of a case, from the model that has the key."""
 
 import re
 from collections.abc import Iterator
@@ -12,7 +12,9 @@ _STEP = re.compile(r"([^.\[\]]+)|\[(\d+)\]")
 
 @lru_cache(256)
 def unit_of_key(key: str) -> str:
-    """Returns ``m/s`` for ``parts[0].velocity[2]``; empty where a number has no unit, or another key determines it."""
+    """Returns the unit of a key, such as ``m/s`` for ``parts[0].velocity[2]``; empty if a number has no unit, or if
+    another key determines the unit.
+    """
     whole = _schema()
     found = [definition(whole, whole)]
     for name, index in _STEP.findall(key):

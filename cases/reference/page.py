@@ -52,14 +52,15 @@ _CHAPTERS = {
     "Numerical method": ("numerics",),
     "Run": ("run", "balance"),
 }
-"""Chapters of the page, and the tables that begin them; a table belongs to the chapter with the longest beginning."""
+"""Chapters of the page, and the beginnings of the table paths that belong to each chapter; the longest matching
+beginning decides."""
 
 _SEVERAL = 4
-"""Number of variants of a table from which a key that they share is listed before the variants (chosen value)."""
+"""Number of variants of a table from which on a common key is listed before the variants (chosen value)."""
 
 
 def page() -> str:
-    """Returns the whole page."""
+    """Returns the whole reference page."""
     text = "\n".join([_head(), *_Page(json_schema()).chapters()])
     return re.sub(r"docs/([a-z]+/[a-z_]+\.md)", r"[\1](../\1)", text)
 
@@ -88,7 +89,7 @@ class _Page:
         self._cells = Cells(whole, {id(table.schema): table.path for table in self._tables})
 
     def chapters(self) -> Iterator[str]:
-        """Yields each chapter with its sections."""
+        """Yields each chapter with the sections of the chapter."""
         groups: dict[str, list[Table]] = {}
         for table in self._tables:
             groups.setdefault(table.path, []).append(table)
@@ -106,7 +107,9 @@ class _Page:
         yield _grid(self._rows(table).values())
 
     def _variants(self, group: list[Table]) -> Iterator[str]:
-        """Yields the sections of a table with variants: first the common keys, then each variant with its own keys."""
+        """Yields the sections of a table with variants: first the common keys, then each variant with its remaining
+        keys.
+        """
         key = group[0].key
         yield f"### `{group[0].path}`\n"
         yield f"`{key}` selects one of these tables: {', '.join(f'`{each.value}`' for each in group)}.\n"
@@ -124,7 +127,7 @@ class _Page:
             yield "\n".join([f"| {key} | keys of its own | described at |", "|---|---|---|", *known, ""])
 
     def _shared(self, group: list[Table], common: list[str]) -> str:
-        """Returns the grid of common keys, with a column of the variants that have them."""
+        """Returns the table of common keys, with a column of the variants that have each key."""
         lines = []
         for line in common:
             values = [each.value for each in group if line in self._own(each).values()]
@@ -132,14 +135,16 @@ class _Page:
         return _grid(lines, f"with {group[0].key}")
 
     def _variant(self, table: Table, own: dict[str, str]) -> Iterator[str]:
-        """Yields the section of a variant, with its own keys."""
+        """Yields the section of a variant, with the keys that only this variant has."""
         yield f"#### {table.title}\n"
         yield from _text(table)
         if own:
             yield _grid(own.values())
 
     def _same(self, table: Table, own: dict[str, str]) -> Table | None:
-        """Returns the table of the same shape, kind or model with a shorter path, if it has all of these rows."""
+        """Returns the table with the same shape, kind or model and a shorter path, if that table has all of these
+        rows.
+        """
         for each in self._tables:
             same = (each.key, each.value) == (table.key, table.value) and len(each.path) < len(table.path)
             if same and own.items() <= self._rows(each).items():
@@ -147,23 +152,23 @@ class _Page:
         return None
 
     def _own(self, table: Table) -> dict[str, str]:
-        """Returns the rows of a variant, without that of the key that selects it."""
+        """Returns the rows of a variant, without the row of the key that selects the variant."""
         return {name: line for name, line in self._rows(table).items() if name != table.key}
 
     def _rows(self, table: Table) -> dict[str, str]:
-        """Returns the row of each key."""
+        """Returns the table row of each key."""
         required = table.schema.get("required", ())
         return {key: self._cells.row(key, each, key in required) for key, each in table.schema["properties"].items()}
 
 
 def _common(variants: list[dict[str, str]]) -> list[str]:
-    """Returns the rows that all variants have in common, or several of them."""
+    """Returns the table rows that all variants have in common, or that several variants have in common."""
     lines = [line for rows in variants for line in rows.values()]
     return [line for line in dict.fromkeys(lines) if lines.count(line) >= max(2, min(_SEVERAL, len(variants)))]
 
 
 def _which(values: list[str], every: list[str]) -> str:
-    """Returns names of variants, in few words."""
+    """Returns the names of variants in few words."""
     others = [value for value in every if value not in values]
     if not others:
         return "all"
@@ -171,13 +176,13 @@ def _which(values: list[str], every: list[str]) -> str:
 
 
 def _text(table: Table) -> Iterator[str]:
-    """Yields description and example of a table."""
+    """Yields the description and the example of a table."""
     yield f"{table.schema['description']}\n"
     if table.title in EXAMPLES:
         yield f"```toml\n{EXAMPLES[table.title]}```\n"
 
 
 def _grid(rows: Iterable[str], last: str = "") -> str:
-    """Returns a Markdown table of keys; ``last``: title of a fifth column."""
+    """Returns a Markdown table of keys; ``last``: title of the fifth column."""
     titles = ["key", "value", "default", "meaning", *([last] if last else [])]
     return "\n".join([f"| {' | '.join(titles)} |", f"|{'---|' * len(titles)}", *rows, ""])

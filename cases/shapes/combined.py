@@ -1,7 +1,7 @@
 """Combinations of shapes before they are meshed: points inside, bounding box, approximate size.
 
-Points are tested exactly; volumes are computed by points of a lattice. The value is unknown for solids of a CAD file
-until the file is read.
+Points are tested exactly; volumes are computed from the points of a lattice. The size of a solid of a CAD file is
+unknown until the file is read.
 """
 
 import math
@@ -29,13 +29,13 @@ Bounds = tuple[Vector, Vector]
 Inside = Callable[[Vector], bool]
 
 WORST = 0.45
-"""Step length of the worst tet of gmsh over that of a regular tet, for a combination without edges shorter than an
-element: 0.3 to 0.7 in 40 of the combinations of tests/mesh/test_combinations.py."""
+"""Step length of the worst tet of gmsh divided by that of a regular tet, for a combination without edges shorter than
+an element. The ratio is 0.3 to 0.7 in 40 of the combinations of tests/mesh/test_combinations.py."""
 _LATTICE = 12
-"""Number of sampling points per direction of a combination. The value was chosen because it gives 1,728 points, and
-volumes within some per cent."""
+"""Number of sampling points per direction of a combination: 1,728 points, and volumes within some per cent (chosen
+value)."""
 _BULKY = 1.5
-"""Surface of a combination over the surface of a cube of the same volume (chosen value)."""
+"""Surface of a combination divided by the surface of a cube of the same volume (chosen value)."""
 _BODIES: dict[str, type[Model]] = {
     "box": Box, "plate": Plate, "cylinder": Cylinder, "tube": Tube, "sphere": Sphere, "cone": Cone, "ogive": Ogive,
     "hemisphere": Hemisphere, "spherical_cap": SphericalCap, "ring_sector": RingSector,
@@ -43,8 +43,9 @@ _BODIES: dict[str, type[Model]] = {
 
 
 def box_of(form: CombinedForm | Operand) -> Bounds | None:
-    """Returns the corners of a bounding box of a form, m: of an operand before it is turned; None for a file.
-    The low corner of an empty intersection can be above the high one."""
+    """Returns the corners of the bounding box of a shape, m; None for a file. The bounding box of an operand is that
+    before the rotation of the operand; the low corner of an empty intersection can be above the high corner.
+    """
     if isinstance(form, FileForm):
         return None
     if not isinstance(form, CombinedForm):
@@ -66,7 +67,9 @@ def box_of(form: CombinedForm | Operand) -> Bounds | None:
 
 
 def _unturned(form: Operand) -> bool:
-    """Whether the box of an operand contains it in its place: a combination inside it is turned as a whole."""
+    """Whether the bounding box of an operand contains the operand at its position: a combination inside the operand is
+    turned as a whole.
+    """
     return not isinstance(form, CombinedForm) or form.turn is None
 
 
@@ -76,7 +79,9 @@ def _placed(form: Operand) -> Placed:
 
 
 def inside(form: CombinedForm | Operand) -> Inside | None:
-    """Returns the test whether a point, m, lies in a form; built once for many points. None for a file."""
+    """Returns the test whether a point, m, lies in a shape; the test is built once for many points. The result is None
+    for a file.
+    """
     if isinstance(form, FileForm):
         return None
     if not isinstance(form, CombinedForm):
@@ -103,7 +108,7 @@ def _joined(form: CombinedForm, known: list[Inside]) -> Inside:
 
 
 def modelled(mesh: Combination) -> Bounds | None:
-    """Returns the bounding box of the modelled part of a combination, m, as far as ``box_of`` has it."""
+    """Returns the bounding box of the modelled part of a combination, m, as far as ``box_of`` gives a box."""
     box = box_of(mesh)
     if box is None:
         return None
@@ -114,7 +119,7 @@ def modelled(mesh: Combination) -> Bounds | None:
 
 
 def cut_by(sector: str, axis: Axis) -> tuple[int, ...]:
-    """Returns the directions across ``axis`` in which a sector keeps the positive side only."""
+    """Returns the directions across ``axis`` in which a sector keeps only the positive side."""
     return across(axis)[: {"full": 0, "half": 1, "quarter": 2}[sector]]
 
 
@@ -139,7 +144,9 @@ def combined_size(mesh: Combination) -> MeshSize | None:
 
 
 def _sizes(mesh: Combination, held: list[Vector], volume: float) -> list[float]:
-    """Returns element sizes, m, in equal shares of the volume, m^3; ``held``: points of a lattice inside, m."""
+    """Returns the element sizes, m, of equal fractions of the volume, m^3; ``held``: points of a lattice inside of the
+    shape, m.
+    """
     grading = mesh.grading
     if grading is None:
         return [mesh.element_size] * len(held)
@@ -150,5 +157,5 @@ def _sizes(mesh: Combination, held: list[Vector], volume: float) -> list[float]:
 
 
 def _skin(volume: float) -> float:
-    """Returns the approximate surface of a combination of a volume, m^3, in m^2."""
+    """Returns the approximate surface, m^2, of a combination with a given volume, m^3."""
     return float(_BULKY * 6.0 * volume ** (2.0 / 3.0))

@@ -1,4 +1,4 @@
-"""Dimensions of the mesh primitives, by formula: bounds, volume, thinnest extent, reach along a direction."""
+"""Dimensions of the mesh primitives by formula: bounds, volume, smallest extent, extent along a direction."""
 
 import math
 from collections.abc import Callable
@@ -31,7 +31,9 @@ def cut_directions(mesh: Primitive, axis: Axis) -> tuple[int, ...]:
 
 
 def centre(mesh: Generated) -> Vector:
-    """Returns the point through which a sector is cut: the origin for a box, the centre or base of other bodies."""
+    """Returns the point through which a sector is cut: the origin for a box, the centre or the base for other
+    bodies.
+    """
     if isinstance(mesh, Box):
         return (0.0, 0.0, 0.0)
     return mesh.centre if isinstance(mesh, Sphere | TwoTets) else mesh.base
@@ -56,14 +58,14 @@ def whole_bounds(mesh: Generated) -> tuple[Vector, Vector]:
 
 
 def height(mesh: Plate | Cylinder | Tube | Revolved | RingSector) -> float:
-    """Extent along the axis, m."""
+    """Extent of a body along its axis, m."""
     if isinstance(mesh, Revolved):
         return profile(mesh).height
     return mesh.thickness if isinstance(mesh, Plate) else mesh.length
 
 
 def _reach(mesh: Plate | Cylinder | Tube | Revolved | RingSector) -> tuple[tuple[float, float], tuple[float, float]]:
-    """Reach of the whole body from its base in the two directions across its axis, m."""
+    """Extent of the whole body from its base in the two directions across the body's axis, m."""
     if isinstance(mesh, RingSector):
         return ring.extremes(mesh, whole=True)
     if isinstance(mesh, Plate):
@@ -86,30 +88,31 @@ def _two_tets(mesh: TwoTets, i: int, j: int) -> tuple[Vector, Vector]:
 
 
 def altitude(mesh: TwoTets) -> float:
-    """Distance of the free corners from the common face, m."""
+    """Distance of the free corners of two tets from their common face, m."""
     return mesh.element_size * math.sqrt(2.0 / 3.0)
 
 
 def side_areas(mesh: TwoTets) -> tuple[float, ...]:
-    """Areas of the six exposed faces of two tets, m^2: the outward normals of the edges of the common face are at
-    60, 180 and 300 deg."""
+    """Areas of the six exposed faces of two tets, m^2. The outward normals of the edges of the common face are at 60,
+    180 and 300 deg.
+    """
     edge, off = mesh.element_size, altitude(mesh) * math.tan(mesh.lean)
     feet = [edge / math.sqrt(12.0) + sign * off * share for sign in (-1.0, 1.0) for share in (0.5, -1.0, 0.5)]
     return tuple(0.5 * edge * math.hypot(altitude(mesh), foot) for foot in feet)
 
 
 def pitch(mesh: Shards) -> float:
-    """Edge of the cube of a shard, m: the sphere round the tet, what its nodes are moved by, and the gap."""
+    """Edge of the cube of a separate tet, m: the sphere around the tet, the displacement of its nodes, and the gap."""
     return 2.0 * mesh.element_size * (math.sqrt(3.0 / 8.0) + math.sqrt(3.0) * mesh.perturbation) + mesh.gap
 
 
 def tets(mesh: TwoTets | Shards) -> int:
-    """Number of tets of a body that is given tet by tet."""
+    """Number of tets of a body that consists of given tets."""
     return 2 if isinstance(mesh, TwoTets) else math.prod(mesh.count)
 
 
 def bounds(mesh: Mesh) -> tuple[Vector, Vector] | None:
-    """Lowest and highest coordinates of the modelled part, m; None for bodies with measured sizes."""
+    """Lowest and highest coordinates of the modelled part of a body, m; None for bodies with measured sizes."""
     if isinstance(mesh, Measured):
         return None
     low, high = map(list, whole_bounds(mesh))
@@ -122,7 +125,7 @@ def bounds(mesh: Mesh) -> tuple[Vector, Vector] | None:
 
 
 def volume(mesh: Generated) -> float:
-    """Volume of the modelled part, m^3; of shards before their nodes are moved."""
+    """Volume of the modelled part of a body, m^3; the volume of separate tets is that before their nodes are moved."""
     if isinstance(mesh, Box):
         low, high = bounds(mesh) or ((0.0,) * 3, (0.0,) * 3)
         return math.prod(max(0.0, b - a) for a, b in zip(low, high, strict=True))
@@ -142,7 +145,7 @@ def volume(mesh: Generated) -> float:
 
 
 def surface(mesh: Generated) -> float:
-    """Surface of the modelled part, m^2, with the cut faces of a sector and both sides of a slit."""
+    """Surface of the modelled part of a body, m^2, with the cut faces of a sector and both sides of a slit."""
     if isinstance(mesh, Box | Plate):
         low, high = bounds(mesh) or ((0.0,) * 3, (0.0,) * 3)
         a, b, c = (y - x for x, y in zip(low, high, strict=True))
@@ -173,7 +176,7 @@ def _ring_surface(mesh: RingSector) -> float:
 
 
 def slit_extents(mesh: Box | Plate) -> tuple[float, float]:
-    """Reach of the slit in its body along the two directions across the slit's axis, m; 0 without one."""
+    """Extent of the slit inside of its body along the two directions across the slit's axis, m; 0 without a slit."""
     if mesh.slit is None:
         return 0.0, 0.0
     low, high = bounds(mesh) or ((0.0,) * 3, (0.0,) * 3)
@@ -185,7 +188,9 @@ def slit_extents(mesh: Box | Plate) -> tuple[float, float]:
 
 
 def holds(mesh: Generated, point: Vector) -> bool:
-    """Whether ``point`` lies inside the modelled part; inside its bounds if it is given tet by tet."""
+    """Whether ``point`` lies inside the modelled part of a body; for a body of given tets, inside the bounds of the
+    body.
+    """
     low, high = bounds(mesh) or ((0.0,) * 3, (0.0,) * 3)
     if not all(a <= x <= b for a, x, b in zip(low, point, high, strict=True)):
         return False
@@ -193,7 +198,9 @@ def holds(mesh: Generated, point: Vector) -> bool:
 
 
 def round_part(mesh: Generated) -> Callable[[Vector], bool]:
-    """Returns the test whether a point inside the bounds of a body lies inside the body; built once for many points."""
+    """Returns the test whether a point inside the bounds of a body lies inside the body; the test is built once for
+    many points.
+    """
     if isinstance(mesh, Box | Plate | TwoTets | Shards):
         return lambda point: True
     if isinstance(mesh, Sphere):
@@ -226,8 +233,9 @@ def thinnest(mesh: Generated) -> float:
 
 
 def lowest_along(mesh: Generated, normal: Vector) -> float:
-    """The smallest value of ``normal . x`` over the whole body, m, for a unit normal; over its bounds if it is given
-    tet by tet, and for a ring sector."""
+    """The smallest value of ``normal . x`` over the whole body, m, for a unit normal. For a ring sector and for a body
+    of given tets, the smallest value is that of the bounds of the body.
+    """
     if isinstance(mesh, Box | RingSector | TwoTets | Shards):
         return sum(min(n * a, n * b) for n, a, b in zip(normal, *whole_bounds(mesh), strict=True))
     start = _dot(normal, centre(mesh))

@@ -1,16 +1,16 @@
-"""The approximate load of a boundary, before there is a mesh."""
+"""The approximate load of a boundary, estimated before there is a mesh."""
 
 from dataclasses import dataclass
 
 _FACTOR, _NODES = 3.0, 10
-"""Ratio of an estimated number of nodes to the real number, and additional nodes. The values were chosen because a
-layer of an unstructured mesh has a third to three times as many nodes as its volume suggests."""
+"""Largest ratio of an estimated number of nodes to the real number, and additional nodes (chosen values). A layer of an
+unstructured mesh has a third to three times as many nodes as its volume suggests."""
 
 
 @dataclass(frozen=True)
 class Load:
-    """The approximate load of a boundary: faces of a traction, nodes of a prescribed velocity. None with a mesh file
-    or loose tets, and for the other kind of boundary.
+    """The approximate load of a boundary: faces of a traction, or nodes of a prescribed velocity. A field is None for a
+    mesh file, for single tets, and for the other kind of boundary.
     """
 
     boundary: int
@@ -19,15 +19,17 @@ class Load:
     """Loaded area, m^2."""
     faces: int | None = None
     spread: float = 0.0
-    """Uncertainty of the estimated area of the mesh's faces, m^2."""
+    """Uncertainty of the estimated area of the mesh faces, m^2."""
     nodes: int | None = None
     fewest: int = 0
-    """Nodes in a box that is not widened by half an element on all sides."""
+    """Number of nodes in a box that is not widened by half an element on all sides."""
     exact: bool = False
     """Whether nodes, or faces of a mesh file, are counted and not estimated."""
 
     def agrees(self, nodes: int, faces: int, area: float) -> bool:
-        """Whether a mesh has approximately this load: ``nodes`` that are driven, or ``faces`` with an ``area``, m^2."""
+        """Whether a mesh has approximately this load: number of driven ``nodes``, or ``faces`` with an ``area``,
+        m^2.
+        """
         if self.area is not None and faces:
             return abs(area - self.area) <= self.spread
         if self.nodes is None or faces:
@@ -37,7 +39,7 @@ class Load:
         return self.fewest <= _FACTOR * nodes + _NODES and nodes <= _FACTOR * self.nodes + _NODES
 
     def words(self) -> str:
-        """The load in words: ``about 32 faces, 4 mm^2``."""
+        """Returns the load in words: ``about 32 faces, 4 mm^2``."""
         if self.area is not None:
             return f"{'' if self.exact else 'about '}{self.faces} faces, {1e6 * self.area:.6g} mm^2"
         if self.nodes is not None:

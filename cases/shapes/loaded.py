@@ -1,5 +1,6 @@
-"""Estimates of the faces on which tractions act, and of the nodes in a box, from the shapes of bodies, before there
-is a mesh."""
+"""Estimates of the faces on which tractions act, and of the nodes in a box, from the shapes of bodies before there is a
+mesh.
+"""
 
 import itertools
 import math
@@ -18,27 +19,27 @@ from .region import Region, slack
 from .sheets import sheets
 
 _FINEST = 60
-"""Largest number of patches along a side of a surface. The value was chosen because so many patches take a tenth of
-a second for a body."""
+"""Largest number of patches along a side of a surface: a tenth of a second for a body (chosen value)."""
 _MOST = 20
-"""Largest number of bodies per boundary. The value was chosen because so many bodies take two seconds at most."""
+"""Largest number of bodies per boundary: two seconds at most (chosen value)."""
 _POINTS = 100_000
-"""Largest number of nodes of a turned grid. The value was chosen because so many nodes take half a second."""
+"""Largest number of nodes of a turned grid: half a second (chosen value)."""
 _LATTICE = 20
-"""Number of sampling points per direction for a body in a box. The value was chosen because it gives 8,000 points in
-all."""
+"""Number of sampling points per direction for a body in a box: 8,000 points in all (chosen value)."""
 _FACETS, _CURVED, _FLAT = 0.3, 0.02, 1e-6
-"""Relative errors of an area: facets may have less area than the surface, and patches less or more. Curved faces: the
-first value times the square of the element size over the radius (a chord 1.3 times as long as an element and the end
-of a cylinder: a sixth of it squared), plus the second; flat faces: the third. Chosen, except the sixth (geometry)."""
+"""Relative errors of an area: facets may have less area than the surface, and patches may have less or more area. For
+curved faces the error is the first value times the square of the ratio of element size and radius, plus the second
+value. A chord 1.3 times as long as an element, and the end of a cylinder, give a sixth of the squared ratio. For flat
+faces the error is the third value; all values are chosen except the sixth (geometry)."""
 _CORNERS = 4.0
-"""Area of faces, over the square of the element size, that a region may contain although it contains no patch; for
-curved and unstructured meshes (chosen value)."""
+"""Area of faces, divided by the square of the element size, that a region may contain although it contains no patch;
+for curved and unstructured meshes (chosen value)."""
 
 
 def loads(case: Case, counted: Sequence[Load] = ()) -> list[Load]:
-    """Returns the load of each traction and each prescribed velocity of a case; ``counted``: those in meshes that
-    have been read."""
+    """Returns the load of each traction and each prescribed velocity of a case; ``counted``: loads in meshes that have
+    been read.
+    """
     known = {load.boundary: load for load in counted}
     return [known.get(load.boundary, load) for load in _loads(case)]
 
@@ -50,14 +51,16 @@ def _loads(case: Case) -> list[Load]:
 
 
 def parts_of(case: Case, spec: Traction | Prescribed) -> list[Part]:
-    """Returns the parts of a boundary: with a set and without names, all with a mesh from a file."""
+    """Returns the parts of a boundary; a boundary with a set and without names applies to all parts with a mesh from a
+    file.
+    """
     if spec.on is not None and not spec.parts:
         return [part for part in case.parts if isinstance(part.mesh, MeshFile)]
     return [part for part in case.parts if not spec.parts or part.name in spec.parts]
 
 
 def near(body: Placed) -> float:
-    """Tolerance of the border of a region for nodes of a body, m; see ``region.slack``."""
+    """Tolerance at the border of a region for nodes of a body, m; see ``region.slack``."""
     reach = max(abs(x) for corner in body.bounds() for x in corner)
     return slack(body.mesh, body.mesh.element_size, reach)
 
@@ -75,8 +78,8 @@ def _meets(region: Region, body: Placed) -> bool:
 
 
 def _reached(case: Case, spec: Traction | Prescribed) -> list[tuple[str, Placed]] | None:
-    """Returns the names and bodies of the parts of a boundary that reach into its box; None with a mesh file, loose
-    tets or too many bodies.
+    """Returns the names and bodies of the parts of a boundary that reach into the box of the boundary; None with a mesh
+    file, single tets or too many bodies.
     """
     region, found = Region.of(spec), list[tuple[str, Placed]]()
     for part in parts_of(case, spec):
@@ -102,8 +105,8 @@ def _acted_on(case: Case, number: int, spec: Traction) -> Load:
 
 
 def _free_faces(case: Case, name: str, body: Placed, region: Region) -> tuple[float, float, float]:
-    """Returns the same as ``_faces`` without the faces on the planes of symmetry of the part ``name``, which are cuts
-    and no surface.
+    """Returns the result of ``_faces`` without the faces on the planes of symmetry of the part ``name``, because these
+    faces are cuts and no surface.
     """
     area, faces, spread = _faces(body, region)
     for _, plane in case.boundaries_of(Symmetry):
@@ -115,7 +118,7 @@ def _free_faces(case: Case, name: str, body: Placed, region: Region) -> tuple[fl
 
 
 def _faces(body: Placed, region: Region) -> tuple[float, float, float]:
-    """Returns area, m^2, and number of faces of a body in a region, and the uncertainty of the area."""
+    """Returns the area, m^2, and the number of faces of a body in a region, and the uncertainty of the area."""
     mesh = body.mesh
     if region.everything:
         return surface(mesh), surface_faces(mesh), _facets(mesh) * surface(mesh)
@@ -124,8 +127,8 @@ def _faces(body: Placed, region: Region) -> tuple[float, float, float]:
 
 
 def planes_of(body: Placed, region: Region) -> list[int] | None:
-    """Returns the numbers of planes of nodes across x, y and z of a block of cubes in a box, for blocks neither
-    turned nor slit; None for other bodies and regions.
+    """Returns the numbers of planes of nodes across x, y and z of a block of cubes in a box, for blocks that are
+    neither turned nor slit; None for other bodies and regions.
     """
     mesh, margin = body.mesh, near(body)
     if not isinstance(mesh, Box | Plate) or not _regular(mesh) or mesh.slit is not None or body.turn is not None:
@@ -141,8 +144,9 @@ def planes_of(body: Placed, region: Region) -> list[int] | None:
 
 
 def block_faces(body: Placed, region: Region) -> tuple[float, int] | None:
-    """Returns area, m^2, and number of faces of such a block in a box; None for other bodies and regions, and
-    without a face."""
+    """Returns the area, m^2, and the number of faces of a block of cubes in a box; None for other bodies and regions,
+    and if the box contains no face.
+    """
     planes, mesh, margin = planes_of(body, region), body.mesh, near(body)
     if planes is None or not isinstance(mesh, Box | Plate) or region.low is None or region.high is None:
         return None
@@ -159,8 +163,8 @@ def block_faces(body: Placed, region: Region) -> tuple[float, int] | None:
 
 
 def _inside(body: Placed, region: Region) -> tuple[float, float, float]:
-    """Returns area, m^2, and number of faces of a body with all corners in a region, as patches of the element size;
-    and the uncertainty of the area from patches on the border of the region and from facets.
+    """Returns the area, m^2, and the number of faces of a body with all corners in a region, from patches of the
+    element size. Also returns the uncertainty of the area from patches on the border of the region and from facets.
     """
     mesh, margin = body.mesh, near(body)
     area, rim = 0.0, 0.0
@@ -181,7 +185,7 @@ def _inside(body: Placed, region: Region) -> tuple[float, float, float]:
 
 
 def _on_rim(corners: list[list[int]], i: int, j: int) -> bool:
-    """Whether a patch of a sheet has a neighbour that is not completely inside."""
+    """Whether a patch of a sheet has a neighbouring patch that is not completely inside of the region."""
     return any(count < 4 for row in corners[max(i - 1, 0) : i + 2] for count in row[max(j - 1, 0) : j + 2])
 
 
@@ -200,7 +204,7 @@ def _facets(mesh: Generated) -> float:
 
 
 def _quad(a: Vector, b: Vector, c: Vector, d: Vector) -> float:
-    """The area of a flat quadrilateral, m^2, by its diagonals."""
+    """The area of a flat quadrilateral, m^2, from its diagonals."""
     (p, q, r), (s, t, u) = ([y - x for x, y in zip(*pair, strict=True)] for pair in ((a, c), (b, d)))
     return 0.5 * math.hypot(q * u - r * t, r * s - p * u, p * t - q * s)
 
@@ -218,7 +222,9 @@ def _held(case: Case, number: int, spec: Prescribed) -> Load:
 
 
 def _nodes(body: Placed, region: Region) -> tuple[int, int, bool]:
-    """Returns the smallest and largest number of nodes of a body in a region, and whether they are exact."""
+    """Returns the smallest and the largest number of nodes of a body in a region, and whether these numbers are
+    exact.
+    """
     if region.everything:
         every = mesh_size(body.mesh).nodes
         return every, every, _counted(body.mesh)
@@ -232,7 +238,7 @@ def _counted(mesh: Generated) -> bool:
 
 
 def _grid_nodes(body: Placed, region: Region) -> int | None:
-    """Returns the nodes of a block of cubes in a box; None for other meshes, and for turned ones of many nodes."""
+    """Returns the nodes of a block of cubes in a box; None for other meshes, and for turned blocks with many nodes."""
     if (planes := planes_of(body, region)) is not None:
         return math.prod(planes)
     mesh, margin = body.mesh, near(body)
@@ -252,7 +258,9 @@ def _between(body: Placed, region: Region) -> tuple[int, int]:
 
 
 def _about(body: Placed, region: Region, wider: float) -> int:
-    """Returns the number of nodes of a body in a box ``wider``, m, on all sides, from the volume of the body in it."""
+    """Returns the number of nodes of a body in a box that is widened by ``wider``, m, on all sides, from the volume of
+    the body in this box.
+    """
     assert region.low is not None
     assert region.high is not None
     bottom, top = body.bounds()

@@ -1,4 +1,4 @@
-"""Bodies in their initial place, turned as their part requires: points inside, mass and motion."""
+"""Bodies at their initial position, turned as their part requires: points inside, mass and motion."""
 
 import itertools
 import math
@@ -10,8 +10,8 @@ from . import geometry
 from .geometry import Generated, Vector, across, index
 
 LATTICE = 20
-"""Number of sampling points per direction of a body. The value was chosen because it gives 8,000 points in all, and
-moments of inertia within 1 %."""
+"""Number of sampling points per direction of a body: 8,000 points in all, and moments of inertia within 1 % (chosen
+value)."""
 
 
 @dataclass(frozen=True)
@@ -22,22 +22,22 @@ class Placed:
     turn: Turn | None = None
 
     def holds(self, point: Vector) -> bool:
-        """Whether ``point``, m, lies in the modelled part."""
+        """Whether ``point``, m, lies in the modelled part of the body."""
         return geometry.holds(self.mesh, _turned(point, self.turn, -1.0))
 
     def turned(self, point: Vector) -> Vector:
-        """Returns the position, m, of a point of the mesh of the body."""
+        """Returns the position, m, of a point of the mesh of the body after the rotation of the part."""
         return _turned(point, self.turn)
 
     def bounds(self) -> tuple[Vector, Vector]:
-        """Lowest and highest coordinates, m; for a turned body the coordinates of its bounding box."""
+        """Lowest and highest coordinates of the body, m; for a turned body the coordinates of its bounding box."""
         low, high = geometry.bounds(self.mesh) or ((0.0,) * 3, (0.0,) * 3)
         corners = [_turned((x, y, z), self.turn) for x, y, z in itertools.product(*zip(low, high, strict=True))]
         (a, b, c), (d, e, f) = ([pick(each) for each in zip(*corners, strict=True)] for pick in (min, max))
         return (a, b, c), (d, e, f)
 
     def points(self) -> list[Vector]:
-        """Points that fill the body evenly; its centre if it is too thin for the lattice."""
+        """Points that fill the body evenly; the centre of the body if it is too thin for the lattice."""
         low, high = geometry.bounds(self.mesh) or ((0.0,) * 3, (0.0,) * 3)
         inside = list(filter(geometry.round_part(self.mesh), lattice(low, high, LATTICE)))
         return [_turned(point, self.turn) for point in inside or [geometry.centre(self.mesh)]]
@@ -70,7 +70,9 @@ def driven(case: Case, part: Part) -> Part:
 
 
 def velocity(part: Part, point: Vector) -> Vector:
-    """Returns the velocity, m/s, of a part at ``point``, m, at the start, without its jitter."""
+    """Returns the velocity, m/s, of a part at ``point``, m, at the start, without the random velocities of
+    ``jitter``.
+    """
     x, y, z = part.velocity
     if part.spin is not None:
         a, b, c = part.spin.rate
@@ -94,20 +96,20 @@ class Bulk:
     momentum: Vector
     """Momentum, N s."""
     energy: float
-    """Kinetic energy, J, without jitter."""
+    """Kinetic energy, J, without the random velocities of ``jitter``."""
     speed: float
     """Largest speed, m/s."""
 
     @property
     def extent(self) -> Vector:
-        """Extents along x, y, z, m."""
+        """Extents of the bounding box along x, y, z, m."""
         a, b, c = (high - low for low, high in zip(self.low, self.high, strict=True))
         return a, b, c
 
 
 def bulk(part: Part, mesh: Generated, density: float) -> Bulk:
-    """Returns mass, box and motion of ``part`` with the generated ``mesh`` and its mass; motion other than uniform
-    translation from points inside.
+    """Returns mass, box and motion of ``part`` from its generated ``mesh`` and the mass of the mesh. A motion other
+    than uniform translation is computed from points inside of the body.
     """
     given = part.rigid.mass if part.rigid is not None else None
     body, mass = Placed(mesh, part.turn), given or density * geometry.volume(mesh)
@@ -123,8 +125,8 @@ def bulk(part: Part, mesh: Generated, density: float) -> Bulk:
 
 
 def with_inertia(part: Part, mass: float, middle: Vector) -> tuple[Vector, float] | None:
-    """Returns momentum and kinetic energy of a rigid part with given inertia at the start; None for any other part.
-    ``middle``: its centre of mass, if none is given.
+    """Returns momentum and kinetic energy at the start of a rigid part with given inertia; None for any other part.
+    ``middle``: centre of mass of the body, used if the case gives none.
     """
     rigid = part.rigid
     if rigid is None or rigid.inertia is None:

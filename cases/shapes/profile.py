@@ -1,4 +1,5 @@
-"""Outlines of bodies of revolution: the radius over the height, with volume, area and other integrals by formula.
+"""Outlines of bodies of revolution: the radius as a function of the height, with volume, area and other integrals by
+formula.
 
 Heights z run along the axis from the low end of the body, radii r from the axis. An outline is a sequence of lines
 and arcs from one end to the other; a flat face closes an end whose radius is not 0.
@@ -11,8 +12,8 @@ from ..model.bodies import Cone, Hemisphere, Ogive, SphericalCap
 from ..model.forms import BallPiece, ConeForm, OgiveForm
 
 _TIP = 1e-7
-"""Largest radius of the end of an arc that counts as on the axis, over the height: the square root of the rounding
-error."""
+"""Largest radius of the end of an arc that counts as on the axis, divided by the height: the square root of the
+rounding error."""
 
 Revolved = Cone | Ogive | Hemisphere | SphericalCap
 RevolvedForm = ConeForm | OgiveForm | BallPiece
@@ -28,11 +29,11 @@ class Line:
     r1: float
 
     def at(self, z: float) -> float:
-        """The radius at a height, m."""
+        """The radius of the line at a height, m."""
         return self.r0 + (self.r1 - self.r0) * (z - self.z0) / (self.z1 - self.z0)
 
     def volume(self) -> float:
-        """Volume of the frustum, m^3."""
+        """Volume of the frustum below the line, m^3."""
         return math.pi / 3.0 * (self.z1 - self.z0) * (self.r0**2 + self.r0 * self.r1 + self.r1**2)
 
     def side(self) -> float:
@@ -44,11 +45,11 @@ class Line:
         return 0.5 * (self.z1 - self.z0) * (self.r0 + self.r1)
 
     def widest(self) -> float:
-        """The largest radius, m."""
+        """The largest radius of the line, m."""
         return max(self.r0, self.r1)
 
     def lowest(self, along: float, out: float) -> float:
-        """The smallest value of ``along`` z - ``out`` r, m, for ``out`` not below 0."""
+        """The smallest value of ``along`` z - ``out`` r on the line, m, for ``out`` not below 0."""
         return min(along * self.z0 - out * self.r0, along * self.z1 - out * self.r1)
 
     def length(self) -> float:
@@ -71,21 +72,21 @@ class Arc:
     radius: float
 
     def at(self, z: float) -> float:
-        """The radius at a height, m."""
+        """The radius of the outline on the arc at a height, m."""
         return max(0.0, self.rc + self._rise(z - self.zc))
 
     @property
     def r0(self) -> float:
-        """The radius at the lower end, m."""
+        """The radius of the outline at the lower end of the arc, m."""
         return self.at(self.z0)
 
     @property
     def r1(self) -> float:
-        """The radius at the higher end, m."""
+        """The radius of the outline at the higher end of the arc, m."""
         return self.at(self.z1)
 
     def volume(self) -> float:
-        """Volume: pi times the integral of r^2, m^3."""
+        """Volume of revolution of the arc: pi times the integral of r^2, m^3."""
 
         def integral(u: float) -> float:
             return (self.rc**2 + self.radius**2) * u - u**3 / 3.0 + 2.0 * self.rc * self._under(u)
@@ -93,7 +94,7 @@ class Arc:
         return math.pi * (integral(self.z1 - self.zc) - integral(self.z0 - self.zc))
 
     def side(self) -> float:
-        """2 pi times the integral of r over the length of the arc, m^2."""
+        """Area of revolution of the arc: 2 pi times the integral of r over the length of the arc, m^2."""
         return 2.0 * math.pi * self.radius * (self.rc * self._angle() + self.z1 - self.z0)
 
     def section(self) -> float:
@@ -101,11 +102,11 @@ class Arc:
         return self.rc * (self.z1 - self.z0) + self._under(self.z1 - self.zc) - self._under(self.z0 - self.zc)
 
     def widest(self) -> float:
-        """The largest radius, m."""
+        """The largest radius of the outline on the arc, m."""
         return self.rc + self.radius if self.z0 <= self.zc <= self.z1 else max(self.r0, self.r1)
 
     def lowest(self, along: float, out: float) -> float:
-        """The smallest value of ``along`` z - ``out`` r, m, for ``out`` not below 0."""
+        """The smallest value of ``along`` z - ``out`` r on the arc, m, for ``out`` not below 0."""
         ends = [along * self.z0 - out * self.r0, along * self.z1 - out * self.r1]
         length = math.hypot(along, out)
         touch = self.zc - self.radius * along / length if length else self.z0
@@ -124,7 +125,7 @@ class Arc:
         return math.sqrt(max(0.0, self.radius**2 - u**2))
 
     def _under(self, u: float) -> float:
-        """Returns the integral of the rise, sqrt(radius^2 - u^2), from 0 to ``u``."""
+        """Returns the integral of the rise of an arc, sqrt(radius^2 - u^2), from 0 to ``u``."""
         return 0.5 * (u * self._rise(u) + self.radius**2 * math.asin(_share(u / self.radius)))
 
     def _angle(self) -> float:
@@ -148,20 +149,20 @@ class Profile:
 
     @property
     def ends(self) -> tuple[float, float]:
-        """Radii of the flat faces at the low and the high end, m; 0 if there is none."""
+        """Radii of the flat faces at the low end and the high end, m; 0 if an end has no flat face."""
         low, high = (r if r > _TIP * self.height else 0.0 for r in (self.segments[0].r0, self.segments[-1].r1))
         return low, high
 
     def at(self, z: float) -> float:
-        """The radius at a height within the body, m."""
+        """The radius of the outline at a height within the body, m."""
         return next((each for each in self.segments if z <= each.z1), self.segments[-1]).at(z)
 
     def volume(self) -> float:
-        """Volume, m^3."""
+        """Volume of the body of revolution, m^3."""
         return math.fsum(each.volume() for each in self.segments)
 
     def surface(self) -> float:
-        """Surface with the flat faces, m^2."""
+        """Surface of the body of revolution with its flat faces, m^2."""
         return math.fsum([*(each.side() for each in self.segments), *(math.pi * r**2 for r in self.ends)])
 
     def section(self) -> float:
@@ -169,16 +170,16 @@ class Profile:
         return math.fsum(each.section() for each in self.segments)
 
     def widest(self) -> float:
-        """The largest radius, m."""
+        """The largest radius of the outline, m."""
         return max(each.widest() for each in self.segments)
 
     def lowest(self, along: float, out: float) -> float:
-        """The smallest value of ``along`` z - ``out`` r, m, for ``out`` not below 0."""
+        """The smallest value of ``along`` z - ``out`` r on the outline, m, for ``out`` not below 0."""
         return min(each.lowest(along, out) for each in self.segments)
 
 
 def profile(mesh: RevolvedForm) -> Profile:
-    """Returns the outline of a body, whose sizes fit (``form_checks``)."""
+    """Returns the outline of a body whose sizes fit together (module ``form_checks``)."""
     if isinstance(mesh, ConeForm):
         return Profile((Line(0.0, mesh.radius, mesh.length, mesh.top_radius),))
     found = _ogive(mesh) if isinstance(mesh, OgiveForm) else (_cap(mesh),)
@@ -187,8 +188,8 @@ def profile(mesh: RevolvedForm) -> Profile:
 
 
 def tips(mesh: RevolvedForm) -> list[tuple[float, float]]:
-    """Returns for both ends of a body the radius, m, of a flat or a round tip, 0 of a sharp one; and the slope of
-    the outline there, used for a sharp tip.
+    """Returns, for both ends of a body, the radius of a flat or round tip, m, 0 for a sharp tip, and the slope of the
+    outline at the end. Only a sharp tip uses the slope.
     """
     outline = profile(mesh)
     small = 1e-4 * outline.height
@@ -204,8 +205,8 @@ def _cap(mesh: BallPiece) -> Arc:
 
 
 def arc_of(mesh: OgiveForm) -> Arc:
-    """Returns the arc of the sharp nose, which begins at height 0: through (0, R) and (L, 0), with its centre beyond
-    the axis. For a tangent ogive the centre is at height 0: L^2 = radius^2 - (radius - R)^2.
+    """Returns the arc of the sharp nose, which begins at height 0: through (0, R) and (L, 0), with the centre of the
+    arc beyond the axis. For a tangent ogive the centre is at height 0: L^2 = radius^2 - (radius - R)^2.
     """
     if mesh.nose is None or mesh.crh is None:
         radius = (mesh.nose**2 + mesh.radius**2) / (2.0 * mesh.radius) if mesh.nose else arc_radius(mesh)
@@ -223,12 +224,12 @@ def tangent(nose: float, radius: float) -> float:
 
 
 def arc_radius(mesh: OgiveForm) -> float:
-    """Radius of the arc of the nose by its calibre radius head, m."""
+    """Radius of the arc of the nose from its calibre radius head, m."""
     return 2.0 * mesh.radius * (mesh.crh or 0.5)
 
 
 def nose_length(mesh: OgiveForm) -> float:
-    """Length of the nose to its sharp tip, m; D sqrt(crh - 1/4) for a tangent ogive."""
+    """Length of the nose to the sharp tip, m; D sqrt(crh - 1/4) for a tangent ogive."""
     return mesh.nose or 2.0 * mesh.radius * math.sqrt((mesh.crh or 0.5) - 0.25)
 
 
@@ -245,8 +246,8 @@ def _ogive(mesh: OgiveForm) -> tuple[Segment, ...]:
 
 
 def _rounded(nose: Arc, tip: float) -> tuple[Arc, Arc]:
-    """Returns the nose with a ball of radius ``tip`` inside that touches the arc: its centre is on the axis, and its
-    distance from the centre of the arc is the difference of the radii.
+    """Returns the nose with a ball of radius ``tip`` inside that touches the arc. The centre of the ball is on the
+    axis, and its distance from the centre of the arc is the difference of the radii.
     """
     centre = nose.zc + math.sqrt(max(0.0, (nose.radius - tip) ** 2 - nose.rc**2))
     touch = centre + (centre - nose.zc) * tip / (nose.radius - tip)

@@ -5,7 +5,7 @@ import math
 from ..model.bodies import RingSector
 
 Angles = tuple[float, float]
-"""Start and end, rad, from the first direction across the axis to the second."""
+"""Start and end of the ring sector, rad, from the first direction across the axis to the second."""
 
 _WINDOW: dict[str, Angles] = {"half": (-0.5 * math.pi, 0.5 * math.pi), "quarter": (0.0, 0.5 * math.pi)}
 """The ranges of angles that are modelled in a sector."""
@@ -33,13 +33,15 @@ def angle(mesh: RingSector) -> float:
 
 
 def holds_angle(mesh: RingSector, x: float, y: float) -> bool:
-    """Whether the direction of a point across the axis is modelled."""
+    """Whether the direction of a point from the axis is modelled."""
     at = math.atan2(y, x)
     return any(a <= at + turn <= b for a, b in angles(mesh) for turn in (-2.0 * math.pi, 0.0, 2.0 * math.pi))
 
 
 def extremes(mesh: RingSector, whole: bool = False) -> tuple[Angles, Angles]:
-    """Lowest and highest value of both coordinates across the axis, m, from the axis; ``whole``: of the full body."""
+    """Lowest and highest value of both coordinates across the axis, m, measured from the axis. ``whole``: whether the
+    values are those of the full body.
+    """
     begin = math.remainder(mesh.start, 2.0 * math.pi)
     ranges = [(begin, begin + mesh.angle)] if whole else angles(mesh)
     x, y = list[float](), list[float]()

@@ -11,7 +11,8 @@ A site's settings file (its other tables are those of ``policy``)::
     time = "12 h"
     modules = ["gcc/13"]
 
-Users select a profile and cannot extend it: the command of a job is in ``job.json``, and the script only reads it.
+Users select a profile and cannot extend it: the command of a job is in ``job.json``, and the script only reads the
+command.
 """
 
 import re
@@ -32,30 +33,30 @@ from . import policy
 
 
 class SiteError(Exception):
-    """Error in the settings file. The text of the error is one line."""
+    """Error in the settings file of a site. The text of the error is one line."""
 
 
 class Profile(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=True):
-    """A way of requesting cores from the batch system."""
+    """A profile: a way of requesting cores from the batch system."""
 
     partition: str = ""
     account: str = ""
     qos: str = ""
     time: str = ""
-    """Time limit of a job, such as ``12 h``; empty: the limit of the partition."""
+    """Time limit of a job, such as ``12 h``; empty: the time limit of the partition."""
     modules: list[str] = []
     """Names of modules that ``module load`` loads."""
     mpi: Literal["mpiexec", "srun"] = "mpiexec"
-    """Command that starts the ranks inside the job."""
+    """Command that starts the ranks inside of a job."""
     mpiexec: str = ""
-    """Path of a site's own mpiexec; empty: the mpiexec that Conoid finds."""
+    """Path of the site's own mpiexec; empty: the mpiexec that Conoid finds."""
     lines: list[str] = []
-    """Lines of the script before the run: what the site's MPI or file system needs."""
+    """Lines of the batch script before the run, as the site's MPI or file system requires."""
     options: list[str] = []
-    """Further arguments of sbatch."""
+    """Further arguments of the command sbatch."""
     notice: str = "120 s"
-    """Time before the time limit at which a run receives the signal to save its state. The value was chosen because
-    some checkpoints of the largest runs can be written in this time."""
+    """Time before the time limit at which a run receives the signal to save its state: enough for some checkpoints of
+    the largest runs (chosen value)."""
 
 
 class Slurm(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=True):
@@ -63,28 +64,28 @@ class Slurm(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=Tru
 
     profiles: dict[str, Profile]
     default: str = ""
-    """Profile of runs that name none; empty: the first."""
+    """Profile of runs that name no profile; empty: the first profile."""
     bin: str = ""
-    """Folder of sbatch, squeue, scancel, scontrol; empty: they are in PATH."""
+    """Folder of the commands sbatch, squeue, scancel, scontrol; empty: the commands are in PATH."""
     router: str = ""
-    """Address of the server's Zenoh router for compute nodes; empty: only that of this machine."""
+    """Address of the server's Zenoh router for compute nodes; empty: only the address of this machine."""
     listen: str = ""
-    """Additional address on which the router listens for compute nodes, such as ``tls/0.0.0.0:7448``."""
+    """Additional address on which the Zenoh router listens for compute nodes, such as ``tls/0.0.0.0:7448``."""
     certificate: str = ""
     key: str = ""
-    """Certificate and key of the router; required with TLS."""
+    """Certificate and key of the Zenoh router; required with TLS."""
     authority: str = ""
-    """Certificate by which the nodes verify the router: a file that they can read."""
+    """Certificate with which the compute nodes verify the Zenoh router: a file that the nodes can read."""
     poll: float = 2.0
-    """Time between two queries of the queue, s (chosen value). One squeue command reads the jobs of all runs."""
+    """Time between two queries of Slurm's queue, s (chosen value). One squeue command reads the jobs of all runs."""
     slots: int = 100_000
-    """Largest number of cores that are submitted at a time, including pending jobs. The value was chosen so large
-    because Slurm has limits of its own."""
+    """Largest number of cores that are submitted at a time, including pending jobs; large because Slurm has its own
+    limits (chosen value)."""
 
 
 class Site(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=True):
-    """Settings of a site: how runs are started, and in ``policy`` their order, size and retention, and the limits of
-    one user.
+    """Settings of a site: how runs are started. The settings in the module ``policy`` are the order, size and retention
+    of runs, and the limits of one user.
     """
 
     launcher: Literal["local", "slurm"] = "local"
@@ -99,19 +100,19 @@ class Site(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=True
 
 _Name = Annotated[str, msgspec.Meta(pattern=r"^[A-Za-z0-9][A-Za-z0-9_.-]{0,127}\Z")]
 _Number = Annotated[str, msgspec.Meta(pattern=r"^([0-9]+(_[0-9]+)?)?\Z")]
-"""Whether a value of a record is safe as an argument of commands: it cannot be one of their options."""
+"""Whether a value of a record is safe as an argument of a command: the value cannot be an option of the command."""
 
 
 class Job(msgspec.Struct, kw_only=True, frozen=True):
-    """job.json: the command of a job of the batch system. This file is on disk before the submission to the batch
-    system.
+    """File job.json: the command of a job of the batch system. The file job.json is on disk before the job is submitted
+    to the batch system.
 
-    Readers of a folder use its name and number only, nothing else in it: ``command`` and ``bin`` are for the job.
+    Readers of a folder use only the name and the number in job.json; ``command`` and ``bin`` are for the job.
     """
 
     run: str
     name: _Name
-    """Name of the job; no other job has it, so that a job is found even if its number was not stored."""
+    """Unique name of the job, so that the job is found even if its number was not stored."""
     attempt: int
     ranks: int
     profile: str
@@ -120,35 +121,35 @@ class Job(msgspec.Struct, kw_only=True, frozen=True):
     submitted: float
     """Unix time of the submission, s."""
     notice: float
-    """Seconds before the time limit at which the run receives the signal."""
+    """Time before the time limit at which the run receives the signal, s."""
     bin: str = ""
-    """Folder of Slurm's commands; empty: they are in PATH."""
+    """Folder of Slurm's commands; empty: the commands are in PATH."""
     task: int | None = None
-    """Index in an array, which is one job for several runs; None: a job of its own."""
+    """Index in a job array, which is one job for several runs; None: the run has a separate job."""
     array: str = ""
-    """Folder of the array."""
+    """Folder of the job array."""
     job: _Number = ""
-    """Number given by the batch system; empty until it is known."""
+    """Number that the batch system has given the job; empty until the number is known."""
     accounting: dict[str, str] = {}
-    """State reported by the batch system for a job that has ended."""
+    """State that the batch system reported for a job that has ended."""
     threads: int = 1
     """Number of cores of each rank."""
 
     @property
     def key(self) -> str:
-        """Unique name of the job."""
+        """Unique name of the job, with its index in a job array."""
         return key_of(self.name, self.task)
 
 
 class Access(msgspec.Struct, kw_only=True, frozen=True):
-    """Address and token with which the ranks of a job publish; in a hidden file that only its owner can read."""
+    """Network address and token with which the ranks of a job publish, in a hidden file for its owner only."""
 
     endpoint: str
     prefix: str
     user: str = ""
     password: str = ""
     authority: str = ""
-    """Certificate authority of the router, with TLS."""
+    """Certificate authority of the Zenoh router, used with TLS."""
 
 
 _job, _access = msgspec.json.Decoder(Job), msgspec.json.Decoder(Access)
@@ -159,7 +160,7 @@ _TEMPLATE = """#!/bin/bash
 
 
 def read_site(path: Path) -> Site:
-    """Reads the settings file of a site. Raises SiteError."""
+    """Reads the settings file of a site. Raises SiteError if the file is invalid."""
     try:
         site = msgspec.convert(tomllib.loads(whole.read_text(path)), Site)
         if site.slurm is not None:
@@ -187,7 +188,7 @@ def _check(slurm: Slurm) -> None:
 
 
 def profile_of(slurm: Slurm, name: str) -> tuple[str, Profile]:
-    """Returns the profile of that name, or the default one. Raises ValueError with the existing names."""
+    """Returns the profile ``name``, or the default profile. Raises ValueError with the existing names."""
     chosen = name or slurm.default or next(iter(slurm.profiles))
     if chosen not in slurm.profiles:
         raise ValueError(f"profile = {chosen[:40]!r}: {allowed(chosen, slurm.profiles)}")
@@ -208,7 +209,7 @@ def new_job(
     place: str = "",
     threads: int = 1,
 ) -> Job:
-    """Returns the record of an attempt that is not yet submitted."""
+    """Returns the record of an attempt that is not submitted yet."""
     word = re.sub(r"[^A-Za-z0-9_.-]", "_", run)[:60]
     return Job(
         run=run, name=f"conoid-{word}-{attempt}-{secrets.token_hex(4)}", attempt=attempt, ranks=ranks, threads=threads,
@@ -218,7 +219,7 @@ def new_job(
 
 
 def key_of(name: str, task: int | None) -> str:
-    """Returns the name of a job, or of one task of an array."""
+    """Returns the name of a job, or of one task of a job array."""
     return name if task is None else f"{name}/{task}"
 
 
@@ -230,21 +231,21 @@ def script(profile: Profile, python: str) -> str:
 
 
 def sbatch_words(job: Job, profile: Profile, folder: Path) -> list[str]:
-    """Returns the arguments of sbatch. The script alone receives TERM, ``notice`` before the limit; the script's
-    program signals the ranks.
+    """Returns the arguments of the command sbatch. Only the script receives the signal TERM, ``notice`` before the time
+    limit; the program of the script signals the ranks.
     """
     return _words(job, profile, folder, f"{layout.LOGS}/{layout.LAUNCHER_LOG}")
 
 
 def array_words(job: Job, profile: Profile, tasks: Iterable[int]) -> list[str]:
-    """Returns the arguments of sbatch for some tasks of an array, of which ``job`` is one."""
+    """Returns the arguments of the command sbatch for some tasks of a job array that contains ``job``."""
     folder = Path(job.array)
     return [f"--array={','.join(map(str, tasks))}", *_words(job, profile, folder, "%a.log")]
 
 
 def _words(job: Job, profile: Profile, folder: Path, log: str) -> list[str]:
-    """Returns the path of ``log`` below ``folder`` for sbatch. Slurm replaces patterns with a percent sign and
-    removes backslashes, in the name of the folder too: for such a folder the job opens its log itself.
+    """Returns the path of ``log`` below ``folder`` for the command sbatch. Slurm replaces patterns with a percent sign
+    and removes backslashes, even in the name of the folder; for such a folder the job opens its log itself.
     """
     if set(str(folder)) & {"%", "\\"}:
         log = "/dev/null"
@@ -261,10 +262,11 @@ def _words(job: Job, profile: Profile, folder: Path, log: str) -> list[str]:
 
 
 def starter(profile: Profile, ranks: int, found: Callable[[], Sequence[str]], threads: int = 1) -> list[str]:
-    """Returns the command that starts ``ranks`` ranks of so many ``threads`` inside a job, before the worker's command.
+    """Returns the command that starts ``ranks`` ranks with ``threads`` threads each inside of a job, before the
+    worker's command.
 
-    ``found``: returns an mpiexec where the profile has none. The wheel of MPICH uses PMI2. srun takes neither number
-    from the job (srun(1)), and binds each rank to its own cores.
+    ``found``: function that returns an mpiexec if the profile has none. The wheel of MPICH uses PMI2; srun takes
+    neither the number of ranks nor the number of threads from the job (srun(1)), and binds each rank to separate cores.
     """
     if profile.mpi == "srun":
         return ["srun", "--mpi=pmi2", f"--ntasks={ranks}", f"--cpus-per-task={threads}", "--cpu-bind=cores"]
@@ -272,7 +274,7 @@ def starter(profile: Profile, ranks: int, found: Callable[[], Sequence[str]], th
 
 
 def read_job(folder: Path) -> Job | None:
-    """Reads the record in a run's folder; None if there is none. Raises OSError, msgspec.MsgspecError."""
+    """Reads the job record in a run's folder; None if there is none. Raises OSError, msgspec.MsgspecError."""
     try:
         return _job.decode(whole.read(folder / layout.JOB))
     except FileNotFoundError:
@@ -288,5 +290,5 @@ def read_access(folder: Path) -> Access | None:
 
 
 def to_json(record: Job | Access) -> bytes:
-    """The record as text, as in the folder."""
+    """Returns the job record as text, in the form of the file."""
     return msgspec.json.format(msgspec.json.encode(record), indent=2)

@@ -34,14 +34,14 @@ import msgspec
 from ..units import parse_quantity
 
 PRIORITY = 100
-"""Largest priority, and minus the smallest (chosen value)."""
+"""Largest priority; the smallest priority is its negative (chosen value)."""
 
 
 class Share(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=True):
     """Settings of a site for one user."""
 
     share: float = 1.0
-    """Share of the machine, relative to that of other users."""
+    """Share of the machine that the user gets, relative to other users."""
     priority: int = 0
     """Runs of users with a higher priority start first."""
 
@@ -52,12 +52,13 @@ class Queue(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=Tru
     half_life: str = "168 h"
     """Half-life of the past usage of a user: a week (chosen value)."""
     memory: int | None = None
-    """Memory for all runs together, bytes, by their estimates; absent: that of the machine."""
+    """Memory for all runs together, bytes, compared with the estimates of the runs; absent: the memory of the
+    machine."""
     users: dict[str, Share] = {}
 
     @property
     def forgets(self) -> float:
-        """The half-life, s."""
+        """The half-life of past usage, s."""
         return parse_quantity(self.half_life, "s")
 
     def of(self, owner: str) -> Share:
@@ -71,23 +72,23 @@ class Quota(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=Tru
     queued: int | None = None
     """Largest number of runs that have not ended; further runs are refused."""
     running: int | None = None
-    """Largest number of concurrent runs; the others wait."""
+    """Largest number of concurrent runs; further runs wait."""
     core_seconds: float | None = None
-    """Largest recent usage, halved after each half-life; beyond it runs wait."""
+    """Largest recent usage, halved after each half-life; runs of a user with a larger usage wait."""
     output_bytes: int | None = None
-    """Largest size of all folders of the user's runs; beyond it further runs are refused."""
+    """Largest size of all folders of the user's runs; at a larger size further runs are refused."""
 
 
 class RunCaps(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=True):
-    """Limits of a run; None: the default of the server."""
+    """Limits of a run; None: the default limit of the server."""
 
     elements: int | None = None
     steps: int | None = None
     memory: int | None = None
     core_seconds: float | None = None
-    """Core seconds, by the estimate at submission, and measured during the run."""
+    """Core seconds of a run: estimated at submission, and measured during the run."""
     wall_time: float | None = None
-    """Wall time, s."""
+    """Wall time of a run, s."""
     output_bytes: int | None = None
     """Size of the folder of a run; a larger run is stopped, and keeps its results so far."""
 
@@ -96,20 +97,21 @@ class Retention(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields
     """Retention of runs that have ended; runs with the label ``keep`` are kept without limit."""
 
     age: str = ""
-    """Age since the end; empty: no limit."""
+    """Age since the end of the run; empty: no limit."""
     bytes: int | None = None
-    """Size of all folders together; the oldest are removed first. None: no limit."""
+    """Size of all folders of runs together; the oldest runs are removed first. None: the size has no limit."""
     every: str = "10 min"
-    """Time between two checks. The value was chosen because reading the sizes of 10,000 folders takes seconds."""
+    """Time between two checks of age and size; reading the sizes of 10,000 folders takes seconds (reason of the chosen
+    value)."""
 
     @property
     def oldest(self) -> float | None:
-        """The age, s."""
+        """The age of runs in s."""
         return parse_quantity(self.age, "s") if self.age else None
 
     @property
     def rest(self) -> float:
-        """Seconds between two checks."""
+        """Time between two checks, s."""
         return parse_quantity(self.every, "s")
 
 
@@ -117,49 +119,53 @@ class Files(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=Tru
     """Limits of the files that a user uploads with cases."""
 
     size: int = 4 << 30
-    """Largest size of one file in bytes; a larger file is refused with 413. The value was chosen because it is the
-    size of ten million tets as text."""
+    """Largest size of one file in bytes: ten million tets as text (chosen value). A larger file is refused with HTTP
+    status 413."""
     bytes: int = 16 << 30
-    """Largest size in bytes of all files of a user, with uploads in progress (chosen value). Further files are
-    refused with 429."""
+    """Largest size in bytes of all files of a user, including uploads in progress (chosen value). Files above this size
+    are refused with HTTP status 429."""
     number: int = 1000
-    """Largest number of files of a user. Further files are refused with 429. The value was chosen because a list of
-    so many files takes some 10 ms."""
+    """Largest number of files of a user; a list of so many files takes some 10 ms (reason of the chosen value). Files
+    above this number are refused with HTTP status 429."""
     age: str = "24 h"
-    """Time for which a file without a run and without requests is kept. The value was chosen because a case follows
-    its files within seconds, and an interrupted upload can continue the next morning."""
+    """Time for which a file without a run and without requests is kept (chosen value). A case follows its files within
+    seconds, and an interrupted upload can continue the next morning."""
 
     @property
     def oldest(self) -> float:
-        """The age, s."""
+        """The age of files in s."""
         return parse_quantity(self.age, "s")
 
 
 class Http(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=True):
-    """Limits of concurrent requests of one user; also of an address whose requests have no valid token."""
+    """Limits of concurrent requests of one user; the limits also apply to a network address whose requests have no
+    valid token.
+    """
 
     requests: int = 16
-    """Largest number of requests in progress, with their bodies, of 1 MiB at most, and their answers in memory
-    (chosen value)."""
+    """Largest number of requests in progress (chosen value); their bodies, of 1 MiB at most, and their answers are in
+    memory."""
     waiting: int = 200
-    """Largest number of waiting requests (chosen value). Further requests are refused with 429."""
+    """Largest number of waiting requests (chosen value). Requests above this number are refused with HTTP status
+    429."""
     streams: int = 100
-    """Largest number of event streams, followed logs, waits for a change and downloads (chosen value). Further
-    requests are refused with 429."""
+    """Largest number of long answers: event streams, followed logs, waits for a change, and downloads (chosen value).
+    Long answers above this number are refused with HTTP status 429."""
     threads: int = 2
-    """Largest number of answers that are computed, or wait for the disk, at a time. The value was chosen because a
-    server has 64 for all users, and one Python process."""
+    """Largest number of answers that are computed, or wait for the disk, at a time (chosen value). A server has 64
+    threads for all users, and one Python process."""
     patience: str = "20 s"
-    """Time after which a request is answered with 503 because the disk or database does not respond (chosen value)."""
+    """Time after which a request is answered with HTTP status 503 because the disk or the database does not respond
+    (chosen value)."""
 
     @property
     def seconds(self) -> float:
-        """The patience, s."""
+        """The patience with the disk and the database, s."""
         return parse_quantity(self.patience, "s")
 
 
 def check(queue: Queue, quota: Quota, caps: RunCaps, retention: Retention, http: Http, files: Files) -> None:
-    """Checks the settings. Raises ValueError: the key, the value, what is allowed."""
+    """Checks the settings. Raises ValueError with the key, the value, and the allowed values."""
     for key, text in (
         ("queue.half_life", queue.half_life), ("retention.every", retention.every), ("http.patience", http.patience),
         ("files.age", files.age),

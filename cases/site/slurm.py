@@ -1,7 +1,7 @@
 """Slurm through its commands with machine-readable output: submission without duplicates, queue, end of jobs.
 
-The controller writes a new job to disk some seconds after its confirmation, and loses it in a crash before: a job is
-searched for before it is submitted again (``slurm_call``).
+The controller of Slurm writes a new job to disk some seconds after it has confirmed the job, and loses the job in a
+crash before the write. Therefore a job is searched for before it is submitted again (module ``slurm_call``).
 """
 
 import fcntl
@@ -19,29 +19,31 @@ from .slurm_call import AwayError, LaterError, RefusedError, SlurmError, away, c
 
 PENDING = frozenset({"PENDING", "REQUEUED", "REQUEUE_HOLD", "REQUEUE_FED", "RESV_DEL_HOLD", "SPECIAL_EXIT"})
 NOT_LAUNCHED = "launch failed requeued held"
-"""Reason of a pending job, with spaces or underscores: its node failed to start it, and Slurm waits for an operator."""
+"""Reason of a pending job, written with spaces or underscores: the node failed to start the job, and Slurm waits for an
+operator."""
 FINAL = frozenset(
     {"BOOT_FAIL", "CANCELLED", "COMPLETED", "DEADLINE", "FAILED", "NODE_FAIL", "OUT_OF_MEMORY", "PREEMPTED", "REVOKED",
      "TIMEOUT"}
 )  # fmt: skip
-"""States of squeue(1); in all others a job has its cores."""
+"""Final states of squeue(1), in which a job has ended."""
 _ONE_BY_ONE = 200
-"""Largest number of names in one squeue command. The value was chosen to limit the command line to 10 kB."""
+"""Largest number of names in one squeue command, so that the command line has at most 10 kB (chosen value)."""
 
 
 _NUMBER = re.compile(r"\d+(_\d+|_\[[^|]*\])?(\+\d+)?")
-"""Number of a job, of a task of an array, of waiting tasks, of a component of a heterogeneous job."""
+"""Pattern of the number of a job, of a task of a job array, of waiting tasks, or of a component of a heterogeneous
+job."""
 
 
 class Entry(NamedTuple):
-    """A job in squeue's list."""
+    """A job in the list that squeue prints."""
 
     job: str
     state: str
     start: float
-    """Unix time of the start, s. For a pending job the time is an estimate; 0 if unknown."""
+    """Unix time of the start of the job, s. For a pending job the start time is an estimate; 0 if unknown."""
     name: str
-    """Name of the job; for a task of an array with its index, as ``batch.key_of`` writes it."""
+    """Name of the job; a task of a job array has the name with the index, as ``batch.key_of`` writes it."""
     reason: str
 
     @property
@@ -51,8 +53,8 @@ class Entry(NamedTuple):
 
 
 def jobs(place: str, *names: str) -> list[Entry]:
-    """Returns this user's jobs that Slurm remembers, of these names or all. Names of other jobs may contain line
-    breaks. Raises AwayError, RefusedError.
+    """Returns the jobs of this user that Slurm remembers: all jobs, or only the jobs with the given names. Names of
+    other jobs may contain line breaks. Raises AwayError or RefusedError.
     """
     found: list[Entry] = []
     words = ["squeue", "--noheader", "--array", "--states=all", f"--user={os.getuid()}", "--format=%i|%T|%S|%j|%r"]
@@ -66,8 +68,9 @@ def jobs(place: str, *names: str) -> list[Entry]:
 
 
 def _entries(lines: Sequence[str], names: Set[str]) -> list[Entry]:
-    """Reads squeue's list. An invalid line makes the whole list invalid, since a missing job may exist; a line
-    broken by another job's name is none of these jobs, and the text after it belongs to it.
+    """Reads the list that squeue prints. An invalid line makes the whole list invalid, because a job could be missing.
+    A line that is broken by the name of another job is no job of this list; the text after the line break belongs to
+    that name.
     """
     found, broken = [], False
     for line in lines:
@@ -83,7 +86,7 @@ def _entries(lines: Sequence[str], names: Set[str]) -> list[Entry]:
 
 
 def _key(job: str, name: str) -> str:
-    """Reads a number; a task of an array has one such as 123_4."""
+    """Reads the number of a job; a task of a job array has a number such as 123_4."""
     task = job.partition("_")[2]
     return batch.key_of(name, int(task) if task.isdigit() else None)
 
@@ -96,8 +99,8 @@ def _time(text: str) -> float:
 
 
 def details(place: str, job: str) -> dict[str, str]:
-    """Returns all properties of a job from the controller; for a repeated word the first, since paths and comments
-    come last. Raises AwayError, RefusedError for an unknown job.
+    """Returns all properties of a job from the controller; for a repeated word the first value, because paths and
+    comments come last. Raises AwayError; raises RefusedError if the job is unknown.
     """
     output = call(place, ["scontrol", "show", "job", "--oneliner", job])
     found: dict[str, str] = {}
@@ -116,7 +119,7 @@ def accounting(place: str, job: str) -> dict[str, str]:
 
 
 def taken(place: str, job: str) -> dict[str, str]:
-    """Returns the usage of a job that has ended, from the accounting database, if there is one."""
+    """Returns the usage of a job that has ended, from the accounting database if there is one."""
     found: dict[str, str] = {}
     fields = ("State", "ExitCode", "Elapsed", "TotalCPU", "MaxRSS", "NodeList")
     with suppress(SlurmError):
@@ -127,10 +130,10 @@ def taken(place: str, job: str) -> dict[str, str]:
 
 
 def submit(place: str, folder: Path, job: Job, profile: Profile) -> str:
-    """Returns the number of the single job for ``job``: an existing one, otherwise a new one.
+    """Returns the number of the single Slurm job for the record ``job``: an existing job, otherwise a new job.
 
-    sbatch holds a lock of the folder, even if the process that started it dies; while it is held no other process
-    submits. Raises AwayError, LaterError, RefusedError, OSError.
+    The command sbatch holds a lock of the folder, even if the process that started it dies; while the lock is held, no
+    other process submits. Raises AwayError, LaterError, RefusedError or OSError.
     """
     with open(folder / ".submit.lock", "a") as lock:
         try:
@@ -149,7 +152,9 @@ def submit(place: str, folder: Path, job: Job, profile: Profile) -> str:
 
 
 def _number(output: str) -> str:
-    """Reads the number of a new job from ``sbatch --parsable``. Raises AwayError."""
+    """Reads the number of a new job from the output of ``sbatch --parsable``. Raises AwayError if the output has no
+    number.
+    """
     number = output.strip().partition(";")[0]
     if not number.isdecimal():
         raise AwayError(f"sbatch has not printed the number of the job, but {output.strip()[:60]!r}")
@@ -157,8 +162,9 @@ def _number(output: str) -> str:
 
 
 def submit_array(place: str, records: Sequence[Job], profile: Profile) -> dict[int, str]:
-    """Returns the number of the single job of each task of an array: of existing ones, and of a new array for the
-    others. The lock of the array prevents a second submission. Raises AwayError, RefusedError, OSError.
+    """Returns the number of the single job of each task of a job array. Existing jobs keep their numbers; the other
+    tasks are submitted as a new array. The lock of the job array prevents a second submission. Raises AwayError,
+    RefusedError or OSError.
     """
     with open(Path(records[0].array) / ".submit.lock", "a") as lock:
         try:
@@ -176,17 +182,19 @@ def submit_array(place: str, records: Sequence[Job], profile: Profile) -> dict[i
 
 
 def cancel(place: str, job: str) -> None:
-    """Ends a job, pending or not: TERM, and KILL some time later. Raises AwayError; a job that has ended is no
-    error."""
+    """Ends a job, pending or not: sends TERM, and KILL some time later. Raises AwayError; a job that has already ended
+    is no error.
+    """
     with suppress(RefusedError):
         call(place, ["scancel", job])
 
 
 def notify(place: str, entry: Entry) -> None:
-    """Ends a job that is pending in squeue's list, otherwise sends TERM to its script. Raises AwayError.
+    """Ends a job that is pending in the list of squeue; sends TERM to the script of any other job. Raises AwayError if
+    the controller does not answer.
 
-    scancel is not given the state: with ``--state=PENDING`` and one task of an array it ends all pending tasks of the
-    array.
+    The state is not an argument of scancel: with ``--state=PENDING`` and one task of a job array, scancel ends all
+    pending tasks of the array.
     """
     if entry.state in PENDING:
         cancel(place, entry.job)
@@ -196,7 +204,7 @@ def notify(place: str, entry: Entry) -> None:
 
 
 def kill(place: str, job: str) -> None:
-    """Ends a job immediately. Raises AwayError."""
+    """Ends a job immediately. Raises AwayError if the controller does not answer."""
     with suppress(RefusedError):
         call(place, ["scancel", "--full", "--signal=KILL", job])
     cancel(place, job)
@@ -209,7 +217,7 @@ def release(place: str, job: str) -> None:
 
 
 def requeue(place: str, job: str) -> None:
-    """Puts a running job back into the queue. Raises AwayError, RefusedError."""
+    """Puts a running job back into the queue. Raises AwayError or RefusedError."""
     call(place, ["scontrol", "requeue", job])
 
 
@@ -226,7 +234,7 @@ def held(folder: Path) -> bool:
 
 
 def begun(folder: Path, job: Job) -> str:
-    """Returns the number of the job that has started under this name; empty if none has."""
+    """Returns the number of the job that has started with this name; empty if no job has started."""
     try:
         return layout.claim(folder, job.name).read_text()
     except FileNotFoundError:

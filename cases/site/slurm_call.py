@@ -1,8 +1,8 @@
-"""Calls of Slurm commands with a time limit, and the classes of their failures.
+"""Calls of Slurm commands with a time limit, and the classes of the failures of these commands.
 
-A failed command raises one of three errors: RefusedError, the controller refuses the request; LaterError, the
-controller refuses for now; AwayError, the result is unknown. After an AwayError the job may exist all the same, so the
-job is searched for before it is submitted again.
+A failed command raises one of three errors. RefusedError: the controller refuses the request; LaterError: the
+controller refuses the request for now; AwayError: the result is unknown. After an AwayError the job may exist all the
+same, so that the job is searched for before it is submitted again.
 """
 
 import os
@@ -12,29 +12,30 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 _LONGEST = {"squeue": 30.0, "sbatch": 30.0, "scancel": 15.0, "scontrol": 15.0, "sacct": 10.0}
-"""Time limit of a command, s: one to three times Slurm's own MessageTimeout (chosen value)."""
+"""Time limit of a Slurm command, s: one to three times Slurm's own MessageTimeout (chosen value)."""
 _RESTS = 20.0
-"""Time, s, during which a command that exceeded its limit is not repeated, so that it does not delay others (chosen
-value)."""
+"""Time, s, for which a Slurm command that exceeded its time limit is not repeated, so that it does not delay other
+commands (chosen value)."""
 _REFUSALS = (
     "invalid", "not permitted", "unspecified", "violates", "not available", "unrecognized", "denied", "more processors",
     "not supported", "exceeds", "disabled", "limit", "unknown", "ambiguous", "too ",
 )  # fmt: skip
-"""Words of final refusals in the last line of sbatch. All other failures (connection, socket, munge) may be
-temporary."""
+"""Words of final refusals in the last line of the output of sbatch. All other failures (connection, socket, munge) may
+be temporary."""
 _PASSING = (
     "submit limit", "submitjob", "not available now", "inactive", "is down", "drain", "temporarily", "try again",
     "standby", "maintenance", "i/o error writing", "maxjobs", "grpjobs", "perusers", "peruser", "peraccount",
 )  # fmt: skip
-"""Words of temporary refusals, anywhere in the output of sbatch: limits by other jobs in the queue, a partition that
-is not up (slurm_errno.c; reasons of squeue(1))."""
+"""Words of temporary refusals, anywhere in the output of sbatch. The reasons are limits by other jobs in the queue, or
+a partition that is not up (slurm_errno.c; reasons of squeue(1))."""
 _LASTING = ("perjob", "wall", "minc", "mintres", "pernode", "perminute")
-"""Words in the output of sbatch for limits that this job always exceeds."""
+"""Words in the output of sbatch for limits that a job always exceeds."""
 _PASSED_ON = (
     "PATH", "HOME", "USER", "LOGNAME", "SHELL", "LANG", "SLURM_CONF", "CONOID_CACHE_DIR", "MODULEPATH", "MODULESHOME",
     "LD_LIBRARY_PATH", "BASH_ENV", "MPI4PY_LIBMPI", "MPI4PY_MPIABI", "PYTHONPATH",
 )  # fmt: skip
-"""Variables that a job inherits from the process that submits it, without tokens, databases and defaults of sbatch."""
+"""Environment variables that a job inherits from the process that submits it; tokens, databases and defaults of sbatch
+are left out."""
 
 
 class SlurmError(Exception):
@@ -42,8 +43,9 @@ class SlurmError(Exception):
 
 
 class AwayError(SlurmError):
-    """Error: the controller was not reached, or not in time, and the result is unknown. ``command``: the command
-    without a response."""
+    """Error: the controller was not reached, or not in time, so that the result is unknown. ``command``: the command
+    without a response.
+    """
 
     command = ""
 
@@ -58,8 +60,8 @@ class RefusedError(SlurmError):
 
 
 def call(place: str, words: Sequence[str], keep: int | None = None) -> str:
-    """Returns the output of a Slurm command. ``place``: its folder, or empty; ``keep``: a file that it keeps open.
-    Raises AwayError, LaterError or RefusedError with its message.
+    """Returns the output of a Slurm command. ``place``: folder of the command, or empty; ``keep``: a file that the
+    command keeps open. Raises AwayError, LaterError or RefusedError with the message of the command.
     """
     path, longest = str(Path(place) / words[0]) if place else words[0], _LONGEST[words[0]]
     if _hung.get(path, 0.0) > time.monotonic():
@@ -81,18 +83,20 @@ def call(place: str, words: Sequence[str], keep: int | None = None) -> str:
 
 
 _hung: dict[str, float] = {}
-"""Monotonic time until which a command is not repeated."""
+"""Time of the monotonic clock until which a command is not repeated."""
 
 
 def away(command: str, why: str) -> AwayError:
-    """Returns the error of a command without a response."""
+    """Returns the error for a command without a response."""
     error = AwayError(why)
     error.command = command
     return error
 
 
 def _failure(command: str, lines: Sequence[str]) -> SlurmError:
-    """Returns the error of a failed command. sbatch names the limit in a line of its own, before the last one."""
+    """Returns the error for a failed command. The command sbatch prints the exceeded limit in a separate line before
+    the last line.
+    """
     text, last = " ".join(lines).lower(), lines[-1][:300]
     named = lines[-2].rpartition(": ")[2] if len(lines) > 1 else ""
     message = f"{last} ({named[:100]})" if named and " " not in named else last
@@ -102,6 +106,6 @@ def _failure(command: str, lines: Sequence[str]) -> SlurmError:
 
 
 def environment(base: Mapping[str, str]) -> dict[str, str]:
-    """Environment of a command: variables that a job may inherit, and times as Unix time in s."""
+    """Environment of a Slurm command: variables that a job may inherit, and the format of times as Unix time in s."""
     kept = {name: value for name, value in base.items() if name in _PASSED_ON or name.startswith("LC_")}
     return {**kept, "SLURM_TIME_FORMAT": "%s"}

@@ -1,5 +1,6 @@
-"""Warnings about bodies that move at the start and have no contact before the end, for example after an error of a
-length unit."""
+"""Warnings about bodies that move at the start and touch nothing before the end, for example after an error of a length
+unit.
+"""
 
 import math
 from collections.abc import Iterator
@@ -16,8 +17,8 @@ Bounds = tuple[Vector, Vector]
 def strangers(case: Case) -> Iterator[Problem]:
     """Yields a warning for each moving part that reaches no other part before ``run.end_time``.
 
-    No warning for a case with mesh files, with bodies that turn or stretch, or with other boundaries than walls and
-    planes of symmetry; nor for a part that can be hit by other parts which collide before the end.
+    A case gets no warning if it has mesh files, bodies that turn or stretch, or boundaries other than walls and planes
+    of symmetry. A part gets no warning if other parts, which collide before the end, can hit it.
     """
     walls = [boundary for boundary in case.boundaries if isinstance(boundary, Wall) and boundary.plain]
     others = [boundary for boundary in case.boundaries if not isinstance(boundary, Symmetry) and boundary not in walls]
@@ -42,8 +43,8 @@ def strangers(case: Case) -> Iterator[Problem]:
 
 
 def _way(case: Case, i: int, times: list[float]) -> float:
-    """Returns the largest distance of part ``i`` at the end, m, after collisions at ``times``: it can leave with its
-    own speed plus twice the speed of the collision. Minus infinity without a collision.
+    """Returns the largest distance of part ``i`` at the end, m, after collisions at ``times``. After a collision a part
+    can move with its own speed plus twice the speed of the collision; without a collision the result is minus infinity.
     """
     own, end = case.parts[i].velocity, case.run.end_time
     speeds = [math.dist(own, each.velocity) for each, when in zip(case.parts, times, strict=True) if when < end]
@@ -52,7 +53,7 @@ def _way(case: Case, i: int, times: list[float]) -> float:
 
 
 def _gap(box: Bounds, other: Bounds) -> float:
-    """Returns the distance of two boxes, m."""
+    """Returns the distance between two boxes, m."""
     return math.hypot(*(max(a - high, low - b, 0.0) for low, high, a, b in zip(*box, *other, strict=True)))
 
 
@@ -63,7 +64,7 @@ def _box(part: Part) -> Bounds | None:
 
 
 def _meeting(box: Bounds, other: Bounds, part: Part, met: Part) -> float:
-    """Returns the time at which the bounding boxes of two moving bodies touch, s; infinity if never."""
+    """Returns the time at which the bounding boxes of two moving bodies touch, s; infinity if they never touch."""
     begin, end = 0.0, math.inf
     for low, high, a, b, v, w in zip(*box, *other, part.velocity, met.velocity, strict=True):
         speed = v - w
@@ -76,7 +77,7 @@ def _meeting(box: Bounds, other: Bounds, part: Part, met: Part) -> float:
 
 
 def _arrival(part: Part, wall: Wall) -> float:
-    """Returns the time at which a moving body reaches a wall, s; infinity if never."""
+    """Returns the time at which a moving body reaches a wall, s; infinity if it never reaches the wall."""
     if wall.parts and part.name not in wall.parts:
         return math.inf
     way = wall.normal or wall.point

@@ -7,8 +7,9 @@ s1 + 3 s3 > 0. In the plane wave of an impact there is no lateral strain, so tha
 
     s1 = 8 T (1 + k) / (1 - k)^2
 
-20 T for nu = 0.22; alumina of 300 MPa and nu = 0.22 has 6.0 GPa; its measured Hugoniot elastic limit is 6.6 GPa
-(alumina_995_jh2 in materials.toml). In a bar under uniaxial stress this limit is 8 T.
+The stress s1 is 20 T for nu = 0.22. Alumina with T = 300 MPa and nu = 0.22 has s1 = 6.0 GPa; its measured Hugoniot
+elastic limit is 6.6 GPa (alumina_995_jh2 in materials.toml). In a bar under uniaxial stress the limit of Griffith's
+criterion is 8 T.
 """
 
 import itertools
@@ -25,7 +26,7 @@ from ..reading.library import library, material
 from ..reading.problems import Problem, problem
 
 CRUSHING = ("mohr_coulomb", "johnson_holmquist")
-"""Laws of strength with which brittle material also fails in compression."""
+"""Laws of strength with which brittle material can also fail in compression."""
 
 
 def bears_all(made: Material) -> bool:
@@ -34,7 +35,7 @@ def bears_all(made: Material) -> bool:
 
 
 def griffith(made: Material) -> float:
-    """Returns the stress of a plane wave, Pa, from which compression breaks a material with ``brittle``."""
+    """Returns the stress of a plane wave, Pa, from which on compression breaks a material with ``brittle``."""
     assert made.brittle is not None
     k = made.elastic.poisson / (1.0 - made.elastic.poisson)
     return 8.0 * made.brittle.strength * (1.0 + k) / (1.0 - k) ** 2
@@ -56,15 +57,16 @@ def impact_stresses(case: Case) -> list[float]:
 
 
 def _impedance(made: Material) -> float:
-    """Impedance of plane waves, kg/m^2/s: density times wave speed; with the bulk wave speed where the material
-    yields."""
+    """Impedance of plane waves, kg/m^2/s: density times wave speed; for a material that yields, the wave speed is the
+    bulk wave speed.
+    """
     flows = made.strength is not None and made.brittle is None
     return made.density * (math.sqrt(made.bulk / made.density) if flows else wave_speed(made))
 
 
 def crushed(case: Case) -> Iterator[Problem]:
-    """Yields a warning for each material that fails in tension only and can be compressed beyond Griffith's
-    criterion, at the part with the largest compression.
+    """Yields a warning for each material that fails in tension only and can be compressed beyond Griffith's criterion.
+    The warning names the part with the largest compression.
     """
     most: dict[str, tuple[float, int]] = {}
     for i, (part, stress) in enumerate(zip(case.parts, impact_stresses(case), strict=True)):
@@ -87,7 +89,7 @@ def crushed(case: Case) -> Iterator[Problem]:
 
 
 def borne(found: Sequence[Compressed]) -> list[str]:
-    """Yields a warning for each part that a run has compressed beyond the criterion."""
+    """Yields a warning for each part that a run has compressed beyond Griffith's criterion."""
     return [
         f"{each.part} was compressed to {si(each.most, 'Pa')}, with {si(each.least, 'Pa')} across it, "
         f"{each.times:.2g} times the limit for its tensile strength (Griffith 1924), in tet {each.tet} at "
@@ -103,7 +105,7 @@ def _cure() -> str:
 
 
 def _alike(name: str) -> list[str]:
-    """Returns the materials of the library with a similar name that fail in compression."""
+    """Returns the materials of the library that have a similar name and fail in compression."""
     return sorted(
         known for known, made in library().items()
         if known.startswith(name.partition("_")[0]) and made.strength is not None and made.strength.model in CRUSHING

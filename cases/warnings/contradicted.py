@@ -8,10 +8,10 @@ from ..reading.problems import Problem, problem
 
 
 def contradicted(case: Case) -> Iterator[Problem]:
-    """Yields a warning for each part whose ``velocity`` has a component, other than 0, that a boundary prescribes for
-    the whole part with another value at the start.
+    """Yields a warning for each part whose ``velocity`` has a component, other than 0, that a boundary replaces for the
+    whole part at the start.
 
-    No warning for boundaries of a box or a set, which hold a moving part at some of its nodes.
+    A boundary with a box or a set causes no warning, because such a boundary may hold some nodes of a moving part.
     """
     for number, drive in case.boundaries_of(Prescribed):
         if drive.low is not None or drive.on is not None:

@@ -1,4 +1,4 @@
-"""The pressure form ``split`` damps elastic motion: which parts of a case it damps, and the words for it."""
+"""The pressure form ``split`` damps elastic motion: the parts of a case that it damps, and the words of the warning."""
 
 from collections.abc import Iterator
 
@@ -8,12 +8,14 @@ from ..reading.library import material
 from ..reading.problems import Problem, problem
 
 WORDS = "damps elastic motion (a free ball of 6,400 tets loses 15 % of its energy in ten periods)"
-"""Measured in tests/verification/test_pressure_modes.py; explanation: docs/theory/elements.md, Pressure forms."""
+"""Words of the warning; measured in tests/verification/test_pressure_modes.py, explained in docs/theory/elements.md,
+Pressure forms."""
 
 
 def damped(case: Case) -> Iterator[Problem]:
-    """Yields a warning where a part with the form ``split`` may stay elastic: without strength, or without an impact
-    that makes it yield."""
+    """Yields a warning if a part with the pressure form ``split`` may stay elastic: it has no strength, or no impact
+    makes it yield.
+    """
     if case.numerics.pressure != "split":
         return
     parts = zip(case.parts, impact_speeds(case), strict=True)

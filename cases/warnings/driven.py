@@ -15,34 +15,33 @@ from ..shapes.loaded import near
 from ..shapes.placed import Placed
 
 _TIMES = 200
-"""Number of times up to the end that are checked. The value was chosen because the path of a body then takes a
-millisecond."""
+"""Number of times up to the end at which paths are checked; the path of a body then takes a millisecond (reason of the
+chosen value)."""
 _MOST = 200
-"""Largest number of driven bodies, and of pairs of driven bodies, that are checked. With the chosen values the check
-takes a second at most."""
+"""Largest number of driven bodies, and largest number of pairs of driven bodies, that are checked: a second at most
+(chosen values)."""
 _TOUCH = 1e-9
-"""Depth of contact without a warning, over the size of a body. The value is far above rounding and far below any
-gap."""
+"""Depth of contact without a warning, divided by the size of a body. The depth is far above rounding errors and far
+below any gap (chosen value)."""
 
 
 class Driven(NamedTuple):
     """A body that a boundary drives."""
 
     number: int
-    """Number of the boundary."""
+    """Number of the boundary that drives the body."""
     drive: Prescribed
     part: Part
     mesh: Generated
     ways: list[Vector]
-    """Displacement of the driven nodes of the body at each time, m; components without drive continue at the initial
-    velocity."""
+    """Displacement of the driven nodes of the body at each time, m; components that are not driven continue at the
+    initial velocity."""
 
 
 def passing(case: Case) -> Iterator[Problem]:
-    """Yields a warning for each boundary that drives nodes behind a wall, or a body into one that another boundary
-    drives.
+    """Yields a warning for each boundary that drives nodes behind a wall, or drives a body into another driven body.
 
-    No warning for rotations, for mesh files, and for bodies that are turned, rotate or stretch.
+    Rotations, mesh files, and bodies that are turned, rotate or stretch cause no warning.
     """
     driven = list(islice(_driven(case), _MOST))
     reported: set[int] = set()
@@ -63,7 +62,9 @@ def _through_walls(case: Case, driven: list[Driven]) -> Iterator[tuple[int, str]
 
 
 def _behind(body: Driven, point: Vector, way: Vector) -> float:
-    """Returns the largest depth of driven nodes behind a wall, m; minus infinity without such nodes."""
+    """Returns the largest depth of driven nodes behind a wall, m; minus infinity if no driven node is behind the
+    wall.
+    """
     length, drive = math.hypot(*way), body.drive
     normal = way[0] / length, way[1] / length, way[2] / length
     low, high = _bounds(body.mesh)
@@ -79,7 +80,7 @@ def _behind(body: Driven, point: Vector, way: Vector) -> float:
 
 
 def _through_bodies(case: Case, driven: list[Driven]) -> Iterator[tuple[int, str]]:
-    """Yields bodies that collide along an axis on which each is driven."""
+    """Yields pairs of bodies that collide along an axis on which each body is driven."""
     if case.contact is None:
         return
     meeting = [each for each in driven if not case.contact.parts or each.part.name in case.contact.parts]

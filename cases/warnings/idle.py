@@ -1,4 +1,4 @@
-"""Boundaries without effect, found before there is a mesh."""
+"""Boundaries without effect, which are found before there is a mesh."""
 
 from collections.abc import Iterator
 
@@ -13,7 +13,8 @@ from ..shapes.region import Region
 
 def idle(case: Case, number: int) -> Iterator[Problem]:
     """Yields an error for a boundary whose box contains no node, or no face, of structured blocks that are not
-    turned."""
+    turned.
+    """
     spec = case.boundaries[number]
     assert isinstance(spec, Prescribed | Traction)
     if all(_empty(part, spec) for part in parts_of(case, spec)):
@@ -23,7 +24,7 @@ def idle(case: Case, number: int) -> Iterator[Problem]:
 
 
 def _empty(part: Part, spec: Traction | Prescribed) -> bool:
-    """Whether a boundary certainly has no effect on a part in its box."""
+    """Whether a boundary certainly has no effect on a part in the box of the boundary."""
     if isinstance(part.mesh, Measured):
         return False
     body, region = Placed(part.mesh, part.turn), Region.of(spec)

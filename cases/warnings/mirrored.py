@@ -12,10 +12,10 @@ from ..shapes.region import GENERATED
 
 
 def mirrored(case: Case) -> Iterator[Problem]:
-    """Yields a warning for gravity with a component across a plane of symmetry, and for a velocity or a spin that
-    moves nodes on the plane across it.
+    """Yields a warning for gravity with a component normal to a plane of symmetry, and for a velocity or a spin that
+    moves nodes off the plane.
 
-    Motion of the parts is checked for generated bodies that are not turned and whose bounds lie on the plane.
+    Motion of the parts is checked only for generated bodies that are not turned and whose bounds lie on the plane.
     """
     for number, plane in case.boundaries_of(Symmetry):
         d = index(plane.axis)
@@ -33,7 +33,7 @@ def _share(plane: Symmetry, gravity: Gravity) -> bool:
 
 
 def _ends_on(part: Part, plane: Symmetry, d: int) -> bool:
-    """Whether the plane is a side of the bounds of a part."""
+    """Whether the plane of symmetry is a side of the bounds of a part."""
     if isinstance(part.mesh, Measured | Loose) or part.turn is not None:
         return False
     low, high = (corner[d] for corner in Placed(part.mesh).bounds())

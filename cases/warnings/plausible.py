@@ -1,5 +1,5 @@
-"""Warnings about a valid case: numbers without a unit, and values outside the usual range, as after an error of a
-unit.
+"""Warnings about a valid case: numbers without a unit, and values outside of the usual range, which may be caused by a
+wrong unit.
 """
 
 import math
@@ -29,11 +29,11 @@ from .stiff import stiff
 from .unused import unused
 
 DAY = 86_400.0
-"""Core time from which a warning is given: a day, in core seconds (chosen value)."""
+"""Core time above which a warning is given: a day, in core seconds (chosen value)."""
 FEW_STEPS = 10
-"""Smallest number of time steps without a warning. The value was chosen because a wave crosses a tet in about two
-steps, and a run that ends before a wave has crossed five tets has no result. The usual cause is a wrong unit of a
-mesh file."""
+"""Smallest number of time steps without a warning (chosen value). A wave crosses a tet in about two steps; a run that
+ends before a wave has crossed five tets has no result. The usual cause of too few time steps is a wrong unit of a mesh
+file."""
 LIKELY: dict[str, tuple[float, float, str]] = {
     "density": (10.0, 23_000.0, "kg/m^3: foams have 10, osmium has 22,590"),
     "wave speed": (20.0, 20_000.0, "m/s: soft rubber has 30, diamond has 18,000"),
@@ -47,19 +47,19 @@ LIKELY: dict[str, tuple[float, float, str]] = {
 }
 """Usual ranges of quantities of solids. The ends of the ranges are near the values of known materials (handbooks)."""
 SHOCKING = 0.1
-"""Share of the wave speed from which an impact on a material with linear pressure gives a warning: at this speed of
-an impact between two bodies of the same material, u = v / 2, the pressure is some 7 % too low, and 13 % where the
+"""Fraction of the wave speed; an impact at a higher speed on a material with linear pressure gives a warning. At this
+speed of an impact between two bodies of the same material, u = v / 2, the pressure is some 7 % too low, and 13 % if the
 other body does not yield. A shock has p = density (c0 + s u) u, with s near 1.5 for metals (1.2 to 1.9 in
 materials.toml); the linear pressure -K ln J gives density (c0 + u / 4) u."""
 STIFFENING, LINEAR_STIFFENING = 1.5, 0.25
-"""Slope of the shock speed over the particle speed u: s of metals, and the value of the linear pressure."""
+"""Slope of the shock speed over the particle speed u: the slope s of metals, and the slope of the linear pressure."""
 _UNLIKE = 1000.0
-"""Largest ratio of the sizes of two parts without a warning. The value was chosen to find a length in millimetres
-that was read as metres."""
+"""Largest ratio of the sizes of two parts without a warning; finds a length in millimetres that was read as metres
+(reason of the chosen value)."""
 
 
 def doubts(data: Mapping[str, Any], case: Case, expected: Estimate) -> list[Problem]:
-    """Yields every warning: ``data`` is the case as it was written, ``expected`` its estimate."""
+    """Yields every warning: ``data`` is the case as it was written, ``expected`` is the estimate of the case."""
     return [*bare_numbers(data), *oddities(case, expected)]
 
 
@@ -89,7 +89,7 @@ def oddities(case: Case, expected: Estimate) -> list[Problem]:
 
 
 def bare_numbers(data: Mapping[str, Any]) -> list[Problem]:
-    """Yields a warning for each key with numbers other than 0 without a unit, with the unit that was assumed."""
+    """Yields a warning for each key with numbers other than 0 that have no unit; the warning gives the assumed unit."""
     whole = shipped_schema()
     return list(_bare((), data, whole, whole, data))
 
@@ -129,7 +129,7 @@ def _taken(location: Location, value: Any, schema: Schema, data: Mapping[str, An
 
 
 def _bare_number(value: Any) -> bool:
-    """Whether a value is a number without a unit, other than 0, also as text."""
+    """Whether a value is a number other than 0 without a unit; the number may be a text."""
     try:
         return not isinstance(value, bool) and float(value) != 0.0
     except (TypeError, ValueError):
@@ -211,8 +211,9 @@ def _bodies(case: Case, expected: Estimate) -> Iterator[Problem]:
 
 
 def _shocks(case: Case) -> Iterator[Problem]:
-    """Yields a warning for each material that is hit too fast for its linear pressure, at the part that is hit
-    fastest."""
+    """Yields a warning for each material that is hit too fast for its linear pressure; the warning names the part that
+    is hit fastest.
+    """
     met: dict[str, tuple[float, int]] = {}
     for i, (part, speed) in enumerate(zip(case.parts, impact_speeds(case), strict=True)):
         fastest, _ = met.get(part.material, (0.0, i))
@@ -231,7 +232,7 @@ def _shocks(case: Case) -> Iterator[Problem]:
 
 
 def linear_error(c0: float, u: float) -> float:
-    """Returns the share by which the linear pressure is below that of a shock with the particle speed ``u``, m/s;
-    ``c0`` is the bulk sound speed, m/s.
+    """Returns the fraction by which the linear pressure is below the pressure of a shock with the particle speed ``u``,
+    m/s. ``c0``: bulk sound speed, m/s.
     """
     return (STIFFENING - LINEAR_STIFFENING) * u / (c0 + STIFFENING * u)

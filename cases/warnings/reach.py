@@ -1,5 +1,6 @@
-"""Warnings about planes of symmetry inside a body and about probe boxes smaller than a tet: both are valid and
-rarely intended."""
+"""Warnings about planes of symmetry inside of a body and about probe boxes smaller than a tet, which are valid but
+rarely intended.
+"""
 
 import math
 from collections.abc import Iterator
@@ -13,16 +14,16 @@ from ..shapes.geometry import index, volume
 from ..shapes.placed import Placed
 
 _TOUCH = 1e-9
-"""Largest depth of a plane that counts as on the surface, over the size of a body. The value is far above rounding
-and far below any tet."""
+"""Largest depth of a plane that counts as on the surface, divided by the size of a body. The depth is far above
+rounding errors and far below any tet (chosen value)."""
 _FEWEST = 1.0
-"""Smallest number of tets that the box of a probe should contain, by its volume. The value was chosen because a
-smaller box may contain no tet of some meshes."""
+"""Smallest number of tets that the box of a probe should contain, by its volume; a smaller box may contain no tet of
+some meshes (reason of the chosen value)."""
 
 
 def cut_bodies(case: Case) -> Iterator[Problem]:
-    """Yields a warning for each plane of symmetry that passes through a body with both sides modelled; none for
-    turned bodies, of which only a bounding box is known.
+    """Yields a warning for each plane of symmetry that passes through a body with both sides modelled. Turned bodies
+    cause no warning, because only their bounding box is known.
     """
     for number, plane in case.boundaries_of(Symmetry):
         d = index(plane.axis)
@@ -40,7 +41,9 @@ def cut_bodies(case: Case) -> Iterator[Problem]:
 
 
 def scant_probes(case: Case, expected: Estimate) -> Iterator[Problem]:
-    """Yields a warning for each probe whose box is smaller than a tet; none for mesh files and graded meshes."""
+    """Yields a warning for each probe whose box is smaller than a tet; mesh files and graded meshes cause no
+    warning.
+    """
     sizes = {part.name: (part, size) for part, size in zip(case.parts, expected.parts, strict=True)}
     for i, probe in enumerate(case.probes):
         if not probe.part:

@@ -1,4 +1,6 @@
-"""Warnings about parts that could be rigid: their deformation absorbs a small share of the energy of an impact."""
+"""Warnings about parts that could be rigid, because their deformation absorbs a small part of the energy of an
+impact.
+"""
 
 import math
 from collections.abc import Iterator
@@ -11,13 +13,14 @@ from ..reading.problems import Problem, problem
 from .compression import impact_stresses
 
 STIFF = 20.0
-"""Ratio of the impedance of a part to that of all others from which a note is given (chosen value). Two bodies
+"""Ratio of the impedance of a part to that of all other parts, above which a note is given (chosen value). Two bodies
 absorb the energy of an impact in inverse proportion to their impedances; at this ratio the stiffer body absorbs 5 %."""
 
 
 def stiff(case: Case, expected: Estimate) -> Iterator[Problem]:
-    """Yields a warning for each part that could be rigid, with the saving; none for parts that yield, break or
-    erode."""
+    """Yields a warning for each part that could be rigid, with the saving; parts that yield, break or erode cause no
+    warning.
+    """
     if case.contact is None or len(case.parts) < 2:
         return
     made = [material(case, part.material) for part in case.parts]
@@ -33,7 +36,7 @@ def stiff(case: Case, expected: Estimate) -> Iterator[Problem]:
 
 
 def _saves(i: int, expected: Estimate) -> str:
-    """Returns the words for the saving of a rigid part."""
+    """Returns the words for the time that a rigid part saves."""
     mine, others = expected.parts[i], [part.dt for j, part in enumerate(expected.parts) if j != i]
     tets = f"{100.0 * mine.elements / expected.elements:.0f} %" if mine.elements and expected.elements else "a share"
     gain = f"would save {tets} of the tets"

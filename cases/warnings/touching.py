@@ -16,21 +16,19 @@ from ..shapes.placed import Placed
 from ..shapes.sheets import sheets
 
 NEAR = 1e-6
-"""Largest distance of coincident faces, over the size of a body. The value was chosen far above rounding and below
-any gap."""
+"""Largest distance of coincident faces, divided by the size of a body: far above rounding errors and below any gap
+(chosen value)."""
 _FINEST = 40
-"""Largest number of patches along a side of a surface. The value was chosen because so many patches take a tenth of
-a second for a body."""
+"""Largest number of patches along a side of a surface: a tenth of a second for a body (chosen value)."""
 _PAIRS = 32
-"""Largest number of pairs of bodies that are checked. The value was chosen because the check takes a second or two
-at most."""
+"""Largest number of pairs of bodies that are checked: one or two seconds at most (chosen value)."""
 _LEAST = 1e-3
-"""Smallest touching area over the surface of the smaller body (chosen value). An area below this value is an edge or a
-corner, found by rounding."""
+"""Smallest touching area divided by the surface of the smaller body (chosen value). A smaller touching area is an edge
+or a corner, found because of rounding."""
 
 
 class Touch(msgspec.Struct, kw_only=True, frozen=True):
-    """Two parts, by index, that touch over about ``area``, m^2."""
+    """Two parts, given by index, that touch over about ``area``, m^2."""
 
     one: int
     other: int
@@ -38,7 +36,7 @@ class Touch(msgspec.Struct, kw_only=True, frozen=True):
 
 
 def touching(case: Case) -> list[Touch]:
-    """Returns the pairs of generated bodies that touch and have no bond; without loose tets and mesh files."""
+    """Returns the pairs of generated bodies that touch and have no bond; single tets and mesh files are left out."""
     bodies = [
         (i, Placed(part.mesh, part.turn))
         for i, part in enumerate(case.parts)
@@ -56,7 +54,7 @@ def bonded(case: Case, one: int, other: int) -> bool:
 
 
 def apart(case: Case, touches: Iterable[Touch]) -> Iterator[Problem]:
-    """Yields a warning for two parts that touch without contact between them: no force acts between them."""
+    """Yields a warning for two parts that touch but have no contact: no force acts between the two parts."""
     for touch in touches:
         names = [case.parts[i].name for i in (touch.one, touch.other)]
         if case.contact is not None and (not case.contact.parts or set(names) <= set(case.contact.parts)):
@@ -84,8 +82,9 @@ def _reach(one: Placed, other: Placed) -> bool:
 
 
 def _common(one: Placed, other: Placed) -> float:
-    """Returns the area, m^2, of the first body's surface that lies on that of the second, summed over patches as
-    large as elements."""
+    """Returns the area, m^2, of the first body's surface that lies on the surface of the second body, summed over
+    patches as large as elements.
+    """
     margin = NEAR * min(size(one), size(other))
     low, high = other.bounds()
     area = whole = 0.0
@@ -105,7 +104,9 @@ def _common(one: Placed, other: Placed) -> float:
 
 
 def _ends(one: Placed, other: Placed, point: Vector, normal: Vector, step: float) -> bool:
-    """Whether the second body begins at the surface of the first: ``step`` along the normal from a point."""
+    """Whether the second body begins at the surface of the first body; ``step``: small distance along the normal from a
+    point.
+    """
     for sign in (-1.0, 1.0):
         own = _moved(point, normal, -sign * step)
         far = _moved(point, normal, sign * step)

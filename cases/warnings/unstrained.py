@@ -8,11 +8,11 @@ from ..model.rigid import Rigid
 from ..model.schema import Case
 
 STRAIN = 1e-3
-"""Largest strain of a part that could be rigid: half of the yield strain of a hard steel (chosen value). At this
-strain the surface moves by a thousandth of the size of the part, which a rigid part would not show."""
+"""Largest strain of a part that could be rigid: half of the yield strain of a hard steel (chosen value). At this strain
+the surface of the part moves by a thousandth of the size of the part, a motion that a rigid part would not have."""
 SHARE = 0.05
-"""Largest share of such a part in the energies of all parts. The value was chosen equal to the share of the stiffer
-of two bodies with an impedance ratio of stiff.STIFF."""
+"""Largest fraction of the energies of all parts that a part which could be rigid may have. The value equals the
+fraction of the stiffer of two bodies with an impedance ratio of stiff.STIFF (chosen value)."""
 
 
 @dataclass(frozen=True)
@@ -21,9 +21,10 @@ class Strained:
 
     elements: int
     strain: float
-    """sqrt(2 U / (E V)) of the largest energy U in its tets: upper bound of the root mean square of the strain."""
+    """Upper bound of the root mean square of the strain: sqrt(2 U / (E V)) with the largest energy U in the tets of the
+    part."""
     share: float
-    """Share of the energy of the part in the sum over all parts."""
+    """Energy of the part divided by the sum of the energies of all parts."""
     plastic: bool
     """Whether a tet of the part has yielded or was deleted."""
 
@@ -46,7 +47,7 @@ def could_be_rigid(case: Case, found: Sequence[Strained], limiter: str) -> Itera
 
 
 def _allowed(case: Case, i: int) -> bool:
-    """Whether the case would be valid with part ``i`` rigid."""
+    """Whether the case would be valid if part ``i`` were rigid."""
     stiff = case.parts[i].model_copy(update={"rigid": Rigid(), "erosion": None})
     parts = (*case.parts[:i], stiff, *case.parts[i + 1 :])
     return not check(case.model_copy(update={"parts": parts}))

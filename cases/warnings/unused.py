@@ -1,4 +1,4 @@
-"""Warnings about keys without effect, because another key selects something else."""
+"""Warnings about keys without effect, because another key selects another variant."""
 
 from collections.abc import Iterator
 
@@ -11,11 +11,11 @@ _NEEDS = (
     ("balance", "alpha", "policy", "outside"), ("balance", "every", "policy", "every"),
     ("mesh", "split", "generator", "structured"), ("fracture", "resolution", "resolve", "strength"),
 )  # fmt: skip
-"""Table, key, and the key of the same table with the value without which the first key has no effect."""
+"""Table, key, and another key of the same table with the value that gives the first key an effect."""
 
 
 def unused(case: Case) -> Iterator[Problem]:
-    """Yields a warning for each key that has another value than its default and no effect."""
+    """Yields a warning for each key that has no effect and a value other than its default."""
     yield from _idle(case.balance, ("balance",))
     for i, part in enumerate(case.parts):
         yield from _idle(part.mesh, ("parts", i, "mesh"))

@@ -11,8 +11,9 @@ from .touching import Touch, apart
 
 
 def warned(case: Case, expected: Estimate, survey: Survey, touches: Iterable[Touch]) -> list[Problem]:
-    """Returns every warning that does not depend on how the case is written (``plausible.bare_numbers``):
-    ``expected``: its estimate, ``survey``: that of its mesh files, ``touches``: the parts whose surfaces coincide.
+    """Returns every warning that does not depend on how the case is written (``plausible.bare_numbers`` gives the
+    others). ``expected``: estimate of the case; ``survey``: survey of its mesh files; ``touches``: pairs of parts whose
+    surfaces coincide.
     """
     return [
         *_notes(case, survey),
@@ -23,7 +24,7 @@ def warned(case: Case, expected: Estimate, survey: Survey, touches: Iterable[Tou
 
 
 def _notes(case: Case, survey: Survey) -> list[Problem]:
-    """Yields the notes on contents of the files that are not in the meshes."""
+    """Yields the notes on contents of the mesh files that are not in the meshes."""
     return [
         problem(("parts", each.part, "mesh", "path"), getattr(case.parts[each.part].mesh, "path", ...), note)
         for each in survey.parts

@@ -83,7 +83,7 @@ def test_every_link_of_the_page_has_its_heading() -> None:
         ('#### `boundaries[]` with `kind = "rotation"`', "| `spin` | table [`parts[].spin`](#partsspin) | required |"),
         (
             "### `bond[]`",
-            "| a stress, Pa, above 0 | – | Tensile strength: normal traction at which the interface breaks.",
+            "| a stress, Pa, above 0 | – | Tensile strength: the interface breaks at this normal traction.",
         ),
         ("### `parts[].mesh`", "| all except two_tets, shards"),
         ("### `parts[].mesh.of[]`", "| `box` | `low`, `high` | [`parts[].mesh`](#partsmesh) |"),
