@@ -1,9 +1,10 @@
-"""Boundary conditions on velocities between kick and move: planes of symmetry are in this file, walls in walls.py,
-loads and prescribed motion in drivers.py.
+"""Boundary conditions on velocities, applied between the kick and the move. Symmetry planes are in this file, walls in
+walls.py, loads and prescribed motion in drivers.py.
 
-Each boundary books the work of its impulses on the body. The work of an impulse at time n is booked in two halves, with
-the velocity before and with the velocity after the impulse: the kinetic energy of the ledger at n, 1/2 m v(n-1/2) .
-v(n+1/2), contains the first half only; ``note`` books the second half before the next kick.
+Each boundary has an account of the work of its impulses on the body. The work of an impulse at time n is added in two
+halves: one with the velocity before the impulse, one with the velocity after it. The kinetic energy of the energy
+balance at n, 1/2 m v(n-1/2) . v(n+1/2), contains the first half only. The method ``note`` adds the second half before
+the next kick.
 """
 
 from abc import ABC, abstractmethod
@@ -24,35 +25,36 @@ from ..parallel.team import Stage, team
 from . import impulses
 
 FREE, PRESCRIBED, MIRRORED = range(3)
-"""Effect of a boundary on a velocity component: free (changed by forces and impulses only); prescribed; zero,
-because the node lies on a plane of symmetry across that axis."""
+"""Effect of a boundary on a velocity component. FREE: only forces and impulses change the component; PRESCRIBED: the
+component has a given value; MIRRORED: the component is zero, because the node lies on a symmetry plane across this
+axis."""
 KEPT = ("contact_loss", "external_work", "_impulse")
-"""Names of the columns by node that every boundary stores in a checkpoint."""
+"""Names of the columns, by node, that every boundary stores in a checkpoint."""
 
 
 class Boundary(ABC):
-    """Interface of a boundary to the time step."""
+    """Interface between a boundary and the time step."""
 
     after_contact = False
     """True if the boundary acts after contact, because contact must not change the velocities that the boundary has
     corrected."""
     mirrors = False
-    """True if all nodes of the boundary lie on one plane in which the body is mirrored; exposed faces in that plane
-    are not surface."""
+    """True if all nodes of the boundary lie on one plane in which the body is mirrored. Exposed faces in this plane do
+    not belong to the surface."""
     on_faces = False
     """True if the boundary acts on faces of tets, not on nodes."""
 
     def __init__(self, nodes: Indices) -> None:
         self.nodes = nodes
         self.contact_loss = np.zeros(len(nodes))
-        """(n,) energy lost by impact on the boundary, J."""
+        """(n,) energy lost by impact of each node on the boundary, J."""
         self.external_work = np.zeros(len(nodes))
-        """(n,) work done on the body from outside, J."""
+        """(n,) external work done on each node, J."""
         self.given: Floats | None = None
-        """(n, 3 walls) sum of the impulses of each wall on each node so far, N s; None for a boundary that is not a
+        """(n, 3 walls) sum of the impulses of each wall on each node so far, N s; None if the boundary is not a
         wall."""
         self.friction_loss: Floats | None = None
-        """(n,) part of ``contact_loss`` by friction, J; None without friction."""
+        """(n,) part of ``contact_loss`` that is due to friction, J; None without friction."""
         self.last_push = 0.0
         """Time of the last impulse, s."""
 
@@ -61,25 +63,27 @@ class Boundary(ABC):
         self._impulse = np.zeros((len(nodes), 3))
         """(n, 3) impulse of the boundary on each node in the last step, N s."""
         self.over = Ranges(team(1))
-        """Threads that process the nodes of the boundary."""
+        """Threads of the rank, with the ranges of the nodes of the boundary."""
         self._notes = Arguments(*impulses.NOTE)
         self._rooms = Rooms("nodes", *KEPT, "_before")
         self._kept: tuple[str, ...] = KEPT
-        """Names of the columns by node that the boundary stores in a checkpoint."""
+        """Names of the columns, by node, that this boundary stores in a checkpoint."""
 
     @abstractmethod
     def held_components(self) -> Bits:
-        """(n, 3) FREE, PRESCRIBED or MIRRORED. Components that are not FREE have no mobility in contact."""
+        """(n, 3) FREE, PRESCRIBED or MIRRORED for each velocity component. A component that is not FREE has no mobility
+        in contact.
+        """
 
     def start(self, state: Nodes) -> None:  # noqa: B027 (forces agree with any velocity)
         """Makes the initial velocities consistent with the boundary."""
 
     def note(self, state: Nodes) -> None:  # noqa: B027 (a symmetry plane does no work)
-        """Before the kick: stores v(n-1/2), and books the second half of the work of the last impulses."""
+        """Stores v(n-1/2) before the kick, and adds the second half of the work of the last impulses to the account."""
 
     def _note(self, state: Nodes, account: Floats, factor: float) -> None:
-        """Executes ``note`` with an account of the work of the impulses, J; ``factor``: 1/2 with the sign of the work
-        in the account.
+        """Executes ``note``. ``account``: work of the impulses, J; ``factor``: 1/2 with the sign that the work has in
+        the account.
         """
         table = self._note_table(state, account, factor)
         self.over.run(impulses.note, table, len(self.nodes))
@@ -88,25 +92,27 @@ class Boundary(ABC):
         return self._notes.set(state.v, self.nodes, self._before, self._impulse, account, factor)
 
     def noting(self, state: Nodes) -> list[Stage]:
-        """Returns ``note`` as stages of a program (stretch.py)."""
+        """Returns the work of ``note`` as stages of a program (stretch.py)."""
         return []
 
     def acting(self, state: Nodes) -> list[Stage] | None:
-        """Returns ``apply`` as stages of a program; None if other code is needed."""
+        """Returns the work of ``apply`` as stages of a program; None if code outside of the program is needed."""
         return None
 
     def mirroring(self, vectors: Floats) -> list[Stage]:
-        """Returns ``mirror`` as stages of a program."""
+        """Returns the work of ``mirror`` as stages of a program."""
         return []
 
     def went_on(self, dt: float) -> None:  # noqa: B027 (most boundaries need no time step)
-        """Sets the last time step, s, after a program."""
+        """Sets the last time step to ``dt``, s. Must be called after a program of steps."""
 
     def measure(self, mass: float, speed: float) -> None:  # noqa: B027 (most add up no integers of their own)
-        """Sets the quanta from the largest nodal ``mass``, kg, and ``speed``, m/s, of the scene."""
+        """Chooses the quanta from the largest nodal ``mass``, kg, and the largest ``speed``, m/s, of the scene."""
 
     def mirror(self, vectors: Floats) -> None:  # noqa: B027 (most boundaries mirror nothing)
-        """Sets the components of nodal means ``vectors`` (nodes, 3) that the mirror image cancels to zero."""
+        """Sets components of the nodal means ``vectors`` (nodes, 3) to zero, if the mirror image of the body cancels
+        them.
+        """
 
     @abstractmethod
     def apply(self, state: Nodes, dt: float, t: float) -> None:
@@ -116,14 +122,14 @@ class Boundary(ABC):
         """Corrects x(n+1)."""
 
     def release(self, loose: Flags, bounds: "list[Boundary]") -> None:  # noqa: B027 (most hold a node, tets or not)
-        """Treats nodes without tets, ``loose`` (nodes,), as particles from now on; ``bounds``: all boundaries; the
-        boundaries that precede this boundary in the list have already been called.
+        """Treats the nodes without tets, ``loose`` (nodes,), as particles from now on. ``bounds``: all boundaries. The
+        boundaries before this one in the list have already released their nodes.
         """
 
     def grow(self, split: Split, ids: Ints) -> None:
-        """Adds the copies of the nodes of the boundary; ``ids``: global ids of the local nodes.
+        """Adds the copies of separated nodes of the boundary; ``ids``: global ids of the local nodes.
 
-        Booked values and the impulse of the last step remain at the parent.
+        The energies in the account and the impulse of the last step remain at the parent.
         """
         parents, n = split.copies.parents, len(self.nodes)
         rooms = self._rooms.of(self, len(parents))
@@ -133,7 +139,7 @@ class Boundary(ABC):
             self._inherit(at)
 
     def drop(self, tets: Ints) -> None:  # noqa: B027 (most boundaries act on nodes)
-        """Removes the loads on faces of the tets with these global ids, which erosion has removed on any rank."""
+        """Removes the loads on faces of ``tets``: global ids of tets that erosion has removed on any rank."""
 
     def keep(self, parcel: Parcel, name: str) -> None:
         """Adds the state of the boundary to a parcel (a checkpoint or migration message), under its ``name``."""
@@ -144,7 +150,7 @@ class Boundary(ABC):
             parcel.nodes[f"{name}.{key}"] = column
 
     def resume(self, parcel: Parcel, name: str, dt: float) -> None:
-        """Restores the state from a parcel (a checkpoint or migration message); ``dt``: of the last step, s."""
+        """Restores the state from a parcel (a checkpoint or migration message). ``dt``: last time step, s."""
         for key in self._kept:
             setattr(self, key, parcel.nodes[f"{name}.{key}"][self.nodes])
         self._before = np.zeros((len(self.nodes), 3))
@@ -153,16 +159,16 @@ class Boundary(ABC):
         """Frees all persistent MPI messages."""
 
     def _inherit(self, at: Ints) -> None:  # noqa: B027 (a boundary of its own may keep more by node)
-        """Extends own columns by copies of the nodes at the places ``at``, after all other nodes."""
+        """Extends the columns of this boundary by copies of the rows ``at``."""
 
 
 class Stopping(Boundary):
-    """Walls: they stop nodes, and sum the impulses on them."""
+    """Base class of walls. A wall stops nodes; the impulses of each wall on the nodes are summed."""
 
     after_contact = True
 
     def __init__(self, nodes: Indices, walls: int, *, reports: bool) -> None:
-        """``walls``: number of walls; ``reports``: True if ``since_last_report`` will be called."""
+        """``walls``: number of walls; ``reports``: whether ``since_last_report`` will be called."""
         super().__init__(nodes)
         self.given: Floats = np.zeros((len(nodes), 3 * walls))
         self._kept = (*KEPT, "given")
@@ -178,16 +184,16 @@ class Stopping(Boundary):
 
 
 class SymmetryPlane(Boundary):
-    """Plane of symmetry: a node that starts on the plane has no velocity across the plane while it has tets, because
-    the tets and their mirror images hold the node on the plane. A node without tets, and its image, are particles
+    """Symmetry plane. While a node that starts on the plane has tets, it has no velocity across the plane, because its
+    tets and their mirror images hold it there. If the node has lost all tets, the node and its image are particles
     (mirrors.py).
     """
 
     mirrors = True
 
     def __init__(self, nodes: Indices, axis: int, beside: Flags | None = None) -> None:
-        """``beside`` (n,): nodes of bodies that lie on one side of the plane, with their images on the other; None:
-        all nodes. A node of a body that lies on both sides stays on the plane.
+        """``beside`` (n,): whether the body of a node lies on one side of the plane, with its mirror image on the other
+        side; None: all bodies do. The nodes of a body that lies on both sides stay on the plane.
         """
         super().__init__(nodes)
         self._axis = axis
@@ -229,7 +235,7 @@ class SymmetryPlane(Boundary):
 
 @dataclass(frozen=True)
 class Acts:
-    """Boundaries by their place in a step, in the order in which they act."""
+    """Boundaries sorted by their position in the time step. Within a position they have the order in which they act."""
 
     boundaries: int
     """Number of all boundaries."""
@@ -240,7 +246,7 @@ class Acts:
 
     @classmethod
     def of(cls, scene: list[Boundary]) -> Self:
-        """Sorts the boundaries of a scene."""
+        """Sorts the boundaries of a scene by their position in the time step."""
         return cls(
             len(scene),
             tuple(each for each in scene if type(each).note is not Boundary.note),
@@ -251,7 +257,7 @@ class Acts:
 
 
 def mirrored(n: int, bounds: Iterable[Boundary]) -> Flags:
-    """(n, 3) velocity components of ``n`` nodes that planes of symmetry hold."""
+    """Returns (n, 3) which velocity components of ``n`` nodes are held by symmetry planes."""
     found = np.zeros((n, 3), bool)
     for bound in bounds:
         found[bound.nodes] |= bound.held_components() == MIRRORED
@@ -259,7 +265,7 @@ def mirrored(n: int, bounds: Iterable[Boundary]) -> Flags:
 
 
 def driven(n: int, bounds: Iterable[Boundary]) -> Flags:
-    """(n,) True for nodes with a prescribed velocity component."""
+    """Returns (n,) whether each node has a prescribed velocity component."""
     found = np.zeros(n, bool)
     for bound in bounds:
         found[bound.nodes] |= (bound.held_components() == PRESCRIBED).any(axis=1)
@@ -276,8 +282,8 @@ def free(nodes: Indices) -> Bits:
     cache=True,
 )
 def _inherit(nodes, loss, work, impulse, before, n, parents, first):  # type: ignore[no-untyped-def]
-    """Fills the rows from ``n`` on of the columns of a boundary for the copies of its nodes: ``first``: local index
-    of the first copy, ``parents`` (copies,): ascending. Returns the places of their parents among the ``n`` nodes.
+    """Fills the rows from ``n`` on of the columns of a boundary, for copies of its ``n`` nodes. ``first``: local index
+    of the first copy; ``parents`` (copies,): local indices of the parents, ascending. Returns the rows of the parents.
     """
     at, k = np.empty(len(parents), np.int64), 0
     for c in range(len(parents)):

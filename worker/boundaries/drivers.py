@@ -1,4 +1,4 @@
-"""Boundaries that do work from outside: gravity, tractions, prescribed motion."""
+"""Boundaries that do external work: gravity, tractions, prescribed motion."""
 
 import math
 from collections.abc import Sequence
@@ -20,7 +20,7 @@ from .boundaries import FREE, KEPT, PRESCRIBED, Boundary, free
 
 
 class Driver(Boundary):
-    """A boundary whose impulses are work from outside."""
+    """A boundary whose impulses do external work."""
 
     def note(self, state: Nodes) -> None:
         self._note(state, self.external_work, 0.5)
@@ -29,11 +29,13 @@ class Driver(Boundary):
         return self.over.stages(impulses.note, self._note_table(state, self.external_work, 0.5), (), len(self.nodes))
 
     def _act(self, kernel: Kernel, arguments: Arguments, state: Nodes, *values: Any) -> None:
-        """Applies a kernel (impulses.py) with its further arguments ``values``."""
+        """Applies a kernel (impulses.py). ``arguments``: types of the arguments; ``values``: arguments after those that
+        all kernels have.
+        """
         self.over.run(kernel, arguments.set(*self._of(state), *values), len(self.nodes))
 
     def _acting(self, kernel: Kernel, arguments: Arguments, state: Nodes, *values: Any) -> list[Stage]:
-        """Returns ``_act`` as stages of a program."""
+        """Returns the work of ``_act`` as stages of a program."""
         return self.over.stages(kernel, *arguments.bind(*self._of(state), *values), len(self.nodes))
 
     def _of(self, state: Nodes) -> tuple[Any, ...]:
@@ -41,17 +43,19 @@ class Driver(Boundary):
 
 
 class Course:
-    """Factor over time: linear between the given ``points`` (time, s, and factor), constant before and after; 1
-    without points.
+    """Factor over time. The factor is linear between the given ``points`` (time, s, and factor), and constant before
+    the first and after the last point; without points it is 1.
     """
 
     def __init__(self, points: Sequence[tuple[float, float]] = ()) -> None:
         self._times, self._factors = np.array(list(points) or [(0.0, 1.0)]).T
         self.constant = float(self._factors[0]) if len(self._factors) == 1 else None
-        """The factor if it does not change, else None."""
+        """The factor if it is constant, else None."""
 
     def mean(self, begin: float, end: float) -> float:
-        """Returns the exact mean of the factor between two times, s; its value if they are equal."""
+        """Returns the exact mean of the factor between two times, s. If the two times are equal, returns the factor at
+        that time.
+        """
         if self.constant is not None:
             return self.constant
         within = self._times[(self._times > begin) & (self._times < end)]
@@ -63,7 +67,9 @@ class Course:
 
 
 class Forcing(Driver):
-    """A driver that acts over the mean step of the kick, times the mean factor of its ``course`` over this step."""
+    """A driver that acts for the mean of the last and the present time step, times the mean of the factor of its
+    ``course`` in this time.
+    """
 
     def __init__(self, nodes: Indices, course: Course) -> None:
         super().__init__(nodes)
@@ -80,21 +86,26 @@ class Forcing(Driver):
         self._last_dt = dt
 
     def _duration(self, dt: float, t: float) -> float:
-        """Returns the mean step of the kick at time ``t`` times the mean factor, s; ``dt`` becomes the last step."""
+        """Returns the mean of the last and the present time step at time ``t``, times the mean factor, s. Stores ``dt``
+        as the last step.
+        """
         mean_dt = 0.5 * (self._last_dt + dt)
         factor = self._course.mean(t - 0.5 * self._last_dt, t + 0.5 * dt)
         self._last_dt = dt
         return mean_dt * factor
 
     def _forcing(self, kernel: Kernel, arguments: Arguments, state: Nodes, vectors: Floats) -> list[Stage] | None:
-        """Returns a kernel with its ``vectors`` and the duration as stages of a program; None if the factor changes."""
+        """Returns a kernel with its arguments, the ``vectors`` and the duration, as stages of a program; None if the
+        factor is not constant.
+        """
         factor = self._course.constant
         return None if factor is None else self._acting(kernel, arguments, state, vectors, Follow(MEAN_DT, factor))
 
 
 class Gravity(Forcing):
-    """Gravity: an ``acceleration`` (3,), m/s^2, times the mean factor of the ``course`` over the mean step of the
-    kick: in free fall velocities are exact at n+1/2, and positions at n if it is constant.
+    """Gravity. The ``acceleration`` (3,), m/s^2, is multiplied by the mean factor of the ``course`` and acts for the
+    mean time step of the kick. In free fall the velocities at n+1/2 are exact; with a constant factor the positions at
+    n are exact, too.
     """
 
     def __init__(self, nodes: Indices, acceleration: Floats, course: Course) -> None:
@@ -109,10 +120,10 @@ class Gravity(Forcing):
 
 
 class Traction(Forcing):
-    """Forces on corners of tets, times the mean factor of the ``course`` over the mean step of the kick; removed with
-    their tets.
+    """Forces on corners of tets. A force is multiplied by the mean factor of the ``course`` and acts for the mean time
+    step of the kick. The forces on a tet are removed with the tet.
 
-    ``load``: forces on all ``corners`` (m,) that are local nodes.
+    ``load``: forces on all corners (m,) that are nodes of this rank.
     """
 
     on_faces = True
@@ -122,7 +133,7 @@ class Traction(Forcing):
         self._corners, self._load = corners, load
         self._arguments = Arguments(*impulses.PUSH)
         self.force = self._summed()
-        """(n, 3) force on each node, N."""
+        """(n, 3) force on each node of the boundary, N."""
 
     def keep(self, parcel: Parcel, name: str) -> None:
         super().keep(parcel, name)
@@ -163,9 +174,9 @@ class Traction(Forcing):
 
 
 class PrescribedVelocity(Driver):
-    """Prescribed velocity components of nodes, times the factor of the ``course``; NaN for a free component.
+    """Prescribed velocity components of nodes, multiplied by the factor of the ``course``; NaN for a free component.
 
-    A step takes the mean factor over its length, so that positions at n are exact.
+    A step uses the mean of the factor over its length, so that positions at n are exact.
     """
 
     def __init__(self, nodes: Indices, velocity: Floats, course: Course) -> None:
@@ -194,7 +205,7 @@ class PrescribedVelocity(Driver):
 
 
 class PrescribedRotation(Driver):
-    """Prescribed rigid rotation of nodes: the velocity of a step is along the chord of the exact rotation."""
+    """Prescribed rigid rotation of nodes. The velocity in a step is along the chord of the exact rotation."""
 
     def __init__(self, nodes: Indices, centre: Floats, rate: Floats) -> None:
         super().__init__(nodes)
@@ -212,7 +223,7 @@ class PrescribedRotation(Driver):
         self._act(impulses.prescribe, self._arguments, state, chord, 1.0)
 
     def _chord(self, state: Nodes, dt: float) -> Floats:
-        """(n, 3) velocities of a step ``dt``, s, m/s."""
+        """(n, 3) velocities, m/s, in a step of length ``dt``, s."""
         r = state.x[self.nodes] - self._centre
         speed = math.sqrt(sum(float(component) ** 2 for component in self._rate))
         if dt == 0.0 or speed == 0.0:

@@ -1,5 +1,5 @@
-"""Impulses of boundaries on nodes, and halves of their work: kernels of tasks over the nodes of a boundary
-(boundaries.py).
+"""Kernels for the impulses of boundaries on nodes, and for halves of the work of the impulses. A kernel is a task over
+a range of the nodes of a boundary (boundaries.py).
 """
 
 import numpy as np
@@ -10,28 +10,29 @@ from ..parallel.team import TASK
 
 _F, _F1, _F2, _N1 = types.float64, types.float64[::1], types.float64[:, ::1], types.int32[::1]
 NOTE = _F2, _N1, _F2, _F2, _F1, _F
-"""Types of the arguments v (nodes, 3) and nodes (n,); of v(n-1/2) and the impulses (n, 3), N s, and the account of
-their work (n,), J, one row for each node of the boundary; and of 1/2 with the sign of the work in the account."""
+"""Types of the arguments of ``note``: v (nodes, 3); nodes (n,) of the boundary; for each of these nodes v(n-1/2) and
+the impulses (n, 3), N s, and the account of their work (n,), J; and 1/2 with the sign that the work has in the
+account."""
 _ACT = _F2, _F1, _N1, _F2, _F2, _F1
-"""Types of the arguments v, mass (nodes,) and nodes; and of v(n-1/2), impulses and account as in the previous
-constant. The work of these impulses is work from outside."""
+"""Types of the arguments that all kernels with external work have: v, mass (nodes,) and nodes of the boundary; for each
+node of the boundary v(n-1/2), the impulse and the account, as in ``NOTE``."""
 PRESCRIBE = (*_ACT, _F2, _F)
-"""Types of the further arguments: velocities (n, 3), m/s, NaN for a free component, and the factor of the
-velocities."""
+"""Types of the further arguments of ``prescribe``: velocities (n, 3), m/s, with NaN for a free component, and the
+factor of the velocities."""
 ACCELERATE = (*_ACT, _F1, _F)
-"""Types of the further arguments: acceleration (3,), m/s^2, and its duration, s."""
+"""Types of the further arguments of ``accelerate``: acceleration (3,), m/s^2, and the time for which it acts, s."""
 PUSH = (*_ACT, _F2, _F)
-"""Types of the further arguments: forces (n, 3), N, and the duration of the forces, s."""
+"""Types of the further arguments of ``push``: forces (n, 3), N, and the time for which they act, s."""
 HOLD = _F2, _N1, types.int64
-"""Types of the arguments vectors (nodes, 3), nodes (n,), and the component that is held."""
+"""Types of the arguments of ``hold``: vectors (nodes, 3), nodes (n,), and the component that is set to zero."""
 _note, _prescribe, _accelerate, _push = reader(*NOTE), reader(*PRESCRIBE), reader(*ACCELERATE), reader(*PUSH)
 _hold = reader(*HOLD)
 
 
 @njit("void(float64[::1], float64[:, ::1], float64[:, ::1], int64, float64)", cache=True)
 def book(account, impulse, before, j, factor):  # type: ignore[no-untyped-def]
-    """Adds ``factor``, 1/2 with a sign, times the work of the impulse at place ``j`` at the velocity ``before`` to
-    the ``account``, J.
+    """Adds half of the work of an impulse to the ``account``, J: ``factor`` (1/2 with a sign) times the impulse of node
+    ``j`` times the velocity ``before``.
     """
     work = 0.0
     for i in range(3):
@@ -41,7 +42,7 @@ def book(account, impulse, before, j, factor):  # type: ignore[no-untyped-def]
 
 @njit(TASK, cache=True)
 def note(table, begin, end, thread):  # type: ignore[no-untyped-def]
-    """Task: stores v(n-1/2), and books the second half of the work of the last impulses."""
+    """Task: stores v(n-1/2), and adds the second half of the work of the last impulses to the account."""
     v, nodes, before, impulse, account, factor = _note(table)
     for j in range(begin, end):
         a = nodes[j]
@@ -66,7 +67,7 @@ def prescribe(table, begin, end, thread):  # type: ignore[no-untyped-def]
 
 @njit(TASK, cache=True)
 def accelerate(table, begin, end, thread):  # type: ignore[no-untyped-def]
-    """Task: adds the same velocity to all nodes."""
+    """Task: adds one velocity to all nodes."""
     v, mass, nodes, before, impulse, account, acceleration, time = _accelerate(table)
     for j in range(begin, end):
         a = nodes[j]
@@ -79,7 +80,7 @@ def accelerate(table, begin, end, thread):  # type: ignore[no-untyped-def]
 
 @njit(TASK, cache=True, error_model="numpy")
 def push(table, begin, end, thread):  # type: ignore[no-untyped-def]
-    """Task: applies forces for a time."""
+    """Task: applies forces for the given time."""
     v, mass, nodes, before, impulse, account, force, time = _push(table)
     for j in range(begin, end):
         a = nodes[j]
@@ -91,7 +92,7 @@ def push(table, begin, end, thread):  # type: ignore[no-untyped-def]
 
 @njit(TASK, cache=True)
 def hold(table, begin, end, thread):  # type: ignore[no-untyped-def]
-    """Task: sets a component of the vectors of the nodes to zero."""
+    """Task: sets one component of the vectors of the nodes to zero."""
     vectors, nodes, axis = _hold(table)
     for j in range(begin, end):
         vectors[nodes[j], axis] = 0.0

@@ -1,8 +1,9 @@
-"""Planes of symmetry for nodes that are not on the plane: a node that reaches the plane hits its mirror image there.
+"""Symmetry planes for nodes that do not start on the plane. A node that reaches the plane hits its own mirror image
+there.
 
-A node with tets and its image exert equal forces on each other, so that neither passes the plane: the plane is a wall
-for each side. Nodes without tets do not interact: such a node passes its image and is replaced by the image, with
-mirrored position and velocity. Debris is therefore reflected at a plane without loss of energy.
+A node with tets and its image exert equal forces on each other, so that neither of the two passes the plane: the plane
+acts as a wall on each side. Nodes without tets do not interact. A node without tets passes its image and is replaced by
+the image, with mirrored position and velocity. Therefore a plane reflects debris without loss of energy.
 """
 
 from typing import Self
@@ -22,8 +23,8 @@ from ..scene.conditions import AXES, node_sides, part_sides
 from .boundaries import Boundary, driven, free
 
 _TOGETHER = 64
-"""Number of nodes that are tested together in one loop with vector instructions. The nodes are tested one by one
-only if at least one node would end beyond the plane."""
+"""Number of nodes that are tested together in one loop with vector instructions. They are tested one by one only if at
+least one of them would end beyond the plane."""
 _TURNS = 1000
 """Largest number of planes that a node without tets may pass in a step. The limit ends the loop if the velocity is
 not finite."""
@@ -36,8 +37,8 @@ _of_take, _of_stop = reader(*_TAKE), reader(*_STOP)
 
 
 class Mirrors(Boundary):
-    """Prevents nodes that started on one side of a plane of symmetry from ending a step on the other side. An impulse
-    stops a node with tets there, and never pulls; one without tets is reflected.
+    """Prevents nodes that started on one side of a symmetry plane from ending a step on the other side. For a node with
+    tets, an impulse stops the node at the plane; the impulse never pulls. A node without tets is reflected.
     """
 
     after_contact = True
@@ -46,25 +47,26 @@ class Mirrors(Boundary):
         self, nodes: Indices, axes: Ints, at: Floats, sides: Floats, restitution: float = 0.0,
         loose_sides: Floats | None = None,
     ) -> None:  # fmt: skip
-        """``axes`` (planes,), ``at`` (planes,): axis across each plane, and its coordinate, m; ``sides`` (n,
-        planes): 1 for a node above, -1 below, 0 for one that the plane does not stop; ``restitution``: as in
-        contact; ``loose_sides``: the same for a node without tets, None: as ``sides``.
+        """``axes`` (planes,), ``at`` (planes,): axis across each plane, and coordinate of the plane, m. ``sides`` (n,
+        planes): 1 for a node above the plane, -1 below, 0 for a node that the plane does not stop. ``restitution``:
+        coefficient as in contact; ``loose_sides``: the values of ``sides`` for a node that has lost its tets; None if
+        these are equal to ``sides``.
         """
         super().__init__(nodes)
         self._axes, self._at, self._sides, self._restitution = axes, at, sides, restitution
         self._loose_sides = sides.copy() if loose_sides is None else loose_sides
         self._loose: Ints = np.zeros(0, np.int64)
-        """Places (indices in the arrays of the boundary) of the nodes without tets."""
+        """Places of the nodes without tets, as indices in the arrays of the boundary."""
         self._reflected: Ints = np.zeros(0, np.int64)
         self._aside = np.zeros((0, 3))
-        """Places of the nodes that are reflected in this step, and the vectors from the new positions of the nodes
-        to the positions of their images, m."""
+        """Places of the nodes that are reflected in this step. Also vectors from the new positions of these nodes to
+        the positions of their images, m."""
         self._takes, self._stops = Arguments(*_TAKE), Arguments(*_STOP)
 
     @classmethod
     def of(cls, case: Case, model: Model, bounds: list[Boundary], comm: Comm) -> Self:
-        """Returns the planes of symmetry of a case, with the nodes that start next to a plane, or that may pass a plane
-        when they have no tets; except nodes of prescribed motion and of rigid parts. Collective.
+        """Returns the symmetry planes of a case with the nodes that start beside a plane or may pass a plane when they
+        have lost their tets. Nodes with a prescribed motion and nodes of rigid parts are left out. Collective.
         """
         specs, of = [spec for _, spec in case.boundaries_of(Symmetry)], model.nodes.part
         axes, at = np.array([AXES[spec.axis] for spec in specs]), np.array([spec.at for spec in specs])
@@ -108,11 +110,11 @@ class Mirrors(Boundary):
         return self.over.stages(_stop, *self._stops.bind(*self._of(state), Follow(DT)), len(self.nodes))
 
     def _noted(self, state: Nodes) -> tuple[Floats | Indices, ...]:
-        """Returns the arguments of ``_take``."""
+        """Returns the arguments of the kernel ``_take``."""
         return self._before, self._impulse, self.contact_loss, state.v, self.nodes
 
     def _of(self, state: Nodes) -> tuple[Floats | Ints | Indices | float, ...]:
-        """Returns the arguments of ``_stop`` without the time step."""
+        """Returns the arguments of the kernel ``_stop``, without the time step."""
         return (
             state.x, state.v, self._before, self._impulse, self.contact_loss, state.mass, self.nodes, self._axes,
             self._at, self._sides, self._restitution,
@@ -126,27 +128,27 @@ class Mirrors(Boundary):
 
 @njit("void(float64[::1], float64[:, ::1], float64[:, ::1], int64)", cache=True)
 def _book(loss, impulse, before, j):  # type: ignore[no-untyped-def]
-    """Books half of the work of the impulse at place ``j`` at the velocity ``before`` it, as loss."""
+    """Adds half of the work of the impulse at place ``j`` to the ``loss``, computed with the velocity ``before``."""
     for i in range(3):
         loss[j] -= 0.5 * impulse[j, i] * before[j, i]
 
 
 @njit("void(float64[::1], float64[:, ::1], float64[:, ::1], int64[::1])", cache=True)
 def _book_all(loss, impulse, before, rows):  # type: ignore[no-untyped-def]
-    """``_book`` for these ``rows``."""
+    """Executes ``_book`` for the given ``rows``."""
     for j in rows:
         _book(loss, impulse, before, j)
 
 
 @njit("boolean(float64[:, ::1], int64)", cache=True)
 def _stopped(impulse, j):  # type: ignore[no-untyped-def]
-    """Whether the node at place ``j`` has an impulse."""
+    """Returns whether the node at place ``j`` has an impulse."""
     return impulse[j, 0] != 0.0 or impulse[j, 1] != 0.0 or impulse[j, 2] != 0.0
 
 
 @njit(TASK, cache=True)
 def _take(table, begin, end, thread):  # type: ignore[no-untyped-def]
-    """Task: stores v(n-1/2), books the second half of the work of the last impulses, and sets the impulses to zero."""
+    """Task: stores v(n-1/2), adds the second half of the work of the last impulses, and sets the impulses to zero."""
     before, impulse, loss, v, nodes = _of_take(table)
     for j in range(begin, end):
         for i in range(3):
@@ -158,9 +160,9 @@ def _take(table, begin, end, thread):  # type: ignore[no-untyped-def]
 
 @njit(TASK, cache=True, error_model="numpy")
 def _stop(table, begin, end, thread):  # type: ignore[no-untyped-def]
-    """Task: stops nodes with tets that would end beyond a plane: the velocity ends on the plane, or is the rebound
-    velocity if there is ``restitution`` of that ``before`` (n, 3): v(n-1/2). Adds to ``impulse``, and books half of
-    the work of the impulses as ``loss``.
+    """Task: stops nodes with tets that would end beyond a plane. The node ends on the plane, or with ``restitution``
+    gets the rebound velocity of v(n-1/2) (``before`` (n, 3)). Adds the impulses to ``impulse``, and half of their work
+    to ``loss``.
     """
     x, v, before, impulse, loss, mass, nodes, axes, at, sides, restitution, dt = _of_stop(table)
     for first in range(begin, end, _TOGETHER):
@@ -192,9 +194,9 @@ def _stop(table, begin, end, thread):  # type: ignore[no-untyped-def]
     cache=True,
 )
 def _reflect(x, v, impulse, mass, nodes, rows, axes, at, sides, dt):  # type: ignore[no-untyped-def]
-    """Reflects the nodes at the places ``rows`` that would end the step beyond planes: sets the velocity of their last
-    image. Adds to ``impulse``; returns the places of these nodes, and (n, 3) the vectors from the positions of the
-    nodes at the end of the step to the positions of their images, m.
+    """Reflects the nodes at the places ``rows`` that would end the step beyond planes: each gets the velocity of its
+    last image. Adds the impulses to ``impulse``. Returns the places of the reflected nodes, and (n, 3) the vectors from
+    their positions at the end of the step to the positions of their images, m.
     """
     turned, aside, n = np.empty(len(rows), np.int64), np.zeros((len(rows), 3)), 0
     for j in rows:

@@ -1,4 +1,4 @@
-r"""Rigid walls that move or are round: they stop the nodes of deformable bodies.
+r"""Rigid walls that move or are round. The walls stop the nodes of deformable bodies.
 
 ::
 
@@ -8,14 +8,14 @@ r"""Rigid walls that move or are round: they stop the nodes of deformable bodies
           |    .  v
         ==|=====.=======> dt V  wall     mirrored components: held by planes of symmetry, no impulse
 
-As at a fixed plane (walls.py), impulses never pull. A wall with a mass M ends the step with the velocity that all
-impulses give it: V solves
+As at a fixed plane (walls.py), impulses never pull. A wall with a mass M ends the step with the velocity V that all
+impulses give it. V is the solution of
 
     M (V - V(n-1/2)) + sum of the impulses, which increase with V, = 0
 
-by Newton's method; the derivative is M plus the masses of the stopped nodes, along their normals, or along all axes for
-nodes that stick. Impulses are rounded to quanta, and the wall gets minus their sum: momentum is conserved exactly, with
-the same result for any number of ranks and threads.
+The equation is solved by Newton's method. The derivative is M plus the masses of the stopped nodes, along their
+normals, or along all axes for nodes that stick. Impulses are rounded to quanta, and the wall gets minus their sum, so
+that momentum is conserved exactly and the result is the same for any number of ranks and threads.
 """
 
 import numpy as np
@@ -32,45 +32,47 @@ from .wall_shapes import SHAPES, Walls, gap
 from .walls import ACROSS
 
 _NEWTON, _ENOUGH = 20, 1e-9
-"""Largest number of iterations, and the relative change of V that ends the iteration. Without sliding the sum is
-piecewise linear in V, so that two or three iterations are enough."""
+"""Largest number of Newton iterations, and the relative change of V at which the iteration ends. Without sliding the
+sum of impulses is piecewise linear in V, so that two or three iterations are enough."""
 _SWEEPS = 4
-"""Number of passes over the walls, if there are several walls (walls.py)."""
+"""Number of passes over the walls if there are several walls (walls.py)."""
 _LINE = 16
-"""Number of words of the sums of a thread: impulse (3), and its derivative xx, yy, zz, yz, zx, xy. The words are
-padded so that two threads do not write to the same cache line."""
+"""Number of words of the sums of a thread: impulse (3), and the derivative of the impulse (xx, yy, zz, yz, zx, xy).
+Further words are added so that two threads do not write to the same cache line."""
 
 
 class MovingWalls(Stopping):
-    """Moving or round walls; ``held`` (n, w): which of the ``walls`` stop which node, none for fixed planes."""
+    """Moving or round walls. ``held`` (n, w): whether each of the ``walls`` stops each node; always False for fixed
+    planes.
+    """
 
     def __init__(
         self, nodes: Indices, owned: Flags, walls: Walls, held: Flags, planes: Flags, comm: Comm, reports: bool = False,
     ) -> None:  # fmt: skip
-        """``owned`` (n,); ``planes`` (n, 3): components held by planes of symmetry; ``reports``: True if
-        ``since_last_report`` will be called.
+        """``owned`` (n,): whether this rank owns each node; ``planes`` (n, 3): components held by symmetry planes;
+        ``reports``: whether ``since_last_report`` will be called.
         """
         super().__init__(nodes, walls.n, reports=reports)
         self.walls, self._owned, self._held, self._mirrored, self._comm = walls, owned, held, planes, comm
         self.scale = self._weight = 1.0
-        """Quanta per N s of impulses, and quanta per kg of the derivative."""
+        """Number of quanta per N s for impulses, and per kg for the derivative."""
         n, w = len(nodes), walls.n
         self._step, self._rubbed = np.zeros((2, n, 3 * w))
-        """(n, 3 walls) impulses of the last step, N s, and the part of these impulses that is friction."""
+        """(n, 3 walls) impulses of the last step, N s, and the part of them that is friction."""
         self.friction_loss = np.zeros(n)
         self._kept = (*self._kept, "friction_loss", "_step", "_rubbed")
         self._pushed = False
         self._arguments, self._books = Arguments(*_PUSH), Arguments(*_BOOK)
 
     def measure(self, mass: float, speed: float) -> None:
-        """Sets the quanta from the largest nodal ``mass``, kg, and ``speed``, m/s, of the scene."""
+        """Chooses the quanta from the largest nodal ``mass``, kg, and the largest ``speed``, m/s, of the scene."""
         self.scale, self._weight = scale_for(mass * speed), scale_for(mass)
 
     def held_components(self) -> Bits:
         return free(self.nodes)
 
     def depths(self, state: Nodes) -> Floats:
-        """(w,) depth of the deepest node behind each wall at the start, m."""
+        """(w,) largest depth of a node behind each wall at the start, m."""
         found = np.full(self.walls.n, -np.inf)
         deepest(found, self.walls.shapes, state.x, self.nodes, self._held)
         return found
@@ -91,7 +93,7 @@ class MovingWalls(Stopping):
         self._pushed = True
 
     def note(self, state: Nodes) -> None:
-        self._note(state, self.contact_loss, 0.0)  # stores v(n-1/2) only
+        self._note(state, self.contact_loss, 0.0)  # this call only stores v(n-1/2)
         if self._pushed:
             self._book(self.walls.speed, self._before)
             self._step[:], self._rubbed[:] = 0.0, 0.0
@@ -112,7 +114,9 @@ class MovingWalls(Stopping):
             self._book(before, self._before)
 
     def _stop(self, state: Nodes, k: int, dt: float) -> bool:
-        """Stops the nodes at wall ``k`` in a step ``dt``, s; returns True if any rank has one."""
+        """Stops the nodes at wall ``k`` in a step of length ``dt``, s. Returns True if the wall stops a node on any
+        rank.
+        """
         walls, mass = self.walls, self.walls.mass[k]
         start = walls.speed[k].copy()
         speed = start.copy()
@@ -135,8 +139,9 @@ class MovingWalls(Stopping):
         return bool(sums[:3].any())
 
     def _sum(self, state: Nodes, k: int, speed: Floats, dt: float, *, gives: bool) -> Ints:
-        """(_LINE,) sums, over the owned nodes, of the impulses of wall ``k`` at a velocity ``speed`` (3,), and of
-        the derivative; over all ranks for a wall with a mass. ``gives``: applies the impulses to the nodes.
+        """(_LINE,) sums over the owned nodes: impulses of wall ``k`` if its velocity is ``speed`` (3,), and the
+        derivative of the impulses. For a wall with a mass the sums are over all ranks. ``gives``: whether the impulses
+        are applied to the nodes.
         """
         sums, walls = np.zeros((self.over.threads, _LINE), np.int64), self.walls
         table = self._arguments.set(
@@ -149,8 +154,8 @@ class MovingWalls(Stopping):
         return self._comm.sum(own) if walls.lightness[k] > 0.0 and self._comm.size > 1 else own
 
     def _book(self, of_walls: Floats, of_nodes: Floats) -> None:
-        """Books half of the work of the impulses of the step at velocities of the walls (w, 3) and of the nodes (n,
-        3), m/s.
+        """Adds half of the work of the impulses of the step, computed with the velocities of the walls (w, 3) and of
+        the nodes (n, 3), m/s.
         """
         table = self._books.set(
             self.contact_loss, self.friction_loss, self.external_work, self._step, self._rubbed, of_walls, of_nodes,
@@ -160,7 +165,9 @@ class MovingWalls(Stopping):
 
 
 def solved(derivative: Floats, mass: float, right: Floats) -> Floats:
-    """(3,) solution of (mass + derivative) x = right; ``derivative`` xx, yy, zz, yz, zx, xy, kg."""
+    """(3,) solution x of (mass + derivative) x = right. ``derivative`` has the components xx, yy, zz, yz, zx, xy,
+    kg.
+    """
     xx, yy, zz = (mass + float(value) for value in derivative[:3])
     yz, zx, xy = (float(value) for value in derivative[3:])
     a, b, c = yy * zz - yz * yz, zx * yz - xy * zz, xy * yz - yy * zx
@@ -180,7 +187,7 @@ _of_push, _of_book = reader(*_PUSH), reader(*_BOOK)
 
 @njit(types.void(_F1, SHAPES, _F2, _N1, _B2), cache=True)
 def deepest(found, shapes, x, nodes, held):  # type: ignore[no-untyped-def]
-    """Raises ``found`` (w,) to the depth of the deepest of the ``nodes`` behind each wall that stops it, m."""
+    """Raises ``found`` (w,) to the largest depth of the ``nodes`` behind each wall that stops them, m."""
     normal = np.empty(3)
     for j in range(len(nodes)):
         a = nodes[j]
@@ -191,12 +198,8 @@ def deepest(found, shapes, x, nodes, held):  # type: ignore[no-untyped-def]
 
 @njit(TASK, cache=True, error_model="numpy")
 def _push_out(table, begin, end, thread):  # type: ignore[no-untyped-def]
-    """Task of ``MovingWalls._sum``, for the nodes that wall ``k`` stops.
-
-    1. Nodes whose gap would be negative at the end of the step. 2. Normal impulse, along the components that are not
-    mirrored. 3. Sliding velocity after the normal impulse, and the share of this velocity that Coulomb's friction
-    takes. 4. Impulse in quanta: applied to the node if ``gives``; added to the sum, on the rank that owns the node. 5.
-    Derivative of the impulse by the velocity of the wall, unless ``gives``.
+    """Task of ``MovingWalls._sum``: computes the impulses of wall ``k`` on a range of nodes. The numbered comments are
+    the steps for one node.
     """
     (
         sums, x, v, mass, nodes, owned, held, mirrored, given, step, rubbed, shapes, wall, k, mu, scale, weight, dt,
@@ -206,7 +209,7 @@ def _push_out(table, begin, end, thread):  # type: ignore[no-untyped-def]
     for j in range(begin, end):
         if not held[j, k]:
             continue
-        # 1. Skip nodes with no negative gap at the end of the step.
+        # 1. Skip a node whose gap is not negative at the end of the step.
         a = nodes[j]
         far = gap(normal, shapes, k, x[a, 0], x[a, 1], x[a, 2])
         speed, along = 0.0, 0.0
@@ -216,12 +219,12 @@ def _push_out(table, begin, end, thread):  # type: ignore[no-untyped-def]
                 along += normal[i] * normal[i]
         if far + dt * speed >= 0.0 or along <= ACROSS:
             continue
-        # 2. Compute the normal impulse.
+        # 2. Compute the normal impulse along the components that are not mirrored.
         push = -(far / dt + speed) / along
         size, share = 0.0, 0.0
         for i in range(3):
             impulse[i] = 0.0 if mirrored[j, i] else push * normal[i]
-        # 3. Compute sliding velocity and friction.
+        # 3. Compute the sliding velocity after the normal impulse, and Coulomb's friction.
         if mu > 0.0:
             speed = speed + push * along
             for i in range(3):
@@ -229,7 +232,8 @@ def _push_out(table, begin, end, thread):  # type: ignore[no-untyped-def]
                 size += slide[i] * slide[i]
             most = mu * push
             share = most / np.sqrt(size) if size > most * most else 1.0
-        # 4. Round the impulse to quanta; apply it, add it to the sum.
+        # 4. Round the impulse to quanta. Apply it to the node if ``gives``. Add it to the sum on the rank that owns the
+        # node.
         for i in range(3):
             rub = -share * slide[i] if mu > 0.0 else 0.0
             words[i] = np.int64(np.rint(mass[a] * (impulse[i] + rub) * scale))
@@ -240,7 +244,7 @@ def _push_out(table, begin, end, thread):  # type: ignore[no-untyped-def]
                 rubbed[j, 3 * k + i] += mass[a] * rub
             if owned[j]:
                 sums[thread, i] += words[i]
-        # 5. Add the derivative of the impulse.
+        # 5. Unless ``gives``, add the derivative of the impulse by the velocity of the wall.
         if owned[j] and not gives:
             sticks = mu > 0.0 and share == 1.0
             for m in range(6):
@@ -255,7 +259,9 @@ def _push_out(table, begin, end, thread):  # type: ignore[no-untyped-def]
 
 @njit(TASK, cache=True)
 def _book(table, begin, end, thread):  # type: ignore[no-untyped-def]
-    """Task of ``MovingWalls._book``: the work of a wall without a mass is from outside."""
+    """Task of ``MovingWalls._book``: adds half of the work of the impulses. The work of a wall without a mass is
+    external work.
+    """
     loss, friction, external, step, rubbed, of_walls, of_nodes, lightness = _of_book(table)
     for j in range(begin, end):
         for k in range(len(lightness)):

@@ -1,12 +1,12 @@
-"""Pressure that follows the surface: on the present area of each face, along its present normal.
+"""Pressure that follows the surface: it acts on the present area of each face, along the present normal of the face.
 
-The force of a face, -p (b - a) x (c - a) / 2, is distributed to its nodes a, b, c in thirds, in quanta of a power of
-two: sums over faces are independent of their order, and shared nodes are completed in one exchange. Impulses and work
-are computed as for a traction: with x(n), v(n-1/2) and v(n+1/2) of the nodes the energy account closes for any motion
-of the surface.
+The force of a face, -p (b - a) x (c - a) / 2, is distributed in thirds to its nodes a, b, c. The forces are integers in
+quanta that are a power of two, so that sums over faces do not depend on the order of the faces. Shared nodes are
+completed in one exchange. Impulses and work are computed as for a traction, with x(n), v(n-1/2) and v(n+1/2) of the
+nodes, so the energy account closes for any motion of the surface.
 
-The faces of a closed surface have zero total force and moment, up to rounding: half a quantum for each node and
-face; the largest force on a node of a face is 2^42 quanta at the start.
+The faces of a closed surface have zero total force and moment up to round-off, which is half a quantum for each node
+and face. At the start the largest force on a node of a face is 2^42 quanta.
 """
 
 import math
@@ -30,23 +30,24 @@ from .boundaries import KEPT
 from .drivers import Course, Forcing
 
 _BITS = 42
-"""Binary logarithm of the number of quanta in the largest force on a node of a face at the start. Chosen value:
-rounding is 1e-13 of the force of a face, and the area may increase by a factor 2^(_MOST - _BITS)."""
+"""Binary logarithm of the number of quanta in the largest force on a node of a face at the start. Chosen value: the
+round-off is 1e-13 of the force of a face, and the area of a face may increase by a factor 2^(_MOST - _BITS)."""
 _MOST = 56
-"""Binary logarithm of the largest number of quanta on a node of a face. With this limit the sum of a node holds 64
+"""Binary logarithm of the largest number of quanta on a node of a face. With this limit the sum at a node can have 64
 faces without overflow."""
 
 
 def scale(spec: Traction, outward: Floats) -> float:
-    """Returns the quanta per newton for faces with area vectors ``outward`` (m, 3), m^2."""
+    """Returns the number of quanta per newton, for faces with area vectors ``outward`` (m, 3), m^2."""
     largest = abs(spec.pressure or 0.0) * float(np.abs(outward).max(initial=0.0)) / 3.0
     return math.ldexp(1.0, _BITS - math.frexp(largest)[1]) if largest > 0.0 else 1.0
 
 
 class SurfacePressure(Forcing):
-    """Applies a ``pressure``, Pa, to faces, times the mean factor of the ``course`` over the mean step of the kick.
+    """Applies a ``pressure``, Pa, to faces. The pressure is multiplied by the mean factor of the ``course`` and acts
+    for the mean time step of the kick.
 
-    A rank has the faces of its tets, and all its nodes that are loaded on any rank.
+    A rank has the faces of its own tets, and all its nodes that are loaded on any rank.
     """
 
     on_faces = True
@@ -54,7 +55,7 @@ class SurfacePressure(Forcing):
     def __init__(
         self, model: Model, faces: LoadedFaces, pressure: float, course: Course, neighbours: list[Neighbour], comm: Comm
     ) -> None:  # fmt: skip
-        """Collective."""
+        """Makes the table of faces, and the list of the loaded nodes. Collective."""
         self._model, self._comm, self._neighbours = model, comm, neighbours
         self._faces, self._corners = faces, model.nodes.places(faces.nodes.reshape(-1)).reshape(-1, 3)
         self._quanta = -pressure * faces.scale / 6.0
@@ -63,14 +64,15 @@ class SurfacePressure(Forcing):
         self._places = self._placed()
         self._shared: SharedSum | None = None
         self._sharing: list[Indices] = []
-        """Nodes shared with each neighbour when the exchange was planned."""
+        """Nodes shared with each neighbour at the last planning of the exchange."""
         self._watched: list[tuple[Block, Ints, Ints]] | None = None
-        """Blocks of parts that fracture, the faces of each, and the places of their tets; None before the first use."""
+        """Blocks of parts that fracture, with the faces of each block and the places of the tets of the faces. None
+        before the first use."""
 
     @property
     def force(self) -> Floats:
-        """(n, 3) force, N, at the present positions; NaN if a face has outgrown the quanta, which ends the run with
-        an error on all ranks. Collective.
+        """(n, 3) force on each node, N, at the present positions. If a face has become too large for the quanta, the
+        result is NaN, which ends the run with an error on all ranks. Collective.
         """
         sums = np.zeros((len(self.nodes), 3), np.int64)
         largest = _press(sums, self._model.nodes.x, self._corners, self._places, self._quanta)
@@ -114,18 +116,18 @@ class SurfacePressure(Forcing):
             self._watched = None
 
     def _placed(self) -> Indices:
-        """(m, 3) places of the corners among the nodes."""
+        """(m, 3) places of the corners of the faces among the nodes of the boundary."""
         return np.searchsorted(self.nodes, self._corners).astype(np.int32)
 
     def _agreed(self, some: Flags) -> Indices:
-        """Returns ``some`` (nodes,), and the nodes of the faces, of any rank. Collective."""
+        """Returns the nodes ``some`` (nodes,) together with the nodes of the faces, of any rank. Collective."""
         some[self._corners] = True
         sums = some[:, None].astype(np.int64)
         complete(self._comm, self._neighbours, sums, Tag.LOAD)
         return np.flatnonzero(sums).astype(np.int32)
 
     def _sums(self) -> SharedSum:
-        """Returns the exchange of the shared loaded nodes; planned again after nodes have separated."""
+        """Returns the exchange of the shared loaded nodes. The exchange is planned again after nodes have separated."""
         if self._shared is None or any(
             one.nodes is not nodes for one, nodes in zip(self._neighbours, self._sharing, strict=True)
         ):
@@ -139,15 +141,15 @@ class SurfacePressure(Forcing):
         return self._shared
 
     def _within(self, block: Block) -> tuple[Block, Ints, Ints]:
-        """Returns a block of a part that fractures, its faces, and the places of their tets. Parts that fracture do not
-        erode.
+        """Returns the faces of a block of a part that fractures, and the places of their tets, together with the block.
+        A part that fractures does not erode.
         """
         at = IdIndex(block.id).places(self._faces.tets)
         rows = np.flatnonzero(at >= 0)
         return block, rows, at[rows].astype(np.int64)
 
     def _drop_loose_faces(self) -> None:
-        """Removes the load from faces of tets that have broken off on all sides."""
+        """Removes the load from the faces of tets whose facets are all broken and wide open."""
         if self._watched is None:
             self._watched = [self._within(block) for block in self._model.blocks if len(block.bond)]
         stay = np.ones(len(self._faces.tets), bool)
@@ -159,8 +161,8 @@ class SurfacePressure(Forcing):
 
 @njit("float64(int64[:, ::1], float64[:, ::1], int32[:, ::1], int32[:, ::1], float64)", cache=True)
 def _press(sums, x, corners, places, factor):  # type: ignore[no-untyped-def]
-    """Adds ``factor`` times twice the area vector of each face to the ``sums`` (n, 3) at the ``places`` of its
-    ``corners`` (m, 3), in quanta. Returns the largest component.
+    """Adds ``factor`` times twice the area vector of each face, in quanta, to ``sums`` (n, 3). ``corners`` (m, 3):
+    nodes of the faces; ``places``: rows of these nodes in ``sums``. Returns the largest component.
     """
     largest = 0.0
     for k in range(len(corners)):

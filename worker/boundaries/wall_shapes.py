@@ -1,4 +1,4 @@
-"""Surfaces of rigid walls, planes, cylinders and spheres, and their motion."""
+"""Surfaces of rigid walls (planes, cylinders and spheres), and the motion of the walls."""
 
 from typing import NamedTuple
 
@@ -15,18 +15,18 @@ KINDS = ("plane", "cylinder", "sphere")
 
 
 class Shapes(NamedTuple):
-    """Shapes of walls; each wall is one row of the arrays."""
+    """Shapes of walls. Each wall is one row of the arrays."""
 
     kind: Ints
     """(w,) shape of each wall: PLANE, CYLINDER or SPHERE."""
     point: Floats
     """(w, 3) point of the plane or the axis, or the centre, m."""
     axis: Floats
-    """(w, 3) unit normal of a plane, unit direction of the axis of a cylinder."""
+    """(w, 3) unit normal of a plane, or unit vector along the axis of a cylinder."""
     radius: Floats
     """(w,) radius of each cylinder or sphere, m."""
     side: Floats
-    """(w,) 1 if bodies are outside, -1 if they are inside."""
+    """(w,) 1 if bodies are outside of a cylinder or sphere, -1 if they are inside."""
 
 
 _F, _F1, _F2 = types.float64, types.float64[::1], types.float64[:, ::1]
@@ -34,7 +34,7 @@ SHAPES = record(Shapes, types.int64[::1], _F2, _F2, _F1, _F1)
 
 
 class Walls:
-    """Walls of a case with their state, equal on all ranks."""
+    """Walls of a case with their motion. All ranks have equal values."""
 
     def __init__(self, specs: list[Wall]) -> None:
         n = len(specs)
@@ -49,7 +49,8 @@ class Walls:
         )  # fmt: skip
         self.friction = np.array([each.friction for each in specs])
         self.given = np.array([each.velocity for each in specs]).reshape(n, 3)
-        """(w, 3) velocity of each wall in the case, m/s: at the start, or times its course."""
+        """(w, 3) velocity of each wall that the case gives, m/s. It is the velocity at the start, or is multiplied by
+        the factor of the wall's course."""
         self._courses = [Course(each.course) for each in specs]
         self.mass = np.array([each.mass or np.inf for each in specs])
         """(w,) mass of each wall, kg; infinite for a fixed or driven wall."""
@@ -63,11 +64,11 @@ class Walls:
 
     @property
     def n(self) -> int:
-        """Number of walls."""
+        """Number of walls of the case."""
         return len(self.mass)
 
     def places(self, n: int) -> Floats | None:
-        """Returns (n, 3) the positions of the first ``n`` walls, m; None if none of them moves."""
+        """Returns (n, 3) the positions of the first ``n`` walls, m; None if no wall of them moves."""
         moves = (self.lightness[:n] > 0.0) | self.given[:n].any(axis=1)
         return self.shapes.point[:n].copy() if moves.any() else None
 
@@ -76,23 +77,25 @@ class Walls:
         return self.shapes.point.copy(), self.speed.copy()
 
     def resume(self, known: tuple[Floats, Floats]) -> None:
-        """Restores positions and velocities; for no walls a checkpoint has arrays without rows."""
+        """Restores positions and velocities. A checkpoint of a case without walls has arrays without rows."""
         point, speed = known
         self.shapes.point[:], self.speed[:] = np.reshape(point, (-1, 3)), np.reshape(speed, self.speed.shape)
 
     def words(self) -> bytes:
-        """Returns the words of moving walls for the digest."""
+        """Returns the values of the moving walls for the digest."""
         moving = ~self.plain
         return bytes(self.shapes.point[moving].tobytes() + self.speed[moving].tobytes())
 
     def kinetic(self) -> float:
-        """Returns the kinetic energy of walls with a mass at n, J: the product of the velocities before and after."""
+        """Returns the kinetic energy of the walls with a mass at n, J: half of the mass times the product of the
+        velocities before and after n.
+        """
         free = self.lightness > 0.0
         squares = self.before[free] * self.speed[free]
         return float((0.5 * self.mass[free] * ((squares[:, 0] + squares[:, 1]) + squares[:, 2])).sum())
 
     def momenta(self) -> Floats:
-        """(6,) momentum, kg m/s, and angular momentum about the origin, kg m^2/s, of walls with a mass at n."""
+        """(6,) momentum, kg m/s, and angular momentum about the origin, kg m^2/s, of the walls with a mass, at n."""
         free = self.lightness > 0.0
         p = 0.5 * self.mass[free, None] * (self.before[free] + self.speed[free])
         x = self.shapes.point[free]
@@ -100,11 +103,11 @@ class Walls:
         return np.concatenate([p.sum(axis=0), np.stack(about, axis=1).sum(axis=0)])
 
     def note(self) -> None:
-        """Before the kick: stores v(n-1/2)."""
+        """Stores v(n-1/2). Must be called before the kick."""
         self.before[:] = self.speed
 
     def kick(self, dt: float, t: float) -> None:
-        """Sets the velocity of driven walls to its mean over the step."""
+        """Sets the velocity of each driven wall to its mean over the step."""
         for k in range(self.n):
             if self.lightness[k] == 0.0:
                 self.speed[k] = self._driven(k, t, t + dt)
@@ -119,8 +122,8 @@ class Walls:
 
 @njit(types.float64(_F1, SHAPES, types.int64, _F, _F, _F), cache=True, error_model="numpy")
 def gap(normal, shapes, k, x, y, z):  # type: ignore[no-untyped-def]
-    """Returns the distance of a point from wall ``k``, m, negative behind it; sets the unit ``normal`` (3,) out of
-    the wall there, zero on the axis of a cylinder or in the centre of a sphere.
+    """Returns the distance of a point from wall ``k``, m; it is negative for a point behind the wall. Sets ``normal``
+    (3,) to the unit normal out of the wall; zero on the axis of a cylinder or at the centre of a sphere.
     """
     p, a = shapes.point, shapes.axis
     dx, dy, dz = x - p[k, 0], y - p[k, 1], z - p[k, 2]

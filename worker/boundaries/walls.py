@@ -1,4 +1,4 @@
-"""Rigid walls that are fixed planes: impulses stop nodes there, with Coulomb friction along the wall."""
+"""Rigid walls that are fixed planes. Impulses stop nodes at a wall, with Coulomb friction along the wall."""
 
 import numpy as np
 
@@ -11,32 +11,33 @@ from .boundaries import KEPT, Boundary, Stopping, free, mirrored
 from .impulses import book
 
 _SWEEPS = 4
-"""Largest number of passes over the walls for each node. Chosen value: two walls at right angles need one pass; the
-remaining error at a sharper corner is corrected in the next step."""
+"""Largest number of passes over the walls for each node. Chosen value: two walls at right angles need one pass. The
+error that remains at a sharper corner is corrected in the next step."""
 ACROSS = 1e-12
-"""Smallest squared length of the unit normal of a wall after the components held by planes of symmetry are set to
-zero. Below this value the wall is parallel to a plane of symmetry and cannot push the node. Chosen value: far above
-rounding (1e-32) and below any intended angle."""
+"""Smallest squared length of the unit normal of a wall after the components held by symmetry planes are set to zero.
+Below this value the wall is parallel to a symmetry plane and cannot push the node. The chosen value is far above
+round-off (1e-32) and below any intended angle."""
 
 
 class RigidWalls(Stopping):
-    """Stops nodes at walls: an impulse along the normal keeps a node from ending the step behind a wall, and never
-    pulls. Another impulse along the wall reduces the sliding velocity of the node, at most by Coulomb's ``friction``
-    (w,) times the normal one.
+    """Stops nodes at walls. An impulse along the normal prevents a node from ending the step behind a wall; the impulse
+    never pulls. A friction impulse along the wall reduces the sliding velocity of the node; it is at most Coulomb's
+    ``friction`` (w,) times the normal impulse.
 
-    ``points`` and ``normals`` (w, 3); ``held`` (n, w): which walls stop which node. A node between two walls is stopped
-    by the first wall, then by the second wall, several times. ``mirrored`` (n, 3): components held by planes of
-    symmetry, None for none; a wall that is not at right angles to a plane pushes the nodes on the plane of symmetry
-    along this plane; the plane takes the other component.
+    ``points`` and ``normals`` (w, 3); ``held`` (n, w): whether each wall stops each node. A node between two walls is
+    stopped by the first wall, then by the second wall, several times. ``mirrored`` (n, 3): components held by symmetry
+    planes, or None. If a wall is not at right angles to a symmetry plane, it pushes the nodes on the symmetry plane
+    along this plane.
     """
 
     def __init__(
         self, nodes: Indices, points: Floats, normals: Floats, held: Flags, mirrored: Flags | None = None,
         friction: Floats | None = None, reports: bool = False,
     ) -> None:  # fmt: skip
-        """``reports``: True if ``since_last_report`` will be called."""
+        """``reports``: whether ``since_last_report`` will be called."""
         self._pushed = np.zeros((1, _PADDED))
-        """(threads, 8) time of the last impulse that each thread gave, s; the other columns are scratch."""
+        """(threads, 8) table in which column 0 is the time of the last impulse that each thread applied, s. The other
+        columns are padding."""
         super().__init__(nodes, len(points), reports=reports)
         self._friction = np.zeros(len(points)) if friction is None else friction
         self._none = np.zeros(0)
@@ -64,7 +65,7 @@ class RigidWalls(Stopping):
         return free(self.nodes)
 
     def depths(self, state: Nodes) -> Floats:
-        """(w,) depth of the deepest node behind each wall at the start, m."""
+        """(w,) largest depth of a node behind each wall at the start, m."""
         depths = np.full(len(self._points), -np.inf)
         for k, (point, normal) in enumerate(zip(self._points, self._normals, strict=True)):
             behind = ((point - state.x[self.nodes[self._held[:, k]]]) * normal).sum(axis=1)
@@ -95,12 +96,12 @@ class RigidWalls(Stopping):
         return self.over.stages(_push_out, table, ties, len(self.nodes))
 
     def _noted(self, state: Nodes) -> tuple[Floats | Indices, ...]:
-        """Returns the arguments of ``_forget``."""
+        """Returns the arguments of the kernel ``_forget``."""
         friction = self._none if self.friction_loss is None else self.friction_loss
         return state.v, self.nodes, self._before, self._impulse, self.contact_loss, self._rubbed, friction
 
     def _of(self, state: Nodes) -> tuple[Floats | Indices | Flags, ...]:
-        """Returns the arguments of ``_push_out`` without the numbers."""
+        """Returns the arguments of the kernel ``_push_out``, without the numbers."""
         if len(self._pushed) != self.over.threads:
             self._pushed = np.full((self.over.threads, _PADDED), self.last_push)
         friction = self._none if self.friction_loss is None else self.friction_loss
@@ -122,7 +123,7 @@ _of_forget, _of_push = reader(*_FORGET), reader(*_PUSH)
 
 @njit(TASK, cache=True)
 def _forget(table, begin, end, thread):  # type: ignore[no-untyped-def]
-    """Task: stores v(n-1/2), books the second half of the work of the last impulses, and sets the impulses to zero."""
+    """Task: stores v(n-1/2), adds the second half of the work of the last impulses, and sets the impulses to zero."""
     v, nodes, before, impulse, loss, rubbed, friction_loss = _of_forget(table)
     for j in range(begin, end):
         a = nodes[j]
@@ -138,14 +139,11 @@ def _forget(table, begin, end, thread):  # type: ignore[no-untyped-def]
 
 @njit(TASK, cache=True, error_model="numpy")
 def _push_out(table, begin, end, thread):  # type: ignore[no-untyped-def]
-    """Task: stops the nodes of a range at all walls, and books half of the work.
+    """Task: stops the nodes of a range at all walls, and adds half of the work of the impulses. The numbered comments
+    are the steps for one node.
 
-    Adds the impulses to ``impulse``, the friction impulses also to ``rubbed``, and the impulses of each wall to
-    ``given``. Sets column 0 of ``pushed`` (threads, 8) to the time ``t`` if a wall stopped a node.
-
-    1. Gap and velocity along the normal, and the square of the normal without ``mirrored`` components. 2. Impulse such
-    that the gap at the end of the step is zero. 3. Friction: sliding velocity across the normal, at most mu times the
-    normal one. 4. Next pass, if a node between several walls was stopped by a wall.
+    The impulses are added to ``impulse``, the friction impulses also to ``rubbed``, and the impulses of each wall to
+    ``given``. If a wall stopped a node, column 0 of ``pushed`` (threads, 8) is set to the time ``t``.
     """
     (
         x, v, mass, nodes, before, impulse, rubbed, given, loss, friction_loss, points, normals, friction, held,
@@ -157,7 +155,8 @@ def _push_out(table, begin, end, thread):  # type: ignore[no-untyped-def]
         for _ in range(_SWEEPS):
             moved = False
             for k in range(len(points)):
-                # 1. Compute gap, velocity and free part of the normal.
+                # 1. Compute gap and velocity along the normal, and the square of the normal without ``mirrored``
+                # components.
                 gap, speed, along = 0.0, 0.0, 1.0
                 for i in range(3):
                     gap += (x[a, i] - points[k, i]) * normals[k, i]
@@ -165,7 +164,7 @@ def _push_out(table, begin, end, thread):  # type: ignore[no-untyped-def]
                     if mirrored[j, i]:
                         along -= normals[k, i] * normals[k, i]
                 if held[j, k] and gap + dt * speed < 0.0 and along > ACROSS:
-                    # 2. Compute the impulse that makes the gap zero.
+                    # 2. Compute the impulse that makes the gap at the end of the step zero.
                     push = -(gap / dt + speed) / along
                     for i in range(3):
                         if mirrored[j, i]:
@@ -177,7 +176,7 @@ def _push_out(table, begin, end, thread):  # type: ignore[no-untyped-def]
                     moved = any_moved = True
                     if friction[k] == 0.0:
                         continue
-                    # 3. Compute the friction.
+                    # 3. Compute the friction impulse, which is at most mu times the normal impulse.
                     speed, size = 0.0, 0.0
                     for i in range(3):
                         speed += v[a, i] * normals[k, i]
@@ -191,7 +190,7 @@ def _push_out(table, begin, end, thread):  # type: ignore[no-untyped-def]
                         impulse[j, i] -= mass[a] * share * slide[i]
                         rubbed[j, i] -= mass[a] * share * slide[i]
                         given[j, 3 * k + i] -= mass[a] * share * slide[i]
-            # 4. Decide whether another pass is needed.
+            # 4. Make another pass if the node is between several walls and a wall stopped it.
             if not moved or len(points) == 1:
                 break
         if any_moved:

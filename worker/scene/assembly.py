@@ -1,5 +1,5 @@
-"""The whole mesh of a case, built on rank 0: meshes of all parts, rotated, separated where they overlap, with loads
-and initial velocities.
+"""Construction of the whole mesh of a case on rank 0. The meshes of all parts are rotated, overlaps are removed, and
+loads and initial velocities are added.
 """
 
 import logging
@@ -39,12 +39,12 @@ from .stacking import Stacked, stacked
 log = logging.getLogger("conoid.worker")
 
 Say = Callable[[str], None]
-"""Callback that reports a phase of the start-up."""
+"""Callback that reports a phase of the start of a run."""
 
 
 @dataclass
 class Whole:
-    """The whole mesh with its loads and initial velocities, on rank 0."""
+    """The whole mesh of a case with its loads and initial velocities, on rank 0."""
 
     points: Floats
     node_part: Indices
@@ -52,33 +52,33 @@ class Whole:
     tet_part: Indices
     volumes: Floats
     across: Indices
-    """(tets, 4) neighbours of the faces (state.Block.across)."""
+    """(tets, 4) neighbours of the faces of each tet (state.Block.across)."""
     shares: Shares
-    """Masses of the nodes of several parts."""
+    """Masses that each part has in the nodes that several parts share."""
     node_volume: Floats
     mass: Floats
     velocity: Floats
     loads: list[Load | LoadedFaces]
-    """Loads of the tractions of the case."""
+    """Loads of the tractions that the case defines."""
     tied: Pieces
-    """Pieces of the bonds of meshes that do not match."""
+    """Pieces of the tied bonds between meshes that do not match."""
     near: Nearness
     marks: Ints
-    """(nodes,) sets that contain each node (state.Nodes.marks)."""
+    """(nodes,) sets that contain each node, as bits (state.Nodes.marks)."""
     warnings: list[str]
     """Warnings about the meshes and about the regions of the boundaries."""
     survey: Survey
-    """Measurements of the meshes from files."""
+    """Measurements of the meshes that come from files."""
 
 
 def quiet(what: str) -> None:
-    """Report no phase."""
+    """Report no phase of the start."""
 
 
 def assemble(case: schema.Case, folder: Path, say: Say = quiet) -> Whole:
-    """Build the meshes of all parts. Raises MeshError, InputError.
+    """Build the whole mesh from the meshes of all parts. Raises MeshError, InputError.
 
-    ``folder``: where relative paths of mesh files start.
+    ``folder``: folder to which the paths of mesh files are relative.
     """
     facts = Facts(case)
     whole = assembled(case, _built(case, folder, say, facts))
@@ -101,10 +101,11 @@ def _built(case: schema.Case, folder: Path, say: Say, facts: Facts) -> Iterator[
 
 
 def assembled(case: schema.Case, meshes: Iterable[tuple[int, TetMesh]], overlaps: bool = True) -> Whole:
-    """Return the whole mesh of the ``meshes`` with their part numbers. Raises MeshError, InputError.
+    """Return the whole mesh, made from the ``meshes`` of the parts and their part numbers. Raises MeshError,
+    InputError.
 
-    Some parts may be missing before a run. In that case only boundaries whose parts are all present select nodes and
-    faces. Overlaps of bodies are searched for if ``overlaps`` is set.
+    In a check before a run some parts may be missing. Then a boundary selects nodes and faces only if all its parts are
+    present. ``overlaps``: whether overlaps between bodies are searched for.
     """
     made = stacked(case, meshes, overlaps)
     x, t, part_of_tet, warnings = made.points, made.tets, made.tet_part, made.warnings
@@ -146,7 +147,9 @@ def assembled(case: schema.Case, meshes: Iterable[tuple[int, TetMesh]], overlaps
 
 
 def _shares(case: schema.Case, made: Stacked, masses: Floats) -> Shares:
-    """Return the shares of the nodes of several parts, from the ``masses`` (tets,) of the tets, kg."""
+    """Return the masses that each part has in the nodes of several parts, from the ``masses`` (tets,) of the tets,
+    kg.
+    """
     rank = ranks(case)
     if not len(rank):
         return Shares()
@@ -158,12 +161,16 @@ def _shares(case: schema.Case, made: Stacked, masses: Floats) -> Shares:
 
 
 def _quarters(tets: Indices, values: Floats, n: int) -> Floats:
-    """Return (n,) the sum at each node of a quarter of the value of each of its tets, in the order of the tets."""
+    """Return (n,) sums at the nodes. Each tet adds a quarter of its value to each of its nodes, in the order of the
+    tets.
+    """
     return np.bincount(tets.reshape(-1), np.repeat(values / 4.0, 4), n).astype(np.float64)
 
 
 def _weighed(case: schema.Case, mass: Floats, part: Indices) -> Floats:
-    """Return (n,) the masses of the nodes, kg, scaled for a rigid part with a given mass."""
+    """Return (n,) the masses of the nodes, kg. If the case gives the mass of a rigid part, the masses of its nodes are
+    scaled to this mass.
+    """
     for index in case.rigid:
         spec = case.parts[index].rigid
         if spec is not None and spec.mass is not None:

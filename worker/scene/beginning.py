@@ -1,4 +1,6 @@
-"""Trial start of a run before it is submitted: the errors and warnings that its start would give."""
+"""Trial start of a run before the run is submitted. The trial gives the errors and warnings that the start of the run
+would give.
+"""
 
 from collections.abc import Mapping
 
@@ -11,10 +13,11 @@ from .assembly import assembled
 
 
 def begun(case: Case, meshes: Mapping[int, TetMesh], compiled: bool) -> list[str]:
-    """Return the warnings of a run up to its first step. Raises the InputError or MeshError of its start.
+    """Return the warnings that a run gives up to its first step. Raises the InputError or MeshError that the start of
+    the run would raise.
 
-    ``meshes``: meshes by part number, of all parts or of the parts from files; ``compiled``: whether kernels are
-    compiled. Overlaps are searched for only with compiled kernels.
+    ``meshes``: meshes keyed by part number, of all parts or of the parts from files; ``compiled``: whether kernels are
+    compiled. Overlaps are searched for only if kernels are compiled.
     """
     whole, comm = assembled(case, meshes.items(), compiled), SerialComm()
     model, piece = domain.alone(case, whole)

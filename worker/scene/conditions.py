@@ -36,8 +36,8 @@ def loads(parcel: Parcel) -> list[Load | LoadedFaces]:
 def walls_of(case: schema.Case) -> Walls:
     """Return the walls of a case in their initial position.
 
-    If parts are rigid, each plane of symmetry adds two walls, one for bodies above the plane and one for bodies
-    below. A contact with such a wall represents the contact of a body beside the plane with its mirror image.
+    If parts are rigid, each symmetry plane adds two walls: one for bodies above the plane and one for bodies below it.
+    A contact between a body and such a wall represents the contact between the body and its mirror image.
     """
     planes = case.boundaries_of(schema.Symmetry) if case.rigid else []
     images = [_image(spec, sign) for _, spec in planes for sign in (1.0, -1.0)]
@@ -45,7 +45,9 @@ def walls_of(case: schema.Case) -> Walls:
 
 
 def _image(plane: schema.Symmetry, sign: float) -> schema.Wall:
-    """Return the plane as a wall for bodies above it (``sign`` 1) or below it (-1)."""
+    """Return the plane as a wall. The wall is for bodies above the plane if ``sign`` is 1, or below the plane if
+    ``sign`` is -1.
+    """
     along = np.eye(3)[AXES[plane.axis]]
     return schema.Wall(
         kind="wall", name="image", point=tuple((plane.at * along).tolist()), normal=tuple((sign * along).tolist())
@@ -53,10 +55,10 @@ def _image(plane: schema.Symmetry, sign: float) -> schema.Wall:
 
 
 def bodies_beside(case: schema.Case, model: Model, comm: Comm) -> Ints:
-    """Return (planes, parts) 1 for a rigid part that starts above a plane of symmetry, -1 for a rigid part below, 0 for
-    all others.
+    """Return (planes, parts) the side of each symmetry plane on which a rigid part starts: 1 above, -1 below, 0 for all
+    other parts.
 
-    The plane must act on the part, and the part must have no node on the plane. Collective.
+    The value is 0 if the plane does not act on the part, or if the part has a node on the plane. Collective.
     """
     planes, nodes = case.boundaries_of(schema.Symmetry), model.nodes
     found = np.zeros((len(planes), len(model.parts)), np.int64)
@@ -73,9 +75,9 @@ def build(
 ) -> list[Boundary]:  # fmt: skip
     """Return the boundaries of a case on this rank's nodes, in the order in which they act. Collective.
 
-    Gravity and tractions come first, so that constraints correct them. Walls come last and omit nodes with a
-    prescribed motion. Rigid parts have their own motion (rigid/motion.py) and appear here only in planes of
-    symmetry. ``loads``: loads of the tractions; ``moving``: the walls of the case in their present position.
+    Gravity and tractions come first, so that constraints correct their effect. Walls come last and omit nodes with a
+    prescribed motion. Rigid parts have their own motion (rigid/motion.py) and appear here only in symmetry planes.
+    ``loads``: loads of the tractions; ``moving``: walls of the case in their present position.
     """
     nodes = model.nodes
     loose = of_nodes(case, nodes) < 0
@@ -106,7 +108,7 @@ def build(
 
 
 def held_by(case: schema.Case, spec: schema.Boundary, model: Model) -> Flags:
-    """Return (n,) the nodes on which a boundary acts."""
+    """Return (n,) whether a boundary acts on each node."""
     nodes, on_set = model.nodes, isinstance(spec, schema.Prescribed | schema.Rotation) and spec.on is not None
     marked = marks.held(nodes.marks, bits(case)[str(getattr(spec, "on", ""))]) if on_set else np.True_
     if isinstance(spec, schema.Prescribed):
@@ -116,13 +118,13 @@ def held_by(case: schema.Case, spec: schema.Boundary, model: Model) -> Flags:
 
 
 def of_parts(spec: schema.Boundary, model: Model) -> Flags:
-    """Return (n,) the nodes of the parts that a boundary names."""
+    """Return (n,) whether each node belongs to a part that the boundary names."""
     return model.nodes.among(selection.named(spec, model.parts))
 
 
 def heights(case: schema.Case, spec: schema.Symmetry, model: Model) -> Floats:
-    """Return (n,) the heights of nodes above a symmetry plane at the start, m; 0 for nodes within round-off of the
-    plane, and for the nodes of its set within the slack of their part.
+    """Return (n,) the heights of nodes above a symmetry plane at the start, m. The height is 0 for nodes within
+    round-off of the plane. It is also 0 for nodes of the plane's set that are within the slack of their part.
     """
     found, part = model.nodes.x0[:, AXES[spec.axis]] - spec.at, model.nodes.part
     within = model.rounding[part]
@@ -132,7 +134,9 @@ def heights(case: schema.Case, spec: schema.Symmetry, model: Model) -> Floats:
 
 
 def on_plane(case: schema.Case, spec: schema.Symmetry, model: Model) -> Flags:
-    """Return (n,) the nodes that start on a symmetry plane: those at the plane, or those of its set."""
+    """Return (n,) whether each node starts on a symmetry plane. If the plane has a set of nodes, these are the nodes of
+    the set, else the nodes at the plane.
+    """
     there = heights(case, spec, model) == 0.0
     return there if spec.on is None else np.asarray(there & _marked(case, spec, model))
 
@@ -142,14 +146,16 @@ def _marked(case: schema.Case, spec: schema.Symmetry, model: Model) -> Flags:
 
 
 def sides(case: schema.Case, spec: schema.Symmetry, model: Model) -> Floats:
-    """Return (n,) the side of a symmetry plane on which its nodes start: 1 above, -1 below, 0 for nodes on which the
-    plane does not act and for nodes at the plane.
+    """Return (n,) the side of a symmetry plane on which each node starts: 1 above, -1 below. The value is 0 for nodes
+    at the plane, and for nodes on which the plane does not act.
     """
     return np.where(of_parts(spec, model), np.sign(heights(case, spec, model)), 0.0)
 
 
 def node_sides(case: schema.Case, spec: schema.Symmetry, model: Model, comm: Comm) -> Floats:
-    """Return ``sides``; nodes at the plane that are not in its set have the side of their part. Collective."""
+    """Return ``sides``, but with the side of the part for nodes that are at the plane and not in its set.
+    Collective.
+    """
     side = sides(case, spec, model)
     if spec.on is None:
         return side
@@ -158,7 +164,7 @@ def node_sides(case: schema.Case, spec: schema.Symmetry, model: Model, comm: Com
 
 
 def part_sides(case: schema.Case, spec: schema.Symmetry, model: Model, comm: Comm) -> Floats:
-    """Return (parts,) 1 for a part above a symmetry plane, -1 for a part below.
+    """Return (parts,) the side of a symmetry plane: 1 for a part above the plane, -1 for a part below.
 
     The value is 0 for a part on which the plane does not act, and for a part with nodes on both sides. Collective.
     """
@@ -188,7 +194,7 @@ def _walls(case: schema.Case, held: list[Flags], planes: Flags) -> list[Boundary
 def _moving(
     case: schema.Case, held: list[Flags], planes: Flags, model: Model, walls: Walls | None, comm: Comm
 ) -> list[Boundary]:  # fmt: skip
-    """Return the walls that are not fixed planes. Collective."""
+    """Return the walls of the case that are not fixed planes. Collective."""
     found = [held[index] & (not spec.plain) for index, spec in case.boundaries_of(schema.Wall)]
     if all(spec.plain for _, spec in case.boundaries_of(schema.Wall)):
         return []

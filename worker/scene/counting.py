@@ -1,5 +1,5 @@
 """Counts of the nodes and faces that tractions and prescribed velocities select in meshes from files. The counts are
-made before a run.
+made in a check before a run.
 """
 
 from collections.abc import Iterator, Mapping
@@ -18,14 +18,13 @@ from .marks import marks
 from .setting import turned
 
 Meshes = Mapping[int, TetMesh]
-"""Meshes by part number, before the rotation of their part."""
+"""Meshes keyed by part number, before the rotation of their part."""
 
 
 def loads(case: Case, meshes: Meshes) -> Iterator[Load]:
-    """Yield the count of each boundary whose parts all have a mesh in ``meshes``. The count is equal to the count in
-    the run.
+    """Yield the count of each boundary whose parts all have a mesh in ``meshes``. The run gives the same counts.
 
-    Raises InputError for bonds without common nodes.
+    Raises InputError if a bond has no common nodes.
     """
     body = bodies(case)
     for number, spec in enumerate(case.boundaries):

@@ -1,7 +1,8 @@
-"""The piece of a rank: its part of the whole mesh, shared nodes, masses and blocks of tets.
+"""Division of the whole mesh among the ranks. Each rank receives its tets and nodes, shared nodes, masses and blocks of
+tets.
 
-Rank 0 builds the whole mesh (assembly.py), numbers it and cuts it; every rank receives its piece. Global ids follow
-the order of the parts and, within a part, the order of the mesh, for any number of ranks.
+Rank 0 builds the whole mesh (assembly.py), numbers its tets and nodes, and divides it. For any number of ranks, global
+ids have the order of the parts and, within a part, the order of the mesh.
 """
 
 import math
@@ -32,12 +33,12 @@ from . import assembly
 from .assembly import Say, Whole
 
 GROUPS = 256
-"""Number of groups of tets with recorded loads (migration/groups.py). Chosen value."""
+"""Number of groups of tets for which loads are recorded (migration/groups.py). Chosen value."""
 
 
 @dataclass
 class Piece:
-    """The data that one rank receives."""
+    """The data of the whole mesh that one rank receives."""
 
     node_ids: Ints
     node_part: Indices
@@ -48,47 +49,47 @@ class Piece:
     mass: Floats
     node_volume: Floats
     shares: Shares
-    """Masses of the nodes of several parts."""
+    """Masses that each part has in the nodes that several parts share."""
     loads: list[Load | LoadedFaces]
-    """Loads of the tractions on all nodes of this rank. A pressure that follows the surface is given on the faces of
-    the tets of this rank."""
+    """Loads of the tractions on all nodes of this rank. The load of a pressure that follows the surface consists of
+    faces of the tets of this rank."""
     tied: Pieces
-    """Pieces of the bonds of meshes that do not match, of all ranks."""
+    """Pieces of the tied bonds between meshes that do not match. Every rank has the pieces of all ranks."""
     tet_ids: Ints
     tet_part: Indices
     tets: Indices
     tet_volume: Floats
     across: Indices
-    """(tets, 4) neighbours of the faces (state.Block.across)."""
+    """(tets, 4) neighbours of the faces of each tet (state.Block.across)."""
     border: Flags
     node_group: Indices
     tet_group: Indices
     groups: Floats
-    """(groups, 4) centre and number of tets of each group (state.Model.groups)."""
+    """(groups, 4) centre and number of tets of each group of tets (state.Model.groups)."""
     neighbours: list[Neighbour]
     totals: tuple[int, int, int]
     """Numbers of tets, nodes and shared nodes of the whole mesh."""
     part_starts: Ints
-    """Global id of the first tet of each part."""
+    """(parts,) global id of the first tet of each part."""
     mean_volumes: Floats
-    """(parts,) mean volume of a tet, m^3."""
+    """(parts,) mean volume of the tets of each part, m^3."""
     size: float
     """Largest absolute coordinate of the whole mesh, m."""
     slack: Floats
     rounding: Floats
-    """(parts,) tolerances of regions and of planes of symmetry, m (state.Model)."""
+    """(parts,) tolerances with which nodes are compared with regions and symmetry planes, m (state.Model)."""
     marks: Ints
-    """(nodes,) sets that contain each node (state.Nodes.marks)."""
+    """(nodes,) sets that contain each node, as bits (state.Nodes.marks)."""
     warnings: list[str]
     """Warnings about the meshes and the boundaries (assembly.Whole)."""
 
 
 def cut(whole: Whole, ranks: int, scale: tuple[float, float, float] = (1.0, 1.0, 1.0)) -> list[Piece]:
-    """Return the pieces of ``ranks`` ranks. The centres of the tets are divided by recursive bisection. A rank gets all
-    nodes of its tets.
+    """Return the pieces of the mesh for ``ranks`` ranks. The centres of the tets are divided by recursive bisection. A
+    rank gets all nodes of its tets.
 
-    ``scale`` multiplies the centres first: a direction with a small factor is cut last. Raises InputError if there
-    are more ranks than tets.
+    Before the bisection the centres are multiplied by ``scale``: a direction with a small factor is cut last. Raises
+    InputError if there are more ranks than tets.
     """
     if ranks > len(whole.tets):
         raise InputError(f"run.ranks = {ranks}: at most {len(whole.tets)}, the number of tets")
@@ -109,8 +110,8 @@ def cut(whole: Whole, ranks: int, scale: tuple[float, float, float] = (1.0, 1.0,
 
 
 def _grouped(whole: Whole, centres: Floats) -> tuple[Indices, Indices, Floats]:
-    """Return the group of each node and of each tet, and the groups (groups, 4); the tets are bisected by their
-    ``centres`` (tets, 3).
+    """Return the group of each node and of each tet, and the groups (groups, 4). The groups are made by bisection of
+    the tets by their ``centres`` (tets, 3).
     """
     n = min(GROUPS, len(centres))
     tets, _ = bisect(centres, np.arange(len(centres)), np.ones(len(centres)), n, SerialComm())
@@ -120,7 +121,7 @@ def _grouped(whole: Whole, centres: Floats) -> tuple[Indices, Indices, Floats]:
 
 
 def _home(whole: Whole, owner: Indices) -> Indices:
-    """Return (nodes,) the part of a cut that owns each node: the part with the tet of smallest id at the node."""
+    """Return (nodes,) the rank that owns each node: the rank with the tet of smallest id at the node."""
     home = np.zeros(len(whole.points), np.int32)
     home[whole.tets[::-1].reshape(-1)] = np.repeat(owner[::-1], 4)
     return home
@@ -153,7 +154,8 @@ def _piece(
 
 
 def build(case: schema.Case, folder: Path, comm: Comm, say: Say = assembly.quiet) -> tuple[Model, Piece]:
-    """Return this rank's model and piece. Rank 0 reports each phase with ``say``.
+    """Return the model of this rank, and its piece of the mesh. Rank 0 reports each phase of the start by the callback
+    ``say``.
 
     Collective. Raises MeshError on every rank if rank 0 cannot build a mesh.
     """
@@ -175,16 +177,16 @@ def build(case: schema.Case, folder: Path, comm: Comm, say: Say = assembly.quiet
 
 
 def _warned(case: schema.Case, folder: Path, survey: Survey) -> list[str]:
-    """Return the warnings about the case that ``conoid validate`` gives."""
+    """Return the warnings about the case that ``conoid validate`` would give."""
     try:
         expected = estimate(case, folder, survey)
-    except (ArithmeticError, ValueError):  # too many elements to count: the reader of the case refuses the case
+    except (ArithmeticError, ValueError):  # too many elements to count; the reader of the case refuses such a case
         return []
     return [str(each) for each in warned(case, expected, survey, [*touching(case), *survey.touching])]
 
 
 def alone(case: schema.Case, whole: Whole) -> tuple[Model, Piece]:
-    """Return the model and the piece of a single rank."""
+    """Return the model and the piece of the mesh for a run with a single rank."""
     (piece,) = cut(whole, 1)
     return _model(case, piece), piece
 
@@ -223,8 +225,8 @@ def _block(case: schema.Case, piece: Piece, index: int) -> Block:
 def block(
     case: schema.Case, index: int, ids: Ints, tets: Tets, state: Floats, across: Indices, border: int
 ) -> Block:  # fmt: skip
-    """Return the block of part ``index``, from the case and from the arrays of its tets. The ``border`` tets come
-    first.
+    """Return the block of tets of part ``index``, made from the case and from the arrays of its tets. The ``border``
+    tets come first.
     """
     part = case.parts[index]
     material = find_material(case, part.material)

@@ -1,4 +1,4 @@
-"""Parts of one body that gmsh meshes together."""
+"""Parts of one body that gmsh meshes together, so that their meshes have common nodes."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -13,7 +13,9 @@ from ..mesh.model import TetMesh
 
 
 def asked(part: Part) -> Mesh:
-    """Return the mesh of a part; the default of ``aligned`` depends on its erosion."""
+    """Return the mesh that the case requests for a part. The default of ``aligned`` depends on the erosion of the
+    part.
+    """
     mesh = part.mesh
     if isinstance(mesh, Symmetric) and mesh.aligned is None:
         return mesh.model_copy(update={"aligned": part.erosion is not None})
@@ -21,7 +23,7 @@ def asked(part: Part) -> Mesh:
 
 
 def grouped(case: Case, index: int) -> list[int]:
-    """Return the parts that gmsh meshes together with part ``index``: the parts of the same body that gmsh meshes."""
+    """Return the parts that gmsh meshes together with part ``index``: all parts of its body that gmsh meshes."""
     body = bodies(case)
     made = [isinstance(part.mesh, Primitive | Meshed) and part.mesh.generator == "gmsh" for part in case.parts]
     return [i for i, of in enumerate(body) if of == body[index] and made[i]] if made[index] else []
@@ -30,7 +32,7 @@ def grouped(case: Case, index: int) -> list[int]:
 def built_together(
     case: Case, group: list[int], folder: Path, before: Callable[[], None] = lambda: None
 ) -> dict[int, TetMesh]:
-    """Return the meshes of the parts of a ``group`` by their numbers. ``before`` is called before the meshes are
-    made."""
+    """Return the meshes of the parts of a ``group``, keyed by their part numbers. ``before`` is called before the
+    meshes are made."""
     meshes = {f"parts[{i}].mesh": asked(case.parts[i]) for i in group}
     return dict(zip(group, build_together(meshes, folder, made=before), strict=True))

@@ -1,4 +1,4 @@
-"""Tractions of a case on the faces of the meshes, and nodes of prescribed velocities."""
+"""Loads of tractions on the faces of the meshes, and nodes of prescribed velocities."""
 
 import numpy as np
 
@@ -25,11 +25,11 @@ def loads(
     marked: Marks,
     tied: Pieces,
 ) -> tuple[list[Load | LoadedFaces], list[Selected], list[str]]:
-    """Return the loads of the tractions of a case, the selection of each traction, and warnings.
+    """Return three things: the loads of the tractions of a case, the faces that each traction selects, and warnings.
 
     A traction gives a third of the force on each face to each node of the face, in the order of the tets. A pressure
-    that follows the surface stores the faces instead. ``of_tets``: (m, 4) tets, and (m,) their parts. A traction
-    that is not ``known`` gets no face. Raises InputError for a known traction that selects no face.
+    that follows the surface stores the faces instead of the forces. ``of_tets``: (m, 4) tets, and (m,) their parts. A
+    traction that is not ``known`` gets no face. Raises InputError for a known traction that selects no face.
     """
     tractions = case.boundaries_of(schema.Traction)
     loads, found, warnings = list[Load | LoadedFaces](), list[Selected](), list[str]()
@@ -57,8 +57,8 @@ def loads(
 
 
 def _bonded(index: int, faces: Ints, tied: Pieces) -> list[str]:
-    """Return a warning for a traction on bonded interfaces, which are no free surface. ``faces``: (m,) numbers of its
-    faces, 4 * tet + local face.
+    """Return a warning for a traction that loads bonded interfaces, because an interface is no free surface. ``faces``:
+    (m,) numbers of the loaded faces, 4 * tet + local face.
     """
     areas = tied.weights.sum(axis=1)
     area = float(areas[np.isin(tied.slave, faces)].sum() + areas[np.isin(tied.master, faces)].sum())
@@ -85,7 +85,9 @@ def _load(spec: schema.Traction, tets: Ints, faces: Ints, outward: Floats) -> Lo
 def driven(
     case: schema.Case, x: Floats, members: Members, near: Nearness, known: list[bool], marked: Marks
 ) -> tuple[list[Selected], list[str]]:
-    """Return the nodes that the regions of the ``known`` prescribed velocities select, and warnings."""
+    """Return the nodes that the prescribed velocities select, and warnings. Only velocities that are ``known`` are
+    processed.
+    """
     found, warnings = list[Selected](), list[str]()
     for index in (index for index, _ in case.boundaries_of(schema.Prescribed) if known[index]):
         selected, held = selection.counted(case, index, x, members, selection.NO_FACES, near, marked)

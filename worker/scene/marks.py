@@ -1,4 +1,4 @@
-"""Nodes and faces in the sets of mesh files to which a case refers by ``on``."""
+"""Nodes and faces that belong to sets of mesh files. A case refers to such sets by the key ``on``."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -15,28 +15,29 @@ from ..mesh.model import NodeSet, TetMesh
 from ..model.state import Flags, Indices, Ints
 
 Meshes = Mapping[int, tuple[TetMesh, Ints]]
-"""Meshes by part number, with the global indices (n,) of their nodes."""
+"""Meshes keyed by part number, with the global indices (n,) of their nodes."""
 
 
 @dataclass
 class Marks:
-    """Membership of nodes and faces in sets of mesh files."""
+    """Membership of nodes and faces in the sets of mesh files."""
 
     nodes: Ints
-    """(n,) bit b of a node: whether the node is in set b of ``cases.on.bits``; (0,) if the case refers to no set."""
+    """(n,) sets that contain each node: bit b is set if the node is in set b of ``cases.on.bits``. The array is (0,) if
+    the case refers to no set."""
     faces: dict[int, Ints] = field(default_factory=dict)
-    """(k, 3) nodes of the faces of surfaces, ascending in each face, by bit of the surface."""
+    """(k, 3) nodes of the faces of each surface, keyed by the bit of the surface. The nodes of a face are ascending."""
     surfaces: dict[int, set[int]] = field(default_factory=dict)
-    """The parts in which a set is a surface, by bit of the set."""
+    """Parts in which a set is a surface, keyed by the bit of the set."""
     warnings: list[str] = field(default_factory=list)
     """Warnings for the user."""
 
     def holds(self, bit: int) -> Flags:
-        """Return (n,) which nodes are in a set."""
+        """Return (n,) whether each node is in the set of a bit."""
         return held(self.nodes, bit)
 
     def chosen(self, bit: int, faces: Indices, part: Indices) -> Flags:
-        """Return (m,) which exposed faces (m, 3) a set contains. ``part``: (m,) the parts of the faces.
+        """Return (m,) whether a set contains each of the exposed faces (m, 3). ``part``: (m,) the parts of the faces.
 
         A surface contains its faces. A set of nodes contains the faces with all nodes in the set.
         """
@@ -52,7 +53,7 @@ class Marks:
 
 
 def held(marks: Ints, bit: int) -> Flags:
-    """Return (n,) which nodes have a bit."""
+    """Return (n,) whether each node has the bit of a set."""
     return np.asarray((marks >> bit & 1).astype(bool))
 
 
@@ -60,7 +61,7 @@ def marks(case: Case, meshes: Meshes, n: int, boundary: int | None = None) -> Ma
     """Return the marks of ``n`` nodes. Raises MeshError if a set does not exist or has no node, or if a name is
     ambiguous.
 
-    ``boundary``: only the sets of this boundary and of planes of symmetry.
+    ``boundary``: if given, only sets of this boundary and of symmetry planes are used.
     """
     bits = on.bits(case)
     made = Marks(np.zeros(n if bits else 0, np.int64))
@@ -83,7 +84,7 @@ def marks(case: Case, meshes: Meshes, n: int, boundary: int | None = None) -> Ma
 
 
 def _found(case: Case, name: str, candidates: Sequence[int], meshes: Meshes, each: bool) -> list[tuple[int, NodeSet]]:
-    """Return the set in each part; ``each``: whether all parts must have the set."""
+    """Return the set with the given name in each part; ``each``: whether every part must have the set."""
     if not candidates:
         return []
     found = [(index, meant(meshes[index][0].sets, name)) for index in candidates]

@@ -1,4 +1,4 @@
-"""Initial velocities of all nodes, and warnings of joined or tied parts with different velocities."""
+"""Initial velocities of all nodes, and warnings about joined or tied parts with different velocities."""
 
 import numpy as np
 
@@ -12,18 +12,17 @@ from ..model.state import Floats, Indices
 from .setting import velocities
 
 _JITTER = 0x6A697474
-"""Seed of the random velocities at the start."""
+"""Seed of the random part of the initial velocities."""
 _ALIKE = 1e-6
-"""Difference between two velocities, as a share of the larger velocity, below which the difference is round-off. Chosen
-value."""
+"""Ratio of the difference between two velocities to the larger velocity, below which the difference counts as
+round-off. Chosen value."""
 
 
 def initial_velocities(case: schema.Case, x: Floats, part: Indices, shares: Shares) -> tuple[Floats, list[str]]:
-    """Return the velocities of the nodes (n, 3), m/s, and a warning if parts with a common node have different
+    """Return the initial velocities of the nodes (n, 3), m/s, and a warning if parts with a common node have different
     velocities.
 
-    The common node gets the mean of the velocities, weighted by mass. ``part``: (n,) the representative part of each
-    node.
+    A common node gets the mean velocity, weighted by mass. ``part``: (n,) the part that represents each node.
     """
     v = np.zeros_like(x)
     for index, spec in enumerate(case.parts):
@@ -39,8 +38,8 @@ def initial_velocities(case: schema.Case, x: Floats, part: Indices, shares: Shar
 
 
 def _mean_velocities(case: schema.Case, v: Floats, x: Floats, shares: Shares) -> list[str]:
-    """Set the velocities of nodes of several parts with different velocities. Return a warning if there are such
-    nodes.
+    """Set the velocities of nodes that belong to several parts with different velocities. Return a warning if there are
+    such nodes.
     """
     own = np.zeros((len(shares.node), 3))
     for index, spec in enumerate(case.parts):
@@ -57,7 +56,7 @@ def _mean_velocities(case: schema.Case, v: Floats, x: Floats, shares: Shares) ->
 
 
 def parted(case: schema.Case, x: Floats, tets: Indices, tied: Pieces) -> list[str]:
-    """Return warnings of ``tied`` parts that start with different velocities at their bond."""
+    """Return warnings about ``tied`` parts that start with different velocities at their bond."""
     warnings = []
     for k, one, two in interface.tied_pairs(case):
         places = x[np.unique(interface.corners(tied.slave[tied.bond == k], tets))]

@@ -1,4 +1,4 @@
-"""Overlaps between bodies at the start. Overlaps are refused, or removed by moving nodes."""
+"""Overlaps between bodies at the start. An overlap is an error, or is removed by moving nodes."""
 
 import numpy as np
 
@@ -14,8 +14,8 @@ from .stacking import Stacked
 
 
 def apart(case: schema.Case, made: Stacked) -> Floats:
-    """Return the points after overlaps were removed, if ``contact.overlap`` requests it. Raises InputError if bodies
-    overlap.
+    """Return the points of the bodies. If ``contact.overlap`` requests it, overlaps are removed by moving points.
+    Raises InputError if bodies overlap.
     """
     assert case.contact is not None
     x, tets, body, part, exposed = made.points, made.tets, made.body, made.part_of_body, made.across < 0

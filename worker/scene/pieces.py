@@ -1,5 +1,5 @@
-"""Pieces of a part from a mesh file: sets of tets without a common node. The module detects overlaps between pieces,
-and allows contact between them.
+"""Pieces of a part from a mesh file. Two pieces of a part have no common node. The module detects overlaps between
+pieces, and allows contact between them.
 """
 
 from collections.abc import Iterator
@@ -18,19 +18,19 @@ from ..mesh.model import TetMesh
 from ..model.state import Indices
 
 _MANY = 1_000
-"""Number of pieces of a part above which overlaps between the pieces are not searched for. Chosen value: the table
-of pairs increases with the square of this number."""
+"""Largest number of pieces of a part for which overlaps between the pieces are searched for. Chosen value: the size of
+the table of pairs is proportional to the square of this number."""
 UNSEEN = "the run checks whether bodies overlap: kernels are not compiled here yet"
-"""Warning if overlaps are not searched for."""
+"""Warning that overlaps are not searched for."""
 
 
 def pieces(case: Case, index: int, mesh: TetMesh, overlaps: bool) -> tuple[Indices, list[str]]:
-    """Return (nodes,) the piece of each node, and warnings. The pieces are zeros unless the mesh is from a file and the
-    part has self-contact.
+    """Return (nodes,) the number of the piece of each node, and warnings. All numbers are zero unless the mesh is from
+    a file and the part has contact with itself.
 
-    A warning is given for unmerged coincident nodes, a common error of meshes. ``overlaps``: whether overlaps of
-    pieces without contact are searched for. Raises InputError if such pieces have volume in common, because this
-    volume would count twice.
+    Unmerged coincident nodes, which are a common error of meshes, give a warning. ``overlaps``: whether overlaps of
+    pieces without contact are searched for. Raises InputError if such pieces have volume in common, because the mass of
+    this volume would count twice.
     """
     whole = np.zeros(len(mesh.points), np.int32)
     if not isinstance(case.parts[index].mesh, Measured):
@@ -53,7 +53,7 @@ def pieces(case: Case, index: int, mesh: TetMesh, overlaps: bool) -> tuple[Indic
 
 
 def _doubled(case: Case, index: int, mesh: TetMesh, piece: Indices) -> Iterator[str]:
-    """Yield a warning if nodes of a piece are inside of another piece. Raises InputError if centres of tets are
+    """Yield a warning if nodes of a piece are inside of another piece. Raises InputError if the centre of a tet is
     inside of another piece.
     """
     inside, tets = overlap.within(mesh.points, mesh.tets, piece)

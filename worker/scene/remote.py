@@ -1,4 +1,6 @@
-"""Warning about bodies so far from the origin that the rounding of their coordinates is a strain that counts."""
+"""Warning about bodies that are very far from the origin. The round-off of their coordinates acts as a strain that is
+not negligible.
+"""
 
 import numpy as np
 
@@ -9,17 +11,18 @@ from ..materials.elementary import power
 from ..model.state import Floats, Indices
 
 _STRAIN = 1e-6
-"""Smallest strain by rounding that gives a warning. Chosen value: 0.2 MPa in steel."""
+"""Smallest strain by round-off that gives a warning. Chosen value: it corresponds to 0.2 MPa in steel."""
 
 
 def remote(case: Case, x: Floats, tets: Indices, part: Indices, volumes: Floats) -> list[str]:
-    """Return a warning for each part whose coordinates ``x`` (n, 3), m, round by more than _STRAIN of its tets.
+    """Return a warning for each part whose coordinates ``x`` (n, 3), m, have a round-off above _STRAIN times the edge
+    of its tets.
 
-    A coordinate X has a rounding error of up to 2^-53 X, and the edges of a tet of volume V are about (6 V)^(1/3) long.
+    The round-off of a coordinate X is up to 2^-53 X, and the edges of a tet of volume V are about (6 V)^(1/3) long.
     """
     warnings = []
     for index in np.unique(part).tolist():
-        some = (part == index) & (volumes > 0.0)  # inverted and flat tets have their own messages
+        some = (part == index) & (volumes > 0.0)  # inverted and flat tets have messages of their own
         if not some.any():
             continue
         far = float(np.abs(x[tets[some]]).max())

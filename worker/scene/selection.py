@@ -1,5 +1,5 @@
-"""Nodes and faces that the regions of a case select, and their comparison with the numbers that ``validate``
-expects.
+"""Nodes and faces that the regions of a case select. Their numbers are compared with the numbers that ``conoid
+validate`` predicts.
 """
 
 import logging
@@ -21,34 +21,35 @@ from .marks import Marks
 log = logging.getLogger("conoid.worker")
 
 _CLOSE = 0.5
-"""Distance outside of a region, divided by the shortest edge, within which nodes are counted to detect a layer.
-Chosen value: the next layer of a regular mesh is at twice this distance."""
+"""Distance outside of a region, divided by the shortest edge, within which nodes are counted to detect a layer of
+nodes. Chosen value: the next layer of a regular mesh is at twice this distance."""
 _LAYER, _FEWEST = 0.5, 4
-"""Share of the counted nodes that must be within region.MOST to be taken as a layer, and the smallest number of such
-nodes. Chosen values: of randomly placed nodes a fifth is that near."""
+"""Smallest fraction of the counted nodes within region.MOST at which these nodes count as a layer, and smallest number
+of such nodes. Chosen values: of randomly placed nodes a fifth is within that distance."""
 Members = tuple[Ints, Indices]
-"""(m,) nodes and (m,) their parts: a row for each part of each node (state.Nodes.of_parts)."""
+"""Two arrays (m,): nodes, and the parts of the nodes. A node of several parts has one entry for each of its parts
+(state.Nodes.of_parts)."""
 _EDGES = ((0, 1), (0, 2), (0, 3), (1, 2), (1, 3), (2, 3))
 """Pairs of corners of a tet that form its edges."""
 
 
 @dataclass(frozen=True)
 class Nearness:
-    """Distances from a border, m, within which nodes of each part count as on the border
+    """Distances, m, within which nodes of each part count as lying on the border of a region
     (``cases/shapes/region.py``).
     """
 
     edge: Floats
     """(parts,) shortest edge of each part, m."""
     slack: Floats
-    """(parts,) distance for regions, m."""
+    """(parts,) distance that is used for regions, m."""
     rounding: Floats
-    """(parts,) distance for planes of symmetry, m."""
+    """(parts,) distance that is used for symmetry planes, m."""
 
 
 def nearness(case: schema.Case, x: Floats, members: Members, tets: Indices, tet_part: Indices) -> Nearness:
-    """Return the object that gives the distances of nodes to all parts. Arguments: nodes (n, 3), tets (m, 4), and the
-    parts of both."""
+    """Return the distances within which nodes count as lying on a border, for all parts. Arguments: nodes (n, 3), tets
+    (m, 4), and the parts of nodes and tets."""
     nodes, part = members
     n = len(case.parts)
     squared, reach = np.full(n, np.inf), np.zeros(n)
@@ -64,18 +65,18 @@ def nearness(case: schema.Case, x: Floats, members: Members, tets: Indices, tet_
 
 
 def named(spec: schema.Boundary, parts: Sequence[str]) -> Flags:
-    """Return (parts,) the parts that a boundary names. A boundary without names has all parts."""
+    """Return (parts,) whether a boundary names each part. A boundary that names no part has all parts."""
     return np.array([not spec.parts or name in spec.parts for name in parts])
 
 
 def settled(case: schema.Case, there: Container[int]) -> list[bool]:
-    """Return for each boundary whether the numbers of all its parts are in ``there``."""
+    """Return for each boundary whether all its parts are in ``there``, which are numbers of parts."""
     return [all(index in there for index in np.flatnonzero(meant(case, spec)).tolist()) for spec in case.boundaries]
 
 
 def meant(case: schema.Case, spec: schema.Boundary) -> Flags:
-    """Return (parts,) the parts of a boundary. A boundary on a set that names no part has the parts with a mesh from
-    a file.
+    """Return (parts,) whether each part belongs to a boundary. If the boundary is on a set and names no part, it has
+    all parts with a mesh from a file.
     """
     found = named(spec, [part.name for part in case.parts])
     if getattr(spec, "on", None) is not None and not spec.parts:
@@ -84,15 +85,17 @@ def meant(case: schema.Case, spec: schema.Boundary) -> Flags:
 
 
 def inside(spec: schema.Prescribed | schema.Traction, x: Floats, part: Indices, near: Floats) -> Flags:
-    """Return (n,) which points (n, 3) of any part are in the region of a boundary; ``near``: (parts,) tolerance, m."""
+    """Return (n,) whether each point (n, 3) is in the region of a boundary; ``near``: (parts,) tolerance, m. The parts
+    of the boundary are not used.
+    """
     return np.asarray(np.full(len(x), True) & Region.of(spec).holds(x.T, near[part]))
 
 
 def held(
     spec: schema.Prescribed | schema.Traction, names: Sequence[str], x: Floats, members: Members, near: Floats
 ) -> Flags:  # fmt: skip
-    """Return (n,) which nodes (n, 3) are in the region of a boundary and belong to its parts. ``names``: names of
-    the parts; ``near``: (parts,) tolerance, m.
+    """Return (n,) whether each node (n, 3) is in the region of a boundary and belongs to one of its parts. ``names``:
+    names of the parts; ``near``: (parts,) tolerance, m.
     """
     nodes, part = members
     some = named(spec, names)[part] & inside(spec, x[nodes], part, near)
@@ -103,7 +106,7 @@ def held(
 
 @dataclass(frozen=True)
 class Selected:
-    """Selection of the region of a boundary: faces of a traction and their area, m^2, or nodes of a velocity."""
+    """The nodes or faces that a boundary selects: faces of a traction and their area, m^2, or nodes of a velocity."""
 
     boundary: int
     nodes: int
@@ -112,7 +115,9 @@ class Selected:
 
 
 def compared(case: schema.Case, found: Sequence[Selected]) -> Iterator[str]:
-    """Log the selected numbers and the numbers that ``validate`` expects. Yield a warning for each difference."""
+    """Log the selected numbers and the numbers that ``conoid validate`` predicts. Yield a warning for each
+    difference.
+    """
     expected = {load.boundary: load for load in loaded.loads(case)}
     for each in found:
         load = expected[each.boundary]
@@ -134,10 +139,10 @@ def _words(found: Selected) -> str:
 def missed(
     case: schema.Case, number: int, x: Floats, members: Members, near: Nearness, took: Flags
 ) -> Iterator[str]:  # fmt: skip
-    """Yield warnings for the region of a boundary that selects something of the parts ``took`` (parts,).
+    """Yield warnings for a boundary whose region selects nodes or faces of the parts ``took`` (parts,).
 
-    A warning is given for named parts without selection. Another warning is given for layers of nodes so close
-    outside of the region that the user may have meant them.
+    A warning is given if the boundary names a part of which it selects no node. Another warning is given for layers of
+    nodes that are so close to the region that the user may have meant them.
     """
     spec = case.boundaries[number]
     assert isinstance(spec, schema.Prescribed | schema.Traction)
@@ -169,8 +174,8 @@ def counted(
     near: Nearness,
     marked: Marks,
 ) -> tuple[Selected, Flags]:
-    """Return the selection of boundary ``number``, and which nodes (n,) of a velocity or faces (m,) of a traction it
-    selects.
+    """Return the numbers that boundary ``number`` selects, and (n,) whether each node of a velocity, or (m,) each face
+    of a traction, is selected.
 
     ``faces``: exposed faces (m, 3) and their parts (m,); ``marked``: sets of the nodes.
     """
@@ -193,8 +198,8 @@ def counted(
 def _cut(
     case: schema.Case, x: Floats, faces: tuple[Indices, Indices], near: Nearness, marked: Marks
 ) -> Flags:  # fmt: skip
-    """Return (m,) which exposed faces, (m, 3) with their parts (m,), lie on a plane of symmetry: a cut through the
-    whole body, which no traction loads.
+    """Return (m,) whether each of the exposed faces (m, 3), with their parts (m,), lies on a symmetry plane. Such a
+    face is a cut through the whole body, and no traction loads it.
     """
     (corners, of), names = faces, [each.name for each in case.parts]
     found = np.zeros(len(corners), bool)
@@ -214,8 +219,8 @@ NO_FACES = np.zeros((0, 3), np.int32), np.zeros(0, np.int32)
 def off_planes(
     case: schema.Case, x: Floats, members: Members, near: Nearness, known: Sequence[bool]
 ) -> Iterator[str]:  # fmt: skip
-    """Yield a warning for each ``known`` plane of symmetry with nodes so close to it that the user may have meant
-    them to be on it.
+    """Yield a warning for each ``known`` symmetry plane with nodes that are not on it, but so close that the user may
+    have meant them to be on it.
     """
     names, (nodes, part) = [each.name for each in case.parts], members
     for number, plane in case.boundaries_of(schema.Symmetry):

@@ -1,4 +1,4 @@
-"""Positions and velocities of the nodes of a part at the start."""
+"""Initial positions and velocities of the nodes of a part."""
 
 import numpy as np
 
@@ -21,8 +21,8 @@ def turned(points: Floats, turn: Turn | None) -> Floats:
 
 
 def velocities(part: Part, points: Floats) -> Floats:
-    """Return (n, 3) the velocities, m/s, of nodes of ``part`` at ``points``, (n, 3), m, without the random part of
-    the velocity.
+    """Return (n, 3) the velocities, m/s, of nodes of ``part`` at ``points``, (n, 3), m. The random part of the velocity
+    is not included.
     """
     found = np.empty_like(points)
     found[:] = part.velocity

@@ -1,4 +1,6 @@
-"""One mesh of all parts: nodes and tets in the order of the parts. Parts joined by bonds have common nodes."""
+"""Construction of one mesh of all parts. Nodes and tets have the order of the parts. Parts joined by bonds have common
+nodes.
+"""
 
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -29,25 +31,25 @@ class Stacked:
     """(m, 4) indices of the nodes of each tet."""
     tet_part: Indices
     node_part: Indices
-    """(n,) part of each node. A node of several parts has the first of them."""
+    """(n,) part of each node. A node of several parts has the first of its parts."""
     body: Indices
-    """(n,) the body of each node. A body is a part, a piece of a part, or several of these joined by bonds."""
+    """(n,) the body of each node. A body is a part, a piece of a part, or several parts and pieces joined by bonds."""
     part_of_body: Ints
-    """(bodies,) the first part of each body. The array includes bodies that were joined to another body."""
+    """(bodies,) the first part of each body. The array also has entries for bodies that were joined to another body."""
     stands: Ints
-    """(bodies,) the body to which each body was joined."""
+    """(bodies,) the body to which each body was joined; the body itself if it was not joined."""
     across: Indices
-    """(m, 4) neighbours of the faces (state.Block.across); (0, 4) if no stage needs them."""
+    """(m, 4) neighbours of the faces of each tet (state.Block.across); (0, 4) if no stage needs the neighbours."""
     warnings: list[str]
     read: dict[int, tuple[TetMesh, Ints]]
-    """Meshes from files by part number, with the indices of their nodes. The dictionary is filled if the case refers
-    to sets."""
+    """Meshes from files, keyed by part number, with the global indices of their nodes. Empty if the case refers to no
+    set."""
 
     def any_of_body(self, allowed: Flags) -> Flags:
-        """Return (bodies, bodies) the pairs of bodies in contact.
+        """Return (bodies, bodies) whether two bodies can be in contact.
 
-        ``allowed``: (bodies, bodies) pairs by the part of each body alone. A joined body is in contact with every
-        body that is in contact with one of its parts.
+        ``allowed``: (bodies, bodies) whether the parts of two bodies can be in contact. A joined body can be in contact
+        with every body with which one of its parts can be in contact.
         """
         met, (one, other) = np.zeros_like(allowed), np.nonzero(allowed)
         met[self.stands[one], self.stands[other]] = True
@@ -55,7 +57,8 @@ class Stacked:
 
 
 def stacked(case: Case, meshes: Iterable[tuple[int, TetMesh]], overlaps: bool) -> Stacked:
-    """Return one mesh of the ``meshes`` with their part numbers, in their order. Raises MeshError, InputError.
+    """Return one mesh made of all ``meshes``, in their order; each is given with its part number. Raises MeshError,
+    InputError.
 
     ``overlaps``: whether overlaps between pieces of a part are searched for.
     """
@@ -91,7 +94,7 @@ def stacked(case: Case, meshes: Iterable[tuple[int, TetMesh]], overlaps: bool) -
 
 
 def _join(made: Stacked, stands: Ints) -> bool:
-    """Merge nodes; return whether any node was merged. ``stands`` (n,) is the node that represents each node."""
+    """Merge nodes; return whether any nodes were merged. ``stands`` (n,): the node that replaces each node."""
     kept = np.flatnonzero(stands == np.arange(len(stands)))
     if len(kept) == len(stands):
         return False

@@ -1,5 +1,5 @@
-"""Start of the boundary conditions: they set initial velocities. Contradictions between boundary conditions are
-refused.
+"""Start of the boundary conditions. The boundary conditions change the initial velocities. Contradictions between
+boundary conditions are errors.
 """
 
 from collections.abc import Sequence
@@ -21,7 +21,8 @@ from . import marks, selection
 from .conditions import AXES, heights, held_by, of_parts, sides
 
 _ASIDE = 1e-9
-"""Velocity across a symmetry plane, as a share of the largest speed, below which it is round-off. Chosen value."""
+"""Ratio of the velocity across a symmetry plane to the largest speed, below which the velocity counts as round-off.
+Chosen value."""
 
 
 def start(
@@ -29,10 +30,10 @@ def start(
 ) -> list[str]:
     """Apply the boundaries to the initial velocities; return warnings. Collective.
 
-    ``known``: for each boundary whether all its parts are in the model. Fewer checks are made for a boundary with a
-    part that is not in the model. None: all boundaries are known. Raises InputError, on every rank, for a boundary
-    without a node, for two boundaries that drive a node differently, for a body that starts behind a wall or through a
-    symmetry plane, and for motion prescribed across a symmetry plane.
+    ``known``: for each boundary whether all its parts are in the model; None if all are. A boundary with a missing part
+    gets fewer checks. Raises InputError on every rank for these errors: a boundary without a node, two boundaries that
+    drive a node differently, a body that starts behind a wall or through a symmetry plane, and a motion prescribed
+    across a symmetry plane.
     """
     held = [held_by(case, spec, model) for spec in case.boundaries]
     known = [True] * len(held) if known is None else known
@@ -57,7 +58,7 @@ def start(
 
 
 def _beside(case: schema.Case, model: Model, comm: Comm) -> list[int]:
-    """Return the symmetry planes with nodes near the plane at the start."""
+    """Return the symmetry planes, with the nodes that are near each plane at the start."""
     planes = case.boundaries_of(schema.Symmetry)
     found = comm.sum(np.array([int(np.count_nonzero(sides(case, spec, model))) for _, spec in planes], np.int64))
     return [index for (index, _), many in zip(planes, found, strict=True) if many]
@@ -66,7 +67,7 @@ def _beside(case: schema.Case, model: Model, comm: Comm) -> list[int]:
 def _stopped(
     case: schema.Case, held: list[Flags], nodes: Nodes, comm: Comm, known: Sequence[bool]
 ) -> list[str]:  # fmt: skip
-    """Return warnings of symmetry planes that change the velocity of nodes on them."""
+    """Return warnings about symmetry planes that change the initial velocity of nodes on them."""
     planes = case.boundaries_of(schema.Symmetry)
     across = [np.abs(nodes.v[held[index], AXES[spec.axis]]).max(initial=0.0) for index, spec in planes]
     speeds = comm.maximum(np.array([*across, np.abs(nodes.v).max(initial=0.0)]))
@@ -88,7 +89,9 @@ def _refuse_overlaps(case: schema.Case, model: Model, boundaries: list[Boundary]
 
 
 def _refuse_crossings(case: schema.Case, model: Model, comm: Comm) -> None:
-    """Raise InputError for a tet on both sides of a symmetry plane: it would overlap its own mirror image."""
+    """Raise InputError if a tet has nodes on both sides of a symmetry plane, because the tet would overlap its own
+    mirror image.
+    """
     for index, spec in case.boundaries_of(schema.Symmetry):
         named, beyond = selection.named(spec, model.parts), np.zeros(len(model.parts))
         height = heights(case, spec, model)
@@ -105,7 +108,7 @@ def _refuse_crossings(case: schema.Case, model: Model, comm: Comm) -> None:
 
 
 def _refuse_off_plane(case: schema.Case, held: list[Flags], model: Model, comm: Comm) -> None:
-    """Raise InputError for a plane of symmetry whose set has nodes too far from it."""
+    """Raise InputError if the set of a symmetry plane has a node that is too far from the plane."""
     for index, spec in case.boundaries_of(schema.Symmetry):
         if spec.on is None:
             continue
@@ -119,7 +122,7 @@ def _refuse_off_plane(case: schema.Case, held: list[Flags], model: Model, comm: 
 
 
 def _refuse_two_drives(specs: Sequence[schema.Boundary], held: list[Flags], comm: Comm) -> None:
-    """Raise InputError for a component of a node with two different prescribed motions."""
+    """Raise InputError if a component of the velocity of a node has two different prescribed motions."""
     found = comm.maximum(np.array([float(_two_drives(specs, held))]))[0]
     if found >= 0:
         second, first = divmod(int(found), len(specs))
@@ -131,9 +134,8 @@ def _refuse_two_drives(specs: Sequence[schema.Boundary], held: list[Flags], comm
 
 
 def _two_drives(specs: Sequence[schema.Boundary], held: list[Flags]) -> int:
-    """Return a pair of boundaries that drive a node of this rank differently; -1 if there is no such pair.
-
-    The pair is encoded as second * boundaries + first.
+    """Return a pair of boundaries that drive a node of this rank differently, as the number second * boundaries +
+    first. Return -1 if there is no such pair.
     """
     drivers = {axis: np.full(len(held[0]) if held else 0, -1) for axis in AXES}
     for second, spec in enumerate(specs):
@@ -149,7 +151,9 @@ def _two_drives(specs: Sequence[schema.Boundary], held: list[Flags]) -> int:
 def _refuse_conflicts(
     specs: Sequence[schema.Boundary], held: list[Flags], boundaries: list[Boundary], nodes: Nodes, comm: Comm
 ) -> None:
-    """Raise InputError for motion prescribed across a symmetry plane at any time, because the plane would do work."""
+    """Raise InputError if a motion is prescribed across a symmetry plane at any time, because the plane would do
+    work.
+    """
     before = nodes.v.copy()
     for boundary in boundaries:
         boundary.start(nodes)

@@ -1,8 +1,8 @@
 """Measurements of the mesh files of a case: ``python -m conoid.worker.scene.survey``.
 
 The process reads one question from standard input and writes one answer to standard output
-(conoid.cases.reading.survey). Child processes read the files with the limits and the store of a run. The run that
-follows does not read the files again.
+(conoid.cases.reading.survey). Child processes read the mesh files, with the limits of a run, and store the meshes in
+the cache of a run. Therefore a run does not read the files again.
 """
 
 import sys
@@ -28,10 +28,10 @@ from .setting import turned
 
 
 def surveyed(case: Case, folder: Path, compiled: bool = True) -> Survey:
-    """Read the files of all parts and report the errors of each file.
+    """Read the mesh files of all parts and report the errors of each file.
 
-    If all files can be used, start a run with them up to its first step. Without ``compiled`` kernels overlaps of
-    bodies are not searched for.
+    If all files can be used, start a trial run with the meshes, up to its first step. If kernels are not ``compiled``,
+    overlaps of bodies are not searched for.
     """
     facts, refused, placed, meshes = Facts(case), list[str](), list[Placed](), dict[int, TetMesh]()
     for index, part in enumerate(case.parts):
@@ -61,8 +61,8 @@ def surveyed(case: Case, folder: Path, compiled: bool = True) -> Survey:
 
 
 def _made(case: Case, index: int, folder: Path, there: dict[int, TetMesh]) -> dict[int, TetMesh]:
-    """Return the meshes of part ``index`` and of the parts meshed together with it, by number. No mesh is returned
-    if ``there`` has the part.
+    """Return the meshes of part ``index`` and of the parts meshed together with it, keyed by part number. Return no
+    mesh if ``there`` already has the part.
     """
     if index in there:
         return {}
@@ -73,9 +73,10 @@ def _made(case: Case, index: int, folder: Path, there: dict[int, TetMesh]) -> di
 
 
 def _begun(case: Case, meshes: dict[int, TetMesh], compiled: bool) -> list[str]:
-    """Return the warnings of the trial start.
+    """Return the warnings of the trial start of a run.
 
-    The module of the trial start is imported here, because numba must have its cache folder before.
+    The module of the trial start is imported inside of the function, because the folder of numba's cache must be set
+    first.
     """
     from .beginning import begun
 
