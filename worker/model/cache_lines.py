@@ -1,4 +1,4 @@
-"""Tables with one cache line a row: a kernel reads a row in one memory access."""
+"""Tables whose rows are cache lines, so that a kernel reads a row in one memory access."""
 
 import numpy as np
 

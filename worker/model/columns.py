@@ -1,4 +1,5 @@
-"""Columns of a table that grows: arrays with a row for each member of the table, in objects of several stages.
+"""Columns of a growing table. The columns are arrays, with a row for each member of the table, and belong to objects of
+several stages.
 
 A stage declares its columns once, with the values of new rows. Columns have spare rows: ``extend`` appends rows to all
 columns in one call of a kernel, without copying the columns.
@@ -14,32 +15,34 @@ from .growing import spare
 
 
 class Rule(IntFlag):
-    """Values of the rows that are appended to a column."""
+    """Rule for the values of the rows that are appended to a column."""
 
     ZERO = 0
-    """Zero, or False."""
+    """New rows have the value zero, or False."""
     ABSENT = 1
-    """All bits are set, for integers: -1."""
+    """All bits of a new row are set; an integer is then -1."""
     COPIED = 2
-    """Flag: a row that is a copy of another row has the values of that row."""
+    """Flag of a rule. If the flag is set and the new row is a copy of another row, it has the values of that row."""
 
 
 ZERO, ABSENT, COPIED = Rule.ZERO, Rule.ABSENT, Rule.COPIED
 _WORDS, _ALL_BITS = 5, 255
-"""Words of a column for the kernels: address, number of bytes, bytes of a row, value of each byte of a new row, and
-whether a copy has the row of its source. Value of a byte with all bits."""
+"""Number of words that describe a column to the kernels: address, number of bytes, bytes of a row, value of each byte
+of a new row, and whether a copy has the row of its source. Then the value of a byte with all bits set."""
 
 
 class _Columns:
-    """Columns that are attributes of one object, which may be replaced by another object of the same kind."""
+    """Columns that are attributes of one object. The object may be replaced by another object of the same type."""
 
     def __init__(self, owner: object, at: str, names: dict[str, int]) -> None:
-        """``at``: path from ``owner`` to the object, "" for the owner itself; ``names``: number of each column."""
+        """``at``: path from ``owner`` to the object with the attributes, "" for the owner itself; ``names``: number of
+        each column, keyed by name.
+        """
         self._owner, self._path, self.names = owner, at.split(".") if at else [], names
 
     @property
     def now(self) -> dict[str, Any]:
-        """The attributes of the object; none if the object does not exist."""
+        """The present attributes of the object; no attributes if the object does not exist."""
         holder: Any = self._owner
         for name in self._path:
             holder = getattr(holder, name)
@@ -53,18 +56,18 @@ class Columns:
     """All columns of one table."""
 
     def __init__(self) -> None:
-        """Creates a table without columns."""
+        """Create a table with no column."""
         self._objects: list[_Columns] = []
         self._rules: list[Rule] = []
         self._rooms: list[np.ndarray | None] = []
-        """Buffers of the columns, with spare rows; None for a column that the scene does not need."""
+        """Buffers of the columns, with spare rows. The buffer is None if the scene does not need the column."""
         self._words = np.zeros((0, _WORDS), np.int64)
 
     def declare(self, owner: object, at: str = "", /, **rules: Rule) -> None:
-        """Declares attributes of ``owner`` as columns, each with the rule for new rows.
+        """Declares attributes of ``owner`` as columns. Each attribute has a rule for its new rows.
 
-        ``at``: path from the owner to the object that has the attributes. An array of length 0 in a table with rows is
-        a column that the scene does not need.
+        ``at``: path from the owner to the object that has the attributes. If a table has rows and an array has length
+        0, the scene does not need this column.
         """
         first = len(self._rules)
         self._objects.append(_Columns(owner, at, {name: first + k for k, name in enumerate(rules)}))
@@ -76,7 +79,7 @@ class Columns:
 
     def extend(self, n: int, more: int) -> None:
         """Appends ``more`` rows to the ``n`` rows of all columns, with the values of their rules."""
-        from .inheriting import fill  # imports numba, which must not be imported before its cache folder is set
+        from .inheriting import fill  # late import of numba: the folder of its cache must be set first
 
         m, rooms = n + more, self._rooms
         for some in self._objects:
@@ -95,7 +98,9 @@ class Columns:
         fill(self._words, self._words.ctypes.data, n, more)
 
     def copy(self, sources: "npt.NDArray[Any]", targets: "npt.NDArray[Any]") -> None:
-        """Copies the rows ``sources`` (k,) of the COPIED columns to the rows ``targets`` (k,), both int64."""
+        """Copies the COPIED columns of the rows ``sources`` (k,) to the rows ``targets`` (k,). The two arrays are
+        int64.
+        """
         from .inheriting import copy
 
         copy(self._words, self._words.ctypes.data, sources, targets)
@@ -106,8 +111,8 @@ class Columns:
 
 
 def _room(array: "np.ndarray", n: int, m: int, name: str) -> "np.ndarray | None":
-    """Returns the buffer of an array of ``n`` rows if it has ``m`` rows or more, else a copy with spare rows; None for
-    an array without rows.
+    """Returns the buffer of an array of ``n`` rows, if the buffer has at least ``m`` rows, else a copy of the array
+    with spare rows. Returns None for an array without rows.
     """
     if len(array) != n:
         if len(array):

@@ -1,4 +1,6 @@
-"""Buffers with spare capacity, for arrays to which rows are appended or that are filled again in every step."""
+"""Buffers with spare capacity. They are used for arrays to which rows are appended, or that are filled again in every
+step.
+"""
 
 from typing import Any
 
@@ -6,10 +8,10 @@ import numpy as np
 
 
 class Scratch:
-    """Buffers, by name, of arrays that are filled again in every step.
+    """Buffers, keyed by name, of arrays that are filled again in every step.
 
-    An array keeps its address while its length does not change, so that tables of arguments (parallel/arguments.py)
-    that contain the array stay valid.
+    An array keeps its address while its length does not change. Therefore a table of arguments (parallel/arguments.py)
+    that contains the array stays valid.
     """
 
     def __init__(self) -> None:
@@ -17,9 +19,7 @@ class Scratch:
         self._some: dict[str, np.ndarray] = {}
 
     def of(self, name: str, n: int, kind: "type[np.generic]" = np.int64, *columns: int) -> Any:
-        """Return an uninitialised (n, *columns) array. Every call with the same name must have the same type and
-        columns.
-        """
+        """Return an uninitialised (n, *columns) array. All calls with one name must have the same type and columns."""
         some = self._some.get(name)
         if some is None or n != len(some):
             room = self._rooms.get(name)
@@ -48,7 +48,7 @@ def spacious_copy(array: Any) -> Any:
 
 
 def spare(array: "np.ndarray", m: int) -> "np.ndarray | None":
-    """Return the buffer that begins with ``array`` and has ``m`` rows or more, None if there is no such buffer."""
+    """Return the buffer whose first rows are ``array``, if it has at least ``m`` rows, else None."""
     room = array.base
     if not isinstance(room, np.ndarray) or room.shape[1:] != array.shape[1:] or room.dtype != array.dtype:
         return None
@@ -61,15 +61,15 @@ def same_memory(one: np.ndarray, two: np.ndarray) -> bool:
 
 
 class Rooms:
-    """Buffers of some columns of a table. A column with spare capacity is not copied when rows are appended."""
+    """Buffers of some columns of a table. If a column has spare capacity, it is not copied when rows are appended."""
 
     def __init__(self, *names: str) -> None:
-        """``names``: attributes of the table that are columns."""
+        """``names``: names of the attributes of the table that are columns."""
         self._rooms: dict[str, np.ndarray | None] = dict.fromkeys(names)
 
     def of(self, table: object, more: int) -> list[Any]:
-        """Return the buffers; each begins with a column of ``table`` and has capacity for at least ``more`` further
-        rows.
+        """Return the buffers of the columns of ``table``. A buffer begins with the rows of its column and has capacity
+        for at least ``more`` further rows.
         """
         for name, room in self._rooms.items():
             column = getattr(table, name)
@@ -80,8 +80,8 @@ class Rooms:
         return list(self._rooms.values())
 
     def append(self, table: object, more: int, **rows: Any) -> None:
-        """Append ``more`` rows to the columns of ``table``. Each argument is an array for one column, or one value
-        for all new rows.
+        """Append ``more`` rows to the columns of ``table``. Each further argument is an array for one column, or one
+        value for all new rows of a column.
         """
         for room, name in zip(self.of(table, more), self._rooms, strict=True):
             n = len(getattr(table, name))

@@ -1,4 +1,6 @@
-"""Search for global ids in sorted lists: by a table of all ids up to the largest for many ids, by bisection for few."""
+"""Search for global ids in sorted lists. For many ids a table of all ids up to the largest id is used; for few ids,
+bisection.
+"""
 
 import numpy as np
 import numpy.typing as npt
@@ -7,12 +9,12 @@ _Ids = npt.NDArray[np.int64] | npt.NDArray[np.int32]
 _Places = npt.NDArray[np.int32]
 
 _BISECTION = 32
-"""Number of table entries that take as long to fill as one bisection takes."""
+"""Number of table entries that can be filled in the time of one bisection."""
 
 
 def located(known: _Ids, wanted: _Ids) -> _Places:
-    """Return the positions of ``wanted`` ids in the ascending ``known``, in the shape of ``wanted``. Every wanted id
-    must be in ``known``.
+    """Return the positions in ``known`` of the ids ``wanted``, in the shape of ``wanted``. ``known`` is ascending and
+    must contain every wanted id.
     """
     if _few(known, wanted):
         return np.searchsorted(known, wanted).astype(np.int32)
@@ -22,8 +24,8 @@ def located(known: _Ids, wanted: _Ids) -> _Places:
 
 
 def places(known: _Ids, wanted: _Ids) -> _Places:
-    """Return the positions of ``wanted`` ids in the ascending ``known``, in the shape of ``wanted``; -1 for ids not
-    in ``known``.
+    """Return the positions in ``known`` of the ids ``wanted``, in the shape of ``wanted``; -1 for ids that are not in
+    ``known``, which is ascending.
     """
     if not len(known):
         return np.full(wanted.shape, -1, np.int32)
@@ -33,16 +35,16 @@ def places(known: _Ids, wanted: _Ids) -> _Places:
     beyond = int(known[-1]) + 1
     table = np.full(beyond + 1, -1, np.int32)
     table[known] = np.arange(len(known), dtype=np.int32)
-    return np.asarray(table[np.minimum(wanted.astype(np.uint64), np.uint64(beyond))])  # negative ids become large ones
+    return np.asarray(table[np.minimum(wanted.astype(np.uint64), np.uint64(beyond))])  # negative ids become large numbers
 
 
 def among(known: _Ids, wanted: _Ids) -> npt.NDArray[np.bool_]:
-    """Return which of the ``wanted`` ids are in the ascending ``known``, in the shape of ``wanted``."""
+    """Return whether each of the ids ``wanted`` is in ``known``, in the shape of ``wanted``. ``known`` is ascending."""
     return np.asarray(places(known, wanted) >= 0)
 
 
 def unique(ids: _Ids) -> npt.NDArray[np.int64]:
-    """Return the distinct ids, ascending. The value -1 is omitted, since it means that there is no id."""
+    """Return the distinct ids, ascending. The value -1 is omitted, because it means that there is no id."""
     largest = int(ids.max(initial=-1))
     if ids.size * _BISECTION < largest:
         return np.unique(ids[ids >= 0]).astype(np.int64)
@@ -52,16 +54,16 @@ def unique(ids: _Ids) -> npt.NDArray[np.int64]:
 
 
 class IdIndex:
-    """Positions of ids in a list, which may have any order."""
+    """Positions of ids in a list in any order."""
 
     def __init__(self, ids: _Ids) -> None:
-        """``ids`` (n,): distinct."""
+        """``ids`` (n,): ids of the list, all different."""
         self._order = np.argsort(ids, kind="stable").astype(np.int32)
         self._known = ids[self._order]
 
     def places(self, wanted: _Ids) -> _Places:
-        """Return the positions of ``wanted`` ids in the list, in the shape of ``wanted``; -1 for ids that are not in
-        the list.
+        """Return the positions in the list of the ids ``wanted``, in the shape of ``wanted``; -1 for ids that are not
+        in the list.
         """
         at = places(self._known, wanted)
         return np.where(at >= 0, self._order[at], -1).astype(np.int32) if len(self._order) else at

@@ -1,17 +1,19 @@
-"""Initial values of new rows of columns, and of nodes that are copies of other nodes."""
+"""Initial values of new rows of columns, and of new nodes that are copies of other nodes."""
 
 from ..kernels.jit import njit, types
 from ..parallel.arguments import reader
 
 _WIDTH, _VALUE, _IS_COPIED, _SIZE = 2, 3, 4, 40
-"""Words of a column (columns.py): bytes of a row, value of each byte of a new row, whether a copy has the row of its
-source; bytes of the words of a column."""
+"""Indices of the words that describe a column (columns.py): bytes of a row, value of each byte of a new row, whether a
+copy has the row of its source. Then the number of bytes of all words of a column."""
 _bytes = reader(types.uint8[::1])
 
 
 @njit("void(int64[:, ::1], int64, int64, int64)", cache=True)
 def fill(columns, words, n, more):  # type: ignore[no-untyped-def]
-    """Set ``more`` rows from row ``n`` on to the values of the rules; ``words``: address of ``columns`` (c, 5)."""
+    """Set ``more`` rows, from row ``n`` on, to the values of the rules; ``words``: address of the table ``columns`` (c,
+    5).
+    """
     for c in range(len(columns)):
         (room,) = _bytes(words + _SIZE * c)
         width, value = columns[c, _WIDTH], columns[c, _VALUE]
@@ -21,7 +23,7 @@ def fill(columns, words, n, more):  # type: ignore[no-untyped-def]
 
 @njit("void(int64[:, ::1], int64, int64[::1], int64[::1])", cache=True)
 def copy(columns, words, sources, targets):  # type: ignore[no-untyped-def]
-    """Copy the rows ``sources`` of the columns with the rule COPIED to the rows ``targets``."""
+    """Copy the rows ``sources`` to the rows ``targets``, in columns with the rule COPIED."""
     for c in range(len(columns)):
         if not columns[c, _IS_COPIED]:
             continue
@@ -39,8 +41,8 @@ def copy(columns, words, sources, targets):  # type: ignore[no-untyped-def]
     cache=True,
 )
 def inherit(ids, owner, owned, mass, parents, new_ids, new_owner, new_owned, masses, n):  # type: ignore[no-untyped-def]
-    """Set ids, owners and masses of the nodes from ``n`` on, copies of ``parents`` (k,). Each copy takes its mass
-    ``masses`` (k,), kg, from its parent.
+    """Set ids, owners and masses of the nodes from ``n`` on, which are copies of the nodes ``parents`` (k,). The mass
+    of a copy, ``masses`` (k,), kg, is subtracted from its parent.
     """
     for c in range(len(parents)):
         ids[n + c], owner[n + c], owned[n + c] = new_ids[c], new_owner[c], new_owned[c]

@@ -1,4 +1,6 @@
-"""Nodes with tets of several parts, which bonds by shared nodes make, and the mass of each part in these nodes."""
+"""Nodes with tets of several parts, and the mass that each part has in such a node. Bonds by shared nodes make these
+nodes.
+"""
 
 from dataclasses import dataclass, field
 
@@ -16,9 +18,9 @@ Flags = npt.NDArray[np.bool_]
 
 @dataclass
 class Shares:
-    """Table with a row for each part of each node that has several parts, ordered by node and part.
+    """Table with one row for each part of a node with several parts, ordered by node and part.
 
-    The table is empty if no node has several parts.
+    If no node has several parts, the table is empty.
     """
 
     node: Indices = field(default_factory=lambda: np.zeros(0, np.int32))
@@ -26,20 +28,20 @@ class Shares:
     part: Indices = field(default_factory=lambda: np.zeros(0, np.int32))
     """(k,) index of the part."""
     mass: Floats = field(default_factory=lambda: np.zeros(0))
-    """(k,) mass of the node that comes from tets of the part, kg."""
+    """(k,) mass of the node that comes from the tets of the part, kg."""
     rank: Ints = field(default_factory=lambda: np.zeros(0, np.int64))
-    """(parts,) precedence of the parts; (0,) if no bond makes nodes of several parts. Contact and similar stages
-    count a node for one part only: its representative part, which is its part of lowest rank."""
+    """(parts,) rank of each part; (0,) if no bond makes nodes of several parts. Contact and other stages count a node
+    for one part only, its representative part, which is the part of the node with the lowest rank."""
 
     @property
     def fraction(self) -> Floats:
-        """Return (k,) the mass of the row divided by the mass of the node."""
+        """Return (k,) the ratio of the mass of each row to the mass of its node."""
         whole = np.bincount(self.node, self.mass, minlength=1)
         return np.asarray(self.mass / whole[self.node])
 
     @property
     def key(self) -> Ints:
-        """Return (k,) node and part of each row as one integer, ascending."""
+        """Return (k,) node and part of each row, combined into one integer; ascending."""
         return self.node.astype(np.int64) * MOST_PARTS + self.part
 
     def take(self, chosen: "np.ndarray") -> "Shares":
@@ -49,15 +51,15 @@ class Shares:
     def members(self, part: Indices) -> tuple[Ints, Indices]:
         """Return (m,) nodes and (m,) their parts.
 
-        First come all nodes with their representative ``part`` (n,). Further rows follow for nodes of several parts,
-        one row for each of their other parts.
+        The first entries are all nodes with their representative ``part`` (n,). Then follows one entry for each other
+        part of a node with several parts.
         """
         more = self.part != part[self.node]
         return np.concatenate([np.arange(len(part)), self.node[more]]), np.concatenate([part, self.part[more]])
 
     def of_nodes(self, local: Indices) -> "Shares":
-        """Return the rows of the nodes with a new index in ``local`` (nodes,), with this index. ``local`` is -1 for
-        omitted nodes.
+        """Return the rows of the nodes that have a new index in ``local`` (nodes,), with the new index. ``local`` is -1
+        for omitted nodes.
         """
         some = local[self.node] >= 0
         return Shares(local[self.node[some]], self.part[some], self.mass[some], self.rank)
@@ -69,11 +71,11 @@ class Shares:
         return nodes, self.part[order][first]
 
     def follow(self, node: Indices, part: Indices, mass: Floats) -> "tuple[Shares, Indices, Indices]":
-        """Return the shares after a separation of nodes, and the changed nodes with their representative parts.
+        """Return the shares after a separation of nodes. Also return the changed nodes with their representative parts.
 
-        The arguments have a row for each tet at each changed node: its new ``node`` (r,), its ``part``, and the mass
-        that the node has from the tet, kg. The order of the rows does not depend on the division of the tets among
-        the ranks.
+        Each argument has one entry for each tet at each changed node: the new ``node`` (r,), the ``part`` of the tet,
+        and the mass that the node has from the tet, kg. The order of the entries does not depend on the division of the
+        tets among the ranks.
         """
         found, at = np.unique(node.astype(np.int64) * MOST_PARTS + part, return_inverse=True)
         nodes, parts = np.divmod(found, MOST_PARTS)
@@ -89,16 +91,16 @@ class Shares:
 
 
 def shared(node: "np.ndarray", part: "np.ndarray", mass: Floats, rank: Ints) -> Shares:
-    """Return the shares of the nodes of several parts. The arguments have a row for each corner of each tet: its
-    ``node``, its ``part``, and the mass that the node has from the tet, kg.
+    """Return the shares of the nodes that belong to several parts. Each argument has one entry for each corner of each
+    tet: the ``node``, the ``part``, and the mass that the node has from the tet, kg.
     """
     empty = Shares(rank=rank)
     return empty.follow(np.asarray(node, np.int32), np.asarray(part, np.int32), mass)[0]
 
 
 def ranks(case: Case) -> Ints:
-    """Return (parts,) ``Shares.rank``; (0,) in a case without shared nodes between parts. Parts that are in contact
-    come first.
+    """Return (parts,) the rank of each part for ``Shares.rank``; (0,) in a case without nodes shared between parts.
+    Parts that are in contact have the lowest ranks.
     """
     if not shared_bonds(case):
         return np.zeros(0, np.int64)

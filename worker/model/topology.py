@@ -1,4 +1,6 @@
-"""The topology change of one step: old node to new nodes, by tet; every array indexed by node is extended from it."""
+"""The topology change of one step: which nodes got copies, and which tets have the copies as new nodes. Every array
+indexed by node is extended from it.
+"""
 
 from dataclasses import dataclass
 from typing import Protocol, Self
@@ -8,46 +10,45 @@ import numpy as np
 from .state import Copies, Indices, Ints
 
 KEY = 2**31
-"""Factor larger than any global tet id."""
+"""Factor that is larger than any global tet id."""
 
 
 def keys(nodes: Ints, tets: Ints) -> Ints:
-    """Return (n,) the ids of a node and a tet as one integer. The integers have the lexicographic order of the
-    pairs.
+    """Return (n,) the id of a node and the id of a tet, combined into one integer. The integers have the lexicographic
+    order of the pairs.
     """
     return np.asarray(nodes * KEY + tets)
 
 
 class KeptByNode(Protocol):
-    """An object with arrays by node that is updated when nodes separate."""
+    """An object with arrays by node. The arrays are extended when nodes separate."""
 
     def grow(self, split: "Split", ids: Ints) -> None:
-        """Extend the arrays indexed by node by the copies of a split; ``ids``: global ids of the local nodes."""
+        """Extend the arrays by node by the copies of a separation; ``ids``: global ids of the local nodes."""
 
 
 @dataclass
 class Split:
     """Separation of nodes in one step, on one rank.
 
-    The table has the tets at each separated node of this rank, and the new nodes of these tets.
+    The table has one row for each tet at a separated node of this rank that gets a copy as new node.
     """
 
     copies: Copies
     first: int
     """Local index of the first copy."""
     touched: Ints
-    """(ranks,) nonzero for ranks that have a node of the breaking facets."""
+    """(ranks,) not zero for ranks that have a node of a breaking facet."""
     key: Ints
-    """(r,) key of each tet whose node became a copy: one integer of the global ids of node and tet (``keys``);
-    ascending."""
+    """(r,) global ids of node and tet of each row, combined into one integer (``keys``); ascending."""
     node: Indices
-    """(r,) local index of the copy of the node of each row."""
+    """(r,) local index of the copy that replaces the node of each row."""
     place: Indices
-    """(r,) index of the tet in its block; -1 for a tet of another rank."""
+    """(r,) index of each tet in its block; -1 for a tet of another rank."""
     corner: Indices
-    """(r,) corner of the tet at which the node is, 0 to 3."""
+    """(r,) corner of each tet at which the separated node is, 0 to 3."""
     block: Indices
-    """(r,) index of the block of the tet."""
+    """(r,) index of the block of each tet."""
 
     @property
     def family(self) -> Indices:
@@ -57,13 +58,13 @@ class Split:
 
     @classmethod
     def elsewhere(cls, first: int, touched: Ints) -> Self:
-        """Return a split without copies on this rank, which has ``first`` nodes."""
+        """Return a separation without copies on this rank; ``first``: number of nodes of the rank."""
         words, places = np.zeros(0, np.int64), np.zeros(0, np.int32)
         copies = Copies(words, words, places, np.zeros(0, bool), np.zeros(0))
         return cls(copies, first, touched, words, places, places, places, places)
 
     def followed(self, nodes: Indices, ids: Ints, tets: Ints) -> Indices:
-        """Return the new local nodes for ``nodes`` (n, k), local, of tets with global ids ``tets`` (n,).
+        """Return the new local nodes that replace ``nodes`` (n, k) in the tets with the global ids ``tets`` (n,).
 
         ``ids``: global ids of the local nodes.
         """
@@ -74,5 +75,7 @@ class Split:
         return np.where(self.key[at] == wanted, self.node[at], nodes).astype(np.int32)
 
     def followed_sides(self, nodes: Indices, ids: Ints, tets: Ints) -> Indices:
-        """Return the new local nodes of facets: ``nodes`` (n, 6), three for each side, of ``tets`` (n, 2)."""
+        """Return the new local nodes of facets. ``nodes`` (n, 6): three local nodes for each side; ``tets`` (n, 2):
+        tets of the two sides.
+        """
         return np.concatenate([self.followed(nodes[:, 3 * k : 3 * k + 3], ids, tets[:, k]) for k in (0, 1)], axis=1)

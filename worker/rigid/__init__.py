@@ -1,1 +1,3 @@
-"""Rigid parts: bodies with six degrees of freedom each, equal on all ranks, moved by integer sums of impulses."""
+"""Rigid parts: bodies with six degrees of freedom each. All ranks have equal values, because bodies are moved by
+integer sums of impulses.
+"""

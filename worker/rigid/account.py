@@ -1,4 +1,4 @@
-"""Energy account of the rigid bodies, and the sums that they add to the ledger."""
+"""Energy account of the rigid bodies, and the values that they add to the sums of the energy balance."""
 
 from typing import Any
 
@@ -12,35 +12,37 @@ _KEPT = {
     "contact_loss": "contact_loss", "external_work": "external_work", "friction_loss": "friction_loss",
     "bond_loss": "bond_loss", "_later": "later", "_before": "before",
 }  # fmt: skip
-"""Names of the sums in a checkpoint, and names of the attributes that hold the sums."""
+"""Names of the sums in a checkpoint, and names of the attributes that have the sums."""
 
 
 class BodyAccount:
-    """Work on the rigid bodies of a case: half of the work of an impulse is computed with the velocity before the
-    impulse, half with the velocity after it. The values are equal on all ranks.
+    """Work done on the rigid bodies of a case. Half of the work of an impulse is computed with the velocity before the
+    impulse, half with the velocity after it. All ranks have equal values.
     """
 
     def __init__(self, bodies: Bodies) -> None:
         self._bodies = bodies
         self.contact_loss, self.external_work, self.friction_loss, self.bond_loss = np.zeros((4, bodies.n))
-        """(b,) energy lost by impact and friction, work from outside, the part of the loss by friction on walls, and
-        energy lost by tied bonds, J."""
+        """(b,) four energies of each body, J: loss by impact and friction; external work; the part of the loss that is
+        friction on walls; loss by tied bonds."""
         self.later = np.zeros((4, bodies.n))
-        """(4, b) second halves of these four in the last step, J."""
+        """(4, b) second halves of the four energies in the last step, J."""
         self.before = np.stack([bodies.speed, bodies.momentum])
         """(2, b, 3) v(n-1/2), m/s, and angular momentum at n-1/2, kg m^2/s."""
 
     def keep(self) -> dict[str, Any]:
-        """Returns the state, for a checkpoint."""
+        """Returns the state of the account for a checkpoint."""
         return {name: getattr(self, attribute).copy() for name, attribute in _KEPT.items()}
 
     def resume(self, known: dict[str, Any]) -> None:
-        """Restores the state."""
+        """Restores the state of the account from a checkpoint."""
         for name, values in known.items():
             setattr(self, _KEPT[name], values.copy())
 
     def note(self) -> None:
-        """Before the kick: books the second halves of the last step, and stores the motion at n-1/2."""
+        """Adds the second halves of the energies of the last step, and stores the motion at n-1/2. Must be called
+        before the kick.
+        """
         self.contact_loss += self.later[0]
         self.external_work += self.later[1]
         self.friction_loss += self.later[2]
@@ -49,9 +51,11 @@ class BodyAccount:
         self.before[0], self.before[1] = self._bodies.speed, self._bodies.momentum
 
     def book(self, impulse: Floats, of_bonds: Floats, stops: BodyStops) -> None:
-        """Books half of the work of the impulses (b, 6) of contact and walls, and of the impulses ``of_bonds`` (b, 6),
-        with the velocities before the impulses; stores the half with the velocities after the impulses for the next
-        step. All other changes of the motion, and driven walls, do work from outside.
+        """Adds half of the work of the impulses, computed with the velocities before the impulses. Stores the half with
+        the velocities after the impulses for the next step.
+
+        ``impulse`` (b, 6): impulses of contact and walls; ``of_bonds`` (b, 6): impulses of tied bonds. The work of all
+        other changes of the motion, and of driven walls, is external work.
         """
         bodies, rubbed, walls = self._bodies, stops.rubbed, stops.walls
         speed, momentum = self.before
@@ -76,14 +80,14 @@ class BodyAccount:
         self.later = halves[1]
 
     def kinetic(self) -> Floats:
-        """(b,) kinetic energy at n, J: the product of the velocities before and after."""
+        """(b,) kinetic energy at n, J, computed as the product of the velocities before and after n."""
         bodies, (speed, momentum) = self._bodies, self.before
         linear = bodies.mass * dot(speed, bodies.speed)
         return np.asarray(0.5 * (linear + dot(momentum, bodies.rates(bodies.momentum))))
 
     def quantity(self, body: int, field: str, axis: int, share: float) -> float:
-        """Returns the kinetic energy, J, or a component of ``momentum``, ``centre`` or ``centre_velocity`` of a body,
-        with this ``share`` of the change by the last impulses.
+        """Returns the kinetic energy of a body, J, or a component of ``momentum``, ``centre`` or ``centre_velocity``.
+        The result contains the fraction ``share`` of the change by the last impulses.
         """
         bodies, (speed, momentum) = self._bodies, self.before
         if field == "centre":

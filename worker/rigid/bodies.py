@@ -1,4 +1,4 @@
-"""State of the rigid bodies of a case, equal on all ranks."""
+"""State of the rigid bodies of a case. All ranks have equal values."""
 
 import math
 from dataclasses import dataclass
@@ -19,7 +19,7 @@ STATE = ("centre", "q", "speed", "momentum")
 
 @dataclass
 class Bodies:
-    """Rigid bodies, one row each."""
+    """Rigid bodies of a case. The arrays have one row for each body."""
 
     part: Ints
     """(b,) number of the part of each body."""
@@ -28,29 +28,30 @@ class Bodies:
     origin: Floats
     """(b, 3) centre of mass at the start, m."""
     inertia: Floats
-    """(b, 3, 3) inertia about the centre, along the axes of the case, at the start, kg m^2."""
+    """(b, 3, 3) inertia about the centre of mass, along the axes of the case, at the start, kg m^2."""
     reach: Floats
-    """(b,) reach: a power of two above the largest distance of a node from the centre, m. The quantum of moments is
-    the quantum of impulses times the reach."""
+    """(b,) reach of each body: a power of two above the largest distance of a node from the centre, m. The quantum of
+    moments is the quantum of impulses times the reach."""
     held: list[Held]
 
     def __post_init__(self) -> None:
-        """Sets the state at rest, at the initial position."""
+        """Sets all bodies to rest in their initial position."""
         n = len(self.part)
         self.centre, self.speed, self.momentum = self.origin.copy(), np.zeros((n, 3)), np.zeros((n, 3))
-        """Centre of mass, m; its velocity, m/s, and the angular momentum about it, kg m^2/s, at mid-step."""
+        """Centre of mass, m. Then values at mid-step: velocity of the centre, m/s, and angular momentum about the
+        centre, kg m^2/s."""
         self.q = np.tile([1.0, 0.0, 0.0, 0.0], (n, 1))
         """(b, 4) unit quaternion of the rotation from the start, scalar first."""
         self.inverse = np.array([inverse(tensor) for tensor in self.inertia]).reshape(n, 3, 3)
         self.rotation, self.compliance = np.empty((n, 3, 3)), np.empty((n, 3, 3))
-        """(b, 3, 3) present rotation; inverse of the inertia in space, about the axis only for a body that turns
-        about one."""
+        """(b, 3, 3) present rotation; and inverse of the inertia along the axes of space. If a body can turn about one
+        axis only, the inverse is that of the inertia about this axis."""
         self.free = np.array([each.free for each in self.held]).reshape(n, 3)
         self.turns = np.array([each.turns for each in self.held]).reshape(n, 3)
-        """(b, 3) 1 for an axis along which impulses may move the body, else 0; and the same for axes about which
-        impulses may rotate the body."""
+        """(b, 3) 1 for an axis along which impulses may move the body, else 0. Then (b, 3) 1 for an axis about which
+        impulses may rotate the body, else 0."""
         self.loose = np.flatnonzero(self.turns.all(axis=1))
-        """Bodies that turn freely."""
+        """Indices of the bodies that can turn about any axis."""
         self.lightness = self.free / self.mass[:, None]
         self.pose()
 
@@ -60,7 +61,7 @@ class Bodies:
         return len(self.part)
 
     def pose(self) -> None:
-        """Updates the quantities that depend on the orientation."""
+        """Updates the values that depend on the orientation of the bodies."""
         rotation.turns_of(self.rotation, self.q)
         rotation.spatial(self.compliance, self.rotation, self.inverse)
         for b in range(self.n):
@@ -69,27 +70,27 @@ class Bodies:
                 self.compliance[b] = 0.0
                 self.compliance[b, axis, axis] = 1.0 / self.about(b)[axis, axis]
         self.yielding = self.compliance * self.turns[:, :, None]
-        """(b, 3, 3) inverse of the inertia in space, 0 where the rotation is held."""
+        """(b, 3, 3) inverse of the inertia along the axes of space; 0 for a body whose rotation is held."""
 
     def about(self, b: int) -> Floats:
-        """Returns the inertia of a body in space, (3, 3), kg m^2."""
+        """Returns the inertia of a body along the axes of space, (3, 3), kg m^2."""
         found = np.empty((1, 3, 3))
         rotation.spatial(found, self.rotation[b : b + 1], self.inertia[b : b + 1])
         return np.asarray(found[0])
 
     def rates(self, momentum: Floats) -> Floats:
-        """Returns the rotation vectors (b, 3) of angular momenta, rad/s."""
+        """Returns the rotation vectors (b, 3), rad/s, that belong to angular momenta."""
         return times(self.compliance, momentum)
 
 
 def times(tensors: Floats, vectors: Floats) -> Floats:
-    """(b, 3) products of tensors (b, 3, 3) and vectors; the order of the sums is fixed."""
+    """(b, 3) products of tensors (b, 3, 3) and vectors (b, 3). The order of the sums is fixed."""
     parts = tensors * vectors[:, None, :]
     return np.asarray((parts[..., 0] + parts[..., 1]) + parts[..., 2])
 
 
 def dot(a: Floats, b: Floats) -> Floats:
-    """(b,) scalar products of rows of three; the order of the sums is fixed."""
+    """(b,) scalar products of vectors (b, 3). The order of the sums is fixed."""
     parts = a * b
     return np.asarray((parts[:, 0] + parts[:, 1]) + parts[:, 2])
 
@@ -100,7 +101,7 @@ def cross(a: Floats, b: Floats) -> Floats:
 
 
 def inverse(tensor: Floats) -> Floats:
-    """(3, 3) inverse of a symmetric tensor, by its cofactors."""
+    """(3, 3) inverse of a symmetric tensor, computed by cofactors."""
     xx, yy, zz, yz, zx, xy = (float(tensor[i, j]) for i, j in ((0, 0), (1, 1), (2, 2), (1, 2), (2, 0), (0, 1)))
     a, b, c = yy * zz - yz * yz, zx * yz - xy * zz, xy * yz - yy * zx
     whole = xx * a + xy * b + zx * c
@@ -109,15 +110,15 @@ def inverse(tensor: Floats) -> Floats:
 
 
 def of_nodes(case: Case, nodes: Nodes) -> Indices:
-    """(nodes,) number of the rigid body of each node, -1 for none."""
+    """(nodes,) number of the rigid body to which each node belongs; -1 if it belongs to none."""
     number = np.full(len(case.parts), -1, np.int32)
     number[case.rigid] = np.arange(len(case.rigid), dtype=np.int32)
     return np.asarray(number[nodes.part])
 
 
 def measured(case: Case, nodes: Nodes, held: list[Held], comm: Comm) -> Bodies:
-    """Returns the bodies of a case at the start, from its ``nodes`` on all ranks; ``held``: constraints and loads of
-    each. Collective.
+    """Returns the bodies of a case at the start. The bodies are computed from their ``nodes`` on all ranks. ``held``:
+    constraints and loads of each body. Collective.
     """
     of = of_nodes(case, nodes)
     found = [_measured(case.parts[i], nodes, of == b, comm) for b, i in enumerate(case.rigid)]
@@ -131,8 +132,8 @@ def measured(case: Case, nodes: Nodes, held: list[Held], comm: Comm) -> Bodies:
 
 
 def _measured(part: Part, nodes: Nodes, chosen: Flags, comm: Comm) -> tuple[float, Floats, Floats, float]:
-    """Returns mass, kg, centre, m, inertia about it, kg m^2, and reach, m, of a body with the nodes ``chosen``.
-    Collective.
+    """Returns four properties of a body with the nodes ``chosen``: mass, kg, centre of mass, m, inertia about this
+    centre, kg m^2, and reach, m. Collective.
     """
     spec, some = part.rigid, chosen & nodes.owned
     assert spec is not None
@@ -149,7 +150,7 @@ def _measured(part: Part, nodes: Nodes, chosen: Flags, comm: Comm) -> tuple[floa
 
 
 def tensor_of(six: tuple[float, ...]) -> Floats:
-    """(3, 3) symmetric tensor of the components xx, yy, zz, yz, zx, xy."""
+    """(3, 3) symmetric tensor with the components xx, yy, zz, yz, zx, xy."""
     xx, yy, zz, yz, zx, xy = six
     return np.array([[xx, xy, zx], [xy, yy, yz], [zx, yz, zz]])
 

@@ -1,9 +1,10 @@
-"""Rigid bodies in tied bonds: the points to which rows are tied, and the impulses of the rows on the bodies.
+"""Rigid bodies in tied bonds: the points of the bodies to which nodes are tied, and the impulses of the tied rows on
+the bodies.
 
-In each sweep of the bonds (bonds/sweeps.py) the impulses of the rows on the points of a body, and their moments about
-the centre of the body, are summed as integers over the ranks. These sums change the motion of the body, and the
-velocities of the points are set to this motion. In a step a point moves along the chord of its arc. A row therefore
-uses arm and rotation vector of mid-step, V + (w + dt/2 w') x (r + dt/2 w x r), with w' = W (l x w) of a free rotation.
+In each sweep of the bonds (bonds/sweeps.py) the impulses on the points of a body, and their moments about the centre of
+the body, are summed as integers over the ranks. These sums change the motion of the body, and the velocities of the
+points are set to this motion. In a step a point moves along the chord of its arc. Therefore a tied row uses arm and
+rotation vector at mid-step, V + (w + dt/2 w') x (r + dt/2 w x r), where w' = W (l x w) is that of a free rotation.
 """
 
 import numpy as np
@@ -22,36 +23,37 @@ _N1, _I2 = types.int32[::1], types.int64[:, ::1]
 
 
 class BodyBonds:
-    """Impulses of tied bonds on the rigid bodies of a case, equal on all ranks."""
+    """Impulses of tied bonds on the rigid bodies of a case. All ranks have equal values."""
 
     def __init__(self, bodies: Bodies, stops: BodyStops, start: Floats, rate: Floats, comm: Comm) -> None:
         """``start`` (2, b, 3): velocities and rotation vectors of the bodies before the impulses of the step; ``rate``
-        (b, 3): present rotation vectors, updated in place.
+        (b, 3): present rotation vectors, which this class updates.
         """
         self._bodies, self._stops, self._start, self._rate, self._comm = bodies, stops, start, rate, comm
         self._total: Ints = np.zeros((bodies.n, WORDS), np.int64)
-        """(b, WORDS) impulses of the bonds in the step, quanta."""
+        """(b, WORDS) sums of the impulses of the bonds on each body in the step, quanta."""
         self._scale, self._half = 1.0, 0.0
-        """Quanta per N s; half of the time step, s."""
+        """Number of quanta per N s; and half of the time step, s."""
         self._origins = np.zeros((bodies.n, 3))
         self._inertia, self._ahead = np.empty((bodies.n, 3, 3)), np.zeros((bodies.n, 3))
-        """(b, 3, 3) inertia in space, kg m^2; (b, 3) change of the rotation vector from n to mid-step, rad/s."""
+        """(b, 3, 3) inertia along the axes of space, kg m^2; (b, 3) change of the rotation vector from n to mid-step,
+        rad/s."""
 
     def begin(self) -> None:
         """Starts a step without impulses."""
         self._total[:] = 0
 
     def take_up(self, points: Points, places: Indices, scale: float) -> None:
-        """Registers the ``points`` of the rows of this rank, and their ``places`` in the table of nodes of the bonds;
-        ``scale``: quanta per N s.
+        """Registers the ``points`` of the tied rows of this rank, and the ``places`` of the points in the table of
+        nodes of the bonds. ``scale``: quanta per N s.
         """
         self._points, self._places, self._scale = points, places, scale
         self._arms = np.zeros((len(points), 3))
-        """(k, 3) arms at n, m."""
+        """(k, 3) arms (vectors from the centre of the body to the points) at n, m."""
         self._every = np.arange(len(points), dtype=np.int32)
 
     def set_out(self, v: Floats, dt: float) -> None:
-        """At the start of the sweeps: sets the velocities of the points in the table ``v`` (n, 3); ``dt``: time step,
+        """Sets the velocities of the points in the table ``v`` (n, 3), at the start of the sweeps. ``dt``: time step,
         s.
         """
         bodies, spin = self._bodies, self._rate
@@ -66,8 +68,8 @@ class BodyBonds:
         self._spread(v)
 
     def give(self, v: Floats, words: Ints, *, walls: bool) -> None:
-        """After a sweep with the impulses ``words`` (n, 3), quanta, on the nodes of the table: moves the bodies, and
-        the points in ``v`` (n, 3). ``walls``: True if walls stop the bodies. Collective.
+        """Moves the bodies, and the points in ``v`` (n, 3), after a sweep. ``words`` (n, 3): impulses of the sweep on
+        the nodes of the table, quanta; ``walls``: whether walls stop the bodies. Collective.
         """
         bodies, sums = self._bodies, np.zeros((self._bodies.n, WORDS), np.int64)
         gather(sums, words, self._places, self._points.body, self._arms, bodies.reach)
@@ -81,7 +83,7 @@ class BodyBonds:
         self._spread(v)
 
     def settle_start(self) -> None:
-        """After the warm start: the present motion is the motion from which contact starts."""
+        """Stores the present motion as the motion from which contact starts. Must be called after the warm start."""
         self._start[0], self._start[1] = self._bodies.speed, self._rate
 
     @property
@@ -101,8 +103,8 @@ class BodyBonds:
 
 @njit(types.void(_I2, _I2, _N1, _N1, _F2, _F1), cache=True)
 def gather(sums, words, places, body, arms, reach):  # type: ignore[no-untyped-def]
-    """Adds the impulses ``words`` (n, 3) on the points at these ``places``, and their moments over the reach of the
-    body, to ``sums`` (b, WORDS).
+    """Adds the impulses ``words`` (n, 3) on the points at ``places`` to ``sums`` (b, WORDS). Also adds their moments,
+    divided by the reach of the body.
     """
     for k in range(len(places)):
         a, b = places[k], body[k]
@@ -111,8 +113,8 @@ def gather(sums, words, places, body, arms, reach):  # type: ignore[no-untyped-d
 
 @njit(types.void(_F2, _N1, _N1, _F2, _F2, _F2, _F), cache=True)
 def spread(v, places, body, arms, speed, rate, half):  # type: ignore[no-untyped-def]
-    """Sets the velocities ``v`` (n, 3) at these ``places`` to the chords of the points: speed + w x (arm + half w x
-    arm), with the ``rate`` w (b, 3) and ``half`` of the time step, s.
+    """Sets the velocities ``v`` (n, 3) at ``places`` to those along the chords of the points: speed + w x (arm + half w
+    x arm). ``rate``: rotation vectors w (b, 3); ``half``: half of the time step, s.
     """
     for k in range(len(places)):
         a, b = places[k], body[k]

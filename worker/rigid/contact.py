@@ -1,4 +1,4 @@
-"""Rigid bodies in the contact of a step: the slots (contact nodes) of the bodies, and the contact impulses on the
+"""Rigid bodies in the contact of a step: the contact slots that are nodes of bodies, and the contact impulses on these
 slots.
 """
 
@@ -19,24 +19,25 @@ _SMALL = 16
 
 
 class _Slots(NamedTuple):
-    """Slots (contact nodes of the step) that are nodes of rigid bodies."""
+    """Contact slots of the step that are nodes of rigid bodies."""
 
     slot: Indices
-    """(k,) place among all slots of the step."""
+    """(k,) index of each of these slots among all slots of the step."""
     body: Indices
-    """(k,) body of each slot."""
+    """(k,) body of each of these slots."""
     arm: Floats
     """(k, 3) vector from the centre of the body to each slot, m."""
     owned: Flags
-    """(k,) True if this rank owns the node."""
+    """(k,) whether this rank owns the node of each slot."""
     node: Indices
-    """(k,) local node, -1 if it is not on this rank."""
+    """(k,) local node of each slot; -1 if the node is not on this rank."""
     impulse: Ints
-    """(k, 3) sum of the impulses in the step, quanta; only with the field ``contact_pressure``."""
+    """(k, 3) sum of the impulses in the step, quanta. The sum is computed only if the field ``contact_pressure`` is
+    requested."""
 
     @classmethod
     def of(cls, places: Indices, surface: SurfaceNodes, of_part: Indices, bodies: Bodies, rank: int) -> Self:
-        """Finds the slots of rigid bodies among the slots at ``places`` of the surface nodes; ``of_part`` (parts,):
+        """Finds the slots of rigid bodies among the slots at ``places`` of the surface nodes. ``of_part`` (parts,):
         body of each part.
         """
         body = of_part[surface.part[places]]
@@ -47,24 +48,24 @@ class _Slots(NamedTuple):
 
 
 class BodyContacts:
-    """Contact impulses on the rigid bodies of a case, equal on all ranks."""
+    """Contact impulses on the rigid bodies of a case. All ranks have equal values."""
 
     def __init__(
         self, bodies: Bodies, stops: BodyStops, of_part: Indices, start: Floats, rate: Floats, comm: Comm,
         *, reports: bool,
     ) -> None:  # fmt: skip
         """``of_part`` (parts,): body of each part, -1 for none; ``start`` (2, b, 3): velocities and rotation vectors of
-        the bodies before the impulses of the step; ``rate`` (b, 3): present rotation vectors, updated in place;
-        ``reports``: True if ``add_pressed`` will be called.
+        the bodies before the impulses of the step; ``rate`` (b, 3): present rotation vectors, which this class updates;
+        ``reports``: whether ``add_pressed`` will be called.
         """
         self._bodies, self._stops, self._of_part, self._comm = bodies, stops, of_part, comm
         self._start, self._rate, self._reports = start, rate, reports
         self._total, self._scale = np.zeros((bodies.n, rows.WORDS), np.int64), 1.0
-        """(b, WORDS) impulses of contact in the step, quanta, and quanta per N s."""
+        """(b, WORDS) contact impulses on each body in the step, quanta; and the number of quanta per N s."""
         self._changed: Ints = np.zeros((bodies.n, rows.WORDS), np.int64)
-        """(b, WORDS) impulses of contact in the last sweep, quanta."""
+        """(b, WORDS) contact impulses on each body in the last sweep, quanta."""
         self.active = False
-        """True if a contact of this step, on any rank, has a node of a rigid body."""
+        """True if a node of a rigid body is in an active contact of this step, on any rank."""
 
     def begin(self) -> None:
         """Starts a step without impulses."""
@@ -79,12 +80,12 @@ class BodyContacts:
         return np.asarray(found)
 
     def take_up(self, places: Indices, surface_nodes: SurfaceNodes, scale: float) -> None:
-        """Registers the slots of a step at ``places`` of the surface nodes; ``scale``: quanta per N s."""
+        """Registers the contact slots of a step at ``places`` of the surface nodes. ``scale``: quanta per N s."""
         self._slots = _Slots.of(places, surface_nodes, self._of_part, self._bodies, self._comm.rank)
         self._scale = scale
 
     def weigh(self, active: ActiveNodes) -> None:
-        """Sets the row weights of rigid slots, from the contacts of all ranks. Collective."""
+        """Sets the row weights of rigid slots, computed from the active contacts of all ranks. Collective."""
         bodies, slots, words = self._bodies, self._slots, np.zeros((self._bodies.n, rows.WEIGHTS), np.int64)
         mine = slots.slot, slots.body, slots.arm
         rows.weigh(words, active, *mine, slots.owned, bodies.reach)
@@ -94,7 +95,9 @@ class BodyContacts:
             rows.norms(active, words, *mine, bodies.reach, bodies.lightness, bodies.yielding)
 
     def give(self, active: ActiveNodes) -> None:
-        """After a sweep: moves the bodies by the impulses on their slots, and the slots with them. Collective."""
+        """Moves the bodies by the impulses on their slots after a sweep, and moves the slots with the bodies.
+        Collective.
+        """
         if not self.active:
             return
         bodies, slots, words = self._bodies, self._slots, np.zeros((self._bodies.n, rows.WORDS), np.int64)
@@ -110,15 +113,15 @@ class BodyContacts:
         rows.spread(active, slots.slot, slots.body, slots.arm, bodies.speed, self._rate)
 
     def add_pressed(self, pressed: Ints) -> None:
-        """Adds the impulses of contact in the step to the impulses on the nodes of this rank, ``pressed`` (nodes, 3),
-        quanta.
+        """Adds the contact impulses of the step to ``pressed`` (nodes, 3), which are the impulses on the nodes of this
+        rank, quanta.
         """
         mine = np.flatnonzero(self._slots.node >= 0)
         pressed[self._slots.node[mine]] += self._slots.impulse[mine]
 
     def unsettled(self) -> Ints:
-        """(2,) l1 norms of the changes of impulses and moments in the last sweep, and of these (sweep_count.py in
-        contact/solver): of all ranks, on rank 0.
+        """(2,) two l1 norms over all ranks, on rank 0: of the impulses and moments in the step, and of their changes in
+        the last sweep (sweep_count.py in contact/solver).
         """
         both = np.zeros(2, np.int64)
         if self._comm.rank == 0 and self.active:
@@ -126,6 +129,8 @@ class BodyContacts:
         return both
 
     def of_contact(self, parts: Ints) -> None:
-        """Adds the impulses of the step to the impulses on the ``parts`` (parts, 3), quanta, on rank 0."""
+        """Adds the impulses of the step to ``parts`` (parts, 3), which are the impulses on the parts, quanta. Only on
+        rank 0.
+        """
         if self._comm.rank == 0:
             parts[self._bodies.part] += self._total[:, :3]

@@ -1,4 +1,4 @@
-"""Loads and constraints of a rigid body from outside: gravity, planes of symmetry, prescribed motion."""
+"""External loads and constraints of a rigid body: gravity, symmetry planes, prescribed motion."""
 
 import math
 from collections.abc import Collection
@@ -21,20 +21,22 @@ class Held:
     free: Floats = field(default_factory=lambda: np.ones(3))
     """(3,) 1 for axes along which impulses may move the body, else 0."""
     turns: Floats = field(default_factory=lambda: np.ones(3))
-    """(3,) 1 for axes about which impulses may rotate the body, else 0; either all axes, one axis or none."""
+    """(3,) 1 for axes about which impulses may rotate the body, else 0. The values are 1 for all axes, for one axis, or
+    for none."""
     driven: dict[int, tuple[float, Course]] = field(default_factory=dict)
-    """Prescribed velocity along each axis, m/s, and the factor over time of that velocity."""
+    """Prescribed velocity along an axis, m/s, and its factor over time, keyed by the axis."""
     spin: tuple[Floats, Floats] | None = None
-    """Point on the axis of a prescribed rotation, m, and the rotation vector, rad/s."""
+    """Point on the axis of a prescribed rotation, m, and the rotation vector, rad/s; None without prescribed
+    rotation."""
     pulls: list[tuple[Floats, Course]] = field(default_factory=list)
     """Accelerations of gravity, m/s^2, with their factors over time."""
     prescribed: bool = False
-    """True if any motion is prescribed: walls do not stop the body then."""
+    """True if any motion is prescribed. Walls do not stop a body with a prescribed motion."""
 
     @classmethod
     def of(cls, case: Case, part: Part, beside: Collection[int] = ()) -> "Held":
-        """Collects the boundaries that act on the ``part``, except the planes of symmetry in ``beside``, next to which
-        the part starts.
+        """Collects the boundaries that act on the ``part``. The symmetry planes beside which the part starts
+        (``beside``) are left out.
         """
         found = cls()
         for index, boundary in enumerate(case.boundaries):
@@ -61,7 +63,7 @@ class Held:
             self.spin = np.array(boundary.spin.centre), np.array(boundary.spin.rate)
 
     def _fix(self, axis: int, speed: float, course: Course) -> None:
-        """Prescribes the velocity of all nodes along an axis: the body can turn about that axis only."""
+        """Prescribes the velocity of all nodes along an axis, so that the body can turn about that axis only."""
         self.free[axis] = 0.0
         self.driven[axis] = speed, course
         self.turns = self.turns * (np.arange(3) == axis)
@@ -74,7 +76,7 @@ class Held:
         return self._driven(speed, 0.0, 0.0), rate * self.turns
 
     def kept(self, momentum: Floats) -> Floats:
-        """(3,) the allowed components of an angular momentum."""
+        """(3,) an angular momentum without the components that the constraints exclude."""
         return momentum if self.spin is not None else momentum * self.turns
 
     def kick(self, speed: Floats, centre: Floats, last_dt: float, dt: float, t: float) -> Floats:
@@ -102,7 +104,9 @@ class Held:
         return np.asarray(point + sine * across + (1.0 - cosine) * np.cross(axis, across))
 
     def half(self, dt: float) -> Floats:
-        """(3,) axis of the prescribed rotation of a step ``dt``, s, times the tangent of half its angle."""
+        """(3,) unit axis of the prescribed rotation of a step ``dt``, s, times the tangent of half of the rotation
+        angle.
+        """
         axis, sine, cosine = self._angle(dt)
         return np.asarray(axis * (sine / (1.0 + cosine)))
 

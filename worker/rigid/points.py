@@ -1,7 +1,7 @@
-"""Points of rigid bodies to which tied bonds tie nodes, and the norms of their rows.
+"""Points of rigid bodies to which tied bonds tie nodes, and norms of the tied rows.
 
-A row of a tied bond (bonds/rows.py) whose mortar nodes belong to a rigid body constrains one point of that body, the
-mean of the mortar nodes by the weights of the row. In the sweeps this point replaces the mortar nodes.
+If the mortar nodes of a tied row (bonds/rows.py) belong to a rigid body, the row constrains one point of that body,
+which is the mean of the mortar nodes by the weights of the row. In the sweeps this point replaces the mortar nodes.
 """
 
 from dataclasses import dataclass
@@ -14,18 +14,18 @@ from .bodies import Bodies
 
 @dataclass
 class Points:
-    """Points of rigid bodies, at most one for each row of the tied bonds."""
+    """Points of rigid bodies; a tied row has at most one point."""
 
     row: Ints
-    """(k,) row of each point, ascending."""
+    """(k,) tied row of each point, ascending."""
     body: Indices
     """(k,) body of each point."""
     arm: Floats
-    """(k, 3) vector from the centre of the body to the point, at the start, m."""
+    """(k, 3) vector from the centre of the body to each point, at the start, m."""
 
     @classmethod
     def none(cls) -> "Points":
-        """Returns no points."""
+        """Returns a table with no point."""
         return cls(np.zeros(0, np.int64), np.zeros(0, np.int32), np.zeros((0, 3)))
 
     def __len__(self) -> int:
@@ -36,13 +36,13 @@ class Points:
         return Points(self.row[chosen], self.body[chosen], self.arm[chosen])
 
     def norms(self, bodies: Bodies) -> Floats:
-        """(k,) bound of the l1 norm of the part of each row that is due to its body, 1/kg.
+        """(k,) bound of the contribution of the body to the l1 norm of each tied row, 1/kg.
 
-        The row i of a point at the arm a and the row k of a point at the arm b of the same body have the product
-        delta_ik / M + ([a] Y [b])_ik, Y the inverse of the inertia. The sum of the magnitudes over all rows of the
-        body is bounded by N / M + |a_l| T_m + |a_m| T_l with T_j = sum_k |Y_jk| L_k and L_k the sum of |b_l| + |b_m|
-        over the N points (i, l, m different). Y and the arms are those at the start: the largest of the three bounds
-        holds in any orientation.
+        Row i of a point at the arm a and row k of a point at the arm b of the same body have the product delta_ik / M +
+        ([a] Y [b])_ik, where Y is the inverse of the inertia. The sum of the magnitudes over all rows of the body is
+        bounded by N / M + |a_l| T_m + |a_m| T_l, where T_j = sum_k |Y_jk| L_k, and L_k is the sum of |b_l| + |b_m| over
+        the N points (i, l, m different). Y and the arms are those at the start. The largest of the three bounds is
+        valid in any orientation.
         """
         size, many = np.abs(self.arm), np.bincount(self.body, minlength=bodies.n)
         light = bodies.lightness.max(axis=1, initial=0.0)
@@ -58,7 +58,7 @@ class Points:
 
 
 def _yielding(bodies: Bodies) -> Floats:
-    """(b, 3, 3) inverse of the inertia at the start, 1/(kg m^2), zero where the rotation is held."""
+    """(b, 3, 3) inverse of the inertia at the start, 1/(kg m^2); zero for a body whose rotation is held."""
     found = np.zeros((bodies.n, 3, 3))
     for b in range(bodies.n):
         axes = np.flatnonzero(bodies.turns[b])

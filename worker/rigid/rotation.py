@@ -1,15 +1,15 @@
 """Free rotation of rigid bodies, and positions and velocities of their nodes.
 
-Orientations are unit quaternions q with rotations R(q); the state is the angular momentum l in space, which is constant
-to the bit if there is no moment. A step rotates a body by the implicit midpoint rule for Euler's equations: with p =
-R^T l in the body and m the mean of p before and after,
+Orientations are unit quaternions q with rotations R(q). The state is the angular momentum l along the axes of space.
+Without a moment l is constant to the last bit. A step rotates a body by the implicit midpoint rule for Euler's
+equations: with p = R^T l in the body and m the mean of p before and after,
 
     m = p + dt/2 m x (I^-1 m),    q' = q (1, dt/2 I^-1 m) / norm.
 
-The second equation is the Cayley map of dt I^-1 m to a rotation: it maps p to 2 m - p, so that l is conserved;
-multiplying the first by I^-1 m shows that p . I^-1 p, twice the energy, is conserved too (Hairer, Lubich and Wanner
-2006, Geometric Numerical Integration, IV.2: the midpoint rule preserves quadratic invariants). The error of the
-phase is of second order in dt.
+The second equation is the Cayley map of dt I^-1 m to a rotation. This rotation maps p to 2 m - p, so that l is
+conserved. The product of the first equation and I^-1 m shows that p . I^-1 p, which is twice the energy, is also
+conserved (Hairer, Lubich and Wanner 2006, Geometric Numerical Integration, IV.2: the midpoint rule preserves quadratic
+invariants). The error of the phase is of second order in dt.
 """
 
 import numpy as np
@@ -25,7 +25,7 @@ which is below a tenth (stage.py)."""
 
 @njit("void(float64[:, :, ::1], float64[:, ::1])", cache=True)
 def turns_of(rotation, q):  # type: ignore[no-untyped-def]
-    """Sets the ``rotation`` (b, 3, 3) of unit quaternions (b, 4), scalar first."""
+    """Sets ``rotation`` (b, 3, 3) to the rotations of unit quaternions (b, 4), scalar first."""
     for b in range(len(q)):
         w, x, y, z = q[b, 0], q[b, 1], q[b, 2], q[b, 3]
         rotation[b, 0, 0], rotation[b, 1, 1] = w * w + x * x - y * y - z * z, w * w - x * x + y * y - z * z
@@ -57,8 +57,9 @@ def spatial(out, rotation, tensor):  # type: ignore[no-untyped-def]
 
 @njit("void(float64[:, ::1], float64[:, ::1], float64[:, :, ::1], float64[:, :, ::1], int64[::1], float64)", cache=True)
 def turn(q, momentum, rotation, inverse, which, dt):  # type: ignore[no-untyped-def]
-    """Rotates the bodies ``which`` (k,), which turn freely, by a step ``dt``, s: their ``q`` (b, 4), for the angular
-    ``momentum`` (b, 3), kg m^2/s, the ``rotation`` of q, and the inverse of the inertia in the body, 1/(kg m^2).
+    """Rotates bodies that can turn freely by a step ``dt``, s: changes their quaternions ``q`` (b, 4). ``which`` (k,):
+    indices of these bodies; ``momentum`` (b, 3): angular momentum, kg m^2/s; ``rotation``: rotation of q; ``inverse``:
+    inverse of the inertia along the axes of the body, 1/(kg m^2).
     """
     p, mean, rate = np.empty(3), np.empty(3), np.empty(3)
     for b in which:
@@ -91,8 +92,8 @@ def _apply(out, tensor, b, vector):  # type: ignore[no-untyped-def]
 
 @njit("void(float64[:, ::1], int64, float64, float64, float64, boolean)", cache=True)
 def multiply(q, b, x, y, z, in_space):  # type: ignore[no-untyped-def]
-    """Multiplies ``q[b]`` by (1, x, y, z) and normalises it: a rotation by twice the arc tangent of the length of
-    (x, y, z), about this axis in the body, or ``in_space``.
+    """Multiplies the quaternion ``q[b]`` by (1, x, y, z) and normalises it. This is a rotation about the axis (x, y, z)
+    by twice the arc tangent of its length. The axis is given in the body, or in space if ``in_space``.
     """
     a, c, d, e = q[b, 0], q[b, 1], q[b, 2], q[b, 3]
     sign = -1.0 if in_space else 1.0
@@ -107,8 +108,8 @@ def multiply(q, b, x, y, z, in_space):  # type: ignore[no-untyped-def]
 
 @njit("void(float64[:, ::1], int32[::1], int32[::1], float64[:, ::1], float64[:, :, ::1], float64[:, ::1])", cache=True)
 def place(x, nodes, body, arms, rotation, centre):  # type: ignore[no-untyped-def]
-    """Sets the positions ``x`` of the ``nodes`` (k,) of bodies: the initial ``arms`` (k, 3), rotated, plus the
-    centre.
+    """Sets the positions ``x`` of the ``nodes`` (k,) of bodies to the initial ``arms`` (k, 3), rotated, plus the centre
+    of the body.
     """
     for k in range(len(nodes)):
         a, b = nodes[k], body[k]
@@ -123,7 +124,9 @@ def place(x, nodes, body, arms, rotation, centre):  # type: ignore[no-untyped-de
     cache=True,
 )
 def carry(v, x, nodes, body, centre, speed, rate):  # type: ignore[no-untyped-def]
-    """Sets the velocities of the ``nodes``: velocity of the centre, ``speed`` (b, 3), plus ``rate`` (b, 3) x arm."""
+    """Sets the velocities of the ``nodes`` of bodies: ``speed`` (b, 3), the velocity of the centre, plus ``rate`` (b,
+    3) x arm.
+    """
     for k in range(len(nodes)):
         a, b = nodes[k], body[k]
         rx, ry, rz = x[a, 0] - centre[b, 0], x[a, 1] - centre[b, 1], x[a, 2] - centre[b, 2]

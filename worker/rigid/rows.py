@@ -1,11 +1,11 @@
-"""Rigid bodies in the sweeps of contact: each body is one node with six degrees of freedom.
+"""Rigid bodies in the sweeps of contact. Each body acts as one node with six degrees of freedom.
 
-Contacts give integer impulses to slots (contact/solver/sweeps.py), and shared slots are completed as for other nodes.
-On the rank that owns the node of a slot, the impulses and their moments about the centre of the body are summed as
-integers, then over the ranks; these sums change the motion of the body, and the velocities of its slots are set to this
-motion. All rows of a body are therefore coupled through its mass and inertia, and the sweeps are Jacobi sweeps, as for
-shared nodes: the norm of a row is bounded by the l1 norm over all rows of the body (``norms``), and the result is
-independent of the order of contacts and ranks.
+Active contacts apply integer impulses to slots (contact/solver/sweeps.py), and the sums of shared slots are completed
+as for other nodes. The impulses on the slots of a body, and their moments about its centre, are summed as integers:
+first on the rank that owns the node of each slot, then over the ranks. These sums change the motion of the body, and
+the velocities of its slots are set to this motion. Therefore mass and inertia of a body couple all its contact rows.
+The sweeps are Jacobi sweeps, as for shared nodes: the norm of a row is bounded by the l1 norm over all rows of the body
+(``norms``), and the result does not depend on the order of contacts and ranks.
 """
 
 import numpy as np
@@ -15,18 +15,19 @@ from ..contact.solver.loading import SHARES
 from ..kernels.jit import njit, types
 
 WEIGHTS = 8
-"""Number of words of the weights of a body: sums over its slots of |w| |n_i|, of |arm x (|w| |n|)|_i over the reach,
-of |w|, of |arm| |w|."""
+"""Number of words of the weights of a body. The words are sums over its slots: of |w| |n_i|, of |arm x (|w| |n|)|_i
+divided by the reach, of |w|, and of |arm| |w|."""
 WORDS = 6
-"""Number of words of an impulse (3), quanta, and a moment (3), quanta times the reach of the body."""
+"""Number of words of an impulse (3), quanta, and of a moment (3), in quanta times the reach of the body."""
 _F, _F1, _F2, _F3 = types.float64, types.float64[::1], types.float64[:, ::1], types.float64[:, :, ::1]
 _N1, _I2, _B1 = types.int32[::1], types.int64[:, ::1], types.boolean[::1]
 
 
 @njit(types.void(_I2, NODES, _N1, _N1, _F2, _B1, _F1), cache=True)
 def weigh(words, active, slots, body, arms, owned, reach):  # type: ignore[no-untyped-def]
-    """Adds the row weights of ``owned`` (k,) ``slots`` (k,) to the sums of their ``body`` (k,), ``words``
-    (b, WEIGHTS); ``arms`` (k, 3) from its centre, m, ``reach`` (b,) above their lengths, a power of two.
+    """Adds the row weights of those ``slots`` (k,) that are ``owned`` (k,) to the sums of their bodies, ``words`` (b,
+    WEIGHTS). ``body`` (k,): body of each slot; ``arms`` (k, 3): vectors from the centre of the body, m; ``reach`` (b,):
+    a power of two above their lengths.
     """
     sums = active.row_weights
     for k in range(len(slots)):
@@ -45,10 +46,9 @@ def weigh(words, active, slots, body, arms, owned, reach):  # type: ignore[no-un
 
 @njit(types.void(NODES, _I2, _N1, _N1, _F2, _F1, _F2, _F3), cache=True, error_model="numpy")
 def norms(active, words, slots, body, arms, reach, lightness, yielding):  # type: ignore[no-untyped-def]
-    """Sets row weights and mobilities of ``slots`` such that their products bound a row of the contact matrix: sum_i
-    |n_i| Q_i along a normal n, Q for any direction across. ``words``: of all ranks, see ``weigh``; ``lightness`` (b,
-    3): reciprocal of the mass, 1/kg, and ``yielding`` (b, 3, 3) the inverse of the inertia in space, zero where the
-    motion is held.
+    """Sets row weights and mobilities of ``slots``. Their products bound a row of the contact matrix: sum_i |n_i| Q_i
+    along a normal n, and Q for any direction across. ``words``: sums of ``weigh`` over all ranks; ``lightness`` (b, 3):
+    1 / mass, 1/kg; ``yielding`` (b, 3, 3): inverse of the inertia along the axes of space; zero for held motion.
     """
     sums, fixed, moment, along = active.row_weights, active.fixed, np.empty(3), np.empty(3)
     for k in range(len(slots)):
@@ -73,8 +73,8 @@ def norms(active, words, slots, body, arms, reach, lightness, yielding):  # type
 
 @njit("void(int64[:, ::1], int64, int64, int64, int64, float64[:, ::1], int64, float64)", cache=True, forceinline=True)
 def add_impulse(words, b, p, q, r, arms, k, reach):  # type: ignore[no-untyped-def]
-    """Adds the impulse p, q, r, quanta, at the arm ``k`` of ``arms`` (n, 3), and its moment over the ``reach`` of the
-    body ``b``, to ``words`` (b, WORDS).
+    """Adds an impulse on the body ``b`` to ``words`` (b, WORDS), and its moment divided by the ``reach`` of the body.
+    p, q, r: components of the impulse, quanta; ``k``: index in ``arms`` (n, 3) of its arm.
     """
     x, y, z = arms[k, 0] / reach, arms[k, 1] / reach, arms[k, 2] / reach
     words[b, 0] += p
@@ -87,7 +87,7 @@ def add_impulse(words, b, p, q, r, arms, k, reach):  # type: ignore[no-untyped-d
 
 @njit(types.void(_I2, NODES, _N1, _N1, _F2, _B1, _F1), cache=True)
 def gather(words, active, slots, body, arms, owned, reach):  # type: ignore[no-untyped-def]
-    """Moves the impulses of a sweep from ``slots`` to their bodies: adds the impulses of ``owned`` slots to ``words``
+    """Moves the impulses of a sweep from ``slots`` to their bodies. Adds the impulses of ``owned`` slots to ``words``
     (b, WORDS), and sets the impulses of all slots to zero.
     """
     moving = active.moving_words
@@ -102,8 +102,8 @@ def gather(words, active, slots, body, arms, owned, reach):  # type: ignore[no-u
 
 @njit(types.void(NODES, _N1, _N1, _F2, _F2, _F2), cache=True)
 def spread(active, slots, body, arms, speed, rate):  # type: ignore[no-untyped-def]
-    """Sets the velocities of ``slots`` to the motion of their bodies, ``speed`` and ``rate`` (b, 3); adds the change
-    to their paths.
+    """Sets the velocities of ``slots`` to the motion of their bodies, ``speed`` and ``rate`` (b, 3). Adds the change of
+    the velocities to the paths of the slots.
     """
     v, path = active.moving, active.path
     for k in range(len(slots)):

@@ -1,10 +1,12 @@
 """Rigid bodies in the time step.
 
-The step from n, with the bodies at their positions of n: v(n-1/2) -> v*(n+1/2) by loads from outside (``kick``),
-impulses of contact and walls to v(n+1/2) (``contacts``, ``settle``), positions and orientations of n+1 (``move``).
-Impulses act at the arms of n, and rotation vectors follow from the angular momentum in the orientation of n: the work
-of an impulse is then half of the impulse times the sum of the velocities of its node before and after, to round-off,
-and no other energy is lost.
+At the start of a step the bodies are at their positions of n. External loads change v(n-1/2) to v*(n+1/2) (``kick``).
+Impulses of contact and walls change it to v(n+1/2) (``contacts``, ``settle``). Then positions and orientations of n+1
+are computed (``move``).
+
+Impulses act at the arms of n, and rotation vectors are computed from the angular momentum in the orientation of n.
+Therefore the work of an impulse is, to round-off, half of the impulse times the sum of the velocities of its node
+before and after, and no other energy is lost.
 """
 
 from typing import Any
@@ -31,16 +33,16 @@ from .stops import BodyStops
 
 _TURN = 0.1
 """Largest rotation of a body in a step, rad. Chosen value: the error of the rotation of a tumbling body is then a
-thousandth of a turn in each turn, and the path of a node differs from the chord by a thousandth of the arm."""
+thousandth of a turn for each turn, and the path of a node differs from the chord by a thousandth of the arm."""
 
 
 class Rigid:
-    """Rigid bodies of a case on one rank; every rank has all bodies."""
+    """Rigid bodies of a case on one rank. Every rank has all bodies."""
 
     def __init__(
         self, case: Case, nodes: Nodes, bodies: Bodies, walls: Walls, beside: Ints, comm: Comm
     ) -> None:  # fmt: skip
-        """``beside``: (planes, parts) for each plane of symmetry, the side on which each body starts, 1 or -1.
+        """``beside`` (planes, parts): side of each symmetry plane on which a part starts, 1 or -1; else 0.
         Collective.
         """
         self.bodies = bodies
@@ -51,17 +53,17 @@ class Rigid:
         self._arms = np.ascontiguousarray(nodes.x0[self.nodes] - bodies.origin[self._body])
         """(k, 3) arms (vectors from the centre of the body to the nodes) at the start, m."""
         self.of_part: Indices = np.full(len(case.parts), -1, np.int32)
-        """(parts,) body of each part, -1 for none."""
+        """(parts,) body of each part; -1 if the part is not rigid."""
         self.of_part[case.rigid] = np.arange(len(case.rigid), dtype=np.int32)
         self.account = BodyAccount(bodies)
         self.last_dt = self.last_push = 0.0
-        """Last time step, and time of the last impulse of contact or a wall, s."""
+        """Last time step, s; and time of the last impulse of contact or a wall, s."""
         self._least = RIGID_STEPS / case.run.end_time if len(case.rigid) == len(case.parts) else 0.0
         self._start, self._rate = np.zeros((2, bodies.n, 3)), np.zeros((bodies.n, 3))
-        """Velocities and rotation vectors before the impulses of the step; present rotation vectors, rad/s."""
+        """Velocities and rotation vectors before the impulses of the step; and present rotation vectors, rad/s."""
         self.share = 1.0
-        """Share of the last change of the motion that the velocities of the nodes contain; less than 1 at the end of
-        a run, when velocities are interpolated to n."""
+        """Fraction of the last change of the motion that the velocities of the nodes contain. It is below 1 at the end
+        of a run, when velocities are interpolated to n."""
         self.stops = BodyStops(
             walls, bodies, *stopped(case, nodes, bodies, beside, comm), _restitution(case, walls), _names(case)
         )
@@ -72,7 +74,9 @@ class Rigid:
         self.bonds = BodyBonds(bodies, self.stops, self._start, self._rate, comm)
 
     def require_front(self, case: Case, size: float) -> None:
-        """Raises InputError if a body starts behind a wall by more than rounding of the ``size``, m."""
+        """Raises InputError if a body starts behind a wall by more than the round-off of coordinates; ``size``: largest
+        coordinate, m.
+        """
         for (index, _), depth in zip(case.boundaries_of(Wall), self.stops.deepest().tolist(), strict=False):
             if depth > GENERATED * size:
                 raise InputError(f"boundaries[{index}]: a body starts {depth:.3g} m behind this wall")
@@ -80,7 +84,7 @@ class Rigid:
     # State ------------------------------------------------------------------------------------------------------------
 
     def keep(self) -> dict[str, Any]:
-        """Returns the state, equal on all ranks."""
+        """Returns the state of the rigid bodies for a checkpoint. All ranks return equal values."""
         kept = {name: getattr(self.bodies, name).copy() for name in STATE}
         constant = {name: getattr(self.bodies, name) for name in ("part", "mass", "origin", "inertia", "reach")}
         return {
@@ -90,7 +94,7 @@ class Rigid:
 
     @staticmethod
     def kept_bodies(known: dict[str, Any], held: list[Any]) -> Bodies:
-        """Returns the bodies of a run that resumes."""
+        """Returns the bodies of a run that resumes; ``known``: state in the checkpoint."""
         bodies = Bodies(**known["constant"], held=held)
         for name, values in known["state"].items():
             setattr(bodies, name, values.copy())
@@ -98,19 +102,21 @@ class Rigid:
         return bodies
 
     def resume(self, known: dict[str, Any]) -> None:
-        """Restores the state except the state of the bodies."""
+        """Restores the state of this object from a checkpoint. The bodies themselves are restored by
+        ``kept_bodies``.
+        """
         self.account.resume(known["own"])
         self.last_dt = known["last_dt"]
         self.stops.given[:] = known["given"]
 
     def words(self) -> bytes:
-        """Returns the words of the digest: positions and motion of the bodies."""
+        """Returns values for the digest: positions and motion of the bodies."""
         return b"".join(np.ascontiguousarray(getattr(self.bodies, name)).tobytes() for name in STATE)
 
     @property
     def limit(self) -> float:
-        """Reciprocal of the longest allowed step, 1/s: no body turns by more than _TURN in a step, and a run with rigid
-        parts only takes RIGID_STEPS.
+        """Returns 1 / longest allowed step, 1/s. No body may turn by more than _TURN in a step, and a run with rigid
+        parts only makes RIGID_STEPS steps.
         """
         rate = self.bodies.rates(self.bodies.momentum)
         return max(float(np.sqrt(dot(rate, rate)).max(initial=0.0)) / _TURN, self._least)
@@ -118,12 +124,12 @@ class Rigid:
     # The step ---------------------------------------------------------------------------------------------------------
 
     def begin(self, nodes: Nodes) -> None:
-        """Sets the velocities of the nodes, before the first step and when a run resumes."""
+        """Sets the velocities of the nodes of bodies, before the first step and when a run resumes."""
         self._rate[:] = self.bodies.rates(self.bodies.momentum)
         self._carry(nodes)
 
     def note(self) -> None:
-        """Before the kick: books the second half of the work of the last impulses."""
+        """Adds the second half of the work of the last impulses. Must be called before the kick."""
         self.account.note()
 
     def kick(self, nodes: Nodes, dt: float, t: float) -> None:
@@ -141,7 +147,9 @@ class Rigid:
         self._carry(nodes)
 
     def settle(self, nodes: Nodes, t: float) -> None:
-        """After contact and walls: computes v(n+1/2) of bodies and nodes; books the first half of the work."""
+        """Computes v(n+1/2) of bodies and nodes after contact and walls. Adds the first half of the work of the
+        impulses.
+        """
         bodies, stops = self.bodies, self.stops
         stops.stop(bodies.speed, self._rate)
         stops.end(bodies.speed, self._rate, self.last_dt, t)
@@ -155,7 +163,9 @@ class Rigid:
         self._carry(nodes)
 
     def move(self, nodes: Nodes, dt: float) -> None:
-        """Computes positions and orientations of n+1, and the velocities of nodes there by the same motion."""
+        """Computes positions and orientations at n+1, and sets the velocities of the nodes to the motion of the
+        bodies.
+        """
         bodies = self.bodies
         bodies.centre += dt * bodies.speed
         rotation.turn(bodies.q, bodies.momentum, bodies.rotation, bodies.inverse, bodies.loose, dt)
@@ -174,13 +184,16 @@ class Rigid:
         self._carry(nodes)
 
     def tied(self, nodes: Nodes) -> None:
-        """After the warm start of the tied bonds: sets the motion from which contact starts, and the nodes."""
+        """Stores the motion from which contact starts, and sets the nodes to it. Must be called after the warm start of
+        the tied bonds.
+        """
         self.bonds.settle_start()
         self._carry(nodes)
 
     def points(self, rows: Ints, masters: Ints, weights: Floats, ids: Ints, comm: Comm) -> Points:
-        """Returns the points of the bodies to which rows of tied bonds are tied: each weight of ``rows`` (e,) is that
-        of the node ``masters`` (e,), a global id; ``ids`` (nodes,): of the local nodes. Collective.
+        """Returns the points of the bodies to which tied rows tie nodes. ``rows`` (e,): row of each weight; ``masters``
+        (e,): global id of its mortar node; ``weights`` (e,). ``ids`` (nodes,): global ids of the local nodes.
+        Collective.
         """
         mine = np.isin(ids[self.nodes], masters)
         words = np.column_stack([ids[self.nodes][mine], self._body[mine], self._arms[mine].view(np.int64)])
@@ -194,8 +207,8 @@ class Rigid:
         return Points(some, every[of[start], 1].astype(np.int32), np.ascontiguousarray(mean[some]))
 
     def of_walls(self, walls: list[int], part: int | None) -> Floats:
-        """(3,) sum of the impulses of these walls so far on the rigid body of ``part``, N s, or on all bodies; zero
-        for a part that is not rigid.
+        """(3,) sum of the impulses so far of the given walls on the rigid body of ``part``, N s. The sum is over all
+        bodies if no part is given, and zero for a part that is not rigid.
         """
         if part is None:
             return np.asarray(self.stops.given[walls].sum(axis=(0, 1)))
@@ -209,7 +222,7 @@ class Rigid:
 
 
 def _restitution(case: Case, walls: Walls) -> Floats:
-    """(walls,) restitution: the restitution of contact for planes of symmetry, zero for walls."""
+    """(walls,) coefficient of restitution of each wall: that of contact for symmetry planes, zero for walls."""
     found = np.zeros(walls.n)
     if case.contact is not None:
         found[len(case.boundaries_of(Wall)) :] = case.contact.restitution

@@ -1,4 +1,4 @@
-"""Rigid bodies of a case, at the start of a run and when it resumes."""
+"""Construction of the rigid bodies of a case, at the start of a run or when a run resumes."""
 
 from typing import Any
 
@@ -18,8 +18,9 @@ from .stage import Rigid
 def rigid_of(
     case: Case, model: Model, walls: Walls, comm: Comm, known: dict[str, Any] | None = None
 ) -> Rigid | None:  # fmt: skip
-    """Returns the rigid bodies of a case, or None: at the start, or with the state ``known`` of a parcel (a checkpoint
-    or migration message). Collective. Raises the same InputError on every rank if a body starts behind a wall.
+    """Returns the rigid bodies of a case; None if no part is rigid. ``known``: state in a parcel (a checkpoint or
+    migration message), if the run resumes. Collective. Raises the same InputError on every rank if a body starts behind
+    a wall.
     """
     if not case.rigid:
         return None

@@ -10,9 +10,9 @@ from .bodies import Bodies, of_nodes
 
 
 def stopped(case: Case, nodes: Nodes, bodies: Bodies, beside: Ints, comm: Comm) -> tuple[Flags, Floats, Indices]:
-    """Returns which walls (walls, b), followed by the two sides of each plane of symmetry, stop which bodies; and
-    for all nodes of these bodies, on all ranks, the initial arms, m, and the body, by ascending id. ``beside``
-    (planes, parts): the side on which a body starts, 1 or -1. Collective.
+    """Returns (walls, b) whether each wall stops each body; the walls of the case are followed by the two sides of each
+    symmetry plane. Also returns, for all nodes of stopped bodies on all ranks, ordered by id, the initial arm, m, and
+    the body. ``beside`` (planes, parts): side on which a body starts, 1 or -1. Collective.
     """
     held = np.concatenate([_by_walls(case, bodies), _by_planes(case, bodies, beside)])
     held &= np.array([not each.prescribed for each in bodies.held], bool)
@@ -34,8 +34,8 @@ def _by_walls(case: Case, bodies: Bodies) -> Flags:
 
 
 def _by_planes(case: Case, bodies: Bodies, beside: Ints) -> Flags:
-    """Returns flags (2 planes, b): for each plane of symmetry, which bodies start above the plane, then which start
-    below.
+    """Returns (2 planes, b) flags. For each symmetry plane the first row marks the bodies that start above the plane,
+    the second row those that start below.
     """
     side = beside[:, bodies.part]
     return np.stack([side > 0, side < 0], axis=1).reshape(2 * len(case.boundaries_of(Symmetry)), bodies.n)

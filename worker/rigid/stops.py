@@ -1,4 +1,4 @@
-r"""Walls that stop rigid bodies: impulses at the nodes of their surfaces.
+r"""Walls that stop rigid bodies by impulses at the surface nodes of the bodies.
 
 ::
 
@@ -10,9 +10,9 @@ r"""Walls that stop rigid bodies: impulses at the nodes of their surfaces.
           =====.===|=========          impulse p n, p >= 0, acts on v, w and -V;  friction |f| <= mu p, across n
               wall    V
 
-Bodies, walls and the nodes here are equal on all ranks: every rank computes all impulses, one after the other
-(Gauss-Seidel), without messages. The impulses are accumulated during a step, within the sweeps of contact and after the
-sweeps, so that a body between a wall and another body penetrates neither of the two.
+All ranks have equal data of bodies, walls and nodes. Therefore every rank computes all impulses, one after the other
+(Gauss-Seidel), without messages. The impulses of a step are accumulated, within the sweeps of contact and after the
+sweeps, so that a body between a wall and another body penetrates neither the wall nor the other body.
 """
 
 from typing import NamedTuple
@@ -26,25 +26,25 @@ from ..model.state import Flags, Floats, Indices, Ints
 from .bodies import Bodies, dot
 
 _NEAR = 2.0
-"""Walls are checked for a body within this multiple of the motion of the body in a step."""
+"""Ratio of a distance to the motion of a body in a step. The walls within this distance of the body are checked."""
 _CLOSE = 1e-3
-"""Length over the reach of a body. The length is added to the distance within which walls are checked; a node that
-ends deeper than this behind a wall ends the run."""
+"""Length, divided by the reach of a body. The length is added to the distance within which walls are checked. If a node
+ends deeper than this length behind a wall, the run ends."""
 _MOST, _ENOUGH = 200, 1e-12
-"""Largest number of passes over the rows, and the relative change of an impulse at which the passes end."""
+"""Largest number of passes over the rows; and relative change of an impulse at which the passes end."""
 
 
 class Rows(NamedTuple):
-    """Nodes of bodies near walls, one row for each node and wall."""
+    """Nodes of bodies near walls. The arrays have one row for each pair of a node and a wall."""
 
     body: Ints
     wall: Ints
     arm: Floats
-    """(m, 3) arm from the centre of the body, m."""
+    """(m, 3) arm: vector from the centre of the body to the node, m."""
     normal: Floats
     """(m, 3) unit normal out of the wall."""
     least: Floats
-    """(m,) velocity along the normal at which the node reaches the wall at the end of the step, m/s."""
+    """(m,) velocity along the normal with which the node reaches the wall exactly at the end of the step, m/s."""
     push: Floats
     """(m,) normal impulse so far, N s."""
     rub: Floats
@@ -71,8 +71,9 @@ class BodyStops:
         self, walls: Walls, bodies: Bodies, held: Flags, arms: Floats, body: Indices, restitution: Floats,
         names: list[str],
     ) -> None:  # fmt: skip
-        """``held`` (walls, b): which walls stop which bodies; ``arms`` (k, 3) of all surface nodes at the start, m,
-        each of a ``body`` (k,); ``restitution`` (walls,); ``names`` (b,) of the parts.
+        """``held`` (walls, b): whether each wall stops each body. ``arms`` (k, 3): arms of all surface nodes at the
+        start, m; ``body`` (k,): bodies of these nodes. ``restitution`` (walls,): coefficients; ``names`` (b,): names of
+        the parts.
         """
         self._restitution, self._names = restitution, names
         self.walls, self._bodies, self._held, self._arms, self._body = walls, bodies, held, arms, body
@@ -81,14 +82,15 @@ class BodyStops:
         self.given = np.zeros((walls.n, bodies.n, 3))
         """(walls, b, 3) sum of the impulses of each wall on each body so far, N s."""
         self.impulse, self.rubbed = np.zeros((2, bodies.n, 6))
-        """(b, 6) impulse, N s, and moment, N m s, of the walls on each body in the step, and the part of both that
-        is friction."""
-        self.of_walls, self.rubbed_by = np.zeros((2, walls.n, bodies.n, 3))
-        """(walls, b, 3) impulses of each wall on each body in the step, N s, and the part of these impulses that is
+        """(b, 6) impulse, N s, and moment, N m s, of the walls on each body in the step; and the part of each that is
         friction."""
+        self.of_walls, self.rubbed_by = np.zeros((2, walls.n, bodies.n, 3))
+        """(walls, b, 3) impulse of each wall on each body in the step, N s; and the part of it that is friction."""
 
     def begin(self, dt: float) -> None:
-        """Finds the rows of a step ``dt``, s, at the positions of n, with the velocities before impulses."""
+        """Finds the pairs of a node and a wall for a step of length ``dt``, s. Positions are those of n, velocities
+        those before the impulses.
+        """
         bodies = self._bodies
         rate = bodies.rates(bodies.momentum)
         size = np.sqrt((bodies.speed * bodies.speed).sum(axis=1)) + bodies.reach * np.sqrt((rate * rate).sum(axis=1))
@@ -104,7 +106,9 @@ class BodyStops:
         self.impulse[:], self.rubbed[:], self.of_walls[:], self.rubbed_by[:] = 0.0, 0.0, 0.0, 0.0
 
     def stop(self, speed: Floats, rate: Floats) -> None:
-        """Corrects ``speed`` and ``rate`` (b, 3) of the bodies, and the velocities of walls with a mass."""
+        """Corrects the velocities ``speed`` and rotation vectors ``rate`` (b, 3) of the bodies, and the velocities of
+        walls with a mass.
+        """
         if self._many:
             walls = self.walls
             press(
@@ -113,7 +117,7 @@ class BodyStops:
             )  # fmt: skip
 
     def _rebound(self, speed: Floats, rate: Floats) -> None:
-        """Raises ``least`` of rows whose nodes would end behind the wall to the velocity of restitution, m/s."""
+        """Raises ``least`` to the velocity of restitution, m/s, in rows whose node would end behind its wall."""
         wall, least, along = self._all.wall[: self._many], self._all.least[: self._many], self._along(speed, rate)
         back = -self._restitution[wall] * along
         least[:] = np.where((along < least) & (self._restitution[wall] > 0.0), np.maximum(least, back), least)
@@ -127,8 +131,8 @@ class BodyStops:
         return dot(v, rows.normal[:n])
 
     def end(self, speed: Floats, rate: Floats, dt: float, t: float) -> None:
-        """Books the impulses of the step ``dt``, s, at ``t``, s. Raises PhysicsError, on all ranks, if a node would
-        still end behind its wall.
+        """Adds the work of the impulses of the step ``dt``, s, at the time ``t``, s. Raises PhysicsError on all ranks
+        if a node would still end behind its wall.
         """
         self.given += self.of_walls
         if self._many:
@@ -143,7 +147,7 @@ class BodyStops:
                 )
 
     def deepest(self) -> Floats:
-        """(walls,) depth of the deepest node behind each wall, m."""
+        """(walls,) largest depth of a node behind each wall, m."""
         rows = Rows.room(len(self._arms) * self.walls.n)
         bodies = self._bodies
         many = find(
@@ -157,8 +161,8 @@ class BodyStops:
 
 @njit(types.int64(ROWS, SHAPES, types.boolean[:, ::1], _F2, _N1, _F3, _F2, _F1, _F), cache=True, error_model="numpy")
 def find(rows, shapes, held, arms, body, rotation, centre, near, dt):  # type: ignore[no-untyped-def]
-    """Finds the nodes less than ``near`` (b,), m, in front of a wall that stops their body; returns the number of
-    rows.
+    """Finds the nodes that are less than ``near`` (b,), m, in front of a wall that stops their body. Returns the number
+    of rows.
     """
     n, arm, normal = 0, np.empty(3), np.empty(3)
     for k in range(len(body)):
@@ -186,7 +190,7 @@ def find(rows, shapes, held, arms, body, rotation, centre, near, dt):  # type: i
 def press(  # type: ignore[no-untyped-def]
     rows, many, speed, rate, lightness, yielding, wall_speed, wall_lightness, friction, impulse, rubbed, given, by
 ):
-    """Passes over the rows until the impulses settle.
+    """Passes over the rows until the impulses have converged.
 
     Adds the impulses to ``impulse`` (b, 6) and ``given`` (walls, b, 3), and the impulses of friction also to ``rubbed``
     and ``by``.
@@ -260,7 +264,7 @@ def press(  # type: ignore[no-untyped-def]
 
 @njit(types.void(types.int64, types.int64, _F, _F, _F, _F1, _F2, _F2, _F2, _F3, _F2, _F1, _F2, _F3), cache=True)
 def _give(b, w, x, y, z, change, speed, rate, lightness, yielding, wall_speed, wall_lightness, impulse, given):  # type: ignore[no-untyped-def]
-    """Applies an impulse ``change`` (3,), N s, of a wall at an arm of a body."""
+    """Applies the impulse ``change`` (3,), N s, of a wall to a body, at the arm x, y, z."""
     p, q, s = change[0], change[1], change[2]
     t, u, v = y * s - z * q, z * p - x * s, x * q - y * p
     impulse[b, 3] += t

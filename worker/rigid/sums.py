@@ -1,4 +1,4 @@
-"""Contribution of rigid bodies and of walls with a mass to the sums of the ledger."""
+"""Contribution of rigid bodies, and of walls with a mass, to the sums of the energy balance."""
 
 import numpy as np
 
@@ -8,7 +8,7 @@ from .stage import Rigid
 
 
 def energy_of(rigid: Rigid | None, walls: Walls) -> float:
-    """Returns the kinetic energy, J."""
+    """Returns the kinetic energy of rigid bodies and of walls with a mass, J."""
     return walls.kinetic() + (float(rigid.account.kinetic().sum()) if rigid is not None else 0.0)
 
 
@@ -18,9 +18,9 @@ def of_bonds(rigid: Rigid | None) -> list[float]:
 
 
 def add_undeformed(sums: Floats, of_parts: Floats, rigid: Rigid | None, walls: Walls) -> None:
-    """Adds to ``sums`` (10,) over the nodes (accounts/nodal.py): kinetic energy, loss by contact and work from outside,
-    J, momentum, kg m/s, the work of unequal steps (zero here), and angular momentum, kg m^2/s; adds the kinetic energy
-    to the kinetic energy of each part, ``of_parts`` (parts, .).
+    """Adds the values of rigid bodies and walls to ``sums`` (10,) over the nodes (accounts/nodal.py): kinetic energy,
+    loss by contact and external work, J, momentum, kg m/s, the work of unequal steps (zero here), and angular momentum,
+    kg m^2/s. Adds the kinetic energy also to that of each part, ``of_parts`` (parts, .).
     """
     if rigid is None and not walls.lightness.any():
         return
