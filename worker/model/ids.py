@@ -35,7 +35,7 @@ def places(known: _Ids, wanted: _Ids) -> _Places:
     beyond = int(known[-1]) + 1
     table = np.full(beyond + 1, -1, np.int32)
     table[known] = np.arange(len(known), dtype=np.int32)
-    return np.asarray(table[np.minimum(wanted.astype(np.uint64), np.uint64(beyond))])  # negative ids become large numbers
+    return np.asarray(table[np.minimum(wanted.astype(np.uint64), np.uint64(beyond))])  # negative ids become large
 
 
 def among(known: _Ids, wanted: _Ids) -> npt.NDArray[np.bool_]:

@@ -28,7 +28,9 @@ class Shares:
     part: Indices = field(default_factory=lambda: np.zeros(0, np.int32))
     """(k,) index of the part."""
     mass: Floats = field(default_factory=lambda: np.zeros(0))
-    """(k,) mass of the node that comes from the tets of the part, kg."""
+    """(parts,) precedence of the parts as numbers, the smallest first; (0,) if no bond makes nodes of several parts.
+    Contact and other stages count a node for one part only, its representative part, which is the part of the node with
+    the smallest number."""
     rank: Ints = field(default_factory=lambda: np.zeros(0, np.int64))
     """(parts,) rank of each part; (0,) if no bond makes nodes of several parts. Contact and other stages count a node
     for one part only, its representative part, which is the part of the node with the lowest rank."""
@@ -99,8 +101,8 @@ def shared(node: "np.ndarray", part: "np.ndarray", mass: Floats, rank: Ints) -> 
 
 
 def ranks(case: Case) -> Ints:
-    """Return (parts,) the rank of each part for ``Shares.rank``; (0,) in a case without nodes shared between parts.
-    Parts that are in contact have the lowest ranks.
+    """Return (parts,) the numbers for ``Shares.rank``; (0,) in a case without nodes shared between parts. Parts that
+    are in contact have the smallest numbers.
     """
     if not shared_bonds(case):
         return np.zeros(0, np.int64)

@@ -190,7 +190,7 @@ class Block:
     """(n,) marks of overstressed faces: bit k is set if the traction on face k, by the stress of the tet alone, exceeds
     ``weakest``."""
     flat: Flags = field(default_factory=lambda: np.zeros(0, bool))
-    """(n,) whether each tet is flat (elements/flat.py); (0,) if no tet is flat. Strains of flat tets are not averaged."""
+    """(n,) whether each tet is flat (elements/flat.py); (0,) if no tet is flat. Their strains are not averaged."""
     shear_weight: float = 0.0
     """Weight of the shear traction relative to the normal traction in the fracture criterion."""
     worn: Flags = field(default_factory=lambda: np.zeros(0, bool))

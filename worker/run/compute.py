@@ -1,4 +1,6 @@
-"""A run from its case to its outcome: builds or resumes the simulation, runs the time loop, sums up."""
+"""Execution of a run from its case to its outcome. The module builds or resumes the simulation, runs the time loop, and
+makes the outcome.
+"""
 
 import logging
 import time
@@ -39,7 +41,7 @@ from .signals import Signals
 from .summary import Times, sum_up
 
 CHOSEN, ALL, PROJECT = "chosen", "all", "project"
-"""Use of the threads of a rank; ``compute`` describes the values."""
+"""Choices for the use of the threads of a rank; ``compute`` describes each choice."""
 
 log = logging.getLogger("conoid.worker")
 
@@ -50,12 +52,12 @@ def compute(
 ) -> Outcome:  # fmt: skip
     """Runs the case in ``folder`` and returns its outcome. Collective.
 
-    ``meshes``: folder at which relative paths of mesh files start; ``restart``: resume from the latest checkpoint;
-    ``use`` of the threads: CHOSEN, as many as make the run faster; ALL; PROJECT, one thread, and the outcome has the
-    estimated time with more. Raises ConoidError.
+    ``meshes``: folder to which the paths of mesh files are relative; ``restart``: whether to resume from the latest
+    checkpoint. ``use``: use of the threads. CHOSEN: as many threads as make the run faster; ALL: all threads; PROJECT:
+    one thread, and the outcome has the estimated time with more threads. Raises ConoidError.
     """
     say = journal.starting if journal is not None else quiet
-    threads = team(case.run.threads)  # the team of threads may have the settings of an earlier run of this process
+    threads = team(case.run.threads)  # an earlier run of this process may have changed its settings
     threads.most = threads.threads
     threads.projecting = Projecting(threads.threads) if use == PROJECT else None
     if comm.size > 1:
@@ -97,7 +99,7 @@ def compute(
 def _resumed(case: Case, folder: Path, comm: Comm, journal: Journal | None) -> tuple[Simulation, Start]:
     """Returns the simulation of the latest complete checkpoint in ``folder``.
 
-    Collective. The journal gets a warning for each later checkpoint, which is damaged. Raises InputError on all
+    Collective. Later checkpoints are damaged; the journal gets a warning for each of them. Raises InputError on all
     ranks.
     """
     found: tuple[Path, Manifest] | None = None
@@ -124,7 +126,9 @@ def _resumed(case: Case, folder: Path, comm: Comm, journal: Journal | None) -> t
 
 
 def _rewound(folder: Path, sim: Simulation, journal: Journal | None, start: Start) -> Start:
-    """Removes the output after the first step of this process; returns ``start`` with a warning for lost lines."""
+    """Removes output that was written after the first step of this process, and lines of the history. Returns ``start``
+    with a warning if lines of the history are missing.
+    """
     lost = rewind.lost(rewind.rewind(folder, sim.clock.step, sim.clock.frame), start.lines)
     checkpoint.forget(folder, sim.clock.step)
     _warn(journal, lost)
@@ -139,7 +143,7 @@ def _warn(journal: Journal | None, texts: Sequence[str]) -> None:
 
 
 def _announce(sim: Simulation, journal: Journal | None, setup: float) -> None:
-    """Reports the size of the model and its distribution over the ranks. Collective."""
+    """Reports the size of the model and the distribution of its tets over the ranks. Collective."""
     model, nodes = sim.model, sim.model.nodes
     sizes = np.zeros(len(model.parts), np.int64)
     for block in model.blocks:

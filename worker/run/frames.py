@@ -1,4 +1,6 @@
-"""Frames of a run: files of the whole field, their messages, and warnings of files that were removed."""
+"""Frames of a run. The module writes the files of the whole field and the messages about them, and warns if files were
+removed.
+"""
 
 from pathlib import Path
 
@@ -17,27 +19,27 @@ class Frames:
     """Writes the frames of a run. Every method is collective except ``report_losses``."""
 
     def __init__(self, folder: Path, notices: Notices, counter: Counter) -> None:
-        """``folder``: folder of the run; ``counter``: finds the fragments that a frame shows."""
+        """``folder``: folder of the run; ``counter``: object that finds the fragments of a frame."""
         self._folder, self._notices, self._counter = folder, notices, counter
         self._losses = Losses(folder) if notices.journal is not None else None
         self.lost: list[str] = []
-        """Warnings of output files that were removed during the run; on rank 0."""
+        """Warnings about output files that were removed during the run. Only on rank 0."""
 
     def write(self, sim: Simulation) -> None:
-        """Write the frame of the present time, and its message if the journal has no message of this frame."""
+        """Write the frame of the present time. If the journal has no message of this frame, write the message."""
         clock, index, journal = sim.clock, sim.clock.frame, self._notices.journal
         sim.count_nodes()
         self.report_losses(sim)
         path = self._written(sim, index)
-        self.report_losses(sim)  # adds the new file to the files that are watched
+        self.report_losses(sim)  # watch the new file from now on
         clock.frame += 1
         if path is not None and journal is not None and index not in journal.frames:
             journal.frames.add(index)
             self._notices.write(clock, messages.Frame, index=index, path=path)
 
     def _written(self, sim: Simulation, index: int) -> str | None:
-        """Write the frame file and the record of the fragments. Return the path of the file in the run's folder on
-        rank 0.
+        """Write the frame file and the record of the fragments. Return the path of the file in the run's folder on rank
+        0.
         """
         t, record = sim.clock.t, sim.record
         cohesion = sim.fracture.cohesion if sim.fracture is not None else None
@@ -52,7 +54,7 @@ class Frames:
         return path
 
     def report_losses(self, sim: Simulation) -> None:
-        """Warn of output files that have been removed since the last call."""
+        """Write warnings about output files that have been removed since the last call."""
         for text in self._losses.found() if self._losses is not None else ():
             self.lost.append(text)
             self._notices.write(sim.clock, messages.Log, level="warning", text=text)

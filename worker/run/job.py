@@ -1,9 +1,9 @@
 """``python -m conoid.worker.run.job FOLDER NAME``: one attempt of a run inside a job of a batch system.
 
 The script of the job becomes this process. The program starts the ranks, sends the signal of the batch system to them,
-and finds the cause of the signal. A cancel ends the run. After a preemption or a time limit the same job is queued
-again, and the run resumes from its checkpoint. If the cause is unknown the folder has a checkpoint and no outcome, and
-the server or command that submitted the job decides.
+and finds the cause of the signal. If the job was cancelled, the run ends. After a preemption or a time limit the same
+job is queued again, and the run resumes from its checkpoint. If the cause is unknown, the folder gets a checkpoint and
+no outcome; the server or the command that submitted the job then decides whether the run continues.
 """
 
 import os
@@ -31,16 +31,17 @@ from .lock import hold
 
 _ONE_THREAD = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
 _ASK_FOR = 20.0
-"""Time for which the controller is asked for the cause of a signal, s. Chosen value: KillWait, 30 s by default, ends
-this process."""
+"""Longest time for which Slurm's controller is asked for the cause of a signal, s. Chosen value: KillWait, 30 s by
+default, after which Slurm ends this process."""
 _EARLY = 90.0
-"""Time by which Slurm may send the signal early (60 s, sbatch(1)), plus a margin for the checkpoint, s."""
+"""Longest time before the time limit at which Slurm may send the signal (60 s, sbatch(1)), plus a margin for the
+checkpoint, s."""
 
 
 @dataclass
 class Relay:
-    """Passes the TERM of the batch system on to the ranks as USR1, because srun takes a TERM as a request to end
-    itself.
+    """Handler that sends the signal TERM of the batch system to the ranks as USR1. It is not sent as TERM, because srun
+    takes a TERM as a request to end itself.
     """
 
     child: "subprocess.Popen[bytes] | None" = None
@@ -62,7 +63,7 @@ class Relay:
 
 
 def main(arguments: list[str]) -> int:
-    """Runs the ranks and returns their exit code. Returns 0 if another job runs this case or this job is queued
+    """Runs the ranks and returns their exit code. Returns 0 if another job runs this case, or if this job is queued
     again.
     """
     relay = Relay()
@@ -90,7 +91,7 @@ def main(arguments: list[str]) -> int:
 def _place(given: Path, env: Mapping[str, str]) -> tuple[Path, str]:
     """Returns the run's folder, and the number of the job as the queue shows it.
 
-    A task of an array finds its folder by its index, and from then on it writes into the log of this folder. Raises
+    A task of a job array finds its folder by its index, and from then on writes into the log of this folder. Raises
     OSError.
     """
     task = env.get("SLURM_ARRAY_TASK_ID", "")
@@ -102,7 +103,7 @@ def _place(given: Path, env: Mapping[str, str]) -> tuple[Path, str]:
 
 
 def _write_into(folder: Path) -> None:
-    """Directs the output of this process and of the ranks into the launcher's log of the run. Raises OSError."""
+    """Directs the output of this process and of the ranks into the log of the run. Raises OSError."""
     log = os.open(folder / layout.LOGS / layout.LAUNCHER_LOG, os.O_WRONLY | os.O_APPEND | os.O_CREAT, 0o600)
     for stream in (1, 2):
         os.dup2(log, stream)
@@ -110,7 +111,7 @@ def _write_into(folder: Path) -> None:
 
 
 def claim(folder: Path, job: Job, number: str) -> bool:
-    """Returns True for the first job of this name that starts, and for the same job when it is started again."""
+    """Returns True if this is the first job of this name that starts, or the same job in a new attempt."""
     path = layout.claim(folder, job.name)
     beside = path.with_name(f"{path.name}.{number}.{os.getpid()}")
     beside.write_text(number)
@@ -144,7 +145,9 @@ def _run(folder: Path, job: Job, number: str, relay: Relay) -> int:
 
 
 def environment(base: Mapping[str, str], job: Job, access: batch.Access | None) -> dict[str, str]:
-    """Returns the environment of the ranks: libraries with one thread, the run's id, its Zenoh credentials."""
+    """Returns the environment of the ranks: settings for libraries with one thread, the run's id, and its Zenoh
+    credentials.
+    """
     env = {**base, **dict.fromkeys(_ONE_THREAD, "1"), "CONOID_RUN": job.run}
     if access is not None and access.user:
         env |= {"CONOID_ZENOH_USER": access.user, "CONOID_ZENOH_PASSWORD": access.password}
@@ -154,7 +157,7 @@ def environment(base: Mapping[str, str], job: Job, access: batch.Access | None) 
 
 
 def _interrupted(folder: Path, job: Job, number: str, further: bool) -> int | None:
-    """Acts on the cause of the signal; returns None if the exit code of the ranks is valid.
+    """Acts on the cause of the signal. Returns None if the exit code of the ranks is valid.
 
     ``further``: whether the ranks have written a newer checkpoint.
     """
@@ -183,8 +186,8 @@ def judge(found: Mapping[str, str], restarts: int, notice: float, now: float) ->
     """Returns the cause of the batch system's signal: ``cancelled``, ``time limit``, ``preempted``, ``requeued`` (Slurm
     has queued the job again by itself), ``outside`` (another sender) or ``unknown``.
 
-    ``found``: the fields of scontrol for the job, which was started ``restarts`` times before; ``notice``: s between
-    the signal and the time limit; ``now``: s since 1970.
+    ``found``: fields of scontrol for the job; ``restarts``: number of times that Slurm had restarted the job before;
+    ``notice``: seconds between the signal and the time limit; ``now``: seconds since 1970.
     """
     if not found:
         return "unknown"
@@ -200,7 +203,7 @@ def judge(found: Mapping[str, str], restarts: int, notice: float, now: float) ->
 
 
 def _seconds(text: str) -> float | None:
-    """Returns a duration ``1-02:03:04`` in s; None for no limit."""
+    """Returns a duration such as ``1-02:03:04`` in s; None if there is no limit."""
     days, _, clock = text.rpartition("-")
     parts = clock.split(":")
     if not all(part.isdigit() for part in (*parts, days or "0")):
@@ -233,7 +236,7 @@ def _cancelled(folder: Path, job: Job, message: str) -> int:
 
 
 def _so_far(folder: Path, state: State, cause: Cause, message: str) -> Outcome:
-    """Returns the outcome of the interrupted ranks, with the true cause of the interruption."""
+    """Returns the outcome that the interrupted ranks have written, with the true cause of the interruption."""
     try:
         found = outcome.from_json(whole.read(folder / layout.INTERRUPTED))
     except (OSError, msgspec.MsgspecError):
@@ -242,7 +245,7 @@ def _so_far(folder: Path, state: State, cause: Cause, message: str) -> Outcome:
 
 
 def end(folder: Path, job: Job, ended: Outcome) -> None:
-    """Writes the outcome and the last message. Raises OSError."""
+    """Writes the outcome and the last message of the run. Raises OSError."""
     lock = hold(folder)
     last = msgspec.structs.replace(ended, ranks=job.ranks, threads=job.threads)
     whole.write(folder / layout.OUTCOME, outcome.to_json(last))

@@ -1,5 +1,5 @@
-"""Lock of a run's folder: rank 0 holds it while the process lives, so that one worker at a time writes into the
-folder, on any node."""
+"""Lock of a run's folder. Rank 0 holds the lock while its process lives, so that only one worker at a time writes into
+the folder, on any node."""
 
 import fcntl
 import time
@@ -9,10 +9,10 @@ from typing import IO
 from conoid.cases.output import layout
 
 _PATIENCE = 20.0
-"""Time to wait for the former holder of the lock, s. Chosen value: a killed run ends within seconds, and a lock on a
-network file system is released within ten."""
+"""Time to wait for the former holder of the lock, s. Chosen value: a killed run ends within seconds, and a network file
+system releases a lock within ten seconds."""
 _PAUSE = 0.2
-"""Interval between two attempts to take the lock, s. Chosen value."""
+"""Interval between two attempts to get the lock, s. Chosen value."""
 
 
 def hold(folder: Path, patience: float = _PATIENCE) -> IO[str] | None:

@@ -1,4 +1,4 @@
-"""The time loop: advances the simulation, runs the outputs that are scheduled, and ends the run in good order."""
+"""The time loop. It advances the simulation, runs the scheduled outputs, and ends the run."""
 
 import gc
 import time
@@ -32,7 +32,9 @@ from .signals import Signals
 
 @dataclass(frozen=True)
 class Start:
-    """Sizes, counters and warnings at the first step of this process. A checkpoint stores them for a resumed run."""
+    """Sizes, counters and warnings at the first step of this process. They are stored in checkpoints for a resumed
+    run.
+    """
 
     elements: int
     nodes: int
@@ -41,16 +43,16 @@ class Start:
     sample: int = 0
     """Number of samples scheduled so far."""
     lines: int = 0
-    """Number of lines of the history so far."""
+    """Number of lines of the history file so far."""
     updates: int = 0
-    """Sum over the steps so far of the number of tets."""
+    """Sum of the numbers of tets over all steps so far."""
     resumed: bool = False
     warnings: tuple[str, ...] = ()
-    """Warnings of the set-up (Simulation)."""
+    """Warnings of the start of the run (Simulation)."""
 
 
 class Loop:
-    """Advances a simulation to its end time or to an early stop."""
+    """Loop that advances a simulation to its end time or to an early stop."""
 
     def __init__(
         self, sim: Simulation, folder: Path, journal: Journal | None, history: History | None, signals: Signals,
@@ -59,11 +61,11 @@ class Loop:
         """``journal`` and ``history``: None on all ranks except 0."""
         self.sim, self.balance = sim, balance
         self.stopped = 0
-        """Reason for an early stop (stops.py); 0 if there is no reason."""
+        """Reason for an early stop (stops.py); 0 if the run does not stop early."""
         self.warnings: list[str] = []
-        """Warnings of the steps, equal on all ranks."""
+        """Warnings that arose in steps, equal on all ranks."""
         self.updates = start.updates
-        """Sum over the steps so far of the number of tets."""
+        """Sum of the numbers of tets over all steps so far."""
         self.choice: Choice | None = None
         """Object that chooses the number of threads of this rank; None if all threads are used."""
         self._folder, self._start = folder, start
@@ -79,7 +81,7 @@ class Loop:
     def run(self) -> None:
         """Take steps until the end time or a reason to stop. Raises PhysicsError."""
         gc.collect()
-        gc.freeze()  # else a garbage collection scans all objects of numba, 0.1 s of one rank
+        gc.freeze()  # otherwise a garbage collection scans all objects of numba, which takes a rank 0.1 s
         self.sim.timers.begin()
         self.sim.comm.sent.since_last()
         if not self._start.resumed:
@@ -104,7 +106,7 @@ class Loop:
             record.number()
 
     def _attend(self) -> None:
-        """Carry out the requests of the last reduction and fill this rank's part of the next reduction."""
+        """Carry out the requests of the last reduction, and write the requests of this rank into the next reduction."""
         sim = self.sim
         if sim.reduction.report:
             self._reports.write(sim, self.samples, self.updates)
@@ -116,7 +118,7 @@ class Loop:
             self._requests.propose(self.sim, self.balance, self.snapshots, now)
 
     def _first_half(self) -> None:
-        """Take stages 1 to 9 of the step (step.py), then run the outputs of time n."""
+        """Execute stages 1 to 9 of the step (step.py). Then run the outputs of time n."""
         sim, clock = self.sim, self.sim.clock
         ending = clock.done or bool(sim.reduction.stop)
         before = sim.model.nodes.v.copy() if ending or self.samples.due(clock) else None
@@ -129,7 +131,7 @@ class Loop:
         self.snapshots.tell()
 
     def _second_half(self) -> None:
-        """Take stages 11 to 15 of the step, and before the stages 14 and 15 further steps that are quiet."""
+        """Execute stages 11 to 15 of the step. Before stage 14, further quiet steps may be executed."""
         sim, steps = self.sim, 0
         if self._requests.idle:
             wall, t, last = self._requests.next(sim.clock.t)
@@ -155,7 +157,7 @@ class Loop:
             self.snapshots.look(sim, due=sim.reduction.snapshot, ending=ending)
 
     def _end(self) -> None:
-        """Write the last report, and the reason of an early stop."""
+        """Write the last report, and the reason for an early stop."""
         sim = self.sim
         self.stopped = 0 if sim.clock.done else sim.reduction.stop
         if self.stopped:
@@ -165,7 +167,7 @@ class Loop:
         self.frames.report_losses(sim)
 
     def _rebalance(self) -> None:
-        """Move tets to other ranks if the load balance requires it and another step follows."""
+        """Move tets to other ranks if the load balance requires this and another step follows."""
         cause = None if self.sim.clock.done else self.balance.cause(self.sim)
         if cause is not None:
             with self.sim.timers.phase("balance"):

@@ -1,4 +1,4 @@
-"""Start-up of the worker: arguments, case, run folder, outcome. Exit codes: cases/run.py."""
+"""Start of the worker: arguments, case, run folder, outcome. The exit codes are in cases/run.py."""
 
 import argparse
 import logging
@@ -61,7 +61,7 @@ def main(arguments: list[str]) -> int:
     try:
         return _run(options, comm, signals, began)
     except BaseException as error:
-        if log.hasHandlers():  # the log is written into the run's folder, which exists
+        if log.hasHandlers():  # the log goes into the run's folder, which already exists
             log.error("rank %d stops the job\n%s", comm.rank, traceback.format_exc())
         if storage.failed(error) or storage.gone(error, options.out):
             named = "" if isinstance(error, OSError) and error.filename else f" (in {options.out})"
@@ -86,7 +86,7 @@ def _run(options: argparse.Namespace, comm: Comm, signals: Signals, began: float
 
 
 def _succeeded(folder: Path) -> bool:
-    """Returns whether the run in a folder has succeeded. The outcome of a successful run must not be replaced."""
+    """Returns whether the run in a folder has succeeded. The outcome of such a run must not be replaced."""
     try:
         return State(outcomes.from_json(whole.read(folder / layout.OUTCOME)).state) is State.SUCCEEDED
     except (OSError, ValueError):
@@ -120,8 +120,8 @@ def _telemetry(options: argparse.Namespace) -> "Telemetry | None":
 def _outcome(
     options: argparse.Namespace, comm: Comm, journal: Journal | None, signals: Signals, began: float
 ) -> tuple[Outcome, int]:
-    """Runs the case and returns its outcome and exit code; an error of the case or of the run becomes a failed
-    outcome."""
+    """Runs the case and returns its outcome and exit code. An error of the case or of the run gives an outcome with the
+    state failed."""
     try:
         case, warnings = _case(options, comm)
         if comm.rank == 0:
@@ -170,9 +170,10 @@ def _parse(arguments: list[str]) -> argparse.Namespace:
 
 
 def _case(options: argparse.Namespace, comm: Comm) -> tuple[Case, list[str]]:
-    """Returns the case with its overrides, for as many ranks as MPI has started, and warnings about its text.
+    """Returns the case with its overrides, and warnings about its text. The number of ranks in the case is set to the
+    number that MPI has started.
 
-    Rank 0 reads the case; all ranks get it, or raise its error.
+    Rank 0 reads the case. All ranks receive the case, or raise the error of rank 0.
     """
     found: tuple[Case, list[str]] | None = None
     failure: Exception | None = None
@@ -189,7 +190,7 @@ def _case(options: argparse.Namespace, comm: Comm) -> tuple[Case, list[str]]:
 
 
 def _file(name: str) -> Path:
-    """Returns the file of a case; the name may be that of a shipped case. Raises CaseError."""
+    """Returns the path of the file of a case. ``name`` is a path, or the name of a shipped case. Raises CaseError."""
     path = Path(name)
     return load.shipped_path(name) if not path.exists() and not path.suffix else path
 
@@ -201,14 +202,14 @@ def _read(options: argparse.Namespace, ranks: int) -> tuple[Case, list[str]]:
 
 
 def _prepare_folder(folder: Path, comm: Comm) -> AbstractContextManager[Any] | None:
-    """Returns the open lock file of the folder on rank 0, and an empty context on the other ranks.
+    """Locks the run's folder. Returns the open lock file on rank 0, and an empty context on the other ranks.
 
     Returns None on every rank if another worker has the lock."""
     held: AbstractContextManager[Any] | None = nullcontext()
     if comm.rank == 0:
         (folder / layout.LOGS).mkdir(parents=True, exist_ok=True)
         held = hold(folder)
-        if held is not None and (folder / layout.OUTCOME).exists():  # the request to stop was for an earlier attempt
+        if held is not None and (folder / layout.OUTCOME).exists():  # an old request to stop was for an earlier attempt
             (folder / layout.STOP_REQUEST).unlink(missing_ok=True)
     if not comm.broadcast(held is not None):
         return None
@@ -226,14 +227,15 @@ def _compute(
     ready_kernels(comm, journal)
     from . import compute
 
-    meshes = _file(options.case).resolve().parent  # relative paths of mesh files start at this folder
+    meshes = _file(options.case).resolve().parent  # relative paths of mesh files start at the folder of the case
     return compute.compute(case, meshes, options.out, comm, journal, signals, began, options.restart, options.use)
 
 
 def ready_kernels(comm: Comm, journal: Journal | None) -> None:
-    """Makes all ranks use the same kernels: rank 0 hashes the sources and compiles missing kernels, the others wait.
+    """Makes all ranks use the same kernels. Rank 0 hashes the sources and compiles missing kernels; the other ranks
+    wait.
 
-    This call must come before the import of numba. Raises CompileError, StoppedError on all ranks.
+    The function must be called before numba is imported. Raises CompileError, StoppedError on all ranks.
     """
     failure: ConoidError | None = None
     if comm.rank == 0:
@@ -256,9 +258,10 @@ def _report(journal: Journal | None, what: str) -> None:
 
 
 def _close(outcome: Outcome, options: argparse.Namespace, journal: Journal, telemetry: "Telemetry | None") -> None:
-    """Writes the outcome, then the last message: a reader of the last message finds the outcome on disk.
+    """Writes the outcome, then the last message. A reader of the last message therefore finds the outcome on disk.
 
-    An interrupted run has no last message here: worker/run/job.py finds the cause of the interruption.
+    For an interrupted run no last message is written here, because worker/run/job.py finds the cause of the
+    interruption.
     """
     interrupted = options.interruptible and outcome.state == State.CANCELLED
     if interrupted and not (options.out / layout.STOP_REQUEST).exists():

@@ -9,7 +9,7 @@ from ..output.journal import Journal
 
 
 class Notices:
-    """Writes messages to the journal on rank 0; does nothing on the other ranks."""
+    """Writes messages to the journal on rank 0. On other ranks its methods do nothing."""
 
     def __init__(self, journal: Journal | None) -> None:
         """``journal``: None on all ranks except 0."""

@@ -1,4 +1,4 @@
-"""Rate of a run: simulated time per wall time."""
+"""Rate of a run: simulated time divided by wall time."""
 
 
 class Pace:
@@ -9,11 +9,11 @@ class Pace:
         self._rate: float | None = None
 
     def add(self, t: float, now: float) -> None:
-        """Adds the report of time ``t``, s, at wall time ``now``, s."""
+        """Adds a report: at the wall time ``now``, s, the simulated time was ``t``, s."""
         rate = (t - self._last[0]) / (now - self._last[1])
         self._rate = rate if self._rate is None else 0.9 * self._rate + 0.1 * rate
         self._last = (t, now)
 
     def left(self, t: float) -> float:
-        """Returns the wall time for another ``t`` of simulated time, s."""
+        """Returns the wall time, s, that a further simulated time ``t``, s, will take."""
         return t / self._rate if self._rate else 0.0

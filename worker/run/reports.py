@@ -1,4 +1,6 @@
-"""Reports of a run: progress and loads for the journal, in the steps in which rank 0 requests them."""
+"""Reports of a run. In the steps in which rank 0 requests a report, the progress of the run and the loads of the ranks
+are written to the journal.
+"""
 
 import logging
 import math
@@ -18,7 +20,7 @@ from .requests import Requests
 from .samples import Samples
 
 _LOG_EVERY = 10.0
-"""Wall time between two lines of the log, s. Chosen value."""
+"""Wall time between two lines of the log file, s. Chosen value."""
 
 log = logging.getLogger("conoid.worker")
 
@@ -27,35 +29,36 @@ class _Load(NamedTuple):
     """Load of a rank since the last report."""
 
     work: dict[str, float]
-    """CPU seconds of this rank by phase."""
+    """CPU seconds of this rank, keyed by phase."""
     others: dict[str, float]
-    """Waiting, messages and outside nodes, by the names of messages.Load."""
+    """Waiting times, messages and outside nodes, keyed by the names in messages.Load."""
     counting: bool
-    """Whether fragments are to be found. The value of rank 0 decides."""
+    """Whether fragments must be found. The value of rank 0 is used."""
     projected: dict[int, dict[str, float]]
-    """Estimated CPU seconds by phase, for each number of threads."""
+    """Estimated CPU seconds, keyed by the number of threads and then by phase."""
 
 
 class Reports:
-    """Collects the loads of all ranks and writes the messages. Every method is collective."""
+    """Reports of a run. Collects the loads of all ranks and writes the messages. Every method is collective."""
 
     def __init__(
         self, sim: Simulation, balance: Balance, groups: Groups, notices: Notices, counter: Counter, requests: Requests,
         updates: int,
     ) -> None:  # fmt: skip
-        """``updates``: sum over the steps so far of the number of tets."""
+        """``updates``: sum of the numbers of tets over all steps so far."""
         self._balance, self._groups, self._notices, self._counter = balance, groups, notices, counter
         self._requests = requests
         self._step, self._updates = sim.clock.step, updates
-        """Step at the last report, and the sum over the steps until then of the number of tets."""
+        """Number of the step of the last report; and the sum of the numbers of tets over all steps up to this
+        report."""
         self._logged = -math.inf
-        """Wall time of the last line of the log, s."""
+        """Wall time of the last line of the log file, s."""
         self._pace = Pace(sim.clock.t, requests.reported)
 
     def write(self, sim: Simulation, samples: Samples, updates: int) -> None:
         """Write the progress and the loads since the last report.
 
-        ``updates``: sum over the steps so far of the number of tets.
+        ``updates``: sum of the numbers of tets over all steps so far.
         """
         spent, clock = sim.timers.since_last(), sim.clock
         ending = clock.done or bool(sim.reduction.stop)
@@ -83,7 +86,7 @@ class Reports:
         self._requests.reported, self._updates = now, updates
 
     def write_groups(self, sim: Simulation) -> None:
-        """Write the loads of the groups of tets."""
+        """Write the loads of the groups of tets to the journal."""
         with sim.timers.phase("output"):
             self._notices.write(sim.clock, messages.Groups, **self._groups.record(sim))
 
@@ -95,7 +98,9 @@ class Reports:
         return sim.comm.share(_Load(spent.cpu, sent, counting, spent.projected))
 
     def _count(self, sim: Simulation, *, find: bool) -> None:
-        """Write the numbers of tets, nodes and fragments if they have changed. ``find``: find the fragments first."""
+        """Write the numbers of tets, nodes and fragments, if they have changed. ``find``: whether the fragments are
+        found first.
+        """
         if find:
             self._counter.find(sim)
         sim.count_nodes()

@@ -1,4 +1,6 @@
-"""Requests of this rank in the reduction of the step: a stop, a report, a checkpoint, a snapshot, a new cut."""
+"""Requests of this rank in the reduction of a step: a stop, a report, a checkpoint, a snapshot, or a new division of
+the tets among the ranks.
+"""
 
 import math
 from pathlib import Path
@@ -19,7 +21,7 @@ _REPORT_EVERY = 0.25
 
 
 class Requests:
-    """Fills this rank's part of the next reduction, in steps in which a request may begin or end."""
+    """Writes the requests of this rank into the next reduction, in steps in which a request may begin or end."""
 
     def __init__(self, case: Case, folder: Path, signals: Signals, groups: Groups, began: float) -> None:
         """``began``: wall time at which the steps began, s."""
@@ -29,27 +31,29 @@ class Requests:
         self._stop_file = False
         """Whether a file has requested a stop."""
         self._active = True
-        """Whether the last part of a reduction that this rank filled contained a request."""
+        """Whether this rank wrote a request into the last reduction that it filled."""
         self._every_step = case.balance.policy == "outside"
-        """Whether the part is filled in every step. Returns True if the number of outside nodes is compared with its
-        limit in every step."""
+        """Whether the requests are written in every step. This is necessary if the number of outside nodes is compared
+        with its limit in every step."""
         self._wall = self._time = 0.0
-        """Wall time and simulated time before which no request can begin, s."""
+        """Wall time, s, and simulated time, s, before which no request can begin."""
 
     @property
     def idle(self) -> bool:
-        """Whether no request is under way, and none depends on the step."""
+        """Whether no request is in progress, and no request depends on the step."""
         return not (self._active or self._every_step)
 
     def next(self, t: float) -> tuple[float, float, int]:
-        """Return wall time, s, simulated time, s, and number of the step, before which no request can begin. Requests
-        that were scheduled before the present time ``t``, s, wait for a later wall time: snapshots have a smallest
-        interval.
+        """Return three bounds before which no request can begin: wall time, s, simulated time, s, and number of the
+        step.
+
+        If the scheduled simulated time of a request is before ``t``, s, the request waits only because snapshots have a
+        smallest interval in wall time. Such a request has no bound in simulated time.
         """
         return self._wall, self._time if self._time > t else math.inf, self._run.max_steps - 1
 
     def due(self, clock: Clock, now: float) -> bool:
-        """Return whether the requests may have changed at the wall time ``now``, s."""
+        """Return whether the requests may have changed before the wall time ``now``, s."""
         last = clock.step + 1 >= self._run.max_steps
         return (
             now >= self._wall or clock.t >= self._time or self._active or self._every_step
@@ -62,7 +66,7 @@ class Requests:
         return (self._folder / layout.CHECKPOINT_REQUEST).exists()
 
     def propose(self, sim: Simulation, balance: Balance, snapshots: Snapshots, now: float) -> None:
-        """Fill this rank's part of the next reduction at the wall time ``now``, s."""
+        """Write the requests of this rank into the next reduction, at the wall time ``now``, s."""
         own, run, leads = sim.reduction.own, self._run, sim.comm.rank == 0
         limit, every = run.max_wall_time, run.checkpoint_every
         own.report = leads and now - self.reported > _REPORT_EVERY
@@ -81,9 +85,9 @@ class Requests:
         )
 
     def _stop(self, clock: Clock, now: float, *, read_files: bool) -> int:
-        """Return the reason to stop; 0 for no reason.
+        """Return the reason for a stop; 0 if there is no reason.
 
-        ``read_files``: whether to test for the file that requests a stop.
+        ``read_files``: whether to look on disk for the file that requests a stop.
         """
         self._stop_file |= read_files and (self._folder / layout.STOP_REQUEST).exists()
         if clock.step + 1 >= self._run.max_steps:

@@ -1,4 +1,4 @@
-"""Samples of a run: the lines of history.csv, and the time of the next sample."""
+"""Samples of a run, which are the lines of history.csv, and the times at which they are taken."""
 
 import math
 
@@ -14,10 +14,10 @@ from ..simulation import Simulation
 
 
 class Samples:
-    """Takes samples and stores the latest sample."""
+    """Takes samples and keeps the latest sample."""
 
     def __init__(self, sim: Simulation, history: History | None, number: int, lines: int) -> None:
-        """``history``: the file, None on all ranks except 0; ``number``: number of samples scheduled so far;
+        """``history``: the history file, None on all ranks except 0; ``number``: number of samples scheduled so far;
         ``lines``: number of samples taken so far.
         """
         run = sim.case.run
@@ -25,9 +25,9 @@ class Samples:
         self._names = [probe.name for probe in sim.case.probes]
         self._every = run.end_time, run.samples
         self.number = number
-        """Number of samples scheduled so far."""
+        """Number of samples that were scheduled so far."""
         self.lines = lines
-        """Number of samples taken so far."""
+        """Number of samples that were taken so far."""
         self.next = number * run.end_time / run.samples
         """Time of the next sample, s."""
         self.time: float | None = None
@@ -38,17 +38,17 @@ class Samples:
         """Values of the probes at the latest sample."""
 
     def due(self, clock: Clock) -> bool:
-        """Return whether the time of the next sample is reached."""
+        """Return whether the simulation has reached the time of the next sample."""
         return clock.t >= self.next
 
     def probes(self) -> dict[str, float | None]:
-        """Return the latest value of each probe by name; None for NaN, since JSON has no NaN."""
+        """Return the latest value of each probe, keyed by name. NaN is returned as None, because JSON has no NaN."""
         named = zip(self._names, self.measured, strict=True)
         return {name: None if math.isnan(value) else value for name, value in named}
 
     def take(self, sim: Simulation, before: Floats, *, ending: bool) -> None:
-        """Write energies, momenta and probes at time n to the history. Raises PhysicsError if the energy is out of
-        balance.
+        """Write energies, momenta and probes at time n to the history. Raises PhysicsError if the energy balance has a
+        too large error.
 
         Collective. ``before``: (nodes, 3) v(n-1/2); ``ending``: whether this is the sample after the last step.
         """

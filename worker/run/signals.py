@@ -1,5 +1,5 @@
-"""Requests to stop by SIGTERM, SIGUSR1 or SIGINT. A signal sets a flag. The reduction of the next step sends the
-flag to all ranks.
+"""Requests to stop by the signals SIGTERM, SIGUSR1 and SIGINT. A signal sets a flag, and the reduction of the next step
+sends the flag to all ranks.
 """
 
 import signal
@@ -8,7 +8,9 @@ REQUESTS = (signal.SIGTERM, signal.SIGUSR1, signal.SIGINT)
 
 
 class Signals:
-    """Handlers of the signals, installed at construction. The flag is first read after the set-up of a run."""
+    """Handlers of the signals. The constructor installs the handlers; the flag is first read when the run has
+    started.
+    """
 
     def __init__(self) -> None:
         self.raised = False

@@ -1,4 +1,4 @@
-"""Reasons for which a run stops before its end time, and their messages."""
+"""Reasons why a run stops before its end time, and the messages for the reasons."""
 
 from conoid.cases.run import Cause, State
 
@@ -6,18 +6,20 @@ from ..clock import SLOWED
 from ..simulation import Simulation
 
 CANCELLED, WALL_TIME, MAX_STEPS = 1, 2, 3
-"""Reasons to stop early, in the reduction of the step. If several ranks have a reason, the largest number decides."""
+"""Numbers of the reasons for an early stop, in the reduction of the step. If ranks have different reasons, the largest
+number decides."""
 
 STOPS = {
     CANCELLED: (State.CANCELLED, Cause.CANCELLED, "stopped on request"),
     WALL_TIME: (State.TIMED_OUT, Cause.WALLTIME, "run.max_wall_time is used up"),
     MAX_STEPS: (State.TIMED_OUT, Cause.STEPS, "run.max_steps is used up before run.end_time"),
 }
-"""State, cause and message for each reason to stop early."""
+"""State, cause and message, keyed by the reason for an early stop."""
 
 
 def reason(sim: Simulation, stop: int) -> str:
-    """Return the message for an early stop: the reason, the time reached, and the stable step if it has decreased much.
+    """Return the message for an early stop. It contains the reason, the time reached, and the stable step if that has
+    decreased much.
 
     Collective.
     """
@@ -30,14 +32,14 @@ def reason(sim: Simulation, stop: int) -> str:
 
 
 def starved(sim: Simulation) -> str:
-    """Return the warning for a stable step so small that run.max_steps may end the run. Collective."""
+    """Return a warning if the stable step is so small that run.max_steps may end the run. Collective."""
     text = _fallen(sim, f"below 1/1000 of the first, at {sim.clock.t:.3g} s")
     return text + ", run.max_steps ends the run"
 
 
 def _fallen(sim: Simulation, extent: str) -> str:
-    """Return the decrease of the stable step, the tet that limits the step, and the key of the case that helps.
-    Collective.
+    """Return a text with the decrease of the stable step, the tet that limits the step, and the key of the case that
+    removes such tets. Collective.
     """
     clock = sim.clock
     return (

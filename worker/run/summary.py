@@ -1,4 +1,6 @@
-"""The outcome of a run: its end, sizes, costs, results and warnings, summed up over all ranks."""
+"""The outcome of a run. The module collects the end, the sizes, the costs, the results and the warnings of a run from
+all ranks.
+"""
 
 import math
 import resource
@@ -72,7 +74,7 @@ def sum_up(loop: Loop, folder: Path, failure: PhysicsError | None, start: Start,
 
 
 def _end(loop: Loop, failure: PhysicsError | None) -> dict[str, Any]:
-    """Return state, cause and message of the end of the run."""
+    """Return state, cause and message for the end of the run."""
     state: State = State.SUCCEEDED
     cause: Cause | None = None
     message = ""
@@ -84,8 +86,8 @@ def _end(loop: Loop, failure: PhysicsError | None) -> dict[str, Any]:
 
 
 def _costs(loop: Loop, start: Start, times: Times) -> dict[str, Any]:
-    """Return the time and the memory that the run has taken. A quantity that differs between ranks has one number
-    per rank.
+    """Return the times and the memory that the run has used. If a quantity differs between ranks, the result has one
+    number for each rank.
     """
     sim = loop.sim
     spent: list[Spent] = sim.comm.gather(sim.timers.spent) or []
@@ -105,7 +107,9 @@ def _costs(loop: Loop, start: Start, times: Times) -> dict[str, Any]:
 
 
 def _sharing(sim: Simulation) -> Sharing | None:
-    """Return the numbers of regions and tasks of this rank if their costs were measured."""
+    """Return the numbers of parallel regions and of tasks of this rank, if the costs of parallel regions were
+    measured.
+    """
     made = team(sim.case.run.threads).projecting
     if not isinstance(made, Projecting):
         return None
@@ -117,7 +121,9 @@ def _sharing(sim: Simulation) -> Sharing | None:
 
 
 def _penetration(sim: Simulation, labels: list[Ints]) -> tuple[dict[str, Any], list[str]]:
-    """Return the number of nodes inside of other bodies, the volume in common, and the warnings about both."""
+    """Return three things: the number of nodes inside of other bodies, the common volume of bodies, and warnings about
+    penetration.
+    """
     if sim.contact is None:
         return {}, []
     nodes = inside.look(sim.contact, sim.model, labels, sim.comm)
@@ -129,7 +135,7 @@ def _penetration(sim: Simulation, labels: list[Ints]) -> tuple[dict[str, Any], l
 
 
 def _probes(loop: Loop, folder: Path) -> list[Measured]:
-    """Return the last value of each probe, and on rank 0 its extremes in the whole history."""
+    """Return the last value of each probe. On rank 0, return also the extremes of each probe in the whole history."""
     probes = loop.sim.case.probes
     ends = extremes(folder, [probe.name for probe in probes]) if loop.sim.comm.rank == 0 else {}
     found = []
@@ -140,7 +146,7 @@ def _probes(loop: Loop, folder: Path) -> list[Measured]:
 
 
 def _warnings(loop: Loop, eroded: int) -> list[str]:
-    """Return the warnings of the steps; ``eroded``: number of removed tets."""
+    """Return the warnings that arose in steps; ``eroded``: number of removed tets."""
     sim = loop.sim
     return [
         *loop.warnings, *loop.frames.lost, *sim.ledger.warnings(sim.case.numerics.dt_safety),
