@@ -15,7 +15,7 @@ _LOADED = re.compile(
     r'<(?:script|img|iframe)\b[^>]*\bsrc="?(?:https?:)?//[^>]*>'
     r'|<link\b[^>]*\brel="?stylesheet[^>]*href="?(?:https?:)?//[^>]*>'
 )
-"""Element that loads from another site; a link that the reader follows is none."""
+"""An HTML element that loads from another site; a link that the reader may follow is not included."""
 _KEYS_PAGE = "reference/case.html"
 _ROOT = Path(__file__).parents[1]
 _ROOT_PAGES = ("ARCHITECTURE.md", "CONVENTIONS.md", "CONTRIBUTING.md", "CHANGELOG.md")
@@ -36,31 +36,35 @@ def on_files(files: Files, *, config: Any) -> Files:
 
 
 def _notebook(file: File) -> str:
-    """A page of a notebook, with a link to the notebook itself."""
+    """Returns the page of a notebook, with a link to the notebook itself."""
     cells = json.loads(Path(file.abs_src_path or "").read_text(encoding="utf-8"))["cells"]
     return "\n\n".join([*map(_cell, cells), f"[Download this notebook]({Path(file.src_uri).name}).\n"])
 
 
 def _from_root(text: str) -> str:
-    """The text of a page of the root with the links that it has below project/."""
+    """Returns the text of a page of the repository's root, with the links that the page has below project/."""
     pages = "|".join(page.removesuffix(".md") for page in _ROOT_PAGES)
     text = re.sub(rf"\]\(({pages})\.md", lambda found: f"]({found[1].lower()}.md", text)
     return re.sub(r"\]\((?!https?:|\w+\.md)(?:docs/)?", lambda found: "](../", text)
 
 
 def _cell(cell: dict[str, Any]) -> str:
-    """A cell of a notebook as Markdown."""
+    """Returns a cell of a notebook as Markdown."""
     text = "".join(cell["source"])
     return text if cell["cell_type"] == "markdown" else f"```python\n{text}\n```"
 
 
 def on_page_markdown(markdown: str, **_: Any) -> str:
-    """The text of a page; links to files outside docs/ become plain text, since the site has no such page."""
+    """Returns the text of a page; links to files outside docs/ become plain text, since the site has no page for such
+    files.
+    """
     return _OUTSIDE.sub(r"`\1`", markdown)
 
 
 def on_post_build(*, config: Any) -> None:
-    """Fails the build if the search does not find a key of a case on its page, or if a page asks another site."""
+    """Fails the build if the search does not find a key of a case on the page of keys, or if a page loads from another
+    site.
+    """
     site = Path(config["site_dir"])
     index = json.loads((site / "search" / "search_index.json").read_text(encoding="utf-8"))
     pages = [page for page in index["docs"] if page["location"].startswith(_KEYS_PAGE)]
@@ -73,7 +77,7 @@ def on_post_build(*, config: Any) -> None:
 
 
 def _keys(schema: object) -> set[str]:
-    """The names of all properties of a JSON schema."""
+    """Returns the names of all properties of a JSON schema."""
     if isinstance(schema, list):
         return set().union(*map(_keys, schema))
     if not isinstance(schema, dict):

@@ -1,5 +1,5 @@
-"""Benchmarks of ``make bench``: speed, growth with the mesh, start-up, speed against error, telemetry. The results
-are in docs/performance/bench.md."""
+"""Benchmarks of ``make bench``: speed, growth with the mesh, start-up, speed against error, telemetry. The results of
+the benchmarks are in docs/performance/bench.md."""
 
 from conoid.worker.kernels.store import use_cache
 

@@ -1,8 +1,8 @@
-"""``make bench``: runs all benchmarks one after the other. It prints tables, and writes them to build/bench/bench.md
-and the numbers to bench.json.
+"""``make bench``: runs all benchmarks one after the other. The program prints tables, and writes the tables to
+build/bench/bench.md and the numbers to bench.json.
 
-``BENCH=quick`` takes about two minutes, the default 15 minutes, ``BENCH=long`` one hour. ``python -m tests.bench
-speed taylor`` runs the named benchmarks only.
+With ``BENCH=quick`` the benchmarks take about two minutes, by default 15 minutes, with ``BENCH=long`` one hour. The
+command ``python -m tests.bench speed taylor`` runs only the named benchmarks.
 """
 
 import json
@@ -78,14 +78,14 @@ LONG = Extent(
 
 @dataclass
 class Book:
-    """Collects the results of the benchmarks, and writes them after each one."""
+    """Collects the results of the benchmarks, and writes the results after each benchmark."""
 
     text: list[str] = field(default_factory=list)
     data: dict[str, Any] = field(default_factory=dict)
     shown: list[Gate] = field(default_factory=list)
 
     def add(self, title: str, text: str, data: object, shown: Iterator[Gate] | None = None) -> None:
-        """Adds a section of the report, its numbers, and the requirements for which these numbers are measured."""
+        """Adds a section to the report, with its numbers and the requirements on these numbers."""
         self.text.append(f"## {title}\n\n{text.rstrip()}\n")
         print(f"\n{self.text[-1]}", flush=True)
         self.data[title] = data
@@ -93,7 +93,7 @@ class Book:
         self.write()
 
     def write(self) -> None:
-        """Writes text and numbers to build/bench."""
+        """Writes the report and the numbers to build/bench."""
         OUT.mkdir(parents=True, exist_ok=True)
         (OUT / "bench.md").write_text("\n".join([*self.text, ""]), encoding="utf-8")
         (OUT / "bench.json").write_text(json.dumps(self.data, indent=1), encoding="utf-8")
@@ -231,7 +231,7 @@ PARTS: dict[str, Callable[[Extent, Book], None]] = {
 
 
 def main(arguments: Sequence[str]) -> int:
-    """Runs the named benchmarks, or all."""
+    """Runs the named benchmarks, or all benchmarks."""
     extents = {"quick": QUICK, "full": FULL, "long": LONG}
     wanted = os.environ.get("BENCH") or "full"
     unknown = [name for name in arguments if name not in PARTS]

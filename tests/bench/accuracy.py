@@ -48,7 +48,7 @@ class Plan:
 
 @dataclass(frozen=True)
 class Answer:
-    """Result of a run; wall time and CPU time of the step loop, s."""
+    """Result of a run with the wall time and the CPU time of the step loop, s."""
 
     plan: Plan
     tets: int
@@ -58,15 +58,17 @@ class Answer:
     residual: float
     checks: tuple[Check, ...]
     problem: str = ""
-    """Reason of an early end of the run; empty if there was none."""
+    """Reason of an early end of the run; empty if the run reached its end time."""
 
     def value(self, quantity: str) -> float:
-        """Returns a measured quantity by the first word of its name; NaN if the run ended before it was measured."""
+        """Returns a measured quantity by the first word of its name; NaN if the run ended before the measurement."""
         return next((check.value for check in self.checks if check.name.startswith(quantity)), float("nan"))
 
 
 def grid(sizes: Iterable[float], safeties: Iterable[float], forms: Iterable[Form] = FORMS) -> list[Plan]:
-    """Returns the plans of both bars with all combinations, the most expensive one first."""
+    """Returns the plans of both bars with all combinations of mesh, pressure form and safety factor, the most expensive
+    plan first.
+    """
     plans = [Plan(bar, size, form, safety) for bar, size, form, safety in product(BARS, sizes, forms, safeties)]
     return sorted(plans, key=lambda plan: plan.size)
 
@@ -79,8 +81,8 @@ def variants(size: float) -> list[Plan]:
 
 
 def measure(plans: Sequence[Plan]) -> list[Answer]:
-    """Runs every plan by the command line of the worker, on one rank each. As many plans as cores run at the same
-    time."""
+    """Runs every plan by the command line of the worker; each run has one rank. The number of plans that run at the
+    same time is the number of cores."""
     with ThreadPoolExecutor(os.cpu_count()) as pool:
         return sorted(pool.map(_run, plans), key=lambda a: (a.plan.bar, FORMS.index(a.plan.form), -a.plan.size))
 
@@ -98,7 +100,7 @@ def _run(plan: Plan) -> Answer:
 
 
 def report(answers: Sequence[Answer]) -> str:
-    """Returns one table for each bar: cost, and each reference quantity with its error."""
+    """Returns one table for each bar with the cost and the error of each reference quantity."""
     return "\n\n".join(_bar(bar, [a for a in answers if a.plan.bar == bar]) for bar in BARS)
 
 

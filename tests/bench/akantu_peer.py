@@ -1,7 +1,8 @@
 """Comparison with Akantu: explicit steps of a linear elastic solid on the same mesh, in a process that alternates with
 Conoid.
 
-Akantu must be installed (``pip install akantu``), here or for the interpreter that BENCH_AKANTU_PYTHON names.
+Akantu must be installed (``pip install akantu``) for this interpreter or for the interpreter that BENCH_AKANTU_PYTHON
+names.
 """
 
 import os
@@ -12,7 +13,7 @@ from types import TracebackType
 
 _STEPS = Path(__file__).with_name("akantu_steps.py")
 TUNED = {"MALLOC_MMAP_THRESHOLD_": "4294967296", "MALLOC_TRIM_THRESHOLD_": "4294967296", "MALLOC_TOP_PAD_": "268435456"}
-"""Environment that makes glibc keep freed memory: Akantu allocates memory in every step."""
+"""Environment variables that make glibc keep freed memory: Akantu allocates memory in every step."""
 
 
 def interpreter() -> str:
@@ -28,7 +29,7 @@ def version() -> str | None:
 
 
 class Akantu:
-    """An Akantu model in a child process."""
+    """A model of Akantu in a child process."""
 
     def __init__(self, mesh: Path, finite: bool, tuned: bool) -> None:
         environment = {**os.environ, "OMP_NUM_THREADS": "1", **(TUNED if tuned else {})}

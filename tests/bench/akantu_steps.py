@@ -1,8 +1,9 @@
 """Akantu on a mesh, in a separate process: ``python akantu_steps.py MESH.npz true|false``; the second argument selects
 finite deformation.
 
-The process prints "ready". For each line of input with a number it computes that number of explicit steps and prints
-their CPU time in s. It imports no module of Conoid, because it may run under another interpreter.
+After the start the process prints "ready". Each input line is a number of explicit steps; the process computes these
+steps and prints their CPU time in s. This module imports no module of Conoid, because it may run under another
+interpreter.
 """
 
 import sys
@@ -25,7 +26,7 @@ material elastic [
 
 
 def main(mesh_path: str, finite: str) -> None:
-    """Creates the model, and answers until standard input ends."""
+    """Creates the model, and answers input lines until standard input ends."""
     with np.load(mesh_path) as stored:
         mesh = _mesh(stored["points"], stored["tets"])
         model = _model(mesh, stored["points"], finite)
@@ -38,7 +39,7 @@ def main(mesh_path: str, finite: str) -> None:
 
 
 def _mesh(points: "np.ndarray", tets: "np.ndarray") -> "akantu.Mesh":
-    """This object must exist as long as the model, which has no reference to it."""
+    """This object must exist as long as the model, because the model has no reference to the object."""
     mesh = akantu.Mesh(3)
     access = akantu.MeshAccessor(mesh)
     access.resizeNodes(len(points))

@@ -1,10 +1,10 @@
-"""Measures each rank of a run with a core of its own, and computes the time of the run on that many cores.
+"""Measures each rank of a run with a core of its own, and computes the time of the run on as many cores as ranks.
 
-``python -m tests.bench.alone CASE RANKS [KEY=VALUE ...]`` first runs the case on all ranks, with any number of
-cores, and records the received data of each rank on a tape. Then each rank runs alone from its tape (tape.py), and
-timeline.py computes the waiting times between the ranks. In contrast to ``conoid bench scale``, no other rank
-empties the caches of the measured rank, and no rank works while another one is measured. A tape takes up to 4 MB per
-step on 16 ranks of the glass bar.
+The command ``python -m tests.bench.alone CASE RANKS [KEY=VALUE ...]`` first runs the case on all ranks, with any number
+of cores, and records the received data of each rank on a tape. After that each rank runs alone from its tape (tape.py),
+and timeline.py computes the waiting times between the ranks. In ``conoid bench scale`` other ranks empty the caches of
+the measured rank and work at the same time; here the measured rank runs alone. A tape takes up to 4 MB per step on 16
+ranks of the glass bar.
 """
 
 import pickle
@@ -25,7 +25,7 @@ NETWORK = Network(latency=2e-6, bandwidth=5e9)
 
 
 def recorded(case: str, ranks: int, changes: list[str], folder: Path) -> str:
-    """Records the tapes of a run; returns its digest. Raises CalledProcessError."""
+    """Records the tapes of a run, and returns the digest of the run. Raises CalledProcessError if the run fails."""
     arguments = [case, "--out", str(folder / "run"), *(word for change in changes for word in ("--set", change))]
     run = [sys.executable, "-m", "mpi4py", "-m", "tests.bench.tape", "record", str(folder), *arguments]
     crowded = ["-genv", "MPIR_CVAR_ENABLE_HEAVY_YIELD", "1"] if ranks > CORES else []
@@ -41,14 +41,14 @@ def recorded(case: str, ranks: int, changes: list[str], folder: Path) -> str:
 
 
 def measured(ranks: int, folder: Path) -> Timeline:
-    """Returns the timeline of the ranks from their calls when they ran alone."""
+    """Returns the timeline of the ranks from the calls that each rank made when it ran alone."""
     timeline = Timeline([pickle.loads(calls(folder, rank).read_bytes()) for rank in range(ranks)], NETWORK)
     timeline.run()
     return timeline
 
 
 def main(case: str, number: str, *changes: str) -> None:
-    """Prints the table."""
+    """Prints the table of the waiting times."""
     ranks = int(number)
     with tempfile.TemporaryDirectory() as passing:
         digest = recorded(case, ranks, list(changes), Path(passing))

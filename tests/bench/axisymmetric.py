@@ -1,9 +1,9 @@
 """Solution of the Taylor bars by another method: axisymmetric quadrilaterals.
 
-The elements are quads of four nodes with 2 x 2 integration points for the deviator and one pressure for each quad
-(mean dilatation); they do not lock. The material is J2-plastic, the time integration is leapfrog, and the bar hits a
-rigid frictionless wall at z = 0. The program shares no code with the worker. Masses, volumes and forces are per
-radian of the circumference.
+The elements are quads of four nodes with 2 x 2 integration points for the deviator and one pressure for each quad (mean
+dilatation); such quads do not lock. The material is J2-plastic, the time integration is leapfrog, and the bar hits a
+rigid frictionless wall at z = 0. The program shares no code with the worker. Masses, volumes and forces are per radian
+of the circumference.
 """
 
 import math
@@ -21,13 +21,13 @@ Floats = npt.NDArray[np.float64]
 
 LENGTH, RADIUS, END = 32.4e-3, 3.2e-3, 80e-6
 LINEAR, SHOCK, QUADRATIC, HALF = 0.06, 0.4, 1.5, 0.01
-"""Coefficients of the bulk viscosity, the same as in the shipped cases."""
+"""Coefficients of the bulk viscosity, equal to those of the shipped cases."""
 SAFETY = 0.8
 
 
 class Metal(NamedTuple):
-    """Constants of a metal, SI. Flow stress (A + B e^n) (1 + C ln(rate / 1 s^-1)) (1 - T*^m); T* is 0 at ``cold``
-    and 1 at ``melt``."""
+    """Constants of a metal, SI units. The flow stress is (A + B e^n) (1 + C ln(rate / 1 s^-1)) (1 - T*^m); T* is 0 at
+    ``cold`` and 1 at ``melt``."""
 
     speed: float
     density: float
@@ -67,12 +67,14 @@ _U, _V = np.array([-1.0, 1.0, 1.0, -1.0]), np.array([-1.0, -1.0, 1.0, 1.0])
 """Natural coordinates of the corners of a quad; the integration points are at _G times the corners."""
 _N = 0.25 * (1.0 + _G * np.outer(_U, _U)) * (1.0 + _G * np.outer(_V, _V))
 _DU, _DV = 0.25 * _U * (1.0 + _G * np.outer(_V, _V)), 0.25 * _V * (1.0 + _G * np.outer(_U, _U))
-"""Shape functions and their derivatives, (point, corner)."""
+"""Shape functions of a quad and their derivatives, (point, corner)."""
 
 
 @njit
 def _gradients(x, v, h, quad, g, hoop, weight):  # type: ignore[no-untyped-def]
-    """Sets gradients at x - h v, N / r, and weights, m^3 per radian. Returns the volume, or -1 for an inverted quad."""
+    """Sets the gradients at x - h v, N / r, and the weights of the integration points, m^3 per radian. Returns the
+    volume of the quad, or -1 for an inverted quad.
+    """
     volume = 0.0
     for p in range(4):
         a, b, c, d, r = 0.0, 0.0, 0.0, 0.0, 0.0
@@ -107,7 +109,7 @@ def _flow(metal, strain, rate, temperature):  # type: ignore[no-untyped-def]
 
 @njit
 def _growth(metal, mises, strain, temperature, dt):  # type: ignore[no-untyped-def]
-    """Returns the increment of plastic strain, at which the flow stress equals the relaxed trial stress (method of
+    """Returns the increment of plastic strain at which the flow stress is equal to the relaxed trial stress (method of
     false position)."""
     low, high = 0.0, mises / (3.0 * metal.shear)
     below, above = mises - _flow(metal, strain, 0.0, temperature), -_flow(metal, strain + high, high / dt, temperature)
@@ -125,8 +127,8 @@ def _growth(metal, mises, strain, temperature, dt):  # type: ignore[no-untyped-d
 
 @njit
 def _return(metal, s, strain, temperature, p, grad, around, dt):  # type: ignore[no-untyped-def]
-    """Updates the deviator (rr, zz, tt, rz) at a point: rotation by the exact angle, elastic trial stress, radial
-    return, heating."""
+    """Updates the deviator (rr, zz, tt, rz) at an integration point: rotation by the exact angle, elastic trial stress,
+    radial return, heating."""
     mean = (grad[0, 0] + grad[1, 1] + around) / 3.0
     angle, twice = (grad[0, 1] - grad[1, 0]) * dt, 2.0 * metal.shear * dt
     half, cos, sin = 0.5 * (s[p, 0] - s[p, 1]), math.cos(angle), math.sin(angle)
@@ -192,7 +194,7 @@ def _forces(metal, x, v, quads, mass, stress, pressure, strain, temperature, for
 
 @njit
 def _move(x, v, force, mass, mean_dt, dt):  # type: ignore[no-untyped-def]
-    """Updates velocities and positions; applies the conditions on the axis and on the wall."""
+    """Updates velocities and positions, and applies the conditions on the axis and on the wall."""
     for i in range(len(x)):
         v[i] += mean_dt / mass[i] * force[i]
         if x[i, 0] == 0.0:
@@ -204,7 +206,7 @@ def _move(x, v, force, mass, mean_dt, dt):  # type: ignore[no-untyped-def]
 
 @dataclass(frozen=True)
 class Bar:
-    """Shape and state of the bar at the end; lengths in m."""
+    """Shape and state of the bar at the end of the run; lengths in m."""
 
     bar: str
     cells: int
@@ -216,9 +218,9 @@ class Bar:
     strain: float
     """Largest plastic strain at an integration point."""
     foot_strain: float
-    """Mean over the quads that are initially within 0.6 mm of the centre of the foot."""
+    """Mean plastic strain over the quads that are initially within 0.6 mm of the centre of the foot."""
     foot_temperature: float
-    """Mean temperature over the same quads, K."""
+    """Mean temperature over the quads that are initially within 0.6 mm of the centre of the foot, K."""
 
 
 def run(bar: str, cells: int) -> Bar:

@@ -1,8 +1,8 @@
 """``make accuracy``: writes docs/verification/accuracy.md with the measured result of every row of the catalogue.
 
-``ACCURACY=quick`` leaves out studies of minutes, and the page reports this. Single parts can be named: shipped,
-tests, hard. The results of each part are stored in build/accuracy, and the page is written from all stored parts.
-The part ``write`` only writes the page.
+With ``ACCURACY=quick`` the program leaves out studies of minutes, and the page reports the missing studies. Arguments
+name single parts of the work: shipped, tests, hard. The results of each part are stored in build/accuracy, and the page
+is written from the stored results of all parts. The argument ``write`` only writes the page.
 """
 
 import json
@@ -36,22 +36,22 @@ ROOT = Path(__file__).parents[2]
 OUT = ROOT / "build" / "accuracy"
 _QUIET = {"run.ranks": 1, "run.frames": 0, "run.snapshots": 0, "run.checkpoint_every": "none"}
 _COARSE = 2.0
-"""Factor of the element sizes in the second, cheaper run of a case. Chosen."""
+"""Factor of the element sizes in the second, cheaper run of a case. Chosen value."""
 _RANKS = ("tests/parallel/", "tests/server/", "tests/client/")
 """Folders of tests that start processes for their work."""
 _QUICK = 60.0
-"""Estimated CPU time of a case, s, above which ``quick`` leaves the case out. Chosen."""
+"""Estimated CPU time, s, above which ``quick`` leaves out a case. Chosen value."""
 
 
 def catalogue() -> list[dict[str, Any]]:
-    """Returns the rows of the catalogue, in their order."""
+    """Returns the rows of the catalogue in the order of the file."""
     text = Path(__file__).with_name("catalogue.toml").read_text(encoding="utf-8")
     return list(tomllib.loads(text)["row"])
 
 
 def shipped_cases(quick: bool) -> dict[str, Any]:
-    """Runs every shipped case that a row names, with its own and with coarser elements; returns the outcomes by
-    name."""
+    """Runs every shipped case that a row names, with the elements of the case and with coarser elements; returns the
+    outcomes by name."""
     plans = {name: row.get("coarse", ()) for row in catalogue() for name in row.get("cases", ())}
     data = {f"{name}|{label}": made for name, coarse in plans.items() for label, made in _costs(name, coarse).items()}
     cases = {key: parse_case(made) for key, made in data.items()}
@@ -89,9 +89,9 @@ def _plain(key: str, run: Run) -> Any:
 
 
 def tests(quick: bool) -> dict[str, Any]:
-    """Runs every test that a row names, and returns their assertions. Tests that start ranks run first and alone,
-    because their ranks wait for each other with a time limit. All tests without ranks run afterwards, one file on each
-    core.
+    """Runs every test that a row of the catalogue names, and returns the assertions of the tests. Tests that start
+    ranks run first and alone, because their ranks wait for each other with a time limit. The tests without ranks run
+    afterwards, one file on each core.
     """
     nodes = sorted({f"tests/{node}" for row in catalogue() for node in row.get("tests", ())})
     ranked = [node for node in nodes if node.startswith(_RANKS)]
@@ -104,7 +104,7 @@ def tests(quick: bool) -> dict[str, Any]:
 
 
 def _recorded(nodes: list[str], name: object, quick: bool) -> dict[str, Any]:
-    """Runs tests in a separate process; returns their assertions by node id."""
+    """Runs tests in a separate process; returns the assertions of the tests by node id."""
     environment = {**os.environ, "PYTHONPYCACHEPREFIX": str(OUT / "bytecode"), "PYTHONPATH": str(ROOT)}
     file = OUT / f"recorded-{name}.json"
     command = [
@@ -130,7 +130,7 @@ PARTS: dict[str, Callable[[bool], Any]] = {"shipped": shipped_cases, "tests": te
 
 
 def main(arguments: Sequence[str]) -> int:
-    """Runs the named parts, or all, and writes the page."""
+    """Runs the named parts of the work, or all parts, and writes the page."""
     unknown = [name for name in arguments if name not in (*PARTS, "write")]
     if unknown:
         print(f"{' '.join(unknown)}: parts are {', '.join(PARTS)}; write writes what they have found")

@@ -1,9 +1,9 @@
-"""A long rod that can be compared with published results: tungsten alloy with L/D = 10, into a block of 4340 steel at
-1.5 km/s.
+"""A long rod of tungsten alloy with L/D = 10 hits a block of 4340 steel at 1.5 km/s; published results exist for this
+impact.
 
-``python -m tests.bench.comparable_rod [NAME...]`` runs the named variants, or all. Each variant differs from the
-first one in one point. The nose is the foremost tet of the rod. Speeds are means over the steady phase, P is the
-depth of the hole at the end.
+The command ``python -m tests.bench.comparable_rod [NAME...]`` runs the named variants, or all variants. Each variant
+differs from the first variant in one point. In the tables the nose is the foremost tet of the rod. Speeds in the tables
+are means over the steady phase, and P is the depth of the hole at the end of the run.
 """
 
 import json
@@ -35,7 +35,7 @@ _STEADY = (20e-6, 60e-6)
 _IMPACT = 1500.0
 """Impact speed, m/s."""
 _PUBLISHED: tuple[Cell, ...] = ("Anderson and Walker 1991", *5 * (None,), "0.77", None, "1.055", "0.215", "1.27")
-"""Published values, recalled and not checked against the publication."""
+"""Published values of the nose speed and of P/L, recalled and not checked against the publication."""
 
 CASE = """
 name = "comparable_rod"
@@ -75,8 +75,8 @@ frames = 28
 samples = 140
 snapshots = 0
 """
-"""The rod has 7 x 70 mm. Except for rate effects, P/L depends on the ratio of the lengths only. The block is the one
-of ``long_rod``."""
+"""The rod is 7 mm thick and 70 mm long. Except for rate effects, P/L depends only on the ratio of the lengths. The
+block has the size of the block in the case ``long_rod``."""
 DAMAGE_OF_TUNGSTEN = {"D1": 0.0, "D2": 0.33, "D3": -1.5, "D4": 0.0, "D5": 0.0}
 """Damage constants by Johnson and Cook 1985, recalled and not checked against the publication; the library has the
 constants of 4340 steel."""
@@ -84,7 +84,7 @@ constants of 4340 steel."""
 
 @dataclass(frozen=True)
 class Variant:
-    """One run: changed keys of the case, and changed constants of the strength of materials of the library."""
+    """One run with changed keys of the case and changed constants of the strength of library materials."""
 
     name: str
     assignments: tuple[str, ...] = ()
@@ -103,7 +103,7 @@ def meshed(size: float) -> tuple[str, ...]:
 
 
 def scaled(name: str, factor: float) -> tuple[tuple[str, dict[str, Any]], ...]:
-    """Returns the constants A and B of a material, times ``factor``."""
+    """Returns the constants A and B of a material, multiplied by ``factor``."""
     strength = library()[name].model_dump(exclude_none=True)["strength"]
     return ((name, {key: factor * strength[key] for key in ("A", "B")}),)
 
@@ -138,7 +138,9 @@ VARIANTS = (
 
 @dataclass(frozen=True)
 class Shot:
-    """Result of a run: the outcome, times of the frames, s, depth and position of the nose in each frame, m."""
+    """Result of a run: the outcome, the times of the frames, s, and the depth of the hole and the position of the nose
+    in each frame, m.
+    """
 
     variant: Variant
     outcome: Outcome
@@ -147,7 +149,7 @@ class Shot:
     nose: Floats
 
     def speed(self, course: Floats) -> float:
-        """Returns the speed of ``depth`` or ``nose``, m/s: slope of a straight line through the steady phase."""
+        """Returns the speed of ``depth`` or ``nose``, m/s: the slope of a straight line through the steady phase."""
         taken = (self.time >= _STEADY[0]) & (self.time <= _STEADY[1]) & np.isfinite(course)
         since = self.time[taken] - self.time[taken].mean()
         return float(since @ course[taken] / (since @ since))
@@ -180,7 +182,9 @@ def _changed(name: str, keys: dict[str, Any]) -> dict[str, Any]:
 
 
 def _look(frame: Path) -> tuple[float, float, float]:
-    """Returns time, s, depth and position of the nose, m, of a frame; NaN without a rod."""
+    """Returns the time of a frame, s, the depth of the hole and the position of the nose, m; NaN if the frame has no
+    rod.
+    """
     with h5py.File(frame) as file:
         grid = file["VTKHDF"]
         points, part, t = grid["Points"][:], grid["CellData/part"][:], float(grid["FieldData/time"][0])
@@ -194,16 +198,16 @@ def _look(frame: Path) -> tuple[float, float, float]:
 
 
 def measure(variants: Sequence[Variant]) -> Iterator[Shot]:
-    """Runs every variant, one after the other."""
+    """Runs the variants one after the other."""
     for variant in variants:
         with tempfile.TemporaryDirectory(prefix="conoid-bench-") as folder:
             yield run(variant, Path(folder))
 
 
 def report(shots: Sequence[Shot]) -> str:
-    """Returns a table; its first row has the published values. U / (V - U), with U of the hole, is the ratio of
-    depth to consumed length in steady penetration. The rest of P/L is the entrance phase, the end of the rod, and
-    the penetration after the rod is consumed.
+    """Returns a table of the variants; its first row has the published values. U / (V - U), with U of the hole, is the
+    ratio of depth to consumed length in steady penetration. The rest of P/L results from the entrance phase, the end of
+    the rod, and the penetration after the rod is consumed.
     """
     head = [
         "variant",
@@ -232,7 +236,7 @@ def _row(shot: Shot) -> list[Cell]:
 
 
 def main(names: Sequence[str]) -> int:
-    """Runs the named variants, or all; prints a line after each run and the table at the end."""
+    """Runs the named variants, or all variants; prints a line after each run and the table at the end."""
     chosen = [variant for variant in VARIANTS if not names or variant.name in names]
     shots = []
     for shot in measure(chosen):

@@ -1,5 +1,5 @@
-"""Cost of contact: bodies in contact with the CPU time of each phase, and the data sent by the two kinds of contact
-domain (box and arbitrary)."""
+"""Cost of contact. One table has the CPU time of each phase for bodies in contact, another table has the data sent by
+the two kinds of contact domain (box and arbitrary)."""
 
 import json
 import os
@@ -20,7 +20,7 @@ from .table import Cell, table
 
 @dataclass(frozen=True)
 class Scene:
-    """A shipped case with assignments, on one rank."""
+    """A shipped case with assignments of keys, on one rank."""
 
     name: str
     case: str
@@ -63,7 +63,7 @@ def measure(scenes: Sequence[Scene]) -> Iterator[Cost]:
 
 
 def report(costs: Sequence[Cost]) -> str:
-    """Returns a table of the phases, in CPU seconds."""
+    """Returns a table of the CPU time of each phase, s."""
     names = ("elements", "nodes", "contact", "output")
     head = ["scene", "tets", "steps", *(f"{name} s" for name in names), "contact / elements", "M upd/s", "residual"]
     return table(head, [_row(cost, names) for cost in costs])
@@ -78,19 +78,19 @@ def _row(cost: Cost, names: Sequence[str]) -> list[Cell]:
 
 
 STEPS = {8: 1500, 16: 400}
-"""Number of ranks; the paper uses 8."""
+"""Number of ranks; the paper of Moon, Kim and Lee uses 8 ranks."""
 DOMAINS = ("box", "arbitrary")
 PAPER = {
     "faces of a search": "1st: 7,284 / 5,467 = 1.33 (fig. 4)",
     "faces sent, a search": "1st, 6th: > 2 (fig. 6)", "contact, CPU s": "> 2 (fig. 5)",
 }  # fmt: skip
-"""Ratio box over arbitrary of Moon, Kim and Lee, for a long body that hits a steel block, on 8 processors."""
+"""Ratios box over arbitrary by Moon, Kim and Lee, for a long body that hits a steel block, on 8 processors."""
 Run = list[dict[str, Any]]
-"""Output of contact_domain, by rank."""
+"""Output of the program contact_domain for each rank."""
 
 
 def domains(ranks: int, steps: int) -> dict[str, list[Run]]:
-    """Runs both domains on the coarse long rod during penetration, each of them twice."""
+    """Runs both contact domains on the coarse long rod during penetration, each domain twice."""
     launch = [str(Path(sys.executable).with_name("mpiexec")), "-n", str(ranks), sys.executable, "-m", "mpi4py"]
     words = [*launch, "-m", "tests.bench.contact_domain", str(steps), *DOMAINS]
     crowded = {**os.environ, "MPIR_CVAR_ENABLE_HEAVY_YIELD": "1"}
@@ -100,7 +100,7 @@ def domains(ranks: int, steps: int) -> dict[str, list[Run]]:
 
 
 def kinds(runs: Sequence[Run], steps: int) -> dict[str, list[float]]:
-    """Returns the mean of the runs with one domain, rank by rank."""
+    """Returns the mean of the runs with one contact domain for each rank."""
 
     def mean(number: Callable[[dict[str, Any]], float]) -> list[float]:
         return [statistics.fmean(map(number, same)) for same in zip(*runs, strict=True)]
@@ -116,8 +116,8 @@ def kinds(runs: Sequence[Run], steps: int) -> dict[str, list[float]]:
 
 
 def domain_report(found: dict[str, list[Run]], steps: int) -> str:
-    """Returns a table of the ratio box over arbitrary: mean over the ranks, slowest rank, first and sixth rank,
-    ratio of the means, and the value of the paper."""
+    """Returns a table of the ratio box over arbitrary: mean over the ranks, slowest rank, first and sixth rank, ratio
+    of the means, and the value of the paper."""
     box, other = (kinds(found[name], steps) for name in DOMAINS)
     rows: list[list[Cell]] = []
     for kind, one in box.items():

@@ -1,9 +1,9 @@
-"""Program under mpiexec: computes steps of the coarse long rod with one kind of contact domain after the other, and
+"""Program under mpiexec that computes steps of the coarse long rod with one kind of contact domain after the other, and
 prints as JSON the work of every rank.
 
-If there are fewer cores than ranks, wall time is useless; the CPU time is that of the thread, without waiting. The
-order is box, arbitrary, arbitrary, box, so that a drift affects both kinds in the same way. The partition is not
-changed.
+The program measures the CPU time of the thread without waiting, because wall time is useless if there are fewer cores
+than ranks. The order of the contact domains is box, arbitrary, arbitrary, box, so that a drift affects both domains in
+the same way. The partition of the mesh is not changed.
 """
 
 import json
@@ -28,7 +28,7 @@ from .long_rod import COARSE  # noqa: E402
 
 
 def main(steps: int, names: Sequence[str]) -> None:
-    """Prints the numbers of every rank on rank 0: for each domain a list of runs."""
+    """Prints on rank 0 the numbers of every rank: a list of runs for each contact domain."""
     world = connect()
     found: dict[str, list[Any]] = {name: [] for name in names}
     for name in (*names, *reversed(names)):
@@ -38,8 +38,8 @@ def main(steps: int, names: Sequence[str]) -> None:
 
 
 def _measured(name: str, steps: int, world: Comm) -> dict[str, Any]:
-    """Returns the numbers of one rank: at each search the time, us, its own faces and those of other ranks; CPU
-    time, s, bytes and messages of contact."""
+    """Returns the numbers of one rank: for each search the time, us, and the numbers of its own and of received faces;
+    CPU time, s, bytes and messages of contact."""
     data = load.apply_overrides(
         load.read_data(load.shipped_path("long_rod")), [*COARSE, "run.frames=0", f'contact.domain="{name}"']
     )
@@ -67,7 +67,7 @@ def _measured(name: str, steps: int, world: Comm) -> dict[str, Any]:
 
 
 def _noted(function: Any, looked: list[tuple[int, int]]) -> Any:
-    """Wraps ``function`` so that the number of faces of each search, and the number that came from other ranks, are
+    """Wraps ``function`` so that the number of faces of each search, and the number of faces from other ranks, are
     stored."""
 
     def noted(sides: NearSurface, *rest: Any) -> Any:

@@ -1,7 +1,7 @@
-"""Running cracks: time of start and branching, speed, and dissipated work, on several meshes.
+"""Running cracks on several meshes: time of start and branching, crack speed, and dissipated work.
 
-A facet counts as open when it carries no traction any more. It breaks earlier; the facets between the two states are
-the cohesive zone.
+A facet counts as open when it carries no traction any more. A facet breaks before it is open; the facets between the
+two states are the cohesive zone.
 """
 
 import time
@@ -41,17 +41,17 @@ _LOOK = 0.25e-6
 """Time between two measurements of a crack, s."""
 _SPAN = 12.0
 """Length over which the speed of a crack is fitted, in elements. If a facet ahead of the tip opens first, the tip
-advances by two elements, a sixth of this length."""
+advances by two elements, which is a sixth of this length."""
 _BIN = 2.0
-"""Width of the bins along x in which branches are searched, in elements."""
+"""Width of the bins along x in which branches of the crack are searched, in elements."""
 _THROUGH = 1.5
-"""Distance from the tip to the far edge, in elements, at which a crack counts as complete."""
+"""Distance of the crack tip from the far edge, in elements, at which a crack counts as complete."""
 _GAP = 3.0
-"""Smallest distance between two branches, in elements."""
+"""Smallest distance between two branches of a crack, in elements."""
 _MOVED = 0.2
-"""Largest displacement of a node in each coordinate, over the element size."""
+"""Largest random displacement of a node in each coordinate, over the element size."""
 _FLAT = 0.6
-"""Smallest height of a tet after its nodes are moved, over the mean height."""
+"""Smallest height of a tet after the displacement of its nodes, over the mean height."""
 
 STRIP = """
 name = "strip"
@@ -89,8 +89,8 @@ pressure = "standard"
 end_time = "34 us"
 frames = 0
 """
-"""A strip under uniform tension. The energy release rate of a long crack, E strain^2 H / 2, exceeds G_c after 16 us
-and is 4 G_c after 32 us; the stress reaches the strength after 36 us."""
+"""Strip under uniform tension. In the strip the energy release rate of a long crack, E strain^2 H / 2, exceeds G_c
+after 16 us and is 4 G_c after 32 us; the stress reaches the strength after 36 us."""
 
 BAR = """
 name = "bar"
@@ -130,8 +130,8 @@ frames = 0
 
 
 def rayleigh(made: Material) -> float:
-    """Returns the speed of surface waves, m/s: c from the root z below 1 of z^3 - 8 z^2 + 8 (3 - 2 k) z - 16 (1 -
-    k), z = (c / c_s)^2, k = (c_s / c_p)^2."""
+    """Returns the speed of surface waves, m/s. The speed c follows from the root z below 1 of z^3 - 8 z^2 + 8 (3 - 2 k)
+    z - 16 (1 - k) = 0 with z = (c / c_s)^2, k = (c_s / c_p)^2."""
     poisson = made.elastic.poisson
     k = (1.0 - 2.0 * poisson) / (2.0 - 2.0 * poisson)
     roots = np.roots([1.0, -8.0, 8.0 * (3.0 - 2.0 * k), -16.0 * (1.0 - k)])
@@ -140,8 +140,8 @@ def rayleigh(made: Material) -> float:
 
 
 def slit(mesh: TetMesh, length: float) -> TetMesh:
-    """Returns the mesh with a slit along the facets nearest to y = 0, from the edge to x = ``length``, m. The nodes
-    at the tip of the slit are not doubled."""
+    """Returns the mesh with a slit along the facets nearest to y = 0, from the edge to x = ``length``, m. The nodes at
+    the tip of the slit are not doubled."""
     behind = mesh.points[mesh.tets, 1].mean(axis=1) > 0.0
     sides = np.zeros((2, len(mesh.points)), bool)
     for side in (0, 1):
@@ -154,8 +154,8 @@ def slit(mesh: TetMesh, length: float) -> TetMesh:
 
 
 def perturbed(mesh: TetMesh, size: float, seed: int) -> TetMesh:
-    """Moves each coordinate of the interior nodes at random by at most _MOVED of ``size``, m; by less where a tet
-    would become flat."""
+    """Moves each coordinate of the interior nodes at random by at most _MOVED of ``size``, m, or by less if a tet would
+    become flat."""
     points, low, high = mesh.points, mesh.points.min(axis=0), mesh.points.max(axis=0)
     least = min(_FLAT * float(mesh.step_lengths().mean()), float(mesh.step_lengths().min()))
     move = np.random.default_rng(seed).uniform(-_MOVED * size, _MOVED * size, points.shape)
@@ -169,9 +169,9 @@ def perturbed(mesh: TetMesh, size: float, seed: int) -> TetMesh:
 def random(body: Box | Plate, seed: int, straight: float = 0.0) -> TetMesh:
     """Returns one layer of prisms of three tets on a Delaunay triangulation of random points.
 
-    The points of a grid are moved at random by up to half an element, then ten times to the mean of their
-    neighbours. Points on the border keep their position, and no triangle has all its corners on the border. Points
-    on the line y = 0 up to x = ``straight``, m, keep their position, too, so that a slit along this line is smooth.
+    The points of a grid are moved at random by up to half an element, and after that ten times to the mean of their
+    neighbours. Points on the border keep their position, and no triangle has all its corners on the border. Points on
+    the line y = 0 up to x = ``straight``, m, also keep their position, so that a slit along this line is smooth.
     """
     (x_low, y_low, z_low), (x_high, y_high, z_high) = bounds(body) or ((0.0,) * 3, (0.0,) * 3)
     lines = [np.linspace(a, b, divisions(b - a, body.element_size) + 1) for a, b in ((x_low, x_high), (y_low, y_high))]
@@ -200,8 +200,8 @@ def random(body: Box | Plate, seed: int, straight: float = 0.0) -> TetMesh:
 
 @dataclass(frozen=True)
 class Plan:
-    """A case, the element size, m, and the kind of mesh; ``seed``: of the displacement of the nodes, or of a
-    ``random`` mesh."""
+    """Plan of a run: a case, the element size, m, and the kind of mesh. The number ``seed`` is for the displacement of
+    the nodes, or for a ``random`` mesh."""
 
     case: str
     size: float
@@ -212,7 +212,7 @@ class Plan:
     text: str = ""
     """Text of a case that is neither shipped nor in this file."""
     straight: bool = False
-    """Whether the slit of a ``random`` mesh is a straight line; False: it is made of facets near that line."""
+    """True if the slit of a ``random`` mesh is a straight line; False if the slit is made of facets near that line."""
 
     @property
     def name(self) -> str:
@@ -223,7 +223,7 @@ class Plan:
 
 
 def prepared(plan: Plan) -> tuple[Case, TetMesh]:
-    """Returns the case, and its mesh with the slit. A plate is one element thick."""
+    """Returns the case and its mesh with the slit. A plate is one element thick."""
     text = plan.text or {"strip": STRIP, "bar": BAR}.get(plan.case)
     data = load.toml_data(text) if text else load.read_data(load.shipped_path(plan.case))
     words = ["run.frames=0", f"parts[0].mesh.element_size={plan.size}", *plan.words]
@@ -267,7 +267,7 @@ class Crack:
     """Element size, m."""
     begin: float
     end: float
-    """x of the tip of the slit, and of the far edge, m."""
+    """Coordinate x of the tip of the slit, and of the far edge, m."""
     id: Ints = field(default_factory=lambda: np.zeros(0, np.int64))
     centre: Floats = field(default_factory=lambda: np.zeros((0, 3)))
     area: Floats = field(default_factory=lambda: np.zeros(0))
@@ -276,7 +276,7 @@ class Crack:
     """Time at which the first facet broke, s."""
 
     def look(self, sim: Simulation) -> None:
-        """Adds the facets that have opened since the last call."""
+        """Adds the facets that have opened since the previous call."""
         assert sim.fracture is not None
         if not sim.fracture.broken:
             return
@@ -294,20 +294,22 @@ class Crack:
         return float(self.time.min()) if len(self.time) else np.nan
 
     def front(self) -> tuple[Floats, Floats]:
-        """Returns times, s, and x, m, of the tip each time it advances; the tip of the slit is its first position."""
+        """Returns the times, s, and x, m, of the crack tip each time the tip advances; the first position is the tip of
+        the slit.
+        """
         order = np.lexsort((-self.centre[:, 0], self.time))
         x = self.centre[order, 0]
         ahead = x > np.concatenate([[self.begin], np.maximum.accumulate(x)[:-1]])
         return self.time[order][ahead], x[ahead]
 
     def passed(self, x: float) -> float:
-        """Returns the time at which the tip passed ``x``, s; NaN if the tip did not pass it."""
+        """Returns the time at which the crack tip passed ``x``, s; NaN if the crack tip did not pass ``x``."""
         times, tip = self.front()
         return float(times[tip >= x][0]) if (tip >= x).any() else np.nan
 
     def speeds(self) -> tuple[Floats, Floats]:
-        """Returns x, m, and speed along x, m/s: slopes of straight lines through _SPAN elements of the path of the
-        tip."""
+        """Returns x, m, and the speed along x, m/s: slopes of straight lines through _SPAN elements of the path of the
+        crack tip."""
         times, tip = self.front()
         where, speed = [], []
         for first in tip:
@@ -332,7 +334,7 @@ class Crack:
 
     @property
     def branched(self) -> float:
-        """x, m, from which two branches exist over 10 elements; NaN without branching."""
+        """Coordinate x, m, from which two branches exist over 10 elements; NaN without branching."""
         x, ways = self.branches()
         two = np.array([len(y) > 1 for y in ways])
         long = [k for k in range(len(two) - 4) if two[k : k + 5].all()]
@@ -340,7 +342,7 @@ class Crack:
 
     @property
     def straight(self) -> float:
-        """Length of the branches, m: sum of straight lines between bins; bins without an open facet are skipped."""
+        """Length of the branches, m: the sum of straight lines between bins; bins without an open facet are skipped."""
         x, ways = self.branches()
         total, before, last = 0.0, np.zeros(1), 2.0 * x[0] - x[1]
         for at, y in zip(x, ways, strict=True):
@@ -350,10 +352,10 @@ class Crack:
 
     @property
     def wake(self) -> "Crack":
-        """The part of the crack that is at least _SPAN elements behind the tip, in whole bins; the whole crack if the
-        tip is at the far edge.
+        """Returns the part of the crack that is at least _SPAN elements behind the tip, in whole bins; the whole crack
+        if the tip is at the far edge.
 
-        Nearer to the tip facets open in any order, so the open area there has no defined length.
+        Near the tip facets open in any order, so the open area near the tip has no defined length.
         """
         tip = float(self.centre[:, 0].max(initial=self.begin))
         if tip > self.end - _THROUGH * self.size:
@@ -389,7 +391,7 @@ class Run:
 
     @property
     def made(self) -> Material:
-        """Material of the only part."""
+        """Material of the only part of the case."""
         return self.case.materials[self.case.parts[0].material]
 
     @property
@@ -400,7 +402,7 @@ class Run:
 
     @property
     def taken(self) -> float:
-        """Work on the cohesive facets, J."""
+        """Work on all cohesive facets, J."""
         return self.energy.fracture + self.energy.cohesive
 
     @property
@@ -418,7 +420,7 @@ class Run:
 
     @property
     def inflation(self) -> float:
-        """Open area over the area of straight lines, from ``Crack``."""
+        """Open area over the area of straight lines, computed by ``Crack``."""
         return self.crack.inflation
 
     @property
@@ -456,7 +458,7 @@ def watch(plan: Plan) -> Run:
 
 
 def _fragments(sim: Simulation, cube: float) -> int:
-    """Returns the number of fragments of at least a tenth of ``cube``, m^3."""
+    """Returns the number of fragments of at least a tenth of the volume ``cube``, m^3."""
     assert sim.fracture is not None
     assert sim.fracture.cohesion is not None
     (labels,) = connectivity.labels(sim.model, sim.fracture.cohesion.facets.tets, sim.comm)
@@ -470,7 +472,7 @@ _KINDS: tuple[tuple[Kind, int | None], ...] = (("structured", None), ("structure
 PLATES = tuple(Plan("branching_plate", size, kind, seed) for size in (1e-3, FINE) for kind, seed in _KINDS)
 """Plans of the branching benchmark on four kinds of meshes."""
 SIBLINGS = tuple(Plan("branching_plate", FINE, "random", seed) for seed in range(1, 5))
-"""Further random meshes, like the last one of PLATES."""
+"""Further random meshes, like the last mesh of PLATES."""
 RANDOM = (PLATES[-1], *SIBLINGS)
 """Five random meshes without preferred directions, with the finer elements."""
 _SAFETIES = (0.9, 0.899, 0.898, 0.897, 0.896, 0.895, 0.89)
@@ -484,11 +486,11 @@ STEPPED = (
     *(_stepped(PLATES[3], safety) for safety in _SAFETIES),
     *(_stepped(plan, safety) for safety in (0.897, 0.893) for plan in RANDOM),
 )
-"""Plans with slightly different time steps: a coarse mesh with seven safety factors, and the meshes of RANDOM with
-two more."""
+"""Plans with slightly different time steps: a coarse mesh with seven safety factors, and the meshes of RANDOM with two
+further safety factors."""
 ROWS = tuple(tuple(_stepped(plan, safety) for safety in _SAFETIES) for plan in (PLATES[0], PLATES[4]))
-"""Plans with seven time steps on the meshes whose facets lie in rows along the crack. The row in which the crack
-runs varies with the time step."""
+"""Plans with seven time steps on the meshes whose facets lie in rows along the crack. The row in which the crack runs
+varies with the time step."""
 SHOWN = (PLATES[0], PLATES[6], PLATES[7], *SIBLINGS[:3])
 """Plans whose cracks are drawn."""
 STRIPS = (Plan("strip", 0.5e-3), Plan("strip", 0.5e-3, "random", 0))
@@ -506,7 +508,7 @@ def measure(plans: Iterable[Plan]) -> Iterator[Run]:
 
 
 def as_data(runs: Sequence[Run]) -> dict[str, list[float]]:
-    """Returns work, J, number of fragments, CPU time, s, and for cracks the columns of the table."""
+    """Returns work, J, number of fragments, CPU time, s, and, for cracks, the columns of the table."""
     return {
         ", ".join((r.plan.case, r.plan.name, *r.plan.words)): [
             r.taken,
@@ -519,7 +521,7 @@ def as_data(runs: Sequence[Run]) -> dict[str, list[float]]:
 
 
 def report(runs: Sequence[Run]) -> str:
-    """Returns all tables."""
+    """Returns all tables of the study."""
     of = {name: [r for r in runs if r.plan.case == name] for name in ("branching_plate", "strip", "bar")}
     plates = [r for r in of["branching_plate"] if not r.plan.words]
     random = [r for r in plates if r.plan in RANDOM]
@@ -560,7 +562,7 @@ def _cracks(runs: Sequence[Run]) -> str:
 
 
 def scatter(what: str, runs: Sequence[Run]) -> str:
-    """Returns a table of mean and scatter of the runs that have a value; ``what``: name of these runs."""
+    """Returns a table of the mean and the scatter of the runs that have a value; ``what`` is the name of these runs."""
     values = np.array([[*_columns(r), 1e3 * r.energy.contact] for r in runs]).T
     some = [column[np.isfinite(column)] for column in values]
     rows: list[list[Cell]] = [["of", *(len(column) for column in some)]]
@@ -571,7 +573,7 @@ def scatter(what: str, runs: Sequence[Run]) -> str:
 
 
 def _bars(runs: Sequence[Run]) -> str:
-    """Returns a table of the work of each bar over that of the finest mesh."""
+    """Returns a table of the work of each bar over the work on the finest mesh."""
     finest = min(runs, key=lambda r: (r.plan.size, r.plan.seed is not None)).taken
     rows: list[list[Cell]] = []
     for r in runs:

@@ -1,7 +1,8 @@
-"""Pictures of bodies in the docs: ``python -m tests.bench.doc_pictures [NAME ...]`` runs their cases and draws them.
+"""Pictures of bodies in the docs: the command ``python -m tests.bench.doc_pictures [NAME ...]`` runs the cases of the
+named pictures and draws the pictures.
 
-Without a name all pictures are drawn. Runs are kept in ``build/pictures``, so that a second call only draws.
-``--list`` prints the names of the pictures and the cost of their runs.
+Without a name all pictures are drawn. Runs are kept in ``build/pictures``, so that a second call of the command only
+draws. The option ``--list`` prints the names of the pictures and the cost of their runs.
 """
 
 import json
@@ -54,11 +55,11 @@ PICTURES = {
 
 MM = 1e-3
 _APART = 15.0
-"""Distance between two shapes, mm. Chosen value: no shape hides another shape."""
+"""Distance between two shapes, mm. Chosen value for which no shape hides another shape."""
 
 
 def shapes() -> dict[str, Any]:
-    """Returns a case with a body of every shape, of equal size, side by side."""
+    """Returns a case with one body of every shape; the bodies have equal size and are side by side."""
     return {
         "name": "shapes", "title": "The shapes of parts",
         "parts": [
@@ -70,7 +71,9 @@ def shapes() -> dict[str, Any]:
 
 
 def _placed(mesh: Mapping[str, Any], k: int) -> dict[str, Any]:
-    """Returns the mesh at position k, and the meshes that a combination consists of."""
+    """Returns the mesh of shape number k, moved to the position of this shape; the operands of a combination are moved,
+    too.
+    """
     x, y = _APART * MM * (k % 7), -_APART * MM * (k // 7)
     moved = {name: _moved(value, x, y) if name in _PLACES else value for name, value in mesh.items()}
     if "of" in mesh:
@@ -123,7 +126,7 @@ _BODIES: dict[str, dict[str, Any]] = {
 
 
 def case(shown: Shown) -> Path:
-    """Returns the file of the case; a case in the text of a page is written to a file first."""
+    """Returns the file of the case; a case in the text of a page is first written to a file."""
     RUNS.mkdir(parents=True, exist_ok=True)
     if shown.case == "shapes":
         (RUNS / "shapes.json").write_text(json.dumps(shapes()), encoding="utf-8")
@@ -136,7 +139,7 @@ def case(shown: Shown) -> Path:
 
 
 def ran(shown: Shown) -> Result:
-    """Returns the run of a picture: the stored run, or a new one."""
+    """Returns the run of a picture: the stored run, or a new run."""
     folder = RUNS / Path(shown.case).stem
     try:
         result = Result.open(folder)

@@ -1,8 +1,8 @@
-"""Contact between fragments under a shock: does contact alone carry the pressure of broken material, and with how many
-sweeps?
+"""Contact between fragments under a shock: does contact alone transmit the pressure of broken material, and how many
+sweeps are needed?
 
-``python -m tests.bench.dust``: a flyer hits a target of the same brittle material between planes of symmetry, so
-that the material cannot move sideways. The tables are in docs/theory/contact.md, "Dust under pressure".
+In ``python -m tests.bench.dust`` a flyer hits a target of the same brittle material between planes of symmetry, so that
+the material cannot move sideways. The resulting tables are in docs/theory/contact.md, "Dust under pressure".
 """
 
 import math
@@ -31,8 +31,8 @@ SIZE = 0.1e-3
 """Element size, m."""
 _WIDE, _FLYER, _TARGET = 0.4e-3, 2e-3, 4e-3
 _FROM, _TO = 0.1e-6, 0.25e-6
-"""Period in which the pressure is measured, s after the impact. In this period the wave of the
-impact has passed the bodies, and no other wave has arrived."""
+"""Period in which the pressure is measured, s after the impact. In this period the wave of the impact has passed the
+bodies, and no other wave has arrived."""
 
 
 @dataclass(frozen=True)
@@ -40,15 +40,15 @@ class Impact:
     """Result of a run."""
 
     pressure: float
-    """Mean of the contact force on the target over its area, Pa."""
+    """Mean of the contact force on the target over the area of the target, Pa."""
     fragments: int
     seconds: float
     """CPU time of contact, s."""
 
 
 def flyer(name: str, speed: float, sweeps: int | None, *, wide: float, long: Sequence[float], end: float) -> Case:
-    """Returns the case of a flyer and a target of one material, with the two lengths ``long``, m; ``sweeps`` None:
-    default number of sweeps."""
+    """Returns the case of a flyer and a target of one material, with the two lengths ``long``, m; for ``sweeps`` None
+    the case has the default number of sweeps."""
     mesh = {"shape": "box", "element_size": SIZE, "generator": "gmsh"}
     return parse_case(
         {
@@ -67,14 +67,14 @@ def flyer(name: str, speed: float, sweeps: int | None, *, wide: float, long: Seq
 
 
 def expected(name: str, speed: float) -> tuple[float, float]:
-    """Returns the pressures of material without strength and of intact material, Pa: linear waves with half the
+    """Returns the pressures of material without strength and of intact material, Pa, for linear waves with half the
     impact speed."""
     made = library()[name]
     return math.sqrt(made.bulk * made.density) * speed / 2.0, made.density * wave_speed(made) * speed / 2.0
 
 
 def measure(case: Case, begin: float) -> Impact:
-    """Computes all steps; the pressure is the mean from ``begin``, s, to the end."""
+    """Computes all steps of a run; the pressure is the mean from ``begin``, s, to the end of the run."""
     sim = simulation.build(case, Path(), SerialComm())
     contact, fracture = sim.contact, sim.fracture
     assert contact is not None
@@ -98,7 +98,7 @@ def measure(case: Case, begin: float) -> Impact:
 
 
 def main() -> int:
-    """Runs all variants."""
+    """Runs all variants of the study."""
     rows: list[list[Cell]] = []
     for name, speed in PLANS:
         cases = (flyer(name, speed, k, wide=_WIDE, long=(_FLYER, _TARGET), end=_TO) for k in (*SWEEPS, None))

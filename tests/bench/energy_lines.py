@@ -1,8 +1,9 @@
-"""``python -m tests.bench.energy_lines [NAME]...``: runs every hard and every shipped case, and writes for each the
-line of the energy ledger that has created most energy, its share and its limit into docs/verification/energy_lines.md.
+"""The command ``python -m tests.bench.energy_lines [NAME]...`` runs every hard and every shipped case. For each case it
+writes into docs/verification/energy_lines.md the term of the energy balance that has created the most energy, the
+created energy and the limit.
 
-Each case is a run on one rank without frames. Results are stored in build/energy_lines, one file for each case;
-stored cases are not run again, and cheap cases run first. The argument ``write`` only writes the page.
+Each case is a run on one rank without frames. Results are stored in build/energy_lines, one file for each case. Cases
+with a stored result are not run again, and cheap cases run first. The argument ``write`` only writes the page.
 """
 
 import json
@@ -29,7 +30,7 @@ _COLUMNS = ("case", "state", "worst line", "made", "at, s", "limit", "residual",
 
 @dataclass(frozen=True)
 class Row:
-    """End of a run, and the line of the ledger that has created most energy."""
+    """End of a run, and the term of the energy balance that has created the most energy."""
 
     case: str
     state: str
@@ -45,7 +46,7 @@ class Row:
 
     @property
     def bad(self) -> bool:
-        """Whether a line is above its limit in a run that succeeded."""
+        """True if a run succeeded although a term of the energy balance is above its limit."""
         return self.state == "succeeded" and self.made > self.limit
 
 
@@ -59,12 +60,12 @@ class Plan:
 
     @property
     def seconds(self) -> float:
-        """Estimated cost, core s."""
+        """Estimated cost of the run, core s."""
         return self._estimate.core_seconds or 0.0
 
     @property
     def steps(self) -> int | None:
-        """Estimated number of steps."""
+        """Estimated number of steps of the run."""
         return self._estimate.steps
 
     @cached_property
@@ -73,7 +74,7 @@ class Plan:
 
 
 def plans() -> list[Plan]:
-    """Returns all cases, the cheapest one first."""
+    """Returns all cases, the cheapest case first."""
     found = [Plan(f"hard/{each.name}", each.path, (*each.changes, *_QUIET)) for each in suite()]
     found += [Plan(f"shipped/{name}", path, _QUIET) for name, path in sorted(shipped().items())]
     return sorted(found, key=lambda plan: plan.seconds)
@@ -91,7 +92,7 @@ def measured(plan: Plan) -> Row:
 
 
 def row_of(name: str, outcome: Outcome, limit: float) -> Row:
-    """Returns the row of a finished run."""
+    """Returns the table row of a finished run."""
     worst = outcome.made[0] if outcome.made else None
     return Row(
         name, outcome.state, outcome.message, worst.line if worst else "none", worst.share if worst else 0.0,
@@ -101,13 +102,13 @@ def row_of(name: str, outcome: Outcome, limit: float) -> Row:
 
 
 def rows() -> Iterator[Row]:
-    """Returns the rows of the finished cases, hard cases first."""
+    """Returns the table rows of the finished cases, hard cases first."""
     for path in sorted(OUT.glob("*.json")):
         yield Row(**json.loads(path.read_text(encoding="utf-8")))
 
 
 def page(found: Sequence[Row]) -> str:
-    """Returns the page: a table, and the list of errors."""
+    """Returns the page with a table and the list of errors."""
     expected = {plan.name: plan.steps for plan in plans()}
     lines: list[list[Cell]] = [
         [r.case, r.state, r.line, r.made, r.at, r.limit, r.residual, r.tets, r.steps, expected[r.case], round(r.cpu, 1)]
@@ -118,12 +119,14 @@ def page(found: Sequence[Row]) -> str:
     known = [plan.name for plan in plans()]
     left = sorted(set(known) - {r.case for r in found})
     return "\n\n".join([
-        "# Energy that lines of the ledger make",
-        "The table contains every hard and every shipped case, each run on one rank. `python -m "
-        "tests.bench.energy_lines` writes it. \"Worst line\" is the line of the ledger that has created the most "
-        "energy at any time. \"Made\" is this energy as a share of the largest energy until then, \"at\" is its time, "
-        "and \"limit\" is `run.made_limit`. \"Estimated\" is the number of steps that `conoid validate` expects. "
-        "[theory/energy.md](../theory/energy.md), \"Energy that a line makes\", explains how this energy is counted.",
+        "# Energy created by single lines of the energy balance",
+        "The table contains every hard and every shipped case, each run on one rank. The command `python -m "
+        "tests.bench.energy_lines` writes this table. The column \"worst line\" is the term of the energy balance that "
+        "has created the most energy at any time of the run. The column \"made\" is the created energy over the "
+        "largest energy of the run up to this time, \"at\" is the time, and \"limit\" is `run.made_limit`. The column "
+        "\"estimated\" is the number of steps that `conoid validate` expects. The page "
+        "[theory/energy.md](../theory/energy.md), \"Energy that a line makes\", explains how the created energy is "
+        "counted.",
         f"{len(found)} of {len(known)} cases; {sum(r.bad for r in found)} succeeded above the limit."
         + (f" Not measured: {', '.join(left)}." if left else ""),
         *(["\n".join(wrong)] if wrong else []),
@@ -132,7 +135,7 @@ def page(found: Sequence[Row]) -> str:
 
 
 def main(arguments: Sequence[str]) -> int:
-    """Runs the named cases, or all without a stored result, and writes the page."""
+    """Runs the named cases, or all cases without a stored result, and writes the page."""
     known = plans()
     unknown = [name for name in arguments if name != "write" and name not in [plan.name for plan in known]]
     if unknown:

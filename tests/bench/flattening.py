@@ -1,7 +1,7 @@
-"""Mean time step of bars that flatten on a wall, compared with its estimate (cases/estimates/shrinkage.py).
+"""Mean time step of bars that flatten on a wall, compared with the estimate of cases/estimates/shrinkage.py.
 
-``python -m tests.bench.flattening`` runs square bars of two metals on one rank. The length is one to four times the
-width.
+The command ``python -m tests.bench.flattening`` runs square bars of two metals on one rank. The length of a bar is one
+to four times its width.
 """
 
 import json
@@ -26,14 +26,14 @@ WIDTH, SIZE = 3e-3, 0.75e-3
 METALS = {150e6: (100.0, 200.0, 300.0), 800e6: (200.0, 400.0)}
 """Yield stress, Pa, and impact speeds, m/s; the hardening modulus is 300 MPa."""
 LENGTHS = (1, 2, 4)
-"""Length over width."""
+"""Length of a bar over its width."""
 GAP = 1e-5
 """Initial distance between bar and wall, m."""
 
 
 def data_of(yield_stress: float, length: int, speed: float) -> dict[str, Any]:
-    """Returns the case of a bar that hits a wall. The end time is 1.5 times length over speed; the bar has rebounded
-    by then."""
+    """Returns the case of a bar that hits a wall. The end time of the run is 1.5 times length over speed; the bar has
+    rebounded by this time."""
     metal = {
         "density": 8900.0, "elastic": {"young": 207e9, "poisson": 0.31},
         "strength": {"model": "linear_hardening", "yield_stress": yield_stress, "hardening": 300e6},
@@ -51,7 +51,7 @@ def data_of(yield_stress: float, length: int, speed: float) -> dict[str, Any]:
 
 
 def measured(data: dict[str, Any]) -> list[Cell]:
-    """Returns the ratio of the initial time step to the mean one, the exponent k that follows from it, and the
+    """Returns the ratio of the initial to the mean time step, the exponent k that follows from this ratio, and the
     estimated ratio."""
     case = parse_case(data)
     with tempfile.TemporaryDirectory(prefix="conoid-bench-") as folder:
@@ -71,7 +71,7 @@ def measured(data: dict[str, Any]) -> list[Cell]:
 
 
 def main() -> int:
-    """Runs all bars, the short ones first."""
+    """Runs all bars, the short bars first."""
     head = ["MPa", "length/width", "m/s", "steps", "step fell by", "k", "expected", "off by", "CPU s"]
     rows: list[list[Cell]] = []
     for length, (stress, speeds) in product(LENGTHS, METALS.items()):

@@ -1,7 +1,7 @@
-"""Cost of fracture on one rank: a body that may fracture but does not, and a glass bar that shatters, on finer and
-finer meshes.
+"""Cost of fracture on one rank, on finer and finer meshes: the first table has a body that may fracture but does not,
+the second table has a glass bar that shatters.
 
-The second table is speed against error for a fracturing body: effect of the mesh on the fragments, and the cost.
+The second table has speed against error: the effect of the mesh on the fragments, and the cost.
 """
 
 import statistics
@@ -30,7 +30,7 @@ _BOX = (
     "reference=[]",
 )  # fmt: skip
 _BLOCK = 10
-"""Number of steps with the test of the faces, and of steps without it, in alternation."""
+"""Number of steps with the fracture test of the faces, and of steps without this test, in alternation."""
 
 
 @dataclass(frozen=True)
@@ -43,7 +43,9 @@ class Armed:
 
 
 def armed(blocks: int) -> Armed:
-    """Measures within one run with the test of the faces switched on and off in alternation; no facet breaks."""
+    """Measures the speed with and without the fracture test of the faces, in alternation within one run; no facet
+    breaks.
+    """
     data = load.apply_overrides(load.read_data(load.shipped_path("free_spin")), _BOX)
     data["parts"][0]["material"] = "soda_lime"
     case = load.parse_case(data)
@@ -66,7 +68,7 @@ def armed(blocks: int) -> Armed:
 
 @dataclass(frozen=True)
 class Shattered:
-    """A glass bar after 60 us."""
+    """Results of a glass bar after 60 us."""
 
     size: str
     outcome: Outcome
@@ -74,7 +76,7 @@ class Shattered:
 
 
 def shatter(sizes: Sequence[str]) -> Iterator[Shattered]:
-    """Runs glass_steel_demo with these element sizes by the command line of the worker."""
+    """Runs glass_steel_demo with the given element sizes by the command line of the worker."""
     for size in sizes:
         with tempfile.TemporaryDirectory(prefix="conoid-bench-") as folder:
             words = [sys.executable, "-m", "conoid.worker", "glass_steel_demo", "--out", folder]
@@ -89,7 +91,7 @@ def shatter(sizes: Sequence[str]) -> Iterator[Shattered]:
 
 
 def report(cost: Armed | None, bars: Sequence[Shattered]) -> str:
-    """Returns both tables."""
+    """Returns the two tables of the study."""
     texts = []
     if cost is not None:
         row: list[Cell] = [cost.tets, f"{cost.without:.1f}", f"{cost.armed:.1f}", f"{cost.without / cost.armed:.2f}"]

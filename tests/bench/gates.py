@@ -1,4 +1,4 @@
-"""Requirements of the project, with the measured values. The benchmark reports failed requirements, but does not
+"""Requirements of the project with the measured values. The benchmark reports failed requirements, but does not
 fail."""
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -16,7 +16,7 @@ from .table import table
 from .taylor_cost import Stage, mean_speed
 
 _LOCKS = {"taylor_copper": (0.54, 6.0), "taylor_42crmo4": (0.8, 4.5)}
-"""Element size and largest foot radius with the standard pressure form, mm, by bar. Locking decreases with the
+"""Element size and largest foot radius of each bar with the standard pressure form, mm. Locking decreases with the
 element size; the limit of the steel bar, a diameter of 9 mm, holds for a mesh of 3,840 tets."""
 
 
@@ -31,7 +31,7 @@ class Gate:
 
 
 def of_speed(speeds: Sequence[Speed]) -> Iterator[Gate]:
-    """Yields the requirements of elastic material, at 136,000 to 150,000 tets."""
+    """Yields the requirements for elastic material, at 136,000 to 150,000 tets."""
     for s in speeds:
         if (s.material, s.form) == ("elastic", "standard") and 1.3e5 < s.tets < 1.6e5:
             yield Gate(f"elastic, {s.tets:,} tets", ">= 12 M updates / CPU-s", f"{s.best:.1f} M", s.best >= 12.0)
@@ -39,15 +39,15 @@ def of_speed(speeds: Sequence[Speed]) -> Iterator[Gate]:
 
 
 def of_taylor(stages: Sequence[Stage]) -> Iterator[Gate]:
-    """Yields the requirement of Johnson-Cook material with nodal pressure, mean over the bar."""
+    """Yields the requirement for Johnson-Cook material with nodal pressure, mean over the bar."""
     best, _ = mean_speed(stages)
     what = f"Johnson-Cook, nodal, Taylor bar, {stages[0].tets:,} tets"
     yield Gate(what, ">= 4 M updates / CPU-s", f"{best:.2f} M", best >= 4.0)
 
 
 def of_growth(sizes: Sequence[Growth]) -> Iterator[Gate]:
-    """Yields the requirements of growth, elastic: memory between the first and the last size, and cost per tet over
-    all sizes."""
+    """Yields the requirements on growth for elastic material: memory between the first and the last size, and cost per
+    tet over all sizes."""
     sizes = [s for s in sizes if not s.armed]
     peak, steady = sizes[-1].bytes_a_tet(sizes[0])
     yield Gate("memory, elastic, while it is set up", "<= 400 bytes a tet", f"{peak:.0f}", peak <= 400.0)
@@ -58,14 +58,14 @@ def of_growth(sizes: Sequence[Growth]) -> Iterator[Gate]:
 
 
 def of_startup(startup: Startup) -> Iterator[Gate]:
-    """Yields the requirements of start-up: time of a warm start, and number of compilations."""
+    """Yields the requirements on the start-up: time of a warm start, and number of compilations."""
     yield Gate("submit to first step, warm", "<= 3 s", f"{startup.submitted:.2f} s", startup.submitted <= 3.0)
     themselves = sum(startup.compiled.values())
     yield Gate("kernels that ranks compile themselves", "0", str(themselves), themselves == 0 < startup.ahead)
 
 
 def of_accuracy(answers: Sequence[Answer]) -> Iterator[Gate]:
-    """Yields the requirements of the Taylor bars as shipped, 12,960 tets, and of a control that must fail."""
+    """Yields the requirements on the shipped Taylor bars with 12,960 tets, and on a control that must fail."""
     for a in answers:
         if a.plan.safety != 0.9 or a.plan.generator != "structured" or not a.plan.viscosity:
             continue
@@ -97,7 +97,7 @@ def _locks(a: Answer) -> Gate:
 
 
 def of_telemetry(costs: Sequence[Pairs], digests: Mapping[str, str]) -> Iterator[Gate]:
-    """Yields the requirements of telemetry: cost with telemetry over cost without."""
+    """Yields the requirements on telemetry: the cost with telemetry over the cost without telemetry."""
     for cost in costs:
         ratio, _, _ = cost.ratio("cpu")
         change = f"{100 * (ratio - 1):+.2f} %"
@@ -108,13 +108,13 @@ def of_telemetry(costs: Sequence[Pairs], digests: Mapping[str, str]) -> Iterator
 
 
 def report(gates: Sequence[Gate]) -> str:
-    """Returns one line for each requirement."""
+    """Returns one line of text for each requirement."""
     rows = [[gate.what, gate.wanted, gate.measured, "yes" if gate.met else "NO"] for gate in gates]
     return table(["what", "wanted", "measured", "met"], rows) + "\n"
 
 
 def of_long_rod(shots: Sequence[Shot]) -> Iterator[Gate]:
-    """Yields the requirements of the long rod: range of P/L, change with the mesh, and wall time."""
+    """Yields the requirements on the long rod: range of P/L, change with the mesh, and wall time."""
     found = {shot.variant.name: shot for shot in shots}
     for speed, (low, high) in BANDS.items():
         if speed in found:
@@ -132,7 +132,7 @@ def of_long_rod(shots: Sequence[Shot]) -> Iterator[Gate]:
 
 
 def of_fracture(cost: Armed, bars: Sequence[Shattered]) -> Iterator[Gate]:
-    """Yields the requirements of fracture: cost without a broken facet, and cost of a shattering bar."""
+    """Yields the requirements on fracture: cost without a broken facet, and cost of a shattering bar."""
     yield Gate(
         f"fracture armed, {cost.tets:,} tets", ">= 5 M updates / CPU-s", f"{cost.armed:.1f} M", cost.armed >= 5.0
     )
@@ -143,7 +143,9 @@ def of_fracture(cost: Armed, bars: Sequence[Shattered]) -> Iterator[Gate]:
 
 
 def of_contact(costs: Sequence[Cost]) -> Iterator[Gate]:
-    """Yields the requirements of contact: cost over that of the elements, and speed of a step with all features."""
+    """Yields the requirements on contact: its cost over the cost of the elements, and the speed of a step with all
+    features.
+    """
     for cost in costs:
         what = f"{cost.scene.name}, {cost.outcome.elements:,} tets"
         yield Gate(f"{what}: contact over elements", "<= 1", f"{cost.contact:.2f}", cost.contact <= 1.0)

@@ -1,8 +1,8 @@
 """Lower limit of the cost of any tet code: read positions and velocities of four nodes, and add to the forces of four
 nodes.
 
-No mechanics is computed. The speed is an upper limit on this machine for any loop over the elements with one pass
-over the mesh.
+The loop computes no mechanics. The measured speed is an upper limit on this machine for any loop over the elements with
+one pass over the mesh.
 """
 
 import time
@@ -28,7 +28,7 @@ def _sweep(x, v, force, tets):  # type: ignore[no-untyped-def]
 
 
 class GatherScatter:
-    """Loops over the mesh of a simulation, in its order, on separate arrays."""
+    """Loops over the mesh of a simulation, in the order of its tets, on separate arrays."""
 
     def __init__(self, sim: Simulation) -> None:
         nodes = sim.model.nodes

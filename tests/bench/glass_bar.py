@@ -1,8 +1,9 @@
-"""The glass bar of the paper: position of the failure front, swelling of the glass behind it, number of nodes and
-fragments over time.
+"""The glass bar of the paper: position of the failure front, swelling of the glass behind the front, number of nodes
+and fragments over time.
 
-``python -m tests.bench glass_bar`` runs the shipped case with coarser elements. ``python -m tests.bench.glass_bar
-FOLDER PNG`` reads a finished run with the element size of the paper, and draws it at four times.
+The command ``python -m tests.bench glass_bar`` runs the shipped case with coarser elements. The command
+``python -m tests.bench.glass_bar FOLDER PNG`` reads a finished run with the element size of the paper, and draws the
+bar at four times.
 """
 
 import csv
@@ -27,18 +28,18 @@ from .table import Cell, table
 
 Floats = npt.NDArray[np.float64]
 SIZES = ("2.4 mm", "1.8 mm", "1.2 mm")
-"""Element sizes; the case has 0.9 mm."""
+"""Element sizes of the runs; the case has 0.9 mm."""
 LENGTH, RADIUS, SOUND = 170e-3, 6.35e-3, 5367.0
 """Length and radius of the glass bar, m; its bar wave speed sqrt(E / rho), m/s."""
 _SLICE = 5e-3
 """Thickness of the slices in which nodes are counted, m."""
 _FAILED = 1.1
-"""Ratio of the number of nodes in a slice to the initial one above which the slice has failed. The front is at the
-end of the failed slices that are connected to the impact face."""
+"""Ratio of the present to the initial number of nodes in a slice, above which the slice has failed. The failure front
+is at the end of the failed slices that are connected to the impact face."""
 _EVERY = 10e-6
-"""Time between two rows of a table, s."""
+"""Time between two rows of the table, s."""
 _BEHIND = 3e-6
-"""Time after the passage of the front from which means are taken, s."""
+"""Time after the passage of the failure front from which means are taken, s."""
 _LOADED = 39e-6
 """Time until which the steel bar pushes, s: its own wave returns after 2 * 100 mm / 5048 m/s."""
 _DRAWN = (10e-6, 30e-6, 60e-6, 110e-6)
@@ -47,7 +48,7 @@ _DRAWN = (10e-6, 30e-6, 60e-6, 110e-6)
 
 @dataclass(frozen=True)
 class Moment:
-    """A frame of the bar, SI."""
+    """Frame of the bar, SI units."""
 
     time: float
     front: float
@@ -55,26 +56,27 @@ class Moment:
     nodes: int
     """Number of nodes of the glass."""
     swelling: float
-    """Mean radius of the rim behind the front over the initial one; 1 without a front."""
+    """Mean radius of the rim behind the failure front over the initial radius; 1 without a front."""
     outward: float
-    """Mean radial velocity of that rim."""
+    """Mean radial velocity of the rim behind the failure front."""
     pieces: fragments.Summary
     """Fragments of the glass."""
 
 
 @dataclass(frozen=True)
 class Bar:
-    """A run."""
+    """Results of a run."""
 
     size: str
     outcome: Outcome
     course: list[Moment]
     work: list[tuple[float, int, float]]
-    """Periods between two reports: time at the end, s, number of steps, CPU time of all ranks without waiting, s."""
+    """Periods between two reports, each with the time at its end, s, its number of steps, and the CPU time of all ranks
+    without waiting, s."""
 
 
 def measure(sizes: Sequence[str], ranks: int = 2) -> Iterator[Bar]:
-    """Runs the shipped case with these element sizes, one after the other."""
+    """Runs the shipped case with the given element sizes, one run after the other."""
     for size in sizes:
         with tempfile.TemporaryDirectory() as place:
             folder = Path(place) / "run"
@@ -113,8 +115,8 @@ def _glass(file: h5py.File) -> tuple[Floats, Floats, Floats]:
 
 
 def front_of(z: Floats, start: Floats) -> float:
-    """Returns the distance from the impact face up to which nodes have separated, m; arguments: initial axial
-    positions of all present nodes, and of the initial nodes.
+    """Returns the distance from the impact face up to which nodes have separated, m. The arguments are the initial
+    axial positions of all present nodes, and those of the initial nodes.
     """
     cuts = np.arange(0.0, LENGTH + _SLICE / 2.0, _SLICE)
     cuts[0], cuts[-1] = -np.inf, np.inf
@@ -123,7 +125,7 @@ def front_of(z: Floats, start: Floats) -> float:
 
 
 def moment(folder: Path, index: int, frame: Path, start: Floats) -> Moment:
-    """Reads a frame; ``start``: initial axial positions of the nodes of the glass."""
+    """Reads a frame; ``start`` has the initial axial positions of the nodes of the glass."""
     with h5py.File(frame) as file:
         x0, x, v = _glass(file)
     time = _time(frame)
@@ -140,14 +142,16 @@ def moment(folder: Path, index: int, frame: Path, start: Floats) -> Moment:
 
 
 def report(bars: Sequence[Bar]) -> str:
-    """Returns a table with one row for each run, and a table over time of the finest run."""
+    """Returns a table with one row for each run, and a table over time of the run with the finest mesh."""
     head = ["size", "tets", "nodes at first", "nodes", "ratio", "front stops at, mm", "its speed to 50 mm, mm/us",
             "rim, m/s", "pieces", "dust, of the mass", "residual", "wall s", "CPU s", "M upd/s"]  # fmt: skip
     return f"{table(head, [_row(bar) for bar in bars])}\n\n{bars[-1].size}:\n\n{course(bars[-1])}"
 
 
 def waves(folder: Path) -> str:
-    """Returns peaks, and means behind the front, at the probes before the release wave arrives from the far end."""
+    """Returns the peaks, and the means behind the wave front, at the probes before the release wave arrives from the
+    far end.
+    """
     with (folder / layout.HISTORY).open(encoding="utf-8") as file:
         named = [{history.split(name)[0]: text for name, text in line.items()} for line in csv.DictReader(file)]
     lines = [{name: float(text) for name, text in line.items() if name != "limiter"} for line in named]
@@ -174,12 +178,14 @@ def _row(bar: Bar) -> list[Cell]:
 
 
 def arrested(moments: Sequence[Moment]) -> float:
-    """Returns the position of the front when the wave returned from the far end, m."""
+    """Returns the position of the failure front at the time at which the wave returned from the far end, m."""
     return max((m.front for m in moments if m.time < LENGTH / SOUND), default=0.0)
 
 
 def course(bar: Bar) -> str:
-    """Returns a table over time; M upd/s: element updates per CPU second since the previous row, in millions."""
+    """Returns a table over time; the column M upd/s has the element updates per CPU second since the previous row, in
+    millions.
+    """
     head = ["t, us", "front, mm", "speed, mm/us", "rim radius", "rim, m/s", "glass nodes", "pieces", "dust", "largest",
             "M upd/s"]  # fmt: skip
     chosen = [bar.course[0]]

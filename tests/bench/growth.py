@@ -1,7 +1,7 @@
 """Growth of cost and memory with the mesh: an elastic structured box without viscosity, of 50,000 to 5 million tets.
 
-``armed``: the box is of glass that may fracture and may be in contact with itself; the stretch is so small that no
-facet breaks.
+In the variant ``armed`` the box is of glass that may fracture and may be in contact with itself; the stretch is so
+small that no facet breaks.
 """
 
 import json
@@ -23,7 +23,7 @@ from .table import Cell, table
 
 @dataclass(frozen=True)
 class Growth:
-    """Result for one size: CPU time per tet and step, ns, and memory of the process, bytes."""
+    """Result for one mesh size: CPU time per tet and step, ns, and memory of the process, bytes."""
 
     armed: bool
     tets: int
@@ -33,27 +33,29 @@ class Growth:
     limit: float
     """CPU time of gather and scatter alone per tet and step, ns; the fastest measurement."""
     base: int
-    """Resident memory with all libraries and kernels loaded, before the mesh, bytes."""
+    """Resident memory of the process with all libraries and kernels loaded, before the mesh is loaded, bytes."""
     peak: int
-    """Largest resident memory during the setup of the model, with its mesh in the cache, bytes."""
+    """Largest resident memory during the setup of the model, with the mesh in the cache, bytes."""
     steady: int
     """Resident memory during the steps, bytes."""
 
     def bytes_a_tet(self, smaller: "Growth") -> tuple[float, float]:
-        """Returns the increase of memory per tet between two sizes, bytes: at the peak, and during the steps."""
+        """Returns the increase of memory per tet between two mesh sizes, bytes: the increase at the peak, and during
+        the steps.
+        """
         more = self.tets - smaller.tets
         return (self.peak - smaller.peak) / more, (self.steady - smaller.steady) / more
 
     @property
     def bytes_each(self) -> tuple[float, float]:
-        """Returns the memory per tet without that of a process without a mesh, bytes: at the peak, and during the
-        steps."""
+        """Returns the memory per tet without the memory of a process without a mesh, bytes: the values at the peak, and
+        during the steps."""
         return (self.peak - self.base) / self.tets, (self.steady - self.base) / self.tets
 
 
 def measure(sizes: Sequence[int], rounds: int = 4) -> list[Growth]:
-    """Measures elastic, then armed boxes. Each runs in a new process for a correct measurement of memory; its mesh
-    is in the cache."""
+    """Measures elastic boxes first, armed boxes afterwards. Each box runs in a new process for a correct measurement of
+    memory; the mesh of the box is in the cache."""
     return [_apart(size, rounds, armed) for armed in (False, True) for size in sizes]
 
 
@@ -67,7 +69,9 @@ def _apart(size: int, rounds: int, armed: bool) -> Growth:
 
 
 def here(size: int, rounds: int, armed: bool) -> Growth:
-    """Measures in this process, which must not have loaded another mesh. Raises RuntimeError if a facet breaks."""
+    """Measures one box in this process, which must not have loaded another mesh. Raises RuntimeError if a facet
+    breaks.
+    """
     base = _resident("VmRSS")
     ride = Ride(scene(size, armed))
     peak = _resident("VmHWM")
@@ -100,7 +104,9 @@ def _resident(name: str) -> int:
 
 
 def report(sizes: Sequence[Growth]) -> str:
-    """Returns a table of cost and memory for each size; the memory per tet is the increase from the previous size."""
+    """Returns a table of cost and memory for each mesh size; the memory per tet is the increase from the previous mesh
+    size.
+    """
     rows: list[list[Cell]] = []
     for before, now in zip([None, *sizes], sizes, strict=False):
         first = next(s for s in sizes if s.armed == now.armed)

@@ -1,10 +1,10 @@
-"""Cost of a change: seven scenes, computed in alternation with the sources of this commit and of an earlier one.
+"""Cost of a change: seven scenes are computed in alternation with the sources of this commit and of an earlier commit.
 
-``python -m tests.bench.guard [COMMIT] [--only SCENE ...]``; the default commit is ``BASE``. The earlier sources are
-checked out below build/guard and use the same Python and libraries; each run has one rank. The printed ratio is the
-median over the rounds of CPU time of this commit over CPU time of the earlier one: above 1 this commit is slower. If
-both digests are equal, the results are bit-identical; otherwise the table has the largest residual of the energy of
-both.
+The command is ``python -m tests.bench.guard [COMMIT] [--only SCENE ...]``; the default commit is ``BASE``. The earlier
+sources are checked out below build/guard and run with the same Python and libraries; each run has one rank. The printed
+ratio is the median over the rounds of the CPU time of this commit over the CPU time of the earlier commit: above 1 this
+commit is slower. If the digests of both commits are equal, the results are bit-identical; otherwise the table has the
+largest energy residual of both commits.
 """
 
 import argparse
@@ -32,7 +32,7 @@ PHASES = "elements", "nodes", "contact", "fracture"
 
 @dataclass(frozen=True)
 class Scene:
-    """A scene: a shipped case or a file of this folder, with assignments."""
+    """A scene of the guard: a shipped case or a file of this folder, with assignments of keys."""
 
     name: str
     case: str
@@ -64,24 +64,26 @@ class Paid:
 
     @property
     def digest(self) -> str:
-        """Digest of the last state."""
+        """Digest of the last state of the run."""
         return str(self.outcome["digest"])
 
     def cpu(self, *phases: str) -> float:
-        """Returns the CPU time of these phases, s; of all phases without names."""
+        """Returns the CPU time of the named phases, s, or of all phases if no phase is named."""
         spent = {name: float(each[0]) for name, each in self.outcome["phases"].items()}
         return sum(spent.get(name, 0.0) for name in phases or spent)
 
 
 @dataclass(frozen=True)
 class Compared:
-    """Rounds of a scene: pairs of the runs of the earlier and of this commit."""
+    """Rounds of a scene: pairs of a run of the earlier commit and a run of this commit."""
 
     scene: Scene
     rounds: list[tuple[Paid, Paid]]
 
     def ratio(self, *phases: str) -> float:
-        """Returns the median ratio over the rounds; 1 if the phases take less than a hundredth of the whole in both."""
+        """Returns the median ratio over the rounds; 1 if the phases take less than a hundredth of the whole time in
+        both commits.
+        """
         pairs = [(there.cpu(*phases), here.cpu(*phases), 0.01 * there.cpu()) for there, here in self.rounds]
         return statistics.median(1.0 if max(there, here) < least else here / there for there, here, least in pairs)
 
@@ -91,7 +93,9 @@ class NoCommitError(Exception):
 
 
 def sources(commit: str) -> Path:
-    """Returns the folder for PYTHONPATH from which the packages of that commit are imported. Raises NoCommitError."""
+    """Returns the folder for PYTHONPATH from which the packages of the given commit are imported. Raises NoCommitError
+    if the commit is not in this repository.
+    """
     place = ROOT / "build" / "guard" / commit
     if not (place / "conoid").is_dir():
         made = subprocess.run(["git", "archive", commit, *HOUSES], cwd=ROOT, capture_output=True)
@@ -103,7 +107,7 @@ def sources(commit: str) -> Path:
 
 
 def run(scene: Scene, place: Path | None) -> Paid:
-    """Runs the scene once with the sources in ``place``, or with the present sources if it is None. Raises
+    """Runs the scene once with the sources in ``place``, or with the present sources if ``place`` is None. Raises
     RuntimeError if the run does not succeed.
     """
     file = Path(__file__).with_name(scene.case)
@@ -125,7 +129,7 @@ def measure(scenes: Sequence[Scene], place: Path) -> Iterator[Compared]:
 
 
 def report(found: Sequence[Compared], commit: str) -> str:
-    """Returns a table; its last column reports whether both results are equal."""
+    """Returns a table; its last column reports whether the results of both commits are equal."""
     head = ["scene", "tets", "steps", f"CPU s at {commit}", "here", "ratio", *PHASES, "answer"]
     return table(head, [_row(each) for each in found])
 
@@ -146,7 +150,7 @@ def _answer(there: Paid, here: Paid) -> str:
 
 
 def main(arguments: Sequence[str]) -> int:
-    """Prints the table; returns 2 for an unknown commit or scene."""
+    """Prints the table; returns 2 if the commit or a scene is unknown."""
     parser = argparse.ArgumentParser(prog="tests.bench.guard", description="CPU time of seven scenes here and there.")
     parser.add_argument("commit", nargs="?", default=BASE)
     parser.add_argument("--only", action="append", metavar="SCENE", help="a scene by how its name begins")

@@ -1,9 +1,9 @@
-"""Plate of Kalthoff and Winkler: edge cracks under shear by an impact between them. The study measures direction, time
-and speed of the crack.
+"""Plate of Kalthoff and Winkler: an impact between two edge cracks loads the cracks in shear. The study measures the
+direction, the time and the speed of the crack.
 
-``python -m tests.bench.kalthoff`` runs all meshes, one after the other. The model is half of the plate, one layer of
-tets between two planes of symmetry (plane strain). Meshes, the slit and the measurement of the crack are those of
-cracks.py.
+The command ``python -m tests.bench.kalthoff`` runs all meshes, one after the other. The model is half of the plate, one
+layer of tets between two planes of symmetry (plane strain). The meshes, the slit and the measurement of the crack are
+the functions of cracks.py.
 """
 
 import pathlib as files
@@ -64,7 +64,7 @@ frames = 0
 is of the same steel and as wide as the distance between the slits; hence the speed of the impact face is half of 33
 m/s."""
 TIP = 50e-3
-"""x of the tip of the slit, m; its y is 0."""
+"""Coordinate x of the tip of the slit, m; the coordinate y of the tip is 0."""
 _NEAR = 20e-3
 """Distance from the tip to which the first part of the crack extends, m."""
 _PUBLISHED: tuple[Cell, ...] = (
@@ -81,14 +81,14 @@ _PUBLISHED: tuple[Cell, ...] = (
     None,
     None,
 )
-"""Results of the test and of computations with extended elements, cohesive zones and phase fields, recalled and not
-checked."""
+"""Results of the experiment and of computations with extended elements, cohesive zones and phase fields, recalled and
+not checked."""
 
 
 @dataclass(frozen=True)
 class Path:
-    """The crack of a run, relative to the tip of the slit. Only facets that open ahead of the slit and above it are
-    included."""
+    """Crack of a run; positions are relative to the tip of the slit. Only facets that open ahead of the slit and above
+    the slit belong to the crack."""
 
     run: Run
 
@@ -109,12 +109,14 @@ class Path:
 
     @cached_property
     def upwards(self) -> "np.ndarray":
-        """Whether each facet (m,) belongs to the crack from the slit, not to a crack from another border."""
+        """Flags (m,): True if a facet belongs to the crack from the slit, False if it belongs to a crack from another
+        border.
+        """
         return np.asarray((self.away[:, 1] > -2.0 * self.run.plan.size) & (self.away[:, 0] > -0.5 * TIP))
 
     def angle(self, most: float) -> float:
-        """Returns the angle to the direction of the slit, degrees: principal axis of the area through the tip, up to
-        the distance ``most``, m."""
+        """Returns the angle between the crack and the direction of the slit, degrees: the principal axis of the open
+        area through the tip, up to the distance ``most``, m."""
         taken = self.upwards & (self.distance <= most)
         if not taken.any():
             return float("nan")
@@ -124,7 +126,7 @@ class Path:
 
     @cached_property
     def reach(self) -> float:
-        """Distance of the crack from the tip at the end, m."""
+        """Distance of the crack tip from the tip of the slit at the end of the run, m."""
         return float(self.distance[self.upwards].max(initial=0.0))
 
     @cached_property
@@ -142,7 +144,7 @@ class Path:
 
     @cached_property
     def share(self) -> float:
-        """Share of the open area that lies within 10 degrees of the angle; the rest is branches and fragments beside
+        """Fraction of the open area that lies within 10 degrees of the angle; the rest is branches and fragments beside
         the crack."""
         turned = np.degrees(np.arctan2(self.away[:, 1], self.away[:, 0]))
         near = self.upwards & (np.abs(turned - self.angle(1.0)) < 10.0)
@@ -150,8 +152,8 @@ class Path:
 
     @property
     def columns(self) -> tuple[float, ...]:
-        """Returns the columns of the table: time of the first broken and the first open facet, us; angle, and angle
-        near the slit, degrees; length, mm; speed over c_R; share."""
+        """Returns the columns of the table: time of the first broken and of the first open facet, us; angle, and angle
+        near the slit, degrees; length, mm; speed over c_R; fraction of the open area."""
         c = self.crack
         relative = self.speed / rayleigh(self.run.made)
         return (
@@ -160,7 +162,9 @@ class Path:
 
 
 def plan(kind: Kind, size: float, seed: int | None = None, *words: str, straight: bool = True) -> Plan:
-    """A mesh of the plate, one element thick; ``size``, m; further assignments; whether the slit is smooth."""
+    """Plan of a run: a mesh of the plate that is one element thick, with the element size ``size``, m, further
+    assignments, and whether the slit is smooth.
+    """
     return Plan("kalthoff", size, kind, seed, (f"boundaries[2].at={size}", *words), CASE, straight)
 
 
@@ -178,7 +182,7 @@ OTHERS = (
 SHOWN = (RANDOM[0], RANDOM[3], OTHERS[4], LATTICES[0], LATTICES[1], LATTICES[3])
 """Plans whose cracks are drawn."""
 _SHOWN = {"split=5": "5 tets a cell", "shear_weight": "shear counts a tenth", "contact": "sides do not meet"}
-"""Names of assignments in the table."""
+"""Names of the assignments in the table."""
 _DIGITS = (1, 1, 1, 1, 1, 2, 2)
 _HEAD = ("breaks, us", "opens, us", "angle, deg", "to 20 mm", "reach, mm", "c / c_R", "within 10 deg")
 
@@ -190,14 +194,16 @@ def measure(plans: Iterable[Plan]) -> Iterator[Path]:
 
 
 def name(some: Plan) -> str:
-    """Returns the name in tables."""
+    """Returns the name of the plan in tables."""
     variants = [text for key, text in _SHOWN.items() if any(key in word for word in some.words)]
     rough = some.kind == "gmsh" or not some.straight
     return ", ".join([some.name, *variants, *(["rough slit"] if rough else [])])
 
 
 def report(paths: Sequence[Path]) -> str:
-    """Returns tables of the results beside the published ones, and of the scatter of the random meshes of one size."""
+    """Returns tables of the results beside the published results, and of the scatter of the random meshes of one
+    element size.
+    """
     rows: list[list[Cell]] = [list(_PUBLISHED)] + [
         [name(p.run.plan), p.run.tets, *_texts(p.columns), p.run.steps, round(p.run.cpu), p.run.worst] for p in paths
     ]
@@ -218,14 +224,14 @@ def _texts(values: Iterable[float]) -> list[Cell]:
 
 
 def draw(paths: Sequence[Path], out: files.Path) -> None:
-    """Draws the open facets of SHOWN as a PNG."""
+    """Draws the open facets of the plans in SHOWN as a PNG."""
     from . import plot
 
     plot.paths([p.run for p in paths if p.run.plan in SHOWN], out, (-25.0, 75.0))
 
 
 def main() -> int:
-    """Runs every mesh; prints a line after each run, then the tables, and draws a picture in build/bench."""
+    """Runs every mesh; prints a line after each run and the tables at the end, and draws a picture in build/bench."""
     paths = []
     for path in measure((*RANDOM, *LATTICES, *OTHERS)):
         paths.append(path)

@@ -1,9 +1,9 @@
-"""A server under load: ``python -m tests.bench.load [SECONDS]``.
+"""A server under load: the command is ``python -m tests.bench.load [SECONDS]``.
 
-A thousand runs wait while a run with 64 ranks sends messages ten times per second and a snapshot every two seconds.
-20 clients watch this run, ten over Zenoh and ten over SSE. Meanwhile GET requests are sent 20 times per second. Then
-the server is killed and started again. Each client is a process; no physics is computed. The memory of the server is
-printed every minute: with 3600 s it shows whether the memory grows.
+A thousand runs wait while a run with 64 ranks sends messages ten times per second and a snapshot every two seconds. 20
+clients watch this run, ten over Zenoh and ten over SSE. During this time GET requests are sent 20 times per second. At
+the end the server is killed and started again. Each client is a separate process; no physics is computed. The memory of
+the server is printed every minute: a measurement of 3600 s shows whether the memory grows.
 """
 
 import json
@@ -37,7 +37,8 @@ from .table import table
 ROOT = Path(__file__).parents[2]
 WORKER = f"{sys.executable} {Path(__file__).with_name('load_worker.py')}"
 RANKS, QUEUED, WATCHERS, ASKS = 64, 1000, 20, 20.0
-"""Ranks of the run; number of waiting runs; number of readers of the stream; GET requests per second."""
+"""Number of ranks of the run; number of waiting runs; number of readers of the stream; number of GET requests per
+second."""
 _STARTS = 120.0
 _CASE = {
     "name": "load",
@@ -52,7 +53,7 @@ _CASE = {
 
 @dataclass
 class Seen:
-    """Results; times in s, memory in bytes."""
+    """Results of the measurement; times in s, memory in bytes."""
 
     answers: dict[str, list[float]] = field(default_factory=dict)
     stream: dict[str, list[float]] = field(default_factory=dict)
@@ -66,7 +67,7 @@ class Seen:
 
 
 def measure(seconds: float) -> Seen:
-    """Measures one server under load for this time."""
+    """Measures one server under load for the given time."""
     seen = Seen()
     with TemporaryDirectory(prefix="conoid-load-") as place:
         runs = Path(place) / "runs"
@@ -94,7 +95,7 @@ def measure(seconds: float) -> Seen:
 
 
 def _fill(runs: Path, seconds: float) -> str:
-    """Creates the folders of all runs as a server does; returns a token."""
+    """Creates the folders of all runs with the methods of a server; returns a token."""
     store = Store(f"sqlite:///{runs / 'server.sqlite'}")
     token = create_token(store, "ann", frozenset({"read", "submit"}))
     for n in range(QUEUED + 1):
@@ -113,7 +114,7 @@ def _fill(runs: Path, seconds: float) -> str:
 
 @contextmanager
 def _served(runs: Path) -> Iterator[tuple["subprocess.Popen[bytes]", str]]:
-    """Yields a server on the folder when it answers."""
+    """Yields a server on the folder as soon as the server answers."""
     address = runs / "server.json"
     address.unlink(missing_ok=True)
     words = [sys.executable, "-m", "conoid.server", "--runs", str(runs), "--port", "0", "--zenoh-port", "0"]
@@ -163,7 +164,7 @@ def _watchers(url: str, token: str, run: str, kind: str, seconds: float) -> "sub
 
 
 def _ask(http: httpx2.Client, run: str, pid: int, seconds: float, seen: Seen) -> None:
-    """Sends GET requests of all kinds at their times; measures CPU time and memory of the server meanwhile."""
+    """Sends GET requests of all kinds at their scheduled times, and measures CPU time and memory of the server."""
     began, cpu = time.monotonic(), _cpu(pid)
     kinds = {
         "a run": f"/v1/runs/{run}",
@@ -188,7 +189,7 @@ def _ask(http: httpx2.Client, run: str, pid: int, seconds: float, seen: Seen) ->
 
 
 def _cpu(pid: int) -> float:
-    """Returns the CPU time of all threads, s."""
+    """Returns the CPU time of all threads of the server, s."""
     fields = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
     return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
 
@@ -198,7 +199,9 @@ def _memory(pid: int) -> int:
 
 
 def watch(url: str, token: str, run: str, kind: str, seconds: float) -> None:
-    """Runs half of the clients: prints when all of them follow, then the delay of each message, s."""
+    """Runs half of the clients: prints a line when all of these clients follow the run, and later the delay of each
+    message, s.
+    """
     late: list[float] = []
     with Session(url, token) as session:
         info = session.run(run).status()
@@ -233,7 +236,7 @@ def _by_zenoh(
 
 
 def _by_sse(session: Session, run: str, last: int, seconds: float, late: list[float], ready: threading.Barrier) -> None:
-    """Messages from before the subscription are not counted."""
+    """Messages that were sent before the subscription are not counted."""
     began, deadline = 0.0, math.inf
     for message in session.stream(f"/v1/runs/{run}/stream", last):
         if not began:
@@ -250,14 +253,14 @@ def _at(values: Sequence[float], share: float) -> float:
 
 
 def _growth(seen: Seen) -> str:
-    """Returns the growth of memory in the second half, from a fitted straight line."""
+    """Returns the growth of the memory in the second half of the measurement, from a fitted straight line."""
     half = seen.memory[len(seen.memory) // 2 :]
     slope = statistics.linear_regression(*zip(*half, strict=True)).slope if len(half) > 1 else 0.0
     return f"in the end {slope * 60 / 1e6:+.2f} MB a minute"
 
 
 def tables(seen: Seen) -> str:
-    """Returns the tables."""
+    """Returns the tables of the results."""
     every = [value for values in seen.answers.values() for value in values]
     streams = [value for values in seen.stream.values() for value in values]
     rows = {**seen.answers, "all GETs": every, **{f"stream, {k}": v for k, v in seen.stream.items()}}

@@ -1,7 +1,7 @@
 """A worker that computes no physics, and sends the messages of 64 ranks: reports ten times per second, a snapshot every
 two seconds.
 
-The program is its own launcher, too: called as ``mpiexec -n N COMMAND`` it executes the command once.
+The program is also its own launcher: called as ``mpiexec -n N COMMAND`` it executes the command once.
 """
 
 import argparse
@@ -20,7 +20,7 @@ from conoid.worker.output.journal import Journal
 from conoid.worker.output.telemetry import Telemetry
 
 RATE = 10.0
-"""Reports per second."""
+"""Number of reports per second."""
 SNAPSHOT = 2.0
 """Time between two snapshots, s."""
 BLOB = 1_000_000
@@ -53,7 +53,7 @@ def main(words: list[str]) -> int:
 
 
 def _talk(journal: Journal, folder: Path, ranks: int, seconds: float) -> None:
-    """Sends the messages at their times, for this number of seconds."""
+    """Sends the messages at their scheduled times, for the given number of seconds."""
     began = time.monotonic()
     (folder / layout.SNAPSHOTS).mkdir(exist_ok=True)
     step, shots, dice = 0, 0, random.Random(1)

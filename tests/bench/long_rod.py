@@ -1,6 +1,7 @@
-"""Long rod through six plates: penetration over mesh, speed, erosion, pressure form, friction and strength.
+"""Long rod through six plates: the study measures the penetration for different meshes, speeds, erosion criteria,
+pressure forms, friction coefficients and strengths.
 
-Every run is the shipped case with a few assignments, on two ranks. The runs follow one after the other.
+Every run is the shipped case with a few changed keys, on two ranks. The runs of the study follow one after the other.
 """
 
 import json
@@ -31,8 +32,8 @@ PARTS = range(7)
 LENGTH = 75.0
 """Length of the rod, mm."""
 BANDS = {"1057 m/s": (0.60, 0.80), "1301 m/s": (0.85, 1.05), "1566.4 m/s": (1.00, 1.20)}
-"""P/L of a tungsten rod in mild steel by the theory of Alekseevskii and Tate. The rod strength of 1.5 to 2 GPa and
-the target resistance of 3 to 3.5 GPa are assumptions, not derived from the constants of the case."""
+"""Ratio P/L of a tungsten rod in mild steel by the theory of Alekseevskii and Tate. The rod strength of 1.5 to 2 GPa
+and the target resistance of 3 to 3.5 GPa are assumptions, not derived from the constants of the case."""
 _RADIUS, _THICKNESS = 3.5e-3, 22e-3
 """Radius of the rod, and thickness of a plate, m."""
 _CRATER = (6.0, 40.0)
@@ -41,12 +42,12 @@ _CRATER = (6.0, 40.0)
 
 @dataclass(frozen=True)
 class Variant:
-    """One run: changed keys of the shipped case."""
+    """Plan of one run: changed keys of the shipped case."""
 
     name: str
     assignments: tuple[str, ...] = ()
     yields: tuple[tuple[str, float], ...] = ()
-    """Materials and their constant A, GPa, if it differs from the library."""
+    """Names of materials with their constant A, GPa, if A differs from the library."""
 
 
 def eroding(key: str, value: object) -> tuple[str, ...]:
@@ -61,7 +62,7 @@ def meshed(size: float, **grading: float) -> tuple[str, ...]:
 
 
 def sector(name: str, *planes: str) -> tuple[str, ...]:
-    """Returns assignments of another sector of every part, with planes of symmetry across these axes."""
+    """Returns assignments of another sector of every part, with planes of symmetry across the given axes."""
     bounds = ", ".join(f'{{kind="symmetry", axis="{axis}"}}' for axis in planes)
     return *(f"parts[{k}].mesh.sector={name}" for k in PARTS), f"boundaries=[{bounds}]"
 
@@ -97,7 +98,9 @@ OTHERS = (
 
 @dataclass(frozen=True)
 class Moment:
-    """Values of a frame: time, s; depth and ends of the rod, m; speed of its last 8 mm, m/s. NaN without a rod."""
+    """Values of a frame: time, s; depth of the hole and ends of the rod, m; speed of the last 8 mm of the rod, m/s. A
+    value is NaN if the frame has no rod.
+    """
 
     t: float
     depth: float
@@ -114,13 +117,13 @@ class Shot:
     outcome: Outcome
     depth: float
     crater: float
-    """Mean diameter in the depths of _CRATER."""
+    """Mean diameter of the crater in the depths of _CRATER."""
     course: tuple[Moment, ...]
-    """Values of each frame."""
+    """Values of each frame of the run."""
 
 
 def measure(variants: Sequence[Variant], ranks: int = 2) -> Iterator[Shot]:
-    """Runs every variant, one after the other."""
+    """Runs the variants one after the other."""
     for variant in variants:
         with tempfile.TemporaryDirectory(prefix="conoid-bench-") as folder:
             yield run(variant, Path(folder), ranks)
@@ -142,7 +145,7 @@ def run(variant: Variant, folder: Path, ranks: int) -> Shot:
 
 
 def _stronger(name: str, strength: float) -> dict[str, Any]:
-    """Returns a material of the library with another A, GPa."""
+    """Returns a material of the library with another constant A, GPa."""
     table: dict[str, Any] = library()[name].model_dump(exclude_none=True)
     table["strength"]["A"] = 1e9 * strength
     return table
@@ -151,8 +154,8 @@ def _stronger(name: str, strength: float) -> dict[str, Any]:
 def crater(frame: Path) -> float:
     """Returns the mean diameter of the hole in the plates of a frame, m, from the outward faces of the remaining tets.
 
-    In each of nine sectors and slices the innermost faces are the wall of the hole. The result is the median over
-    all, so that a flake in the hole has no effect.
+    In each of nine sectors and slices the innermost faces are the wall of the hole. The result is the median over all
+    sectors and slices, so that a flake in the hole has no effect.
     """
     with h5py.File(frame) as file:
         grid = file["VTKHDF"]
@@ -190,9 +193,9 @@ def moment(frame: Path) -> Moment:
 
 
 def course(moments: Sequence[Moment]) -> str:
-    """Returns a table of depth and speed of the rod over time, with the rod strength from the deceleration of its
-    tail and the resistance at its nose. The equations of Alekseevskii and Tate are applied to 30 us around each row:
-    Y = -rho L dV/dt, R = rho (V - U)^2 / 2 + Y - rho_t U^2 / 2.
+    """Returns a table of the depth and the speed of the rod over time. The table has the rod strength from the
+    deceleration of the tail and the target resistance at the nose. The equations of Alekseevskii and Tate are applied
+    to 30 us around each row: Y = -rho L dV/dt, R = rho (V - U)^2 / 2 + Y - rho_t U^2 / 2.
     """
     rows: list[list[Cell]] = []
     for before, now, after in zip(moments, moments[3:], moments[6:], strict=False):
@@ -208,7 +211,7 @@ def course(moments: Sequence[Moment]) -> str:
 
 
 def report(shots: Sequence[Shot]) -> str:
-    """Returns a table."""
+    """Returns a table of all variants."""
     head = ["variant", "tets", "eroded", "steps", "wall s", "CPU s", "contact / elements", "residual", "P mm", "P/L",
             "crater mm"]  # fmt: skip
     return table(head, [_row(shot) for shot in shots])

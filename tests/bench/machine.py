@@ -1,4 +1,4 @@
-"""Description of the machine and software of a measurement."""
+"""Description of the machine and the software of a measurement."""
 
 import os
 import platform
@@ -20,8 +20,8 @@ def describe() -> dict[str, str]:
 
 
 def load() -> str:
-    """Returns the number of runnable processes, mean over 1, 5 and 15 minutes. A mean above the number of cores
-    shows that other programs ran, too."""
+    """Returns the number of runnable processes, mean over 1, 5 and 15 minutes. A mean above the number of cores shows
+    that other programs were running, too."""
     return " ".join(f"{mean:.1f}" for mean in os.getloadavg())
 
 

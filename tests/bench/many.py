@@ -1,9 +1,10 @@
-"""A folder of runs without a solver: ``python -m tests.bench.many FOLDER --runs 200 --sweeps 10``.
+"""A folder of runs that no solver computed: the command is
+``python -m tests.bench.many FOLDER --runs 200 --sweeps 10``.
 
-The runs are of three shipped cases and spread over two months; most of them are points of sweeps, and some have
-failed. Each has the files that a server and the page read: submission, case, journal, history.csv, one snapshot,
-outcome. The numbers follow simple laws of the changed keys, so that plots show a trend. The same arguments make the
-same folder, except for the time of day.
+The runs have one of three shipped cases and are spread over two months; most runs are points of sweeps, and some runs
+have failed. Each run has the files that a server and the page read: submission, case, journal, history.csv, one
+snapshot, outcome. The numbers in these files follow simple laws of the changed keys, so that plots show a trend. The
+same arguments make the same folder, except for the time of day.
 """
 
 import argparse
@@ -30,7 +31,7 @@ from .story import Story
 Changes = dict[str, Any]
 _BATCHES = ("first", "second", "paper")
 _DAYS = 60
-"""Period in which the runs were submitted. Chosen."""
+"""Period in which the runs were submitted. Chosen value."""
 
 
 @dataclass(frozen=True)
@@ -53,12 +54,12 @@ class Place:
 
 
 def grid(keys: dict[str, Sequence[Any]]) -> list[Changes]:
-    """Returns each value of a key combined with each value of the other keys."""
+    """Returns each combination of the values of the keys."""
     return [dict(zip(keys, row, strict=True)) for row in product(*keys.values())]
 
 
 def plans(sweeps: int) -> list[Planned]:
-    """Yields this number of sweeps; the first ones of each kind show the clearest trend."""
+    """Yields the given number of sweeps; the first sweeps of each kind show the clearest trend."""
     speed, wide = "parts[0].velocity[2]", "parts[1].mesh.element_size"
     kinds = [
         Planned("glass_steel_demo", "speed", [{speed: f"{v} m/s"} for v in range(60, 301, 20)]),
@@ -74,7 +75,7 @@ def plans(sweeps: int) -> list[Planned]:
 
 
 def lay(runs: Path, number: int = 200, sweeps: int = 10, owner: str = OWNER, seed: int = 1) -> list[str]:
-    """Creates the folders of ``number`` runs of an owner; returns the ids, oldest first."""
+    """Creates the folders of ``number`` runs of an owner; returns the ids of the runs, the oldest first."""
     draw = random.Random(seed)
     runs.mkdir(exist_ok=True, mode=0o700)
     jobs = list(_jobs(plans(sweeps), number, draw))
@@ -92,7 +93,7 @@ def lay(runs: Path, number: int = 200, sweeps: int = 10, owner: str = OWNER, see
 
 
 def _jobs(planned: Sequence[Planned], number: int, draw: random.Random) -> Iterator[Planned]:
-    """Yields the sweeps and single runs between them, up to the requested number of runs."""
+    """Yields sweeps, and single runs between the sweeps, up to the requested number of runs."""
     alone = number - sum(len(each.points) for each in planned)
     left, rest = list(planned), max(0, alone)
     while left or rest > 0:
@@ -105,7 +106,7 @@ def _jobs(planned: Sequence[Planned], number: int, draw: random.Random) -> Itera
 
 
 def _id(at: float, draw: random.Random) -> str:
-    """Returns an id as ``folder.new_id`` does, for another time."""
+    """Returns an id with the format of ``folder.new_id``, for another time of submission."""
     return folder._letters(int(1e6 * at), 11) + folder._letters(draw.getrandbits(55), 11)
 
 
@@ -133,7 +134,7 @@ def _run(runs: Path, place: Place, name: str, changes: Changes, draw: random.Ran
 
 
 def main(arguments: list[str]) -> None:
-    """Creates the runs."""
+    """Creates the folder of runs."""
     words = argparse.ArgumentParser(description=__doc__)
     words.add_argument("folder", type=Path)
     words.add_argument("--runs", type=int, default=200)

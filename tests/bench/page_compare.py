@@ -1,8 +1,8 @@
-"""Speed of the comparison of runs: ``python -m tests.bench.page_compare``.
+"""Speed of the page that compares runs: the command is ``python -m tests.bench.page_compare``.
 
-The server has 200 runs without a solver (``many``). A browser with software rendering compares twelve runs of a
-sweep. Measured are the times until the charts and the table of values and results are complete, and the time to hide
-a run. Each is measured twice: at the first load of the scripts, and again.
+The server has 200 runs that no solver computed (``many``). A browser with software rendering compares twelve runs of a
+sweep. The study measures the times until the charts and the table of values and results are complete, and the time to
+hide a run. Each time is measured twice: at the first load of the scripts, and at a second load.
 """
 
 import argparse
@@ -33,7 +33,7 @@ _HIDDEN = """(async () => {
 
 
 def main(arguments: list[str]) -> None:
-    """Creates the runs, compares some of them, and prints a line for each number."""
+    """Creates the runs, compares some of the runs, and prints a line for each measured time."""
     words = argparse.ArgumentParser(description=__doc__)
     words.add_argument("--runs", type=int, default=200)
     words.add_argument("--compared", type=int, default=_COMPARED)
@@ -60,7 +60,7 @@ def main(arguments: list[str]) -> None:
 
 
 def alike(runs: Path, ids: list[str], number: int) -> list[str]:
-    """Returns consecutive runs, of the same case if there are enough."""
+    """Returns consecutive runs, of the same case if there are enough such runs."""
     sizes = {run: (runs / run / "case.resolved.json").stat().st_size for run in ids}
     starts = range(len(ids) - number + 1)
     first = min(starts, key=lambda k: len({sizes[run] // 64 for run in ids[k : k + number]}))

@@ -1,8 +1,9 @@
-"""Pictures of the page: ``python -m tests.bench.page_pictures RUN``; RUN is the folder of a finished run.
+"""Pictures of the page: the command is ``python -m tests.bench.page_pictures RUN``; RUN is the folder of a finished
+run.
 
-docs/pictures/page.png is the page of a run. ``--all FOLDER`` makes further pictures for inspection: whole pages,
-light and dark, wide, on a phone, at 200 %, with 16 ranks (a run without a solver), the list of runs, a case in the
-editor.
+The picture docs/pictures/page.png shows the page of a run. The option ``--all FOLDER`` makes further pictures for
+inspection: whole pages, light and dark, wide, on a phone, at 200 %, with 16 ranks (a run that no solver computed), the
+list of runs, a case in the editor.
 """
 
 import argparse
@@ -25,7 +26,7 @@ _LOOKS = (
 )  # fmt: skip
 _DRAWN = "[...document.querySelectorAll('.plot')].every((plot) => plot.querySelector('canvas'))"
 _SETTLED = 2.0
-"""Time in s after which the page does not change any more. Chosen."""
+"""Time in s after which the page does not change any more. Chosen value."""
 
 
 def main(arguments: list[str]) -> None:

@@ -1,4 +1,6 @@
-"""A run without a solver: a snapshot with a given number of triangles, and a journal with a given number of events."""
+"""A run that no solver computed: a snapshot with a given number of triangles, and a journal with a given number of
+events.
+"""
 
 import hashlib
 import itertools
@@ -17,16 +19,16 @@ from conoid.cases.run import State
 from tests.server.visitor import OWNER
 
 _AROUND = 20
-"""Triangles of a fragment; each fragment is an icosahedron."""
+"""Number of triangles of a fragment; each fragment is an icosahedron."""
 _GOLDEN = (1.0 + 5.0**0.5) / 2.0
 _SPAN = 0.1
-"""Edge of the box, m."""
+"""Edge of the box that contains the fragments, m."""
 _END = 1e-3
 """End time of the run, s."""
 
 
 def blob(n: int, triangles: int, t: float) -> bytes:
-    """Returns a snapshot of icosahedra on a grid; each is a fragment."""
+    """Returns a snapshot of icosahedra on a grid; each icosahedron is a fragment."""
     fragments = triangles // _AROUND
     points, faces = _icosahedron()
     side = int(np.ceil(fragments ** (1.0 / 3.0)))
@@ -60,7 +62,9 @@ def _column(values: "np.ndarray[Any, Any]") -> Column:
 
 
 def _icosahedron() -> tuple["np.ndarray[Any, Any]", "np.ndarray[Any, Any]"]:
-    """Returns points on the unit sphere (12, 3), and faces (20, 3) of three neighbouring points each."""
+    """Returns the corners of an icosahedron on the unit sphere (12, 3), and its faces (20, 3), each with three
+    neighbouring corners.
+    """
     signs = itertools.product((-1.0, 1.0), (-_GOLDEN, _GOLDEN))
     points = np.array([np.roll((0.0, a, b), turn) for a, b in signs for turn in range(3)])
     near = np.linalg.norm(points[:, None] - points, axis=2) < 2.1
@@ -76,7 +80,7 @@ def take(made: Path, runs: Path) -> None:
 
 
 def lay(folder: Path, made_of: Path, events: int, triangles: int, ranks: int = 2) -> None:
-    """Creates the folder of a finished run like that of ``made_of``, with other events and one snapshot."""
+    """Creates the folder of a finished run with the case of ``made_of``, other events and one snapshot."""
     shutil.copytree(
         made_of, folder, ignore=shutil.ignore_patterns("frames", "checkpoints", "snapshots", layout.JOURNAL)
     )

@@ -1,10 +1,11 @@
-"""Speed of the page: ``python -m tests.bench.page_speed RUN``; RUN is the folder of a finished run.
+"""Speed of the page: the command is ``python -m tests.bench.page_speed RUN``; RUN is the folder of a finished run.
 
-A browser with software rendering opens two runs without a solver: one with a snapshot of 50,000 triangles and a few
-events, one with 200,000 triangles and a million events. Printed are the time of the first paint, the time of the
-history of a million events (first and second request), the time of its page, the time from an address to the first
-picture of the body, script time and draw calls per frame, frames per second, and CPU time per frame of all processes of
-the browser. Other load on the machine affects the CPU time less than the other numbers.
+A browser with software rendering opens two runs that no solver computed: one run with a snapshot of 50,000 triangles
+and a few events, one run with 200,000 triangles and a million events. The command prints the time of the first paint,
+the time of the history of a million events (first and second request), the time of the page with this history, and the
+time from an address to the first picture of the body. It also prints script time and draw calls per frame, frames per
+second, and CPU time per frame of all processes of the browser. Other load on the machine affects the CPU time less than
+the other numbers.
 """
 
 import argparse
@@ -23,9 +24,9 @@ from tests.server.visitor import SHOWN, Site, sign_in
 from .page_scene import lay
 
 _FRAMES = 5.0
-"""Time for which the body is rotated, s. Chosen."""
+"""Time for which the body is rotated, s. Chosen value."""
 _LEAST = 5
-"""Number of frames, however long they take. Chosen."""
+"""Number of frames that are drawn, for any duration of a frame. Chosen value."""
 _TURN = f"""(async () => {{
   const canvas = document.querySelector(".view3d canvas");
   canvas.scrollIntoView({{ block: "center" }});
@@ -43,11 +44,11 @@ _TURN = f"""(async () => {{
   while (seen.frames.length < drawn - 1) await new Promise((done) => setTimeout(done, 100));
   return [seconds, drawn];
 }})()"""
-"""A pixel is read, so that a frame counts when it is drawn, not when it is requested."""
+"""A pixel is read after each frame, so that a frame counts when it is drawn, not when it is requested."""
 
 
 def main(arguments: list[str]) -> None:
-    """Creates the runs, opens them, and prints a line for each number."""
+    """Creates the two runs, opens the runs, and prints a line for each number."""
     words = argparse.ArgumentParser(description=__doc__)
     words.add_argument("run", type=Path)
     words.add_argument("--events", type=int, default=1_000_000)

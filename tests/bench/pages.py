@@ -1,4 +1,6 @@
-"""The page of the verification catalogue: one line for each row, then the details of each row; failed rows are red."""
+"""The page of the verification catalogue: one line for each row of the catalogue, followed by the details of each row;
+failed rows are red.
+"""
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -8,9 +10,9 @@ from .table import Cell, table
 
 RED, GREEN, GREY = "🔴", "🟢", "⚪"
 _HELD = 3
-"""Number of assertions of a test that are shown. Chosen."""
+"""Number of assertions of a test that the page shows. Chosen value."""
 _WIDE = 96
-"""Number of characters of an assertion that are shown. Chosen."""
+"""Number of characters of an assertion that the page shows. Chosen value."""
 
 
 @dataclass
@@ -92,7 +94,9 @@ def _line(row: Mapping[str, Any], parts: Mapping[str, Any]) -> Line:
 
 
 def _add_case(line: Line, name: str, runs: Mapping[str, Any]) -> None:
-    """Returns the lines of the references. References of the coarser run are shown, but do not make a row fail."""
+    """Returns the lines of the references of a case. References of the coarser run are shown, but do not make a row of
+    the catalogue fail.
+    """
     for label in ("as it is", "coarser"):
         outcome = runs.get(f"{name}|{label}")
         if outcome is None:

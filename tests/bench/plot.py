@@ -23,9 +23,9 @@ _MARKS = {"standard": "s", "nodal": "o", "split": "^"}
 
 
 def speed_and_error(answers: Sequence[Answer], path: Path, limits: dict[tuple[str, str], float] | None = None) -> None:
-    """Draws final length and foot radius of both bars over the CPU time as a PNG, one line for each pressure form.
-    The band is the tolerance of the reference in the case; ``limits``: results of another method, by bar and
-    quantity.
+    """Draws the final length and foot radius of both bars over the CPU time as a PNG, one curve for each pressure form.
+    The shaded band is the tolerance of the reference in the case; ``limits`` has the results of another method, by bar
+    and quantity.
     """
     figure, axes = plt.subplots(2, 2, figsize=(10, 7), sharex="row", layout="constrained")
     for row, bar in enumerate(BARS):
@@ -44,8 +44,8 @@ def speed_and_error(answers: Sequence[Answer], path: Path, limits: dict[tuple[st
 
 
 def paths(runs: Sequence[Run], path: Path, across: tuple[float, float] = (-20, 20)) -> None:
-    """Draws the open facets of plates with a slit as a PNG, one panel for each mesh, coloured by the time of
-    opening. ``across``: range of y, mm.
+    """Draws the open facets of plates with a slit as a PNG, one panel for each mesh, coloured by the time of opening.
+    The argument ``across`` is the range of y, mm.
     """
     size = 10, 2.4 + 0.055 * (across[1] - across[0])
     figure, axes = plt.subplots(-(-len(runs) // 3), 3, figsize=size, sharex=True, sharey=True, layout="constrained")
@@ -64,8 +64,8 @@ def paths(runs: Sequence[Run], path: Path, across: tuple[float, float] = (-20, 2
 
 
 def growth(sizes: Sequence[Growth], path: Path) -> None:
-    """Draws CPU time per tet and step, and bytes per tet, over the number of tets as a PNG, elastic and armed. The
-    memory of a process without a mesh is subtracted.
+    """Draws CPU time per tet and step, and bytes per tet, over the number of tets as a PNG, for elastic and armed
+    boxes. The memory of a process without a mesh is subtracted from the bytes.
     """
     figure, (cost, memory) = plt.subplots(1, 2, figsize=(10, 4), layout="constrained")
     for armed, name in ((False, "elastic"), (True, "fracture and contact armed")):
@@ -88,8 +88,8 @@ def growth(sizes: Sequence[Growth], path: Path) -> None:
 
 
 def domains(found: Mapping[str, Sequence[Ranks]], steps: int, path: Path) -> None:
-    """Draws faces and CPU time of each rank for box and arbitrary contact domains, and their course on two ranks, as
-    a PNG."""
+    """Draws faces and CPU time of each rank for box and arbitrary contact domains as a PNG, and the change with time on
+    two ranks."""
     figure, (looked, cpu, course) = plt.subplots(1, 3, figsize=(14, 4), layout="constrained")
     for name, colour, shift in zip(DOMAINS, (_COLOURS["split"], _COLOURS["nodal"]), (-0.2, 0.2), strict=True):
         numbers = kinds(found[name], steps)

@@ -1,7 +1,8 @@
-"""The plate of ``plugging_weldox`` at three speeds, on several meshes, compared with the published test; also the
-effect of single model choices.
+"""The plate of ``plugging_weldox`` at three impact speeds, on several meshes, compared with the published experiment;
+further runs show the effect of single model choices.
 
-``python -m tests.bench.plugging [NAME...]`` runs the named variants, or all, on one rank, one after the other.
+The command ``python -m tests.bench.plugging [NAME...]`` runs the named variants, or all variants, on one rank, one
+after the other.
 """
 
 import json
@@ -26,15 +27,17 @@ PUBLISHED = {399.6: 291.3, 285.4: 181.1, 244.2: 132.6}
 """Speeds of the projectile before and after the plate, m/s: Borvik and others 1999, recalled and not checked against
 the publication."""
 ENDS = {399.6: "60 us", 285.4: "90 us", 244.2: "110 us"}
-"""End time of a run; by then the projectile is through the plate, or counts as stopped."""
+"""End time of a run; by this time the projectile is through the plate, or counts as stopped."""
 FINE = 0.4
-"""Element size, mm, up to which fine tets fill a band of 0.45 mm on either side of the rim; for larger tets the band
-has 0.7 mm."""
+"""Element size, mm, up to which fine tets fill a band of 0.45 mm on either side of the rim; for larger tets the width
+of the band is 0.7 mm."""
 
 
 @dataclass(frozen=True)
 class Variant:
-    """One run: the speed, m/s, changed keys of the case, and changed constants of the plate's strength."""
+    """Plan of one run: the impact speed, m/s, changed keys of the case, and changed constants of the plate's
+    strength.
+    """
 
     name: str
     speed: float
@@ -45,7 +48,7 @@ class Variant:
 
 def meshed(size: float) -> tuple[str, ...]:
     """Returns assignments of another element size below the rim of the projectile, mm. The band of fine tets is
-    narrower, so that their number halves.
+    narrower for small tets, so that the number of fine tets halves.
     """
     band = ("parts[1].mesh.grading.near=0.45 mm",) if size <= FINE else ()
     return (f"parts[1].mesh.element_size={size:g} mm", *band)
@@ -74,7 +77,7 @@ CAUSES = (
     Variant("1 mm, D2 30 % lower", 285.4, _COARSE, (("D2", 1.212),)),
     Variant("1 mm, projectile elastic", 285.4, (*_COARSE, "materials.arne.strength.yield_stress=20 GPa")),
 )
-"""Variants; each differs from the first one in one point."""
+"""Variants of the case; each variant differs from the first variant in one point."""
 
 
 @dataclass(frozen=True)
@@ -112,16 +115,16 @@ def run(variant: Variant, folder: Path) -> Shot:
 
 
 def measure(variants: Sequence[Variant]) -> Iterator[Shot]:
-    """Runs every variant, one after the other."""
+    """Runs the variants one after the other."""
     for variant in variants:
         with tempfile.TemporaryDirectory(prefix="conoid-bench-") as folder:
             yield run(variant, Path(folder))
 
 
 def extrapolated(speed: float, coarse: tuple[float, float], fine: tuple[float, float]) -> float:
-    """Returns the speed behind the plate, m/s, extrapolated to element size 0 from two pairs of element size and
+    """Returns the residual speed, m/s, extrapolated to element size 0 from two pairs of element size and residual
     speed. The energy loss of the projectile is assumed to be linear in the element size, because the work of a shear
-    band of one tet width is.
+    band of the width of one tet is linear in this width.
     """
     (large, one), (small, two) = ((size, speed**2 - left**2) for size, left in (coarse, fine))
     lost = two - small * (one - two) / (large - small)
@@ -145,7 +148,7 @@ def _row(shot: Shot) -> list[Cell]:
 
 
 def main(names: Sequence[str]) -> int:
-    """Runs the named variants, or all; prints a line after each run and the table at the end."""
+    """Runs the named variants, or all variants; prints a line after each run and the table at the end."""
     shots = []
     for shot in measure([variant for variant in (*CURVE, *CAUSES) if not names or variant.name in names]):
         shots.append(shot)

@@ -1,9 +1,10 @@
 """Stiffness of fragmented material under pressure, for several numbers of contact sweeps.
 
-``python -m tests.bench.press [SWEEPS ...]``: a ram presses a quarter of a glass cylinder in a steel bore through a
-hole of half its width. The fragments are supported by contact alone, in chains from the ram to the walls. A driven
-ram has a constant 60 m/s. A free ram starts with 200 m/s, and the run ends after it has stopped; this case is also
-run with half the element size. The tables are in docs/theory/contact.md, "Driven rubble" and "Sweeps by need".
+In ``python -m tests.bench.press [SWEEPS ...]`` a ram presses a quarter of a glass cylinder in a steel bore through a
+hole of half its width. Contact alone supports the fragments, in chains from the ram to the walls. A driven ram has a
+constant speed of 60 m/s. A free ram starts with 200 m/s, and the run ends after the ram has stopped; the free ram also
+runs with half the element size. The resulting tables are in docs/theory/contact.md, "Driven rubble" and "Sweeps by
+need".
 """
 
 import sys
@@ -32,17 +33,17 @@ GLASS = {
 
 @dataclass(frozen=True)
 class Ram:
-    """The ram."""
+    """Properties of the ram."""
 
     name: str
     length: float
     """Length of the ram, mm."""
     speed: float
-    """Speed, m/s."""
+    """Speed of the ram, m/s."""
     end: float
     """End time of the run, s."""
     driven: bool
-    """Whether the speed of the ram is prescribed."""
+    """True if the speed of the ram is prescribed."""
     fine: float = 1.0
     """Element size of all parts, relative to the default."""
 
@@ -57,7 +58,7 @@ class Pressed:
     """Result of a run."""
 
     work: float
-    """Work of the ram, J: its loss of kinetic energy, and the external work on it."""
+    """Work of the ram, J: the sum of its loss of kinetic energy and the external work on the ram."""
     speed: float
     """Final speed of the ram towards the glass, m/s."""
     overlapping: int
@@ -65,7 +66,7 @@ class Pressed:
     overlap: float
     """Penetrated volume over the volume of all tets."""
     cpu: float
-    """CPU time, s."""
+    """CPU time of the run, s."""
 
 
 def _round(name: str, low: float, length: float, size: float, **radii: float) -> dict[str, Any]:
@@ -77,7 +78,7 @@ def _round(name: str, low: float, length: float, size: float, **radii: float) ->
 
 
 def press(sweeps: int | None = None, ram: Ram = DRIVEN) -> Case:
-    """Returns the case; without ``sweeps`` it has the default number of sweeps."""
+    """Returns the case; if ``sweeps`` is missing the case has the default number of sweeps."""
     size = 0.8 * ram.fine
     plug, rod = _round("plug", 0.0, 4.0, size, radius=3.0), _round("ram", 4.0, ram.length, size, radius=2.95)
     fracture = {"model": "cohesive", "delay": 0, "traction": "nodes", "friction": 0.3}
@@ -103,7 +104,7 @@ def press(sweeps: int | None = None, ram: Ram = DRIVEN) -> Case:
 
 
 def measure(case: Case) -> Pressed:
-    """Runs the case."""
+    """Runs the case of a ram."""
     began, sim = time.process_time(), simulation.build(case, Path(), SerialComm())
     ram = np.flatnonzero(sim.model.nodes.part == [part.name for part in case.parts].index("ram"))
     mass, start = sim.model.nodes.mass[ram], sim.model.nodes.v[ram]
@@ -125,7 +126,7 @@ def measure(case: Case) -> Pressed:
 
 
 def main(arguments: Sequence[str]) -> None:
-    """Prints the tables; the row with the default number of sweeps is the last one."""
+    """Prints the tables; the last row has the default number of sweeps."""
     head = ["sweeps", "work of the ram, J", "its speed, m/s", "tets in others", "overlap", "CPU s"]
     for ram in (DRIVEN, FLYING, FINE):
         rows: list[list[Cell]] = []

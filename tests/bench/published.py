@@ -1,6 +1,6 @@
 """Speed-ups measured by Moon, Kim and Lee, compared with those of ``conoid bench scale --out FOLDER``.
 
-``python -m tests.bench.published FOLDER`` prints a table and draws FOLDER/published.svg.
+The command ``python -m tests.bench.published FOLDER`` prints a table and draws FOLDER/published.svg.
 """
 
 import sys
@@ -22,7 +22,7 @@ class Published:
 
     @property
     def source(self) -> str:
-        """Place in the paper."""
+        """Place of the measurements in the paper."""
         return f"Moon, Kim and Lee, {self.figure}"
 
 
@@ -30,13 +30,13 @@ PAPER = {
     "long_rod": Published("fig. 14", {32: 23.79}, "no rebalances"),
     "glass_steel_bar": Published("fig. 19", {16: 0.77 * 16, 32: 18.74}, "18 rebalances on 16"),
 }
-"""Published measurements by case. The text has 58 % for fig. 19 on 32 processors, which is the speed-up of 18.74 in
-its conclusion."""
+"""Published measurements by case. The text of the paper has 58 % for fig. 19 on 32 processors, which is the speed-up of
+18.74 in its conclusion."""
 
 
 def compared(study: Study) -> str:
-    """Returns the published speed-ups beside the projected ones, as Markdown. Raises KeyError for a case without
-    a published speed-up."""
+    """Returns the published speed-ups beside the projected ones, as Markdown. Raises KeyError if the case has no
+    published speed-up."""
     paper = PAPER[study.case]
     projected = {run.ranks: study.speed_up(run) for run in study.runs if run.threads == 1 and not run.by_tasks}
     rows = []
@@ -49,13 +49,13 @@ def compared(study: Study) -> str:
 
 
 def drawn(study: Study) -> str:
-    """Returns the chart of the study as SVG, with the published points if there are any."""
+    """Returns the chart of the study as SVG, with the published points if the case has published points."""
     paper = PAPER.get(study.case)
     return chart.speed_up(study, paper.speed_up, paper.source) if paper else chart.speed_up(study)
 
 
 def main(folder: Path) -> None:
-    """Compares the study in ``folder``."""
+    """Compares the study in ``folder`` with the published speed-ups."""
     study = from_json((folder / "scale.json").read_bytes())
     print(compared(study), end="")
     (folder / "published.svg").write_text(drawn(study), encoding="utf-8")

@@ -1,7 +1,8 @@
-"""A pytest plugin that stores as JSON the assertions of every test with their numbers, its outcome and its CPU time.
+"""A pytest plugin that stores as JSON the assertions of every test with their numbers, the outcome of the test and its
+CPU time.
 
-``pytest -p tests.bench.recorder -o enable_assertion_pass_hook=true --recorded FILE``. The tests need no change:
-pytest calls a hook for each assertion that holds, with the values of its terms.
+The command is ``pytest -p tests.bench.recorder -o enable_assertion_pass_hook=true --recorded FILE``. The tests need no
+change for the recorder: pytest calls a hook for each assertion that holds, with the values of its terms.
 """
 
 import json
@@ -17,7 +18,7 @@ _SIGN = re.compile(r"<|>|==|\bin\b")
 
 
 class Recorder:
-    """Collects the results by node id."""
+    """Collects the results of the tests by node id."""
 
     def __init__(self, path: Path) -> None:
         """Sets the file that is written at the end of the session."""
@@ -26,7 +27,7 @@ class Recorder:
 
     @pytest.hookimpl(wrapper=True)
     def pytest_runtest_call(self, item: pytest.Item) -> Any:
-        """Measures the CPU time of the test and of the processes that it waits for."""
+        """Measures the CPU time of the test and of the processes for which the test waits."""
         began = _cpu()
         try:
             return (yield)
@@ -41,7 +42,7 @@ class Recorder:
             self._entry(item.nodeid)["held"][str(lineno)] = [" ".join(orig.split()), line]
 
     def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
-        """Stores the outcome of the test; a failure of its setup or teardown counts, too."""
+        """Stores the outcome of the test; a failure of the setup or the teardown also counts."""
         entry = self._entry(report.nodeid)
         if report.when == "call" or report.outcome != "passed":
             xfailed = hasattr(report, "wasxfail")
@@ -73,7 +74,7 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 
 
 def pytest_configure(config: pytest.Config) -> None:
-    """Starts the recorder if the option is given."""
+    """Starts the recorder if the option ``--recorded`` is given."""
     path = config.getoption("--recorded")
     if path is not None:
         config.pluginmanager.register(Recorder(path), "recorder")

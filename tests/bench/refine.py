@@ -1,4 +1,4 @@
-"""Refinement of a tet mesh: each tet is cut into eight at its corners and edge midpoints; nodal values are
+"""Refinement of a tet mesh: each tet is cut into eight tets at its corners and edge midpoints; nodal values are
 interpolated."""
 
 from dataclasses import dataclass
@@ -15,8 +15,8 @@ _EDGES = ((0, 1), (0, 2), (0, 3), (1, 2), (1, 3), (2, 3))
 _CHILDREN = np.array([
     (0, 4, 5, 6), (1, 7, 4, 8), (2, 5, 7, 9), (3, 8, 6, 9), (4, 7, 5, 9), (4, 8, 7, 9), (4, 6, 8, 9), (4, 5, 6, 9),
 ])  # fmt: skip
-"""Corners of the eight tets: 0-3 are the corners of the old tet, 4-9 its midpoints in the order of _EDGES. The inner
-octahedron is cut along 4-9."""
+"""Corners of the eight tets: numbers 0-3 are the corners of the old tet, numbers 4-9 its midpoints in the order of
+_EDGES. The inner octahedron is cut along the diagonal 4-9."""
 
 
 @dataclass(frozen=True)
@@ -25,18 +25,21 @@ class Refined:
 
     mesh: TetMesh
     ends: Ints
-    """Ends (nodes, 2) of the edge of the old mesh on which each new node lies; twice the same node for an old node."""
+    """Ends (nodes, 2) of the edge of the old mesh on which each new node lies; for an old node both ends are this
+    node."""
     parent: Ints
-    """Old tet (tets,) of each new tet."""
+    """Old tet (tets,) that contains each new tet."""
 
     def nodal(self, values: Floats) -> Floats:
-        """Returns values at the new nodes, interpolated from values (old, ...) at the old nodes."""
+        """Returns values at the new nodes, interpolated from the values (old, ...) at the old nodes."""
         mean: Floats = 0.5 * (values[self.ends[:, 0]] + values[self.ends[:, 1]])
         return mean
 
 
 def refined(mesh: TetMesh) -> Refined:
-    """Cuts every tet into eight of equal volume. Nodes are numbered in the order in which the tets use them."""
+    """Cuts every tet into eight tets of equal volume. The new nodes are numbered in the order in which the tets use
+    them.
+    """
     n, tets = len(mesh.points), mesh.tets.astype(np.int64)
     pairs = np.sort(np.stack([tets[:, list(edge)] for edge in _EDGES], axis=1), axis=2).reshape(-1, 2)
     edges, number = np.unique(pairs, axis=0, return_inverse=True)

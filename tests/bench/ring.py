@@ -1,9 +1,9 @@
-"""A ring that is stretched until it breaks, and a bar in one dimension: number of fragments, compared with two
+"""Number of fragments of a ring that is stretched until it breaks, and of a bar in one dimension, compared with two
 published fits.
 
-``python -m tests.bench.ring`` prints two tables: bars of the program in ``tests/fracture/bar_1d.py``, and rings of
-tets. A ring is modelled by a quarter between two planes of symmetry; numbers of fragments are those of the whole
-ring.
+The command ``python -m tests.bench.ring`` prints two tables: bars of the program in ``tests/fracture/bar_1d.py``, and
+rings of tets. The model of a ring is a quarter between two planes of symmetry; the numbers of fragments are those of
+the whole ring.
 """
 
 import sys
@@ -30,9 +30,9 @@ AROUND = 2.0 * np.pi * RADIUS / Bar().s_0
 THICK = 0.1e-3
 """Side of the square cross-section, m: 0.33 s_0."""
 _END = {0.1: 35.0, 0.3: 20.0, 1.0: 15.0}
-"""End time over t_0, after which hardly any fragment is added. The strength is reached after 1 / x."""
+"""End time over t_0; after this time hardly any fragment is added. The stress reaches the strength after 1 / x."""
 _LEAST = 0.02
-"""Mass, relative to the mean published fragment mass, below which a fragment counts as a crumb."""
+"""Mass of a fragment, relative to the mean published fragment mass, below which the fragment counts as a crumb."""
 FINE = (12, 24, 48)
 """Numbers of elements of a bar per s_0."""
 BARS = {
@@ -78,7 +78,7 @@ frames = 0
 
 @dataclass(frozen=True)
 class Plan:
-    """A ring: rate over rate_0, element size, m, Weibull modulus of the strengths of its facets."""
+    """Parameters of a ring: rate over rate_0, element size, m, Weibull modulus of the strengths of its facets."""
 
     x: float
     size: float
@@ -119,8 +119,8 @@ def broken(plan: Plan) -> Broken:
 
 
 def bars() -> str:
-    """Returns a table of bars: number of fragments per length of the ring, for several distributions of strength and
-    element sizes."""
+    """Returns a table of bars: the number of fragments per length of the ring, for several distributions of strength
+    and element sizes."""
     rows: list[list[Cell]] = []
     for x in (0.1, 0.3, 1.0):
         for name, bar in BARS.items():
@@ -156,12 +156,12 @@ def report(rings: Sequence[Broken]) -> str:
 
 
 def _published(x: float) -> list[Cell]:
-    """Returns the number of fragments of the ring by the two fits."""
+    """Returns the number of fragments of the ring by the two published fits."""
     return [round(AROUND / even(x)), round(AROUND / scattered(x))]
 
 
 def main() -> int:
-    """Prints both tables, and a line after each ring."""
+    """Prints the two tables, and a line after each ring."""
     print(bars(), flush=True)
     rings = []
     for plan in RINGS:

@@ -16,7 +16,7 @@ Router = subprocess.Popen[bytes]
 
 @contextmanager
 def started() -> Iterator[tuple[Router, str]]:
-    """Yields a router that listens, and its endpoint; the router is killed at the end of the block."""
+    """Yields the process of a listening router and its endpoint; the router is killed at the end of the block."""
     port = _free_port()
     words = [sys.executable, "-m", "tests.bench.router", str(port)]
     with subprocess.Popen(words, cwd=Path(__file__).parents[2], stdout=subprocess.PIPE) as router:
@@ -36,7 +36,7 @@ def _free_port() -> int:
 
 
 def main(port: str) -> None:
-    """Listens, prints "ready", and runs until the process is killed."""
+    """Starts the router, prints "ready", and runs until the process is killed."""
     config = zenoh.Config()
     for key, value in {
         "mode": "router",

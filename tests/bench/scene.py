@@ -1,7 +1,7 @@
 """Bodies for timing: a box of about a given number of tets, of one material, under uniform stretch.
 
-The stretch keeps the volume and is the same everywhere. So every tet of a plastic material yields within about ten
-steps and continues to yield; in an elastic material the strain stays small.
+The stretch keeps the volume and is the same in all tets. Therefore every tet of a plastic material yields within about
+ten steps and continues to yield; in an elastic material the strain stays small.
 """
 
 import time
@@ -23,11 +23,11 @@ Form = Literal["standard", "nodal", "split"]
 Generator = Literal["gmsh", "structured"]
 FORMS: tuple[Form, ...] = ("standard", "nodal", "split")
 SAMPLE_EVERY = 20
-"""Number of steps between two samples of the ledger: the default of 500 samples in a run of 10,000 steps."""
+"""Number of steps between two samples of the energy balance: the default of 500 samples in a run of 10,000 steps."""
 
 _EDGE = 0.01
 _GMSH_TETS = 5.9
-"""Number of tets of gmsh in a cube of the size ``element_size``; the structured generator makes 6."""
+"""Number of tets of gmsh in a cube of the size ``element_size``; the structured generator makes 6 tets."""
 
 
 def box(tets: int, generator: Generator = "gmsh") -> bodies.Box:
@@ -39,7 +39,7 @@ def box(tets: int, generator: Generator = "gmsh") -> bodies.Box:
 
 
 def case(material: str, form: Form, mesh: bodies.Box, viscosity: bool = True) -> schema.Case:
-    """Returns a case with one part of ``material``, a name of the library."""
+    """Returns a case with one part of ``material``, a name in the library."""
     return schema.Case(
         name="bench", parts=(schema.Part(name="body", material=material, mesh=mesh),),
         numerics=schema.Numerics(pressure=form, viscosity=schema.Viscosity() if viscosity else None),
@@ -48,10 +48,12 @@ def case(material: str, form: Form, mesh: bodies.Box, viscosity: bool = True) ->
 
 
 class Ride:
-    """A simulation that computes whole steps as the worker does, with ledger and probes every SAMPLE_EVERY steps."""
+    """A simulation that computes whole steps as the worker does, with the energy balance and probes every SAMPLE_EVERY
+    steps.
+    """
 
     def __init__(self, scene: schema.Case, mesh: TetMesh | None = None) -> None:
-        """``mesh``: mesh of the only part, in place of the mesh of the case."""
+        """The argument ``mesh`` is the mesh of the only part; it replaces the mesh of the case."""
         ready: AbstractContextManager[object] = nullcontext()
         if mesh is not None:
             ready = patch.object(assembly, "build_mesh", lambda *_, **__: mesh)
@@ -65,7 +67,7 @@ class Ride:
         return self.sim.model.elements_global
 
     def stretch(self, strain: float) -> None:
-        """Sets the velocities: a strain of ``strain`` per step along z, and minus half of it in the other
+        """Sets the velocities: a strain of ``strain`` per step along z, and minus half of this strain in the other
         directions."""
         nodes = self.sim.model.nodes
         rate = strain * self.sim.reduction.limit / self.sim.case.numerics.dt_safety
@@ -90,7 +92,7 @@ class Ride:
         step.second_half(sim)
 
     def yielding(self) -> float:
-        """Computes one step; returns the share of the tets that yield in it."""
+        """Computes one step; returns the fraction of the tets that yield in this step."""
         before = self._plastic_strain()
         self._step()
         return float((self._plastic_strain() > before).mean()) if len(before) else 0.0

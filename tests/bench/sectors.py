@@ -1,18 +1,18 @@
-"""Comparison of a quarter, a half and the whole of a rod that erodes in a target: ``python -m tests.bench.sectors
-[SIZE] [RUNS]``.
+"""Comparison of a quarter, a half and the whole of a rod that erodes in a target: the command is
+``python -m tests.bench.sectors [SIZE] [RUNS]``.
 
-A rod of tungsten alloy, 5 x 20 mm, hits a cylinder of 4340 steel, 40 x 45 mm, at 1.5 km/s. Both erode at a strain of
-1.5. ``SIZE``: element size, mm, default 1.
+A rod of tungsten alloy, 5 x 20 mm, hits a cylinder of 4340 steel, 40 x 45 mm, at 1.5 km/s. The rod and the target erode
+at a strain of 1.5. The argument ``SIZE`` is the element size, mm, by default 1.
 
-gmsh makes each mesh. The meshes of the half and of the whole (``full``) are made both aligned with the quarter
-(``mesh.aligned``) and not aligned. The mesh of ``mirrored``, a whole, consists of the quarter and its images. Each is
-run ``RUNS`` times, default 3, with time steps that differ by 1 %. In one series nodes without tets leave after a
-contact, in the other they remain as particles.
+The program gmsh makes each mesh. The meshes of the half and of the whole (``full``) are made both aligned with the
+quarter (``mesh.aligned``) and not aligned. The mesh of ``mirrored``, a whole body, consists of the quarter and its
+mirror images. Each mesh is run ``RUNS`` times, by default three times, with time steps that differ by 1 %. In one
+series nodes without tets are removed after a contact, in the other series they remain as particles.
 
-The table has, after 60 us, mean and standard error of the depth of the hole. From the last run the table has, of the
-mass of nodes without tets within the radius of the rod, the share within a quarter of SIZE of the axis; removed nodes
-count at the place of their contact. Beside that share are the share of a uniform distribution over the radius, and the
-remaining momentum of the rod along the axis.
+The table has the mean and the standard error of the depth of the hole after 60 us. From the last run the table has a
+fraction of the mass of nodes without tets within the radius of the rod: the fraction within a quarter of SIZE of the
+axis. Removed nodes count at the place of their contact. The table also has this fraction for a uniform distribution
+over the radius, and the remaining momentum of the rod along the axis.
 """
 
 import math
@@ -46,8 +46,8 @@ def case_of(
     target: tuple[float, float] = (20 * MM, 45 * MM), strain: float = 1.5, nodes: str = "strike", safety: float = 0.9,
     **keys: Any,
 ) -> schema.Case:  # fmt: skip
-    """Returns the case: length of the ``rod``, radius and length of the ``target``, m; ``strain`` of erosion;
-    treatment of free ``nodes``; ``safety`` of the time step; further ``keys`` of both meshes.
+    """Returns the case with the length of the ``rod``, the radius and the length of the ``target``, m, the ``strain``
+    of erosion, the treatment of free ``nodes``, the ``safety`` of the time step, and further ``keys`` of both meshes.
     """
 
     def part(name: str, material: str, speed: float, low: float, radius: float, length: float) -> dict[str, Any]:
@@ -77,7 +77,7 @@ def case_of(
 
 
 def images(mesh: TetMesh, axes: tuple[int, ...]) -> TetMesh:
-    """Returns the mesh and its images at the planes across these axes; nodes on the planes are shared."""
+    """Returns the mesh with its mirror images at the planes across the given axes; nodes on the planes are shared."""
     x, tets = mesh.points.copy(), mesh.tets
     for axis in axes:
         on = np.abs(x[:, axis]) < 1e-9
@@ -91,7 +91,7 @@ def images(mesh: TetMesh, axes: tuple[int, ...]) -> TetMesh:
 
 
 def mirrored(case: schema.Case) -> Simulation:
-    """Returns a simulation of the whole, whose mesh consists of the quarter and its images."""
+    """Returns a simulation of the whole body, whose mesh consists of the quarter and its mirror images."""
 
     def images_of(mesh: Any, *args: Any, **keys: Any) -> TetMesh:
         return images(build(mesh.model_copy(update={"sector": "quarter"}), *args, **keys), (0, 1))

@@ -1,8 +1,10 @@
-"""Cost of snapshots of the fragments per step: ``python -m tests.bench.snapshots --ranks 4 --readers 20 --frozen``.
+"""Cost of snapshots of the fragments per step: the command is
+``python -m tests.bench.snapshots --ranks 4 --readers 20 --frozen``.
 
-The comparison is made within one run, as in ``switch``, because two processes differ by more than the cost. Blocks
-of steps come in pairs: one with snapshots as often as allowed, one without, in random order. The CPU time of the
-solver threads of all ranks is measured, without waiting. Readers subscribe to all keys over Zenoh.
+Steps with and without snapshots are compared within one run, as in ``switch``, because two processes differ by more
+than the cost of snapshots. Blocks of steps come in pairs: one block with snapshots as often as allowed, one block
+without snapshots, in random order. The measured value is the CPU time of the solver threads of all ranks, without
+waiting. The readers subscribe to all keys over Zenoh.
 """
 
 import argparse
@@ -30,7 +32,7 @@ _ROOT = Path(__file__).parents[2]
 
 
 def measure(options: argparse.Namespace, folder: Path) -> tuple[Pairs, float]:
-    """Pairs of blocks of a run, and the share of the CPU time that the solver spends in calls for snapshots."""
+    """Pairs of blocks of a run, and the fraction of the CPU time that the solver spends in calls for snapshots."""
     with ExitStack() as stack:
         _, endpoint = stack.enter_context(router.started())
         for frozen in [False] * bool(options.readers) + [True] * options.frozen:
@@ -57,8 +59,8 @@ def measure(options: argparse.Namespace, folder: Path) -> tuple[Pairs, float]:
 
 
 def _blocks(marks: list[list[list[float]]], pairs: int, steps: int) -> list[Block]:
-    """Returns CPU times of solver and other threads, wall time, and time within the calls, from the marks of each
-    rank at the ends of the blocks."""
+    """Returns the CPU times of solver and other threads, the wall time, and the time within the calls, from the marks
+    of each rank at the ends of the blocks."""
     blocks = []
     for k, live in zip(range(min(map(len, marks)) - 1), switch.turns(pairs), strict=False):
         spent = [[(b - a) / steps for a, b in zip(rank[k], rank[k + 1], strict=True)] for rank in marks]
@@ -81,7 +83,7 @@ def _readers(endpoint: str, number: int, frozen: bool) -> Iterator[None]:
 
 
 def _read(endpoint: str, number: int) -> None:
-    """Runs some readers in this process, until it is killed."""
+    """Runs some readers in this process, until the process is killed."""
     import zenoh
 
     config = zenoh.Config()
@@ -97,8 +99,8 @@ def _read(endpoint: str, number: int) -> None:
 
 
 def _work(steps: int, arguments: list[str]) -> int:
-    """Runs the worker; snapshots are switched on and off every ``steps`` steps. The worker writes marks at the ends
-    of the blocks."""
+    """Runs the worker and switches snapshots on and off every ``steps`` steps. The worker writes a mark at the end of
+    each block."""
     from conoid.worker.accounts.timers import worked
     from conoid.worker.run import main
 
@@ -143,7 +145,7 @@ def _work(steps: int, arguments: list[str]) -> int:
 
 
 def main() -> None:
-    """Prints the medians, the ratio with its interval, and the number of snapshots."""
+    """Prints the medians of the CPU times, their ratio with its interval, and the number of snapshots."""
     if "--worker" in sys.argv:
         sys.exit(_work(int(sys.argv[2]), sys.argv[3:]))
     if "--reader" in sys.argv:

@@ -21,7 +21,7 @@ from .table import Cell, table
 
 @dataclass(frozen=True)
 class Metal:
-    """A material of the library; ``strain``: strain of a tet per step."""
+    """A material of the library; ``strain`` is the strain of a tet per step."""
 
     title: str
     name: str
@@ -41,7 +41,9 @@ METALS = (
 
 @dataclass(frozen=True)
 class Speed:
-    """Millions of element updates per CPU second of one body, best and median; ``limit``: gather and scatter only."""
+    """Speed of one body in millions of element updates per CPU second, best and median; ``limit`` is the speed of
+    gather and scatter only.
+    """
 
     material: str
     form: str
@@ -53,7 +55,7 @@ class Speed:
     limit_best: float
     limit_median: float
     phases: dict[str, float]
-    """Share of the CPU time."""
+    """Fraction of the CPU time that each phase takes."""
 
     @property
     def share(self) -> float:
@@ -94,7 +96,9 @@ def _limit(ride: Ride, sweeps: int) -> Work:
 
 
 def _burst(tets: int) -> int:
-    """Returns the number of steps of one measurement: whole periods of the ledger, about 3 million element updates."""
+    """Returns the number of steps of one measurement: whole periods of the energy balance, about 3 million element
+    updates.
+    """
     return SAMPLE_EVERY * min(3, max(1, round(3e6 / SAMPLE_EVERY / tets)))
 
 
@@ -103,7 +107,7 @@ def _rates(times: Times, prefix: str, updates: int) -> dict[str, float]:
 
 
 def tables(speeds: Sequence[Speed]) -> str:
-    """Returns one table for each size: best (median) speed of each pressure form, and its share of the limit."""
+    """Returns one table for each mesh size: best (median) speed of each pressure form, and its ratio to the limit."""
     head = ["material", "yielding", *FORMS, *(f"{form} / limit" for form in FORMS), "gather-scatter"]
     parts = []
     for tets in dict.fromkeys(speed.tets for speed in speeds):
@@ -159,7 +163,7 @@ def beside_akantu(body: Box, rounds: int = 4, steps: int = SAMPLE_EVERY) -> list
 
 
 def peer_table(peers: Sequence[Peer]) -> str:
-    """Returns a table: time per step, ms, and millions of element updates per CPU second."""
+    """Returns a table of the time per step, ms, and of millions of element updates per CPU second."""
     rows: list[list[Cell]] = [
         [p.code, round(p.milliseconds, 1), f"{p.best:.2f} ({p.median:.2f})", f"{p.spread:.0%}"] for p in peers
     ]

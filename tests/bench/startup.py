@@ -30,25 +30,25 @@ _CACHED = re.compile(r"^\[(\d+)\].*\[cache\] data (saved to|loaded from)", re.MU
 
 @dataclass(frozen=True)
 class Startup:
-    """Time to the first step of a Taylor bar with 12,960 tets, s; for each phase wall time and CPU time."""
+    """Time to the first step of a Taylor bar with 12,960 tets, s; wall time and CPU time for each phase."""
 
     cold: Phases
     """Time on one rank, without kernels and mesh in the cache."""
     warm: Phases
-    """Time on one rank with kernels and mesh in the cache; median."""
+    """Median time on one rank with kernels and mesh in the cache."""
     ranks: int
     cold_ranks: float
-    """Time from ``mpiexec`` with this number of ranks to the first step, without kernels in the cache, with the
-    mesh."""
+    """Time from ``mpiexec`` with the given number of ranks to the first step, without kernels in the cache, but with
+    the mesh."""
     warm_ranks: float
     submitted: float
     """Time from the submission over HTTP to the first step, with kernels and mesh in the cache."""
     ahead: int
     """Number of kernels in the cache after a start without kernels in the cache."""
     compiled: dict[int, int]
-    """Number of kernels that each rank compiled itself, without kernels in the cache."""
+    """Number of kernels that each rank compiled itself in a start without kernels in the cache."""
     loaded: dict[int, int] = field(default_factory=dict)
-    """Number of kernels that each rank loaded, without kernels in the cache."""
+    """Number of kernels that each rank loaded in a start without kernels in the cache."""
 
 
 def measure(rounds: int = 3, ranks: int = 2) -> Startup:
@@ -86,7 +86,9 @@ def _phases(environment: Mapping[str, str]) -> Phases:
 
 
 def _launch(ranks: int, environment: Mapping[str, str]) -> tuple[float, str]:
-    """Returns the time from ``mpiexec`` to the first step, s, and the output of the ranks; each line has its rank."""
+    """Returns the time from ``mpiexec`` to the first step, s, and the output of the ranks; each line of the output
+    names its rank.
+    """
     with tempfile.TemporaryDirectory(prefix="conoid-bench-") as folder:
         command = [str(Path(sys.executable).with_name("mpiexec")), "-prepend-rank", "-n", str(ranks), sys.executable]
         command += ["-m", "mpi4py", "-m", "conoid.worker", CASE, "--out", folder]

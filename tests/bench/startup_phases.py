@@ -1,8 +1,9 @@
-"""Times the start of one worker: ``python -m tests.bench.startup_phases LAUNCHED CASE``; prints seconds as JSON.
+"""Times the start of one worker: the command ``python -m tests.bench.startup_phases LAUNCHED CASE`` prints seconds as
+JSON.
 
-``LAUNCHED``: Unix time of the launch of the process. The order of the phases is that of the worker. Each phase has
-wall time and CPU time, with the CPU time of child processes. A kernel is loaded at its first call, most of them in
-the first pass.
+The argument ``LAUNCHED`` is the Unix time of the launch of the process. The order of the phases is that of the worker.
+Each phase has its wall time and its CPU time, which includes the CPU time of child processes. A kernel is loaded at its
+first call; most kernels are loaded in the first pass.
 """
 
 import json
@@ -34,14 +35,14 @@ class Stamps:
         self.seconds = {name: [0.0, 0.0] for name in PHASES}
 
     def stamp(self, name: str) -> None:
-        """Adds the time since the last call to a phase."""
+        """Adds the time since the previous call to a phase."""
         now = (time.time(), sum(os.times()[:4]))
         for clock in range(2):
             self.seconds[name][clock] += now[clock] - self._last[clock]
         self._last = now
 
     def around(self, work: Callable[..., Any], before: str, name: str) -> Callable[..., Any]:
-        """Returns ``work`` with timing: its time is added to the phase ``name``, the time before it to the phase
+        """Returns ``work`` with timing: its time is added to the phase ``name``, the time before its call to the phase
         ``before``."""
 
         def timed(*arguments: Any) -> Any:
@@ -54,7 +55,7 @@ class Stamps:
 
 
 def main(launched: float, case: str) -> None:
-    """Runs all phases of a start, and prints their times."""
+    """Runs all phases of a start, and prints the times of the phases."""
     stamps = Stamps(launched)
     from conoid.cases import load
     from conoid.worker.parallel.mpi import connect

@@ -5,7 +5,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 Work = Callable[[], float]
-"""Function with a fixed amount of work; returns its CPU time, s."""
+"""Function with a fixed amount of work that returns its CPU time, s."""
 
 
 @dataclass(frozen=True)
@@ -16,7 +16,7 @@ class Times:
 
     @property
     def best(self) -> float:
-        """Shortest time: least affected by other load."""
+        """Shortest time, which other load affects least."""
         return min(self.seconds)
 
     @property
@@ -26,12 +26,14 @@ class Times:
 
     @property
     def spread(self) -> float:
-        """(slowest - fastest) / median."""
+        """Scatter of the times: (slowest - fastest) / median."""
         return (max(self.seconds) - min(self.seconds)) / self.median
 
 
 def take_turns(work: Mapping[str, Work], rounds: int) -> dict[str, Times]:
-    """Runs each function ``rounds`` times in alternation. A round before that fills the caches and is not counted."""
+    """Runs each function ``rounds`` times in alternation. An additional first round fills the caches and is not
+    counted.
+    """
     seconds: dict[str, list[float]] = {name: [] for name in work}
     for turn in range(rounds + 1):
         for name, do in work.items():

@@ -1,4 +1,6 @@
-"""Messages and files of a run without a solver: journal, history.csv, a snapshot, an outcome, by simple laws."""
+"""Messages and files of a run that no solver computed: journal, history.csv, a snapshot and an outcome, by simple
+laws.
+"""
 
 import csv
 import hashlib
@@ -19,9 +21,9 @@ from conoid.cases.run import State
 from .page_scene import blob
 
 _POINTS = 60
-"""Number of lines of a history. Chosen: a chart shows a curve."""
+"""Number of lines of history.csv. Chosen value: so many lines make a curve in a chart."""
 _TRIANGLES = 400
-"""Size of a snapshot. Chosen: twenty fragments."""
+"""Size of a snapshot. Chosen value: twenty fragments."""
 _ENDS: Sequence[tuple[State, str | None, str]] = (
     [(State.SUCCEEDED, None, "")] * 17
     + [(State.FAILED, "diverged", "the time step fell to 1.2e-14 s: tet 4711 of glass, held by its shape")]
@@ -30,14 +32,14 @@ _ENDS: Sequence[tuple[State, str | None, str]] = (
 )  # fmt: skip
 _LIMITER = "stability: tet 12 of part 0"
 _BALLISTIC = 160.0
-"""Impact speed above which these laws let a projectile through, m/s. Chosen."""
+"""Impact speed above which a projectile perforates the target in these laws, m/s. Chosen value."""
 
 
 class Story:
-    """Numbers of one run."""
+    """Numbers of one run by the simple laws."""
 
     def __init__(self, path: Path, run: str, case: Case, began: float, draw: random.Random) -> None:
-        """Chooses the end of the run and its measured values; ``began``: Unix time, s."""
+        """Chooses the end of the run and its measured values; ``began`` is the Unix time of the start, s."""
         self.path, self.run, self.case, self.began = path, run, case, began
         self.state, self.cause, self.message = draw.choice(_ENDS)
         self.friction = case.contact.friction if case.contact is not None else 0.0
@@ -50,22 +52,24 @@ class Story:
         self.values = [self._probe(k) for k in range(len(case.probes))]
 
     def _probe(self, k: int) -> list[float]:
-        """Returns a wave at a probe: it arrives later at a greater distance, and its amplitude grows with the speed."""
+        """Returns a wave at a probe: the wave arrives later at a greater distance, and its amplitude grows with the
+        speed.
+        """
         unit = FIELD_UNITS[self.case.probes[k].field]
         size = self.speed * (1e7 if unit == "Pa" else 0.5) * (-1.0 if unit == "Pa" else 1.0) * (1.0 + self.noise[1])
         return [size * _front(n / _POINTS - 0.1 * (k // 2), 9.0) for n in range(1, self.last + 1)]
 
     @property
     def last(self) -> int:
-        """Number of lines of the history."""
+        """Number of lines of history.csv."""
         return max(2, round(self.share * _POINTS))
 
     def time(self, n: int) -> float:
-        """Simulated time at line ``n``, s."""
+        """Returns the simulated time at line ``n`` of history.csv, s."""
         return self.case.run.end_time * n / _POINTS
 
     def energy(self, n: int) -> messages.Energy:
-        """Returns the values of line ``n``."""
+        """Returns the values of line ``n`` of history.csv."""
         whole, spent = 1e-2 * self.speed**2, 0.4 * (1.0 - math.exp(-3.0 * n / _POINTS))
         return messages.Energy(
             kinetic=whole * (1.0 - spent), elastic=0.1 * whole * spent, plastic=0.6 * whole * spent,
@@ -75,7 +79,7 @@ class Story:
         )  # fmt: skip
 
     def tell(self) -> None:
-        """Writes all files."""
+        """Writes all files of the run."""
         self._write_history()
         snapshot = self._write_snapshot()
         with (self.path / layout.JOURNAL).open("ab") as file:
@@ -167,5 +171,5 @@ class Story:
 
 
 def _front(x: float, steep: float) -> float:
-    """Returns a step with oscillations: 0 for negative arguments, a front at 0."""
+    """Returns a step function with oscillations: 0 for negative arguments, a front at 0."""
     return 0.0 if x <= 0.0 else 1.0 - math.exp(-steep * x) * math.cos(40.0 * x)

@@ -1,9 +1,9 @@
 """Cost of telemetry per step, measured within one run: telemetry is switched on and off every quarter of a second.
 
 Two processes with the same work differ by more than the cost of telemetry, for example by the addresses of their
-memory. So both states are compared within one process: each Progress message ends a block of steps and begins the next
-one, with or without telemetry. Blocks come in pairs, in random order within a pair; a slow drift and the properties of
-the process affect both blocks in the same way.
+memory. Therefore both states of telemetry are compared within one process: each Progress message ends a block of steps
+and begins the next block, with or without telemetry. Blocks come in pairs with a random order within a pair: a slow
+drift and the properties of the process affect both blocks in the same way.
 """
 
 import math
@@ -25,13 +25,13 @@ from conoid.worker.run.signals import Signals
 _WARM = 4
 """Number of blocks with telemetry before the first measured block."""
 _HALF_WIDTH = 0.98
-"""Half of 1.96. In a sorted sample of n values, the 95 % interval of the median lies between the ranks n / 2 - and +
-this times sqrt(n)."""
+"""Half of 1.96, for the 95 % interval of a median. In a sorted sample of n values, the 95 % interval of the median lies
+between the ranks n / 2 - d and n / 2 + d; d is this constant times sqrt(n)."""
 
 
 @dataclass(frozen=True)
 class Block:
-    """Time per step between two Progress messages, s: CPU time of the solver thread, CPU time of all other threads,
+    """Times per step between two Progress messages, s: CPU time of the solver thread, CPU time of all other threads,
     wall time."""
 
     live: bool
@@ -42,7 +42,7 @@ class Block:
 
 @dataclass(frozen=True)
 class Pairs:
-    """A run with a router in one state."""
+    """Results of a run with a router in one state."""
 
     way: str
     blocks: list[Block]
@@ -52,8 +52,8 @@ class Pairs:
         return float(statistics.median(getattr(block, what) for block in self.blocks if block.live is live))
 
     def ratio(self, what: str) -> tuple[float, float, float]:
-        """Returns the ratio of each pair of blocks, with over without telemetry: the median, and its 95 % interval
-        (sign test)."""
+        """Returns the ratio of each pair of blocks, with telemetry over without telemetry: the median, and its 95 %
+        interval (sign test)."""
         pairs = zip(self.blocks[::2], self.blocks[1::2], strict=True)
         ratios = sorted((getattr(a, what) / getattr(b, what)) ** (1 if a.live else -1) for a, b in pairs)
         n = len(ratios)
@@ -69,10 +69,14 @@ class End(Signals):
 
 
 class Switch:
-    """A listener of the journal that passes messages on in blocks with telemetry, and stores the cost of each block."""
+    """A listener of the journal that sends messages to telemetry only in blocks with telemetry, and stores the cost of
+    each block.
+    """
 
     def __init__(self, telemetry: Telemetry, turns: Sequence[bool], ready: Callable[[], None], end: End) -> None:
-        """``ready``: called once, after some blocks with telemetry; ``end``: raised after the last block."""
+        """The function ``ready`` is called once, after some blocks with telemetry; the exception ``end`` is raised
+        after the last block.
+        """
         self.blocks: list[Block] = []
         self._telemetry = telemetry
         self._turns = iter(turns)
@@ -111,7 +115,7 @@ def _now(step: int) -> tuple[float, float, float, int]:
 
 
 def turns(pairs: int, seed: int = 1) -> list[bool]:
-    """Returns the order of the blocks: pairs of one with and one without telemetry, in random order."""
+    """Returns the order of the blocks: pairs of a block with and a block without telemetry, in random order."""
     coin = random.Random(seed)
     firsts = [True, False] * ((pairs + 1) // 2)
     coin.shuffle(firsts)

@@ -1,10 +1,11 @@
-"""Replay of one rank alone: the data that a rank receives in a run is recorded on a tape, and the rank runs again from
-its tape.
+"""Replay of one rank alone: a tape stores the data that a rank receives in a run, and the rank runs again from its
+tape.
 
-``mpiexec -n P python -m mpi4py -m tests.bench.tape record FOLDER <arguments of the worker>`` records the tapes.
-``python -m tests.bench.tape replay FOLDER RANK <arguments of the worker>`` runs one rank from its tape, and writes
-its calls (timeline.Call) into FOLDER. During a replay the rank has a core and its caches to itself. It computes the
-same as in the recorded run, because all data of other ranks and of the clock is on the tape.
+The command ``mpiexec -n P python -m mpi4py -m tests.bench.tape record FOLDER <arguments of the
+worker>`` records the tapes. The command ``python -m tests.bench.tape replay FOLDER RANK <arguments of the worker>``
+runs one rank from its tape, and writes the calls of the rank (timeline.Call) into FOLDER. During a replay the rank has
+a core and its caches to itself. The replay has the same result as the recorded run, because all data of other ranks and
+of the clock is on the tape.
 """
 
 import pickle
@@ -25,11 +26,11 @@ from conoid.worker.run import main as worker
 from .timeline import Call
 
 _TWICE = ("join", "share", "gather", "scatter", "broadcast")
-"""Methods with two collectives each: the first one sends the length."""
+"""Methods with two collectives each: the first collective sends the length."""
 
 
 def tape(folder: Path, rank: int) -> Path:
-    """Returns the tape of a rank."""
+    """Returns the file of the tape of a rank."""
     return folder / f"tape-{rank}"
 
 
@@ -52,12 +53,12 @@ class Recorder:
         return self._comm.waited
 
     def note(self, data: Any) -> Any:
-        """Records received data, and returns it."""
+        """Records received data, and returns this data."""
         pickle.dump(data, self._file)
         return data
 
     def begin_maximum(self, words: Ints, result: Ints) -> Pending:
-        """Same as in ``Comm``. If ranks share cores, reports are further apart in time, so that the number of steps
+        """Method of ``Comm``. If ranks share cores, reports are further apart in time, so that the number of steps
         between them is that of ranks with a core each."""
         from conoid.worker.run import loop  # imported here because it imports numba, see Player.begin
 
@@ -67,15 +68,15 @@ class Recorder:
         return _Noted(self, self._comm.begin_maximum(words, result), [result])
 
     def begin_sum(self, words: Ints, result: Ints) -> Pending:
-        """Same as in ``Comm``."""
+        """Method of ``Comm``."""
         return _Noted(self, self._comm.begin_sum(words, result), [result])
 
     def exchange(self, sends: list[tuple[int, Ints]], receives: list[tuple[int, Ints]], tag: Tag) -> Exchange:
-        """Same as in ``Comm``."""
+        """Method of ``Comm``."""
         return _Noted(self, self._comm.exchange(sends, receives, tag), [words for _, words in receives])
 
     def __getattr__(self, name: str) -> Any:
-        """Any other method of the communicator; its result is recorded."""
+        """Any other method of the communicator; the result of the method is recorded."""
         verb = getattr(self._comm, name)
         return lambda *items: self.note(verb(*items))
 
@@ -87,15 +88,15 @@ class _Noted:
         self._comm, self._inner, self._results = comm, inner, results
 
     def begin(self) -> None:
-        """Same as in ``Exchange``."""
+        """Method of ``Exchange``."""
         self._inner.begin()
 
     def free(self) -> None:
-        """Same as in ``Exchange``."""
+        """Method of ``Exchange``."""
         self._inner.free()
 
     def finish(self) -> None:
-        """Same as in ``Comm``."""
+        """Method of ``Comm``."""
         self._inner.finish()
         self._comm.note([words.copy() for words in self._results])
 
@@ -116,18 +117,18 @@ class Player:
     def begin(self) -> None:
         """Starts the storage of calls, at the first step."""
         from conoid.worker.kernels.jit import (
-            cpu_time,  # numba, which must not be there before the worker has named its cache
+            cpu_time,  # imports numba, which must not be imported before the worker has set the cache folder
         )
 
         self._clock, self._last = cpu_time, cpu_time()
 
     def note(self, **parts: Any) -> None:
-        """Stores the start of a call."""
+        """Stores the start of a call of the communicator."""
         if self._clock is not None:
             self.calls.append(Call(self._clock() - self._last, **parts))
 
     def next_data(self) -> Any:
-        """Returns the next data of the tape, at the end of a call."""
+        """Returns the next data of the tape, at the end of a call of the communicator."""
         item = pickle.load(self._file)
         if self._clock is not None:
             self._last = self._clock()
@@ -138,12 +139,12 @@ class Player:
         self._file.close()
 
     def posted(self) -> None:
-        """Ends a call that waits for no other rank."""
+        """Ends a call of the communicator that waits for no other rank."""
         if self._clock is not None:
             self._last = self._clock()
 
     def begin_maximum(self, words: Ints, result: Ints) -> Pending:
-        """Same as in ``Comm``."""
+        """Method of ``Comm``."""
         self.note(enters=True)
         self.posted()
         return _Played(self, {"leaves": 1, "size": words.nbytes * self.size}, [], [result])
@@ -151,13 +152,13 @@ class Player:
     begin_sum = begin_maximum
 
     def exchange(self, sends: list[tuple[int, Ints]], receives: list[tuple[int, Ints]], tag: Tag) -> Exchange:
-        """Same as in ``Comm``."""
+        """Method of ``Comm``."""
         out = [(rank, int(tag), words.nbytes) for rank, words in sends]
         awaited = {"receives": [(rank, int(tag)) for rank, _ in receives]}
         return _Played(self, awaited, out, [words for _, words in receives])
 
     def swap(self, sends: dict[int, Ints]) -> dict[int, Ints]:
-        """Same as in ``Comm``."""
+        """Method of ``Comm``."""
         began = len(self.calls)
         self.note(enters=True, leaves=1, size=8 * self.size)
         received: dict[int, Ints] = self.next_data()
@@ -167,14 +168,14 @@ class Player:
         return received
 
     def trade(self, sends: dict[int, Ints], sources: Iterable[int]) -> dict[int, Ints]:
-        """Same as in ``Comm``."""
+        """Method of ``Comm``."""
         out = [(rank, int(Tag.TRADE), words.nbytes) for rank, words in sends.items()]
         self.note(sends=out, receives=[(rank, int(Tag.TRADE)) for rank in sources])
         received: dict[int, Ints] = self.next_data()
         return received
 
     def __getattr__(self, name: str) -> Any:
-        """Any other method of the communicator: one collective, or two."""
+        """Any other method of the communicator, which is one collective or two collectives."""
         return lambda *_: self._collective(2 if name in _TWICE else 1)
 
     def _collective(self, many: int) -> Any:
@@ -195,30 +196,32 @@ class _Played:
         self._comm, self._awaited, self._sends, self._results = comm, awaited, sends, results
 
     def begin(self) -> None:
-        """Same as in ``Exchange``."""
+        """Method of ``Exchange``."""
         self._comm.note(sends=self._sends)
         self._comm.posted()
 
     def finish(self) -> None:
-        """Same as in ``Exchange``."""
+        """Method of ``Exchange``."""
         self._comm.note(**self._awaited)
         for words, received in zip(self._results, self._comm.next_data(), strict=True):
             words[...] = received
         self._comm.posted()
 
     def free(self) -> None:
-        """Same as in ``Exchange``."""
+        """Method of ``Exchange``."""
 
 
 class _Sent(Sent):
-    """Counter of sent data. Its first use is at the first step (Loop.run), and starts the storage of calls."""
+    """Counter of sent data. The first use of the counter is at the first step (Loop.run), and starts the storage of
+    calls.
+    """
 
     def __init__(self, comm: Player) -> None:
         super().__init__()
         self._comm: Player | None = comm
 
     def since_last(self) -> dict[str, int]:
-        """Same as in ``Sent``."""
+        """Method of ``Sent``."""
         if self._comm is not None:
             self._comm.begin()
             self._comm = None

@@ -1,8 +1,8 @@
 """Mean cost of a Johnson-Cook tet over a Taylor bar of about 140,000 tets, without a run of the whole fine bar.
 
-A coarse bar runs to its end. At several stages, with equal numbers of steps between them, its mesh is refined twice,
-with velocities and state, and some steps of this fine bar are timed. The mean speed is the harmonic mean over the
-stages.
+A coarse bar runs to its end. At several stages of the run, with equal numbers of steps between two stages, the mesh of
+the coarse bar is refined twice, with velocities and state, and some steps of this fine bar are timed. The mean speed of
+the fine bar is the harmonic mean over the stages.
 """
 
 from collections.abc import Sequence
@@ -31,11 +31,11 @@ _KEEP_EVERY = 100
 
 @dataclass(frozen=True)
 class Stage:
-    """The fine bar at one stage of the run; speeds in millions of element updates per CPU second."""
+    """Speeds of the fine bar at one stage of the run, in millions of element updates per CPU second."""
 
     form: str
     share: float
-    """Share of the steps of the run."""
+    """Fraction of the steps of the run that belongs to the stage."""
     time: float
     tets: int
     yielding: float
@@ -47,7 +47,7 @@ class Stage:
 
 @dataclass(frozen=True)
 class Moment:
-    """The coarse bar at some step."""
+    """State of the coarse bar at some step."""
 
     time: float
     x: state.Floats
@@ -99,7 +99,7 @@ def _stage(case: schema.Case, share: float, moment: Moment, once: Refined, twice
 
 
 def _put(ride: Ride, moment: Moment, once: Refined, twice: Refined) -> None:
-    """Copies velocities and state of the coarse bar to the fine one, and computes the forces."""
+    """Copies velocities and state of the coarse bar to the fine bar, and computes the forces."""
     nodes, block = ride.sim.model.nodes, ride.sim.model.blocks[0]
     nodes.x[:] = twice.nodal(once.nodal(moment.x))
     nodes.v[:] = twice.nodal(once.nodal(moment.v))
@@ -121,7 +121,7 @@ def _rates(stages: Sequence[Stage]) -> tuple[list[float], list[float]]:
 
 
 def report(stages: Sequence[Stage]) -> str:
-    """Returns a table of the stages, and their mean."""
+    """Returns a table of the stages, and the mean over the stages."""
     rows: list[list[Cell]] = [
         [
             f"{s.share:.0%}", f"{s.time * 1e6:.1f}", f"{s.yielding:.0%}", f"{s.best:.2f} ({s.median:.2f})",

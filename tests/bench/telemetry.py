@@ -1,7 +1,7 @@
-"""Cost of telemetry of a run with a working router, a router that freezes, and a router that dies.
+"""Cost of telemetry of a run for three states of the router: working, frozen, killed.
 
-Measured are the cost per step with and without telemetry (``switch``), and the time for which the solver waits at a
-single message. The digest of a whole run must be the same for each state of the router.
+The study measures the cost per step with and without telemetry (``switch``), and the time for which the solver waits at
+a single message. The digest of a run must be the same for each state of the router.
 """
 
 import os
@@ -96,7 +96,7 @@ class Message:
 
 
 def hand_over(count: int = 500, pause: float = 0.002) -> list[Message]:
-    """Sends ``count`` messages, one every ``pause`` s; the worker sends about eight per second."""
+    """Sends ``count`` messages, one message every ``pause`` s; the worker sends about eight messages per second."""
     return [_hand_over(way, count, pause) for way in WAYS]
 
 
@@ -113,7 +113,7 @@ def _hand_over(way: str, count: int, pause: float) -> Message:
 
 
 def _wait(telemetry: Telemetry, number: int, pause: float) -> float:
-    """Returns the time to send one message, s; pauses after it."""
+    """Returns the time to send one message, s; pauses after the message."""
     message = messages.Log(run="run", seq=number, level="info", text="x" * 200)
     begin = time.perf_counter()
     telemetry.tell(message)

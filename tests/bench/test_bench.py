@@ -1,4 +1,4 @@
-"""Tests of the benchmarks: each of them runs on a small case."""
+"""Tests of the benchmarks: each benchmark runs on a small case."""
 
 import time
 from unittest.mock import Mock
@@ -94,7 +94,9 @@ def progress(step: int) -> messages.Progress:
 
 @pytest.mark.parametrize("cost", [0.0, 1e-3])
 def test_the_switch_finds_what_telling_costs(cost: float) -> None:
-    """Blocks of ten steps and 5 ms. A message costs the solver 1 ms, a fifth of a block, in either order of a pair."""
+    """Each block has ten steps and takes 5 ms. A message costs the solver 1 ms, a fifth of a block, in either order of
+    a pair.
+    """
     slow, end, ready = Mock(), switch.End(), Mock()
     slow.tell = lambda message, blob: spin(cost)
     listener = switch.Switch(slow, switch.turns(20), ready, end)

@@ -1,4 +1,4 @@
-"""Tests of the verification catalogue: its rows name cases and tests that exist, and failures are red."""
+"""Tests of the verification catalogue: its rows name existing cases and tests, and failures are red."""
 
 import ast
 from pathlib import Path

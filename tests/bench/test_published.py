@@ -1,4 +1,4 @@
-"""Tests of the comparison with the paper: table and chart."""
+"""Tests of the table and the chart of the comparison with the paper."""
 
 import re
 import xml.etree.ElementTree as ElementTree

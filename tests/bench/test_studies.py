@@ -47,8 +47,8 @@ def test_a_random_plate_has_a_smooth_slit_of_the_length_that_is_asked_for() -> N
 
 
 def test_the_angle_and_the_speed_of_a_crack_that_is_known() -> None:
-    """Open facets along 65 degrees from the tip of the slit, at 1.5 km/s from 20 us on, and further ones from the
-    other side."""
+    """The open facets lie along 65 degrees from the tip of the slit, at 1.5 km/s from 20 us on; further open facets
+    come from the other side."""
     r, turned = np.linspace(0.5e-3, 60e-3, 60), np.radians(65.0)
     centre = np.column_stack([kalthoff.TIP + r * np.cos(turned), r * np.sin(turned), 0.0 * r])
     far = np.array([[90e-3, -20e-3, 0.0]] * 5)

@@ -1,4 +1,6 @@
-"""Tests of the benchmark of ranks times threads: it continues from stored runs, and stops when its time is used up."""
+"""Tests of the benchmark of ranks times threads: the benchmark continues from stored runs, and stops when its time is
+used up.
+"""
 
 from pathlib import Path
 

@@ -1,4 +1,4 @@
-"""Tests of the waiting times between ranks, with calls whose times are known."""
+"""Tests of the computed waiting times between ranks, with calls whose times are known."""
 
 import pickle
 from pathlib import Path

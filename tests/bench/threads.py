@@ -1,10 +1,10 @@
 """Combinations of ranks and threads on three scenes, in a given time: the glass bar, a bar with eight times its tets,
 the long rod.
 
-``python -m tests.bench.threads FOLDER [--minutes 10] [--scenes bar,rod,large] [--ranks 1,1x16,...]`` makes one run
-after the other, the most important ones first, until the time is used up; a run that is still going on then is stopped.
-A later call continues from the runs in FOLDER. Each call prints, and writes to FOLDER, the tables of ``conoid bench
-scale`` of each scene.
+The command ``python -m tests.bench.threads FOLDER [--minutes 10] [--scenes bar,rod,large] [--ranks 1,1x16,...]`` makes
+one run after the other, the most important runs first, until the time is used up; an unfinished run is stopped at this
+time. A later call of the command continues from the runs in FOLDER. Each call of the command prints the tables of
+``conoid bench scale`` of each scene, and writes the tables to FOLDER.
 
 On 16 cores all combinations take about ten minutes. On fewer cores, the times of threads without a core are
 projected from timed tasks; runs with two threads show the error of this projection.
@@ -31,7 +31,7 @@ from conoid.client.studies.projection import Network
 from conoid.client.studies.scaling import CORES, Layout, Trial, found, run, trials
 
 RANKS = "1,1x16,16,4x4,1x4,2x8,1x8,1x2"
-"""Combinations of ranks and threads, the most important ones first."""
+"""Combinations of ranks and threads, the most important combinations first."""
 NETWORK = Network(latency=2e-6, bandwidth=5e9)
 _QUIET = ["run.frames=0", "run.snapshots=0", "reference=[]"]
 _LEAST = 10.0
@@ -58,8 +58,8 @@ SCENES: Mapping[str, Scene] = {
 
 
 def main(words: Sequence[str]) -> int:
-    """Runs the benchmark; returns 0 if all runs are complete, 3 if the time was too short, 1 if digests differ or a
-    run failed."""
+    """Runs the benchmark. Returns 0 if all runs are complete, 3 if the time was too short, 1 if digests differ or a run
+    failed."""
     options = _parse(words)
     layouts, deadline = layouts_of(options.ranks), time.monotonic() + 60.0 * options.minutes
     names = options.scenes.split(",")
@@ -83,7 +83,9 @@ def _parse(words: Sequence[str]) -> argparse.Namespace:
 
 
 def _in_order(names: Sequence[str], layouts: Sequence[Layout]) -> Iterator[tuple[str, Trial]]:
-    """Yields the runs: all scenes of each combination, in the given order; a single rank comes first."""
+    """Yields the runs: all scenes of each combination, in the given order; the combination with a single rank comes
+    first.
+    """
     place = {each: number for number, each in enumerate([(1, 1), *layouts][::-1])}
     some = sorted(trials(layouts, CORES), key=lambda trial: -place.get((trial.ranks, trial.threads), 0))
     return ((name, trial) for trial in some for name in names)
@@ -112,7 +114,7 @@ def _succeeded(place: Path) -> bool:
 
 
 def _ended(name: str, folder: Path, layouts: Sequence[Layout]) -> bool:
-    """Prints the tables of the finished runs of a scene; returns whether their digests are equal."""
+    """Prints the tables of the finished runs of a scene; returns whether the digests of these runs are equal."""
     scene = SCENES[name]
     there = [trial for trial in trials(layouts, CORES) if _succeeded(folder / trial.folder)]
     if not there or (there[0].ranks, there[0].threads) != (1, 1):

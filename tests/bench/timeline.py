@@ -1,10 +1,10 @@
 """Computes the end of a run with a core for each rank, from the work of every rank between two calls of its
 communicator.
 
-A message arrives one latency, plus its bytes over the bandwidth, after it was sent. A collective ends for all ranks
-when the last rank has entered it, after two passes through a binary tree. Each call, and each message at both of its
-ends, costs CPU time of the rank. The computation does not average over steps: a rank that is late in one step delays
-the others in that step.
+A message arrives after one latency plus its number of bytes over the bandwidth. A collective ends for all ranks when
+the last rank has entered it, after two passes through a binary tree. Each call, and each message at both of its ends,
+costs CPU time of the rank. The computation does not average over steps: a rank that is late in one step delays the
+others in that step.
 """
 
 from collections import defaultdict, deque
@@ -14,31 +14,32 @@ from dataclasses import dataclass, field
 from conoid.client.studies.projection import Network
 
 CALL = 3e-6
-"""CPU time of a call of the communicator, from Python to MPI and back, s. Chosen: time of a call of a kernel from
-Python."""
+"""CPU time of a call of the communicator, from Python to MPI and back, s. Chosen value: the time of a call of a kernel
+from Python."""
 MESSAGE = 0.5e-6
-"""CPU time of a message at each of its ends, s. Chosen: time in which MPI posts a message in shared memory."""
+"""CPU time of a message at each of its ends, s. Chosen value: the time in which MPI posts a message in shared
+memory."""
 
 
 @dataclass
 class Call:
-    """A call of the communicator; the fields are in the order of its parts."""
+    """A call of the communicator; the fields are in the order of the parts of a call."""
 
     work: float
     """CPU time of the rank since the previous call, s."""
     enters: bool = False
     """Whether the rank enters a collective."""
     leaves: int = 0
-    """Number of collectives for which the rank waits; the result has ``size`` bytes."""
+    """Number of collectives for which the rank waits; the result of a collective has ``size`` bytes."""
     size: int = 0
     sends: list[tuple[int, int, int]] = field(default_factory=list)
-    """Sent messages: receiver, tag, bytes."""
+    """Sent messages, each with receiver, tag and number of bytes."""
     receives: list[tuple[int, int]] = field(default_factory=list)
-    """Received messages, for which the rank waits: sender, tag."""
+    """Received messages for which the rank waits, each with sender and tag."""
 
 
 class DeadlockError(Exception):
-    """Ranks wait for each other without end: the calls are not of one run."""
+    """Ranks wait for each other without end, because the calls do not belong to one run."""
 
 
 @dataclass
@@ -46,7 +47,7 @@ class Timeline:
     """Times of all ranks up to their present calls."""
 
     calls: Sequence[Sequence[Call]]
-    """Calls of each rank."""
+    """Calls of the communicator by each rank."""
     network: Network
     now: list[float] = field(init=False)
     """Present time of each rank, s."""
@@ -62,7 +63,7 @@ class Timeline:
         self._levels = (ranks - 1).bit_length()
 
     def run(self) -> float:
-        """Returns the time of the last rank, s. Raises DeadlockError."""
+        """Returns the time of the last rank, s. Raises DeadlockError if ranks wait for each other without end."""
         under_way = {rank: self._steps(rank) for rank in range(len(self.calls))}
         while under_way:
             before = len(under_way), self._progress()
@@ -77,7 +78,7 @@ class Timeline:
         return sum(self.now), sum(map(len, self._mail.values())) + sum(map(len, self._come))
 
     def _steps(self, rank: int) -> Iterator[int]:
-        """Processes the calls of a rank up to the first one for which it must wait."""
+        """Processes the calls of a rank up to the first call for which the rank must wait."""
         for call in self.calls[rank]:
             self.now[rank] += call.work + CALL
             if call.enters:

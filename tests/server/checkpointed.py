@@ -10,7 +10,7 @@ from .running import Running
 
 
 def with_checkpoint(server: Running, run: str, step: int) -> Path:
-    """Adds the files that a worker with checkpoints leaves to the folder of a run."""
+    """Adds to the folder of a run the files that a worker with checkpoints leaves."""
     return with_checkpoint_in(made(server.ann.runs / run, step))
 
 

@@ -1,7 +1,7 @@
-"""A Chromium without a window. The tests send commands of the DevTools protocol to the browser over a pipe; the browser
-draws by software.
+"""A Chromium browser without a window, driven by tests. The tests send commands of the DevTools protocol to the browser
+over a pipe; the browser draws by software.
 
-https://chromedevtools.github.io/devtools-protocol describes the methods that are called here.
+The site https://chromedevtools.github.io/devtools-protocol describes the methods that are called here.
 """
 
 import base64
@@ -25,14 +25,15 @@ _OPTIONS = (
     "--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--ignore-gpu-blocklist",
 )  # fmt: skip
 _ONTO_3_AND_4 = "import os, sys; r, w, *a = sys.argv[1:]; os.dup2(int(r), 3); os.dup2(int(w), 4); os.execvp(a[0], a)"
-"""Program that moves the pipes to descriptors 3 and 4: the browser reads commands from 3 and writes answers to 4."""
+"""Program that moves the pipes to the descriptors 3 and 4: the browser reads commands from descriptor 3 and writes
+answers to descriptor 4."""
 _PATIENCE = 60.0
 _NOTHING = (None, False, 0, "")
 """Values that are false in JavaScript. The protocol sends an element of the page as an empty dict, which counts as
 true."""
 _BUTTON = {"button": "left", "clickCount": 1}
 KEYS = {"Enter": 13, "Escape": 27, "Tab": 9, " ": 32, "ArrowLeft": 37, "ArrowUp": 38, "ArrowRight": 39, "ArrowDown": 40}
-"""Keys that a test can press, with their Windows key codes, which the protocol requires."""
+"""Keys that a test can press, with the Windows key codes that the protocol requires."""
 
 MEASURES = """
 window.seen = {frames: [], events: []};
@@ -50,14 +51,14 @@ def program() -> str | None:
 
 
 class PageError(Exception):
-    """A script of the page has failed, or a condition did not become true in time."""
+    """Error: a script of the page has failed, or a condition did not become true in time."""
 
 
 class Browser:
     """A browser with an empty profile; a context manager."""
 
     def __init__(self, folder: Path) -> None:
-        """Prepares the browser; ``folder`` is the place of the profile."""
+        """Prepares the browser; ``folder`` is the folder of the browser's profile."""
         self._folder = folder
         self._lock = threading.Lock()
         self._answers: dict[int, queue.SimpleQueue[dict[str, Any]]] = {}
@@ -98,7 +99,7 @@ class Browser:
         phone: bool = False,
         beside: "Page | None" = None,
     ) -> "Page":
-        """Opens an empty page with a profile of its own, or with the profile of another page."""
+        """Opens an empty page with its own profile, or with the profile of another page."""
         context = beside.context if beside else self.call("Target.createBrowserContext")["browserContextId"]
         target = self.call("Target.createTarget", url="about:blank", browserContextId=context)["targetId"]
         session = self.call("Target.attachToTarget", targetId=target, flatten=True)["sessionId"]
@@ -108,7 +109,9 @@ class Browser:
         return page
 
     def call(self, method: str, session: str = "", /, **params: Any) -> dict[str, Any]:
-        """Calls a method of the protocol and returns its answer. Raises PageError."""
+        """Calls a method of the protocol and returns the answer of the browser. Raises PageError if the browser answers
+        with an error.
+        """
         answer: queue.SimpleQueue[dict[str, Any]] = queue.SimpleQueue()
         number = self.send(method, session, answer, **params)
         try:
@@ -125,7 +128,7 @@ class Browser:
     def send(
         self, method: str, session: str, answer: "queue.SimpleQueue[dict[str, Any]] | None" = None, **params: Any
     ) -> int:
-        """Calls a method without waiting for the answer; returns the number of the call."""
+        """Calls a method of the protocol without waiting for the answer; returns the number of the call."""
         with self._lock:
             self._last += 1
             number = self._last
@@ -159,7 +162,7 @@ class Page:
         """Status and address of each request to the server."""
 
     def open(self, width: int, height: int, *, dark: bool, phone: bool) -> None:
-        """Sets size and theme of the window and subscribes to events."""
+        """Sets the size and the theme of the window and subscribes to events."""
         for domain in ("Page", "Runtime", "Log", "Network"):
             self.call(f"{domain}.enable")
         self.size(width, height, phone=phone)
@@ -172,7 +175,7 @@ class Page:
         self.call("Emulation.setDeviceMetricsOverride", width=width, height=height, deviceScaleFactor=1, mobile=phone)
 
     def call(self, method: str, /, **params: Any) -> dict[str, Any]:
-        """Calls a method of the protocol for this page. Raises PageError."""
+        """Calls a method of the protocol for this page. Raises PageError if the browser answers with an error."""
         return self._browser.call(method, self._session, **params)
 
     def on_event(self, method: str, params: dict[str, Any]) -> None:
@@ -194,8 +197,8 @@ class Page:
         self.wait("document.readyState === 'complete'")
 
     def evaluate(self, script: str) -> Any:
-        """Returns the value of a JavaScript expression; of a promise, the value with which it resolves. Raises
-        PageError.
+        """Returns the value of a JavaScript expression; if the value is a promise, the value with which the promise
+        resolves. Raises PageError if the expression fails.
         """
         found = self.call(
             "Runtime.evaluate", expression=script, awaitPromise=True, returnByValue=True, userGesture=True
@@ -205,7 +208,9 @@ class Page:
         return found["result"].get("value")
 
     def wait(self, script: str, seconds: float = _PATIENCE) -> Any:
-        """Waits until an expression is true and returns its value. Raises PageError."""
+        """Waits until an expression is true and returns the value of the expression. Raises PageError if the expression
+        does not become true in time.
+        """
         until = time.monotonic() + seconds
         while (value := self.evaluate(script)) in _NOTHING:
             if time.monotonic() > until:
@@ -218,7 +223,7 @@ class Page:
         return str(self.evaluate(f"document.querySelector({json.dumps(selector)})?.innerText ?? ''"))
 
     def place(self, selector: str, right: float = 0.5, down: float = 0.5) -> tuple[float, float]:
-        """Scrolls an element into view and returns the position of a point in it, px. The point is given by
+        """Scrolls an element into view and returns the position of a point in the element, px. The point is given by
         fractions of the element's size.
         """
         box = self.wait(f"""(() => {{
@@ -240,7 +245,9 @@ class Page:
         self.call("Input.dispatchMouseEvent", type="mouseReleased", x=x, y=y, **_BUTTON)
 
     def press(self, key: str, modifiers: int = 0) -> None:
-        """Presses a key in the element that has the focus; ``modifiers``: 1 Alt, 2 Ctrl, 8 Shift."""
+        """Presses a key in the element that has the focus; ``modifiers`` is the sum of 1 for Alt, 2 for Ctrl and 8 for
+        Shift.
+        """
         text = {"Enter": "\r"}.get(key, key if len(key) == 1 else "")
         known = {"key": key, "code": key, "windowsVirtualKeyCode": KEYS.get(key, ord(key[0])), "modifiers": modifiers}
         self.call("Input.dispatchKeyEvent", type="keyDown", **known, **({"text": text} if text else {}))

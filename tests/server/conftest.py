@@ -1,4 +1,4 @@
-"""Servers for tests, in this process or in a process of their own. Their worker computes nothing."""
+"""Servers for tests, in this process or in a separate process. The worker of these servers computes nothing."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -37,8 +37,8 @@ def server(settings: Settings) -> Iterator[Running]:
 
 @pytest.fixture(scope="module")
 def ended(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Running, str]]:
-    """A server and a finished run of two ranks, shared by tests that only read, or that restore the files that they
-    change.
+    """A server and a finished run of two ranks, shared by tests that only read files, or that restore the files that
+    they change.
     """
     with running(settings_in(tmp_path_factory.mktemp("ended"))) as made:
         run = made.ann.submit(ranks=2)
@@ -48,7 +48,7 @@ def ended(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Running, s
 
 @contextmanager
 def running(settings: Settings) -> Iterator[Running]:
-    """A server in this process. All workers have ended after the test."""
+    """A server in this process. All workers of the server have ended after the test."""
     with opened(settings) as service, TestClient(build_app(service), base_url="http://127.0.0.1") as client:
         users = []
         for name in ("ann", "bob"):
@@ -60,7 +60,7 @@ def running(settings: Settings) -> Iterator[Running]:
 
 
 def _like(client: TestClient, token: str) -> TestClient:
-    """Returns a client of the same server with a token, inside the same event loop."""
+    """Returns a client of the server with a token, inside the same event loop."""
     other = TestClient(client.app, base_url="http://127.0.0.1", headers={"Authorization": f"Bearer {token}"})
     other.portal = client.portal
     return other
@@ -80,7 +80,9 @@ def ask(tmp_path_factory: pytest.TempPathFactory) -> Ask:
 
 @pytest.fixture(scope="module")
 def site(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Site]:
-    """A server without runs in a process of its own. A test file that needs runs defines a fixture with this name."""
+    """A server without runs in a separate process. A test file that needs runs on the server defines a fixture with the
+    name of this fixture.
+    """
     made = Site(tmp_path_factory.mktemp("site") / "runs")
     yield made
     made.process.terminate()

@@ -1,4 +1,6 @@
-"""Program that replaces the one that makes reports. The title of the run's case selects the behaviour."""
+"""Test program in place of the program that makes reports. The title of the run's case selects the behaviour of the
+program.
+"""
 
 import sys
 import time

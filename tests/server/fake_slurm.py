@@ -1,4 +1,4 @@
-"""Slurm's commands as shell scripts. A file contains the queue."""
+"""Fake commands of Slurm as shell scripts. A file contains the queue of the fake Slurm."""
 
 from pathlib import Path
 
@@ -12,7 +12,7 @@ cd {place}; [ -e away ] && {{ echo "slurm_load_jobs error: Unable to contact slu
 cat queue 2>/dev/null; exit 0
 """
 TELL = {"scancel": "ended", "scontrol": "released"}
-"""Commands that append their arguments to a file."""
+"""Fake Slurm commands that append their arguments to a file."""
 ACCEPT = 'echo "$((100 + $(wc -l < calls)))|PENDING|N/A|$name|Resources" >> queue'
 
 

@@ -1,8 +1,8 @@
-"""A worker that computes nothing and has the interface of the real one: command line, journal, outcome, signals, exit
-codes.
+"""A worker that computes nothing and has the interface of the real worker: command line, journal, outcome, signals,
+exit codes.
 
-The case's ``description`` is JSON with ``steps``, ``pace`` (s per step), ``end`` (see the function), and ``wait``
-(the worker pauses until this file exists). Rank 0 holds the lock of the folder until its end.
+The ``description`` of the case is JSON with ``steps``, ``pace`` (s per step), ``end`` (see the function), and ``wait``
+(the worker pauses until this file exists). Rank 0 of the fake worker holds the lock of the folder until its end.
 """
 
 import argparse
@@ -124,7 +124,7 @@ def end(how: str, options: argparse.Namespace, say: object, steps: int) -> int:
 
 
 def interrupted(options: argparse.Namespace, steps: int) -> int:
-    """Writes a checkpoint and the outcome so far; the process that started the worker determines the cause of the
+    """Writes a checkpoint and the preliminary outcome; the process that started the worker determines the cause of the
     interruption.
     """
     layout.checkpoint(options.out, steps).mkdir(parents=True, exist_ok=True)

@@ -1,8 +1,8 @@
 """Faults at each place at which the supervisor writes, and a launcher whose workers are objects in this process.
 
-Python calls audit hooks before a file is opened, renamed, made or removed; an error of a hook becomes the error of
-the call. ``os.write`` and ``os.fsync`` are replaced. A test therefore finds all places at which a disk can fail,
-also those of later code.
+Python calls audit hooks before a file is opened, renamed, made or removed; an error of a hook becomes the error of the
+call. The functions ``os.write`` and ``os.fsync`` are replaced. A test therefore finds all places in the code at which a
+disk can fail, also places in later code.
 """
 
 import os
@@ -31,16 +31,15 @@ class CrashError(BaseException):
 
 @dataclass
 class Plan:
-    """Plan of a fault: fails at the ``place``-th write below ``root``, and at the writes after it, ``times`` times
-    in all.
-    """
+    """Plan of a fault: the writes below ``root`` fail from number ``place`` on, ``times`` writes in all."""
 
     root: Path
     place: int
     error: BaseException
     times: int = 1
     reads: bool = False
-    """True: opening a file for reading counts as well. A process without free descriptors also fails there."""
+    """True if opening a file for reading also counts. A process without free descriptors also fails when it opens a
+    file for reading."""
     seen: int = 0
     fired: int = 0
 
@@ -84,14 +83,14 @@ sys.addaudithook(_audit)
 
 
 def fsync(descriptor: int) -> None:
-    """Replaces ``os.fsync``."""
+    """Replaces ``os.fsync`` with a call that may fail."""
     if _current.plan is not None and not _current.plan.reads:
         _current.plan.touch()
     _fsync(descriptor)
 
 
 def write(descriptor: int, data: bytes) -> int:
-    """Replaces ``os.write``. When a write fails, half of the data are on disk."""
+    """Replaces ``os.write`` with a call that may fail. When the replaced write fails, half of the data are on disk."""
     if _current.plan is not None and not _current.plan.reads:
         try:
             _current.plan.touch()
@@ -113,7 +112,9 @@ def faults(plan: Plan) -> Iterator[None]:
 
 @dataclass
 class Puppet:
-    """A worker with a planned end. Its own writes do not fail, as if it were another process."""
+    """A worker with a planned end (puppet). The writes of a puppet do not fail, as if the puppet were another
+    process.
+    """
 
     run: str
     folder: Path
@@ -135,8 +136,8 @@ class Puppet:
         return ""
 
     def exited(self) -> Exit | None:
-        """Polls the worker. The worker runs from the second poll on; it ends at the fourth poll or after a request
-        to stop.
+        """Polls the worker. The puppet runs from the second poll on, and ends at the fourth poll or after a request to
+        stop.
         """
         plan, _current.plan = _current.plan, None
         try:
@@ -158,7 +159,7 @@ class Puppet:
             (self.folder / layout.LOGS / layout.LAUNCHER_LOG).write_text("=   EXIT CODE: 9\n")
 
     def stop(self) -> None:
-        """Requests an end at the next poll."""
+        """Requests an end of the worker at the next poll."""
         self.stopped = True
 
     def kill(self) -> None:
@@ -176,7 +177,7 @@ class Puppets:
     queues: bool = False
 
     def start(self, job: Job) -> Worker:
-        """Starts a worker, then records it, in the order of a real launcher."""
+        """Starts a worker, and records it afterwards, in the order of a real launcher."""
         if self.refuses:
             raise LaunchError("no mpiexec")
         puppet = Puppet(job.run, job.folder, self.ends)
@@ -208,15 +209,15 @@ class House:
         self.supervisor = self.begin()
 
     def begin(self) -> Supervisor:
-        """Returns a supervisor that has loaded the runs of the folder. Its thread does not run; tests call its
-        turns.
+        """Returns a supervisor that has loaded the runs of the folder. The thread of this supervisor does not run;
+        tests call its turns.
         """
         made = Supervisor(self.settings, self.store, self.puppets, None, lambda _: None)
         made._take_up()
         return made
 
     def accept(self) -> Run:
-        """Accepts a run with the steps of a real submission."""
+        """Accepts a run in the same steps as a real submission."""
         run_id, now = folder.new_id()
         made = Submission(
             id=run_id, owner="ann", name="bar", title="", ranks=1, submitted=now, case_file="case.toml",

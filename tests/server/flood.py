@@ -1,5 +1,5 @@
-"""``flood.py HOST PORT SECONDS THREADS`` sends requests without a token as fast as possible, and prints the number
-of answers by status.
+"""The command ``flood.py HOST PORT SECONDS THREADS`` sends requests without a token as fast as possible, and prints the
+number of answers by status.
 """
 
 import json

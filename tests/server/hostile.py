@@ -1,4 +1,6 @@
-"""Hostile bodies of requests: small bodies with a high cost, numbers that are not finite, incomplete characters."""
+"""Hostile bodies of HTTP requests: small bodies with a high cost, numbers that are not finite, incomplete
+characters.
+"""
 
 import json
 import random
@@ -10,7 +12,7 @@ from .running import case_text
 
 TOML, JSON = "application/toml", "application/json"
 Body = tuple[str, str, bytes]
-"""Name, content type and bytes."""
+"""Name, content type and bytes of a request body."""
 _SEED = 20260
 VALUES: tuple[Any, ...] = (
     None, True, [], {}, "", "x" * 100_000, -1, 0, 2**63, 2**64, 10**400, 1e308, 1e160, 1e-160, 5e-324, "1e160 m",
@@ -24,13 +26,13 @@ def good() -> dict[str, Any]:
 
 
 def corpus() -> list[Body]:
-    """Returns all hostile bodies; each call returns the same bodies."""
+    """Returns all hostile HTTP request bodies; each call returns the same bodies."""
     made = [*_quadratic(), *_deep(), *_numbers(), *_text(), *_large(), *_replaced(), *_mutated()]
     return [(f"{n:03d} {name}", kind, body) for n, (name, kind, body) in enumerate(made)]
 
 
 def quadratic() -> list[Body]:
-    """Returns the bodies whose cost grows faster than their size."""
+    """Returns the HTTP request bodies whose cost grows faster than their size."""
     return [*_quadratic(), *_large()]
 
 
@@ -175,7 +177,7 @@ def _places(data: Any, place: tuple[int | str, ...] = ()) -> Iterator[tuple[int 
 
 
 def _with(place: tuple[int | str, ...], value: Any) -> bytes:
-    """Returns a valid case with a value at a key."""
+    """Returns a valid case with the given value at the given key."""
     case = good()
     inner: Any = case
     for key in place[:-1]:

@@ -21,14 +21,14 @@ ENERGY = {
 
 
 def parts(k: int) -> dict[str, messages.PartEnergy]:
-    """Returns energies by part, which only newer workers report."""
+    """Returns energies by part, which only newer versions of the worker report."""
     made = {"rod": (2.0, 0.5 * k), "ball": (1.0, 0.0)}
     return {name: messages.PartEnergy(kinetic=a, internal=b) for name, (a, b) in made.items()} if k else {}
 
 
 def lines_of_run(reports: int, ranks: int = 2, every: int = 100) -> Iterator[messages.AnyMessage]:
-    """Yields the messages of a run with ``reports`` reports. After each ``every`` reports come a balance event and a
-    snapshot.
+    """Yields the messages of a run with ``reports`` reports. Each group of ``every`` reports is followed by a balance
+    event and a snapshot.
     """
     yield messages.Status(run="r", wall=1000.0, state=State.ACCEPTED)
     yield messages.Status(run="r", wall=1010.0, state=State.RUNNING)

@@ -10,9 +10,10 @@ from typing import Any
 from .visitor import WEB
 
 NODE = shutil.which("node")
-"""Path of the program node; None if it is not installed."""
+"""Path of the program node; None if node is not installed."""
 Ask = Callable[..., Any]
-"""``ask(modules, expression, data)`` returns the value of an expression; ``page`` has the exports of the modules."""
+"""The function ``ask(modules, expression, data)`` returns the value of an expression; ``page`` in the expression has
+the exports of the modules."""
 
 
 def asking(web: Path) -> Ask:

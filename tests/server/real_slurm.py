@@ -1,4 +1,4 @@
-"""A Slurm of one node on this machine, started for tests by root, without systemd, cgroups or a database."""
+"""A Slurm of one node on this machine, which tests start as root, without systemd, cgroups or a database."""
 
 import os
 import shutil
@@ -14,8 +14,8 @@ from pathlib import Path
 NEEDED = ("slurmctld", "slurmd", "munged", "sbatch")
 PACKAGES = "slurm-wlm munge"
 CORES = 8
-"""Number of cores in the configuration of the node, independent of the machine: this number of small runs can run at
-the same time."""
+"""Number of cores in the configuration of the node, independent of the machine. This number of runs with one core can
+run at the same time."""
 _PATIENCE = 60.0
 
 _CONF = """
@@ -58,7 +58,7 @@ PartitionName=high Nodes={host} MaxTime=INFINITE State=UP PriorityTier=10 Preemp
 
 
 def missing() -> str:
-    """Returns the reason why no Slurm can be started on this machine; empty if one can."""
+    """Returns the reason why no Slurm can be started on this machine; empty if Slurm can be started."""
     absent = [name for name in NEEDED if shutil.which(name) is None]
     if absent:
         return f"{', '.join(absent)}: not installed (apt-get install {PACKAGES}; make drill does it)"
@@ -83,25 +83,25 @@ class Cluster:
         return done.stdout.strip()
 
     def jobs(self, name: str) -> list[tuple[str, str]]:
-        """Returns number and state of all jobs whose names begin with ``name``."""
+        """Returns the number and the state of all Slurm jobs whose names begin with ``name``."""
         rows = [row.split("|") for row in self.command("squeue", "-h", "-t", "all", "-o", "%i|%T|%j").splitlines()]
         return [(row[0], row[1]) for row in rows if len(row) > 2 and row[2].startswith(name)]
 
     def start(self) -> None:
-        """Starts the controller."""
+        """Starts the controller of Slurm."""
         subprocess.run(["slurmctld", "-f", str(self.conf)], check=True, timeout=60, env=self._env())
 
     def kill(self) -> None:
-        """Kills the controller, which simulates a crash."""
+        """Kills the controller of Slurm, which simulates a crash."""
         with suppress(OSError, ValueError):
             os.kill(int((self.place / "slurmctld.pid").read_text()), signal.SIGKILL)
 
     def pause(self, number: signal.Signals) -> None:
-        """Sends the controller a signal."""
+        """Sends a signal to the controller of Slurm."""
         os.kill(int((self.place / "slurmctld.pid").read_text()), number)
 
     def await_node(self) -> None:
-        """Returns when the node accepts jobs."""
+        """Returns when the node accepts Slurm jobs."""
         deadline, state = time.monotonic() + _PATIENCE, "unknown"
         while time.monotonic() < deadline:
             with suppress(AssertionError):
@@ -124,7 +124,9 @@ class Cluster:
 
 @contextmanager
 def running(place: Path) -> Iterator[Cluster]:
-    """Starts a cluster with its state below ``place`` and sets SLURM_CONF; ends it afterwards with all its jobs."""
+    """Starts a cluster with its state below ``place`` and sets SLURM_CONF; afterwards ends the cluster with all its
+    jobs.
+    """
     for name in ("state", "spool"):
         (place / name).mkdir(parents=True)
     for parent in (place, *place.parents):
@@ -152,7 +154,7 @@ def running(place: Path) -> Iterator[Cluster]:
 
 
 def _munged(place: Path) -> "subprocess.Popen[bytes]":
-    """Starts a munge with a key of its own."""
+    """Starts a munge daemon with its own key."""
     key = place / "munge.key"
     key.write_bytes(os.urandom(128))
     key.chmod(0o600)

@@ -1,4 +1,6 @@
-"""Servers in this process and in processes of their own, and their users. The workers compute nothing."""
+"""Servers in this process and in separate processes, and the users of these servers. The workers of these servers
+compute nothing.
+"""
 
 import json
 import os
@@ -60,7 +62,7 @@ threads = {threads}
 
 @dataclass
 class User:
-    """A user of a server; ``http`` sends the user's token."""
+    """A user of a server; the client ``http`` sends the user's token."""
 
     http: httpx2.Client
     name: str
@@ -68,7 +70,7 @@ class User:
     """Folder of the server's runs."""
 
     def submit(self, text: str | None = None, **plan: Any) -> str:
-        """Submits a run and returns its id."""
+        """Submits a run and returns the id of the run."""
         answer = self.http.post("/v1/runs", content=text or case_text(**plan), headers=TOML)
         assert answer.status_code == 202, answer.text
         return str(answer.json()["id"])
@@ -90,12 +92,12 @@ class User:
         return seen
 
     def events(self, run: str, **query: int) -> list[dict[str, Any]]:
-        """Returns the journal over REST."""
+        """Returns the journal of the run over REST."""
         found: list[dict[str, Any]] = self.http.get(f"/v1/runs/{run}/events", params=query).json()["events"]
         return found
 
     def states(self, run: str) -> list[str]:
-        """Returns the states in the journal, in order."""
+        """Returns the states of the run in the journal, in order."""
         return [event["state"] for event in self.events(run) if event["type"] == "status"]
 
 
@@ -111,7 +113,7 @@ class Running:
 
 @dataclass
 class Process:
-    """A server in a process of its own, on a folder, with the arguments for another start."""
+    """A server in a separate process, on a folder, with the arguments for another start."""
 
     runs: Path
     arguments: tuple[str, ...]
@@ -119,7 +121,7 @@ class Process:
     clients: list[httpx2.Client] = field(default_factory=list)
 
     def start(self) -> dict[str, Any]:
-        """Starts the server and returns its server.json."""
+        """Starts the server and returns the content of server.json."""
         address = self.runs / "server.json"
         address.unlink(missing_ok=True)
         command = [sys.executable, "-m", "conoid.server", "--runs", str(self.runs), "--port", "0", *self.arguments]
@@ -151,7 +153,7 @@ class Process:
         _end_workers(self.runs)
 
     def end(self, number: signal.Signals) -> int:
-        """Sends a signal and waits for the end of the server."""
+        """Sends a signal to the server and waits for the end of the server."""
         assert self.child is not None
         self.child.send_signal(number)
         return self.child.wait(PATIENCE)
@@ -162,8 +164,8 @@ MakeProcess = Callable[..., Process]
 
 @contextmanager
 def processes(folder: Path) -> Iterator[MakeProcess]:
-    """Yields a function that makes servers on ``folder``/runs with given arguments; ends all servers and their
-    workers.
+    """Yields a function that makes servers on ``folder``/runs with given arguments; afterwards ends all servers and
+    their workers.
     """
     made: list[Process] = []
 

@@ -1,8 +1,9 @@
-"""``sandbox.py UNIT STATE -- COMMAND`` runs a command in the sandbox of a systemd unit, without systemd. Needs root.
+"""The command ``sandbox.py UNIT STATE -- COMMAND`` runs COMMAND in the sandbox of a systemd unit, without systemd. The
+command needs root.
 
-Mounts, user, limits and filters of system calls are set by the unit's file. A setting that this program does not
-support is an error: no restriction is omitted silently. ``STATE`` replaces /var/lib/conoid, and the environment of
-this Python replaces /opt/conoid. The settings are described in systemd.exec(5).
+The file of the unit sets mounts, user, limits and filters of system calls. A setting of the unit that this program does
+not support is an error: no restriction is omitted silently. The folder ``STATE`` replaces /var/lib/conoid, and the
+environment of this Python replaces /opt/conoid. The page systemd.exec(5) describes the settings.
 """
 
 import ctypes
@@ -34,12 +35,12 @@ _PASSED_OVER = {
     "ExecStart", "Restart", "RestartSec", "KillMode", "OOMPolicy", "UMask", "WorkingDirectory", "User", "Environment",
     "LimitNOFILE", "StateDirectory", "StateDirectoryMode", "ReadWritePaths", "SystemCallErrorNumber", "RemoveIPC",
 }  # fmt: skip
-"""Settings that ``enter`` reads, and settings that act only at the start or the end of a service."""
+"""Settings of the unit that ``enter`` reads, and settings that act only at the start or the end of a service."""
 Unit = dict[str, list[str]]
 
 
 def read(path: Path) -> Unit:
-    """Returns the settings of the section [Service], each with its values in order."""
+    """Returns the settings of the section [Service] of the unit, each with its values in order."""
     found: Unit = {}
     section = ""
     for line in path.read_text().splitlines():
@@ -58,7 +59,7 @@ def enter(unit: Unit, state: Path) -> None:
         raise SystemExit(f"sandbox: settings that it does not have: {', '.join(sorted(unknown))}")
     _check(_LIBC.unshare(_NEW_MOUNTS), "unshare")
     _mount("none", "/", _PRIVATE | _RECURSIVE)
-    os.umask(0o022)  # systemd makes mount points with this mask, for any mask of the caller
+    os.umask(0o022)  # systemd makes mount points with this file mode mask, for any mask of the caller
     _install(state)
     for name, protect in _MOUNTS.items():
         if name in unit:
@@ -75,7 +76,7 @@ def enter(unit: Unit, state: Path) -> None:
 
 
 def environment(unit: Unit) -> dict[str, str]:
-    """Returns the environment that systemd sets for a service of this unit."""
+    """Returns the environment variables that systemd sets for a service of this unit."""
     own = dict(pair.split("=", 1) for line in unit.get("Environment", ()) for pair in line.split())
     home = "/var/lib/conoid"
     path = "/usr/local/sbin:/usr/local/bin:/usr/sbin:/usr/bin:/sbin:/bin"
@@ -116,7 +117,7 @@ def _strict(unit: Unit) -> None:
 
 
 def _no_homes(unit: Unit) -> None:
-    """Makes the homes empty, except for this Python and its code, which an installation has in /opt."""
+    """Makes the home folders empty, except for this Python and its code, which an installation has in /opt."""
     needed = [Path(sys.base_prefix), Path(sys.prefix), Path(__file__).parents[2]]
     hidden = [path for path in needed if _below(str(path), _HOMES)]
     held = [os.open(path, os.O_PATH) for path in hidden]
@@ -175,7 +176,7 @@ def _below(path: str, places: tuple[str, ...]) -> bool:
 
 
 def _read_only(place: str) -> None:
-    """Makes a mount read-only and keeps its other flags."""
+    """Makes a mount read-only and keeps the other flags of the mount."""
     with suppress(FileNotFoundError, PermissionError):
         flags = os.statvfs(place).f_flag & (_NO_SUID | _NO_DEVICES)
         _mount("none", place, _REMOUNT | _BIND | _READ_ONLY | flags)
@@ -200,7 +201,7 @@ def nobody() -> pwd.struct_passwd:
 
 
 def _becomenobody() -> None:
-    """Changes to a user without a capability, which also holds after an exec."""
+    """Changes to a user without a capability; the process also has no capability after an exec."""
     for capability in range(64):
         if _LIBC.prctl(_BOUNDING_DROP, capability, 0, 0, 0):
             break
@@ -239,7 +240,7 @@ _MOUNTS: dict[str, Callable[[Unit], None]] = {
     "PrivateMounts": _nothing,
     "DevicePolicy": _nothing,
 }
-"""Settings of the unit, in the order in which they are applied."""
+"""Settings of the unit, in the order in which this program applies them."""
 _CALLS: dict[str, Callable[[Unit], None]] = {
     "SystemCallArchitectures": lambda unit: syscalls.native(),
     "RestrictAddressFamilies": lambda unit: syscalls.address_families(_words(unit, "RestrictAddressFamilies")),
@@ -255,7 +256,7 @@ _CALLS: dict[str, Callable[[Unit], None]] = {
 
 
 def main(arguments: list[str]) -> None:
-    """Enters the sandbox and replaces this process by the command."""
+    """Enters the sandbox and replaces this process with the command."""
     unit, state, command = read(Path(arguments[0])), Path(arguments[1]), arguments[3:]
     enter(unit, state)
     os.execvpe(command[0], command, environment(unit))

@@ -1,6 +1,6 @@
-// Evaluates an expression with modules of the page. Standard input is { module, script, data } in JSON; the value of
-// the expression is written to standard output. `module` may name several modules of one folder, separated by spaces.
-// Data with the key "base64" is passed as bytes.
+// Program that evaluates an expression with modules of the page. The standard input is { module, script, data } in
+// JSON; the value of the expression is written to standard output. The field `module` may name several modules of one
+// folder, separated by spaces. Data with the key "base64" is passed to the expression as bytes.
 
 import { readFileSync } from "node:fs";
 import { pathToFileURL } from "node:url";

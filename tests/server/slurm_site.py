@@ -47,7 +47,7 @@ class Site:
     ann: User
 
     def submit(self, text: str, profile: str = "standard") -> str:
-        """Submits a run and returns its id."""
+        """Submits a run and returns the id of the run."""
         answer = self.ann.http.post("/v1/runs", params={"profile": profile}, content=text, headers=TOML)
         assert answer.status_code == 202, answer.text
         return str(answer.json()["id"])
@@ -57,7 +57,7 @@ class Site:
         return self.reached(run, seconds, *(state for state in State if state.final))
 
     def reached(self, run: str, seconds: float, *states: State) -> dict[str, Any]:
-        """Waits until the run is in one of the states and returns the run."""
+        """Waits until the run is in one of the given states and returns the run."""
         deadline = time.monotonic() + seconds
         while (seen := self.ann.show(run))["state"] not in states:
             assert time.monotonic() < deadline, f"{seen['state']} ({seen['reason']}), not {states}: {self.tail(run)}"
@@ -70,7 +70,7 @@ class Site:
         return log.read_text()[-2000:] if log.exists() else "no log"
 
     def jobs(self, run: str) -> list[tuple[str, str]]:
-        """Returns number and state of all jobs of the run."""
+        """Returns the number and the state of all Slurm jobs of the run."""
         return self.cluster.jobs(f"conoid-{run}-")
 
     def again(self, number: signal.Signals = signal.SIGKILL) -> None:
@@ -80,7 +80,7 @@ class Site:
 
 
 def sweep_of(site: Site, number: int, **plan: Any) -> list[str]:
-    """Submits a sweep and returns its runs in the order of its points."""
+    """Submits a sweep and returns the runs of the sweep in the order of its points."""
     return [point["run"]["id"] for point in sweep_and_body(site, number, **plan)[0]["points"]]
 
 
@@ -94,7 +94,7 @@ def sweep_and_body(site: Site, number: int, **plan: Any) -> tuple[dict[str, Any]
 
 
 def job_of(site: Site, run: str) -> Job:
-    """Waits until Slurm has given the run a job number; returns the record of the job."""
+    """Waits until Slurm has given the run a job number; returns the record of the Slurm job."""
     deadline = time.monotonic() + 30.0
     while (found := read_job(site.server.runs / run)) is None or not found.job:
         assert time.monotonic() < deadline
@@ -103,7 +103,7 @@ def job_of(site: Site, run: str) -> Job:
 
 
 def processes_of(run: str) -> list[int]:
-    """Returns the processes of a run's ranks, of the solver or of the fake worker."""
+    """Returns the processes of a run's ranks, for the solver or for the fake worker."""
     found = []
     for entry in Path("/proc").iterdir():
         if entry.name.isdigit():

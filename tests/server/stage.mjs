@@ -1,8 +1,8 @@
-// A page without a browser: elements that store their children, and a server with answers from the test.
-// Standard input is { module, script } in JSON; the result of the async script is written to standard output.
-// The script can use `load(module)`, `text(element)`, `pause(ms)`, `store()` and `state.served`. `state.served` is a
-// function from a path to the data of a JSON answer, or to a number, the status of an answer. If the function throws,
-// the server does not answer.
+// A page without a browser has elements that store their children, and a server with answers from the test. The
+// standard input is { module, script } in JSON; the result of the async script is written to standard output. The
+// script can use `load(module)`, `text(element)`, `pause(ms)`, `store()` and `state.served`. The function
+// `state.served` gets a path and returns the data of a JSON answer, or a number, which is the status of an answer. If
+// `state.served` throws, the server does not answer.
 
 import { readFileSync } from "node:fs";
 import { pathToFileURL } from "node:url";
@@ -62,7 +62,7 @@ const text = (element) => (element instanceof Element ? element.children.map(tex
 const pause = (ms) => new Promise((resolve) => setTimeout(resolve, ms));
 const { module, script } = JSON.parse(readFileSync(0, "utf8"));
 const load = (name) => import(new URL(name, pathToFileURL(module)));
-// What a browser keeps by name.
+// Storage that replaces the storage of a browser, by name.
 const store = () => {
   const kept = new Map();
   return { kept, getItem: (key) => kept.get(key) ?? null, setItem: (key, value) => kept.set(key, value), removeItem: (key) => kept.delete(key) };

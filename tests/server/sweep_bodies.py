@@ -1,4 +1,4 @@
-"""Requests for sweeps of one case with four end times, and servers that are killed during a submission."""
+"""HTTP requests for sweeps of one case with four end times, and servers that are killed during a submission."""
 
 import json
 import time
@@ -16,13 +16,13 @@ ENDS = [f"{n} us" for n in range(1, 5)]
 
 
 def wish(**extra: Any) -> bytes:
-    """Returns the body of a sweep over four end times."""
+    """Returns the HTTP body that requests a sweep over four end times."""
     points = [{"run.end_time": end} for end in ENDS]
     return json.dumps({"case": tomllib.loads(case_text()), "points": points, **extra}).encode()
 
 
 def handed_in(user: User, body: bytes, key: str | None = None, status: int = 202) -> dict[str, Any]:
-    """Submits a sweep and returns the answer."""
+    """Submits a sweep and returns the answer of the server."""
     headers = {"Content-Type": "application/json", **({"Idempotency-Key": key} if key else {})}
     answer = user.http.post("/v1/sweeps", content=body, headers=headers)
     assert answer.status_code == status, answer.text
@@ -35,14 +35,14 @@ class Killed(BaseException):
 
 
 class Never(set[str]):
-    """Set from which nothing is removed: no run starts before the end of the server."""
+    """A set from which nothing is removed: no run starts before the end of the server."""
 
     def discard(self, _: object) -> None:
         """Does nothing."""
 
 
 def after(service: Service, sweep: str, states: set[State]) -> list[Run]:
-    """Waits until all runs of the sweep are in one of the states and returns the runs."""
+    """Waits until all runs of the sweep are in one of the given states and returns the runs."""
     deadline = time.monotonic() + PATIENCE
     while True:
         runs = [run for run in service.store.all() if folder.submission(service.settings.runs / run.id).labels]

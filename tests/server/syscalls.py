@@ -1,7 +1,7 @@
-"""System calls that a unit of systemd forbids, as filters of libseccomp in the calling process.
+"""System calls that a systemd unit forbids, as filters of libseccomp in the calling process.
 
-Each of systemd's settings that acts on system calls is one filter; a call must pass all filters. The rules are those
-of systemd.exec(5) and of systemd's ``src/shared/seccomp-util.c``.
+Each systemd setting that acts on system calls is one filter; a system call must pass all filters. The rules of the
+filters are those of systemd.exec(5) and of systemd's ``src/shared/seccomp-util.c``.
 """
 
 import ctypes
@@ -27,7 +27,7 @@ class _Compare(ctypes.Structure):
 
 
 def library() -> ctypes.CDLL | None:
-    """Returns libseccomp; None if it is not installed."""
+    """Returns the library libseccomp; None if libseccomp is not installed."""
     try:
         found = ctypes.CDLL("libseccomp.so.2", use_errno=True)
     except OSError:
@@ -42,17 +42,17 @@ def library() -> ctypes.CDLL | None:
 
 
 class Filter:
-    """One filter: a list of allowed calls, or a list of forbidden calls."""
+    """One filter: a list of allowed system calls, or a list of forbidden system calls."""
 
     def __init__(self, default: int = _ALLOW) -> None:
-        """Makes a filter; ``default``: action for a call without a rule."""
+        """Makes a filter; ``default`` is the action for a system call without a rule."""
         lib = library()
         assert lib is not None
         self._lib, self._context = lib, lib.seccomp_init(ctypes.c_uint32(default))
 
     def rule(self, action: int, call: str, *where: tuple[int, int, int, int]) -> None:
-        """Adds a rule; ``where``: argument, comparison and its two numbers. A call that this machine does not have
-        is skipped.
+        """Adds a rule for a system call; ``where`` has the argument, the comparison and its two numbers. A system call
+        that this machine does not have is skipped.
         """
         number = self._lib.seccomp_syscall_resolve_name(call.encode())
         compare = (_Compare * len(where))(*(_Compare(*each) for each in where))
@@ -60,11 +60,11 @@ class Filter:
         assert failed in (0, -errno.EDOM, -errno.EFAULT), f"{call}: {failed}"
 
     def deny(self, call: str, *where: tuple[int, int, int, int], code: int = errno.EPERM) -> None:
-        """Returns the action by which the call fails with ``code``."""
+        """Returns the action by which the system call fails with ``code``."""
         self.rule(_ERRNO | code, call, *where)
 
     def load(self) -> None:
-        """Applies the filter to this process and its children."""
+        """Applies the filter to this process and its child processes."""
         failed = self._lib.seccomp_load(self._context)
         assert failed == 0, f"seccomp_load: {failed}"
         self._lib.seccomp_release(self._context)
@@ -80,7 +80,7 @@ def address_families(names: Sequence[str]) -> None:
 
 
 def calls(words: Sequence[str], code: int) -> None:
-    """SystemCallFilter: allows the calls of the named groups, without the calls of the groups with a ``~``."""
+    """SystemCallFilter: allows the system calls of the named groups, without the calls of the groups with a ``~``."""
     allowed: set[str] = set()
     for word in words:
         if word.startswith("~"):
@@ -94,7 +94,7 @@ def calls(words: Sequence[str], code: int) -> None:
 
 
 def _members(word: str) -> set[str]:
-    """Returns the calls of a group, from the output of systemd-analyze."""
+    """Returns the system calls of a group, from the output of systemd-analyze."""
     if not word.startswith("@"):
         return {word}
     command = [str(shutil.which("systemd-analyze")), "--no-pager", "syscall-filter", word]
@@ -104,7 +104,7 @@ def _members(word: str) -> set[str]:
 
 
 def namespaces() -> None:
-    """RestrictNamespaces=yes: forbids to make a namespace and to change to another one."""
+    """RestrictNamespaces=yes: forbids to make a namespace and to change to another namespace."""
     none = Filter()
     none.deny("setns")
     none.deny("clone3", code=errno.ENOSYS)
@@ -123,7 +123,7 @@ def realtime() -> None:
 
 
 def set_id_bits() -> None:
-    """RestrictSUIDSGID=yes: forbids to set these bits of a file."""
+    """RestrictSUIDSGID=yes: forbids to set the SUID and SGID bits of a file."""
     none = Filter()
     for bit in (stat.S_ISUID, stat.S_ISGID):
         for call, place in (("chmod", 1), ("fchmod", 1), ("fchmodat", 2), ("mkdir", 1), ("mkdirat", 2), ("creat", 1)):
@@ -150,7 +150,7 @@ def personality() -> None:
 
 
 def denied(names: Iterable[str]) -> Callable[[], None]:
-    """Returns a filter by which the given calls, or groups of calls, always fail."""
+    """Returns a filter by which the given system calls, or groups of system calls, always fail."""
 
     def load() -> None:
         none = Filter()

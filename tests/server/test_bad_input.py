@@ -1,4 +1,4 @@
-"""Bad input to a real server gets one line with the key, the value and what is allowed; the next run succeeds."""
+"""Bad input to a real server gets one line with the key, the value and the allowed values; the next run succeeds."""
 
 from collections.abc import Iterator
 from typing import Any
@@ -76,7 +76,7 @@ def test_no_token(users: tuple[User, User]) -> None:
 
 
 def test_another_users_run_and_no_run_is_lost(users: tuple[User, User]) -> None:
-    """After all bad inputs the server runs a valid case, and bob does not see this run."""
+    """After all bad inputs the server runs a valid case, and the user bob does not see this run."""
     ann, bob = users
     run = ann.submit()
     assert ann.wait_for(run)["state"] == "succeeded"

@@ -1,4 +1,4 @@
-"""A run as a job of Slurm without a server, by the commands of docs/howto/cluster.md."""
+"""A run as a Slurm job without a server, by the commands of docs/howto/cluster.md."""
 
 import hashlib
 import json
@@ -198,7 +198,7 @@ MESH = "*NODE\n1, 0, 0, 0\n2, 10, 0, 0\n3, 0, 10, 0\n4, 0, 0, 10\n*ELEMENT, TYPE
 
 
 def test_a_job_has_its_own_copy_of_a_mesh_file(elsewhere: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """The same command with another file is another case."""
+    """The same command with another mesh file is another case."""
     here = elsewhere.parent
     monkeypatch.setenv("CONOID_CACHE_DIR", str(here / "cache"))
     (here / "bar.toml").write_text(MESHED)
@@ -218,7 +218,9 @@ def test_a_job_has_its_own_copy_of_a_mesh_file(elsewhere: Path, monkeypatch: pyt
 
 
 def evil(folder: Path, **changes: str) -> Path:
-    """A folder that another user has made. Its record names programs that would leave a file if they ran."""
+    """Another user has made the folder of the run. The record in this folder names programs that would leave a file if
+    they ran.
+    """
     (folder / "bin").mkdir(parents=True)
     for name in ("squeue", "scancel", "sbatch", "scontrol", "sacct"):
         (folder / "bin" / name).write_text(f"#!/bin/sh\ntouch {folder}/owned\n")
@@ -232,8 +234,8 @@ def evil(folder: Path, **changes: str) -> Path:
 
 
 def test_a_folder_chooses_no_program(elsewhere: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """The job number in the record belongs to another job. The commands of the site ask Slurm for the name of that
-    job.
+    """The job number in the record belongs to another Slurm job. The Slurm commands of the site return the name of this
+    other job.
     """
     monkeypatch.setenv("CONOID_SITE", str(elsewhere))
     monkeypatch.setattr(following, "_ASK_EVERY", 0.0)
@@ -262,7 +264,7 @@ def test_a_text_of_a_record_is_no_option_of_a_command(changes: dict[str, str], e
 
 
 def test_a_run_that_goes_on_is_started_by_a_command_of_this_machine(elsewhere: Path) -> None:
-    """The same command submits a lost run again. The start command in the run's folder is ignored."""
+    """A repeated command submits a lost run again. The start command in the run's folder is ignored."""
     words = ["batch", "two_tets", "--ranks", 1, "--site", elsewhere, "--out", "run"]
     assert conoid(*words).exit_code == 0
     folder = elsewhere.parent / "run"
@@ -297,8 +299,8 @@ def test_a_request_to_stop_follows_no_link(tmp_path: Path) -> None:
 def test_a_folder_without_a_worker_is_neither_cancelled_nor_still_running(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """A killed worker writes no last message. Without this rule a request file would wait for the next worker, and a
-    command that follows the run would not end.
+    """A killed worker writes no last message. Without this rule a request file of a killed worker would wait for the
+    next worker, and a command that follows the run would not end.
     """
     monkeypatch.setattr(following, "_ASK_EVERY", 0.0)
     (tmp_path / layout.JOURNAL).write_text('{"type":"status","run":"a","seq":1,"state":"running"}\n')

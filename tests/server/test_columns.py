@@ -45,7 +45,9 @@ def test_a_short_file_is_given_as_it_is(tmp_path: Path) -> None:
 
 
 def test_no_peak_is_lost_however_long_the_file_is(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Spikes in single lines at random places are read in pieces of random lengths and combined into few groups."""
+    """Spikes in single lines of history.csv, at random places, are read in pieces of random lengths and combined into
+    few groups.
+    """
     monkeypatch.setattr(columns, "_GROUPS", 64)
     lot, path = random.Random(7), tmp_path / layout.HISTORY
     found, sent = Columns(path), list[float]()
@@ -76,7 +78,7 @@ def test_extremes_keep_their_order_and_pass_over_what_is_no_number() -> None:
 
 
 def test_a_rewritten_file_is_read_again(tmp_path: Path) -> None:
-    """A run that continues from a checkpoint removes lines of the history and writes them again."""
+    """A run that continues from a checkpoint removes lines of history.csv and writes these lines again."""
     path = tmp_path / layout.HISTORY
     write(path, [1.0, 2.0, 9.0])
     found = read(path)

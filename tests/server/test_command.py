@@ -27,7 +27,7 @@ Printed = Callable[..., tuple[int, str, str]]
 
 @pytest.fixture
 def say(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> Printed:
-    """Runs the command on a folder of its own; returns exit code, output and errors."""
+    """Runs the command on a separate folder; returns exit code, output and errors."""
 
     def run(*arguments: str) -> tuple[int, str, str]:
         code = main(["--runs", str(tmp_path / "runs"), *arguments])

@@ -204,7 +204,9 @@ def test_a_run_whose_folder_was_emptied_is_continued(tmp_path: Path, state: Stat
 def test_an_end_that_the_database_missed_twice_is_written_later(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The end could not be written to the database at the end of the run, and not at the start of the next server."""
+    """The end of the run could not be written to the database, neither at the end of the run nor at the start of the
+    next server.
+    """
     house = House(tmp_path / "runs")
     run = house.accept()
 

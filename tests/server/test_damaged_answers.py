@@ -27,7 +27,7 @@ SNAPSHOT: dict[str, Any] = {
 
 
 def answers(server: Running, run: str) -> dict[str, Any]:
-    """Returns the answers by route. Each answer is JSON in UTF-8 with the status 200 or 404."""
+    """Returns the answers of the server by route. Each answer is JSON in UTF-8 with the status 200 or 404."""
     found = {}
     for route in ROUTES:
         answer = server.ann.http.get(route.format(run))

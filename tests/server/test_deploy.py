@@ -53,7 +53,9 @@ def certificate(place: Path) -> None:
 
 
 def placed(place: Path, port: int, server: int) -> Path:
-    """Writes a shipped file with the addresses and the certificate of this test; each replaced text must exist."""
+    """Writes a shipped file with the addresses and the certificate of this test; each text that is replaced must exist
+    in the file.
+    """
     text = (DEPLOY / "nginx.conf").read_text()
     for shipped, here in {
         "listen 443 ssl;": f"listen 127.0.0.1:{port} ssl;",
@@ -113,7 +115,7 @@ def running(process: MakeProcess, place: Path) -> tuple[User, str]:
 
 @contextmanager
 def behind(ann: User, place: Path) -> Iterator[httpx2.Client]:
-    """Returns the same user with requests through nginx."""
+    """Returns the user with requests through nginx."""
     port = ann.http.base_url.port
     assert port is not None
     with proxy(place, port) as outside, visitor(place, outside, ann.http.headers["authorization"]) as far:

@@ -28,7 +28,7 @@ COUNTS = Counts(run="a", elements=45, nodes=33, shared=2, fragments=4, elements_
 
 
 def journaled(folder: Path, *messages: AnyMessage) -> Path:
-    """Makes a folder whose journal has these messages and an incomplete line."""
+    """Makes a folder whose journal has the given messages and an incomplete line."""
     (folder / layout.JOURNAL).write_bytes(b"".join(to_json(each) + b"\n" for each in messages) + b'{"type":"prog')
     return folder
 
@@ -75,7 +75,7 @@ def test_the_end_is_the_last_received_message(tmp_path: Path) -> None:
 
 
 class Gone:
-    """A worker that has ended; with ``alive`` it still runs."""
+    """A worker that has ended; with ``alive`` the worker still runs."""
 
     def __init__(self, alive: bool) -> None:
         self.alive_now = alive
@@ -92,7 +92,7 @@ class Gone:
 
 @pytest.mark.parametrize(("seen", "at"), [(True, 0.0), (False, 11.0)], ids=["seen alive", "gone when first looked at"])
 def test_an_unobserved_end_has_the_time_of_the_last_message(seen: bool, at: float, tmp_path: Path) -> None:
-    """The job of Slurm ended while no server was running."""
+    """The Slurm job ended while no server was running."""
     worker = Gone(alive=seen)
     watch = Watch(journaled(tmp_path, STARTED), worker, None)  # type: ignore[arg-type]
     looks = [*watch.look()]

@@ -1,4 +1,6 @@
-"""Faults other than kills: of disks, folders and clocks, and damaged files. The reported state stays true."""
+"""Faults other than kills: faults of disks, folders and clocks, and damaged files. The reported state of the run stays
+true after each fault.
+"""
 
 import errno
 import json
@@ -85,7 +87,7 @@ def test_a_worker_that_complains_of_a_full_disk_failed_for_storage(server: Runni
 
 
 def test_a_worker_names_the_removed_file(server: Running) -> None:
-    """The last line on standard error is that of MPI, which does not name the file."""
+    """The last line on standard error is a line of MPI, which does not name the file."""
     ended = server.ann.wait_for(server.ann.submit(end="gone"))
     assert (ended["state"], ended["cause"]) == ("failed", "storage")
     assert ended["message"].endswith("its last words: a file of the run is gone or cannot be written: history.csv")

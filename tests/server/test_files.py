@@ -55,7 +55,7 @@ def run(ended: tuple[Running, str], folder: Path) -> str:
 
 @pytest.fixture
 def folder(ended: tuple[Running, str], tmp_path: Path) -> Iterator[Path]:
-    """The folder of the run. The content of the file is restored after the test."""
+    """The folder of the run. The content of the file in the folder is restored after the test."""
     server, run = ended
     path = server.service.settings.runs / run
     kept = shutil.copytree(path, tmp_path / "kept")
@@ -253,7 +253,7 @@ def test_head_of_what_has_no_end_ends_at_once(server: Running, tmp_path: Path) -
 def test_a_followed_log_sends_keep_alive_bytes(
     server: Running, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The stream sends bytes with value 0 as a sign of life. A followed log does not contain such bytes."""
+    """The stream sends bytes with value 0 as a sign of life. A followed log does not contain bytes with the value 0."""
     monkeypatch.setattr(stream, "KEEP_ALIVE", 0.2)
     run = server.ann.submit(wait=str(tmp_path / "go"))
     server.ann.wait_for(run, State.RUNNING)

@@ -1,5 +1,5 @@
-"""A full disk when a server starts and under its commands: possible actions are done, others are refused in one
-line.
+"""A full disk at the start of a server and during its commands: possible actions are done, other actions are refused in
+one line.
 """
 
 import asyncio
@@ -44,7 +44,7 @@ def no_room() -> None:
 def test_a_server_starts_on_a_full_disk_and_answers(runs: Path) -> None:
     (runs / "server.secret").write_bytes(bytes(range(32)))
     (runs / "server.secret").chmod(0o600)
-    kept = Store(Settings(runs=runs).database_url)  # an open database has a log file, as with another reader
+    kept = Store(Settings(runs=runs).database_url)  # an open database has a log file
     token = create_token(kept, "ann", frozenset({"read", "submit"}))
     command = [sys.executable, "-m", "conoid.server", "--runs", str(runs), "--port", "0", "--zenoh-port", "0"]
     with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, preexec_fn=no_room) as child:

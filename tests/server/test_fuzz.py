@@ -1,5 +1,5 @@
-"""The REST interface against its own description, by schemathesis with given cases and runs; skipped without
-schemathesis.
+"""The REST interface is compared with its own description by schemathesis, with given cases and runs; the test is
+skipped without schemathesis.
 """
 
 import json
@@ -22,8 +22,8 @@ from .journal_lines import lines_of_run, write
 from .running import Process, User, case_text, processes
 
 REJECTED, ACCEPTED = "ST202", "ST201"
-"""Codes of schemathesis: a request that satisfies the schema is refused; a request that violates the schema is
-accepted."""
+"""Codes of schemathesis for two findings: the server refuses a request that satisfies the schema; the server accepts a
+request that violates the schema."""
 ALLOWED = {
     (REJECTED, "POST /v1/runs"): "a case makes sense beyond its schema; labels have a form",
     (REJECTED, "POST /v1/sweeps"): "as a case, and as many points as are allowed",
@@ -33,8 +33,8 @@ ALLOWED = {
     (ACCEPTED, "GET /v1/runs/{run_id}/stream"): "an empty Last-Event-ID is none, as browsers send it",
     (ACCEPTED, "POST /v1/cases:validate"): "it answers 200 where it finds a case wrong",
 }
-"""Findings that are not faults, with the reason. A run that was removed also answers 410, which schemathesis does
-not expect."""
+"""Findings of schemathesis that are no faults of the server, each with the reason. A removed run is also answered with
+410, which schemathesis does not expect."""
 EXAMPLES = 30
 """Number of examples for each route in each phase."""
 PHASES = ("examples", "coverage", "fuzzing", "stateful")
@@ -51,8 +51,8 @@ def ann(tmp_path_factory: pytest.TempPathFactory) -> Iterator[User]:
 
 
 def seeds(ann: User, place: Path) -> dict[str, list[Any]]:
-    """Returns values of parameters that are names of things: finished runs, a running one, a sweep, and files of
-    these.
+    """Returns values of parameters that name something: finished runs, a running run, a sweep, and files of these
+    runs.
     """
     runs = [ann.submit() for _ in range(ENDED)]
     for run in runs:
@@ -68,7 +68,7 @@ def seeds(ann: User, place: Path) -> dict[str, list[Any]]:
 
 
 def speak(folder: Path) -> None:
-    """Adds messages to the journal that the fake worker does not write: reports, a balance event, a snapshot."""
+    """Adds to the journal messages that the fake worker does not write: reports, a balance event, a snapshot."""
     sent = [message for message in lines_of_run(100) if not isinstance(message, Status)]
     write(folder, iter(sent), after=len((folder / layout.JOURNAL).read_bytes().splitlines()))
     layout.snapshot(folder, 0).parent.mkdir()
@@ -76,12 +76,12 @@ def speak(folder: Path) -> None:
 
 
 def wish() -> dict[str, Any]:
-    """Returns the body of a sweep of two points."""
+    """Returns the request body of a sweep of two points."""
     return {"case": tomllib.loads(case_text()), "points": [{"run.end_time": "1 us"}, {"run.end_time": "2 us"}]}
 
 
 def seeded(schema: dict[str, Any], known: dict[str, list[Any]]) -> dict[str, Any]:
-    """Returns the description with useful values in place of arbitrary text."""
+    """Returns the description of the interface with useful values in place of arbitrary text."""
     bodies = {
         "application/toml": case_text(), "application/json": tomllib.loads(case_text()), "/v1/sweeps": wish(),
     }  # fmt: skip
@@ -96,12 +96,14 @@ def seeded(schema: dict[str, Any], known: dict[str, list[Any]]) -> dict[str, Any
 
 
 def hooked() -> dict[str, str]:
-    """Returns an environment in which schemathesis can write TOML."""
+    """Returns environment variables with which schemathesis can write TOML."""
     return {**os.environ, "PYTHONPATH": str(Path(__file__).parent), "SCHEMATHESIS_HOOKS": "fuzz_toml"}
 
 
 def hold_whole(report: dict[str, Any], schema: str) -> None:
-    """Requires that every phase has ended without an error on every route, and that valid cases were accepted."""
+    """Requires that every phase of schemathesis has ended without an error on every route, and that valid cases were
+    accepted.
+    """
     ended = {name: report["phases"][name]["status"] for name in PHASES}
     assert set(ended.values()) <= {"success", "failure"}, f"{ended}\n{schema[-6000:]}"
     assert report["complete"]
@@ -115,8 +117,8 @@ def hold_whole(report: dict[str, Any], schema: str) -> None:
 def failures(output: str, paths: Iterable[str]) -> list[tuple[str, str, str]]:
     """Returns the findings of schemathesis: the code of the check, the route and the status of the answer.
 
-    The output has a block for each route, and a block for all sequences of requests, where the last request has
-    failed. ``paths`` are the paths of the description.
+    The output of schemathesis has a block for each route, and a block for all sequences of requests; in a sequence the
+    last request has failed. The argument ``paths`` has the paths of the description.
     """
     text = output.partition("= FAILURES =")[2].rpartition("= SUMMARY =")[0]
     found = []
@@ -141,7 +143,7 @@ def last_route(case: str, paths: Iterable[str]) -> str:
 
 
 def test_a_run_that_did_not_start_is_no_success() -> None:
-    """The study must fail for a phase that stopped early, an error, a missing route, or cases that were all refused."""
+    """The check must fail for a phase that stopped early, an error, a missing route, or cases that were all refused."""
     rates = {route: {"examples": {"accepted": 1}} for route in TAKE_CASES}
     phases = {name: {"status": "success"} for name in PHASES}
     good = {

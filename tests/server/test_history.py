@@ -1,4 +1,4 @@
-"""History of a run and its snapshots over HTTP."""
+"""The history of a run and the snapshots of a run over HTTP."""
 
 import struct
 import time
@@ -228,7 +228,7 @@ def test_the_course_of_a_fragment_is_that_of_the_snapshots_that_have_it(server: 
 
 
 def tabled(masses: dict[int, float]) -> bytes:
-    """Returns a snapshot with fragments of these masses by number, all at 5 m/s, and without triangles."""
+    """Returns a snapshot with fragments of the given masses by number, all at 5 m/s, and without triangles."""
     n = len(masses)
     header = Header(
         n=0, step=0, t=0.0, box=((0.0,) * 3, (0.0,) * 3), ranks=1, parts=[], tets=0, surface_triangles=0,

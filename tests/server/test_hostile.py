@@ -1,4 +1,4 @@
-"""Hostile bodies are refused in one line at a small cost, and other users are not delayed."""
+"""Hostile request bodies are refused in one line at a small cost, and other users are not delayed."""
 
 import json
 import math
@@ -25,7 +25,7 @@ FLOOD = Path(__file__).with_name("flood.py")
 ALLOWED = {202, 400, 413, 415, 422}
 ALL = corpus()
 STEP = len(ALL) // 20
-"""Step between two bodies of the sample."""
+"""Step between two hostile request bodies of the sample."""
 
 
 def finite(value: Any) -> bool:
@@ -38,12 +38,12 @@ def finite(value: Any) -> bool:
 
 
 def send(user: User, body: Body) -> httpx2.Response:
-    """Submits a body."""
+    """Submits a request body."""
     return user.http.post("/v1/runs", content=body[2], headers={"Content-Type": body[1]})
 
 
 def hold_true(user: User, body: Body) -> None:
-    """Requires the properties that the answer to any body must have."""
+    """Requires the properties that the answer to any request body must have."""
     answer = send(user, body)
     assert answer.status_code in ALLOWED, f"{body[0]}: {answer.status_code} {answer.text[:300]}"
     made = json.loads(answer.content)
@@ -67,7 +67,7 @@ def test_a_sample_of_hostile_bodies_is_answered(server: Running) -> None:
 
 @pytest.mark.parametrize("size", ["1e160", "1e-160", "5e-324"])
 def test_a_case_with_uncountable_tets_is_refused(tmp_path_factory: pytest.TempPathFactory, size: str) -> None:
-    """A site without limits refuses such a case too."""
+    """A site without limits also refuses a case of this size."""
     from conoid.cases.load import CaseError
     from conoid.server.intake.reading import Question, read
     from conoid.server.requests import limits
@@ -85,7 +85,7 @@ def test_a_case_with_uncountable_tets_is_refused(tmp_path_factory: pytest.TempPa
 
 @pytest.mark.slow
 def test_a_case_that_takes_too_long_is_given_up(server: Running, monkeypatch: pytest.MonkeyPatch) -> None:
-    """The case has thousands of bodies at one place, and the check compares each with each."""
+    """The case has thousands of bodies at one place, and the check compares each body with each other body."""
     from .hostile import good
 
     part = good()["parts"][0]
@@ -155,7 +155,9 @@ def test_a_flood_without_a_token_delays_no_user(users: tuple[User, User]) -> Non
 
 
 def half_sent(host: str, port: int, count: int, seconds: float) -> None:
-    """Keeps ``count`` connections open with half a request each. A connection that the server closes is replaced."""
+    """Keeps ``count`` connections open with half a request each. A connection that the server closes is replaced with a
+    new connection.
+    """
     open_sockets: list[socket.socket] = []
     deadline = time.monotonic() + seconds
     while time.monotonic() < deadline:
@@ -179,7 +181,9 @@ def half_sent(host: str, port: int, count: int, seconds: float) -> None:
 
 
 def measure(what: str, user: User, run: str, others: list[threading.Thread]) -> None:
-    """Measures the GETs of a user while other clients attack: p99 is at most 200 ms, and each takes at most 5 s."""
+    """Measures the GET requests of a user while other clients attack: p99 is at most 200 ms, and each request takes at
+    most 5 s.
+    """
     quiet = latencies(user, run, 200)
     for other in others:
         other.start()
@@ -195,7 +199,7 @@ def measure(what: str, user: User, run: str, others: list[threading.Thread]) -> 
 
 
 def latencies(user: User, run: str, count: int) -> list[float]:
-    """Returns the durations of ``count`` GETs in s, the shortest first."""
+    """Returns the durations of ``count`` GET requests in s, the shortest first."""
     found = []
     for _ in range(count):
         began = time.monotonic()

@@ -31,7 +31,7 @@ def beside(runs: Path) -> str:
 
 @pytest.fixture
 def served(tmp_path: Path) -> Path:
-    """A folder that belongs to a server."""
+    """A folder of runs that belongs to a server."""
     runs = tmp_path / "runs"
     runs.mkdir()
     with opened(beside(runs)) as store:
@@ -41,7 +41,9 @@ def served(tmp_path: Path) -> Path:
 
 
 def refusal(runs: Path, url: str) -> str:
-    """Returns the error line with which the folder is refused. Folder and database are unchanged afterwards."""
+    """Returns the error line with which the server refuses the folder. The folder and the database are unchanged after
+    the refusal.
+    """
     before = {path.name: path.read_bytes() for path in runs.iterdir() if path.suffix != ".sqlite"}
     with opened(url) as store:
         bond = store.bond()

@@ -1,7 +1,7 @@
-"""At any fault, every open run is watched, waits for its turn or has a timer, and ends in a true state.
+"""At any fault, every open run is watched, waits in the queue or has a timer, and ends in a true state.
 
-Tests call the turns of a supervisor without a thread. A fault occurs at each place at which the supervisor writes,
-one after the other. At each place the supervisor is also killed, and another supervisor continues.
+Tests call the turns of a supervisor without a thread. A fault occurs at each place at which the supervisor writes, at
+one place after the other. At each of these places the supervisor is also killed, and another supervisor continues.
 """
 
 import errno
@@ -24,7 +24,9 @@ TURNS = 400
 
 @dataclass(frozen=True)
 class Scenario:
-    """Course of a run: its end, the turn in which the owner cancels it (-1: never), and the expected state."""
+    """Course of a run: the end of the run, the turn in which the owner cancels the run (-1: never), and the expected
+    state.
+    """
 
     ends: str
     cancel: int
@@ -56,7 +58,7 @@ QUICK = {
 
 
 class Home(House):
-    """Server in which the scenarios run."""
+    """Server on which the tests of the faults run."""
 
     def live(self, run: Run, scenario: Scenario, plan: Plan) -> None:
         """Calls turns until the run has ended, and checks after each turn the conditions that must always hold."""

@@ -1,4 +1,6 @@
-"""Rules for the removal of runs, by age and by size, runs that are kept for ever, and answers about removed runs."""
+"""Rules for the removal of runs by age and by size, for runs that are never removed, and for answers about removed
+runs.
+"""
 
 import os
 import shutil
@@ -25,7 +27,7 @@ from .running import PATIENCE, TOML, Running, User, case_text
 
 
 def keeper_of(server: Running, **rules: Any) -> Removal:
-    """Returns a keeper with its own rules; the test calls its checks."""
+    """Returns a keeper with the given rules; the test calls the checks of the keeper."""
     service = server.service
     settings = replace(service.settings, site=Site(retention=Retention(**rules)))
     return Removal(settings, service.store, service.removed_runs,
@@ -90,7 +92,9 @@ def test_the_removal_of_a_run_is_reported_to_its_user(server: Running) -> None:
 
 
 def test_removed_runs_are_in_no_list(server: Running) -> None:
-    """Before, a removed run was listed as ``succeeded`` and as the newest one, although every request to it fails."""
+    """In an earlier version a removed run was listed as ``succeeded`` and as the newest run, although every request for
+    this run fails.
+    """
     runs = [ended(server) for _ in range(4)]
     for gone in (runs[3], runs[1]):
         server.ann.http.delete(f"/v1/runs/{gone}")
@@ -101,7 +105,7 @@ def test_removed_runs_are_in_no_list(server: Running) -> None:
 
 
 def places_of(user: User, run: str) -> dict[str, bool]:
-    """Returns in which answers a successful run occurs."""
+    """Returns the answers in which a successful run occurs."""
     text = user.http.get("/metrics").text
     return {
         "list": run in [line["id"] for line in user.http.get("/v1/runs").json()["runs"]],

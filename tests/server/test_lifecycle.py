@@ -1,4 +1,4 @@
-"""The state machine alone, without a clock, a file or a process."""
+"""The state machine of a run alone, without a clock, a file or a process."""
 
 from dataclasses import replace
 from itertools import product
@@ -88,8 +88,8 @@ def test_the_straight_way() -> None:
 
 
 def test_the_way_through_a_batch_system() -> None:
-    """The job writes the journal itself. The wall time counts from the job's start, and a job may wait several
-    times.
+    """The Slurm job writes the journal itself. The wall time counts from the start of the Slurm job, and a Slurm job
+    may wait several times.
     """
     run, actions = advance(replace(RUN, state=State.QUEUED), Granted(batch=True), 2.0)
     assert (run.state, run.started, actions) == (State.QUEUED, 0.0, (Launch(),))

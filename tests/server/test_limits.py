@@ -1,4 +1,4 @@
-"""Limits of one user's share of the server: bytes and processor time of answers, bodies, connections."""
+"""Limits of one user's share of the server: bytes and processor time of answers, request bodies, connections."""
 
 import json
 import time
@@ -33,7 +33,7 @@ def run(server: Running) -> str:
 
 
 def labelled(server: Running, *labels: str) -> str:
-    """Adds a run of ann with labels."""
+    """Adds a run of the user ann with labels."""
     answer = server.ann.http.post("/v1/runs", params={"label": labels}, content=case_text(), headers=TOML)
     return str(answer.json()["id"])
 
@@ -154,7 +154,7 @@ def test_a_database_without_labels_gets_them_from_the_folders(server: Running) -
 
 
 def test_a_database_without_threads_has_runs_of_one_thread(tmp_path: Path) -> None:
-    """The database is that of an earlier version of the server, which stored no threads."""
+    """The database is that of an earlier version of the server, which stored no numbers of threads."""
     url = f"sqlite:///{tmp_path / 'old.sqlite'}"
     run = Run("r1", "ann", "bar", 3, 0.0, State.SUCCEEDED, started=10.0, finished=20.0, threads=4)
     store = Store(url)
@@ -170,7 +170,7 @@ def test_a_database_without_threads_has_runs_of_one_thread(tmp_path: Path) -> No
 
 
 def test_three_thousand_runs_are_searched_in_a_moment(tmp_path: Path) -> None:
-    """The runs are searched by their labels; the test limits the CPU time."""
+    """The runs are searched by their labels; the test limits the CPU time of the search."""
     store = Store(f"sqlite:///{tmp_path / 'many.sqlite'}")
     runs = [folder.first(_made(n)) for n in range(3000)]
     with store._engine.begin() as connection:

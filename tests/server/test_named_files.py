@@ -1,4 +1,6 @@
-"""Submitted cases that name files: which user may use a file, and the copy that a run has."""
+"""Submitted cases that name files: the tests check which user may use a file, and the copy of the file in the run's
+folder.
+"""
 
 import hashlib
 import json
@@ -46,7 +48,7 @@ def quick(monkeypatch: pytest.MonkeyPatch) -> list[Path]:
 
 
 def case(path: str = "/etc/passwd", sha256: str | None = HASH, **mesh: Any) -> dict[str, Any]:
-    """Returns a case whose rod has its mesh in a file."""
+    """Returns a case in which the mesh of the rod is in a file."""
     import tomllib
 
     data = tomllib.loads(case_text())
@@ -88,7 +90,7 @@ def test_a_run_has_its_own_copy_and_reads_no_path(server: Running, quick: list[P
 
 
 def test_a_file_is_used_by_those_who_have_sent_it(server: Running, quick: list[Path]) -> None:
-    """Another user gets the same answer for a file of somebody else and for a file that does not exist."""
+    """A user gets the same answer for a file of another user and for a file that does not exist."""
     send(server.ann)
     nobodys = hashlib.sha256(b"nobody's").hexdigest()
     for hand in (hand_in, validated):
@@ -128,7 +130,7 @@ def test_a_check_names_the_files_of_any_wrong_case(server: Running, quick: list[
 
 
 def test_the_hash_is_of_the_run_and_of_its_key(server: Running, quick: list[Path]) -> None:
-    """The same key with another file is another case."""
+    """A repeated idempotency key with another file is another case."""
     other = send(server.ann, MESH + b"** another\n")
     send(server.ann)
     first = hand_in(server.ann, case(), key="k")
@@ -180,7 +182,7 @@ def test_a_restart_takes_the_copy_of_its_run(server: Running, quick: list[Path],
 
 
 def test_points_of_a_sweep_have_files_of_their_own(server: Running, quick: list[Path]) -> None:
-    """The files are read once for all points with the same bodies."""
+    """The files are read once for all points of the sweep with the same bodies."""
     other = send(server.ann, MESH + b"** another\n")
     send(server.ann)
     speeds: list[dict[str, Any]] = [{"parts[0].velocity[2]": v} for v in (1.0, 2.0)]
@@ -214,7 +216,7 @@ def submission_wish() -> Any:
 
 
 def test_the_keeper_removes_unused_files_without_a_request(server: Running, quick: list[Path]) -> None:
-    """Sent files are removed on a site without rules too. A file stays as long as a run needs it."""
+    """A site without rules also removes sent files. A sent file stays as long as a run needs the file."""
     other = send(server.ann, b"nobody's")
     send(server.ann)
     run = hand_in(server.ann, case())["id"]
@@ -231,8 +233,8 @@ def test_the_keeper_removes_unused_files_without_a_request(server: Running, quic
 
 
 def test_a_file_counts_once_for_each_user(server: Running, quick: list[Path]) -> None:
-    """A file counts once, for any number of runs with this file. The limit of a run's output does not include its
-    files.
+    """A sent file counts once, for any number of runs with this file. The limit of a run's output does not include the
+    sent files of the run.
     """
     data = MESH + b"**" + b" " * 100_000
     sha256 = send(server.ann, data)
@@ -264,8 +266,8 @@ def test_a_file_is_gone_with_the_last_run_that_has_it() -> None:
 def test_what_files_hold_is_measured_by_the_caps(
     settings: Settings, server: Running, monkeypatch: pytest.MonkeyPatch, read: bool
 ) -> None:
-    """The content that the worker has read is compared with the limits; without the worker, an estimate by the size
-    of the file.
+    """The content that the worker has read is compared with the limits; without the worker, an estimate by the size of
+    the file is compared.
     """
     part = Surveyed(
         part=0, elements=5000, nodes=2000, faces=100, step_length=1e-3, altitude=1e-3, mass=1.0, low=(0.0, 0.0, 0.0),
@@ -286,8 +288,8 @@ def test_what_files_hold_is_measured_by_the_caps(
 def test_the_worker_reads_files_before_a_run_is_accepted(
     server: Running, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The real worker reads the files in its process. The estimate uses the content, and a refusal has the worker's
-    message.
+    """The real worker reads the files in a separate process. The estimate uses the content of the files, and a refusal
+    has the worker's message.
     """
     monkeypatch.setenv("CONOID_CACHE_DIR", str(tmp_path / "cache"))
     send(server.ann)

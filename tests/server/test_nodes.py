@@ -1,4 +1,4 @@
-"""The Zenoh router for the nodes of a cluster: a port of its own, with TLS and the credentials of the run's owner."""
+"""The Zenoh router for the nodes of a cluster has its own port, TLS, and the credentials of the run's owner."""
 
 import json
 import shutil

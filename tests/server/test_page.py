@@ -1,4 +1,6 @@
-"""Libraries of the page: the tested files of an installed wheel, or a line with the reason why they are missing."""
+"""Libraries of the page: the server sends the tested files of an installed wheel, or reports in one line why the files
+are missing.
+"""
 
 import gzip
 import hashlib
@@ -97,7 +99,7 @@ def test_an_odd_address_of_the_page_is_not_there(client: TestClient, address: st
 
 
 def test_a_route_exists_for_any_parameters(client: TestClient) -> None:
-    """The route also answers if the page answers all other addresses."""
+    """The route of the libraries also answers if the page answers all other addresses."""
     for method, path, allowed in (
         ("PUT", "/v1/runs", "GET, HEAD, POST"),
         ("DELETE", "/v1/me", "GET, HEAD"),
@@ -137,7 +139,9 @@ def test_a_changed_file_is_not_served(tmp_path: Path, monkeypatch: pytest.Monkey
 
 
 def replace_package(folder: Path, monkeypatch: pytest.MonkeyPatch, version: str | None) -> None:
-    """Replaces the installed nicegui by an empty package of ``version``; None: by no package."""
+    """Replaces the installed nicegui with an empty package of the version ``version``; with None, removes the
+    package.
+    """
 
     def distribution(name: str) -> metadata.Distribution:
         if version is None:

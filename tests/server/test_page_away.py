@@ -1,4 +1,6 @@
-"""Scripts of the page in node with a server that is not reachable, comes back, refuses, or sends more than is shown."""
+"""Scripts of the page in node with a server that is not reachable, becomes reachable again, refuses, or sends more data
+than the page shows.
+"""
 
 import json
 import shutil
@@ -31,7 +33,7 @@ LIST = """
 
 @pytest.fixture
 def web(tmp_path: Path) -> Path:
-    """The scripts as modules that node can import."""
+    """The scripts of the page as modules that node can import."""
     for path in WEB.glob("*.js"):
         shutil.copy(path, tmp_path)
     (tmp_path / "package.json").write_text('{"type": "module"}')
@@ -39,7 +41,7 @@ def web(tmp_path: Path) -> Path:
 
 
 def played(web: Path, script: str) -> Any:
-    """Runs a script and returns its result."""
+    """Runs a script in node and returns the result of the script."""
     question = json.dumps({"module": str(web / "app.js"), "script": script})
     command = [str(NODE), str(Path(__file__).with_name("stage.mjs"))]
     done = subprocess.run(command, input=question, capture_output=True, text=True, timeout=60, check=False)
@@ -109,7 +111,7 @@ def test_runs_are_compared_when_the_server_comes_back(web: Path) -> None:
 
 
 def listing(*runs: str) -> str:
-    """Returns the JSON of an answer of GET /v1/table with these runs."""
+    """Returns the JSON of an answer of GET /v1/table with the given runs."""
     return f"{{ runs: [{', '.join(runs)}], cases: [], pending: 0, next: null }}"
 
 
@@ -172,8 +174,8 @@ ENDED = {
 
 
 def test_the_page_of_an_ended_run_shows_its_cause_and_warnings(web: Path) -> None:
-    """The warnings are those of the whole log and of the outcome. Each warning is shown once, for any time at which the
-    page is opened.
+    """The warnings on the page are those of the whole log and of the outcome. Each warning is shown once, for any time
+    at which the page is opened.
     """
     log = [{"type": "log", "seq": 1, "level": "warning", "text": each, "wall": 1.0} for each in "aba"]
     history = {"series": {}, "snapshots": [], "log": log, "warnings": log[:2], "last": 3, "state": "failed"}

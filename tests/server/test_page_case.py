@@ -1,4 +1,4 @@
-"""The case in the page's editor, in node: positions of its keys, changes of its text, and hashes of files."""
+"""The case in the page's editor, in node: positions of the keys, changes of the text, and hashes of files."""
 
 import base64
 import hashlib
@@ -23,7 +23,7 @@ HASH = "ab" * 32
 
 
 def asked(tmp_path: Path, module: str, script: str, data: Any) -> Any:
-    """Returns the value of an expression with the module as ``page``, and ``data``."""
+    """Returns the value of an expression with the module as ``page`` and the data as ``data``."""
     for path in WEB.glob("*.js"):
         shutil.copy(path, tmp_path)
     (tmp_path / "package.json").write_text('{"type": "module"}')
@@ -119,7 +119,7 @@ def test_values_are_read_as_they_are_written(tmp_path: Path) -> None:
 
 
 def test_any_text_that_is_typed_is_survived(tmp_path: Path) -> None:
-    """The text of an editor is an incomplete case most of the time."""
+    """While a user types, the text of an editor is mostly an incomplete case."""
     draw = random.Random(5)
     pieces = [*"\"'[]{}=#\n\\. ", '"""', "'''", "[[", "]]", "path", "a.inp", "run", "ranks = 2"]
     texts = ["".join(draw.choices(pieces, k=40)) for _ in range(400)]

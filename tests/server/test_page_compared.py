@@ -1,4 +1,4 @@
-"""Charts and the comparison of runs in a real browser: choose, read, save, sort and hide, by pointer and by
+"""Charts and the comparison of runs in a real browser: a user chooses, reads, saves, sorts and hides, by pointer and by
 keyboard.
 """
 
@@ -35,7 +35,7 @@ DRAWN = "[...document.querySelectorAll('.charts .plot')].filter((one) => one.que
 
 @pytest.fixture(scope="module")
 def site(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Site, list[str]]]:
-    """A server with runs that no solver has computed; twelve of them are a sweep."""
+    """A server with runs that no solver has computed; twelve of these runs are a sweep."""
     made = Site(tmp_path_factory.mktemp("site") / "runs")
     made.kill()
     ids = lay(made.runs, 40, 1)
@@ -134,7 +134,7 @@ def test_bodies_share_camera_and_clock_and_everybody_can_use_it(
     page.place(".panes")
     page.wait("document.querySelectorAll('.pane canvas').length >= 2")
     page.wait("[...document.querySelectorAll('.pane figcaption')].every((it) => it.innerText.includes('fragment'))")
-    if phone:  # A wide window has three bodies at first.
+    if phone:  # A wide window shows three bodies at first.
         page.click(".picks .pick:nth-child(3) input")
     page.wait("document.querySelectorAll('.pane').length === 3")
     page.slide("input[aria-label='simulated time']", 0)

@@ -28,7 +28,7 @@ DEMO = 1800.0
 
 @pytest.fixture(scope="module")
 def watched(site: Site, browser: Browser) -> tuple[str, Page]:
-    """The demo, watched to its end; returns the list of the changes on the page."""
+    """The demo run, which the page shows from its start to its end; returns the list of the changes on the page."""
     page = browser.page()
     page.go(site.url)
     page.wait("document.querySelector('form.sign-in')")
@@ -58,7 +58,7 @@ def watched(site: Site, browser: Browser) -> tuple[str, Page]:
 
 
 def test_events_reach_the_screen_in_time(watched: tuple[str, Page]) -> None:
-    """The delays are printed and not limited: other tests use the same machine."""
+    """The delays are printed but not limited, because other tests use the same machine."""
     events = watched[1].evaluate("seen.events")
     print(f"\n{len(events)} events, from the journal to the drawn page: median {median(events):.0f} ms")
     assert len(events) > 20
@@ -178,7 +178,7 @@ def test_buttons_the_age_of_numbers_and_two_runs(site: Site, watched: tuple[str,
     page.wait("/numbers .* old/.test(document.querySelector('.link').innerText)", 30)
     site.start(port)
     page.wait("document.querySelector('.link').innerText === 'live'", 60)
-    page.errors.clear()  # The browser reports an error for each request while the server was not running.
+    page.errors.clear()  # The browser reports an error for each request that it sent while the server was not running.
     page.evaluate("document.querySelector('button.stop').click()")
     page.wait("document.querySelector('.pill.cancelled')", 120)
     page.go(f"{site.url}#/compare/{done}/{run}")

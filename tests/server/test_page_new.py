@@ -26,7 +26,7 @@ LONG = 600.0
 
 @pytest.fixture
 def page(site: Site, browser: Browser) -> Iterator[Page]:
-    """A page with a signed-in user, opened at a new run."""
+    """The page of a new run with a signed-in user."""
     made = browser.page()
     sign_in(made, site)
     made.go(f"{site.url}#/new")

@@ -267,7 +267,7 @@ def test_the_page_writes_numbers_as_python_does(ask: Ask) -> None:
 
 
 def test_no_module_of_the_page_writes_numbers_on_its_own() -> None:
-    """A width in a style sheet is excepted: users do not read it."""
+    """A width in a style sheet is excepted: users do not read this width."""
     own = re.compile(r"\.(toFixed|toExponential|toPrecision|toLocaleString)\(")
     found = [
         f"{path.name}: {line.strip()}"
@@ -379,7 +379,9 @@ def test_debris_does_not_make_the_frame_wider_and_heavy_pieces_do(ask: Ask) -> N
     head = {"n": 0, "step": 0, "t": 0.0, "ranks": 1}
 
     def framed(mass: float) -> tuple[float, float]:
-        """Returns the lengths along x of two frames, m: around the bodies, and around everything."""
+        """Returns the lengths along x of two frames, m: the frame around the bodies, and the frame around
+        everything.
+        """
         body = shattered(5, 1)
         far = np.argmax(body.x[body.tets].mean(axis=1)[:, 0])
         alone = replace(body, bond=body.bond.copy(), mass=body.mass.copy(), x=body.x.copy())
@@ -497,7 +499,7 @@ def test_the_tooltip_of_any_chart_stays_text(ask: Ask) -> None:
 
 
 def test_walls_stand_where_the_snapshot_has_them(ask: Ask) -> None:
-    """The case is the resolved one, in which absent keys are null."""
+    """The case is the resolved case, in which absent keys are null."""
     walls: list[dict[str, Any]] = [
         {"kind": "wall", "point": [0, 0, -1], "normal": [0, 0, 2]},
         {"kind": "wall", "name": "wall_1", "shape": "sphere", "point": [0, 0, 9], "radius": 2, "mass": 1},

@@ -1,4 +1,4 @@
-"""The table of runs and the page of a sweep, as far as they need no browser, in node."""
+"""The table of runs and the page of a sweep, in node, as far as the table and the page need no browser."""
 
 import json
 import random
@@ -22,7 +22,7 @@ TABLE = """
 
 
 def line(run: str, n: int = 0, **more: Any) -> dict[str, Any]:
-    """Returns a run of a list."""
+    """Returns one run of a list of runs."""
     found: dict[str, Any] = {
         "id": run, "short": run[:7], "name": "bar", "title": "A bar", "state": "succeeded", "cause": None,
         "message": "", "reason": "", "ranks": 1, "threads": 1, "submitted": 1000.0 + n,
@@ -32,7 +32,7 @@ def line(run: str, n: int = 0, **more: Any) -> dict[str, Any]:
 
 
 def answer(*runs: tuple[dict[str, Any], card.Card]) -> dict[str, Any]:
-    """Returns the answer of the server with these runs."""
+    """Returns the answer of the server with the given runs."""
     made = rows.Table()
     for run, known in runs:
         assert made.add(run, known)
@@ -96,7 +96,9 @@ def test_keys_that_few_runs_change_or_that_follow_another_are_not_shown_at_first
 
 
 def test_titles_of_keys_have_the_names_of_parts_and_axes(ask: Ask) -> None:
-    """A part that has another name in another case has its number, and two keys never have the same title."""
+    """A part that has another name in another case has its number in the titles of its columns. Two keys never have the
+    same title.
+    """
     vector = {f"parts[0].velocity[{i}]": 0.0 for i in range(3)}
     one = {**vector, "parts[0].name": "ball", "parts[1].name": "plate", "parts[1].mesh.element_size": 1e-3}
     more = {"run.end_time": 1.0, "numerics.dt_safety": 0.9, "materials.steel.strength.A": 1e9, "parts[1].size": 1.0}
@@ -183,7 +185,7 @@ def test_short_ids_are_those_of_the_server(ask: Ask) -> None:
 
 
 def test_a_thousand_rows_are_sorted_in_a_moment(ask: Ask) -> None:
-    """The test limits the CPU time of the whole for 5,000 rows."""
+    """The test limits the CPU time of the whole table for 5,000 rows."""
     known = [
         (line(f"run{n:06d}", n), card.Card(values={"v": float(n % 97)}, results={"probe.x": float(n % 89)}))
         for n in range(5000)

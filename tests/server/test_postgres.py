@@ -1,4 +1,6 @@
-"""The index of runs and the tokens in a real PostgreSQL, which the tests start; skipped without PostgreSQL."""
+"""The index of runs and the tokens in a real PostgreSQL server, which the tests start; the tests are skipped without
+PostgreSQL.
+"""
 
 import os
 import pwd
@@ -26,7 +28,9 @@ _ANSWERS = 60.0
 
 
 def missing() -> str:
-    """Returns the reason why no PostgreSQL can be started on this machine; empty if one can."""
+    """Returns the reason why no PostgreSQL server can be started on this machine; empty if PostgreSQL can be
+    started.
+    """
     if shutil.which("initdb") is None or shutil.which("postgres") is None:
         return "initdb, postgres: not installed (apt-get install postgresql, and its bin folder in PATH)"
     try:
@@ -42,7 +46,9 @@ pytestmark = [pytest.mark.slow, pytest.mark.skipif(bool(missing()), reason=missi
 
 @pytest.fixture(scope="module")
 def url() -> Iterator[str]:
-    """URL of a database that is removed after the tests. It accepts connections only at a socket in its folder."""
+    """URL of a database that is removed after the tests. The PostgreSQL server accepts connections only at a socket in
+    its folder.
+    """
     user = "postgres" if os.geteuid() == 0 else None
     with TemporaryDirectory(prefix="conoid-pg-") as place:
         if user is not None:
@@ -74,7 +80,7 @@ def _await(url: str) -> None:
 
 
 def test_a_run_lives_with_its_index_in_postgresql(url: str, tmp_path: Path) -> None:
-    """A run is submitted and ends. The next server finds the run, also with an empty database."""
+    """A run is submitted and ends. The next server finds this run, also with an empty database."""
     settings = Settings(
         runs=tmp_path / "runs", port=0, zenoh_port=None, slots=2, worker=FAKE, grace=0.5, caps=Caps(free_disk=0),
         database=url,

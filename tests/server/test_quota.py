@@ -37,7 +37,7 @@ def settings(tmp_path: Path) -> Settings:
 
 
 def test_one_waits_for_his_quota_while_another_runs(server: Running, tmp_path: Path) -> None:
-    """Reasons, priorities and quotas are the same over HTTP; the order is the same after a restart."""
+    """Reasons, priorities and quotas are the same over HTTP; the order of the queue is the same after a restart."""
     ann, bob = server.ann, server.bob
     runs = [ann.submit(wait=str(tmp_path / "go")) for _ in range(3)]
     ann.wait_for(runs[0], State.RUNNING)
@@ -74,7 +74,7 @@ def test_a_run_that_writes_too_much_is_stopped(server: Running, monkeypatch: pyt
 
 
 def test_core_seconds_and_output_are_quotas_too(server: Running) -> None:
-    """Runs of a user without quota wait, and the user cannot submit more."""
+    """Runs of a user without quota wait, and this user cannot submit further runs."""
     quota = Quota(core_seconds=5.0, output_bytes=1000)
     waitlist, desk = server.service.supervisor._waitlist, server.service.desk
     waitlist._quota = quota
@@ -90,7 +90,7 @@ def test_core_seconds_and_output_are_quotas_too(server: Running) -> None:
 
 
 def test_the_order_survives_a_restart_without_the_database(tmp_path: Path) -> None:
-    """The data that decide the order are in the folders of the runs."""
+    """The data that decide the order of the queue are in the folders of the runs."""
     settings = Settings(
         runs=tmp_path / "runs", port=0, zenoh_port=None, slots=1, worker=FAKE, grace=0.5, caps=Caps(free_disk=0),
     )  # fmt: skip
@@ -125,7 +125,7 @@ def reasons(waiting: list[tuple[User, str]]) -> list[str]:
 
 @contextmanager
 def users_of(settings: Settings, children: list[Any]) -> Iterator[tuple[User, User]]:
-    """Returns a server and two users; workers that still run at the end are in ``children``."""
+    """Returns a server and two users; workers that still run at the end of the test are in ``children``."""
     with opened(settings) as service, TestClient(build_app(service), base_url="http://127.0.0.1") as client:
         found = []
         for name in ("ann", "bob"):

@@ -52,7 +52,9 @@ print(first(sys.stdin.buffer.read()))
 
 
 def test_a_case_finds_everything_loaded() -> None:
-    """A fork loads no module and fills no cache that all cases share. The first case of another program does both."""
+    """A fork loads no module and fills no cache that all cases share. The first case that another program reads loads
+    the modules and fills the caches.
+    """
     question = msgspec.msgpack.encode(QUESTION)
     alone = subprocess.run([sys.executable, "-c", FIRST], input=question, capture_output=True, check=True)
     control, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)

@@ -1,5 +1,5 @@
-"""Bodies of files over real connections: other requests are answered meanwhile, hostile bodies are refused, memory
-is bounded.
+"""HTTP bodies with files over real connections: other requests are answered during the transfer, hostile bodies are
+refused, memory is bounded.
 """
 
 import hashlib
@@ -21,7 +21,7 @@ MEGA = 1 << 20
 
 @pytest.fixture(scope="module")
 def up(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Process, User, User]]:
-    """A server in a process of its own, and its two users."""
+    """A server in a separate process, and the two users of the server."""
     with processes(tmp_path_factory.mktemp("files")) as make:
         yield started(make)
 
@@ -59,7 +59,9 @@ def spoken(user: User, head: str, *bodies: bytes) -> bytes:
 
 
 def test_others_are_answered_while_a_body_arrives(up: tuple[Process, User, User]) -> None:
-    """The sender's own requests and a second file of the sender are also answered. The upload continues afterwards."""
+    """During the transfer, the server also answers other requests of the sender and receives a second file. After these
+    requests the upload continues.
+    """
     _, ann, bob = up
     data = random.Random(1).randbytes(3 * MEGA)
     sha256, asked, answered = hashlib.sha256(data).hexdigest(), threading.Event(), threading.Event()
@@ -110,7 +112,7 @@ def test_more_bytes_than_were_announced_are_no_part_of_the_file(up: tuple[Proces
 def test_a_body_without_end_is_refused_before_it_is_read(
     up: tuple[Process, User, User], head: str, code: bytes
 ) -> None:
-    """The server reads at most as many bytes as of another body that is answered before its end."""
+    """The server reads at most as many bytes as of any other body that is answered before its end."""
     _, ann, _ = up
     before = parts_of(ann)
     answer = spoken(ann, f"PUT /v1/files/{'ab' * 32} HTTP/1.1\r\n{head}", b"10000\r\n")
@@ -120,7 +122,7 @@ def test_a_body_without_end_is_refused_before_it_is_read(
 
 
 def test_a_body_that_breaks_off_leaves_what_has_come(up: tuple[Process, User, User]) -> None:
-    """Another connection sends the remaining bytes."""
+    """Another connection sends the remaining bytes of the file."""
     _, ann, _ = up
     data = random.Random(2).randbytes(MEGA)
     sha256 = hashlib.sha256(data).hexdigest()
@@ -139,7 +141,7 @@ def test_a_body_that_breaks_off_leaves_what_has_come(up: tuple[Process, User, Us
 
 
 def test_a_new_connection_replaces_a_stalled_one(up: tuple[Process, User, User]) -> None:
-    """A broken connection cannot be distinguished from a slow one for five seconds."""
+    """A broken connection cannot be distinguished from a slow connection for five seconds."""
     _, ann, _ = up
     data = random.Random(3).randbytes(MEGA)
     sha256 = hashlib.sha256(data).hexdigest()
@@ -176,7 +178,7 @@ def peak(server: Process) -> int:
 def test_the_memory_of_the_server_does_not_grow_with_a_file(
     up: tuple[Process, User, User], tmp_path: Path, size: int
 ) -> None:
-    """The file is sent in one PUT; every GET of another user is answered meanwhile."""
+    """The file is sent in one PUT; every GET of another user is answered during this PUT."""
     server, ann, bob = up
     path, digest, made = tmp_path / "large", hashlib.sha256(), random.Random(size)
     with path.open("wb") as file:

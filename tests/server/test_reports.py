@@ -1,4 +1,4 @@
-"""Reports that the server makes: once, with limits, for the owner; an error is one line."""
+"""Reports that the server makes: each report is made once, with limits, for its owner; an error is one line."""
 
 import importlib.util
 import os

@@ -1,4 +1,4 @@
-"""Order in which requests begin: one request in each turn of the event loop, users in rotation."""
+"""Order in which requests begin: one request in each turn of the event loop, with the users in rotation."""
 
 import asyncio
 from collections.abc import Awaitable, Callable, Iterator
@@ -24,8 +24,8 @@ def service(settings: Settings) -> Iterator[Service]:
 
 
 def begun(*who: str, cancelled: int | None = None) -> list[tuple[str, int]]:
-    """Returns the users of requests that waited at the same time, in the order of their start, each with the turn of
-    the loop.
+    """Returns the users of requests that waited at the same time, in the order in which the requests began, each with
+    the turn of the loop.
     """
     order: list[tuple[str, int]] = []
 
@@ -76,8 +76,8 @@ def test_a_request_that_is_gone_takes_no_turn() -> None:
 
 
 def entered(service: Service, flood: dict[str, str], late: dict[str, str]) -> int:
-    """Returns the number of requests that began before ``late``; ``late`` came after ``FLOOD`` requests of another
-    client.
+    """Returns the number of requests that began before the request ``late``, which came after ``FLOOD`` requests of
+    another client.
     """
     order: list[str] = []
 

@@ -1,4 +1,4 @@
-"""Refused requests with their messages, and the access rights of users."""
+"""Messages of refused requests, and the access rights of users."""
 
 import asyncio
 import gzip
@@ -395,7 +395,7 @@ def test_bad_parameters(server: Running, path: str, pointer: str) -> None:
 
 
 def test_a_refusal_of_an_unknown_parameter_lists_the_known_ones(server: Running) -> None:
-    """Otherwise a wrongly spelt state would list all runs."""
+    """Without this check a wrongly spelt state would list all runs."""
     problem = refusal(server.ann.http.get("/v1/runs?stat=failed"), 400, "bad_parameter")
     allowed = "case, cursor, label, limit, prefix, since, state, text, until"
     assert problem["detail"] == f"stat: /v1/runs has no such parameter; allowed: {allowed}; did you mean 'state'?"
@@ -581,7 +581,7 @@ def test_an_etag_is_recognised_in_every_form(server: Running) -> None:
 
 
 def test_a_body_that_breaks_off_is_no_fault_of_the_server() -> None:
-    """Before, the log had an error with two tracebacks."""
+    """In an earlier version the log had an error with two tracebacks."""
     body: Iterator[dict[str, Any]] = iter(
         [{"type": "http.request", "body": b"[run]", "more_body": True}, {"type": "http.disconnect"}]
     )
@@ -602,7 +602,7 @@ def test_a_body_that_breaks_off_is_no_fault_of_the_server() -> None:
 
 @pytest.mark.parametrize("path", ["/v1/runs/", "/v1/me/", "/healthz/", "/v1/sweeps/", "/readyz//"])
 def test_no_answer_uses_an_address_of_the_request(server: Running, path: str) -> None:
-    """Before, the redirect for a trailing slash used the header Host."""
+    """In an earlier version the redirect for a trailing slash used the header Host."""
     answer = server.ann.http.get(path, headers={"Host": "evil.test"}, follow_redirects=False)
     assert answer.status_code == 404
     assert "evil.test" not in f"{answer.headers} {answer.text}"

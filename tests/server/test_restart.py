@@ -1,4 +1,4 @@
-"""A server that is killed loses no acknowledged run, and its workers continue."""
+"""A server that is killed loses no acknowledged run, and the workers of the runs continue."""
 
 import json
 import os
@@ -24,7 +24,7 @@ SLOTS = 12
 
 @dataclass
 class Aftermath:
-    """State after a kill: a new server continues the runs of a server that was killed with runs in every state."""
+    """State after a kill: a new server continues the runs of the killed server, which had runs in every state."""
 
     ann: User
     runs: Path
@@ -33,7 +33,7 @@ class Aftermath:
     pids: dict[str, int]
 
     def show(self, name: str) -> dict[str, Any]:
-        """Returns the state of the named run from the new server."""
+        """Returns the state that the new server reports for the named run."""
         return self.ann.show(self.names[name])
 
     def last_words(self, name: str) -> float:
@@ -206,7 +206,7 @@ def living(run: str) -> bool:
 
 
 def test_the_folder_of_the_runs_may_have_any_name(tmp_path: Path) -> None:
-    """The name occurs in the database, in the commands of the launcher, in the log and in the backup."""
+    """The name of the folder occurs in the database, in the commands of the launcher, in the log and in the backup."""
     name = "100%s a%20b\\c #1?mode=ro&x=y;[z] 'q' \"w\" {v} $u \u00e4"
     place = tmp_path / name
     place.mkdir()

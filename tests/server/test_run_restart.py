@@ -1,4 +1,4 @@
-"""``:restart``: a new run continues from a checkpoint of another run."""
+"""The request ``:restart`` makes a new run that continues from a checkpoint of another run."""
 
 import json
 import os
@@ -83,7 +83,7 @@ def test_a_run_without_checkpoints_explains_how_to_get_some(server: Running) -> 
 
 
 def remade(path: Path, kind: str) -> None:
-    """Replaces a file by something else."""
+    """Replaces a file with something else, for example a folder."""
     path.unlink()
     if kind == "pipe":
         os.mkfifo(path)
@@ -125,7 +125,7 @@ def test_results_that_are_not_files_are_left_out(tmp_path: Path) -> None:
 def test_a_checkpoint_that_is_replaced_meanwhile_is_searched_again(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """A running run keeps its newest checkpoints only, and may write another one at any time."""
+    """A run in progress keeps only its newest checkpoints, and may write another checkpoint at any time."""
     source, real = made(tmp_path / "a", 10), os.link
 
     def replaced(one: str, other: str) -> None:

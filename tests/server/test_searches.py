@@ -1,4 +1,4 @@
-"""Adaptive sweeps that the server stores: reports, their limits, their owners, and cancels."""
+"""Adaptive sweeps that the server stores: their reports, limits and owners, and requests to cancel."""
 
 import json
 from typing import Any

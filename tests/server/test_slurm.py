@@ -1,4 +1,4 @@
-"""Runs as jobs of a real Slurm, which the tests start. Faults are made with real commands of Slurm."""
+"""Runs as jobs of a real Slurm, which the tests start. The tests make faults with real commands of Slurm."""
 
 import json
 import os
@@ -28,11 +28,11 @@ pytestmark = pytest.mark.skipif(bool(real_slurm.missing()), reason=real_slurm.mi
 
 BREAKING = Path(__file__).parents[1] / "parallel" / "breaking.toml"
 _DONE_WITH = 3.0
-"""Time after which a node has finished with a requeued job, s."""
+"""Time after which a node has finished with a requeued Slurm job, s."""
 DIGEST = tomllib.loads(BREAKING.with_name("digests.toml").read_text(encoding="utf-8"))["breaking"]
-"""Digest of the breaking case, the same on any number of ranks."""
+"""Digest of the breaking case, which is the same on any number of ranks."""
 LONG = "12 us"
-"""End time with which the same case takes some ten seconds, long enough for an interruption."""
+"""End time with which the breaking case takes some ten seconds, long enough for an interruption."""
 
 
 @pytest.fixture(scope="module")
@@ -52,7 +52,7 @@ def site(cluster: Cluster, tmp_path: Path) -> Iterator[Site]:
 
 @pytest.fixture
 def solver(cluster: Cluster, tmp_path: Path) -> Iterator[Site]:
-    """The same site with the real worker."""
+    """The Slurm site with the real worker."""
     cluster.await_node()
     (tmp_path / "site.toml").write_text(SITE)
     with processes(tmp_path) as make:
@@ -158,8 +158,8 @@ def test_twelve_runs_at_a_time(site: Site) -> None:
 
 @pytest.mark.slow
 def test_a_sweep_is_one_array_with_a_job_for_each_run(site: Site, tmp_path: Path) -> None:
-    """Twelve runs are one sbatch. One run is cancelled, and the server is killed meanwhile; when the sweep is repeated,
-    the cancelled run alone has another job.
+    """Twelve runs are submitted by one sbatch. One run of the sweep is cancelled, and the server is killed during the
+    sweep. When the sweep is repeated, only the cancelled run gets another job.
     """
     sweep, body = sweep_and_body(site, 12, wait=str(tmp_path / "go"))
     runs = [point["run"]["id"] for point in sweep["points"]]
@@ -205,7 +205,7 @@ def test_a_controller_killed_while_arrays_are_handed_over_makes_one_job_a_run(si
 
 @pytest.mark.slow
 def test_a_controller_killed_while_jobs_are_handed_over_makes_one_of_each(site: Site) -> None:
-    """Twenty times: the controller is killed at another time before or after sbatch, and starts again."""
+    """Twenty times the controller is killed, each time at another time before or after sbatch, and starts again."""
     runs = []
     for number in range(20):
         runs.append(site.submit(case_text(steps=2)))
@@ -313,8 +313,8 @@ def uninterrupted(tmp_path_factory: pytest.TempPathFactory) -> str:
 @pytest.mark.slow
 @pytest.mark.parametrize(("profile", "jobs"), [("standard", 1), ("pmi2", 1), ("grace", 1), ("gone", 2)])
 def test_a_preempted_run_goes_on_to_the_same_digest(solver: Site, profile: str, jobs: int, uninterrupted: str) -> None:
-    """The run is requeued by Slurm, requeued by the job within a grace period, or ended for good; then another job
-    continues the run.
+    """Slurm requeues the run, the job requeues the run within a grace period, or the job ends for good. After each of
+    these ends another job continues the run.
     """
     run = solver.submit(with_ranks(2, LONG), profile)
     await_progress(solver, run)
@@ -330,10 +330,10 @@ def test_a_preempted_run_goes_on_to_the_same_digest(solver: Site, profile: str, 
 
 
 def hurry(solver: Site, run: str) -> None:
-    """Releases a requeued job.
+    """Releases a requeued Slurm job.
 
-    Slurm lets a requeued job wait for two minutes, and the test skips this time. The node must have finished with the
-    job: a job that starts in the second in which the old job ended is mistaken for the old job.
+    Slurm lets a requeued job wait for two minutes; the test skips these two minutes. The node must have finished with
+    the old job, because Slurm mistakes a job that starts in the second in which the old job ended for the old job.
     """
     since = dict[str, float]()
     deadline = time.monotonic() + 20.0
@@ -366,7 +366,7 @@ def test_a_run_that_reaches_the_time_limit_goes_on_to_the_same_digest(solver: Si
 
 
 def with_ranks(ranks: int, end_time: str = "1.5 us", threads: int = 1) -> str:
-    """Returns the breaking case with numbers of ranks and threads, and another end time."""
+    """Returns the breaking case with the given numbers of ranks and threads, and another end time."""
     text = BREAKING.read_text()
     assert '[run]\nend_time = "1.5 us"\n' in text
     return text.replace(

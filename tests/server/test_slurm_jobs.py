@@ -1,4 +1,4 @@
-"""Decisions about jobs, without Slurm: lost answers, second jobs, meaning of signals, the lock."""
+"""Decisions about Slurm jobs, without Slurm: lost answers, second jobs, the meaning of signals, the lock."""
 
 import json
 import os
@@ -32,7 +32,7 @@ JOB = batch.new_job("run", 2, ("a", Profile()), ["true"], 0.0)
 
 @pytest.fixture
 def place(tmp_path: Path) -> Path:
-    """Folders for the commands and for the run."""
+    """Folders for the Slurm commands and for the run."""
     (tmp_path / "bin").mkdir()
     (tmp_path / "run" / layout.LOGS).mkdir(parents=True)
     return tmp_path
@@ -137,7 +137,7 @@ def test_of_two_jobs_the_one_that_has_begun_stays(place: Path) -> None:
 
 @pytest.mark.parametrize("reason", ["launch failed requeued held", "launch_failed_requeued_held"])
 def test_a_job_that_no_node_starts_is_released_a_few_times_and_then_lost(place: Path, reason: str) -> None:
-    """Slurm holds the job until an operator releases it; a run never waits for the operator."""
+    """Slurm holds the job until an operator releases the job; a run never waits for the operator."""
     worker = SlurmWorker(place / "run", JOB, Slurm(profiles={"a": Profile()}, bin=commands(place, "exit 1")))
     worker.write_down(job="7")
     held, runs = Entry("7", "PENDING", 0.0, JOB.name, reason), Entry("7", "RUNNING", 5.0, JOB.name, "None")
@@ -166,7 +166,7 @@ def test_a_held_job_stays_held(place: Path, reason: str) -> None:
 def test_a_restarted_server_ends_no_run_that_was_interrupted(
     tmp_path: Path, asked: Cause | None, state: State, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The worker has reported its stop. Only the database contains that the stop was requested."""
+    """The worker has reported that it stopped. Only the database contains that a user requested the stop."""
     monkeypatch.setattr(SlurmLauncher, "_work", lambda launcher: None)
     run, now = new_id()
     made = Submission(
@@ -191,7 +191,7 @@ def commands_of(place: Path) -> str:
 
 
 def test_a_job_that_waits_though_its_run_has_ended_is_taken_out(place: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """A controller that crashed has requeued a started job under the same number."""
+    """A controller of Slurm that crashed has requeued a started job under the same number."""
     run = place / "run"
     worker = SlurmWorker(run, JOB, Slurm(profiles={"a": Profile()}, bin=commands(place, "exit 1")))
     worker.write_down(job="7", command=["false"])
@@ -294,7 +294,7 @@ def test_one_worker_writes_into_a_folder(tmp_path: Path) -> None:
 
 
 def test_a_wrong_number_of_ranks_is_reported(tmp_path: Path) -> None:
-    """srun without --mpi=pmi2 starts such processes: each process is a world of one rank."""
+    """Without --mpi=pmi2, srun starts processes each of which is an MPI world of one rank."""
     words = [sys.executable, "-m", "conoid.worker", "two_tets", "--out", str(tmp_path / "out"), "--ranks", "2"]
     ended = subprocess.run(words, capture_output=True, text=True, timeout=120, check=False)
     assert ended.returncode == 1
@@ -344,8 +344,8 @@ def test_runs_that_start_together_are_one_array(place: Path) -> None:
 
 
 def test_an_array_whose_number_was_lost_is_not_submitted_again(place: Path) -> None:
-    """The next server, which has only the records, does not submit the array again either. A task that does not
-    exist is submitted.
+    """The next server, which has only the records, does not submit the array again. The next server submits a task that
+    does not exist.
     """
     lost = 'echo "101_0|PENDING|N/A|$name|R" >> queue; echo "sbatch: error: Socket timed out" >&2; exit 1'
     arrays, workers = group_of(place, 2, lost)
@@ -369,7 +369,7 @@ def test_an_array_that_is_refused_goes_one_by_one(place: Path) -> None:
 
 
 def test_a_task_finds_its_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """The task runs nothing if another job has the run."""
+    """The task computes nothing if another job has the run."""
     (tmp_path / "run" / layout.LOGS).mkdir(parents=True)
     (tmp_path / layout.ARRAY).write_text(json.dumps([str(tmp_path), str(tmp_path / "run")]))
     monkeypatch.setattr(os, "dup2", lambda log, stream: None)

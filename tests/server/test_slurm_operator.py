@@ -1,4 +1,4 @@
-"""Actions of an operator on a real Slurm while a server submits its runs to it."""
+"""Actions of an operator on a real Slurm while a server submits runs to this Slurm."""
 
 import os
 import signal
@@ -41,7 +41,7 @@ def site(cluster: Cluster, tmp_path: Path, request: pytest.FixtureRequest) -> It
 
 
 def partition(_: Site) -> str:
-    """Returns the partition of the profile that runs use."""
+    """Returns the partition in the profile that the runs use."""
     return "low"
 
 
@@ -93,7 +93,7 @@ def script_of(run: str) -> list[int]:
 
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGKILL])
 def test_a_job_that_was_killed_by_hand_is_not_cancelled(site: Site, number: signal.Signals) -> None:
-    """The script gets SIGTERM; the ranks and the script get SIGKILL."""
+    """The job script gets SIGTERM; the ranks and the job script get SIGKILL."""
     run = site.submit(case_text(steps=100_000, pace=0.02))
     site.reached(run, 30.0, State.RUNNING)
     ranks, script = processes_of(run), script_of(run)
@@ -107,7 +107,9 @@ def test_a_job_that_was_killed_by_hand_is_not_cancelled(site: Site, number: sign
 
 
 def test_a_run_whose_script_alone_was_killed_goes_on_from_its_checkpoint(site: Site) -> None:
-    """Slurm ends the ranks of such a job, and the ranks leave a checkpoint. The job ends in the normal way."""
+    """Slurm ends the ranks of a job that an operator requeues or cancels, and the ranks leave a checkpoint. After that
+    the job ends in the normal way.
+    """
     run = site.submit(case_text(steps=100_000, pace=0.02))
     site.reached(run, 30.0, State.RUNNING)
     for pid in script_of(run):

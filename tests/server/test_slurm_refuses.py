@@ -1,4 +1,4 @@
-"""Temporary refusals of Slurm, unusual names, cancels by the operator, and commands that hang."""
+"""Temporary refusals of Slurm, unusual names, cancels by the operator, and Slurm commands that hang."""
 
 import time
 from pathlib import Path

@@ -74,7 +74,7 @@ def test_a_run_that_was_to_be_cancelled_is_cancelled_where_its_folder_cannot_be_
 
 @pytest.fixture
 def counted(monkeypatch: pytest.MonkeyPatch) -> dict[str, int]:
-    """Replaces the kernel's counter by a value of the test."""
+    """Replaces the kernel's counter with a value of the test."""
     counts = {"kills": 4}
     monkeypatch.setattr(memory, "kills", lambda: counts["kills"])
     return counts

@@ -1,4 +1,4 @@
-"""Server-sent events from a real server: each event once, in order, live, and after a resumption."""
+"""Server-sent events from a real server: each event arrives once, in order, live, and after a resumption."""
 
 import json
 import signal
@@ -24,7 +24,7 @@ def ann(tmp_path_factory: pytest.TempPathFactory) -> Iterator[User]:
 
 
 def listen(user: User, run: str, headers: dict[str, str] | None = None, **query: int) -> Iterator[dict[str, Any]]:
-    """Yields the events of a stream as they arrive, each with ``id`` and ``event`` of its frame."""
+    """Yields the events of a stream when they arrive, each with the ``id`` and the ``event`` of its frame."""
     with user.http.stream("GET", f"/v1/runs/{run}/stream", headers=headers, params=query) as answer:
         assert answer.status_code == 200
         assert answer.headers["content-type"].startswith("text/event-stream")

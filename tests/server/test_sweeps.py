@@ -1,4 +1,6 @@
-"""Sweeps: all runs or none, each run once, a limited number at a time, and the table of results."""
+"""Sweeps: all runs of a sweep are accepted or no run, each run is made once, with a limited number at a time; the table
+has the results.
+"""
 
 import asyncio
 import csv
@@ -226,7 +228,7 @@ def test_a_sweep_that_is_refused_in_the_middle_leaves_nothing_that_runs(
 
 
 def broken_off(settings: Settings, monkeypatch: pytest.MonkeyPatch, key: str | None) -> str:
-    """Returns a sweep of four points of which two were accepted before the server was killed."""
+    """Returns a sweep of four points; two of the points were accepted before the server was killed."""
     with opened(settings) as service:
         real, left = service.desk.submit, [2]
 
@@ -320,7 +322,7 @@ def test_a_point_that_is_nested_too_deeply_is_refused(server: Running) -> None:
 
 
 def test_a_submitted_run_does_not_wait_for_sweeps(settings: Settings, monkeypatch: pytest.MonkeyPatch) -> None:
-    """The user of the sweep does not wait either, and a sweep does not wait for that of another user."""
+    """The user of the sweep also does not wait, and a sweep does not wait for the sweep of another user."""
     monkeypatch.setattr(reader, "usable_cores", lambda: 1)
     real, reading, go = Desk.read, {"ann": threading.Event(), "bob": threading.Event()}, threading.Event()
 

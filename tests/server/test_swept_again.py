@@ -1,4 +1,4 @@
-"""Points of a sweep without success run again; successful points stay."""
+"""Points of a sweep without success run again; the results of successful points stay."""
 
 import json
 import shutil

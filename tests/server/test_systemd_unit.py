@@ -1,4 +1,4 @@
-"""The shipped unit of systemd: a run of two ranks inside its sandbox, the remaining exposure, and automatic
+"""The shipped systemd unit: a run of two ranks inside the sandbox of the unit, the remaining exposure, and automatic
 restarts.
 """
 
@@ -24,7 +24,7 @@ ROOT = Path(__file__).parents[2]
 UNIT = ROOT / "deploy" / "conoid-server.service"
 ANALYZE = shutil.which("systemd-analyze")
 EXPOSURE = 2.0
-"""Limit of the exposure that systemd-analyze reports; it is 1.6 with systemd 252."""
+"""Limit of the exposure that systemd-analyze reports; the exposure of the shipped unit is 1.6 with systemd 252."""
 END = 240.0
 """Time limit of a run that compiles all kernels on a busy machine, s."""
 SANDBOX = pytest.mark.skipif(
@@ -35,7 +35,7 @@ SANDBOX = pytest.mark.skipif(
 
 @dataclass
 class Place:
-    """A home of the service user, and the unit that runs in this home."""
+    """A home folder of the service user, and the unit that runs in this folder."""
 
     state: Path
 
@@ -67,7 +67,7 @@ def place(tmp_path: Path) -> Place:
 
 @pytest.fixture
 def url(place: Place) -> Iterator[str]:
-    """URL of a server that the unit's ExecStart has started at a free port."""
+    """URL of a server that the ExecStart line of the unit has started at a free port."""
     start = sandbox.read(UNIT)["ExecStart"][0].split()
     child = subprocess.Popen(place.command(*start, "--port", "0", "--zenoh-port", "0", "--end-runs", "--grace", "1"))
     address = place.state / "runs/server.json"
@@ -84,7 +84,7 @@ def url(place: Place) -> Iterator[str]:
 
 
 def token(place: Place) -> str:
-    """Token for ann, made by the command of docs/howto/site.md."""
+    """Token for the user ann, made by the command of docs/howto/site.md."""
     serve = ["/opt/conoid/bin/python", "-m", "conoid.server", "--runs", "/var/lib/conoid/runs"]
     ended = subprocess.run(
         place.command(*serve, "token", "add", "ann"), check=True, capture_output=True, text=True

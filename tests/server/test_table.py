@@ -1,4 +1,4 @@
-"""The table of runs: bounded, paged, limited to the user's own runs; results are read once."""
+"""The table of runs is bounded, paged, and limited to the user's own runs; results are read once."""
 
 import json
 import random

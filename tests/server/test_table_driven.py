@@ -1,4 +1,6 @@
-"""The table of runs and the pages of sweeps in a real browser: 200 runs, 10 sweeps, some of them running."""
+"""The table of runs and the pages of sweeps in a real browser, with 200 runs and 10 sweeps, some of them in
+progress.
+"""
 
 import json
 import time
@@ -54,7 +56,7 @@ def plans(site: Site) -> list[dict[str, Any]]:
 
 
 def press(page: Page, words: str) -> None:
-    """Clicks on the first button with the given text in it."""
+    """Clicks on the first button that contains the given text."""
     page.evaluate(f"""(() => {{
       const words = {json.dumps(words)};
       [...document.querySelectorAll("button")].find((one) => one.innerText.includes(words)).click();
@@ -62,7 +64,7 @@ def press(page: Page, words: str) -> None:
 
 
 def fill(page: Page, text: str) -> None:
-    """Sets the text of the filter."""
+    """Sets the text of the filter of the table."""
     page.evaluate(f"""(() => {{
       const field = document.querySelector(".search");
       field.value = {json.dumps(text)};
@@ -71,7 +73,7 @@ def fill(page: Page, text: str) -> None:
 
 
 def column(page: Page, title: str) -> list[str]:
-    """Returns the texts of a column in the visible rows."""
+    """Returns the texts of a column in the visible rows of the table."""
     return list(
         page.evaluate(f"""(() => {{
       const heads = [...document.querySelectorAll('.runs thead th')];

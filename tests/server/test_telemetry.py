@@ -1,4 +1,4 @@
-"""The embedded Zenoh router: the runs to which each client may subscribe."""
+"""The embedded Zenoh router, and the runs to which each client may subscribe."""
 
 import json
 import socket
@@ -100,8 +100,8 @@ def test_the_history_and_the_life_sign_pass_the_rules(telemetry: Telemetry) -> N
         token.undeclare()  # type: ignore[no-untyped-call]
         publisher = ext.declare_advanced_publisher(workers, f"{worker.prefix}/counts", cache=ext.CacheConfig())
         publisher.put(b"early")
-        # A subscriber requests the history once. The declaration of the publisher's cache arrives over another
-        # connection, perhaps later: the subscriber repeats the request until the history arrives.
+        # A Zenoh subscriber requests the history once. The declaration of the publisher's cache arrives over another
+        # connection, perhaps after the request. Therefore the subscriber repeats the request until the history arrives.
         received, deadline = threading.Event(), time.monotonic() + PATIENCE
         while not received.is_set():
             assert time.monotonic() < deadline
@@ -193,7 +193,7 @@ def test_without_tokens_anybody_on_this_machine_may_listen(tmp_path: Path) -> No
 
 
 def test_idle_connections_do_not_close_the_port(telemetry: Telemetry) -> None:
-    """Neither open connections block the port, nor connections that replace closed ones."""
+    """Neither open connections nor connections that replace closed connections block the port."""
     ann, worker = telemetry.reader("ann", ANN), telemetry.worker("ann", "r1")
     with ExitStack() as stack:
         for _ in range(150):

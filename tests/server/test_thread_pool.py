@@ -1,5 +1,5 @@
-"""Threads for calls that may block: few for each user, not shared between users; the server never waits for a
-thread.
+"""Threads for calls that may block: each user has few threads, users do not share threads, and the server never waits
+for a thread.
 """
 
 import asyncio
@@ -55,7 +55,7 @@ def users(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[tuple[Use
 
 
 def together(works: Sequence[Callable[[], Awaitable[Any]]]) -> list[Any]:
-    """Runs all calls at the same time and returns results and errors."""
+    """Runs all calls at the same time and returns the results and errors of the calls."""
 
     async def all_() -> list[Any]:
         return await asyncio.gather(*(work() for work in works), return_exceptions=True)
@@ -94,7 +94,7 @@ def test_a_thread_that_hangs_stays_taken_and_is_free_when_its_work_ends(gate: th
 
 
 def test_users_take_turns(gate: threading.Event) -> None:
-    """With one thread, a user with ten calls is served once before the next user, not ten times."""
+    """With one thread, a user with ten calls gets one turn before the next user, not ten turns."""
     pool, order = ThreadPool(each=1, waiting=100, patience=PATIENCE, most=1), list[str]()
     together([as_("ann", pool, lambda: order.append("ann"))] * 10 + [as_("bob", pool, lambda: order.append("bob"))])
     assert order.index("bob") <= 2

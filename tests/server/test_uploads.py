@@ -37,7 +37,7 @@ def made(size: int, seed: int = 1) -> tuple[bytes, str]:
 
 
 def put(user: User, sha256: str, data: Any, piece: str | None = None, **headers: str) -> Any:
-    """Sends one PUT of the whole file, or of the range of bytes ``piece`` of it."""
+    """Sends one PUT request with the whole file, or with the range of bytes ``piece`` of the file."""
     part = {"Content-Range": f"bytes {piece}"} if piece else {}
     return user.http.put(f"/v1/files/{sha256}", content=data, headers={**part, **headers})
 
@@ -205,7 +205,7 @@ def test_bytes_and_number_of_files_are_a_users_quota(server: Running) -> None:
 
 
 def test_a_user_gets_no_information_about_files_of_others(server: Running, monkeypatch: pytest.MonkeyPatch) -> None:
-    """The answers for a hash of another user's file and for an unknown hash are equal and take the same work."""
+    """The answers for a hash of another user's file and for an unknown hash are equal and take the same CPU time."""
     (there, none) = made(500, 1), made(500, 2)
     assert put(server.ann, there[1], there[0]).status_code == 201
     assert put(server.bob, made(1)[1], made(1)[0]).status_code == 201
@@ -267,7 +267,9 @@ def test_a_full_disk_refuses_in_one_line_and_keeps_what_has_come(
 
 
 def test_wherever_a_disk_fails_the_same_again_makes_the_file_whole(tmp_path: Path) -> None:
-    """A fault occurs at each call that writes, one after the other. A file with its final name is always complete."""
+    """A fault occurs at each call that writes, at one call after the other. A file with its final name is always
+    complete.
+    """
     data, sha256 = made(1000)
     store, fired = Uploads(tmp_path, Files(), 0), 0
 
@@ -290,7 +292,7 @@ def test_wherever_a_disk_fails_the_same_again_makes_the_file_whole(tmp_path: Pat
 
 
 def test_another_connection_waits_and_continues_a_stalled_one(server: Running) -> None:
-    """The receiver has one transfer that received bytes recently, and another without recent bytes."""
+    """The receiver has one transfer that received bytes recently, and another transfer without recent bytes."""
     data, sha256 = made(100)
     transfer = receiving._Transfer()
     book = server.service.receiver._open

@@ -1,4 +1,6 @@
-"""Scheduling: shares, priorities, backfill with a reservation, memory. Pure functions without a clock."""
+"""Scheduling of waiting runs: shares, priorities, backfill with a reservation, memory. The tested functions are pure
+functions without a clock.
+"""
 
 import math
 import random
@@ -133,8 +135,8 @@ def test_a_run_that_can_never_start_delays_no_other() -> None:
 
 
 def test_no_backfill_ever_delays_the_first_that_waits() -> None:
-    """Random queues are simulated with true run times, which differ from the estimates. The large run starts when it
-    would start without the small runs.
+    """Random queues are simulated with true times of the runs, which differ from the estimates. The large run starts at
+    the time at which it would start without the small runs.
     """
     dice = random.Random(4)
     passed = 0
@@ -158,7 +160,7 @@ def test_no_backfill_ever_delays_the_first_that_waits() -> None:
 
 
 def first_fit(large: Need, ends: list[tuple[int, float]], slots: int) -> float:
-    """Returns the time at which a number of ranks is free, from the true ends of the running runs."""
+    """Returns the time at which the given number of ranks is free, from the true ends of the active runs."""
     left = slots - sum(ranks for ranks, _ in ends)
     if left >= large.cores:
         return 0.0

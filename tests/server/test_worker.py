@@ -1,4 +1,4 @@
-"""The real worker with the real server: from HTTP to a result, live over Zenoh."""
+"""The real worker with the real server: from the HTTP request to a result, live over Zenoh."""
 
 import base64
 import hashlib
@@ -131,7 +131,7 @@ def test_from_http_to_a_result_live(ann: User) -> None:
 
 
 def _are_lines_of_the_history(ann: User, run: str, messages: list[dict[str, Any]]) -> None:
-    """Requires that probes and energy of each report are a line of history.csv at the same time."""
+    """Requires that the probes and the energy of each report are equal to the line of history.csv at the same time."""
     values = ann.http.get(f"/v1/runs/{run}/columns", params={"name": "*", "points": 8192}).json()["values"]
     names = list(messages[-1]["probes"])
     assert names
@@ -156,7 +156,9 @@ def test_cancel(ann: User) -> None:
 
 @pytest.mark.slow
 def test_a_run_that_was_cancelled_goes_on_as_a_new_one_to_the_same_digest(ann: User) -> None:
-    """The new run has another number of ranks. Files of the first run are in the folder of the second."""
+    """The new run has another number of ranks than the first run. Files of the first run are in the folder of the new
+    run.
+    """
     text = BAR.format(end_time="600 us")
     whole = ended(ann, ann.submit(text))
     run = ann.submit(text)

@@ -1,4 +1,4 @@
-"""User of the page: the server, and actions and readings that several tests need."""
+"""User of the page: the server, and actions and readings of the page that several tests need."""
 
 import json
 import os
@@ -21,16 +21,16 @@ ROOT = Path(__file__).parents[2]
 WEB = ROOT / "client" / "web"
 DEMO_CASE = ROOT / "cases" / "shipped" / "glass_steel_demo.toml"
 CUTS = '\n[balance]\npolicy = "every"\nevery = 150\n'
-"""Balance policy with regular cuts: the charts have markers, however even the loads are."""
+"""Balance policy with regular cuts: the charts have markers, for any balance of the loads."""
 SHOWN = "document.querySelector('section[data-shown]')?.dataset.shown"
-"""Expression for the number of the snapshot on the screen."""
+"""JavaScript expression for the number of the snapshot on the screen."""
 OWNER = "ann"
-"""User whose token a site has."""
+"""User of a site, with a token."""
 STANDARDS = ["wcag2a", "wcag2aa", "wcag21a", "wcag21aa"]
 
 
 class Site:
-    """A server in a process of its own, with a token."""
+    """A server in a separate process, with a token."""
 
     def __init__(self, runs: Path) -> None:
         """Prepares a server; ``runs`` is the folder of the runs."""
@@ -42,7 +42,7 @@ class Site:
         self.start()
 
     def start(self, port: int = 0) -> None:
-        """Starts the server; ``url`` is its address."""
+        """Starts the server, whose address is ``url``."""
         command = [sys.executable, "-m", "conoid.server", "--runs", str(self.runs), "--port", str(port)]
         self.process = subprocess.Popen([*command, "--no-zenoh", "--web", str(WEB)], start_new_session=True)
         address = self.runs / "server.json"
@@ -53,20 +53,20 @@ class Site:
         self.url = json.loads(address.read_text())["url"] + "/"
 
     def submit(self, text: str, query: str = "") -> str:
-        """Submits a run and returns its id."""
+        """Submits a run and returns the id of the run."""
         headers = {"Authorization": f"Bearer {self.token}", "Content-Type": "application/toml"}
         answer = httpx2.post(f"{self.url}v1/runs?{query}", content=text, headers=headers, timeout=60)
         assert answer.status_code == 202, answer.text
         return str(answer.json()["id"])
 
     def kill(self) -> None:
-        """Kills the server; its workers continue."""
+        """Kills the server; the workers of the server continue."""
         os.kill(self.process.pid, signal.SIGKILL)
         self.process.wait()
 
 
 def demo(**changes: str) -> str:
-    """Returns the case of ``make demo`` with regular cuts and other values of some lines."""
+    """Returns the case of ``make demo`` with regular cuts and other values in some lines."""
     text = DEMO_CASE.read_text()
     for name, value in changes.items():
         old = next(line for line in text.splitlines() if line.startswith(f"{name} = "))
@@ -83,7 +83,7 @@ def sign_in(page: Page, site: Site) -> None:
 
 
 def facts(page: Page, place: str = ".card .facts") -> dict[str, str]:
-    """Returns names and values of a list of facts."""
+    """Returns the names and values of a list of facts on the page."""
     names = json.dumps(f"{place} dt")
     script = f"[...document.querySelectorAll({names})].map((e) => [e.innerText, e.nextSibling.innerText])"
     return dict(page.evaluate(script))
@@ -94,7 +94,9 @@ def number(text: str) -> int:
 
 
 def violations(page: Page) -> list[str]:
-    """Returns the findings of axe-core for the levels A and AA: rule, number of places, and the first place."""
+    """Returns the findings of axe-core for the levels A and AA, each with the rule, the number of places, and the first
+    place.
+    """
     source = Path(str(metadata.distribution("axe-playwright-python").locate_file("axe_playwright_python/axe.min.js")))
     page.evaluate(source.read_text(encoding="utf-8") + "; true")
     found: list[dict[str, Any]] = page.evaluate(
