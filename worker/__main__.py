@@ -1,4 +1,4 @@
-"""``mpiexec -n N python -m mpi4py -m conoid.worker CASE --out DIR``: one run, from a case to an outcome."""
+"""``mpiexec -n N python -m mpi4py -m conoid.worker CASE --out DIR`` executes one run, from a case to an outcome."""
 
 import sys
 

@@ -5,26 +5,27 @@ import math
 from .kernels.jit import njit
 
 T, LOST, DT, LAST_DT, MEAN_DT, SHORTER, STABLE = range(7)
-"""Numbers of the clock in a program of the step (stretch.py), in the order of ``Clock.numbers``."""
+"""Indices of the clock's numbers in a program of steps (stretch.py). The order is that of ``Clock.numbers``."""
 
 COLLAPSE = 1e-6
-"""Smallest stable step over the first stable step; below it the run ends with an error because a tet is crushed.
-Chosen value: a run with a million times as many steps would never end."""
+"""Ratio of the stable step to the first stable step. Below this ratio a tet counts as crushed and the run ends with an
+error. Chosen value: a run with a million times as many steps would never end."""
 
 STARVED = 1e-3
-"""Stable step over the first stable step below which a warning is given. With such a step the rest of the run would
-take a thousand times as many steps. Chosen value: dust and penetration reduce the stable step to a hundredth, which
-needs no warning."""
+"""Ratio of the stable step to the first stable step below which a warning is given. With such a step the rest of the
+run would take a thousand times as many steps. Chosen value: dust and penetration reduce the stable step to a hundredth,
+which needs no warning."""
 
 SLOWED = 0.1
-"""Stable step over the first stable step below which the stable step is named as the reason why a run has reached
-its limit of time or of steps. Chosen value: plastic flow and dust reduce the stable step to a third in any run."""
+"""Ratio of the stable step to the first stable step. Below this ratio the stable step is named as the reason why a run
+has reached its limit of time or of steps. Chosen value: plastic flow and dust reduce the stable step to a third in any
+run."""
 
 
 @njit("UniTuple(float64, 4)(float64, float64, float64, float64, float64, float64)", cache=True, error_model="numpy")
 def chosen(limit, safety, growth, stable, last_dt, left):  # type: ignore[no-untyped-def]
     """Return the stable step, the next step, the mean of the last and the next step, and a quarter of their difference,
-    s; ``left``: time to the next output, s. See ``Clock.choose``.
+    s. ``left``: time to the next output, s. See ``Clock.choose``.
     """
     stable = min(safety / limit if limit > 0.0 else math.inf, growth * stable)
     dt = min(stable, last_dt)
@@ -35,8 +36,8 @@ def chosen(limit, safety, growth, stable, last_dt, left):  # type: ignore[no-unt
 
 @njit("UniTuple(float64, 2)(float64, float64, float64, float64)", cache=True)
 def advanced(t, lost, dt, target):  # type: ignore[no-untyped-def]
-    """Return the time after a step ``dt``, s, and its rounding error; ``target``: time of the next output, which is set
-    exactly.
+    """Return the time after a step ``dt``, s, and the rounding error of this time. ``target``: time of the next output,
+    which is reached exactly.
     """
     increment = dt - lost
     new = t + increment
@@ -46,7 +47,7 @@ def advanced(t, lost, dt, target):  # type: ignore[no-untyped-def]
 
 
 class Clock:
-    """Simulated time, by compensated summation (Kahan), and the time step."""
+    """Simulated time, summed with compensation (Kahan), and the time step."""
 
     def __init__(self, end: float, safety: float, growth: float, frames: int) -> None:
         self.t = 0.0
@@ -56,9 +57,9 @@ class Clock:
         self.last_dt = 0.0
         """Time step from n-1 to n, s."""
         self.mean_dt = 0.0
-        """Mean of ``dt`` and ``last_dt``, s: duration of the kick from v(n-1/2) to v(n+1/2)."""
+        """Mean of ``dt`` and ``last_dt``, s. In the kick from v(n-1/2) to v(n+1/2) the forces act for this time."""
         self.shorter = 0.0
-        """A quarter of ``last_dt - dt``, s."""
+        """A quarter of the difference ``last_dt - dt``, s."""
         self._first = 0.0
         self._lost = 0.0
         self._stable = math.inf
@@ -67,14 +68,14 @@ class Clock:
         self._growth = growth
         self._frames = frames
         self.frame = 0
-        """Index of the next frame; a step ends exactly at the time of a frame."""
+        """Index of the next frame. A step ends exactly at the time of a frame."""
         self._of = -1
-        """Index of the frame to which the times ``_landing`` and ``_after`` belong."""
+        """Index of the frame to which ``_landing`` and ``_after`` belong."""
         self._landing = self._after = 0.0
-        """Time of the next frame, and time of the frame after the next one, s."""
+        """Time of the next frame, s; and time of the frame after the next frame, s."""
 
     def keep(self) -> dict[str, float]:
-        """Returns the whole state, for a checkpoint."""
+        """Returns the state of the clock for a checkpoint."""
         return dict(vars(self))
 
     def resume(self, known: dict[str, float]) -> None:
@@ -83,7 +84,7 @@ class Clock:
 
     @property
     def done(self) -> bool:
-        """True if the end time is reached."""
+        """True if the end time of the run is reached."""
         return self.t >= self._end
 
     def frame_time(self, index: int) -> float:
@@ -98,13 +99,13 @@ class Clock:
         return self.t >= self._landing and self._frames > 0 and self.frame <= self._frames
 
     def choose(self, limit: float) -> float:
-        """Chooses the next time step ``dt`` and returns ``mean_dt``, s. ``limit``: the largest one-over-stable-step of
-        all tets, 1/s; zero when no tet is left.
+        """Chooses the next time step ``dt`` and returns ``mean_dt``, s. ``limit``: largest value of 1 / stable step of
+        all tets, 1/s; zero if no tet is left.
 
-        The interval to the next frame is divided into as few equal steps as are stable: a step that changes little
-        costs little energy, and no step is much shorter than the others. ``growth`` bounds the ratio of two successive
-        stable steps. At the end time, ``dt`` is the step that would come next: equal to the last step if the last step
-        is still stable, else the stable step.
+        The interval to the next frame is divided into equal steps, as few as are stable. Equal steps create little
+        energy, and no step is much shorter than the others. ``growth`` bounds the ratio of two successive stable steps.
+        At the end time, ``dt`` is the step that would be made next. This step is equal to the last step if the last
+        step is still stable, else it is the stable step.
         """
         self.last_dt = self.dt
         left = (self._after if self.frame_due else self._landing) - self.t
@@ -116,7 +117,7 @@ class Clock:
 
     @property
     def numbers(self) -> tuple[float, ...]:
-        """The numbers T to STABLE."""
+        """The numbers of the clock for a program of steps, in the order T to STABLE."""
         return self.t, self._lost, self.dt, self.last_dt, self.mean_dt, self.shorter, self._stable
 
     @property
@@ -126,7 +127,7 @@ class Clock:
         return self._safety, self._growth, STARVED * self._first, target
 
     def go_on(self, steps: int, numbers: list[float]) -> None:
-        """Sets the ``numbers`` after ``steps`` further steps of a program."""
+        """Sets the ``numbers`` of the clock after ``steps`` further steps in a program."""
         self.t, self._lost, self.dt, self.last_dt, self.mean_dt, self.shorter, self._stable = numbers
         self.step += steps
 
@@ -136,13 +137,15 @@ class Clock:
         return self._growth * self.dt
 
     def choose_again(self, limit: float) -> float:
-        """Chooses the time step again, for another ``limit``, before it is used; see ``choose``."""
+        """Chooses the time step again, for another ``limit``. Must be called before the time step is used; see
+        ``choose``.
+        """
         self.dt = self.last_dt
         return self.choose(limit)
 
     @property
     def collapsed(self) -> bool:
-        """True if the stable step is so far below the first stable step that the run would never end."""
+        """True if the stable step is so far below the first stable step that the run would practically never end."""
         return self._stable < COLLAPSE * self._first
 
     @property
@@ -162,13 +165,13 @@ class Clock:
 
     @property
     def stable(self) -> float:
-        """Largest time step that stability and growth allow, s; ``choose`` shortens it so that a step ends at the
-        output time.
+        """Largest time step that stability and growth allow, s. ``choose`` shortens this step so that a step ends at
+        the output time.
         """
         return self._stable
 
     def advance(self) -> None:
-        """Adds the chosen step to the time; a frame time is set exactly."""
+        """Adds the chosen step to the time. The time of a frame is set exactly."""
         target = self._landing if self._of == self.frame else self.frame_time(self.frame)
         self.t, self._lost = advanced(self.t, self._lost, self.dt, target)
         self.step += 1

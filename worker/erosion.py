@@ -1,12 +1,12 @@
-"""Erosion: removes worn tets, makes the free faces of their neighbours surface, and books the removed energy and
-momentum.
+"""Erosion: removes the tets that meet an erosion criterion, makes the free faces of their neighbours surface, and sums
+the removed energy and momentum.
 
-A tet is marked in the pass over the elements (elements/wear.py), when its force of n+1 is already in the nodal sums.
-The tet is removed before the contact of the next step, so that the exposed faces of its neighbours are in contact in
-that step. The last force of a removed tet acts in one more velocity update. Therefore the second half of the work of
-this force is booked one step later, as for a boundary. Tets that exceed only a strain or damage limit are collected for
-some steps, because each removal requires new mean normals. If a part has ``erosion.nodes = "strike"``, its nodes
-without tets that contact has pushed are collected in the same steps.
+A tet is marked in the pass over the elements (elements/wear.py). At this time its force of n+1 is already in the nodal
+sums. The tet is removed before the contact of the next step, so that this contact includes the exposed faces of its
+neighbours. The last force of a removed tet acts in one more velocity update. Therefore the second half of the work of
+this force is added one step later, as for a boundary. Tets that exceed only a strain or damage limit are collected for
+some steps, because each removal requires new mean normals. If a part has ``erosion.nodes = "strike"``, nodes of the
+part without tets that got a contact impulse are collected in the same steps.
 """
 
 import numpy as np
@@ -28,12 +28,12 @@ from .parallel.ownership import Neighbour, complete
 from .parallel.tags import Tag
 
 GATHERED = 10
-"""Number of steps for which worn tets are collected before they are removed together. Chosen value: it is above 1
+"""Number of steps for which marked tets are collected before they are removed together. Chosen value: it is above 1,
 because each removal requires new mean normals and tests of all candidate pairs."""
 UNDECIDED = 0.25
-"""Largest damage over ``erosion.damage`` from which a warning reports that no tet was removed. Chosen value: in the
-example of a punch (docs/theory/erosion.md, Erosion) the damage of the plate is 0.42 and no tet is removed; with
-smaller tets the punch cuts a plug out of the plate."""
+"""Ratio of the largest damage to ``erosion.damage`` above which a warning reports that no tet was removed. Chosen
+value: in the example of a punch (docs/theory/erosion.md, Erosion) the damage of the plate is 0.42 and no tet is
+removed; with smaller tets the punch cuts a plug out of the plate."""
 
 
 class Erosion:
@@ -43,7 +43,9 @@ class Erosion:
         self, case: Case, model: Model, neighbours: list[Neighbour], contact: Contact | None, bounds: list[Boundary],
         comm: Comm, clock: Clock, extremes: tuple[float, float, float],
     ) -> None:  # fmt: skip
-        """``extremes``: largest nodal mass, kg, speed, m/s, and distance from the origin, m, of the scene."""
+        """``extremes``: largest nodal mass, kg, largest speed, m/s, and largest distance from the origin, m, of the
+        scene.
+        """
         self._model, self._neighbours, self._contact = model, neighbours, contact
         self._bounds = bounds
         self._comm, self._clock = comm, clock
@@ -53,21 +55,21 @@ class Erosion:
             for kind in ("remove", "strike")
         )
         self.removed = np.zeros(model.nodes.n, bool)
-        """(nodes,) True for removed nodes; the velocity of a removed node is zero."""
+        """(nodes,) whether each node is removed. The velocity of a removed node is zero."""
         self._tets_at = self._completed([block.tets.astype(np.int64) for block in model.blocks])
-        # Parts that fracture do not erode (cases/checks/checks.py): no tet of a separated node is removed. The number
-        # of tets of a copy is therefore never used; it only must not be zero.
+        # Parts that fracture do not erode (cases/checks/checks.py), so no tet of a separated node is removed. Therefore
+        # the number of tets of a copy is never used; it must only be different from zero.
         model.nodes.columns.declare(self, removed=COPIED, _leaves=COPIED, _strikes=COPIED, _tets_at=COPIED)
         self._leaving: tuple[Ints, Floats] = np.zeros(0, np.int64), np.zeros((0, 3))
-        """Nodes that are removed in this step, and their v(n-1/2), m/s."""
+        """Nodes that are removed in this step, and their velocities v(n-1/2), m/s."""
         self.account = ErosionAccount(clock, extremes)
         self._limit = 0.0
         self.due = False
         """True if tets or nodes are removed at the start of the next step."""
 
     def begin(self, limit: float) -> None:
-        """Sets the limits of the stable step, as shares of the first one; ``limit``: the largest
-        one-over-stable-step at the start, 1/s.
+        """Computes the limits of the stable step, which the case gives as fractions of the first stable step.
+        ``limit``: 1 / first stable step, 1/s.
         """
         self._limit = limit
         for block in self._model.blocks:
@@ -76,7 +78,7 @@ class Erosion:
                 block.life[FREQUENCY] = limit / spec.time_step
 
     def keep(self, parcel: Parcel) -> None:
-        """Adds the state to a parcel (a checkpoint or migration message)."""
+        """Adds the state of erosion to a parcel (a checkpoint or migration message)."""
         nodes, ids = self._model.nodes, parcel.nodes["id"]
         account = self.account
         parcel.known["erosion"] = self._limit, self.due, account.work.scale, account.nodal.scale
@@ -87,7 +89,7 @@ class Erosion:
         account.keep(parcel, nodes.x)
 
     def resume(self, parcel: Parcel) -> None:
-        """Restores the state from a parcel (a checkpoint or migration message)."""
+        """Restores the state of erosion from a parcel (a checkpoint or migration message)."""
         limit, self.due, self.account.work.scale, self.account.nodal.scale = parcel.known["erosion"]
         self.begin(limit)
         self.removed, self._tets_at = parcel.nodes["erosion.removed"], parcel.nodes["erosion.tets_at"]
@@ -96,9 +98,8 @@ class Erosion:
         self._release()
 
     def strikes(self) -> int:
-        """After contact: marks the nodes without tets that contact pushed in this step, in parts with
-        ``erosion.nodes = "strike"``. Returns TIRED (elements/wear.py) if nodes of this rank are to be removed, else
-        SOUND.
+        """Marks nodes without tets that contact pushed in this step, in parts with ``erosion.nodes = "strike"``. Must
+        be called after contact. Returns TIRED (elements/wear.py) if nodes of this rank must be removed, else SOUND.
         """
         if self._contact is not None:
             flying = np.flatnonzero(self._strikes & self._loose)
@@ -106,13 +107,13 @@ class Erosion:
         return TIRED if (self._leaves & self._loose).any() else SOUND
 
     def decide(self, found: int) -> None:
-        """Decides whether the next step removes tets or nodes; ``found``: the maximum over all ranks of SOUND, TIRED
-        and BROKEN (elements/wear.py).
+        """Decides whether the next step removes tets or nodes. ``found``: maximum over all ranks of SOUND, TIRED and
+        BROKEN (elements/wear.py).
         """
         self.due = found == BROKEN or (found > SOUND and self._clock.step % GATHERED == 0)
 
     def warnings(self, eroded: int) -> list[str]:
-        """Returns warnings for the end of the run; ``eroded``: number of removed tets of all ranks. Collective."""
+        """Returns the warnings for the end of the run; ``eroded``: number of removed tets on all ranks. Collective."""
         parts = self._model.parts
         left, damage = np.zeros(len(parts), np.int64), np.zeros(len(parts))
         for block in self._model.blocks:
@@ -138,23 +139,23 @@ class Erosion:
 
     @property
     def idle(self) -> bool:
-        """True if nothing is removed or outstanding, and all nodes have tets."""
+        """True if no tet or node must be removed, no work must be added later, and all nodes have tets."""
         return not (self.due or self.account.outstanding or (self._tets_at == 0).any())
 
     def note(self, state: Nodes) -> None:
-        """Before the kick: books the second half of the work of the last removal."""
+        """Adds the second half of the work of the last removal. Must be called before the kick."""
         self.account.note(state)
 
     def remove(self, state: Nodes) -> None:
-        """Removes the marked tets, if a removal is scheduled. Collective."""
+        """Removes the marked tets, if the removal is scheduled for this step. Collective."""
         self._leaving = np.zeros(0, np.int64), np.zeros((0, 3))
         if self.due:
             self._remove(state)
             self.due = False
 
     def stop_removed(self, state: Nodes) -> None:
-        """After the kick: books the nodes that are removed in this step; sets the velocities of all removed nodes to
-        zero.
+        """Adds the nodes that are removed in this step to the account, and sets the velocities of all removed nodes to
+        zero. Must be called after the kick.
         """
         leaving, before = self._leaving
         if len(leaving):
@@ -162,7 +163,9 @@ class Erosion:
         state.v[self.removed] = 0.0
 
     def _remove(self, state: Nodes) -> None:
-        """Removes the marked tets, and the nodes that are removed because all of their tets are removed. Collective."""
+        """Removes the marked tets. Removes also the nodes that have lost all their tets, if their part requires this.
+        Collective.
+        """
         gone, left, ids = [np.zeros((0, exposure.WORDS), np.int64)], [], [np.zeros(0, np.int64)]
         for block in self._model.blocks:
             worn = np.flatnonzero(block.worn)
@@ -186,17 +189,17 @@ class Erosion:
 
     @property
     def _loose(self) -> Flags:
-        """(nodes,) nodes without tets that are not removed: particles."""
+        """(nodes,) whether each node is a particle: it has no tets and is not removed."""
         return np.asarray((self._tets_at == 0) & ~self.removed)
 
     def _release(self) -> None:
-        """Declares nodes without tets particles, in all boundaries."""
+        """Declares the nodes without tets as particles in all boundaries."""
         for bound in self._bounds:
             bound.release(self._loose, self._bounds)
 
     def _unload(self, gone: Ints) -> None:
-        """Removes the boundary loads of the removed tets ``gone`` (global ids, of this rank), on every rank that has a
-        node of a removed tet. Collective.
+        """Removes the boundary loads of removed tets, on every rank that has a node of such a tet. ``gone``: global ids
+        of the removed tets of this rank. Collective.
         """
         if any(bound.on_faces for bound in self._bounds):
             gone = self._comm.join(gone)
@@ -204,7 +207,7 @@ class Erosion:
                 bound.drop(gone)
 
     def _completed(self, tets: list[Ints]) -> Ints:
-        """(nodes,) number of tets at each node, counted over these ``tets`` of all ranks. Collective."""
+        """(nodes,) number of the given ``tets`` at each node, counted over all ranks. Collective."""
         corners = np.concatenate([np.zeros(0, np.int64), *(rows.reshape(-1) for rows in tets)])
         counts = np.bincount(corners, minlength=self._model.nodes.n)[:, None].astype(np.int64)
         complete(self._comm, self._neighbours, counts, Tag.TETS_AT_NODE)

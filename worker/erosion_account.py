@@ -1,4 +1,4 @@
-"""Energy and momentum that erosion removes: exact sums over the removed tets and nodes."""
+"""Energy and momentum that erosion removes, as exact sums over the removed tets and nodes."""
 
 import numpy as np
 
@@ -29,27 +29,29 @@ class ErosionAccount:
     """Sums of a rank over the tets and nodes that erosion has removed."""
 
     def __init__(self, clock: Clock, extremes: tuple[float, float, float]) -> None:
-        """``extremes``: largest nodal mass, kg, speed, m/s, and distance from the origin, m, of the scene."""
+        """``extremes``: largest nodal mass, kg, largest speed, m/s, and largest distance from the origin, m, of the
+        scene.
+        """
         self._clock = clock
         mass, speed, arm = extremes
         energy, momentum, spin = mass * speed * speed, mass * speed, mass * speed * arm
         self.work = Tally(np.full(len(WORKS) + 1, energy))
-        """Sums of WORKS over the removed tets, J, and the sum of their heat, for tets with an equation of state that
-        depends on heat."""
+        """Sums of WORKS over the removed tets, J. Also the sum of the heat of removed tets whose equation of state
+        depends on heat, J."""
         self.nodal = Tally(np.array([energy, mass, *[momentum] * 3, *[spin] * 3]))
         """Energy, J, mass, kg, momentum, kg m/s, and angular momentum, kg m^2/s, of the removed nodes."""
         self._half = self.nodal.quanta(np.zeros((0, len(self.nodal.scale))))
-        """Second half of ``nodal`` for the last removal, quanta."""
+        """Second half of the energy and momenta of the last removal, quanta."""
         self._last: list[tuple[Ints, Floats]] = []
-        """Nodes (k, 4) and last forces (k, 4, 3), N, of the tets of the last removal."""
+        """Nodes (k, 4) of the tets of the last removal, and the last forces (k, 4, 3) of these tets, N."""
 
     @property
     def outstanding(self) -> bool:
-        """Whether the second half of a removal is not booked yet."""
+        """Whether the second half of the work of a removal must still be added."""
         return bool(self._last or self._half.any())
 
     def note(self, state: Nodes) -> None:
-        """Before the kick: books the second half of the work of the last removal."""
+        """Adds the second half of the work of the last removal. Must be called before the kick."""
         for tets, forces in self._last:
             work = np.zeros(len(tets))
             for corner in range(4):
@@ -62,12 +64,14 @@ class ErosionAccount:
         self._half[:] = 0
 
     def add_tets(self, block: Block, worn: Ints, x: Floats) -> None:
-        """Books the tets ``worn`` of a block, before they are removed."""
+        """Adds the energies of the tets ``worn`` of a block, before these tets are removed."""
         self._last.append((block.tets[worn].astype(np.int64), _forces(block, worn, x)))
         self.work.add(_energies(block, worn))
 
     def add_nodes(self, state: Nodes, leaving: Ints, before: Floats) -> None:
-        """After the kick: books the nodes ``leaving``, and sets their forces to zero; ``before``: their v(n-1/2)."""
+        """Adds energy and momentum of the nodes ``leaving`` after the kick, and sets their forces to zero. ``before``:
+        velocities v(n-1/2) of these nodes.
+        """
         owned = leaving[state.owned[leaving]]
         after, mass = state.v[owned], state.mass[owned]
         early = self._clock.shorter / state.scale * (before * state.force[leaving]).sum(axis=1)
@@ -90,7 +94,9 @@ class ErosionAccount:
         parcel.rows["erosion.last"] = {"at": x[tets].mean(axis=1), "with": ids[tets], "force": forces}
 
     def resume(self, parcel: Parcel) -> None:
-        """Restores the account from a parcel (a checkpoint or migration message), except the scales of the sums."""
+        """Restores the account from a parcel (a checkpoint or migration message). The scales of the sums are not
+        restored.
+        """
         self.work.words, self.nodal.words, self._half = (
             parcel.sums[f"erosion.{key}"].copy() for key in ("work", "nodal", "half")
         )
@@ -99,12 +105,12 @@ class ErosionAccount:
 
 
 def _rows(block: Block, chosen: Ints, rows: "np.ndarray") -> Floats:
-    """Returns the values of the state rows ``rows`` of the tets ``chosen``, (len(chosen), len(rows))."""
+    """Returns the state rows ``rows`` of the tets ``chosen``, in the shape (len(chosen), len(rows))."""
     return np.asarray(block.state[(chosen // CHUNK)[:, None], rows, (chosen % CHUNK)[:, None]])
 
 
 def _energies(block: Block, chosen: Ints) -> Floats:
-    """(k, 5) WORKS of some tets, J, and the heat in their equation of state, J."""
+    """(k, 5) WORKS of the chosen tets, J, and the heat on which their pressure depends, J."""
     none = np.zeros(len(chosen))
     found = {row: block.at(row, chosen) if block.has(row) else none for row in WORKS}
     heat = found[WORK_VISCOUS] + found[WORK_PLASTIC] if EQUATIONS[block.eos] is GRUNEISEN else none
@@ -112,7 +118,7 @@ def _energies(block: Block, chosen: Ints) -> Floats:
 
 
 def _forces(block: Block, chosen: Ints, x: Floats) -> Floats:
-    """(k, 4, 3) nodal forces -V stress grad N of some tets, N."""
+    """(k, 4, 3) nodal forces -V stress grad N of the chosen tets, N."""
     values = _rows(block, chosen, np.arange(VISCOUS + 1))
     stress = np.empty((len(chosen), 3, 3))
     pressure = values[:, PRESSURE] + values[:, VISCOUS]

@@ -10,7 +10,8 @@
     └── PhysicsError                 exit 3   the solution has diverged
         └── EnergyError              exit 3   the energy ledger does not close
 
-The text of each error is a single line for the author of the case: key, value, what is allowed.
+The text of each error is a single line for the author of the case. The line has the key, the value and the allowed
+values.
 """
 
 from typing import ClassVar
@@ -20,7 +21,9 @@ from conoid.cases.run import Cause, ExitCode, State
 
 
 class ConoidError(problems.ConoidError):
-    """Base class of the errors of the worker; a user of Conoid catches problems.ConoidError (client/errors.py)."""
+    """Base class of the errors of the worker. A user of Conoid catches problems.ConoidError (client/errors.py)
+    instead.
+    """
 
     exit_code: ClassVar[int] = ExitCode.CRASHED
     cause: ClassVar[Cause] = Cause.SERVICE
@@ -28,11 +31,11 @@ class ConoidError(problems.ConoidError):
 
 
 class CompileError(ConoidError):
-    """Error: the kernels cannot be compiled."""
+    """Error that is raised if the kernels cannot be compiled."""
 
 
 class StoppedError(ConoidError):
-    """Error: the run was asked to stop before its first step."""
+    """Error that is raised if the run was asked to stop before its first step."""
 
     exit_code = ExitCode.INTERRUPTED
     cause = Cause.CANCELLED
@@ -40,26 +43,26 @@ class StoppedError(ConoidError):
 
 
 class InputError(ConoidError, ValueError):
-    """Error: the case, or a file that the case names, is wrong."""
+    """Error that is raised if the case, or a file that the case names, is wrong."""
 
     exit_code = ExitCode.BAD_INPUT
     cause = Cause.INPUT
 
 
 class MeshError(InputError):
-    """Error: the mesh cannot be made, read or used."""
+    """Error that is raised if the mesh cannot be made, read or used."""
 
     cause = Cause.MESH
 
 
 class PhysicsError(ConoidError):
-    """Error: the solution has diverged."""
+    """Error that is raised if the solution has diverged."""
 
     exit_code = ExitCode.PHYSICS
     cause = Cause.DIVERGED
 
 
 class EnergyError(PhysicsError):
-    """Error: the energy ledger does not close."""
+    """Error that is raised if the residual of the energy ledger is above its limit."""
 
     cause = Cause.ENERGY

@@ -1,4 +1,6 @@
-"""Digest of the final state: sha256 over nodes and tets in the order of their global ids, for any number of ranks."""
+"""Digest of the final state: a sha256 over nodes and tets in the order of their global ids. The digest is equal for any
+number of ranks.
+"""
 
 import hashlib
 
@@ -10,11 +12,11 @@ from ..parallel.comm import Comm
 
 
 def digest(model: Model, comm: Comm, nodal: list[Floats], more: bytes = b"") -> str | None:
-    """Return the hex digest on rank 0, None on the others.
+    """Return the digest as hexadecimal text on rank 0, None on other ranks.
 
-    Collective. The digest covers positions, velocities, the other ``nodal`` arrays, every row of the state of the
-    tets except VOLUME_FLUX, and the bytes ``more``, which are equal on all ranks. VOLUME_FLUX is omitted, because it
-    is scratch or a volume that follows from the positions.
+    Collective. The digest covers positions, velocities, the other ``nodal`` arrays, every row of the state of the tets
+    except VOLUME_FLUX, and the bytes ``more``, which are equal on all ranks. VOLUME_FLUX is omitted, because it is a
+    temporary value or a volume that is determined by the positions.
     """
     nodes, h = model.nodes, hashlib.sha256()
     owned = nodes.owned

@@ -1,11 +1,12 @@
-"""The energy ledger: every joule is in one line, and the residual shows whether the lines add up.
+"""The energy ledger (energy balance). Every energy is in exactly one term, and the residual shows the error of the sum
+of all terms.
 
 Kinetic energy is the form that the leapfrog step conserves together with the trapezoidal work of the forces. For equal
 steps this form is 1/2 m v(n-1/2) . v(n+1/2). With the steps dt- before n and dt+ after n, seen from before n, the form
 is 1/2 m v(n-1/2) . v(n+1/2) + 1/4 (dt- - dt+) v(n-1/2) . f(n). Seen from after n the form is less by 1/4 (dt- - dt+)
-f(n) . (v(n-1/2) - v(n+1/2)). The energy that unequal steps create is an error of the method, and is booked for each
-node as ``stepping`` (docs/theory/time_integration.md, Time integration). Work of the stress is summed tet by tet from
-stress and strain rate, not from nodal forces, so the residual compares two independent accounts.
+f(n) . (v(n-1/2) - v(n+1/2)). The energy that unequal steps create is an error of the method, and is added for each node
+to ``stepping`` (docs/theory/time_integration.md, Time integration). The work of the stress is computed for each tet
+from stress and strain rate, not from nodal forces, so the residual compares two independent computations.
 """
 
 from typing import Any
@@ -22,9 +23,9 @@ from .sums import Sums, Totals
 
 
 class Ledger:
-    """The energies (lines) of the ledger, summed over all ranks; equal on all ranks.
+    """The terms of the energy ledger, summed over all ranks. All ranks have equal values.
 
-    Construction sets the initial energy. Collective.
+    The constructor computes the initial energy. Collective.
     """
 
     def __init__(self, sums: Sums, parts: list[str]) -> None:
@@ -32,24 +33,25 @@ class Ledger:
         self._sums, self._names = sums, parts
         self.initial = sums.kinetic()
         self.worst = 0.0
-        """Largest residual so far."""
+        """Largest residual of the energy ledger so far."""
         self.making = Making(sums.rounding())
-        """Energy that single lines of the ledger have made."""
+        """Energy that single terms of the ledger have created."""
         self.lost = 0.0
-        """Energy lost to contact, with friction, at the last call, as a share of the initial energy."""
+        """Energy lost to contact (including friction) at the last call, divided by the initial energy."""
         self.residual = 0.0
-        """Residual at the last call: difference of the lines, divided by the largest energy. The largest energy is
-        the maximum of the energy received so far, the work of the stress and the kinetic energy."""
+        """Residual at the last call: error of the sum of all terms, divided by the largest energy. The largest energy
+        is the maximum of the energy received so far, the work of the stress and the kinetic energy."""
         self.beyond = 0.0
-        """Kinetic energy in excess of all received energy at the last call, divided by the same largest energy. Such an
-        excess means that the sum of all other lines of the energy is negative."""
+        """Difference of the kinetic energy and all received energy at the last call, divided by the largest energy that
+        is also the divisor of ``residual``. If the difference is positive, the sum of all other terms of the ledger is
+        negative."""
         self.unpaid = 0.0
         """Largest decrease of the energy lost to fracture so far, divided by the energy that all broken facets
         absorb. A decrease means that facets released more energy than they had absorbed."""
         self._taken = 0.0
-        """Largest energy lost to fracture so far, J."""
+        """Largest energy that was lost to fracture so far, J."""
         self.came = self.initial
-        """Largest energy received so far, J."""
+        """Largest energy that was received so far, J."""
         self.momentum = np.zeros(3)
         """Linear momentum at the last call, kg m/s, including removed nodes."""
         self.angular_momentum = np.zeros(3)
@@ -60,7 +62,7 @@ class Ledger:
         """Energies of each part at the last call; empty if there is one part."""
 
     def keep(self) -> tuple[Any, ...]:
-        """Return the state of the ledger for a checkpoint, equal on all ranks."""
+        """Return the state of the ledger for a checkpoint. All ranks return equal values."""
         largest = self.initial, self.came, self.worst, self.lost, self._taken, self.unpaid
         return largest, self.momentum, self.angular_momentum, self.eroded_mass, self.making.keep()
 
@@ -94,7 +96,7 @@ class Ledger:
         return closed
 
     def _set(self, sums: Totals) -> None:
-        """Set the momenta, masses and shares at time n."""
+        """Set the momenta, masses and ratios at time n."""
         self.parts = _named(self._names, sums.kinetic, sums.internal)
         self.eroded_mass = sums.eroded.mass
         self.momentum = sums.nodal[3:6] + sums.eroded.momenta[:3]
@@ -107,7 +109,7 @@ class Ledger:
     def _judge(self, total: float, kinetic: float, external: float, work: float) -> float:
         """Set the residual and return the largest energy, J.
 
-        ``total``: sum of the lines; ``work``: work of the stress.
+        ``total``: sum of the terms; ``work``: work of the stress.
         """
         self.came = max(self.came, abs(external))
         scale = max(self.came, work, kinetic)
@@ -118,7 +120,7 @@ class Ledger:
         return scale
 
     def warnings(self, safety: float) -> list[str]:
-        """Return warnings of the ledger so far; ``safety``: numerics.dt_safety."""
+        """Return the warnings about the ledger so far; ``safety``: numerics.dt_safety."""
         found = [
             (self.worst, "the energy ledger has a residual of up to {:.2g} of the largest energy"),
             (self.unpaid, "facets that closed have released {:.2g} of the energy that all broken facets absorb, more "
@@ -131,8 +133,8 @@ class Ledger:
     def require(self, run: Run, safety: float, when: str) -> None:
         """Raise EnergyError if a limit of ``run`` is exceeded.
 
-        The residual of the last call is compared with run.residual_limit, the energy made in any call with
-        run.made_limit. ``safety``: numerics.dt_safety.
+        The residual of the last call is compared with run.residual_limit. The energy that a term has created up to any
+        call is compared with run.made_limit. ``safety``: numerics.dt_safety.
         """
         limit = run.residual_limit
         for what, share in (
@@ -145,6 +147,6 @@ class Ledger:
 
 
 def _named(parts: list[str], kinetic: Floats, internal: Floats) -> dict[str, PartEnergy]:
-    """Return the energies of each part; an empty result if there is one part."""
+    """Return the energies of each part; an empty result if the case has one part only."""
     rows = zip(parts, kinetic.tolist(), internal.tolist(), strict=True)
     return {part: PartEnergy(kinetic=k, internal=i) for part, k, i in rows} if len(parts) > 1 else {}

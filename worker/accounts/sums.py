@@ -1,8 +1,8 @@
 """Sums of the energy ledger at time n, over the nodes, tets, boundaries, facets and bonds of all ranks.
 
-One reduction over the ranks adds all sums, for each part and for the whole model, in the quanta of the whole model. The
-sums of the whole model add the same integers as the sums of the parts, so their bits do not depend on the parts. The
-sums of parts need no further pass.
+One reduction over the ranks computes all sums, for each part and for the whole model, in the quanta of the whole model.
+The sums of the whole model add the same integers as the sums of the parts, so they do not depend on the division into
+parts. The sums of parts need no further pass.
 """
 
 from dataclasses import dataclass, field
@@ -32,35 +32,36 @@ from .nodal import NODAL, OF_NODES, add_booked, of_nodes
 
 @dataclass(frozen=True)
 class Eroded:
-    """Accounts of removed tets and nodes."""
+    """Energies, mass and momenta of removed tets and nodes."""
 
     works: Floats
-    """(5,) WORKS of the tets, and the part of their heat on which their pressure depends, J."""
+    """(5,) sums of WORKS over the removed tets, and of the part of their heat on which their pressure depends, J."""
     kinetic: float = 0.0
-    """Kinetic energy of the nodes, J."""
+    """Kinetic energy of the removed nodes, J."""
     mass: float = 0.0
-    """Mass of the nodes, kg."""
+    """Mass of the removed nodes, kg."""
     momenta: Floats = field(default_factory=lambda: np.zeros(6))
-    """Momentum, kg m/s, and angular momentum, kg m^2/s, of the nodes."""
+    """Momentum, kg m/s, and angular momentum, kg m^2/s, of the removed nodes."""
 
 
 @dataclass(frozen=True)
 class Totals:
-    """The sums at time n."""
+    """The sums of the energy ledger at time n."""
 
     t: float
     """Time at step n, s."""
     nodal: Floats
     """(NODAL,) sums of the rows of ``nodal.of_nodes`` over all nodes, rigid bodies and walls."""
     works: Floats
-    """(4,) sums of WORKS over all tets, J."""
+    """(4,) sums of the columns WORKS over all tets, J."""
     kinetic: Floats
     """(parts,) kinetic energy of each part, J."""
     internal: Floats
     """(parts,) work of the stress and of the bulk viscosity in each part, J."""
     eroded: Eroded
     facets: tuple[float, float, float]
-    """Energies of cohesive facets, J: dissipated, recoverable, and the fracture energy of all facets ever inserted."""
+    """Energies of the cohesive facets, J: dissipated energy, recoverable energy, and the fracture energy of all facets
+    that were ever inserted."""
     bonds: list[float]
     """Energy lost by bonds of meshes that do not match, J."""
     friction: float
@@ -68,14 +69,14 @@ class Totals:
 
 
 class Sums:
-    """Makes the sums of the ledger. Every public method is collective."""
+    """Computes the sums of the energy ledger. Every public method is collective."""
 
     def __init__(
         self, model: Model, boundaries: list[Boundary], contact: Contact | None, bonds: Bonds | None,
         erosion: Erosion | None, fracture: Fracture | None, undeformed: tuple[Rigid | None, Walls], comm: Comm,
         clock: Clock, team: Team,
     ) -> None:  # fmt: skip
-        """``undeformed``: rigid parts and walls; ``team``: threads for the pass over the nodes."""
+        """``undeformed``: rigid parts and walls; ``team``: threads that pass over the nodes."""
         self._pass, self._columns = Pass(team, of_nodes, *OF_NODES), np.empty(0)
         self._model, self._boundaries, self._contact, self._bonds = model, boundaries, contact, bonds
         self._erosion, self._undeformed, self._comm, self._clock = erosion, undeformed, comm, clock
@@ -88,7 +89,7 @@ class Sums:
         return self._node_sum(energy, self._counted()) + energy_of(*self._undeformed)
 
     def rounding(self) -> float:
-        """Return the energy of a volume strain of making.STRAIN in the whole model, J."""
+        """Return the energy that a volume strain of making.STRAIN has in the whole model, J."""
         nodes, bulk = self._model.nodes, np.zeros(len(self._model.parts))
         for block in self._model.blocks:
             bulk[block.part] = block.params[BULK] / block.params[DENSITY]
@@ -116,8 +117,8 @@ class Sums:
         )  # fmt: skip
 
     def _tables(self, before: Floats) -> dict[str, list[Columns]]:
-        """Return the columns to be summed, in the order of the sums: NODAL, WORKS, one for each boundary with
-        friction, one for bonds, and the columns of cohesive facets.
+        """Return the columns to be summed, in the order of the sums. These are NODAL, WORKS, one column for each
+        boundary with friction, one for bonds, and the columns of cohesive facets.
         """
         nodes, parts = self._model.nodes, len(self._model.parts)
         tables: dict[str, list[Columns]] = {
@@ -135,7 +136,7 @@ class Sums:
         return tables
 
     def _of_nodes(self, before: Floats) -> Floats:
-        """Return (NODAL, nodes) the accounts of the nodes, in a buffer that the next call reuses."""
+        """Return (NODAL, nodes) the energies and momenta of the nodes. The next call overwrites the returned array."""
         nodes = self._model.nodes
         if NODAL * nodes.n > len(self._columns):
             self._columns = np.empty(int(1.25 * NODAL * nodes.n))
@@ -187,14 +188,16 @@ class Sums:
         return float(exact_sums(self._comm, values[counted][:, None])[0])
 
     def _counted(self) -> Flags:
-        """Return (nodes,) which nodes this rank counts: nodes that it owns, except nodes of rigid parts."""
+        """Return (nodes,) whether this rank counts each node. It counts the nodes that it owns, except nodes of rigid
+        parts.
+        """
         nodes, rigid = self._model.nodes, self._undeformed[0]
         return nodes.owned if rigid is None else nodes.owned & (rigid.of_part[nodes.part] < 0)
 
 
 def _by_part(columns: Floats, nodes: Nodes) -> tuple[Floats, Indices]:
-    """Return (n, NODAL) rows of ``columns`` (NODAL, nodes), and their parts (n,). A node of several parts has a row
-    for each of its parts; its values are divided by mass.
+    """Return (n, NODAL) rows of ``columns`` (NODAL, nodes), and their parts (n,). A node of several parts has one row
+    for each of its parts; its values are divided among the parts in proportion to mass.
     """
     shares = nodes.shares
     if not len(shares.node):

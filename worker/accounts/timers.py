@@ -1,9 +1,9 @@
-"""Seconds per phase of the step: CPU time of this thread, and wall time inside and outside of regions.
+"""Seconds in each phase of the step: CPU time of this thread, and wall time inside and outside of parallel regions.
 
-MPI polls while it waits: the time of a phase in calls that wait for other ranks counts as ``exchange``. The time of
-the other phases is work. The loading of kernels at their first call counts in no phase. A region is a call of
-``Team.run``; all threads of the rank share its tasks. Wall time in regions is ``parallel``. Wall time outside of
-regions, except the waiting, is ``serial``: one thread of the rank works and the other threads are idle.
+MPI uses CPU time while it waits. The time in calls that wait for other ranks counts as ``exchange``; the time of the
+other phases is work. The loading of kernels at their first call counts in no phase. A parallel region is a call of
+``Team.run``; all threads of the rank share its tasks. The wall time in parallel regions is ``parallel``. The wall time
+outside of them, without the waiting, is ``serial``: one thread of the rank works and the other threads are idle.
 """
 
 from collections.abc import Sequence
@@ -14,16 +14,18 @@ from ..parallel.comm import Comm
 from ..parallel.team import Team
 
 PHASES = ("elements", "exchange", "nodes", "contact", "fracture", "output", "balance", "rest")
-"""Phases of the step. ``rest`` is the time between the other phases."""
+"""Phases of the step. The phase ``rest`` is the time between the other phases."""
 
 
 def worked(comm: Comm) -> float:
-    """Return the CPU time of this thread so far without waiting and without the loading of kernels, s."""
+    """Return the CPU time of this thread so far, s, without the waiting and without the loading of kernels."""
     return cpu_time() - comm.waited
 
 
 def by_phase(seconds: Sequence[dict[str, float]]) -> dict[str, list[float]]:
-    """Return for each phase a list with one number per rank; {} for no ranks. ``seconds``: of each rank, by phase."""
+    """Return, for each phase, a list with one number for each rank; {} if there are no ranks. ``seconds``: seconds of
+    each rank, keyed by phase.
+    """
     return {name: [each[name] for each in seconds] for name in PHASES} if seconds else {}
 
 
@@ -37,21 +39,21 @@ def _less(now: dict[str, float], before: dict[str, float]) -> dict[str, float]:
 
 @dataclass
 class Spent:
-    """Seconds by phase, and the waiting time of all phases together."""
+    """Seconds in each phase, and the waiting time of all phases together."""
 
     cpu: dict[str, float] = field(default_factory=_none)
-    """CPU time of this thread by phase."""
+    """CPU time of this thread, keyed by phase."""
     serial: dict[str, float] = field(default_factory=_none)
-    """Wall time outside of regions by phase, without the waiting. The wall time includes the time of other programs on
-    the same core."""
+    """Wall time outside of parallel regions without the waiting, keyed by phase. The wall time includes the time of
+    other programs on the same core."""
     parallel: dict[str, float] = field(default_factory=_none)
-    """Wall time in regions by phase."""
+    """Wall time in parallel regions, keyed by phase."""
     waiting: float = 0.0
     """CPU time in calls that wait for other ranks. This time is also part of ``exchange`` of ``cpu``."""
     helped: float = 0.0
     """Time of the other threads of the rank in tasks, summed over these threads."""
     projected: dict[int, dict[str, float]] = field(default_factory=dict)
-    """Estimate of ``cpu`` without the waiting, by number of threads (parallel/projecting.py)."""
+    """Estimate of ``cpu`` without the waiting, keyed by the number of threads (parallel/projecting.py)."""
 
     def since(self, before: "Spent") -> "Spent":
         """Return the difference between this state and an earlier state."""
@@ -62,7 +64,7 @@ class Spent:
         )  # fmt: skip
 
     def of_all_phases(self) -> dict[str, float]:
-        """Return the sums over all phases for messages.Load."""
+        """Return the sums over all phases, for messages.Load."""
         return {
             "serial": sum(self.serial.values()), "parallel": sum(self.parallel.values()), "waiting": self.waiting,
             "helped": self.helped,
@@ -75,7 +77,7 @@ class Spent:
 
 
 class Timers:
-    """Accumulated time per phase."""
+    """Accumulated time in each phase."""
 
     def __init__(self, comm: Comm, team: Team) -> None:
         self._comm, self._team = comm, team
@@ -85,7 +87,7 @@ class Timers:
 
     @property
     def seconds(self) -> dict[str, float]:
-        """CPU time by phase so far, s."""
+        """CPU time so far, s, keyed by phase."""
         return self.spent.cpu
 
     def begin(self) -> None:
@@ -102,7 +104,7 @@ class Timers:
         self._reported, self._helped = self.spent.copy(), self._team.helped
 
     def phase(self, name: str) -> "_Phase":
-        """Return a context whose time is added to a phase. The time of a phase inside of it is subtracted."""
+        """Return a context that adds its time to a phase. The time of a phase inside of the context is subtracted."""
         return self._blocks[name]
 
     def switch(self, name: str) -> str:
@@ -127,8 +129,9 @@ class Timers:
         return ended
 
     def divide(self, inside: dict[str, float], outside: dict[str, float]) -> None:
-        """End the present phase, in which a program of the phases ran, and divide its time; ``inside``, ``outside``:
-        wall time of the program by phase in and outside of regions, s. The rest of the time is of the present phase.
+        """End the present phase, in which a program of several phases ran, and divide its time among these phases.
+        ``inside``, ``outside``: wall time of the program in and outside of parallel regions, s, keyed by phase. The
+        rest of the time belongs to the present phase.
         """
         cpu, wall, spent = cpu_time(), wall_time(), self.spent
         of_program = sum(inside.values()) + sum(outside.values())
@@ -142,7 +145,9 @@ class Timers:
         self._cpu, self._wall, self._within = cpu, wall, self._team.within
 
     def _project(self, phase: str, serial: float) -> None:
-        """Add to a phase the CPU time outside of regions, and the estimated time of each crew in regions."""
+        """Add to a phase the CPU time outside of parallel regions, and the time in parallel regions that is estimated
+        for each number of threads.
+        """
         assert self._team.projecting is not None
         spans = self._team.projecting.spans
         for seconds, now, before in zip(self.spent.projected.values(), spans, self._spans, strict=True):
@@ -150,7 +155,7 @@ class Timers:
         self._spans = spans
 
     def since_last(self) -> Spent:
-        """Return the time since the last call of this method; called between phases."""
+        """Return the time since the last call of this method. The method must be called between phases."""
         self.switch(self._phase)
         self.spent.helped = self._team.helped - self._helped
         added = self.spent.since(self._reported)
@@ -159,7 +164,7 @@ class Timers:
 
 
 class _Phase:
-    """Context of a phase. This context manager is a class, because a step opens two dozen contexts, and a generator
+    """Context of a phase. It is a class, because a step opens two dozen contexts, and a context made from a generator
     takes longer.
     """
 

@@ -1,1 +1,3 @@
-"""Probes and references: means over tets, and gauges of forces, sums over nodes, fragments and shapes."""
+"""Probes and references. Probes are means over tets, and measurements (gauges) of forces, sums over nodes, fragments
+and shapes.
+"""

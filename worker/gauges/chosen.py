@@ -1,4 +1,4 @@
-"""The tets of probes: those whose centre starts in the region of the probe."""
+"""The tets that a probe measures: those whose centre is in the region of the probe at the start."""
 
 from collections.abc import Sequence
 
@@ -13,19 +13,19 @@ from ..scene.marks import held
 
 
 class ChosenTets:
-    """The tets of some probes of a case on this rank."""
+    """The tets on this rank that some probes of a case measure."""
 
     def __init__(self, case: Case, model: Model, numbers: Sequence[int]) -> None:
-        """``numbers``: places of the probes in the case."""
+        """``numbers``: indices of the probes in the case."""
         self._model = model
         centres = [_centres(block, model) for block in model.blocks] if numbers else []
         self.ids = {
             k: [_inside(case, case.probes[k], block, model, x) for block, x in zip(model.blocks, centres, strict=True)]
             for k in numbers
         }
-        """Global ids of the tets of each probe, for each block."""
+        """Global ids of the tets of each probe, one array for each block."""
         self._counted: list[int] | None = None
-        """Number of tets of each block when ``_found`` was made."""
+        """Number of tets of each block at the last selection of tets."""
         self._found: dict[int, list[tuple[Block, Ints]]] = {}
 
     def count(self, number: int) -> int:
@@ -33,8 +33,8 @@ class ChosenTets:
         return sum(len(ids) for ids in self.ids[number])
 
     def changed(self) -> bool:
-        """Return whether tets were removed since the last call; True at the first call. The selection ``found`` is
-        computed again.
+        """Return whether tets were removed since the last call; True at the first call. If tets were removed, the tets
+        of the probes are selected again.
         """
         if self._counted == (counted := [block.n for block in self._model.blocks]):
             return False
@@ -43,7 +43,7 @@ class ChosenTets:
         return True
 
     def found(self, number: int) -> list[tuple[Block, Ints]]:
-        """Return each block with tets of a probe, and the places of these tets in the block."""
+        """Return the blocks that have tets of a probe, and the places of these tets in each block."""
         return self._found[number]
 
     def _places(self, number: int) -> list[tuple[Block, Ints]]:

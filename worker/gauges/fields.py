@@ -21,8 +21,8 @@ def tet_volumes(tets: Tets, x: Floats) -> Floats:
 
 
 def field(block: Block, name: str, model: Model, places: Ints) -> Floats:
-    """Return (n,) a field of ``cases.schema.ProbeField`` for the tets at ``places`` (n,) of a block; stress includes
-    the viscous part.
+    """Return (n,) the values of a field of ``cases.schema.ProbeField`` for the tets at ``places`` (n,) of a block. The
+    stress includes the viscous part.
     """
 
     def row(row: int) -> Floats:

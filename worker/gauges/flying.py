@@ -13,13 +13,13 @@ from .sums import ahead, way
 
 
 def held(scene: Scene) -> Ints:
-    """Return (m, 2) pairs of tets that a broken facet still connects by its cohesion."""
+    """Return (m, 2) pairs of tets that the cohesion of a broken facet still connects."""
     cohesion = scene.fracture.cohesion if scene.fracture is not None else None
     return cohesion.facets.tets if cohesion is not None else np.zeros((0, 2), np.int64)
 
 
 class Flying:
-    """The probes of fragments beyond a plane; they have no state."""
+    """The probes of fragments beyond a plane. The probes have no state."""
 
     def __init__(self, case: Case, scene: Scene) -> None:
         self._scene = scene

@@ -1,4 +1,4 @@
-"""Interface of gauges, groups of probes that are measured in one way, and the data that they read."""
+"""Interface of gauges, and the data that they read. A gauge is a group of probes that are measured in the same way."""
 
 from typing import Any, NamedTuple, Protocol
 
@@ -14,7 +14,7 @@ from ..rigid.stage import Rigid
 
 
 class Scene(NamedTuple):
-    """The parts of a simulation on this rank that gauges read."""
+    """The objects of a simulation on this rank that gauges read."""
 
     model: Model
     contact: Contact | None
@@ -28,13 +28,15 @@ class Scene(NamedTuple):
 
 
 class Gauge(Protocol):
-    """A group of probes. Every method is collective and returns the same values on all ranks."""
+    """A group of probes that are measured in the same way. Every method is collective and returns equal values on all
+    ranks.
+    """
 
     def measure(self, v: Floats) -> dict[int, float]:
-        """Return the present values by the number of the probe; ``v`` (nodes, 3): velocities now, m/s."""
+        """Return the present values, keyed by the number of the probe. ``v`` (nodes, 3): present velocities, m/s."""
 
     def keep(self) -> Any:
-        """Return the state of the gauges for a checkpoint: numbers and arrays in lists, equal on all ranks."""
+        """Return the state of the gauges for a checkpoint: lists of numbers and arrays, equal on all ranks."""
 
     def resume(self, known: Any) -> None:
-        """Restore the state of the gauges from the data of ``keep``."""
+        """Restore the state of the gauges from the lists that ``keep`` returned."""

@@ -17,16 +17,16 @@ from .gauge import Scene
 
 
 class Means:
-    """The probes of means on this rank; they have no state."""
+    """The probes on this rank that are means. The probes have no state."""
 
     def __init__(self, case: Case, scene: Scene, numbers: Sequence[int]) -> None:
-        """``numbers``: places of the probes in the case."""
+        """``numbers``: indices of the probes in the case."""
         self._fields = {k: case.probes[k].field for k in numbers}
         self._model, self._comm = scene.model, scene.comm
         self.tets = ChosenTets(case, scene.model, numbers)
         self._found: list[tuple[str, Block, Ints, slice, slice]] = []
-        """Entries for each mean and each block with tets of this mean. An entry has the field, the block, the
-        indices of the tets, and two slices of the summed values: field times mass, and mass."""
+        """Table with an entry for each mean and each block that has tets of this mean. An entry has the field, the
+        block, the indices of the tets, and two slices of the summed values: field times mass, and mass."""
         self._starts = np.zeros(1, np.int64)
         """Index of the first value of each sum."""
 
@@ -44,7 +44,7 @@ class Means:
         pass
 
     def _columns(self) -> Ragged:
-        """Return for each mean two sums over its tets: field times mass, and mass."""
+        """Return two sums over the tets of each mean: field times mass, and mass."""
         if self.tets.changed():
             self._place()
         values = np.empty(self._starts[-1])
@@ -54,7 +54,7 @@ class Means:
         return Ragged(values, self._starts)
 
     def _place(self) -> None:
-        """Place the summed values of each mean one after the other."""
+        """Compute the positions of the summed values, so that the values of each mean are successive."""
         self._found, starts, end = [], [0], 0
         for k, name in self._fields.items():
             begin, there = end, []

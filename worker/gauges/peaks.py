@@ -15,17 +15,17 @@ from .gauge import Scene
 
 
 class Peaks:
-    """The probes of largest and smallest values on this rank; they have no state."""
+    """The probes on this rank that are largest or smallest values. The probes have no state."""
 
     def __init__(self, case: Case, scene: Scene, numbers: Sequence[int]) -> None:
-        """``numbers``: places of the probes in the case."""
+        """``numbers``: indices of the probes in the case."""
         self._fields = {k: case.probes[k].field for k in numbers}
         self._model, self._comm = scene.model, scene.comm
         self.tets = ChosenTets(case, scene.model, numbers)
 
     def measure(self, v: Floats) -> dict[int, float]:
-        """Return the values; NaN if all tets of a probe were removed. Smallest values are maxima of the negative
-        field, so that one message has all of them.
+        """Return the values; NaN if all tets of a probe were removed. A smallest value is computed as the maximum of
+        the negative field, so that one message has all values.
         """
         self.tets.changed()
         most = self._comm.maximum(np.array([self._own(k, name) for k, name in self._fields.items()])).tolist()
@@ -41,7 +41,9 @@ class Peaks:
         pass
 
     def _own(self, number: int, name: str) -> float:
-        """Return the value of this rank times its sign; minus infinity without tets."""
+        """Return the value of this rank times the sign of the probe; minus infinity if the rank has no tet of the
+        probe.
+        """
         values = [_sign(name) * field(block, name[:-4], self._model, at) for block, at in self.tets.found(number)]
         return max((float(each.max()) for each in values), default=-math.inf)
 

@@ -1,9 +1,9 @@
-"""Depth of the hole that a part has made in the other parts, measured on lines parallel to the axis.
+"""Depth of the hole that a part has made in the other parts, measured on straight lines parallel to the axis.
 
-A line is cut into spans inside of tets and voids between the tets. The hole is the void in front of the bodies and
-all voids joined to this void. Voids of neighbouring lines are joined where they overlap. A cavity that opens ahead
-of the hole is not joined to the hole, and a flake in the hole does not end the hole. The free space beyond the
-bodies is not a void.
+A line is cut into spans inside of tets and voids between the tets. The hole is the void in front of the bodies and all
+voids joined to this void. Voids of neighbouring lines are joined where they overlap. A cavity that opens ahead of the
+hole is not joined to the hole, and a flake in the hole does not end the hole. The free space beyond the bodies is not a
+void.
 """
 
 from itertools import pairwise
@@ -14,19 +14,22 @@ from ..model.state import Floats, Ints, Model, Tets
 from ..parallel.comm import Comm
 
 LINES = np.arange(1, 11) / 10.0
-"""Distances of the lines from the axis, divided by the radius of the part. Voids of neighbouring lines are joined."""
+"""Distances of the measuring lines from the axis, divided by the radius of the part. Voids of neighbouring lines are
+joined."""
 MEASURED = (0, 2, 4)
-"""Indices in ``LINES`` of the lines whose depths are averaged: the lines at 0.1, 0.3 and 0.5 of the radius."""
+"""Indices in ``LINES`` of the lines whose depths are averaged. These are the lines at 0.1, 0.3 and 0.5 of the
+radius."""
 _TOUCHING = 1e-6
-"""Largest gap, divided by the radius, that counts as closed. ``spans`` moves lines to the side by this distance."""
+"""Largest gap that counts as closed, divided by the radius. The function ``spans`` moves lines to the side by this
+distance."""
 
 
 def spans(x: Floats, tets: Tets, axis: int, at: tuple[float, float]) -> tuple[Ints, Floats]:
-    """Return the tets that a line along ``axis`` passes, (k,), and (k, 2) the interval of the line inside of each tet,
-    m.
+    """Return the tets (k,) through which a line along ``axis`` passes, and (k, 2) the interval of the line inside of
+    each tet, m.
 
-    ``at``: position of the line in the two directions normal to ``axis``. The line is moved aside by some 1e-6 of
-    its distance from the axis: a line that lies in a face would be in two tets.
+    ``at``: position of the line in the two directions normal to ``axis``. The line is moved aside by some 1e-6 of its
+    distance from the axis, because a line that lies in a face would be in two tets.
     """
     i, j = (axis + 1) % 3, (axis + 2) % 3
     aside = 1e-6 * max(map(abs, at))
@@ -51,8 +54,8 @@ def spans(x: Floats, tets: Tets, axis: int, at: tuple[float, float]) -> tuple[In
 
 
 def passed(x: Floats, tets: Tets, part: Ints, axis: int, radius: float) -> Floats:
-    """Return (k, 4) line, part and interval, m, for every tet on a line; ``part`` (n,): the part of each tet. The
-    lines are placed between the two directions normal to the axis, where every sector of a body has tets.
+    """Return (k, 4) line, part and interval, m, for every tet on a line; ``part`` (n,): part of each tet. The lines are
+    placed between the two directions normal to the axis, because every sector of a body has tets there.
     """
     rows = [np.zeros((0, 4))]
     for line, share in enumerate(LINES):
@@ -66,7 +69,8 @@ def passed_by(model: Model, name: str, along: str, comm: Comm) -> tuple[Floats, 
     """Return the intervals of the lines in the parts other than ``name`` (see ``passed``), and the radius of ``name``,
     m.
 
-    Collective. If the part lies above the other parts on the axis, the axis is reversed: the part always starts below.
+    Collective. If the part lies above the other parts on the axis, the axis is reversed, so that the part always starts
+    below the other parts.
     """
     nodes, axis = model.nodes, "xyz".index(along)
     mine = nodes.in_part(model.parts.index(name))
@@ -103,8 +107,8 @@ def depth(rows: Floats, thick: Floats, radius: float) -> float:
     m.
 
     The hole starts at the low end of the axis. The remaining thickness of each part is the distance from the end of the
-    hole to the rear of the part. The distance includes cavities. The rear is the furthest point of the part on any
-    line, since a cavity may have opened the rear on some lines.
+    hole to the rear of the part; it includes cavities. The rear is the furthest point of the part on any line, because
+    a cavity may have opened the rear on some lines.
     """
     rears = np.full(thick.shape[1], -np.inf)
     np.maximum.at(rears, rows[:, 1].astype(int), rows[:, 3])
@@ -127,7 +131,9 @@ def bottoms(rows: Floats, tolerance: float) -> Floats:
 
 
 def _voids(spans: Floats, tolerance: float) -> Floats:
-    """Return (v, 2) the intervals of a line outside of all bodies. The interval beyond the last body is omitted."""
+    """Return (v, 2) the intervals of a line that are outside of all bodies. The interval beyond the last body is
+    omitted.
+    """
     spans = spans[np.argsort(spans[:, 0])]
     reach = np.concatenate([[-np.inf], np.maximum.accumulate(spans[:, 1])])
     starts = np.append(spans[:, 0], np.inf)

@@ -1,4 +1,4 @@
-"""Probes, the columns of history.csv: groups of probes that are measured in one way."""
+"""Probes, which are the columns of history.csv. The probes are grouped by the way in which they are measured."""
 
 import logging
 from collections.abc import Callable
@@ -25,7 +25,7 @@ log = logging.getLogger("conoid.worker")
 _OTHER: tuple[tuple[tuple[str, ...], Callable[[Case, Scene], Gauge]], ...] = (
     (PUSHES, Pushes), (COURSES, Courses), (SUMS, NodeSums), (FRAGMENTS, Flying), (SHAPES, Shapes),
 )  # fmt: skip
-"""Fields that are not measured over tets, and the class that measures them."""
+"""Fields that are not measured over tets, each with the class that measures it."""
 
 
 class Probes:
@@ -40,15 +40,15 @@ class Probes:
         means = [k for k, name in enumerate(kinds) if name not in PEAKS and name not in other]
         over_tets = [make(case, scene, numbers) for make, numbers in ((Means, means), (Peaks, peaks)) if numbers]
         self._tets = {number: gauge.tets for gauge in over_tets for number in gauge.tets.ids}
-        """The tets of each probe that is measured over tets."""
+        """The tets of all probes that are measured over tets."""
         self._gauges: list[Gauge] = [*over_tets, *(make(case, scene) for names, make in _OTHER if {*kinds} & {*names})]
         self._sums = NodeSums(case, scene)
         self.sums = any(isinstance(gauge, NodeSums) for gauge in self._gauges)
-        """Whether some probe is a sum over nodes. Probes of these fields need the velocities at time n."""
+        """Whether some probe is a sum over nodes. Such a probe needs the velocities at time n."""
 
     def require_tets(self, case: Case) -> None:
-        """Raise InputError, on every rank, for a probe over tets without a tet, or for a sum over a box or a set
-        without a node.
+        """Raise InputError on every rank if a probe over tets has no tet, or if a sum over a box or a set has no
+        node.
         """
         some = [k for k, probe in enumerate(case.probes) if kind(probe.field) in SUMS]
         boxes = [k for k in some if case.probes[k].low is not None or case.probes[k].on is not None]
@@ -69,19 +69,19 @@ class Probes:
                 )
 
     def keep(self) -> list[Any]:
-        """Return the state of the gauges for a checkpoint, equal on all ranks."""
+        """Return the state of the gauges for a checkpoint. All ranks return equal values."""
         return [gauge.keep() for gauge in self._gauges]
 
     def resume(self, known: list[Any]) -> None:
-        """Restore the state of the gauges from the data of ``keep``."""
+        """Restore the state of the gauges from the value that ``keep`` returned."""
         for gauge, own in zip(self._gauges, known, strict=True):
             gauge.resume(own)
 
     def measure(self, v: Floats | None = None) -> Floats:
         """Return (probes,) the present values, equal for any number of ranks.
 
-        Collective. ``v`` (nodes, 3): velocities at time n for sums; needed if the velocities of the model are half a
-        step ahead.
+        Collective. ``v`` (nodes, 3): velocities at time n, for probes that are sums. They are needed if the velocities
+        of the model are half a step ahead.
         """
         found: dict[int, float] = {}
         for gauge in self._gauges:

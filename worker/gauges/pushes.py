@@ -1,5 +1,5 @@
-"""Forces and impulses of contact and walls on parts: impulses since the start, and mean forces since the last
-sample.
+"""Forces and impulses of contact and walls on parts. Impulses are measured since the start; forces are means since the
+last sample.
 """
 
 from typing import Any
@@ -25,7 +25,7 @@ class Pushes:
         self._probes = {k: probe for k, probe in enumerate(case.probes) if kind(probe.field) in PUSHES}
         self._names = [wall.name for _, wall in case.boundaries_of(Wall)]
         self._given, self._since = np.zeros(len(self._probes)), 0.0
-        """(probes,) impulses at the last sample, N s, and the time of this sample, s."""
+        """(probes,) impulses at the last sample, N s; and the time of the last sample, s."""
 
     def measure(self, v: Floats) -> dict[int, float]:
         now, t = self._impulses(), self._scene.clock.t
@@ -43,7 +43,7 @@ class Pushes:
         self._given, self._since = known
 
     def _impulses(self) -> Floats:
-        """Return (probes,) the impulse on the part of each probe since the start, along the axis of the probe, N s."""
+        """Return (probes,) the impulse since the start on the part of each probe, along the axis of the probe, N s."""
         parts, contact = self._scene.model.parts, self._scene.contact
         of = {probe.by is None for probe in self._probes.values() if probe.field.startswith("contact_")}
         every = contact.impulses() if contact is not None and True in of else None
@@ -61,7 +61,7 @@ class Pushes:
         return found
 
     def _of_walls(self) -> Floats:
-        """Return (probes,) the impulses of walls, N s; zero for probes without walls."""
+        """Return (probes,) the impulses of walls, N s; zero for probes that have no walls."""
         if not any(probe.field.startswith("wall_") for probe in self._probes.values()):
             return np.zeros(len(self._probes))
         tables = [np.zeros((0, len(self._probes))), *(self._given_by(walls) for walls in self._scene.walls)]
@@ -73,7 +73,9 @@ class Pushes:
         return found
 
     def _given_by(self, walls: Boundary) -> Floats:
-        """Return (n, probes) the impulses of walls on each of their nodes that this rank owns, N s."""
+        """Return (n, probes) the impulses, N s, of walls on each of their nodes. Only nodes that this rank owns are
+        counted.
+        """
         nodes, columns = self._scene.model.nodes, np.zeros((len(walls.nodes), len(self._probes)))
         for place, probe in enumerate(self._probes.values()):
             if probe.field.startswith("wall_"):
@@ -85,5 +87,5 @@ class Pushes:
         return columns
 
     def _of(self, probe: Probe) -> list[int]:
-        """Return the walls that act on a probe."""
+        """Return the walls whose impulses a probe measures."""
         return [k for k, name in enumerate(self._names) if probe.wall in (None, name)]

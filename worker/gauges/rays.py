@@ -1,4 +1,6 @@
-"""Rays normal to an axis from a point to the nearest matter. The rays measure the shape of a hole round the axis."""
+"""Rays normal to an axis, from a point to the nearest material. The rays measure the shape of a hole around the
+axis.
+"""
 
 import numpy as np
 
@@ -11,8 +13,8 @@ RAYS = 360
 
 
 def directions(axis: int) -> Floats:
-    """Return (RAYS, 3) unit vectors normal to an axis. No vector lies in a coordinate plane, which may be a plane of
-    symmetry.
+    """Return (RAYS, 3) unit vectors normal to an axis. No vector lies in a coordinate plane, because such a plane may
+    be a symmetry plane.
     """
     angles: Floats = (np.arange(RAYS, dtype=float) + 0.5) * (2.0 * np.pi / RAYS)
     sines, cosines = sines_and_cosines(angles)
@@ -22,8 +24,8 @@ def directions(axis: int) -> Floats:
 
 
 def reach(x: Floats, tets: Tets, origin: Floats, axis: int) -> Floats:
-    """Return (RAYS,) the distance of matter from ``origin`` (3,) along each ray normal to an axis, m; infinite without
-    matter.
+    """Return (RAYS,) the distance, m, from ``origin`` (3,) to the nearest material along each ray normal to an axis;
+    infinite if the ray meets no material.
 
     A point of a ray is inside of a tet if it is on the inner side of the planes of all faces of the tet (Cyrus and
     Beck).

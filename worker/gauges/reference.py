@@ -1,4 +1,4 @@
-"""``[[reference]]``: comparison of a finished run with published or derived numbers."""
+"""Comparison of a finished run with published or derived numbers, which are the tables ``[[reference]]`` of a case."""
 
 import csv
 from pathlib import Path
@@ -23,8 +23,8 @@ _STRESSES = ("stress_xx", "stress_yy", "stress_zz", "stress_yz", "stress_zx", "s
 
 
 def thicknesses(sim: Simulation) -> list[list[list[float]]]:
-    """Return the initial thicknesses, m, by line and part, for every reference of a penetration; [] for the other
-    references.
+    """Return the initial thicknesses, m, for each line and part, for every reference that is a penetration; [] for
+    other references.
 
     Collective, equal on all ranks.
     """
@@ -36,7 +36,7 @@ def thicknesses(sim: Simulation) -> list[list[list[float]]]:
 
 
 def measure(sim: Simulation, folder: Path, thick: list[list[list[float]]]) -> list[Check]:
-    """Return the result of every reference of the case; ``thick``: the result of ``thicknesses`` at the start.
+    """Return the result of every reference of the case. ``thick``: the result of ``thicknesses`` at the start.
 
     Collective, equal on all ranks.
     """

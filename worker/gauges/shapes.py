@@ -1,4 +1,4 @@
-"""Probes of shapes: depth of penetration, holes and cones, measured with rays, lines and faces."""
+"""Probes of shapes: depth of penetration, size of holes and cones. They are measured with rays, lines and faces."""
 
 import math
 from typing import Any
@@ -19,13 +19,13 @@ from .gauge import Scene
 
 _AXES = "xyz"
 _DAMAGED = 0.5
-"""Damage of a tet above which the tet counts as broken. Chosen value: damage rises from 0 to 1 within few steps."""
+"""Damage of a tet above which the tet counts as broken. Chosen value: damage increases from 0 to 1 within few steps."""
 
 
 class Shapes:
     """The probes of shapes on this rank.
 
-    At the start each probe measures its initial state: thicknesses, rays that hit material, areas of faces.
+    At the start each probe measures the initial state: thicknesses, distances along rays, areas of faces.
     """
 
     def __init__(self, case: Case, scene: Scene) -> None:
@@ -92,7 +92,7 @@ class Shapes:
         return -self._scene.comm.maximum(-nearest)
 
     def _ends(self, probe: Probe, axis: int) -> tuple[float, float]:
-        """Return the first and the last coordinate of the part along the axis at the start, m."""
+        """Return the lowest and the highest coordinate of the part along the axis at the start, m."""
         nodes = self._scene.model.nodes
         x = nodes.x0[nodes.in_part(self._scene.model.parts.index(probe.part)), axis]
         low, high = self._scene.comm.maximum(np.array([-x.min(initial=np.inf), x.max(initial=-np.inf)]))
@@ -101,7 +101,7 @@ class Shapes:
     def _areas(self, probe: Probe, axis: int, ends: tuple[float, float], sound: Any) -> list[float]:
         """Return the initial areas, m^2, of the faces of tets at the two ends of the part.
 
-        ``sound``: (n,) for each block of the part, which tets count; None: all tets count.
+        ``sound``: for each block of the part, (n,) whether each tet counts; None if all tets count.
         """
         x, near, columns = self._scene.model.nodes.x0, self._scene.model.slack, []
         for b, block in enumerate(self._blocks(probe)):
@@ -114,7 +114,9 @@ class Shapes:
         return [float(v) for v in exact_sums(self._scene.comm, np.concatenate([np.zeros((0, 2)), *columns]))]
 
     def _sound(self, probe: Probe) -> Any:
-        """Return (n,) for each block of the part which tets are undamaged tets of the heaviest fragment of the part."""
+        """Return, for each block of the part, (n,) whether each tet is undamaged and belongs to the heaviest fragment
+        of the part.
+        """
         scene, model = self._scene, self._scene.model
         cohesion = scene.fracture.cohesion if scene.fracture is not None else None
         damaged = damage(self._case, model, cohesion, scene.comm)

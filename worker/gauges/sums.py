@@ -21,17 +21,17 @@ _AXES = "xyz"
 
 
 def ahead(beyond: Beyond, x: Floats) -> Floats:
-    """Return (n,) the distances of points (n, 3) beyond a plane, m."""
+    """Return (n,) the distances, m, by which points (n, 3) lie beyond a plane."""
     return np.asarray((x[:, _AXES.index(beyond.axis)] - beyond.at) * way(beyond))
 
 
 def way(beyond: Beyond) -> float:
-    """Return the sign of the direction that points away from the plane."""
+    """Return the sign of the direction along the axis that points away from the plane."""
     return 1.0 if beyond.side == "above" else -1.0
 
 
 class NodeSums:
-    """The probes of sums on this rank; they have no state."""
+    """The probes on this rank that are sums over nodes. The probes have no state."""
 
     def __init__(self, case: Case, scene: Scene) -> None:
         self._scene, self._bits = scene, bits(case)
@@ -50,7 +50,9 @@ class NodeSums:
         pass
 
     def started(self, probe: Probe) -> Flags:
-        """Return (nodes,) which nodes owned by this rank were in the box of a probe at the start and are in its set."""
+        """Return (nodes,) whether each node is owned by this rank, was in the box of a probe at the start, and is in
+        the set of the probe.
+        """
         model, nodes = self._scene.model, self._scene.model.nodes
         part = model.parts.index(probe.part)
         inside = Region.of(probe).holds(nodes.x0.T, model.slack[part])
@@ -59,7 +61,7 @@ class NodeSums:
         return np.asarray(nodes.owned & nodes.in_part(part) & inside)
 
     def chosen(self, probe: Probe) -> Flags:
-        """Return (nodes,) which nodes of a probe this rank owns."""
+        """Return (nodes,) whether each node belongs to the probe and is owned by this rank."""
         nodes, erosion, found = self._scene.model.nodes, self._scene.erosion, self.started(probe)
         if erosion is not None:
             found &= ~erosion.removed
@@ -68,8 +70,8 @@ class NodeSums:
         return np.asarray(found)
 
     def _of_bodies(self, v: Floats) -> dict[int, float]:
-        """Return the values of probes of whole rigid parts. The inertia and centre of a rigid part may differ from
-        the sums over its nodes.
+        """Return the values of probes of whole rigid parts. These probes are not sums over nodes, because inertia and
+        centre of a rigid part may differ from the sums over its nodes.
         """
         found: dict[int, float] = {}
         rigid, clock = self._scene.rigid, self._scene.clock
@@ -84,7 +86,7 @@ class NodeSums:
         return found
 
     def _columns(self, probe: Probe, v: Floats) -> tuple[Floats, Floats]:
-        """Return (nodes,) the terms of the sum, and (nodes,) the terms of the divisor of the sum."""
+        """Return two columns (nodes,): the terms of the sum, and the terms of its divisor."""
         nodes, field = self._scene.model.nodes, kind(probe.field)
         mass = np.where(self.chosen(probe), nodes.mass_of(self._scene.model.parts.index(probe.part)), 0.0)
         if field in ("mass", "residual_mass"):

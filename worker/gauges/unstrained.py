@@ -16,7 +16,7 @@ from .fields import tet_volumes
 
 
 def found(sim: Simulation, folder: Path, eroded: int) -> Iterator[str]:
-    """Yield a line for each part that could have been rigid. Collective. ``eroded``: number of removed tets."""
+    """Yield a message for each part that could have been rigid. Collective. ``eroded``: number of removed tets."""
     case, parts = sim.case, len(sim.case.parts)
     if case.contact is None or parts < 2 or all(part.rigid is not None for part in case.parts):
         return

@@ -1,8 +1,8 @@
 """Compilation of all kernels ahead of a run, on several cores: ``python -m conoid.worker.kernels.compile``.
 
-Modules with unchanged sources are linked from an earlier cache folder. For each core a child process compiles
-kernels of the other modules into the cache folder, module after module. A module is compiled after the modules that
-it imports, so that no kernel is compiled twice. numba has separate files for each kernel, so two children never
+If the sources of a module are unchanged, its kernels are linked from an earlier cache folder. The kernels of all other
+modules are compiled by one child process for each core, module after module. A module is compiled after the modules
+that it imports, so that no kernel is compiled twice. numba has separate files for each kernel, so two children never
 write the same file.
 """
 
@@ -25,27 +25,26 @@ from ..run.signals import REQUESTS
 from . import store
 
 Tell = Callable[[int, int], None]
-"""Callback for the progress, called every few seconds: number of compiled kernels, and number of all kernels."""
+"""Callback that receives the progress every few seconds: number of compiled kernels, and number of all kernels."""
 
 COMPLETE = "complete"
-"""File in the cache folder that marks all kernels as compiled."""
+"""File in the cache folder. If it exists, all kernels are compiled."""
 WORD_EVERY = 3.0
 """Interval between two reports of the progress, s. Chosen value."""
 _MOST = 4
-"""Largest number of child processes: the longest chain of modules holds 27 % of the machine code."""
+"""Largest number of child processes. Chosen value: the longest chain of imports has 27 % of the machine code."""
 _MOST_WORDS = 500
-"""Number of characters of a numba error report that are kept: the error is at its beginning."""
+"""Number of characters that are kept of an error report of numba. The error is at the beginning of the report."""
 _PATIENCE = 900.0
-"""Time limit for the compilation of a module, s: the largest module takes ten seconds on an idle core."""
+"""Time limit for the compilation of a module, s. The largest module takes ten seconds on an idle core."""
 _HASH = "hash"
-"""File in the folder of a module. This file marks all kernels of a module as compiled, and contains the hash of their
-sources."""
+"""File in the folder of a module with compiled kernels. The file has the hash of the sources of the kernels."""
 _LOCK, _LOOK = "lock", 0.3
-"""Lock file of the program that compiles, and interval between two tests of the lock, s: a tenth of WORD_EVERY."""
+"""Lock file of the program that compiles; and interval between two checks of the lock, s, a tenth of WORD_EVERY."""
 
 
 def compile_all(folder: Path, tell: Tell, root: Path = store.ROOT, package: str = "conoid.worker") -> bool:
-    """Compiles every kernel below ``root`` that ``folder`` lacks; returns False if none is missing. Raises
+    """Compiles every kernel below ``root`` that is missing in ``folder``. Returns False if no kernel is missing. Raises
     CompileError.
 
     A lock ensures that only one program compiles at a time. A second program waits, and continues the compilation if
@@ -68,7 +67,7 @@ def compile_all(folder: Path, tell: Tell, root: Path = store.ROOT, package: str 
 
 
 class _Saying:
-    """Reports the number of kernels in the folder, at once and then every ``WORD_EVERY`` s."""
+    """Reports the number of kernels in the folder: first at once, then every ``WORD_EVERY`` s."""
 
     def __init__(self, tell: Tell, folder: Path, total: int) -> None:
         self._tell, self._folder, self._total = tell, folder, total
@@ -82,7 +81,7 @@ class _Saying:
 
 @contextmanager
 def _alone(folder: Path, progress: _Saying) -> Iterator[None]:
-    """Holds the lock of the folder, so that no other program compiles into it; the lock ends with the process."""
+    """Holds the lock of the folder while this process lives, so that no other program compiles into the folder."""
     try:
         folder.mkdir(parents=True, exist_ok=True)
         lock = (folder / _LOCK).open("w")
@@ -104,7 +103,7 @@ class _Module:
     """A source file with kernels."""
 
     name: str
-    """Name of the module for Python's import, and name of its cache folder."""
+    """Name with which Python imports the module, and name of the module's cache folder."""
     hash: str
     """Hash of all sources on which the kernels of the module depend."""
 
@@ -114,8 +113,8 @@ class _Module:
         return cls(name, store.module_hash(path, root))
 
     def take_over(self, folder: Path) -> bool:
-        """Links the kernels of the module from another folder beside ``folder``, unless ``folder`` has them; returns
-        whether all kernels are present.
+        """Links the kernels of the module from another folder beside ``folder``, unless ``folder`` has them. Returns
+        whether all kernels of the module are now in the folder.
         """
         own = folder / self.name
         if self._whole(own):
@@ -126,7 +125,7 @@ class _Module:
         return False
 
     def done(self, folder: Path) -> None:
-        """Marks the kernels of the module in the folder as complete."""
+        """Marks the kernels of the module in the folder as completely compiled."""
         own = folder / self.name
         own.mkdir(exist_ok=True)
         (own / _HASH).write_text(self.hash)
@@ -138,7 +137,7 @@ class _Module:
             return False
 
     def _link(self, other: Path, own: Path) -> bool:
-        """Links files; returns False if links are impossible. If links are impossible, the kernels are compiled."""
+        """Links files. Returns False if the file system allows no links; the kernels are then compiled."""
         try:
             own.mkdir(exist_ok=True)
             for path in other.glob("*.nb[ci]"):
@@ -154,8 +153,8 @@ class _Module:
 
 
 def _order(files: set[Path]) -> dict[Path, set[Path]]:
-    """Returns for each file the files that must be compiled before it. Files that begin the longest chains of source
-    come first.
+    """Returns, for each file, the files that must be compiled before it. Files at the beginning of the longest chains
+    of imports come first.
     """
     needs = {path: _needed(path, files) for path in files}
     length = {path: len(path.read_text(encoding="utf-8")) for path in files}
@@ -171,7 +170,7 @@ def _needed(path: Path, files: set[Path]) -> set[Path]:
 
 
 def _in_parallel(needs: dict[Path, set[Path]], folder: Path, progress: _Saying, modules: dict[Path, _Module]) -> None:
-    """Compiles the files of ``needs``, each after the files that it needs, with as many children as there are cores."""
+    """Compiles files, each after the files that it ``needs``, with as many child processes as there are cores."""
     children: queue.SimpleQueue[_Child] = queue.SimpleQueue()
     number = min(_MOST, len(os.sched_getaffinity(0)), len(needs))
     done: set[Path] = set()
@@ -214,8 +213,8 @@ class _Child:
     errors: IO[bytes]
 
     def compile(self, module: str) -> None:
-        """Returns when all kernels of the module are in the cache. Raises CompileError, and StoppedError if the run
-        was asked to stop: launchers send the signal to all processes of a rank.
+        """Compiles a module. Returns when all kernels of the module are in the cache. Raises CompileError, or
+        StoppedError if the run was asked to stop, because a launcher sends the stop signal to all processes of a rank.
         """
         assert self.process.stdin is not None
         assert self.process.stdout is not None
@@ -228,7 +227,7 @@ class _Child:
         raise CompileError(f"kernels of {module} cannot be compiled: {self._reason()}")
 
     def _reason(self) -> str:
-        """Returns the last line that the child wrote, or its exit code."""
+        """Returns the last line that the child process wrote, or its exit code."""
         code = self.process.wait()
         self.errors.seek(0)
         lines = self.errors.read().decode(errors="replace").strip().splitlines()
@@ -237,7 +236,7 @@ class _Child:
 
 @contextmanager
 def _child(folder: Path) -> Iterator[_Child]:
-    """Starts a child that compiles into ``folder``. The child ends with the block, and when this process dies."""
+    """Starts a child process. It ends when the ``with`` block ends, or when this process dies."""
     command = [sys.executable, "-P", "-m", "conoid.worker.kernels.compile", "--child"]
     environment = os.environ | {store.VARIABLE: str(folder), "NUMBA_NUM_THREADS": "1"}
     pipe = subprocess.PIPE
@@ -255,7 +254,7 @@ def _serve() -> int:
     """Runs the child: imports the modules named on standard input, compiles their kernels, and writes the name of each
     finished module. Returns the exit code.
 
-    A child prints only its answers to standard output, and everything else to standard error.
+    A child process prints only its answers to standard output; it prints all other text to standard error.
     """
     import importlib
 

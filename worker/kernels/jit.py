@@ -1,12 +1,12 @@
 """Kernels: functions that numba compiles for their declared signature, at their first call.
 
-``numba.njit`` compiles a function with a signature at its declaration, or loads it from the cache: every rank would
-load every kernel of the worker at its start, for any scene. ``njit`` of this module, the only one that imports numba,
-does the same at the first call, from Python or from another kernel.
+``numba.njit`` compiles a function with a signature at its declaration, or loads it from the cache. With ``numba.njit``
+every rank would load every kernel of the worker at its start, for any scene. ``njit`` of this module compiles or loads
+a kernel at its first call, from Python or from another kernel. No other module imports numba.
 
 numba counts references to every array of every record that one kernel passes to another, with atomic operations. A
-kernel that makes no array needs no counts and has none: they were three quarters of the time of the narrow phase of
-a stack of plates.
+kernel that makes no array needs no reference counts and is compiled without them. In the narrow phase of a stack of
+plates, reference counts took three quarters of the time.
 """
 
 import inspect
@@ -32,29 +32,30 @@ __all__ = ["DECLARED", "Kernel", "intrinsic", "njit", "packed", "prefetch", "rec
 
 _BLAS = "scipy.linalg"
 _TO_READ, _TO_SECOND, _DATA = 0, 2, 1
-"""Arguments of LLVM's prefetch instruction: prefetch for reading, into the second-level cache, of data."""
+"""Arguments of LLVM's prefetch instruction: the access is reading, the target is the second-level cache, the content is
+data."""
 FunctionIdentity._unique_ids = iter(lambda: int.from_bytes(os.urandom(8), "big"), None)  # type: ignore[assignment]
-"""Random numbers by which numba distinguishes functions of one name. By default numba counts the functions of each
-process. Two kernels from different processes may then have functions with the same name and number, and the function
-that is loaded first serves both kernels: kernels could call each other's sorting, and crash (numba issue 10486)."""
+"""Random numbers by which numba distinguishes functions with equal names. By default numba counts the functions of each
+process. Two kernels from different processes may then have functions with equal name and number, and the function that
+is loaded first is used by the two kernels. A kernel could call the wrong function, and crash (numba issue 10486)."""
 _MAKERS = {
     "arange", "argsort", "array", "concatenate", "copy", "cumsum", "empty", "full", "ones", "sort", "unique", "zeros",
 }  # fmt: skip
-"""Names of functions and methods that make arrays; kernels that call them need reference counts. numba refuses to
-compile a kernel without reference counts that makes arrays in another way, or assigns whole rows: such a kernel is
-declared with ``_nrt=True``."""
+"""Names of functions and methods that make arrays. A kernel that calls one of them needs reference counts. numba
+refuses to compile a kernel without reference counts if the kernel makes arrays in another way, or assigns whole rows.
+Such a kernel is declared with ``_nrt=True``."""
 DECLARED: list["Kernel"] = []
 """All kernels of the imported modules."""
 
 
 def _folder() -> str:
-    """Returns the folder of all kernels; "" if no folder is set."""
+    """Returns the cache folder of all kernels; "" if no folder is set."""
     return str(config.CACHE_DIR)  # type: ignore[attr-defined]
 
 
 class _ModuleFolder(_CacheLocator):
-    """Locator of cache files for numba: the folder of the kernels of a module, below the folder named by the sources
-    (kernels/store.py).
+    """Locator of cache files, an interface of numba. It returns the cache folder of the module of a kernel. This folder
+    is inside of the folder that kernels/store.py names by the sources.
     """
 
     def __init__(self, function: Callable[..., Any], file: str) -> None:
@@ -67,19 +68,21 @@ class _ModuleFolder(_CacheLocator):
         return self._path
 
     def get_source_stamp(self) -> str:
-        """Returns a constant instead of a stamp of the sources: other sources have another folder."""
+        """Returns a constant. numba expects a time stamp of the sources, but different sources have different
+        folders.
+        """
         return ""
 
     def get_disambiguator(self) -> str:
-        """Returns the part of a file name that by default contains the line of the kernel: empty here, since
-        docstrings move lines. Kernels of one name share an index file. numba finds a kernel in this index by its
-        byte code.
+        """Returns a part of the file name of a kernel. By default this part contains the line of the kernel. It is
+        empty here, because a changed docstring moves lines. Kernels with equal names share an index file, in which
+        numba finds a kernel by its byte code.
         """
         return ""
 
     @classmethod
     def from_function(cls, function: Callable[..., Any], file: str) -> "_ModuleFolder | None":
-        """Returns None if the folder is not set or cannot be made: numba uses its default folder in that case."""
+        """Returns None if the folder is not set or cannot be made; numba then uses its default folder."""
         try:
             return cls(function, file) if _folder() else None
         except OSError:
@@ -98,7 +101,7 @@ class Kernel(CPUDispatcher):
     """A compiled function with one signature."""
 
     signature: Any = ""
-    """Signature as declared, in numba's notation, or a signature made from ``types``."""
+    """Signature of the kernel as it was declared: text in numba's notation, or a signature made with ``types``."""
 
     @property
     def result(self) -> Any:
@@ -110,8 +113,8 @@ class Kernel(CPUDispatcher):
         self._cache = _Cache(self.py_func)  # type: ignore[no-untyped-call]
 
     def load(self) -> None:
-        """Compiles the kernel and the kernels that it calls, or loads them from the cache. The kernel is loaded once,
-        in the thread that calls it first.
+        """Compiles the kernel and the kernels that it calls, or loads them from the cache. This is done only once, in
+        the thread that calls the kernel first.
         """
         with global_compiler_lock:
             if self.overloads:
@@ -123,29 +126,31 @@ class Kernel(CPUDispatcher):
 
     @cached_property
     def address(self) -> int:
-        """Address of the machine code of the kernel, for calls with the calling convention of C."""
+        """Address of the machine code of the kernel. The code has the calling convention of C."""
         self.load()
         compiled: Any = next(iter(self.overloads.values()))
         return int(compiled.library.get_pointer_to_function(compiled.fndesc.llvm_cfunc_wrapper_name))
 
     def compile(self, sig: Any) -> Any:
-        """Returns the entry point of this kernel when numba compiles a call of it from another kernel. The entry point
-        is that of the declared signature, for any ``sig``.
+        """Returns the entry point of this kernel, when numba compiles a call of the kernel in another kernel. For any
+        ``sig`` it is the entry point of the declared signature.
         """
         self.load()
         (compiled,) = self.overloads.values()
         return compiled.entry_point  # type: ignore[attr-defined]
 
     def _compile_for_args(self, *args: Any, **kws: Any) -> "Kernel":
-        """Loads the kernel. numba calls this method at the first call of the kernel from Python. After that numba
-        calls the kernel again and checks the types of the arguments.
+        """Loads the kernel. numba calls this method when Python calls the kernel for the first time. Then numba calls
+        the kernel again and checks the types of the arguments.
         """
         self.load()
         return self
 
 
 def _makes_arrays(kernel: Kernel) -> bool:
-    """Returns whether a kernel makes arrays, or calls one that returns arrays, and so needs reference counts."""
+    """Returns whether a kernel needs reference counts, because it makes arrays or calls a kernel that returns
+    arrays.
+    """
     names, used = kernel.py_func.__code__.co_names, inspect.getclosurevars(kernel.py_func)
     known = [*used.nonlocals.values(), *used.globals.values()]
     known += [getattr(module, name, None) for module in known if isinstance(module, ModuleType) for name in names]
@@ -160,7 +165,7 @@ def _holds_arrays(kind: Any) -> bool:
 
 
 def njit(signature: Any, *, cache: bool = True, **options: Any) -> Callable[[Callable[..., Any]], Kernel]:
-    """Declares a kernel with the given signature; ``options`` are options of numba's njit."""
+    """Declares a kernel with the given signature. ``options`` are the options of numba's njit."""
 
     def declare(function: Callable[..., Any]) -> Kernel:
         kernel = Kernel(function, targetoptions={"nopython": True, "boundscheck": None, **options})
@@ -204,12 +209,14 @@ def _prefetch(_: Any, array: Any, index: Any) -> Any:
 
 
 prefetch: Any = intrinsic(_prefetch)
-"""Loads the cache line of an element of a one-dimensional array, in a kernel. The call changes no value. An index
-beyond the end of the array is harmless."""
+"""Loads the cache line of an element of a one-dimensional array; to be called in a kernel. The call changes no value.
+An index beyond the end of the array does no harm."""
 
 
 class _Loading:
-    """CPU and wall time of this thread for loading kernels, s. The time of nested loads is counted once."""
+    """CPU time and wall time that this thread has spent on loading kernels, s. The time of nested loads is counted
+    once.
+    """
 
     def __init__(self) -> None:
         self.spent = self.passed = 0.0
@@ -231,10 +238,10 @@ _loading = _Loading()
 
 
 def _begin() -> None:
-    """Loads numba's own implementations, which the first kernel needs, without the BLAS of scipy, which no kernel
-    needs.
+    """Loads numba's own functions, which the first kernel needs. The BLAS of scipy is not loaded, because no kernel
+    needs it.
 
-    Without this function numba would import the whole linear algebra of scipy, if scipy is installed.
+    Without this function, numba would import the whole linear algebra of scipy if scipy is installed.
     """
     absent = _BLAS not in sys.modules
     if absent:
@@ -251,10 +258,10 @@ _begin()
 
 
 def cpu_time() -> float:
-    """Returns the CPU time of this thread so far without the loading of kernels, s."""
+    """Returns the CPU time of this thread so far, s, without the loading of kernels."""
     return time.thread_time() - _loading.spent
 
 
 def wall_time() -> float:
-    """Returns the time of a clock of this process, s. The clock stops while kernels are loaded."""
+    """Returns the wall time of a clock that stops while kernels are loaded, s."""
     return time.monotonic() - _loading.passed

@@ -1,8 +1,8 @@
 """Loading of the kernels that a scene needs, on all ranks at once before the first step.
 
-A kernel is loaded at its first call (worker/kernels/jit.py), which takes 3 to 20 ms. Without this module the ranks
-would load the forty kernels of fracture one rank after the other, as cracks reach them, while all others wait. The
-kernels are found by the names in the functions of the packages; there is no list of them.
+A kernel is loaded at its first call (worker/kernels/jit.py), which takes 3 to 20 ms. Without this module each rank
+would load the forty kernels of fracture when cracks reach the rank, and all other ranks would wait. The kernels are
+found by the names that occur in the functions of the packages.
 """
 
 import sys
@@ -37,8 +37,8 @@ def preload(case: Case) -> None:
 
 
 def called(module: ModuleType) -> Iterator[Kernel]:
-    """Yields the kernels that the functions and methods of a module refer to by name, in this module or in another
-    module.
+    """Yields the kernels to which the functions and methods of a module refer by name. The kernels may be in this
+    module or in another module.
     """
     loader = module.__loader__
     assert isinstance(loader, InspectLoader)
@@ -52,7 +52,9 @@ def called(module: ModuleType) -> Iterator[Kernel]:
 
 
 def _functions(code: CodeType, kernels: set[CodeType]) -> Iterator[CodeType]:
-    """Yields the functions that are defined in a code object, at any depth, except ``kernels``."""
+    """Yields the functions that are defined in a code object, at any depth. Functions among ``kernels`` are left
+    out.
+    """
     for constant in code.co_consts:
         if isinstance(constant, CodeType) and constant not in kernels:
             yield constant

@@ -1,11 +1,12 @@
 """Folder of the compiled kernels.
 
-numba's disk cache does not detect an edited callee in another file. The name of the cache folder is therefore a hash
-of the code of every source that kernels depend on (files with kernels, and their imports from the worker), the
-versions and the processor. Path and time of a source are not in it: equal sources share a folder. Below it each
-module has a folder of its own (worker/kernels/jit.py), named by a hash of the sources of its kernels: a new folder
-gets unchanged modules from an earlier one. Rank 0 hashes the sources once a run and compiles missing kernels
-(worker/kernels/compile.py); it sends the hash to the other ranks.
+numba's disk cache does not detect an edited callee in another file. Therefore the name of the cache folder is a hash.
+The hash covers the code of every source on which kernels depend (files with kernels, and their imports from the
+worker), the versions and the processor. The hash does not depend on path and time of a source, so equal sources share a
+folder. Inside of the cache folder each module has its own folder (worker/kernels/jit.py), named by a hash of the
+sources of its kernels. A new cache folder gets the folders of unchanged modules from an earlier cache folder. Rank 0
+hashes the sources once in a run, compiles missing kernels (worker/kernels/compile.py), and sends the hash to the other
+ranks.
 """
 
 import hashlib
@@ -20,18 +21,18 @@ from pathlib import Path
 ROOT = Path(__file__).parents[1]
 VARIABLE = "NUMBA_CACHE_DIR"
 DECLARATION = "\n@njit("
-"""Text with which the declaration of a kernel begins in its source."""
+"""Text with which the declaration of a kernel begins in a source file."""
 _PROSE = re.compile(rb'"""[\s\S]*?"""|#[^\n]*')
-"""Pattern of docstrings and comments in a source."""
+"""Pattern of the docstrings and comments in a source file."""
 _IMPORT = re.compile(r"^from (\.+)([\w.]*) import (\([^)]*\)|[^\n]*)", re.MULTILINE)
-"""Pattern of a relative import at the top level of a source without comments: level, module and names. The syntax tree
-of all sources takes six times as long."""
+"""Pattern of a relative import at the top level of a source without comments. Its groups are level, module and names.
+Reading the syntax trees of all sources would take six times as long."""
 
 
 @cache
 def source_hash(root: Path = ROOT) -> str:
-    """Returns a hash of the sources of all kernels below ``root``, and of the versions. The call takes 0.06 CPU
-    seconds on an idle core.
+    """Returns a hash of the sources of all kernels below ``root`` and of the versions. The computation takes 0.06 s of
+    CPU time on an idle core.
     """
     return _hashed(kernel_sources(root), root)
 
@@ -54,8 +55,8 @@ def _hashed(sources: set[Path], root: Path) -> str:
 
 @cache
 def _code(source: bytes) -> bytes:
-    """Returns the lines of a source without docstrings, comments and empty lines, since kernels do not depend on
-    these.
+    """Returns the lines of a source without docstrings, comments and empty lines, because kernels do not depend on
+    them.
     """
     return b"\n".join(line.rstrip() for line in _PROSE.sub(b"", source).splitlines() if line.strip())
 
@@ -67,19 +68,19 @@ def _named(sources: str) -> str:
 def cache_folder(sources: str | None = None) -> Path:
     """Returns the cache folder for the kernels of this source tree on this machine.
 
-    ``sources``: result of ``source_hash()`` if it is already computed.
+    ``sources``: result of ``source_hash()``, if it was computed before.
     """
     base = os.environ.get("CONOID_CACHE_DIR") or Path.home() / ".cache" / "conoid"
     return Path(base) / "kernels" / _named(sources or source_hash())
 
 
 def kernel_sources(root: Path) -> set[Path]:
-    """Returns the files below ``root`` with kernels, and the files from which they import names, to any depth."""
+    """Returns the files below ``root`` that have kernels, and the files from which they import names, at any depth."""
     return reached(kernel_files(root))
 
 
 def reached(paths: list[Path]) -> set[Path]:
-    """Returns the files ``paths``, and the files that they import relatively, to any depth."""
+    """Returns the files ``paths``, and the files that they import relatively, at any depth."""
     found: set[Path] = set()
     waiting = list(paths)
     while waiting:
@@ -91,7 +92,7 @@ def reached(paths: list[Path]) -> set[Path]:
 
 
 def kernel_files(root: Path) -> list[Path]:
-    """Returns the files below ``root`` with kernels."""
+    """Returns the files below ``root`` that have kernels."""
     return [path for path in root.rglob("*.py") if DECLARATION in path.read_text(encoding="utf-8")]
 
 
@@ -107,7 +108,7 @@ def imported(path: Path) -> list[Path]:
 
 
 def _names(listed: str) -> list[str]:
-    """Returns the names of an import statement, without the names that it gives them."""
+    """Returns the names that an import statement imports, without the names after ``as``."""
     return [each.split()[0] for each in listed.strip("()\n ").split(",") if each.strip()]
 
 
@@ -123,8 +124,8 @@ def _processor() -> str:
 def use_cache(sources: str | None = None) -> Path:
     """Sets numba's cache folder and returns it.
 
-    Raises RuntimeError if numba was imported before: numba would then keep kernels beside their sources, and not
-    detect an edited callee.
+    Raises RuntimeError if numba was already imported, because numba would then keep kernels beside their sources, and
+    not detect an edited callee.
     """
     folder = cache_folder(sources)
     if "numba" in sys.modules and os.environ.get(VARIABLE) != str(folder):

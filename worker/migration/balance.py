@@ -1,8 +1,9 @@
-"""Load balance: costs of tets, the decision to cut again, and the time that cuts have saved.
+"""Load balance: costs of tets, the decision to divide the tets again among the ranks (a cut), and the time that cuts
+have saved.
 
-Costs are CPU seconds of this run. The cost of the tets of each part is measured in the passes over these tets. The
-cost of nodes and the cost of contact, by the candidates of a node, are measured as well. Every rank receives the
-work of all ranks, so that all ranks make the same decision. The answer of the run does not depend on this decision.
+Costs are CPU seconds of this run. The cost of the tets of each part is measured in the passes over these tets. The cost
+of nodes, and the cost of contact for the candidate pairs of a node, are also measured. Every rank receives the times of
+all ranks, so that all ranks make the same decision. The answer of the run does not depend on this decision.
 """
 
 import time
@@ -26,47 +27,47 @@ from .parcel import Parcel
 from .route import route
 
 _LEAST = 1e-9
-"""Smallest cost of a tet, s. With this value every rank gets tets before any cost is measured. Chosen value, far
-below the measured cost of any tet."""
+"""Smallest cost of a tet, s. With this value every rank gets tets even before any cost is measured. The chosen value is
+far below the measured cost of any tet."""
 
 
 @dataclass
 class Window:
-    """CPU seconds of all ranks over some steps."""
+    """CPU seconds of all ranks in some steps."""
 
     steps: int
     work: dict[str, list[float]]
-    """CPU seconds by phase, one number per rank."""
+    """CPU seconds, keyed by phase; one number for each rank."""
 
     def loads(self, phases: tuple[str, ...]) -> list[float]:
-        """Return (ranks,) the load of each rank in some phases, s per step."""
+        """Return (ranks,) the load of each rank in the given phases, s per step."""
         return [float(load) / max(self.steps, 1) for load in np.sum([self.work[name] for name in phases], axis=0)]
 
     @property
     def imbalance(self) -> float:
-        """Largest load of a rank divided by the mean load."""
+        """Ratio of the largest load of a rank to the mean load."""
         return balancing.imbalance(self.loads(WORK))
 
 
 @dataclass
 class Balance:
-    """Measures the loads of a run and moves tets when a cut saves time."""
+    """Load balance of a run. Measures the loads and moves tets if a new cut saves time."""
 
     case: Case
     comm: Comm
     trigger: Trigger
     _meter: Meter
-    """Measures costs since the last cut. The measurement is restarted at half of the loss that triggers the next
-    cut, since costs change as fronts move."""
+    """Meter of the costs since the last cut. It is restarted when half of the loss that triggers the next cut has
+    accumulated, because costs change as fronts move."""
     spent: float = 0.0
     """Wall time of all cuts, s."""
     events: int = 0
     _half: bool = False
-    """Whether the meter was reset since the last cut."""
+    """Whether the meter was restarted since the last cut."""
     _guard: Guard | None = None
     _latest: Window | None = None
     _before: float | None = None
-    """Imbalance of the steps just before the last cut."""
+    """Imbalance in the steps just before the last cut."""
     _saved: float = 0.0
     """Time saved by all cuts except the last one, s."""
 
@@ -77,7 +78,7 @@ class Balance:
         return cls(sim.case, sim.comm, trigger, Meter.of(sim))
 
     def look(self, window: Window) -> None:
-        """Add the work of all ranks since the last call. Work that no cut can move is omitted."""
+        """Add the times of all ranks since the last call. Time that no cut can move to another rank is omitted."""
         self._latest = window
         self.trigger.look(window.loads(MOVED), window.steps)
 
@@ -85,8 +86,8 @@ class Balance:
     def saved(self) -> float:
         """Time saved by all cuts so far, s.
 
-        For each cut the work is compared with the imbalance just before and just after the cut. Imbalance that
-        arises later is not counted.
+        For each cut the time is compared for two imbalances: just before and just after the cut. Imbalance that arises
+        later is not counted.
         """
         stretch = self.trigger.stretch
         if self._before is None or not stretch.steps:
@@ -101,7 +102,7 @@ class Balance:
         return self._guard.grown(sim.contact.outside)
 
     def cause(self, sim: Simulation) -> str | None:
-        """Return the reason to cut now, or None; equal on all ranks."""
+        """Return the reason to make a cut now, or None. All ranks return the same reason."""
         if self.comm.size == 1:
             return None
         cause = self.trigger.cause(sim.clock.step, sim.reduction.grown)
@@ -110,7 +111,7 @@ class Balance:
         return cause
 
     def move(self, sim: Simulation) -> tuple[Simulation, dict[str, Any]]:
-        """Cut by the costs and move tets. Return the new simulation and the fields of the message.
+        """Make a cut by the costs and move the tets. Return the new simulation and the fields of the message.
 
         Collective.
         """
@@ -132,7 +133,9 @@ class Balance:
         return now, message
 
     def _settle(self, sim: Simulation, cost: float, work: float) -> None:
-        """Reset the measurement after a cut that took ``cost`` s of wall time and ``work`` s of the slowest rank."""
+        """Restart the measurement after a cut. ``cost``: wall time of the cut, s; ``work``: CPU time of the cut on the
+        slowest rank, s.
+        """
         paid = self._before is None or self.saved - self._saved >= self.trigger.cost
         self.events, self.spent, self._saved = self.events + 1, self.spent + cost, self.saved
         self._before, self._latest = self.trigger.stretch.halves[1] if self.trigger.stretch.steps else None, None
@@ -143,8 +146,8 @@ class Balance:
     def weigh(self, sim: Simulation, parcel: Parcel) -> None:
         """Set the ``weight`` of every tet of a parcel, s per step.
 
-        The weight has a column for each phase after which ranks wait: the cost of the tet itself, and for its nodes
-        the cost of the search and of the rest of contact. Collective.
+        The weight has one column for each phase after which ranks wait. The columns are the cost of the tet itself, the
+        cost of the contact search for its nodes, and the cost of the rest of contact for its nodes. Collective.
         """
         if self.case.balance.weights == "tets":
             return
@@ -162,8 +165,8 @@ class Balance:
 
 
 def _with_their_first_tets(parcel: Parcel, effort: "np.ndarray") -> dict[int, Floats]:
-    """Return by part (n, k) the ``effort`` (nodes, k) of nodes. Each node counts for one tet: the tet of smallest id
-    on this rank.
+    """Return, for each part, (n, k) the ``effort`` (nodes, k) of nodes, assigned to tets. A node is assigned to one
+    tet: the tet of smallest id on this rank.
     """
     ids, first = parcel.nodes["id"], np.full(len(effort), np.iinfo(np.int64).max)
     corners = {part: located(ids, t["corners"]) for part, t in parcel.tets.items()}

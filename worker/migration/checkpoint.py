@@ -1,11 +1,12 @@
-"""Checkpoints: folders with a file a rank and a manifest, complete on disk or not present.
+"""Checkpoints. A checkpoint is a folder with one file for each rank and a manifest. The folder is on disk completely or
+not at all.
 
 ::
 
     checkpoints/000001200/rank-0.h5 ...   state of each rank: columns of nodes, tets and other things, by global ids
                           manifest.json   step, time, the case, state common to all ranks, bytes and sha256 of each file
 
-The folder is written under another name, flushed to disk and renamed. Any number of ranks can read it. The
+The folder is written under a temporary name, flushed to disk and renamed. Any number of ranks can read it. The
 conditions of a complete checkpoint are in conoid.cases.output.checkpoints.
 """
 
@@ -43,7 +44,7 @@ from ..parallel.comm import Comm
 from .parcel import Parcel, Table, take
 
 _KEPT = 2
-"""Number of checkpoints that are kept. Chosen value: one more than the latest, which may be damaged."""
+"""Number of checkpoints that are kept. Chosen value: one more than the latest checkpoint, which may be damaged."""
 _FREE = {
     "run": {
         "ranks", "threads", "profile", "cut_scale", "max_steps", "max_wall_time", "checkpoint_every", "residual_limit",
@@ -51,11 +52,11 @@ _FREE = {
     },
     "contact": {"skin", "domain"},
 }  # fmt: skip
-"""Keys that may change when a run is resumed: the answer does not depend on these keys."""
+"""Keys that may change when a run is resumed, because the answer does not depend on them."""
 
 
 def write(parcel: Parcel, case: Case, folder: Path, step: int, t: float, comm: Comm) -> tuple[Path, int]:
-    """Write a checkpoint of the run in ``folder``; return its folder and its number of bytes.
+    """Write a checkpoint of the run in ``folder``. Return the folder of the checkpoint and its number of bytes.
 
     Collective.
     """
@@ -82,7 +83,7 @@ def write(parcel: Parcel, case: Case, folder: Path, step: int, t: float, comm: C
 
 
 def _describe(beside: Path, manifest: Manifest) -> None:
-    """Write the manifest and its sha256, flushed to disk."""
+    """Write the manifest and its sha256, and flush them to disk."""
     for name, content in zip((MANIFEST, SEAL), sealed(manifest), strict=True):
         with (beside / name).open("wb") as file:
             file.write(content)
@@ -91,8 +92,8 @@ def _describe(beside: Path, manifest: Manifest) -> None:
 
 
 def forget(folder: Path, step: int = -1) -> None:
-    """Remove the checkpoints of ``folder`` after a step, and unfinished checkpoints. Without a step all checkpoints
-    are removed.
+    """Remove the checkpoints of ``folder`` after the step ``step``, and unfinished checkpoints. Without a step all
+    checkpoints are removed.
     """
     if step < 0:
         shutil.rmtree(folder / layout.CHECKPOINTS, ignore_errors=True)
@@ -103,7 +104,8 @@ def forget(folder: Path, step: int = -1) -> None:
 
 
 def latest(folder: Path) -> tuple[Path, Manifest, list[str]]:
-    """Return the latest complete checkpoint, its manifest, and a line for each later one, which is damaged.
+    """Return the latest complete checkpoint and its manifest. Return also a message for each later checkpoint, because
+    such a checkpoint is damaged.
 
     Raises InputError if no checkpoint is complete.
     """
@@ -121,8 +123,8 @@ def latest(folder: Path) -> tuple[Path, Manifest, list[str]]:
 
 
 def require_same(case: Case, manifest: Manifest) -> None:
-    """Raise InputError if the case differs from the case of the checkpoint in a key on which the answer depends, or
-    allows no further step."""
+    """Raise InputError if the case differs from the case of the checkpoint in a key on which the answer depends. Raise
+    InputError also if the case allows no further step."""
     now, then = (_answering(data) for data in (json.loads(resolved_json(case)), manifest.case))
     for location, value, former in _differences(now, then, ()):
         was = "does not have" if former is ... else f"has {shown(former)} in"
@@ -134,7 +136,7 @@ def require_same(case: Case, manifest: Manifest) -> None:
 
 
 def _differences(now: Any, then: Any, location: Location) -> Iterator[tuple[Location, object, object]]:
-    """Yield the place and the two values of each key that differs; Ellipsis for a key that is missing."""
+    """Yield the location and the two values of each key that differs. The value of a missing key is Ellipsis."""
     if isinstance(now, dict) and isinstance(then, dict):
         for key in sorted({*now, *then}):
             yield from _differences(now.get(key, ...), then.get(key, ...), (*location, key))
@@ -146,7 +148,7 @@ def _differences(now: Any, then: Any, location: Location) -> Iterator[tuple[Loca
 
 
 def _answering(case: dict[str, Any]) -> dict[str, Any]:
-    """Return the keys of a case on which its answer depends."""
+    """Return the keys of a case on which the answer of the run depends."""
     found = {key: value for key, value in case.items() if key not in ("balance", "title", "description")}
     for table, free in _FREE.items():
         if isinstance(keys := found.get(table), dict):
@@ -155,7 +157,7 @@ def _answering(case: dict[str, Any]) -> dict[str, Any]:
 
 
 def read(place: Path, manifest: Manifest, comm: Comm) -> Parcel:
-    """Return this rank's share of a checkpoint: the contents of some of its files, or empty tables."""
+    """Return the data of a checkpoint that this rank reads: the contents of some of its files, or empty tables."""
     names = [file.name for file in manifest.files]
     mine = [_read_parcel(place / name) for name in names[comm.rank :: comm.size]]
     whole = Parcel.of(mine or [_nothing_of(_read_parcel(place / names[0]))])
@@ -201,7 +203,7 @@ def _columns(group: "h5py.Group") -> Table:
 
 
 def _plain(value: Any) -> Any:
-    """Return a value that JSON can represent; arrays with their type."""
+    """Return a value that JSON can represent. The representation of an array contains its type."""
     if isinstance(value, np.ndarray):
         return {"dtype": str(value.dtype), "values": value.tolist()}
     if isinstance(value, dict):
@@ -212,7 +214,7 @@ def _plain(value: Any) -> Any:
 
 
 def _rich(value: Any) -> Any:
-    """Return the value that was the argument of ``_plain``, with tuples as lists."""
+    """Return the value from which ``_plain`` made its result. Lists become tuples."""
     if isinstance(value, dict):
         if value.keys() == {"dtype", "values"}:
             return np.array(value["values"], value["dtype"])

@@ -1,8 +1,9 @@
-"""Loads of groups of tets, recorded at intervals. The effect of other balance policies is computed from these records.
+"""Loads of groups of tets, recorded at intervals. From the records the effect of other balance policies can be
+computed.
 
 ``conoid replay-balance`` reads the records (docs/performance/balance.md). A group is a fixed set of tets, cut at the
-start, with a set of nodes and their copies. When its tets and nodes move between ranks, they stay in the group.
-Counts are integers and equal for any number of ranks, except candidates of edges and cracks whose nodes are on
+start, with a set of nodes and their copies. When tets and nodes move between ranks, they stay in their group. Counts
+are integers and equal for any number of ranks; an exception are candidate pairs of edges and cracks whose nodes are on
 several ranks.
 """
 
@@ -16,15 +17,15 @@ from ..simulation import Simulation
 from .meter import Meter
 
 _TIMES = 200
-"""Largest number of records of a run. A slow run has more: one for each interval ``_PATIENCE``."""
+"""Largest number of records of a run. A slow run has more records: one for each interval ``_PATIENCE``."""
 _PATIENCE = 10.0
 """Largest wall time between two records, s. Chosen value."""
 _SHARE = 1.0 / 400.0
-"""Share of the time of a run that records may take."""
+"""Fraction of the time of a run that records may take."""
 
 
 class Groups:
-    """Makes the records of the groups of a run."""
+    """Records the loads of the groups of a run."""
 
     def __init__(self, sim: Simulation, cost: float) -> None:
         """``cost``: expected cost of a cut, s."""
@@ -37,11 +38,13 @@ class Groups:
         self._first = True
 
     def moved(self, sim: Simulation) -> None:
-        """Reset the meter, since tets have moved and blocks count from zero."""
+        """Restart the meter after tets have moved, because the time of a block then counts from zero."""
         self._meter = Meter.of(sim)
 
     def due(self, t: float, now: float) -> bool:
-        """Return whether a record is scheduled at time ``t`` and wall time ``now``; called on rank 0."""
+        """Return whether a record is scheduled at the simulated time ``t`` and the wall time ``now``. Only rank 0 calls
+        this method.
+        """
         since = now - self._recorded
         return since * _SHARE > self._took and (t >= self._t or since > _PATIENCE)
 

@@ -1,4 +1,4 @@
-"""Costs of tets, contact candidates and ranks: CPU seconds of this run."""
+"""Measurement of costs, in CPU seconds of this run: costs of tets, of contact candidates and of ranks."""
 
 from dataclasses import dataclass
 from typing import Self
@@ -11,8 +11,8 @@ from ..model.state import Floats
 from ..simulation import Simulation
 
 _FARTHEST = 4.0
-"""Bound of the ratio between the cost of a candidate on one rank and the mean cost, in both directions. Chosen
-value: with few candidates the measurement is mostly noise."""
+"""Largest ratio of the cost of a candidate pair on one rank to the mean cost, and of the mean cost to the cost on one
+rank. Chosen value: with few candidate pairs the measurement is mostly noise."""
 
 
 @dataclass(frozen=True)
@@ -22,31 +22,31 @@ class Costs:
     tet: Floats
     """(parts,) cost of a tet of each part."""
     candidate: float
-    """Cost of a contact candidate on this rank. Candidates differ between ranks, and the cost measured on a rank is
-    the best estimate for this rank."""
+    """Cost of a contact candidate on this rank. It is measured on this rank, because the candidates of different ranks
+    have different costs."""
     fracture: float
-    """Cost of the whole fracture stage on this rank."""
+    """Cost of the fracture stage on this rank."""
     rank: float
-    """Cost of contact that is not proportional to the candidates, for each rank."""
+    """(ranks,) cost of contact on each rank that is not proportional to the number of candidates."""
 
 
 @dataclass
 class Meter:
-    """Measures costs since its construction."""
+    """Meter that measures costs since it was made."""
 
     step: int
     seconds: dict[str, float]
-    """Timers at construction, s."""
+    """Timers when the meter was made, s."""
     on_parts: Floats
-    """(parts,) CPU time at construction of the passes over the tets of each part, s."""
+    """(parts,) CPU time of the passes over the tets of each part when the meter was made, s."""
 
     @classmethod
     def of(cls, sim: Simulation) -> Self:
-        """Return a meter that starts now."""
+        """Return a meter that measures from now on."""
         return cls(sim.clock.step, dict(sim.timers.seconds), on_parts(sim))
 
     def costs(self, sim: Simulation, effort: float) -> Costs:
-        """Return the costs; ``effort``: number of candidates of this rank. Collective."""
+        """Return the costs since the meter was made; ``effort``: number of candidates of this rank. Collective."""
         tets, steps = np.zeros(len(self.on_parts)), max(sim.clock.step - self.step, 1)
         for block in sim.model.blocks:
             tets[block.part] = block.n
@@ -63,16 +63,16 @@ class Meter:
 
 
 def _candidates(had: Floats, took: Floats) -> Floats:
-    """Return (ranks,) the cost of a candidate on each rank, from the numbers of candidates ``had`` and the times
-    ``took``, (ranks,).
+    """Return (ranks,) the cost of a candidate on each rank. ``had`` (ranks,): numbers of candidates; ``took`` (ranks,):
+    CPU times.
     """
     mean = took.sum() / max(had.sum(), 1.0)
     return np.asarray(np.clip(took / np.maximum(had, 1.0), mean / _FARTHEST, mean * _FARTHEST))
 
 
 def on_parts(sim: Simulation) -> Floats:
-    """Return (parts,) the CPU time of the passes over the tets of each part so far, s. With one block the time of the
-    part is the time of the phase.
+    """Return (parts,) the CPU time of the passes over the tets of each part so far, s. If the rank has one block, the
+    time of its part is the time of the phase.
     """
     seconds, blocks = np.zeros(len(sim.model.parts)), sim.model.blocks
     for block in blocks:

@@ -1,4 +1,4 @@
-"""Conversion of the model into a parcel and back."""
+"""Conversion of the model into a parcel, and of a parcel into the model."""
 
 from typing import Any
 
@@ -17,7 +17,7 @@ from .route import Arrived
 
 _NODAL = ("id", "part", "x0", "x", "v", "mass", "force", "stepping", "group")
 _OF_TETS = ("across", "bond", "weakest", "worn")
-"""Columns of a block that exist if the scene needs them."""
+"""Columns of a block of tets that exist only if the scene needs them."""
 
 
 def keep(model: Model, case: Case) -> Parcel:
@@ -56,7 +56,9 @@ def _keep_block(block: Block, ids: Ints) -> Table:
 
 
 def resume(case: Case, arrived: Arrived, comm: Comm) -> Model:
-    """Return the model from tables in a parcel that are sorted in the order of its tets and nodes."""
+    """Return the model, made from the tables of a parcel. The tables must be sorted in the order of the tets and
+    nodes.
+    """
     parcel, known = arrived.parcel, arrived.parcel.known
     values: dict[str, Any] = {
         name: np.ascontiguousarray(parcel.nodes[name]) for name in (*_NODAL, "marks") if name in parcel.nodes

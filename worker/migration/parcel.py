@@ -1,8 +1,9 @@
-"""Parcels: the complete state of some tets, of their nodes and of the data that belongs to them, by global ids.
+"""Parcels. A parcel is the complete state of some tets, of their nodes and of the data that belongs to tets and nodes,
+keyed by global ids.
 
-Every stage adds its state to a parcel (``keep``) and reads it from one (``resume``): on the same rank, on another
-rank, or in another process. Data that can be computed again from the case and from the parcel, to the same bits, is
-not in it.
+Every stage adds its state to a parcel (``keep``). A stage reads its state from a parcel (``resume``) on the same rank,
+on another rank, or in another process. Data that can be computed again bit-identically from the case and the parcel is
+not in the parcel.
 """
 
 import pickle
@@ -15,7 +16,7 @@ import numpy as np
 from ..model.state import Ints
 
 Table = dict[str, "np.ndarray"]
-"""Columns of equal length."""
+"""Table: columns of equal length, keyed by name."""
 
 
 def length(table: Table) -> int:
@@ -35,30 +36,30 @@ def joined(tables: Sequence[Table]) -> Table:
 
 
 def once(table: Table, key: "np.ndarray") -> Table:
-    """Return the rows by ascending ``key``, the first of rows with equal keys."""
+    """Return the rows sorted by the column ``key``. Of rows with equal keys only the first is returned."""
     return take(table, np.unique(key, return_index=True)[1])
 
 
 @dataclass
 class Parcel:
-    """A parcel is the state of tets and nodes in a message or a checkpoint. ``known`` and the names of all columns are
-    equal on all ranks.
+    """The state of tets and nodes in a message or a checkpoint. ``known`` and the names of all columns are equal on all
+    ranks.
     """
 
     known: dict[str, Any] = field(default_factory=dict)
     """Numbers and small arrays that are equal on all ranks."""
     sums: dict[str, Ints] = field(default_factory=dict)
-    """Integers of this rank; only their sums over the ranks have a meaning."""
+    """Integers of this rank that are terms of sums over the ranks. Only the sums have a meaning."""
     nodes: Table = field(default_factory=dict)
-    """Table with a row for each node, and a column ``id`` (n,), ascending after routing. If there is a column
-    ``family`` (n,), a tet is sent with all nodes of the families of its corners."""
+    """Table with one row for each node. The column ``id`` (n,) is ascending after routing. If there is a column
+    ``family`` (n,), a tet is sent together with all nodes that have the family of one of its corners."""
     tets: dict[int, Table] = field(default_factory=dict)
-    """Tables by part, with a row for each tet: ``id`` (n,), ``corners`` (n, 4) global ids of nodes, and the state of
-    the tet."""
+    """Tables with one row for each tet, keyed by part. The columns are ``id`` (n,), ``corners`` (n, 4), which are
+    global ids of nodes, and the state of the tet."""
     rows: dict[str, Table] = field(default_factory=dict)
-    """Tables of other data. A row is sent to the rank of a tet, ``tet`` (k,), to the owner of a node, ``node`` (k,),
-    or to the rank at a position, ``at`` (k, 3). The nodes in its column ``with`` (k, m), -1 for none, are sent with
-    it. Rows with equal ``key`` (k,) are copies of each other."""
+    """Tables of other data. A row is sent to the rank of its tet, ``tet`` (k,), to the owner of its node, ``node``
+    (k,), or to the rank at its position, ``at`` (k, 3). The nodes in the column ``with`` (k, m), -1 for no node, are
+    sent with the row. Rows with equal ``key`` (k,) are copies of one row."""
 
     def packed(self) -> Ints:
         """Return the parcel as one flat message."""
@@ -70,12 +71,14 @@ class Parcel:
 
     @classmethod
     def unpacked(cls, words: Ints) -> "Parcel":
-        """Return the parcel from a message made by ``packed``."""
+        """Return the parcel from a message that ``packed`` made."""
         return cls(*pickle.loads(words[1:].view(np.uint8)[: int(words[0])].data))
 
     @classmethod
     def of(cls, parcels: Sequence["Parcel"]) -> "Parcel":
-        """Return the union of at least one parcel. A node in several parcels is in the union once."""
+        """Return the union of parcels; at least one parcel is required. A node that is in several parcels is in the
+        union once.
+        """
         nodes = joined([p.nodes for p in parcels])
         parts = sorted({part for p in parcels for part in p.tets})
         names = sorted({name for p in parcels for name in p.rows})

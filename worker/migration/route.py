@@ -1,9 +1,9 @@
-"""Redistribution of the state: a cut of all tets, parcels from rank to rank, and the holders and owners of nodes
-afterwards.
+"""Redistribution of the state: all tets are divided again (a cut), parcels are sent from rank to rank, and the holders
+and owners of nodes are found.
 
-A box of the cut goes to the rank that already has most of its tets. The nodes of a tet are sent with the tet. A
-distributed directory finds the ranks that share a node: the rank with the number id % ranks receives the holders of
-a node and sends to each of them the other holders.
+A box of the cut is assigned to the rank that already has most of its tets. The nodes of a tet are sent with the tet. A
+distributed directory finds the ranks that share a node: the rank with the number id % ranks receives the list of ranks
+that have the node, and sends this list to each of these ranks.
 """
 
 from dataclasses import dataclass
@@ -19,21 +19,23 @@ from ..parallel.ownership import Neighbour
 from .parcel import Parcel, Table, joined, length, once, take
 
 _NO_TET = np.iinfo(np.int64).max
-"""Id of the smallest tet at a node on a rank that has no tet at this node."""
+"""Value for the smallest tet id at a node, on a rank that has no tet at the node."""
 
 
 @dataclass
 class Directory:
-    """Part of the directory of all nodes on this rank: the nodes with id % ranks equal to the number of this rank."""
+    """Part of the distributed directory that is on this rank: the nodes for which id % ranks equals the number of this
+    rank.
+    """
 
     comm: Comm
     id: Ints
-    """(n,) ids of the nodes, ascending."""
+    """(n,) ids of the nodes of this part, ascending."""
     owner: Indices
-    """(n,) owner of each node: the rank that has the tet of smallest id at this node."""
+    """(n,) owner of each node. The owner is the rank that has the tet of smallest id at the node."""
 
     def owners(self, ids: Ints) -> Indices:
-        """Return (k,) the owners of nodes with these ids. Collective."""
+        """Return (k,) the owners of the nodes ``ids``. Collective."""
         home = ids % self.comm.size
         asked = self.comm.swap({rank: ids[home == rank] for rank in range(self.comm.size)})
         answers = self.comm.swap({
@@ -51,18 +53,18 @@ class Arrived:
 
     parcel: Parcel
     owner: Indices
-    """(nodes,) rank that owns each of the parcel's nodes."""
+    """(nodes,) rank that owns each node of the parcel."""
     border: Flags
-    """(nodes,) whether other ranks hold the node, too."""
+    """(nodes,) whether other ranks also have the node."""
     neighbours: list[Neighbour]
     moved: tuple[int, int]
     """Numbers of tets and nodes that this rank received from other ranks."""
 
 
 def route(parcel: Parcel, scale: tuple[float, float, float], comm: Comm) -> Arrived:
-    """Cut all tets by their ``weight`` (n, 3) (Balance.weigh), and send all data to its target rank.
+    """Cut all tets by their ``weight`` (n, 3) (Balance.weigh), and send all data to the new ranks.
 
-    Collective. ``scale`` multiplies positions before the cut.
+    Collective. Before the cut, positions are multiplied by ``scale``.
     """
     places, cuts = _cut(parcel, np.array(scale), comm)
     home = _homes(places, comm)
@@ -86,7 +88,7 @@ def route(parcel: Parcel, scale: tuple[float, float, float], comm: Comm) -> Arri
 def _one_of_each(name: str, rows: Table) -> Table:
     """Return the rows by ascending key, each key once.
 
-    Raises ConoidError if two rows with equal key differ: the answer would depend on the choice between them.
+    Raises ConoidError if two rows with equal key differ, because the answer would depend on the choice of the row.
     """
     found = once(rows, rows["key"])
     at = np.searchsorted(found["key"], rows["key"])
@@ -97,7 +99,7 @@ def _one_of_each(name: str, rows: Table) -> Table:
 
 
 def _cut(parcel: Parcel, scale: Floats, comm: Comm) -> tuple[dict[int, Indices], list[Cut]]:
-    """Return the box of the cut of every tet, by part, and the cuts. Collective."""
+    """Return the box of the cut in which each tet is, for each part. Return also the cuts. Collective."""
     nodes, points, ids, weights = parcel.nodes, [np.zeros((0, 3))], [np.zeros(0, np.int64)], [np.zeros((0, 3))]
     for table in parcel.tets.values():
         corners = located(nodes["id"], table["corners"])
@@ -110,7 +112,8 @@ def _cut(parcel: Parcel, scale: Floats, comm: Comm) -> tuple[dict[int, Indices],
 
 
 def _homes(places: dict[int, Indices], comm: Comm) -> Indices:
-    """Return (boxes,) the rank of each box: the rank that has most of the tets of the box, if this rank has no box yet.
+    """Return (boxes,) the rank to which each box is assigned. It is the rank that has most of the tets of the box,
+    among the ranks that have no box yet.
 
     Collective.
     """
@@ -128,7 +131,7 @@ def _homes(places: dict[int, Indices], comm: Comm) -> Indices:
 def _share(
     parcel: Parcel, targets: dict[int, Indices], boxes: tuple[list[Cut], Indices], rank: int, scale: Floats
 ) -> Parcel:  # fmt: skip
-    """Return the data for ``rank``, except tables that go to owners of nodes; ``boxes``: the cuts, and the rank of
+    """Return the data for ``rank``, without tables that go to owners of nodes. ``boxes``: the cuts, and the rank of
     each box.
     """
     cuts, home = boxes
@@ -152,7 +155,7 @@ def _share(
 
 
 def _relatives(nodes: Table, corners: Ints) -> Ints:
-    """Return (k,) the nodes of the families of these ``corners``."""
+    """Return (k,) the nodes that belong to the families of the nodes ``corners``."""
     if "family" not in nodes or not len(corners):
         return corners[:0]
     families = unique(nodes["family"][among(corners, nodes["id"])])
@@ -188,7 +191,9 @@ def _settle(whole: Parcel, comm: Comm) -> tuple[Directory, list[Neighbour], Indi
 
 
 def _sharing(every: Ints, group: Ints, owners: Ints, rank: int) -> Ints:
-    """Return (k, 3) node, other holder and owner, for the nodes that ``rank`` shares; ``group``: node of each row."""
+    """Return (k, 3) node, other rank and owner, for each node that ``rank`` shares with another rank; ``group``: node
+    of each row.
+    """
     held = np.zeros(len(owners), bool)
     held[group[every[:, 2] == rank]] = True
     rows = held[group] & (every[:, 2] != rank)
