@@ -1,6 +1,6 @@
-"""A rod of linear elements in one dimension whose joints break: results that fracture cases should give, in plain
-numpy. Every element has its own two nodes with half of its mass each. A joint makes two nodes move together until it
-breaks; from then on it is a cohesive law and an inelastic contact.
+"""A rod of linear elements in one dimension whose joints break: reference results for fracture cases, in plain numpy.
+Every element of the rod has two separate nodes, each with half of its mass. A joint makes two nodes move together until
+it breaks; a broken joint is a cohesive law and an inelastic contact.
 """
 
 from dataclasses import dataclass
@@ -13,7 +13,9 @@ Floats = npt.NDArray[np.float64]
 
 @dataclass
 class History:
-    """Values at each step: ``t``, s; velocity of the last element, m/s; mean stress, Pa; number of failed joints."""
+    """Values of the rod at each step: ``t``, s; velocity of the last element, m/s; mean stress, Pa; number of failed
+    joints.
+    """
 
     t: Floats
     end: Floats
@@ -25,10 +27,11 @@ def broken_rod(
     h: float, v: Floats, modulus: float, density: float, strength: Floats, energy: float, end: float,
     viscosity: tuple[float, float] = (0.0, 0.0), held: bool = False, step: float = 0.2,
 ) -> History:  # fmt: skip
-    """Returns the history of a rod: elements of length ``h``, m; initial velocities ``v`` (n, 2) of their nodes;
-    ``strength`` (n - 1,) of joints. A joint breaks when the mean stress of its elements reaches its strength. The
-    cohesive traction falls linearly until the energy ``energy``, J/m^2, is absorbed, and unloads along the secant.
-    ``viscosity``: linear and quadratic, in compression only. ``held``: the ends keep their velocities.
+    """Returns the history of a rod: elements of length ``h``, m; initial velocities ``v`` (n, 2) of the nodes of each
+    element; ``strength`` (n - 1,) of joints. A joint breaks when the mean stress of its two elements reaches its
+    strength. The cohesive traction falls linearly until the energy ``energy``, J/m^2, is absorbed, and unloads along
+    the secant. ``viscosity``: linear and quadratic coefficient, in compression only. ``held``: whether the ends of the
+    rod keep their velocities.
     """
     c, v, u = (modulus / density) ** 0.5, v.copy(), np.zeros_like(v)
     dt, half, ends = step * h / c, 0.5 * density * h, (v[0, 0], v[-1, 1])

@@ -6,7 +6,7 @@ from conoid.cases.estimates.balancing import Guard, Stretch, Trigger, imbalance,
 from conoid.cases.model.schema import Balance
 
 EVEN, ODD = [2.0, 2.0], [3.0, 1.0]
-"""Loads of two ranks, s in each step."""
+"""Loads of two ranks, s per step."""
 
 
 def test_what_is_lost_and_the_imbalance() -> None:
@@ -16,7 +16,7 @@ def test_what_is_lost_and_the_imbalance() -> None:
 
 
 def test_measured_cuts_when_more_is_lost_than_a_cut_costs() -> None:
-    """Each step loses 1 s, a decomposition costs 10 s."""
+    """Each step loses 1 s, and a decomposition costs 10 s."""
     trigger = Trigger(Balance(policy="measured"), 10.0)
     trigger.look(ODD, 10)
     assert trigger.cause(10, False) is None, "10 s do not exceed 10 s"
@@ -27,8 +27,9 @@ def test_measured_cuts_when_more_is_lost_than_a_cut_costs() -> None:
 
 
 def test_the_measured_policy_counts_again_after_a_cut() -> None:
-    """A loss before a decomposition is not counted again; a loss after it is counted, because the next decomposition
-    may remove it."""
+    """Time lost before a decomposition does not count again; time lost after a decomposition counts, because the next
+    decomposition may avoid such a loss.
+    """
     trigger = Trigger(Balance(policy="measured"), 10.0)
     trigger.look(ODD, 50)
     trigger.settle(50, 4.0)
@@ -40,7 +41,7 @@ def test_the_measured_policy_counts_again_after_a_cut() -> None:
 
 
 def test_measured_does_not_count_what_ranks_lose_in_turn() -> None:
-    """First one rank has more work, then the other rank: no decomposition would help."""
+    """First one rank has more work, then the other rank: no decomposition would reduce the lost time."""
     trigger = Trigger(Balance(policy="measured"), 10.0)
     for step in range(0, 1000, 10):
         trigger.look(ODD if step % 20 else ODD[::-1], 10)
@@ -78,7 +79,9 @@ def test_a_rank_without_a_cut_keeps_its_first_count() -> None:
 
 
 def test_cuts_that_do_not_pay_become_rare() -> None:
-    """Each unprofitable decomposition doubles the required loss; a profitable one resets it to the cost."""
+    """Each unprofitable decomposition doubles the lost time that triggers the next one; a profitable decomposition
+    resets this time to the cost.
+    """
     trigger = Trigger(Balance(), 1.0)
     waited = []
     for paid in (False, False, False, True):
@@ -92,8 +95,9 @@ def test_cuts_that_do_not_pay_become_rare() -> None:
 
 
 def test_the_start_and_the_end_of_a_stretch_are_distinguished() -> None:
-    """The loads are equal for 100 steps, then one rank has 1 s more in each step: the halves have 1 and 1.5, for any
-    windows."""
+    """The loads are equal for 100 steps, then one rank has 1 s more in each step: the halves have the imbalances 1 and
+    1.5, for any windows.
+    """
     for window in (1, 3, 10, 50):
         stretch = Stretch()
         for step in range(0, 200, window):

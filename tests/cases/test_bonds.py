@@ -11,7 +11,7 @@ FILE = {"shape": "file", "path": "joint.inp", "unit": "1 mm"}
 
 
 def joint(bond: dict[str, Any], *overrides: str) -> dict[str, Any]:
-    """Returns a tile bonded to its backing, as plain data."""
+    """Returns a case of a tile that is bonded to its backing, as plain data."""
     parts = [
         {"name": "tile", "material": "alumina", "mesh": {**PLATE, "base": [0, 0, "5 mm"]}},
         {"name": "backing", "material": "steel", "mesh": PLATE},

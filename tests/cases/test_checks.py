@@ -127,7 +127,7 @@ def test_a_fault_is_named(overrides: list[str], key: str, message: str) -> None:
 
 
 def test_a_body_that_moves_to_a_symmetry_plane_need_not_start_on_it() -> None:
-    """The rod moves down: towards a plane below it, and away from a plane above it."""
+    """The rod of the case moves down: towards a plane below the rod, and away from a plane above the rod."""
     parse_case(rod("boundaries[0]={kind='symmetry', axis='z', at='-1 mm'}"))
     assert "boundaries[0].at" in messages("boundaries[0]={kind='symmetry', axis='z', at='40 mm'}")
 
@@ -148,7 +148,9 @@ def test_names_are_unique() -> None:
 
 
 def _as_overrides(data: dict[str, object]) -> list[str]:
-    """Returns overrides that set whole lists of ``data``; TOML writes a list of dicts with equals signs."""
+    """Returns overrides that set whole lists of ``data``, written in TOML, in which a list of tables has equals
+    signs.
+    """
     return [f"{key}={_toml(data[key])}" for key in ("parts", "probes", "boundaries")]
 
 
@@ -214,7 +216,9 @@ def test_melting_lies_above_the_reference_temperature() -> None:
 
 
 def test_a_part_that_breaks_before_it_strains_is_refused() -> None:
-    """D1 below zero is usual, -2.2 for Armco iron: with D2 = 5.43 and D3 = -0.47 it breaks at 2.4."""
+    """A Johnson-Cook constant D1 below zero is usual, -2.2 for Armco iron: with D2 = 5.43 and D3 = -0.47 the iron
+    breaks at a strain of 2.4.
+    """
     law = "{{model='johnson_cook', A=1, B=1, n=1, C=0, m=1, melt_temperature=2000, specific_heat=1, damage={}}}"
     steel = "materials.m={{density=1, elastic={{young=1, poisson=0}}, strength={}}}"
     parse_case(rod(steel.format(law.format("{D1=-2.2, D2=5.43, D3=-0.47}"))))

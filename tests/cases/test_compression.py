@@ -15,7 +15,7 @@ MM = 1e-3
 
 
 def shot(material: str = "alumina", speed: float = 800.0, **case: Any) -> dict[str, Any]:
-    """Returns a rod of steel that hits a tile."""
+    """Returns a case of a steel rod that hits a tile."""
     return {
         "name": "shot", "run": {"end_time": 1e-5},
         "parts": [
@@ -30,15 +30,16 @@ def shot(material: str = "alumina", speed: float = 800.0, **case: Any) -> dict[s
 
 
 def crushed(data: dict[str, Any]) -> dict[str, str]:
-    """Returns the warnings about compression, by key."""
+    """Returns the warnings about compression of a case, by key."""
     case = parse_case(data)
     found = doubts(data, case, estimate(case))
     return {each.key: each.message for each in found if "crushed" in each.message}
 
 
 def test_griffith_of_a_plane_wave_is_on_his_parabola() -> None:
-    """(s1 - s3)^2 = 8 T (s1 + s3) with s3 = nu / (1 - nu) s1; the value is near the measured elastic limit of
-    alumina."""
+    """Griffith's criterion is (s1 - s3)^2 = 8 T (s1 + s3) with s3 = nu / (1 - nu) s1; the stress s1 is near the
+    measured elastic limit of alumina.
+    """
     made = library()["alumina"]
     assert made.brittle is not None
     s1 = griffith(made)

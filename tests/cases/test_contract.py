@@ -1,4 +1,4 @@
-"""Messages, outcome, states and Zenoh keys: the contract between the houses."""
+"""Messages, outcome, states and Zenoh keys: the contract between client, server and worker."""
 
 import typing
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""Number of cores that a process may use, by control groups of both versions; ranks and threads in words."""
+"""Number of cores that a process may use by control groups of both versions; words for ranks and threads."""
 
 from pathlib import Path
 

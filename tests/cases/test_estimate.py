@@ -1,4 +1,4 @@
-"""Estimates compared with generated meshes, and with measured runs."""
+"""Estimates of cases compared with generated meshes, and with measured runs."""
 
 import math
 import subprocess
@@ -193,7 +193,7 @@ HARD = {
 
 @pytest.mark.parametrize("hard", [hard for hard in suite() if hard.name in HARD], ids=lambda hard: hard.name)
 def test_breaking_takes_memory_between_the_two_estimates(hard: Hard) -> None:
-    """The measured time is between half of the first estimate and one and a half times the second."""
+    """The measured time is between half of the first estimate and one and a half times the second estimate."""
     expected = estimate(parse_case(apply_overrides(read_data(hard.path), hard.changes)))
     assert expected.core_seconds is not None
     took = HARD[hard.name] + START
@@ -231,14 +231,14 @@ end_time = "20 us"
 
 
 def test_glass_that_is_crushed_between_metals_takes_what_is_estimated() -> None:
-    """The measured run had 1,567 steps with 153 CPU s, on one rank."""
+    """The measured run had 1,567 steps with 153 s of CPU time, on one rank."""
     expected = estimate(parse_case(toml_data(CRUSHED)))
     assert expected.core_seconds is not None
     assert expected.core_seconds < 153.0 + START < expected.core_seconds + expected.breaking < 2.0 * 153.0
 
 
 def test_how_far_a_part_breaks_follows_from_how_fast_it_is_stretched() -> None:
-    """The size of fragments is (24 G / (density rate^2))^(1/3): 0.58 mm at 20,000 / s."""
+    """The size of fragments by Grady's formula is (24 G / (density rate^2))^(1/3): 0.58 mm at a rate of 20,000 / s."""
     pulled = rod("parts[0].material=glass", "parts[0].fracture.model=cohesive", "parts[0].velocity=[0, 0, 0]")
     brittle = {"strength": 1e6, "energy": 8.0}
     glass = {"density": 2500.0, "elastic": {"young": 72e9, "poisson": 0.22}, "brittle": brittle}
@@ -253,7 +253,7 @@ def test_how_far_a_part_breaks_follows_from_how_fast_it_is_stretched() -> None:
 
 
 def test_dust_that_something_presses_costs_more_than_loose_dust() -> None:
-    """A glass rod flies against a wall; in the second case a traction also pushes its end."""
+    """A glass rod flies against a wall; in the second case a traction also pushes the end of the rod."""
     glass = rod("parts[0].material=soda_lime", "parts[0].fracture.model=cohesive", "contact.friction=0.1")
     driven = {"kind": "velocity", "z": -10.0, "low": [0.0, 0.0, 0.029], "high": [0.003, 0.003, 0.031]}
     pushed = {**glass, "boundaries": [*glass["boundaries"], driven]}
@@ -292,13 +292,13 @@ FLATTENED = {
     (150e6, 1, 100.0): 1.15, (150e6, 1, 300.0): 2.79, (800e6, 1, 400.0): 2.15, (150e6, 2, 200.0): 2.95,
     (800e6, 2, 200.0): 1.44, (800e6, 2, 400.0): 4.68, (150e6, 4, 300.0): 9.01, (800e6, 4, 400.0): 8.59,
 }  # fmt: skip
-"""Yield stress, length over width and speed; the value is the factor by which the mean step fell (``python -m
-tests.bench.flattening``)."""
+"""Yield stress, ratio of length to width, and speed of each bar; the value is the factor by which the mean time step
+fell (``python -m tests.bench.flattening``)."""
 
 
 @pytest.mark.parametrize(("bar", "measured"), FLATTENED.items())
 def test_bars_that_flatten_take_no_more_steps_than_expected(bar: tuple[float, int, float], measured: float) -> None:
-    """The number of steps is more than 3/8 of the estimate, because the bars may harden."""
+    """The number of steps may be as small as 3/8 of the estimate, because the bars may harden."""
     case = parse_case(flattening.data_of(*bar))
     (speed,) = impact_speeds(case)
     assert 0.99 < shrinkage(case, case.parts[0], speed) / measured < 2.7
@@ -335,7 +335,9 @@ def test_the_step_of_what_implodes_or_is_shocked_falls_as_expected(name: str, st
 
 
 def test_a_tube_under_pressure_strains_as_far_as_its_wall_has_moved() -> None:
-    """The cross section keeps its area. A pressure below the strength of the tube does not strain it."""
+    """The cross section of the tube keeps its area. A pressure below the strength of the tube does not strain the
+    tube.
+    """
     hard = next(each for each in suite() if each.name == "closing_bore")
     found = []
     for pressure, end_time in (("0.1 GPa", "10 us"), ("1.1615 GPa", "2 us"), ("6 GPa", "10 us")):

@@ -16,5 +16,5 @@ ASKED_FOR = {"density", "effective_strain", "strain_rate", "contact_pressure"}
     ],
 )  # fmt: skip
 def test_a_case_lacks_what_nothing_in_it_can_have(name: str, missing: set[str]) -> None:
-    """The case also lacks fields that are written only if run.fields requests them."""
+    """The case also lacks the fields that are written only if run.fields requests them."""
     assert lacking(read_case(shipped_path(name))) == missing | ASKED_FOR

@@ -1,4 +1,4 @@
-"""Numbers in words: one table for Python and for the page."""
+"""Numbers in words: one table of inputs and texts for Python and for the page."""
 
 import ast
 import json
@@ -28,7 +28,8 @@ def test_unknown_and_infinite_numbers_are_shown_as_symbols() -> None:
 
 
 OWN = {"studies/chart.py", "drawing/films.py"}
-"""Exceptions: coordinates in SVG, options of ffmpeg, and messages about decks, which repeat the numbers of the deck."""
+"""Exceptions from the rule: coordinates in SVG, options of ffmpeg, and messages about decks, which repeat the numbers
+of the deck."""
 
 
 def test_no_module_of_the_client_writes_numbers_on_its_own() -> None:

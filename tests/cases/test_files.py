@@ -1,4 +1,4 @@
-"""The files that a case names, and their place for a run."""
+"""The files that a case names, and the location of each file for a run."""
 
 from pathlib import Path
 from typing import Any
@@ -19,7 +19,7 @@ def case_with(**mesh: Any) -> dict[str, Any]:
 
 
 def test_every_table_below_a_mesh_that_has_a_path_names_a_file() -> None:
-    """Tables inside of other tables name files too; all keys of a table except ``path`` are ignored."""
+    """Tables inside of other tables may also name files; all keys of a table except ``path`` are ignored."""
     inner = {"shape": "union", "of": [{"path": "a.STEP", "sha256": HASH.upper()}, {"shape": "box"}, 3]}
     case = {"parts": [{"mesh": {"path": "b.k"}}, {}, None, {"mesh": inner}, {"mesh": {"path": 7}}], "path": "no"}
     found = [(file.table, file.path, file.sha256, file.copy) for file in files_of(case)]

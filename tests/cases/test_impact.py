@@ -13,7 +13,7 @@ TOUGH = {**BRITTLE, "strength": {"model": "linear_hardening", "yield_stress": 20
 
 
 def meeting(speed: float, contact: dict[str, Any] | None = None, **other: Any) -> Case:
-    """Returns a moving block of steel and a block at rest, c = 5,917 m/s."""
+    """Returns a case of a moving block of steel and a block at rest; the wave speed is 5,917 m/s."""
     cube = {"shape": "box", "low": [0, 0, 0], "high": [1e-3] * 3, "element_size": 5e-4}
     away = {**cube, "low": [0, 0, 2e-3], "high": [1e-3, 1e-3, 3e-3]}
     return parse_case(
@@ -42,13 +42,14 @@ def meeting(speed: float, contact: dict[str, Any] | None = None, **other: Any) -
     ],
 )
 def test_fast_collisions_get_more_sweeps(case: Case, least: int, most: int) -> None:
-    """The limit is a fifth of the wave speed."""
+    """The limit of the impact speed is a fifth of the wave speed."""
     assert sweeps(case) == (least, most)
 
 
 def test_parts_that_are_pressed_together_and_break_get_more_sweeps() -> None:
-    """A prescribed motion or a traction presses while it acts. Parts that cannot break, and a drive of a single
-    part, need no more sweeps."""
+    """A prescribed motion or a traction presses parts together while it acts. Parts that cannot break, and a prescribed
+    motion of a single part, need no additional sweeps.
+    """
     ram = {"kind": "velocity", "parts": ["b"], "z": -1.0}
     slow = meeting(1.0, material="glass", fracture={})
     assert [sweeps(bounded(slow, boundary)).least for boundary in (ram, {**ram, "z": 0.0})] == [40, 5]
@@ -58,7 +59,7 @@ def test_parts_that_are_pressed_together_and_break_get_more_sweeps() -> None:
 
 
 def test_a_traction_presses_what_is_at_rest() -> None:
-    """All nodes are at rest at the start, and all have a prescribed motion later."""
+    """All nodes are at rest at the start, and all nodes have a prescribed motion later."""
     rest = meeting(0.0, material="glass", fracture={})
     pushed = {"kind": "traction", "parts": ["b"], "pressure": 1e8}
     assert sweeps(bounded(rest, pushed)).least == 40
@@ -72,8 +73,9 @@ def test_bodies_are_pressed_together_at_a_tenth_of_the_speed_of_waves() -> None:
 
 
 def test_what_flows_is_pressed_where_the_impact_has_more_than_its_flow_stress() -> None:
-    """The limit for 4340 with a flow stress of 1.07 GPa at a strain of 0.1 is 53 m/s; elastic and breaking parts
-    have no such limit."""
+    """The limit of the impact speed for 4340 with a flow stress of 1.07 GPa at a strain of 0.1 is 53 m/s; elastic and
+    breaking parts have no such limit.
+    """
     assert [pressed(meeting(speed, material="steel_4340")) for speed in (52.0, 55.0)] == [[False, False], [False, True]]
     assert pressed(meeting(100.0, material="tough")) == [False, True]
     assert pressed(meeting(100.0, material="tough", fracture={})) == [False, False]
@@ -102,7 +104,9 @@ def test_a_wall_is_met_at_the_speed_of_the_part() -> None:
     ],
 )
 def test_a_driven_part_has_the_speed_of_its_drive(drive: dict[str, Any], speed: float) -> None:
-    """The prescribed motion acts on a box of a body in addition to its velocity, or on a whole body instead of it."""
+    """The prescribed motion acts on a box of a body in addition to the velocity of the body, or replaces this velocity
+    on the whole body.
+    """
     assert impact_speeds(bounded(meeting(600.0), {"kind": "velocity", **drive})) == pytest.approx([speed] * 2)
 
 

@@ -23,7 +23,7 @@ def leaves(model: BaseModel, prefix: str = "") -> Iterator[str]:
 
 @pytest.mark.parametrize("name", NAMES)
 def test_every_number_has_a_confidence_and_a_source(name: str) -> None:
-    """Numbers that the schema fills in by default would have no source; therefore the library gives all numbers."""
+    """Constants that the schema fills in by default would have no source; therefore the library gives all constants."""
     known = provenance(name)
     assert set(known) == set(leaves(library()[name]))
     assert {confidence for confidence, _ in known.values()} <= set(CONFIDENCES)
@@ -50,7 +50,7 @@ def test_the_paper_gives_all_of_its_metals_but_a_and_the_thermal_constants() -> 
 
 
 def flow_stress(law: JohnsonCook, strain: float, rate: float) -> float:
-    """Returns the flow stress at the reference temperature, Pa."""
+    """Returns the flow stress of a material at the reference temperature, Pa."""
     return float((law.A + law.B * strain**law.n) * (1.0 + law.C * math.log(rate / law.reference_rate)))
 
 
@@ -85,8 +85,9 @@ def test_the_derived_elastic_constants(name: str, bulk: float, shear: float) -> 
 
 @pytest.mark.parametrize("name", NAMES)
 def test_the_constants_make_a_solid(name: str) -> None:
-    """Wave speeds are those of solids (boron carbide: 14 km/s); the bulk modulus of an equation of state is near the
-    elastic one."""
+    """Wave speeds of the library are those of solids (boron carbide: 14 km/s); the bulk modulus of an equation of state
+    is near the elastic bulk modulus.
+    """
     made: Material = library()[name]
     bulk = made.elastic.young / (3 * (1 - 2 * made.elastic.poisson))
     shear = made.elastic.young / (2 * (1 + made.elastic.poisson))
@@ -96,8 +97,9 @@ def test_the_constants_make_a_solid(name: str) -> None:
 
 
 def test_the_glass_has_the_strengths_that_it_was_derived_from() -> None:
-    """The strengths are 1 GPa in compression, 0.1 GPa in tension, and the cap at a Hugoniot elastic limit of 5 GPa,
-    to three digits."""
+    """To three digits, the strength is 1 GPa in compression and 0.1 GPa in tension, and the cap corresponds to a
+    Hugoniot elastic limit of 5 GPa.
+    """
     made, law = library()["soda_lime_mohr_coulomb"], library()["soda_lime_mohr_coulomb"].strength
     assert isinstance(law, MohrCoulomb)
     cohesion, sine = 2.0 * law.cohesion * math.cos(law.friction_angle), math.sin(law.friction_angle)

@@ -1,4 +1,4 @@
-"""Reading of cases: all errors are reported at once, each in one line with the key that the user wrote."""
+"""Reading of cases: all errors are reported at once, each error in one line with the key that the user wrote."""
 
 import json
 import os

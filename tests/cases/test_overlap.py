@@ -18,13 +18,13 @@ TUBE = {"shape": "tube", "inner_radius": 2e-3, "radius": 4e-3, "length": 8e-3, "
 
 
 def scene(one: dict[str, Any], other: dict[str, Any], **more: Any) -> dict[str, Any]:
-    """Returns two parts of steel."""
+    """Returns a case of two parts of steel."""
     parts = [{"name": name, "material": "steel", "mesh": mesh} for name, mesh in (("one", one), ("other", other))]
     return {"name": "two", "run": {"end_time": "1 us"}, "parts": parts, **more}
 
 
 def warned(data: dict[str, Any]) -> list[str]:
-    """Returns the problems of overlap."""
+    """Returns the problems of a case that are about overlap."""
     try:
         parse_case(data)
     except CaseError as error:
@@ -50,8 +50,9 @@ def test_bodies_that_overlap(one: dict[str, Any], other: dict[str, Any], depth: 
 
 
 def test_tied_bodies_may_overlap_by_the_gap_of_their_bond() -> None:
-    """The default gap is 0.1 mm for facets of 1 mm. A rod that fills a tube and is bonded to it gives no warning
-    about contact."""
+    """The default gap of the bond is 0.1 mm for facets of 1 mm. A rod that fills a tube and is bonded to the tube gives
+    no warning about contact.
+    """
     upper = {**BLOCK, "low": [-5e-3, -5e-3, -5e-5], "high": [5e-3, 5e-3, 4e-3]}
     bond = {"parts": ["other", "one"], "kind": "tied"}
     assert len(warned(scene(BLOCK, upper))) == 1
@@ -81,7 +82,9 @@ def test_tied_bodies_may_overlap_by_the_gap_of_their_bond() -> None:
     ],
 )
 def test_bodies_that_touch_or_are_cut_away_do_not(one: dict[str, Any], other: dict[str, Any]) -> None:
-    """Facets of 1 mm may cut off 0.06 mm of the tube and of a rod that is 0.04 mm too wide: the worker decides."""
+    """Facets of 1 mm may cut off 0.06 mm of the tube and of a rod that is 0.04 mm too wide; therefore only the worker
+    can decide about the overlap.
+    """
     assert warned(scene(one, other)) == []
 
 
@@ -95,7 +98,7 @@ def test_turned_bodies_are_where_they_are_turned_to() -> None:
 
 @pytest.mark.parametrize("angle", [30, 45, 60, 90, 120, 150])
 def test_turned_bodies_that_touch_do_not(angle: int) -> None:
-    """At 30 degrees the tested points lie on the common face up to rounding."""
+    """At 30 degrees the tested points lie on the common face up to rounding errors."""
     turn = {"axis": "z", "angle": f"{angle} deg", "centre": ["0.7 mm", "0.3 mm", "0.1 mm"]}
     block = {**BLOCK, "low": [0, 0, 0], "high": [2e-3, 2e-3, 2e-3]}
     data = scene(block, {**block, "low": [2e-3, 0, 0], "high": [4e-3, 2e-3, 2e-3]})
@@ -147,7 +150,7 @@ def test_problems_of_the_reader_are_refused_by_the_worker_too() -> None:
 
 
 def test_many_bodies_cost_little_time() -> None:
-    """Two hundred tubes are inside of each other: of 20,000 pairs only the first are tested."""
+    """Two hundred tubes are inside of each other: of 20,000 pairs of tubes only the first pairs are tested."""
     shells = [{**TUBE, "inner_radius": 1e-3 * k + 1e-3, "radius": 1e-3 * k + 2e-3} for k in range(200)]
     parts = [{"name": f"shell_{k}", "material": "steel", "mesh": shell} for k, shell in enumerate(shells)]
     assert warned({"name": "shells", "run": {"end_time": "1 us"}, "parts": parts}) == []
@@ -168,7 +171,7 @@ def test_many_bodies_cost_little_time() -> None:
     ],
 )
 def test_a_rod_that_fills_a_tube_gets_a_warning(one: dict[str, Any], other: dict[str, Any], close: bool) -> None:
-    """Facets cut 0.06 mm off the tube at its hole."""
+    """Facets cut 0.06 mm off the hole of the tube."""
     data = scene(one, other, contact={})
     case = parse_case(data)
     found = [str(doubt) for doubt in grazes(case)]

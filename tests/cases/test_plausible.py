@@ -1,5 +1,6 @@
-"""Warnings about probable errors of units: bare numbers, unusual constants, speeds, sizes and places; shipped cases
-have no such warning."""
+"""Warnings about probable errors of units: bare numbers, unusual constants, speeds, sizes and positions; shipped cases
+have no such warning.
+"""
 
 import math
 import time
@@ -39,7 +40,7 @@ element_size = "1 mm"
 
 
 def warnings_of(data: dict[str, Any]) -> dict[str, str]:
-    """Returns the warnings, by key."""
+    """Returns the warnings of a case, by key."""
     case = parse_case(data)
     odd = doubts(data, case, estimate(case))
     assert len({each.key for each in odd}) == len(odd)
@@ -47,7 +48,7 @@ def warnings_of(data: dict[str, Any]) -> dict[str, str]:
 
 
 def target(**changes: Any) -> dict[str, Any]:
-    """Returns the ball and the plate; arguments such as ``plate__mesh`` replace keys below ``plate``."""
+    """Returns the case of a ball and a plate; arguments such as ``plate__mesh`` replace keys below ``plate``."""
     data = toml_data(TARGET)
     for key, value in changes.items():
         part, _, table = key.partition("__")
@@ -57,11 +58,11 @@ def target(**changes: Any) -> dict[str, Any]:
 
 
 LINEAR = {"fast_fragment": [0, 1], "long_rod": [0, 1]}
-"""Parts of shipped cases that are hit fast without an equation of state: one case tests contact only, and the paper
-of the other has no equation of state.
-"""
+"""Shipped cases with parts that are hit fast without an equation of state: one case tests contact only, and the source
+of the other case has no equation of state."""
 CRUSHED = {"glass_ball_cohesive", "glass_steel_bar", "glass_steel_demo"}
-"""Shipped cases whose glass may be compressed beyond Griffith's criterion: in the paper it breaks in tension only."""
+"""Shipped cases whose glass may be compressed beyond Griffith's criterion: in the source of the case the glass breaks
+in tension only."""
 
 
 @pytest.mark.parametrize("name", sorted(shipped()))
@@ -210,8 +211,8 @@ def test_keys_without_effect_are_reported() -> None:
 
 
 def test_what_others_may_send_on_its_way_is_not_odd() -> None:
-    """A ball flies away from the plate, and a second body beside the ball hits the plate: fragments may reach the
-    ball, but not if it is a metre away.
+    """A ball flies away from the plate, and a second body beside the ball hits the plate: fragments may reach the ball,
+    but not if the ball is a metre away.
     """
     data = target(ball={"velocity": [0, 0, "5 m/s"]})
     assert "'ball' meets nothing at all" in warnings_of(data)["parts[0].velocity"]
@@ -230,8 +231,9 @@ EOS = {"model": "mie_gruneisen", "c0": "4600 m/s", "S": 1.49, "gamma0": 2}
     [(570.0, {}, None), (600.0, {}, "7 %"), (4000.0, {}, "33 %"), (4000.0, {"eos": EOS}, None)],
 )
 def test_an_impact_beyond_a_linear_pressure_is_reported(speed: float, more: dict[str, Any], low: str | None) -> None:
-    """Steel has plane waves of 5,856 m/s and c0 = 4,607 m/s: the error is (1.5 - 1/4) u / (c0 + 1.5 u), with u half
-    of the speed."""
+    """Steel has plane waves of 5,856 m/s and c0 = 4,607 m/s: the relative error of the pressure is (1.5 - 1/4) u / (c0
+    + 1.5 u), with u half of the speed.
+    """
     own = {"density": "7850 kg/m^3", "elastic": {"young": "200 GPa", "poisson": 0.3}} | more
     motion = {"material": "own", "velocity": [0, 0, f"-{speed} m/s"]}
     found = warnings_of({**target(ball=motion, plate={"material": "own"}), "materials": {"own": own}})
@@ -270,8 +272,9 @@ def warned(*boundaries: dict[str, Any]) -> dict[str, str]:
     ],
 )
 def test_a_drive_into_a_wall_is_reported(drive: dict[str, Any], depth: str) -> None:
-    """The ball moves along z. The wall does not act on it, because its x is prescribed: its lowest point moves from
-    1 mm to -4 mm."""
+    """The ball moves along z. The wall does not act on the ball, because the x motion of the ball is prescribed: its
+    lowest point moves from 1 mm to -4 mm.
+    """
     part = drive["parts"][0]
     floor = FLOOR if part == "plate" else {**FLOOR, "point": [0, 0, "-3.5 mm"], "parts": ["ball"]}
     found = warned(floor, drive)["boundaries[1]"]
@@ -294,7 +297,9 @@ def test_a_drive_that_stays_before_a_wall_gets_no_warning(drive: dict[str, Any])
 
 
 def test_many_drives_of_many_bodies_cost_little_time() -> None:
-    """Two hundred plates have as many prescribed motions each: of 40,000 driven bodies only the first are tested."""
+    """Two hundred plates have two hundred prescribed motions each: of 40,000 driven bodies only the first bodies are
+    tested.
+    """
     data = target()
     plate = data["parts"][1]
     bases = [[0, 0, f"{-10 * k - 5} mm"] for k in range(200)]
@@ -352,8 +357,9 @@ def test_mass_momentum_and_energy_of_a_part() -> None:
 
 
 def test_a_body_that_spins_stretches_and_is_turned() -> None:
-    """A bar of 2 x 4 x 20 mm is turned from z to x: the energies are I w^2 / 2 with I = m (b^2 + c^2) / 12, and m
-    k^2 a^2 / 24."""
+    """A bar of 2 x 4 x 20 mm is turned from z to x: the energies of spin and stretch are I w^2 / 2 with I = m (b^2 +
+    c^2) / 12, and m k^2 a^2 / 24.
+    """
     bar = {
         "shape": "box",
         "low": ["-1 mm", "-2 mm", "-10 mm"],
@@ -401,7 +407,7 @@ def test_a_plane_of_symmetry_through_a_body_is_reported() -> None:
 
 @pytest.mark.parametrize(("side", "warned"), [(0.0, True), (0.3, True), (1.0, False)])
 def test_a_probe_box_smaller_than_a_tet_is_reported(side: float, warned: bool) -> None:
-    """A tet of 1 mm has a volume of some 0.12 mm^3."""
+    """A tet with an edge of 1 mm has a volume of some 0.12 mm^3."""
     box = {"low": [0, 0, "-3 mm"], "high": [f"{side} mm", f"{side} mm", f"{side - 3.0} mm"]}
     probe = {"name": "p", "part": "plate", "field": "pressure", **box}
     odd = warnings_of({**target(), "probes": [probe]})
@@ -419,7 +425,9 @@ def test_a_probe_box_smaller_than_a_tet_is_reported(side: float, warned: bool) -
     ids=["elastic", "nodal", "flows"],
 )  # fmt: skip
 def test_the_form_split_is_named_where_a_part_may_stay_elastic(changes: dict[str, Any], named: bool) -> None:
-    """``split`` damps elastic motion; tests/verification/test_pressure_modes.py measures this."""
+    """The pressure form ``split`` damps elastic motion; tests/verification/test_pressure_modes.py measures the
+    damping.
+    """
     data = target() | {"numerics": changes["numerics"]}
     for part in data["parts"]:
         part["material"] = changes.get("material", part["material"])

@@ -1,4 +1,4 @@
-"""The reference of keys: complete, generated from the models, and consistent with the reader."""
+"""The reference of keys of a case: complete, generated from the models, and consistent with the reader of cases."""
 
 import json
 import re
@@ -23,7 +23,7 @@ CHECK = jsonschema.Draft202012Validator(SCHEMA)
 
 
 def keys(schema: dict[str, Any]) -> Iterator[tuple[str, dict[str, Any]]]:
-    """Returns every key of every table, with its schema."""
+    """Returns every key of every table of a case, with the schema of the key."""
     for name, table in {"Case": schema, **schema["$defs"]}.items():
         for key, each in table.get("properties", {}).items():
             yield f"{name}.{key}", each
@@ -44,7 +44,7 @@ def test_every_key_has_a_text(name: str) -> None:
 
 
 def test_every_table_and_key_stands_on_the_page() -> None:
-    """A key is below the heading of its table, or in the list of variants if another table has the same keys."""
+    """Each key is below the heading of its table, or in the list of variants if another table has the same keys."""
     text = page.page()
     for table in tables(SCHEMA):
         chapter = text.partition(f"### `{table.path}`\n" if table.path else "## The case\n")[2].partition("\n### ")[0]
@@ -94,8 +94,9 @@ def test_a_row_has_unit_range_default_and_meaning(section: str, row: str) -> Non
 
 
 def with_example(example: str) -> dict[str, Any]:
-    """Returns the smallest case with an example: keys of an existing part are replaced, entries of other lists are
-    added."""
+    """Returns the smallest case with an example added: keys of an existing part are replaced, entries of other lists
+    are added.
+    """
     data, piece = toml_data(SMALLEST), toml_data(example)
     parts = {part["name"]: part for part in data["parts"]}
     for part in piece.pop("parts", []):

@@ -1,4 +1,4 @@
-"""Keys of rigid parts and of walls: errors in one line, and suggestions of rigid parts."""
+"""Keys of rigid parts and of walls: errors in one line, and suggestions to make a part rigid."""
 
 from dataclasses import replace
 from typing import Any
@@ -19,7 +19,7 @@ WALL = "boundaries=[{kind='wall', point=[0, 0, '-9 mm'], normal=[0, 0, 1]}]"
 
 
 def scene(*overrides: str) -> dict[str, Any]:
-    """Returns a rigid ball above a pad of rubber, as plain data."""
+    """Returns a case of a rigid ball above a pad of rubber, as plain data."""
     parts = [
         {"name": "ball", "material": "steel", "mesh": BALL, "rigid": True, "velocity": [0, 0, "-5 m/s"]},
         {"name": "pad", "material": "rubber", "mesh": PAD},
@@ -30,7 +30,7 @@ def scene(*overrides: str) -> dict[str, Any]:
 
 
 def test_a_given_mass_is_the_reported_mass() -> None:
-    """The printed momentum and energy are those of the given mass."""
+    """The printed momentum and energy are computed with the given mass."""
     case = parse_case(scene("parts[0].rigid={mass='2 kg'}"))
     found = bulk(case.parts[0], case.parts[0].mesh, 7850.0)  # type: ignore[arg-type]
     assert (found.mass, found.momentum, found.energy) == (2.0, (0.0, 0.0, -10.0), 25.0)
@@ -93,7 +93,9 @@ def test_a_slip_is_one_line(override: str, line: str) -> None:
 
 
 def test_a_plate_and_its_turned_tensor_are_bodies() -> None:
-    """A moment may be equal to the sum of the other two, and a tensor may have products of inertia."""
+    """A moment of inertia may be equal to the sum of the other two, and an inertia tensor may have products of
+    inertia.
+    """
     for six in ("1, 1, 2, 0, 0, 0", "1.5, 1.5, 1, 0, 0, 0.5"):
         assert parse_case(scene(INERTIA.format(six))).parts[0].rigid is not None
     assert parse_case(scene("parts[0].rigid=false")).parts[0].rigid is None
@@ -108,7 +110,9 @@ def test_a_rigid_part_costs_no_tets_and_no_steps_before_a_run() -> None:
 
 
 def test_a_stiff_part_could_be_rigid() -> None:
-    """Steel on rubber gives a suggestion; steel on steel and rigid parts give none."""
+    """Steel on rubber gives the suggestion to make the steel rigid; steel on steel and rigid parts give no
+    suggestion.
+    """
 
     def warned(*overrides: str) -> list[str]:
         case = parse_case(scene(*overrides))

@@ -21,7 +21,7 @@ SECTORS = ("full", "half", "quarter")
 
 
 def scene(**mesh: Any) -> dict[str, Any]:
-    """Returns a case of one body."""
+    """Returns a case of one body with the given shape."""
     return {
         "name": "one",
         "parts": [{"name": "body", "material": "steel", "mesh": {key: v for key, v in mesh.items() if v is not None}}],
@@ -31,8 +31,9 @@ def scene(**mesh: Any) -> dict[str, Any]:
 
 @pytest.mark.parametrize("crh", [0.5, 1.5, 3.0, 8.0])
 def test_a_tangent_ogive_is_that_of_the_textbook(crh: float) -> None:
-    """Length D sqrt(crh - 1/4) and radius sqrt(rho^2 - z^2) - (rho - R), rho = D crh (Carlucci and Jacobson,
-    Ballistics, chapter 8); a nose of this length has this crh."""
+    """The nose has the length D sqrt(crh - 1/4) and the radius sqrt(rho^2 - z^2) - (rho - R), rho = D crh (Carlucci and
+    Jacobson, Ballistics, chapter 8); a nose of this length has this crh.
+    """
     radius, rho = 0.5, crh
     body = revolved("tangent", radius=radius, crh=crh, shank=0.0)
     outline, length = profile(body), math.sqrt(crh - 0.25)
@@ -44,7 +45,7 @@ def test_a_tangent_ogive_is_that_of_the_textbook(crh: float) -> None:
 
 
 def test_a_secant_ogive_passes_through_base_and_tip_with_its_radius() -> None:
-    """Three points of the outline lie on a circle of the radius D crh; at the base it has an edge inwards."""
+    """Three points of the outline lie on a circle of the radius D crh; at its base the nose has an edge inwards."""
     body = revolved("secant", pointing="high")
     outline, points = profile(body), [0.0, 0.4, 0.9]
     (x1, y1), (x2, y2), (x3, y3) = [(z, outline.at(z)) for z in points]
@@ -87,8 +88,9 @@ def test_volume_and_area_of_a_revolved_body_are_its_integrals(name: str) -> None
 @pytest.mark.parametrize("sector", SECTORS)
 @pytest.mark.parametrize("name", SHAPES)
 def test_formulas_of_a_shape_agree_with_its_mesh(name: str, sector: str) -> None:
-    """The reference of the volume are random points inside of the body; the references of area and extent are the
-    patches of its surfaces."""
+    """The reference of the volume is the fraction of random points inside of the body; the references of area and
+    extent are the patches of its surfaces.
+    """
     body, chance = shape(name, sector=sector), random.Random(1)
     low, high = bounds(body) or ((), ())
     box, many = math.prod(b - a for a, b in zip(low, high, strict=True)), 4_000
@@ -107,7 +109,7 @@ def test_formulas_of_a_shape_agree_with_its_mesh(name: str, sector: str) -> None
 
 
 def _area(body: Any, n: int = 40) -> float:
-    """Returns the area of all patches of the surfaces, each with two triangles."""
+    """Returns the sum of the areas of all patches of the surfaces; a patch consists of two triangles."""
     total = 0.0
     for at, _, _ in sheets(body):
         x = np.array([[at(i / n, j / n) for j in range(n + 1)] for i in range(n + 1)])

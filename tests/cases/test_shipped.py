@@ -1,4 +1,4 @@
-"""The shipped cases: valid, and every derived reference value computed again from its formula."""
+"""The shipped cases are valid, and every derived reference value is computed again from its formula."""
 
 import math
 from collections.abc import Callable
@@ -19,7 +19,7 @@ from .one_dimension import broken_rod
 
 NAMES = sorted(shipped())
 OF_FILES = ["imported_taylor"]
-"""Cases whose mesh is read from a file, which the contract does not open."""
+"""Shipped cases whose mesh is read from a file, which the package cases does not open."""
 TAYLOR = ["demo", "taylor_42crmo4", "taylor_copper", "taylor_copper_split"]
 
 
@@ -28,7 +28,7 @@ def load(name: str) -> Case:
 
 
 def reference(name: str, quantity: str) -> Reference:
-    """Returns the reference of a case by its quantity or its probe."""
+    """Returns the reference of a case by its quantity, or by the probe of the reference."""
     found = [entry for entry in load(name).reference if quantity in (entry.probe, entry.quantity)]
     assert len(found) == 1
     return found[0]
@@ -134,8 +134,9 @@ def test_dissimilar_bars() -> None:
 
 
 def test_bonded_tile() -> None:
-    """While the mean is taken, only the incident pulse passes the probes; its reflection at the free end then breaks
-    the bond."""
+    """While the mean is taken, only the incident pulse passes the probes; the reflection of the pulse at the free end
+    then breaks the bond.
+    """
     moduli = [young * (1 - nu) / ((1 + nu) * (1 - 2 * nu)) for young, nu in ((370e9, 0.22), (73e9, 0.33))]
     (c1, c2), (z1, z2) = zip(
         *((math.sqrt(m / rho), math.sqrt(m * rho)) for m, rho in zip(moduli, (3900.0, 2770.0), strict=True)),
@@ -216,7 +217,9 @@ def test_sliding_block() -> None:
 
 
 class Copper:
-    """Copper of the benchmark: stress linear in logarithmic strain, J2 plasticity with linear hardening."""
+    """Returns the material of the benchmark, copper: stress linear in logarithmic strain, J2 plasticity with linear
+    hardening.
+    """
 
     density, young, poisson, yielding = 8930.0, 117e9, 0.35, 0.4e9
     bulk = young / (3 * (1 - 2 * poisson))
@@ -231,7 +234,7 @@ def jump(density: float, stress: tuple[float, float], stretch: tuple[float, floa
 
 
 def solve(f: Callable[[float], float], low: float, high: float) -> float:
-    """Returns the root of a rising function by bisection."""
+    """Returns the root of a rising function, found by bisection."""
     for _ in range(200):
         middle = 0.5 * (low + high)
         low, high = (low, middle) if f(middle) > 0 else (middle, high)
@@ -276,8 +279,9 @@ def test_plastic_bar_wave() -> None:
         return Copper.young * e if e <= at_yield else Copper.yielding + tangent * (e - at_yield)
 
     def force(e: float) -> float:
-        """Returns the force over the initial area: the section grows by 2 nu of the elastic strain and by the whole
-        plastic strain."""
+        """Returns the force divided by the initial area: the cross section grows by 2 nu times the elastic strain, and
+        by the whole plastic strain.
+        """
         elastic = stress(e) / Copper.young
         return stress(e) * math.exp(2 * Copper.poisson * elastic + (e - elastic))
 
@@ -299,8 +303,9 @@ def test_plastic_bar_wave() -> None:
 
 
 def test_triaxial_glass() -> None:
-    """The strength follows from Mohr's circles and is below the cap; the tolerance is the effect of the tolerance of
-    the lateral pressure."""
+    """The strength follows from Mohr's circles and is below the cap; the tolerance of the strength is the effect of the
+    tolerance of the lateral pressure.
+    """
     law = library()["soda_lime_mohr_coulomb"].strength
     assert isinstance(law, MohrCoulomb)
     sides = -reference("triaxial_glass", "lateral").value
@@ -342,8 +347,9 @@ def test_shocks(name: str, density: float, c0: float, slope: float, speed: float
 
 
 def test_two_tets_pass_on_a_third_of_their_stress() -> None:
-    """The force is F = 1/3 A traction(stress). Its peak is reached when F / A is the strength, and the area under F
-    is energy times A, both along the line."""
+    """The force is F = 1/3 A traction(stress). The force reaches its peak when F / A is the strength, and the area
+    under F is energy times A, both along the line.
+    """
     case = load("two_tets")
     soft, pair = case.materials["soft"], case.parts[0].mesh
     law = soft.brittle
@@ -366,8 +372,9 @@ def test_two_tets_pass_on_a_third_of_their_stress() -> None:
 
 
 def test_the_breathing_facet_breaks_and_holds() -> None:
-    """The initial velocities give more energy than the facet needs to reach its strength, and a quarter of the
-    energy to open the facet."""
+    """The initial velocities give more energy than the facet needs to reach its strength, and a quarter of the energy
+    that would open the facet completely.
+    """
     case = load("breathing_facet")
     made, pair, stretch = case.materials["metal"], case.parts[0].mesh, case.parts[0].stretch
     assert isinstance(pair, TwoTets)
@@ -406,8 +413,9 @@ def test_spall_glass() -> None:
 
 
 def test_a_spall_of_eighty_layers_in_one_dimension() -> None:
-    """The velocity of the rear face falls by the pull-back, reduced by the mesh, at the theoretical time; without
-    fracture it does not."""
+    """The velocity of the rear face falls by the pull-back velocity, reduced by the mesh, at the theoretical time;
+    without fracture the velocity does not fall.
+    """
     glass, flyer, layers = library()["soda_lime"], 5e-3, 80
     assert glass.brittle is not None
     c, h, v = wave_speed(glass), flyer / layers, np.zeros((3 * layers, 2))
@@ -424,8 +432,9 @@ def test_a_spall_of_eighty_layers_in_one_dimension() -> None:
 
 
 def test_the_stretched_bar_in_one_dimension() -> None:
-    """With the element size of the case the peak of the mean stress agrees, and the number of fragments is at least
-    four fifths of the 40 of the formula."""
+    """With the element size of the case the peak of the mean stress agrees with the model, and the number of fragments
+    is at least four fifths of the 40 of the formula.
+    """
     case = load("stretched_bar")
     made, n, rate = case.materials["ceramic"], 200, 35700.0
     assert made.brittle is not None
@@ -551,8 +560,9 @@ def cavity_resistance(name: str) -> float:
 
 
 def alekseevskii_tate(speed: float, strength: float, resistance: float, until: float = math.inf) -> float:
-    """Returns the depth, m, of the hole that the long rod makes in steel until a time, s, or while it moves and
-    erodes; stresses in Pa."""
+    """Returns the depth, m, of the hole that the long rod makes in steel until a given time, s, or while the rod moves
+    and erodes; stresses in Pa.
+    """
     rod, target = library()["wha"].density, library()["mild_steel"].density
     length, depth, t, dt = 0.075, 0.0, 0.0, 1e-8
     while t < until and length > 1e-5:
@@ -586,7 +596,7 @@ def test_the_depth_of_the_long_rod_is_that_of_a_rod_which_erodes() -> None:
 def test_what_the_theory_gives_beside_the_long_rod(
     strength: float, resistance: float, depths: tuple[float, ...]
 ) -> None:
-    """The numbers are those of docs/verification/long_rod.md, mm."""
+    """The reference numbers are those of docs/verification/long_rod.md, mm."""
     found = [1e3 * alekseevskii_tate(speed, strength, resistance) for speed in (1057.0, 1301.0, 1566.4)]
     assert found == pytest.approx(depths, abs=0.2)
 

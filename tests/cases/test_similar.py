@@ -1,4 +1,4 @@
-"""Suggestions of similar names in the error of every choice from a list."""
+"""Suggestions of similar names in the error message of every choice from a list."""
 
 from typing import Any
 

@@ -1,4 +1,4 @@
-"""Stages that a case has or lacks, and the distribution of its cost over them."""
+"""Stages that a case has or lacks, and the distribution of the core time of a case over its stages."""
 
 import pytest
 

@@ -1,4 +1,4 @@
-"""Quantities: the closed grammar, SI values, and one clear line for everything else."""
+"""Quantities as text: the closed grammar, SI values, and one clear line for every invalid text."""
 
 import math
 from fractions import Fraction

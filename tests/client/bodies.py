@@ -14,7 +14,7 @@ RADIUS, LENGTH = 3.2e-3, 32.4e-3
 
 
 def quarter_bar(across: int = 4, along: int = 16) -> tuple[Any, Any]:
-    """Returns points (n, 3) and tets (m, 4) of a quarter of a square bar, x and y from 0."""
+    """Returns points (n, 3) and tets (m, 4) of a quarter of a square bar; x and y of the points begin at 0."""
     axes = [np.linspace(0, RADIUS, across + 1)] * 2 + [np.linspace(0, LENGTH, along + 1)]
     points = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
     number = np.arange(len(points)).reshape(across + 1, across + 1, along + 1)
@@ -31,7 +31,7 @@ def quarter_bar(across: int = 4, along: int = 16) -> tuple[Any, Any]:
 
 
 def write_frame(path: Path, t: float = 80e-6, leave_out: tuple[str, ...] = ()) -> None:
-    """Writes a frame of the quarter bar with a spread foot, and all fields except those of ``leave_out``."""
+    """Writes a frame of the quarter bar with a widened foot, and all fields except the fields in ``leave_out``."""
     points, tets = quarter_bar()
     z = points[:, 2:] / LENGTH
     moved = points * np.concatenate([1 + 0.9 * np.exp(-7 * z), 1 + 0.9 * np.exp(-7 * z), 1 - 0.18 + 0 * z], axis=1)
@@ -60,7 +60,7 @@ def write_frame(path: Path, t: float = 80e-6, leave_out: tuple[str, ...] = ()) -
 
 
 def write_fragments(folder: Path, index: int, masses: list[float], t: float = 80e-6) -> None:
-    """Writes a table of fragments of these masses, kg; each fragment has ten tets per gram."""
+    """Writes a table of fragments with the given masses, kg; each fragment has ten tets per gram."""
     path = fragments.path(folder, index)
     path.parent.mkdir(parents=True, exist_ok=True)
     rows = []
@@ -76,8 +76,8 @@ LINE = dict.fromkeys(history.COLUMNS, "0.0") | {"limiter": "stability: tet 3 of 
 
 
 def write_history(folder: Path, **columns: list[float]) -> None:
-    """Writes a history with these columns and 0 in the others. Units are those of a worker; further columns have
-    m/s.
+    """Writes a history.csv with the given columns; all other columns are 0. The columns have the units that a worker
+    writes; additional columns have m/s.
     """
     names = {**history.COLUMNS, **{name: "m/s" for name in columns if name not in history.COLUMNS}}
     lines = [",".join(history.header(names))]
@@ -88,7 +88,7 @@ def write_history(folder: Path, **columns: list[float]) -> None:
 
 
 def write_run(folder: Path) -> Path:
-    """Writes a finished run: outcome, history, resolved case, two frames and their series."""
+    """Writes the folder of a finished run: outcome, history, resolved case, two frames and the list of frames."""
     times = {"000000.vtkhdf": 0.0, "000007.vtkhdf": 80e-6}
     for name, t in times.items():
         write_frame(folder / "frames" / name, t)

@@ -1,4 +1,4 @@
-"""A Zenoh router in this process, and a server in a process of its own whose worker computes nothing."""
+"""A Zenoh router in this process, and a server in a separate process whose worker computes nothing."""
 
 import json
 from collections.abc import Callable, Iterator
@@ -38,20 +38,20 @@ def broker(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Broker]:
 
 @pytest.fixture(scope="session")
 def one_child() -> Iterator[Callable[[Picture], Ended]]:
-    """Child process that starts when the first picture is drawn."""
+    """Child process that draws pictures; it starts when the first picture is drawn."""
     with studio() as draw:
         yield draw
 
 
 @pytest.fixture
 def warm(one_child: Callable[[Picture], Ended], monkeypatch: pytest.MonkeyPatch) -> None:
-    """Draws all pictures in one child process; otherwise each picture starts a process."""
+    """Draws all pictures of the tests in one child process, instead of one process for each picture."""
     monkeypatch.setattr(renderer, "child", one_child)
 
 
 @pytest.fixture
 def quiet_home(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """An empty working folder, no configuration file, and an environment without a server."""
+    """A test environment: an empty working folder, no configuration file, and no address of a server."""
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path / "config"))
     for name in ("CONOID_URL", "CONOID_TOKEN"):
@@ -61,7 +61,7 @@ def quiet_home(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 @pytest.fixture(scope="module")
 def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[LocalServer]:
-    """A real server in a process of its own with the fake worker."""
+    """A real server in a separate process with the fake worker."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("CONOID_WORKER", FAKE_WORKER)
         with LocalServer(tmp_path_factory.mktemp("server") / "runs", slots=4) as running:

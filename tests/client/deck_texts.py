@@ -15,21 +15,21 @@ DECKS = (
 
 
 def row(*values: object) -> str:
-    """Returns a card of LS-DYNA with fields of 10 columns."""
+    """Returns a card of an LS-DYNA deck with fields of 10 columns."""
     return "".join(f"{value:>10}" for value in values)
 
 
 STEEL = ("*MAT_ELASTIC", row(1, "7.85E-9", 210000.0, 0.3))
-"""Steel, in mm, t, s."""
+"""Elastic steel as a card of LS-DYNA, in mm, t, s."""
 
 
 def r20(*values: object) -> str:
-    """Returns a line of Radioss with fields of 20 columns."""
+    """Returns a line of a Radioss deck with fields of 20 columns."""
     return "".join(f"{value:>20}" for value in values)
 
 
 def lsdyna(*keywords: str, mid: int = 1, eos: int = 0) -> str:
-    """Returns a deck with one tet of the material ``mid``."""
+    """Returns an LS-DYNA deck with one tet of the material ``mid``."""
     nodes = "\n".join(f"{i:8}{x:16.3f}{y:16.3f}{z:16.3f}" for i, (x, y, z) in enumerate(_CORNERS, 1))
     return "\n".join((
         "*KEYWORD", "*CONTROL_TERMINATION", row(0.01), "*PART", "body", row(1, 1, mid, eos), "*SECTION_SOLID",
@@ -39,7 +39,7 @@ def lsdyna(*keywords: str, mid: int = 1, eos: int = 0) -> str:
 
 
 def abaqus(material: str, step: str = "", model: str = "", dynamic: str = "*Dynamic, Explicit") -> str:
-    """Returns an input file with one tet of the material ``M``."""
+    """Returns an Abaqus input file with one tet of the material ``M``."""
     nodes = "\n".join(f"{i}, {x}, {y}, {z}" for i, (x, y, z) in enumerate(_CORNERS, 1))
     return (
         f"*Heading\nbody\n*Node, nset=all\n{nodes}\n*Element, type=C3D4, elset=body\n1, 1, 2, 3, 4\n"
@@ -49,7 +49,7 @@ def abaqus(material: str, step: str = "", model: str = "", dynamic: str = "*Dyna
 
 
 def radioss(*options: str) -> str:
-    """Returns a starter with one tet of the material 1, in mm, Mg, s."""
+    """Returns a Radioss starter deck with one tet of the material 1, in mm, Mg, s."""
     nodes = "\n".join(f"{i:10}{x:20.3f}{y:20.3f}{z:20.3f}" for i, (x, y, z) in enumerate(_CORNERS, 1))
     units = r20("Mg", "mm", "s")
     return "\n".join((
@@ -62,13 +62,13 @@ _CORNERS = ((0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 
 
 def read(folder: Path, name: str, text: str, units: str | None = "mm,t,s") -> Imported:
-    """Imports the deck as a case."""
+    """Imports a deck as a case."""
     (folder / name).write_text(text, encoding="utf-8")
     return read_deck(folder / name, units)
 
 
 def material(found: Imported) -> Material:
-    """Returns the only material of the case, parsed."""
+    """Returns the only material of the case as a model."""
     (made,) = found.data["materials"].values()
     return Material.model_validate(bare(made))
 
@@ -86,4 +86,4 @@ INSTANCES = (
     "*Material, name=M\n*Density\n7.85e-9,\n"
     "*Elastic\n2.1e5, 0.3\n*Step\n*Dynamic, Explicit\n, 1e-5\n*End Step\n"
 )
-"""Two instances of a part of one tet, with a place for sets of the assembly."""
+"""Abaqus input file with two instances of a part of one tet, and a place for sets of the assembly."""

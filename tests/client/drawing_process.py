@@ -11,7 +11,7 @@ from conoid.client.drawing.picture import Picture
 from conoid.client.drawing.renderer import _environment
 
 Ended = tuple[int, bytes, str]
-"""Exit code, last line of the output, and standard error."""
+"""Result of a drawing: exit code, last line of the output, and standard error."""
 
 _LOOP = """
 import sys
@@ -24,7 +24,7 @@ for line in sys.stdin.buffer:
 
 @contextmanager
 def studio() -> Iterator[Callable[[Picture], Ended]]:
-    """Replacement of ``renderer.child`` that avoids 3 s for the start of each child."""
+    """Replacement of ``renderer.child`` that avoids the 3 s for the start of each child process."""
     child = subprocess.Popen(
         [sys.executable, "-c", _LOOP], stdin=subprocess.PIPE, stdout=subprocess.PIPE, env=_environment()
     )

@@ -1,10 +1,10 @@
-"""A worker that computes nothing. It reports the messages of a short run, in its journal and over Zenoh, and writes
-files.
+"""A worker that computes nothing. The fake worker reports the messages of a short run, in its journal and over Zenoh,
+and writes files.
 
-The case's ``description`` is JSON with ``steps``, ``pace`` (s per step), ``lose`` (every n-th message is not sent
-over Zenoh), ``fail`` (a cause), ``snapshots`` (one in each of the first steps), ``warn`` (a warning of the log and
-of the outcome), ``flaw`` (a file: while it exists, velocities above 300 m/s fail). The probe of the run has the
-residual velocity of Recht and Ipson with a limit of 250 m/s.
+The case's ``description`` is JSON with these keys: ``steps``; ``pace``, s per step; ``lose``, every n-th message is not
+sent over Zenoh; ``fail``, a cause; ``snapshots``, number of first steps with a snapshot each; ``warn``, a warning of
+the log and of the outcome; ``flaw``, a file: while the file exists, velocities above 300 m/s fail. The probe of the
+fake run has the residual velocity of Recht and Ipson with a limit velocity of 250 m/s.
 """
 
 import argparse
@@ -28,8 +28,8 @@ stop = False
 
 
 class Voice:
-    """Writes messages to the journal first, then sends them over Zenoh. Numbers continue from the last line of the
-    journal.
+    """Writes messages to the journal first, then sends them over Zenoh. The numbers of the messages continue from the
+    last line of the journal.
     """
 
     def __init__(self, options: argparse.Namespace, lose: int) -> None:
@@ -49,7 +49,7 @@ class Voice:
             self.session.put(keys.message_key(self.prefix, message.channel), messages.to_msgpack(sent))
 
     def show(self, n: int, folder: Path) -> None:
-        """Writes a snapshot of one triangle and reports it."""
+        """Writes a snapshot of one triangle and reports the snapshot."""
         self.blob = triangle(n)
         path = layout.snapshot(folder, n)
         path.parent.mkdir(exist_ok=True)

@@ -18,19 +18,19 @@ OWNER = "ann"
 
 @dataclass
 class Broker:
-    """A router with one user, and a publisher inside it."""
+    """A Zenoh router with one user, and a publisher inside the router."""
 
     session: zenoh.Session
     router: Router
 
     def publish(self, message: AnyMessage) -> None:
-        """Sends a message in the form in which a worker sends it."""
+        """Sends a message over Zenoh in the form in which a worker sends it."""
         key = keys.message_key(keys.run_prefix(OWNER, message.run), message.channel)
         self.session.put(key, to_msgpack(message))
 
 
 def free_port() -> int:
-    """Returns a port of the loopback address at which no program listens."""
+    """Returns a port of the loopback address on which no program listens."""
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))
         port: int = probe.getsockname()[1]

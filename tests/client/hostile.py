@@ -1,4 +1,4 @@
-"""A server that answers with arbitrary bytes, and texts that must not reach a terminal."""
+"""A server that answers with arbitrary bytes, and texts that must not be printed unchanged in a terminal."""
 
 import json
 import socket
@@ -9,14 +9,14 @@ from contextlib import contextmanager, suppress
 from typing import Any, TypeAlias
 
 Answer: TypeAlias = Callable[[], Iterable[bytes]]
-"""Function that yields the pieces of an answer, including its head, in the order of sending."""
+"""Function that yields the pieces of an HTTP answer, including its head, in the order of sending."""
 
 EVIL = (
     "\x1b]0;owned\x07\x1b[2J\x1b[31m\x9b31m\x08\x7f\u202egnp\u2066\u2069\u200e\u200f\u061c\u200b\u200d\ufeff\u2028"
     "\u2029\x85\x00\u2060\U000e0041 [red]red[/red] [/] :smile: {0} %s"
 )
-"""Escape sequences that rename a window, clear it or reverse text; characters without width; markup of rich and
-names of emoji."""
+"""Text with escape sequences that rename a window, clear it or reverse text, characters without width, markup of rich,
+and names of emoji."""
 OBEYED = set("\x1b\x07\x9b\x08\x7f\u202e\u2066\u2069\u200e\u200f\u061c\u200b\u200d\ufeff\u2028\u2029\x85\x00\u2060") | {
     "\U000e0041"
 }
@@ -24,13 +24,15 @@ OBEYED = set("\x1b\x07\x9b\x08\x7f\u202e\u2066\u2069\u200e\u200f\u061c\u200b\u20
 
 
 def head(status: int, length: int | None, kind: str = "application/json", more: str = "") -> bytes:
-    """Returns the head of an answer of ``length`` bytes; with None the answer ends when the connection is closed."""
+    """Returns the head of an HTTP answer of ``length`` bytes; with None the answer ends when the connection is
+    closed.
+    """
     size = "" if length is None else f"Content-Length: {length}\r\n"
     return f"HTTP/1.1 {status} X\r\nContent-Type: {kind}\r\n{size}{more}Connection: close\r\n\r\n".encode()
 
 
 def answering(data: Any, status: int = 200, kind: str = "application/json") -> Answer:
-    """Returns a complete answer; plain data is sent as JSON."""
+    """Returns a complete HTTP answer; plain data is sent as JSON."""
     body = data if isinstance(data, bytes) else json.dumps(data).encode()
     return lambda: [head(status, len(body), kind), body]
 
@@ -44,7 +46,7 @@ def run_info(**changes: Any) -> dict[str, Any]:
 
 
 class Hostile(socketserver.ThreadingTCPServer):
-    """A server with ``answers`` by path without the query; another path gets a 404."""
+    """A server with ``answers`` by path without the query; any other path gets status 404."""
 
     daemon_threads = True
     block_on_close = False
@@ -81,7 +83,7 @@ def _head_of(connection: socket.socket) -> bytes:
 
 @contextmanager
 def hostile() -> Iterator[Hostile]:
-    """Starts a hostile server for the duration of the block."""
+    """Runs a hostile server while the ``with`` block runs."""
     with Hostile() as server:
         thread = threading.Thread(target=server.serve_forever, args=(0.05,), daemon=True)
         thread.start()

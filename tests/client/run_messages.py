@@ -1,4 +1,4 @@
-"""Messages of invented runs, for tests of their readers."""
+"""Messages of invented runs, for tests of the readers of messages."""
 
 from conoid.cases.messages import (
     AnyMessage,
@@ -19,7 +19,7 @@ END_TIME = 80e-6
 
 
 def energy(done: float, residual: float = 2e-4) -> Energy:
-    """Returns a ledger in which the fraction ``done`` of 12 J of kinetic energy has become plastic work."""
+    """Returns an energy ledger in which the fraction ``done`` of 12 J of kinetic energy has become plastic work."""
     return Energy(
         kinetic=12.0 * (1 - done), elastic=0.0, plastic=12.0 * done, viscous=0.0, contact=0.0, external=0.0,
         initial=12.0, residual=residual,
@@ -27,7 +27,7 @@ def energy(done: float, residual: float = 2e-4) -> Energy:
 
 
 def progress(seq: int, done: float) -> Progress:
-    """Returns the progress of a run at the fraction ``done`` of END_TIME."""
+    """Returns the progress message of a run at the fraction ``done`` of END_TIME."""
     return Progress(
         run=RUN, seq=seq, wall=START + seq, step=round(1000 * done), t=done * END_TIME, end_time=END_TIME, dt=8.1e-9,
         limiter="tet 7 (bar): sound speed", eta=60 * (1 - done), energy=energy(done), updates_per_second=9.7e6,
@@ -35,12 +35,12 @@ def progress(seq: int, done: float) -> Progress:
 
 
 def status(seq: int, state: str, cause: str | None = None, message: str = "") -> Status:
-    """Returns a change of state."""
+    """Returns a message with a change of state."""
     return Status(run=RUN, seq=seq, wall=START + seq, state=state, cause=cause, message=message)
 
 
 def whole() -> list[AnyMessage]:
-    """Returns all messages of a run of two ranks, from acceptance to success."""
+    """Returns all messages of a run on two ranks, from acceptance to success."""
     story: list[AnyMessage] = [
         status(1, "accepted"), status(2, "queued"), status(3, "starting"), status(4, "running"),
         Started(run=RUN, seq=5, wall=START + 5, ranks=2, elements=24000, nodes=4961, end_time=END_TIME, setup=1.5,

@@ -1,4 +1,6 @@
-"""A proxy between a client and a server, in this process. The proxy can be slow, and breaks connections on request."""
+"""A proxy between a client and a server, in the process of the test. The proxy can be slow, and breaks connections on
+request.
+"""
 
 import socket
 import threading
@@ -13,14 +15,14 @@ _PIECE = 1 << 16
 
 @dataclass
 class Line:
-    """Settings of the proxy and its counters."""
+    """Settings of the proxy, and counters of the sent bytes."""
 
     server: int
     """Port of the server; it may change while the proxy runs."""
     breaks: list[int] = field(default_factory=list)
-    """Numbers of bytes to the server after which the first connection is cut, then the second, and further ones."""
+    """Numbers of bytes to the server after which the first, the second and further connections are cut."""
     rate: float = 0.0
-    """Bytes per second to the server; 0: no limit."""
+    """Largest rate to the server in bytes per second; 0: no limit."""
     url: str = ""
     broken: int = 0
     carried: int = 0

@@ -1,4 +1,4 @@
-"""A small study of one and two ranks, with numbers whose sums are simple."""
+"""A small scaling study of one and two ranks, with numbers whose sums are simple."""
 
 from typing import Any
 
@@ -8,7 +8,7 @@ from conoid.client.studies.projection import Network, Projection, project
 from conoid.client.studies.study import Study
 
 SLOW = Network(latency=1e-3, bandwidth=1e6)
-"""A network with 1 ms per message and 1 us per byte."""
+"""A model network with 1 ms per message and 1 us per byte."""
 
 
 def load(**fields: Any) -> Load:
@@ -45,7 +45,7 @@ def one_rank() -> Projection:
 
 
 def two_threads() -> Projection:
-    """Returns a run of one rank with two threads; the second thread has worked for 2 s."""
+    """Returns the record of a run on one rank with two threads; the second thread has worked for 2 s."""
     alone = load(
         phases={"elements": [2.5], "exchange": [0.0], "contact": [1.5]}, waiting=[0.0], steps=4, messages=[0],
         bytes=[0], collectives=[0], collective_bytes=[0],
@@ -58,7 +58,7 @@ def two_threads() -> Projection:
 
 
 def by_tasks(threads: int) -> Projection:
-    """Returns a run of one rank whose tasks were timed for 1, 2 and 4 threads."""
+    """Returns the record of a run on one rank whose tasks were timed for 1, 2 and 4 threads."""
     seconds = {
         1: {"elements": [6.0], "exchange": [0.0], "contact": [2.0]},
         2: {"elements": [3.0], "exchange": [0.0], "contact": [2.0]},

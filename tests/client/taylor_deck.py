@@ -1,7 +1,7 @@
 """Writes the deck of the shipped case ``imported_taylor``: a quarter of the copper Taylor bar, in mm, t, s.
 
-``python -m tests.client.taylor_deck cases/shipped/imported_taylor.inp`` writes the file again; a name that ends in
-``.k`` gives the same deck for LS-DYNA.
+The command ``python -m tests.client.taylor_deck cases/shipped/imported_taylor.inp`` writes the deck again; a name that
+ends in ``.k`` gives the same deck for LS-DYNA.
 """
 
 import sys
@@ -18,8 +18,8 @@ _NEAR = 1e-9
 
 
 def mesh(size: float) -> TetMesh:
-    """Returns the mesh of a quarter of the bar of taylor_copper, with radius 3.2 mm and length 32.4 mm; ``size`` in
-    m.
+    """Returns the mesh of a quarter of the bar of taylor_copper, with radius 3.2 mm and length 32.4 mm; ``size``:
+    element size in m.
     """
     return structured(Cylinder(
         shape="cylinder", radius=3.2e-3, length=32.4e-3, sector="quarter", generator="structured", element_size=size
@@ -38,13 +38,13 @@ def plane(made: TetMesh, axis: int) -> list[int]:
 
 
 def rows(numbers: Iterable[int], width: int, between: str = "") -> str:
-    """Returns lines of eight numbers."""
+    """Returns lines of eight numbers each."""
     words = [f"{number:{width}}" for number in numbers]
     return "\n".join(between.join(words[i : i + 8]) for i in range(0, len(words), 8))
 
 
 def lsdyna_text(size: float, end: str = "8.0E-5") -> str:
-    """Returns the deck for LS-DYNA."""
+    """Returns the Taylor deck for LS-DYNA."""
     made = mesh(size)
     nodes = "\n".join(f"{n:8}{x:16.9f}{y:16.9f}{z:16.9f}" for n, x, y, z in points(made))
     solids = "\n".join(
@@ -57,7 +57,7 @@ def lsdyna_text(size: float, end: str = "8.0E-5") -> str:
 
 
 def abaqus_text(size: float, end: str = "8.0E-5") -> str:
-    """Returns the input file for Abaqus/Explicit; the nodes at the end of the bar are fixed to the plane of the
+    """Returns the Taylor deck for Abaqus/Explicit; the nodes at the end of the bar are fixed to the plane of the
     wall.
     """
     made = mesh(size)

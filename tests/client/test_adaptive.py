@@ -42,8 +42,8 @@ def lambert_jonas(limit: float, a: float, p: float) -> Callable[[float], float]:
 
 
 class Firing:
-    """A server that computes ``curve`` of the velocity; if the curve returns a text, the run fails with this
-    message.
+    """A server whose runs have the result ``curve`` of the velocity; if the curve returns a text, the run fails with
+    this message.
     """
 
     def __init__(self, curve: Callable[[float], float | str], slots: int = 1) -> None:
@@ -216,7 +216,7 @@ def test_the_error_of_a_curve_through_points_that_scatter_is_what_they_scatter()
 
 
 def test_points_that_do_not_follow_the_law_have_no_curve() -> None:
-    """A free plate, which slow projectiles push along and only the fastest one perforates."""
+    """Case: a free plate, which slow projectiles push along and only the fastest projectile perforates."""
     left = {20: 3.3, 26.7: 4.9, 30: 5.8, 33.3: 6.6, 40: 8.4, 60: 13.3, 80: 17.7, 140: 30.7, 200: 127.9}
     shots = [Sample(v, speed - 5.0) for v, speed in left.items()]
     made = bracket(shots)

@@ -1,4 +1,6 @@
-"""Answers of an arbitrary server: an error in one line, in a bounded time, and no file outside the folder."""
+"""Answers of an arbitrary server: the client prints an error in one line, in a bounded time, and writes no file outside
+of the folder.
+"""
 
 import itertools
 import json
@@ -64,7 +66,7 @@ def server(quiet_home: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Hostil
 
 
 class Every(dict[str, Answer]):
-    """A server with the same answer at every path."""
+    """A server that gives the same answer at every path."""
 
     def __init__(self, answer: Answer) -> None:
         self.answer = answer

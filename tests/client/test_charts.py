@@ -1,4 +1,4 @@
-"""Data and files of the charts of ranks."""
+"""Data and files of the charts that compare ranks."""
 
 from pathlib import Path
 
@@ -20,8 +20,8 @@ def cut(t: float) -> Balance:
 
 
 def test_the_course_of_a_run_that_went_on_from_a_checkpoint_is_drawn_once() -> None:
-    """The run went back from step 3 to step 1. Its messages about steps 2 and 3 come twice; the CPU time of both is
-    counted.
+    """The run went back from step 3 to step 1: its messages about steps 2 and 3 occur twice, and the CPU time of both
+    messages counts.
     """
     sent: list[AnyMessage] = [load(1.0, [5, 5]), load(2.0, [7, 5]), cut(2.0), load(3.0, [6, 6])]
     again: list[AnyMessage] = [load(2.0, [7, 5]), cut(2.5), load(3.0, [6, 7])]
@@ -48,7 +48,7 @@ def test_many_ranks_are_grey_but_for_the_extreme_ones(ranks: int, named: int) ->
 
 @pytest.mark.parametrize("outside", [[4, 9], []])
 def test_a_chart_is_written(outside: list[int], tmp_path: Path) -> None:
-    """A chart is also written for a run without contact, whose messages have no surface nodes."""
+    """A chart is also written for a run without contact; the messages of such a run have no surface nodes."""
     out = tmp_path / "balance.png"
     course = charts.course([load(0.5e-6, outside), load(2e-6, outside)])
     charts.balance(course, "a bar", "glass_steel_bar", out)

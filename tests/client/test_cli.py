@@ -1,4 +1,4 @@
-"""The command line, in this process with a real server, and in processes of their own."""
+"""The command line, in the process of the test with a real server, and in separate processes."""
 
 import fcntl
 import json
@@ -29,7 +29,7 @@ CONOID = [sys.executable, "-m", "conoid.client.cli"]
 
 @pytest.fixture
 def user(server: LocalServer, quiet_home: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """A working folder, and an environment with the address of a server."""
+    """Sets a working folder, and an environment with the address of a server."""
     monkeypatch.setenv("CONOID_URL", server.session.url)
     monkeypatch.setenv("CONOID_TOKEN", server.token)
     return quiet_home
@@ -285,7 +285,7 @@ def test_run_does_it_all_and_leaves_no_process(alone: Path) -> None:
 
 
 def test_an_interrupted_run_is_cancelled(alone: Path) -> None:
-    """Two processes with a server each are interrupted at the same time, one by SIGINT and one by SIGTERM."""
+    """Two processes, each with a server, are interrupted at the same time: one by SIGINT and one by SIGTERM."""
     numbers = (signal.SIGINT, signal.SIGTERM)
     folders = {number: alone / f"runs-{number.value}" for number in numbers}
     case = str(case_file(alone, steps=2000, pace=0.02))

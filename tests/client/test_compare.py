@@ -1,4 +1,4 @@
-"""Comparison of two runs, columns as tables and data frames, and their charts."""
+"""Comparison of two runs; columns as tables and data frames; charts of the columns."""
 
 import json
 import math
@@ -24,7 +24,7 @@ TIMES = [0.0, 4e-5, 8e-5]
 
 @pytest.fixture
 def runs(tmp_path: Path) -> tuple[Result, Result]:
-    """Two runs; the second is slower and breaks into more fragments."""
+    """Two runs for the comparison; the second run is slower and breaks into more fragments."""
     for name, speed, masses in (("a", 10.0, [1.0, 2.0, 4.0, 1e-4]), ("b", 8.0, [1.0, 1.0, 1.0, 1.0, 2.0])):
         folder = write_run(tmp_path / name)
         write_history(
@@ -88,7 +88,7 @@ def test_the_command_prints_and_draws(runs: tuple[Result, Result], tmp_path: Pat
 
 
 def test_the_tables_are_read_on_a_terminal_of_80_columns(runs: tuple[Result, Result], tmp_path: Path) -> None:
-    """Runs of a server have names of 22 letters."""
+    """Runs of a server have folder names of 22 letters, which the comparison must show."""
     for name in ("a", "b"):
         case = json.loads((tmp_path / name / "case.resolved.json").read_text())
         title = f"{name} bar of steel that hits a wall " * 20

@@ -34,7 +34,7 @@ def conoid(server: Hostile, *words: str) -> Result:
 
 
 def obeyed(text: str) -> set[str]:
-    """Returns the characters that a terminal would execute or not show."""
+    """Returns the characters of a text that a terminal would execute or not show."""
     return OBEYED & set(text)
 
 
@@ -60,7 +60,7 @@ def test_a_line_of_text_stays_as_it_is() -> None:
 
 
 def test_half_a_character_is_escaped() -> None:
-    """The name of the file is not valid UTF-8."""
+    """The name of the case file is not valid UTF-8."""
     assert plain("a\udce4b") == "a\\udce4b"
 
 
@@ -69,7 +69,7 @@ def test_an_escape_is_right_in_json() -> None:
 
 
 def test_one_module_prints() -> None:
-    """``render`` is excepted: another program reads its output."""
+    """The command ``render`` is excepted, because another program reads its output."""
     printing = {"print", "typer.echo", "typer.secho", "Console"}
     found = {
         path.name

@@ -36,8 +36,8 @@ def run(variant: Variant, factor: float, length: float, cost: float, member: int
 
 
 def two_forms() -> list[Done]:
-    """Returns points of two forms. Nodal: 2 + 0.1 h^2 at a cost of h^-4. Standard locks: it converges to 1.5 with
-    order 1, at half the cost.
+    """Returns points of convergence studies of two pressure forms. The value of the nodal form is 2 + 0.1 h^2 at a cost
+    of h^-4. The standard form locks: its value converges to 1.5 with order 1, at half the cost.
     """
     nodal = [run(NODAL, h, 2.0 + 0.1 * h**2, 10.0 * h**-4) for h in (0.5, 1.0, 2.0)]
     return [*nodal, *(run(STANDARD, h, 1.5 + 0.25 * h, 5.0 * h**-4) for h in (0.5, 1.0, 2.0))]
@@ -56,7 +56,7 @@ def test_a_study_finds_order_and_limit_of_each_variant() -> None:
 
 
 def test_a_form_that_crosses_the_truth_by_chance_is_not_called_accurate() -> None:
-    """The value of the standard form is 2.0 at h = 2 and converges to 1.5."""
+    """The value of the standard form is 2.0 at the element size h = 2 and converges to 1.5."""
     found = book(two_forms())
     number, goal = found.goals()["length"]
     assert goal.variant == NODAL
@@ -112,7 +112,9 @@ def test_a_reference_that_the_finest_mesh_lacks_is_skipped() -> None:
 
 
 def test_variants_on_one_mesh_are_distinguished_from_their_scatter() -> None:
-    """A study of the time step on one mesh has no limit; the result is the effect of the step on a quantity."""
+    """A study of the time step on one mesh has no limit value; the result is the effect of the time step on a
+    quantity.
+    """
     shorter = Variant("nodal", 0.6)
     done = [
         run(variant, 1.0, length + 0.01 * member, 10.0, member, broken=100.0 + 3.0 * member + other)
@@ -130,7 +132,7 @@ def test_variants_on_one_mesh_are_distinguished_from_their_scatter() -> None:
 
 
 def test_a_count_that_has_settled_does_not_stand_for_a_reference_without_a_limit(tmp_path: Path) -> None:
-    """A case is run for its references. The picture has axes even if all errors are 0."""
+    """A case is run and compared with its references; the picture has axes even if all errors are 0."""
     lengths = {0.5: 2.2, 1.0: 2.4, 2.0: 2.1}
     found = book([run(NODAL, h, length, 10.0 * h**-4, broken=7.0) for h, length in lengths.items()])
     assert found.leading() is None

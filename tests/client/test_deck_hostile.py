@@ -1,4 +1,4 @@
-"""Damaged decks: each is refused in one line, or becomes a case with an account of its keywords."""
+"""Damaged decks: each deck is refused in one line, or becomes a case with an account of its keywords."""
 
 import random
 import re
@@ -24,7 +24,7 @@ NUMBERS = ("0", "-1", "999999999999", "1e400", "1E-400", "nan", "1.e29", "-1.5-3
 
 
 def spoilt(text: list[str], chance: random.Random) -> list[str]:
-    """Returns a deck with lines removed, added, moved, cut or overwritten at random."""
+    """Returns a deck whose lines are removed, added, moved, cut or overwritten at random."""
     at, what = chance.randrange(len(text)), chance.randrange(7)
     if what == 0:
         return text[:at] + text[at + 1 :]

@@ -1,8 +1,8 @@
-"""Imported materials give the values of the formulas of their code, point by point.
+"""Imported materials give the values of the formulas of the other code, point by point.
 
-The formulas are those of the manuals: LS-DYNA Keyword User's Manual II (materials 3, 10, 15, 18, 24, 98, 110;
-equation of state 4), Abaqus Analysis User's Guide ("Johnson-Cook plasticity", "Damage initiation for ductile
-metals", "Equation of state"), Radioss Reference Guide (laws 2, 4, 79, /FAIL/JOHNSON, /EOS/GRUNEISEN).
+The formulas are those of the manuals: LS-DYNA Keyword User's Manual II (materials 3, 10, 15, 18, 24, 98, 110; equation
+of state 4), Abaqus Analysis User's Guide ("Johnson-Cook plasticity", "Damage initiation for ductile metals", "Equation
+of state"), Radioss Reference Guide (laws 2, 4, 79, /FAIL/JOHNSON, /EOS/GRUNEISEN).
 """
 
 import math
@@ -18,12 +18,12 @@ from conoid.worker.materials.law import DENSITY, EQUATION
 from .deck_texts import abaqus, lsdyna, material, part, r20, radioss, read, row
 
 POINTS = [(0.0, 1.0, 300.0), (0.02, 10.0, 400.0), (0.3, 1e4, 900.0), (1.1, 3e5, 1300.0)]
-"""Plastic strain, rate in 1/s, and temperature in K of each point."""
+"""Plastic strain, strain rate in 1/s, and temperature in K of each compared point."""
 MPA = 1e6
 
 
 def flow(law: JohnsonCook, strain: float, rate: float, temperature: float) -> float:
-    """Returns Conoid's flow stress, Pa (cases/laws/johnson_cook.py)."""
+    """Returns Conoid's flow stress of Johnson and Cook, Pa (cases/laws/johnson_cook.py)."""
     span = law.melt_temperature - law.reference_temperature
     soft = min(max((temperature - law.reference_temperature) / span, 0.0), 1.0)
     fast = 1.0 + law.C * math.log(max(rate / law.reference_rate, 1.0))
@@ -31,7 +31,7 @@ def flow(law: JohnsonCook, strain: float, rate: float, temperature: float) -> fl
 
 
 def fracture(law: JohnsonCook, tension: float, rate: float, temperature: float) -> float:
-    """Returns Conoid's fracture strain (cases/laws/johnson_cook.py)."""
+    """Returns Conoid's fracture strain of Johnson and Cook (cases/laws/johnson_cook.py)."""
     of = law.damage
     assert of is not None
     span = law.melt_temperature - law.reference_temperature
@@ -153,7 +153,9 @@ def test_straight_flow_curves_of_lsdyna(
     ],
 )
 def test_the_factor_of_cowper_and_symonds_of_lsdyna(tmp_path: Path, cards: tuple[str, ...]) -> None:
-    """In mm, kg, ms: SRC or C is a rate in 1/ms, and the factor multiplies yield stress and hardening."""
+    """In the units mm, kg, ms the constant SRC or C is a rate in 1/ms; the rate factor multiplies yield stress and
+    hardening.
+    """
     found = read(tmp_path, "a.k", lsdyna(*cards), "mm,kg,ms")
     law = material(found).strength
     assert isinstance(law, CowperSymonds)
@@ -209,8 +211,8 @@ JH2 = {
 
 @pytest.mark.parametrize("name", JH2)
 def test_johnson_holmquist_of_both_codes(tmp_path: Path, name: str) -> None:
-    """Intact: sigma* = a (p* + t*)^n (1 + c ln rate*). Fractured: b p*^m (1 + c ln rate*), at most SFMAX. Stresses
-    are divided by 3/2 (HEL - PHEL).
+    """Intact strength: sigma* = a (p* + t*)^n (1 + c ln rate*). Fractured strength: b p*^m (1 + c ln rate*), at most
+    SFMAX. Stresses of JH-2 are divided by 3/2 (HEL - PHEL).
     """
     found = read(tmp_path, name, JH2[name])
     law = material(found).strength
@@ -239,8 +241,8 @@ CELSIUS = "*Physical constants, absolute zero=-273.15\n*Initial Conditions, type
 
 
 def test_johnson_cook_of_abaqus(tmp_path: Path) -> None:
-    """Temperatures are in degrees Celsius; R = 1 + C ln(rate / rate0); the factor of the triaxiality is exp(-d3
-    triaxiality).
+    """Temperatures of the deck are in degrees Celsius; R = 1 + C ln(rate / rate0); the factor of the triaxiality is
+    exp(-d3 triaxiality).
     """
     deck = abaqus(ABAQUS_JC, model=CELSIUS, dynamic="*Dynamic, Explicit, adiabatic")
     found = read(tmp_path, "a.inp", deck)
@@ -276,7 +278,7 @@ def test_two_rows_of_plasticity_are_a_line(tmp_path: Path) -> None:
 
 
 def test_usup_of_abaqus(tmp_path: Path) -> None:
-    """p = rho0 c0^2 eta / (1 - s eta)^2 (1 - Gamma0 eta / 2) + Gamma0 rho0 Em."""
+    """Mie-Grueneisen pressure: p = rho0 c0^2 eta / (1 - s eta)^2 (1 - Gamma0 eta / 2) + Gamma0 rho0 Em."""
     deck = abaqus("*Density\n8.96e-9,\n*Elastic, type=SHEAR\n46000.,\n*Eos, type=USUP\n3.94e6, 1.49, 1.99")
     made = material(read(tmp_path, "a.inp", deck))
     assert made.eos is not None
@@ -292,7 +294,7 @@ def test_usup_of_abaqus(tmp_path: Path) -> None:
 
 
 def test_johnson_cook_of_radioss(tmp_path: Path) -> None:
-    """Law 2: (a + b e^n)(1 + c ln(rate / rate0))(1 - ((T - Tr) / (Tmelt - Tr))^m); the heating uses rho Cp."""
+    """Radioss law 2: (a + b e^n)(1 + c ln(rate / rate0))(1 - ((T - Tr) / (Tmelt - Tr))^m); the heating uses rho Cp."""
     found = read(tmp_path, "a_0000.rad", radioss(
         "/MAT/PLAS_JOHNS/1", "copper", r20("8.96E-9"), r20(1.24e5, 0.34), r20(90.0, 292.0, 0.31, 0, 0),
         r20(0.025, 1.0), r20(1.09, 1356.0, 3.43168, 298.0), "/FAIL/JOHNSON/1", r20(0.54, 4.89, -3.03, 0.014, 1.12),

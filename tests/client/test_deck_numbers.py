@@ -1,4 +1,4 @@
-"""Numbers in decks: sets of sets, numbers of two objects, numbers of missing objects."""
+"""Numbers in decks: sets of sets, numbers that two objects have, numbers of missing objects."""
 
 from pathlib import Path
 
@@ -15,7 +15,7 @@ OTHER = "".join(f"{n:8}" for n in (2, 7, 1, 2, 3, 4, 4, 4, 4, 4))
 
 
 def test_a_set_of_sets_has_their_nodes(tmp_path: Path) -> None:
-    """The members of the set are sets: the deck has no nodes 51 and 52."""
+    """The members of the set 9 are the sets 51 and 52: the deck has no nodes with these numbers."""
     sets = ("*SET_NODE_LIST", row(51), row(1, 2), "*SET_NODE", row(52), row(3, 4), "*SET_NODE_ADD", row(9), row(51, 52))
     found = read(tmp_path, "a.k", lsdyna(*STEEL, *sets, HELD, row(9, 0, 1, 1, 1)))
     assert found.refusals == []
@@ -98,7 +98,7 @@ def test_a_second_velocity_of_a_body_that_turns_refuses(tmp_path: Path) -> None:
 
 
 def test_a_velocity_that_replaces_another_one_is_in_the_account(tmp_path: Path) -> None:
-    """Two loads of one body are more often a mistake than a wish."""
+    """Two loads of one body are more often a mistake than the intention of a user."""
     push = ["*INITIAL_VELOCITY_GENERATION", row(1, 2, 0.0, 5.0), row(0)]
     for speed, expected in ((7.0, ["replaces the velocity that another keyword gives to body"]), (5.0, [])):
         again = ["*INITIAL_VELOCITY_GENERATION", row(1, 2, 0.0, speed), row(0)]
@@ -129,7 +129,7 @@ def starter(points: list[str]) -> str:
 
 
 def keywords(points: list[str]) -> str:
-    """Returns the same model as a keyword deck."""
+    """Returns the model of the Radioss deck as an LS-DYNA keyword deck."""
     first, second = (
         "".join(f"{n:8}" for n in ids) for ids in ((1, 1, 1, 2, 3, 4, *(4,) * 4), (2, 2, 5, 6, 7, 8, *(8,) * 4))
     )

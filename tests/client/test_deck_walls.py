@@ -114,7 +114,7 @@ def test_walls_that_end_and_rigid_bodies_of_nodes_refuse(tmp_path: Path, cards: 
 
 
 def rbody(mass: float = 0.0) -> tuple[str, ...]:
-    """Returns a rigid body whose main node is 9, and the restraint of this node."""
+    """Returns a rigid body whose main node is 9, and the restraint of the main node."""
     head = f"{row(9, 0, 0, 0)}{mass:>20}{row(5, 0, 0, 0)}"
     return (
         *ELASTIC,

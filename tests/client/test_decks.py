@@ -25,7 +25,7 @@ def imported(name: str) -> Imported:
 
 
 def keyword_lines(path: Path) -> list[tuple[str, int]]:
-    """Returns the lines of a deck that begin a keyword or an option, found without the importer."""
+    """Returns the lines of a deck that begin a keyword or an option, found without the code of the importer."""
     sign = r"/[A-Z]" if path.suffix == ".rad" else r"\*[A-Za-z]"
     text = path.read_text(encoding="utf-8").splitlines()
     return [(line, number) for number, line in enumerate(text, 1) if re.match(sign, line)]
@@ -205,7 +205,9 @@ def test_a_keyword_that_would_change_the_answer_refuses_the_import(tmp_path: Pat
 
 
 def test_walls_and_sliding_nodes_off_a_plane_are_reported(tmp_path: Path) -> None:
-    """Walls do not stop driven nodes: a set of sliding nodes on no plane of symmetry would move through the wall."""
+    """A set of sliding nodes on no plane of symmetry is refused, because walls do not stop driven nodes, which would
+    move through the wall.
+    """
     deck = abaqus("*Density\n7.85e-9,\n*Elastic\n2.1e5, 0.3", model="*Nset, nset=some\n1, 2\n*Boundary\nsome, 1, 1")
     assert read(tmp_path, "a.inp", deck).data["boundaries"][0]["on"] == "some"
     cards = ("*SET_NODE_LIST", row(3), row(1, 2), "*BOUNDARY_SPC_SET", row(3, 0, 1), "*RIGIDWALL_PLANAR", "",

@@ -1,4 +1,4 @@
-"""Blocks of code in README and docs: cases are valid, Python compiles and uses names that exist, commands exist."""
+"""Blocks of code in README and docs: cases are valid, Python code compiles and uses existing names, commands exist."""
 
 import ast
 import copy
@@ -22,11 +22,11 @@ from conoid.client.cli import app
 ROOT = Path(__file__).parents[2]
 PAGES = sorted([ROOT / "README.md", ROOT / "CONTRIBUTING.md", ROOT / "ARCHITECTURE.md", *ROOT.glob("docs/**/*.md")])
 CLASSES = {"session": "Session", "run": "Run", "result": "Result", "sweep": "Sweep", "found": "Found"}
-"""Names of variables in the examples, and the classes of the client to which they belong."""
+"""Names of variables in the examples, and the client class of each variable."""
 
 
 def blocks(path: Path) -> Iterator[tuple[str, str]]:
-    """Returns language and text of each fenced block."""
+    """Returns language and text of each fenced block of a page."""
     yield from re.findall(r"^```(\w*)\n(.*?)^```", path.read_text(encoding="utf-8"), re.DOTALL | re.MULTILINE)
 
 
@@ -42,7 +42,7 @@ def every(language: str) -> list[Any]:
 
 @cache
 def partial_schema() -> dict[str, Any]:
-    """Returns the schema of cases without required keys: an excerpt of a case may lack them."""
+    """Returns the schema of cases without required keys, because an excerpt of a case may lack required keys."""
 
     def relaxed(node: Any) -> Any:
         if isinstance(node, list):
@@ -92,8 +92,8 @@ def test_the_reference_of_the_client_has_every_public_name() -> None:
 
 
 def commands(text: str) -> Iterator[str]:
-    """Yields the lines of a block that begin with a program of the project. Prompts and comments are removed,
-    continued lines are joined.
+    """Yields the lines of a block that begin with a program of the project. Prompts and comments are removed from the
+    lines; continued lines are joined.
     """
     for line in re.sub(r"\\\n\s*", " ", text).splitlines():
         plain = line.strip().removeprefix("$ ")
@@ -115,18 +115,18 @@ def written() -> list[Any]:
 
 
 def words(line: str) -> list[str]:
-    """Returns the words of a command up to a pipe or another operator, without optional words in brackets and
-    without three dots.
+    """Returns the words of a command up to a pipe or another operator, without optional words in brackets and without
+    three dots.
     """
     plain = re.sub(r"\.\.\.|(?<=\s)\[(?=--)|\](?=[\s.]|$)|[&|;>].*$", " ", line.replace("KEY=VALUE ]", "KEY=VALUE"))
     return shlex.split(plain, comments=True)
 
 
 def refused(given: list[str]) -> str:
-    """Returns the error for a command or an option that does not exist; empty for a valid command. Runs only the
-    help.
+    """Returns the error for a command or an option that does not exist; empty for a valid command. The function runs
+    only the help of the command.
     """
-    if given[:1] == ["serve"]:  # the options of serve belong to the server
+    if given[:1] == ["serve"]:  # the options of conoid serve belong to the server
         return ""
     ended = CliRunner().invoke(app, [*given, "--help"])
     return "" if ended.exit_code == 0 or "rgument" in ended.stderr else ended.stderr

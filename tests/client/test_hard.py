@@ -51,7 +51,9 @@ def test_a_case_whose_energy_is_made_must_be_refused_for_that_line() -> None:
 
 
 def test_momentum_drifts_over_the_motion_of_the_parts_not_over_its_sum() -> None:
-    """Two equal parts collide: their momenta cancel, and the drift of one part's momentum is one half."""
+    """Two equal parts collide: their momenta cancel, and the drift of the momentum of one part gives the value one
+    half.
+    """
     case = case_of(named("scissors"))
     assert is_free(case)
     one = 60.0 * 7850.0 * 2.85e-3 * 4e-3 * 2.5e-3

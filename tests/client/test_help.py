@@ -1,4 +1,6 @@
-"""The help: every command is in a group, has one line of description, and has examples that are valid."""
+"""The help of the commands: every command is in a group, has one line of description, and has examples that are
+valid.
+"""
 
 import re
 import shlex
@@ -14,7 +16,7 @@ from conoid.client.commands.helping import EXAMPLES, GROUPS
 ROOT: Any = typer.main.get_command(app)
 NAMES = [name for name in ROOT.commands if not ROOT.commands[name].hidden]
 WIDTH = 60
-"""Largest number of characters beside the longest name on a terminal of 80."""
+"""Largest number of characters of a help text beside the longest name on a terminal of 80 characters."""
 
 
 def test_the_help_has_all_commands_in_groups_a_line_each() -> None:

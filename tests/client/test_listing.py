@@ -1,4 +1,4 @@
-"""``conoid runs``: filters and columns; short ids, which every command accepts."""
+"""The command ``conoid runs``: filters, columns, and short ids, which every command accepts."""
 
 from datetime import datetime
 from pathlib import Path
@@ -41,7 +41,7 @@ def conoid(*words: object) -> Result:
 
 @pytest.fixture
 def made(server: LocalServer, quiet_home: Path, monkeypatch: pytest.MonkeyPatch) -> dict[str, str]:
-    """Ids of three finished runs by their names, with a server in the environment."""
+    """Ids of three finished runs by name; the address of their server is in the environment."""
     monkeypatch.setenv("CONOID_URL", server.session.url)
     monkeypatch.setenv("CONOID_TOKEN", server.token)
     found = {}
@@ -94,7 +94,7 @@ COMMANDS = (
 
 
 def test_every_command_takes_the_short_id(server: LocalServer, made: dict[str, str]) -> None:
-    """Each command ends with the short id in the same way as with the full id."""
+    """Each command ends with a short id in the same way as with the full id."""
     (short,) = [row.info.short for row in server.session.table(text=made["slow"])]
     assert 7 <= len(short) < 22
     for command, *more in COMMANDS:

@@ -1,4 +1,4 @@
-"""State of a run from its messages, and its display in a terminal."""
+"""State of a run from its messages, and display of the run in a terminal."""
 
 import io
 import threading
@@ -55,7 +55,7 @@ def test_the_other_threads_of_a_rank_are_busy_by_the_time_of_their_tasks() -> No
 
 
 def test_waiting_for_other_ranks_is_not_exchange() -> None:
-    """client/web/live.js has the same rule."""
+    """The file client/web/live.js has the same rule."""
     phases = {"elements": [1.0, 2.0], "exchange": [0.5, 0.25]}
     assert grouped(phases, interval=3.0, waiting=[0.25, 0.5]) == {
         "compute": [1.0, 2.0], "exchange": [0.25, 0.0], "wait": [0.25, 0.25], "descheduled": [1.5, 0.75],
@@ -198,7 +198,7 @@ def test_the_live_screen_ends_with_the_last_picture() -> None:
 
 
 class Queued:
-    """A run that waits until its reason has been printed."""
+    """A fake run that waits until the reason of the wait has been printed."""
 
     id, title, reason = run_messages.RUN, "A bar", "waiting for 4 of 2 slots; 1 free"
 
@@ -219,7 +219,7 @@ class Queued:
 
 
 class Deserted(Queued):
-    """A run without messages whose server has stopped; it continues after the message about the server has been
+    """A fake run without messages whose server has stopped; it continues after the message about the server has been
     printed.
     """
 
@@ -238,7 +238,7 @@ class Deserted(Queued):
 
 
 def test_a_server_that_has_ended_is_reported(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The client cannot find out then whether the run still runs."""
+    """After the server has stopped, the client cannot find out whether the run still runs."""
     monkeypatch.setattr(progress, "LONGEST", 0.05)
     monkeypatch.setattr("conoid.client.watch.REASON_EVERY", 0.01)
     run, lines = Deserted(), list[str]()
@@ -257,7 +257,7 @@ def test_a_server_that_has_ended_is_reported(monkeypatch: pytest.MonkeyPatch) ->
 
 
 class Nothing:
-    """A subscription without messages."""
+    """A fake subscription without messages."""
 
     name, trouble = "none", ""
 
@@ -265,7 +265,7 @@ class Nothing:
         return None
 
     def close(self) -> None:
-        """Does nothing."""
+        """Replaces a method and does nothing."""
 
 
 def test_the_reason_of_waiting_in_the_queue_is_reported(monkeypatch: pytest.MonkeyPatch) -> None:

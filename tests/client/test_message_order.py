@@ -1,4 +1,4 @@
-"""Messages arrive in order and once each, for any loss, repetition or order in the stream."""
+"""Messages arrive in order and once each, for any loss, repetition or order of messages in the stream."""
 
 import random
 
@@ -13,7 +13,7 @@ def message(seq: int) -> Log:
 
 
 class Journal:
-    """A journal of which the lines up to ``written`` exist; it counts its readings."""
+    """A fake journal of which the lines up to ``written`` exist; the journal counts how often it is read."""
 
     def __init__(self, written: int = 0) -> None:
         self.written = written

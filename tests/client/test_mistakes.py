@@ -28,7 +28,7 @@ def conoid(*words: object) -> Result:
 
 
 def refused(code: int, *words: object) -> str:
-    """Returns the one line of the error."""
+    """Returns the only line of the error output."""
     result = conoid(*words)
     assert result.exit_code == code, repr(result.exception)
     (line,) = result.stderr.splitlines()
@@ -64,7 +64,7 @@ def test_a_folder_without_a_run_is_not_followed(quiet_home: Path) -> None:
     "words", [("get", "last", "--out", ""), ("get", "last", "--out="), ("sweep", "x.toml", "--list", "")]
 )
 def test_an_empty_name_of_a_file_is_refused(words: tuple[str, ...], quiet_home: Path) -> None:
-    """The empty value of an unset variable would mean the working folder."""
+    """An option with an empty value, as from an unset variable, would mean the working folder."""
     option = next(word.removesuffix("=") for word in words if word.startswith("--"))
     assert refused(2, *words) == f"conoid: {option} is empty: write the name of a file or a folder"
 
@@ -93,7 +93,7 @@ def test_a_case_of_another_shape_is_one_line(command: str, text: str, damaged: P
 
 
 def test_a_link_out_of_a_folder_is_not_read(damaged: Path) -> None:
-    """Without this check a report could contain a private file of the user who makes the report."""
+    """Without the check of links a report could contain a private file of the user who makes the report."""
     (damaged / layout.RESOLVED_CASE).unlink()
     (damaged.parent / "secret").write_text("{}")
     (damaged / layout.RESOLVED_CASE).symlink_to(damaged.parent / "secret")
@@ -228,7 +228,7 @@ def test_space_round_a_token_is_no_part_of_it() -> None:
 
 @pytest.mark.parametrize("words", [("show",), ("watch",), ("cancel",), ("get",), ("report",), ("sweep-table",)])
 def test_an_empty_id_is_none(quiet_home: Path, words: tuple[str, ...]) -> None:
-    """An unset variable of a script gives an empty id."""
+    """An unset variable of a shell script gives an empty id."""
     assert "an id, or 'last'" in refused(2, *words, "")
 
 

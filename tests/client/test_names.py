@@ -1,4 +1,4 @@
-"""Runs and sweeps are selected by an id, by a prefix of an id, by 'last' or by a folder only."""
+"""Runs and sweeps are selected only by an id, by a prefix of an id, by 'last' or by a folder."""
 
 import fcntl
 import json
@@ -23,7 +23,7 @@ NONE = answering({"detail": "run: there is none"}, 404)
 
 @pytest.fixture
 def server(quiet_home: Path) -> Iterator[Hostile]:
-    """A server with three runs and three sweeps of the same ids; it returns ids up to the requested one."""
+    """A fake server with three runs and three sweeps that have the same ids; it returns ids up to the requested id."""
     with hostile() as made:
         made.answers = {f"/v1/runs/{name}": answering(run_info(id=name)) for name in IDS}
         made.answers |= {f"/v1/sweeps/{name}": answering(sweep(name)) for name in IDS}
@@ -101,7 +101,7 @@ def test_a_list_without_end_is_given_up(server: Hostile, monkeypatch: pytest.Mon
 
 @pytest.fixture
 def folder(quiet_home: Path) -> Path:
-    """A running run in a folder whose name is not an id."""
+    """Makes a running run in a folder whose name is not an id."""
     made = quiet_home / "my runs" / "a%b ü"
     made.mkdir(parents=True)
     journal: list[messages.AnyMessage] = [
@@ -115,7 +115,7 @@ def folder(quiet_home: Path) -> Path:
 
 @pytest.fixture
 def worker(folder: Path) -> Iterator[None]:
-    """Holds the lock of the folder, as rank 0 does."""
+    """Holds the lock of a run's folder, as rank 0 does."""
     with open(folder / layout.LOCK, "a") as lock:
         fcntl.flock(lock, fcntl.LOCK_EX)
         yield
@@ -161,7 +161,7 @@ def test_a_command_that_needs_a_server_is_refused_for_a_folder(folder: Path) -> 
 
 
 def test_a_copy_of_a_run_does_not_stand_for_the_one_of_the_server(folder: Path, server: Hostile) -> None:
-    """conoid get makes a folder with the id of the run as its name."""
+    """The command conoid get makes a folder with the id of the run as its name."""
     name = "1kaaa".ljust(22, "0")
     folder.rename(Path(name))
     server.answers[f"/v1/runs/{name}"] = answering(run_info(id=name))

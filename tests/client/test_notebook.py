@@ -1,4 +1,4 @@
-"""Runs the notebook of the tutorial: all cells, one after the other, in an empty folder."""
+"""Runs all cells of the tutorial notebook, one after the other, in an empty folder."""
 
 import json
 from pathlib import Path

@@ -31,8 +31,8 @@ def readings(path: Path) -> list[object]:
 
 
 def deck(folder: Path, seed: int) -> Path:
-    """Writes a deck of random depth, with changing formats, comments, continued names, folders, and *END before the
-    end.
+    """Writes a deck with includes of random depth, with changing formats, comments, continued names, folders, and *END
+    before the end.
     """
     dice, count = random.Random(seed), 0
 
@@ -60,7 +60,7 @@ def deck(folder: Path, seed: int) -> Path:
 
 @pytest.mark.parametrize("seed", range(12))
 def test_the_one_file_equals_the_deck_with_its_includes(tmp_path: Path, seed: int) -> None:
-    """Names of parts are relative to the folder of the deck, which is that of the first file here."""
+    """Names of parts are relative to the folder of the deck, which is the folder of the first file in this test."""
     (tmp_path / "in").mkdir()
     top = deck(tmp_path / "in", seed)
     root = tmp_path / "in" / "top.k"
@@ -72,7 +72,7 @@ def test_the_one_file_equals_the_deck_with_its_includes(tmp_path: Path, seed: in
 
 
 def files_of(path: Path) -> list[Path]:
-    """Returns all files that the importer opens."""
+    """Returns all files that the importer opens for a deck."""
     made = Deck(path)
     list(made.blocks())
     return made.included.files
@@ -83,7 +83,7 @@ def case(path: str, **more: str) -> dict[str, object]:
 
 
 def test_a_deck_with_includes_is_hashed_and_kept_as_one_file(tmp_path: Path) -> None:
-    """The included file belongs to the deck: another included file gives another file and hash."""
+    """Included files belong to the deck: with another included file the submitted file and its hash differ."""
     (tmp_path / "a.k").write_text("*KEYWORD\n*INCLUDE\nnodes.k\n*END\n")
     (tmp_path / "nodes.k").write_text("*NODE\n1,0,0,0\n")
     hashes = Hashes()

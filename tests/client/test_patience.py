@@ -18,8 +18,8 @@ from conoid.client.sweeps.sweep import SweepInfo
 
 
 class Away(httpx2.BaseTransport):
-    """A server that does not answer a number of requests, or is too busy for them, and then reports that the run has
-    ended.
+    """A fake server that does not answer a number of requests, or is too busy for them, and then reports that the run
+    has ended.
     """
 
     def __init__(self, times: int, status: int | None) -> None:
@@ -36,7 +36,7 @@ class Away(httpx2.BaseTransport):
 
 
 class Silent:
-    """A subscription without messages."""
+    """A fake subscription without messages."""
 
     name, trouble = "none", ""
 
@@ -45,12 +45,12 @@ class Silent:
         return None
 
     def close(self) -> None:
-        """Does nothing."""
+        """Replaces a method and does nothing."""
 
 
 @pytest.fixture(autouse=True)
 def clock(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Clock whose time passes only in ``sleep``."""
+    """Fake clock whose time passes only in ``sleep``."""
     now = [1000.0]
     monkeypatch.setattr(time, "monotonic", lambda: now[0])
     monkeypatch.setattr(time, "sleep", lambda seconds: now.__setitem__(0, now[0] + seconds))
@@ -81,7 +81,7 @@ def test_a_refusal_is_no_absence() -> None:
 
 @pytest.mark.parametrize("status", [None, 502, 503])
 def test_a_follower_continues_after_a_restart_behind_a_proxy(status: int | None) -> None:
-    """The shipped nginx answers 502 while the server behind it restarts."""
+    """The shipped nginx configuration answers with status 502 while the server behind it restarts."""
     left = [20]
 
     def refill(after: int) -> list[AnyMessage]:
@@ -116,7 +116,7 @@ def test_a_user_without_permission_gets_an_error() -> None:
 
 
 def test_a_large_sweep_may_take_its_time() -> None:
-    """A server reads, checks and writes each point before it answers."""
+    """The server reads, checks and writes each point of a sweep before it answers."""
     seconds = []
 
     class Slow(httpx2.BaseTransport):

@@ -26,7 +26,7 @@ TWO = Scene(parts=("foot", "head"), title="Two parts")
 
 @pytest.fixture(scope="module")
 def frame(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A bar with two parts, the lower and the upper half, that is hot only at its axis, in three fragments."""
+    """A bar of two parts, the lower and the upper half; the bar is hot only at its axis and has three fragments."""
     path = tmp_path_factory.mktemp("frames") / "000000.vtkhdf"
     write_frame(path)
     points, tets = quarter_bar()
@@ -53,7 +53,9 @@ def drawn(frame: Path, field: str, out: Path, **options: Any) -> Drawn:
 
 
 def coloured(path: Path) -> Any:
-    """Returns (height, width) True for the pixels of the body; the captions are at the right."""
+    """Returns an array (height, width) that is True for the pixels of the body; the captions at the right are left
+    out.
+    """
     pixels = imread(path)[:, : int(0.7 * SIZE[0]), :3]
     found = pixels.max(axis=2) - pixels.min(axis=2) > 0.08
     found[int(0.75 * SIZE[1]) :, : int(0.25 * SIZE[0])] = False
@@ -70,8 +72,8 @@ def coloured(path: Path) -> Any:
 def test_a_cut_has_the_field_that_is_inside(
     section: str, mirror: str, camera: str, frame: Path, tmp_path: Path
 ) -> None:
-    """The cut of a mirrored body has the field too. A section in the plane of a mirror cuts no tets and shows the
-    inside.
+    """The cut of a mirrored body also shows the field. A section in the plane of a mirror cuts no tets and shows the
+    inside of the body.
     """
     outside = drawn(frame, "temperature", tmp_path / "a.png", raw=True, mirror=mirror)
     cut = drawn(frame, "temperature", tmp_path / "b.png", raw=True, mirror=mirror, section=section, camera=camera)
@@ -161,7 +163,7 @@ def test_debris_far_away_does_not_shrink_the_body_and_is_counted(frame: Path, tm
 
 @pytest.mark.usefixtures("warm")
 def test_nodes_that_have_left_are_no_part_of_the_body(frame: Path, tmp_path: Path) -> None:
-    """A long body still lies horizontally, and a section must lie within its tets."""
+    """A long body lies horizontally in the picture, and the section of the test must lie within its tets."""
     lost = tmp_path / "lost.vtkhdf"
     lost.write_bytes(frame.read_bytes())
     with h5py.File(lost, "r+") as file:
@@ -211,7 +213,7 @@ def test_a_fixed_range_is_that_of_the_run(frame: Path, tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("size", [(200, 200), (320, 240), (700, 500), (1280, 720), (1920, 1080), (500, 1400)])
 def test_no_text_is_cut_off_at_any_size(size: tuple[int, int]) -> None:
-    """No text is drawn on the outermost pixels, for any field and any length of a name."""
+    """No text is drawn on the outermost pixels of a picture, for any field and any length of a name."""
     font = picture_layout.font(size)
     right, above, towards = np.linalg.qr(np.random.default_rng(sum(size)).normal(size=(3, 3)))[0]
     eye = Camera(np.zeros(3), towards, right, above, half=0.05, deep=0.1)
@@ -249,7 +251,9 @@ def test_the_ends_and_round_numbers_are_written_beside_a_bar() -> None:
 
 @pytest.mark.usefixtures("warm")
 def test_a_film_has_the_colours_and_the_camera_of_a_picture(frame: Path, tmp_path: Path) -> None:
-    """The film has one frame and the same view: position and colour of the body do not depend on the kind of file."""
+    """A film of one frame has the same view as the picture: position and colour of the body do not depend on the kind
+    of file.
+    """
     for field in ("fragment", "temperature"):
         drawn(frame, field, tmp_path / "a.png", camera="x")
         draw([frame, frame], TWO, "bar", field, tmp_path / "a.gif", size=SIZE, camera="x")
@@ -281,7 +285,9 @@ def test_a_film_goes_to_ffmpeg_and_its_absence_is_one_line(tmp_path: Path, monke
 
 @pytest.mark.usefixtures("warm")
 def test_a_picture_has_the_colours_of_the_fragments(frame: Path, tmp_path: Path) -> None:
-    """Light makes the colours brighter or darker; the ratios of red, green and blue are those of the page."""
+    """Light makes the colours of a picture brighter or darker; the ratios of red, green and blue are those of the
+    page.
+    """
     drawn(frame, "fragment", tmp_path / "a.png", camera="x", outlines=False)
     pixels = np.asarray(Image.open(tmp_path / "a.png").convert("RGB")).astype(float)
     for number, part in ((0, 0), (1, 1), (2, 1)):

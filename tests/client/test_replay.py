@@ -1,4 +1,4 @@
-"""Replay of a run's loads with other balance policies, for loads whose result is known."""
+"""Replay of a run's loads with other policies of load balance, for loads whose result is known."""
 
 import json
 from collections.abc import Sequence
@@ -18,17 +18,17 @@ from conoid.worker.parallel import decompose
 from conoid.worker.parallel.comm import SerialComm
 
 COST = 12.0
-"""Cost of a cut, s."""
+"""Cost of a decomposition, s."""
 
 
 def spot(window: int) -> int:
-    """Returns the group with the load: eight groups in a row have the load for two windows of ten steps each."""
+    """Returns the number of the loaded group: each of eight groups has the load for two windows of ten steps."""
     return (window - 1) // 2
 
 
 def wandering() -> list[AnyMessage]:
-    """Returns load messages in which one group has the whole load, 1 s per step. Groups that have had the load have
-    20 surface nodes, others 10.
+    """Returns load messages in which one group has the whole load, 1 s per step. Groups that have had the load have 20
+    surface nodes, all other groups have 10.
     """
     row = [(float(x), 0.0, 0.0) for x in range(8)]
     sent: list[AnyMessage] = [
@@ -47,21 +47,21 @@ def account(words: str, sent: Sequence[AnyMessage] | None = None, ranks: int = 2
 
 
 def test_never_loses_half_of_the_load_on_two_ranks() -> None:
-    """One rank has the whole load, and the mean is half of the load: 0.5 s are lost in each of 160 steps."""
+    """One rank has the whole load, and the mean is half of the load: each of 160 steps loses 0.5 s."""
     never = account("never")
     assert (never.cuts, never.lost, never.work, never.imbalance) == ([], 80.0, 80.0, 2.0)
 
 
 def test_every_ten_steps_halves_the_load_in_the_second_window_of_each_place() -> None:
-    """Each cut divides the group that has the load; no cut follows the last step."""
+    """Each decomposition divides the group that has the load; no decomposition follows the last step."""
     every = account("every:10")
     assert every.cuts == list(range(10, 160, 10))
     assert (every.lost, every.cost, every.total) == (40.0, 15 * COST, 40.0 + 15 * COST)
 
 
 def test_steps_between_two_moments_are_cut_at_too() -> None:
-    """In each ten steps there are cuts at steps 4 and 8, with the loads of all ten. The group is divided from step 4
-    on; the cut at step 8 changes nothing.
+    """In each window of ten steps there are decompositions at steps 4 and 8, with the loads of all ten steps. The
+    loaded group is divided from step 4 on; the decomposition at step 8 changes nothing.
     """
     every = account("every:4")
     assert every.cuts == list(range(4, 160, 4))
@@ -69,8 +69,9 @@ def test_steps_between_two_moments_are_cut_at_too() -> None:
 
 
 def test_measured_cuts_when_a_cut_has_been_lost() -> None:
-    """A window without a division loses 5 s, and the limit is 12 s. The first cut is in the third window, then there
-    is one in every fourth window, because each cut divides the group with the load for one more window.
+    """A window in which the loaded group is not divided loses 5 s; the limit for a decomposition is 12 s. The first
+    decomposition is in the third window; later every fourth window has one, because each decomposition divides the
+    loaded group for one more window.
     """
     measured = account("measured")
     assert measured.cuts == [30, 70, 110, 150]
@@ -78,7 +79,9 @@ def test_measured_cuts_when_a_cut_has_been_lost() -> None:
 
 
 def test_outside_cuts_when_a_rank_has_grown() -> None:
-    """The surface nodes are 40 and 40 at first, then 30 + 10 and 80 - 10 + 10 after the first cut, and so on."""
+    """The surface nodes of the two ranks are 40 and 40 at first, then 30 + 10 and 80 - 10 + 10 after the first
+    decomposition.
+    """
     outside = account("outside")
     assert outside.cuts == [10, 50, 90, 110, 130, 150]
     assert outside.lost == 50.0
@@ -141,8 +144,9 @@ def test_alpha_and_every_go_into_the_policy() -> None:
 
 @pytest.mark.parametrize("ranks", [2, 3, 5, 8, 16])
 def test_the_division_is_that_of_the_worker(ranks: int) -> None:
-    """Differences are at most one point for each cut: the replay divides the point at a cut, and the worker gives the
-    whole point to one side. The longest axis is unambiguous."""
+    """The replay and the worker differ by at most one point for each cut: the replay divides the point at a cut, and
+    the worker gives the whole point to one side. The longest axis of the points is unambiguous.
+    """
     random = np.random.default_rng(ranks)
     points = random.uniform(size=(400, 3)) * [16.0, 3.0, 0.5]
     weights = random.uniform(0.1, 1.0, 400)

@@ -25,7 +25,7 @@ from .bodies import write_fragments, write_history, write_run
 
 
 class Reader(HTMLParser):
-    """Parser that collects the addresses in a page and its text, and checks that every element is closed."""
+    """Parser that collects the addresses and the text of a page, and checks that every element is closed."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -73,7 +73,7 @@ def test_a_report_for_which_the_disk_is_too_small_leaves_the_old_one(folder: Pat
 
 
 def test_what_is_no_file_is_written_to_as_it_is(tmp_path: Path) -> None:
-    """A link to a file stays a link; a device is not replaced."""
+    """The command keeps a link to a file as a link, and does not replace a device."""
     (tmp_path / "link").symlink_to(tmp_path / "file")
     for out in (tmp_path / "link", Path("/dev/null")):
         save_text(out, "text")
@@ -187,14 +187,14 @@ def with_snapshots(folder: Path, n: int) -> Result:
 
 
 def embedded(html: str, name: str) -> bytes:
-    """Returns the unpacked content of an element of the page, by its id."""
+    """Returns the unpacked content of an element of the report, by the id of the element."""
     found = re.search(rf'<script type="application/octet-stream" id={name}>(.*?)</script>', html)
     assert found is not None
     return gzip.decompress(base64.b64decode(found[1]))
 
 
 def modules(html: str) -> dict[str, str]:
-    """Returns the embedded modules by the names by which they are imported."""
+    """Returns the embedded modules of the report by the names by which they are imported."""
     found: dict[str, str] = json.loads(embedded(html, "modules"))
     return found
 

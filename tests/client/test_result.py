@@ -1,4 +1,4 @@
-"""Results of a run, each read at its first use."""
+"""Results of a run, each of which is read at its first use."""
 
 import warnings
 from array import array
@@ -107,7 +107,7 @@ def test_a_result_shows_itself_in_notebooks(folder: Path) -> None:
     ],
 )
 def test_missing_lines_of_a_history_give_a_warning(text: str, problem: str | None, tmp_path: Path) -> None:
-    """A history that was cut off shows the last values of an earlier time as those of the end."""
+    """A truncated history must not give values of an earlier time as the values at the end."""
     (tmp_path / "history.csv").write_text(text)
     (tmp_path / "outcome.json").write_text('{"state": "succeeded", "time": 8e-5}')
     with warnings.catch_warnings(record=True) as caught:

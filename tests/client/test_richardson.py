@@ -1,4 +1,6 @@
-"""Orders, extrapolations and indices of data with a known order, and of the worked examples of the sources."""
+"""Orders, extrapolations and convergence indices of data with a known order, and of the worked examples of the
+sources.
+"""
 
 import math
 
@@ -37,7 +39,7 @@ def test_the_worked_example_of_an_inlet() -> None:
 
 
 def test_the_examples_of_celik_and_others_with_unequal_ratios() -> None:
-    """Table 1 of the paper: reattachment length, velocity, and a value that oscillates."""
+    """Table 1 of the cited paper: reattachment length, velocity, and a value that oscillates."""
     sizes = [1.0, 1.5, 2.0]
     assert observed_order(sizes, [6.063, 5.972, 5.863]) == pytest.approx(1.53, abs=0.01)
     assert extrapolated(6.063, 5.972, 1.5, 1.53) == pytest.approx(6.1685, abs=1e-3)
@@ -108,8 +110,8 @@ def test_mean_deviation_and_error_of_a_sample() -> None:
 
 @pytest.mark.parametrize(("effect", "needed"), [(0.5, 64), (0.8, 26), (1.2, 12)])
 def test_runs_that_a_difference_needs(effect: float, needed: int) -> None:
-    """Cohen's tables for two samples, 5 % and a power of 0.8: differences of half a deviation need 64 runs in each
-    sample.
+    """Cohen's tables for two samples, 5 % and a power of 0.8: a difference of half a standard deviation needs 64 runs
+    in each sample.
     """
     assert runs_needed(1.0, effect) == pytest.approx(needed, abs=1)
 

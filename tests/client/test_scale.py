@@ -1,4 +1,4 @@
-"""The projection compared with simple sums, the tables, and the command."""
+"""The projection of scaling compared with simple sums, the tables, and the command."""
 
 import json
 import re

@@ -1,4 +1,6 @@
-"""Upload of files from a client to a real server: over slow and broken connections, and of paths that are not files."""
+"""Upload of files from a client to a real server: over slow and broken connections, and from paths that are not
+files.
+"""
 
 import hashlib
 import os
@@ -43,7 +45,7 @@ BAR = """*NODE
 
 @pytest.fixture
 def folder(tmp_path: Path) -> Path:
-    """A case with a mesh file beside it."""
+    """A case with a mesh file in the same folder."""
     (tmp_path / "meshes").mkdir()
     (tmp_path / "meshes" / "bar.inp").write_text(BAR)
     (tmp_path / "bar.toml").write_text(CASE)
@@ -95,8 +97,8 @@ def test_a_file_arrives_over_a_line_that_breaks_again_and_again(
 
 @pytest.mark.slow
 def test_a_large_file_arrives_over_a_slow_line_that_breaks(server: LocalServer, tmp_path: Path) -> None:
-    """A file of 200 MB is sent at 10 MB/s over a connection that is cut eleven times. The hash is right, and neither
-    the server nor the client uses much memory.
+    """A file of 200 MB is sent at 10 MB/s over a connection that is cut eleven times. After the upload the hash is
+    right, and neither the server nor the client has used much memory.
     """
     path, size = tmp_path / "large.inp", 200_000_000
     with path.open("wb") as file:
@@ -124,7 +126,7 @@ def sha256sum(path: Path) -> str:
 
 
 def peak(process: int) -> int:
-    """Returns the largest memory of a process so far, bytes."""
+    """Returns the largest memory that a process has used so far, bytes."""
     lines = Path(f"/proc/{process}/status").read_text().splitlines()
     return 1024 * int(next(line for line in lines if line.startswith("VmHWM")).split()[1])
 
@@ -132,7 +134,7 @@ def peak(process: int) -> int:
 def test_a_slow_line_gets_smaller_pieces(
     server: LocalServer, tmp_path: Path, impatient: None, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """With smaller pieces no answer is late, and a broken connection loses little."""
+    """With smaller pieces of a file no answer is late, and a broken connection loses little."""
     monkeypatch.setattr(sending, "_WANTED", 0.05)
     sizes: list[int] = []
     path = file_of(tmp_path, 1_500_000)
@@ -198,8 +200,8 @@ def test_a_server_that_is_killed_in_the_middle_goes_on_when_it_is_started_again(
 
 
 def test_a_file_that_changes_after_it_was_hashed_is_refused(server: LocalServer, tmp_path: Path) -> None:
-    """Before sending, the client compares the file's state. During sending, the server finds another hash, refuses
-    the file and stores nothing.
+    """A file that changes before sending is detected by the client, which compares the state of the file. A file that
+    changes during sending has another hash: the server refuses the file and stores nothing.
     """
     path = file_of(tmp_path, 2_500_000)
     (local,) = Hashes().of(case_with(path), Path())
@@ -220,7 +222,7 @@ def test_a_file_that_changes_after_it_was_hashed_is_refused(server: LocalServer,
 
 
 def unusable(folder: Path, kind: str) -> str:
-    """A path at which there is no file that can be sent."""
+    """A path in a case at which there is no file that can be sent."""
     path = folder / kind.replace(" ", "-")
     match kind:
         case "a pipe":
@@ -255,7 +257,7 @@ def unusable(folder: Path, kind: str) -> str:
     ],
 )  # fmt: skip
 def test_a_path_that_is_not_a_file_is_refused_in_one_line(folder: Path, kind: str, message: str) -> None:
-    """The client refuses the path before a request to a server, and does not hang."""
+    """The client refuses the wrong path before any request to a server, and does not hang."""
     with Session("http://127.0.0.1:9") as session, pytest.raises(CaseError) as raised:
         session.submit(case_with(unusable(folder, kind)))
     (problem,) = raised.value.problems
@@ -281,9 +283,9 @@ def conoid(*words: object) -> tuple[int, str, str]:
 
 
 def test_commands_send_what_a_case_names(server: LocalServer, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Paths are relative to the folder of the case; a point of a sweep may have a file of its own.
+    """Paths in a case are relative to the folder of the case; a point of a sweep may have a separate file.
 
-    A copied run's folder can be submitted again without the original file.
+    A copied run's folder can be submitted again without the original mesh file.
     """
     monkeypatch.setenv("CONOID_URL", server.session.url)
     monkeypatch.setenv("CONOID_TOKEN", server.token)
@@ -308,10 +310,10 @@ def test_commands_send_what_a_case_names(server: LocalServer, folder: Path, monk
 
 
 def test_a_refusal_is_shown_in_the_words_of_the_server(server: LocalServer, tmp_path: Path) -> None:
-    """A refused file is not sent again."""
+    """A file that the server has refused is not sent again."""
     path = tmp_path / "large.inp"
     with path.open("wb") as file:
-        file.truncate(5 << 30)  # takes no room
+        file.truncate(5 << 30)  # a sparse file, which uses no disk space
     with path.open("rb") as file:
         local = LocalFile(Named((), "large.inp", None), path, "0" * 64, state_of(file.fileno()))
     with pytest.raises(ServiceError, match=r"^the file has 5\.37 GB; this server allows 4\.29 GB$") as raised:

@@ -1,4 +1,4 @@
-"""The Python API with a real server in a process of its own, over Zenoh and over SSE."""
+"""The Python API with a real server in a separate process, over Zenoh and over SSE."""
 
 from pathlib import Path
 

@@ -1,4 +1,4 @@
-"""The real worker on a mesh file: a run by the server has the same answer as a run of the worker alone."""
+"""The real worker on a mesh file: a run on the server has the same digest as a run of the worker alone."""
 
 import hashlib
 import json
@@ -34,7 +34,9 @@ BAR = """*NODE
 
 
 def test_a_run_of_a_mesh_file_has_the_digest_of_the_worker_alone(quiet_home: Path) -> None:
-    """``conoid run`` reads the copy in the run's folder. The original file may change, and the folder may be moved."""
+    """The command ``conoid run`` reads the copy of the mesh file in the run's folder. The original mesh file may
+    change, and the folder of the run may be moved.
+    """
     for name, text in (("case/bar.toml", CASE), ("meshes/bar.inp", BAR)):
         (quiet_home / name).parent.mkdir()
         (quiet_home / name).write_text(text)

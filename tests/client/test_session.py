@@ -1,4 +1,4 @@
-"""Requests and refusals, with answers of a transport in this process."""
+"""Requests and refusals of the client, with answers of a transport in the process of the test."""
 
 import errno
 import json
@@ -39,8 +39,8 @@ def _no_pauses(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_a_damaged_file_of_a_server_is_named_by_its_run() -> None:
-    """The message has the name of the run, not the path of its local copy, which no longer exists when a user reads
-    the message.
+    """The message contains the name of the run, not the path of its local copy, which no longer exists when a user
+    reads the message.
     """
     session = served(lambda _: httpx2.Response(200, content=b"{"))
     for name, noun in (("case.resolved.json", "case"), ("outcome.json", "outcome")):
@@ -50,7 +50,7 @@ def test_a_damaged_file_of_a_server_is_named_by_its_run() -> None:
 
 @pytest.mark.parametrize(("overrides", "message"), [("run.ranks=2", "'run.ranks=2'"), (5, "5")])
 def test_one_text_is_no_list_of_assignments(overrides: Any, message: str) -> None:
-    """Before, the text was read letter by letter."""
+    """In an earlier version the text was read letter by letter."""
     with pytest.raises(
         CaseError, match=rf"^overrides = {message}: write a list of assignments, such as \['run.ranks=2'\]"
     ):
@@ -210,7 +210,7 @@ def test_a_file_name_cannot_leave_the_folder(name: str, tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("elsewhere", ["http://evil.test/v1/runs/r1/files/a", "/v1/runs/r2/files/a", ""])
 def test_files_are_fetched_only_from_addresses_of_the_server(tmp_path: Path, elsewhere: str) -> None:
-    """A name that is not valid UTF-8 is shown as text; its address contains the exact bytes."""
+    """A file name that is not valid UTF-8 is shown as text; its address contains the exact bytes."""
     asked: list[str] = []
 
     def answer(request: httpx2.Request) -> httpx2.Response:
@@ -310,7 +310,7 @@ def test_errors_of_the_worker_are_in_the_same_tree() -> None:
 
 
 def listing(size: int, state: str = "succeeded") -> Answer:
-    """Returns a server that lists a file of this size and sends three bytes."""
+    """Returns a fake server that lists a file of the given size and sends three bytes."""
 
     def answer(request: httpx2.Request) -> httpx2.Response:
         if request.url.path.endswith("/files"):
@@ -337,7 +337,7 @@ def test_a_file_that_is_not_as_large_as_it_is_listed_is_refused(tmp_path: Path) 
 
 @pytest.mark.parametrize(("seconds", "times"), [(0.0, 3), (30.0, 1)])
 def test_a_server_that_hangs_is_asked_once(seconds: float, times: int, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Before, the client gave up a server that never answers after 93 s only."""
+    """In an earlier version the client waited 93 s for a server that never answers."""
     asked, clock = [0], [0.0]
     monkeypatch.setattr("conoid.client.remote.http.time.monotonic", lambda: clock[0])
 

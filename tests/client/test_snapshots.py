@@ -1,4 +1,6 @@
-"""Snapshots of the fragments through the Python API: listed, fetched, followed over Zenoh and over SSE."""
+"""Snapshots of the fragments through the Python API: the snapshots are listed, fetched, and followed over Zenoh and
+over SSE.
+"""
 
 from pathlib import Path
 

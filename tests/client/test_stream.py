@@ -1,4 +1,4 @@
-"""Subscription over Zenoh with a real router and real messages; a list replaces the journal of the server."""
+"""Subscription over Zenoh with a real router and real messages; a list in memory replaces the journal of the server."""
 
 import threading
 import time
@@ -22,7 +22,7 @@ PREFIX = keys.run_prefix(OWNER, run_messages.RUN)
 
 
 class Journal:
-    """Messages that are written so far; ``reads`` counts the readings."""
+    """Messages that are written so far; ``reads`` counts how often the messages are read."""
 
     def __init__(self) -> None:
         self.lines: list[AnyMessage] = []
@@ -54,8 +54,8 @@ def reading(
 
 
 def subscribed(broker: Broker) -> ZenohLink:
-    """Opens a subscription and waits until the router has it: a declaration takes a moment to arrive. Messages of
-    this wait have seq 0.
+    """Opens a subscription and waits until the router has it, because a declaration takes a moment to arrive. The
+    messages that are sent during this wait have seq 0.
     """
     link = ZenohLink(broker.router, PREFIX)
     deadline = time.monotonic() + 10

@@ -1,4 +1,4 @@
-"""Points of a sweep from arguments and from files."""
+"""Points of a sweep, given by arguments and by files."""
 
 from pathlib import Path
 
@@ -51,7 +51,7 @@ def test_arrays_ranges_and_tuples_are_lists_of_values() -> None:
 
 @pytest.mark.parametrize("value", ["1 us", 4, None, {"ranks": [1]}])
 def test_one_value_is_no_list_of_values(value: object) -> None:
-    """A text could be read letter by letter, and a table key by key."""
+    """A text must not be read letter by letter, and a table must not be read key by key."""
     with pytest.raises(CaseError, match=r"^points = .*: run.end_time has one value; write a list of values, such as"):
         points_along({"run.end_time": value})  # type: ignore[dict-item]
 

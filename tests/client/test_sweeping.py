@@ -1,5 +1,5 @@
-"""``conoid sweep`` with a real server: progress, a repeated command, a server of its own, the table, an adaptive
-sweep.
+"""The command ``conoid sweep`` with a real server: progress, a repeated command, a separate server, the table, an
+adaptive sweep.
 """
 
 import csv
@@ -21,7 +21,7 @@ SPEED = "parts[0].velocity[2]"
 
 @pytest.fixture
 def user(server: LocalServer, quiet_home: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """A working folder, and an environment with the address of a server."""
+    """Sets a working folder, and an environment with the address of a server."""
     monkeypatch.setenv("CONOID_URL", server.session.url)
     monkeypatch.setenv("CONOID_TOKEN", server.token)
     return quiet_home

@@ -1,4 +1,4 @@
-"""Tables in a terminal and in a pipe."""
+"""Printed tables in a terminal and in a pipe."""
 
 import io
 

@@ -1,5 +1,5 @@
-"""The blocks of the tutorial make a case that is valid, follows the schema, and has the estimate and the result of
-the text.
+"""The blocks of the tutorial make a case that is valid, follows the schema, and has the estimate and the result that
+the text gives.
 """
 
 import re
@@ -32,7 +32,7 @@ def test_the_pieces_are_a_sound_case() -> None:
 
 
 def test_the_pieces_of_the_bullet_stand_in_its_case() -> None:
-    """The mesh file of the case has the solids that the blocks name."""
+    """The mesh file of the tutorial case has the solids that the blocks name."""
     folder = Path(__file__).parents[2] / "docs" / "tutorial" / "bullet"
     text, case = (folder.parent / "bullet.md").read_text(), (folder / "bullet_tile.toml").read_text()
     pieces = re.findall(r"```toml\n(.*?)```", text, re.DOTALL)

@@ -35,7 +35,9 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def body_box(path: Path) -> tuple[float, float, float, float]:
-    """Returns left, right, top and bottom of the body, left of the colour bar, over the size of the picture."""
+    """Returns left, right, top and bottom of the body as fractions of the picture; the body is left of the colour
+    bar.
+    """
     pixels = imread(path)[:, :, :3]
     assert pixels.shape == (SIZE[1], SIZE[0], 3)
     coloured = pixels.max(axis=2) - pixels.min(axis=2) > 0.25
@@ -124,7 +126,9 @@ def test_mirror_planes_are_read() -> None:
 
 
 def test_a_crash_of_the_renderer_names_the_system_package(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """VTK without EGL and OSMesa ends with a segmentation fault; the test makes the child end with such a fault."""
+    """VTK without EGL and OSMesa ends with a segmentation fault; the test makes the child process end with a
+    segmentation fault.
+    """
     (tmp_path / "sitecustomize.py").write_text("import ctypes; ctypes.string_at(0)")
     monkeypatch.setenv("PYTHONPATH", str(tmp_path))
     write_frame(tmp_path / "f.vtkhdf")
@@ -228,8 +232,8 @@ def seen(**options: Any) -> Picture:
 
 @pytest.mark.usefixtures("warm")
 def test_a_scale_bar_has_its_printed_length(folder: Path, tmp_path: Path) -> None:
-    """The body is 32.4 mm long at the start and 0.82 of that in the last frame; body and scale bar have the same
-    scale.
+    """The body is 32.4 mm long at the start and has 0.82 of this length in the last frame; body and scale bar have the
+    same scale.
     """
     size = (600, 800)
     drawn = view(folder, "temperature", tmp_path / "s.png", size=size, camera="x", raw=True, captions=False,
@@ -249,8 +253,8 @@ def test_a_scale_bar_has_its_printed_length(folder: Path, tmp_path: Path) -> Non
 def test_a_long_body_lies_along_the_picture_and_shows_its_planes_of_symmetry(
     along: int, cuts: dict[int, float]
 ) -> None:
-    """The low end of the body is at the left unless a plane of symmetry requires the other side; with ``up`` the
-    body stands.
+    """The low end of the body is at the left unless a plane of symmetry requires the other side; with ``up`` the body
+    stands upright.
     """
     bounds = np.array([[0.0, 1.0]] * 3)
     bounds[along, 1] = 4.0
@@ -347,7 +351,7 @@ def test_a_failure_names_its_file() -> None:
     [("x", "y=0.002"), ("x,y", "z=0.01"), ("y", "x=0.001,z=0.01"), ("auto", "z=0.02"), ("z", "x=0.001,y=0.001")],
 )
 def test_a_body_is_cut_and_mirrored_at_once(mirror: str, section: str, folder: Path, tmp_path: Path) -> None:
-    """A section leaves faces of three to six corners."""
+    """A section of a tet mesh consists of faces with three to six corners."""
     cut = view(folder, "mises", tmp_path / "a.png", size=(64, 64), section=section)
     both = view(folder, "mises", tmp_path / "b.png", size=(64, 64), section=section, mirror=mirror)
     assert both.faces > cut.faces
@@ -443,7 +447,7 @@ def test_tets_of_a_set_are_drawn_alone(tmp_path: Path) -> None:
 
 @pytest.mark.usefixtures("warm")
 def test_round_and_moving_walls_are_drawn_where_they_are(tmp_path: Path) -> None:
-    """The case is written as a worker writes it; the frames have the positions of the walls."""
+    """The test writes the case in the same way as a worker; the frames have the positions of the walls."""
     run = write_run(tmp_path / "bar")
     ball = {"kind": "wall", "name": "ball", "shape": "sphere", "radius": "2 mm", "mass": "1 g"}
     walls = [

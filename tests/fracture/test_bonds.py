@@ -1,5 +1,5 @@
-"""Bonds that break: energy in tension, shear and mixed mode; bonds of parts that fracture; independence of the
-partition.
+"""Bonds that break: energy in tension, shear and mixed mode; bonds of parts that fracture; independence of the domain
+decomposition.
 """
 
 from pathlib import Path
@@ -26,7 +26,7 @@ class Ended(NamedTuple):
     """Results of a run."""
 
     spent: float
-    """Energy absorbed by the bond, over its area, J/m^2."""
+    """Energy absorbed by the bond, divided by its area, J/m^2."""
     broken: int
     residual: float
     digest: str | None
@@ -35,7 +35,7 @@ class Ended(NamedTuple):
 
 
 def drawn(x: str, z: str) -> list[dict[str, Any]]:
-    """Returns a scene in which the lower end is fixed and the upper end is driven, without motion along y."""
+    """Returns a scene whose lower end is fixed and whose upper end is driven, without motion along y."""
     below, above = [-1, -1, "0.1 mm"], [-1, -1, "5.9 mm"]
     return [
         {"kind": "velocity", "x": 0, "z": 0, "low": [-1, -1, -1], "high": [1, 1, below[2]]},
@@ -80,8 +80,8 @@ def test_a_bond_in_tension_absorbs_its_energy() -> None:
 def test_a_bond_in_mixed_mode_absorbs_energy_by_its_share_of_shear(
     x: float, z: float, least: float, most: float
 ) -> None:
-    """All nodes move along one line, so that no facet rotates and the traction that breaks a facet has one
-    direction. The energy follows from w_n / 10 + w_s / 25 = 1, with the work w_n and w_s in the two modes.
+    """All nodes move along one line, so that no facet rotates and the traction that breaks a facet has one direction.
+    The absorbed energy follows from w_n / 10 + w_s / 25 = 1, with the work w_n and w_s in the two modes.
     """
     slide = {"kind": "velocity", "y": 0, "low": [-1, -1, -1], "high": [1, 1, 1]}
     if z == 0.0:
@@ -97,7 +97,7 @@ def test_a_bond_in_mixed_mode_absorbs_energy_by_its_share_of_shear(
 
 
 def _with_shares(sim: Simulation) -> tuple[Ended, float]:
-    """Returns the results and the mean energy from the tractions that broke the facets."""
+    """Returns the results of a run and the mean energy, computed from the tractions that broke the facets."""
     found: list[float] = []
     assert sim.fracture is not None
     insertion = sim.fracture._insertion
@@ -133,7 +133,7 @@ def test_ranks_and_a_restart_change_no_bit_where_a_bond_breaks(form: Form, tmp_p
 
 
 def test_a_bond_without_energy_breaks_at_its_strength_and_one_without_strength_holds() -> None:
-    """The bond behaves in the same way if its two parts fracture."""
+    """A bond behaves in the same way if its two parts fracture."""
     keys: dict[str, Any] = {"boundaries": drawn("0 m/s", "2 m/s"), "run": {"end_time": "1.5 us"}}
     (ended,) = on(1, joint(("alumina", "steel"), {"strength": "20 MPa"}, **keys), PARTS, run)
     assert (ended.broken, ended.fragments, ended.spent) == (18, 2, 0.0)
@@ -146,14 +146,14 @@ def test_a_bond_without_energy_breaks_at_its_strength_and_one_without_strength_h
 
 
 def _torn(sim: Simulation) -> tuple[Ended, int]:
-    """Returns the results and the number of broken facets between the two parts."""
+    """Returns the results of a run and the number of broken facets between the two parts."""
     ended = run(sim)
     first, block = sim.model.part_starts[1], sim.model.blocks[0]
     return ended, int((block.bond[block.across // 4 >= first] != 0).sum())
 
 
 def test_parts_of_a_broken_bond_are_in_contact() -> None:
-    """The parts are pulled apart and pushed back: contact transmits the pressure, without penetration."""
+    """The two parts are pulled apart and pushed back: contact transmits the pressure, without penetration."""
     course = [[0, 1], ["1.5 us", 1], ["1.6 us", -1], ["5 us", -1]]
     ends = drawn("0 m/s", "2 m/s")
     ends[1]["course"] = course

@@ -1,7 +1,7 @@
 """Cohesive facets release no more energy than they absorbed, at time steps near the stable one, in bodies that break.
 
-Without unloading, a facet that closes beyond its initial opening would give its neighbours half of strength times
-offset: more than the fracture energy, if the offset is longer than the critical opening.
+Without unloading, a facet that closes beyond its initial opening would release half of strength times offset to its
+neighbours: more than the fracture energy, if the offset is longer than the critical opening.
 """
 
 from dataclasses import dataclass
@@ -67,7 +67,7 @@ dt_safety = {safety}
 end_time = {end}
 frames = 0
 """
-"""Scene: a cube of stone between two plates of steel; ``across``: the plates also slide."""
+"""Scene: a cube of stone between two plates of steel; with ``across`` the plates also slide."""
 
 BAR = """
 name = "bar"
@@ -95,7 +95,7 @@ dt_safety = {safety}
 end_time = {end}
 frames = 0
 """
-"""Scene: a bar of glass that is stretched; with free ``ends`` it closes again."""
+"""Scene: a bar of glass that is stretched; with free ``ends`` the cracks of the bar close again."""
 
 BLOCK = """
 name = "block"
@@ -130,7 +130,7 @@ frames = 0
 
 
 def cube(safety: float, half: float = 2e-3, across: float = 0.0, scatter: str = "", end: float = 8e-6) -> str:
-    """Returns the scene; ``half``: half of the edge of the cube."""
+    """Returns the scene of a subject; ``half``: half of the edge of the cube."""
     gap, plate = 1e-5, 2e-3
     face = half + gap
     return CUBE.format(
@@ -155,7 +155,7 @@ SCENES = {
     "askew": lambda safety: BLOCK.format(safety=safety),
     "six": lambda safety: cube(safety, half=3e-3, end=20e-6),
 }
-"""Scenes by their subject; ``six`` is the first one with a cube of 6 mm."""
+"""Scenes by their subject; ``six`` is the first scene with a cube of 6 mm."""
 
 
 @dataclass
@@ -164,15 +164,16 @@ class Account:
 
     fracture: float = 0.0
     least: float = 0.0
-    """Smallest recoverable energy, as a share of the energy dissipated so far."""
+    """Smallest recoverable energy, divided by the energy dissipated so far."""
     given: float = 0.0
-    """Largest energy that all facets together had released beyond what they absorbed, at any time."""
+    """Largest energy that all facets together had released in excess of the energy that they had absorbed, at any
+    time."""
     residual: float = 0.0
     facets: int = 0
 
 
 def account(text: str) -> Account:
-    """Returns the energy balance of every step."""
+    """Returns the energies of every step of a run."""
     sim, found = simulation.build(load.parse_toml(text), Path(), SerialComm()), Account()
 
     def look(sim: Simulation, before: Floats) -> None:
@@ -196,7 +197,7 @@ def account(text: str) -> Account:
     ],
 )
 def test_closing_facets_release_no_more_than_they_absorbed(name: str, safety: float) -> None:
-    """The remaining energy is due to pairs that contact pushed back differently than in the step before."""
+    """The remaining energy comes from pairs of nodes that contact pushed back differently than in the previous step."""
     found = account(SCENES[name](safety))
     print(f"{name} {safety}: {found}")
     assert found.facets > 100

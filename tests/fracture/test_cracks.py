@@ -1,4 +1,6 @@
-"""Contact across new cracks: no spurious impulses, closing cracks stop, and a broad phase changes no contact."""
+"""Contact across new cracks: no spurious impulses, closing cracks stop, and the times of the broad phase change no
+contact.
+"""
 
 from collections.abc import Callable, Iterator
 from unittest.mock import patch
@@ -31,7 +33,7 @@ HEIGHT = 2.0 * MM
 
 @pytest.fixture(autouse=True)
 def only_the_plane_breaks() -> Iterator[None]:
-    """Facets of the plane have a strength of 1 Pa, all others do not break."""
+    """Strengths: facets of the plane have a strength of 1 Pa, all other facets do not break."""
     weak = plane(mesh_of(), HEIGHT)[:, 0]
 
     def strengths(self: Toughness, ids: Ints, area: Floats) -> Floats:
@@ -52,7 +54,7 @@ def case_of(friction: float = 0.0, **fracture: object) -> schema.Case:
 
 
 def sides(sim: Simulation) -> Flags:
-    """Returns (nodes,) whether a node belongs to tets above the plane."""
+    """Returns (nodes,) whether each node belongs to tets above the plane."""
     above = np.zeros(sim.model.nodes.n, bool)
     for b in sim.model.blocks:
         above[b.tets[sim.model.nodes.x0[b.tets].mean(axis=1)[:, 2] > HEIGHT]] = True
@@ -61,7 +63,8 @@ def sides(sim: Simulation) -> Flags:
 
 def at_rest(sim: Simulation) -> Simulation:
     """Returns the block just after the whole plane has broken at a stress of a few Pa: without stress, force and
-    motion."""
+    motion.
+    """
     nodes = sim.model.nodes
     step.prepare(sim)
     first = sim.model.nodes_global
@@ -74,7 +77,7 @@ def at_rest(sim: Simulation) -> Simulation:
             break
     assert sim.model.nodes_global == first + 16
     nodes.x[:], nodes.v[:] = nodes.x0, 0.0
-    step.prepare(sim)  # volumes that the pass over the tets stores
+    step.prepare(sim)  # volumes that the loop over the tets stores
     nodes.force[:] = 0
     for b in sim.model.blocks:
         b.state[:, : rows.VISCOUS + 1, :] = 0.0
@@ -105,7 +108,7 @@ def ticks(sim: Simulation, steps: int, look: Callable[[], None] = lambda: None) 
 
 @pytest.mark.parametrize("searched", [False, True])
 def test_a_new_crack_makes_no_impulse(searched: bool) -> None:
-    """The gap is zero to the bit, and a body at rest stays at rest."""
+    """The gap of the crack is exactly zero, and a body at rest stays at rest."""
     sim = cracked()
     assert sim.contact is not None
     assert (gaps(sim) == 0.0).all()
@@ -118,7 +121,7 @@ def test_a_new_crack_makes_no_impulse(searched: bool) -> None:
 
 @pytest.mark.parametrize("searched", [False, True])
 def test_sides_that_close_stop(searched: bool) -> None:
-    """The sides stop in the same step, with conserved momentum; the gap is never negative."""
+    """The two sides of the crack stop in the same step, with conserved momentum; the gap is never negative."""
     sim = cracked()
     assert sim.contact is not None
     nodes, above = sim.model.nodes, sides(sim)
@@ -133,8 +136,8 @@ def test_sides_that_close_stop(searched: bool) -> None:
 
 
 def test_a_crack_that_closes_acts_as_two_bodies_do() -> None:
-    """The reference has the same two halves as separate parts, in contact by nodes and faces from the start: the
-    motion while they touch and the momentum of each are equal.
+    """The reference has the same two halves as separate parts, in contact by nodes and faces from the start. The motion
+    while the halves touch, and the momentum of each half, are equal to those of the crack.
     """
     sim = cracked()
     above = sides(sim)
@@ -159,8 +162,8 @@ def test_a_crack_that_closes_acts_as_two_bodies_do() -> None:
 
 @pytest.mark.parametrize("friction", [0.0, 0.3])
 def test_sides_that_slide_rub(friction: float) -> None:
-    """Pressed and sheared sides lose mu times the normal impulse. Without friction the sides lose only the part due to
-    the rotation of faces by the strain, v / c = 2e-4.
+    """Pressed and sheared sides of a crack lose mu times the normal impulse. Without friction the sides of a crack lose
+    only the part that is caused by the rotation of faces by the strain, v / c = 2e-4.
     """
     sim = cracked(friction=friction)
     assert sim.contact is not None
@@ -199,7 +202,7 @@ def test_cracks_close_equally_on_any_number_of_ranks(friction: float) -> None:
 
 
 def test_an_open_crack_carries_nothing_and_is_surface_after_a_search() -> None:
-    """Halves that separate move freely; the broad phase adds the new faces when they are wide enough for other
+    """Halves that separate move freely; the broad phase adds the new faces when the crack is wide enough for other
     contacts.
     """
     sim = cracked()

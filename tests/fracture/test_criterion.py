@@ -1,4 +1,4 @@
-"""Fracture criterion: traction of the two sides, inexpensive test before it, strengths, delay."""
+"""Fracture criterion: traction of the two sides, the inexpensive test before the criterion, strengths, delay."""
 
 import math
 from typing import Any
@@ -32,7 +32,7 @@ GLASS = materials.Material(
 )  # fmt: skip
 MANY = 100_000
 ROWS = np.array([[0, 5, 4], [5, 1, 3], [4, 3, 2]])
-"""Row of the state for each component of the deviator."""
+"""Row of the state array for each component of the stress deviator."""
 
 
 def effective(traction: Floats, normal: Floats, weight: float, friction: float) -> Floats:
@@ -66,14 +66,14 @@ def marks(corners: Floats, rows: Floats, weakest: Floats, weight: float) -> Ints
 
 
 def stresses(rows: Floats) -> Floats:
-    """Returns (n, 3, 3) stresses of rows (n, 7): deviator and pressure."""
+    """Returns (n, 3, 3) stresses from rows (n, 7): deviator and pressure."""
     return np.asarray(rows[:, ROWS] - rows[:, PRESSURE, None, None] * np.eye(3))
 
 
 @pytest.mark.parametrize("weight", [0.0, 0.3, 1.0, 4.0])
 def test_a_facet_that_passes_is_overstressed_on_one_side_at_least(weight: float) -> None:
-    """Check 100 000 pairs of tets with random stresses; with equal stress in both, the marked faces are those that
-    pass in tension.
+    """Checks 100 000 pairs of tets with random stresses; with equal stress in both tets, the marked faces are those
+    that pass the criterion in tension.
     """
     random = np.random.default_rng([1, int(10 * weight)])
     corners = REGULAR + random.uniform(-0.3, 0.3, (MANY, 4, 3))
@@ -104,8 +104,9 @@ def test_a_facet_that_passes_is_overstressed_on_one_side_at_least(weight: float)
 
 
 def loaded_sim(sim: Simulation) -> Simulation:
-    """Returns a simulation with random stresses by the id of the tet; every face is marked, and all tractions are
-    below the strength."""
+    """Returns a simulation with random stresses by the id of the tet; every face is marked, and all tractions are below
+    the strength.
+    """
     step.prepare(sim)
     for b in sim.model.blocks:
         for row in (*range(S_XX, S_XY + 1), PRESSURE, VISCOUS):
@@ -123,8 +124,8 @@ def loaded_sim(sim: Simulation) -> Simulation:
 
 
 def tractions(sim: Simulation) -> dict[int, list[float]]:
-    """Returns, for facets whose side of smaller id is on this rank, the traction and the effective one, by that
-    side.
+    """Returns the traction and the effective traction of the facets whose side of smaller id is on this rank, by the
+    number of this side.
     """
     assert sim.fracture is not None
     found: dict[int, list[float]] = {}
@@ -144,8 +145,8 @@ def case_of(**fracture: Any) -> schema.Case:
 
 @pytest.mark.parametrize("source", ["tets", "nodes"])
 def test_tractions_are_those_of_numpy_and_the_same_on_any_number_of_ranks(source: str) -> None:
-    """The traction is the mean of the two sides, or of the three nodes by volume, without the viscous part, on the
-    outward normal of the tet of smaller id, once for each facet.
+    """The traction of a facet is the mean of its two sides, or of its three nodes by volume, without the viscous part.
+    The traction acts on the outward normal of the tet of smaller id, and exists once for each facet.
     """
     mesh, case = block((3, 3, 2), 1e-3, seed=2), case_of(delay=0.0, shear_weight=0.7, friction=0.4, traction=source)
     sim = loaded_sim(build(case, [mesh]))
@@ -184,7 +185,7 @@ def test_tractions_are_those_of_numpy_and_the_same_on_any_number_of_ranks(source
 
 
 def test_facets_below_their_strength_are_no_candidates() -> None:
-    """The result is the same on any number of ranks."""
+    """The result is equal on any number of ranks."""
     mesh, case = block((3, 3, 2), 1e-3, seed=2), case_of(delay=0.0, shear_weight=0.7, friction=0.4)
 
     def strengthened(sim: Simulation) -> Simulation:
@@ -242,7 +243,9 @@ def test_a_tiny_modulus_makes_facets_that_never_break() -> None:
 @pytest.mark.parametrize("modulus", [2.0, 8.0, 30.0])
 @pytest.mark.parametrize("seed", [0, 5])
 def test_strengths_have_the_weibull_distribution(modulus: float, seed: int) -> None:
-    """Test of Kolmogorov and Smirnov on the ids of a mesh; strengths of different seeds are independent."""
+    """Test of Kolmogorov and Smirnov for the strengths by the ids of a mesh; strengths of different seeds are
+    independent.
+    """
     ids = 4 * np.arange(20_000) + np.arange(20_000) % 4
     area = np.ones(len(ids))
     found = tough(modulus=modulus, seed=seed, minimum=10e6).strengths(ids, area)
@@ -253,7 +256,7 @@ def test_strengths_have_the_weibull_distribution(modulus: float, seed: int) -> N
 
 
 def test_large_facets_are_as_strong_as_their_weakest_part() -> None:
-    """A facet of k areas has the strength of the weakest of k facets of one area."""
+    """A facet of k unit areas has the strength of the weakest of k facets of one unit area."""
     ids, k = np.arange(40_000), 16
     one = tough(modulus=4.0, area=1e-6).strengths(ids, np.full(len(ids), 1e-6)).reshape(-1, k).min(axis=1)
     large = tough(modulus=4.0, area=1e-6).strengths(ids[: len(one)] + 10**6, np.full(len(one), k * 1e-6))
@@ -262,7 +265,7 @@ def test_large_facets_are_as_strong_as_their_weakest_part() -> None:
 
 
 def test_strengths_are_independent_of_order_and_ranks() -> None:
-    """Strength by the id of the facet: equal on both sides and on all ranks."""
+    """The strength depends on the id of the facet: it is equal on both sides and on all ranks."""
     mesh, case = block((3, 3, 2), 1e-3, seed=2), case_of()
 
     def strengths(sim: Simulation) -> dict[int, float]:
@@ -291,8 +294,9 @@ def test_strengths_are_independent_of_order_and_ranks() -> None:
 
 
 def required(made: Toughness, strength: Floats, since: Floats) -> Floats:
-    """Returns (n,) the traction, Pa, that breaks facets at the times ``since`` after they first passed their
-    strength."""
+    """Returns (n,) the traction, Pa, that breaks facets at the times ``since`` after they first exceeded their
+    strength.
+    """
     return np.array([required_traction(s, t, made.delay) for s, t in zip(strength, since, strict=True)])
 
 
@@ -313,8 +317,8 @@ def test_the_delay_is_that_of_the_paper(factor: float) -> None:
 
 
 def test_the_delay_comes_from_the_work_on_two_half_spaces() -> None:
-    """An incident stress s above the strength opens a crack whose traction falls linearly with the opening d:
-    rho c d' / 2 = s - T(d) on each side. The opening 2 energy / strength is reached at the time of eq. (3).
+    """An incident stress s above the strength opens a crack whose traction falls linearly with the opening d: rho c d'
+    / 2 = s - T(d) on each side. The opening 2 energy / strength is reached at the time of eq. (3).
     """
     made = toughness(GLASS, schema.Fracture(delay=1.0), 1e-3)
     impedance = math.sqrt(2500.0 * 72e9 * 0.78 / (1.22 * 0.56))

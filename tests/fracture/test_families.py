@@ -1,5 +1,5 @@
-"""Pieces with only a common edge or node: they do not pass each other at it while the cracks round it are narrow,
-and they pass if their faces would not touch.
+"""Pieces with only a common edge or node: while the cracks around this edge or node are narrow, the pieces do not pass
+each other there. The pieces pass each other if their faces would not touch.
 """
 
 from collections.abc import Iterator, Sequence
@@ -33,14 +33,15 @@ MIDDLE = 2.0 * MM
 
 
 def mesh_of(height: int = 2) -> TetMesh:
-    """Returns a block of 4 x 2 x 4 mm, with planes of facets at x and z = 2 mm that cross in its middle; ``height``:
-    in y, mm."""
+    """Returns a block of 4 x 2 x 4 mm, with planes of facets at x and z = 2 mm that cross in the middle of the block;
+    ``height``: extent along y, mm.
+    """
     return block((4, height, 4), MM, shake=0.0)
 
 
 @contextmanager
 def planes_that_break(mesh: TetMesh, axes: list[int]) -> Iterator[None]:
-    """Facets in the middle planes of these axes have a strength of 1 Pa, all others hold."""
+    """Strengths: facets in the middle planes of the given axes have a strength of 1 Pa, all other facets hold."""
     facets = inner(mesh)
     points = mesh.points[corners_of(mesh, facets)]
     weak = facets[(points[:, :, axes] == MIDDLE).all(axis=1).any(axis=1), 0]
@@ -54,8 +55,9 @@ def planes_that_break(mesh: TetMesh, axes: list[int]) -> Iterator[None]:
 
 @pytest.fixture
 def columns_come_apart() -> Iterator[None]:
-    """Breaks the block into four columns; each column has two neighbours and is opposite to one column across the
-    edge in the middle."""
+    """Breaks the block into four columns; each column has two neighbours, and is opposite to one column across the edge
+    in the middle.
+    """
     with planes_that_break(mesh_of(), [0, 2]):
         yield
 
@@ -65,7 +67,9 @@ def case_of() -> schema.Case:
 
 
 def columns(sim: Simulation) -> Ints:
-    """Returns (nodes,) the column of each node: 1 for x, plus 2 for z beyond the middle. Collective."""
+    """Returns (nodes,) the column of each node: 1 for x, plus 2 for z, if the node is beyond the middle. All ranks must
+    call the function.
+    """
     sim.count_nodes()
     nodes = sim.model.nodes
     found = np.zeros(sim.model.nodes_global)
@@ -76,8 +80,8 @@ def columns(sim: Simulation) -> Ints:
 
 
 def at_rest(sim: Simulation, axes: Sequence[int] = (0, 2)) -> Simulation:
-    """Returns the block just after the planes of these ``axes`` have broken at a stress of a few Pa: without stress,
-    force and motion.
+    """Returns the block just after the planes of the given ``axes`` have broken at a stress of a few Pa: without
+    stress, force and motion.
     """
     nodes = sim.model.nodes
     step.prepare(sim)
@@ -98,8 +102,9 @@ def at_rest(sim: Simulation, axes: Sequence[int] = (0, 2)) -> Simulation:
 
 
 def meeting(sim: Simulation) -> Ints:
-    """Returns a scene in which two columns with the common edge collide at this edge at 4 m/s, and the two other
-    columns move away."""
+    """Returns a scene in which two columns with the common edge collide at this edge at 4 m/s, and the other two
+    columns move away.
+    """
     which, speed = columns(sim), np.array([[1.0, 0.0, 1.0], [1.2, 0.0, -1.2], [-1.2, 0.0, 1.2], [-1.0, 0.0, -1.0]])
     sim.model.nodes.v[:] = speed[which] * 2.0
     return which
@@ -117,8 +122,9 @@ def depth(sim: Simulation, which: Ints) -> float:
 @pytest.mark.usefixtures("columns_come_apart")
 @pytest.mark.parametrize("searched", [False, True])
 def test_pieces_that_share_an_edge_do_not_pass_there(searched: bool) -> None:
-    """The penetration is at most a twentieth of the penetration without contact, the error of five sweeps; momentum
-    is exact."""
+    """The penetration is at most a twentieth of the penetration without contact, which is the error of five sweeps;
+    momentum is exact.
+    """
     sim = at_rest(build(case_of(), [mesh_of()]))
     assert sim.contact is not None
     which, nodes = meeting(sim), sim.model.nodes
@@ -135,7 +141,8 @@ def test_pieces_that_share_an_edge_do_not_pass_there(searched: bool) -> None:
 
 def test_a_piece_that_passes_behind_a_node_is_free() -> None:
     """Eight octants have a common node. One octant moves past its corner, below the plane of a side of the opposite
-    octant but behind all of its tets, while the other octants move apart: no contact acts, and no velocity changes.
+    octant but behind all tets of this octant, while the other octants move apart: no contact acts, and no velocity
+    changes.
     """
     mesh = mesh_of(4)
     with planes_that_break(mesh, [0, 1, 2]):
@@ -155,7 +162,7 @@ def test_a_piece_that_passes_behind_a_node_is_free() -> None:
 
 @pytest.mark.usefixtures("columns_come_apart")
 def test_contact_at_a_shared_edge_is_equal_on_any_number_of_ranks() -> None:
-    """Broad phases occur in between; the results are bit-identical."""
+    """Broad phases occur between the steps; the results are bit-identical."""
 
     def work(sim: Simulation) -> list[float]:
         at_rest(sim)

@@ -42,13 +42,13 @@ class Body:
     bond: Ints
     held: Ints
     bare: int = -1
-    """Part whose block has neither faces nor bonds."""
+    """Part of a rank whose block has neither faces nor bonds."""
     gone: Ints = field(default_factory=lambda: np.zeros(0, np.int64))
-    """Tets that have eroded, but are still named behind the faces of others."""
+    """Tets that have eroded, but that the face tables of other tets still name."""
 
     def rank(self, owner: Ints, rank: int) -> tuple[Model, Ints]:
-        """Returns the part of the mesh on each of several ranks; ``owner`` (n,) of each tet. Every pair is given on
-        one of its ranks.
+        """Returns the part of the mesh on each of several ranks; ``owner`` (n,): rank of each tet. Every pair of tets
+        is given on one of its ranks.
         """
         mine = np.setdiff1d(np.flatnonzero(owner == rank), self.gone)
         ids = np.unique(self.tets[owner == rank])
@@ -76,7 +76,7 @@ class Body:
         return made
 
     def labels(self) -> Ints:
-        """Returns (n,) labels computed by scipy."""
+        """Returns (n,) fragment labels computed by scipy."""
         whole = (self.across >= 0) & ((self.bond == 0) | (self.part == self.bare)[:, None])
         tet, face = np.nonzero(whole)
         pairs = np.vstack([np.column_stack([tet, self.across[tet, face] // 4]), self.held])
@@ -89,8 +89,8 @@ class Body:
 
 
 def body(seed: int, cells: tuple[int, int, int] = (5, 4, 3), broken: float = 0.6, parts: int = 1) -> Body:
-    """Returns adjacent blocks of 1 mm cells, 1 m from the origin, with randomly broken faces; a tenth of these faces
-    have a cohesive facet.
+    """Returns adjacent blocks of 1 mm cells, 1 m from the origin, with randomly broken faces; a tenth of the broken
+    faces have a cohesive facet.
     """
     random = np.random.default_rng(seed)
     x0, tets, part = np.zeros((0, 3)), np.zeros((0, 4), np.int64), np.zeros(0, np.int64)
@@ -114,7 +114,7 @@ def body(seed: int, cells: tuple[int, int, int] = (5, 4, 3), broken: float = 0.6
 
 
 def owners(b: Body, ranks: int, seed: int) -> Ints:
-    """Returns a random distribution of the tets; with five ranks one rank has no tets."""
+    """Returns a random distribution of the tets among ranks; with five ranks one rank has no tets."""
     return np.random.default_rng(seed).integers(0, ranks - (ranks == 5), len(b.tets))
 
 
@@ -174,7 +174,7 @@ def test_a_part_without_faces_is_one_fragment() -> None:
 
 
 def test_eroded_tets_join_no_fragments() -> None:
-    """Faces and pairs that name removed tets connect no fragments."""
+    """Faces and pairs that name deleted tets connect no fragments."""
     b = body(29, broken=0.3)
     b.gone = np.random.default_rng(2).choice(len(b.tets), len(b.tets) // 3, replace=False)
     b.held = b.held[~np.isin(b.held, b.gone).all(axis=1)]
@@ -188,8 +188,9 @@ def test_eroded_tets_join_no_fragments() -> None:
 
 
 def test_chains_are_found_in_any_order_of_their_numbers() -> None:
-    """The chains have ids that are shuffled, ascending or descending, or branch from the largest: slow cases for
-    union-find."""
+    """The ids of the tets along the chains are shuffled, ascending or descending, or branch from the largest id, which
+    are slow cases for union-find.
+    """
     n = 3000
     random = np.random.default_rng(0)
     comb = np.concatenate([np.arange(n // 2), np.arange(n // 2, n)[::-1]]).reshape(2, -1).T.reshape(-1)
@@ -235,7 +236,7 @@ def test_the_table_is_that_of_plain_sums() -> None:
 
 
 def test_fragments_have_the_mass_and_motion_of_the_nodes() -> None:
-    """The totals agree to 1e-12 of the sum of magnitudes, 1 m from the origin."""
+    """The totals of a body 1 m from the origin agree to 1e-12 of the sum of magnitudes."""
     b = body(7, cells=(8, 6, 5))
     rows = table_of(b, 3)
     mass = np.bincount(b.tets.reshape(-1), np.repeat(b.mass / 4.0, 4), len(b.x))
@@ -279,8 +280,9 @@ def test_plain_sums_would_not_have_the_same_bits() -> None:
 
 
 def test_a_small_fragment_keeps_its_digits_beside_a_large_one() -> None:
-    """A fragment of 1e-5 of the size, with 1e-25 of the inertia of the other, has the same digits as without the
-    large fragment."""
+    """A fragment of 1e-5 of the size, with 1e-25 of the inertia of the other fragment, has the same digits as without
+    the large fragment.
+    """
     large, small = body(1, cells=(3, 3, 3), broken=0.0), body(2, cells=(1, 1, 1), broken=0.0)
     place = np.array([0.3, 1.0, -0.7])
     for points in (small.x0, small.x):
@@ -300,8 +302,8 @@ def test_a_small_fragment_keeps_its_digits_beside_a_large_one() -> None:
 
 def test_a_spinning_block_has_the_momentum_and_energy_of_its_lumped_masses() -> None:
     """The block has cubes of edge h with six tets each. The four nodes on a side of a cube have half of its mass, so
-    m h^2 / 12 of a solid cube becomes m h^2 / 4. Four thirds of the mass of a corner lie along the diagonal, so the
-    product of inertia is m h^2 / 12.
+    that m h^2 / 12 of a solid cube becomes m h^2 / 4. Four thirds of the mass of a corner lie along the diagonal, so
+    that the product of inertia is m h^2 / 12.
     """
     n, h, rho = (6, 4, 2), 2e-3, 2500.0
     mesh = block(n, h, shake=0.0)
@@ -331,7 +333,7 @@ def test_a_spinning_block_has_the_momentum_and_energy_of_its_lumped_masses() -> 
 
 
 def test_the_largest_piece_of_a_fragment_keeps_its_number() -> None:
-    """Faces break and tets erode, four times. The result is that of a plain search, for any number of ranks."""
+    """Faces break and tets erode, four times. The fragments are those of a plain search, for any number of ranks."""
     b, random, gone = body(17, broken=0.3), np.random.default_rng(1), np.zeros(0, np.int64)
     known, following = np.full(len(b.tets), numbers.UNKNOWN), 0
     for _ in range(4):
@@ -364,7 +366,7 @@ def test_the_largest_piece_of_a_fragment_keeps_its_number() -> None:
 
 
 def plainly_numbered(before: Ints, labels: Ints, following: int) -> tuple[Ints, list[list[int]]]:
-    """Reference of ``numbers.numbered``, by dictionaries."""
+    """Reference of ``numbers.numbered``, computed with dictionaries."""
     common: dict[tuple[int, int], int] = {}
     for key in zip(before.tolist(), labels.tolist(), strict=True):
         common[key] = common.get(key, 0) + 1
@@ -380,8 +382,9 @@ def plainly_numbered(before: Ints, labels: Ints, following: int) -> tuple[Ints, 
 
 @pytest.mark.parametrize("ranks", [1, 3])
 def test_the_part_of_a_fragment_does_not_follow_from_its_number(ranks: int) -> None:
-    """The number of a fragment does not determine the part: here the numbers decrease while the ids of the tets
-    increase."""
+    """The number of a fragment does not determine the order of the parts: here the numbers decrease while the ids of
+    the tets increase.
+    """
     b = body(5, parts=3)
     of_tet, last = b.labels(), len(b.tets) + 1000
 

@@ -29,7 +29,7 @@ def lines(size: float, safety: float = 0.9, rate: float = 0.0, **spec: Any) -> l
 
 @pytest.mark.parametrize("size", [0.6e-3, 0.7e-3, 1e-3, 1.23e-3, 2e-3, 3.1e-3])
 def test_a_cohesive_zone_of_the_requested_length_is_resolved(size: float) -> None:
-    """The ratio equals the requested one up to the last bits."""
+    """The warned ratio equals the requested ratio up to the last bits."""
     assert not [line for line in lines(size, resolve="strength") if "resolved" in line]
 
 
@@ -52,7 +52,7 @@ def test_the_advice_on_the_step_helps() -> None:
 
 
 def test_a_stretched_part_opens_by_its_rate_as_well() -> None:
-    """Glass opens at 4.3 m/s when it breaks; at 64,000/s tets of 0.6 mm are stretched by 38 m/s."""
+    """Glass opens at 4.3 m/s when it breaks; at a rate of 64,000/s tets of 0.6 mm are stretched by 38 m/s."""
     assert not [line for line in lines(0.6e-3) if "does not resolve" in line]
     [line] = [line for line in lines(0.6e-3, rate=64e3) if "does not resolve" in line]
     found = re.search(r"would open by (\S+) um in a step of (\S+) ns", line)

@@ -1,4 +1,6 @@
-"""Node separation: pieces of stars compared with scipy, and the same numbers of copies for any number of ranks."""
+"""Node separation: connected pieces of the tets at a node compared with scipy, and equal numbers of copies for any
+number of ranks.
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -42,7 +44,7 @@ STEPS = 40
 
 @pytest.mark.parametrize("seed", range(4))
 def test_pieces_are_those_of_scipy(seed: int) -> None:
-    """Check every node of a block with randomly broken facets, in three shares."""
+    """Checks every node of a block with randomly broken facets, in three parts."""
     random = np.random.default_rng(seed)
     mesh = block((4, 3, 3), seed=seed)
     facets = inner(mesh)
@@ -82,12 +84,12 @@ def test_pieces_are_those_of_scipy(seed: int) -> None:
 
 @dataclass
 class Cracked:
-    """The whole mesh after some events."""
+    """The whole mesh after some events, combined from the ranks."""
 
     tets: Ints
-    """(n, 4) global nodes."""
+    """(n, 4) global nodes of the tets."""
     bond: Ints
-    """(n, 4)."""
+    """(n, 4) state of the facets of the tets."""
     x: Floats
     v: Floats
     mass: Floats
@@ -95,8 +97,8 @@ class Cracked:
 
 
 def expected_tets(mesh: TetMesh, events: Sequence[Ints]) -> tuple[Ints, list[int]]:
-    """Returns the connectivity after some events, by a plain search through sets, and how often each final node was
-    a copy.
+    """Returns the connectivity after some events, found by a plain search through sets, and how often each final node
+    was a copy.
     """
     tets, broken, n = mesh.tets.astype(np.int64), set[int](), len(mesh.points)
     depth = [0] * n
@@ -162,7 +164,7 @@ def break_on(model: Model, separation: Separation, facets: Ints, comm: Comm) -> 
 
 
 def cracked(mesh: TetMesh, events: Sequence[Ints], ranks: int) -> Cracked:
-    """Returns the mesh after some events, combined from the ranks; copies of a node must agree."""
+    """Returns the mesh after some events, combined from the ranks; all ranks must agree about the copies of a node."""
     pieces = pieces_of(case_of(), [mesh], ranks)
 
     def work(comm: Comm) -> tuple[Model, list[Ints]]:
@@ -200,7 +202,7 @@ def cracked(mesh: TetMesh, events: Sequence[Ints], ranks: int) -> Cracked:
 
 
 def random_events(mesh: TetMesh, seed: int, shares: Sequence[float]) -> list[Ints]:
-    """Returns fractions of all facets that break in one event after the other."""
+    """Returns the fractions of all facets that break in one event after the other."""
     facets = np.random.default_rng(seed).permutation(inner(mesh))
     ends = np.cumsum([0, *(int(share * len(facets)) for share in shares)])
     return [facets[a:b] for a, b in pairwise(ends)]
@@ -209,7 +211,9 @@ def random_events(mesh: TetMesh, seed: int, shares: Sequence[float]) -> list[Int
 @pytest.mark.parametrize("ranks", RANKS)
 @pytest.mark.parametrize("seed", [1, 2])
 def test_nodes_separate_as_in_a_plain_search_on_any_number_of_ranks(seed: int, ranks: int) -> None:
-    """Five events include nodes that separate again, copies that separate, and at the end no intact facet."""
+    """The five events include nodes that separate again, copies that separate, and at the end a mesh without intact
+    facets.
+    """
     mesh = block((3, 2, 2), seed=seed)
     events = random_events(mesh, seed, (0.35, 0.2, 0.15, 0.1, 0.1))
     events.append(inner(mesh)[~np.isin(inner(mesh)[:, 0], np.concatenate(events)[:, 0])])
@@ -223,7 +227,7 @@ def test_nodes_separate_as_in_a_plain_search_on_any_number_of_ranks(seed: int, r
 
 @pytest.mark.parametrize("ranks", RANKS)
 def test_mass_and_momentum_stay(ranks: int) -> None:
-    """Check every node with its copies: a copy has the position of its parent, and the mass of its tets."""
+    """Checks every node with its copies: a copy has the position of its parent, and the mass of its own tets."""
     mesh = block((3, 2, 2), seed=3)
     events = random_events(mesh, 3, (0.5, 0.2))
     found, before = cracked(mesh, events, ranks), cracked(mesh, [], 1)
@@ -276,7 +280,7 @@ def test_a_sheet_through_the_body_cuts_it_in_two(ranks: int) -> None:
 
 @pytest.mark.parametrize("ranks", [1, 2, 3])
 def test_hinges_separate(ranks: int) -> None:
-    """Two tets have a common facet; two more tets are connected to them by a node and by an edge only."""
+    """Two tets have a common facet; two more tets are connected to the first two only by a node and by an edge."""
     points = np.array(
         [(0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1), (0, 0, -1),
          (-1, 0, 0), (-1, -1, 0), (-1, 0, 1), (2, 1, 0), (2, 0, 1)], float,
@@ -294,7 +298,8 @@ def test_hinges_separate(ranks: int) -> None:
 
 def test_a_rank_without_touched_nodes_does_not_communicate() -> None:
     """A facet breaks at one end of a bar: the rank at the other end sends and receives nothing. The maximum of three
-    words before the break, and of one word after it, are part of the reductions of this step and of the next step.
+    words before the break, and of one word after the break, are part of the reductions of this step and of the next
+    step.
     """
     mesh, ranks = block((2, 2, 12), shake=0.0), 3
     pieces, facets = pieces_of(case_of(), [mesh], ranks), plane(mesh, 1.0)
@@ -326,7 +331,7 @@ def pulled(**fracture: object) -> schema.Case:
 @pytest.mark.parametrize("model", ["instant", "cohesive"])
 @pytest.mark.parametrize("form", ["standard", "split"])
 def test_a_step_in_which_nothing_breaks_costs_no_collective_of_its_own(model: str, form: str) -> None:
-    """Faces are overstressed and their clocks run; the reduction of the step contains that no facet breaks."""
+    """Faces are overstressed and their delays run; the reduction of the step contains that no facet breaks."""
     mesh = block((2, 2, 4), 1e-3, seed=5)
     case = pulled(model=model, delay=1e3)
     case = case.model_copy(update={"contact": None})
@@ -354,8 +359,8 @@ def test_a_step_in_which_nothing_breaks_costs_no_collective_of_its_own(model: st
 
 
 def test_a_break_costs_no_collective_of_its_own() -> None:
-    """Facets break in most steps, on different ranks, and fragments collide: only the ranks with broken facets, or
-    with ghosts of their surface, communicate.
+    """Facets break in most steps, on different ranks, and fragments collide: only the ranks that have broken facets, or
+    ghosts of their surface, communicate.
     """
     case = pulled(delay=0.2)
 
@@ -386,8 +391,9 @@ def test_a_break_costs_no_collective_of_its_own() -> None:
 
 
 def test_a_parcel_between_two_steps_has_all_nodes() -> None:
-    """The parcel includes nodes that separated far from rank 0 in the last step, which no reduction has contained
-    yet."""
+    """The parcel of a tet that is sent includes nodes that separated far from rank 0 in the last step, which no
+    reduction has contained yet.
+    """
     case = pulled(delay=0.2).model_copy(update={"contact": None})
 
     def work(sim: Simulation) -> tuple[bool, int]:
@@ -410,8 +416,9 @@ def test_a_parcel_between_two_steps_has_all_nodes() -> None:
 @pytest.mark.parametrize("model", ["instant", "cohesive"])
 @pytest.mark.parametrize("form", ["standard", "split"])
 def test_forces_are_those_of_the_tets_after_every_event(model: str, form: str) -> None:
-    """Forces are equal in integers on one, two and three ranks, momentum to round-off, and all ranks break the same
-    facets."""
+    """Forces are equal in integers on one, two and three ranks, momentum is equal to round-off, and all ranks break the
+    same facets.
+    """
     mesh = block((2, 2, 4), 1e-3, seed=5)
     case = pulled(model=model, delay=0.2)
     case = case.model_copy(update={"numerics": case.numerics.model_copy(update={"pressure": form})})

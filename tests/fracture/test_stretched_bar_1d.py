@@ -9,11 +9,11 @@ from scipy.optimize import brentq
 from .bar_1d import Bar, Run, even, law, scattered
 
 ENOUGH = 20.0
-"""Time in t_0: from here to 25 t_0 fewer than 1 % of all cracks were added in any of the bars below."""
+"""Time in units of t_0 after which, up to 25 t_0, fewer than 1 % of all cracks open in any of the bars below."""
 
 
 def stretched(bar: Bar, x: float, end: float) -> Run:
-    """Returns a bar at x times rate_0 after ``end`` t_0; its energy balance is checked in every step."""
+    """Returns a bar at x times rate_0 after ``end`` t_0; the energy balance of the bar is checked in every step."""
     run = Run(bar, x * bar.rate_0)
     worst = 0.0
     while run.t < end * bar.t_0:
@@ -47,8 +47,9 @@ def test_the_law_is_linear_and_comes_back_on_the_secant() -> None:
 
 
 def test_a_single_crack_opens_as_in_closed_form() -> None:
-    """The far stress rises as E rate t, and d / dt = 2 (far stress - T) / (rho c). Therefore d = 2 c rate t_0^2
-    (exp(t / t_0) - 1 - t / t_0), and the interface fails when exp(tau) - 1 - tau = 1 / x.
+    """The far stress rises as E rate t, and the derivative of the opening d is 2 (far stress - T) / (rho c). Therefore
+    d = 2 c rate t_0^2 (exp(t / t_0) - 1 - t / t_0), and the interface fails at the time t = tau t_0 with exp(tau) - 1 -
+    tau = 1 / x.
     """
     bar, x, middle = Bar(length=2.5e-3, elements=400, scatter=0.0), 1.0, 199
     run = Run(bar, x * bar.rate_0, share=1.0)
@@ -72,8 +73,9 @@ def test_a_single_crack_opens_as_in_closed_form() -> None:
 
 
 def test_fragments_that_meet_do_not_overlap() -> None:
-    """Two halves collide at 1 m/s each: the stress becomes rho c v, and the collision takes the energy of the two
-    nodes."""
+    """Two halves collide at 1 m/s each: the stress becomes rho c v, and the collision dissipates the kinetic energy of
+    the two nodes.
+    """
     bar = Bar(length=2.5e-3, elements=200)
     run = Run(bar, 0.0, share=0.0)
     run.largest[99] = run.critical[99]
@@ -112,7 +114,9 @@ def test_a_bar_of_even_strength_breaks_into_the_smaller_fragments_of_the_ring_of
 @pytest.mark.slow
 @pytest.mark.parametrize("x", [0.3, 1.0, 3.0, 10.0])
 def test_bars_break_into_fragments_of_the_published_size(x: float) -> None:
-    """The value is the mean of five bars: the number of fragments in one bar scatters by 4 % at the lowest rate."""
+    """The value is the mean of five bars, because the number of fragments in one bar scatters by 4 % at the lowest
+    rate.
+    """
     cracks = [stretched(Bar(seed=seed), x, ENOUGH).failed for seed in range(1, 6)]
     bar = Bar()
     size = bar.length / float(np.mean(cracks)) / bar.s_0

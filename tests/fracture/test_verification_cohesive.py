@@ -1,8 +1,8 @@
-"""V24, H5: a cohesive facet driven by prescribed positions, against the closed form of its law.
+"""V24, H5: a cohesive facet driven by prescribed positions, compared with the closed form of its law.
 
-After insertion the pairs of nodes open by ``u``. With e the offset, n the normal, b^2 = 1 / weight and D = |(e + u)|
-in the norm of the law, the traction is strength (1 - (D - |e|) / critical) in size, along <d_n> n + b^2 d_t, and the
-absorbed energy at D = |e| + critical is energy times area, for any path.
+After insertion the pairs of nodes open by ``u``. With e the offset, n the normal, b^2 = 1 / weight and D = |(e + u)| in
+the norm of the law, the traction has the size strength (1 - (D - |e|) / critical) and the direction <d_n> n + b^2 d_t;
+the absorbed energy at D = |e| + critical is energy times area, for any path.
 """
 
 import math
@@ -29,18 +29,19 @@ AREA = 0.5 * float(np.linalg.norm(np.cross(*EDGES)))
 NORMAL = np.cross(*EDGES) / (2.0 * AREA)
 ALONG = EDGES[0] / np.linalg.norm(EDGES[0])
 ANGLES = [0.0, 20.0, 45.0, 70.0, 90.0]
-"""Angles between the traction at insertion and the normal, degrees."""
+"""Angles between the normal and the traction at insertion, degrees."""
 
 
 def direction(angle: float, turn: float = 0.4) -> Floats:
-    """Returns a unit vector at ``angle``, rad, to the normal; ``turn``, rad: direction of its shear in the plane of
-    the facet."""
+    """Returns a unit vector at ``angle``, rad, to the normal; ``turn``, rad: direction of its shear in the plane of the
+    facet.
+    """
     shear = math.cos(turn) * ALONG + math.sin(turn) * np.cross(NORMAL, ALONG)
     return np.asarray(math.cos(angle) * NORMAL + math.sin(angle) * shear)
 
 
 class Facet:
-    """A facet that is inserted under ``traction`` (3,), Pa, and opened by displacements of the far side."""
+    """A facet that is inserted under ``traction`` (3,), Pa, and is opened by displacements of its far side."""
 
     def __init__(
         self, traction: Floats, weight: float = 1.0, effective: float = STRENGTH, stiffness: float = STIFFNESS
@@ -68,28 +69,32 @@ class Facet:
 
     @property
     def pull(self) -> Floats:
-        """Returns the (3,) traction on the first side, Pa."""
+        """Returns the (3,) traction on the first side of the facet, Pa."""
         return np.asarray(self.facets.state.pull[0].sum(axis=0) / AREA)
 
     @property
     def work(self) -> float:
-        """Returns the work done so far, J."""
+        """Returns the work done on the facet so far, J."""
         return sum(self.energies()[:2])
 
     def energies(self) -> tuple[float, float, float]:
-        """Returns dissipated, recoverable and fracture energy, J."""
+        """Returns dissipated, recoverable and fracture energy of the facet, J."""
         sums = exact_sums(SerialComm(), self.cohesion.columns())
         return self.cohesion.energies(sums, self.cohesion.gone.total(SerialComm()))
 
     def open(self, u: Floats, turned: Floats | None = None) -> None:
-        """Moves the far side away from the first side by ``u`` (3,), m; ``turned`` (3, 3): rotation of both sides."""
+        """Moves the far side of the facet away from the first side by ``u`` (3,), m; ``turned`` (3, 3): rotation of
+        both sides.
+        """
         x = self.x0.copy()
         x[3:] += u
         self.cohesion.open(x if turned is None else np.ascontiguousarray(x @ turned.T))
 
 
 def tear(facet: Facet, way: Floats, steps: int = 4000, turned: bool = False) -> None:
-    """Opens a facet along ``way`` (3,) until it has failed; ``turned``: while it turns by 1 rad."""
+    """Opens a facet along ``way`` (3,) until the facet has failed; ``turned``: whether the facet turns by 1 rad
+    meanwhile.
+    """
     along = float(way @ NORMAL)
     end = 1.01 * (CRITICAL + 2.0 * facet.offset) / math.sqrt(along**2 + (1.0 - along**2) / facet.weight)
     for k in range(1, steps + 1):
@@ -99,7 +104,7 @@ def tear(facet: Facet, way: Floats, steps: int = 4000, turned: bool = False) -> 
 
 
 def rotation(angle: float) -> Floats:
-    """Returns the rotation about the z axis."""
+    """Returns the rotation matrix for a rotation about the z axis."""
     c, s = math.cos(angle), math.sin(angle)
     return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
 
@@ -161,9 +166,9 @@ def test_a_facet_unloads_along_the_secant_and_releases_the_energy_under_it(angle
 
 
 def test_dissipated_energy_never_decreases() -> None:
-    """The opening makes a random walk, including closing beyond the start. A step that closes a facet further than
-    allowed releases half of its traction times the step. A step in which the normal opening changes its sign
-    (<d_n> is its positive part), so that the mean of two forces is not exact, releases stiffness times step^2 / 8.
+    """The opening makes a random walk, including closing beyond the start. A step that closes a facet further than the
+    start releases half of its traction times the step. A step in which the normal opening changes its sign (<d_n> is
+    its positive part), so that the mean of two forces is not exact, releases stiffness times step^2 / 8.
     """
     random, u, lost, largest = np.random.default_rng(3), np.zeros(3), [0.0], 0.0
     facet = Facet(STRENGTH * direction(0.7), weight=0.5)
@@ -186,8 +191,9 @@ def test_dissipated_energy_never_decreases() -> None:
 
 @pytest.mark.parametrize("angle", ANGLES)
 def test_a_facet_that_closes_beyond_its_start_is_unloaded(angle: float) -> None:
-    """The facet closes in one step, far shorter than the offset: it releases half of the traction times the step
-    once, and then nothing."""
+    """The facet closes in one step that is far shorter than the offset: the facet releases half of the traction times
+    the step once, and no more energy later.
+    """
     way, facet = direction(math.radians(angle)), Facet(STRENGTH * direction(math.radians(angle)))
     step = 1e-3 * facet.offset
     facet.open(-step * way)
@@ -226,8 +232,9 @@ def test_a_facet_that_turns_with_its_bodies_takes_the_same() -> None:
 
 
 def test_an_offset_across_the_opening_does_no_more_work_when_a_facet_turns_than_its_size_allows() -> None:
-    """Traction and opening are not collinear then: a rotation by an angle adds at most strength times offset times
-    angle."""
+    """Traction and opening are not collinear after a rotation: a rotation by an angle adds at most strength times
+    offset times angle.
+    """
     facet = Facet(STRENGTH * direction(0.0))
     tear(facet, direction(math.pi / 2), turned=True)
     assert abs(facet.work - ENERGY * AREA) < STRENGTH * facet.offset * AREA
@@ -235,7 +242,7 @@ def test_an_offset_across_the_opening_does_no_more_work_when_a_facet_turns_than_
 
 @pytest.mark.parametrize("depth", [0.0, 0.3, 3.0])
 def test_under_pressure_only_shear_counts(depth: float) -> None:
-    """Sides that have passed each other slide: the traction is in the plane of the facet, for any depth."""
+    """Sides of a facet that have passed each other slide: the traction is in the plane of the facet, for any depth."""
     shear = direction(math.pi / 2)
     facet = Facet(STRENGTH * shear)
     for share in np.linspace(0.1, 0.9, 9):
@@ -253,8 +260,9 @@ def test_a_facet_that_broke_under_pressure_holds_the_shear_that_friction_leaves(
 
 
 def test_one_pair_fails_after_the_other() -> None:
-    """The facet is opened as a hinge about its first edge: only one of three pairs opens, and absorbs a third of the
-    energy."""
+    """The facet is opened as a hinge about its first edge: only one of three pairs of nodes opens, and absorbs a third
+    of the energy.
+    """
     facet = Facet(STRENGTH * NORMAL)
     x = facet.x0.copy()
     steps = 4000

@@ -1,5 +1,5 @@
 """Running cracks: slower than surface waves (V27), their start and branches (E4), their energy (V28, V29). The slow
-tests are runs of the crack benchmark; its tables are in docs/performance/bench.md.
+tests are runs of the crack benchmark, whose tables are in docs/performance/bench.md.
 """
 
 import math
@@ -26,7 +26,7 @@ def facets(x: list[float], y: list[float], times: list[float]) -> Crack:
 
 
 def test_the_speed_of_surface_waves() -> None:
-    """The speed is that of the benchmark; for nu = 1/4 it is 0.9194 c_s, z = 2 - 2 / sqrt(3)."""
+    """The crack speed is that of the benchmark; for nu = 1/4 the Rayleigh speed is 0.9194 c_s, z = 2 - 2 / sqrt(3)."""
     glass = load.parse_case(load.read_data(load.shipped_path("branching_plate"))).materials["glass"]
     assert cracks.rayleigh(glass) == pytest.approx(2125.0, abs=1.0)
     quarter = glass.model_copy(update={"elastic": glass.elastic.model_copy(update={"poisson": 0.25})})
@@ -49,7 +49,9 @@ def test_a_tip_that_moves_evenly_has_its_speed_everywhere() -> None:
 
 
 def test_two_ways_with_solid_between_them_are_branches() -> None:
-    """From x = 16 on there are two paths at 45 degrees to either side; a deviation at one place only is no branch."""
+    """From x = 16 on the crack has two paths at 45 degrees to either side; a deviation at one place only is no
+    branch.
+    """
     x = [*np.arange(0.5, 16.0), *np.arange(16.5, 40.0), *np.arange(16.5, 40.0), 8.5]
     y = [*np.zeros(16), *(np.arange(24) + 2.0), *(-np.arange(24) - 2.0), 9.0]
     crack = facets(x, y, x)
@@ -59,7 +61,7 @@ def test_two_ways_with_solid_between_them_are_branches() -> None:
 
 
 def test_facets_that_open_aside_and_ahead_of_the_tip_are_no_length() -> None:
-    """The area of a straight crack is the area of a line, including openings ahead of its tip."""
+    """The area of a straight crack is the area of a line, including openings ahead of the crack tip."""
     x = [*np.arange(0.5, 29.0), 31.5]
     crack = facets(x, [*np.zeros(29), 4.0], x)
     assert crack.straight > 1.1 * crack.area.sum()
@@ -105,12 +107,12 @@ def _nearest(points: "np.ndarray", size: float) -> "np.ndarray":
 
 @pytest.fixture(scope="module")
 def coarse() -> cracks.Run:
-    """Returns the strip with elements of 1 mm, 4,800 tets."""
+    """Returns the strip of the crack test with elements of 1 mm, 4,800 tets."""
     return cracks.watch(Plan("strip", 1e-3))
 
 
 def test_a_crack_in_a_strip_is_slower_than_surface_waves(coarse: cracks.Run) -> None:
-    """The crack is slower for any load, up to four times G_c at the end."""
+    """The crack is slower than surface waves for any load, up to four times G_c at the end."""
     where, speed = coarse.crack.speeds()
     assert len(speed) >= 5
     assert 0.3 * cracks.rayleigh(coarse.made) < speed.max() < cracks.rayleigh(coarse.made)
@@ -140,8 +142,9 @@ def test_a_random_mesh_has_no_direction_and_no_flat_tets() -> None:
 
 @pytest.fixture(scope="module")
 def plates() -> list[cracks.Run]:
-    """Returns five meshes without preferred directions: which of them branch is random, so they are tested together.
-    A time step shorter by 1 % moves the branches of one mesh by 9 mm and 11 us (docs/performance/bench.md, Cracks).
+    """Returns five meshes without preferred directions; the meshes are tested together, because it is random which of
+    them branch. A time step shorter by 1 % moves the branches of one mesh by 9 mm and 11 us (docs/performance/bench.md,
+    Cracks).
     """
     return [cracks.watch(plan) for plan in cracks.RANDOM]
 
@@ -149,10 +152,10 @@ def plates() -> list[cracks.Run]:
 @pytest.mark.slow
 @pytest.mark.timeout(1200)
 def test_branching_plates_start_and_branch_as_published(plates: list[cracks.Run]) -> None:
-    """All plates start in time, and some branch. A crack cannot start before K = 2 s / (1 - m) sqrt(c t (1 - 2 m) /
-    pi) = sqrt(E G) (Freund 1990), for crack faces with the sudden pressure s = 2 MPa that makes them free of stress,
-    in plane stress, m = nu / (1 + nu). A fully open facet is the far end of a cohesive zone, which has to form
-    first; this is later than the published 11 to 14 us.
+    """The cracks of all plates start in time, and some cracks branch. A crack cannot start before K = 2 s / (1 - m)
+    sqrt(c t (1 - 2 m) / pi) = sqrt(E G) (Freund 1990), for crack faces with the sudden pressure s = 2 MPa that makes
+    them free of stress, in plane stress, m = nu / (1 + nu). A fully open facet is the far end of a cohesive zone, which
+    has to form first; therefore the crack starts later than the published 11 to 14 us.
     """
     m = 0.2 / 1.2
     wait = math.pi * 32e9 * 3.0 * (1 - m) ** 2 / (4 * 4e12 * 3689.0 * (1 - 2 * m))
@@ -166,7 +169,7 @@ def test_branching_plates_start_and_branch_as_published(plates: list[cracks.Run]
 @pytest.mark.slow
 @pytest.mark.timeout(1200)
 def test_branching_plates_are_no_faster_than_published(plates: list[cracks.Run]) -> None:
-    """The median of the largest speeds of the cracks before branching is below 0.6 of the Rayleigh speed."""
+    """The median of the largest speeds of the cracks before branching is below 0.6 times the Rayleigh speed."""
     fastest = [run.fastest[0] for run in plates]
     print(f"largest speeds of one crack {np.round(fastest, 3)}")
     assert np.median(fastest) < 0.6
@@ -176,7 +179,7 @@ def test_branching_plates_are_no_faster_than_published(plates: list[cracks.Run])
 @pytest.mark.timeout(1200)
 @pytest.mark.xfail(strict=False, reason="by chance: fourteen of fifteen runs are at the edge after 74.3 +- 1.8 us")
 def test_branching_plates_are_at_the_edge_as_published(plates: list[cracks.Run]) -> None:
-    """The mean time is 75 to 80 us, and the deviation is not larger than this range."""
+    """The mean time of branching is 75 to 80 us, and the standard deviation is not larger than this range."""
     edge = np.array([run.crack.passed(run.crack.end - 1.5 * FINE) for run in plates])
     print(f"at the edge after {edge.mean():.4g} s, standard deviation {edge.std():.2g} s")
     assert edge.std() < 5e-6
@@ -187,7 +190,7 @@ def test_branching_plates_are_at_the_edge_as_published(plates: list[cracks.Run])
 @pytest.mark.timeout(600)
 @pytest.mark.parametrize("plan", [*cracks.PLATES[1:4], *cracks.STRIPS], ids=lambda p: f"{p.case}, {p.name}")
 def test_no_crack_is_faster_than_surface_waves(plan: Plan) -> None:
-    """The opened length exceeds that of a line by less than 30 %."""
+    """The length of the opened crack exceeds that of a line by less than 30 %."""
     run = cracks.watch(plan)
     print(run.fastest, run.inflation, run.share)
     assert 0.4 < run.fastest[1] < 1.0
@@ -198,8 +201,9 @@ def test_no_crack_is_faster_than_surface_waves(plan: Plan) -> None:
 @pytest.mark.timeout(1200)
 @pytest.mark.parametrize("plans", cracks.ROWS, ids=lambda plans: plans[0].name)
 def test_no_crack_along_rows_of_facets_is_faster_than_surface_waves(plans: tuple[Plan, ...]) -> None:
-    """The same bounds hold for the structured plates, for any row of the crack. The bound of the speed holds for
-    each of seven steps, and the bound of the length for their mean, because one of them varies by a tenth of it.
+    """The bounds of speed and length also hold for the structured plates, for any row of the crack. The bound of the
+    speed holds for each of seven time steps; the bound of the length holds for their mean, because one of the lengths
+    varies by a tenth of it.
     """
     runs = [cracks.watch(plan) for plan in plans]
     inflation = np.array([run.inflation for run in runs])

@@ -1,5 +1,5 @@
-"""The glass bar of the paper with larger elements: without fracture its stress is that of bar theory; with fracture
-it fails behind a front.
+"""The glass bar of the paper with larger elements: without fracture the stress is that of bar theory; with fracture the
+bar fails behind a front.
 """
 
 from pathlib import Path
@@ -30,8 +30,8 @@ def bar(end: str, breaks: bool) -> Simulation:
 
 @pytest.mark.slow
 def test_unbroken_glass_has_the_stress_of_bar_theory() -> None:
-    """The values are v Zs Zg / (Zs + Zg) and v Zs / (Zs + Zg) with the impedances of bars, 2.10 GPa and 156.9 m/s;
-    the means behind the wave front are within 2 %.
+    """The stress and the velocity are v Zs Zg / (Zs + Zg) and v Zs / (Zs + Zg) with the impedances of bars, 2.10 GPa
+    and 156.9 m/s; the means behind the wave front are within 2 %.
     """
     sim = bar("38 us", breaks=False)
     names, seen = [probe.name for probe in sim.case.probes], list[Floats]()
@@ -52,8 +52,8 @@ def test_unbroken_glass_has_the_stress_of_bar_theory() -> None:
 
 @pytest.mark.slow
 def test_the_front_of_failure_follows_the_wave_slows_down_and_the_glass_behind_swells() -> None:
-    """The speed of the front is between 0.4 and 1.0 of the wave speed in the first half of the bar, never negative,
-    then lower; the glass behind the front moves outwards.
+    """The speed of the failure front is between 0.4 and 1.0 of the wave speed in the first half of the bar, never
+    negative, and lower in the second half. The glass behind the failure front moves outwards.
     """
     sim = bar("32 us", breaks=True)
     glass = sim.model.parts.index("glass")

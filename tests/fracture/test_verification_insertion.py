@@ -20,7 +20,7 @@ from ..worker.kernels import run
 from ..worker.meshes import Floats
 
 YOUNG, DENSITY, STRENGTH = 72e9, 2500.0, 60e6
-"""Material without lateral contraction: the wave speed is that of bars."""
+"""Material without lateral contraction, so that the wave speed is that of bars."""
 C = (YOUNG / DENSITY) ** 0.5
 BAR = """
 name = "bar"
@@ -51,7 +51,7 @@ frames = 0
 
 
 def bar(extra: str = "", **keys: Any) -> Simulation:
-    """Returns a square bar along z; ``extra``: more tables of the case."""
+    """Returns a square bar along z; ``extra``: additional tables of the case."""
     given: dict[str, Any] = {
         "contact": "{ friction = 0 }", "strength": STRENGTH, "energy": 5.0, "rate": 0.0, "model": "instant", "low": 0.0,
         "high": 8e-3, "wide": 2e-3, "size": 1e-3, "safety": 0.5, "end": 1e-6, **keys,
@@ -69,8 +69,8 @@ def drawn(low: float, high: float, rate: float) -> str:
 
 
 def test_a_cohesive_facet_that_breaks_leaves_the_acceleration_as_it_is() -> None:
-    """Under slow uniform tension all facets of a plane break at once, and no nodal acceleration changes by more than
-    1 % of the effect of losing its traction.
+    """Under slow uniform tension all facets of a plane break at once; no nodal acceleration changes by more than 1 % of
+    the effect of losing its traction.
     """
     rate = 100.0
     sim = bar(drawn(0.0, 8e-3, rate), rate=rate, model="cohesive", end=10e-6, contact='"none"')
@@ -108,8 +108,8 @@ def test_a_cohesive_facet_that_breaks_leaves_the_acceleration_as_it_is() -> None
 
 
 def test_facets_that_open_evenly_do_not_touch() -> None:
-    """Under uniform tension all planes break at once: the layers separate, without contact. After reversal there is
-    contact.
+    """Under uniform tension all planes break at once: the layers separate, without contact. After the motion is
+    reversed the layers are in contact.
     """
     rate = 1000.0
     sim = bar(drawn(0.0, 8e-3, rate), rate=rate, end=1e-3)
@@ -137,12 +137,14 @@ LENGTH, LAYER, PULSE, BEGIN = 20e-3, 0.4e-3, 8e-3, 4e-3
 
 
 def shape(z: Floats) -> Floats:
-    """Returns a smooth pulse that begins at BEGIN, m: without a jump that would excite oscillations between layers."""
+    """Returns a smooth pulse that begins at z = BEGIN, m, without a jump that would excite oscillations between
+    layers.
+    """
     return np.where((z > BEGIN) & (z < BEGIN + PULSE), np.sin(np.pi * (z - BEGIN) / PULSE) ** 2, 0.0)
 
 
 def pulse(peak: float, model: str, end: float) -> Simulation:
-    """Returns a bar in which a compression of ``peak``, Pa, moves towards the far end."""
+    """Returns a bar in which a compression pulse of ``peak``, Pa, moves towards the far end."""
     sim = bar(low=0.0, high=LENGTH, wide=2 * LAYER, size=LAYER, end=end, model=model)
     nodes, block = sim.model.nodes, sim.model.blocks[0]
     nodes.v[:, 2] = peak / (DENSITY * C) * shape(nodes.x[:, 2])
@@ -157,8 +159,9 @@ def pulse(peak: float, model: str, end: float) -> Simulation:
 
 
 def first_spall(peak: float) -> tuple[float, float]:
-    """Returns position, m, and time, s, at which incident and reflected pulse first add up to the strength, in
-    closed form."""
+    """Returns position, m, and time, s, at which incident and reflected pulse first add up to the strength, in closed
+    form.
+    """
     z = np.linspace(0.0, LENGTH, 8001)
     for t in np.arange(0.0, 3e-6, 1e-9):
         stress = peak * (shape(2.0 * LENGTH - z - C * t) - shape(z - C * t))
@@ -169,8 +172,8 @@ def first_spall(peak: float) -> tuple[float, float]:
 
 @pytest.mark.parametrize(("ratio", "model"), [(1.1, "instant"), (1.1, "cohesive"), (1.5, "cohesive"), (2.5, "instant")])
 def test_a_pulse_spalls_a_bar_where_it_should(ratio: float, model: str) -> None:
-    """The bar breaks within one layer of the plane, and within the travel time of a layer. Shear counts in a
-    cohesive facet: twice the strength would break it in compression already.
+    """The bar breaks within one layer of the predicted plane, and within the travel time of a layer. Shear counts in a
+    cohesive facet, so that a pulse of twice the strength would break the facet already in compression.
     """
     where, when = first_spall(ratio * STRENGTH)
     sim = pulse(ratio * STRENGTH, model, when + 2.0 * LAYER / C)
@@ -195,7 +198,7 @@ def test_a_pulse_spalls_a_bar_where_it_should(ratio: float, model: str) -> None:
 
 @pytest.mark.parametrize("model", ["instant", "cohesive"])
 def test_a_pulse_below_the_strength_breaks_nothing(model: str) -> None:
-    """The pulse has 0.95 of the strength and is reflected at the free end."""
+    """The pulse has 0.95 of the strength and is reflected at the free end, so that the bar does not break."""
     sim = run(pulse(0.95 * STRENGTH, model, 3e-6))
     assert sim.fracture is not None
     assert sim.fracture.broken == 0
@@ -206,8 +209,8 @@ SYMMETRIC = '[[boundaries]]\nkind = "symmetry"\naxis = "z"\n'
 
 
 def dissipated(low: float, extra: str) -> tuple[float, int, float]:
-    """Returns the energy dissipated by fracture, J, in a bar from ``low`` to 8 mm that is pulled apart, the number
-    of broken facets and the worst residual.
+    """Returns results of a bar from ``low`` to 8 mm that is pulled apart: energy dissipated by fracture, J, number of
+    broken facets, and worst residual.
     """
     rate, size = 2000.0, 0.25e-3
     sim = bar(drawn(low, 8e-3, rate) if low else drawn(8e-3, 8e-3, rate) + extra, low=low, rate=rate,
@@ -225,8 +228,9 @@ def dissipated(low: float, extra: str) -> tuple[float, int, float]:
 
 
 def test_half_a_bar_with_a_symmetry_plane_takes_half_the_energy() -> None:
-    """All 63 planes between the 64 layers of the whole bar break, and 31 planes in the half: the symmetry plane is
-    not a facet."""
+    """All 63 planes between the 64 layers of the whole bar break, and 31 planes of the half bar break: the symmetry
+    plane is not a facet.
+    """
     whole, half = dissipated(-8e-3, ""), dissipated(0.0, SYMMETRIC)
     print(f"whole {whole}, half {half}, {whole[0] / half[0]:.3f} to 1")
     assert whole[0] == pytest.approx(2.0 * half[0], rel=0.05)

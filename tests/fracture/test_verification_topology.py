@@ -46,7 +46,7 @@ def burst(model: str, form: str) -> Simulation:
 
 
 def components(tets: Ints, joined: list[tuple[int, int]]) -> int:
-    """Returns the number of pieces into which ``joined`` pairs connect ``tets``."""
+    """Returns the number of pieces into which the pairs ``joined`` connect ``tets``."""
     root = {int(t): int(t) for t in tets}
 
     def find(t: int) -> int:
@@ -60,7 +60,7 @@ def components(tets: Ints, joined: list[tuple[int, int]]) -> int:
 
 
 def check_topology(sim: Simulation, before: Ints) -> None:
-    """Checks the topology; ``before`` (n, 4): the tets of the unbroken mesh, by local nodes."""
+    """Checks the topology of the mesh; ``before`` (n, 4): the tets of the unbroken mesh, by local nodes."""
     nodes, block = sim.model.nodes, sim.model.blocks[0]
     tets = block.tets.astype(np.int64)
     assert np.array_equal(nodes.id, np.arange(sim.model.nodes_global))
@@ -125,8 +125,8 @@ def test_a_shattering_block_stays_a_mesh(model: str) -> None:
 @pytest.mark.parametrize("form", ["standard", "nodal", "split"])
 @pytest.mark.parametrize("model", ["instant", "cohesive"])
 def test_forces_after_an_event_are_those_of_the_separated_mesh(model: str, form: str) -> None:
-    """Forces transferred in integers equal a new sum over the separated mesh, to the last quantum; copies and parent
-    together have the previous force of the parent.
+    """Forces transferred in integers equal a new sum over the separated mesh, to the last quantum; the forces of copies
+    and parent add up to the previous force of the parent.
     """
     sim, seen, worst = burst(model, form), 0, 0.0
     origin: Ints = np.arange(sim.model.nodes.n)

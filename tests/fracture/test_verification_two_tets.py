@@ -27,7 +27,7 @@ def shipped(name: str, *overrides: str) -> Simulation:
 
 
 def torn(lean: float, *overrides: str) -> Simulation:
-    """Returns the shipped pair of tets, pulled apart along a line inclined by ``lean``, rad."""
+    """Returns the shipped case of two tets, pulled apart along a line inclined by ``lean``, rad."""
     x, z = SPEED * math.sin(lean), SPEED * math.cos(lean)
     pull = [f"boundaries[{i}].{c}={s * v!r}" for i, s in ((0, 1.0), (1, -1.0)) for c, v in (("x", x), ("z", z))]
     stretch = f"parts[0].stretch.rate=[0,0,{z / HEIGHT!r}]"
@@ -38,8 +38,8 @@ def torn(lean: float, *overrides: str) -> Simulation:
     "lean", [0.0, 60.0, *(pytest.param(lean, marks=pytest.mark.slow) for lean in (15.0, 30.0, 45.0, 63.0))]
 )
 def test_tearing_two_tets_takes_the_fracture_energy(lean: float) -> None:
-    """The test has pure opening to mostly shear; the energy from the balance uses the area at which the facet broke,
-    which is that of the mesh except elastic strain.
+    """The opening of the facet varies from pure opening to mostly shear. The energy from the energy ledger uses the
+    area at which the facet broke, which is that of the mesh except elastic strain.
     """
     sim, area = torn(math.radians(lean)), 0.0
     energies: list[Energy] = []
@@ -64,8 +64,8 @@ def test_tearing_two_tets_takes_the_fracture_energy(lean: float) -> None:
 
 @pytest.mark.parametrize("back", [0.0, 0.005, 0.02])
 def test_energy_released_without_work_is_reported(back: float) -> None:
-    """Halfway, a part of the energy is subtracted from the work; the last message reports the difference if it is
-    above a hundredth.
+    """Halfway through the run a part of the energy is subtracted from the work; the last message reports the difference
+    if it is above a hundredth.
     """
     sim, taken, area = torn(0.0), False, 0.0
 
@@ -89,7 +89,9 @@ def test_energy_released_without_work_is_reported(back: float) -> None:
 
 
 def test_the_traction_follows_the_law_in_every_step() -> None:
-    """Check each pair: a third of the area times strength (1 - opening / critical), or the secant."""
+    """Checks the traction of each pair of nodes: a third of the area times strength (1 - opening / critical), or the
+    secant.
+    """
     sim = torn(math.radians(30.0))
     worst, seen, top = 0.0, 0, np.zeros(3)
 
@@ -122,7 +124,9 @@ def test_the_traction_follows_the_law_in_every_step() -> None:
 
 
 def breathing(end: str, *sets: str) -> tuple[int, float, float]:
-    """Returns how often the facet closed, the largest growth of the energy as a share of it, and the worst residual."""
+    """Returns how often the facet closed, the largest growth of the energy divided by the energy, and the worst
+    residual.
+    """
     sim = shipped("breathing_facet", f"run.end_time={end}", "run.residual_limit=1", *sets)
     totals, closed = list[float](), list[bool]()
 
@@ -146,8 +150,8 @@ def breathing(end: str, *sets: str) -> tuple[int, float, float]:
     [("false", "0.3 ms", 30), pytest.param("false", "2 ms", 40, marks=pytest.mark.slow), ("true", "0.3 ms", 15)],
 )
 def test_a_facet_that_opens_and_closes_gains_no_energy(edges: str, end: str, least: int) -> None:
-    """Contact has dissipated all but 0.001 of the energy after about fifty closings, 0.1 ms, or after half of them
-    if the edges of the two tets also touch. The remaining energy does not grow.
+    """Contact has dissipated all but 0.001 of the energy after about fifty closings, 0.1 ms, or after half of these
+    closings if the edges of the two tets also touch. The remaining energy does not grow.
     """
     cycles, growth, residual = breathing(end, f"contact.edges={edges}")
     print(f"{cycles} cycles, growth {growth:.2e}, residual {residual:.2e}")
@@ -157,7 +161,9 @@ def test_a_facet_that_opens_and_closes_gains_no_energy(edges: str, end: str, lea
 
 
 def rings(count: str, steps: int) -> tuple[float, float]:
-    """Returns the largest growth of kinetic and elastic energy of free tets, and the drift of its mean over time."""
+    """Returns the largest growth of kinetic and elastic energy of free tets, and the drift of the mean energy over
+    time.
+    """
     sim = shipped("free_tets", f"parts[0].mesh.count={count}", "run.end_time=1")
     totals: list[float] = []
     every = max(steps // 1000, 1)

@@ -7,9 +7,9 @@ CORNERS = ((0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0), (0, 0, 1), (1, 0, 1), (1,
 
 
 def bar(path: Path, cells: tuple[int, int, int] = (10, 2, 2), more: str = "") -> Path:
-    """Returns a bar of ``cells`` cubes of size 1 along x, y and z from the origin. Sets: CLAMP, the nodes at x = 0;
-    TIP, the nodes at the other end; END, the faces at the other end; SKIN, all faces of the surface; INNER, faces
-    inside of the bar.
+    """Returns the text of a bar of ``cells`` cubes of size 1 along x, y and z from the origin. Sets of the bar: CLAMP,
+    the nodes at x = 0; TIP, the nodes at the other end; END, the faces at the other end; SKIN, all faces of the
+    surface; INNER, faces inside of the bar.
     """
     places = list(product(*(range(n + 1) for n in cells)))
     number = {place: k for k, place in enumerate(places, 1)}

@@ -1,4 +1,4 @@
-"""STEP, BREP and STL files, written by gmsh or facet by facet."""
+"""Writes STEP, BREP and STL files, with gmsh or facet by facet."""
 
 import re
 import struct
@@ -26,7 +26,8 @@ for name in sys.argv[1:]:
 gmsh.finalize()
 """
 NAMES = ("Core", "Rod, 'x'", "Jacket")
-"""Names of the solids: a cube of 10, a cylinder of radius 3 and length 5, and a plate of 2 x 10 x 10 on the cube."""
+"""Names of the three solids: a cube of 10, a cylinder of radius 3 and length 5, and a plate of 2 x 10 x 10 on the
+cube."""
 _INCH = """#9001 = LENGTH_MEASURE_WITH_UNIT(LENGTH_MEASURE(25.4),#9002);
 #9002 = ( LENGTH_UNIT() NAMED_UNIT(*) SI_UNIT(.MILLI.,.METRE.) );
 #9003 = DIMENSIONAL_EXPONENTS(1.,0.,0.,0.,0.,0.,0.);
@@ -48,12 +49,12 @@ def written(folder: Path) -> tuple[str, bytes]:
 
 
 def in_metres(step: str) -> str:
-    """Returns the same numbers in metres."""
+    """Returns the text of a STEP file with the same numbers in metres."""
     return step.replace("SI_UNIT(.MILLI.,.METRE.)", "SI_UNIT($,.METRE.)")
 
 
 def in_inches(step: str) -> str:
-    """Returns the same numbers in inches, which STEP defines by millimetres."""
+    """Returns the text of a STEP file with the same numbers in inches, which STEP defines by millimetres."""
     end = step.rindex("ENDSEC;")
     return (step[:end] + "@" + step[end:]).replace(_MILLIMETRE, _BASED).replace("@", _INCH)
 
@@ -66,7 +67,7 @@ def box(low: tuple[float, float, float] = (0.0, 0.0, 0.0), size: float = 10.0) -
 
 
 def ball(n: int = 24, radius: float = 5.0, centre: tuple[float, float, float] = (0.0, 0.0, 0.0)) -> Facets:
-    """Returns (k, 3, 3) facets of a ball with ``n`` facets round it and its poles along z, in single precision."""
+    """Returns (k, 3, 3) facets of a ball with ``n`` facets around it and its poles along z, in single precision."""
     theta, phi = np.linspace(0.0, np.pi, n // 2 + 1), np.linspace(0.0, 2.0 * np.pi, n + 1)[:-1]
     rings = [[(np.sin(t) * np.cos(p), np.sin(t) * np.sin(p), np.cos(t)) for p in phi] for t in theta]
     rings[0], rings[-1] = [(0.0, 0.0, 1.0)] * n, [(0.0, 0.0, -1.0)] * n
@@ -79,7 +80,7 @@ def ball(n: int = 24, radius: float = 5.0, centre: tuple[float, float, float] = 
 
 
 def binary(facets: Facets) -> bytes:
-    """Returns a binary STL file whose head begins like a text file."""
+    """Returns a binary STL file whose header begins like a text file."""
     rows = b"".join(struct.pack("<12fH", 0, 0, 0, *each.ravel(), 0) for each in facets)
     return b"solid of facets".ljust(80) + struct.pack("<I", len(facets)) + rows
 

@@ -1,4 +1,4 @@
-"""A mesh cache for the tests of this folder, separate from the cache of the user."""
+"""A mesh cache for the tests of tests/mesh, separate from the cache of the user."""
 
 import pytest
 
@@ -7,8 +7,9 @@ from conoid.worker.kernels.store import cache_folder
 
 @pytest.fixture(autouse=True, scope="package")
 def mesh_cache(tmp_path_factory: pytest.TempPathFactory) -> object:
-    """Sets ``CONOID_CACHE_DIR`` to a folder without meshes while these tests run; the folder of the kernels does not
-    change."""
+    """Sets ``CONOID_CACHE_DIR`` to an empty folder while the mesh tests run; the folder of the compiled kernels does
+    not change.
+    """
     folder, kernels = tmp_path_factory.mktemp("cache"), cache_folder().parent
     (folder / kernels.name).symlink_to(kernels)
     with pytest.MonkeyPatch.context() as patch:

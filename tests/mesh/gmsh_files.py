@@ -1,6 +1,6 @@
 """Writes .msh and .inp files with gmsh in random options: ``python gmsh_files.py FOLDER SEED COUNT``. The program runs
-as a separate process, because gmsh has the licence GPL. ``truth.json`` contains the members of each group of each file,
-from the model of gmsh.
+as a separate process, because gmsh has the licence GPL. The file ``truth.json`` contains the members of each group of
+each written file, from the model of gmsh.
 """
 
 import itertools
@@ -15,8 +15,9 @@ import numpy as np
 
 
 def main(folder: Path, seed: int, count: int) -> None:
-    """Writes one model after the other, each in a separate process: gmsh crashes on some models (SIGSEGV), which are
-    omitted."""
+    """Writes one model after the other, each in a separate process, because gmsh crashes on some models (SIGSEGV);
+    crashed models are omitted.
+    """
     import gmsh  # noqa: F401  once, for all
 
     truth: dict[str, dict[str, list[float]]] = {}
@@ -38,7 +39,7 @@ def main(folder: Path, seed: int, count: int) -> None:
 
 
 def _write(folder: Path, seed: int, index: int) -> None:
-    """Writes one model, and its contents into one.json."""
+    """Writes one model, and the contents of the model into one.json."""
     import gmsh
 
     gmsh.initialize(readConfigFiles=False)
@@ -54,7 +55,7 @@ def _model(gmsh: Any, chance: random.Random, folder: Path, index: int) -> tuple[
     groups = _groups(gmsh, chance, volumes)
     gmsh.option.setNumber("Mesh.MeshSizeMax", chance.choice((0.5, 0.7, 1.0)))
     flat = all(gmsh.model.getType(2, tag) == "Plane" for _, tag in gmsh.model.getEntities(2))
-    if flat and chance.random() < 0.5:  # the volume of faces of four corners that are not flat is not defined
+    if flat and chance.random() < 0.5:  # the volume of a face with four corners that is not flat is not defined
         gmsh.option.setNumber("Mesh.RecombineAll", 1)
     gmsh.model.mesh.generate(3)
     second = chance.random() < 0.07
@@ -86,7 +87,7 @@ def _model(gmsh: Any, chance: random.Random, folder: Path, index: int) -> tuple[
 
 
 def _bodies(gmsh: Any, chance: random.Random) -> list[int]:
-    """Returns one to three bodies, with common faces where they touch or overlap."""
+    """Returns one to three bodies; bodies that touch or overlap get common faces."""
     occ = gmsh.model.occ
     for i in range(chance.randint(1, 3)):
         kind, x = chance.randrange(4), 1.2 * i
@@ -123,7 +124,7 @@ def _groups(gmsh: Any, chance: random.Random, volumes: list[int]) -> dict[str, l
 def _measured(
     gmsh: Any, volumes: list[int], groups: dict[str, list[int]], options: dict[str, Any], inp: bool
 ) -> dict[str, list[float]]:
-    """Returns volume and first moments of each group; the empty name is the whole file."""
+    """Returns volume and first moments of each group; the empty name stands for the whole file."""
     tags, coordinates, _ = gmsh.model.mesh.getNodes()
     order = np.argsort(tags)
     points, tags = coordinates.reshape(-1, 3)[order], tags[order]
@@ -145,7 +146,7 @@ def _measured(
 
     saved = volumes if options["SaveAll"] else [v for v in volumes if any(v in members for members in groups.values())]
     truth = {"": of(saved)}
-    if inp:  # gmsh writes blanks of names as _, and its own name for a group without a name
+    if inp:  # gmsh writes blanks of names as _, and gives a group without a name a name
         groups = {name.replace(" ", "_"): members for name, members in groups.items() if not name.isdigit()}
     lost = not inp and options["SaveAll"] and options["MshFileVersion"] == 2.2  # gmsh omits the groups in this format
     if not truth[""][0]:
@@ -156,7 +157,7 @@ def _measured(
 def _renamed(
     chance: random.Random, file: Path, truth: dict[str, list[float]], groups: dict[str, list[int]]
 ) -> dict[str, list[float]]:
-    """Gives two groups without a common body the name of the first group."""
+    """Gives two groups without a common body the name of the first of them."""
     names = [name for name in groups if not name.isdigit()]
     for one, other in itertools.combinations(names, 2):
         if other in truth and not set(groups[one]) & set(groups[other]):

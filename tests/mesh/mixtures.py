@@ -1,4 +1,4 @@
-"""Random meshes of hexahedra, wedges and pyramids, and the tets that the rule of cutting gives."""
+"""Random meshes of hexahedra, wedges and pyramids, and the tets that result from the rule of cutting."""
 
 import math
 import random
@@ -18,22 +18,24 @@ FACES = {
     PYRAMID5: ((0, 3, 2, 1), (0, 1, 4), (1, 2, 4), (2, 3, 4), (3, 0, 4)),
 }
 DEGENERATE = {WEDGE6: (1, 0, 3, 4, 2, 2, 5, 5), PYRAMID5: (0, 1, 2, 3, 4, 4, 4, 4)}
-"""Elements in the form of LS-DYNA: the wedge lies on a face of four corners."""
+"""Elements in the form of LS-DYNA: the wedge lies on a face with four corners."""
 
 
 @dataclass
 class Mixture:
-    """``points`` (n, 3) by node number; elements by number."""
+    """A mesh: ``points`` (n, 3) by node number, and elements by number."""
 
     points: NDArray[np.float64]
     elements: dict[int, Element]
 
     def content(self, degenerate: bool = False) -> Content:
-        """Returns the elements in the form of a reader."""
+        """Returns the elements in the form of a reader of mesh files."""
         return Content(np.arange(len(self.points)), self.points, list(self.cells(degenerate)))
 
     def cells(self, degenerate: bool = False) -> list[Cells]:
-        """Returns the elements by kind; with ``degenerate``, wedges and pyramids are hexahedra that repeat nodes."""
+        """Returns the elements by kind; with ``degenerate``, wedges and pyramids are written as hexahedra that repeat
+        nodes.
+        """
         rows: dict[Kind, list[tuple[int, tuple[int, ...]]]] = {}
         for number, (kind, nodes) in self.elements.items():
             if degenerate and kind in DEGENERATE:
@@ -46,15 +48,18 @@ class Mixture:
         ]
 
     def surface(self) -> set[tuple[int, ...]]:
-        """Returns the triangles of the faces that belong to one element only, each beginning with its smallest node,
-        directed outward."""
+        """Returns the triangles of the faces that belong to only one element; each triangle begins with its smallest
+        node and is directed outward.
+        """
         faces = [[nodes[k] for k in face] for kind, nodes in self.elements.values() for face in FACES[kind]]
         times = Counter(frozenset(face) for face in faces)
         outer = [face for face in faces if times[frozenset(face)] == 1]
         return {turned(triangle) for face in outer for triangle in halves(face)}
 
     def volumes(self) -> dict[int, float]:
-        """Returns the volumes of the polyhedra of the elements, whose faces are cut through their smallest node."""
+        """Returns the volumes of the polyhedra of the elements; the faces of a polyhedron are cut through their
+        smallest node.
+        """
         return {number: self._volume(element) for number, element in self.elements.items()}
 
     def _volume(self, element: Element) -> float:
@@ -68,21 +73,22 @@ class Mixture:
 
 
 def halves(face: list[int]) -> list[list[int]]:
-    """Returns the triangles of a face, cut by the diagonal through its smallest node."""
+    """Returns the triangles of a face that is cut by the diagonal through its smallest node."""
     first = face.index(min(face))
     a, b, c, *d = face[first:] + face[:first]
     return [[a, b, c], [a, c, *d]] if d else [[a, b, c]]
 
 
 def turned(face: list[int]) -> tuple[int, ...]:
-    """Returns the nodes in the same cyclic order, beginning with the smallest node."""
+    """Returns the nodes of a face in the same cyclic order, beginning with the smallest node."""
     first = face.index(min(face))
     return tuple(face[first:] + face[:first])
 
 
 def mixture(seed: int, jitter: float = 0.12) -> Mixture:
     """Returns a grid whose nodes are moved and numbered at random; each cell is a hexahedron, two wedges or six
-    pyramids."""
+    pyramids.
+    """
     chance = random.Random(seed)
     shape = [chance.randint(1, 4) for _ in range(3)]
     stretch = [chance.uniform(0.3, 3.0) for _ in range(3)]

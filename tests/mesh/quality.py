@@ -1,4 +1,4 @@
-"""Ratio of the worst tet of a mesh to the others, by step lengths; and shared faces of tets."""
+"""Ratio of the worst tet of a mesh to the mean tet, by step lengths; and number of tets at each face."""
 
 from dataclasses import dataclass
 
@@ -11,7 +11,9 @@ from conoid.worker.mesh.model import Ints, TetMesh
 
 @dataclass(frozen=True)
 class Quality:
-    """Step lengths, m: ``worst`` limits the time step, ``mean`` would limit it if all tets were equal."""
+    """Step lengths of a mesh, m: ``worst`` limits the time step, ``mean`` would limit the time step if all tets were
+    equal.
+    """
 
     worst: float
     mean: float
@@ -19,7 +21,7 @@ class Quality:
 
     @property
     def ratio(self) -> float:
-        """Returns worst over mean; 1 for a mesh of equal tets."""
+        """Returns the worst divided by the mean step length; 1 for a mesh of equal tets."""
         return self.worst / self.mean
 
 
@@ -31,6 +33,8 @@ def quality(mesh: TetMesh) -> Quality:
 
 
 def face_counts(tets: Ints) -> NDArray[np.int64]:
-    """Returns (k,) the number of tets at each distinct face: 1 on the boundary, 2 inside, more only in a wrong mesh."""
+    """Returns (k,) the number of tets at each distinct face: 1 on the boundary, 2 inside, more than 2 only in a wrong
+    mesh.
+    """
     faces = np.sort(tets[:, FACES].reshape(-1, 3), axis=1)
     return np.asarray(np.unique(faces, axis=0, return_counts=True)[1])

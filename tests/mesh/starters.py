@@ -1,4 +1,4 @@
-"""Radioss starter decks of random mixtures."""
+"""Radioss starter decks of random mixtures of elements."""
 
 from random import Random
 

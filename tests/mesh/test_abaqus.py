@@ -89,7 +89,9 @@ def test_instances_are_moved_then_turned(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("lines", ["\n0, 0, 0, 0, 1, 0, 90.\n", " 0., , \n0,0,0, 0,1,0, 9.D1\n", ",\n,,,,1,,90\n\n"])
 def test_an_instance_may_be_turned_and_not_moved(lines: str, tmp_path: Path) -> None:
-    """x becomes -z, and z becomes x. The first line, which is empty here, is the translation."""
+    """The rotation of the instance turns x into -z, and z into x. The first line of the instance, which is empty in
+    this file, is the translation.
+    """
     text = f"{PART}*INSTANCE, NAME=I, PART=Rod\n{lines}*END INSTANCE\n"
     expected = np.array([[0, 0, 0], [0, 0, -1], [0, 1, 0], [1, 0, 0], [-1, 1, -1]])
     assert read(text, tmp_path).mesh.points == pytest.approx(expected)
@@ -137,7 +139,9 @@ Lower,
      ("Rod 2.Lower", 8, [2])],
 )  # fmt: skip
 def test_members_and_sets_of_instances_stay_distinct(group: str, low: float, tets: list[int], tmp_path: Path) -> None:
-    """A set of the assembly hides sets of the same name in parts; each set belongs to its own scope."""
+    """A set of the assembly hides sets of the same name in parts; each set belongs to the scope in which it is
+    defined.
+    """
     found = read(PART + QUALIFIED, tmp_path, group)
     assert found.names.tets.tolist() == tets
     assert found.mesh.points[:, 2].min() == low
@@ -181,7 +185,7 @@ def test_a_set_holds_what_another_one_held_where_it_is_named(tmp_path: Path) -> 
 
 
 def test_names_that_are_no_ascii_are_kept_apart(tmp_path: Path) -> None:
-    """The file is in UTF-8 or in Latin-1; a file in UTF-16 is refused."""
+    """A file in UTF-8 or in Latin-1 is read; a file in UTF-16 is refused."""
     text = f"{FLAT}*ELSET, ELSET=Körper\n1\n*ELSET, ELSET=Kärper\n2\n"
     for encoding in ("utf-8", "latin-1"):
         (tmp_path / "case.inp").write_bytes(text.encode(encoding))
@@ -406,7 +410,7 @@ U, V
 
 
 def test_what_would_join_or_remove_bodies_is_counted(tmp_path: Path) -> None:
-    """The keywords are in the model, in the assembly and in a step, also shortened."""
+    """The unsupported keywords are in the model, in the assembly and in a step, and some keywords are shortened."""
     assert keywords.JOINING.keys() <= keywords.ANALYSIS
     joined = "*TIE, NAME=t\na, b\n*Tie, name=u\nb, c\n*Embedded Element\nx\n*END ASSEMBLY"
     later = "*EQUA\n2\n1, 1, 1., 2, 1, -1.\n*STEP\n*MODEL CHANGE, REMOVE\nx\n"

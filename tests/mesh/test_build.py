@@ -1,5 +1,4 @@
-"""Making and reading of meshes: the cache, the same bits every time, the limits of the child process, clear
-refusals."""
+"""Making and reading of meshes: the cache, equal bytes every time, the limits of the child process, clear refusals."""
 
 import hashlib
 import os
@@ -158,7 +157,9 @@ def test_a_child_that_is_told_to_stop_has_not_failed(tmp_path: Path, monkeypatch
 
 
 def test_the_child_gets_no_secrets(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """The variables of its environment are selected by name; the child prints no other variable of this process."""
+    """The environment variables of the child process are selected by name; the child process prints no other variable
+    of this process.
+    """
     monkeypatch.setenv("CONOID_ZENOH_PASSWORD", "hunter2")
     monkeypatch.setenv("PYTHONPATH", str(tmp_path))
     (tmp_path / "sitecustomize.py").write_text(
@@ -193,8 +194,9 @@ except MeshError as error:
 
 @pytest.mark.parametrize(("memory", "says"), [(3 * 2**30, "True"), (200 * 2**20, "0.195 GiB")])
 def test_a_child_allocates_no_more_than_is_allowed(memory: int, says: str, cache: Path) -> None:
-    """The test uses hard limits, as set by ``ulimit -v`` and ``ulimit -t`` or by a batch system, which no user can
-    raise."""
+    """The test sets hard limits, as ``ulimit -v`` and ``ulimit -t`` or a batch system do; no user can raise such
+    limits.
+    """
     command = [sys.executable, "-c", UNDER_LIMITS, str(memory), "200"]
     ended = subprocess.run(command, capture_output=True, text=True, timeout=120, check=True)
     assert says in ended.stdout

@@ -17,7 +17,7 @@ from conoid.worker.mesh.occ.solids import measured
 from .cad_files import in_inches, in_metres, written
 
 CUBE, ROD, PLATE = 1000.0, 45.0 * np.pi, 200.0
-"""Volumes of the three solids, cubic units of the file."""
+"""Volumes of the three solids, in cubic units of the file."""
 
 
 @pytest.fixture(scope="module")
@@ -41,7 +41,7 @@ def cad(path: Path, **more: Any) -> Any:
 
 
 def made(path: Path, data: str | bytes, **more: Any) -> TetMesh:
-    """Returns the mesh, made in this process to save the time of a child process."""
+    """Returns the mesh of a body, made in this process to save the time of a child process."""
     path.write_bytes(data.encode() if isinstance(data, str) else data)
     return check(measured(cad(path, **more), {"mesh": path}, "mesh"))
 
@@ -52,7 +52,7 @@ def made(path: Path, data: str | bytes, **more: Any) -> TetMesh:
     ids=["mm", "m", "inch"],
 )
 def test_a_file_contains_its_unit(folder: Path, step: str, change: Any, unit: float, written_unit: str) -> None:
-    """The key ``unit`` may have the same unit, and no other."""
+    """The key ``unit`` may have the unit of the STEP file, and no other unit."""
     path = folder / "unit.step"
     for given in (None, written_unit):
         mesh = made(path, change(step), element_size=2.0 * unit, unit=given)
@@ -95,7 +95,7 @@ def test_a_quarter_of_a_solid_is_a_quarter(folder: Path, step: str) -> None:
 
 
 def test_a_solid_of_a_file_is_an_operand(folder: Path, step: str) -> None:
-    """The body is a hole in the cube of the file: the place and the rotation of its operands are those of the file."""
+    """The body is a hole in the cube of the file: position and rotation are those of the operands."""
     path = folder / "operand.step"
     path.write_text(step)
     hole = {"shape": "cylinder", "base": ["5 mm", "5 mm", "-1 mm"], "radius": "2 mm", "length": "20 mm"}
@@ -119,8 +119,9 @@ def test_a_brep_file_needs_a_unit(folder: Path, brep: bytes) -> None:
 
 
 def test_the_bytes_of_a_file_decide_its_mesh(folder: Path, step: str) -> None:
-    """The mesh is made in a child process. Another file under the same name gives another mesh; the same file is
-    found in the cache."""
+    """The mesh is made in a child process. Another file with the same name gives another mesh; an unchanged file is
+    found in the cache.
+    """
     path, made_again = folder / "child.step", []
     path.write_text(step)
     body = cad(path, solids=[1])
@@ -135,20 +136,20 @@ def test_the_bytes_of_a_file_decide_its_mesh(folder: Path, step: str) -> None:
 
 
 def _without(step: str, begin: str) -> str:
-    """Returns the file without the first statement that contains ``begin``."""
+    """Returns the text of the file without the first statement that contains ``begin``."""
     lines = step.split(";\n")
     lines.remove(next(line for line in lines if begin in line))
     return ";\n".join(lines)
 
 
 def _open(step: str) -> str:
-    """Returns the file without one face of a shell."""
+    """Returns the text of the file without one face of a shell."""
     head = step.index("CLOSED_SHELL('',(") + len("CLOSED_SHELL('',(")
     return step[:head] + step[step.index(",", head) + 1 :]
 
 
 def test_surface_bodies_of_a_file_are_reported(folder: Path, step: str) -> None:
-    """A plate that was saved as a surface beside solids would be missing without a message."""
+    """A plate that was saved as a surface beside solids must not be missing without a message."""
     note = "mesh: 1 surface body without volume in sheet.step: not in the mesh; only solids are read"
     sheet = step.replace("ENDSEC;\nEND-", "#9998 = OPEN_SHELL('',());\nENDSEC;\nEND-")
     for data, solids, notes in ((sheet, (), (note,)), (sheet, (1,), ()), (step, (), ())):
@@ -180,7 +181,7 @@ def test_a_damaged_file_is_refused_in_one_line(folder: Path, step: str, damage: 
 
 
 def test_brep_files_that_are_cut_off_and_huge_files_are_refused(folder: Path, brep: bytes) -> None:
-    """OpenCASCADE would read such a BREP file without end."""
+    """OpenCASCADE would read such a damaged BREP file without end."""
     for share in (0.1, 0.5, 0.9, 0.99):
         with pytest.raises(MeshError, match="the BREP file is cut off"):
             made(folder / "cut.brep", brep[: int(share * len(brep))], unit="1 mm")

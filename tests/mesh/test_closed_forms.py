@@ -19,15 +19,16 @@ from conoid.worker.mesh.model import check
 from conoid.worker.mesh.occ.solids import measured
 
 FLATTER = 0.44
-"""Largest loss of volume by flat faces, over the volume of the round operands times (size / radius)^2: an arc of radius
-r with edges of 1.15 h loses (1.15 h / r)^2 / 6 of its area, a ball at most twice as much of its volume."""
+"""Largest loss of volume by flat faces, divided by the volume of the round operands times (size / radius)^2. An arc of
+radius r with edges of 1.15 h loses (1.15 h / r)^2 / 6 of its area; a ball loses at most twice this fraction of its
+volume."""
 Case = tuple[dict[str, Any], float, float, float]
-"""A combination, its volume, the volume of its round operands (a third of their area times the radius), m^3, and their
-smallest radius, m; 0, 1 without."""
+"""A combination with its volume, the volume of its round operands (a third of their area times the radius), m^3, and
+their smallest radius, m; 0 and 1 without round operands."""
 
 
 def turned(shape: dict[str, Any], random: Random) -> dict[str, Any]:
-    """Turns a body; its volume does not change."""
+    """Turns a body, whose volume does not change."""
     turn = {"axis": random.choice("xyz"), "angle": random.uniform(-1.5, 1.5), "centre": [0.1, -0.2, 0.3]}
     around = box([-9.0, -9.0, -9.0], [9.0, 9.0, 9.0])
     return {"shape": "intersection", "of": [{**shape, "turn": turn}, around]} if random.random() < 0.5 else shape
@@ -38,7 +39,7 @@ def box(low: list[float], high: list[float]) -> dict[str, Any]:
 
 
 def bored(random: Random) -> Case:
-    """A block with a bore: a b c - pi r^2 b."""
+    """Returns a block with a bore: volume a b c - pi r^2 b."""
     a, b, c, r = (random.uniform(*ends) for ends in ((0.8, 1.4), (0.6, 1.2), (0.8, 1.4), (0.2, 0.35)))
     bore = {"shape": "cylinder", "axis": "y", "base": [0.05, -1.0, -0.02], "radius": r, "length": 3.0}
     shape = {"shape": "difference", "of": [box([-a / 2, 0.0, -c / 2], [a / 2, b, c / 2]), bore]}
@@ -46,7 +47,9 @@ def bored(random: Random) -> Case:
 
 
 def two_boxes(random: Random) -> Case:
-    """The union of two blocks, by inclusion and exclusion: no round face, exact."""
+    """Returns the union of two blocks, with the volume by inclusion and exclusion, which is exact because no face is
+    round.
+    """
     x, y, z = (random.uniform(0.2, 0.7) for _ in range(3))
     shape = {"shape": "union", "of": [box([0, 0, 0], [1, 1, 1]), box([x, y, z], [x + 1, y + 0.8, z + 0.9])]}
     common = (1 - x) * (min(1, y + 0.8) - y) * (min(1, z + 0.9) - z)
@@ -54,7 +57,7 @@ def two_boxes(random: Random) -> Case:
 
 
 def lens(random: Random) -> Case:
-    """The intersection of two balls (Weisstein, Sphere-Sphere Intersection, MathWorld, equation 16)."""
+    """Returns the intersection of two balls (Weisstein, Sphere-Sphere Intersection, MathWorld, equation 16)."""
     R, r = random.uniform(0.5, 0.8), random.uniform(0.45, 0.6)
     d = random.uniform(0.35, 0.6) * (R + r)
     volume = math.pi * (R + r - d) ** 2 * (d * d + 2 * d * r - 3 * r * r + 2 * d * R + 6 * r * R - 3 * R * R) / (12 * d)
@@ -65,7 +68,7 @@ def lens(random: Random) -> Case:
 
 
 def crossed(random: Random) -> Case:
-    """The intersection of two equal cylinders at a right angle: 16 r^3 / 3 (Archimedes, The Method)."""
+    """Returns the intersection of two equal cylinders at a right angle: volume 16 r^3 / 3 (Archimedes, The Method)."""
     r = random.uniform(0.4, 0.6)
     bars = [{"shape": "cylinder", "axis": axis, "radius": r, "length": 3.0, "base": base}
             for axis, base in (("x", [-1.5, 0.0, 0.0]), ("z", [0.0, 0.0, -1.5]))]  # fmt: skip
@@ -73,7 +76,7 @@ def crossed(random: Random) -> Case:
 
 
 def shell(random: Random) -> Case:
-    """A ball without a block inside of it."""
+    """Returns a ball without a block inside of the ball."""
     r, a = random.uniform(0.6, 0.9), random.uniform(0.25, 0.4)
     hole = box([-a, -a * 0.8, -a * 0.7], [a, a * 0.6, a * 0.9])
     ball = 4.0 / 3.0 * math.pi * r**3
@@ -81,7 +84,7 @@ def shell(random: Random) -> Case:
 
 
 def capped(random: Random) -> Case:
-    """A truncated cone with a hemisphere on its end."""
+    """Returns a truncated cone with a hemisphere on its end."""
     R, r, h = random.uniform(0.6, 0.8), random.uniform(0.4, 0.55), random.uniform(0.6, 1.0)
     cone = {"shape": "cone", "radius": R, "top_radius": r, "length": h}
     cap = {"shape": "hemisphere", "radius": r, "base": [0.0, 0.0, h]}
@@ -150,7 +153,7 @@ def test_the_volume_of_a_combination_is_that_of_its_closed_form(seed: int) -> No
 
 
 def test_a_surface_that_gmsh_meshes_in_part_is_meshed_again() -> None:
-    """A lens of which gmsh meshes 0.27 of the volume, without an error (seed 110)."""
+    """Test of a lens of which gmsh meshes 0.27 of the volume, without an error (seed 110)."""
     assert_volume(110)
 
 

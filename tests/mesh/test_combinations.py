@@ -33,12 +33,14 @@ def combination(request: dict[str, Any], **more: Any) -> Combination:
 
 
 def made(body: Combination) -> TetMesh:
-    """Returns the mesh, made in this process to save the time of a child process."""
+    """Returns the mesh of a body, made in this process to save the time of a child process."""
     return check(measured(body, {}, "mesh"))
 
 
 def by_chance(body: Combination, seed: int) -> tuple[float, float]:
-    """Return a Monte Carlo estimate of the volume inside according to ``cases``, m^3, and its standard deviation."""
+    """Returns a Monte Carlo estimate of the volume, m^3, that is inside according to ``cases``, and the standard
+    deviation of the estimate.
+    """
     holds, box = inside(body), box_of(body)
     assert holds is not None
     low, high = np.array(box or ((-2.0,) * 3, (2.0,) * 3))
@@ -51,8 +53,8 @@ def by_chance(body: Combination, seed: int) -> tuple[float, float]:
 
 
 def assert_volume(seed: int) -> None:
-    """The volume of the mesh agrees with the Monte Carlo estimate, up to its deviation and to the volume that facets
-    cut off round bodies.
+    """The volume of the mesh agrees with the Monte Carlo estimate, up to the deviation of the estimate and to the
+    volume that facets cut off round bodies.
     """
     body = combination(tree(seed))
     volume, off = by_chance(body, seed)
@@ -75,7 +77,9 @@ def test_the_volumes_of_two_hundred_combinations_made_at_random() -> None:
 
 
 def test_inclusion_and_exclusion() -> None:
-    """|A or B| = |A| + |B| - |A and B| = |A - B| + |B|, of meshes, at second order of the size."""
+    """Volumes of meshes fulfil |A or B| = |A| + |B| - |A and B| = |A - B| + |B|, at second order of the element
+    size.
+    """
     pair = [
         {"shape": "sphere", "radius": 0.6},
         {"shape": "cone", "radius": 0.5, "length": 1.2, "base": [0.2, 0.1, 0.0]},
@@ -88,7 +92,9 @@ def test_inclusion_and_exclusion() -> None:
 
 
 def test_a_jacket_round_a_core_and_its_sectors() -> None:
-    """The cavity exists; a quarter has a quarter of the volume, with nodes exactly on its planes."""
+    """The cavity exists in the mesh; a quarter of the body has a quarter of the volume, with nodes exactly on its
+    planes.
+    """
     shape = {"shape": "difference", "of": [JACKET, CORE]}
     whole, quarter = (made(combination(shape, element_size=0.08, sector=each)) for each in ("full", "quarter"))
     nose = {radius: _ogive(radius) for radius in (0.5, 0.3)}
@@ -109,7 +115,7 @@ def _ogive(radius: float) -> float:
 
 
 def test_a_solid_turned_or_elsewhere_is_the_same_solid() -> None:
-    """Operands have their own rotations, and a combination inside of another is rotated as a whole."""
+    """Each operand has its own rotation, and a combination inside of another combination is rotated as a whole."""
     hole = {"shape": "cylinder", "radius": 0.2, "length": 2.0, "base": [0.0, 0.0, -1.0]}
     block = {"shape": "box", "low": [-0.5, -0.4, -0.3], "high": [0.5, 0.4, 0.3]}
     turn = {"axis": "y", "angle": 0.7, "centre": [0.3, 0.0, 0.1]}
@@ -190,7 +196,7 @@ def test_a_combination_that_is_wrong_is_refused_under_its_key(mesh: dict[str, An
 
 
 def _written(mesh: Any) -> Any:
-    """Returns the keys whose values are not None."""
+    """Returns the keys of a table whose values are not None."""
     if isinstance(mesh, dict):
         return {key: _written(value) for key, value in mesh.items() if value is not None}
     return [_written(each) for each in mesh] if isinstance(mesh, list) else mesh

@@ -41,7 +41,7 @@ FILES = ["2.2-0.msh", "2.2-1.msh", "4.1-0.msh", "4.1-1.msh", "gmsh.inp"]
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Two cubes with a common face, written by gmsh: the steel cube from x = 0, the glass cube from x = 1."""
+    """Writes two cubes with a common face with gmsh: the steel cube from x = 0, the glass cube from x = 1."""
     place = tmp_path_factory.mktemp("meshes")
     subprocess.run([sys.executable, "-c", WRITER], cwd=place, check=True, timeout=60)
     return place
@@ -106,7 +106,7 @@ def test_a_file_that_was_cut_off_is_refused(path: str, share: float, folder: Pat
     ],
 )
 def test_garbage_is_refused_in_one_line(content: bytes, message: str, tmp_path: Path) -> None:
-    """The third file would start a program if gmsh read it, because gmsh would execute it as a script."""
+    """The third file would start a program if gmsh read the file, because gmsh would execute it as a script."""
     (tmp_path / "bad.msh").write_bytes(content)
     with pytest.raises(MeshError, match=rf"^parts\[1\]\.mesh\.path = 'bad.msh': .*({message})") as raised:
         read("bad.msh", tmp_path)

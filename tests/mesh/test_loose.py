@@ -1,4 +1,4 @@
-"""Meshes made tet by tet: two regular tets with a common face, and shards that do not touch."""
+"""Meshes made tet by tet: two regular tets with a common face, and separate tets that do not touch."""
 
 import itertools
 import math
@@ -51,7 +51,8 @@ def test_two_tets_share_a_face(axis: str) -> None:
 
 def test_two_tets_lean() -> None:
     """The free corners are on a line through the centre of the common face; volumes and bounds agree with the
-    estimate."""
+    estimate.
+    """
     made = TwoTets.model_validate({"shape": "two_tets", "element_size": 0.2, "axis": "y", "lean": "50 deg"})
     mesh = check(structured(made))
     free = mesh.points[np.setxor1d(mesh.tets[0], mesh.tets[1])]
@@ -78,8 +79,9 @@ def test_shards_are_regular_and_free() -> None:
 
 @pytest.mark.parametrize("perturbation", [0.0, 0.15])
 def test_every_shard_stays_in_a_ball_of_its_own(perturbation: float) -> None:
-    """The balls are in the middle of cubes, half a gap away from their faces: no two shards are nearer to each other
-    than the gap."""
+    """The spheres around the tets are in the middle of cubes, half a gap away from the faces of the cubes: no two tets
+    are nearer to each other than the gap.
+    """
     made = shards(perturbation=perturbation)
     mesh = structured(made)
     corners = (mesh.points[mesh.tets] - np.array(made.base)) / pitch(made)
@@ -101,8 +103,9 @@ def test_the_seed_makes_the_shards() -> None:
 
 
 def test_all_rotations_are_treated_equally() -> None:
-    """The rotations have no preferred direction: means of their entries and of the squares are within four standard
-    errors, and the angles have the density (1 - cos a) / pi."""
+    """The rotations of the tets have no preferred direction: means of their entries and of the squares are within four
+    standard errors, and the angles have the density (1 - cos a) / pi.
+    """
     turns = rotations(uniform(np.arange(60_000), 9).reshape(-1, 3))
     assert np.einsum("nij,nkj->nik", turns, turns) == pytest.approx(np.broadcast_to(np.eye(3), turns.shape), abs=1e-12)
     assert np.linalg.det(turns) == pytest.approx(1.0, abs=1e-12)

@@ -27,7 +27,7 @@ def small_box() -> TetMesh:
 def test_volume_and_step_length_of_known_tets() -> None:
     corner = TetMesh(CORNER, ONE)
     assert corner.volumes() == pytest.approx([1 / 6])
-    assert corner.step_lengths() == pytest.approx([6**-0.5])  # squared gradients: 1, 1, 1 and 3
+    assert corner.step_lengths() == pytest.approx([6**-0.5])  # squares of the four gradients: 1, 1, 1 and 3
     regular = TetMesh(np.array([[1, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]]) / 8**0.5, ONE)
     assert abs(regular.step_lengths()[0]) == pytest.approx(REGULAR_STEP)
 
@@ -92,7 +92,7 @@ def test_boundary_of_a_box() -> None:
     assert areas(mesh.points, faces).sum() == pytest.approx(6.0)
     a, b, c = (mesh.points[faces[:, i]] for i in range(3))
     flux = np.einsum("ij,ij->", np.cross(b - a, c - a), a + b + c) / 18
-    assert flux == pytest.approx(1.0)  # the divergence theorem: all faces are directed outward
+    assert flux == pytest.approx(1.0)  # by the divergence theorem all faces are directed outward
     counts = face_counts(mesh.tets)
     assert (counts == 1).sum() == len(faces)
     assert 2 * (counts == 2).sum() + len(faces) == 4 * len(mesh.tets)

@@ -1,4 +1,4 @@
-"""The reader of .msh files, in this process: files that gmsh writes in every option, and damaged files."""
+"""The reader of .msh files, in this process: files that gmsh writes with every option, and damaged files."""
 
 import itertools
 import subprocess
@@ -50,7 +50,9 @@ DIALECTS = [f"{version}-{binary}" for version, binary in itertools.product((2.2,
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Two boxes of 20 m^3 with a common face, with the groups lower, upper and all, which contains both."""
+    """Writes two boxes of 20 m^3 with a common face, with the groups lower, upper and all; the last group contains both
+    boxes.
+    """
     place = tmp_path_factory.mktemp("msh")
     subprocess.run([sys.executable, "-c", WRITER], cwd=place, check=True, timeout=120)
     return place
@@ -67,11 +69,11 @@ def volume(found: NamedMesh) -> float:
 @pytest.mark.parametrize("dialect", DIALECTS)
 @pytest.mark.parametrize("kind", ["plain", "SaveAll", "SaveParametric", "ghosts"])
 def test_each_group_has_its_own_tets_once(kind: str, dialect: str, folder: Path) -> None:
-    """Some tets are in two groups; a file of the format 2.2 lists such a tet once for each group. Other tets are ghost
-    cells.
+    """Some tets are in two groups; a file of the format 2.2 lists such a tet once for each group. Some tets in the file
+    are ghost cells.
     """
     path = folder / f"{kind}-{dialect}.msh"
-    if kind == "SaveAll" and dialect.startswith("2.2"):  # gmsh omits the groups in such a file
+    if kind == "SaveAll" and dialect.startswith("2.2"):  # gmsh omits the groups in a file of this format
         assert len(read_msh(path, "lower", "mesh").mesh.tets) == 0
         assert volume(read_msh(path, None, "mesh")) == pytest.approx(40.0)
         return

@@ -1,5 +1,6 @@
-"""Text files of all formats that are truncated, or have lines removed, repeated or swapped: each is refused in one
-line, or read with its present content."""
+"""Text files of all formats that are truncated, or whose lines are removed, repeated or swapped: each file is refused
+in one line, or read with its present content.
+"""
 
 import math
 from collections.abc import Callable

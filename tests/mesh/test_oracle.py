@@ -25,7 +25,7 @@ from .styles import POISONS, STYLES, Floats, block, measured
 
 SEED = int(os.environ.get("CONOID_SEED", "20260801"))
 FEW, MANY = 10, 100
-"""Numbers of files of each of the two writers."""
+"""Numbers of files that each of the two writers writes."""
 
 
 def held(path: Path, group: str | None, unit: float = 1.0) -> Floats:
@@ -68,14 +68,14 @@ def refused(path: Path, group: str | None, where: str) -> None:
 
 
 def cut_off(path: Path, chance: Random, where: str) -> None:
-    """Checks that a file that is truncated in its last third before its last word is refused."""
+    """Checks that a file is refused if it is truncated in its last third before its last word."""
     content = path.read_bytes()
     path.write_bytes(content[: chance.randint(len(content) * 2 // 3, len(content) - 30)])
     refused(path, None, where)
 
 
 def check_gmsh(folder: Path, seed: int, count: int) -> int:
-    """Checks files of gmsh; returns the number of files that meshio could read too."""
+    """Checks files of gmsh; returns the number of files that meshio could also read."""
     command = [sys.executable, str(Path(__file__).with_name("gmsh_files.py")), str(folder), str(seed), str(count)]
     subprocess.run(command, check=True, timeout=600)
     both = 0

@@ -19,23 +19,24 @@ from .quality import face_counts
 
 HERE = Path(__file__).parent
 WORST = 0.38
-"""Smallest step length over that of a regular tet in these bodies, including blunt tips."""
+"""Smallest step length divided by that of a regular tet in the bodies of this module, including blunt tips."""
 
 
 def made(body: Shape) -> TetMesh:
-    """Returns the mesh, made in this process to save the time of a child process."""
+    """Returns the mesh of a body, made in this process to save the time of a child process."""
     return check(unstructured(body))
 
 
 def skin(mesh: TetMesh) -> float:
-    """Returns the area of the surface, m^2."""
+    """Returns the area of the surface of a mesh, m^2."""
     return float(areas(mesh.points, boundary_faces(mesh.tets)).sum())
 
 
 @pytest.mark.parametrize("name", SHAPES)
 def test_volume_and_area_converge_at_second_order(name: str) -> None:
-    """A chord cuts off h^2 / 8 R: the errors at h and h/2 have the ratio 4, as far as a few elements round the body
-    show this; a body with flat faces has no error."""
+    """A chord cuts off h^2 / 8 R: the errors at h and h/2 have the ratio 4, as far as a few elements around the body
+    show this ratio. A body with flat faces has no error.
+    """
     body = shape(name)
     errors = []
     for size in (0.14, 0.07):
@@ -66,7 +67,7 @@ def test_a_sector_is_a_share_of_the_whole_with_nodes_exactly_on_its_planes(name:
 
 @pytest.mark.parametrize("name", SHAPES)
 def test_the_worst_tet_is_known_before(name: str) -> None:
-    """The estimate is within its factor of two; at sharp tips nodes slide along the surface."""
+    """The estimate of the step length is within its factor of two; at sharp tips nodes slide along the surface."""
     for sector in ("full", "quarter"):
         body = shape(name, sector=sector)
         mesh, expected = made(body), mesh_size(body)
@@ -77,7 +78,9 @@ def test_the_worst_tet_is_known_before(name: str) -> None:
 
 
 def test_nodes_lie_on_the_surface() -> None:
-    """The body is an ogive, whose radius at each height is known: smoothing has moved the nodes along the surface."""
+    """The body is an ogive, whose radius at each height is known: smoothing has moved the nodes along the surface
+    only.
+    """
     body = shape("tangent", base=(0.0, 0.0, 0.0), sector="quarter")
     mesh = made(body)
     faces = boundary_faces(mesh.tets)
@@ -90,7 +93,7 @@ def test_nodes_lie_on_the_surface() -> None:
 
 
 def test_slender_cones_have_tips_that_a_mesh_can_be_made_of() -> None:
-    """A single face round a slender tip would have two triangles with the same nodes."""
+    """A single face around a slender tip would have two triangles with the same nodes."""
     for half_angle in (2.0, 5.0, 10.0):
         body = shape(
             "cone",

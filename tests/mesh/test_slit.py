@@ -1,5 +1,6 @@
-"""A slit: its two sides are exposed, its border inside of the body is connected, and nothing else of the mesh
-changes."""
+"""A slit: both sides of the slit are exposed, its border inside of the body is connected, and nothing else of the mesh
+changes.
+"""
 
 from typing import Any
 
@@ -40,8 +41,9 @@ def crack(made: Box | Plate, mesh: TetMesh) -> tuple[Floats, Floats]:
 @pytest.mark.parametrize("axis", ["x", "y", "z"])
 @pytest.mark.parametrize("written", [FROM_ONE_SIDE, INSIDE], ids=["edge", "inside"])
 def test_both_sides_are_exposed(written: dict[str, Any], axis: str, split: int) -> None:
-    """Each side has the area of the rectangle, and the sides are opposite to each other, except corner faces with
-    all nodes on the border."""
+    """Each side of the slit has the area of the rectangle, and the sides are opposite to each other, except corner
+    faces whose nodes are all on the border.
+    """
     shift = "xyz".index(axis) - "xyz".index(written["slit"]["axis"])
     turned = {
         key: tuple(np.roll(value, shift).tolist()) if key in ("low", "high") else value
@@ -74,8 +76,9 @@ def test_the_surface_is_that_of_the_block_and_the_slit() -> None:
 
 
 def test_the_border_inside_the_body_holds_it_together() -> None:
-    """Nodes at the tip are not duplicated; all other nodes of the slit exist twice. The halves have common nodes
-    only beyond the tip."""
+    """Nodes at the tip of the slit are not duplicated; all other nodes of the slit exist twice. The halves of the body
+    have common nodes only beyond the tip of the slit.
+    """
     made = body(FROM_ONE_SIDE)
     mesh = structured(made)
     on = np.abs(mesh.points[:, 1] - 0.2) < 1e-9

@@ -19,8 +19,9 @@ SEEDS = range(100)
 
 
 def judge(made: NamedMesh, truth: Mixture) -> None:
-    """Checks that the tets of every element have its volume, every inner face has two tets, and the surface is that
-    of the elements."""
+    """Checks three properties: the tets of every element have the volume of the element, every inner face has two tets,
+    and the surface is that of the elements.
+    """
     mesh = check(made.mesh, made.names)
     volumes = mesh.volumes()
     for number, expected in truth.volumes().items():
@@ -63,7 +64,7 @@ def test_a_thousand_strongly_warped_mixtures_do_or_are_refused() -> None:
 
 
 def test_the_cube_has_seventy_four_cuts() -> None:
-    """De Loera, Rambau, Santos 2010, "Triangulations", theorem 6.3.10."""
+    """The number of triangulations is from De Loera, Rambau, Santos 2010, "Triangulations", theorem 6.3.10."""
     every = [cut for pattern in range(64) for cut in cuts(pattern)]
     assert len(every) == 74
     assert sum(not row[-1].any() for row in every) == 2, "two of five tets, the others of six"
@@ -92,7 +93,7 @@ def one(nodes: list[int], points: np.ndarray = CUBE, line: int = 0) -> NamedMesh
     ],
 )
 def test_a_hexahedron_may_repeat_nodes(nodes: list[int], volume: float | None, tets: int) -> None:
-    """The hexahedron is a wedge in two ways, a pyramid, a flat tet, a tet in two ways, or lacks one edge."""
+    """The degenerate hexahedron is a wedge in two ways, a pyramid, a flat tet, a tet in two ways, or lacks one edge."""
     if volume is None:
         with pytest.raises(MeshError, match="hexahedron 7 is flat"):
             one(nodes)
@@ -120,8 +121,9 @@ def test_an_element_without_a_proper_volume_is_refused_with_its_line(nodes: list
 @pytest.mark.parametrize(("raised", "share"), [(4, 1 / 3), (5, 1 / 6)])
 def test_warped_faces_are_reported_with_their_lost_volume(raised: int, share: float) -> None:
     """A corner of the unit cube is raised by h. The volume below a bilinear top is larger by h / 4. The volume below
-    the triangles is larger by h / 3 if the diagonal ends at this corner, as it does at the smallest number, else by
-    h / 6."""
+    the two triangles is larger by h / 3 if the diagonal ends at this corner, as it does at the smallest number, else by
+    h / 6.
+    """
     points = CUBE.copy()
     points[raised, 2] += 0.3
     found = one(list(range(8)), points)
@@ -133,7 +135,7 @@ def test_warped_faces_are_reported_with_their_lost_volume(raised: int, share: fl
 
 @pytest.mark.parametrize("other", [False, True])
 def test_a_quadrilateral_beside_two_tets_takes_their_diagonal(other: bool) -> None:
-    """Half a cube is a wedge, and two tets with either diagonal are on its face 0 2 6 4."""
+    """Half a cube is a wedge, and two tets with either diagonal are on the face 0 2 6 4 of the cube."""
     wedge = cells(HEX8, np.array([1]), np.array([[0, 1, 2, 2, 4, 5, 6, 6]]))
     rows = [(2, 4, 6, 8), (2, 0, 4, 8)] if other else [(0, 6, 2, 8), (0, 4, 6, 8)]
     points = np.concatenate([CUBE, [[0.1, 0.9, 0.5]]])
@@ -186,8 +188,10 @@ def test_tets_of_ten_nodes_become_eight_or_their_corners() -> None:
 
 
 def test_the_volume_that_corners_lose_is_that_of_the_quadratic_element() -> None:
-    """Three edges of the unit tet are bent by h along -z. Each adds A h / 3 below, and one of them removes as much
-    at the slanted face (the integral of the shape function of such a node over a triangle is a third of its area)."""
+    """Three edges of the unit tet are bent by h along -z. Each bent edge adds A h / 3 below the tet, and one of them
+    removes as much at the slanted face (the integral of the shape function of such a node over a triangle is a third of
+    its area).
+    """
     corners = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]])
     middles = np.array([(corners[a] + corners[b]) / 2 for a, b in EDGES])
     middles[:3, 2] -= 0.01
@@ -218,7 +222,7 @@ def test_a_mesh_that_eight_tets_cannot_match_is_refused() -> None:
 
 
 def test_hexahedra_of_twenty_nodes_are_taken_by_their_corners() -> None:
-    """The four upper edges of a cube are bent outwards by h along z: each adds A h / 3 on the top face."""
+    """The four upper edges of a cube are bent outwards by h along z: each edge adds A h / 3 on the top face."""
     middles = np.array([(CUBE[a] + CUBE[b]) / 2 for a, b in HEX20.edges])
     middles[4:8, 2] += 0.03
     points = np.concatenate([CUBE, middles])

@@ -31,7 +31,7 @@ def made(folder: Path, data: bytes | str, **more: Any) -> TetMesh:
 
 
 def inside(facets: Any) -> float:
-    """Returns the volume within facets, m^3, of a file in mm."""
+    """Returns the volume inside of facets, m^3, of an STL file in mm."""
     a, b, c = facets.transpose(1, 0, 2)
     return float((a * np.cross(b, c)).sum() / 6.0 * 1e-9)
 
@@ -47,7 +47,7 @@ def inside(facets: Any) -> float:
 def test_text_and_binary_are_the_same_body_with_elements_of_the_size_asked_for(
     tmp_path: Path, facets: Any, share: float
 ) -> None:
-    """The elements have the requested size for any triangles of the file: the triangles of the box are the largest
+    """The elements have the requested size for any triangles of the file: the triangles of the box are as large as
     possible.
     """
     meshes = [made(tmp_path, data) for data in (text(facets), binary(facets))]
@@ -79,7 +79,7 @@ def _flipped() -> Any:
 
 
 def _folded() -> Any:
-    """Returns a box with one corner pushed out through the opposite side."""
+    """Returns a box with one corner pushed out through the opposite side of the box."""
     facets = BALL.copy()
     corner = facets[40][0].copy()
     facets[(np.abs(facets - corner) < 1e-9).all(axis=2)] = -1.3 * corner
@@ -115,8 +115,9 @@ def test_a_surface_that_is_wrong_is_refused_in_one_line(tmp_path: Path, data: by
 
 
 def test_triangles_that_cross_are_those_that_edges_pierce() -> None:
-    """Random pairs are compared with the signs of volumes: the ends of an edge of one triangle are on both sides of
-    the other, and the edge passes through the inside of the other."""
+    """Random pairs of triangles are compared with the signs of volumes: the ends of an edge of one triangle are on both
+    sides of the other triangle, and the edge passes through its inside.
+    """
     chance = np.random.default_rng(5)
     corners = chance.uniform(0.0, 1.0, (400, 1, 3)) + chance.uniform(-0.15, 0.15, (400, 3, 3))
     faces = np.arange(1200).reshape(-1, 3)
@@ -143,7 +144,9 @@ def _pierces(one: Any, other: Any) -> bool:
 
 
 def test_a_surface_is_an_operand_and_has_sectors_in_a_combination(tmp_path: Path) -> None:
-    """A quarter of a ball, and of a block without the ball: plane faces only, so the volume is that of the facets."""
+    """A quarter of a ball, and of a block without the ball, has only plane faces, so that the volume is that of the
+    facets.
+    """
     facets = ball(8)
     (tmp_path / "a.stl").write_bytes(binary(facets))
     block = {"shape": "box", "low": [-6e-3] * 3, "high": [6e-3] * 3}

@@ -36,7 +36,7 @@ def body(shape: str, **more: Any) -> Generated:
 
 
 def polygon_share(steps: int) -> float:
-    """Returns the area of the polygon with ``steps`` corners in each quarter over that of its circle."""
+    """Returns the area of the polygon with ``steps`` corners in each quarter divided by the area of its circle."""
     return steps * math.sin(math.pi / 2 / steps) / (math.pi / 2)
 
 
@@ -57,8 +57,9 @@ def test_a_regular_mesh_fills_its_body(shape: str, axis: str, sector: str, split
 
 
 def assert_planes_are_exact(made: Generated, mesh: TetMesh) -> None:
-    """Checks that the cut faces lie on their planes to the last bit and are complete: area of section times number
-    of divisions."""
+    """Checks that the cut faces lie on their planes to the last bit and are complete: their area is the area of the
+    section times the number of divisions.
+    """
     start = np.array(centre(made))
     faces = boundary_faces(mesh.tets)
     for direction in cut_directions(made, made.axis):

@@ -1,4 +1,4 @@
-"""Shapes meshed together: each has its volume, and their interface has one mesh."""
+"""Shapes meshed together: each shape has its volume, and their interface has one mesh."""
 
 from pathlib import Path
 from typing import Any
@@ -60,7 +60,7 @@ def test_a_small_plate_on_a_large_one(axis: str) -> None:
 
 
 def test_a_rod_that_fills_a_tube() -> None:
-    """The facets of rod and tube are those of one mesh: no gap and no overlap between the two."""
+    """The facets of rod and tube are those of one mesh: no gap and no overlap between rod and tube."""
     whole = joined(ROD, TUBE)
     lateral = 2.0 * np.pi * 4e-3 * 10e-3
     assert interface(whole) == pytest.approx(lateral, rel=0.1)
@@ -90,8 +90,9 @@ def test_shapes_with_a_gap_and_shapes_that_overlap_are_refused() -> None:
 
 @pytest.mark.parametrize("axis", ["x", "y", "z"])
 def test_a_core_that_fills_a_jacket(axis: str) -> None:
-    """An ogive is inside of a larger ogive with a cavity: a quarter, whose nodes are exactly on the planes of the
-    cut."""
+    """A quarter of an ogive is inside of a larger ogive with a cavity; the nodes are exactly on the planes of the
+    cut.
+    """
     base: list[Any] = [0, 0, 0]
     base["xyz".index(axis)] = "2 mm"
     core = {"shape": "ogive", "radius": "3 mm", "crh": 3, "shank": "6 mm", "axis": axis, "base": base}
@@ -110,7 +111,8 @@ def test_a_core_that_fills_a_jacket(axis: str) -> None:
 
 def test_solids_of_a_step_file_are_two_parts_of_one_body(tmp_path: Path) -> None:
     """The run has the numbers that ``validate`` gives; a part of the body without a file is meshed together with the
-    solids."""
+    solids.
+    """
     (tmp_path / "s.step").write_text(written(tmp_path)[0])
     core, jacket = (
         {"shape": "cad", "path": "s.step", "solids": [name], "element_size": "2 mm"} for name in ("Core", "Jacket")

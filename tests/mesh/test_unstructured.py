@@ -1,4 +1,4 @@
-"""Meshes by gmsh, made in the same way as for a case, in the child process."""
+"""Meshes by gmsh, made in the child process in the same way as for a case."""
 
 from pathlib import Path
 from typing import Any
@@ -54,8 +54,9 @@ def test_an_unstructured_mesh_fills_its_body(shape: str, axis: str, sector: str)
 
 
 def assert_cuts_are_exact(made: Generated, mesh: TetMesh) -> None:
-    """Checks that each cut plane has nodes to the last bit, that no other nodes are near the plane, and that the
-    faces cover the section."""
+    """Checks that each cut plane has nodes to the last bit, that no other nodes are near the plane, and that the faces
+    cover the section.
+    """
     faces, start = boundary_faces(mesh.tets), np.array(centre(made))
     for direction in cut_directions(made, made.axis):
         on = mesh.points[:, direction] == start[direction]
@@ -66,7 +67,7 @@ def assert_cuts_are_exact(made: Generated, mesh: TetMesh) -> None:
 
 
 def section(made: Generated, direction: int) -> float:
-    """Returns the area of the cut normal to ``direction``, m^2."""
+    """Returns the area of the cut of a mesh normal to ``direction``, m^2."""
     halved = 0.5 if made.sector == "quarter" else 1.0
     if isinstance(made, Sphere):
         return halved * np.pi * made.radius**2
@@ -88,7 +89,9 @@ def assert_quality(made: Generated, mesh: TetMesh) -> None:
 @pytest.mark.parametrize("shape", ["plate", "cylinder", "tube", "sphere"])
 @pytest.mark.parametrize("sector", ["half", "full"])
 def test_an_aligned_mesh_has_the_tets_of_a_quarter_at_the_axis(shape: str, sector: str) -> None:
-    """A mesh that is not aligned has tets of up to twice the volume at the axis, and no node on the axis."""
+    """A mesh that is not aligned with the axis has tets of up to twice the volume at the axis, and no node on the
+    axis.
+    """
     made = body(shape, axis="z", sector=sector, aligned=True)
     quarter, share = build(body(shape, axis="z", sector="quarter"), HERE), {"half": 2, "full": 4}[sector]
     mesh = check(build(made, HERE))
@@ -101,7 +104,7 @@ def test_an_aligned_mesh_has_the_tets_of_a_quarter_at_the_axis(shape: str, secto
 
 
 def at_axis(made: Generated, mesh: TetMesh) -> float:
-    """Returns the mean volume of the tets within an element size of the axis z."""
+    """Returns the mean volume of the tets whose distance from the axis z is at most an element size."""
     x = mesh.points[:, :2] - np.array(centre(made))[:2]
     near = np.linalg.norm(x[mesh.tets].mean(axis=1), axis=1) < made.element_size
     return float(mesh.volumes()[near].mean())
@@ -109,7 +112,7 @@ def at_axis(made: Generated, mesh: TetMesh) -> float:
 
 @pytest.mark.parametrize("shape", ["cylinder", "plate"])
 def test_end_faces_are_exactly_flat(shape: str) -> None:
-    """Therefore a wall touches the whole end face at once."""
+    """The nodes of the end face lie on one plane; therefore a wall touches the whole end face at once."""
     mesh = build(body(shape), HERE)
     assert (mesh.points[:, 2] == 0.3).sum() > 30
     assert not ((mesh.points[:, 2] > 0.3) & (mesh.points[:, 2] < 0.32)).any()
@@ -124,8 +127,9 @@ def test_round_surfaces_are_round() -> None:
 
 
 def test_millimetres_are_meshed_as_metres_are() -> None:
-    """The tolerances of gmsh are absolute. The mesher scales by a power of two, so the mesh is the same except for
-    its size."""
+    """The tolerances of gmsh are absolute. The mesher scales a body by a power of two, so that the mesh is equal except
+    for its size.
+    """
     large = build(body("box", low=(0, 0, 0), high=(1.0, 0.5, 0.5), element_size=0.125), HERE)
     small = build(body("box", low=(0, 0, 0), high=(2.0**-10, 2.0**-11, 2.0**-11), element_size=2.0**-13), HERE)
     assert np.array_equal(large.tets, small.tets)

@@ -116,7 +116,7 @@ def test_files_of_meshio_are_read(tmp_path: Path) -> None:
 
 
 def test_a_damaged_file_is_refused_or_has_the_right_mesh(tmp_path: Path) -> None:
-    """The file is truncated, has a changed byte, or a part that is repeated or missing."""
+    """The test file is truncated, has a changed byte, or has a part that is repeated or missing."""
     path, bad = tmp_path / "good.vtu", tmp_path / "bad.vtu"
     refusals = 0
     for seed in range(60):
@@ -135,7 +135,7 @@ def test_a_damaged_file_is_refused_or_has_the_right_mesh(tmp_path: Path) -> None
 
 
 def reads(path: Path) -> bool:
-    """Returns whether a file is read; any other result than a refusal in one line is an error."""
+    """Returns whether a file is read; any result other than a refusal in one line is an error."""
     try:
         taken(path)
     except MeshError as error:

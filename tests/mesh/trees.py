@@ -8,8 +8,7 @@ _COMBINED = ("union", "difference", "intersection")
 
 
 def tree(seed: int) -> dict[str, Any]:
-    """Returns a combination of two or three shapes, or of combinations of these, near the origin, with sizes of
-    about 1 m."""
+    """Returns a combination of two or three shapes, or of combinations, near the origin, with sizes of about 1 m."""
     chance = random.Random(seed)
     return {"shape": chance.choice(_COMBINED), "of": [_operand(chance, 1) for _ in range(chance.randint(2, 3))]}
 

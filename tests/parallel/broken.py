@@ -1,5 +1,6 @@
-"""Program under mpiexec: a worker in which one rank raises an error in its tenth step. The first argument is this
-rank."""
+"""Program under mpiexec: a worker in which one rank raises an error in its tenth step. The first argument of the
+program is the number of this rank.
+"""
 
 import itertools
 import sys

@@ -1,5 +1,6 @@
-"""Runs of the scene with fracture that several modules compare: each run is made once in a session, at its first
-use."""
+"""Runs of the scene with fracture that several modules compare; each run is made once in a session, at its first
+use.
+"""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -14,7 +15,7 @@ from .scenes import FAST, SCENES, arguments
 
 @pytest.fixture(scope="session")
 def breaking(tmp_path_factory: pytest.TempPathFactory) -> Callable[[int, str], Path]:
-    """Returns the folder of an uninterrupted run by the number of ranks and the scene; runs with the same number of
+    """Returns the folder of an uninterrupted run, by the number of ranks and the scene; runs with the same number of
     ranks are made together. On more than one rank a file requests a checkpoint before the run begins.
     """
     root = tmp_path_factory.mktemp("breaking")
@@ -35,7 +36,9 @@ def breaking(tmp_path_factory: pytest.TempPathFactory) -> Callable[[int, str], P
 
 @pytest.fixture(scope="session")
 def moving(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Returns the folder of a run of the scene on three ranks, with a new cut every five steps."""
+    """Returns the folder of a run of the scene with fracture on three ranks, with a new decomposition every five
+    steps.
+    """
     root = tmp_path_factory.mktemp("moving")
     words = [word for change in ("balance.policy=every", "balance.every=5") for word in ("--set", change)]
     together(3, root, [[*arguments(FAST, root, root), *words]])

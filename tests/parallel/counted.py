@@ -1,4 +1,4 @@
-"""A kernel of tasks for tests: it counts the numbers of its range."""
+"""A kernel of tasks for tests, which counts the numbers of its range."""
 
 from conoid.worker.kernels.jit import njit, types
 from conoid.worker.parallel.arguments import reader
@@ -10,7 +10,7 @@ _counts = reader(*KINDS)
 
 @njit(TASK, cache=False)
 def count(table, first, end, thread):  # type: ignore[no-untyped-def]
-    """Counts each number of its range."""
+    """Adds 1 to the counter of each number of the range."""
     (done,) = _counts(table)
     for k in range(first, end):
         done[k] += 1

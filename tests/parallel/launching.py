@@ -1,4 +1,6 @@
-"""Real workers under the real mpiexec, started and awaited with a time limit; no process continues after a test."""
+"""Real workers under the real mpiexec, started and awaited with a time limit; no process of a worker continues after a
+test.
+"""
 
 import json
 import os
@@ -12,7 +14,7 @@ from pathlib import Path
 
 MPIEXEC = Path(sys.executable).with_name("mpiexec")
 PATIENCE, EACH = 180.0, 30.0
-"""Time limits in s: of a launcher, and in addition of each run that ``together`` starts in one program."""
+"""Time limits in s: of a launcher, and of each run that ``together`` starts in one program in addition."""
 _PROCESS = re.compile(r"rank \d+ of \d+, process (\d+)")
 
 
@@ -23,7 +25,7 @@ def command(ranks: int, *arguments: str, module: Sequence[str] = ("-m", "conoid.
 
 @contextmanager
 def started(words: list[str]) -> Iterator[subprocess.Popen[str]]:
-    """Starts a launcher in a separate process group, and kills it at the end of the block."""
+    """Starts a launcher in a separate process group, and kills it at the end of the ``with`` block."""
     with subprocess.Popen(
         words, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True
     ) as launcher:
@@ -39,15 +41,15 @@ def started(words: list[str]) -> Iterator[subprocess.Popen[str]]:
 
 
 def ended(words: list[str], patience: float = PATIENCE) -> subprocess.CompletedProcess[str]:
-    """Returns the launcher after its end, which comes within ``patience`` s."""
+    """Waits at most ``patience`` s for the end of the launcher; returns the launcher."""
     with started(words) as launcher:
         out, err = launcher.communicate(timeout=patience)
     return subprocess.CompletedProcess(words, launcher.returncode, out, err)
 
 
 def together(ranks: int, place: Path, runs: Sequence[Sequence[str]]) -> None:
-    """Runs several cases, given by the arguments of their workers, one after the other in one program of ``ranks``
-    ranks; ``place`` is a folder for them.
+    """Runs several cases one after the other in one program of ``ranks`` ranks; each case is given by the arguments of
+    its worker. ``place``: a folder for the cases.
     """
     place.mkdir(exist_ok=True)
     (place / "runs.json").write_text(json.dumps(runs), encoding="utf-8")
@@ -80,7 +82,7 @@ def _lives(number: int) -> bool:
 
 
 def wait_for(path: Path, text: str, launcher: subprocess.Popen[str], seconds: float = 90.0) -> None:
-    """Waits until a file contains a text; fails if the launcher ends or the time is over."""
+    """Waits until a file contains a text; fails if the launcher ends or the time limit has passed."""
     limit = time.monotonic() + seconds
     while not path.exists() or text not in path.read_text(encoding="utf-8"):
         assert launcher.poll() is None, "the worker ended before it wrote that"

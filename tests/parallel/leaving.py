@@ -1,4 +1,4 @@
-"""Program under mpiexec: ranks that end at once with the exit code of the only argument."""
+"""Program under mpiexec: ranks that end at once; the only argument is their exit code."""
 
 import sys
 

@@ -1,5 +1,6 @@
-"""Program under mpiexec: a worker that prints the kernels that it loads after the first step. The arguments are
-those of the worker."""
+"""Program under mpiexec: a worker that prints the kernels that it loads after the first step. The arguments of the
+program are those of the worker.
+"""
 
 import sys
 

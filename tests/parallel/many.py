@@ -1,5 +1,5 @@
-"""Program under mpiexec: runs several cases one after the other in the same ranks, which start only once. The
-arguments of the runs are in a JSON file: a list of lists of arguments of the worker.
+"""Program under mpiexec: runs several cases one after the other in the same ranks, which start only once. A JSON file
+has the arguments of the runs: a list of lists of arguments of the worker.
 """
 
 import json

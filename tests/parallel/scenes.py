@@ -1,11 +1,11 @@
-"""The scene with fracture, and its variants."""
+"""The scene with fracture, and its variants, for tests of several ranks."""
 
 from pathlib import Path
 
 CASE = Path(__file__).with_name("breaking.toml")
-"""A cohesive plate of stone, held at one edge, and a brittle block that hits the plate and the wall below; a metal
-rod above them erodes. The scene has gravity, a symmetry plane, friction, and scatter of strength with and without
-area."""
+"""Case: a cohesive plate of stone, held at one edge, and a brittle block that hits the plate and the wall below; a
+metal rod above the plate and the block erodes. The scene has gravity, a symmetry plane, friction, and scatter of
+strength with and without area."""
 SCENES = {
     "nodal": [],
     "standard": ["numerics.pressure=standard"],
@@ -21,7 +21,7 @@ SCENES = {
     "pressure": [],
 }
 FAST = "nodal"
-"""The variant of the scene that is compared in the fast tests, on two ranks."""
+"""Variant of the scene with fracture that is compared in the fast tests, on two ranks."""
 TRACTION = """
 [[boundaries]]
 kind = "traction"
@@ -43,7 +43,7 @@ _LOADS = {"traction": TRACTION, "pressure": PRESSURE}
 
 
 def arguments(name: str, root: Path, folder: Path) -> list[str]:
-    """Returns the arguments of the worker; the case of the scene is in ``root``."""
+    """Returns the arguments of the worker; the case of the scene is in the folder ``root``."""
     case = root / f"{name}.toml"
     case.write_text(CASE.read_text(encoding="utf-8") + _LOADS.get(name, ""), encoding="utf-8")
     return [str(case), *(word for change in SCENES[name] for word in ("--set", change)), "--out", str(folder / name)]

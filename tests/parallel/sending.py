@@ -1,5 +1,6 @@
-"""Program under mpiexec: makes one communication of each kind, of known size, and prints the counts of each rank as
-JSON."""
+"""Program under mpiexec: makes one communication of each kind, of known size, and prints the communication counts of
+each rank as JSON.
+"""
 
 import json
 from collections.abc import Callable
@@ -13,7 +14,7 @@ from conoid.worker.parallel.tags import Tag
 
 
 def talk(comm: Comm) -> list[tuple[str, dict[str, int]]]:
-    """Return the counts of this rank for each operation."""
+    """Returns the communication counts of this rank for each operation."""
     right, left = (comm.rank + 1) % comm.size, (comm.rank - 1) % comm.size
     out, into = np.zeros((5, 3), np.int64), np.zeros((5, 3), np.int64)
     words, result = np.zeros(9, np.int64), np.zeros(9, np.int64)

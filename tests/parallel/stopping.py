@@ -1,5 +1,6 @@
-"""Program under mpiexec: a worker that gets a stop request before a step. Arguments: the step, then the arguments of
-the worker."""
+"""Program under mpiexec: a worker that gets a stop request before a given step. Arguments of the program: the step,
+then the arguments of the worker.
+"""
 
 import sys
 

@@ -1,5 +1,6 @@
-"""One answer with tied bonds: a tile that fractures on a plate that erodes, for any number of ranks, cuts, and a
-restart."""
+"""One answer with tied bonds: a tile that fractures on a plate that erodes, for any number of ranks, any
+decompositions, and a restart.
+"""
 
 from pathlib import Path
 

@@ -1,4 +1,6 @@
-"""Choice of the number of threads: as many as shorten the regions, with one message if this is fewer than given."""
+"""Choice of the number of threads: only as many threads as shorten the parallel regions, with one message if this
+number is below the given number.
+"""
 
 import numpy as np
 import pytest
@@ -21,8 +23,9 @@ def test_more_threads_are_taken_where_they_are_worth_it(spans: list[float], thre
 
 
 def steps(team: Team, chosen: Choice, number: int) -> tuple[list[str], "np.ndarray"]:
-    """Return the messages of the given number of steps of a region of twelve tasks, and how often each task was
-    done."""
+    """Returns the messages after the given number of steps of a parallel region of twelve tasks, and how often each
+    task was done.
+    """
     done, table = np.zeros(120_000, np.int64), Arguments(*KINDS)
     tasks = np.column_stack([np.arange(0, 120_000, 10_000), np.arange(10_000, 130_000, 10_000)])
     reports = []
@@ -64,7 +67,7 @@ def test_few_threads_are_tried_again_and_all_are_kept(monkeypatch: pytest.Monkey
     assert team.most == 1
     while team.projecting is not None:
         steps(team, chosen, 1)
-    chosen._costs = None  # as in a region with more work
+    chosen._costs = None  # as in a parallel region with more work
     costs[0] = Costs(turn=0, call=0, wake=0)
     steps(team, chosen, 30)
     assert team.most == 4

@@ -1,5 +1,6 @@
 """The committed digests are reproduced, also on other machines and with other versions of the compiler of the
-kernels."""
+kernels.
+"""
 
 import importlib
 import platform
@@ -21,24 +22,24 @@ SHORT = {
     "shock_copper": "0.3 us", "spinning_cube": "10 us", "crossed_bars": "1 us", "plate_stack": "1 us",
     "taylor_copper": "3 us", "triaxial_glass": "2 us", "free_tets": "5 us",
 }  # fmt: skip
-"""Shipped cases whose meshes are made without gmsh, and their end times in this test."""
+"""Shipped cases whose meshes are made without gmsh, and the end times of the cases in this test."""
 GIVEN = ("breaking", "eroding", "colliding", "holding")
-"""Scenes of this folder that run to their ends."""
+"""Scenes of this folder that run to their end times."""
 EVERYWHERE = [*SHORT, *GIVEN, *(f"shattering_{form}" for form in ("standard", "nodal", "split"))]
 PLAIN = "-AVX2,-FMA,-AVX2_Usable,-FMA_Usable"
-"""Settings that disable optimised functions of the C library, by their names in its versions."""
+"""Settings that disable optimised functions of the C library, by the names of the settings in its versions."""
 AT_ONCE = ("model=instant", "delay=0")
-"""Fracture of the bodies of ``shattering``."""
+"""Fracture table of the bodies of ``shattering``."""
 
 
 def shattering() -> str:
-    """Returns the scene with fracture by the model ``instant`` and with one strength for each material."""
+    """Returns the scene with fracture, with the model ``instant`` and one strength for each material."""
     lines = CASE.read_text(encoding="utf-8").splitlines()
     return "\n".join(line for line in lines if not line.startswith(("brittle.scatter", "fracture")))
 
 
 def arguments(name: str, place: Path, threads: int) -> list[str]:
-    """Returns the arguments of the worker for a scene by its name."""
+    """Returns the arguments of the worker for a scene, by the name of the scene."""
     case, form = name, name.partition("_")[2]
     words = ["run.frames=0", "run.samples=10", "reference=[]", f"run.threads={threads}"]
     if name in SHORT:
@@ -52,7 +53,7 @@ def arguments(name: str, place: Path, threads: int) -> list[str]:
 
 
 def ended(place: Path, ranks: int, threads: int) -> dict[str, str]:
-    """Returns the digest of every scene by its name."""
+    """Returns the digest of every scene, by the name of the scene."""
     (place / "shattering.toml").write_text(shattering(), encoding="utf-8")
     together(ranks, place, [arguments(name, place, threads) for name in EVERYWHERE])
     ends = {name: from_json((place / name / layout.OUTCOME).read_bytes()) for name in EVERYWHERE}
@@ -63,7 +64,7 @@ def ended(place: Path, ranks: int, threads: int) -> dict[str, str]:
 
 @pytest.fixture(scope="module")
 def digests(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
-    """Returns the digests on two ranks of two threads."""
+    """Returns the digests of all scenes on two ranks of two threads."""
     return ended(tmp_path_factory.mktemp("digests"), 2, 2)
 
 

@@ -20,7 +20,7 @@ from .scenes import CASE as BREAKING
 pytestmark = pytest.mark.slow
 
 LONG = ("--set", "run.end_time=1 s", "--set", "reference=[]", "--set", "run.frames=0")
-"""Makes a case run for hours."""
+"""Changes a case so that it runs for hours."""
 
 
 def outcome(folder: Path) -> Outcome:
@@ -57,7 +57,7 @@ def test_a_signal_to_the_launcher_cancels_the_run(number: signal.Signals, tmp_pa
 
 
 def test_a_file_in_the_folder_cancels_the_run_and_a_second_worker_keeps_out(tmp_path: Path) -> None:
-    """The worker runs as in a batch system, where a signal without this file is an interruption."""
+    """The worker runs as in a batch system, in which a signal without the stop file is an interruption."""
     folder = tmp_path / "run"
     words = command(2, "free_spin", "--out", str(folder), *LONG, "--interruptible")
     with started(words) as launcher:
@@ -75,7 +75,7 @@ def test_a_file_in_the_folder_cancels_the_run_and_a_second_worker_keeps_out(tmp_
 
 
 def test_a_request_to_stop_one_attempt_stops_no_other_attempt(tmp_path: Path) -> None:
-    """In an earlier version the file remained and stopped every later attempt."""
+    """In an earlier version the stop file remained and stopped every later attempt."""
     folder = tmp_path / "run"
     words = command(1, "free_spin", "--out", str(folder), "--set", "run.end_time=1us")
     assert ended(words).returncode == 0
@@ -99,7 +99,7 @@ def test_an_interrupted_run_has_a_checkpoint_and_no_outcome(tmp_path: Path) -> N
 
 
 def test_a_rank_that_raises_ends_the_job(tmp_path: Path) -> None:
-    """The log of the rank has its number and the traceback; the other ranks do not wait for it."""
+    """The log of the failing rank has its number and the traceback; the other ranks do not wait for this rank."""
     folder, program = tmp_path / "run", Path(__file__).with_name("broken.py")
     done = ended(command(3, "1", "free_spin", "--out", str(folder), *LONG, module=[str(program)]))
     assert done.returncode not in (0, 2, 3, 4)
@@ -246,8 +246,9 @@ def test_wall_time_and_steps_run_out(tmp_path: Path) -> None:
 
 
 def test_as_many_ranks_as_tets_and_not_more(tmp_path: Path) -> None:
-    """With five tets the answer is the same on one and on five ranks; six ranks are refused, because one would have
-    no tet."""
+    """With five tets the answer is equal on one and on five ranks; six ranks are refused, because one rank would have
+    no tet.
+    """
     few = ("--set", "parts[0].mesh.element_size=10 mm", "--set", "parts[0].mesh.split=5", "--set", "run.end_time=20 us")
     digests = []
     for ranks in (1, 5, 6):

@@ -1,4 +1,4 @@
-"""Fracture on any number of ranks: equal digests, histories and counts, to the bit."""
+"""Fracture on any number of ranks: equal digests, histories and counts, to the last bit."""
 
 from collections import defaultdict
 from collections.abc import Callable
@@ -60,7 +60,7 @@ def test_the_same_facets_break_on_any_number_of_ranks(name: str, ranks: int, bre
 
 
 def frame_fields(folder: Path) -> dict[str, bytes]:
-    """Return the fields of the tets and nodes in the last frame, except the rank."""
+    """Returns the fields of the tets and nodes in the last frame, except the field ``rank``."""
     with h5py.File(sorted((folder / layout.FRAMES).glob("*.vtkhdf"))[-1]) as file:
         groups = [file["VTKHDF"][group] for group in ("CellData", "PointData")]
         return {name: each[...].tobytes() for data in groups for name, each in data.items() if name != "rank"}
@@ -80,8 +80,9 @@ def test_the_scenes_break_thoroughly(name: str, breaking: Answers) -> None:
 
 
 def shared(sim: Simulation) -> dict[str, Any]:
-    """Returns the tables of the scene of a rank as ids in their order: the nodes that it has, may push and has as
-    copies, and, for each other rank, the nodes that it sums with, sends to and receives from this rank.
+    """Returns the tables of the contact scene of a rank as ids in their order. The tables are the nodes that the rank
+    has, may push and has as copies, and, for each other rank, the nodes that the two ranks sum, and that this rank
+    sends and receives.
     """
     assert sim.contact is not None
     now, nodes = sim.contact.searches.scene, sim.model.nodes
@@ -97,8 +98,9 @@ def shared(sim: Simulation) -> dict[str, Any]:
 
 
 def test_all_ranks_have_the_sharers_of_separating_nodes() -> None:
-    """After every split the lists of two ranks are the same, in the same order, with each node once. If any rank may
-    push a node, all ranks that push or have the node take part in its sum. A rank receives each ghost node once.
+    """After every split the lists of two ranks are equal, in the same order, with each node once. If any rank may push
+    a node, all ranks that push or have the node take part in the sum over the node. A rank receives each ghost node
+    once.
     """
     case, ranks = parse_case(read_data(CASE)), 3
 

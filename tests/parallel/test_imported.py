@@ -1,4 +1,4 @@
-"""A case made from a deck and the same case written directly have equal results, to the bit."""
+"""A case made from a deck and an equal case written directly have equal results, to the last bit."""
 
 import sys
 from pathlib import Path

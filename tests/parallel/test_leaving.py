@@ -9,6 +9,8 @@ from .launching import command, ended
 
 @pytest.mark.parametrize("code", [0, 4])
 def test_many_ranks_end_with_their_own_code(code: int) -> None:
-    """Without the deregistration (``os._exit``) Hydra kills the other ranks: exit code 9 in most of these runs."""
+    """Without the deregistration (``os._exit``) Hydra kills the other ranks: most runs of the test then have exit code
+    9.
+    """
     done = ended(command(7, str(code), module=[str(Path(__file__).with_name("leaving.py"))]))
     assert (done.returncode, done.stderr) == (code, ""), done.stdout

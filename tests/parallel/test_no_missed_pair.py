@@ -1,7 +1,7 @@
-"""No missed pair: for any number of ranks the run finds every active contact of the whole surface once. The ranks
-are threads. The active contacts of a step are recorded, each with its nodes and, to the bit, its weights, its normal
-and its target before restitution. On one rank the same kernels get all pairs of nodes and faces, and of edges,
-instead of the candidate pairs.
+"""No missed pair: for any number of ranks the run finds every active contact of the whole surface once. The ranks of
+this test are threads. The active contacts of a step are recorded: each contact with its nodes and, to the last bit, its
+weights, its normal and its target velocity before restitution. On one rank the same kernels get all pairs of nodes and
+faces, and of edges, instead of the candidate pairs.
 """
 
 from collections import Counter
@@ -43,11 +43,12 @@ CLOSER = {
     "hertz_spheres": ("parts[0].velocity[2]=100", "parts[1].velocity[2]=-100"),
     "colliding": ("parts[0].velocity[2]=800", "parts[2].velocity[2]=-800"),
 }
-"""Speeds at which bodies, or large parts of their surfaces, touch within this number of steps."""
+"""Speeds at which bodies, or large parts of their surfaces, touch within the number of steps of the run."""
 OURS = ("colliding", "eroding")
 """Scenes of this folder."""
 QUICK = ("eroding", "crossed_bars", "sliding_block")
-"""Cases for the fast tests: surface exposed by erosion, edges, and steps without energy to give back."""
+"""Cases for the fast tests: surface exposed by erosion, edges, and steps in which contact has no energy to give
+back."""
 _MOST = 1_000_000
 """Largest number of pairs in one call of a kernel."""
 
@@ -61,11 +62,11 @@ def case_of(name: str, *changes: str) -> Case:
 
 CASES = {name: case_of(name) for name in sorted(shipped())}
 NAMES = [*OURS, *(name for name, case in CASES.items() if case.in_contact and not case.fractures)]
-"""Scenes without separation: the test makes the whole surface again, without the cracks of the search."""
+"""Scenes without separation: the test makes the whole surface again, without the cracks of the broad phase."""
 
 
 def written(met: ContactRows, ids: "np.ndarray") -> Met:
-    """Return the active contacts, by the global ids of their nodes."""
+    """Returns the active contacts, by the global ids of their nodes."""
     columns = ids[met.nodes], met.weights, met.normals, met.wanted[:, None]
     return Counter(tuple(np.ascontiguousarray(row).tobytes() for row in rows) for rows in zip(*columns, strict=True))
 
@@ -85,7 +86,7 @@ class Found:
         )
 
     def run(self) -> dict[int, Met]:
-        """Make some steps and record the active contacts that this rank computed; boundaries and forces act as
+        """Makes some steps and records the active contacts that this rank computed; boundaries and forces act as
         usual.
         """
         step.prepare(self.sim)
@@ -97,7 +98,7 @@ class Found:
 
 
 class Brute(Found):
-    """A rank that also records the active contacts of all pairs of the surface in some steps."""
+    """A rank that also records, in some steps, the active contacts among all pairs of the surface."""
 
     def __init__(self, sim: Simulation) -> None:
         super().__init__(sim)
@@ -113,7 +114,9 @@ class Brute(Found):
         super().meet(now, give, dt)
 
     def _sides(self) -> NearSurface:
-        """Return the whole present surface: with the faces exposed since the last search, without removed faces."""
+        """Returns the whole present surface: with the faces exposed since the last broad phase, without deleted
+        faces.
+        """
         exterior = self.contact.exterior
         found = exterior._build(exterior.surface.flags, exterior.surface.turned)
         return SurfaceMotion(found, self.sim.model.nodes, exterior.motion.mobility, exterior.size, self.sim.comm).sides
@@ -159,8 +162,9 @@ class Brute(Found):
         return met
 
     def _pairs(self, sides: NearSurface, small: Indices, large: Indices) -> Iterator[Indices]:
-        """Return (p, 2) all pairs of small and large things whose parts may be in contact and that have no common
-        corner."""
+        """Returns (p, 2) all pairs of a node and a face, or of two edges, whose parts may be in contact and that have
+        no common corner.
+        """
         part, allowed = sides.surface_nodes.part, ~np.isnan(self.contact.searches.mu)
         for begin in range(0, len(small), max(_MOST // max(len(large), 1), 1)):
             some = small[begin : begin + max(_MOST // max(len(large), 1), 1)]
@@ -172,14 +176,14 @@ class Brute(Found):
 
 
 def brute(case: Case) -> Brute:
-    """Return one rank after its steps."""
+    """Returns a rank of the run after its steps."""
     ran = Brute(simulation.build(case, Path(), SerialComm()))
     ran.run()
     return ran
 
 
 def found(case: Case, ranks: int) -> dict[int, Met]:
-    """Return the active contacts of all ranks together at each step."""
+    """Returns the active contacts of all ranks together at each step."""
 
     def one(comm: Comm) -> dict[int, Met]:
         return Found(simulation.build(case, Path(), comm)).run()
@@ -195,7 +199,7 @@ def found(case: Case, ranks: int) -> dict[int, Met]:
     "name", [name if name in QUICK else pytest.param(name, marks=pytest.mark.slow) for name in NAMES]
 )
 def test_every_pair_that_meets_is_found_once_on_any_number_of_ranks(name: str) -> None:
-    """The contacts that one rank finds in the steps between two searches are compared too."""
+    """The contacts that one rank finds in the steps between two broad phases are also compared."""
     case = case_of(name)
     whole = brute(case)
     assert sum(map(bool, whole.all.values())) > len(whole.all) // 3
@@ -208,14 +212,14 @@ def test_every_pair_that_meets_is_found_once_on_any_number_of_ranks(name: str) -
 
 
 def missed(case: Case) -> int:
-    """Return active contacts of all pairs that one rank has not found."""
+    """Returns the active contacts among all pairs that one rank has not found."""
     whole = brute(case)
     return sum((met - whole.at[number]).total() for number, met in whole.all.items())
 
 
 def test_a_search_without_foresight_is_found_out() -> None:
-    """Control: the check can fail. The candidates are pairs that are near at present, without the predicted motion,
-    and the skin is too small for the motion until the next search.
+    """Control: the check can fail. The candidates in the control are pairs that are near at present, without the
+    predicted motion, and the skin is too small for the motion until the next broad phase.
     """
     case, find = case_of("fast_fragment", "contact.skin=0.1"), search.find
 

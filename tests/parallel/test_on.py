@@ -56,7 +56,7 @@ field = "momentum_x"
 LAST
 """
 MANY = next(seed for seed in range(100) if len({kind for kind, _ in mixture(seed).elements.values()}) == 3)
-"""A mixture that has all three kinds of elements."""
+"""A mesh that has hexahedra, wedges and pyramids."""
 SETS = {"CLAMP": 'on = "clamp"', "END": 'on = "END"', "TIP": 'on = "TIP"', "LAST": 'on = "TIP"'}
 BOXES = {
     "CLAMP": 'low = [0, 0, 0]\nhigh = [0, "2 mm", "2 mm"]',
@@ -103,11 +103,11 @@ on = "END"
 stress = ["-200 MPa", 0, 0]
 course = [["0 us", 1], ["3 us", 1], ["3.1 us", -1]]
 """
-"""A bar that is pressed on a plane of symmetry, and pulled off later."""
+"""Case: a bar that is pressed on a plane of symmetry, and pulled off later."""
 
 
 def case(place: Path, name: str, words: dict[str, str], turning: bool) -> str:
-    """Returns a case file. A box cannot rotate nodes, so it is compared without the rotation."""
+    """Returns a case file. A box cannot rotate nodes, so that the case with boxes is compared without the rotation."""
     text = CASE if turning else CASE.replace('kind = "rotation"\nCLAMP\nspin', 'kind = "gravity"\n#')
     text = text.replace("#", 'acceleration = ["1 m/s^2", 0, 0]\n#')
     if turning:
@@ -151,7 +151,9 @@ def test_sets_hold_what_boxes_hold_on_any_number_of_ranks(tmp_path: Path) -> Non
 
 
 def assert_open(folder: Path, ligament: int, crack: int) -> None:
-    """The nodes of the set stay on the plane, the others of its nodes have left it; the frame contains the sets."""
+    """The nodes of the set stay on the plane of symmetry, other nodes on the plane have left it; the frame contains the
+    sets.
+    """
     with h5py.File(layout.frame(folder, 1)) as file:
         root = file["VTKHDF"]
         x, data = root["Points"][:, 0], root["PointData"]

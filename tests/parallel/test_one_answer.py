@@ -1,5 +1,6 @@
-"""One answer for any number of ranks: the digest and the history, to the bit. On one rank and on 2, 3, 4 and 7
-ranks: every shipped case for some fifty steps, and a scene with all features in each pressure form.
+"""One answer for any number of ranks: the digest and the history are equal, to the last bit. The numbers of ranks are
+1, 2, 3, 4 and 7; the cases are every shipped case for some fifty steps, and a scene with all features in each pressure
+form.
 """
 
 from collections.abc import Callable
@@ -16,7 +17,7 @@ from .launching import command, ended, together
 RANKS = (2, 3, 4, 7)
 QUICK = 3
 """Number of ranks on which the fast tests compare the scenes of this folder with one rank; other numbers are part of
-the drill."""
+the slow tests."""
 SHORT = {
     "bar_on_bar": "3 us",
     "bonded_tile": "1.8 us",
@@ -98,8 +99,9 @@ gamma0 = 1.96
 
 
 def everything() -> str:
-    """Eight bars with all strength laws and equations of state move, spin and hit a tilted wall; one mesh is
-    unstructured."""
+    """Case: eight bars with all strength laws and equations of state move, spin and hit a tilted wall; one mesh is
+    unstructured.
+    """
     text = """
 name = "everything"
 [run]
@@ -146,17 +148,19 @@ high = ["1 m", "1 m", "1 m"]
 
 EVERYTHING = [f"everything_{form}" for form in FORMS]
 COLLIDING = ["colliding_arbitrary", "colliding_box"]
-"""Four bodies collide, rotate and slide on each other, with each contact domain (colliding.toml)."""
+"""Case: four bodies collide, rotate and slide on each other, with each contact domain (colliding.toml)."""
 ERODING = ["eroding_arbitrary", "eroding_box"]
-"""A rod perforates two plates and hundreds of tets erode, with each contact domain (eroding.toml)."""
+"""Case: a rod perforates two plates and hundreds of tets erode, with each contact domain (eroding.toml)."""
 SHEDDING = "shedding"
-"""A slab under pressure breaks until no part carries the pressure any more (shedding.toml)."""
+"""Case: a slab under pressure breaks until no part carries the pressure any more (shedding.toml)."""
 SCENES = [*EVERYTHING, *COLLIDING, *ERODING, SHEDDING]
 NAMES = sorted([*SHORT, *SCENES])
 
 
 def arguments(name: str, folder: Path) -> list[str]:
-    """Returns the arguments of the worker for a run by its name; ``everything.toml`` is beside the folder."""
+    """Returns the arguments of the worker for a run, by the name of the run; ``everything.toml`` is beside the
+    folder.
+    """
     words = ["run.frames=0", "run.samples=10", f"run.end_time={SHORT.get(name, '')}", "reference=[]"]
     case = name
     if name in EVERYTHING:
@@ -173,8 +177,9 @@ Answers = Callable[[int, str], Path]
 
 @pytest.fixture(scope="module")
 def answers(tmp_path_factory: pytest.TempPathFactory) -> Answers:
-    """Returns the folder of a run by the number of ranks and the name; the run is made at the first call, together
-    with all runs on this number of ranks."""
+    """Returns the folder of a run by the number of ranks and the name; the run is made at the first call, together with
+    all runs on the same number of ranks.
+    """
     root = tmp_path_factory.mktemp("answers")
     (root / "everything.toml").write_text(everything(), encoding="utf-8")
 
@@ -193,11 +198,11 @@ def outcome(folder: Path) -> Outcome:
 
 
 TETS = {"two_tets": 2, "breathing_facet": 2}
-"""Numbers of tets of the cases with fewer tets than the largest number of ranks."""
+"""Numbers of tets of the cases that have fewer tets than the largest number of ranks."""
 
 
 def slowly(name: str, ranks: int = 1) -> list[pytest.MarkDecorator]:
-    """Returns the marks of a comparison."""
+    """Returns the pytest marks of a comparison."""
     return [] if name in SCENES and ranks in (1, QUICK) else [pytest.mark.slow]
 
 
@@ -224,7 +229,7 @@ def test_the_answer_is_the_same_on_any_number_of_ranks(name: str, ranks: int, an
 
 @pytest.mark.parametrize("name", [pytest.param(name, marks=slowly(name)) for name in NAMES])
 def test_the_runs_are_worth_comparing(name: str, answers: Answers) -> None:
-    """Each run has dozens of steps, and energy in several lines of the balance."""
+    """Each compared run has dozens of steps, and energy in several terms of the energy ledger."""
     end = outcome(answers(1, name))
     assert (end.steps or 0) >= 40
     assert len(end.digest) == 64
@@ -246,14 +251,14 @@ def test_the_runs_are_worth_comparing(name: str, answers: Answers) -> None:
 
 @pytest.mark.slow
 def test_other_runs_have_other_digests(answers: Answers) -> None:
-    """The ghosts of a rank have no effect on the digest."""
+    """The ghost nodes and faces of a rank have no effect on the digest."""
     digests = {name: outcome(answers(1, name)).digest for name in NAMES}
     assert len(set(digests.values())) == len(NAMES) - 2
     assert len({digests[name] for name in COLLIDING}) == len({digests[name] for name in ERODING}) == 1
 
 
 def test_the_answer_is_the_same_again(answers: Answers, tmp_path: Path) -> None:
-    """The same run is made twice, by the plain command line."""
+    """The same run is made twice by the command line of the worker."""
     (tmp_path / "everything.toml").write_text(everything(), encoding="utf-8")
     assert ended(command(QUICK, *arguments(EVERYTHING[0], tmp_path / "again"))).returncode == 0
     assert outcome(tmp_path / "again" / EVERYTHING[0]).digest == outcome(answers(QUICK, EVERYTHING[0])).digest

@@ -24,7 +24,9 @@ def count(table, first, stop, thread):  # type: ignore[no-untyped-def]
 
 @njit(TASK, cache=False)
 def extend(table, first, stop, thread):  # type: ignore[no-untyped-def]
-    """Makes the range 13 longer; repeats the counting until the range is 130 long, then ends the program."""
+    """Kernel that makes the range 13 longer; it repeats the counting until the range is 130 long, then ends the
+    program.
+    """
     _, lengths, control = _words(table)
     lengths[1] += 13
     control[0] = 0 if lengths[1] <= 130 else END
@@ -32,7 +34,7 @@ def extend(table, first, stop, thread):  # type: ignore[no-untyped-def]
 
 @njit(TASK, cache=False)
 def never(table, first, stop, thread):  # type: ignore[no-untyped-def]
-    """Spoils the counts."""
+    """Kernel that overwrites the counts."""
     done, _, _ = _words(table)
     done[0] = -1000
 

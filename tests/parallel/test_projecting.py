@@ -1,4 +1,4 @@
-"""Estimate of the time of a team: the greedy list schedule in plain Python, and the timed tasks of regions."""
+"""Estimate of the time of a team: the greedy list schedule in plain Python, and the timed tasks of parallel regions."""
 
 import numpy as np
 import pytest
@@ -12,7 +12,7 @@ from .counted import KINDS, count
 
 
 def schedule(took: list[int], threads: int, begins: list[int]) -> int:
-    """Return the end of the last task; each task goes to the thread that is free first."""
+    """Returns the end of the last task; each task goes to the thread that is free first."""
     free, last = begins[:threads], 0
     for each in took:
         first = free.index(min(free))
@@ -28,7 +28,7 @@ def test_tasks_go_to_the_thread_that_is_free_first(asleep: bool) -> None:
     projecting._ready(asleep, np.array([3, 11, 20]), crews, free)
     for each in took:
         projecting._give(each, crews, free)
-    woken = [11, *[20] * 2, *[40] * 4, *[60] * 8, 80]  # each thread wakes two more
+    woken = [11, *[20] * 2, *[40] * 4, *[60] * 8, 80]  # each thread wakes two more threads
     begins = woken if asleep else [0] * 16
     assert [int(free[c, n]) for c, n in enumerate(crews)] == [schedule(took, int(n), begins) for n in crews]
 

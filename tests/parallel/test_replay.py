@@ -1,4 +1,4 @@
-"""A recorded run: the records of its groups, and its replay."""
+"""A recorded run: the records of its groups of tets, and its replay."""
 
 import json
 import subprocess
@@ -19,7 +19,9 @@ CASE = Path(__file__).with_name("breaking.toml")
 
 @pytest.fixture(scope="module")
 def run(tmp_path_factory: pytest.TempPathFactory) -> Callable[[int], Path]:
-    """Returns the folder of a run of some dozens of steps by the number of ranks, with a new cut every 8 steps."""
+    """Returns the folder of a run of some dozens of steps by the number of ranks, with a new decomposition every 8
+    steps.
+    """
     root = tmp_path_factory.mktemp("recorded")
 
     @cache

@@ -1,5 +1,6 @@
 """Counts of the messages of ranks, compared with communications of known size; the counts are equal under MPI and in
-threads."""
+threads.
+"""
 
 import json
 import pickle
@@ -26,8 +27,8 @@ KNOWN = {
     "begin_maximum": (0, 0, 1, 72),
     "begin_sum": (0, 0, 1, 72),
 }
-"""Messages, bytes, collectives and bytes given to collectives of each operation. A rank sends nothing to itself, and
-only ``trade`` sends an empty message."""
+"""Messages, bytes, collective calls, and bytes given to collective calls of each operation. No rank sends a message to
+itself, and only ``trade`` sends an empty message."""
 OBJECTS = {"share": (0, 0, 2, len(pickle.dumps(bytes(1000), pickle.HIGHEST_PROTOCOL))), "barrier": (0, 0, 1, 0)}
 
 
@@ -53,9 +54,9 @@ def test_one_rank_sends_nothing() -> None:
 
 @pytest.mark.parametrize(("form", "words"), [("standard", 3), ("nodal", 5), ("split", 8)])
 def test_a_shared_node_costs_these_words_a_step(form: str, words: int) -> None:
-    """The two ranks with a node send the forces (3 words), in the nodal form also the volumes (2), and in the split
-    form also the gradients (3). Forces that overflow their quantum are sent again, so the smallest count of some
-    steps is used.
+    """The two ranks with a common node send the forces (3 words), in the nodal form also the volumes (2), and in the
+    split form also the gradients (3). Forces that overflow their quantum are sent again, so that the smallest count of
+    some steps is used.
     """
     data = apply_overrides(read_data(shipped()["elastic_bar_wall"]), [f"numerics.pressure={form}", "run.frames=0"])
     case = parse_case(data)

@@ -1,5 +1,5 @@
-"""Snapshots of a run agree with its tables on any number of ranks; the snapshots in the journal of a killed run are
-complete.
+"""Snapshots of a run agree with the tables of the run on any number of ranks; the snapshots in the journal of a killed
+run are complete.
 """
 
 import csv
@@ -27,14 +27,14 @@ STOPPING = Path(__file__).with_name("stopping.py")
 
 
 def snapshots_of(folder: Path) -> list[Snapshot]:
-    """Returns the snapshots of the journal; an incomplete line after a kill is ignored."""
+    """Returns the snapshot messages of the journal; an incomplete line after a kill is ignored."""
     lines = (folder / layout.JOURNAL).read_bytes().splitlines(keepends=True)
     found = [from_json(line) for line in lines if line.endswith(b"\n")]
     return [message for message in found if isinstance(message, Snapshot)]
 
 
 def whole(folder: Path, message: Snapshot) -> bytes:
-    """Return the bytes of a snapshot, which agree with the journal."""
+    """Returns the bytes of a snapshot, which agree with the journal."""
     data = (folder / message.path).read_bytes()
     assert (len(data), hashlib.sha256(data).hexdigest()) == (message.bytes, message.sha256)
     assert message.path == str(layout.snapshot(folder, message.n).relative_to(folder))
@@ -50,7 +50,7 @@ def arrays(data: bytes) -> dict[str, Any]:
 
 
 def spread(folder: Path, kind: type[Counts | Snapshot]) -> tuple[int, int, list[int]]:
-    """Return the number of fragments and their sizes in the last message of a kind."""
+    """Returns the number of fragments and the sizes of the fragments in the last message of a kind."""
     lines = (folder / layout.JOURNAL).read_bytes().splitlines()
     last = [message for message in map(from_json, lines) if isinstance(message, kind)][-1]
     return last.fragments, last.smallest, last.sizes
@@ -129,7 +129,9 @@ def test_births_are_those_of_the_genealogy(breaking: Callable[[int, str], Path])
 
 
 def test_a_fragment_keeps_its_number_from_frame_to_frame(breaking: Callable[[int, str], Path]) -> None:
-    """Most tets with a number in a frame have it in the next frame, and no number is used again."""
+    """Most tets with a fragment number in a frame have the same number in the next frame, and no number is used
+    again.
+    """
     frames, used, kept = sorted((breaking(2, FAST) / layout.FRAMES).glob("*.vtkhdf")), set[int](), 0
     before: dict[int, int] = {}
     for path in frames:

@@ -1,4 +1,4 @@
-"""A stable step that falls by orders of magnitude gives a warning with the tet and the remedy, on any number of
+"""A stable time step that falls by orders of magnitude gives a warning with the tet and the remedy, on any number of
 ranks.
 """
 
@@ -44,7 +44,7 @@ z = 0
 end_time = END
 frames = 0
 """
-"""All nodes have a prescribed motion: the body is flat at 1 ms."""
+"""All nodes have a prescribed motion: the body is flat at t = 1 ms."""
 
 
 def outcome(tmp_path: Path, end: str, ranks: int, *words: str) -> Outcome:
@@ -55,7 +55,7 @@ def outcome(tmp_path: Path, end: str, ranks: int, *words: str) -> Outcome:
 
 
 def warned(end: Outcome) -> list[str]:
-    """Returns the warnings of a run; the numbers of the case have no units."""
+    """Returns the warnings of a run; the numbers in the case have no units."""
     return [text for text in end.warnings if "no unit, taken for" not in text]
 
 
@@ -77,7 +77,7 @@ def test_flat_is(tmp_path: Path, ranks: int) -> None:
 
 @pytest.mark.parametrize("ranks", [pytest.param(1, marks=pytest.mark.slow), 2])
 def test_a_run_out_of_steps_reports_its_step_sizes(tmp_path: Path, ranks: int) -> None:
-    """At the end of the run a fifth of the height of the body is left."""
+    """At the end of the run the body has a fifth of its initial height."""
     end = outcome(tmp_path, "1.1 ms", ranks, "--set", "run.max_steps=300")
     assert (end.state, end.cause, end.steps, warned(end)) == ("timed_out", "steps", 300, [])
     assert end.message.startswith("run.max_steps is used up before run.end_time, at 0.0008")

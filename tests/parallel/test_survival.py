@@ -1,4 +1,6 @@
-"""A run gives the same bits after new cuts, after stops and restarts on other numbers of ranks, and after kills."""
+"""A run gives equal results to the last bit after new decompositions, after stops and restarts on other numbers of
+ranks, and after kills.
+"""
 
 import contextlib
 import itertools
@@ -24,7 +26,7 @@ STEPS = 54
 """Number of steps of the scene with fracture."""
 ERODING = Path(__file__).with_name("eroding.toml")
 SEED = int(os.environ.get("CONOID_FUZZ", time.strftime("%Y%m%d")))
-"""Seed of the sample of the day; it is part of the names of the tests and can be set again."""
+"""Seed of the random sample of the day; the seed is part of the names of the tests and can be set again."""
 Made = Callable[[str], Path]
 
 
@@ -59,7 +61,7 @@ def journal(folder: Path) -> list[object]:
 
 
 def must_be_one(whole: Path, other: Path) -> None:
-    """Checks that the answer is the same, and that no piece of the output is repeated or missing."""
+    """Checks that the answer is equal, and that no piece of the output is repeated or missing."""
     one, two = outcome(whole), outcome(other)
     assert two.state == "succeeded"
     assert two.digest == one.digest
@@ -80,11 +82,11 @@ def must_be_one(whole: Path, other: Path) -> None:
 
 
 Leg = tuple[int, int, int]
-"""Numbers of ranks and of threads, and the step before which the run stops."""
+"""Numbers of ranks and of threads of each part of a run, and the step before which the part stops."""
 
 
 def go(words: Sequence[str], legs: Sequence[Leg]) -> None:
-    """Runs a case in several parts; the last part must reach the end."""
+    """Runs a case in several parts; the last part must reach the end of the case."""
     for k, (ranks, threads, last) in enumerate(legs):
         more = ["--threads", str(threads), "--use", "all", *(["--restart"] if k else [])]
         launched = ended(command(ranks, str(last), *words, *more, module=[str(STOPPING)]))
@@ -116,7 +118,7 @@ def test_moving_tets_every_five_steps_changes_no_bit(whole: Made, moving: Path) 
 
 
 def must_have_moved(whole: Path, other: Path) -> None:
-    """Checks that the answer is the same, and that tets were moved between ranks."""
+    """Checks that the answer is equal, and that tets were moved between ranks."""
     must_be_one(whole, other)
     moved = [message for message in journal(other) if isinstance(message, Balance)]
     assert len(moved) == (outcome(other).rebalances or 0) > 0
@@ -155,8 +157,9 @@ def test_a_run_goes_on_on_other_ranks(name: str, legs: list[Leg], whole: Made, t
 
 @pytest.mark.parametrize("kills", [2, pytest.param(50, marks=[pytest.mark.slow, pytest.mark.timeout(1200)])])
 def test_a_run_survives_being_killed(kills: int, whole: Made, tmp_path: Path) -> None:
-    """The run writes a checkpoint in every step and is killed at random moments, also while it writes a checkpoint;
-    on one rank or on several."""
+    """The run writes a checkpoint in every step and is killed at random times, also while it writes a checkpoint; on
+    one rank or on several ranks.
+    """
     draw, killed, runs = random.Random(SEED), 0, itertools.count()
     while killed < kills:
         root = tmp_path / str(next(runs))
@@ -167,7 +170,7 @@ def test_a_run_survives_being_killed(kills: int, whole: Made, tmp_path: Path) ->
 
 
 def killed_and_ended(draw: random.Random, words: list[str], folder: Path, most: int) -> int:
-    """Return how often a run was killed, at most, before it ended."""
+    """Returns how often a run was killed, at most, before it ended."""
     killed = 0
     while not (folder / layout.OUTCOME).exists() or outcome(folder).state != "succeeded":
         again = ["--restart"] if list((folder / layout.CHECKPOINTS).glob("*[0-9]")) else []
@@ -197,7 +200,7 @@ def test_a_checkpoint_is_asked_for_by_a_file(whole: Made, breaking: Callable[[in
 
 
 def refused(words: Sequence[str]) -> str:
-    """Return the message of a worker that refuses to resume."""
+    """Returns the message of a worker that refuses to resume a run."""
     launched = ended(command(1, *words, "--restart"))
     assert launched.returncode == 2
     return launched.stderr.strip()
@@ -223,7 +226,7 @@ def test_a_run_that_cannot_be_resumed_has_a_reason(tmp_path: Path) -> None:
 
 
 def test_a_run_that_has_succeeded_stays_as_it_is(tmp_path: Path) -> None:
-    """Otherwise an attempt to resume the run would replace its outcome by a failure."""
+    """Without the refusal, an attempt to resume the run would replace its outcome by a failure."""
     words = ["two_tets", "--out", str(tmp_path / "run"), "--set", "run.end_time=1 us", "--set", "run.frames=0"]
     assert ended(command(1, *words)).returncode == 0
     before = {path: path.read_bytes() for path in (tmp_path / "run").iterdir() if path.is_file()}

@@ -31,7 +31,7 @@ def arguments_read(table):  # type: ignore[no-untyped-def]
 
 @njit(TASK, cache=False)
 def count(table, first, end, thread):  # type: ignore[no-untyped-def]
-    """Count each number of the range, and record the thread that has done it."""
+    """Counts each number of the range, and records the thread that has done the range."""
     done, who = _counts(table)
     for k in range(first, end):
         done[k] += 1
@@ -51,7 +51,7 @@ def test_a_kernel_gets_what_the_table_was_given_last() -> None:
 
 @njit("Tuple((int64, float64, int64))(int64)", cache=False)
 def read_both(handle):  # type: ignore[no-untyped-def]
-    """Values of the two tables of a handle."""
+    """Values of the two argument tables of a handle."""
     (numbers,), ((values, flag, others), factor, shift) = _first(handle), _second(handle)
     return numbers[0] + others[-1] + shift, values[1, 2] * factor, 1 if flag else 0
 
@@ -94,7 +94,7 @@ def test_every_task_is_done_once_in_each_of_many_passes(threads: int) -> None:
 
 @njit(TASK, cache=False)
 def gather(table, first, end, thread):  # type: ignore[no-untyped-def]
-    """Adds to each number of its range the count of the next number."""
+    """Adds to each number of the range the count of the next number."""
     done, who = _counts(table)
     for k in range(first, end):
         who[k] += done[(k + 1) % len(done)]
@@ -113,7 +113,7 @@ def test_the_stages_of_a_program_come_one_after_the_other_in_every_round(threads
     for _ in range(20):
         team(threads).repeat(stages, 10)
     assert (done == 200).all()
-    assert (seen == 200 * 201 // 2).all()  # each has the counts of the first stage only
+    assert (seen == 200 * 201 // 2).all()  # each number has the counts of the first stage only
 
 
 def test_helpers_take_part_and_are_there_once() -> None:
