@@ -3,6 +3,9 @@
 import { exact, onAxis, percent, scaleOf, si } from "./figures.js";
 
 export const FONT = 12;
+const MOST_LINES = 3; // Largest number of lines of a legend.
+const LINE = 18; // Height of a line of a legend, px.
+const MARGIN = 7; // Space between the symbol of a legend and its text, px.
 const DASHES = ["solid", [7, 4], [2, 3]];
 const HUES = 6; // Colours of the style sheet, --line-0 and so on, safe for colour blindness (Okabe and Ito 2008).
 export const colour = (name) => getComputedStyle(document.documentElement).getPropertyValue(`--${name}`).trim() || name;
@@ -16,13 +19,34 @@ export function whole(alone, option) {
   return { ...all, ...option, tooltip: { ...all.tooltip, ...option.tooltip } };
 }
 
+// An option whose legend has as many lines as it needs, up to MOST_LINES; a longer one has pages.
+export function wrapped(option, width) {
+  const { legend, grid, series } = option;
+  const names = legend.data ?? series.map(({ name }) => name).filter(Boolean);
+  const lines = legend.show === false || !width ? 1 : linesOf(names, width, legend);
+  if (lines < 2 || lines > MOST_LINES || !(grid.top >= 0)) return option;
+  return { ...option, legend: { ...legend, type: "plain" }, grid: { ...grid, top: grid.top + LINE * (lines - 1) } };
+}
+
+function linesOf(names, width, { itemWidth, itemGap, left, right }) {
+  const ctx = (linesOf.ctx ??= document.createElement("canvas").getContext("2d"));
+  ctx.font = `${FONT}px system-ui, sans-serif`;
+  let [lines, x] = [1, 0];
+  for (const name of names) {
+    const wide = itemWidth + MARGIN + ctx.measureText(name).width;
+    if (x && x + wide > width - left - right) [lines, x] = [lines + 1, 0];
+    x += wide + itemGap;
+  }
+  return lines;
+}
+
 // Common options of all charts: colours of the theme, zoom with Ctrl and the wheel. A chart that is `alone` has a tooltip
 // for one item, the others a cursor, whose values cursorbox.js shows.
 export function common(alone) {
   return {
     animation: false,
     textStyle: { fontFamily: "system-ui, sans-serif", color: colour("ink") },
-    grid: { left: 64, right: 14, top: 46, bottom: 26 },
+    grid: { left: 64, right: 14, top: 50, bottom: 26 },
     legend: { top: 0, left: 0, right: 4, type: "scroll", itemWidth: 14, itemHeight: 8, itemGap: 8, textStyle: { color: colour("soft"), fontSize: FONT, lineHeight: 18 }, inactiveColor: colour("faint"),
       pageIconColor: colour("soft"), pageIconInactiveColor: colour("line"), pageTextStyle: { color: colour("soft"), fontSize: FONT } },
     tooltip: {

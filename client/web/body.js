@@ -8,7 +8,7 @@ import { Picked, table } from "./picked.js";
 import { SectionPlane, symmetry } from "./plane.js";
 import { range } from "./ranges.js";
 import { film, picture } from "./saving.js";
-import { colourings, fragment, rowOf } from "./snapshot.js";
+import { colourings, fragment, rowOf, telling } from "./snapshot.js";
 import { Snapshots } from "./snapshots.js";
 import { Tools } from "./tools.js";
 import { View3d } from "./view3d.js";
@@ -39,9 +39,10 @@ export class Body {
     this.scrub = h("input", { type: "range", min: 0, step: 1, max: 0, value: 0, "aria-label": "snapshot" });
     this.playing = h("button.quiet", { type: "button" }, "Play");
     this.note = h("span.note");
-    this.bar = h("div.scrub", {}, this.playing, this.scrub);
+    this.moment = h("output");
+    this.bar = h("div.scrub", {}, this.playing, this.scrub, this.moment);
     this.element = h("section.card.body3d", { "aria-label": "the body", hidden: "" },
-      h("div.card-head", {}, h("h2", {}, "The body"), this.note), this.tools.element, h("div.frame3d", {}, this.holder, h("div.aside3d", {}, this.tools.cutting, this.card.element)), this.bar);
+      h("div.card-head", {}, h("h2", {}, "The body"), this.note), this.tools.element, h("div.frame3d", {}, this.holder, h("div.aside3d", {}, this.tools.cutting)), this.bar);
     this.listen();
   }
 
@@ -89,6 +90,7 @@ export class Body {
   // Only the last requested snapshot is fetched when the slider moves faster than the network.
   async show(place) {
     this.scrub.value = place;
+    this.moment.textContent = si(this.entries[place].t, "s");
     this.wanted = place;
     if (this.fetching) return this.fetching;
     this.fetching = this.fetch();
@@ -132,7 +134,7 @@ export class Body {
 
   offer() {
     const { header, arrays } = this.snapshot;
-    this.tools.offer(colourings(this.snapshot));
+    this.tools.offer(colourings(this.snapshot), telling(this.snapshot));
     this.tools.offerParts(header.parts);
     this.tools.warnOfSize(header.tets);
     this.tools.edgeNote.textContent = header.surface_triangles > arrays.triangles.length / 3 ? `the surface is simplified: ${counted(header.surface_triangles, "face")} of the mesh` : "";

@@ -1,6 +1,6 @@
 // A chart of a run with ECharts: one cursor and one zoom for all charts of a page, pointer and keys, saved as CSV and SVG.
 
-import { colour, whole } from "./axes.js";
+import { colour, whole, wrapped } from "./axes.js";
 import { h } from "./figures.js";
 import { echarts } from "./libraries.js";
 import { readout } from "./cursorbox.js";
@@ -26,7 +26,7 @@ export class Chart {
     this.tools = h("span.save", { hidden: "" }, button(KINDS[0], () => this.saveTable()), button(KINDS[1], () => this.savePicture()));
     this.eye = new IntersectionObserver((entries) => this.look(entries.at(-1).isIntersecting), { rootMargin: NEAR });
     this.eye.observe(this.element);
-    this.watch = new ResizeObserver(() => this.chart?.resize());
+    this.watch = new ResizeObserver(() => this.resize());
     this.watch.observe(this.element);
     this.dark = matchMedia("(prefers-color-scheme: dark)");
     this.dark.addEventListener("change", this.redraw = () => this.draw());
@@ -45,7 +45,8 @@ export class Chart {
 
   async open(before) {
     try {
-      [this.kit] = await Promise.all([echarts(), before]);
+      await before;
+      this.kit = await echarts();
       this.draw();
     } catch (error) {
       this.element.replaceChildren(h("p.hint", {}, `No charts: ${error.message}`));
@@ -62,6 +63,11 @@ export class Chart {
   draw(needed = false) {
     if (this.seen) this.paint();
     else if ((needed || !this.chart) && !this.waiting) this.waiting = whenIdle(() => this.late());
+  }
+
+  resize() {
+    this.chart?.resize();
+    if (this.chart && this.wide !== this.element.clientWidth) this.draw(); // The legend may need another number of lines.
   }
 
   late() {
@@ -85,7 +91,8 @@ export class Chart {
     if (gone) this.chart.dispatchAction({ type: "hideTip", escapeConnect: true }); // ECharts fails when its cursor has the number of a removed series.
     this.places = Object.assign(places, { panels });
     const how = moved ? { notMerge: true } : { replaceMerge: ["series"] }; // ECharts fails when a line moves to another panel.
-    this.chart.setOption(whole(this.alone, option), { ...how, lazyUpdate: false });
+    this.chart.setOption(wrapped(whole(this.alone, option), this.element.clientWidth), { ...how, lazyUpdate: false });
+    this.wide = this.element.clientWidth;
     this.series = option.series;
     this.reads = !this.alone && !option.tooltip?.formatter;
     if (readout.of === this) this.read(this.cursor);

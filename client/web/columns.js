@@ -7,18 +7,18 @@ import { titles } from "./titles.js";
 
 const STATES = ["running", "stopping", "starting", "queued", "accepted", "succeeded", "cancelled", "timed_out", "failed", "lost"];
 const ID = 9; // Number of characters of a short id beside the name.
-const NOTE = 10; // Largest number of characters of the reason beside a state that the width allows for.
+const [NOTE, LONG] = [10, 60]; // Largest number of characters of the reason beside a state: in a full table, and with room to spare.
 
 export const share = (row) => (row.state === "succeeded" ? 1 : row.progress?.end_time > 0 ? row.progress.t / row.progress.end_time : 0);
 export const cores = ({ ranks, threads }) => (threads > 1 ? `${ranks}×${threads}` : String(ranks));
 export const took = (row) => (row.started && FINAL.has(row.state) ? row.finished - row.started : null);
 
 // { id, title, group, number, value(row), text(row) }: rows are sorted by `value`, which is null if missing;
-// Columns with a smaller `rank` stay in a narrow window; `letters(row)` is the width of a cell that is not its text.
+// Columns with a smaller `rank` stay in a narrow window; `letters(row)` is the width of a cell that is not its text, `most(row)` with room to spare.
 // `number` columns are right-aligned, and may have a `unit`, in which `write(value)` formats a number.
 const FIRST = [
   { id: "run", title: "run", value: (row) => row.name, text: (row) => row.name, letters: ({ name }) => name.length + ID },
-  { id: "state", title: "state", value: (row) => STATES.indexOf(row.state) - share(row), text: (row) => row.state, letters },
+  { id: "state", title: "state", value: (row) => STATES.indexOf(row.state) - share(row), text: (row) => row.state, letters: (row) => letters(row, NOTE), most: (row) => letters(row, LONG) },
 ];
 const LAST = [
   { id: "references", title: "references", value: (row) => (row.references ? row.missed.length : null), text: references },
@@ -47,9 +47,9 @@ export function detail(row) {
   return note.startsWith(row.state) ? "" : note;
 }
 
-// Number of characters that the state and its detail need; a bar of the progress takes as much as seven.
-function letters(row) {
-  const note = Math.min(NOTE, detail(row).length);
+// Number of characters that the state and `most` characters of its detail need; a bar of the progress takes as much as seven.
+function letters(row, most) {
+  const note = Math.min(most, detail(row).length);
   return 0.9 * row.state.length + 4 + 0.9 * (note && 2 + note) + (row.progress && !FINAL.has(row.state) ? 7 : 0);
 }
 

@@ -6,7 +6,7 @@ import { rough } from "./figures.js";
 import { TERMS } from "./live.js";
 
 export const VIEWS = { ledger: "all terms of the ledger", lost: "without the kinetic energy", internal: "internal energy by part", kinetic: "kinetic energy by part" };
-const SMALL = 0.005; // Share of the largest energy below which a term, too thin to be seen, is not in the legend.
+const SMALL = 0.01; // Share of the largest energy below which a term, too thin to be seen, is not in the legend.
 const FLOOR = 1e-10; // Residuals below this value are rounding errors.
 const RESIDUAL = 1e-2; // Limit of the residual.
 
@@ -42,10 +42,10 @@ function ofTerms(live, view) {
   if (view !== "ledger") return list;
   const [initial, external] = [course(live, "initial"), course(live, "external")];
   const came = initial.map(([t, value], i) => [t, value + (external[i]?.[1] ?? 0)]);
-  return [...list, series({ name: "initial + external", colour: "ink", unit: "J", dash: [5, 4], width: 1.4, data: came, z: 4 })];
+  return [...list, series({ name: "input", colour: "ink", unit: "J", dash: [5, 4], width: 1.4, data: came, z: 4 })];
 }
 
-const words = (name) => ({ stepping: "time stepping", averaging: "pressure averaging", viscous: "bulk viscosity" })[name] ?? name;
+const words = (name) => ({ stepping: "time stepping", averaging: "pressure averaging", viscous: "viscosity" })[name] ?? name;
 
 // One area for each part, in the colours of the parts in the 3-D view.
 export const ofParts = (live, view) => parts(live).map((part, i) =>

@@ -45,8 +45,8 @@ export class Grid {
     const stamp = JSON.stringify([columns.map(({ id, title, unit }) => [id, title, unit]), sort]);
     const boxes = this.all.filter(({ id }) => this.marked.has(id)).length;
     if (this.everything) Object.assign(this.everything, { checked: boxes > 0 && boxes === this.all.length, indeterminate: boxes > 0 && boxes < this.all.length });
-    if (stamp === this.stamp) return;
-    this.stamp = stamp;
+    if (stamp === this.headed) return;
+    this.headed = stamp;
     const focus = document.activeElement?.dataset?.column;
     this.everything = h("input", { type: "checkbox", "aria-label": "mark all runs that are shown", onchange: ({ target }) => this.on.markAll(this.all, target.checked) });
     this.head.replaceChildren(h("tr", { "aria-rowindex": 1 }, h("th.mark", { scope: "col" }, this.everything), columns.map((column) => this.title(column, sort))));
@@ -82,10 +82,13 @@ export class Grid {
 
   // Widths that stay constant while the rows scroll.
   measure(columns, stamp) {
-    if (stamp === this.stamp) return;
-    this.stamp = stamp;
+    const room = this.room();
+    if (`${stamp} ${room}` === this.measured) return;
+    this.measured = `${stamp} ${room}`;
     const some = sampled(this.all);
     const letters = columns.map((column) => width(column, some));
+    const spare = Math.max(0, room - letters.reduce((sum, n) => sum + n, 0));
+    columns.forEach(({ most }, n) => { if (most && spare < Infinity) letters[n] += Math.min(spare, Math.max(0, Math.max(...some.map(most)) + 2 - letters[n])); });
     this.widths.replaceChildren(h("col", { style: { width: `${BOX}px` } }), ...letters.map((n) => h("col", { style: { width: `${n}ch` } })));
     this.table.style.width = `max(100%, calc(${BOX}px + ${letters.reduce((sum, n) => sum + n, 0)}ch))`;
   }

@@ -14,7 +14,7 @@ export class Picked {
     this.list = h("dl.facts");
     this.course = h("div.course");
     const close = h("button.quiet.shut-picked", { type: "button", "aria-label": "close the fragment", onclick: onClose }, "×");
-    this.element = h("div.picked", { hidden: "" }, close, this.list, this.course);
+    this.element = h("section.card.picked", { hidden: "", "aria-label": "the selected fragment" }, close, this.list, this.course);
   }
 
   // A fragment (snapshot.js) at the time `t` of the snapshot that is shown, or null.
@@ -24,7 +24,8 @@ export class Picked {
     this.list.replaceChildren(...facts(found));
     if (this.id !== found.id) this.read(found.id);
     this.id = found.id;
-    return this.place(t);
+    this.t = t;
+    return this.place();
   }
 
   async read(id) {
@@ -35,12 +36,13 @@ export class Picked {
     if (this.id !== id || !data || data.t.length < 2) return;
     this.data = data;
     this.course.replaceChildren(...[["mass", data.mass, "kg"], ["speed", data.speed, "m/s"]].map(([name, values, unit]) => small(name, data.t, values, unit)));
+    this.place();
   }
 
-  // Draws a line at the present time.
-  place(t) {
+  // Draws a line at the time of the snapshot.
+  place() {
     if (!this.data) return;
-    const x = across(this.data.t)(t);
+    const x = across(this.data.t)(this.t);
     for (const line of this.course.querySelectorAll("line")) ["x1", "x2"].forEach((name) => line.setAttribute(name, x));
   }
 }
@@ -84,13 +86,13 @@ export function table({ arrays, header }, picked, onPick) {
   const rows = [...ids.keys()].filter((row) => ids[row] >= 0n).sort((a, b) => masses[b] - masses[a]).slice(0, HEAVIEST);
   const columns = [
     alike(rows.map((row) => masses[row]), "kg"), alike(rows.map((row) => Math.hypot(v[3 * row], v[3 * row + 1], v[3 * row + 2])), "m/s"),
-    alike(rows.map((row) => sizes[row]), "m"), rows.map((row) => born(births[row])),
+    alike(rows.map((row) => sizes[row]), "m"), rows.map((row) => (births[row] === 0 ? "start" : born(births[row]))),
   ];
   const body = rows.map((row, i) => h("tr", { "aria-selected": String(row === picked) },
     h("th", { scope: "row" }, h("button.tab", { type: "button", onclick: () => onPick(row) }, String(ids[row]))), columns.map((column) => h("td.number", {}, column[i]))));
   const more = header.fragments_total - rows.length;
   return [
-    h("table.checks.heaviest", {}, h("thead", {}, h("tr", {}, ["number", "mass", "speed", "size", "birth"].map((name) => h("th", { scope: "col" }, name)))), h("tbody", {}, body)),
+    h("table.checks.heaviest", {}, h("thead", {}, h("tr", {}, ["number", "mass", "speed", "size", "birth"].map((name, i) => h(i ? "th.number" : "th", { scope: "col" }, name)))), h("tbody", {}, body)),
     more > 0 ? h("p.hint", {}, `and ${count(more)} lighter ones`) : "",
   ];
 }

@@ -42,7 +42,7 @@ export function plots(live, onBalance, before) {
     probes: add("probes", "probes over time", "Probes", [chooser.element], () => (chooser.draw(), ofProbes(live, chooser.chosen)), { table: lines(() => chooser.chosen) }),
     forces: add("forces", "contact forces over time", "Contact forces", [], () => ofForces(live), { table: lines(() => columnsOf(live)) }),
     sizes: add("sizes", "number of fragments of a size and larger", "Fragment sizes", [], () => ofSizes(made.snapshot, live.spread), { unit: "m", table: async () => tableOf({ ...ofSizes(made.snapshot, live.spread), xName: "size [m]" }) }),
-    counts: add("counts", "nodes, broken facets and fragments over time", "Nodes, broken facets, fragments", [], () => ofCounts(live), { table: reports(ofCounts) }),
+    counts: add("counts", "nodes, broken facets and fragments over time", "Nodes and fragments", [], () => ofCounts(live), { table: reports(ofCounts) }),
     residual: add("residual", "energy residual over time", "Energy residual", [], () => ofResidual(live), { table: lines(() => ["residual"]) }),
     dt: add("dt", "time step over time", "Time step", [], () => ofStep(live), { table: reports(ofStep) }),
     imbalance: add("imbalance", "load imbalance over time", "Load imbalance", [], () => ofImbalance(live),

@@ -3,7 +3,7 @@
 import { call, download, messages, refused } from "./api.js";
 import { Body } from "./body.js";
 import { Cards } from "./cards.js";
-import { counted, fixed, h, percent, words } from "./figures.js";
+import { fixed, h, percent, words } from "./figures.js";
 import { Files } from "./files.js";
 import { Headline } from "./headline.js";
 import { fill, followColumns } from "./history.js";
@@ -41,7 +41,7 @@ export class RunPage {
     const { live } = this;
     this.head = new Headline(live.run, (verb) => this.ask(verb));
     this.numbers = new Numbers();
-    this.notes = { residual: h("span.note"), imbalance: h("span.note"), counts: h("span.note") };
+    this.notes = { residual: h("span.note"), imbalance: h("span.note") };
     this.logs = new Logs(live);
     this.warnings = new Warnings();
     this.files = new Files(live.run);
@@ -55,7 +55,7 @@ export class RunPage {
     this.fillCards();
     this.element = h("div.work", {}, this.head.element, this.situation.element,
       h("div.bench", {}, h("div.stage", {}, this.body.element, this.empty),
-        h("aside.now", { "aria-label": "now" }, this.numbers.element, this.warnings.element, this.cards.beside, this.files.element, this.logs.element)),
+        h("aside.now", { "aria-label": "now" }, this.body.card.element, this.numbers.element, this.warnings.element, this.cards.beside, this.files.element, this.logs.element)),
       this.cards.grid, this.cards.shelf);
     this.draw();
   }
@@ -126,7 +126,9 @@ export class RunPage {
   async readBody() {
     const { snapshots } = await call(`${this.path}/snapshots`, { signal: this.abort.signal }).catch(() => ({ snapshots: [] }));
     if (!snapshots.length) this.body.ready();
+    if (this.abort.signal.aborted) return;
     if (this.live.snapshots.length < snapshots.length) this.live.snapshots = snapshots;
+    this.body.update(this.live.snapshots); // Without waiting for a frame: the first frames of a new tab are late.
     this.later();
   }
 
@@ -248,10 +250,9 @@ export class RunPage {
   }
 
   drawNotes() {
-    const { progress, load, counts } = this.live;
+    const { progress, load } = this.live;
     if (progress) this.notes.residual.replaceChildren(residual(...ended(progress, this.outcome).residual));
     this.notes.imbalance.textContent = load ? fixed(load.imbalance) : "";
-    this.notes.counts.textContent = counts ? counted(counts.fragments, "fragment") : "";
   }
 
   drawHead() {

@@ -28,9 +28,9 @@ export class Answer {
 
   close() { this.chart.close(); }
 
-  // `info`: the sweep from the server.
-  draw(info) {
-    this.info = info;
+  // `info`: the sweep from the server; `titled(name)`: title of a key or of a result.
+  draw(info, titled) {
+    Object.assign(this, { info, titled });
     const { search } = info;
     this.element.hidden = false;
     const x = (values, between = " and ") => vector(values, search.unit, 4, between);
@@ -39,7 +39,7 @@ export class Answer {
     const { bracket, curve } = search;
     this.state.textContent = search.over ? "" : goesOn(info) ? "goes on" : `no report since ${moment(info.reported)}: the command that selects the points has ended or lost its connection; the same command continues the sweep`;
     this.found.textContent = bracket ? x([(bracket[0] + bracket[1]) / 2, (bracket[1] - bracket[0]) / 2], " ± ") : search.over ? "not found" : "not bracketed yet";
-    this.sought.textContent = `${search.key}${search.more.length ? ` and ${counted(search.more.length, "key")} with it` : ""}, where ${search.result} = ${y(search.threshold).replace(" ", "\u00a0")}`;
+    this.sought.textContent = `${titled(search.key)}${search.more.length ? ` and ${counted(search.more.length, "key")} with it` : ""}, where ${titled(search.result)} = ${y(search.threshold).replace(" ", "\u00a0")}`;
     const without = search.points.filter(({ problem }) => problem).length;
     const ends = (bracket ?? [search.low, search.high]).filter((end) => typeof results.get(end) === "number");
     const facts = [
@@ -50,6 +50,7 @@ export class Answer {
       ["constants", curve ? constants(curve) : ""],
       ["runs", `${search.points.length}${without ? `, ${without} without a result` : ""}`],
     ];
+    this.sought.title = `${search.key}, ${search.result}`;
     this.facts.replaceChildren(...facts.filter(([, text]) => text).map(([name, text]) => h("div", {}, h("dt", {}, name), h("dd", {}, text))));
     this.notes.replaceChildren(...remarks(search, x).map((text) => h("p.hint", {}, text)));
     this.chart.draw(true);
@@ -73,8 +74,8 @@ export class Answer {
     return {
       grid: { left: 72, right: 22, top: 58, bottom: 46 },
       legend: { ...common(true).legend, data: list.filter(({ name }) => name).map(({ name }) => name) },
-      xAxis: { ...across, name: named(search.key, across.name), nameLocation: "middle", nameGap: 28, nameTextStyle: { ...across.nameTextStyle, align: "center" } },
-      yAxis: { ...along, name: named(search.result, along.name), nameTextStyle: { ...along.nameTextStyle, align: "left" } },
+      xAxis: { ...across, name: named(this.titled(search.key), across.name), nameLocation: "middle", nameGap: 28, nameTextStyle: { ...across.nameTextStyle, align: "center" } },
+      yAxis: { ...along, name: named(this.titled(search.result), along.name), nameTextStyle: { ...along.nameTextStyle, align: "left" } },
       series: list, xName: `${search.key}${unit ? ` [${unit}]` : ""}`,
       tooltip: { trigger: "item", formatter: ({ value: [at, result, , problem], seriesName }) => `${exact(at, unit, 5)}\n${problem ?? (seriesName === "run goes on" ? seriesName : si(result, up, 4))}` },
     };
@@ -123,6 +124,6 @@ function drawn({ law, course }, unit) {
 
 // The limit of the curve with its standard error.
 function interval({ limit, error }, threshold) {
-  const bar = { ...series({ name: "", colour: "line-1", data: [[limit - error, threshold], [limit + error, threshold]], width: 5 }), silent: true, z: 6, lineStyle: { width: 6, opacity: 0.55, cap: "round" } };
-  return [...(error === null ? [] : [bar]), { type: "scatter", name: "limit of the curve", data: [[limit, threshold]], symbol: "diamond", symbolSize: 12, color: colour("line-1"), z: 7 }];
+  const bar = { ...series({ name: "", colour: "line-1", data: [[limit - error, threshold], [limit + error, threshold]], width: 2.5 }), silent: true, z: 6, showSymbol: true, symbol: "rect", symbolSize: [2.5, 13] };
+  return [...(error === null ? [] : [bar]), { type: "scatter", name: "limit of the curve", data: [[limit, threshold]], symbol: "diamond", symbolSize: 11, color: colour("line-1"), z: 7 }];
 }

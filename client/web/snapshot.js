@@ -39,6 +39,13 @@ export function corners({ positions, triangles, vertex_fragment: rows }) {
 // Colourings of the triangles: "fragment", "part", "rank" and the fields of this case.
 export const colourings = ({ header }) => ["fragment", "part", ...(header.ranks > 1 ? ["rank"] : []), ...Object.keys(header.fields)];
 
+// The colouring of a body before the user has chosen one: bodies that do not break have one colour each, and their plastic
+// strain shows more.
+export function telling({ header: { fields, fragments_total: number, parts } }) {
+  const breaks = "broken_faces" in fields || number > parts.length;
+  return !breaks && "plastic_strain" in fields ? "plastic_strain" : "fragment";
+}
+
 // One byte a corner: the rank and the part by number, a field between its low and its high.
 export function cornerValues({ arrays }, by) {
   const name = { rank: "triangle_rank", part: "triangle_part" }[by] ?? `field:${by}`;

@@ -119,7 +119,7 @@ export class SweepPage {
     this.columns = [point, ...this.keys, ...others.filter(({ shown }) => shown)];
     this.columns = this.grid.fitting(this.columns, (id) => id.startsWith("value:"), rows);
     this.drawHead();
-    if (this.info.search) this.answer.draw(this.info);
+    if (this.info.search) this.answer.draw(this.info, (name) => this.titled(name));
     this.drawFailed();
     this.drawGrid();
     this.choices();
@@ -137,6 +137,9 @@ export class SweepPage {
     this.stop.hidden = this.finished;
     this.fail("");
   }
+
+  // Title of a key or of a result, as in the table.
+  titled(name) { return [...this.keys, ...this.results].find(({ full }) => full === name)?.title ?? name; }
 
   drawFailed() {
     const failed = this.points.filter(({ row }) => FINAL.has(row.state) && row.state !== "succeeded");

@@ -10,8 +10,10 @@ const CUTS = ["none", "x", "y", "z", "as seen"];
 const STEPS = 400; // Steps of the slider of a section.
 const FILLED = 1_000_000; // Largest number of tets of a snapshot with a file of all tets (MOST_TETS of worker/snapshots/volume.py).
 const SIGNS = { "+": "+", "-": "−" };
-const KEYS = "x y z: look from there, with Shift from the other side · i: isometric · f: fit · a: fit all · e: edges · o: outlines · "
-  + "v: arrows · m: mirror · arrows: turn, with Shift move · + −: zoom · , .: snapshot · Space: play";
+const KEYS = {
+  "x y z": "look from there", "Shift x y z": "from the other side", i: "isometric", "f, a": "fit the bodies, fit all", "← → ↑ ↓": "turn", "Shift ← →": "move", "+ −": "zoom",
+  ", .": "previous, next snapshot", Space: "play", "o, e": "outlines, edges", v: "velocities as arrows", m: "mirror images",
+};
 
 export class Tools {
   // `act` has the actions: colour(), slice(), camera(name), follow(text), set(changes), opacities(), save(kind), fragments();
@@ -51,7 +53,7 @@ export class Tools {
     const buttons = VIEW_NAMES.map((name) => button(name.replace(/^[+-]/, (sign) => SIGNS[sign]), `look from ${name}`, () => this.act.camera(name)));
     this.frame = choice("what the frame follows", ["fit", "all", "free"], () => this.act.follow(this.frame.value));
     this.frames([]);
-    return h("div.lines", {}, h("div.buttons", {}, buttons), field("Frame", this.frame), h("p.hint", {}, KEYS));
+    return h("div.lines", {}, h("div.buttons", {}, buttons), field("Frame", this.frame), h("dl.keys", {}, Object.entries(KEYS).map(([keys, what]) => h("div", {}, h("dt", {}, keys), h("dd", {}, what)))));
   }
 
   // Parts that the camera can follow.
@@ -132,10 +134,11 @@ export class Tools {
     this.filming.textContent = "Film";
   }
 
-  // `list`: names of the fields to colour by.
-  offer(list) {
+  // `list`: names of the fields to colour by; `first`: the one before the user has chosen.
+  offer(list, first = "fragment") {
     if (list.join() === [...this.by.options].map(({ value }) => value).join()) return;
-    const before = this.by.value;
+    const before = this.offered ? this.by.value : first;
+    this.offered = true;
     this.by.replaceChildren(...list.map((name) => h("option", { value: name }, ["fragment", "part", "rank"].includes(name) ? name : scaleOf(name).label)));
     this.by.value = list.includes(before) ? before : "fragment";
   }

@@ -9,7 +9,7 @@ import { draw as drawOver } from "./overlay.js";
 import { ramp, scaleOf } from "./scales.js";
 import { css, ofFragment, ofName } from "./colours.js";
 import { Surface } from "./surface.js";
-import { Walls } from "./walls.js";
+import { WALL, Walls } from "./walls.js";
 
 const MANY = 60_000; // Number of triangles from which lines are drawn only after the body stops moving.
 const STILL = 160; // ms.
@@ -166,11 +166,13 @@ export class View3d {
     renderer.clear();
     surface.draw(renderer, camera);
     if (this.arrows.mesh.visible || this.walls.seen) renderer.render(this.extras, camera);
-    const lines = look.lines && !this.moving;
+    const lines = look.lines && !this.moving && this.begun;
     if (lines || this.picked >= 0) {
       this.outlines.draw(renderer, () => surface.numbers(renderer, camera), camera, { picked: this.picked, lines, ink: tones.ink });
     }
     this.drawOver();
+    if (!this.begun) this.later(); // The first frame is on the screen earlier without lines.
+    this.begun = true;
     performance.measure("conoid:frame", { start, detail: { calls: renderer.info.render.calls } });
     performance.clearMeasures("conoid:frame");
   }
@@ -192,7 +194,8 @@ export class View3d {
     const pieces = header.fragments_total > header.parts.length;
     const tones = (i) => (by === "fragment" ? [ofFragment(BigInt(i), i, header.parts.length), ...(pieces ? [ofName(i)] : [])] : [ofName(i)]).map(css);
     const list = by === "rank" ? Array.from({ length: header.ranks }, (_, rank) => `rank ${rank}`) : header.parts;
-    return { title: by === "fragment" && pieces ? "whole bodies | pieces" : by === "fragment" ? "bodies" : by, names: list.map((name, i) => ({ name, colours: tones(i) })), arrows };
+    const walls = this.walls.seen ? [{ name: "rigid wall", colours: [WALL] }] : [];
+    return { title: by === "fragment" && pieces ? "whole bodies | pieces" : by === "fragment" ? "bodies" : by, names: [...list.map((name, i) => ({ name, colours: tones(i) })), ...walls], arrows };
   }
 
   // Colours of the page, once for each theme.

@@ -1,8 +1,8 @@
 // Rigid walls beside the body: a disk for a plane, the side of a cylinder, a sphere. Shapes are those of the case, positions
 // those of the snapshot.
 
-const COLOUR = 0x8fa0b3;
-const OPACITY = { plane: 0.18, round: 0.3 }; // A wall in front of the body must not hide it.
+export const WALL = "#8fa0b3"; // Colour of a wall.
+const OPACITY = { plane: 0.24, round: 0.3 }; // A wall in front of the body must not hide it.
 const WIDER = 1.35; // Radius of a disk, and half of the length of a cylinder, over half of the diagonal of the body.
 
 // The walls of a resolved case: { shape, point, along, radius, moves } each.
@@ -31,7 +31,7 @@ export class Walls {
     this.three = THREE;
     this.group = new Group();
     this.list = [];
-    const look = { color: COLOUR, transparent: true, depthWrite: false, side: DoubleSide };
+    const look = { color: WALL, transparent: true, depthWrite: false, side: DoubleSide };
     this.materials = { plane: new MeshBasicMaterial({ ...look, opacity: OPACITY.plane }), round: new MeshLambertMaterial({ ...look, opacity: OPACITY.round }) };
     this.light = new HemisphereLight(0xffffff, 0x606a76, 3);
   }

@@ -71,7 +71,7 @@ class Browser:
         into, out_of = (fcntl.fcntl(fd, fcntl.F_DUPFD, 10) for fd in (ours[0], theirs[1]))
         launch = [sys.executable, "-c", _ONTO_3_AND_4, str(into), str(out_of), program() or PROGRAMS[0]]
         self._process = subprocess.Popen(
-            [*launch, *_OPTIONS, f"--user-data-dir={self._folder}"], pass_fds=(into, out_of),
+            [*launch, *_OPTIONS, f"--user-data-dir={self._folder}", "about:blank"], pass_fds=(into, out_of),
             stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, start_new_session=True,
         )  # fmt: skip
         for fd in (ours[0], theirs[1], into, out_of):
