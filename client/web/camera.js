@@ -9,6 +9,9 @@ const FREE = 0.16; // Fraction of the height that is left free for axes and scal
 const LEGEND = [90, 0.2]; // Space at the right for the legend: px, and largest fraction of the width.
 const VIEWS = { "+x": [1, 0, 0], "-x": [-1, 0, 0], "+y": [0, 1, 0], "-y": [0, -1, 0], "+z": [0, 0, 1], "-z": [0, 0, -1] };
 
+// Numbers of client/drawing/camera.py: the direction to the camera, its component along the side that is seen, and the
+// ratio of the first to the second extent above which a body is long.
+const [FROM, ASIDE, LONG] = [[1, -1.55, 0.62], 1.55, 2.2];
 export const VIEW_NAMES = [...Object.keys(VIEWS), "isometric"];
 
 export class ViewCamera {
@@ -72,26 +75,28 @@ export class ViewCamera {
     else if (this.mode === "part") this.carry();
   }
 
-  // Sets the first view: a long body is horizontal, and the view is from slightly above onto the planes of symmetry.
+  // Sets the first view, that of the default camera of pictures (client/drawing/camera.py).
   first() {
     const list = this.list();
-    const side = [0, 1, 2].map((axis) => extent(list, axis));
-    const longest = side.indexOf(Math.max(...side));
-    const up = longest === 2 ? 1 : 2;
-    const across = 3 - longest - up;
-    const away = [0, 0, 0];
-    [away[longest], away[up], away[across]] = [0.35, 0.45, longest === 2 ? 1 : -1];
-    for (const { axis, at } of this.framed().cuts) if (axis === across || axis === up) away[axis] = Math.abs(away[axis]) * (middle(list, axis) > at ? -1 : 1);
-    this.look(away, up);
+    const sides = new Map(this.framed().cuts.map(({ axis, at }) => [axis, middle(list, axis) > at ? -1 : 1]));
+    const { away, up, top } = firstView([0, 1, 2].map((axis) => extent(list, axis)), sides);
+    this.look(away, up, top);
   }
 
-  // Sets the view along a direction; `up` is an axis.
-  look(away, up) {
+  // Sets the view along a direction; `up` is an axis, which points upwards (`top` 1) or downwards (-1).
+  look(away, up, top = 1) {
     this.direction = true;
-    this.camera.up.set(0, 0, 0).setComponent(up, 1);
+    this.camera.up.set(0, 0, 0).setComponent(up, top);
+    this.pole();
     this.camera.position.fromArray(away).normalize().add(this.controls.target);
     this.camera.lookAt(this.controls.target);
     this.fit(this.mode === "part" ? { only: this.part } : {});
+  }
+
+  // OrbitControls turn about the upward direction that the camera has when they are made; this sets the present one.
+  pole() {
+    this.controls._quat.setFromUnitVectors(this.camera.up, new this.three.Vector3(0, 1, 0));
+    this.controls._quatInverse.copy(this.controls._quat).invert();
   }
 
   // Selects one of VIEW_NAMES.
@@ -208,6 +213,7 @@ export class ViewCamera {
     this.quiet = true;
     this.direction = true;
     for (const name of ["position", "up", "quaternion"]) this.camera[name].copy(other.camera[name]);
+    this.pole();
     this.controls.target.copy(other.controls.target);
     Object.assign(this.camera, { near: other.camera.near, far: other.camera.far });
     Object.assign(this, { mode: "free" });
@@ -216,6 +222,25 @@ export class ViewCamera {
     this.changed();
     this.quiet = false;
   }
+}
+
+// Direction to the camera { away } and the axis that points upwards { up } for a body of so many metres along x, y and z.
+// A long body lies horizontally; planes of symmetry, Map of the axis to the side that is seen, -1 or 1, face the camera.
+export function firstView(side, sides) {
+  const [second, longest] = [0, 1, 2].sort((a, b) => side[a] - side[b]).slice(1);
+  if (side[longest] > LONG * side[second]) return beside(longest, sides);
+  if (!sides.has(0) && !sides.has(1)) return { away: FROM, up: 2, top: 1 };
+  const [x, y] = [sides.get(0) ?? 0.8, sides.get(1) ?? -0.8];
+  return { away: [x * (sides.has(1) ? 1 : ASIDE), y * (sides.has(0) ? 1 : ASIDE), FROM[2]], up: 2, top: 1 };
+}
+
+function beside(along, sides) {
+  const [x, y] = [sides.get(0) ?? sides.get(1) ?? -1, sides.get(1) ?? -(sides.get(0) ?? -1)];
+  const faces = along < 2 ? [1 - along, 2, sides.get(1 - along) ?? (along ? 1 : -1), 1] : x * y < 0 ? [0, 1, x, y] : [1, 0, y, x];
+  const [shown, up, face, top] = faces;
+  const away = [0, 0, 0];
+  [away[shown], away[up], away[along]] = [ASIDE * face, 0.5 * top, 0.45 * (sides.get(along) ?? 1)];
+  return { away, up, top };
 }
 
 // Couples several views, each { eye }: all views move together. The frame is that of the first view.

@@ -20,7 +20,7 @@ export function draw(ctx, frame) {
   if (frame.axes) axes(ctx, frame);
   if (frame.bar) bar(ctx, frame);
   if (frame.legend) legend(ctx, frame);
-  if (frame.caption) text(ctx, frame, frame.caption, frame.width / 2, frame.height - PAD - 4, 12.5, frame.ink, "center", 600);
+  if (frame.caption) text(ctx, frame, frame.caption, PAD, PAD + 6, 12.5, frame.ink, "left", 600);
 }
 
 // Writes a text with a rim in the colour of the background: the text is readable over any body.

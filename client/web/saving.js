@@ -7,7 +7,7 @@ const HOLD = 800; // Time for which the last snapshot of a film is shown, ms.
 
 // Draws the view on the background colour of the page onto `onto` (a canvas, created if missing).
 export function composed(view, onto = document.createElement("canvas")) {
-  view.draw(); // The browser keeps the drawing until the end of this task.
+  view.draw(true); // The browser keeps the drawing until the end of this task.
   const { width, height } = view.canvas;
   if (onto.width !== width || onto.height !== height) Object.assign(onto, { width, height });
   const ctx = onto.getContext("2d");

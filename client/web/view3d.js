@@ -153,7 +153,8 @@ export class View3d {
   }
 
   // The browser's timeline has the script time of a frame as "conoid:frame", with the number of draw calls.
-  draw() {
+  // `captioned`: with the time in the picture, for saved pictures.
+  draw(captioned = false) {
     this.due = false;
     if (this.closed || !this.snapshot || !this.sized) return;
     const start = performance.now();
@@ -170,20 +171,20 @@ export class View3d {
     if (lines || this.picked >= 0) {
       this.outlines.draw(renderer, () => surface.numbers(renderer, camera), camera, { picked: this.picked, lines, ink: tones.ink });
     }
-    this.drawOver();
+    this.drawOver(captioned);
     if (!this.begun) this.later(); // The first frame is on the screen earlier without lines.
     this.begun = true;
     performance.measure("conoid:frame", { start, detail: { calls: renderer.info.render.calls } });
     performance.clearMeasures("conoid:frame");
   }
 
-  drawOver() {
+  drawOver(captioned) {
     const { width, height, ratio } = this.sized;
     const { ink, soft, paper } = this.inks().css;
     const ctx = this.over.getContext("2d");
     ctx.setTransform(ratio, 0, 0, ratio, 0, 0);
     const { axes, bar, caption } = this.look;
-    drawOver(ctx, { width, height, camera: this.eye.camera, distance: this.eye.distance, axes, bar, caption, ink, soft, paper, legend: this.look.legend ? this.legend() : null });
+    drawOver(ctx, { width, height, camera: this.eye.camera, distance: this.eye.distance, axes, bar, caption: captioned && caption, ink, soft, paper, legend: this.look.legend ? this.legend() : null });
   }
 
   legend() {
