@@ -1,10 +1,11 @@
-"""The reduction of the step (Allreduce): all ranks then have the same limits and flags, and make the same decisions.
+"""The reduction of the step (Allreduce). After the reduction all ranks have the same limits and flags, and make the
+same decisions.
 
 The reduction takes the maximum of int64 words over all ranks. Each field of the reduction is one word: an integer, a
-flag (0 or 1), or the bits of a float64 that is not negative. The bits of non-negative floats have the order of the
-floats, and a NaN is larger than any number, so the maximum of the words is the maximum of the values for every field.
-If parts fracture, there is one more word for each rank. If there is contact, a sum of six words is reduced at the same
-time. A run with a single rank sends no message.
+flag (0 or 1), or the bit pattern of a float64 that is not negative. As integers, the bit patterns of non-negative
+floats have the order of the floats, and a NaN is larger than any number, so the maximum of the words is the maximum of
+the values for every field. If parts fracture, there is one more word for each rank. If there is contact, a sum of six
+words is reduced at the same time. A run with a single rank sends no message.
 """
 
 import struct
@@ -17,38 +18,41 @@ from .model.state import Ints
 from .parallel.comm import Comm, Pending
 
 _COSTS, _UNSETTLED = 4, 2
-"""Number of words in the sum: 4 for the energies that contact took from the bodies, 2 for the residuals of the
-contact sweeps."""
+"""Number of words in the sum: 4 words for the energies that contact took from the bodies, 2 words for the residuals of
+the contact sweeps."""
 
 
 class Fields:
     """The fields of the reduction."""
 
     def __init__(self) -> None:
-        """Sets all fields to zero: no limit and no request."""
+        """Sets all fields to zero, which means no limit and no request."""
         self.limit = 0.0
-        """Largest one-over-stable-step of all tets, 1/s; NaN when some tet is inverted or not a number."""
+        """Largest value of 1 / stable step of all tets, 1/s. The value is NaN if some tet is inverted or has a value
+        that is not a number."""
         self.force = 0.0
         """Largest contribution to a nodal force, N."""
         self.stop = 0
-        """Number of the reason to stop the run, 0 for none (worker/run/stops.py); of several reasons the largest
-        number is used."""
+        """Number of the reason to stop the run; 0 if there is no reason (worker/run/stops.py). Of several reasons the
+        largest number is used."""
         self.report = False
         """Rank 0 requests the loads of all ranks."""
         self.groups = False
         """Rank 0 also requests the loads of groups."""
         self.approach = 0.0
-        """Largest value of one over the time in which a node passes half of the tet that it hits, 1/s."""
+        """Largest value of 1 / (time in which a node passes half of the tet that it hits), 1/s."""
         self.opening = False
         """A crack has opened so wide that its two sides become surface."""
         self.stray = False
-        """A contact node (slot) will leave its skin in the next step, so its candidate pairs must be searched again."""
+        """A contact node (slot) will leave its skin in the next step. Therefore its candidate pairs must be searched
+        again."""
         self.search = False
-        """The surface of a rank has moved further than the last broad phase allows, so a new broad phase is needed."""
+        """The surface of a rank has moved further than the last broad phase allows. Therefore a new broad phase is
+        needed."""
         self.worn = 0
-        """State of the worn tets of a rank: SOUND, TIRED or BROKEN (elements/wear.py)."""
+        """State of the tets that erosion will remove: SOUND, TIRED or BROKEN (elements/wear.py)."""
         self.breaking = 0
-        """State of the facets of a rank: NOTHING, OVERSTRESSED or BREAKS (fracture/stage.py)."""
+        """State of the facets: NOTHING, OVERSTRESSED or BREAKS (fracture/stage.py)."""
         self.grown = False
         """A rank has more surface nodes than the load balance allows."""
         self.checkpoint = False
@@ -58,20 +62,20 @@ class Fields:
         self.apart = False
         """A bond of a tied node has failed (bonds/stage.py)."""
         self.nodes = 0
-        """Number of nodes of all ranks. After node separation, ranks that have none of the separated nodes receive
-        the new number in this field."""
+        """Number of nodes on all ranks. After a node separation, ranks without a separated node receive the new number
+        of nodes in this field."""
 
     def pack(self, words: Ints) -> None:
-        """Encodes the fields in the first ``words``."""
+        """Encodes the fields and writes them to the first elements of ``words``."""
         _LAYOUT.pack_into(words.data, 0, *_values(self))
 
     def unpack(self, words: Ints) -> None:
-        """Decodes the fields from the first ``words``."""
+        """Decodes the fields from the first elements of ``words``."""
         vars(self).update(zip(NAMES, _LAYOUT.unpack_from(words.data), strict=True))
 
 
 NAMES = tuple(vars(Fields()))
-"""Names of the fields, in the order of their words."""
+"""Names of the fields. The order is that of their words."""
 _values = attrgetter(*NAMES)
 _LAYOUT = struct.Struct("=" + "".join("d" if isinstance(value, float) else "q" for value in vars(Fields()).values()))
 
@@ -83,7 +87,7 @@ class Offer(Fields):
         """``ranks``: number of ranks of the run."""
         super().__init__()
         self.touched: Ints = np.zeros(ranks, np.int64)
-        """(ranks,) non-zero for the ranks that have a node of the facets that break (fracture/separation.py)."""
+        """(ranks,) not zero for the ranks that have a node of the facets that break (fracture/separation.py)."""
         self.sums: Ints = np.zeros(_COSTS + _UNSETTLED, np.int64)
         self.costs: Ints = self.sums[:_COSTS]
         """(4,) energies that contact took from the bodies on this rank (contact/account.py)."""
@@ -92,10 +96,12 @@ class Offer(Fields):
 
 
 class StepReduction(Fields):
-    """Result of the last reduction, equal on all ranks; ``own``: the contribution of this rank to the next one."""
+    """Result of the last reduction, equal on all ranks. ``own`` is the contribution of this rank to the next
+    reduction.
+    """
 
     def __init__(self, ranks: int = 1, *, fractures: bool = True, contact: bool = True) -> None:
-        """``ranks``: number of ranks; ``fractures``, ``contact``: whether the case has them."""
+        """``ranks``: number of ranks; ``fractures``, ``contact``: whether the case has fracture, and contact."""
         super().__init__()
         self.own = Offer(ranks)
         self._alone, self._contact = ranks == 1, contact
@@ -110,13 +116,13 @@ class StepReduction(Fields):
         self._pending: list[Pending] = []
 
     def keep(self) -> Ints:
-        """Returns (fields,) words of the result, for a checkpoint; independent of the number of ranks."""
+        """Returns (fields,) words of the result for a checkpoint. The words do not depend on the number of ranks."""
         words = np.zeros(len(NAMES), np.int64)
         self.pack(words)
         return words
 
     def resume(self, words: Ints) -> None:
-        """Restores the result from the words of ``keep``."""
+        """Restores the result from the words that ``keep`` returned."""
         self.unpack(words)
 
     def begin(self, comm: Comm) -> Self:
@@ -142,8 +148,8 @@ class StepReduction(Fields):
         self.unpack(self._agreed)
 
     def begin_again(self) -> None:
-        """Clears the requests that were executed before the checkpoint: a resumed run does not repeat a stop or a
-        report. Requests a broad phase, with which a resumed run starts.
+        """Clears the requests that were executed before the checkpoint, so that a resumed run does not repeat a stop or
+        a report. Requests a broad phase, because a resumed run starts with a broad phase.
         """
         self.stop = 0
         self.report = self.groups = self.stray = self.grown = self.checkpoint = self.snapshot = self.apart = False

@@ -1,5 +1,5 @@
-"""The simulation of one rank: model, pressure form, boundaries, contact, fracture and accounts, built once; the time
-step (step.py) uses it.
+"""The simulation of one rank: model, pressure form, boundaries, contact, fracture and accounts. It is built once and
+used by the time step (step.py).
 """
 
 from dataclasses import dataclass
@@ -50,7 +50,7 @@ from .scene.assembly import Say, quiet
 
 
 class Stage(Protocol):
-    """Interface of a stage of the simulation that has state by node, by tet or in its own rows."""
+    """Interface of a stage of the simulation. A stage may have state by node, by tet or in tables of its own."""
 
     def keep(self, parcel: Parcel) -> None:
         """Adds the state of the stage to a parcel (a checkpoint or migration message)."""
@@ -61,7 +61,7 @@ class Stage(Protocol):
 
 @dataclass
 class Simulation:
-    """Model and stages of one rank; a stage that the case does not need is None."""
+    """Model and stages of one rank. A stage that the case does not need is None."""
 
     case: Case
     comm: Comm
@@ -86,24 +86,25 @@ class Simulation:
     crushing: Crushing | None
     neighbours: list[Neighbour]
     assembled: float
-    """CPU time for building the stages on the slowest rank, s."""
+    """CPU time that the slowest rank needed to build the stages, s."""
     floor: float
-    """Force, N, down to which the force quantum is refined; it is not refined further if all forces are smaller."""
+    """Force, N, down to which the force quantum is refined. If all forces are smaller, the quantum is not refined
+    further."""
     reduction: StepReduction
     warnings: tuple[str, ...] = ()
-    """Warnings about the meshes; only in a run that starts, not in one that resumes."""
+    """Warnings about the meshes. A run that resumes has no such warnings."""
     _acts: Acts | None = None
 
     @property
     def acts(self) -> Acts:
-        """The boundaries by their place in the step."""
+        """The boundaries, sorted by their position in the time step."""
         if self._acts is None or self._acts.boundaries != len(self.boundaries):
             self._acts = Acts.of(self.boundaries)
         return self._acts
 
     @property
     def scale(self) -> float:
-        """Quanta per newton of the present nodal forces."""
+        """Number of quanta per newton of the present nodal forces."""
         return self.model.nodes.scale
 
     @scale.setter
@@ -112,23 +113,25 @@ class Simulation:
 
     @property
     def limit(self) -> float:
-        """Largest inverse of the stable step of tets and contact, 1/s."""
+        """Largest value of 1 / stable step of tets and contact, 1/s."""
         return max(self.reduction.limit, self.contact.limit) if self.contact is not None else self.reduction.limit
 
     @property
     def pushing(self) -> "list[Boundary | Contact | Rigid]":
-        """All objects that apply impulses to nodes; each has ``last_push``, the time of its last impulse."""
+        """All objects that apply impulses to nodes. Each object has the attribute ``last_push``, the time of its last
+        impulse.
+        """
         return [*self.boundaries, *(each for each in (self.contact, self.rigid) if each is not None)]
 
     @property
     def stages(self) -> list[Stage]:
-        """The stages that have state, in the order in which their state is restored."""
+        """The stages that have state, in the order in which the state is restored."""
         found = self.erosion, self.contact, self.bonds, self.elements, self.fracture, self.record
         return [each for each in found if each is not None]
 
     def limiting_id(self) -> int:
         """Returns the id of the tet that limits the time step; of several such tets the smallest id; -1 if no tet
-        limits it. Collective."""
+        limits the time step. Collective."""
         mine = self.elements.limit_bits == fixed_point.bits_of(self.reduction.limit)
         first = self.comm.maximum(np.array([-float(self.elements.limiting) if mine else -np.inf]))[0]
         return -1 if np.isinf(first) or not self.model.elements_global else -int(first)
@@ -142,7 +145,7 @@ class Simulation:
         return f"tet {first} of {self.model.parts[part]}"
 
     def limiter(self) -> str:
-        """Returns the reason for the present time step and the tet that limits it. Collective."""
+        """Returns a text with the reason for the present time step and the tet that limits the step. Collective."""
         stable, tet = self.clock.stable, self.limiting_tet()
         if self.limit > self.reduction.limit:
             return "contact: speed of approach"
@@ -161,7 +164,9 @@ class Simulation:
         return int(self.comm.sum(np.array([(shared & self.model.nodes.owned).sum()]))[0])
 
     def count_nodes(self) -> None:
-        """Makes ``nodes_global`` equal on all ranks, as the reduction of the next step would. Collective."""
+        """Sets ``nodes_global`` to the same number on all ranks, as the reduction of the next step would.
+        Collective.
+        """
         most = self.comm.maximum(np.array([float(self.model.nodes_global)]))
         self.model.nodes_global = int(most[0])
 
@@ -172,13 +177,13 @@ class Simulation:
                 each.free()
 
     def next_scale(self) -> float:
-        """Returns the quanta per newton for the next sum of forces."""
+        """Returns the number of quanta per newton for the next sum of forces."""
         return float(fixed_point.scale_for(max(self.reduction.force, self.floor)))
 
 
 def build(case: Case, folder: Path, comm: Comm, say: Say = quiet) -> Simulation:
-    """Meshes the case, partitions and distributes the mesh, and builds the stages; rank 0 calls ``say`` with its
-    progress.
+    """Makes the mesh of a case, divides it among the ranks, and builds the stages. Rank 0 reports its progress by calls
+    of ``say``.
 
     Raises the same InputError on every rank.
     """
@@ -203,7 +208,7 @@ def _assemble(
     tied: Pieces,
 ) -> Simulation:  # fmt: skip
     """Builds the stages that the case needs, for a model and its boundaries. ``node_volume`` (nodes,): nodal volumes at
-    the start, m^3; ``tied``: pieces of the bonds, only for a run that starts.
+    the start, m^3; ``tied``: pieces of the tied bonds, None for a run that resumes.
     """
     began, run, numerics, (rigid, moving) = worked(comm), case.run, case.numerics, undeformed
     threads = team(run.threads)
@@ -246,7 +251,7 @@ def _assemble(
 
 
 def keep(sim: Simulation) -> Parcel:
-    """Returns the whole state of this rank between two steps. Collective."""
+    """Returns the whole state of this rank between two steps as a parcel. Collective."""
     sim.count_nodes()
     parcel = model_of.keep(sim.model, sim.case)
     pushes = sim.comm.maximum(np.array([each.last_push for each in sim.pushing]))
@@ -266,7 +271,9 @@ def keep(sim: Simulation) -> Parcel:
 
 
 def resume(case: Case, arrived: Arrived, comm: Comm, timers: Timers) -> Simulation:
-    """Builds the simulation from the parcel that arrived from a checkpoint or from other ranks. Collective."""
+    """Builds the simulation from the parcel ``arrived``, which was read from a checkpoint or received from other ranks.
+    Collective.
+    """
     parcel, known = arrived.parcel, arrived.parcel.known
     model = model_of.resume(case, arrived, comm)
     walls = conditions.walls_of(case)

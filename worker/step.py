@@ -1,7 +1,8 @@
 """The time step, in order.
 
-Leapfrog: positions, stresses and forces are known at n, velocities at n-1/2. One pass over the elements computes
-stress(n+1) and then f(n+1). Therefore f(n) is known when a step begins. Each row of the table is a part of the step:
+The step is a leapfrog step: positions, stresses and forces are known at n, velocities at n-1/2. One pass over the
+elements computes stress(n+1) and then f(n+1). Therefore f(n) is known when a step begins. Each row of the table is a
+part of the step:
 
 ==  =====================================================  ==========================
  1  choose dt (in the first step again, after 4)           from the limits at n
@@ -25,9 +26,9 @@ stress(n+1) and then f(n+1). Therefore f(n) is known when a step begins. Each ro
 between the halves. After the last step, rows 1 to 10 are executed once more, and ``end`` sets the velocities to v(n).
 
 - Rigid bodies (rigid/stage.py) and moving walls act in rows 2, 6, 8, 9 and 11 only.
-- Surface that erosion exposes in row 3 has contact from row 4 of the same step on.
-- Rows 12 and 13 are one pass over each chunk of tets; the averaged pressure forms need two passes, with the exchange of
-  the nodal volume sums in between.
+- Faces that erosion exposes in row 3 are in contact from row 4 of the same step on.
+- Rows 12 and 13 are one pass over each chunk of tets; the averaged pressure forms need two passes, and exchange
+  the nodal volume sums between the two passes.
 - Row 14 starts after the border tets and ends after the interior tets, before the fracture criterion. The criterion is
   computed before the reduction, which then contains whether any facet breaks, and which ranks have a node of such a
   facet.
@@ -48,7 +49,7 @@ from .simulation import Simulation
 
 
 def prepare(sim: Simulation) -> None:
-    """Computes forces and limits of the initial state by a pass over the elements with dt = 0."""
+    """Computes forces and limits of the initial state, by a pass over the elements with dt = 0."""
     sim.model.nodes.force[:] = 0
     _advance_elements(sim, 0.0)
     _reduce(sim, None)
@@ -58,30 +59,30 @@ def prepare(sim: Simulation) -> None:
 
 
 def first_half(sim: Simulation) -> None:
-    """Executes rows 1 to 9 of the table: computes v(n+1/2) from f(n). Raises PhysicsError if the stable step has
+    """Executes rows 1 to 9 of the table, which compute v(n+1/2) from f(n). Raises PhysicsError if the stable step has
     collapsed.
     """
     nodes, clock = sim.model.nodes, sim.clock
     sim.timers.switch("nodes")
-    mean_dt = clock.choose(sim.limit)  # Row 1: choose dt between n and n+1.
+    mean_dt = clock.choose(sim.limit)  # Row 1: choose dt, the step from n to n+1.
     if clock.collapsed:
         raise PhysicsError(
             f"{_when(sim)}: {sim.limiting_tet()} is crushed; the stable step is {clock.stable:.3g} s. Where its "
             "part erodes (parts[].erosion) such a tet is removed"
         )
     acts = sim.acts
-    _before_kick(sim, acts)  # Rows 2 to 4: work of the last impulses, erosion, broad phase.
+    _before_kick(sim, acts)  # Rows 2 to 4: add the work of the last impulses, remove tets, run the broad phase.
     if sim.contact is not None and clock.step == 0 and sim.contact.look_ahead(nodes):
-        mean_dt = clock.choose_again(sim.limit)  # Row 1 again: choose dt with the limit of contact.
+        mean_dt = clock.choose_again(sim.limit)  # Row 1 again: choose dt, now with the limit of contact.
     if sim.fracture is not None:
         sim.fracture.unload()  # Row 5: unload cohesive facets that would release more energy than they absorbed.
-    # Row 5: v*(n+1/2) = v(n-1/2) + (dt(n-1/2) + dt(n+1/2)) / 2 f(n) / m
+    # Row 5 (kick): v*(n+1/2) = v(n-1/2) + (dt(n-1/2) + dt(n+1/2)) / 2 f(n) / m
     sim.leapfrog.kick(nodes, mean_dt / nodes.scale, clock.shorter / nodes.scale)
     _after_kick(sim, acts)  # Rows 6 to 9: compute v(n+1/2).
 
 
 def end(sim: Simulation, before: Floats) -> None:
-    """Sets the velocities to v(n), after the first half of a step beyond the last one.
+    """Sets the velocities to v(n), after the first half of a step beyond the last step of the run.
 
     v(n) is interpolated between v(n-1/2), ``before`` (nodes, 3), and v(n+1/2), which walls and contact have corrected
     as in any step.
@@ -101,10 +102,10 @@ def between(sim: Simulation, before: Floats) -> Floats:
 
 
 def _before_kick(sim: Simulation, acts: Acts) -> None:
-    """Executes rows 2 to 4 of the table, with v(n-1/2)."""
+    """Executes rows 2 to 4 of the table. The velocities are v(n-1/2)."""
     nodes, erosion, contact, bonds = sim.model.nodes, sim.erosion, sim.contact, sim.bonds
     for boundary in acts.noting:
-        boundary.note(nodes)  # Row 2: book half of the last impulse times v(n-1/2).
+        boundary.note(nodes)  # Row 2: add half of the last impulse times v(n-1/2) to the work.
     if erosion is not None:
         erosion.note(nodes)
     if contact is not None:
@@ -118,37 +119,39 @@ def _before_kick(sim: Simulation, acts: Acts) -> None:
         if bonds is not None and removes:
             bonds.follow()
     if bonds is not None:
-        bonds.note(nodes)  # Row 2 of the tied bonds, after row 3: only for the nodes that are still tied.
+        bonds.note(nodes)  # Row 2 for the tied bonds. After row 3 only nodes that are still tied count.
     if contact is not None:
         contact.search_if_due(nodes)  # Row 4: update the candidate pairs of the present surface.
 
 
 def _after_kick(sim: Simulation, acts: Acts) -> None:
-    """Executes rows 6 to 9 of the table: computes v(n+1/2) from v*(n+1/2)."""
+    """Executes rows 6 to 9 of the table, which compute v(n+1/2) from v*(n+1/2)."""
     nodes, dt, t = sim.model.nodes, sim.clock.dt, sim.clock.t
     for boundary in acts.before_contact:
-        boundary.apply(nodes, dt, t)  # Row 6: gravity, tractions, symmetry, prescribed motion.
+        boundary.apply(nodes, dt, t)  # Row 6: apply gravity, tractions, symmetry and prescribed motion.
     sim.walls.kick(dt, t)
     if sim.rigid is not None:
         sim.rigid.kick(nodes, dt, t)
     if sim.erosion is not None:
         sim.erosion.stop_removed(nodes)  # Row 7: stop removed nodes.
     if sim.bonds is not None:
-        sim.bonds.predict(nodes)  # Row 8: last impulses of tied bonds, as a warm start.
+        sim.bonds.predict(nodes)  # Row 8: apply the last impulses of tied bonds (warm start).
     if sim.contact is not None:
-        sim.contact.solve(nodes, dt, t)  # Row 8: impulses of active contacts.
+        sim.contact.solve(nodes, dt, t)  # Row 8: apply the impulses of active contacts.
     if sim.bonds is not None:
-        sim.bonds.solve(nodes, touched=sim.contact is not None)  # Row 8: impulses of tied bonds.
+        sim.bonds.solve(nodes, touched=sim.contact is not None)  # Row 8: apply the impulses of tied bonds.
     for boundary in acts.after_contact:
-        boundary.apply(nodes, dt, t)  # Row 9: walls and mirror images.
+        boundary.apply(nodes, dt, t)  # Row 9: apply walls and mirror images.
     if sim.rigid is not None:
         sim.rigid.settle(nodes, t)
 
 
 def second_half(sim: Simulation) -> None:
-    """Executes rows 11 to 15 of the table: computes f(n+1) from v(n+1/2). Raises PhysicsError if a tet has failed."""
+    """Executes rows 11 to 15 of the table, which compute f(n+1) from v(n+1/2). Raises PhysicsError if a tet has
+    failed.
+    """
     nodes, clock = sim.model.nodes, sim.clock
-    # Row 11: x(n+1) = x(n) + dt v(n+1/2)
+    # Row 11 (move): x(n+1) = x(n) + dt v(n+1/2)
     sim.leapfrog.move(nodes, clock.dt, clock.shorter / nodes.scale)
     for boundary in sim.acts.moving:
         boundary.after_move(nodes)  # Row 11: reflect debris that passed a symmetry plane.
@@ -156,12 +159,13 @@ def second_half(sim: Simulation) -> None:
     if sim.rigid is not None:
         sim.rigid.move(nodes, clock.dt)
     clock.advance()
-    _advance_elements(sim, clock.dt)  # Rows 12 and 13: stress, forces, limits.
+    _advance_elements(sim, clock.dt)  # Rows 12 and 13: compute stress, forces and limits.
     complete(sim)
 
 
 def complete(sim: Simulation) -> None:
-    """Executes rows 14 and 15 of the table: shared nodes, reduction, fracture. Raises PhysicsError if a tet has failed.
+    """Executes rows 14 and 15 of the table, which are the completion of shared nodes, the reduction, and fracture.
+    Raises PhysicsError if a tet has failed.
 
     A step of a program (stretch.py) ends with this function.
     """
@@ -169,7 +173,8 @@ def complete(sim: Simulation) -> None:
     _reduce(sim, sim.fracture)
     if sim.fracture is not None and sim.reduction.breaking != NOTHING:
         sim.timers.switch("fracture")
-        # Row 15: facets break, nodes separate; the forces f(n+1) of tets of a new node are moved to the new node.
+        # Row 15: break facets and separate nodes. The forces f(n+1) of the tets of a new node are moved to the new
+        # node.
         sim.fracture.advance(sim.reduction.breaking, sim.reduction.touched)
         if sim.bonds is not None and sim.reduction.breaking == BREAKS:
             sim.bonds.follow()
@@ -186,7 +191,9 @@ def _advance_elements(sim: Simulation, dt: float) -> None:
 
 
 def _reduce(sim: Simulation, fracture: Fracture | None) -> None:
-    """Executes row 14 of the table. ``fracture``: None in the pass over the initial state, where no facet breaks."""
+    """Executes row 14 of the table. ``fracture`` is None in the pass over the initial state, in which no facet
+    breaks.
+    """
     elements, reduction = sim.elements, sim.reduction
     sim.timers.switch("exchange")
     _offer(sim, fracture)
@@ -200,7 +207,7 @@ def _reduce(sim: Simulation, fracture: Fracture | None) -> None:
 
 
 def _offer_contact(sim: Simulation) -> None:
-    """Row 14 of the table: sets the contribution of contact on this rank to the reduction, at the positions of n+1."""
+    """Sets the contribution of contact on this rank to the reduction (row 14 of the table), at the positions of n+1."""
     contact, own = sim.contact, sim.reduction.own
     if contact is None:
         return
@@ -211,8 +218,8 @@ def _offer_contact(sim: Simulation) -> None:
 
 
 def _offer(sim: Simulation, fracture: Fracture | None) -> None:
-    """Row 14 of the table: sets the contribution of the other stages on this rank to the reduction. With fracture, the
-    forces of shared nodes are completed first, and the facets that break are found.
+    """Sets the contribution of all other stages on this rank to the reduction (row 14 of the table). With fracture,
+    first the forces of shared nodes are completed, and the facets that break are found.
     """
     elements, own = sim.elements, sim.reduction.own
     own.breaking = OVERSTRESSED if elements.hot else NOTHING
@@ -231,8 +238,8 @@ def _offer(sim: Simulation, fracture: Fracture | None) -> None:
 
 
 def _follow_reduction(sim: Simulation) -> None:
-    """Row 14 of the table: applies the result of the reduction, equal on all ranks. Raises PhysicsError if a limit or a
-    force is not a finite number.
+    """Applies the result of the reduction (row 14 of the table), which is equal on all ranks. Raises PhysicsError if a
+    limit or a force is not a finite number.
     """
     reduction = sim.reduction
     sim.model.nodes_global = reduction.nodes
@@ -247,7 +254,7 @@ def _follow_reduction(sim: Simulation) -> None:
 
 
 def _sum_again(sim: Simulation) -> None:
-    """Rows 13 and 14 of the table: repeats the sum of the forces in a coarser quantum, if the largest force is too
+    """Repeats the sum of the forces (rows 13 and 14 of the table) in a larger quantum, if the largest force is too
     large for the present quantum.
     """
     sim.scale = fixed_point.scale_for(sim.reduction.force)

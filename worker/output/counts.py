@@ -1,10 +1,11 @@
-"""Counts of a run for its reports: sizes of the model and fragments, sent when they have changed.
+"""Counts of a run for its reports: sizes of the model, and number and sizes of fragments. A count is sent when it has
+changed.
 
 To find the fragments, all ranks read the state of all their tets (docs/reference/snapshots.md, "Between two
-snapshots"). Fragments are therefore searched only when a facet has broken or a tet was removed since the last
-search, and never in a scene that can neither break nor erode. A share of the wall time limits the number of searches:
-every report of a small model, every few seconds for a large model. Rank 0 decides, and its decision is sent with the
-loads.
+snapshots"). Fragments are therefore searched only when a facet has broken or a tet was removed since the last search,
+and never in a scene that can neither break nor erode. The searches may take only a fraction of the wall time: a small
+model is searched for every report, a large model every few seconds. Rank 0 decides whether to search, and sends its
+decision with the loads.
 """
 
 import math
@@ -27,8 +28,8 @@ from ..simulation import Simulation
 from ..snapshots.table import by_size
 
 SHARE = 1.0 / 50.0
-"""Share of the wall time for finding fragments between frames. Chosen value: a run of a minute takes one second
-longer."""
+"""Fraction of the wall time that the search for fragments between frames may take. Chosen value: a run of a minute
+takes one second longer."""
 _TETS = 4096
 """Number of tets in a task. Chosen value: a task takes some 20 us."""
 _MEASURE = (
@@ -42,27 +43,29 @@ class Counter:
     """The counts of a run. Every method is collective except ``due``."""
 
     def __init__(self) -> None:
-        """Start without any count."""
+        """Start with no count."""
         self._sent: tuple[object, ...] = ()
         self._found: tuple[int, int] = (-1, -1)
-        """Numbers of broken facets and of tets when fragments were last found."""
+        """Number of broken facets and number of tets at the last search for fragments."""
         self._step = -1
-        """Step in which the fragments were last found."""
+        """Number of the step of the last search for fragments."""
         self._again = -math.inf
-        """Wall time from which fragments may be found again, as time.monotonic(), s."""
+        """Wall time from which on fragments may be searched again, as time.monotonic(), s."""
         self._fragments, self._smallest, self._sizes = 0, 0, list[int]()
 
     def due(self, sim: Simulation, now: float, *, ending: bool) -> bool:
-        """Return whether fragments are to be found. Rank 0 alone calls this method.
+        """Return whether fragments must be searched. Only rank 0 calls this method.
 
         ``ending``: whether this is the last report.
         """
         return _changing(sim) and _state(sim) != self._found and (ending or now >= self._again)
 
     def find(self, sim: Simulation) -> None:
-        """Find the fragments and their sizes, unless their number cannot have changed. Collective.
+        """Find the fragments and their sizes. The search is omitted if the number of fragments cannot have changed.
+        Collective.
 
-        The first search loads a kernel, so its duration does not count for the interval between two searches.
+        The duration of the first search does not count for the interval between two searches, because the first search
+        loads a kernel.
         """
         if not _changing(sim) or (sim.record is None and _state(sim) == self._found):
             return
@@ -73,8 +76,8 @@ class Counter:
         self._again = ended if first else ended + (ended - began) / SHARE
 
     def changed(self, sim: Simulation, cuts: int) -> dict[str, Any] | None:
-        """Return the fields of a message (messages.Counts) if the counts have changed; ``cuts``: number of cuts so
-        far.
+        """Return the fields of a message (messages.Counts), if the counts have changed. ``cuts``: number of new
+        divisions of the tets among the ranks so far.
         """
         model, found = sim.model, self._count(sim)
         now = model.elements_global, model.nodes_global, cuts, found, self._found
@@ -90,8 +93,8 @@ class Counter:
         }  # fmt: skip
 
     def _count(self, sim: Simulation) -> int:
-        """Return the number of fragments of the last search; before the first one that of the last process or of the
-        bodies.
+        """Return the number of fragments of the last search. Before the first search, return the number that an earlier
+        process of the run found, or the number of bodies.
         """
         if self._step >= 0:
             return self._fragments
@@ -99,10 +102,10 @@ class Counter:
 
 
 def fragments(sim: Simulation) -> tuple[int, list[Ints]]:
-    """Return the number of fragments and, for each block, (n,) the fragment of each tet. Collective.
+    """Return the number of fragments, and the fragment of each tet: one array (n,) for each block. Collective.
 
-    Fragments are separated by broken facets, or by removed tets where no part breaks. Where the neighbours of the tets
-    are unknown, the fragments are the bodies of the case.
+    Fragments are separated by broken facets; if no part breaks, they are separated by removed tets. If the neighbours
+    of the tets are not stored, the fragments are the bodies of the case.
     """
     if sim.record is not None:
         sim.record.update()
@@ -114,13 +117,15 @@ def fragments(sim: Simulation) -> tuple[int, list[Ints]]:
 
 
 def of_bodies(sim: Simulation) -> list[Ints]:
-    """Return, for each block, (n,) the body of each tet (cases/model/joined.py)."""
+    """Return the body of each tet (cases/model/joined.py): one array (n,) for each block."""
     body = np.array(bodies(sim.case))
     return [np.full(block.n, body[block.part]) for block in sim.model.blocks]
 
 
 def _connected(sim: Simulation) -> bool:
-    """Return whether the tets have neighbours (``Block.across``), by which fragments are found."""
+    """Return whether the neighbours of the tets are stored (``Block.across``). Fragments are found by the
+    neighbours.
+    """
     return sim.record is not None or sim.contact is not None
 
 
@@ -134,10 +139,10 @@ def _state(sim: Simulation) -> tuple[int, int]:
 
 
 def sizes(model: Model, labels: list[Ints], comm: Comm, threads: Team) -> tuple[int, list[int]]:
-    """Return the number of fragments of each size (snapshots/table.by_size) on rank 0, (0, []) on the others.
-    Collective.
+    """Return the number of fragments, and a histogram of their sizes (snapshots/table.by_size), on rank 0; (0, []) on
+    other ranks. Collective.
 
-    ``labels``: for each block (n,) the fragment of each tet.
+    ``labels``: the fragment of each tet, one array (n,) for each block.
     """
     boxes, bounds = [np.zeros(0, np.int64)], [np.zeros((0, 6))]
     measure = Pass(threads, _measure, *_MEASURE, size=_TETS)
@@ -152,7 +157,9 @@ def sizes(model: Model, labels: list[Ints], comm: Comm, threads: Team) -> tuple[
 
 
 def _merged(labels: Ints, bounds: Floats) -> tuple[Ints, Floats]:
-    """Return the distinct labels, and the bounds (g, 6) of each one: the maxima of the rows with this label."""
+    """Return the distinct labels, and for each label the bounds (g, 6), which are the maxima of the rows with this
+    label.
+    """
     here = unique(labels)
     reach = np.full((len(here), 6), -np.inf)
     _raise(reach, located(here, labels), bounds)
@@ -160,7 +167,7 @@ def _merged(labels: Ints, bounds: Floats) -> tuple[Ints, Floats]:
 
 
 def _extents(pieces: list[tuple[Ints, Floats]]) -> Floats:
-    """Return (g,) the longest side of the bounding box of each fragment, m. A fragment may have pieces on several
+    """Return (g,) the longest side of the bounding box of each fragment, m. The pieces of a fragment may be on several
     ranks.
     """
     label, of = np.unique(np.concatenate([labels for labels, _ in pieces]), return_inverse=True)
@@ -171,8 +178,8 @@ def _extents(pieces: list[tuple[Ints, Floats]]) -> Floats:
 
 @njit(TASK, cache=True)
 def _measure(table, first, stop, thread):  # type: ignore[no-untyped-def]
-    """Task: list the fragments of a range of tets, and their ``reach``: upper corners and negative lower corners of
-    their bounding boxes. Successive tets of one fragment have one row.
+    """Task: list the fragments of a range of tets, and their ``reach``: upper corner and negative lower corner of the
+    bounding box. Successive tets of one fragment share one row.
     """
     labels, reach, counts, of, tets, x = _read_measure(table)
     n = first - 1
@@ -192,7 +199,7 @@ def _measure(table, first, stop, thread):  # type: ignore[no-untyped-def]
 
 @njit("void(float64[:, ::1], int32[::1], float64[:, ::1])", cache=True)
 def _raise(reach, of, rows):  # type: ignore[no-untyped-def]
-    """Raise ``reach`` (g, 6) to the ``rows`` (k, 6) of the groups ``of`` (k,)."""
+    """Raise the rows ``of`` (k,) of ``reach`` (g, 6) to the values ``rows`` (k, 6)."""
     for k in range(len(rows)):
         for i in range(6):
             reach[of[k], i] = max(reach[of[k], i], rows[k, i])

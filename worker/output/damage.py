@@ -1,8 +1,8 @@
 """Damage of tets for frames: 0 intact, 1 failed.
 
-Damage is the largest of three values: the damage of the material law; the dissipated share of the fracture energy in
-the most damaged cohesive facet of the tet (1 for a facet that has failed); the plastic strain of the tet divided by
-its erosion strain.
+The damage of a tet is the largest of three values. The first is the damage of the material law. The second is the
+dissipated fraction of the fracture energy in the most damaged cohesive facet of the tet (1 for a facet that has
+failed). The third is the plastic strain of the tet divided by its erosion strain.
 """
 
 import numpy as np
@@ -19,7 +19,7 @@ from ..parallel.comm import Comm
 
 
 def damage(case: Case, model: Model, cohesion: Cohesion | None, comm: Comm) -> list[Floats] | None:
-    """Return for each block (n,) the damage of its tets; None if no part can be damaged. Collective."""
+    """Return the damage of each tet, one array (n,) for each block; None if no part can be damaged. Collective."""
     if not damageable(case):
         return None
     limits = {i: p.erosion.plastic_strain for i, p in enumerate(case.parts) if p.erosion and p.erosion.plastic_strain}
@@ -34,11 +34,11 @@ def damage(case: Case, model: Model, cohesion: Cohesion | None, comm: Comm) -> l
 
 
 def spent_energy(f: Facets) -> Floats:
-    """Return (m,) the share of the fracture energy that each facet has dissipated: 1 - (remaining area below the law) /
-    energy.
+    """Return (m,) the fraction of its fracture energy that each facet has dissipated: 1 - (remaining area below the
+    law) / energy.
 
-    The remaining area of a pair of nodes is strength share^2 critical / 2, with the remaining ``share`` of the
-    traction (fracture/cohesive.py). A facet has three pairs of nodes.
+    A facet has three pairs of nodes. The remaining area of a pair is strength share^2 critical / 2, where ``share`` is
+    the remaining fraction of the traction (fracture/cohesive.py).
     """
     law, beyond = f.softening, np.maximum(f.state.top - f.softening.knee, 0.0)
     fallen = np.divide(beyond, law.critical, out=(beyond > 0.0).astype(float), where=law.critical > 0.0)
@@ -47,8 +47,8 @@ def spent_energy(f: Facets) -> Floats:
 
 
 def _facets(cohesion: Cohesion, comm: Comm) -> tuple[Ints, Floats]:
-    """Return the tets on either side (m, 2) of the cohesive facets of all ranks, and the dissipated shares (m,) of
-    these facets.
+    """Return the two tets (m, 2) at each cohesive facet of all ranks, and the dissipated fraction (m,) of its fracture
+    energy.
 
     Collective.
     """
@@ -63,7 +63,9 @@ def _strained(block: Block, limit: float | None) -> Floats:
 
 
 def _broken(block: Block, held: Ints, spent: Floats) -> Floats:
-    """Return (n,) the damage of the most damaged facet of each tet; 1 for a broken facet without cohesion."""
+    """Return (n,) the damage of the most damaged facet of each tet. A broken facet without cohesion has the damage
+    1.
+    """
     order = np.argsort(block.id)
     values, holding = np.zeros(block.n), np.zeros(block.n, np.int64)
     for side in (0, 1):

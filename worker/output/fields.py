@@ -1,7 +1,7 @@
 """Fields of frames that a case requests (``run.fields``): density, strain, strain rate, contact pressure.
 
-The first three fields are computed from positions and velocities. The contact pressure is computed from the impulses
-of contact since the frame before. Each value depends on its tet or node only, not on ranks or on the order of tets.
+The first three fields are computed from positions and velocities. The contact pressure is computed from the impulses of
+contact since the previous frame. Each value depends on its tet or node only, not on ranks or on the order of tets.
 """
 
 from collections.abc import Mapping
@@ -15,7 +15,7 @@ from ..model.rows import MASS
 from ..model.state import Block, Floats, Ints, Nodes
 
 _ORDER = ((0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (2, 0))
-"""Indices of the tensor components in VTK's order."""
+"""Indices of the tensor components in the order that VTK uses."""
 
 
 _FACING = 0.5
@@ -25,18 +25,18 @@ cosine, and the sides of an edge of 90 degrees have a smaller cosine up to a coe
 
 
 class Wanted(NamedTuple):
-    """Requested fields of a frame, and their data."""
+    """The fields that a case requests for a frame, and the data from which they are computed."""
 
     names: tuple[str, ...] = ()
     """Names of the fields (``cases.schema.FrameField``)."""
     impulses: Floats | None = None
-    """(nodes, 3) impulses of contact and walls on each node since the frame before, N s."""
+    """(nodes, 3) impulses of contact and walls on each node since the previous frame, N s."""
     passed: float = 0.0
-    """Time since the frame before, s; 0 for the first frame."""
+    """Time since the previous frame, s; 0 for the first frame."""
     walls: Floats | None = None
     """(walls, 3) present position of ``point`` of each wall of the case, m; None if no wall moves."""
     sets: Mapping[str, int] = MappingProxyType({})
-    """Names of the arrays of the sets, and the bits of the sets in ``Nodes.marks``."""
+    """Bits of the sets in ``Nodes.marks``, keyed by the name of the array of the set."""
 
 
 def of_tets(names: tuple[str, ...], block: Block, nodes: Nodes) -> dict[str, Floats]:
@@ -57,8 +57,8 @@ def of_tets(names: tuple[str, ...], block: Block, nodes: Nodes) -> dict[str, Flo
 
 
 def logarithmic(F: Floats) -> Floats:
-    """Return (n, 3, 3) the strains ln V of deformation gradients F = V R (n, 3, 3): half the logarithm of the
-    eigenvalues of F F^T, on its axes (Hencky). An inverted tet has the strain of its mirror image.
+    """Return (n, 3, 3) the logarithmic strains ln V (Hencky) of deformation gradients F = V R (n, 3, 3). ln V is half
+    the logarithm of the eigenvalues of F F^T, on its axes. An inverted tet has the strain of its mirror image.
     """
     squares, axes = np.linalg.eigh(_product(F, np.swapaxes(F, 1, 2)))
     logarithms = 0.5 * np.log(np.maximum(squares, np.finfo(float).tiny))
@@ -73,8 +73,8 @@ def effective(strain: Floats) -> Floats:
 
 
 def contact_pressure(x: Floats, tets: Ints, impulses: Floats, passed: float) -> Floats:
-    """Return (nodes,) the mean contact pressure on the nodes of the surface, Pa; 0 inside of bodies and on nodes
-    without a loaded face.
+    """Return (nodes,) the mean contact pressure on the nodes of the surface, Pa; 0 for nodes inside of bodies and for
+    nodes without a loaded face.
 
     The pressure is the component of the ``impulses`` (nodes, 3), N s, along the normal of the loaded area of a node,
     divided by this area and the time ``passed``, s. The loaded area is a third of each face whose inward normal is
@@ -93,8 +93,8 @@ def contact_pressure(x: Floats, tets: Ints, impulses: Floats, passed: float) -> 
 
 
 def _edges(values: Floats, block: Block) -> Floats:
-    """Return (n, 3, 3) differences of nodal values (nodes, 3) from the first node of each tet to its other nodes, as
-    rows.
+    """Return (n, 3, 3) three vectors for each tet: nodal values (nodes, 3) of its nodes 1, 2, 3 less that of its node
+    0. The vectors are rows.
     """
     corners = values[block.tets]
     return np.asarray(corners[:, 1:] - corners[:, :1])
@@ -105,12 +105,12 @@ def _determinant(rows: Floats) -> Floats:
 
 
 def _inverse_transposed(rows: Floats) -> Floats:
-    """Return (n, 3, 3) transposed inverses of matrices, by cofactors."""
+    """Return (n, 3, 3) transposed inverses of matrices, computed by cofactors."""
     a, b, c = rows[:, 0], rows[:, 1], rows[:, 2]
     cofactors = np.stack([np.cross(b, c), np.cross(c, a), np.cross(a, b)], axis=1)
     return np.asarray(cofactors / _determinant(rows)[:, None, None])
 
 
 def _product(a: Floats, b: Floats) -> Floats:
-    """Return (n, 3, 3) products of matrices, with a fixed order of sums."""
+    """Return (n, 3, 3) products of matrices. The order of the sums is fixed."""
     return a[:, :, 0, None] * b[:, None, 0] + a[:, :, 1, None] * b[:, None, 1] + a[:, :, 2, None] * b[:, None, 2]

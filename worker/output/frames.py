@@ -1,6 +1,6 @@
-"""Frames: one VTKHDF file per frame (version 2.3, UnstructuredGrid), readable during the run.
+"""Frames. Each frame is one VTKHDF file (version 2.3, UnstructuredGrid), which can be read during the run.
 
-A file is written under another name, flushed to disk and renamed: a visible file is complete.
+A file is written under a temporary name, flushed to disk and renamed, so a visible file is complete.
 """
 
 import json
@@ -36,15 +36,16 @@ UNITS = {
     "temperature": "K", "plastic_strain": "1", "damage": "1", "density": "kg/m^3", "strain": "1",
     "effective_strain": "1", "strain_rate": "1/s", "contact_pressure": "Pa",
 }  # fmt: skip
-"""Unit of each field, the attribute ``unit`` of its data set. Names and numbers have no unit."""
+"""Units of the fields. The unit of a field is the attribute ``unit`` of its data set. Fields that are names or numbers
+have no unit."""
 _NOTHING = fields.Wanted()
 _ORDER = [0, 1, 2, 5, 3, 4]
-"""Indices of the components in VTK's order, xx, yy, zz, xy, yz, zx, among the components of the state
+"""Indices of the components xx, yy, zz, xy, yz, zx (the order of VTK) among the components of the state
 (CONVENTIONS.md)."""
 
 
 def principal(stress: Floats) -> Floats:
-    """Return (n,) the largest principal values of stresses (n, 6) in VTK's order."""
+    """Return (n,) the largest principal values of stresses (n, 6), whose components are in the order of VTK."""
     xx, yy, zz, xy, yz, zx = stress.T
     matrices = np.stack([xx, xy, zx, xy, yy, yz, zx, yz, zz], axis=1).reshape(-1, 3, 3)
     values: Floats = np.linalg.eigvalsh(np.where(np.isfinite(matrices), matrices, 0.0))[:, 2]
@@ -75,7 +76,7 @@ def _cells(block: Block, rank: int, fragment: Ints | None, damage: Floats | None
 def _share(
     model: Model, rank: int, labels: list[Ints] | None, damage: list[Floats] | None, wanted: fields.Wanted
 ) -> dict[str, Any]:
-    """Return this rank's part of a frame."""
+    """Return the data of a frame that this rank writes."""
     nodes = model.nodes
     cells = [
         _cells(block, rank, None if labels is None else each, None if damage is None else share)
@@ -97,8 +98,8 @@ def _share(
 def _by_block(
     model: Model, labels: list[Ints] | None, damage: list[Floats] | None
 ) -> Iterator[tuple[Block, Ints, Floats]]:  # fmt: skip
-    """Yield each block with the fragments and the damage of its tets. A rank without tets yields an empty block, so
-    that every rank has all columns.
+    """Yield each block with the fragments and the damage of its tets. For a rank without tets an empty block is
+    yielded, so that every rank has all columns.
     """
     none: tuple[Ints, Floats] = np.zeros(0, np.int64), np.zeros(0)
     if not model.blocks:
@@ -112,10 +113,11 @@ def write(
     folder: Path, index: int, t: float, model: Model, comm: Comm, labels: list[Ints] | None = None,
     damage: list[Floats] | None = None, wanted: fields.Wanted = _NOTHING,
 ) -> str | None:  # fmt: skip
-    """Write frame ``index``; return its path relative to the run's folder on rank 0, None on the others. Collective.
+    """Write frame ``index``. Return the path of its file, relative to the run's folder, on rank 0; None on other ranks.
+    Collective.
 
-    ``labels``: for each block the fragment of each tet, or None; ``damage``: for each block the damage of each tet,
-    or None; ``wanted``: further fields.
+    ``labels``: for each block the fragment of each tet, or None; ``damage``: for each block the damage of each tet, or
+    None; ``wanted``: further fields.
     """
     pieces = comm.gather(_share(model, comm.rank, labels, damage, wanted))
     if pieces is None:
@@ -178,7 +180,9 @@ def _by_id(pieces: list[dict[str, Any]], name: str, total: int) -> "np.ndarray":
 
 
 def _sets(pieces: list[dict[str, Any]], total: int) -> dict[str, "np.ndarray"]:
-    """Return (nodes,) 1 for the nodes of each set, else 0, by the name of the array."""
+    """Return arrays (nodes,), keyed by the name of the array of each set. A value is 1 if the node is in the set, else
+    0.
+    """
     found = {name: np.zeros(total, np.uint8) for name in pieces[0]["sets"]}
     for piece in pieces:
         for name, values in found.items():

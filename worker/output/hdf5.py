@@ -1,8 +1,9 @@
-"""HDF5 files that are safe on a full disk.
+"""HDF5 files that are written safely even if the disk becomes full.
 
 After a failed write HDF5 continues with the data that it could not write. HDF5 then fails again at each object that is
-freed, which Python can only print, and ends in a segmentation fault. In other cases a file opens as complete although a
-part is missing. Therefore this module records the failures of the disk and does not report them to HDF5.
+freed; Python can only print this error, and at last the process ends with a segmentation fault. In other cases an
+incomplete file can be opened as if it were complete. Therefore this module records the failures of the disk and does
+not report them to HDF5.
 """
 
 import errno
@@ -37,7 +38,7 @@ def created(path: Path) -> Iterator["h5py.File"]:
 def _at_once(path: str, flags: int) -> int:
     """Open a file without waiting.
 
-    Raises OSError for a path that is not a regular file: a pipe would block the rank, and a device would not keep
+    Raises OSError if the path is not a regular file, because a pipe would block the rank, and a device would not keep
     the data.
     """
     handle = os.open(path, flags | os.O_NONBLOCK, 0o666)
@@ -48,15 +49,17 @@ def _at_once(path: str, flags: int) -> int:
 
 
 class _Disk:
-    """A file object for HDF5. After a failure it discards the written data, and reports success."""
+    """A file object for HDF5. After a failure of the disk it discards the data to be written, and reports success to
+    HDF5.
+    """
 
     def __init__(self, raw: Any) -> None:
         self._raw = raw
         self.failure: OSError | None = None
-        """The first failure of the disk; None without a failure."""
+        """The first failure of the disk; None if no failure occurred."""
 
     def write(self, data: Any) -> int:
-        """Write all data, or discard it after a failure; return its size."""
+        """Write all data and return its size. After a failure of the disk, discard the data."""
         left = memoryview(data).cast("B")
         size = len(left)
         while self.failure is None and left:
@@ -67,7 +70,7 @@ class _Disk:
         return size
 
     def readinto(self, room: Any) -> int:
-        """Read into ``room``; zeros where the file has no data."""
+        """Fill ``room`` with data of the file. Where the file has no data, fill with zeros."""
         left = memoryview(room).cast("B")
         size = len(left)
         while left and (found := self._raw.readinto(left)):
@@ -76,7 +79,7 @@ class _Disk:
         return size
 
     def read(self, size: int) -> bytes:
-        """Read ``size`` bytes; h5py recognises a file object by this method."""
+        """Read ``size`` bytes. h5py recognises a file object by the presence of this method."""
         room = bytearray(size)
         self.readinto(room)
         return bytes(room)
@@ -94,8 +97,8 @@ class _Disk:
         return int(self._raw.seek(offset, whence))
 
     def tell(self) -> int:
-        """Return the position."""
+        """Return the position in the file."""
         return int(self._raw.tell())
 
     def flush(self) -> None:
-        """Do nothing: no data is buffered."""
+        """Do nothing, because no data is buffered."""

@@ -1,5 +1,5 @@
-"""history.csv: one line per sample with clock, ledger, momenta, parts and probes. At the end of the run
-history.parquet gets the same data, if pyarrow is installed.
+"""The table history.csv. Each sample is one line, with clock, energy ledger, momenta, parts and probes. At the end of
+the run history.parquet gets the same data, if pyarrow is installed.
 """
 
 import csv
@@ -18,11 +18,11 @@ from . import storage
 
 
 class History:
-    """Appends lines to the file and flushes each line."""
+    """Appends lines to history.csv and flushes each line."""
 
     def __init__(self, folder: Path, further: Mapping[str, str]) -> None:
-        """``further``: names of the columns of parts and probes, with their units. A file of an earlier attempt
-        keeps its columns.
+        """``further``: names of the columns of parts and probes, with their units. If an earlier attempt of the run has
+        written the file, its columns are kept.
         """
         self._path = folder / layout.HISTORY
         head = history.header({**history.COLUMNS, **further})
@@ -34,10 +34,10 @@ class History:
             self._writer.writerow(head)
 
     def write(self, step: int, t: float, dt: float, limiter: str, energy: Energy, extra: list[float]) -> None:
-        """Write one line; ``extra``: momenta, parts and probes.
+        """Write one line. ``extra``: momenta, values of parts, and values of probes.
 
-        Numbers are written so that reading them back gives the same bits. Raises OSError, also if the file was
-        removed.
+        The text of each number gives the bit-identical number when it is read. Raises OSError if the line cannot be
+        written or if the file was removed.
         """
         storage.require(self._file, self._path)
         values = [*msgspec.structs.astuple(energy), *extra]
@@ -46,13 +46,13 @@ class History:
         self._file.flush()
 
     def close(self) -> None:
-        """Close the file, and write it as Parquet if pyarrow is installed."""
+        """Close the file. If pyarrow is installed, write the table also as history.parquet."""
         self._file.close()
         write_parquet(self._path)
 
 
 def _head(path: Path) -> list[str]:
-    """Return the first line of a table; [] if there is no table."""
+    """Return the names in the first line of a table; [] if there is no table."""
     if not path.exists():
         return []
     with path.open(newline="", encoding="utf-8") as file:
@@ -60,8 +60,8 @@ def _head(path: Path) -> list[str]:
 
 
 def extremes(folder: Path, names: Sequence[str]) -> dict[str, tuple[float, float]]:
-    """Return the smallest and the largest number of each of these columns; NaN if the column is empty or the file
-    was removed.
+    """Return the smallest and the largest number in each of the columns ``names``; NaN if the column is empty or the
+    file was removed.
     """
     found = dict.fromkeys(names, (math.nan, math.nan))
     path = folder / layout.HISTORY
@@ -78,8 +78,8 @@ def extremes(folder: Path, names: Sequence[str]) -> dict[str, tuple[float, float
 
 
 def write_parquet(path: Path) -> Path | None:
-    """Write a history as Parquet beside it, with the unit of each column in its metadata; None if pyarrow is
-    missing.
+    """Write a history as a Parquet file into its folder. The metadata of the file have the unit of each column. Return
+    None if pyarrow is not installed.
     """
     try:
         import pyarrow

@@ -1,5 +1,5 @@
-"""journal.jsonl, the complete record of a run. Every message is numbered, written and flushed before it is sent to
-readers.
+"""The file journal.jsonl, which is the complete record of a run. Every message is numbered, written and flushed before
+it is sent to readers.
 """
 
 import contextlib
@@ -19,11 +19,11 @@ from . import storage
 
 M = TypeVar("M", bound=messages.Message)
 _MOST = 1 << 40
-"""Largest size of a journal that is read, bytes. So large a number practically means no limit."""
+"""Largest size of a journal that is read, bytes. The value is so large that it is practically no limit."""
 
 
 class _Head(msgspec.Struct):
-    """Fields of every message."""
+    """Fields that every message has."""
 
     seq: int
     type: str
@@ -33,22 +33,24 @@ _head = msgspec.json.Decoder(_Head)
 
 
 class Listener(Protocol):
-    """Receiver of messages after they are in the journal."""
+    """Interface of receivers of messages. A message is received after it was written to the journal."""
 
     def tell(self, message: messages.AnyMessage, blob: bytes = b"") -> None:
         """Receive a message without blocking; ``blob``: the bytes of a snapshot, or empty."""
 
 
 class Journal:
-    """Appends to the journal of a run folder. The numbers of the messages continue the numbers in the journal."""
+    """Appends messages to the journal of a run folder. The numbers of new messages continue the numbers in the
+    journal.
+    """
 
     def __init__(self, folder: Path, run: str, listener: Listener | None = None) -> None:
         self._path = path = folder / layout.JOURNAL
         self._run = run
         self.frames: set[int] = set()
-        """Indices of the frames in the journal."""
+        """Indices of the frames of which the journal has a message."""
         self.snapshots = 0
-        """Number of the next snapshot. The numbering continues that of the snapshots in the journal."""
+        """Number of the next snapshot. It continues the numbers of the snapshots in the journal."""
         self._file = whole.appended(path)
         self._seq, content = 0, whole.read(path, _MOST)
         for line in content.splitlines():
@@ -65,7 +67,8 @@ class Journal:
     def write(self, kind: type[M], step: int = 0, t: float = 0.0, blob: bytes = b"", **fields: Any) -> M:
         """Write one message and send it to readers, with the ``blob`` of a snapshot.
 
-        Raises OSError, also if the file was removed: the message would be lost.
+        Raises OSError if the message cannot be written. The error is also raised if the file was removed, because the
+        message would be lost.
         """
         storage.require(self._file, self._path)
         self._seq += 1
@@ -78,16 +81,16 @@ class Journal:
         return message
 
     def starting(self, what: str) -> None:
-        """Report a phase of the start-up."""
+        """Report a phase of the start of the run."""
         self.write(messages.Status, state=State.STARTING, message=what)
 
     def close(self) -> None:
-        """Closes the file; the journal is complete."""
+        """Close the file. After this call the journal is complete."""
         self._file.close()
 
 
 def _number(line: bytes) -> int:
-    """Return the number of a message, also of a message of another version; 0 for a line that is no message."""
+    """Return the number of a message, even if the message has another version; 0 for a line that is no message."""
     try:
         return _head.decode(line).seq
     except (msgspec.DecodeError, UnicodeDecodeError):
@@ -95,7 +98,7 @@ def _number(line: bytes) -> int:
 
 
 def _written(content: bytes) -> Iterator[messages.AnyMessage]:
-    """Yield the messages of a journal; lines damaged by a crash are skipped."""
+    """Yield the messages of a journal. Lines that a crash has damaged are skipped."""
     for line in content.splitlines():
         with contextlib.suppress(msgspec.DecodeError, UnicodeDecodeError):
             yield messages.from_json(line)

@@ -1,11 +1,11 @@
-"""Output files that are removed during a run. Each removed file gives a warning, and the run continues."""
+"""Check for output files that are removed during a run. Removed files give a warning, and the run continues."""
 
 from pathlib import Path
 
 from conoid.cases.output import fragments, layout
 
 _KINDS = {layout.FRAMES: ".vtkhdf", fragments.FOLDER: ".csv", layout.SNAPSHOTS: ".snap"}
-"""Folders of output, and suffixes of finished files in them."""
+"""Folders of output, with the suffix of finished files in each folder."""
 
 
 class Losses:

@@ -1,4 +1,4 @@
-"""Removal of output after the step of a checkpoint. A resumed run writes the removed output again."""
+"""Removal of output that was written after the step of a checkpoint. A resumed run writes this output again."""
 
 import csv
 import io
@@ -9,15 +9,15 @@ from conoid.cases.output import fragments, layout
 from conoid.cases.reading import whole
 
 _TEXTS = frozenset({"limiter"})
-"""Columns of the tables that are not numbers."""
+"""Columns of the tables that contain text."""
 
 
 def rewind(folder: Path, step: int, frame: int) -> int:
-    """Remove lines from the history and the genealogy in a run's folder; return the number of lines of the history
-    that stay.
+    """Remove lines from the history and the genealogy in a run's folder. Return the number of lines that remain in the
+    history.
 
-    Removed are lines of the history from ``step`` on and lines of the genealogy from ``frame`` on, all lines at step
-    0, and damaged lines. Raises OSError.
+    The removed lines are lines of the history from ``step`` on, lines of the genealogy from ``frame`` on, and damaged
+    lines. At step 0 all lines are removed. Raises OSError.
     """
     kept = _keep_below(folder / layout.HISTORY, step)
     _keep_below(fragments.genealogy(folder), frame)
@@ -27,7 +27,7 @@ def rewind(folder: Path, step: int, frame: int) -> int:
 
 
 def lost(kept: int, written: int) -> list[str]:
-    """Return the warning for a history that has fewer lines than were written up to the checkpoint."""
+    """Return a warning if the history has fewer lines than were written up to the checkpoint."""
     if kept >= written:
         return []
     what = f"{layout.HISTORY} has {kept} of the {written} lines that were written up to the checkpoint"
@@ -35,8 +35,8 @@ def lost(kept: int, written: int) -> list[str]:
 
 
 def _keep_below(path: Path, limit: int) -> int:
-    """Keep the header of a table and its complete lines with a first column below ``limit``; return their number. A
-    table without a header is removed."""
+    """Keep the header of a table and its complete lines whose first column is below ``limit``. Return the number of
+    these lines. A table without a header is removed."""
     if not os.path.lexists(path):
         return 0
     with io.TextIOWrapper(io.BufferedReader(whole.opened(path)), "utf-8", "replace", newline="") as file:

@@ -1,4 +1,6 @@
-"""Standard output of a worker that runs without a server: the start, a line for each percent, warnings, and the end."""
+"""Standard output of a worker that runs without a server. It prints the start, a line for each percent of progress,
+warnings, and the end.
+"""
 
 import contextlib
 import sys
@@ -21,7 +23,7 @@ class Speaker:
         self._warned = set[str]()
 
     def tell(self, message: messages.AnyMessage, blob: bytes = b"") -> None:
-        """Print the new information of a message."""
+        """Print the information of a message that is new to the user."""
         match message:
             case messages.Status() if message.state == State.STARTING and message.message:
                 self._say(message, message.message)
@@ -53,7 +55,7 @@ class Speaker:
         )
 
     def close(self, outcome: Outcome) -> None:
-        """Print how the run has ended, and where its results are."""
+        """Print how the run has ended, and the path of its results."""
         why = outcome.message or outcome.cause or ""
         end = f"{outcome.state}: {why}" if why else outcome.state
         steps = f", {counted(outcome.steps, 'step')} in {duration(outcome.elapsed)}" if outcome.steps else ""
@@ -72,6 +74,6 @@ class Speaker:
 
 
 def _write(text: str) -> None:
-    """Print a line; a closed standard output does not stop the run."""
+    """Print a line. A closed standard output does not stop the run."""
     with contextlib.suppress(OSError):
         print(text.replace("\n", "\\n"), file=sys.stdout, flush=True)

@@ -1,4 +1,6 @@
-"""Classification of errors of the run's files: a disk that is full, over its quota or broken, or a removed file."""
+"""Classification of errors of the files of a run. The disk may be full, over its quota or broken, or a file may be
+removed.
+"""
 
 import errno
 import os
@@ -23,9 +25,7 @@ def require(file: IO[Any], path: Path) -> None:
 
 
 def failed(error: BaseException) -> bool:
-    """Return whether the cause of ``error`` is a disk, also if the error number is only in the text of an HDF5
-    error.
-    """
+    """Return whether ``error`` was caused by a disk. The error number may be only in the text of an HDF5 error."""
     if isinstance(error, OSError) and error.errno in _STORAGE:
         return True
     if any(f"errno = {number}," in str(error) for number in _STORAGE):

@@ -1,9 +1,10 @@
-"""Messages on Zenoh, sent by a thread with a bounded queue: the solver never waits for the network.
+"""Sending of messages by Zenoh. A thread with a bounded queue sends the messages, so that the solver never waits for
+the network.
 
-A snapshot is sent with its bytes. If several snapshots wait, the older ones are sent without their bytes, and
-readers fetch the bytes over HTTP. ``put`` reports no loss and may block, so it is called in the thread. When the
-queue is full, the oldest message is dropped. A reader that finds a gap in ``seq`` reads the journal. Without a
-router the thread tries to connect at intervals; the run is not affected.
+A snapshot is sent with its bytes. If several snapshots wait, the older ones are sent without their bytes, and readers
+fetch the bytes over HTTP. Zenoh's ``put`` reports no loss and may block, so it is called in the thread. When the queue
+is full, the oldest message is dropped. A reader that finds a gap in ``seq`` reads the journal. Without a router the
+thread tries to connect at intervals; the run is not affected.
 """
 
 import json
@@ -21,33 +22,33 @@ _RING = 1024
 """Largest number of messages that wait for the network. Chosen value: more than a minute of a run, which sends some
 ten messages a second."""
 _BLOBS = 2
-"""Largest number of snapshots that wait for the network with their bytes, a megabyte each. Chosen value: the
-snapshot that is being sent, and the newest one."""
+"""Largest number of snapshots that wait for the network with their bytes; a snapshot has about a megabyte. Chosen
+value: the snapshot that is being sent, and the newest snapshot."""
 _RETRY = 2.0
 """Interval between two attempts to reach a router, s. Chosen value."""
 _LINGER = 1.0
-"""Time for sending the last messages at the end, s. Chosen value: messages that are not sent are still in the
-journal."""
+"""Longest time for which the last messages are sent at the end of a run, s. Chosen value: messages that are not sent
+are still in the journal."""
 
 log = logging.getLogger("conoid.worker")
 
 
 class Telemetry:
-    """Publishes messages on Zenoh."""
+    """Sender of messages by Zenoh."""
 
     def __init__(self, endpoint: str, prefix: str) -> None:
         self._endpoint = endpoint
         self._prefix = prefix
         self._ring: deque[messages.AnyMessage | messages.Fragments] = deque()
         self.dropped = self.bare = 0
-        """Number of messages that were not sent, and of snapshots that were sent without their bytes."""
+        """Two numbers: messages that were not sent, and snapshots that were sent without their bytes."""
         self._wake = threading.Condition()
         self._closing = False
         self._thread = threading.Thread(target=self._work, name="telemetry", daemon=True)
         self._thread.start()
 
     def tell(self, message: messages.AnyMessage, blob: bytes = b"") -> None:
-        """Queue a message; a snapshot is queued with its bytes. The call never waits for the network."""
+        """Queue a message for sending; a snapshot is queued with its bytes. The call never waits for the network."""
         whole = isinstance(message, messages.Snapshot) and blob
         with self._wake:
             if len(self._ring) == _RING:
@@ -59,14 +60,16 @@ class Telemetry:
             self._wake.notify()
 
     def _thin_out(self) -> None:
-        """Remove the bytes of all waiting snapshots except the newest snapshots."""
+        """Remove the bytes of waiting snapshots, except those of the newest snapshots."""
         waiting = [i for i, message in enumerate(self._ring) if isinstance(message, messages.Fragments)]
         for i in waiting[:-_BLOBS]:
             self._ring[i] = messages.without_blob(self._ring[i])  # type: ignore[arg-type]
             self.bare += 1
 
     def close(self) -> None:
-        """Wait a moment for the last messages; the thread ends with the process if the network hangs."""
+        """Wait a short time until the last messages are sent. If the network hangs, the thread ends with the
+        process.
+        """
         with self._wake:
             self._closing = True
             self._wake.notify()

@@ -14,7 +14,9 @@ from .fields import Wanted
 
 
 def wanted(sim: Simulation, index: int) -> Wanted:
-    """Return the requested fields of frame ``index`` and their data; called once a frame."""
+    """Return the requested fields of frame ``index`` and the data for them. Must be called exactly once for each
+    frame.
+    """
     run = sim.case.run
     sets = {layout.set_array(name): bit for name, bit in bits(sim.case).items()}
     passed = run.end_time / run.frames if index else 0.0
@@ -22,8 +24,8 @@ def wanted(sim: Simulation, index: int) -> Wanted:
 
 
 def _impulses(sim: Simulation) -> Floats | None:
-    """Return (nodes, 3) the impulses of contact and walls on each node since the last call, N s; None if no frame
-    has a contact pressure.
+    """Return (nodes, 3) the impulses of contact and walls on each node since the last call, N s; None if the case
+    requests no contact pressure.
     """
     if "contact_pressure" not in sim.case.run.fields:
         return None

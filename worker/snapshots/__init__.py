@@ -1,3 +1,3 @@
-"""Snapshots of the fragments: copies that the ranks make between two steps, and a separate process that makes
-snapshots from the copies.
+"""Snapshots of the fragments. The ranks copy their data between two steps, and a separate process makes the snapshots
+from the copies.
 """

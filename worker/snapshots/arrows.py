@@ -1,4 +1,4 @@
-"""Arrows of velocity in a snapshot. The arrows are at a few triangles that are spread evenly over the outline."""
+"""Velocity arrows in a snapshot. The arrows are at a few triangles that are spread evenly over the outline."""
 
 import numpy as np
 
@@ -9,15 +9,16 @@ _MOST = 1000
 """Largest number of arrows in a snapshot. Chosen value: more arrows would hide the body."""
 MOST_BYTES = _MOST * (4 + 3 * 4)
 _LEVELS = 6
-"""Level of the finest grid that is tried: it has 2^6 cells along the longest side. The coarsest grid has one cell."""
+"""Level of the finest grid that is tried. This grid has 2^6 cells along the longest side; the coarsest grid has one
+cell."""
 
 
 def chosen(drawn: Outline, velocity: Floats) -> dict[str, "np.ndarray"]:
-    """Return the arrays of a snapshot: triangles with an arrow, and their velocities; ``velocity`` (m, 3): of each
-    triangle, m/s.
+    """Return two arrays of a snapshot: triangles with an arrow, and their velocities. ``velocity`` (m, 3): velocity of
+    each triangle, m/s.
 
-    The arrows are at the first triangle in each cell of a grid. The grid is the finest one with at most ``_MOST``
-    occupied cells.
+    In each cell of a grid the first triangle gets an arrow. The grid is the finest grid with at most ``_MOST`` occupied
+    cells.
     """
     rows = np.zeros(0, np.int64)
     if len(drawn.tet):

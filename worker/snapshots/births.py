@@ -1,4 +1,4 @@
-"""Times at which fragments were formed, read from the genealogy. The frames of a run record the genealogy."""
+"""Times at which fragments were formed. The times are read from the genealogy, which the frames of a run record."""
 
 from pathlib import Path
 
@@ -10,7 +10,7 @@ from ..model.state import Floats, Ints
 
 
 class Births:
-    """Reads the genealogy of a run while the run writes it."""
+    """Reader of the genealogy of a run, while the run writes the genealogy."""
 
     def __init__(self, folder: Path, end: float, frames: int) -> None:
         """``folder``: folder of the run; ``frames``: number of frames up to the time ``end``, s."""
@@ -21,9 +21,9 @@ class Births:
     def at(self, t: float, numbers: Ints, initial: int, *, kept: bool = True) -> Floats:
         """Return (g,) the times, s, at which fragments ``numbers`` were formed.
 
-        The time is that of the first frame up to time ``t`` with this fragment, or ``t`` if there is no such frame;
-        0 for the ``initial`` fragments. Without a record of fragments (``kept``) the time of the other fragments is
-        NaN.
+        The time of a fragment is that of the first frame up to time ``t`` that contains it, or ``t`` if there is no
+        such frame. The ``initial`` fragments have the time 0. ``kept``: whether the run records fragments; if not, the
+        time of all other fragments is NaN.
         """
         if not kept:
             return np.where(numbers < initial, 0.0, np.nan)
@@ -46,5 +46,5 @@ class Births:
                 self._known.setdefault(int(child), self._time(int(frame)))
 
     def _time(self, frame: int) -> float:
-        """Return the time of a frame, equal to Clock.frame_time."""
+        """Return the time of a frame, which is equal to Clock.frame_time."""
         return self._end * (frame / self._frames) if frame < self._frames else self._end

@@ -1,5 +1,5 @@
-"""Conversion of a whole model into the bytes of a snapshot (cases/output/snapshot.py), and of all its tets into the
-bytes for sections.
+"""Conversion of a whole model into the bytes of a snapshot (cases/output/snapshot.py), and into the bytes of all tets
+for sections.
 """
 
 from collections.abc import Callable
@@ -27,11 +27,12 @@ UNITS = {
     "speed": "m/s", "broken_faces": "", "plastic_strain": "", "temperature": "K", "damage": "", "mises": "Pa",
     "pressure": "Pa", "principal_stress": "Pa",
 }  # fmt: skip
-"""Units of the fields. ``broken_faces`` is the share of a tet's faces that are broken."""
+"""Units of the fields. The field ``broken_faces`` is the fraction of a tet's faces that are broken."""
 
 
 _PERCENTILES = 0.0, 0.5, 99.5, 100.0
-"""Percentiles of the values of a field. Chosen values: 0.5 % of the values at each end count as extremes."""
+"""Percentiles of the values of a field that are computed. Chosen values: 0.5 % of the values at each end count as
+extremes."""
 
 
 @dataclass(frozen=True)
@@ -44,26 +45,26 @@ class Budget:
 
 @dataclass(frozen=True)
 class Made:
-    """A snapshot, and the further fields of its line in the journal."""
+    """A snapshot, and the other fields of its line in the journal."""
 
     data: bytes
     tets: bytes
-    """All tets for sections, packed; empty if there are no tets or more than ``volume.MOST_TETS``."""
+    """All tets for sections, packed. Empty if there are no tets, or more than ``volume.MOST_TETS``."""
     triangles: int
     fragments: int
     smallest: int
-    """First size of the histogram of fragments (``table.by_size``)."""
+    """First size class of the histogram of fragments (``table.by_size``)."""
     sizes: list[int]
     fields: dict[str, list[float]]
-    """Statistics of each field: smallest value, 0.5 and 99.5 percentile, and largest value."""
+    """Statistics of each field: smallest value, 0.5 percentile, 99.5 percentile, and largest value."""
 
 
 Births = Callable[[Ints], Floats]
-"""Callback that returns (g,) times of birth, s, of the fragments with these numbers."""
+"""Callback that returns (g,) times of birth, s, of the fragments with the given numbers."""
 
 
 def made(whole: Whole, stamp: dict[str, Any], births: Births, budget: Budget) -> Made:
-    """Return the snapshot of a model. ``stamp``: n, step, t, ranks and walls for the header."""
+    """Return the snapshot of a model. ``stamp``: entries of the header (n, step, t, ranks and walls)."""
     labels = np.concatenate([np.zeros(0, np.int64), *connectivity.labels(whole.model, whole.held, SerialComm())])
     every = table.measured(whole, _numbers(whole, labels))
     columns, row = table.columns(every, births(every.label))
@@ -94,9 +95,9 @@ def made(whole: Whole, stamp: dict[str, Any], births: Births, budget: Budget) ->
 def _numbers(whole: Whole, labels: Ints) -> Ints:
     """Return (tets,) the number of the fragment of each tet.
 
-    If bodies are separated by erosion only, there is no record of fragments. In that case the largest piece of each
-    part has the number of the part. The number of every other piece is the number of parts plus the index of the
-    first tet of the piece.
+    If only erosion can separate bodies, there is no record of fragments. In that case the largest piece of each part
+    has the number of the part. The number of every other piece is the number of parts plus the index of the first tet
+    of the piece.
     """
     if whole.initial:
         return numbered(whole.numbers, labels, whole.next, SerialComm())[0]
@@ -112,7 +113,7 @@ def _numbers(whole: Whole, labels: Ints) -> Ints:
 def _tets(whole: Whole, header: Header, corners: Ints, values: dict[str, Floats], row: Ints) -> bytes:
     """Return all tets, packed.
 
-    ``corners`` (tets, 4): indices of their nodes; ``row`` (tets,): row of the fragment of each tet.
+    ``corners`` (tets, 4): indices of the nodes of each tet; ``row`` (tets,): row of the fragment of each tet.
     """
     places = _in_box(whole.model.nodes.x, header.box)
     nodes, over, order = volume.ordered(places, corners)
@@ -130,7 +131,7 @@ def _packed(header: Header, arrays: dict[str, "np.ndarray"]) -> bytes:
 
 
 def _levels(of: dict[str, Floats]) -> tuple[dict[str, Field], dict[str, "np.ndarray"]]:
-    """Return the header entries of fields (m,), and their arrays."""
+    """Return the header entries of fields (m,), and the arrays of the fields."""
     fields, arrays = {}, {}
     for name, values in of.items():
         low, high, arrays[FIELD + name] = _in_bits(values)
@@ -139,13 +140,13 @@ def _levels(of: dict[str, Floats]) -> tuple[dict[str, Field], dict[str, "np.ndar
 
 
 def _ranges(of: dict[str, Floats]) -> dict[str, list[float]]:
-    """Return the statistics ``Made.fields``."""
+    """Return the statistics of the fields for ``Made.fields``."""
     known = {name: values[np.isfinite(values)] for name, values in of.items()}
     return {name: np.percentile(values, _PERCENTILES).tolist() for name, values in known.items() if len(values)}
 
 
 def _drawn(whole: Whole, drawn: Outline, row: Ints, box: Any) -> dict[str, "np.ndarray"]:
-    """Return the arrays of vertices and triangles, without the fields; ``row`` (g,): row of each fragment."""
+    """Return the arrays of vertices and triangles, without the fields. ``row`` (g,): row of each fragment."""
     return {
         "positions": _in_box(drawn.points, box), "triangles": drawn.triangles.astype(np.uint32),
         "vertex_fragment": row[drawn.fragment].astype(np.uint32), "triangle_rank": whole.rank[drawn.tet],
@@ -154,7 +155,7 @@ def _drawn(whole: Whole, drawn: Outline, row: Ints, box: Any) -> dict[str, "np.n
 
 
 def _fields(whole: Whole) -> dict[str, Floats]:
-    """Return (tets,) for each field except the speed."""
+    """Return all fields except the speed, one array (tets,) for each field."""
     values = dict(whole.rows)
     if any(len(block.bond) for block in whole.model.blocks):
         shares = [(b.bond > 0).mean(axis=1) if len(b.bond) else np.zeros(b.n) for b in whole.model.blocks]
@@ -163,7 +164,7 @@ def _fields(whole: Whole) -> dict[str, Floats]:
 
 
 def _velocity(model: Model, drawn: Outline) -> Floats:
-    """Return (m, 3) the mean velocity of the original nodes of each triangle, m/s."""
+    """Return (m, 3) the velocity of each triangle, m/s, which is the mean velocity of its original nodes."""
     v = model.nodes.v[drawn.faces]
     return np.asarray((v[:, 0] + v[:, 1] + v[:, 2]) / 3.0)
 
@@ -185,14 +186,14 @@ def _box(points: Floats) -> Any:
 
 
 def _in_box(points: Floats, box: Any) -> "np.ndarray":
-    """Return (v, 3) uint16 positions in a box."""
+    """Return (v, 3) positions of points in a box, as uint16 numbers."""
     low, high = np.array(box)
     places = np.rint((points - low) * (65535.0 / np.where(high > low, high - low, 1.0)))
     return np.asarray(np.clip(places, 0, 65535).astype(np.uint16))
 
 
 def _in_bits(values: Floats) -> tuple[float, float, "np.ndarray"]:
-    """Return the lowest and the highest of values (m,), and uint8 levels between these two."""
+    """Return the lowest and the highest of the values (m,), and the values as uint8 levels between these two."""
     low, high = float(values.min(initial=np.inf)), float(values.max(initial=-np.inf))
     if not low < high:
         return (low, low, np.zeros(len(values), np.uint8)) if len(values) else (0.0, 0.0, np.zeros(0, np.uint8))

@@ -1,5 +1,5 @@
-"""Side thread of a rank. The courier thread writes the copied state of the rank to disk. On rank 0 it also sends tasks
-to the packer, which makes snapshots from the shares.
+"""Side thread of a rank (courier). It writes the copied state of the rank to disk. On rank 0 it also sends tasks to the
+packer, the process that makes snapshots from the copies of all ranks.
 """
 
 import contextlib
@@ -22,15 +22,15 @@ from . import share
 from .share import Share
 
 _FAREWELL = 30.0
-"""Time for the last snapshots after the last step, s. Chosen value: a hundred times the duration of one snapshot of
-150,000 tets."""
+"""Longest time for which the last snapshots are awaited after the last step, s. Chosen value: a hundred times the
+duration of one snapshot of 150,000 tets."""
 _SECRETS = ("CONOID_ZENOH_USER", "CONOID_ZENOH_PASSWORD")
 
 log = logging.getLogger("conoid.worker")
 
 
 class Courier:
-    """Queue and thread for the shares of a rank. The solver never waits for the thread."""
+    """Queue and thread for the copied state of a rank. The solver never waits for the thread."""
 
     def __init__(self, folder: Path, rank: int) -> None:
         self._folder, self._rank = folder, rank
@@ -38,17 +38,18 @@ class Courier:
         self._packer: subprocess.Popen[str] | None = None
         self._thread: threading.Thread | None = None
         self.answers: deque[tuple[dict[str, Any], bytes]] = deque()
-        """Answers on rank 0, one for each task: the fields of the task with the snapshot, or an ``error``."""
+        """Answers to the tasks, on rank 0. An answer has the fields of the task and the snapshot, or the field
+        ``error``."""
         self.under_way = 0
-        """Number of tasks without an answer."""
+        """Number of tasks that have no answer yet."""
 
     @property
     def packer(self) -> int | None:
-        """Id of the process that makes the snapshots, or None."""
+        """Id of the process that makes the snapshots; None if there is no process."""
         return None if self._packer is None else self._packer.pid
 
     def send(self, task: dict[str, Any], given: Share) -> None:
-        """Queue a share for the snapshot ``task["n"]``."""
+        """Queue the copied state of the rank for the snapshot number ``task["n"]``."""
         if self._thread is None:
             self._thread = threading.Thread(target=self._work, name="snapshots", daemon=True)
             self._thread.start()
@@ -56,14 +57,14 @@ class Courier:
         self._tasks.put((task, given))
 
     def close(self) -> None:
-        """Return when all tasks are done, or after a time limit."""
+        """Wait until all tasks are done, or until a time limit, and return."""
         if self._thread is not None:
             self._tasks.put(None)
             self._thread.join(_FAREWELL)
         self._end()
 
     def _end(self) -> None:
-        """End the packer; the next task starts another packer."""
+        """End the packer process. The next task starts another packer process."""
         if self._packer is not None:
             with contextlib.suppress(OSError):
                 self._packer.kill()
@@ -72,16 +73,15 @@ class Courier:
         self._packer = None
 
     def _work(self) -> None:
-        """Work on the tasks of the queue.
+        """Process the tasks of the queue.
 
-        Launchers send the requests to stop to all processes of a rank, and the packer must make the last snapshot.
-        Therefore the packer inherits the blocked signals of this thread from its start, and ends with its standard
-        input.
+        A launcher sends the requests to stop to all processes of a rank, but the packer must make the last snapshot.
+        Therefore the packer inherits the blocked signals of this thread, and ends when its standard input ends.
         """
         signal.pthread_sigmask(signal.SIG_BLOCK, REQUESTS)
         while (task := self._tasks.get()) is not None:
             try:
-                (self._folder / layout.SNAPSHOTS).mkdir(exist_ok=True)  # the folder may have been removed
+                (self._folder / layout.SNAPSHOTS).mkdir(exist_ok=True)  # a user may have removed the folder
                 share.write(layout.share(self._folder, task[0]["n"], self._rank), task[1])
                 if self._rank == 0:
                     self._ask(task[0])
@@ -91,7 +91,7 @@ class Courier:
                     self.answers.append(({**task[0], "error": str(error)}, b""))
 
     def _ask(self, task: dict[str, Any]) -> None:
-        """Have the packer make a snapshot. Raises OSError, ValueError."""
+        """Send the task to the packer and wait for the snapshot. Raises OSError, ValueError."""
         if self._packer is None:
             self._packer = _started(self._folder)
         assert self._packer.stdin is not None

@@ -1,9 +1,9 @@
 """Decimation of the outline: vertices in one cell of a grid are merged (Rossignac and Borrel 1993).
 
-Each fragment has cells of its own size, at most half its extent, so that a small fragment keeps a shape while a
-large one becomes coarser. Fragments with few triangles are unchanged. If there are more fragments than the budget of
-triangles allows, the smallest fragments are omitted. All decisions depend on the whole model only, not on the number
-of ranks.
+The cells for a fragment are at most half as large as the fragment, so that a small fragment keeps a shape while a large
+fragment becomes coarser. Fragments with few triangles are unchanged. If there are more fragments than the budget of
+triangles allows, the smallest fragments are omitted. All decisions depend on the whole model, not on the number of
+ranks.
 """
 
 from collections.abc import Callable
@@ -15,15 +15,16 @@ from ..model.state import Floats, Ints
 from .outline import Outline
 
 _FINENESS = 2.0**0.25
-"""Ratio of successive cell sizes. Chosen value: at most a third of the budget of triangles is unused."""
+"""Ratio of two successive cell sizes. Chosen value: at most a third of the budget of triangles is unused."""
 _LEAST = 8
-"""Smallest number of triangles in the budget for each fragment. Chosen value: the number of triangles of two tets."""
+"""Smallest number of triangles that the budget has for each fragment. Chosen value: the number of triangles of two
+tets."""
 _SIMPLE = 8
-"""Largest number of triangles of a fragment that stays unchanged. Chosen value."""
+"""Largest number of triangles of a fragment that is not decimated. Chosen value."""
 _SIZES = 128
-"""Number of cell sizes. The sizes decrease from the whole box to 2^-32 of the box."""
+"""Number of cell sizes. The cell size decreases from the whole box to 2^-32 of the box."""
 Fits = Callable[[Outline], bool]
-"""Callback: whether an outline is within the budget."""
+"""Callback that returns whether an outline is within the budget."""
 
 
 def to_budget(outline: Outline, mass: Floats, most: int, fits: Fits) -> Outline:
@@ -51,7 +52,9 @@ def to_budget(outline: Outline, mass: Floats, most: int, fits: Fits) -> Outline:
 
 
 def _fewest(outline: Outline, mass: Floats, fits: Fits) -> Outline:
-    """Halve the number of fragments until the outline is within the budget, if no cells are coarse enough."""
+    """Return the outline for the case that no cells are coarse enough: the number of fragments is halved until the
+    outline is within the budget.
+    """
     most = len(np.unique(outline.fragment))
     while most and not fits(outline):
         most //= 2
@@ -61,8 +64,8 @@ def _fewest(outline: Outline, mass: Floats, fits: Fits) -> Outline:
 
 
 def _heaviest(mass: Floats, most: int) -> "np.ndarray":
-    """Return (fragments,) which fragments are among the heaviest. If several fragments have the same mass, the first of
-    them is chosen.
+    """Return (fragments,) whether each fragment is among the heaviest fragments. If several fragments have the same
+    mass, the first of them is chosen.
     """
     chosen = np.zeros(len(mass), bool)
     chosen[np.argsort(-mass, kind="stable")[:most]] = True
@@ -78,7 +81,9 @@ def _extents(outline: Outline, fragments: int) -> Floats:
 
 
 def _level(outline: Outline, longest: float, most: int) -> int:
-    """Return the first level of the search: its cells have about as many faces as the budget has triangles."""
+    """Return the level of cell size at which the search begins. At this level there are about as many cell faces as the
+    budget has triangles.
+    """
     a, b, c = (outline.points[outline.triangles[:, k]] for k in range(3))
     area = float(np.sqrt((np.cross(b - a, c - a) ** 2).sum(axis=1)).sum()) / 2.0
     size = max(np.sqrt(2.0 * area / most), 1e-9 * longest) if most else longest
@@ -86,8 +91,8 @@ def _level(outline: Outline, longest: float, most: int) -> int:
 
 
 def _merged(outline: Outline, extent: Floats, longest: float, level: int) -> Outline:
-    """Return the outline with one vertex a cell, at the mean position of its vertices; degenerate and duplicate
-    triangles are removed.
+    """Return the outline with one vertex for each cell, at the mean position of the vertices in the cell. Degenerate
+    and duplicate triangles are removed.
     """
     size = np.minimum(longest * _FINENESS**-level, 0.5 * extent)
     count = np.bincount(outline.fragment[outline.triangles[:, 0]], minlength=len(extent))
@@ -108,7 +113,7 @@ def _merged(outline: Outline, extent: Floats, longest: float, level: int) -> Out
 
 
 def _distinct(triangles: Ints) -> Ints:
-    """Return the rows with three different vertices, without repetitions."""
+    """Return the triangles that have three different vertices, each triangle once."""
     corners = np.sort(triangles, axis=1)
     whole = np.flatnonzero((corners[:, 1:] != corners[:, :-1]).all(axis=1))
     a, b, c = corners[whole].T

@@ -1,4 +1,4 @@
-"""Invariants of stresses for pictures: von Mises stress, pressure, largest principal stress."""
+"""Stress invariants for pictures: von Mises stress, pressure, largest principal stress."""
 
 import numpy as np
 
@@ -6,11 +6,11 @@ from ..model.state import Floats
 
 
 def of(rows: "np.ndarray") -> dict[str, Floats]:
-    """Return the invariants by name, (n,) Pa each; ``rows`` (7, n): deviatoric stress in the order xx, yy, zz, yz, zx,
-    xy, and the pressure.
+    """Return the invariants, keyed by name, as arrays (n,), Pa. ``rows`` (7, n): deviatoric stress in the order xx, yy,
+    zz, yz, zx, xy, and the pressure.
 
-    The largest principal stress is 2 sqrt(J2/3) cos(a) - p with cos(3a) = (J3/2) (3/J2)^(3/2), 0 <= a <= pi/3
-    (Malvern 1969, Introduction to the mechanics of a continuous medium, 3.3).
+    The largest principal stress is 2 sqrt(J2/3) cos(a) - p with cos(3a) = (J3/2) (3/J2)^(3/2), 0 <= a <= pi/3 (Malvern
+    1969, Introduction to the mechanics of a continuous medium, 3.3).
     """
     xx, yy, zz, yz, zx, xy, pressure = np.where(np.isfinite(rows), rows, 0.0).astype(np.float64)
     second = 0.5 * (xx * xx + yy * yy + zz * zz) + yz * yz + zx * zx + xy * xy

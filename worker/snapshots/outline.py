@@ -1,4 +1,6 @@
-"""Outline of fragments: the triangles of their surfaces that are visible, also when the fragments are drawn apart."""
+"""Outline of fragments: the visible triangles of their surfaces. The outline is complete even if the fragments are
+drawn apart.
+"""
 
 from dataclasses import dataclass
 
@@ -18,14 +20,14 @@ class Outline:
     fragment: Ints
     """(v,) number of the fragment of each vertex."""
     triangles: Ints
-    """(m, 3) vertices, anticlockwise seen from outside."""
+    """(m, 3) vertices of each triangle, anticlockwise seen from outside."""
     tet: Ints
-    """(m,) index of the tet of each triangle in the model."""
+    """(m,) index in the model of the tet of each triangle."""
     faces: Ints
     """(m, 3) indices of the original nodes of each triangle."""
 
     def chosen(self, rows: Ints) -> "Outline":
-        """Return the outline of these triangles and their vertices."""
+        """Return the outline that consists of the triangles ``rows`` and their vertices."""
         used, corners = np.unique(self.triangles[rows], return_inverse=True)
         triangles = corners.reshape(-1, 3)
         return Outline(self.points[used], self.fragment[used], triangles, self.tet[rows], self.faces[rows])
@@ -34,8 +36,8 @@ class Outline:
 def find(model: Model, fragment: Ints) -> Outline:
     """Return the outline of a whole model; ``fragment`` (tets,): number of the fragment of each tet.
 
-    The surface contains the exposed faces, the faces between two fragments, and the sides of open cracks; a closed
-    crack within a fragment is not visible.
+    The outline contains the exposed faces, the faces between two fragments, and the sides of open cracks. A closed
+    crack within a fragment is not part of the outline.
     """
     ids = np.concatenate([np.zeros(0, np.int64), *(block.id for block in model.blocks)])
     order = np.argsort(ids)
@@ -49,9 +51,9 @@ def find(model: Model, fragment: Ints) -> Outline:
 
 
 def _seen(block: Block, known: Ints, fragments: Ints, own: Ints) -> "np.ndarray":
-    """Return (n, 4) which faces of a block are part of the outline.
+    """Return (n, 4) whether each face of a block is part of the outline.
 
-    ``fragments``: fragments of the tets with ``known`` ids.
+    ``fragments``: fragments of the tets with the ids ``known``.
     """
     if not len(block.across):
         return np.asarray(across(block.tets.astype(np.int32)) < 0)

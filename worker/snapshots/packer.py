@@ -1,9 +1,10 @@
-"""Process that makes snapshots of the shares of the ranks: ``python -m conoid.worker.snapshots.packer FOLDER``.
+"""Process that makes snapshots from shares, which are the copied states of the ranks: ``python -m
+conoid.worker.snapshots.packer FOLDER``.
 
-A thread of the solver's process would hold the interpreter lock; this process uses idle cores, except for the last
-snapshot, for which the run waits. Each line on standard input is a task, and each line on standard output an answer.
-The process ends at the end of its standard input. A snapshot is written under another name, flushed to disk and
-renamed.
+A separate process is used, because a thread of the solver's process would hold the interpreter lock. The process uses
+idle cores; only for the last snapshot the run waits. Each line on standard input is a task, and each line on standard
+output is an answer. The process ends when its standard input ends. A snapshot is written under a temporary name,
+flushed to disk and renamed.
 """
 
 import hashlib
@@ -23,16 +24,16 @@ from . import blob, share
 from .births import Births
 
 _NICE, _LOWEST = 10, 19
-"""Decrease of the priority of this process, and the lowest priority. With the decrease of 10 a rank gets nine times
-the share of a core. Chosen value: the remaining share is sufficient."""
+"""Decrease of the priority of this process, and the lowest priority. With a decrease of 10, a rank on the core of this
+process gets nine times as much CPU time as this process. Chosen value: the remaining CPU time is sufficient."""
 _TETS = 256_000_000
 """Approximate limit of the bytes of all tets in all snapshots of a run. Early snapshots use only a part of the limit,
-so that later snapshots fit too. Chosen value: a hundred snapshots of 150,000 tets in 2,900 fragments."""
+so that later snapshots are also possible. Chosen value: a hundred snapshots of 150,000 tets in 2,900 fragments."""
 _PATIENCE = 60.0
-"""Time within which the share of a rank must appear, s. Chosen value: many times the duration of writing on a slow
-disk."""
+"""Longest time until the share (copied state) of a rank must appear, s. Chosen value: many times the duration of
+writing it to a slow disk."""
 _LOOK = 0.005
-"""Interval between two tests for a share, s. Chosen value."""
+"""Interval between two checks for the share (copied state) of a rank, s. Chosen value."""
 
 
 def main(folder: Path) -> None:
@@ -47,19 +48,19 @@ def main(folder: Path) -> None:
                     answer = _made(folder, task, births)
                 else:
                     answer = behind.submit(_made, folder, task, births).result()
-            except Exception as error:  # an error of one snapshot; the next one may be made
+            except Exception as error:  # the error concerns one snapshot; the next snapshot may be made
                 answer = {"error": f"{type(error).__name__}: {error}"}
             print(json.dumps({"n": task["n"], "cpu": time.process_time() - began, **answer}), flush=True)
 
 
 def _step_back() -> None:
-    """Lower the priority of this thread; only the superuser could raise it again."""
+    """Lower the priority of this thread. Only the superuser could raise the priority again."""
     thread = threading.get_native_id()
     os.setpriority(os.PRIO_PROCESS, thread, min(os.getpriority(os.PRIO_PROCESS, thread) + _NICE, _LOWEST))
 
 
 def _made(folder: Path, task: dict[str, Any], births: Births) -> dict[str, Any]:
-    """Make a snapshot and return the fields of its journal line. Raises OSError, ValueError."""
+    """Make a snapshot and return the fields of its line in the journal. Raises OSError, ValueError."""
     paths = [layout.share(folder, task["n"], rank) for rank in range(task["ranks"])]
     try:
         whole = share.joined([_awaited(path) for path in paths], task["parts"])
@@ -96,7 +97,9 @@ def _with_tets(folder: Path, task: dict[str, Any], tets: bytes) -> int:
 
 
 def _may_keep(folder: Path, task: dict[str, Any], size: int) -> bool:
-    """Return whether the tets of later snapshots still fit after ``size`` bytes; True for the last snapshot."""
+    """Return whether the limit of bytes still allows the tets of later snapshots after ``size`` bytes; True for the
+    last snapshot.
+    """
     if task["cause"] == "end":
         return True
     kept = sum(path.stat().st_size for path in (folder / layout.SNAPSHOTS).glob(f"*{layout.TETS_SUFFIX}"))

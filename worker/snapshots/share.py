@@ -1,6 +1,8 @@
-"""Shares: the data of a rank for a snapshot, a copy of the arrays from which fragments and their surface are computed.
+"""Shares. A share is the data of a rank for a snapshot: a copy of the arrays from which fragments and their surface are
+computed.
 
-A share is a file that only the packer of the same run reads: names in one line, then the arrays.
+A share is written to a file that only the packer of the same run reads. The file has the names of the arrays in one
+line, then the arrays.
 """
 
 import json
@@ -20,12 +22,12 @@ from ..model.state import Block, Floats, Ints, Model, Nodes
 from . import invariants
 
 ROWS = {"plastic_strain": PLASTIC_STRAIN, "temperature": TEMPERATURE, "damage": DAMAGE}
-"""Rows of the state of tets that become fields, if a block has these rows."""
+"""Rows of the state of the tets from which fields are made. A block of tets may not have all of the rows."""
 _STRESSES = PRESSURE + 1 - S_XX
 _STRESS = slice(S_XX, PRESSURE + 1)
-"""Rows of the deviatoric stress and of the pressure."""
+"""State rows of the deviatoric stress and of the pressure."""
 Share = dict[str, "np.ndarray"]
-"""Arrays by name. The names of arrays of block k begin with ``k.``."""
+"""Arrays, keyed by name. The names of the arrays of block k begin with ``k.``."""
 
 
 def copied(
@@ -33,9 +35,9 @@ def copied(
 ) -> Share:
     """Return the share of a rank.
 
-    ``held`` (m, 2): ids of tets that a cohesive facet connects; ``counting``: parts with a law that has damage;
-    ``numbers``: for each block the fragments of its tets in the last frame; ``known``: number of fragments at the
-    start, and the next number.
+    ``held`` (m, 2): ids of the tets of each cohesive facet; ``counting``: parts whose material law has damage;
+    ``numbers``: fragment of each tet in the last frame, one array for each block; ``known``: number of fragments at the
+    start, and next fragment number.
     """
     nodes = model.nodes
     share = {"nodes": nodes.id.copy(), "x": nodes.x.copy(), "v": nodes.v.copy(), "held": held.copy()}
@@ -53,7 +55,7 @@ def copied(
 
 
 def write(path: Path, share: Share) -> None:
-    """Write a share under another name and rename it. Raises OSError with the name of the file."""
+    """Write a share under a temporary name and rename the file. Raises OSError with the name of the file."""
     beside = path.with_name(path.name + ".part")
     try:
         with named(path), beside.open("wb") as file:
@@ -75,31 +77,33 @@ def read(path: Path) -> Share:
 
 @dataclass
 class Whole:
-    """The model of all ranks, in the order of global ids, equal for any number of ranks."""
+    """The model of all ranks. Tets and nodes have the order of their global ids, so the model is equal for any number
+    of ranks.
+    """
 
     model: Model
-    """Blocks by part. The restored blocks have ids, tets, faces and bonds only."""
+    """Blocks of tets, one for each part. The restored blocks have ids, tets, faces and bonds only."""
     held: Ints
-    """(m, 2) pairs of tets that a cohesive facet connects (``copied``)."""
+    """(m, 2) ids of the tets of each cohesive facet (``copied``)."""
     mass: Floats
     """(tets,) mass of each tet, kg, in the order of the blocks."""
     rank: "np.ndarray"
     """(tets,) uint16 rank of each tet."""
     rows: dict[str, Floats]
-    """(tets,) arrays by name: each row of ``ROWS`` that some block has, with 0 in other blocks, and the invariants
-    of the stress."""
+    """Arrays (tets,), keyed by name: each state row of ``ROWS`` that some block has, with 0 in other blocks, and the
+    stress invariants."""
     numbers: Ints
     """(tets,) number of the fragment of each tet in the last frame."""
     initial: int
-    """Number of fragments at the start. The fragments of the start have the first numbers. The number is 0 if no part
+    """Number of fragments at the start. These fragments have the first numbers. The number is 0 if no part
     fractures."""
     next: int
-    """Number of the next new fragment."""
+    """Number that the next new fragment will get."""
 
 
 def joined(shares: Sequence[Share], parts: list[str]) -> Whole:
-    """Return the model of the shares of all ranks; the share of rank 0 is the first. The state of a node on several
-    ranks is read from the first of these ranks.
+    """Return the model that is made from the shares of all ranks; the first share is that of rank 0. If a node is on
+    several ranks, its state is read from the first of these ranks.
     """
     ids, first = np.unique(np.concatenate([share["nodes"] for share in shares]), return_index=True)
     x, v = (np.concatenate([share[name] for share in shares])[first] for name in ("x", "v"))
@@ -158,7 +162,7 @@ def _block(shares: Sequence[Share], part: int, ids: Ints) -> tuple[Block, dict[s
 
 
 def _by_tet(stress: "np.ndarray", n: int) -> "np.ndarray":
-    """Return (n, 7) rows from an array (chunks, 7, CHUNK)."""
+    """Return (n, 7) rows, one for each tet, from an array (chunks, 7, CHUNK)."""
     return stress.transpose(0, 2, 1).reshape(-1, _STRESSES)[:n]
 
 

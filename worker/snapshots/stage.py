@@ -1,8 +1,8 @@
 """Schedule of the snapshots.
 
-The cost of a snapshot for the solver is a copy (``share``), which a side thread writes (``courier``). All ranks copy
-between the same two halves of a step, at the place where frames are written. Rank 0 requests the copy in the
-reduction of the step before.
+For a snapshot the solver only copies its data (``share``); a side thread writes the copy (``courier``). All ranks make
+the copy between the same two halves of a step, where frames are written. Rank 0 requests the copy in the reduction of
+the previous step.
 """
 
 import math
@@ -24,16 +24,16 @@ from .courier import Courier
 from .share import copied
 
 _APART = 1.0
-"""Smallest wall time between two scheduled snapshots, s. Chosen value: people do not watch more often."""
+"""Smallest wall time between two scheduled snapshots, s. Chosen value: users do not need more frequent snapshots."""
 _SHARE = 1.0 / 200.0
-"""Share of the time of a run that copies may take."""
+"""Fraction of the time of a run that copies may take."""
 _CROWDED = 1.0 / 20.0
-"""Share of a core for the process that makes snapshots, if ranks use all cores. All ranks wait for the rank on the
-core of this process. Chosen value: a run takes at most a twentieth longer, and a body of 150,000 tets still has a
-snapshot every 6 s."""
+"""Fraction of a core that the process that makes snapshots may use, if ranks use all cores. All ranks wait for the rank
+on the core of this process. Chosen value: a run takes at most a twentieth longer, and a body of 150,000 tets still has
+a snapshot every 6 s."""
 
 _EARLY = 1e-6
-"""Time by which a snapshot may be early, as a share of the time between two snapshots. The value is far above
+"""Largest time by which a snapshot may be early, divided by the time between two snapshots. The value is far above
 round-off."""
 
 
@@ -41,12 +41,13 @@ class Snapshots:
     """The snapshots of a run; ``journal``: None on all ranks except 0."""
 
     def __init__(self, sim: Simulation, folder: Path, journal: Journal | None) -> None:
-        """Start with the number after the last snapshot in the journal. Collective."""
+        """Start with the number that follows the last snapshot in the journal. Collective."""
         self._folder, self._journal, self._case, self._comm = folder, journal, sim.case, sim.comm
         self._n: int = sim.comm.broadcast(journal.snapshots if journal is not None else 0)
         self._courier = Courier(folder, sim.comm.rank)
         self.next_time = math.inf
-        """Simulated time before which no snapshot is scheduled, s. Requested snapshots are not limited by this time."""
+        """Simulated time before which no snapshot is scheduled, s. This time does not limit snapshots that a user
+        requests."""
         self._wait(self._place(sim.clock) + 1)
         self._taken = self._took = self._packed = 0.0
         self._crowded = len(os.sched_getaffinity(0)) <= sim.comm.size
@@ -58,9 +59,9 @@ class Snapshots:
         sim.comm.barrier()
 
     def due(self, clock: Clock, now: float, *, look: bool) -> bool:
-        """Return whether to make a snapshot of the next state. Rank 0 alone calls this method.
+        """Return whether a snapshot of the next state must be made. Only rank 0 calls this method.
 
-        ``look``: whether to test for a request.
+        ``look``: whether to check for a request of a user.
         """
         self._asked_for = self._asked_for or (look and (self._folder / layout.SNAPSHOT_REQUEST).exists())
         if self._courier.under_way:
@@ -70,11 +71,13 @@ class Snapshots:
 
     @property
     def asked_for(self) -> bool:
-        """Whether a snapshot is requested and not made yet."""
+        """Whether a snapshot is requested and not yet made."""
         return self._asked_for
 
     def look(self, sim: Simulation, *, due: bool, ending: bool) -> None:
-        """Copy the present state if a snapshot is ``due``, or if the state is the first or the last one."""
+        """Copy the present state if a snapshot is ``due``, or if the state is the first or the last state of the
+        run.
+        """
         wanted = self._case.run.snapshots > 0
         first = wanted and sim.clock.step == 0
         if not (due or first or (wanted and ending)):
@@ -90,7 +93,7 @@ class Snapshots:
         self._took = self._taken - began
 
     def tell(self) -> None:
-        """Write the messages of finished snapshots, on rank 0."""
+        """Write the messages about finished snapshots. Only on rank 0."""
         answers = self._courier.answers
         while answers:
             answer, data = answers.popleft()
@@ -108,23 +111,25 @@ class Snapshots:
             self._journal.write(messages.Snapshot, **values)
 
     def close(self) -> None:
-        """Wait for the last snapshot and write its message.
+        """Wait for the last snapshot and write the message about it.
 
-        Collective. The waiting ranks leave their cores to the packer.
+        Collective. The waiting ranks do not use their cores, so the packer can use them.
         """
         self._courier.close()
         self.tell()
         self._comm.await_all()
 
     def _wait(self, place: int) -> None:
-        """Set the number of the next evenly spaced time, and the time of the test, which is slightly earlier."""
+        """Set the number of the next of the evenly spaced times. Set also the time at which this is tested, which is
+        slightly earlier.
+        """
         self._next = place
         run = self._case.run
         if run.snapshots:
             self.next_time = (place - _EARLY) / run.snapshots * run.end_time
 
     def _place(self, clock: Clock) -> int:
-        """Return how many evenly spaced times are reached."""
+        """Return how many of the evenly spaced times have been reached."""
         run = self._case.run
         return math.floor(clock.t / run.end_time * run.snapshots) if run.snapshots else -1
 
@@ -156,7 +161,9 @@ def pause(copying: float, packing: float, *, crowded: bool) -> float:
 
 
 def _clear(folder: Path, n: int) -> None:
-    """Remove files of a killed worker, and snapshots from ``n`` on, which are not in the journal."""
+    """Remove files of a killed worker. Remove also snapshots with numbers from ``n`` on, which are not in the
+    journal.
+    """
     place = folder / layout.SNAPSHOTS
     place.mkdir(exist_ok=True)
     for path in place.iterdir():

@@ -1,4 +1,6 @@
-"""Table of the fragments in a snapshot: the heaviest fragments first, and the other fragments in one row."""
+"""Table of the fragments in a snapshot. The heaviest fragments come first and have a row each; all other fragments
+share one row.
+"""
 
 from dataclasses import dataclass
 
@@ -12,13 +14,15 @@ from ..parallel.comm import SerialComm
 from .share import Whole
 
 MOST_ROWS = 2048
-"""Largest number of fragments with a row of their own. Chosen value: their rows take a tenth of the bytes of a
-snapshot, and a user selects fewer fragments."""
+"""Largest number of fragments that have a row of their own in the table. Chosen value: these rows take a tenth of the
+bytes of a snapshot, and a user selects fewer fragments."""
 
 
 @dataclass
 class Table:
-    """All fragments of a model, by ascending label. The values are bit-identical to ``fragments.table``."""
+    """All fragments of a model, in ascending order of their labels. The values are bit-identical to those of
+    ``fragments.table``.
+    """
 
     label: Ints
     """(g,) label of each fragment."""
@@ -57,7 +61,9 @@ def measured(whole: Whole, labels: Ints) -> Table:
 
 
 def columns(table: Table, birth: Floats) -> tuple[dict[str, "np.ndarray"], Ints]:
-    """Return the arrays of a snapshot, and (g,) the row of each fragment. ``birth`` (g,): time of birth, s."""
+    """Return the arrays of a snapshot for the table, and (g,) the row of each fragment. ``birth`` (g,): time of birth,
+    s.
+    """
     order = np.argsort(-table.mass, kind="stable")
     listed, rest = order[:MOST_ROWS], order[MOST_ROWS:]
     row = np.empty(len(order), np.int64)
@@ -76,7 +82,7 @@ def columns(table: Table, birth: Floats) -> tuple[dict[str, "np.ndarray"], Ints]
 
 
 def _rest(table: Table, rest: Ints) -> dict[str, "np.ndarray"]:
-    """Return one row for the fragments ``rest``: sums and means, without a size and a time of birth."""
+    """Return the one row for all fragments ``rest``. The row has sums and means, but no size and no time of birth."""
     mass = table.mass[rest]
     total = mass.sum()
     return {
@@ -88,10 +94,10 @@ def _rest(table: Table, rest: Ints) -> dict[str, "np.ndarray"]:
 
 
 def by_size(size: Floats) -> tuple[int, list[int]]:
-    """Return the histogram of the ``size`` (g,), m, of fragments: a first number k, and counts.
+    """Return a histogram of the sizes ``size`` (g,), m, of fragments: a first number k, and counts.
 
-    Count i is the number of fragments with sizes from 2^((k+i)/2) m up to the next bound. Fragments without extent
-    are omitted.
+    Count i is the number of fragments with sizes from 2^((k+i)/2) m up to the next bound. Fragments without extent are
+    omitted.
     """
     steps = np.floor(2.0 * np.log2(size[size > 0.0])).astype(np.int64)
     if not len(steps):

@@ -1,8 +1,8 @@
-"""All tets of a model in few bytes, for sections; in the layout of a snapshot (cases/output/snapshot.py).
+"""All tets of a model in few bytes, for sections. The layout is that of a snapshot (cases/output/snapshot.py).
 
-Nodes are in the order of a Z-curve through the box (Morton 1966). The four nodes of a tet are ascending, and the
-tets are sorted by their nodes. Differences of successive values are therefore small, and gzip compresses the zeros
-of their high bytes.
+Nodes are in the order of a Z-curve through the box (Morton 1966). The four nodes of a tet are ascending, and the tets
+are sorted by their nodes. Therefore the differences of successive values are small, and gzip compresses the zeros of
+their high bytes.
 """
 
 import gzip
@@ -15,13 +15,15 @@ MOST_TETS = 1_000_000
 """Largest number of tets of a model for which the file is written. Chosen value: a page cuts this number of tets in
 20 ms, and their file is made in 0.9 s of CPU time."""
 _BITS = 10
-"""Number of bits of a coordinate on the Z-curve. Chosen value: finer than meshes of ``MOST_TETS`` tets."""
+"""Number of bits of a coordinate on the Z-curve. With the chosen value the resolution is finer than meshes of
+``MOST_TETS`` tets."""
 _LEVEL = 1
-"""Level of gzip. Chosen value: level 6 takes three times as long for 5 % fewer bytes."""
+"""Compression level of gzip. Chosen value: level 6 takes three times as long and saves 5 % of the bytes."""
 
 
 def ordered(places: "np.ndarray", tets: Ints) -> tuple["np.ndarray", Ints, Ints]:
-    """Return the nodes in their order (k,), the tets over them (n, 4), and the original row of each tet (n,).
+    """Return three arrays: the nodes in the order of the Z-curve (k,), the tets with indices of these nodes (n, 4), and
+    the original row of each tet (n,).
 
     ``places``: (v, 3) uint16 positions; ``tets``: (n, 4) nodes.
     """
@@ -45,11 +47,11 @@ def _along(places: "np.ndarray") -> Ints:
 
 
 def steps(corners: Ints) -> "np.ndarray":
-    """Return (4, 4, n) uint8 bytes of differences modulo 2^32: for each byte of 32 bits, lowest first, and for each
-    corner.
+    """Return (4, 4, n) bytes (uint8) of differences modulo 2^32. The first index is the byte of the 32 bits, lowest
+    first; the second index is the corner.
 
-    The first node of a tet is subtracted from the first node of the tet before, each other node from the node of the
-    corner before.
+    The first node of a tet is compared with the first node of the previous tet; each other node is compared with the
+    previous corner of its tet.
     """
     change = np.concatenate([np.diff(corners[:, :1], axis=0, prepend=0), np.diff(corners, axis=1)], axis=1)
     words = np.ascontiguousarray(change.T).astype("<u4")
