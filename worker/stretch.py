@@ -54,15 +54,16 @@ from .stretch_numbers import (
 )
 
 _POLL = 0.05
-"""Largest wall time of a program, s. Chosen value: signals are answered in a time that no user notices."""
+"""Largest wall time of a program, s. With the chosen value the answer to a signal comes after a time that no user
+notices."""
 _SHORT, _PAUSE = 4, 16
 """A program is begun only if no output is scheduled within _SHORT steps. After an event in a program of fewer steps,
-the next _PAUSE steps are executed without a program, so that a scene that is never quiet for long does not pay for
-programs. Chosen values: to begin a program costs as much as a step of a small scene."""
+the next _PAUSE steps are executed without a program, so that a scene that is quiet only for short times spends no time
+on programs. Chosen values: to begin a program takes as long as a step of a small scene."""
 
 
 class Until(NamedTuple):
-    """First time at which other code than a program is needed."""
+    """First time at which code outside of the program is needed."""
 
     wall: float
     """Wall time, s."""
@@ -74,13 +75,13 @@ class Until(NamedTuple):
 
 @dataclass(frozen=True)
 class _Part:
-    """A stage of the program with its phase, and the block of which it computes the elements."""
+    """A stage of the program with its phase and, if it computes elements, the block of these elements."""
 
     phase: str
     stage: Stage
     block: Block | None = None
     alone: bool = False
-    """Whether the stage is outside of regions: one thread computes it by nature."""
+    """Whether the stage is outside of parallel regions, because only one thread can compute it."""
 
 
 class Stretch:
@@ -98,8 +99,9 @@ class Stretch:
         self._ties = Ties(np.zeros(0, np.int64), np.zeros(0), np.zeros(0, np.int64))
 
     def run(self, until: Until) -> int:
-        """Executes quiet steps, from row 11 of the present step on. Returns their number; then ``step.complete`` must
-        complete the last of them. Returns 0, and changes nothing, if the present step is not quiet.
+        """Executes quiet steps, from row 11 of the present step on, and returns their number. After the call,
+        ``step.complete`` must complete the last of these steps. If the present step is not quiet, nothing changes and 0
+        is returned.
         """
         sim = self._sim
         if not self._possible or not self._is_quiet(until):
@@ -121,7 +123,9 @@ class Stretch:
         return steps
 
     def _is_quiet(self, until: Until) -> bool:
-        """Returns whether a program is worth while: whether other code is needed at the end of the present step."""
+        """Returns whether a program is useful. It is not useful if code outside of the program is needed at the end of
+        the present step.
+        """
         sim, clock = self._sim, self._sim.clock
         if clock.t + _SHORT * clock.dt >= until.t or clock.step + _SHORT >= until.step or clock.starved:
             return False
@@ -130,7 +134,7 @@ class Stretch:
         return (sim.fracture is None or sim.fracture.intact) and (sim.erosion is None or sim.erosion.idle)
 
     def _parts(self) -> list[_Part] | None:
-        """Returns the program; None if a stage needs other code than kernels."""
+        """Returns the stages of the program; None if a stage needs code outside of kernels."""
         sim, nodes = self._sim, self._sim.model.nodes
         ending = sim.elements.ending(Follow(SCALE))
         acting = self._acting(sim.acts.before_contact), self._acting(sim.acts.after_contact)
@@ -158,7 +162,7 @@ class Stretch:
         return Stage(decide, self._decide.set(self._words, self._numbers, peaks, self._ties), *one)
 
     def _begin(self, until: Until) -> None:
-        """Sets words and numbers to the present state."""
+        """Sets the words and numbers of the program to the present state of the simulation."""
         sim, clock, words, numbers = self._sim, self._sim.clock, self._words, self._numbers
         words[STOP] = words[STEPS] = 0
         words[MOST_STEPS] = min(until.step - clock.step, 2**62)
@@ -181,7 +185,7 @@ class Stretch:
         self._sim.elements.scratches.peaks[:] = 0
 
     def _end(self, parts: list[_Part], spent: Ints) -> None:
-        """Sets the simulation to the state in which the program ended; ``spent`` (parts,): time of each stage, ns."""
+        """Sets the simulation to the state in which the program ended. ``spent`` (parts,): time of each stage, ns."""
         sim, steps = self._sim, int(self._words[STEPS])
         sim.clock.go_on(steps, self._numbers[: len(sim.clock.numbers)].tolist())
         sim.scale = float(self._numbers[SCALE])

@@ -1,4 +1,4 @@
-"""Numbers of a program of quiet steps (stretch.py), and the stage that decides: it ends a step or the program."""
+"""Numbers of a program of quiet steps (stretch.py), and the stage ``decide``, which ends a step or the program."""
 
 import math
 from typing import NamedTuple
@@ -16,31 +16,32 @@ from .parallel.team import TASK
 from .parallel.words import now, write_real
 
 SCALE, NEXT_SCALE, IMPULSE_QUANTUM, SHORTER_QUANTUM = range(STABLE + 1, STABLE + 5)
-"""Numbers after those of the clock: quanta per newton of the present forces and of the next forces; mean of two steps
-over the scale, N s; a quarter of the difference of two steps over the scale (motion.py)."""
+"""Indices of numbers that follow those of the clock: quanta per newton of the present forces, and of the next forces;
+mean of two steps divided by the scale, N s; a quarter of the difference of two steps divided by the scale
+(motion.py)."""
 SAFETY, GROWTH, LEAST_STABLE, LANDING, NEXT, FLOOR, MANY = range(SHORTER_QUANTUM + 1, SHORTER_QUANTUM + 8)
-"""Numbers that are constant in a program: limits of the clock (``Clock.limits``); time of the first output or request,
-s; force, N, down to which the scale is refined. MANY: the number of all numbers."""
+"""Indices of numbers that are constant in a program: limits of the clock (``Clock.limits``); time of the first output
+or request, s; force, N, down to which the scale is refined. MANY: the number of all numbers."""
 STOP, STEPS, MOST_STEPS, DEADLINE, TIME = range(5)
-"""Words of a program: 0, or the reason for which the program ends; steps so far, and largest number of steps; wall
-time at which the program ends, ns; two words for reading the clock."""
+"""Indices of the words of a program: 0, or the reason why the program ends; number of steps so far, and largest number
+of steps; wall time at which the program ends, ns; two words for reading the clock."""
 SCHEDULED, EVENT = 1, 2
-"""Reasons for which a program ends."""
+"""Reasons why a program ends."""
 SIZE = TIME + 2
 """Number of words."""
 
 
 class Ties(NamedTuple):
-    """Words in the argument tables of all stages that must change with the numbers of the program
+    """Words in the argument tables of all stages that change with the numbers of the program
     (parallel/arguments.py).
     """
 
     number: Ints
-    """(k,) index of the number."""
+    """(k,) index of the number that determines each word."""
     factor: Floats
-    """(k,) constant factor."""
+    """(k,) constant factor of each word."""
     address: Ints
-    """(k,) address of the word."""
+    """(k,) address of each word."""
 
 
 _F1, _I1, _I2 = types.float64[::1], types.int64[::1], types.int64[:, ::1]
@@ -52,7 +53,7 @@ _of_decide = reader(*DECIDE)
 
 @njit(types.void(_F1, _TIES), cache=True, error_model="numpy")
 def spread(numbers, ties):  # type: ignore[no-untyped-def]
-    """Computes the quanta from the steps and the scale, and writes the numbers into the tables of the stages."""
+    """Computes the quanta from the steps and the scale. Writes the numbers into the tables of the stages."""
     numbers[IMPULSE_QUANTUM] = numbers[MEAN_DT] / numbers[SCALE]
     numbers[SHORTER_QUANTUM] = numbers[SHORTER] / numbers[SCALE]
     for k in range(len(ties.number)):
@@ -61,8 +62,8 @@ def spread(numbers, ties):  # type: ignore[no-untyped-def]
 
 @njit("int64(int64[::1], float64[::1], int64[::1])", cache=True, error_model="numpy")
 def _ends(words, numbers, peaks):  # type: ignore[no-untyped-def]
-    """Whether other code than the program must complete the step: EVENT if a tet or a force has failed, a tet is worn
-    or a face is overstressed; SCHEDULED if an output or a request is scheduled; else 0.
+    """Returns whether code outside of the program must complete the step. EVENT: a tet or a force has failed, erosion
+    will remove a tet, or a face is overstressed; SCHEDULED: an output or a request is scheduled; 0: neither.
     """
     limit = np.int64(peaks[LARGEST_LIMIT]).view(np.float64)
     force = np.int64(peaks[LARGEST_FORCE]).view(np.float64)
@@ -76,8 +77,8 @@ def _ends(words, numbers, peaks):  # type: ignore[no-untyped-def]
 
 @njit(TASK, cache=True, error_model="numpy")
 def decide(table, begin, end, thread):  # type: ignore[no-untyped-def]
-    """Stage after the elements: advances the time, then either sets STOP, or chooses the next step as step.py does and
-    prepares all tables for it.
+    """Task: the stage after the elements. It advances the time. Then it either sets STOP, or chooses the next step as
+    step.py does and prepares all tables for this step.
     """
     words, numbers, peaks, ties = _of_decide(table)
     gather_peaks(peaks)

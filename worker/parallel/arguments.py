@@ -1,9 +1,10 @@
-"""Tables of kernel arguments: 64-bit words at one address, which a kernel takes instead of records of arrays.
+"""Tables of kernel arguments. A table consists of 64-bit words at one address, and a kernel takes this address as
+argument instead of records of arrays.
 
-A call with records costs 4 us or more, since numba unpacks each of their arrays. A call with an address costs 0.2
-us, and any thread can make it. An array takes 1 + ndim words, its address and its shape. If the layout of the array
-is not C, ndim further words have its strides. A number or a flag takes one word. Arrays that a kernel reads from the
-table have no owner and no reference counts; ``Arguments`` holds references to them.
+A call with records as arguments costs 4 us or more, because numba unpacks each array of each record. A call with an
+address as argument costs 0.2 us, and any thread can make such a call. An array takes 1 + ndim words, its address and
+its shape. If the layout of the array is not C, ndim further words have its strides. A number or a flag takes one word.
+Arrays that a kernel reads from the table have no owner and no reference counts; ``Arguments`` holds references to them.
 """
 
 import ctypes
@@ -18,7 +19,7 @@ from llvmlite import ir
 from ..kernels.jit import intrinsic, packed, several, types
 
 _WORD, _BIT = ir.IntType(64), ir.IntType(1)
-"""LLVM types of a word of the table and of a flag."""
+"""LLVM types: a word of a table, and a flag."""
 _POINTER: Any = ctypes.PYFUNCTYPE(ctypes.c_int64, ctypes.py_object, ctypes.c_char_p)(
     ("PyCapsule_GetPointer", ctypes.pythonapi)
 )
@@ -27,7 +28,9 @@ _DATA = 40
 
 
 class Follow(NamedTuple):
-    """A number of a stage that changes from round to round: a number of the program times a constant factor."""
+    """A number of a stage that changes from round to round. It is the product of a number of the program and a constant
+    factor.
+    """
 
     number: int
     """Index of the number of the program."""
@@ -35,7 +38,7 @@ class Follow(NamedTuple):
 
 
 class Tie(NamedTuple):
-    """A word of a table that follows a number of a program."""
+    """A word of a table that changes with a number of the program."""
 
     number: int
     factor: float
@@ -44,7 +47,7 @@ class Tie(NamedTuple):
 
 
 class Arguments:
-    """A table for arguments of the numba types ``kinds``. A record counts as one argument."""
+    """A table for arguments of the numba types ``kinds``. A record is one argument."""
 
     def __init__(self, *kinds: Any) -> None:
         self._kinds = list(_leaves(several(*kinds)))
@@ -61,14 +64,15 @@ class Arguments:
         self._reals = self._words.cast("B").cast("d")
         self._kept: list[Any] = [None] * len(leaves)
         self.address = int(words.ctypes.data)
-        """Address of the table, for kernels."""
+        """Address of the table, which kernels take as argument."""
 
     def set(self, *values: Any) -> int:
         """Write the arguments into the table and return its address. Arguments that are already in the table are not
         written again.
 
-        Records are tuples, at the same positions in every call. Raises ValueError if an array has another type than
-        declared, or if it is not in C order although the declared type is in C order.
+        Records are tuples, and must be at the same positions in every call. Raises ValueError if an array has another
+        type than declared. Raises ValueError also if an array is not in C order although the declared type is in C
+        order.
         """
         if len(values) != len(self._values):
             sizes = [len(value) if isinstance(value, tuple) else 1 for value in values]
@@ -88,8 +92,8 @@ class Arguments:
         return self.address
 
     def bind(self, *values: Any) -> tuple[int, tuple[Tie, ...]]:
-        """Write the arguments as ``set`` does; some of the numbers are ``Follow``. Return the address of the table and
-        the words that the program writes. The next ``set`` writes these words again.
+        """Write the arguments as ``set`` does, but some of the numbers are ``Follow``. Return the address of the table,
+        and the words that the program writes. The next ``set`` writes these words again.
         """
         address = self.set(*(0.0 if isinstance(value, Follow) else value for value in values))
         ties = []
@@ -104,7 +108,9 @@ class Arguments:
         return int(self.address + self._words.itemsize * self._places[k])
 
     def put(self, first: int, leaves: tuple[Any, ...]) -> None:
-        """Write the leaves from number ``first`` on; those that are already in the table are not written again."""
+        """Write the leaves (arrays, numbers and flags) from number ``first`` on. Leaves that are already in the table
+        are not written again.
+        """
         end, kept = first + len(leaves), self._kept
         for k, value in compress(enumerate(leaves, first), map(is_not, leaves, kept[first:end])):
             self._put(k, value)
@@ -132,7 +138,7 @@ class Arguments:
 
 
 class Handle:
-    """Tables of arguments under one address, for the stages of a program: a kernel reads the tables that it needs."""
+    """Tables of arguments for the stages of a program, under one address. A kernel reads the tables that it needs."""
 
     def __init__(self, *kinds: tuple[Any, ...]) -> None:
         """``kinds``: numba types of the arguments of each table."""
@@ -143,8 +149,8 @@ class Handle:
         self.address = int(self._words.ctypes.data)
 
     def set(self, k: int, *leaves: Any) -> None:
-        """Write the arguments of the tables from number ``k`` on, one after the other, with the fields of records in
-        place of the records. Arguments that are already in the tables are not written again.
+        """Write the arguments of the tables from number ``k`` on, one table after the other. A record is replaced by
+        its fields. Arguments that are already in the tables are not written again.
         """
         self._every.put(self._first[k], leaves)
 
@@ -156,7 +162,7 @@ def _dtype(kind: Any) -> np.dtype[Any]:
 def address_of(array: Any) -> int:
     """Return the address of the first item of an array.
 
-    The result is ``array.ctypes.data``, obtained in half the time, by numpy's array interface for C.
+    The result is that of ``array.ctypes.data``. numpy's array interface for C gives it in half the time.
     """
     return int(ctypes.c_int64.from_address(_POINTER(array.__array_struct__, None) + _DATA).value)
 
@@ -180,8 +186,8 @@ def _words(kind: Any) -> int:
 
 
 def reader(*kinds: Any) -> Any:
-    """Return a function for kernels. The function reads arguments of these types at an address and returns them as a
-    tuple.
+    """Return a function for kernels. The function reads arguments of the given types at an address, and returns them as
+    a tuple.
     """
     kind = several(*kinds)
 
@@ -195,8 +201,8 @@ def reader(*kinds: Any) -> Any:
 
 
 def table_of(k: int, *kinds: Any) -> Any:
-    """Return a function for kernels. The function reads the arguments of table ``k`` of a ``Handle``, of these types,
-    at the address of the handle, and returns them as a tuple.
+    """Return a function for kernels. The function reads the arguments of table ``k`` of a ``Handle``, and returns them
+    as a tuple. The arguments have the given types; the function takes the address of the handle.
     """
     kind = several(*kinds)
 
@@ -212,8 +218,8 @@ def table_of(k: int, *kinds: Any) -> Any:
 
 
 def _read(context: Any, builder: Any, kind: Any, base: Any, at: int) -> tuple[Any, int]:
-    """Return the value of that type at word ``at`` of the table ``base``, and the index of the next word after the
-    value.
+    """Return the value of type ``kind`` that begins at word ``at`` of the table ``base``, and the index of the first
+    word after the value.
     """
     if isinstance(kind, types.BaseTuple):
         values = []

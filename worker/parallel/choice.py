@@ -1,8 +1,10 @@
-"""Choice of the number of threads that a rank uses: the number with the shortest regions, measured over some steps.
+"""Choice of the number of threads that a rank uses. The chosen number is that with the shortest time in parallel
+regions, measured over some steps.
 
-A scene can be too small for threads: it has few tasks, or its tasks are as short as the time to hand one out. A number
-of threads below the full number is measured again at intervals, since contact and cracks add work. A choice of the full
-number is final. The answer of the run does not depend on the number of threads.
+A scene can be too small for several threads: it has few tasks, or a task takes as little time as its assignment to a
+thread. If the chosen number is not the full number, it is measured again at intervals, because contact and cracks add
+work. If the full number is chosen, no further measurement is made. The answer of the run does not depend on the number
+of threads.
 """
 
 import time
@@ -13,18 +15,18 @@ from .projecting import Projecting
 from .team import Team
 
 _STEPS, _SECONDS = 10, 0.1
-"""Length of a measurement in steps and in s: the measurement ends at the limit that is reached first, after one step
-at least. Chosen values."""
+"""Length of a measurement, in steps and in s. The measurement ends at the limit that is reached first, but takes at
+least one step. Chosen values."""
 _AGAIN = 20.0
-"""Interval between two measurements, s. Chosen value: a measurement takes less than a hundredth of the interval,
-except with very long steps."""
+"""Interval between two measurements, s. Chosen value: a measurement takes less than a hundredth of the interval, unless
+the steps are very long."""
 _WORTH = 0.98
-"""A larger number of threads is chosen if its time in regions is below this share of the time with fewer threads.
-Chosen value."""
+"""Largest ratio of the time in parallel regions with more threads to the time with fewer threads, at which more threads
+are chosen. Chosen value."""
 
 
 class Choice:
-    """Measures and sets the number of threads; called once a step."""
+    """Measures and sets the number of threads of a rank. It must be called once in each step."""
 
     def __init__(self, team: Team) -> None:
         self._team, self._reported = team, False
@@ -33,12 +35,12 @@ class Choice:
 
     @property
     def due(self) -> float:
-        """Wall time before which no measurement begins, s; 0 during a measurement."""
+        """Wall time before which no measurement begins, s; 0 while a measurement is made."""
         return self._due if self._team.projecting is None else 0.0
 
     def step(self) -> str:
-        """Begin or end a measurement if it is time for it. Return a message, once, if fewer threads than given are
-        used.
+        """Begin or end a measurement if its time has come. If fewer threads than given are used, return a message about
+        this once.
         """
         trial, now = self._team.projecting, time.monotonic()
         if trial is None:
@@ -75,8 +77,8 @@ class Choice:
 
 
 def best_crew(crews: list[int], spans: list[float]) -> int:
-    """Return the number of threads to use; ``spans``: time in s that regions take with each number of ``crews``
-    threads.
+    """Return the number of threads to use. ``spans``: time in parallel regions, s, for each number of threads in
+    ``crews``.
     """
     best = 0
     for k in range(1, len(crews)):

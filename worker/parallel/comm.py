@@ -1,7 +1,7 @@
-"""Communication between ranks: the operations, and their meaning on one rank. The module mpi.py implements them with
-MPI.
+"""Communication between ranks. The module defines the operations, and their result on a single rank; mpi.py implements
+the operations with MPI.
 
-All decisions are maxima over int64 words or sums of integers, which do not depend on the order of the ranks.
+All decisions of ranks are maxima or sums of int64 words, which do not depend on the order of the ranks.
 """
 
 from collections.abc import Iterable
@@ -19,8 +19,8 @@ from .tags import Tag
 class Sent:
     """Counts of the data that a rank has sent since the last report: messages to single ranks, and collectives.
 
-    The bytes of a collective are the bytes that the rank contributes. An object takes two collectives: its length is
-    sent first.
+    The bytes of a collective are the bytes that this rank contributes. An object needs two collectives, because its
+    length is sent first.
     """
 
     messages: int = 0
@@ -34,7 +34,7 @@ class Sent:
         self.bytes += size
 
     def collective(self, size: int = 0, number: int = 1) -> None:
-        """Count ``number`` collectives to which this rank contributes ``size`` bytes."""
+        """Count ``number`` collectives. This rank contributes ``size`` bytes to them."""
         self.collectives += number
         self.collective_bytes += size
 
@@ -53,12 +53,12 @@ class Pending(Protocol):
 
 
 class Comm(Protocol):
-    """The operations of a communicator. All operations are collective except ``exchange`` and ``trade``."""
+    """The operations of a communicator. All operations except ``exchange`` and ``trade`` are collective."""
 
     rank: int
     size: int
     waited: float
-    """CPU seconds of this thread in calls that may wait for other ranks, without the packing of objects."""
+    """CPU seconds of this thread in calls that may wait for other ranks. The packing of objects is not included."""
     sent: Sent
 
     def begin_maximum(self, words: Ints, result: Ints) -> Pending:
@@ -78,47 +78,49 @@ class Comm(Protocol):
         """Return the element-wise maximum over all ranks."""
 
     def exchange(self, sends: list[tuple[int, Ints]], receives: list[tuple[int, Ints]], tag: Tag) -> "Exchange":
-        """Return a repeatable exchange of fixed buffers with other ranks. Sends and receives are pairs (rank,
-        buffer).
+        """Return an exchange of fixed buffers with other ranks, which can be repeated. Sends and receives are pairs
+        (rank, buffer).
         """
 
     def swap(self, sends: dict[int, Ints]) -> dict[int, Ints]:
-        """Send words to each rank that is a key. Return the words of each rank for this rank, flat, by ascending
-        rank. Words of this rank for itself are included.
+        """Send words to each rank that is a key of ``sends``. Return the words that all ranks have sent to this rank as
+        one flat array, by ascending rank. Words of this rank for itself are included.
         """
 
     def trade(self, sends: dict[int, Ints], sources: Iterable[int]) -> dict[int, Ints]:
-        """Send words of any length to the ranks in ``sends``; return the words of the ranks ``sources``, flat, in their
-        order.
+        """Send words of any length to the ranks in ``sends``. Return the words of the ranks ``sources`` as one flat
+        array, in the order of ``sources``.
 
-        Only ranks that send or receive call this function: a rank is in the ``sources`` of exactly the ranks to which
-        it sends. An empty array is sent as an empty message.
+        Only ranks that send or receive call this function. The ``sources`` of a rank must be exactly the ranks that
+        send words to it. An empty array is sent as an empty message.
         """
 
     def join(self, words: Ints) -> Ints:
-        """Return the words of all ranks on every rank, flat, in the order of the ranks."""
+        """Return the words of all ranks as one flat array, in the order of the ranks. Every rank gets the result."""
 
     def share(self, item: Any) -> list[Any]:
-        """Return the items of all ranks on every rank, in the order of the ranks."""
+        """Return the items of all ranks in the order of the ranks. Every rank gets the result."""
 
     def gather(self, item: Any) -> list[Any] | None:
-        """Return the items of all ranks on rank 0, in the order of the ranks; None on the others."""
+        """Return the items of all ranks in the order of the ranks, on rank 0; None on other ranks."""
 
     def scatter(self, items: list[Any] | None) -> Any:
-        """Return item ``rank`` of the list on rank 0."""
+        """Return item number ``rank`` of the list that rank 0 has."""
 
     def broadcast(self, item: Any) -> Any:
-        """Return the item of rank 0 on every rank."""
+        """Return, on every rank, the item of rank 0."""
 
     def barrier(self) -> None:
         """Return when every rank has made this call."""
 
     def await_all(self) -> None:
-        """The operation ``barrier`` for long waits: it sleeps instead of polling."""
+        """Return when every rank has made this call. Used for long waits, because the call sleeps; ``barrier``
+        polls.
+        """
 
 
 class Exchange(Protocol):
-    """A set of messages with fixed partners and buffers, sent repeatedly."""
+    """A set of messages with fixed partners and buffers. The messages can be sent repeatedly."""
 
     def begin(self) -> None:
         """Start all sends and receives."""

@@ -1,12 +1,14 @@
-"""Domain decomposition by recursive bisection (Berger and Bokhari 1987), with cuts that halve every phase of the step.
+"""Domain decomposition by recursive bisection (Berger and Bokhari 1987). The cuts halve the load of every phase of the
+step.
 
-No rank has the points of another rank: a cut is found digit by digit from sums of weights over all ranks.
+No rank has the points of another rank. Therefore the position of a cut is found digit by digit, from sums of weights
+over all ranks.
 
-Ranks wait for each other within a step, after contact and after the elements. Halving the sum of the loads is
-therefore not sufficient: a rank with all contact and a rank with all tets have equal sums, and each rank waits for
-the other. In three dimensions there is a plane that halves any three measures at once (the ham sandwich theorem). If
-a point has several weights, one for each phase, planes of many directions are tried. Each plane halves the sum of
-the weights, and the plane with the most nearly even phases is chosen.
+Ranks wait for each other within a step, after contact and after the elements. Therefore it is not sufficient to halve
+the sum of the loads: if one rank has all contact and another rank has all tets, with equal sums, each rank waits for
+the other. In three dimensions some plane halves any three measures at once (the ham sandwich theorem). If a point has
+several weights, one for each phase, planes of many directions are tried. Each tried plane halves the sum of the
+weights; the plane that divides the phases most evenly is chosen.
 """
 
 from dataclasses import dataclass
@@ -20,37 +22,37 @@ from ..model.state import Flags, Floats, Indices, Ints
 from .comm import Comm
 
 _LEVELS = 2.0**31 - 1.0
-"""Number of distinct positions along a normal. Points at one position are ordered by their ids."""
+"""Number of distinct positions along a normal. Points at equal positions are ordered by their ids."""
 _ID_BITS = 32
-"""Number of bits for the id in a sorting key of 63 bits; 31 higher bits have the position. Ids are below 2^32."""
+"""Number of bits for the id in a sorting key of 63 bits. The 31 higher bits have the position. Ids are below 2^32."""
 _DIGIT = 8
-"""Number of bits of a sorting key that one sum over the ranks determines: 256 counts per box, eight sums in all.
-Chosen value."""
+"""Number of bits of a sorting key that are determined by one sum over the ranks. With the chosen value a sum has 256
+counts for each box, and eight sums are needed."""
 _FINEST = 2.0**30
 """Value of the largest weight in quanta. With this value sums of four billion weights are exact."""
 _BINS = 128
 """Number of slices into which the weights along a direction are binned when directions are compared."""
 _SHORT = 0.2
-"""Smallest ratio of an extent of a box to its longest extent at which the box is cut across this extent (as with
-``run.cut_scale``)."""
+"""Smallest ratio of an extent of a box to the longest extent of the box. A box is cut across an extent only if the
+ratio is not smaller (with extents scaled by ``run.cut_scale``)."""
 _SURFACE = 0.05
-"""Penalty, as a share of the time, of a cut that goes through twice as much weight as the cut of the direction with
-the least weight."""
+"""Penalty for a cut that goes through twice as much weight as the cut in the direction with the least weight. The
+penalty is a fraction of the time."""
 _TOGETHER = 8
-"""Number of boxes whose slices are summed over the ranks in one call. With a fixed number the memory does not
+"""Number of boxes whose slices are summed over the ranks in one call. The number is fixed, so that the memory does not
 increase with the number of ranks."""
 _THICK = 2
-"""Number of slices on either side of a cut from which the weight at the cut is computed."""
+"""Number of slices on each side of a cut from which the weight at the cut is computed."""
 _SAMPLE = 4096
-"""Size of the sample of points in a box by which directions are compared. Only points that have a weight in the first
-phase and in no other phase are sampled. Chosen value: with 4,000 points in 128 slices the error of the middle is below
-a hundredth of the box."""
+"""Number of sampled points in a box by which directions are compared. Only points that have a weight in the first phase
+alone are sampled; all other points are used. Chosen value: with 4,000 points in 128 slices the error of the middle is
+below a hundredth of the box."""
 
 
 def _directions() -> Floats:
-    """Return (49, 3) unit normals, one of each pair of opposite directions.
+    """Return (49, 3) unit normals. Of two opposite directions only one is returned.
 
-    The axes come first, then all directions with components in the ratio of 0, 1 and 2.
+    The axes come first, then all directions whose components have the ratios 0, 1 and 2.
     """
     found = [v for v in product(range(-2, 3), repeat=3) if v > (0, 0, 0) and np.gcd.reduce(v) == 1]
     found.sort(key=lambda v: (sum(map(abs, v)), [-c for c in v]))
@@ -59,13 +61,13 @@ def _directions() -> Floats:
 
 DIRECTIONS = _directions()
 _AXES = 3
-"""Number of the first directions that are x, y and z."""
+"""Number of normals that are axes x, y and z. They are the first normals."""
 
 
 @dataclass
 class Cut:
-    """A cut of the ranks ``first`` .. ``first + parts - 1``. Points below ``key`` along a normal are on the lower
-    side.
+    """A cut between ranks. It divides the ranks from ``first`` to ``first + parts - 1``. Points whose key along a
+    normal is below ``key`` are on the lower side.
     """
 
     first: int
@@ -82,9 +84,11 @@ class Cut:
         return self.parts // 2
 
     def keys(self, points: Floats, ids: Ints) -> Ints:
-        """Return (n,) sorting keys: positions of points (n, 3) along the normal, then their ``ids`` (n,)."""
+        """Return (n,) sorting keys. A key consists of the position of the point (n, 3) along the normal and of its id
+        (n,).
+        """
         (x, y, z), extent = DIRECTIONS[self.direction], self.high - self.low
-        along = points[:, 0] * x + points[:, 1] * y + points[:, 2] * z  # the same bits for any array length
+        along = points[:, 0] * x + points[:, 1] * y + points[:, 2] * z  # one result for any length of the array
         share = (along - self.low) / (extent if extent > 0.0 else 1.0)
         return np.asarray((np.clip(share, 0.0, 1.0) * _LEVELS).astype(np.int64) << _ID_BITS | ids)
 
@@ -94,10 +98,10 @@ def bisect(
 ) -> tuple[Indices, list[Cut]]:  # fmt: skip
     """Return (n,) the part of each of this rank's points (n, 3), and the cuts. Collective.
 
-    Boxes are cut so that the sums of ``weights``, (n,) or (n, phases), are equal; with one phase across their
-    longest axis. Points at one position are ordered by their ``ids`` (n,), below 2^32, so the parts do not depend on
-    the distribution of the points over the ranks. A number of parts that is not a power of two is split as floor :
-    ceiling.
+    Boxes are cut so that the sums of ``weights``, (n,) or (n, phases), are equal. With one phase a box is cut across
+    its longest axis. Points at equal positions are ordered by their ``ids`` (n,), below 2^32, so the parts do not
+    depend on the distribution of the points over the ranks. An odd number of parts k is divided into (k - 1) / 2 and (k
+    + 1) / 2 parts.
     """
     owner, cuts = np.zeros(len(points), np.int32), []
     phases = weights if weights.ndim == 2 else weights[:, None]
@@ -115,7 +119,7 @@ def bisect(
 
 
 def place(cuts: list[Cut], points: Floats) -> Indices:
-    """Return (n,) the part of each of other points (n, 3)."""
+    """Return (n,) the part to which each of further points (n, 3) belongs."""
     owner, none = np.zeros(len(points), np.int32), np.zeros(len(points), np.int64)
     for cut in cuts:
         inside = np.flatnonzero(owner == cut.first)
@@ -126,10 +130,10 @@ def place(cuts: list[Cut], points: Floats) -> Indices:
 def _level(
     points: Floats, ids: Ints, quanta: Ints, owner: Indices, groups: list[tuple[int, int]], tried: int, comm: Comm
 ) -> list[Cut]:  # fmt: skip
-    """Return the cuts of the ``groups`` (first, parts), each across one of the first ``tried`` directions.
+    """Return the cuts of the ``groups`` (first, parts). Each cut is across one of the first ``tried`` directions.
 
-    The points of a group have ``owner`` equal to ``first``. Points beyond the cut get the first rank of the upper
-    side.
+    A point belongs to the group whose ``first`` equals its ``owner``. Points on the upper side of the cut get the first
+    rank of the upper side as owner.
     """
     members = [np.flatnonzero(owner == first) for first, _ in groups]
     if tried > _AXES:
@@ -149,8 +153,8 @@ def _level(
 
 
 def _extents(points: Floats, members: list[Ints], directions: list[Floats], comm: Comm) -> Floats:
-    """Return (groups, 2, k) the largest position of the members of each group along each of its ``directions`` (k, 3),
-    and the negative of the smallest position. Zeros if no rank has members.
+    """Return (groups, 2, k) the largest position of the members of each group along each direction, and the negative of
+    the smallest position. ``directions`` (k, 3). If no rank has members, the values are zeros.
 
     Collective.
     """
@@ -163,8 +167,8 @@ def _extents(points: Floats, members: list[Ints], directions: list[Floats], comm
 def _most_even(
     points: Floats, ids: Ints, quanta: Ints, members: list[Ints], groups: list[tuple[int, int]], comm: Comm
 ) -> Ints:  # fmt: skip
-    """Return (groups,) the direction of the cut that halves the sum and leaves the phases most nearly even, from a
-    sample of the points. A cut through more weight has a penalty (_SURFACE). Collective.
+    """Return (groups,) the best direction of the cut of each group. The cut halves the sum and divides the phases most
+    evenly, judged by a sample of the points. A cut through more weight has a penalty (_SURFACE). Collective.
     """
     luck, many = splitmix64(ids, 0), comm.sum(np.array([len(chosen) for chosen in members], np.int64))
     samples = [_drawn(chosen, luck, quanta, max(int(n) // _SAMPLE, 1)) for chosen, n in zip(members, many, strict=True)]
@@ -192,7 +196,7 @@ def _unevenness(slices: Floats, parts: int) -> tuple[Floats, Floats]:
     """Return the loss of a cut that halves the sum of ``slices`` (directions, bins, phases) for ``parts`` ranks, and
     the mean weight of the slices near the cut, both (directions,).
 
-    The loss is the waiting time after each phase, as a share of the whole time.
+    The loss is the waiting time after the phases, divided by the whole time.
     """
     every, bins = np.arange(len(slices)), slices.shape[1]
     left, upto = parts // 2, np.cumsum(slices, axis=1)
@@ -214,8 +218,8 @@ def _unevenness(slices: Floats, parts: int) -> tuple[Floats, Floats]:
 def _drawn(chosen, luck, quanta, stride):  # type: ignore[no-untyped-def]
     """Return the indices of a sample of the ``chosen`` points, and their ``quanta`` (n, phases).
 
-    The sample has all points with a weight in a later phase. From the other points one in ``stride`` points is chosen
-    by the hash ``luck`` (n,), with ``stride`` times its weight.
+    The sample has all points with a weight in a later phase. Of the other points one in ``stride`` points is selected
+    by the hash ``luck`` (n,), and gets ``stride`` times its weight.
     """
     some, weights, n = np.empty(len(chosen), np.int64), np.empty((len(chosen), quanta.shape[1]), np.int64), 0
     for a in chosen:
@@ -233,8 +237,8 @@ def _drawn(chosen, luck, quanta, stride):  # type: ignore[no-untyped-def]
 
 @njit("void(float64[:, ::1], float64[:, ::1], int64[::1], float64[:, ::1])", cache=True)
 def _reach(reach, points, chosen, directions):  # type: ignore[no-untyped-def]
-    """Raise ``reach`` (2, directions) to the largest position of the ``chosen`` points, and to the negative of the
-    smallest position.
+    """Raise ``reach`` (2, directions) to the largest position of the ``chosen`` points along each direction, and to the
+    negative of the smallest position.
     """
     for a in chosen:
         for k in range(len(directions)):
@@ -260,7 +264,8 @@ def _slice(sums, points, quanta, chosen, directions, low, scale):  # type: ignor
 
 
 def _search(cuts: list[Cut], keys: list[Ints], quanta: list[Ints], comm: Comm) -> None:
-    """Set the key of every cut: the smallest key at which the weight below the cut exceeds the share of the lower side.
+    """Set the key of every cut. It is the smallest key at which the weight below the cut exceeds the weight that the
+    lower side must have.
 
     Collective.
     """

@@ -1,8 +1,9 @@
-"""Sums that do not depend on their order: integers in units of a power of two.
+"""Sums that do not depend on the order of their terms. The terms are integers in units of a power of two.
 
-The scale of the nodal forces follows from the largest contribution of the step before; if a step exceeds it, the sum
-is repeated in a coarser quantum. A contribution has 51 bits; node 0 of a tet may get three of them, so the sum is
-safe for a node with up to 680 tets: twenty times the number in a mesh.
+The scale of the nodal forces is computed from the largest contribution of the previous step. If a contribution is too
+large for the scale, the sum is repeated in a larger quantum. A contribution has 51 bits, and node 0 of a tet may get
+three contributions. Therefore the sum cannot overflow at a node with up to 680 tets, which is twenty times the number
+in a mesh.
 """
 
 import math
@@ -18,36 +19,38 @@ from ..model.state import Floats, Indices, Ints
 from .comm import Comm
 
 CONTRIBUTION_BITS = 51
-"""Number of bits of a contribution. A contribution is below 2^51 quanta: adding 1.5 * 2^52 to such
-a value rounds it to an integer in float64 (elements/forces.py)."""
+"""Number of bits of a contribution. A contribution is below 2^51 quanta, because the sum of such a value and 1.5 * 2^52
+in float64 is rounded to an integer (elements/forces.py)."""
 HEADROOM_BITS = 5
-"""Number of bits of headroom: contributions may increase 32-fold in a step before the sum has to be repeated."""
+"""Number of bits of headroom. Contributions may increase 32-fold in a step before the sum must be repeated."""
 _NEAREST_BITS = 0x4338000000000000
-"""Bits of the float64 NEAREST."""
+"""Bit pattern of the float64 NEAREST."""
 _MAGNITUDE, _INFINITE = 0x7FFFFFFFFFFFFFFF, 0x7FF0000000000000
-"""Mask of all bits of a float64 except its sign, and the bits of infinity."""
+"""Mask of all bits of a float64 except its sign; and the bit pattern of infinity."""
 _LIMB_BITS = 30
 _LIMB = 2.0**_LIMB_BITS
-"""Ratio of the quanta of the high and the low limb. Two limbs have 60 bits, and each limb sums 2^32 values in an
-int64."""
+"""Ratio of the quanta of the high and the low limb. Two limbs have 60 bits together; each limb can sum 2^32 values in
+an int64."""
 _WORD, _REAL = struct.Struct("=q"), struct.Struct("=d")
 _SMALLEST = -993
-"""Smallest exponent of a column. An exponent below this value would overflow the scale."""
+"""Smallest exponent of the magnitudes of a column. With a smaller exponent the scale would overflow."""
 
 
 def float_of(bits: int) -> float:
-    """Return the float64 with these bits."""
+    """Return the float64 that has the bit pattern ``bits``."""
     return float(_REAL.unpack(_WORD.pack(bits))[0])
 
 
 def bits_of(value: float) -> int:
-    """Return the bits of a float64."""
+    """Return the bit pattern of a float64 as an integer."""
     return int(_WORD.unpack(_REAL.pack(value))[0])
 
 
 @njit("float64(float64)", cache=True)
 def scale_for(largest):  # type: ignore[no-untyped-def]
-    """Return the number of quanta per newton for contributions up to ``largest``, N, with headroom."""
+    """Return the number of quanta per newton for contributions up to ``largest``, N. The result includes the
+    headroom.
+    """
     return math.ldexp(1.0, CONTRIBUTION_BITS - HEADROOM_BITS - math.frexp(largest)[1])
 
 
@@ -59,14 +62,16 @@ def outgrown(largest, scale):  # type: ignore[no-untyped-def]
 
 @njit("float64(int64)", cache=True)
 def magnitude(bits):  # type: ignore[no-untyped-def]
-    """Return the float64 with the given ``bits``, the result of ``most``; infinity if a value was not finite."""
+    """Return the float64 with the bit pattern ``bits``, which is the result of ``most``; infinity if a value was not
+    finite.
+    """
     return np.int64(bits).view(np.float64) if bits < _INFINITE else math.inf
 
 
 @njit("int64(float64[::1])", cache=True, error_model="numpy")
 def most(values):  # type: ignore[no-untyped-def]
-    """Return the largest magnitude as bits. The bits have the order of the floats. The bits of a value that is not
-    finite exceed those of all finite values, so a maximum over ranks keeps this value.
+    """Return the largest magnitude as its bit pattern (integer). Bit patterns have the order of the floats. The bit
+    pattern of a value that is not finite is above those of all finite values, so a maximum over ranks keeps this value.
     """
     found = np.int64(0)
     for i in range(len(values)):
@@ -79,7 +84,7 @@ def limbs(values, scale):  # type: ignore[no-untyped-def]
     """Return the sums of the high and of the low limbs of ``values``, in quanta of 1 / ``scale`` and 2^-30 / ``scale``;
     undefined if a value reaches 2^51 quanta.
 
-    The last bits of x + NEAREST are the integer nearest to x, the even one of two.
+    The last bits of x + NEAREST are the integer nearest to x; of two equally near integers the even one.
     """
     highs, lows = np.int64(0), np.int64(0)
     for i in range(len(values)):
@@ -92,22 +97,22 @@ def limbs(values, scale):  # type: ignore[no-untyped-def]
 
 @njit("void(float64[::1], float64[::1], int64[::1])", cache=True, error_model="numpy")
 def _largest(largest, values, starts):  # type: ignore[no-untyped-def]
-    """Set the ``largest`` (k,) magnitude of each column (``Columns.largest``)."""
+    """Set ``largest`` (k,) to the largest magnitude of each column (``Columns.largest``)."""
     for j in range(len(largest)):
         largest[j] = magnitude(most(values[starts[j] : starts[j + 1]]))
 
 
 @njit("void(int64[:, ::1], float64[::1], int64[::1], float64[::1])", cache=True, error_model="numpy")
 def _limbs(words, values, starts, scale):  # type: ignore[no-untyped-def]
-    """Set the sums of the high limbs and of the low limbs of each column, ``words`` (2, k)."""
+    """Set ``words`` (2, k) to the sums of the high limbs and of the low limbs of each column."""
     for j in range(len(scale)):
         words[0, j], words[1, j] = limbs(values[starts[j] : starts[j + 1]], scale[j])
 
 
 @njit("void(int64[:, :, ::1], float64[:, ::1], int32[::1], float64[::1])", cache=True, error_model="numpy")
 def _limbs_by_group(words, columns, group, scale):  # type: ignore[no-untyped-def]
-    """Add the sums of limbs of each ``group`` (n,) of ``columns`` (k, n) to ``words`` (groups, 2, k). Successive
-    rows of one group are summed together.
+    """Add the limbs of each column of ``columns`` (k, n) to the sums of its ``group`` (n,), ``words`` (groups, 2, k).
+    Successive rows of one group are summed together.
     """
     begin = 0
     while begin < len(group):
@@ -122,20 +127,26 @@ def _limbs_by_group(words, columns, group, scale):  # type: ignore[no-untyped-de
 
 
 def _whole(words: Ints) -> Floats:
-    """Return (..., k) the sums of limbs (..., 2, k) in quanta of the low limb, rounded once."""
+    """Return (..., k) the values of the sums of limbs (..., 2, k), in quanta of the low limb. The result is rounded
+    once.
+    """
     high, low = words[..., 0, :], words[..., 1, :]
     over = high + (low >> _LIMB_BITS)
-    if over.size and max(int(over.max()), -int(over.min())) < 2**53:  # both terms are exact, so the sum rounds once
+    if over.size and max(int(over.max()), -int(over.min())) < 2**53:  # two exact terms, so one rounding
         return np.asarray(over * _LIMB + (low & ((1 << _LIMB_BITS) - 1)))
     pairs = zip(high.reshape(-1).tolist(), low.reshape(-1).tolist(), strict=True)
     return np.array([float((a << _LIMB_BITS) + b) for a, b in pairs]).reshape(high.shape)
 
 
 class Tally:
-    """Sums that are accumulated over a whole run: integers in two limbs, independent of order and ranks."""
+    """Sums that are accumulated over a whole run. They are integers in two limbs, independent of the order of the terms
+    and of ranks.
+    """
 
     def __init__(self, largest: Floats) -> None:
-        """``largest`` (k,): order of magnitude of the values added to each sum. The quantum is 2^-60 of ``largest``."""
+        """``largest`` (k,): order of magnitude of the values that are added to each sum. The quantum is 2^-60 of
+        ``largest``.
+        """
         self.scale = np.ldexp(1.0, 30 - np.frexp(largest)[1])
         """(k,) number of quanta of the high limb per unit."""
         self.words = np.zeros((2, len(largest)), np.int64)
@@ -154,10 +165,10 @@ class Tally:
         self.carry()
 
     def carry(self) -> None:
-        """Move the overflow of the low limbs to the high limbs. The sums are unchanged to the bit.
+        """Move the overflow of the low limbs to the high limbs. The values of the sums do not change.
 
-        A low limb gets at most 2^29 quanta from each value, and all quanta of values far below a quantum of the high
-        limb. Without carry it would overflow after 2^34 values, a number that contact may add in a long run.
+        A low limb gets at most 2^29 quanta from each value. Without ``carry`` it would overflow after 2^34 values;
+        contact may add as many values in a long run.
         """
         high, low = self.words
         over = (low + (1 << (_LIMB_BITS - 1))) >> _LIMB_BITS
@@ -174,21 +185,21 @@ class Tally:
 
 
 class Columns(Protocol):
-    """Columns of values. The rows need not be contiguous in memory."""
+    """Interface of columns of values. The rows need not be contiguous in memory."""
 
     def largest(self) -> Floats:
-        """Return (k,) the largest magnitude of each column; infinite if a value is not finite."""
+        """Return (k,) the largest magnitude in each column; infinite if a value is not finite."""
 
     def limbs(self, scale: Floats) -> Ints:
-        """Return (groups, 2, k) the sums of the high and of the low limbs of each column, for each group of rows, in
-        quanta of 1 / ``scale`` (k,).
+        """Return (groups, 2, k) the sums of the high limbs and of the low limbs of each column, for each group of rows,
+        in quanta of 1 / ``scale`` (k,).
         """
 
 
 class Ragged:
     """Columns of different lengths in one array ``values``. Column k begins at ``starts`` (k + 1,).
 
-    All rows are in the first of the groups.
+    All rows belong to the first group.
     """
 
     def __init__(self, values: Floats, starts: Ints, groups: int = 1) -> None:
@@ -206,7 +217,7 @@ class Ragged:
 
 
 class Table(Ragged):
-    """The columns of an array (n, k). The transpose of a C-ordered array is used without a copy."""
+    """The columns of an array (n, k). If the array is the transpose of a C-ordered array, no copy is made."""
 
     def __init__(self, values: Floats, groups: int = 1) -> None:
         self._columns = np.ascontiguousarray(values.T)
@@ -215,7 +226,7 @@ class Table(Ragged):
 
 
 class Grouped(Table):
-    """The columns of an array whose row i belongs to ``group`` i, (n,). Sums are fast if neighbouring rows are in
+    """The columns of an array whose row i belongs to the group ``group[i]``. Sums are fast if neighbouring rows are in
     one group.
     """
 
@@ -230,16 +241,17 @@ class Grouped(Table):
 
 
 def exact_sums(comm: Comm, *tables: Floats) -> Floats:
-    """Return (k,) the sums of the columns of ``tables`` (n, .) over all ranks (``exact_totals``)."""
+    """Return (k,) the sums of the columns of the ``tables`` (n, .) over all ranks (``exact_totals``)."""
     return exact_totals(comm, *map(Table, tables))[0] if tables else np.zeros(0)
 
 
 def exact_totals(comm: Comm, *tables: Columns) -> tuple[Floats, Floats]:
-    """Return (k,) the sums of the columns of ``tables`` over all ranks, and (groups, k) those of each group of rows:
-    the same bits for any order and partition. All tables have the same number of groups. Collective.
+    """Return (k,) the sums of the columns of ``tables`` over all ranks, and (groups, k) the sums of each group of rows.
+    The results are bit-identical for any order and partition. All tables must have the same number of groups.
+    Collective.
 
-    Each value is split into two integer limbs of a common quantum, 2^-60 of the column's largest magnitude; the
-    error of the result is at most n times that quantum. The sum of a column with a value that is not finite is NaN.
+    Each value is split into two integer limbs of a common quantum, 2^-60 of the column's largest magnitude; the error
+    of the result is at most n quanta. If a column has a value that is not finite, its sum is NaN.
     """
     return totals_and_words(comm, tables, np.zeros(0, np.int64))[:2]
 

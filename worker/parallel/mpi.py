@@ -1,4 +1,4 @@
-"""The only module that imports MPI: communicator of all ranks, and the end of a process."""
+"""The only module that imports MPI: the communicator of all ranks, and the end of a process."""
 
 import os
 import pickle
@@ -15,8 +15,8 @@ from .comm import Comm, Exchange, Pending, Sent, SerialComm
 from .tags import Tag
 
 _NAP = 0.01
-"""Interval between two tests in a wait that leaves the core to other processes, s. Chosen value: a hundredth of the
-start of a rank."""
+"""Interval between two checks in a wait that leaves the core to other processes, s. Chosen value: a hundredth of the
+start time of a rank."""
 
 
 class MpiComm:
@@ -34,11 +34,13 @@ class MpiComm:
         MPI.pickle.__init__(self._pickled, self._unpickled)  # type: ignore[misc]
 
     def waiting(self, sign: int = 1) -> "_Waiting":
-        """Return a context that adds the CPU time of its block to ``waited``; with sign -1 it subtracts this time."""
+        """Return a context that adds the CPU time of its block to ``waited``. If ``sign`` is -1, the time is
+        subtracted.
+        """
         return _Waiting(self, sign)
 
     def _pickled(self, item: Any, protocol: int | None = None) -> bytes:
-        """Pickle an item. The time of pickling counts as work, although the surrounding call counts as waiting."""
+        """Pickle an item. The time of pickling counts as work, even if the surrounding call counts as waiting."""
         with self.waiting(-1):
             data = pickle.dumps(item, protocol)
         self.sent.collective_bytes += len(data)
@@ -158,8 +160,8 @@ class MpiComm:
 
 
 class _Waiting:
-    """Context of a block that waits. This context manager is a class, because every step opens dozens of contexts, and
-    a generator takes longer.
+    """Context of a block that waits. It is a class, because every step opens dozens of contexts, and a context made
+    from a generator takes longer.
     """
 
     __slots__ = ("_comm", "_sign", "_start")
@@ -186,7 +188,7 @@ class _MpiPending:
 
 class _MpiExchange:
     def __init__(self, comm: MpiComm, kind: Any, requests: list[Any], sends: tuple[int, int]) -> None:
-        """``sends``: number of messages, and number of their bytes."""
+        """``sends``: number of messages, and number of bytes of the messages."""
         self._comm = comm
         self._kind = kind
         self._requests = requests
@@ -206,7 +208,7 @@ class _MpiExchange:
 
 
 def leave(code: int) -> NoReturn:
-    """End this rank with an exit code after all ranks have finished; no rank is aborted.
+    """End this rank with an exit code, after all ranks have finished. No rank is aborted.
 
     The process must end normally (no ``os._exit``). Otherwise MPICH does not deregister from the launcher, and the
     launcher kills the other ranks.

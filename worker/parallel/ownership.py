@@ -1,8 +1,8 @@
-"""Shared nodes: the ranks that hold them, and the completion of their integer sums.
+"""Shared nodes: the ranks that have each shared node, and the completion of the integer sums at shared nodes.
 
 Each rank sums the contributions of its own tets. One exchange with the neighbouring ranks adds the contributions of the
-tets of these ranks. Integer addition does not depend on the order, so every holder of a node gets the same bits and
-integrates the same motion.
+tets of these ranks. Integer addition does not depend on the order. Therefore every rank that has a node gets a
+bit-identical sum and computes the same motion.
 """
 
 from dataclasses import dataclass
@@ -17,8 +17,8 @@ from .tags import Tag
 
 @dataclass
 class Neighbour:
-    """Another rank, and the local nodes shared with this rank. The nodes are in the order of their global ids;
-    copies are appended.
+    """Another rank, and the local nodes that this rank shares with it. The nodes are in the order of their global ids;
+    copies of separated nodes are appended.
     """
 
     rank: int
@@ -26,12 +26,12 @@ class Neighbour:
 
 
 def same(some: list[Neighbour], others: list[Neighbour]) -> bool:
-    """Return whether two lists hold the same array objects: no node was added."""
+    """Return whether two lists have the same array objects. If so, no shared node was added."""
     return len(some) == len(others) and all(a.nodes is b.nodes for a, b in zip(some, others, strict=True))
 
 
 def ranks(owners: Indices | Ints) -> list[int]:
-    """Return the distinct ranks in ``owners``, ascending."""
+    """Return the distinct ranks that occur in ``owners``, ascending."""
     found: list[int] = np.flatnonzero(np.bincount(owners)).tolist()
     return found
 
@@ -59,12 +59,12 @@ def complete(comm: Comm, neighbours: list[Neighbour], sums: Ints, tag: Tag) -> N
 
 
 class SharedSum:
-    """Repeated completion of nodal sums, (nodes, ``columns``) int64."""
+    """Completion of nodal sums, (nodes, ``columns``) int64, that can be repeated."""
 
     def __init__(
         self, comm: Comm, neighbours: list[Neighbour], columns: int, tag: Tag, *, headed: bool = False
     ) -> None:  # fmt: skip
-        """``headed``: whether a word for each neighbour is sent with the sums."""
+        """``headed``: whether a word for each neighbour is sent together with the sums."""
         self._nodes = [n.nodes for n in neighbours]
         head = np.full(int(headed), -1, np.int32)
         self._every = np.concatenate([head[:0], *(part for nodes in self._nodes for part in (nodes, head))])
@@ -78,18 +78,18 @@ class SharedSum:
         )
 
     def serves(self, neighbours: list[Neighbour]) -> bool:
-        """Return whether the neighbours share the same nodes as at construction."""
+        """Return whether the neighbours share the same nodes as when this object was made."""
         return all(one.nodes is nodes for one, nodes in zip(neighbours, self._nodes, strict=True))
 
     @property
     def received(self) -> Ints:
-        """(neighbours,) the word that each neighbour has sent with its sums."""
+        """(neighbours,) the word that each neighbour has sent together with its sums."""
         return np.asarray(self._in[self._heads, 0])
 
     def begin(self, sums: Ints, words: Ints | None = None) -> None:
         """Send the local sums of the shared nodes, and ``words`` (neighbours,).
 
-        All tets of this rank at shared nodes must have been added to the sums.
+        Before the call, all tets of this rank at shared nodes must have been added to the sums.
         """
         if not self._nodes:
             return
@@ -99,7 +99,7 @@ class SharedSum:
         self._exchange.begin()
 
     def finish(self, sums: Ints) -> None:
-        """Add the sums of the neighbours. The sums of the shared nodes are then complete."""
+        """Receive and add the sums of the neighbours. After the call the sums of the shared nodes are complete."""
         if not self._nodes:
             return
         self._exchange.finish()

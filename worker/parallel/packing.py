@@ -1,7 +1,7 @@
-"""Packing: the ranges that the tasks of a pass have written become one array without gaps.
+"""Packing: the results that the tasks of a pass have written to separate ranges are copied to one array without gaps.
 
-A task that does not know the number of its results writes them from a fixed row on. The results of all tasks are then
-in the order of the tasks, so the packed array is the same on any number of threads.
+The number of results of a task is not known before, so each task writes its results from a fixed row on. The packed
+results have the order of the tasks, so the packed array is the same for any number of threads.
 """
 
 from typing import Any
@@ -21,7 +21,7 @@ _pack = reader(*_PACK)
 
 @njit("int64(int64[::1], int64[::1])", cache=True)
 def offsets(begins, counts):  # type: ignore[no-untyped-def]
-    """Set ``begins`` to the sum of all ``counts`` before each one; return the sum of all."""
+    """Set each of ``begins`` to the sum of all ``counts`` before it. Return the sum of all counts."""
     total = 0
     for k in range(len(counts)):
         begins[k] = total
@@ -31,7 +31,7 @@ def offsets(begins, counts):  # type: ignore[no-untyped-def]
 
 @njit("int64(int64[::1], int64[:, ::1])", cache=True)
 def range_offsets(begins, counts):  # type: ignore[no-untyped-def]
-    """Begin of each range and task of a counting sort by ranges of keys.
+    """Compute where each range and each task begins in a counting sort by ranges of keys.
 
     Set ``begins`` (ranges + 1,) to the first item of each range, and each of ``counts`` (tasks, ranges) to the first
     item of the task in the range; return the number of items.
@@ -47,7 +47,7 @@ def range_offsets(begins, counts):  # type: ignore[no-untyped-def]
 
 @njit(TASK, cache=True)
 def _copy(table, first, stop, thread):  # type: ignore[no-untyped-def]
-    """Task: copy the rows of task ``first`` / ``size``, of ``width`` bytes each."""
+    """Task: copy the rows of task number ``first`` / ``size``. A row has ``width`` bytes."""
     out, source, width, begins, counts, size, spread = _pack(table)
     k = first // size
     to, fro = width * begins[k], width * spread * first
@@ -56,18 +56,18 @@ def _copy(table, first, stop, thread):  # type: ignore[no-untyped-def]
 
 
 class Packing:
-    """Passes that pack the results of passes with tasks of one length."""
+    """Passes that pack the results of other passes. All tasks of these passes have one length."""
 
     def __init__(self, team: Team, size: int) -> None:
         """``size``: length of a task."""
         self._size, self._pass = size, Pass(team, _copy, *_PACK, size=size)
 
     def run(self, n: int, out: Any, source: Any, begins: Ints, counts: Ints, spread: int = 1) -> None:
-        """Copy the results of a pass over the range from 0 to ``n`` from ``source`` to ``out``, arrays of rows of one
-        type.
+        """Copy the results of a pass over the range from 0 to ``n`` from ``source`` to ``out``. The two arrays have
+        rows of one type.
 
-        The task that begins at index f has written ``counts`` rows from row ``spread`` * f on, and they are copied to
-        row ``begins`` of the task.
+        The task that begins at index f has written ``counts`` rows to ``source``, from row ``spread`` * f on. They are
+        copied to ``out``, from the row on that ``begins`` has for the task.
         """
         if n:
             width = source.dtype.itemsize * int(np.prod(source.shape[1:], dtype=np.int64))

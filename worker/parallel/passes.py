@@ -1,4 +1,4 @@
-"""Passes over a range, cut into tasks of equal size. The threads of a rank share the tasks."""
+"""Passes over a range that is cut into tasks of equal size. The threads of a rank share the tasks."""
 
 from typing import Any
 
@@ -10,11 +10,11 @@ from .arguments import Arguments, Tie
 from .team import Stage, Team
 
 NODES_OF_A_TASK = 4096
-"""Number of nodes in a task. Chosen value: a task is 10 us of work; a region of threads costs 2 us."""
+"""Number of nodes in a task. Chosen value: a task takes 10 us, compared with 2 us to start a parallel region."""
 
 
 class _Range:
-    """A range of indices from 0 on, cut into tasks of equal size; only the last task may be shorter."""
+    """A range of indices from 0 on, cut into tasks of equal size. Only the last task may be shorter."""
 
     def __init__(self, team: Team, size: int) -> None:
         """``size``: length of a task."""
@@ -28,8 +28,8 @@ class _Range:
         return -(-n // self.size)
 
     def _cut(self, n: int) -> None:
-        """Cut the range from 0 to ``n`` > 0 into tasks. The callers test first whether it is cut already: a call takes
-        as long as the work of a small task.
+        """Cut the range from 0 to ``n`` > 0 into tasks. The callers first test whether the range is already cut,
+        because this call takes as long as a small task.
         """
         many = self.many(n)
         if many > len(self._room):
@@ -53,15 +53,15 @@ class Ranges(_Range):
         super().__init__(team, size)
 
     def run(self, kernel: Kernel, table: int, n: int) -> None:
-        """Run over the range from 0 to ``n``, with the arguments at the address ``table``."""
+        """Run a kernel over the range from 0 to ``n``. ``table``: address of its arguments."""
         if n:
             if n != self._n:
                 self._cut(n)
             self._team.run(kernel, table, self._tasks, self._starts)
 
     def stages(self, kernel: Kernel, table: int, ties: tuple[Tie, ...], n: int) -> list[Stage]:
-        """Return the run over the range from 0 to ``n`` as a stage of a program; [] if ``n`` is 0. The stage is valid
-        until another range is requested.
+        """Return the run of a kernel over the range from 0 to ``n`` as a stage of a program; [] if ``n`` is 0. The
+        stage is valid until another range is requested.
         """
         if n and n != self._n:
             self._cut(n)
@@ -69,7 +69,7 @@ class Ranges(_Range):
 
 
 class Pass(_Range):
-    """A kernel with its table of arguments, to be run over ranges; see ``Ranges``."""
+    """A kernel with its table of arguments, which can be run over ranges (``Ranges``)."""
 
     def __init__(self, team: Team, kernel: Kernel, *kinds: Any, size: int = NODES_OF_A_TASK) -> None:
         """``kinds``: numba types of the arguments; ``size``: length of a task."""
@@ -77,15 +77,15 @@ class Pass(_Range):
         self._kernel, self._arguments = kernel, Arguments(*kinds)
 
     def run(self, n: int, *values: Any) -> None:
-        """Run over the range from 0 to ``n``; ``values``: the arguments."""
+        """Run the kernel over the range from 0 to ``n``. ``values``: arguments of the kernel."""
         if n:
             if n != self._n:
                 self._cut(n)
             self._team.run(self._kernel, self._arguments.set(*values), self._tasks, self._starts)
 
     def stage(self, n: int, *values: Any) -> Stage:
-        """Return the run over the range from 0 to ``n`` > 0 as a stage of a program; numbers among the ``values`` may
-        be ``Follow``. The stage is valid until other arguments or another range are requested.
+        """Return the run of the kernel over the range from 0 to ``n`` > 0 as a stage of a program. Numbers among the
+        ``values`` may be ``Follow``. The stage is valid until other arguments or another range are requested.
         """
         if n != self._n:
             self._cut(n)

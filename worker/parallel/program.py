@@ -1,9 +1,10 @@
-"""Programs: stages that the threads of a rank run one after the other, in one call without Python code between them.
+"""Programs. A program consists of stages that the threads of a rank run one after the other, in one call without Python
+code between them.
 
 A stage is a kernel with its table of arguments and its tasks. The tasks are either given before the call (``Stage``),
-or they are a range whose length is a word of memory that is read when the stage begins (``Span``): an earlier stage may
-have written the length. A stage with the length 0 is skipped. A kernel may also choose which stage comes next: it
-writes its number to ``Program.control``. A stage number beyond the last stage ends the call.
+or they are a range (``Span``). The length of the range is a word of memory that is read when the stage begins, so an
+earlier stage may write it. A stage with the length 0 is skipped. A kernel may also choose the next stage: it writes the
+number of this stage to ``Program.control``. A stage number beyond the last stage ends the call.
 """
 
 from collections.abc import Sequence
@@ -18,15 +19,15 @@ from .team import CLOCK, END, KERNEL, MOST, SIZE, TABLE, WITHIN, Stage, Team, di
 from .words import call_task, now, word_at
 
 _WORD = 8
-"""Size of a word, bytes."""
+"""Size of a word of memory, bytes."""
 _WORDS = 7
-"""Words of a stage: kernel, table; tasks, starts, number of colours; address of the length of a range, length of a
-task."""
+"""Number of words that describe a stage: kernel, table; tasks, starts, number of colours; address of the length of a
+range, length of a task."""
 
 
 @njit("boolean(int64[::1], int64, int64[::1])", cache=True)
 def _of_range(job, semaphore, stage):  # type: ignore[no-untyped-def]
-    """Run a stage over a range; return whether it had more than one task."""
+    """Run a stage over a range. Return whether the stage had more than one task."""
     n, size = word_at(stage[5], 0), stage[6]
     many = (n + size - 1) // size
     if many <= 1 or job[MOST] == 1:
@@ -40,7 +41,7 @@ def _of_range(job, semaphore, stage):  # type: ignore[no-untyped-def]
 
 @njit("void(int64[::1], int64, int64[::1])", cache=True)
 def _of_tasks(job, semaphore, stage):  # type: ignore[no-untyped-def]
-    """Run a stage with given tasks."""
+    """Run a stage whose tasks are given."""
     tasks, starts, colours = stage[2], stage[3], stage[4]
     if job[MOST] > 1:
         share(job, semaphore, stage[0], stage[1], tasks, starts, colours)
@@ -51,8 +52,8 @@ def _of_tasks(job, semaphore, stage):  # type: ignore[no-untyped-def]
 
 @njit("int64(int64[::1], int64, int64[:, ::1], int64[::1], int64, int64)", cache=True)
 def _run(job, semaphore, stages, control, first, end):  # type: ignore[no-untyped-def]
-    """Run the stages from ``first`` to ``end``; return the number of the stage that would come next. A range of one
-    task does not count as time in regions.
+    """Run the stages from ``first`` to ``end``. Return the number of the stage that would come next. The time of a
+    range with one task does not count as time in parallel regions.
     """
     k, begin = first, now(job, CLOCK)
     while k < end:
@@ -70,8 +71,9 @@ def _run(job, semaphore, stages, control, first, end):  # type: ignore[no-untype
 
 @dataclass(frozen=True)
 class Span:
-    """A pass over a range from 0 to the word ``at`` of ``lengths``, read when the stage begins; ``size``: length of a
-    task. The number of the task that begins at index ``first`` is ``first`` divided by ``size``.
+    """A pass over a range that begins at 0. The length of the range is the word ``at`` of ``lengths``, read when the
+    stage begins. ``size``: length of a task. The number of the task that begins at index ``first`` is ``first`` divided
+    by ``size``.
     """
 
     kernel: Kernel
@@ -81,11 +83,11 @@ class Span:
     size: int
 
     def words(self) -> list[int]:
-        """Return the words of the stage."""
+        """Return the words that describe the stage."""
         return [self.kernel.address, self.table, 0, 0, 0, address_of(self.lengths) + _WORD * self.at, self.size]
 
     def tasks(self) -> Ints:
-        """Return the present tasks (k, 2)."""
+        """Return the tasks (k, 2) for the present length."""
         n = int(self.lengths[self.at])
         first = np.arange(0, n, self.size)
         return np.column_stack([first, np.minimum(first + self.size, n)])
@@ -97,18 +99,18 @@ def _words(stage: Stage) -> list[int]:
 
 
 class Program:
-    """Stages in the order in which they are run."""
+    """A program: stages in the order in which they are run."""
 
     def __init__(self, team: Team, stages: Sequence[Stage | Span], control: Ints) -> None:
-        """``control`` (1,): word of the next stage, -1 for the following one; kernels write it."""
+        """``control`` (1,): number of the next stage, which kernels may write; -1 for the following stage."""
         self._team, self._stages, self.control = team, list(stages), control
         words = [each.words() if isinstance(each, Span) else _words(each) for each in stages]
         self._words = np.array(words, np.int64).reshape(-1, _WORDS)
         control[0] = -1
 
     def run(self, first: int = 0, end: int | None = None) -> int:
-        """Run the stages from ``first`` to ``end``, all by default, and return the number of the stage that would come
-        next: ``end``, or a larger number that a kernel has written.
+        """Run the stages from ``first`` to ``end``; by default all stages. Return the number of the stage that would
+        come next: ``end``, or a larger number that a kernel has written.
         """
         end = len(self._stages) if end is None else end
         team = self._team
@@ -122,7 +124,7 @@ class Program:
         return k
 
     def _timed(self, stage: Stage | Span) -> None:
-        """Run a stage while tasks are timed (projecting.py)."""
+        """Run a stage while the times of tasks are measured (projecting.py)."""
         if isinstance(stage, Stage):
             self._team.run(stage.kernel, stage.table, stage.tasks, stage.starts)
         elif len(tasks := stage.tasks()):

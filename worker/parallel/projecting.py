@@ -1,10 +1,11 @@
-"""Estimate of the time that regions would take on more threads than there are cores.
+"""Estimate of the time that parallel regions would take with more threads than the machine has cores.
 
-The tasks are timed one after the other and assigned as a team of each size would assign them: the next task goes to
-the thread that is free first, colour by colour. The costs of sharing are measured before, on two threads. The cost
-``turn`` is that of a colour. After a pause a sleeping thread costs its caller the time ``call``, and works after the
-time ``wake``. Each woken thread wakes two more (team.py). The estimate omits the slow-down of simultaneous tasks by
-the memory that they share.
+The tasks are run and timed one after the other. For each number of threads (crew) the tasks are assigned as a team
+would assign them: colour by colour, the next task goes to the thread that is free first. The costs of parallel regions
+are measured before, with two threads. Each colour costs the time ``turn``. After a pause, waking a thread costs the
+calling thread the time ``call``, and the woken thread begins to work after the time ``wake``. Each woken thread wakes
+two more threads (team.py). The estimate does not include that simultaneous tasks slow each other down by the memory
+that they share.
 """
 
 import time
@@ -19,22 +20,24 @@ from .team import Team
 from .words import TASK, call_task, now
 
 _PAUSE = 100_000
-"""Time after which threads without a task sleep, ns. Chosen value: twice the time for which they poll (team.py)."""
+"""Time after which threads without a task sleep, ns. Chosen value: twice the time for which such threads poll
+(team.py)."""
 _REPEATS = 50
 _ROUNDS = 100_000
-"""Number of iterations of a task that lasts longer than the waking of a thread. Chosen value: some 100 us."""
+"""Number of iterations of a task that takes longer than the waking of a thread. With the chosen value the task takes
+some 100 us."""
 _WORDS = types.int64[::1], types.int64
 _words = reader(*_WORDS)
 
 
 def crews_of(threads: int) -> list[int]:
-    """Return the sizes of the teams of the estimate: 1, 2, 4, 8, ... and ``threads`` threads."""
+    """Return the numbers of threads for which the estimate is made: 1, 2, 4, 8, ... and ``threads``."""
     return sorted({threads} | {1 << k for k in range(threads.bit_length()) if 1 << k <= threads})
 
 
 @dataclass(frozen=True)
 class Costs:
-    """Costs of sharing, ns. The docstring of the module defines ``turn``, ``call`` and ``wake``."""
+    """Costs of parallel regions, ns. The docstring of the module defines ``turn``, ``call`` and ``wake``."""
 
     turn: int
     call: int
@@ -43,8 +46,8 @@ class Costs:
 
 @njit("void(boolean, int64[::1], int64[::1], int64[:, ::1])", cache=True)
 def _ready(asleep, costs, crews, free):  # type: ignore[no-untyped-def]
-    """Set the time at which each thread of each crew can begin the first task of a colour. The last column is the
-    time at which the last task of a crew ends.
+    """Set the time at which each thread of each crew can begin the first task of a colour. The last column is the time
+    at which the last task of a crew ends.
     """
     for c in range(len(crews)):
         free[c, : crews[c]] = 0
@@ -59,7 +62,7 @@ def _ready(asleep, costs, crews, free):  # type: ignore[no-untyped-def]
 
 @njit("void(int64, int64[::1], int64[:, ::1])", cache=True)
 def _give(took, crews, free):  # type: ignore[no-untyped-def]
-    """Assign a task, for each crew, to the thread that is free first."""
+    """Assign a task in each crew to the thread that is free first."""
     for c in range(len(crews)):
         first = 0
         for k in range(1, crews[c]):
@@ -72,7 +75,9 @@ def _give(took, crews, free):  # type: ignore[no-untyped-def]
 @njit("int64(int64[::1], int64, int64, int64[:, ::1], int64[::1], int64[::1], int64[::1], int64[:, ::1], int64[::1])",
       cache=True)  # fmt: skip
 def _timed(clock, kernel, table, tasks, starts, costs, crews, free, spans):  # type: ignore[no-untyped-def]
-    """Run all tasks and return the time, ns. Set ``spans`` (crews,) to the time that each crew would take, ns."""
+    """Run all tasks and return the time that they took, ns. Set ``spans`` (crews,) to the time that each crew would
+    take, ns.
+    """
     begin = now(clock, 0)
     asleep = begin - clock[2] > _PAUSE
     spans[:] = 0
@@ -91,10 +96,12 @@ def _timed(clock, kernel, table, tasks, starts, costs, crews, free, spans):  # t
 
 
 class Projecting:
-    """Runs the tasks of regions one after the other, and sums up the time that crews of other sizes would take."""
+    """Runs the tasks of parallel regions one after the other. Sums the time that crews of other sizes would take."""
 
     def __init__(self, threads: int, costs: Costs | None = None) -> None:
-        """``threads``: size of the largest crew; ``costs``: costs of sharing, which are measured if not given."""
+        """``threads``: size of the largest crew; ``costs``: costs of parallel regions. If the costs are not given, they
+        are measured.
+        """
         self.crews = crews_of(threads)
         self.costs = costs or measured()
         self.regions = self.colours = self.tasks = 0
@@ -106,14 +113,14 @@ class Projecting:
 
     @property
     def spans(self) -> list[float]:
-        """Return the time that each crew would have taken for all regions so far, s."""
+        """Return the time that each crew would have taken for all parallel regions so far, s."""
         return (1e-9 * self._spans).tolist()  # type: ignore[no-any-return]
 
     def run(self, kernel: Kernel, table: int, tasks: Ints, starts: Ints) -> int:
         """Run the tasks as ``Team.run`` does; return the CPU time, ns.
 
-        If another program used the core, the wall times of the tasks are too long. All wall times are therefore
-        scaled by the ratio of CPU time to wall time.
+        The wall times of tasks are too long if another program used the core. Therefore all wall times are multiplied
+        by the ratio of CPU time to wall time.
         """
         self.regions += 1
         self.colours += len(starts) - 1
@@ -129,7 +136,7 @@ class Projecting:
 
 @njit(TASK, cache=True)
 def _spin(table, first, end, thread):  # type: ignore[no-untyped-def]
-    """A loop of given length that the compiler cannot remove."""
+    """Run a loop of given length that the compiler cannot remove."""
     totals, rounds = _words(table)
     total = totals[thread]
     for k in range(rounds):
@@ -138,8 +145,8 @@ def _spin(table, first, end, thread):  # type: ignore[no-untyped-def]
 
 
 def measured() -> Costs:
-    """Return the costs of sharing, measured on two threads of this process. Each cost is the tenth percentile of its
-    measurements, since other programs may use the cores.
+    """Return the costs of parallel regions, measured with two threads of this process. Each cost is the tenth
+    percentile of its measurements, because other programs may use the cores.
     """
     two, totals = Team(2), np.zeros(2, np.int64)
     table, tasks = Arguments(*_WORDS), np.array([[0, 1], [1, 2]])

@@ -1,7 +1,7 @@
 """Tags of the messages between two ranks.
 
-Two exchanges that may be in progress at the same time never share a tag. Trades share a tag: messages between two
-ranks arrive in the order in which they were sent, and both ranks trade in the same order.
+Two exchanges that may be in progress at the same time never have the same tag. All trades have one tag, because
+messages between two ranks arrive in the order in which they were sent, and the two ranks trade in the same order.
 """
 
 from enum import IntEnum, unique
@@ -9,7 +9,7 @@ from enum import IntEnum, unique
 
 @unique
 class Tag(IntEnum):
-    """Content of a message."""
+    """Content of a message, by which messages are distinguished."""
 
     SCATTER = 0
     """An item from rank 0 for one rank (parallel/mpi.py)."""
@@ -49,9 +49,9 @@ class Tag(IntEnum):
     """Sums of the impulses of a sweep at tied nodes, in every step with bonds of meshes that do not match
     (bonds/layout.py)."""
     BONDED = 23
-    """Positions and velocities of tied nodes that this rank does not hold, in every step with bonds of meshes that
-    do not match (bonds/layout.py)."""
+    """Positions and velocities of tied nodes that this rank does not have, in every step with bonds of meshes that do
+    not match (bonds/layout.py)."""
     SWAP = 90
-    """Words of unknown number, which is exchanged first (parallel/mpi.py)."""
+    """Words whose number is not known; the number is exchanged first (parallel/mpi.py)."""
     TRADE = 91
-    """Words between two partners that both expect the message (parallel/mpi.py)."""
+    """Words between two partners that have both planned the message (parallel/mpi.py)."""

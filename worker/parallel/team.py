@@ -1,16 +1,17 @@
-"""The threads of a rank: a pass is cut into tasks, and each task is taken by the next free thread.
+"""The threads of a rank. A pass is cut into tasks, and the next free thread takes the next task.
 
-A task is a range of the pass: chunks of tets, or nodes. Tasks of one colour write to no common memory, so threads need
-no locks and no separate sums. Colours run one after the other. All sums are of integers, so the answer is the same on
-any number of threads.
+A task is a range of a pass: a range of chunks of tets, or of nodes. Tasks of one colour write to no common memory, so
+threads need no locks and no separate sums. Colours run one after the other. All sums are of integers, so the answer is
+the same on any number of threads.
 
-The calling thread also runs tasks. At the end the calling thread waits for the tasks that have begun, not for threads:
-if another program uses the core of a helper, the other threads run the tasks of this helper. OpenMP waits for every
-thread at the end of every region, which takes milliseconds in that case (docs/performance/scaling.md, "Threads"). One
-word holds the number of tasks and the index of the next task. A thread takes a task by an atomic increment of the word.
-A colour does not end before its last task, so the arguments of a task stay valid. Helpers poll the word for some 50 us,
-then sleep until the next pass. Waking a thread takes some 20 us of the waking thread. The calling thread therefore
-wakes one or two threads, and each woken thread wakes two more while there are tasks.
+The calling thread also runs tasks; the other threads are called helpers. At the end of a pass the calling thread waits
+for the tasks that have begun, not for threads. If another program uses the core of a helper, the other threads run the
+tasks. OpenMP would wait for every thread at the end of every parallel region, which takes milliseconds in that case
+(docs/performance/scaling.md, "Threads"). One word has the number of tasks and the index of the next task. A thread
+takes a task by an atomic increment of the word. A colour does not end before its last task, so the arguments of a task
+stay valid. Helpers poll the word for some 50 us, then sleep until the next pass. To wake a thread takes some 20 us of
+the time of another thread. Therefore the calling thread wakes one or two threads, and each woken thread wakes two more
+threads while there are tasks.
 """
 
 import ctypes
@@ -33,28 +34,28 @@ __all__ = ["TASK", "Stage", "Team", "team"]
 _NEXT, _DONE, _ASLEEP, KERNEL, TABLE, TASKS, MOST, WITHIN, CLOCK, SIZE, _SEMAPHORE, END, _THREADS = (
     0, 8, 16, 24, 25, 26, 27, 28, 29, 31, 32, 36, 40,
 )  # fmt: skip
-"""Offsets in the words of a job. Words that several threads write have a cache line of their own. SIZE: length of each
-task of a range that ends at END, or 0 if the tasks are a table at the address TASKS; MOST: number of threads that may
-work; WITHIN: time in regions so far, ns; CLOCK: two words for reading the clock. From _THREADS on each thread has a
-line: its time in tasks, ns, and words for the clock."""
+"""Offsets in the words that describe a job. A word that several threads write has a cache line of its own. SIZE: length
+of each task of a range that ends at END, or 0 if the tasks are a table at the address TASKS; MOST: number of threads
+that may work; WITHIN: time in parallel regions so far, ns; CLOCK: two words for reading the clock. From _THREADS on
+each thread has a cache line: its time in tasks, ns, and words for the clock."""
 _BITS, _MASK = 20, (1 << 20) - 1
-"""Number of low bits of the word _NEXT, which have the next task, and their mask. The higher bits have the number of
-tasks."""
+"""Number of low bits of the word _NEXT, which are the index of the next task, and the mask of these bits. The higher
+bits are the number of tasks."""
 _LINE = 8
 """Number of words in a cache line."""
 _WAKES = 2
-"""Largest number of threads that a thread wakes."""
+"""Largest number of threads that one thread wakes."""
 _LONG = 1000
-"""Smallest number of rounds of a program during which other threads of Python run. Chosen value: far above the number
-of sweeps of contact, far below the number of steps in a second."""
+"""Smallest number of rounds of a program that allows other Python threads to run meanwhile. The chosen value is far
+above the number of sweeps of contact and far below the number of steps in a second."""
 _POLLS = 4000
-"""Number of polls before a helper sleeps, and before the calling thread yields its core. Chosen value: some 50 us,
-longer than the gap between two colours, much shorter than a step."""
+"""Number of polls before a helper sleeps, and before the calling thread yields its core. With the chosen value polling
+takes some 50 us, which is longer than the gap between two colours and much shorter than a step."""
 
 
 @njit("boolean(int64[::1], int64)", cache=True)
 def _do_one(job, thread):  # type: ignore[no-untyped-def]
-    """Take one task and run it; return False if no task is left."""
+    """Take one task and run it. Return False if no task is left."""
     word = load(job, _NEXT)
     if word & _MASK >= word >> _BITS:
         return False
@@ -78,7 +79,9 @@ def _do_one(job, thread):  # type: ignore[no-untyped-def]
 
 @njit("void(int64[::1], int64)", cache=True)
 def _wake(job, semaphore):  # type: ignore[no-untyped-def]
-    """Wake sleeping threads: at most _WAKES, and no more than there are tasks and threads that may work."""
+    """Wake sleeping threads. At most _WAKES threads are woken, and no more than there are tasks and threads that may
+    work.
+    """
     word, threads = load(job, _NEXT), (len(job) - _THREADS) // _LINE
     helpers = min((word >> _BITS) - (word & _MASK), load(job, MOST)) - 1
     for _ in range(_WAKES):
@@ -87,13 +90,13 @@ def _wake(job, semaphore):  # type: ignore[no-untyped-def]
             return
         if add(job, _ASLEEP, -1) > 0:
             sem_post(semaphore)
-        else:  # another caller has woken the last sleeping thread
+        else:  # another caller woke the last sleeping thread
             add(job, _ASLEEP, 1)
 
 
 @njit("void(int64[::1], int64, int64)", cache=True, nogil=True)
 def _help(job, semaphore, thread):  # type: ignore[no-untyped-def]
-    """Run tasks for ever; sleep after a time without tasks."""
+    """Run tasks in an endless loop. Sleep after a time without tasks."""
     idle = 0
     while True:
         if _do_one(job, thread):
@@ -109,7 +112,7 @@ def _help(job, semaphore, thread):  # type: ignore[no-untyped-def]
 
 @njit("void(int64[::1], int64, int64)", cache=True)
 def divide(job, semaphore, many):  # type: ignore[no-untyped-def]
-    """Run ``many`` tasks of the pass that the words of the job describe; return when all are done."""
+    """Run ``many`` tasks of the pass that the words of the job describe. Return when all tasks are done."""
     swap(job, _DONE, 0)
     swap(job, _NEXT, many << _BITS)
     if many > 1:
@@ -125,7 +128,7 @@ def divide(job, semaphore, many):  # type: ignore[no-untyped-def]
 
 @njit("void(int64[::1], int64, int64, int64, int64, int64, int64)", cache=True)
 def share(job, semaphore, kernel, table, tasks, starts, colours):  # type: ignore[no-untyped-def]
-    """Run the tasks of a pass, one colour after the other; return when all are done."""
+    """Run the tasks of a pass, one colour after the other. Return when all tasks are done."""
     job[KERNEL], job[TABLE], job[SIZE] = kernel, table, 0
     for colour in range(colours):
         first = word_at(starts, colour)
@@ -152,8 +155,8 @@ def _alone(job, kernel, table, tasks):  # type: ignore[no-untyped-def]
 
 @njit("void(int64[::1], int64[::1], int64, int64[:, ::1], int64, int64[::1])", cache=True)
 def _repeat(spent, job, semaphore, stages, rounds, stop):  # type: ignore[no-untyped-def]
-    """Run all stages, one after the other, ``rounds`` times, or until a stage has set ``stop`` (1,) to a number other
-    than 0; ``stages`` (n, 5) has the arguments of each pass. Adds the time of each stage, ns, to ``spent`` (n,).
+    """Run all stages one after the other, ``rounds`` times, or until a stage has set ``stop`` (1,) to a number other
+    than 0. ``stages`` (n, 5): arguments of each pass. Adds the time of each stage, ns, to ``spent`` (n,).
     """
     begin = last = now(job, CLOCK)
     for _ in range(rounds):
@@ -176,44 +179,44 @@ def _repeat(spent, job, semaphore, stages, rounds, stop):  # type: ignore[no-unt
 
 @njit("void(int64[::1], int64[::1], int64, int64[:, ::1], int64, int64[::1])", cache=True, nogil=True)
 def _repeat_long(spent, job, semaphore, stages, rounds, stop):  # type: ignore[no-untyped-def]
-    """``_repeat`` for a long program: other threads of Python run meanwhile."""
+    """Does the same as ``_repeat`` for a long program, while other Python threads may run."""
     _repeat(spent, job, semaphore, stages, rounds, stop)
 
 
 @dataclass(frozen=True)
 class Stage:
-    """A pass of a program: the arguments of ``Team.run``."""
+    """A pass of a program. It has the arguments of ``Team.run``."""
 
     kernel: Kernel
     table: int
     tasks: Ints
     starts: Ints
     ties: tuple[Tie, ...] = ()
-    """Words of the table that follow numbers of the program."""
+    """Words of the table of arguments that change with numbers of the program."""
 
 
 class Timed(Protocol):
-    """A replacement for a team. This team runs tasks one after the other, and sums up the time that teams of the sizes
-    ``crews`` would take.
+    """A replacement for a team. It runs tasks one after the other, and sums the time that teams of the sizes ``crews``
+    would take.
     """
 
     crews: list[int]
 
     @property
     def spans(self) -> list[float]:
-        """Return the time that each crew would have taken for all regions so far, s."""
+        """Return the time that each crew would have taken for all parallel regions so far, s."""
 
     def run(self, kernel: Kernel, table: int, tasks: Ints, starts: Ints) -> int:
         """Run the tasks as ``Team.run`` does; return the CPU time, ns."""
 
 
 class Team:
-    """A number of threads, including the calling thread. The threads exist until the process ends (``team``)."""
+    """The threads of a rank, including the calling thread. The threads exist until the process ends (``team``)."""
 
     def __init__(self, threads: int) -> None:
         self.threads = threads
         self.projecting: Timed | None = None
-        """Object that runs all tasks in place of the threads while tasks are timed."""
+        """Object that runs all tasks in place of the threads, if the times of tasks are measured."""
         size = _THREADS + _LINE * threads
         room = np.zeros(size + _LINE, np.int64)
         self.job: Ints = room[-(room.ctypes.data // room.itemsize) % _LINE :][:size]
@@ -236,19 +239,19 @@ class Team:
 
     @property
     def within(self) -> float:
-        """Wall time in ``run`` so far, s. More threads could share this time."""
+        """Wall time in ``run`` so far, s. More threads would shorten this time."""
         return self._words[WITHIN] / SECOND
 
     @property
     def helped(self) -> float:
-        """Time of all threads except the calling one in tasks, summed over these threads, s."""
+        """Time in tasks of all threads except the calling thread, summed over these threads, s."""
         return float(self.job[_THREADS + _LINE :: _LINE].sum()) / SECOND
 
     def run(self, kernel: Kernel, table: int, tasks: Ints, starts: Ints) -> None:
-        """Run ``tasks`` (k, 2), first and end, with a ``kernel`` of the signature TASK and the arguments at the address
-        ``table``.
+        """Run ``tasks`` (k, 2), each given by its first index and its end. ``kernel`` has the signature TASK;
+        ``table``: address of its arguments.
 
-        Tasks ``starts[c]`` to ``starts[c + 1]``, at most 2^20, write to no common memory.
+        The tasks from ``starts[c]`` to ``starts[c + 1]``, at most 2^20, write to no common memory.
         """
         if self.projecting is not None:
             self._words[WITHIN] += self.projecting.run(kernel, table, tasks, starts)
@@ -259,11 +262,11 @@ class Team:
             _ask(self.job, self.semaphore, kernel.address, table, *places)
 
     def repeat(self, stages: Sequence[Stage], rounds: int, stop: Ints | None = None) -> Ints:
-        """Run all ``stages``, one after the other, ``rounds`` times, in one call; end early after the stage that sets
+        """Run all ``stages`` one after the other, ``rounds`` times, in one call. End early after a stage that sets
         ``stop`` (1,) to a number other than 0. Return (stages,) the time of each stage, ns.
 
-        Threads stay awake between the stages, and no Python code runs between them. A kernel that needs the number
-        of the round stores it in its table.
+        Threads stay awake between the stages, and no Python code runs between the stages. If a kernel needs the number
+        of the round, it stores the number in its table.
         """
         spent, stop = np.zeros(len(stages), np.int64), np.zeros(1, np.int64) if stop is None else stop
         if self.projecting is not None:
@@ -283,5 +286,5 @@ class Team:
 
 @cache
 def team(threads: int) -> Team:
-    """Return the team of this process with so many threads."""
+    """Return the team of this process with ``threads`` threads."""
     return Team(threads)

@@ -1,4 +1,4 @@
-"""Atomic words, the clock and calls of the C library, for kernels."""
+"""Atomic words, the clock, and calls of the C library, for use in kernels."""
 
 from typing import Any
 
@@ -8,9 +8,10 @@ from ..kernels.jit import intrinsic, types
 
 _WORD = ir.IntType(64)
 _MONOTONIC, SECOND = 1, 1_000_000_000
-"""Number of the clock CLOCK_MONOTONIC, which is the same for all threads, and number of ns in a second."""
+"""Number of the clock CLOCK_MONOTONIC, which gives the same time in all threads; and the number of ns in a second."""
 TASK = "void(int64, int64, int64, int64)"
-"""Signature of a kernel that runs a task: address of its arguments (arguments.py), first, end, number of the thread."""
+"""Signature of a kernel that runs a task: address of its arguments (arguments.py), first index, end, number of the
+thread."""
 
 
 def _call(_: Any, kernel: Any, table: Any, first: Any, end: Any, thread: Any) -> Any:
@@ -89,19 +90,19 @@ def _library(name: str, signature: Any) -> Any:
 
 call_task: Any = intrinsic(_call)
 add: Any = intrinsic(_added)
-"""Function for kernels: add to a word atomically and return its old value. Two threads that add at the same time never
-get the same old value."""
+"""Function for kernels. It adds to a word atomically and returns the old value of the word. Two threads that add at the
+same time never get the same old value."""
 swap: Any = intrinsic(_swapped)
-"""Function for kernels: set a word and return its old value. Earlier writes of the thread are visible to threads
-that read the new value."""
+"""Function for kernels. It sets a word and returns the old value of the word. Threads that read the new value also see
+all earlier writes of the thread."""
 load: Any = intrinsic(_loaded)
-"""Function for kernels: read a word that other threads write."""
+"""Function for kernels. It reads a word that other threads may write."""
 now: Any = intrinsic(_read_clock)
-"""Function for kernels: return the time, ns; two words at ``at`` are scratch."""
+"""Function for kernels. It returns the time, ns, and uses two words at the address ``at`` as temporary memory."""
 word_at: Any = intrinsic(_read)
-"""Function for kernels: return word ``k`` at an address."""
+"""Function for kernels. It returns word number ``k`` at an address."""
 write_real: Any = intrinsic(_write)
-"""Function for kernels: write a float64 to an address."""
+"""Function for kernels. It writes a float64 to an address."""
 sched_yield: Any = intrinsic(lambda _: _library("sched_yield", types.void()))
 sem_wait: Any = intrinsic(lambda _, semaphore: _library("sem_wait", types.void(semaphore)))
 sem_post: Any = intrinsic(lambda _, semaphore: _library("sem_post", types.void(semaphore)))
