@@ -71,6 +71,7 @@ def test_the_volume_of_a_combination_made_at_random(seed: int) -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.timeout(1800)
 def test_the_volumes_of_two_hundred_combinations_made_at_random() -> None:
     for seed in range(24, 224):
         assert_volume(seed)

@@ -30,7 +30,7 @@ from .occ.frame import Frame, scale_of
 from .occ.meshing import with_names
 from .occ.sizes import GMSH_SIZE, graded
 from .occ.sliding import Cut
-from .occ.solids import draw_solid
+from .occ.solids import draw_solid, with_surfaces
 from .sources import Sources
 from .unstructured import draw
 
@@ -64,9 +64,13 @@ def together(bodies: Mapping[str, Joint], sources: Sources, name: str) -> list[T
     for key, body in bodies.items():
         if not isinstance(body, _Solid):
             refuse_impossible(body, key)
+    return with_surfaces(lambda exact: _meshed(bodies, sources, name, exact=exact), bodies.values())
+
+
+def _meshed(bodies: Mapping[str, Joint], sources: Sources, name: str, *, exact: bool) -> list[TetMesh]:
     with session(OPTIONS) as gmsh:
         frame = Frame((0.0, 0.0, 0.0), "z", _scale(gmsh, bodies, sources))
-        drawn = [_drawn(gmsh, body, frame.scale, sources, key) for key, body in bodies.items()]
+        drawn = [_drawn(gmsh, body, frame.scale, sources, key, exact) for key, body in bodies.items()]
         model = _Model(gmsh, bodies, frame, _fragments(gmsh.model.occ, drawn, list(bodies)))
         gmsh.model.occ.synchronize()
         _sizes(model)
@@ -82,12 +86,12 @@ def _scale(gmsh: Any, bodies: Mapping[str, Joint], sources: Sources) -> float:
     return scale_of(max([*sizes, *np.ptp(np.array(known).reshape(-1, 3), axis=0).tolist()] if known else sizes))
 
 
-def _drawn(gmsh: Any, body: Joint, scale: float, sources: Sources, key: str) -> Solids:
+def _drawn(gmsh: Any, body: Joint, scale: float, sources: Sources, key: str, exact: bool) -> Solids:
     """Draw a body in its position in space, with lengths divided by ``scale``. Return the volumes of the body."""
     occ, start = gmsh.model.occ, body.centre if isinstance(body, _Solid) else centre(body)
     before = set(occ.getEntities(3))
     if isinstance(body, _Solid):
-        draw_solid(gmsh, body, Frame(start, body.axis, scale), sources, key)
+        draw_solid(gmsh, body, Frame(start, body.axis, scale), sources, key, exact=exact)
     elif isinstance(body, Revolved | RingSector):
         primitives.draw(occ, body, Frame(start, body.axis, scale))
     else:

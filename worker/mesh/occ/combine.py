@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from typing import Any
 
-from conoid.cases.model.operands import CadForm, CombinedForm, DifferenceForm, Operand, StlForm, UnionForm
+from conoid.cases.model.operands import CadForm, CadOperand, CombinedForm, DifferenceForm, Operand, StlForm, UnionForm
 from conoid.cases.shapes.combined import box_of
 
 from ...errors import MeshError
@@ -31,7 +31,8 @@ class Drawing:
     frame: Frame
     sources: Sources
     exact: bool = False
-    """Whether bodies of CAD files keep their surfaces (``cad.imported``). Possible for a single file only."""
+    """Whether CAD bodies keep their surfaces (``cad.imported``). CAD operands of a combination always do: a body that a
+    general transformation damages would not be cut off, without an error."""
 
     def solids(self, form: AnyForm, key: str) -> Solids:
         """Draw the form at the key ``key`` of the case, with its rotation. Return the volumes of the form, or no volume
@@ -42,7 +43,8 @@ class Drawing:
             made = self._combined(form, key)
         elif isinstance(form, CadForm):
             head = f"{key}.path = {form.path!r}"
-            made = imported(self.gmsh, form, self.sources[key], self.frame, head, exact=self.exact)
+            exact = self.exact or isinstance(form, CadOperand)
+            made = imported(self.gmsh, form, self.sources[key], self.frame, head, exact=exact)
         elif isinstance(form, StlForm):
             made = faceted(self.gmsh, form, self.sources[key], self.frame, f"{key}.path = {form.path!r}")
         else:

@@ -1,8 +1,9 @@
 """Meshes of combinations of shapes, solids of CAD files and closed surfaces."""
 
 import hashlib
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -25,8 +26,9 @@ from .sizes import set_size
 from .stl import read_stl
 from .surface import enclose
 
-_CLOSED = "Impossible to mesh periodic surface"
-"""Text of the gmsh error for a closed surface that gmsh cannot mesh."""
+T = TypeVar("T")
+_BY_GMSH = "gmsh"
+"""Beginning of messages about the mesher; messages about a file begin with the key of the mesh."""
 _TETS_PER_CUBE = 6.0
 """Number of tets that gmsh makes in a volume of element_size^3."""
 
@@ -42,7 +44,7 @@ def measured(mesh: Measured, sources: Sources, key: str) -> TetMesh:
     if isinstance(mesh, Stl):
         made = _of_surface(mesh, sources, key)
     elif isinstance(mesh, Cad | Combination):
-        made = _of_solid(mesh, sources, key)
+        made = with_surfaces(lambda exact: _meshed(mesh, sources, key, exact=exact), [mesh])
     else:
         raise MeshError(f"{key}: gmsh does not draw this")
     points = made.mesh.points
@@ -50,14 +52,16 @@ def measured(mesh: Measured, sources: Sources, key: str) -> TetMesh:
     return replace(made.mesh, origin=Origin(name, np.arange(len(points), dtype=np.int64), tuple(made.notes)))
 
 
-def _of_solid(mesh: Cad | Combination, sources: Sources, key: str) -> _Made:
-    """Mesh a solid. If gmsh cannot mesh a closed spline surface, mesh again with the exact surfaces of the CAD file."""
+def with_surfaces(make: Callable[[bool], T], bodies: Iterable[object]) -> T:
+    """Return ``make(False)``. If gmsh cannot mesh the splines that it has made of the surfaces of a CAD body among the
+    ``bodies``, return ``make(True)``, which keeps these surfaces.
+    """
     try:
-        return _meshed(mesh, sources, key, exact=False)
+        return make(False)
     except MeshError as error:
-        if _CLOSED not in str(error) or not isinstance(mesh, Cad):
+        if not str(error).startswith(_BY_GMSH) or not any(isinstance(each, Cad) for each in bodies):
             raise
-    return _meshed(mesh, sources, key, exact=True)
+    return make(True)
 
 
 def _meshed(mesh: Cad | Combination, sources: Sources, key: str, *, exact: bool) -> _Made:
