@@ -1,1 +1,3 @@
-"""Contact of bodies: surface, broad phase, narrow phase and solver of the impulses, with ghosts of other ranks."""
+"""Contact of bodies. The packages are the surface, the broad phase, the narrow phase and the solver of the impulses;
+surfaces of other ranks are present as ghosts.
+"""

@@ -8,13 +8,13 @@ from ..model.state import Ints
 from ..parallel.fixed_point import Tally
 
 _AHEAD = 2.0
-"""Safety factor: penetrations are corrected only while the balance exceeds this factor times the largest energy that
-contact has returned in one step so far."""
+"""Safety factor. Penetrations are corrected only while the energy in the account exceeds this factor times the largest
+energy that contact has returned in one step so far."""
 
 
 class Account:
-    """Sums over all contacts, steps and ranks, as integers: independent of the order of summation and of the
-    partition.
+    """Sums over all contacts, steps and ranks. They are integers, so they do not depend on the order of summation and
+    on the partition.
     """
 
     def __init__(self, energy: float) -> None:
@@ -22,24 +22,24 @@ class Account:
         self._tally = Tally(np.full(2, energy))
         self._taken, self._early, self._most = 0.0, 0.0, 0.0
         self._settled = b""
-        """Words of the last call of ``settle``."""
+        """Words of the account at the last call of ``settle``."""
 
     @property
     def words(self) -> Ints:
-        """(2, 2) limbs (low and high words) of the sums of this rank; see impulse_work.cost."""
+        """(2, 2) low and high limbs of the sums of this rank; see impulse_work.cost."""
         return self._tally.words
 
     @property
     def scale(self) -> float:
-        """Quanta of the high limb per joule."""
+        """Number of quanta of the high limb per joule."""
         return float(self._tally.scale[0])
 
     def carry(self) -> None:
-        """Carries the low limbs into the high limbs, so that the low limbs do not overflow; see Tally."""
+        """Moves the overflow of the low limbs to the high limbs; see Tally."""
         self._tally.carry()
 
     def settle(self, words: Ints) -> bool:
-        """Returns whether contact may correct penetrations in the step ahead; ``words`` (2, 2): sum of the words of all
+        """Returns whether contact may correct penetrations in the next step. ``words`` (2, 2): sum of the words of all
         ranks.
 
         Correction is allowed while the energy taken from the bodies is at least ``_AHEAD`` times the largest energy
@@ -52,12 +52,12 @@ class Account:
         return self._taken >= _AHEAD * self._most
 
     def known(self) -> tuple[float, float, float, float]:
-        """Returns the values of the account other than the words, for a parcel (a checkpoint or migration message);
-        equal on all ranks.
+        """Returns the values of the account except the words, for a parcel (a checkpoint or migration message). All
+        ranks return equal values.
         """
         return self.scale, self._taken, self._early, self._most
 
     def resume(self, words: Ints, known: tuple[float, float, float, float]) -> None:
-        """Restores the state of ``keep`` from a parcel (a checkpoint or migration message)."""
+        """Restores the account from a parcel (a checkpoint or migration message)."""
         scale, self._taken, self._early, self._most = known
         self._tally.words, self._tally.scale = words, np.full(2, scale)

@@ -18,7 +18,7 @@ from .scene.scene import Scene
 from .solver.impulse_work import book
 
 _SLOTS = 2048
-"""Number of slots in a task. Chosen value: a task takes some 20 us; to start a region takes 2 us."""
+"""Number of slots in a task. Chosen value: a task takes some 20 us, compared with 2 us to start a parallel region."""
 _F1, _F2, _N1 = types.float64[::1], types.float64[:, ::1], types.int32[::1]
 _BOOK = _F1, _F1, _N1, _N1, _F2, types.int64[:, ::1], _F2, types.float64
 _read = reader(*_BOOK)
@@ -26,47 +26,51 @@ _read = reader(*_BOOK)
 
 @njit(TASK, cache=True)
 def _book(table, first, stop, thread):  # type: ignore[no-untyped-def]
-    """Task: ``impulse_work.book``."""
+    """Task: runs ``impulse_work.book``."""
     loss, external, places, index, before, total, mobility, scale = _read(table)
     book(loss, external, places, index, before, total, mobility, scale, first, stop)
 
 
 class Books:
-    """Sums of the energies and impulses of contact. Half of the work of an impulse, with v(n-1/2), is booked in the
-    step that applies the impulse. The other half, with v(n+1/2), is booked in the next step.
+    """Sums of the energies and impulses of contact. Half of the work of an impulse, computed with v(n-1/2), is added in
+    the step that applies the impulse. The other half, computed with v(n+1/2), is added in the next step.
     """
 
     def __init__(self, nodes: Nodes, case: Case, impulse: float, energy: float, team: Team) -> None:
-        """``impulse``, N s, and ``energy``, J: upper bounds at one node in one step."""
+        """``impulse``, N s, and ``energy``, J: upper bounds of the impulse and of the energy at one node in one
+        step.
+        """
         self._book = Pass(team, _book, *_BOOK, size=_SLOTS)
         self.contact_loss = np.zeros(nodes.n)
         """(nodes,) energy lost by impact and friction, J."""
         self.external_work = np.zeros(nodes.n)
-        """(nodes,) work of the supports of held nodes against contact, J."""
+        """(nodes,) external work: work of the supports of held nodes against contact, J."""
         self.scale = fixed_point.scale_for(impulse)
-        """Number of quanta of impulse per N s."""
+        """Number of quanta per N s of an impulse."""
         self.friction = fixed_point.Tally(np.full(2, energy))
-        """Work of friction so far, J, and the part of the work of the last step that is not yet in the ledger."""
+        """Work of friction so far, J; and the part of the work of the last step that the energy ledger does not contain
+        yet."""
         self.account = Account(energy)
         self.agreed = self.account.words
-        """Sum over all ranks of the words of the account, from the last reduction (account.py)."""
+        """Sum over all ranks of the words of the account, at the last reduction (account.py)."""
         parts, asked = len(case.parts), any(probe.by is not None for probe in case.probes)
         self.parts = np.zeros((parts, 3), np.int64)
-        """(parts, 3) impulses on each part so far, quanta."""
+        """(parts, 3) sum of the impulses on each part so far, quanta."""
         self.pairs = np.zeros((parts, parts, 3) if asked else (0, 0, 3), np.int64)
-        """(parts, parts, 3) impulses so far on each part (first index) from each other part, quanta; it is (0, 0, 3)
-        if no probe of the case has the key ``by``."""
+        """(parts, parts, 3) sum of the impulses so far on each part (first index) from each other part, quanta. The
+        array is (0, 0, 3) if no probe of the case has the key ``by``."""
         self.pressed = np.zeros((nodes.n if "contact_pressure" in case.run.fields else 0, 3), np.int64)
-        """(nodes, 3) impulses since the last frame, quanta; (0, 3) if the field ``contact_pressure`` is not written."""
-        # Booked energies and impulses remain at the parent of a copy.
+        """(nodes, 3) sum of the impulses since the last frame, quanta; (0, 3) if the field ``contact_pressure`` is not
+        requested."""
+        # A copy of a node starts with zero; the parent keeps the energies and impulses.
         nodes.columns.declare(self, contact_loss=ZERO, external_work=ZERO, pressed=ZERO)
         self.open: Ints = np.zeros((0, 3), np.int64)
-        """(nodes, 3) impulses of the last step before a restart or a repartition, quanta; (0, 3) once they are
-        booked."""
+        """(nodes, 3) impulses of the last step before a restart or a repartition, quanta. After their work was added,
+        the array is (0, 3)."""
 
     def keep(self, parcel: Parcel, scene: Scene | None) -> None:
-        """Adds all sums to the ``parcel`` (a checkpoint or migration message); the impulses of the last step are read
-        from the ``scene``, if there is one.
+        """Adds all sums to the ``parcel`` (a checkpoint or migration message). The impulses of the last step are read
+        from the ``scene``, if there is a scene.
         """
         parcel.nodes["contact.contact_loss"] = self.contact_loss
         parcel.nodes["contact.external_work"] = self.external_work
@@ -80,7 +84,9 @@ class Books:
         parcel.nodes["contact.total"] = total
 
     def resume(self, parcel: Parcel, known: tuple[float, float, float, float]) -> None:
-        """Restores the sums from the ``parcel`` (checkpoint or migration message); ``known``: values of the account."""
+        """Restores the sums from the ``parcel`` (a checkpoint or migration message). ``known``: values of the
+        account.
+        """
         self.contact_loss = np.array(parcel.nodes["contact.contact_loss"])
         self.external_work = np.array(parcel.nodes["contact.external_work"])
         self.account.resume(parcel.sums["contact.account"], known)
@@ -91,32 +97,34 @@ class Books:
 
     @staticmethod
     def friction_work(friction: Floats) -> float:
-        """Heat of friction of all ranks at time n, J, without the half of the last step that ``contact_loss`` does
-        not have yet; ``friction``: sums over all ranks.
+        """Heat of friction of all ranks at time n, J, without the half of the last step that ``contact_loss`` does not
+        contain yet. ``friction``: sums over all ranks.
         """
         work, later = friction
         return float(work - later)
 
     def impulses(self, comm: Comm) -> Floats:
-        """(parts, 3) impulses of contact on each part so far, N s. Collective."""
+        """(parts, 3) sum of the contact impulses on each part so far, N s. Collective."""
         return np.asarray(comm.sum(self.parts) / self.scale)
 
     def between(self, comm: Comm) -> Floats:
-        """(parts, parts, 3) impulses of contact on each part from each other part so far, N s. Collective."""
+        """(parts, parts, 3) sum of the contact impulses on each part from each other part so far, N s. Collective."""
         return np.asarray(comm.sum(self.pairs) / self.scale)
 
     def due(self) -> None:
-        """Sets the outstanding half of the work of friction to zero, because the next booking includes that half."""
+        """Sets the outstanding half of the work of friction to zero, because the next call of ``book`` adds this
+        half.
+        """
         self.friction.words[:, 1] = 0
 
     def press(self, scene: Scene) -> None:
-        """Adds the impulses of the step to the impulses since the last frame, if these are written."""
+        """Adds the impulses of the step to the impulses since the last frame, if the contact pressure is requested."""
         if len(self.pressed):
             self.pressed[scene.own.local] += scene.slots.total[scene.own.slots]
 
     def book(self, scene: Scene, places: Indices) -> None:
-        """Books half of the work of the last impulses at the ``places`` of the scene, with the velocities ``before``.
-        The solver books the other half.
+        """Adds half of the work of the last impulses at the ``places`` of the scene, computed with the velocities
+        ``before``. The solver adds the other half.
         """
         self._book.run(
             len(places), self.contact_loss, self.external_work, places, scene.surface_nodes.local, scene.slots.before,
@@ -124,8 +132,8 @@ class Books:
         )  # fmt: skip
 
     def book_resumed(self, nodes: Nodes, mobility: Floats) -> None:
-        """Books the second half of the work of impulses from before a restart or a repartition; ``mobility`` (nodes,
-        3), 1/kg.
+        """Adds the second half of the work of impulses from before a restart or a repartition. ``mobility`` (nodes, 3),
+        1/kg.
         """
         if len(self.open):
             some = np.flatnonzero(self.open.any(axis=1)).astype(np.int32)

@@ -1,1 +1,3 @@
-"""Candidate pairs: search by cells, swept filter, reference motions, and the schedule of searches."""
+"""Candidate pairs. The modules are the search by cells, the swept filter, reference motions, and the schedule of
+searches.
+"""

@@ -1,4 +1,4 @@
-"""Boxes around the paths of nodes, edges and faces over the horizon of a search."""
+"""Bounding boxes of the paths of nodes, edges and faces over the horizon of a search."""
 
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -17,25 +17,26 @@ _PRIMITIVES = 1024
 """Number of primitives in a task. Chosen value: a task takes some 30 us, compared with 2 us to start a parallel
 region."""
 _EVERYWHERE = np.full((1, 2, 3), (((-np.inf,) * 3, (np.inf,) * 3)))
-"""Hull that every box touches."""
+"""Hull that touches every box."""
 
 
 @dataclass
 class Primitives:
-    """Points, edges or faces, given by nodes; all with the same number of corners."""
+    """Points, edges or faces, given by their nodes. All have the same number of corners."""
 
     corners: Indices
-    """(n, k) rows of the nodes of the primitives."""
+    """(n, k) rows of the corner nodes of each primitive."""
     reach: Floats
-    """(n,) reach, m: distance from the hull of the corners within which other primitives are candidates."""
+    """(n,) reach of each primitive, m: distance from the hull of its corners within which other primitives are
+    candidates."""
     some: Indices | None = None
-    """(m,) rows of the primitives to be searched; None for all."""
+    """(m,) rows of the primitives that are searched; None if all are searched."""
     columns: int | None = None
-    """Number of columns of ``corners`` that are corners of the primitive; None for all."""
+    """Number of columns of ``corners`` that are corners of the primitive; None if all columns are corners."""
 
     @property
     def searched(self) -> Indices:
-        """(m,) rows of the primitives to be searched."""
+        """(m,) rows of the primitives that are searched."""
         return np.arange(len(self.corners), dtype=np.int32) if self.some is None else self.some
 
     @property
@@ -45,47 +46,47 @@ class Primitives:
 
 
 class Lines(NamedTuple):
-    """Extrapolation of the nodes of primitives."""
+    """Straight lines along which the nodes of primitives are extrapolated."""
 
     x: Floats
     """(nodes, 3) positions, m."""
     v: Floats
-    """(nodes, 3) velocities less the mean, m/s."""
+    """(nodes, 3) velocities less the mean velocity, m/s."""
     horizon: float
-    """s."""
+    """Time over which the nodes are extrapolated, s."""
     part: Indices
     """(nodes,) part of each node."""
 
 
 @dataclass
 class Boxes:
-    """(n, 3) lowest and highest corner of the swept volume of each primitive."""
+    """Boxes of the swept volumes of primitives: (n, 3) lowest corners, and (n, 3) highest corners."""
 
     low: Floats
     high: Floats
 
     @property
     def hull(self) -> Floats:
-        """(6,) lowest corner of all boxes, and minus the highest corner of all boxes; infinities if there are no
+        """(6,) lowest corner of all boxes, then minus the highest corner of all boxes; infinite if there are no
         boxes.
         """
         return np.asarray(_hull(self.low, self.high))
 
     def touching(self, hull: Floats) -> Flags:
-        """(n,) boxes that touch a hull."""
+        """(n,) whether each box touches a hull."""
         return np.asarray(_in_hull(self.low, self.high, hull))
 
 
 class Sought(NamedTuple):
-    """Primitives of one search, with their boxes."""
+    """Primitives of one side of a search, with their boxes."""
 
     low: Floats
     """(m, 3) lowest corners of the boxes of the primitives."""
     high: Floats
     corners: Indices
-    """(n, k) slots of all primitives."""
+    """(n, k) slots of the corners of all primitives."""
     many: int
-    """Number of corners of a primitive: the first columns of ``corners``."""
+    """Number of corners of a primitive. The corners are the first columns of ``corners``."""
     some: Indices
     """(m,) rows of the searched primitives."""
 
@@ -124,7 +125,7 @@ def _in_hull(low, high, hull):  # type: ignore[no-untyped-def]
 
 @njit("void(float64[:, :, ::1])", cache=True)
 def _clear(hull):  # type: ignore[no-untyped-def]
-    """Sets the hulls (parts, 2, 3) of parts without boxes."""
+    """Sets the hulls (parts, 2, 3) of all parts to those of parts without boxes."""
     for q in range(len(hull)):
         for i in range(3):
             hull[q, 0, i], hull[q, 1, i] = np.inf, -np.inf
@@ -132,9 +133,9 @@ def _clear(hull):  # type: ignore[no-untyped-def]
 
 @njit(_I(*_BOX, types.float64[:, :, ::1], _N1, _I, _I), cache=True)
 def _box(out, reach, lines, allowed, hull, own, some, first, stop):  # type: ignore[no-untyped-def]
-    """Sets the boxes and rows of the primitives ``some``, from ``first`` to ``stop``, that touch the ``hull`` (parts,
-    2, 3) of a part with which the part of the primitive may be in contact; returns their number. Sets ``own`` (parts,
-    2, 3) to the hulls of the parts of these primitives.
+    """Sets the boxes and rows of the primitives ``some``, from ``first`` to ``stop``. A primitive is used only if it
+    touches the ``hull`` (parts, 2, 3) of a part with which its own part may be in contact. Returns the number of used
+    primitives. Sets ``own`` (parts, 2, 3) to the hulls of the parts of these primitives.
     """
     low, high, corners, x, v, n = out.low, out.high, out.corners, lines.x, lines.v, first
     _clear(own)
@@ -164,7 +165,7 @@ def _box(out, reach, lines, allowed, hull, own, some, first, stop):  # type: ign
 
 @njit(TASK, cache=True)
 def _boxes(table, first, stop, thread):  # type: ignore[no-untyped-def]
-    """Task: ``_box``."""
+    """Task: runs ``_box``."""
     out, reach, lines, allowed, hull, own, counts, some = _boxed(table)
     k = first // _PRIMITIVES
     counts[k] = _box(out, reach, lines, allowed, hull, own[k], some, first, stop)
@@ -172,7 +173,7 @@ def _boxes(table, first, stop, thread):  # type: ignore[no-untyped-def]
 
 @njit(TASK, cache=True)
 def _pack(table, first, stop, thread):  # type: ignore[no-untyped-def]
-    """Task: copies the boxes of a task to their places."""
+    """Task: copies the boxes that a task has found to their places."""
     out, found, begins, counts = _packed(table)
     k = first // _PRIMITIVES
     for p in range(counts[k]):
@@ -184,7 +185,7 @@ def _pack(table, first, stop, thread):  # type: ignore[no-untyped-def]
 
 @njit("void(float64[:, :, ::1], float64[:, :, :, ::1])", cache=True)
 def _join(hull, own):  # type: ignore[no-untyped-def]
-    """Sets the ``hull`` of each part from the hulls of all tasks."""
+    """Sets the ``hull`` of each part to the hull that contains the hulls of all tasks."""
     _clear(hull)
     for k in range(len(own)):
         for q in range(len(hull)):
@@ -194,21 +195,21 @@ def _join(hull, own):  # type: ignore[no-untyped-def]
 
 
 def everywhere(parts: int) -> Floats:
-    """(parts, 2, 3) hulls that every box touches."""
+    """(parts, 2, 3) hulls that touch every box."""
     return np.repeat(_EVERYWHERE, parts, axis=0)
 
 
 class Boxing:
-    """Passes over the primitives of one side of a search."""
+    """Passes that compute the boxes of the primitives of one side of a search."""
 
     def __init__(self, team: Team) -> None:
         self._pass = Pass(team, _boxes, *_BOXED, size=_PRIMITIVES)
         self._pack, self._scratch = Pass(team, _pack, *_PACK, size=_PRIMITIVES), Scratch()
 
     def of(self, things: Primitives, lines: Lines, allowed: Flags, hull: Floats) -> tuple[Sought, Floats]:
-        """Returns the primitives that touch the ``hull`` (parts, 2, 3) of a part with which the part of the primitive
-        may be in contact, by ``allowed`` (parts, parts), and the hulls of the parts of these primitives. The result
-        is valid until the next call.
+        """Returns the primitives that touch the ``hull`` (parts, 2, 3) of a part with which their own part may be in
+        contact, and the hulls of the parts of these primitives. ``allowed`` (parts, parts): pairs of parts that may be
+        in contact. The result is valid until the next call.
         """
         some = things.searched
         n, many = len(some), self._pass.many(len(some))
@@ -230,7 +231,9 @@ class Boxing:
 
 
 def swept(things: Primitives, x: Floats, v: Floats, horizon: float) -> Boxes:
-    """Bounding boxes of the searched primitives over the horizon, reach included; ``x`` and ``v`` (nodes, 3)."""
+    """Bounding boxes of the searched primitives over the horizon. The boxes include the reach. ``x`` and ``v`` (nodes,
+    3).
+    """
     some, n = things.searched, len(things.searched)
     out = Sought(np.empty((n, 3)), np.empty((n, 3)), things.corners, things.many, np.empty(n, np.int32))
     lines = Lines(x, v, horizon, np.zeros(len(x), np.int32))

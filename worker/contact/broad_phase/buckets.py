@@ -1,9 +1,10 @@
-"""Bucket sort with position codes (Oldenburg and Nilsson 1994): boxes near a box, without a grid in memory.
+"""Search for the boxes near a box, by a bucket sort with position codes (Oldenburg and Nilsson 1994). No grid is stored
+in memory.
 
 The code of a cell is ix + nx (iy + ny iz) (the paper's eq. 10). Every box is entered under the codes of the cells that
 it touches, and the entries are sorted by a hash of their codes. To find the boxes near a given box, the search reads
-the entries with the codes of the cells of this box. The entries of one code are a short range. Memory is proportional
-to the number of boxes, for any distance between them.
+the entries with the codes of the cells of this box. The entries of one code are a short range. The memory is
+proportional to the number of boxes, for any distance between the boxes.
 """
 
 from typing import NamedTuple
@@ -19,42 +20,42 @@ from ...parallel.passes import Pass
 from ...parallel.team import TASK, Team
 
 _MOST = 2.0**20
-"""Largest number of cells along an axis: codes of three axes stay far below 2^63."""
+"""Largest number of cells along an axis. With this number the codes of three axes are far below 2^63."""
 _WIDE = 512
-"""Largest number of cells of a box that is entered in the buckets; a box with more cells is tested against all other
+"""Largest number of cells of a box that is entered in the buckets. A box with more cells is compared with all other
 boxes."""
 _CURVE_BITS = 12
 """Number of bits of each coordinate in the code of the space-filling curve."""
 _LEAST_BITS = 6
-"""Smallest number of bits of the hash. Entries are sorted by so many upper bits first, then each range of hashes by
-itself."""
+"""Smallest number of bits of the hash. Entries are first sorted by this number of upper bits; then each range of hashes
+is sorted separately."""
 _BOXES, _RANGES = 512, 4
 """Number of boxes in a task that enters boxes, and number of ranges of hashes in a task. Chosen values: a task takes
 some 20 us in a search of 10,000 boxes, compared with 2 us to start a parallel region."""
 
 
 class Table(NamedTuple):
-    """Hash table of bounding boxes, by the cells that each box touches."""
+    """Hash table of bounding boxes. A box is entered for each cell that it touches."""
 
     origin: Floats
     inverse: float
     """Inverse of the edge of a cell, 1/m."""
     shape: Ints
-    """(3,) cells along each axis."""
+    """(3,) number of cells along each axis."""
     bits: int
     """Number of bits of the hash."""
     start: Ints
     """(2^bits + 1,) offset of the first entry of each hash value; the last value is the number of entries."""
     thing: Indices
-    """(m,) box of each entry."""
+    """(m,) box to which each entry belongs."""
     code: Ints
-    """(m,) code of each entry."""
+    """(m,) code of the cell of each entry."""
     wide: Indices
-    """(w,) boxes that touch too many cells and therefore have no entries."""
+    """(w,) boxes that touch too many cells. These boxes have no entries."""
 
 
 class Cells(NamedTuple):
-    """Grid of cells: the first columns of a Table."""
+    """Grid of cells. Its fields are the first columns of a Table."""
 
     origin: Floats
     inverse: float
@@ -74,7 +75,9 @@ _read_count, _read_enter, _read_arrange = reader(*_COUNT), reader(*_ENTER), read
 
 
 class Buckets:
-    """Passes that enter boxes into a table: a counting sort, first by the upper bits of the hash, then by all."""
+    """Passes that enter boxes into a table by a counting sort: first by the upper bits of the hash, then by all
+    bits.
+    """
 
     def __init__(self, team: Team) -> None:
         self._count = Pass(team, _count, *_COUNT, size=_BOXES)
@@ -83,8 +86,8 @@ class Buckets:
         self._scratch = Scratch()
 
     def sort(self, low: Floats, high: Floats, hull: Floats, edge: float) -> Table:
-        """Enters the boxes ``low``, ``high`` (n, 3), which lie in the ``hull`` (2, 3), into cells of edge ``edge``, m,
-        or larger if the boxes are too far apart for the codes. The table is valid until the next call.
+        """Enters the boxes ``low``, ``high`` (n, 3) into cells. ``hull`` (2, 3): hull of all boxes; ``edge``: edge of a
+        cell, m, which is enlarged if the hull is too large for the codes. The table is valid until the next call.
         """
         n, (least, most) = len(low), hull
         edge = max(edge, float((most - least).max()) / _MOST)
@@ -111,13 +114,13 @@ class Buckets:
 
 @njit("int64(float64, float64, float64, int64)", cache=True)
 def bucket_of(x, origin, inverse, n):  # type: ignore[no-untyped-def]
-    """Index of a coordinate along an axis, clamped to 0 ... n - 1."""
+    """Index of the cell that contains a coordinate along an axis, clamped to 0 ... n - 1."""
     return np.int64(min(max(np.floor((x - origin) * inverse), 0.0), n - 1.0))
 
 
 @njit(types.void(_I1, _F2, _F1, _F, _I, _I), cache=True)
 def interleaved(codes, x, origin, inverse, first, stop):  # type: ignore[no-untyped-def]
-    """Sets the codes of the points ``x`` (n, 3) from ``first`` to ``stop`` on a space-filling curve; see
+    """Sets the codes of the points ``x`` (n, 3), from ``first`` to ``stop``, on a space-filling curve; see
     ScenePasses.curve.
     """
     for a in range(first, stop):
@@ -130,13 +133,13 @@ def interleaved(codes, x, origin, inverse, first, stop):  # type: ignore[no-unty
 
 @njit("int64(int64, int64)", cache=True)
 def bucket_at(code, bits):  # type: ignore[no-untyped-def]
-    """Hash of a code: the upper ``bits`` of its product with 2^64 over the golden ratio (Knuth 1998, 6.4)."""
+    """Hash of a code: the upper ``bits`` of the product of the code and 2^64 / golden ratio (Knuth 1998, 6.4)."""
     return np.int64((np.uint64(code) * np.uint64(0x9E3779B97F4A7C15)) >> np.uint64(64 - bits))
 
 
 @njit(_I(_I2, CELLS, _F2, _F2, _I), cache=True)
 def _cells(span, cells, low, high, j):  # type: ignore[no-untyped-def]
-    """Number of cells that box j touches, from ``span[0]`` to ``span[1]`` (2, 3)."""
+    """Number of cells that box j touches. Sets ``span`` (2, 3) to the first and the last cell along each axis."""
     many = 1
     for i in range(3):
         span[0, i] = bucket_of(low[j, i], cells.origin[i], cells.inverse, cells.shape[i])
@@ -147,7 +150,7 @@ def _cells(span, cells, low, high, j):  # type: ignore[no-untyped-def]
 
 @njit(TASK, cache=True)
 def _count(table, first, stop, thread):  # type: ignore[no-untyped-def]
-    """Task: counts the entries of each range of hashes, and lists the boxes without entries."""
+    """Task: counts the entries in each range of hashes, and lists the boxes without entries."""
     counts, widths, wide, cells, low, high = _read_count(table)
     span, n, k, shape = np.empty((2, 3), np.int64), first, first // _BOXES, cells.shape
     for r in range(counts.shape[1]):
@@ -166,7 +169,7 @@ def _count(table, first, stop, thread):  # type: ignore[no-untyped-def]
 
 @njit("int64(int32[::1], int64[::1])", cache=True)
 def _together(wide, widths):  # type: ignore[no-untyped-def]
-    """Moves the boxes without entries of all tasks to the front; returns their number."""
+    """Moves the boxes without entries of all tasks to the front. Returns the number of these boxes."""
     n = 0
     for k in range(len(widths)):
         for at in range(k * _BOXES, k * _BOXES + widths[k]):
@@ -177,7 +180,7 @@ def _together(wide, widths):  # type: ignore[no-untyped-def]
 
 @njit(TASK, cache=True)
 def _enter(table, first, stop, thread):  # type: ignore[no-untyped-def]
-    """Task: writes the entries of boxes, by ranges of hashes."""
+    """Task: writes the entries of boxes, sorted by ranges of hashes."""
     codes, things, counts, cells, low, high = _read_enter(table)
     span, k, shape = np.empty((2, 3), np.int64), first // _BOXES, cells.shape
     for j in range(first, stop):

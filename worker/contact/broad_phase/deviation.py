@@ -1,4 +1,6 @@
-"""Distances of slots, faces and edges from their reference motions in a step: passes of the threads of a rank."""
+"""Distances of slots, faces and edges from their reference motions in a step. The distances are computed in passes of
+the threads of a rank.
+"""
 
 import numpy as np
 
@@ -22,7 +24,7 @@ _leave, _largest = reader(*_LEAVE), reader(*_LARGEST)
 
 @njit(TASK, cache=True)
 def _slots(table, first, stop, thread):  # type: ignore[no-untyped-def]
-    """Task: ``reference_motion.leave`` for the search lines and the short lines, and ``farthest`` for the search
+    """Task: runs ``reference_motion.leave`` for the search lines and the short lines, and ``farthest`` for the search
     lines.
     """
     left, line, course, near, short, mean, x, v, t, dt, tracked, most = _leave(table)
@@ -33,7 +35,7 @@ def _slots(table, first, stop, thread):  # type: ignore[no-untyped-def]
 
 @njit(TASK, cache=True)
 def _corners(table, first, stop, thread):  # type: ignore[no-untyped-def]
-    """Task: ``reference_motion.largest``."""
+    """Task: runs ``reference_motion.largest``."""
     out, corners, many, left = _largest(table)
     largest(out, corners, many, left, first, stop)
 
@@ -50,8 +52,8 @@ class Deviation:
         self, motion: ReferenceMotion, x: Floats, v: Floats, faces: Indices, edges: Indices, tracked: Flags
     ) -> float:  # fmt: skip
         """Sets the distances of slots, faces and edges from their lines, over the step and the time ``motion.beyond``
-        after it. ``x``, ``v`` (slots, 3): positions, and velocities before contact. Returns the largest distance of the
-        ``tracked`` (slots,) slots from their search lines, m.
+        after the step. ``x``, ``v`` (slots, 3): positions, and velocities before contact. Returns the largest distance
+        of the ``tracked`` (slots,) slots from their search lines, m.
         """
         strayed = self.of_slots(motion, x, v, tracked)
         self._faces.run(len(faces), motion.faces, faces, 3, motion.short.left)
@@ -59,7 +61,7 @@ class Deviation:
         return strayed
 
     def of_slots(self, motion: ReferenceMotion, x: Floats, v: Floats, tracked: Flags) -> float:
-        """Sets the distances of the slots alone; see ``measure``."""
+        """Sets the distances of the slots only; see ``measure``."""
         n, dt, searched, short = len(x), motion.end - motion.t + motion.beyond, motion.searched, motion.short
         most = self._scratch.of("most", self._slots.many(n), np.float64)
         lines = searched.left, searched.x, searched.course, short.left, short.x, short.course

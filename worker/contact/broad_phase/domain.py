@@ -1,9 +1,10 @@
 """Contact domain: the faces and edges of this rank that other ranks need as ghosts.
 
-``box`` compares bounding boxes (Paik et al.): a face or edge is sent to every rank whose box of nodes and edges it
-touches. ``arbitrary`` adds a second exchange (the paper's eqs 5 to 16, in three dimensions): the other rank sends the
-cells of its nodes and edges, and receives only the faces and edges that touch one of these cells. Since only surface
-nodes are entered, every occupied cell is an outside cell, and the paper's test of a cell's neighbours is not needed.
+The method ``box`` compares bounding boxes (Paik et al.): a face or edge is sent to every rank whose box of nodes and
+edges it touches. The method ``arbitrary`` adds a second exchange (the paper's eqs 5 to 16, in three dimensions): the
+other rank sends the cells of its nodes and edges, and receives only the faces and edges that touch one of these cells.
+Only surface nodes are entered, so every occupied cell is an outside cell, and the paper's test of a cell's neighbours
+is not needed.
 """
 
 import numpy as np
@@ -18,9 +19,9 @@ _NONE = np.zeros(0, np.int64)
 
 
 def choose(kind: str, askers: Boxes, things: list[Boxes], edge: float, comm: Comm) -> dict[int, list[Flags]]:
-    """Returns flags of each list of this rank's ``things``, for every other rank that needs some.
+    """Returns, for every other rank that needs some of this rank's ``things``, flags of the needed faces and edges.
 
-    ``askers``: boxes of this rank's nodes and edges; ``edge`` of a cell, m, equal on all ranks.
+    ``askers``: boxes of this rank's nodes and edges; ``edge``: edge of a cell, m, equal on all ranks.
     """
     mine = np.concatenate([askers.hull, np.minimum.reduce([t.hull for t in things])])
     hulls = comm.join(mine.view(np.int64)).view(np.float64).reshape(comm.size, 2, 6)
@@ -33,7 +34,7 @@ def choose(kind: str, askers: Boxes, things: list[Boxes], edge: float, comm: Com
 
 
 def _touching(hull: Floats, hulls: Floats, comm: Comm) -> list[int]:
-    """Other ranks whose ``hulls`` (ranks, 6) touch the hull of this rank."""
+    """Other ranks whose hull in ``hulls`` (ranks, 6) touches the hull of this rank."""
     touch = np.all((hulls[:, :3] <= -hull[3:]) & (-hulls[:, 3:] >= hull[:3]), axis=1)
     touch[comm.rank] = False
     found: list[int] = np.flatnonzero(touch).tolist()
@@ -43,7 +44,9 @@ def _touching(hull: Floats, hulls: Floats, comm: Comm) -> list[int]:
 def _in_cells(
     near: dict[int, list[Flags]], askers: Boxes, asked: dict[int, Flags], things: list[Boxes], edge: float, comm: Comm
 ) -> dict[int, list[Flags]]:
-    """Keeps the boxes that touch a cell of the other rank's list; ``asked``: boxes of this rank near each rank."""
+    """Keeps the boxes that touch a cell in the list of the other rank. ``asked``: boxes of this rank that are near each
+    rank.
+    """
     cells = comm.swap({
         rank: np.sort(_cells(askers.low, askers.high, some, edge)) for rank, some in asked.items() if some.any()
     })  # fmt: skip
@@ -62,15 +65,15 @@ def _cell(x, edge):  # type: ignore[no-untyped-def]
 
 @njit("int64(int64, int64, int64)", cache=True)
 def _code(ix, iy, iz):  # type: ignore[no-untyped-def]
-    """Returns the code of a cell. Two cells have the same code only if they are 2^20 cells apart; the only effect is
-    that an unneeded ghost is sent.
+    """Returns the code of a cell. Two cells have equal codes only if they are 2^20 cells apart. The only effect of
+    equal codes is that an unneeded ghost is sent.
     """
     return (ix << 42) + (iy << 21) + iz
 
 
 @njit("int64[::1](float64[:, ::1], float64[:, ::1], boolean[::1], float64)", cache=True)
 def _cells(low, high, some, edge):  # type: ignore[no-untyped-def]
-    """Returns the codes of all cells that the boxes ``some`` touch, each code once."""
+    """Returns the codes of all cells that the boxes ``some`` touch. Each code is returned once."""
     bits, n = 6, 0
     codes, used, found = np.empty(1 << bits, np.int64), np.zeros(1 << bits, np.bool_), np.empty(1 << bits, np.int64)
     for j in range(len(low)):
@@ -97,8 +100,8 @@ def _cells(low, high, some, edge):  # type: ignore[no-untyped-def]
 
 @njit("int64(int64[::1], boolean[::1], int64, int64)", cache=True)
 def _place(codes, used, code, bits):  # type: ignore[no-untyped-def]
-    """Position of a code in a table of 2^bits entries, or of the free entry for it: at the entry of its hash, or at the
-    next entry after that one which is free or has the code.
+    """Position of a code in a hash table of 2^bits entries; if the code is missing, the position of the free entry for
+    it. The search begins at the entry of the hash of the code and ends at the first entry that is free or has the code.
     """
     at = bucket_at(code, bits)
     while used[at] and codes[at] != code:
@@ -108,7 +111,7 @@ def _place(codes, used, code, bits):  # type: ignore[no-untyped-def]
 
 @njit("boolean[::1](boolean[::1], float64[:, ::1], float64[:, ::1], int64[::1], float64)", cache=True)
 def _named(flags, low, high, cells, edge):  # type: ignore[no-untyped-def]
-    """Returns the flagged boxes that touch one of the ``cells``, given by ascending codes."""
+    """Returns the flagged boxes that touch one of the ``cells``, which are ascending codes."""
     kept = np.zeros(len(flags), np.bool_)
     if len(cells) == 0:
         return kept

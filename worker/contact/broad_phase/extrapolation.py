@@ -1,9 +1,9 @@
 """Velocities with which a search extrapolates the nodes.
 
 A node of a metal is extrapolated with its own velocity. Nodes of a body that breaks vibrate: a free tet has a period of
-some ten steps, and the release of 1 GPa in glass makes it vibrate with sigma / (rho c) = 75 m/s. Extrapolation to the
-next search with this velocity would be wrong by more than the motion of the node. Therefore a node whose tets may break
-gets the velocity of a rigid body with the momentum and the angular momentum of its tets.
+some ten steps, and the release of a stress of 1 GPa in glass makes the tet vibrate with sigma / (rho c) = 75 m/s. With
+this velocity the extrapolation to the next search would have an error above the motion of the node. Therefore a node
+whose tets may break gets the velocity of a rigid body with the momentum and the angular momentum of its tets.
 """
 
 import numpy as np
@@ -18,10 +18,10 @@ from ...parallel.tags import Tag
 from ...parallel.team import TASK, Team
 
 _QUANTA = 2.0**16
-"""Quanta per m/s; with this value sums up to 1e14 m/s do not overflow."""
+"""Number of quanta per m/s. With this value sums up to 1e14 m/s do not overflow."""
 _THIN = 1e-9
-"""Smallest value, over the cube of its trace, of the determinant of the inertia of a tet for which the rotation of
-the tet is computed."""
+"""Smallest determinant of the inertia of a tet, divided by the cube of its trace. For a smaller value the rotation of
+the tet is not computed."""
 
 _F2 = types.float64[:, ::1]
 _RIGID = types.int64[:, ::1], types.uint32[:, ::1], _F2, _F2, types.float64
@@ -29,8 +29,8 @@ _read = reader(*_RIGID)
 
 
 def courses(blocks: list[Block], nodes: Nodes, neighbours: list[Neighbour], comm: Comm, rigid: TetPass) -> Floats:
-    """(nodes, 3) extrapolated velocities, m/s: at nodes of tets that may break, the mean of the rigid motions of
-    their tets. ``rigid``: see rigid_motions. Collective."""
+    """(nodes, 3) extrapolated velocities, m/s. A node of tets that may break gets the mean of the rigid motions of
+    these tets. ``rigid``: see rigid_motions. Collective."""
     sums = np.zeros((nodes.n, 4), np.int64)
     for block in blocks:
         if len(block.bond):
@@ -41,20 +41,20 @@ def courses(blocks: list[Block], nodes: Nodes, neighbours: list[Neighbour], comm
 
 
 def rigid_motions(team: Team) -> TetPass:
-    """Returns the pass that adds the rigid motions of the tets of a block at their nodes."""
+    """Returns the pass that adds the rigid motion of each tet of a block to its nodes."""
     return TetPass(team, _add_rigid, *_RIGID)
 
 
 @njit("float64(float64[::1], float64[::1], float64[::1])", cache=True)
 def _det(a, b, c):  # type: ignore[no-untyped-def]
-    """a . b x c of three vectors (3,)."""
+    """Triple product a . b x c of three vectors (3,)."""
     return a[0] * (b[1] * c[2] - b[2] * c[1]) + a[1] * (b[2] * c[0] - b[0] * c[2]) + a[2] * (b[0] * c[1] - b[1] * c[0])
 
 
 @njit(TASK, cache=True, error_model="numpy", _nrt=True)
 def _add_rigid(table, first, stop, thread):  # type: ignore[no-untyped-def]
-    """Task: adds the rigid motion of each of ``tets`` (n, 4) of some chunks at its corners, and the count one, to the
-    ``sums`` (nodes, 4).
+    """Task: adds the rigid motion of each tet of some chunks to its corners, in ``sums`` (nodes, 4). The fourth column
+    is the number of added motions. ``tets`` (n, 4).
 
     The motion is that of four equal masses: u + omega x r with I omega = sum(r x v), solved by Cramer's rule.
     """
@@ -90,7 +90,7 @@ def _add_rigid(table, first, stop, thread):  # type: ignore[no-untyped-def]
             turn[0] = _det(spin, inertia[1], inertia[2]) / det
             turn[1] = _det(inertia[0], spin, inertia[2]) / det
             turn[2] = _det(inertia[0], inertia[1], spin) / det
-        # 4. Add u + omega x r and the count to the sums of the corners.
+        # 4. Add u + omega x r, and the count 1, to the sums of the corners.
         for a in range(4):
             node = tets[e, a]
             for i in range(3):

@@ -1,4 +1,4 @@
-"""Pairs of boxes that overlap, found by the buckets of the smaller set of boxes."""
+"""Search for pairs of boxes that overlap. The smaller set of boxes is entered in buckets."""
 
 import numpy as np
 
@@ -16,8 +16,8 @@ _LARGE = 128
 """Number of large primitives in a task. Chosen value: a task takes some 30 us, compared with 2 us to start a parallel
 region."""
 _EACH, _MOST = 8, 64
-"""Number of pairs of a large primitive for which memory is reserved at first, on average over a task, and the largest
-such number."""
+"""Number of pairs for each large primitive for which memory is first reserved, on average over a task; and the largest
+number of pairs of a large primitive."""
 _I, _B2, _N1, _N2, _I1 = (
     types.int64, types.boolean[:, ::1], types.int32[::1], types.int32[:, ::1], types.int64[::1],
 )  # fmt: skip
@@ -25,12 +25,12 @@ _FOUND = TABLE, SOUGHT, SOUGHT, _I1, _N1, _B2
 _PAIRS = _N2, _I1, _N2, _I, _I1, *_FOUND
 _read = reader(*_PAIRS)
 _NO_PAIRS, _NOWHERE = np.zeros((0, 2), np.int32), np.zeros(0, np.int64)
-"""Result and places of the tasks in the first pass, which has none."""
+"""Arguments of the tasks in the first pass, in which there are no results and no places."""
 
 
 @njit("boolean(int32[:, ::1], int64, int32[:, ::1], int64, int64, int64)", cache=True)
 def _meet(small, few, large, many, i, j):  # type: ignore[no-untyped-def]
-    """Returns True if two primitives, with ``few`` and ``many`` corners, have a common corner."""
+    """Returns True if two primitives have a common corner. The primitives have ``few`` and ``many`` corners."""
     for a in range(few):
         for b in range(many):
             if small[i, a] == large[j, b]:
@@ -40,10 +40,11 @@ def _meet(small, few, large, many, i, j):  # type: ignore[no-untyped-def]
 
 @njit(_I(_N2, _I, _I, *_FOUND, _I, _I), cache=True)
 def _ask(out, n, end, table, small, large, rank, part, allowed, asked, stop):  # type: ignore[no-untyped-def]
-    """Finds the small primitives near each large one, from ``asked`` to ``stop``, in the buckets that its box touches.
+    """Finds the small primitives near each large primitive from ``asked`` to ``stop``, in the buckets that its box
+    touches.
 
-    Writes the pairs into the rows of ``out`` from ``n`` on, and not beyond the row ``end``; returns their number.
-    Conditions of a pair, numbered at the ends of lines:
+    Writes the pairs into the rows of ``out`` from ``n`` on, but not beyond the row ``end``. Returns the number of
+    pairs. A pair must satisfy five conditions; comments in the code have their numbers:
 
         +-----------+          1. The entry has the code of the cell, not only its hash.
         |     +-----|----+     2. The two boxes overlap.
@@ -62,7 +63,7 @@ def _ask(out, n, end, table, small, large, rank, part, allowed, asked, stop):  #
             first[i] = bucket_of(box_low[at, i], origin[i], inverse, shape[i])
             last[i] = bucket_of(box_high[at, i], origin[i], inverse, shape[i])
             cells *= last[i] - first[i] + 1
-        alone = cells > len(every)  # a box of so many cells is compared with every small primitive
+        alone = cells > len(every)  # a box with so many cells is compared with every small primitive
         if alone:
             last[:] = first
         for z in range(first[2], last[2] + 1):
@@ -74,11 +75,11 @@ def _ask(out, n, end, table, small, large, rank, part, allowed, asked, stop):  #
                         bucket = bucket_at(code, bits)
                         begin, end_of_code = np.int64(table.start[bucket]), np.int64(table.start[bucket + 1])
                     apart = end_of_code - begin
-                    if x == first[0] and y == first[1] and z == first[2]:  # first cell: add the unentered boxes
+                    if x == first[0] and y == first[1] and z == first[2]:  # first cell: add primitives without entries
                         end_of_code += len(every) if alone else len(table.wide)
                     for p in range(begin, end_of_code):
                         if p - begin < apart:
-                            if table.code[p] != code:  # condition 1, listed above
+                            if table.code[p] != code:  # condition 1: the entry has the code of the cell
                                 continue
                             b = table.thing[p]
                         else:
@@ -89,7 +90,7 @@ def _ask(out, n, end, table, small, large, rank, part, allowed, asked, stop):  #
                             continue
                         if few_high[b, 1] < box_low[at, 1] or few_high[b, 2] < box_low[at, 2]:
                             continue
-                        if p - begin < apart:  # condition 3, listed above
+                        if p - begin < apart:  # condition 3: the cell contains the lowest corner of the intersection
                             if bucket_of(max(few_low[b, 0], box_low[at, 0]), origin[0], inverse, shape[0]) != x:
                                 continue
                             if bucket_of(max(few_low[b, 1], box_low[at, 1]), origin[1], inverse, shape[1]) != y:
@@ -97,7 +98,7 @@ def _ask(out, n, end, table, small, large, rank, part, allowed, asked, stop):  #
                             if bucket_of(max(few_low[b, 2], box_low[at, 2]), origin[2], inverse, shape[2]) != z:
                                 continue
                         i, j = every[b], others[at]
-                        if len(rank) > 0 and rank[i] >= rank[j]:  # condition 4, listed above
+                        if len(rank) > 0 and rank[i] >= rank[j]:  # condition 4: the small primitive has the lower rank
                             continue
                         if not allowed[part[few[i, 0]], part[many[j, 0]]]:  # condition 5
                             continue
@@ -111,11 +112,11 @@ def _ask(out, n, end, table, small, large, rank, part, allowed, asked, stop):  #
 
 @njit(TASK, cache=True)
 def _pairs(arguments, first, stop, thread):  # type: ignore[no-untyped-def]
-    """Task: ``_ask``, in two passes.
+    """Task: runs ``_ask``, in two passes.
 
-    The first, without places in ``out``, writes the pairs to ``found``, which has rows for ``each`` pairs of a large
-    primitive, and counts them. The second copies the pairs of a task to their places, which begin at ``begins``, or
-    finds them again if the task had too few rows.
+    In the first pass there are no places in ``out``. The task counts the pairs and writes them to ``found``, which has
+    memory for ``each`` pairs of a large primitive. In the second pass the task copies its pairs to their places, which
+    begin at ``begins``; if ``found`` was too small, the task finds the pairs again.
     """
     out, begins, found, each, counts, table, small, large, rank, part, allowed = _read(arguments)
     k, room = first // _LARGE, each * first
@@ -137,8 +138,8 @@ class Overlaps:
         self._pass, self._scratch, self._each = Pass(team, _pairs, *_PAIRS, size=_LARGE), Scratch(), _EACH
 
     def of(self, table: Table, small: Sought, large: Sought, rank: Ints, part: Indices, allowed: Flags) -> Indices:
-        """(pairs, 2) primitives whose boxes overlap: row of a small primitive and of a large one; see search.find.
-        The small primitives are in the ``table``.
+        """(pairs, 2) primitives whose boxes overlap: row of the small primitive, and row of the large primitive; see
+        search.find. The small primitives are in the ``table``.
         """
         n, each = len(large.some), self._each
         begins, counts = np.empty((2, self._pass.many(n)), np.int64)

@@ -1,18 +1,18 @@
 """Tables of candidate pairs, and the condition under which a pair is not tested.
 
-A list of candidates serves many steps, and in most steps most of its pairs are far apart. Every slot has a reference
-motion, on a straight line; ``left`` is its distance from that line in the step ahead, the larger of the distances at
-the beginning and at the end without contact. A pair that is tested and is ``slack`` further apart than the distance of
-contact is not tested again as long as
+A list of candidates is used for many steps, and in most steps most pairs are far apart. Every slot has a reference
+motion on a straight line; ``left`` is the distance of the slot from this line in the next step (the larger of the
+distances at the beginning and at the end of the step, without contact). If the test of a pair shows that its distance
+is larger than the distance of contact by ``slack``, the pair is not tested again as long as
 
     slack > U t + left_1 + left_2 (now) + left_1 + left_2 (when it was tested),
 
-with U the relative speed of the two reference motions and t the time since the test; for a face or an edge, ``left`` is
-the distance of the farthest corner. A pair therefore stores one number and U. The condition is exact: a pair that is
-not tested cannot be active. No bit of the answer depends on the deactivation of pairs, which may differ between ranks.
+Here U is the relative speed of the two reference motions, and t is the time since the test. For a face or an edge,
+``left`` is the distance of the farthest corner. Therefore a pair stores one number and U. The condition is exact: a
+pair that is not tested cannot be active. Ranks may test different pairs without an effect on the answer.
 
-A pair whose face is turned away from the node is not tested until the face may have turned towards it
-(node_face.py).
+If the face of a pair is turned away from the node, the pair is not tested until the face may have turned towards the
+node (node_face.py).
 """
 
 from dataclasses import dataclass, field
@@ -26,7 +26,7 @@ from ..narrow_phase.node_face import chain
 from ..narrow_phase.tables import Pairs
 
 _FRESH = {"until": -np.inf, "speed": np.nan, "turned": False, "kept": 0.0, "next": -1}
-"""Initial values of a pair, with which the pair is tested in the next step."""
+"""Initial values of a pair. With these values the pair is tested in the next step."""
 
 
 @dataclass
@@ -38,8 +38,8 @@ class PairTable:
     speed: Floats = field(default_factory=lambda: np.zeros(0))
     turned: Flags = field(default_factory=lambda: np.zeros(0, bool))
     kept: Floats = field(default_factory=lambda: np.zeros((0, 4)))
-    """(p, 4) stored impulse of the pair in the last step times its row norm, zero if it was not active: along the
-    normal, and across, m/s."""
+    """(p, 4) stored impulse of each pair in the last step times its row norm, m/s: along the normal, and across it. The
+    values are zero if the pair was not active."""
     next: Indices = field(default_factory=lambda: np.zeros(0, np.int32))
     _active: Indices = field(default_factory=lambda: np.zeros(0, np.int32), init=False, repr=False)
     _tested: tuple[Indices, Ints, Ints] | None = field(default=None, init=False, repr=False)
@@ -50,26 +50,28 @@ class PairTable:
         return len(self.rows)
 
     def add(self, rows: Indices) -> None:
-        """Adds pairs, to be tested in the next step."""
+        """Adds pairs. The added pairs are tested in the next step."""
         if len(rows):
             self._rooms.append(self, len(rows), rows=rows, **_FRESH)
 
     def take_tested(self, active: Indices, begins: Ints, counts: Ints) -> None:
-        """Stores which pairs the tasks have tested: the ranges of ``active`` that begin at ``begins``, with ``counts``
-        pairs each.
+        """Stores which pairs the tasks have tested. The pairs of a task are the ``counts`` entries of ``active`` from
+        ``begins`` on.
         """
         self._tested = active, begins, counts
 
     @property
     def tested(self) -> Indices:
-        """(k,) pairs tested by the narrow phase of the last step."""
+        """(k,) pairs that the narrow phase of the last step tested."""
         if self._tested is None:
             return np.zeros(0, np.int32)
         active, begins, counts = self._tested
         return np.concatenate([active[:0], *(active[b : b + n] for b, n in zip(begins, counts, strict=True))])
 
     def hang(self, first: Indices, begin: int) -> None:
-        """Adds the pairs from row ``begin`` on to the linked lists of their nodes, ``first`` (slots,)."""
+        """Adds the pairs from row ``begin`` on to the linked lists of their nodes; ``first`` (slots,): first pair of
+        each list.
+        """
         chain(first, self.next, self.rows, begin)
 
     def drop(self, one: Flags, two: Flags) -> None:
@@ -81,18 +83,18 @@ class PairTable:
 
     @property
     def pushed(self) -> Ints:
-        """(k,) pairs with impulses in the last step."""
+        """(k,) pairs that had impulses in the last step."""
         return np.asarray(_with_impulses(self.kept))
 
     def recall(self, first: Indices, rows: Indices, kept: Floats) -> None:
-        """Sets the stored impulses of the pairs ``rows`` (k, 2), of nodes and faces, to ``kept`` (k, 4); pairs that
-        are not in the table are ignored; ``first``: see ``hang``.
+        """Sets the stored impulses of the pairs ``rows`` (k, 2), given by node and face, to ``kept`` (k, 4). Pairs that
+        are not in the table are ignored. ``first``: see ``hang``.
         """
         _recall(self.kept, first, self.next, self.rows, rows, kept)
 
     def carried(self, one: Indices, two: Indices) -> "PairTable":
-        """Returns the pairs with new numbers ``one`` and ``two`` of their members, -1 for removed members, ordered by
-        the first member, so that successive pairs of a kernel share data.
+        """Returns the pairs with new numbers of their members: ``one`` and ``two``, -1 for a removed member. The pairs
+        are ordered by the first member, so that successive pairs in a kernel have common data.
         """
         some, rows = _renumbered(self.rows, one, two, int(one.max(initial=-1)) + 1)
         return PairTable(
@@ -100,7 +102,7 @@ class PairTable:
         )
 
     def wake(self) -> None:
-        """Schedules all pairs for a test, after a change of the short lines and mean normals."""
+        """Schedules all pairs for a test. Necessary after a change of the short lines and mean normals."""
         some = ~np.isposinf(self.until)
         self.until[some], self.speed[some] = -np.inf, np.nan
 
@@ -134,8 +136,8 @@ def _recall(kept, first, following, pairs, rows, values):  # type: ignore[no-unt
 
 @njit("Tuple((int64[::1], int32[:, ::1]))(int32[:, ::1], int32[::1], int32[::1], int64)", cache=True)
 def _renumbered(pairs, one, two, n):  # type: ignore[no-untyped-def]
-    """Returns the rows of ``pairs`` (p, 2) whose members both have new numbers in ``one`` and ``two``, in the order of
-    the new number of the first member, which is below ``n``; and the new numbers.
+    """Returns the rows of ``pairs`` (p, 2) whose two members have new numbers in ``one`` and ``two``, and the new
+    numbers. The rows have the order of the new number of the first member, which is below ``n``.
     """
     begin = np.zeros(n + 1, np.int64)
     for p in range(len(pairs)):

@@ -1,11 +1,13 @@
 """Reference motions: the straight lines along which slots are extrapolated, and the distances of the slots from them.
 
-A search extrapolates every slot along a straight line. Pairs that it excludes can be active only if slots depart from
-their lines by half the skin. A slot that departs so far gets a new line, which begins at the present position of the
-slot, with its mean velocity since the last line, and is registered again (registration.py).
+A search extrapolates every slot along a straight line. A pair that the search excludes can be active only if a slot
+departs from its line by half of the skin. A slot that departs so far gets a new line and is registered again
+(registration.py). The new line begins at the present position of the slot, with the mean velocity of the slot since the
+last line.
 
-The time for which a pair is not tested is measured from other, short lines, renewed every few steps for all slots:
-with the mean velocities of these steps they are much closer to the slots, and need no registration (pairs.py).
+The time for which a pair is not tested is measured from other lines, the short lines, which all slots get every few
+steps. A short line has the mean velocity of these steps, so it is much closer to the slot than the line of the search.
+A new short line needs no registration (pairs.py).
 """
 
 from typing import ClassVar
@@ -21,13 +23,13 @@ _V1, _V2, _N2 = "float64[::1]", "float64[:, ::1]", "int32[:, ::1]"
 
 
 class Lines:
-    """Straight line along which each slot is extrapolated."""
+    """Straight lines along which the slots are extrapolated."""
 
     COLUMNS: ClassVar = {"x": COPIED, "course": COPIED, "since": COPIED, "left": COPIED}
-    """Rules of the columns by slot (model/columns.py)."""
+    """Rules of the columns with one value for each slot (model/columns.py)."""
 
     def __init__(self, x: Floats, course: Floats) -> None:
-        """``x``, ``course`` (slots, 3): positions, m, and velocities, m/s, at time 0."""
+        """Begins the lines at time 0. ``x``, ``course`` (slots, 3): positions, m, and velocities, m/s."""
         self.x, self.course = spacious_copy(x), spacious_copy(course)
         self.since = np.zeros(len(x))
         """(slots,) time at which each line began, s."""
@@ -36,13 +38,13 @@ class Lines:
         beginning and at the end of the step."""
 
     def begin_at(self, first: int, x: Floats, course: Floats, t: float) -> None:
-        """Begins the lines of the slots from ``first`` on, with their positions and velocities at time ``t``, (n, 3)
-        each.
+        """Begins the lines of the slots from ``first`` on at time ``t``. ``x``, ``course`` (n, 3): positions and
+        velocities at this time.
         """
         self.x[first:], self.course[first:], self.since[first:] = x - t * course, course, t
 
     def take_over(self, slots: Indices, old: "Lines", t: float) -> None:
-        """Copies the lines of ``old`` at time ``t``; ``slots``: new number of each of its slots, -1 for removed
+        """Copies the lines of ``old`` at time ``t``. ``slots``: new number of each slot of ``old``, -1 for removed
         slots.
         """
         self.x -= t * self.course
@@ -50,7 +52,7 @@ class Lines:
         _take_over(self.x, self.course, self.since, slots, old.x, old.course, old.since)
 
     def begin_anew(self, some: "np.ndarray", x: Floats, t: float) -> None:
-        """Begins new lines for ``some`` (slots,), from ``x`` (slots, 3) at time ``t`` on."""
+        """Begins new lines for ``some`` (slots,), at the positions ``x`` (slots, 3) and the time ``t``."""
         _begin_anew(some, self.x, self.course, self.since, x, t)
 
 
@@ -64,60 +66,64 @@ class ReferenceMotion:
         self.until = until
         """Time up to which the candidates are complete, s after the search."""
         self.searched, self.short = Lines(x, course), Lines(x, course)
-        """Search lines, and short lines; the distances of pairs are measured from the short lines."""
+        """Lines of the search, and short lines. The distances of pairs are measured from the short lines."""
         self.faces, self.edges = np.zeros(faces), np.zeros(edges)
-        """(f,) and (e,) largest distance of a corner from its short line, m."""
+        """Largest distance of a corner from its short line, m: (f,) for each face, and (e,) for each edge."""
         self.t = 0.0
         """Time at the beginning of the step, s after the search."""
         self.end = 0.0
         """Time at the end of the step, s after the search."""
         self.beyond = 0.0
-        """Time beyond the end of the step for which distances are measured too, s."""
+        """Time after the end of the step, s, for which distances are also measured."""
         self.strayed = 0.0
-        """Largest distance of a tracked slot from its line of the search in the step, m."""
+        """Largest distance of a tracked slot from its search line in the step, m."""
 
     def begin_at(self, first: int, x: Floats, course: Floats) -> None:
-        """Begins the lines of the slots from ``first`` on, with their present positions and velocities, (n, 3) each."""
+        """Begins the lines of the slots from ``first`` on. ``x``, ``course`` (n, 3): present positions and velocities
+        of these slots.
+        """
         self.searched.begin_at(first, x, course, self.end)
         self.short.begin_at(first, x, course, self.end)
 
     def take_over(self, slots: Indices, old: "ReferenceMotion") -> None:
-        """Copies the lines of ``old``; ``slots``: new number of each of its slots, -1 for removed slots."""
+        """Copies the lines of ``old``. ``slots``: new number of each slot of ``old``, -1 for removed slots."""
         self.t = self.end = old.end
         self.searched.take_over(slots, old.searched, self.t)
         self.short.take_over(slots, old.short, self.t)
 
     def advance(self, dt: float, beyond: float = 0.0) -> None:
-        """Begins a step ``dt``; distances are measured to ``beyond`` its end, s."""
+        """Begins a step of length ``dt``, s. Distances are measured up to the time ``beyond`` after the end of the
+        step, s.
+        """
         self.t, self.end, self.beyond = self.end, self.end + dt, beyond
 
     def farthest(self, some: Flags) -> float:
-        """Largest distance of ``some`` (slots,) from their lines of the search in the step, m."""
+        """Largest distance of the slots ``some`` (slots,) from their search lines in the step, m."""
         return float(farthest(self.searched.left, some, 0, len(some)))
 
     def begin_anew(self, some: "np.ndarray", x: Floats) -> None:
-        """Begins new lines of the search for ``some`` (slots,), from ``x`` (slots, 3) on."""
+        """Begins new search lines for the slots ``some`` (slots,), at the positions ``x`` (slots, 3)."""
         self.searched.begin_anew(some, x, self.t)
 
     def aim(self, some: "np.ndarray", x: Floats, v: Floats) -> None:
-        """Begins lines of the search for ``some`` (slots,) whose velocity jumped: from ``x`` on, with velocities
-        ``v``."""
+        """Begins new search lines for slots whose velocity has changed suddenly, ``some`` (slots,). The lines begin at
+        ``x`` with the velocities ``v``."""
         lines = self.searched
         lines.course[some], lines.x[some], lines.since[some] = v[some], (x - self.t * v)[some], self.t
 
     def shorten(self, x: Floats) -> None:
-        """Begins new short lines for all slots, from ``x`` (slots, 3) on."""
+        """Begins new short lines for all slots, at the positions ``x`` (slots, 3)."""
         self.short.begin_anew(np.ones(len(x), bool), x, self.t)
 
     def positions(self) -> Floats:
-        """(slots, 3) positions on the lines of the search at the beginning of the step, m."""
+        """(slots, 3) positions on the search lines at the beginning of the step, m."""
         return np.asarray(self.searched.x + self.t * self.searched.course)
 
 
 @njit(f"void({_V1}, {_V2}, {_V2}, {_V2}, {_V2}, float64, float64, int64, int64)", cache=True)
 def leave(left, line, course, x, v, t, dt, first, stop):  # type: ignore[no-untyped-def]
-    """Sets the distances of the slots from ``first`` to ``stop`` from their lines in a step ``dt`` from ``t`` on:
-    positions ``x`` and velocities ``v`` before contact, (slots, 3) each.
+    """Sets the distances of the slots from ``first`` to ``stop`` from their lines, in a step of length ``dt`` from time
+    ``t`` on. ``x``, ``v`` (slots, 3): positions and velocities before contact.
     """
     for a in range(first, stop):
         now, then = 0.0, 0.0
@@ -131,7 +137,9 @@ def leave(left, line, course, x, v, t, dt, first, stop):  # type: ignore[no-unty
 
 @njit(f"float64({_V1}, boolean[::1], int64, int64)", cache=True)
 def farthest(left, some, first, stop):  # type: ignore[no-untyped-def]
-    """Largest distance of ``some`` (slots,) of the slots from ``first`` to ``stop`` from their lines, m."""
+    """Largest distance from their lines, m, of those slots from ``first`` to ``stop`` that are among ``some``
+    (slots,).
+    """
     most = 0.0
     for a in range(first, stop):
         most = max(most, left[a] if some[a] else 0.0)
@@ -140,7 +148,7 @@ def farthest(left, some, first, stop):  # type: ignore[no-untyped-def]
 
 @njit(f"void({_V1}, {_N2}, int64, {_V1}, int64, int64)", cache=True)
 def largest(out, corners, many, left, first, stop):  # type: ignore[no-untyped-def]
-    """Sets the largest distance of the first ``many`` corners of each row from ``first`` to ``stop`` from their
+    """Sets, for each row from ``first`` to ``stop``, the largest distance of its first ``many`` corners from their
     lines."""
     for f in range(first, stop):
         most = 0.0

@@ -1,10 +1,10 @@
 """Registration: the search for the candidate pairs of changed nodes, faces and edges on one rank, without
 communication. Registration finds each pair once.
 
-The pairs of a changed node, face or edge are removed and searched again among everything in the broad phase. A node,
-face or edge is changed if it has departed from its line (reference_motion.py) or is new on the surface. A complete
-search is a registration in which everything is changed. No bit of the answer depends on candidates that do not become
-active.
+The pairs of a changed node, face or edge are removed. Then pairs of it are searched among all nodes, faces and edges in
+the broad phase. A node, face or edge counts as changed if it has departed from its line (reference_motion.py) or is new
+on the surface. A complete search is a registration in which all nodes, faces and edges are changed. Candidates that do
+not become active have no effect on the answer.
 """
 
 import numpy as np
@@ -23,12 +23,12 @@ from .extrapolation import rigid_motions
 from .swept_filter import SweptFilter
 
 _PARTLY = 0.5
-"""Share of half the skin. When a slot has departed from its line by half the skin, all slots that have departed by
-more than this share of half the skin get new lines too."""
+"""Fraction of half of the skin. When a slot has departed from its line by half of the skin, all slots that have
+departed by more than this fraction of half of the skin also get new lines."""
 
 
 class Registration:
-    """Passes of searches and registrations, on the threads of a team."""
+    """Passes of searches and registrations, run by the threads of a team."""
 
     def __init__(self, team: Team) -> None:
         self.deviation = Deviation(team)
@@ -45,10 +45,10 @@ class Registration:
         self._register(scene)
 
     def renew(self, scene: Scene, x: Floats, v: Floats, strayed: bool) -> None:
-        """Registers all new nodes, faces and edges and, with ``strayed``, begins new lines for the slots that have
+        """Registers all new nodes, faces and edges. If ``strayed``, first begins new lines for the slots that have
         departed from their lines.
 
-        ``x``, ``v`` (slots, 3): at the beginning of the step, v before contact.
+        ``x``, ``v`` (slots, 3): positions at the beginning of the step, and velocities before contact.
         """
         off = scene.settle_live()
         if strayed:
@@ -79,7 +79,9 @@ class Registration:
         scene.slots.new[:], scene.faces.new[:], scene.edges.new[:] = False, False, False
 
     def _node_face(self, scene: Scene, nodes: Flags, faces: Flags, lines: Lines) -> None:
-        """Adds pairs of slot and face: changed nodes with all faces, changed faces with the other nodes."""
+        """Adds pairs of a slot and a face. Changed nodes are paired with all faces; changed faces are paired with the
+        nodes that have not changed.
+        """
         half, size, n = 0.5 * scene.rules.skin, scene.faces.size, scene.surface_nodes.n
         every = np.arange(n, dtype=np.int32)[:, None], np.full(n, half)
         changed, others = (Primitives(*every, _rows(some)) for some in (nodes, scene.slots.live & ~nodes))
@@ -92,13 +94,13 @@ class Registration:
                 self._add_faces(scene, np.ascontiguousarray(found[:, ::-1]), lines)
 
     def _add_faces(self, scene: Scene, pairs: Indices, lines: Lines) -> None:
-        """Adds those ``pairs`` (p, 2) of slot and face that may be in contact."""
+        """Adds the pairs of slot and face, of ``pairs`` (p, 2), that may be in contact."""
         faces = scene.faces
         scene.node_face.add(self._filter.faces(pairs, faces.corners, faces.size, lines, scene.rules.skin))
 
     def _edge_edge(self, scene: Scene, edges: Flags, lines: Lines) -> None:
-        """Adds pairs of edges of which at least one has changed. The edge of lower rank is first, and the pair is
-        computed on the rank that has this edge.
+        """Adds pairs of edges of which at least one has changed. The edge of lower rank is the first of a pair; the
+        rank that has this edge computes the pair.
         """
         of = scene.edges.corners, 0.5 * (scene.rules.skin + scene.edges.deep)
         allowed, rank = scene.rules.allowed, scene.edges.rank
@@ -110,7 +112,7 @@ class Registration:
         self._add_edges(scene, found, lines)
 
     def _add_edges(self, scene: Scene, pairs: Indices, lines: Lines) -> None:
-        """Adds those ``pairs`` (p, 2) of edges that this rank computes and that may be in contact."""
+        """Adds the pairs of edges, of ``pairs`` (p, 2), that this rank computes and that may be in contact."""
         edges = scene.edges
         if not edges.own.all():
             pairs = pairs[edges.own[pairs[:, 0]]]
@@ -124,8 +126,8 @@ class Registration:
 
 def carry(now: Scene, old: Scene) -> None:
     """Copies the state of the scene ``old`` to ``now``, which is not connected yet: lines, broad-phase flags, and the
-    pairs that still exist. The pairs of a copied node were on the rank of its parent, and are from now on on the rank
-    that owns the copy.
+    pairs that still exist. Before the copy the pairs of a copied node were on the rank of its parent; now they are on
+    the rank that owns the copy.
     """
     slots = now.passes.located(now.surface_nodes.id, old.surface_nodes.id)
     faces, edges = _numbers(now.faces.id, old.faces.id), _numbers(now.edges.names, old.edges.names)
@@ -149,7 +151,7 @@ def carry(now: Scene, old: Scene) -> None:
 
 
 def _numbers(now: Ints, old: Ints) -> Indices:
-    """Returns the row of each name of ``old`` in ``now``, -1 for a name that is missing."""
+    """Returns, for each name of ``old``, its row in ``now``; -1 for a name that is missing in ``now``."""
     if (now[1:] > now[:-1]).all() and (old[1:] > old[:-1]).all():
         return np.asarray(_merged(now, old))
     order = np.argsort(now, kind="stable")
@@ -159,7 +161,7 @@ def _numbers(now: Ints, old: Ints) -> Indices:
 
 @njit("int32[::1](int64[::1], int64[::1])", cache=True)
 def _merged(now, old):  # type: ignore[no-untyped-def]
-    """``_numbers`` of ascending names."""
+    """Does the same as ``_numbers`` for ascending names."""
     rows, at = np.empty(len(old), np.int32), 0
     for k in range(len(old)):
         while at < len(now) and now[at] < old[k]:

@@ -1,9 +1,9 @@
 """Candidate pairs: nodes and faces, edges and edges, that may be in contact before the next search.
 
-All nodes are extrapolated over a time, the horizon, and two primitives are candidates when their paths come closer than
-their reach. A candidate list is valid until the horizon has passed or a node has departed from its path by half the
-skin; so free flight at a constant velocity uses none of the skin. The list may contain pairs that are not needed, but
-misses none.
+All nodes are extrapolated over a time, the horizon. Two primitives (points, edges or faces) are candidates if their
+paths come closer than their reach. A candidate list is valid until the horizon has passed or a node has departed from
+its path by half of the skin, so motion at a constant velocity uses no part of the skin. The list may contain pairs that
+are not needed, but no needed pair is missing.
 """
 
 import numpy as np
@@ -16,17 +16,17 @@ from .buckets import Buckets
 from .overlaps import Overlaps
 
 _FEW, _SAMPLE = 8, 256
-"""Ratio of the numbers of large and small primitives above which larger cells are faster; and size of the sample of
-boxes from which the size of the cells is computed."""
+"""Ratio of the numbers of large and small primitives above which larger cells are faster; and number of sampled boxes
+from which the size of the cells is computed."""
 _WORTHWHILE = 1024
-"""Number of primitives of the smaller set above which those far from the other set are removed before the search.
-Chosen value: one task of boxes.py."""
+"""Number of primitives of the smaller set. Above this number, the primitives that are far from the other set are
+removed before the search. Chosen value: one task of boxes.py."""
 _ANY = np.zeros(0, np.int64)
-"""Rank of primitives for which the order of a pair has no meaning."""
+"""Rank of primitives if the order of a pair has no meaning."""
 
 
 class Finder:
-    """Passes of a search, on the threads of a team."""
+    """Passes of a search, run by the threads of a team."""
 
     def __init__(self, team: Team) -> None:
         self._one, self._two = Boxing(team), Boxing(team)
@@ -35,7 +35,7 @@ class Finder:
     def find(
         self, small: Primitives, large: Primitives, lines: Lines, allowed: Flags, rank: Ints | None = None
     ) -> Indices:  # fmt: skip
-        """See ``find``."""
+        """Returns the candidate pairs of a search; see the function ``find``."""
         if not len(small.searched) or not len(large.searched):
             return np.zeros((0, 2), np.int32)
         first, second = (small, allowed), (large, allowed.T.copy())
@@ -58,25 +58,25 @@ def find(
     small: Primitives, large: Primitives, x: Floats, v: Floats, part: Indices, allowed: Flags, horizon: float,
     rank: Ints | None, finder: Finder | None = None,
 ) -> Indices:  # fmt: skip
-    """(pairs, 2) candidates: row of a small primitive and of a large one.
+    """(pairs, 2) candidates: row of the small primitive, and row of the large primitive.
 
-    ``x``, ``v`` (nodes, 3), less the mean velocity, and ``part`` (nodes,) of the nodes of corners; ``allowed`` (parts,
-    parts): parts that may be in contact. Primitives with a common corner are no candidates. ``rank`` (large,): the
-    small primitives are the first rows of the large primitives, and a pair is found only from the primitive of lower
-    rank. ``finder``: the passes; None for one thread.
+    ``x``, ``v``, ``part``: position (nodes, 3), velocity less the mean velocity (nodes, 3), and part (nodes,) of each
+    node. ``allowed`` (parts, parts): pairs of parts that may be in contact. Primitives with a common corner are no
+    candidates. ``rank`` (large,): if given, the small primitives are the first rows of the large primitives, and a pair
+    is found only from its primitive of lower rank. ``finder``: passes of the search; None for one thread.
     """
     return (finder or Finder(team(1))).find(small, large, Lines(x, v, horizon, part), allowed, rank)
 
 
 def _edge(small: Sought, large: Sought) -> float:
-    """Edge of the cells, m."""
+    """Edge length of the cells, m."""
     edge = max(_extent(small.low, small.high), _extent(large.low, large.high))
     return 2.0 * edge if _FEW * len(small.some) < len(large.some) else float(edge)
 
 
 @njit("float64(float64[:, ::1], float64[:, ::1])", cache=True)
 def _extent(low, high):  # type: ignore[no-untyped-def]
-    """Median of the longest sides of a sample of the boxes, m."""
+    """Median of the longest sides of the boxes, from a sample, m."""
     step = max(len(low) // _SAMPLE, 1)
     sides = np.empty(-(-len(low) // step))
     for k in range(len(sides)):

@@ -1,4 +1,4 @@
-"""Searches of all ranks: schedule, horizon, and the scene that results from a search."""
+"""Searches of all ranks: the schedule and the horizon of searches, and the scene that a search makes."""
 
 import math
 from functools import cached_property
@@ -28,32 +28,33 @@ from .extrapolation import courses
 from .registration import Registration, carry
 
 _SHORTEST = 10.0
-"""Smallest horizon of a search, in steps. The horizon is also at most twice the number of steps since the last
-search."""
+"""Smallest horizon of a search, in steps. The horizon is at most twice the number of steps since the last search, but
+never below this value."""
 _LONGEST = 80.0
-"""Largest horizon of a search, in steps, if bodies break. With 300 steps the additional pairs between fragments
-would cost a quarter more than the searches that are saved (docs/performance/bench.md, the bar to 40 us)."""
+"""Largest horizon of a search, in steps, if bodies break. With a horizon of 300 steps the additional pairs between
+fragments would cost a quarter more than the omitted searches save (docs/performance/bench.md, the bar to 40 us)."""
 _AHEAD = 2.0
 """Number of steps before the end of the horizon at which the next search is scheduled. The second of these steps is
 needed because the narrow phase also detects the contacts of the step after the present one."""
 _LEAST = 3.0 + _AHEAD
-"""Smallest remaining horizon, in steps, for which the candidates of the last search are kept; with a shorter horizon
+"""Smallest remaining horizon, in steps, for which the candidates of the last search are kept. With a shorter horizon
 the next search would follow immediately. Chosen value: three steps more than _AHEAD; one of the three allows for a time
 step that increases."""
 
 
 class Searches:
-    """Scene of a rank, and the searches that replace the scene."""
+    """Scene of a rank, and the searches that make new scenes."""
 
     def __init__(
         self, case: Case, model: Model, neighbours: list[Neighbour], exterior: Exterior, comm: Comm, clock: Clock,
         registered: Registration,
     ) -> None:  # fmt: skip
-        """Creates the searches without a scene."""
+        """Prepares searches. Before the first search there is no scene."""
         self._case, self._model, self._neighbours, self._exterior = case, model, neighbours, exterior
         self._comm, self._clock, self._registered, self._fractures = comm, clock, registered, case.fractures
         self.mu = part_pairs.friction(case)
-        """(parts, parts) Coulomb's coefficient, NaN where two parts may not be in contact."""
+        """(parts, parts) Coulomb's coefficient of friction for each pair of parts; NaN if the two parts cannot be in
+        contact."""
         self.scene: Scene | None = None
         model.nodes.columns.declare(self, "scene.own", place=ABSENT)
         self.due = True
@@ -63,7 +64,7 @@ class Searches:
         self._last = -math.inf
         """Number of the step of the last complete search."""
         self._kept: tuple[Ints, Floats] = np.zeros((0, 2), np.int64), np.zeros((0, 4))
-        """Pairs with their stored impulses, from before a repartition or a restart; the next search assigns the
+        """Pairs with their stored impulses, from before a repartition or a restart. The next search assigns the
         impulses to the new pairs."""
 
     @cached_property
@@ -73,7 +74,7 @@ class Searches:
 
     @cached_property
     def _self_contact(self) -> Flags:
-        """(parts,) True if the body of the part may be in contact with itself."""
+        """(parts,) True if the body of the part can be in contact with itself."""
         return part_pairs.self_contact(self._case, self.mu)
 
     @property
@@ -86,33 +87,37 @@ class Searches:
         )
 
     def keep(self, parcel: Parcel) -> None:
-        """Adds the stored impulses of pairs to the ``parcel`` (a checkpoint or migration message); the candidates are
-        found again by a search.
+        """Adds the stored impulses of pairs to the ``parcel`` (a checkpoint or migration message). The candidate pairs
+        are not added, because a search finds them again.
         """
         keys, kept = self._kept if self.scene is None else self.scene.kept
         parcel.rows["contact.kept"] = {"node": keys[:, 0], "face": keys[:, 1], "kept": kept}
 
     def resume(self, parcel: Parcel) -> None:
-        """Restores the stored impulses."""
+        """Restores the stored impulses of pairs from a parcel."""
         kept = parcel.rows["contact.kept"]
         self._kept = np.column_stack([kept["node"], kept["face"]]), kept["kept"]
 
     def spent(self, nodes: Nodes) -> bool:
-        """Returns True if a surface node will depart, within _AHEAD steps, more than the last search allows."""
+        """Returns True if a surface node will depart from its line, within _AHEAD steps, by more than the last search
+        allows.
+        """
         return self._exterior.motion.spent(nodes, self._clock.t, _AHEAD * self._clock.dt)
 
     @property
     def scheduled(self) -> bool:
-        """True if ``begin`` must be called before the step."""
+        """True if ``begin`` must be called before the next step."""
         return self.due or self.scene is None or self._clock.step % normals.EVERY == 0 or self._ages
 
     @property
     def _ages(self) -> bool:
-        """True if the ages of cracks are tested before the step."""
+        """True if the ages of cracks must be tested before the next step."""
         return self._fractures and self._clock.step % AGE == 0
 
     def begin(self, nodes: Nodes) -> None:
-        """Before a step: recomputes mean normals every EVERY steps, and searches if scheduled. Collective."""
+        """Recomputes the mean normals every EVERY steps, and searches if a search is scheduled. Must be called before a
+        step. Collective.
+        """
         if self._clock.step % normals.EVERY == 0:
             self._exterior.turn()
             if self.scene is not None:
@@ -123,7 +128,7 @@ class Searches:
             self._search(nodes)
 
     def _search(self, nodes: Nodes) -> None:
-        """Makes a new scene. Collective."""
+        """Makes a new scene by a search. Collective."""
         motion, old, exterior = self._exterior.motion, self.scene, self._exterior
         if old is not None:
             old.free()
@@ -147,8 +152,8 @@ class Searches:
         self.many += 1
 
     def _laid_out(self, nodes: Nodes, goes_on: bool) -> Scene:
-        """Lays out the present surface, without pairs; with ``goes_on`` for the remaining horizon of the last complete
-        search, else for a new horizon. Collective.
+        """Makes a scene of the present surface, without pairs. With ``goes_on`` the scene has the remaining horizon of
+        the last complete search, else a new horizon. Collective.
         """
         clock, motion = self._clock, self._exterior.motion
         self._exterior.refresh(self._courses(nodes), clock.t)
@@ -174,8 +179,8 @@ class Searches:
         follower.settle(self._neighbours, self._comm)
 
     def foresee(self, *, anew: bool = False) -> None:
-        """Adds the faces of cracks that may open soon to the broad phase of all ranks that have them. ``anew``: True
-        after a search, when the faces that were already in the broad phase are added again. Collective.
+        """Adds the faces of cracks that may open soon to the broad phase of all ranks that have these faces. ``anew``:
+        True after a search, when faces that were already in the broad phase must be added again. Collective.
         """
         now, cracks = self.scene, self._exterior.cracks
         if now is None or not self._fractures:
@@ -188,8 +193,8 @@ class Searches:
         now.enliven(sides[~now.faces.live[sides]])
 
     def separate(self, split: Split, cracks: Ints) -> None:
-        """Updates the scene after the separation of nodes; ``cracks``: rows of the cracks at separated nodes. Called on
-        all ranks, see topology_updates.py for the ranks that exchange messages.
+        """Updates the scene after the separation of nodes. ``cracks``: rows of the cracks at separated nodes. All ranks
+        must call the method; topology_updates.py describes which ranks exchange messages.
         """
         if self.scene is None:
             return
@@ -203,7 +208,7 @@ class Searches:
             follower.share(split, received, self._neighbours)
 
     def pushed(self, nodes: Ints) -> Flags:
-        """(k,) which of the local ``nodes`` (k,) had an impulse of contact in the last step."""
+        """(k,) whether each of the local ``nodes`` (k,) had a contact impulse in the last step."""
         if (now := self.scene) is None:
             return np.zeros(len(nodes), bool)
         places = now.own.place[nodes]

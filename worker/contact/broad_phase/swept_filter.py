@@ -1,12 +1,11 @@
-"""Swept filter: removes candidate pairs whose boxes touch but which stay apart over the horizon.
+"""Swept filter: removes candidate pairs whose boxes touch but whose primitives stay apart over the horizon.
 
-A box round a face or an edge is much larger than the primitive. A pair of edges is removed if a single direction
+The box around a face or an edge is much larger than the face or edge. A pair of edges is removed if a single direction
 separates the two edges over the whole horizon. For a node and a face, the height over the face and the distances from
 its sides are computed at the beginning, middle and end of the horizon. Each of these distances is nearly a parabola in
-time: between two of these moments it deviates from the straight line by an eighth of its second difference; the filter
-allows for twice that deviation. A pair is removed only if a single measure excludes contact over the whole horizon,
-with the skin and the depth of contacts as margin. Therefore a pair that no measure excludes at the beginning of the
-step remains a candidate.
+time. Between two of the three moments it deviates from the straight line by an eighth of its second difference; the
+filter allows twice this deviation. A pair is removed only if a single one of the distances excludes contact over the
+whole horizon, with the skin and the depth of contacts as margin.
 """
 
 import numpy as np
@@ -30,7 +29,7 @@ _read = reader(*_KEEP)
 
 
 class SweptFilter:
-    """Passes over pairs, on the threads of a team."""
+    """Passes of the filter over pairs, run by the threads of a team."""
 
     def __init__(self, team: Team) -> None:
         self._faces = Pass(team, _keep_faces, *_KEEP, size=_PAIRS)
@@ -38,14 +37,14 @@ class SweptFilter:
         self._packing = Packing(team, _PAIRS)
 
     def faces(self, pairs: Indices, places: Indices, size: Floats, lines: Lines, skin: float) -> Indices:
-        """Returns the pairs of slot and face, of ``pairs`` (p, 2), that may be in contact; ``places`` (f, 4) and
-        ``size`` (f,) of the faces. The content of ``pairs`` is lost.
+        """Returns the pairs of a slot and a face, of ``pairs`` (p, 2), that may be in contact. ``places`` (f, 4): slots
+        of each face; ``size`` (f,): size of each face, m. The content of ``pairs`` is overwritten.
         """
         return self._kept(self._faces, pairs, places, size, lines, skin)
 
     def edges(self, pairs: Indices, places: Indices, deep: Floats, lines: Lines, skin: float) -> Indices:
-        """Returns the pairs of edges, of ``pairs`` (p, 2), that may be in contact; ``places`` (e, 6); ``deep`` (e,):
-        greatest depth of a contact, m. The content of ``pairs`` is lost.
+        """Returns the pairs of edges, of ``pairs`` (p, 2), that may be in contact. ``places`` (e, 6): slots of each
+        edge; ``deep`` (e,): greatest depth of a contact, m. The content of ``pairs`` is overwritten.
         """
         return self._kept(self._edges, pairs, places, deep, lines, skin)
 
@@ -60,8 +59,8 @@ class SweptFilter:
 
 @njit("float64(float64, float64, float64)", cache=True)
 def _least(f, g, h):  # type: ignore[no-untyped-def]
-    """Returns a lower bound of a function with the values f, g and h at the beginning, middle and end of the
-    horizon.
+    """Returns a lower bound over the horizon of a function that has the values f, g and h at the beginning, middle and
+    end of the horizon.
     """
     return min(f, g, h) - 0.25 * abs(f - 2.0 * g + h)
 
@@ -74,7 +73,7 @@ def _then(x, v, s, t):  # type: ignore[no-untyped-def]
 
 @njit(f"Tuple((float64, {VECTOR}))({VECTOR}, {VECTOR}, {VECTOR}, {VECTOR})", cache=True, error_model="numpy")
 def _over(s, i, j, k):  # type: ignore[no-untyped-def]
-    """Height of the point s over the face i, j, k, and its distance outside of each of the sides, m."""
+    """Height of the point s above the face i, j, k, m, and its distance outside of each of the three sides, m."""
     e, f, r = minus(j, i), minus(k, i), minus(s, i)
     g, q = minus(f, e), minus(r, e)
     n = cross(e, f)
@@ -87,7 +86,7 @@ def _over(s, i, j, k):  # type: ignore[no-untyped-def]
 
 @njit(TASK, cache=True, error_model="numpy")
 def _keep_faces(table, first, stop, thread):  # type: ignore[no-untyped-def]
-    """Task: moves the pairs of slot and face that may be in contact to its first rows."""
+    """Task: moves those of its pairs of slot and face that may be in contact to its first rows."""
     pairs, counts, faces, size, lines, skin = _read(table)
     x, v, part, horizon, n = lines.x, lines.v, lines.part, lines.horizon, first
     half = 0.5 * horizon
@@ -113,16 +112,16 @@ def _keep_faces(table, first, stop, thread):  # type: ignore[no-untyped-def]
 
 @njit(f"boolean({VECTOR}, {VECTOR}, {VECTOR}, {VECTOR}, {VECTOR}, float64)", cache=True)
 def _beyond(axis, a, b, c, d, far):  # type: ignore[no-untyped-def]
-    """Returns True if the segment cd lies further from ab than ``far`` in the direction of ``axis``."""
+    """Returns True if the segment cd is beyond ab in the direction of ``axis`` by more than ``far``."""
     one, two = max(dot(axis, a), dot(axis, b)), min(dot(axis, c), dot(axis, d))
     return two - one > far * np.sqrt(dot(axis, axis))
 
 
 @njit(f"boolean({_V2}, {_V2}, int64, int64, int64, int64, float64, float64, float64)", cache=True)
 def _separated(x, v, a, b, c, d, begin, end, far):  # type: ignore[no-untyped-def]
-    """Returns True if the segments ab and cd stay further apart than ``far`` from time ``begin`` to ``end``, along the
-    direction in which the segments are nearest at the middle of that time: on straight lines their distance along a
-    fixed direction is least at either end.
+    """Returns True if the segments ab and cd stay further apart than ``far`` from time ``begin`` to ``end``. The
+    distance is measured along the direction in which the segments are nearest at the middle of this time. On straight
+    lines the distance along a fixed direction is least at the beginning or at the end.
     """
     half = 0.5 * (begin + end)
     axis = nearest(_then(x, v, a, half), _then(x, v, b, half), _then(x, v, c, half), _then(x, v, d, half))
@@ -133,7 +132,7 @@ def _separated(x, v, a, b, c, d, begin, end, far):  # type: ignore[no-untyped-de
 
 @njit(TASK, cache=True, error_model="numpy")
 def _keep_edges(table, first, stop, thread):  # type: ignore[no-untyped-def]
-    """Task: moves the pairs of edges that may be in contact to its first rows."""
+    """Task: moves those of its pairs of edges that may be in contact to its first rows."""
     pairs, counts, edges, deep, lines, skin = _read(table)
     x, v, horizon, n = lines.x, lines.v, lines.horizon, first
     half = 0.5 * horizon

@@ -1,1 +1,1 @@
-"""Nodes and volumes of a body inside of another body, at the start and at the end of a run."""
+"""Checks at the start and at the end of a run: nodes and volumes of a body that are inside of another body."""

@@ -1,10 +1,10 @@
-"""Common volume of bodies: tets that overlap tets of another body or fragment, and by how much.
+"""Common volume of bodies: the volume of tets that is inside of tets of another body or fragment.
 
-Bodies may overlap without a node of one inside of the other (``inside``): by their edges, or face on face. Every tet
-with a corner on the surface, or with a separated corner, is cut by all tets that have no node in common with the tet
-and whose part may be in contact with the part of the tet; in a part that breaks, tets of the same fragment are
-excluded. The common volume of two tets is their intersection, exact except for rounding. Tets of other ranks are
-exchanged by bounding boxes, so that no cut of the domain changes the result.
+Bodies may overlap although no node of one body is inside of the other (``inside``): their edges may cross, or their
+faces may coincide. Every tet with a corner on the surface, or with a separated corner, is compared with all tets that
+have no common node with it and whose part may be in contact with its part. In a part that breaks, tets of the same
+fragment are excluded. The common volume of two tets is the volume of their intersection, exact except for round-off.
+Tets of other ranks are exchanged by bounding boxes, so that the result does not depend on the partition.
 """
 
 from dataclasses import dataclass
@@ -23,37 +23,38 @@ from ..stage import Contact
 from .inside import outermost
 
 LARGE = 0.1
-"""A tet is counted if more than this share of its volume lies in other tets. Chosen value: where curved bodies of flat
-facets touch, their tets have about a hundredth of the volume in common."""
+"""Largest fraction of the volume of a tet that may lie in other tets; a tet with a larger fraction is counted. Chosen
+value: where curved bodies of flat facets touch, their tets have about a hundredth of the volume in common."""
 _SHARED, _MOST = 0.01, 0.5
-"""Limits of the warning: common volume over the volume of all tets that were cut, and the largest common volume of
-one tet over the volume of that tet. Chosen values; the first is equal to the limit of the lines of the ledger."""
+"""Limits of the warning: ratio of the common volume to the volume of all tested tets, and largest ratio of the common
+volume of one tet to its volume. Chosen values; the first limit is equal to the limit of the terms of the energy
+ledger."""
 _WORDS = 19
-"""Number of words of a tet in a message: its id, its fragment, its part, its nodes' ids and the words of their
+"""Number of words of a tet in a message: its id, its fragment, its part, the ids of its nodes, and the words of their
 positions."""
 _QUANTUM = 2.0**-40
-"""Quantum of the common volumes of a tet, as a share of its volume. Sums of quanta do not depend on the order of
+"""Quantum of the common volumes of a tet, divided by its volume. Sums of quanta do not depend on the order of
 summation."""
 _PIECES = 81
-"""Largest number of pieces of a tet after four cuts by planes, each into at most three."""
+"""Largest number of pieces of a tet after four cuts by planes. Each cut divides a piece into at most three pieces."""
 
 
 @dataclass(frozen=True)
 class CommonVolume:
-    """Result of the check, equal on all ranks."""
+    """Result of the check. All ranks have equal values."""
 
     tets: int
-    """Number of tets that were cut."""
+    """Number of tested tets."""
     large: int
-    """Number of tets with more than the share LARGE of their volume in other tets."""
+    """Number of tets with more than the fraction LARGE of their volume in other tets."""
     largest: float
-    """Largest share of the volume of one tet that lies in other tets."""
+    """Largest fraction of the volume of one tet that lies in other tets."""
     share: float
-    """Share of the volume of all tets that were cut that lies in other tets."""
+    """Fraction of the volume of all tested tets that lies in other tets."""
 
     @property
     def warnings(self) -> list[str]:
-        """Returns a warning of one line if the common volume is above the limits."""
+        """Returns a warning if the common volume is above the limits."""
         if self.share <= _SHARED and self.largest <= _MOST:
             return []
         return [
@@ -66,7 +67,7 @@ class CommonVolume:
 def measure(contact: Contact, model: Model, labels: list[Ints] | None, comm: Comm) -> CommonVolume:
     """Measures the volume of tets at the surface inside of other tets, at the present positions. Collective.
 
-    ``labels``: for each block (n,) the fragment of each tet; None: every part is one fragment.
+    ``labels``: fragment of each tet, one array (n,) for each block; None if every part is one fragment.
     """
     fragments = labels or [np.full(block.n, block.part, np.int64) for block in model.blocks]
     own = _at_surface(contact, model, fragments)
@@ -101,7 +102,7 @@ def measure(contact: Contact, model: Model, labels: list[Ints] | None, comm: Com
 
 
 def _at_surface(contact: Contact, model: Model, fragments: list[Ints]) -> Ints:
-    """(n, _WORDS) words of this rank's tets with a corner on the surface, or with a separated corner."""
+    """(n, _WORDS) words of the tets of this rank that have a corner on the surface or a separated corner."""
     outer, found = outermost(contact), [np.zeros((0, _WORDS), np.int64)]
     for block, fragment in zip(model.blocks, fragments, strict=True):
         some = np.flatnonzero(outer[block.tets].any(axis=1))
@@ -112,7 +113,7 @@ def _at_surface(contact: Contact, model: Model, fragments: list[Ints]) -> Ints:
 
 
 def _reaching(own: Ints, model: Model, comm: Comm) -> Ints:
-    """(n, _WORDS) words of the tets at the surface of all ranks that touch the bounding box of this rank's nodes."""
+    """(n, _WORDS) words of the surface tets of all ranks that touch the bounding box of this rank's nodes."""
     hulls = comm.join(_hull(model.nodes.x[None]).view(np.int64)).view(np.float64).reshape(-1, 6)
     low, high = np.split(_hull(_corners(own)), 2, axis=1)
     touch = [((low <= hull[3:]) & (high >= hull[:3])).all(axis=1) for hull in hulls]
@@ -127,7 +128,7 @@ def _hull(points: Floats) -> Floats:
 
 
 def _corners(received: Ints) -> Floats:
-    """(n, 4, 3) corners of received tets, m."""
+    """(n, 4, 3) corners of the received tets, m."""
     return np.ascontiguousarray(received[:, 7:]).view(np.float64).reshape(-1, 4, 3)
 
 
@@ -138,8 +139,8 @@ def _volumes(corners: Floats) -> Floats:
 
 @njit("float64(float64[:, :], int64, int64, int64, float64[:, :], int64)", cache=True)
 def _triple(tet, a, b, c, other, k):  # type: ignore[no-untyped-def]
-    """Six times the volume, m^3, of the tet whose corners are three corners of one tet and corner ``k`` of another
-    tet.
+    """Six times the signed volume, m^3, of the tet that consists of three corners of one tet and corner ``k`` of
+    another tet.
     """
     start = at(tet, a)
     return dot(cross(minus(at(tet, b), start), minus(at(tet, c), start)), minus(at(other, k), start))
@@ -152,13 +153,15 @@ def _determinant(tet):  # type: ignore[no-untyped-def]
 
 @njit("float64(float64[:, :], int64, float64[:, :], int64)", cache=True)
 def _height(tet, face, other, k):  # type: ignore[no-untyped-def]
-    """Returns ``_triple`` of corner ``k`` of ``other`` and the face opposite to a corner; above 0 inside."""
+    """Returns ``_triple`` of corner ``k`` of ``other`` and the face opposite to a corner of a tet. The value is
+    positive on the inner side of the face.
+    """
     return -_triple(tet, FACES[face, 0], FACES[face, 1], FACES[face, 2], other, k)
 
 
 @njit("boolean(float64[:, ::1], float64[:, ::1])", cache=True)
 def _apart(one, other):  # type: ignore[no-untyped-def]
-    """Returns True if a tet lies entirely on the outer side of a face of another tet."""
+    """Returns True if one of the two tets lies entirely on the outer side of a face of the other tet."""
     for face in range(4):
         behind = True
         for k in range(4):
@@ -170,7 +173,9 @@ def _apart(one, other):  # type: ignore[no-untyped-def]
 
 @njit("void(float64[::1], float64[:, ::1], float64[::1], int64, int64)", cache=True)
 def _meet(point, tet, height, a, b):  # type: ignore[no-untyped-def]
-    """Sets ``point`` to the intersection of the edge from corner a to b with the plane of the heights."""
+    """Sets ``point`` to the intersection of the edge from corner a to corner b with the plane to which the heights
+    refer.
+    """
     share = height[a] / (height[a] - height[b])
     for i in range(3):
         point[i] = tet[a, i] + share * (tet[b, i] - tet[a, i])
@@ -181,9 +186,10 @@ def _meet(point, tet, height, a, b):  # type: ignore[no-untyped-def]
     cache=True, _nrt=True,
 )  # fmt: skip
 def _in_front(out, n, tet, height, wedge, order):  # type: ignore[no-untyped-def]
-    """Cuts a tet by a plane, given by the heights of its corners, and writes the pieces in front of the plane to
-    ``out`` from row ``n`` on; returns their new number. With one corner in front the result is a tet; with two or three
-    a wedge, of three tets. ``wedge`` (6, 3), ``order`` (4,): working arrays.
+    """Cuts a tet by a plane, which is given by the heights of the corners above it. Writes the pieces in front of the
+    plane to ``out`` from row ``n`` on. Returns the new number of pieces. With one corner in front of the plane the
+    result is a tet; with two or three corners it is a wedge, made of three tets. ``wedge`` (6, 3), ``order`` (4,):
+    working arrays.
     """
     before, end = 0, 4
     for k in range(4):
@@ -218,8 +224,8 @@ def _in_front(out, n, tet, height, wedge, order):  # type: ignore[no-untyped-def
 
 @njit("float64(float64[:, :, ::1], float64[:, :, ::1], float64[:, ::1], float64[:, ::1])", cache=True)
 def intersection(pieces, others, one, other):  # type: ignore[no-untyped-def]
-    """Six times the common volume, m^3, of two tets (4, 3), neither inverted: the first is cut by the face planes of
-    the second, one after the other. ``pieces``, ``others`` (_PIECES, 4, 3): working arrays.
+    """Six times the common volume, m^3, of two tets (4, 3), neither of which is inverted. The first tet is cut by the
+    face planes of the second tet, one after the other. ``pieces``, ``others`` (_PIECES, 4, 3): working arrays.
     """
     n, height, wedge, order = 1, np.empty(4), np.empty((6, 3)), np.empty(4, np.int64)
     pieces[0] = one
@@ -242,8 +248,9 @@ def intersection(pieces, others, one, other):  # type: ignore[no-untyped-def]
     error_model="numpy",
 )
 def _cut(quanta, pairs, ids, ones, other_ids, others):  # type: ignore[no-untyped-def]
-    """Adds the shares of the tets ``ones`` (n, 4, 3) inside of ``others`` (m, 4, 3) to ``quanta`` (n,), pair by pair
-    (p, 2), for pairs without a common node; ``ids`` (n, 4), (m, 4): of their nodes.
+    """Adds the fraction of each of the tets ``ones`` (n, 4, 3) that is inside of ``others`` (m, 4, 3) to ``quanta``
+    (n,), for the pairs (p, 2) without a common node. ``ids`` (n, 4), ``other_ids`` (m, 4): ids of the nodes of the
+    tets.
     """
     pieces, next_pieces = np.empty((_PIECES, 4, 3)), np.empty((_PIECES, 4, 3))
     for p in range(len(pairs)):

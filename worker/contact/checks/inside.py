@@ -1,14 +1,14 @@
-"""Penetrated nodes: nodes inside of another body or fragment, and nodes without tets inside of their own part. The
-second kind is counted whether the part is in contact with itself or not.
+"""Penetrated nodes: nodes inside of another body or fragment, and nodes without tets that are inside of their own part.
+Nodes inside of their own part are counted even if the part has no contact with itself.
 
-A node in a tet of another fragment has passed through that body's surface. The depth of such a node is computed from
-the tet alone: below the nearest exposed face of the tet; in a tet without exposed face but with a corner on the
-surface, below the nearest of all its faces; and at most the distance from such a corner. In a tet without a corner on
-the surface the node is deeper than the outermost layer, unless that layer has been compressed to nearly nothing: then
-the nearest exposed faces of the body decide. A node on an edge between two corners on the surface counts as touching,
-because a tet with an edge on the surface may have no exposed face there; this includes edges that run through a plate
-of one tet. Nodes of the surface and separated nodes are tested against the tets of all ranks, so that the partition
-does not change the result.
+A node in a tet of another fragment has passed through the surface of that fragment. The depth of the node is computed
+from the tet alone. It is the depth below the nearest exposed face of the tet. If the tet has no exposed face but a
+corner on the surface, it is the depth below the nearest of all its faces. The depth is at most the distance from a
+corner on the surface. In a tet without a corner on the surface the node is deeper than the outermost layer of tets. If
+that layer was compressed to nearly zero thickness, the nearest exposed faces of the body determine the depth. A node on
+an edge between two corners on the surface counts as touching, because a tet with an edge on the surface may have no
+exposed face there. Such edges may run through a plate that is one tet thick. Nodes of the surface and separated nodes
+are tested against the tets of all ranks, so that the result does not depend on the partition.
 """
 
 from dataclasses import dataclass
@@ -26,40 +26,41 @@ from ..stage import Contact
 from .overlap import to_borders
 
 SLIGHT = 0.05
-"""Depth over the typical size of a face; depths below this value count as 0. Chosen value: it is above the residual of
-the contact sweeps."""
+"""Ratio of the depth to the typical size of a face. Depths below this ratio count as 0. The chosen value is above the
+residual of the contact sweeps."""
 _WORDS = 5
 """Number of words of a node in a message."""
 _AT_ONCE = 1 << 14
-"""Number of pairs of a node and a tet that are tested at a time, so that their arrays stay small."""
+"""Number of pairs of a node and a tet that are tested together. The number limits the size of temporary arrays."""
 _ROUNDING = 1e-9
-"""Tolerance of the volume coordinates. With this tolerance a node on the face between two tets is in both tets."""
+"""Tolerance of the volume coordinates. Within this tolerance a node on the face between two tets counts as being in
+each of them."""
 DEEP = 0.25
-"""Depth over the typical size of a face above which there is a warning. Chosen value: about half of the altitude of
-a regular tet."""
+"""Ratio of the depth to the typical size of a face, above which a warning is given. Chosen value: about half of the
+altitude of a regular tet."""
 
 
 @dataclass(frozen=True)
 class Inside:
-    """Result, equal on all ranks."""
+    """Result of the check. All ranks have equal values."""
 
     tested: int
-    """Number of nodes tested."""
+    """Number of tested nodes."""
     nodes: int
-    """Number of nodes deeper than SLIGHT inside of another body or fragment; for nodes without tets, also inside of
-    their own part."""
+    """Number of nodes that are deeper than SLIGHT inside of another body or fragment. Nodes without tets are also
+    counted if they are inside of their own part."""
     own: int
-    """Number of penetrated nodes without tets that are inside of their own part only."""
+    """Number of penetrated nodes that have no tets and are inside of their own part only."""
     buried: int
-    """Number of penetrated nodes that lie in a tet without a corner on the surface, further than SLIGHT from any
-    exposed face of the body of that tet."""
+    """Number of penetrated nodes that lie in a tet without a corner on the surface, and are further than SLIGHT from
+    any exposed face of the body of that tet."""
     deepest: float
-    """Largest depth of the penetrated nodes that lie in a tet with a corner on the surface, in typical sizes of a
-    face; 0 if no node is deeper than SLIGHT."""
+    """Largest depth of the penetrated nodes that lie in a tet with a corner on the surface, divided by the typical size
+    of a face; 0 if no node is deeper than SLIGHT."""
 
     @property
     def warnings(self) -> list[str]:
-        """Returns a warning of one line if a node is deeper than DEEP."""
+        """Returns a warning if a node is deeper than DEEP."""
         if not self.buried and self.deepest <= DEEP:
             return []
         how = [f"{self.own} of them, without tets, into the part that they come from"] if self.own else []
@@ -75,7 +76,7 @@ class Inside:
 def look(contact: Contact, model: Model, labels: list[Ints] | None, comm: Comm) -> Inside:
     """Finds the nodes inside of other bodies, at the present positions. Collective.
 
-    ``labels``: for each block (n,) the fragment of each tet; None: every part is one fragment.
+    ``labels``: fragment of each tet, one array (n,) for each block; None if every part is one fragment.
     """
     fragments = labels or [np.full(block.n, block.part, np.int64) for block in model.blocks]
     outer, may = outermost(contact), _may(contact)
@@ -113,30 +114,30 @@ def look(contact: Contact, model: Model, labels: list[Ints] | None, comm: Comm) 
 
 
 def _may(contact: Contact) -> Flags:
-    """(parts, parts) pairs of parts to be tested: pairs that may be in contact, and each part of such a pair with its
-    own nodes without tets.
+    """(parts, parts) pairs of parts that are tested. These are the pairs that may be in contact, and each part of such
+    a pair with its own nodes without tets.
     """
     meet = ~np.isnan(contact.searches.mu)
     return np.asarray(meet | (np.eye(len(meet), dtype=bool) & meet.any(axis=1)))
 
 
 class _Seen(NamedTuple):
-    """Tested nodes; equal on all ranks."""
+    """Nodes that are tested. All ranks have equal values."""
 
     part: Indices
     """(k,) part of each node."""
     fragment: Ints
-    """(k,) fragment of each node, -1 for a node without tets."""
+    """(k,) fragment of each node; -1 for a node without tets."""
     x: Floats
     """(k, 3) position of each node, m."""
 
 
 def _seen(outer: Flags, model: Model, fragments: list[Ints], comm: Comm) -> _Seen:
-    """Gathers the ``outer`` nodes (nodes,) of all ranks. Collective."""
+    """Collects the ``outer`` nodes (nodes,) of all ranks. Collective."""
     nodes = model.nodes
     some = nodes.owned & outer
     received = comm.join(np.column_stack([nodes.id, nodes.part, nodes.x.view(np.int64)])[some]).reshape(-1, _WORDS)
-    here = np.full(nodes.n + 1, -1, np.int64)  # the last entry is for nodes that are not on this rank
+    here = np.full(nodes.n + 1, -1, np.int64)  # the last element is for nodes that are not on this rank
     for block, fragment in zip(model.blocks, fragments, strict=True):
         here[block.tets] = fragment[:, None]
     known = here[nodes.places(received[:, 0])].astype(np.float64)
@@ -145,7 +146,7 @@ def _seen(outer: Flags, model: Model, fragments: list[Ints], comm: Comm) -> _See
 
 
 def outermost(contact: Contact) -> Flags:
-    """(nodes,) nodes of the surface, and nodes that have separated."""
+    """(nodes,) whether each node is on the surface or has separated."""
     ring = contact.exterior.cracks.families.ring
     return np.asarray(contact.exterior.surface.flags | (ring != np.arange(len(ring))))
 
@@ -153,7 +154,9 @@ def outermost(contact: Contact) -> Flags:
 def _at_surface(
     x: Floats, parts: Indices, of: Ints, contact: Contact, model: Model, fragments: list[Ints]
 ) -> Ints:  # fmt: skip
-    """(p,) number of open faces of this rank, of the fragments ``of`` (p,), within SLIGHT of ``x`` (p, 3)."""
+    """(p,) number of open faces of this rank that belong to the fragments ``of`` (p,) and are within SLIGHT of the
+    points ``x`` (p, 3).
+    """
     if not len(x):
         return np.zeros(0, np.int64)
     points, part = np.concatenate([model.nodes.x, x]), np.concatenate([model.nodes.part, parts])
@@ -172,7 +175,7 @@ def _at_surface(
 
 
 def _exposed(block: Block, contact: Contact) -> Flags:
-    """(n, 4) faces of tets that are exposed or broken, except faces in symmetry planes."""
+    """(n, 4) whether each face of a tet is exposed or broken. Faces in symmetry planes are not exposed."""
     faces = contact.exterior.surface.faces
     opened = np.isin(4 * block.id[:, None] + np.arange(4), faces.id[faces.exposed])
     if len(block.bond):
@@ -181,17 +184,17 @@ def _exposed(block: Block, contact: Contact) -> Flags:
 
 
 def _open(block: Block, contact: Contact, outer: Flags) -> Flags:
-    """(n, 4) faces of tets that are ``_exposed``; all faces of a tet without such a face but with a corner on the
-    surface."""
+    """(n, 4) whether each face of a tet is used for depths. These are the faces that are ``_exposed``; in a tet without
+    such a face but with a corner on the surface, all faces are used."""
     opened = _exposed(block, contact)
     touching = np.asarray(outer[block.tets].any(axis=1))
     return np.asarray(opened | (touching & ~opened.any(axis=1))[:, None])
 
 
 def _depths(points: Floats, corners: Floats, opened: Flags, outer: Flags) -> Floats:
-    """(p,) depth of points (p, 3) in tets (p, 4, 3), m: the distance from the nearest ``opened`` face (p, 4) or from
-    the nearest corner on the surface, ``outer`` (p, 4); infinite without either, negative outside of the tet and in
-    a tet without volume.
+    """(p,) depth of points (p, 3) in tets (p, 4, 3), m. The depth is the distance from the nearest ``opened`` face (p,
+    4) or from the nearest corner on the surface, ``outer`` (p, 4). It is infinite if the tet has neither; it is
+    negative outside of the tet and in a tet without volume.
     """
     edges = corners[:, 1:] - corners[:, :1]
     solid = np.linalg.det(edges) > 0.0
@@ -205,7 +208,7 @@ def _depths(points: Floats, corners: Floats, opened: Flags, outer: Flags) -> Flo
 
 
 def _from_faces(points: Floats, corners: Floats) -> Floats:
-    """(p,) distance of points (p, 3) from triangles (p, 3, 3), m."""
+    """(p,) distance of each point (p, 3) from its triangle (p, 3, 3), m."""
     sides, arms = np.roll(corners, -1, axis=1) - corners, points[:, None] - corners
     normal = np.cross(sides[:, 0], sides[:, 1])
     length = np.linalg.norm(normal, axis=1)
@@ -215,8 +218,8 @@ def _from_faces(points: Floats, corners: Floats) -> Floats:
 
 
 def _from_edges(points: Floats, corners: Floats, outer: Flags) -> Floats:
-    """(p,) distance of points (p, 3) from the nearest edge of tets (p, 4, 3) between two corners on the surface,
-    ``outer`` (p, 4), m; infinite without such an edge.
+    """(p,) distance, m, of each point (p, 3) from the nearest edge of its tet (p, 4, 3) between two corners on the
+    surface, ``outer`` (p, 4); infinite if the tet has no such edge.
     """
     nearest = np.full(len(points), np.inf)
     for a, b in combinations(range(4), 2):

@@ -1,5 +1,5 @@
-"""Overlap of bodies before the first step: finds place and depth of an overlap, removes the overlap by moving nodes,
-and reports an error if an overlap remains.
+"""Overlap of bodies before the first step. The module finds place and depth of an overlap and can remove the overlap by
+moving nodes. If an overlap remains, it reports an error.
 """
 
 from collections.abc import Iterator
@@ -15,20 +15,20 @@ from ..broad_phase.boxes import Primitives
 from ..narrow_phase.facing import FACING
 
 _INSIDE = 1e-9
-"""Tolerance of the volume coordinates of a node inside of a tet."""
+"""Tolerance of the volume coordinates for a node inside of a tet."""
 _ROUNDING = 1e-6
-"""Depth over the size of a face; depths below this value count as 0."""
+"""Ratio of the depth to the size of a face. Depths below this ratio count as 0."""
 _TRIES = 30
 """Largest number of passes in which overlapping bodies are moved apart. Chosen value."""
 
 
 _THROUGH = 0.1
-"""Tolerance of the crossing of an edge and a face. An edge passes through a face if its two ends are further than
-this share of the size of the face from the plane of the face, on opposite sides, and the crossing point is further
-from each side of the face than this share of the altitude on that side. Rims, and facets of two round bodies that
-fit, overlap by less. Chosen value."""
+"""Tolerance for the crossing of an edge and a face. An edge passes through a face under two conditions. First, its two
+ends are on opposite sides of the face, and further from the plane of the face than this ratio times the size of the
+face. Second, the crossing point is further from each side of the face than this ratio times the altitude on that side.
+Rims, and facets of two round bodies that fit, overlap by less. Chosen value."""
 _CRUSHED = 0.1
-"""Smallest allowed volume of a tet after the move over its volume before the move. Chosen value."""
+"""Smallest allowed ratio of the volume of a tet after the move to its volume before the move. Chosen value."""
 
 
 @dataclass(frozen=True)
@@ -40,13 +40,13 @@ class Surface:
     part: Indices
     """(f,) part of each face."""
     exposed: Flags
-    """(tets, 4) True for the faces of tets that are exposed."""
+    """(tets, 4) whether each face of a tet is exposed."""
 
 
 @dataclass(frozen=True)
 class Overlaps:
-    """Nodes inside another part: depth of each node below the surface of that part, m, and unit direction out of that
-    part.
+    """Nodes inside of another part: depth of each node below the surface of that part, m, and unit vector along which
+    the node would leave that part.
     """
 
     nodes: Indices
@@ -57,8 +57,8 @@ class Overlaps:
 
 
 def find(points: Floats, tets: Indices, part: Indices, surface: Surface, allowed: Flags) -> Overlaps:
-    """Finds surface nodes inside the tets (k, 4) of another part that may be in contact with the part of the node;
-    ``points`` (n, 3), m.
+    """Finds surface nodes that are inside of the tets (k, 4) of another part. The two parts must be ``allowed`` to be
+    in contact. ``points`` (n, 3), m.
     """
     others = allowed & ~np.eye(len(allowed), dtype=bool)
     nodes = np.unique(surface.faces).astype(np.int32)
@@ -87,8 +87,8 @@ def find(points: Floats, tets: Indices, part: Indices, surface: Surface, allowed
 def move_apart(
     points: Floats, tets: Indices, part: Indices, surface: Surface, allowed: Flags
 ) -> tuple[Floats, Indices]:
-    """Returns points in which overlapping nodes have been moved towards the surface of the other part, by half of the
-    depth in each pass; and the part that each was moved out of last, -1 for none.
+    """Moves overlapping nodes towards the surface of the other part, by half of the depth in each pass. Returns the new
+    points. Returns also, for each node, the last part out of which the node was moved; -1 if it was not moved.
     """
     moved, out_of = points.copy(), np.full(len(points), -1, np.int32)
     for _ in range(_TRIES):
@@ -101,16 +101,17 @@ def move_apart(
 
 
 def crushed(before: Floats, after: Floats, tets: Indices) -> Indices:
-    """Returns the tets that have less than a tenth of their volume after the move, or are inverted."""
+    """Returns the tets that are inverted after the move or have less than a tenth of their volume."""
     had = _volumes(before[tets])
     return np.flatnonzero((had > 0.0) & (_volumes(after[tets]) < _CRUSHED * had)).astype(np.int32)
 
 
 def nested(points: Floats, tets: Indices, part: Indices, surface: Surface, allowed: Flags) -> Indices:
-    """(n, 2) tets of the surface whose centre lies inside a tet of another part, and these other tets; only parts that
-    may be in contact count.
+    """(n, 2) pairs of a surface tet whose centre is inside of a tet of another part, and this other tet. Only parts
+    that may be in contact are compared.
 
-    Bodies whose surfaces coincide have no node inside each other: their nodes lie on each other's faces.
+    If the surfaces of two bodies coincide, no node is inside of the other body, because the nodes lie on faces of the
+    other body.
     """
     others = allowed & ~np.eye(len(allowed), dtype=bool)
     outer = np.flatnonzero(surface.exposed.any(axis=1)).astype(np.int32)
@@ -124,11 +125,12 @@ def nested(points: Floats, tets: Indices, part: Indices, surface: Surface, allow
 
 
 def within(points: Floats, tets: Indices, body: Indices) -> tuple[Indices, Indices]:
-    """Nodes, and tets by their centres, that lie inside another body; ``body`` (n,) of the nodes.
+    """Nodes that are inside of another body, and tets whose centre is inside of another body; ``body`` (n,): body of
+    each node.
 
-    A node on the surface of a body does not lie inside it, a node on a face between two of its tets does: meshes of one
-    grid that are shifted by half a cell have all nodes on such faces. A centre lies in its own tet, so a tet whose
-    centre is on any face of another body has volume in common with that body.
+    A node on the surface of a body is not inside of the body. A node on a face between two tets of a body is inside of
+    the body: if two meshes of one grid are shifted by half a cell, all nodes lie on such faces. A centre is inside of
+    its own tet. Therefore a tet whose centre is on any face of another body has common volume with that body.
     """
     every = np.concatenate([points, points[tets].mean(axis=1)])
     of = np.concatenate([body, body[tets[:, 0]]])
@@ -148,8 +150,9 @@ def within(points: Floats, tets: Indices, body: Indices) -> tuple[Indices, Indic
 
 
 def crossing(points: Floats, part: Indices, surface: Surface, allowed: Flags) -> Indices:
-    """(n, 2) nodes at one end of surface edges that pass through a face of another part, and nodes at a corner of these
-    faces; only parts that may be in contact count: bodies that cross each other may have no node inside each other.
+    """(n, 2) a node at one end of each surface edge that passes through a face of another part, and a corner of this
+    face. Only parts that may be in contact are compared. Bodies that cross each other may have no node inside of each
+    other.
     """
     others, faces = allowed & ~np.eye(len(allowed), dtype=bool), np.ascontiguousarray(surface.faces, np.int32)
     edges = np.unique(np.sort(faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1), axis=0)
@@ -176,14 +179,17 @@ def _volumes(corners: Floats) -> Floats:
 
 
 def _shares(nodes: Floats, corners: Floats) -> Floats:
-    """(p, 4) volume coordinates of nodes (p, 3) in tets (p, 4, 3): none is negative inside, one is zero on a face."""
+    """(p, 4) volume coordinates of nodes (p, 3) in tets (p, 4, 3). Inside of the tet no coordinate is negative; on a
+    face one coordinate is zero.
+    """
     edges = corners[:, 1:] - corners[:, :1]
     tail = np.einsum("pi,pij->pj", nodes - corners[:, 0], np.linalg.inv(edges))
     return np.column_stack([1.0 - tail.sum(axis=1), tail])
 
 
 def _faced(outward: Floats, inward: Floats) -> Flags:
-    """(p, 4) faces, by their normals into tets (p, 4, 3), on which a node with the outward direction (p, 3) may lie.
+    """(p, 4) whether a node with the outward direction ``outward`` (p, 3) may lie on each face. The faces are given by
+    their normals into the tets (p, 4, 3).
 
     If sides of two bodies lie in one plane and one body penetrates the other, a rim node of the first body is on that
     side of the second body, but this side does not support the node.
@@ -192,16 +198,17 @@ def _faced(outward: Floats, inward: Floats) -> Flags:
 
 
 def _inward(corners: Floats) -> Floats:
-    """(p, 4, 3) unit normals, into tets (p, 4, 3), of the faces opposite to each corner."""
+    """(p, 4, 3) unit normals, pointing into the tets (p, 4, 3), of the faces opposite to each corner."""
     tail = np.swapaxes(np.linalg.inv(corners[:, 1:] - corners[:, :1]), 1, 2)
     inward = np.concatenate([-tail.sum(axis=1, keepdims=True), tail], axis=1)
     return np.asarray(inward / np.linalg.norm(inward, axis=2)[:, :, None])
 
 
 def _clear(normals: Floats, ways: Floats) -> Flags:
-    """(f,) planes through a node with these unit ``normals`` (f, 3) behind which none of its ``ways`` (w, 3) leads:
-    then the node lies on the plane, for any mean of its normals. A corner at the rim of two slanted sides may face
-    neither.
+    """(f,) whether a node lies on each plane, because no tet of the node reaches behind the plane. The planes go
+    through the node and have the unit ``normals`` (f, 3); ``ways`` (w, 3): vectors from the node to the corners of its
+    tets. The test holds for any mean normal of the node. It is needed because a corner at the rim of two slanted sides
+    may face neither side.
     """
     return np.asarray((normals @ ways.T).min(axis=1) >= -_ROUNDING * np.linalg.norm(ways, axis=1).max())
 
@@ -217,7 +224,7 @@ def _ways(points: Floats, tets: Indices, nodes: Indices) -> Iterator[Floats]:
 
 
 def _normals(points: Floats, faces: Indices) -> Floats:
-    """(n, 3) unit outward normals of the nodes, zero for nodes without faces (f, 3)."""
+    """(n, 3) unit outward normals of the nodes; zero for a node without faces. ``faces`` (f, 3)."""
     normals, areas = np.zeros_like(points), face_normals(points, faces)
     for k in range(3):
         np.add.at(normals, faces[:, k], areas)
@@ -226,11 +233,11 @@ def _normals(points: Floats, faces: Indices) -> Floats:
 
 
 def _nearest(node: Floats, outward: Floats, ways: Floats, triangles: Floats) -> tuple[float, Floats]:
-    """Depth below the nearest of the triangles (f, 3, 3) that the node faces, m, and the unit normal there. A node
-    faces a triangle by the mean of its normals, or because none of its tets, whose corners are ``ways`` (w, 3) from it,
-    reaches behind the plane.
+    """Returns the depth of a node below the nearest triangle that it faces, m, and the unit normal of this triangle.
+    ``triangles`` (f, 3, 3). A node faces a triangle because of its mean normal, or because no tet of the node reaches
+    behind the plane of the triangle; ``ways`` (w, 3): vectors to the corners of these tets.
 
-    The depth is zero for a node on the surface, and if no faced triangle has the foot of the node. In a dent of the
+    The depth is zero for a node on the surface, and if the foot of the node is on no faced triangle. In a dent of the
     surface the nearest triangle may be wrong: a ridge may be nearest, with the foot on its far side.
     """
     e, f, r = triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0], node - triangles[:, 0]
@@ -252,7 +259,9 @@ def _nearest(node: Floats, outward: Floats, ways: Floats, triangles: Floats) -> 
 
 
 def to_borders(node: Floats, triangles: Floats) -> Floats:
-    """(f,) distance, m, of a node, or of one each (f, 1, 3), from the nearest border of the triangles (f, 3, 3)."""
+    """(f,) distance, m, of a point from the nearest border of each triangle (f, 3, 3). ``node`` is one point, or one
+    point for each triangle (f, 1, 3).
+    """
     along = np.roll(triangles, -1, axis=1) - triangles
     square = (along * along).sum(axis=2)
     share = (along * (node - triangles)).sum(axis=2) / np.where(square > 0.0, square, 1.0)
