@@ -1,4 +1,4 @@
-"""Cost of contact by node, for the load balance between ranks."""
+"""Cost of contact for each node, by which the load is balanced between ranks."""
 
 import numpy as np
 
@@ -6,14 +6,14 @@ from ..model.state import Flags, Floats
 from .scene.scene import Scene
 
 _SURFACE, _LISTED, _TESTED, _ACTIVE = 9.0, 0.1, 3.0, 4.0
-"""Costs per step in units of 50 ns: of a surface node (searches and registrations, averaged), a listed pair, a
-tested pair or crack, and an active contact: 450, 3, 150 and 200 ns, measured in the profile of the shattering bar to
-40 us on one rank."""
+"""Costs per step in units of 50 ns: of a surface node (average of searches and registrations), of a listed pair, of a
+tested pair or crack, and of an active contact. They are 450, 3, 150 and 200 ns, measured in the profile of the
+shattering bar to 40 us on one rank."""
 
 
 def effort(now: Scene | None, on_surface: Flags) -> Floats:
-    """(nodes, 2) cost of the scene ``now`` by local node, in units of 50 ns: of searches, and of the narrow phase and
-    solver; ``on_surface`` (nodes,): owned surface nodes.
+    """(nodes, 2) cost of the scene ``now`` for each local node, in units of 50 ns: cost of searches, and cost of narrow
+    phase and solver. ``on_surface`` (nodes,): surface nodes that this rank owns.
     """
     n = len(on_surface)
     search, push = _SURFACE * on_surface, np.zeros(n)

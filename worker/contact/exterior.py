@@ -1,4 +1,4 @@
-"""Surface, cracks and node normals of a rank, and their updates."""
+"""Surface, cracks and node normals of a rank, and the updates of these data."""
 
 import numpy as np
 
@@ -20,7 +20,7 @@ from .surface import exposure, normals, surface
 from .surface.families import CornerLists, Corners, Families
 
 _WORDS = 9 + 2 * normals.SHARE
-"""Number of columns of a row of ``Exterior.widened``, which describes a crack that opens."""
+"""Number of columns in a row of ``Exterior.widened``. A row describes a crack that opens."""
 
 
 class Exterior:
@@ -29,22 +29,22 @@ class Exterior:
     def __init__(
         self, model: Model, neighbours: list[Neighbour], bounds: list[Boundary], edges: bool, comm: Comm, team: Team
     ) -> None:
-        """``edges``: whether edge-edge contact is on. Collective."""
+        """``edges``: whether there is edge-edge contact. Collective."""
         self._normals, self._corner_lists = normals.MeanNormals(team), CornerLists(team)
         self._builder = surface.SurfaceBuilder(team)
         self._model, self._neighbours, self._comm, self._edges = model, neighbours, comm, edges
         self._bounds = bounds
         self.cracks = Cracks.none(model.nodes.id)
         self._near_erosion: Ints | None = None
-        """Ids, ascending, of the local tets that were near erosion at the last search; None before any tet has
-        eroded."""
+        """Ids, ascending, of the local tets that were near erosion at the last search; None if no tet has eroded
+        yet."""
         self.surface = self._build(np.zeros(model.nodes.n, bool), np.zeros(0, np.int64))
         self.size = typical(self.surface.faces.size, comm)
-        """Typical size of the faces of all ranks at the start, m."""
+        """Typical size of a face at the start, m. All ranks have the same value."""
         self.motion = SurfaceMotion(self.surface, model.nodes, mobilities(model.nodes, bounds), self.size, comm)
         self._moments = np.zeros((model.nodes.n, normals.COLUMNS), np.int64)
         self._broken = False
-        """True if facets of any rank have broken, so that cracks may open."""
+        """True if facets of any rank have broken. Then cracks may open."""
         columns = model.nodes.columns
         columns.declare(self, _moments=COPIED)
         columns.declare(self, "motion", **SurfaceMotion.COLUMNS)
@@ -52,8 +52,8 @@ class Exterior:
         columns.declare(self, "cracks.families", **Families.COLUMNS)
 
     def keep(self, parcel: Parcel) -> None:
-        """Adds cracks, edges that became sharp, surface nodes and moments of normals to the ``parcel`` (a checkpoint or
-        migration message).
+        """Adds cracks, edges that have become sharp, surface nodes and moments of normals to the ``parcel`` (a
+        checkpoint or migration message).
         """
         parcel.rows["contact.cracks"] = self.cracks.keep(parcel.nodes["id"])
         parcel.nodes["family"] = self.cracks.families.root
@@ -62,11 +62,11 @@ class Exterior:
         parcel.nodes["contact.loose"] = self.motion.loose
 
     def resume(self, parcel: Parcel, size: float, broken: bool) -> None:
-        """Restores the state that ``keep`` has added to a parcel. Collective."""
+        """Restores the state of this object from a parcel. Collective."""
         self.size, self._broken = size, broken
         turned = np.sort(parcel.rows["contact.turned"]["name"])
         self.surface.sharpen(turned)
-        self.surface.turned = turned  # includes edges at cracks, which the next search adds to the surface
+        self.surface.turned = turned  # includes edges at cracks; the next search adds these edges to the surface
         self.surface.flags = np.array(parcel.nodes["contact.flags"])
         self._moments = np.array(parcel.nodes["contact.moments"])
         nodes = self._model.nodes
@@ -76,8 +76,8 @@ class Exterior:
         self.cracks = Cracks.resume(parcel.rows["contact.cracks"], root, self._model.blocks, nodes)
 
     def require_faces(self, allowed: Flags) -> None:
-        """Raises InputError on all ranks when a part that may be in contact, by ``allowed`` (parts, parts), has no
-        exposed face.
+        """Raises InputError on all ranks if a part that may be in contact has no exposed face. ``allowed`` (parts,
+        parts): pairs of parts that may be in contact.
         """
         model = self._model
         first = np.searchsorted(model.nodes.id, self.surface.faces.nodes[:, 0])
@@ -90,13 +90,13 @@ class Exterior:
 
     @property
     def owned(self) -> Flags:
-        """(nodes,) surface nodes that this rank owns."""
+        """(nodes,) whether each node is a surface node that this rank owns."""
         return self.surface.flags & self._model.nodes.owned
 
     def _build(self, flags: Flags, turned: Ints) -> surface.Surface:
-        """Returns the surface, with the sides of cracks that may open and the faces behind tets near erosion. Nodes
-        that have been on the surface, ``flags`` (n,), stay surface nodes, and edges that became sharp, ``turned``, stay
-        sharp. Collective.
+        """Returns the surface. It includes the sides of cracks that may open, and the faces behind tets near erosion.
+        ``flags`` (n,): nodes that have been on the surface and stay surface nodes; ``turned``: edges that have become
+        sharp and stay sharp. Collective.
         """
         model, neighbours, comm = self._model, self._neighbours, self._comm
         sides, covered = self.cracks.foresee(), np.zeros((0, 3), np.int32)
@@ -108,7 +108,7 @@ class Exterior:
         return found
 
     def sharpen(self, scene: Scene, least: Floats) -> None:
-        """Marks the edges as sharp whose two faces have normals with a cosine below ``least`` (parts,). An edge that
+        """Marks edges as sharp if the normals of their two faces have a cosine below ``least`` (parts,). An edge that
         was sharp once remains sharp.
         """
         turned = scene.sharpen(least)[: self.surface.edges.n]
@@ -116,9 +116,10 @@ class Exterior:
             self.surface.sharpen(np.union1d(self.surface.turned, self.surface.edges.names[turned]))
 
     def uncover(self, gone: Ints, loose: Flags, removed: Flags, scene: Scene | None) -> bool:
-        """Updates mean normals, surface nodes and the ``scene`` after erosion of the tets ``gone`` (k, exposure.WORDS)
-        of this rank. ``loose`` (nodes,): nodes without tets that stay in the model; ``removed`` (nodes,): nodes that
-        are removed from the model. Returns whether a search must add faces that the scene lacks. Collective.
+        """Updates mean normals, surface nodes and the ``scene`` after erosion. ``gone`` (k, exposure.WORDS): removed
+        tets of this rank; ``loose`` (nodes,): nodes without tets that stay in the model; ``removed`` (nodes,): nodes
+        that are removed from the model. Returns whether a search must add faces that are missing in the scene.
+        Collective.
         """
         if self._near_erosion is None:
             self._near_erosion = np.zeros(0, np.int64)
@@ -143,22 +144,22 @@ class Exterior:
         return False
 
     def _loosen(self, loose: Flags) -> None:
-        """Updates the mobility of nodes that have lost their last tet: the components of such nodes are held only by
-        boundaries that act on the nodes themselves.
+        """Updates the mobility of nodes that have lost their last tet. Such a node is held only by boundaries that act
+        on the node itself.
         """
         if (loose & ~self.motion.loose).any():
             self.motion.loose, self.motion.mobility = loose, mobilities(self._model.nodes, self._bounds)
 
     def take_up(self) -> None:
-        """Builds the surface, with all faces that may become surface before the next search. Collective."""
+        """Builds the surface. It includes all faces that may become surface before the next search. Collective."""
         if self._near_erosion is not None:
             self._near_erosion = exposure.near_erosion(self._model.blocks)
         if self._broken or self._near_erosion is not None:
             self.surface = self._build(self.surface.flags, self.surface.turned)
 
     def age(self) -> bool:
-        """Admits the edges of all present cracks to edge-edge contact, if that is on; returns whether a search must
-        add them. Collective.
+        """Admits the edges of all present cracks to edge-edge contact, if the run has edge-edge contact. Returns
+        whether a search must add these edges. Collective.
         """
         return self._edges and self.cracks.age(self._comm.sum(self.cracks.ages))
 
@@ -171,8 +172,8 @@ class Exterior:
         self._moments = self._normals.moments(self._model, self._planes, self.size, self._neighbours, self._comm)
 
     def show(self, scene: Scene, local: "np.ndarray") -> "np.ndarray":
-        """Writes the mean normals of the nodes ``local`` of this rank, and whether they are on the surface, to the
-        scene; returns their slots.
+        """Writes to the scene the mean normals of the nodes ``local`` of this rank, and whether these nodes are on the
+        surface. Returns the slots of the nodes.
         """
         place = scene.own.place[local]
         local, place = local[place >= 0], place[place >= 0]
@@ -181,7 +182,7 @@ class Exterior:
         return np.asarray(place)
 
     def refresh(self, course: Floats, t: float) -> None:
-        """Sets the positions at time ``t`` and the extrapolated velocities ``course`` (nodes, 3) of the current
+        """Sets the positions at time ``t`` and the extrapolated velocities ``course`` (nodes, 3) of the present
         surface. Collective.
         """
         nodes = self._model.nodes
@@ -192,9 +193,9 @@ class Exterior:
             self.motion.refresh(nodes)
 
     def widened(self, rows: Ints) -> Ints:
-        """(k, _WORDS) messages of the cracks ``rows`` (k,): whether the last search included them; ids of both
-        sides; ids of the nodes of either side, counter-clockwise seen from outside; and their contributions to the
-        moments of the nodes.
+        """(k, _WORDS) messages about the cracks ``rows`` (k,). A message has: whether the last search included the
+        crack; ids of its two sides; ids of the nodes of each side, counter-clockwise seen from outside; contributions
+        of the sides to the moments of the nodes.
         """
         if not len(rows):
             return np.zeros((0, _WORDS), np.int64)
@@ -204,8 +205,8 @@ class Exterior:
         return np.column_stack([cracks.foreseen[rows], cracks.faces[rows], nodes.id[sides], shares])
 
     def open(self, received: Ints, scene: Scene | None) -> bool:
-        """Adds the sides of the wide cracks of all ranks, the rows of ``widened``, to the surface; returns True if the
-        scene lacks any of these sides.
+        """Adds the sides of the wide cracks of all ranks to the surface; ``received``: rows of ``widened``. Returns
+        True if some of these sides are missing in the scene.
         """
         received = received.reshape(-1, _WORDS)
         nodes, sides = self._model.nodes, received[:, 3:9].reshape(-1, 3)
@@ -222,26 +223,28 @@ class Exterior:
         return bool((received[:, 0] == 0).any())
 
     def narrow(self) -> list[tuple[Block, Corners]]:
-        """Blocks with broken facets, and the corners of their narrow sides; see corner_contact.py."""
+        """Blocks with broken facets, and the corners of the narrow sides of these facets; see corner_contact.py."""
         some = enumerate(self._model.blocks) if len(self.cracks.faces) else ()
         return [(block, self.cracks.corners(b, self._corner_lists)) for b, block in some if len(block.bond)]
 
     def separate(self, split: Split) -> Ints:
-        """Updates the cracks after nodes have separated on any rank; returns the rows of cracks at separated nodes."""
+        """Updates the cracks after nodes have separated on any rank. Returns the rows of the cracks that have a
+        separated node.
+        """
         self._broken |= bool(split.touched.any())
         if not split.copies.n:
             return np.zeros(0, np.int64)
         return self.cracks.follow(split, self._model.nodes.id, self._corner_lists.touching)
 
     def grow(self, split: Split) -> None:
-        """Updates the mobilities of separated nodes and their copies to their new masses."""
+        """Sets the mobilities of separated nodes and of their copies, which have new masses."""
         _lighten(self.motion.mobility, self._model.nodes.mass, split.copies.parents, split.first)
 
 
 @njit("void(float64[:, ::1], float64[::1], int64[::1], int64)", cache=True)
 def _lighten(mobility, mass, parents, first):  # type: ignore[no-untyped-def]
-    """Sets the mobilities of ``parents`` (k,) and of their copies, numbered from ``first`` on, to the inverse of their
-    masses; held components stay 0.
+    """Sets the mobilities of ``parents`` (k,) and of their copies to the inverse of their masses. The copies have
+    numbers from ``first`` on. Components that are held stay 0.
     """
     for c in range(len(parents)):
         for i in range(3):
@@ -251,7 +254,7 @@ def _lighten(mobility, mass, parents, first):  # type: ignore[no-untyped-def]
 
 
 def mobilities(nodes: Nodes, bounds: list[Boundary]) -> Floats:
-    """(nodes, 3) inverse of the mass, 1/kg; zero in held directions."""
+    """(nodes, 3) inverse of the mass of each node, 1/kg; zero in directions in which the node is held."""
     mobility = np.repeat(1.0 / nodes.mass[:, None], 3, axis=1)
     for bound in bounds:
         mobility[bound.nodes] = np.where(bound.held_components() == FREE, mobility[bound.nodes], 0.0)
@@ -259,7 +262,7 @@ def mobilities(nodes: Nodes, bounds: list[Boundary]) -> Floats:
 
 
 def symmetry_planes(n: int, bounds: list[Boundary]) -> Flags:
-    """(nodes, planes) membership of ``n`` nodes in symmetry planes; two planes normal to the same axis are two
+    """(nodes, planes) whether each of ``n`` nodes is on each symmetry plane. Two planes normal to the same axis are two
     columns."""
     mirrors = [bound for bound in bounds if bound.mirrors]
     planes = np.zeros((n, len(mirrors)), bool)

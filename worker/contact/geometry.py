@@ -7,8 +7,8 @@ import numpy as np
 from ..kernels.jit import njit
 
 MARGIN = 1e-3
-"""Tolerance of the area coordinates: largest distance outside of a face at which the foot of a node still counts as
-on the face."""
+"""Tolerance of the area coordinates. If the foot of a node is outside of a face by less than this value, it counts as
+being on the face."""
 VECTOR = "UniTuple(float64, 3)"
 """Type of a vector in numba's notation."""
 
@@ -64,7 +64,9 @@ def distance(a, b):  # type: ignore[no-untyped-def]
 
 @njit(f"Tuple((float64, {VECTOR}))({VECTOR}, {VECTOR}, {VECTOR}, {VECTOR})", cache=True, error_model="numpy")
 def height(s, i, j, k):  # type: ignore[no-untyped-def]
-    """Height of the point s above the face i, j, k, m, and the unit normal of the face; NaN for a face of zero area."""
+    """Height of the point s above the face i, j, k, m, and the unit normal of the face. The height is NaN if the face
+    has zero area.
+    """
     n = cross(minus(j, i), minus(k, i))
     r = 1.0 / np.sqrt(dot(n, n))
     return dot(n, minus(s, i)) * r, (n[0] * r, n[1] * r, n[2] * r)
@@ -72,8 +74,8 @@ def height(s, i, j, k):  # type: ignore[no-untyped-def]
 
 @njit(f"Tuple((boolean, {VECTOR}))({VECTOR}, {VECTOR}, {VECTOR})", cache=True, error_model="numpy")
 def foot(r, e, f):  # type: ignore[no-untyped-def]
-    """Returns True if the foot of a point lies on the face of edges e and f, and the area coordinates of the foot;
-    ``r``: the point minus the common corner of e and f.
+    """Returns whether the foot of a point is on the face with the edges e and f, and the area coordinates of the foot.
+    ``r``: vector from the common corner of e and f to the point.
     """
     ee, ff, ef, er, fr = dot(e, e), dot(f, f), dot(e, f), dot(e, r), dot(f, r)
     area = ee * ff - ef * ef
@@ -97,8 +99,8 @@ def off(s, a, b):  # type: ignore[no-untyped-def]
 
 @njit(f"float64({VECTOR}, {VECTOR}, {VECTOR}, {VECTOR})", cache=True, error_model="numpy")
 def segments(a, b, c, d):  # type: ignore[no-untyped-def]
-    """Distance of the segments ab and cd, m: between the nearest points of their lines if both lie within, else the
-    least from an end."""
+    """Distance of the segments ab and cd, m. If the nearest points of their lines are within the segments, it is the
+    distance of these points, else the least distance from an end."""
     u, w, r = minus(b, a), minus(d, c), minus(c, a)
     uu, uw, ww, ur, wr = dot(u, u), dot(u, w), dot(w, w), dot(u, r), dot(w, r)
     area = uu * ww - uw * uw
@@ -111,7 +113,9 @@ def segments(a, b, c, d):  # type: ignore[no-untyped-def]
 
 @njit(f"{VECTOR}({VECTOR}, {VECTOR}, {VECTOR}, {VECTOR})", cache=True, error_model="numpy")
 def nearest(a, b, c, d):  # type: ignore[no-untyped-def]
-    """Vector from the point of the segment ab nearest to cd to the nearest point of cd; Ericson (2005), 5.1.9."""
+    """Vector between the nearest points of two segments: from the point of ab to the point of cd. Ericson (2005),
+    5.1.9.
+    """
     u, w, r = minus(b, a), minus(d, c), minus(c, a)
     uu, uw, ww, ur, wr = dot(u, u), dot(u, w), dot(w, w), dot(u, r), dot(w, r)
     area = uu * ww - uw * uw

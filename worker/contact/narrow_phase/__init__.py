@@ -1,1 +1,3 @@
-"""Active contacts of the candidate pairs in every step: nodes on faces, edges on edges, nodes across cracks."""
+"""Narrow phase: selects the active contacts from the candidate pairs in every step. The contacts are of nodes on faces,
+edges on edges, and nodes across cracks.
+"""

@@ -1,10 +1,10 @@
 """Clearance of a scene: a bound of the motion up to which no candidate pair has to be tested.
 
-Every candidate pair has a bound (broad_phase/pairs.py): it is not tested while the distances of its members from their
-short lines, and the relative motion of these lines, are below the bound. After a step without active contacts the
-clearance is the smallest bound of all pairs, less the relative motion up to a time ``until``. Up to that time no pair
-is tested while twice the largest distance of a slot from its short line is below the clearance. The narrow phase is
-then a comparison of two numbers. No bit of the answer depends on it.
+Every candidate pair has a bound (broad_phase/pairs.py). The pair is not tested while the sum of the distances of its
+members from their short lines and of the relative motion of these lines is below the bound. After a step without active
+contacts the clearance is the smallest bound of all pairs, less the relative motion up to a time ``until``. Up to this
+time no pair is tested while twice the largest distance of a slot from its short line is below the clearance. The narrow
+phase is then only a comparison of two numbers. The answer does not depend on the clearance.
 """
 
 import math
@@ -19,26 +19,26 @@ from ..scene.scene import Scene
 from ..surface import normals
 
 _STEPS = float(normals.EVERY)
-"""Length of the time for which a clearance is computed, in steps: new short lines begin after normals.EVERY steps."""
+"""Time for which a clearance is computed, in steps. New short lines begin after normals.EVERY steps."""
 _ROUNDING = 1e-9
-"""Share of the size of a face that is subtracted for rounding."""
+"""Fraction of the size of a face that is subtracted for round-off."""
 _NONE: Ints = np.zeros(0, np.int64)
 
 
 class Clearance:
-    """Clearance of the scene of a rank. The clearance is valid until pairs, faces or short lines change."""
+    """Clearance of the scene of a rank. A clearance is valid until pairs, faces or short lines change."""
 
     def __init__(self) -> None:
         self._scene: Scene | None = None
         self._until, self._width = -math.inf, 0.0
 
     def clear(self) -> None:
-        """Ends the validity of the clearance."""
+        """Marks the clearance as not valid."""
         self._scene = None
 
     def measure(self, now: Scene, dt: float, size: float) -> None:
-        """Computes the clearance after a step in which the pairs of the scene ``now`` were tested; ``dt``: largest
-        length of the next step, s; ``size`` of a face, m.
+        """Computes the clearance after a step in which the pairs of the scene ``now`` were tested. ``dt``: largest
+        length of the next step, s; ``size``: size of a face, m.
         """
         self._scene, self._until = now, now.reference.end + _STEPS * dt
         width = min(_least(table.until, table.speed, self._until) for table in (now.node_face, now.edge_edge))
@@ -48,12 +48,14 @@ class Clearance:
                 _none_tested(table)
 
     def holds(self, now: Scene) -> bool:
-        """Whether the clearance is that of the scene ``now`` and includes the present step."""
+        """Whether the clearance is valid for the scene ``now`` and for the present step."""
         reference = now.reference
         return now is self._scene and self._width > 0.0 and reference.end + reference.beyond <= self._until
 
     def exceeds(self, reference: ReferenceMotion) -> bool:
-        """Whether no slot is so far from its short line in the step that a pair must be tested."""
+        """Whether the clearance is large enough: no slot is so far from its short line in the step that a pair must be
+        tested.
+        """
         return bool(2.0 * reference.short.left.max(initial=0.0) < self._width)
 
 
@@ -63,8 +65,8 @@ def _none_tested(table: PairTable) -> None:
 
 @njit("float64(float64[::1], float64[::1], float64)", cache=True)
 def _least(until, speed, end):  # type: ignore[no-untyped-def]
-    """Smallest difference of the bounds ``until`` (p,) of pairs and the relative motion of their lines up to the time
-    ``end``, m; -1 if a pair must be tested before.
+    """Smallest value of bound minus relative motion over all pairs, m; -1 if a pair must be tested before the time
+    ``end``. ``until`` (p,): bounds of the pairs; the relative motion is that of the lines of a pair up to ``end``.
     """
     least = np.inf
     for p in range(len(until)):

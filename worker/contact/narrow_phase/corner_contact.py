@@ -1,14 +1,14 @@
 """Contact of separated nodes with the faces at their former corner.
 
-When a node separates into three or more pieces, a copy has a twin across a facet only if their two pieces have that
-facet in common. With the other pieces the copy has only an edge or the node in common. At the moment of separation the
-copy lies on all sides of these pieces (faces of broken facets that are not surface yet), with a gap of zero. The
-position of the copy at the end of the step decides which side the copy would enter: the nearest side above the copy
-that contains the foot of the copy (docs/theory/fracture.md, "Contact").
+When the star of a node separates into three or more pieces, two copies of the node are twins across a facet only if
+their pieces have this facet in common. With all other pieces a copy has only an edge or the node in common. At the
+moment of separation the copy lies on all sides of these pieces (faces of broken facets that are not surface yet), with
+a gap of zero. The position of the copy at the end of the step determines which side the copy would enter: the nearest
+side that is above the copy and contains its foot (docs/theory/fracture.md, "Contact").
 
-The corners of such narrow sides are processed by family (all copies of one original node). The positions of each member
-relative to all corners of its family are computed in loops over rows of a few kilobytes, which the compiler vectorizes;
-the few corners that pass are then tested one by one.
+These sides are called narrow sides. Their corners are processed family by family; a family is all copies of one
+original node. The positions of each member relative to all corners of its family are computed in loops over rows of a
+few kilobytes, which the compiler vectorizes. The few corners that pass this test are then tested one by one.
 """
 
 from typing import NamedTuple
@@ -41,7 +41,7 @@ from .corner_rows import (
 from .tables import CONTACT_ROWS, DEEP_SELF, STEP, needed
 
 _SOON, _NEXT = 16, 8
-"""Prefetch distances, in corners: for the numbers of the nodes of a side, and for the positions of these nodes."""
+"""Prefetch distances, in corners: for the node numbers of a side, and for the positions of these nodes."""
 _LATER = np.array([0, 1, 2, 0, 1])
 """Corners of a side in cyclic order."""
 _I, _F, _F1, _F2 = types.int64, types.float64, types.float64[::1], types.float64[:, ::1]
@@ -49,18 +49,18 @@ _N1, _N2, _N3 = types.int32[::1], types.int32[:, ::1], types.int32[:, :, ::1]
 
 
 class NarrowSides(NamedTuple):
-    """Cracks, and the block of tets whose faces are the sides of the cracks."""
+    """Cracks, and the block of tets whose faces are sides of the cracks."""
 
     cracks: Indices
     """(m, 6) local nodes of all cracks."""
     sides: Indices
-    """(m, 2, 3) block, tet and face of either side: see Cracks."""
+    """(m, 2, 3) block, tet and face of each side; see Cracks."""
     tets: Tets
-    """(n, 4) nodes of the block's tets; ``across`` (n, 4) and ``bond`` (n, 4) likewise."""
+    """(n, 4) nodes of the tets of the block. ``across`` (n, 4) and ``bond`` (n, 4) are those of the block."""
     across: Indices
     bond: Bits
     ring: Indices
-    """(nodes,) next node of the family: see Families."""
+    """(nodes,) next node of the family of each node; see Families."""
     place: Indices
     """(nodes,) slot of each local node."""
 
@@ -70,7 +70,9 @@ NARROW = record(NarrowSides, _N2, _N3, types.uint32[:, ::1], _N2, types.uint8[:,
 
 @njit("int64(uint32[:, ::1], int32[:, ::1], uint8[:, ::1], int64, int64, int64)", cache=True, forceinline=True)
 def _opened(tets, across, bond, e, f, g):  # type: ignore[no-untyped-def]
-    """Bits of the sides of tet ``e`` that are broken or exposed: 1 for the one opposite to node ``f``, 2 for ``g``."""
+    """Bits that show which sides of tet ``e`` are broken or exposed: 1 for the side opposite to node ``f``, 2 for the
+    side opposite to node ``g``.
+    """
     first, second = 0, 0
     for k in range(4):
         first += k * (tets[e, k] == f)
@@ -81,7 +83,7 @@ def _opened(tets, across, bond, e, f, g):  # type: ignore[no-untyped-def]
 
 @njit(types.void(_N1, _I, _N2, _N1, types.float64[:, :]), cache=True, forceinline=True)
 def _bring(corners, i, cracks, place, ahead):  # type: ignore[no-untyped-def]
-    """Prefetches the data of the corners after position ``i``: the nodes of a crack, and their positions."""
+    """Prefetches data of the corners after position ``i``: the nodes of a crack, and the positions of these nodes."""
     last = len(corners) - 1
     prefetch(cracks, 6 * (corners[min(i + _SOON, last)] >> 3))
     m = corners[min(i + _NEXT, last)]
@@ -92,8 +94,8 @@ def _bring(corners, i, cracks, place, ahead):  # type: ignore[no-untyped-def]
 
 @njit(f"UniTuple(float64, 2)({VECTOR}, {VECTOR}, {VECTOR})", cache=True, forceinline=True)
 def _foot(r, e, f):  # type: ignore[no-untyped-def]
-    """Area coordinates of the foot of a point at the ends of e and f, times the square of twice the area; ``r``: the
-    point relative to the common origin of e and f.
+    """Area coordinates of the foot of a point at the ends of e and f, times the square of twice the area. ``r``: vector
+    from the common origin of e and f to the point.
     """
     ee, ff, ef, er, fr = dot(e, e), dot(f, f), dot(e, f), dot(e, r), dot(f, r)
     return ff * er - ef * fr, ee * fr - ef * er
@@ -101,8 +103,8 @@ def _foot(r, e, f):  # type: ignore[no-untyped-def]
 
 @njit(f"boolean({VECTOR}, {VECTOR}, {VECTOR}, {VECTOR}, float64)", cache=True, forceinline=True)
 def _nearer(r, inward, e, f, depth):  # type: ignore[no-untyped-def]
-    """Returns True if the point ``r``, below the side of edges e and f, has its foot between the two edges and is less
-    than ``depth`` below the side.
+    """Returns True if the point ``r`` is less than ``depth`` below the side of the edges e and f, and its foot is
+    between the two edges.
     """
     if not dot(inward, r) < depth * np.sqrt(dot(inward, inward)):
         return False
@@ -112,8 +114,9 @@ def _nearer(r, inward, e, f, depth):  # type: ignore[no-untyped-def]
 
 @njit(f"boolean({VECTOR}, {VECTOR}, {VECTOR}, {VECTOR}, {VECTOR}, int64)", cache=True, forceinline=True)
 def _beside(r, inward, e, f, g, opened):  # type: ignore[no-untyped-def]
-    """Returns True if the point ``r``, below the side of edges f and g of a corner of edges e, f, g, with the normal
-    ``inward``, is above another ``opened`` side (_opened), or nearer to another opened side.
+    """Returns True if the point ``r`` belongs to another ``opened`` side (_opened) of the corner: it is above that
+    side, or nearer to it. ``r`` is below the side of the edges f and g, whose normal is ``inward``; e, f, g are the
+    edges of the corner.
     """
     depth, k = dot(inward, r) / np.sqrt(dot(inward, inward)), 1
     while k < 3:
@@ -132,10 +135,10 @@ def _beside(r, inward, e, f, g, opened):  # type: ignore[no-untyped-def]
     error_model="numpy",
 )
 def _pushed_out(out, step, first, stop):  # type: ignore[no-untyped-def]
-    """Completes the contacts of entering nodes in place: rows of ``out`` from ``first`` to ``stop`` that have the slots
-    of the node, of the corner and of the other two nodes of the side, clockwise seen from outside, and the weights of
-    these three at the foot. Contacts deeper than DEEP_SELF at the beginning of the step are removed. Returns the number
-    of remaining contacts.
+    """Completes the contacts of entering nodes in place. The contacts are rows of ``out`` from ``first`` to ``stop``. A
+    row has the slots of the node, of the corner and of the other two nodes of the side, clockwise seen from outside,
+    and the weights of the last three at the foot. Contacts that are deeper than DEEP_SELF at the beginning of the step
+    are removed. Returns the number of remaining contacts.
     """
     x, v, ahead, n = step.x, step.v, step.ahead, first
     for r in range(first, stop):
@@ -147,7 +150,7 @@ def _pushed_out(out, step, first, stop):  # type: ignore[no-untyped-def]
             continue
         every = out.weights[r, 0] + out.weights[r, 1] + out.weights[r, 2]
         w, w_f, w_g = -out.weights[r, 0] / every, -out.weights[r, 1] / every, -out.weights[r, 2] / every
-        if w_f == 0.0:  # two equal slots in the middle mark a contact of two nodes
+        if w_f == 0.0:  # two equal slots in the middle: a contact of two nodes
             f, w_f, g, w_g = g, w_g, f, w_f
         if w_f == 0.0:
             f, w = a, -1.0
@@ -167,8 +170,8 @@ def _pushed_out(out, step, first, stop):  # type: ignore[no-untyped-def]
 
 @njit(types.void(_F1, _N2, _N1, _I, _I, _N2, _N1, _N1, types.float64[:, :]), cache=True, forceinline=True)
 def _gather(w, rest, corners, head, many, cracks, among, place, ahead):  # type: ignore[no-untyped-def]
-    """Writes the positions of ``many`` corners from ``head`` on, and of the other nodes of their sides, to the rows
-    ``w``, and the three local nodes of each to ``rest``.
+    """Writes data of ``many`` corners from ``head`` on: their positions and those of the other nodes of their sides to
+    the rows ``w``, and the three local nodes of each corner to ``rest``.
     """
     for i in range(many):
         _bring(corners, head + i, cracks, place, ahead)
@@ -208,9 +211,10 @@ def entering(out, base, each, narrow, of, step, first, stop):  # type: ignore[no
     """Writes contacts of separated nodes with the narrow sides at their former corner, of the families ``of`` a block
     from ``first`` to ``stop``.
 
-    The contacts are written to rows of ``out``, from ``base`` plus ``each`` times the number of corners before the
-    first family on, with ``each`` rows per corner on average. Returns the number of contacts; if this number is larger
-    than the number of rows, some contacts have no row. Numbers at the ends of lines: conditions listed above.
+    The contacts are written to rows of ``out``. The first row is ``base`` plus ``each`` times the number of corners
+    before the first family; there are ``each`` rows for each corner on average. Returns the number of contacts. If this
+    number is larger than the number of rows, some contacts have no row. The comments have the numbers of the conditions
+    in the drawing.
     """
     ahead, part, mu, nodes, weights = step.ahead, step.part, step.mu, out.nodes, out.weights
     members, begin, among, corners, start = of
@@ -221,7 +225,7 @@ def entering(out, base, each, narrow, of, step, first, stop):  # type: ignore[no
     words, rest = flags.view(np.uint64), np.empty((MANY, 3), np.int32)
     for family in range(first, stop):
         kind = part[place[members[begin[family]]]]
-        if not mu[kind, kind] >= 0.0:  # condition 1, listed above
+        if not mu[kind, kind] >= 0.0:  # condition 1: contact of the part with itself
             continue
         for head in range(start[family], start[family + 1], MANY):
             many = min(start[family + 1] - head, MANY)
@@ -233,7 +237,7 @@ def entering(out, base, each, narrow, of, step, first, stop):  # type: ignore[no
             for member in range(begin[family], begin[family + 1]):
                 d = place[members[member]]
                 x, y, z = at(ahead, d)
-                under(flags, w, full * WORD, member, x, y, z)  # condition 2, listed above
+                under(flags, w, full * WORD, member, x, y, z)  # condition 2: below the side, foot on it, no twin
                 for word in range(full):
                     if words[word] == 0:
                         continue
@@ -263,4 +267,4 @@ def entering(out, base, each, narrow, of, step, first, stop):  # type: ignore[no
                         n += 1
     if n > end:
         return n - begins
-    return _pushed_out(out, step, begins, n)  # condition 4, listed above
+    return _pushed_out(out, step, begins, n)  # condition 4: depth at the start of the step

@@ -1,21 +1,21 @@
-"""Rows of the corners of narrow sides, for loops that the compiler vectorizes (corner_contact.py)."""
+"""Rows with data of the corners of narrow sides, for loops that the compiler vectorizes (corner_contact.py)."""
 
 from ...kernels.jit import njit, types
 from ..geometry import VECTOR, cross, dot
 from ..surface.sharp import SHARP
 
 _BENT = 1.0 - SHARP * SHARP
-"""Square of the sine of the largest angle between two neighbouring faces of a smooth surface, equal to the limit for
-sharp edges."""
+"""Square of the sine of the largest angle between two neighbouring faces of a smooth surface. The angle is equal to the
+limit for sharp edges."""
 MANY = 64
 """Number of corners in one block of rows. A block has 10 kB, which fit into the first-level cache."""
 WORD = 8
-"""Number of flags in a word, and number of float64 in the longest vector register."""
+"""Number of flags in a word. It is the number of float64 in the longest vector register."""
 CORNER, TO_F, TO_G, INWARD = (MANY * row for row in (0, 3, 6, 9))
-"""First rows of vectors of three components: the position of the corner; the vectors from the corner to the other
-two nodes of the side, clockwise seen from outside; the inward normal of the side."""
+"""First rows of three vectors with three components, and of the position of the corner: the vectors from the corner to
+the other two nodes of the side, clockwise seen from outside; the inward normal of the side."""
 SQUARE, FF, GG, FG, TWIN = (MANY * row for row in (12, 13, 14, 15, 16))
-"""Rows of the square of the normal, of the dot products of the two edges, and of the number of the corner's twin
+"""Rows of numbers: the square of the normal, the dot products of the two edges, and the index of the corner's twin
 among the members of the family."""
 ROWS = 17
 """Number of rows of a block."""
@@ -36,8 +36,8 @@ def set_vector(w, row, i, a):  # type: ignore[no-untyped-def]
 
 @njit(types.void(_F1, _I), cache=True, error_model="numpy")
 def measure(w, n):  # type: ignore[no-untyped-def]
-    """Computes the edges, normals and dot products of the first ``n`` corners, whose edges are still positions of
-    their ends."""
+    """Computes the edges, normals and dot products of the first ``n`` corners. Before the call, the rows of the edges
+    have the positions of their ends."""
     for row in (TO_F, TO_G):
         to, o = w[row:], w[CORNER:]
         for i in range(n):
@@ -54,11 +54,11 @@ def measure(w, n):  # type: ignore[no-untyped-def]
 
 @njit(types.void(types.uint8[::1], _F1, _I, _I, _F, _F, _F), cache=True, error_model="numpy")
 def under(flags, w, n, member, x, y, z):  # type: ignore[no-untyped-def]
-    """Sets the flags of the corners among the first ``n`` whose side is above the ``member`` at x, y, z, if the foot of
-    the member is on the side.
+    """Sets the flags of those among the first ``n`` corners whose side is above the ``member`` at x, y, z and contains
+    its foot.
 
-    A foot beyond an edge still counts if a neighbouring face, at less than the angle of a sharp edge, could contain the
-    foot. A foot on the far side of the corner does not count.
+    A foot beyond an edge still counts if a neighbouring face could contain it, at an angle below that of a sharp edge.
+    A foot on the far side of the corner does not count.
     """
     for i in range(n):
         r = x - w[CORNER + i], y - w[CORNER + MANY + i], z - w[CORNER + 2 * MANY + i]

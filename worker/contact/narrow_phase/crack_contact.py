@@ -8,20 +8,20 @@ from ..geometry import at, cross, dot, half, minus, plus
 from .tables import CONTACT_ROWS, CRACK, DEEP_SELF, NEAR, STEP, needed
 
 _WIDE = 0.2
-"""Width of a crack over the typical size of a face from which on the sides of the crack are surface. With 0.1, 33 of
-the 38 searches in the first 500 steps of the glass bar are caused by cracks that open without having been included
-in a search; with 0.2, 2 of 32 searches."""
+"""Smallest ratio of the width of a crack to the typical size of a face at which the sides of the crack are surface.
+With 0.1, 33 of the 38 searches in the first 500 steps of the glass bar are caused by cracks that open without having
+been included in a search; with 0.2, 2 of 32 searches."""
 _FORESEEN = 0.5
-"""Share of the width _WIDE from which on the faces of a crack are in the broad phase, so that their candidate pairs
+"""Fraction of the width _WIDE from which on the faces of a crack are in the broad phase, so that their candidate pairs
 exist when the crack opens."""
 _AHEAD = 8
-"""Prefetch distance of the nodes, in cracks."""
+"""Distance, in cracks, by which the data of nodes are prefetched."""
 
 
 @njit("int64[::1](int32[:, ::1], float64[:, ::1], float64)", cache=True)
 def widening(cracks, x, typical):  # type: ignore[no-untyped-def]
-    """Returns the rows of the ``cracks`` (m, 6), given by slots, that are so wide at the positions ``x`` (slots, 3)
-    that their faces must enter the broad phase; ``typical``: size of a face, m.
+    """Returns the rows of those ``cracks`` (m, 6) that are so wide at the positions ``x`` (slots, 3) that their faces
+    must be in the broad phase. The cracks are given by slots; ``typical``: size of a face, m.
     """
     rows, n = np.empty(len(cracks), np.int64), 0
     for c in range(len(cracks)):
@@ -63,10 +63,10 @@ def widening(cracks, x, typical):  # type: ignore[no-untyped-def]
 )
 def across(out, base, opening, cracks, typical, step, first, stop):  # type: ignore[no-untyped-def]
     """Writes contacts of nodes across the ``cracks`` (m, 6; -1 for cracks of other ranks) from ``first`` to ``stop``:
-    rows of ``out`` from ``base + 3 first`` on.
+    contacts are rows of ``out`` from ``base + 3 first`` on.
 
-    ``typical``: size of a face, m. Returns their number, and the number of cracks that have become wide enough to open;
-    ``opening`` (m,): the numbers of these, from ``first`` on.
+    ``typical``: size of a face, m. Returns the number of contacts, and the number of cracks that have become wide
+    enough to open. Writes the numbers of these cracks to ``opening`` (m,), from ``first`` on.
     """
     x, v, part, mu, dt = step.x, step.v, step.part, step.mu, step.dt
     n, wide = base + 3 * first, first
@@ -86,7 +86,7 @@ def across(out, base, opening, cracks, typical, step, first, stop):  # type: ign
         most = 0.0
         for k in range(3):
             p, q = cracks[c, k], cracks[c, 3 + k]
-            if p == q:  # condition 1, listed above
+            if p == q:  # condition 1: the nodes have separated
                 continue
             width = minus(at(x, q), at(x, p))
             most = max(most, dot(width, width))

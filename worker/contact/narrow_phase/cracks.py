@@ -1,11 +1,11 @@
 """Contact across cracks.
 
-The two sides of a broken facet coincide, so no search is needed to find the contacts of the two sides. From the moment
-of separation, the two copies of a node on opposite sides are in contact along the normal of the facet, with an initial
-gap of exactly zero. Another body could reach the faces of a crack only by entering the crack. The faces are therefore
-not on the surface until the width of the crack is a fixed share of the size of a facet. In the step in which the width
-reaches this share, the crack opens: faces, nodes and edges are on the surface from the next step on. The last search
-has included these faces, so that opening needs no search. Cracks that do not widen never cause a search.
+The two sides of a broken facet coincide, so no search is needed to find contacts between the two sides. From the moment
+of separation on, the two copies of a node on opposite sides are in contact along the normal of the facet, with an
+initial gap of exactly zero. Another body could reach the faces of a crack only by entering the crack. Therefore the
+faces are not surface until the width of the crack is a fixed fraction of the size of a facet. In the step in which the
+width reaches this fraction, the crack opens: its faces, nodes and edges are surface from the next step on. The last
+search has included these faces, so that opening needs no search. Cracks that do not widen never cause a search.
 """
 
 from dataclasses import dataclass, field
@@ -21,66 +21,67 @@ from ..surface.families import CornerLists, Corners, Families, TouchingRows
 from ..surface.records import CrackSides
 
 AGE, _YOUNG = 16, 0.3
-"""Number of steps between two checks whether cracks become aged, and the share of young cracks above which all
-cracks become aged (docs/theory/contact.md, "Edges at cracks")."""
+"""Number of steps between two checks of the ages of cracks; and fraction of young cracks above which all cracks become
+aged (docs/theory/contact.md, "Edges at cracks")."""
 _KEPT = 12
-"""Columns of the stored impulses of a crack."""
+"""Number of columns of the stored impulses of a crack."""
 _COLUMNS = "faces", "nodes", "sides", "foreseen", "aged", "places", "kept"
-"""Arrays with a row for each crack."""
+"""Names of the arrays with one row for each crack."""
 _IN_LIST, _WALKED = 1, 2
-"""Marks of a node: it is in the list, and so is its family."""
+"""Marks of a node: the node is in the list; its family is in the list."""
 
 
 @dataclass
 class Cracks:
-    """Cracks: broken facets with a side on this rank whose sides are not surface yet."""
+    """Cracks: broken facets that have a side on this rank and whose sides are not surface yet."""
 
     faces: Ints
     """(m, 2) global ids of the two sides; the side of the tet of smaller id is first."""
     nodes: Indices
-    """(m, 6) local nodes of the first side, counter-clockwise seen from outside of its tet, and the nodes across."""
+    """(m, 6) local nodes of each crack: three nodes of the first side, counter-clockwise seen from outside of its tet,
+    and the nodes across."""
     sides: Indices
-    """(m, 2, 3) block, tet and face of either side, -1 for a side of another rank."""
+    """(m, 2, 3) block, tet and face of each side; -1 for a side of another rank."""
     foreseen: Flags
     """(m,) whether the scene of the last search includes the sides."""
     aged: Flags
-    """(m,) aged cracks: edges between their sides and the surface are in edge-edge contact."""
+    """(m,) whether each crack is aged. Edges between the sides of an aged crack and the surface are in edge-edge
+    contact."""
     places: Indices
-    """(m, 6) slots of the nodes; all -1 for a crack without separated nodes, and for a crack that another rank
-    computes. The rank of the first side computes the crack."""
+    """(m, 6) slots of the nodes. All slots are -1 for a crack without separated nodes, and for a crack that another
+    rank computes. The rank of the first side computes a crack."""
     kept: Floats
-    """(m, 12) stored impulse of each of the three pairs of nodes across, times the row norm of the pair, m/s: along
-    the normal (1) and across (3). Zero for a pair that was not active; undefined for a crack that another rank
-    computes."""
+    """(m, 12) stored impulse times row norm, m/s, of each of the three pairs of nodes across: along the normal (1) and
+    across it (3). Zero for a pair that was not active; undefined for a crack that another rank computes."""
     families: Families
-    """Families (all copies of one original node) of all local nodes."""
+    """Families of all local nodes. A family is all copies of one original node."""
     _corners: dict[int, Corners] = field(default_factory=dict)
-    """Corners of the narrow sides by block, kept until cracks or families change."""
+    """Corners of the narrow sides, keyed by block. They are kept until cracks or families change."""
     _rooms: Rooms = field(default_factory=lambda: Rooms(*_COLUMNS), init=False, repr=False)
 
     @classmethod
     def none(cls, ids: Ints) -> "Cracks":
-        """Returns a table without cracks; ``ids`` of the local nodes."""
+        """Returns a table with no cracks; ``ids``: global ids of the local nodes."""
         faces, sides = np.zeros((0, 2), np.int64), np.zeros((0, 2, 3), np.int32)
         families, none, flags = Families.of(ids), np.zeros((0, 6), np.int32), np.zeros(0, bool)
         return cls(faces, none, sides, flags, flags, none, np.zeros((0, _KEPT)), families)
 
     def add(self, faces: Ints, nodes: Indices, sides: Indices) -> None:
-        """Adds broken facets between ``faces`` (m, 2) with their three ``nodes`` (m, 3)."""
+        """Adds cracks for broken facets between the ``faces`` (m, 2), with the three ``nodes`` (m, 3) of each facet."""
         both = np.concatenate([nodes, nodes], axis=1)
         new = {"foreseen": False, "aged": False, "places": -1, "kept": 0.0}
         self._rooms.append(self, len(faces), faces=faces, nodes=both, sides=sides, **new)
         self._corners = {}
 
     def corners(self, block: int, lists: CornerLists) -> Corners:
-        """Corners of the narrow sides of a block; see corner_contact.py."""
+        """Returns the corners of the narrow sides of a block; see corner_contact.py."""
         if block not in self._corners:
             self._corners[block] = lists.of(self.nodes, self.sides, block, self.families)
         return self._corners[block]
 
     def follow(self, split: Split, ids: Ints, touching: TouchingRows) -> Ints:
-        """Updates nodes and families after a split; ``ids`` of the local nodes. Returns the rows of the cracks at
-        separated nodes.
+        """Updates nodes and families after a separation of nodes; ``ids``: global ids of the local nodes. Returns the
+        rows of the cracks that have a separated node.
         """
         families, parents = self.families, split.copies.parents
         families.marks[parents] = 1
@@ -92,7 +93,7 @@ class Cracks:
         return rows
 
     def keep(self, ids: Ints) -> Table:
-        """Returns the cracks as a table, one row a side; ``ids`` of the local nodes."""
+        """Returns the cracks as a table with one row for each side; ``ids``: global ids of the local nodes."""
         rows, k = np.nonzero(self.sides[:, :, 1] >= 0)
         faces = self.faces[rows]
         return {"tet": faces[range(len(rows)), k] // 4, "key": 2 * faces[:, 0] + k, "faces": faces,
@@ -100,9 +101,9 @@ class Cracks:
 
     @classmethod
     def resume(cls, table: Table, root: Ints, blocks: list[Block], nodes: Nodes) -> "Cracks":
-        """Builds cracks from the rows of a table, sorted by key. The row of the first side is used if present: a rank
-        that had only the second side may have the nodes in another order, which changes the last bit of a normal. A
-        rank that gets a crack from another rank has not computed this crack, so it has no stored impulses of the crack.
+        """Builds cracks from the rows of a table, sorted by key. If the row of the first side is present, it is used,
+        because a rank that had only the second side may have the nodes in another order, which changes the last bit of
+        a normal. If a rank gets a crack from another rank, it has no stored impulses of the crack.
         """
         table = once(table, table["faces"][:, 0])
         faces = np.array(table["faces"])
@@ -118,7 +119,7 @@ class Cracks:
         return cls(faces, nodes.places(table["with"]), sides, foreseen, aged, nowhere, kept, families)
 
     def foresee(self) -> CrackSides:
-        """Returns all local sides, for a scene that includes them."""
+        """Marks all local sides as foreseen and returns them, for a scene that includes them."""
         self.foreseen[:] = True
         sides, aged = self.sides.reshape(-1, 3), np.repeat(self.aged, 2)
         here = sides[:, 1] >= 0
@@ -126,21 +127,22 @@ class Cracks:
 
     @property
     def ages(self) -> Ints:
-        """(2,) numbers of young cracks and of all, each counted by the rank of its first side."""
+        """(2,) number of young cracks, and number of all cracks. A crack is counted by the rank of its first side."""
         mine = self.sides[:, 0, 1] >= 0
         return np.array([int((mine & ~self.aged).sum()), int(mine.sum())])
 
     def age(self, ages: Ints) -> bool:
-        """Makes all cracks aged if enough are young, by the ``ages`` of all ranks; returns True if the cracks became
-        aged. In which steps the broad phase runs has no influence, so no result of a run depends on it.
+        """Makes all cracks aged if the fraction of young cracks is large enough. ``ages``: counts over all ranks.
+        Returns True if the cracks became aged. The decision does not depend on the steps in which the broad phase runs,
+        so no result of a run depends on these steps.
         """
         if due := bool(ages[0] > _YOUNG * ages[1]):
             self.aged[:] = True
         return due
 
     def beside(self, rows: Ints, blocks: list[Block]) -> Indices:
-        """Returns the nodes of the local tets at the cracks ``rows`` and of the families at their corners, each once.
-        The nodes of the cracks that this rank computes are among them.
+        """Returns the nodes of the local tets at the cracks ``rows``, and the nodes of the families at the corners of
+        these tets, each node once. The nodes of the cracks that this rank computes are included.
         """
         marks, ring = self.families.marks, self.families.ring
         found = np.empty(len(ring), np.int32)
@@ -151,15 +153,17 @@ class Cracks:
         return found[:n]
 
     def arrange(self) -> None:
-        """Sorts the cracks by the slots of their first nodes: neighbours in space become neighbours in memory."""
+        """Sorts the cracks by the slots of their first nodes, so that neighbours in space become neighbours in
+        memory.
+        """
         order = np.argsort(self.places[:, 0], kind="stable")
         for column in self._columns().values():
             column[:] = column.take(order, axis=0)
         self._corners = {}
 
     def open(self, faces: Ints, blocks: list[Block]) -> None:
-        """Removes the cracks whose first sides are among ``faces``, ascending, from the table, because their sides are
-        now surface. The last rows are moved to the free rows.
+        """Removes cracks from the table because their sides are now surface. ``faces``: first sides of these cracks,
+        ascending. The last rows of the table are moved to the free rows.
         """
         rows = named(self.faces[:, 0], faces)
         sides = self.sides[rows].reshape(-1, 3)
@@ -176,13 +180,15 @@ class Cracks:
         self._corners = {}
 
     def _columns(self) -> "dict[str, np.ndarray]":
-        """Arrays with a row for each crack."""
+        """Returns the arrays with one row for each crack."""
         return {name: column for name, column in vars(self).items() if name in _COLUMNS}
 
 
 @njit("void(int32[:, ::1], int64[:, ::1], int64[::1], int64[::1], int64[::1], int32[::1])", cache=True)
 def _follow(nodes, faces, rows, ids, key, became):  # type: ignore[no-untyped-def]
-    """Replaces the nodes of the cracks ``rows`` by their copies; ``key`` and ``became``: key and node of a Split."""
+    """Replaces the nodes of the cracks ``rows`` by their copies. ``key`` and ``became``: columns key and node of a
+    Split.
+    """
     for r in rows:
         for k in range(6):
             wanted = ids[nodes[r, k]] * KEY + faces[r, k // 3] // 4
@@ -193,7 +199,7 @@ def _follow(nodes, faces, rows, ids, key, became):  # type: ignore[no-untyped-de
 
 @njit("int64(int32[::1], uint8[::1], int64[::1], int32[:, ::1], int32[::1])", cache=True)
 def _families_beside(found, marks, rows, nodes, ring):  # type: ignore[no-untyped-def]
-    """Lists the families of the separated nodes of the cracks ``rows``; returns the number of nodes."""
+    """Lists the families of the separated nodes of the cracks ``rows``. Returns the number of listed nodes."""
     n = 0
     for r in rows:
         for k in range(6):
@@ -211,8 +217,8 @@ def _families_beside(found, marks, rows, nodes, ring):  # type: ignore[no-untype
     cache=True,
 )
 def _tets_beside(found, n, marks, rows, nodes, sides, block, tets):  # type: ignore[no-untyped-def]
-    """Adds the nodes of the local tets of one block at the cracks ``rows`` with separated nodes to a list of ``n``
-    nodes; returns the number of nodes.
+    """Adds nodes to a list of ``n`` nodes and returns the new number of nodes. The added nodes are those of the local
+    tets of one block at the cracks ``rows`` with separated nodes.
     """
     for r in rows:
         if nodes[r, 0] == nodes[r, 3] and nodes[r, 1] == nodes[r, 4] and nodes[r, 2] == nodes[r, 5]:
@@ -230,7 +236,7 @@ def _tets_beside(found, n, marks, rows, nodes, sides, block, tets):  # type: ign
 
 @njit("int64[::1](int64[:], int64[::1])", cache=True)
 def named(ids, wanted):  # type: ignore[no-untyped-def]
-    """Returns the rows of the ``ids`` that are among the ascending ``wanted``."""
+    """Returns the indices of those elements of ``ids`` that are among ``wanted``, which is ascending."""
     rows, n = np.empty(len(ids), np.int64), 0
     for i in range(len(ids)):
         at = np.searchsorted(wanted, ids[i])

@@ -1,5 +1,5 @@
-"""Detection of the active contacts of a step: registration of changed nodes, then the narrow phase of the candidate
-pairs."""
+"""Detection of the active contacts of a step. First changed nodes are registered; then the narrow phase tests the
+candidate pairs."""
 
 from dataclasses import dataclass
 from functools import cache
@@ -31,40 +31,40 @@ from .tables import FAST, Step, StepRoom
 from .tied import Tied
 
 _KINEMATIC = 2.0
-"""Inverse of the largest share of the altitude of a tet that a node may pass in a step."""
+"""Inverse of the largest fraction of the altitude of a tet that a node may pass in a step."""
 _FACES, _EDGES, _CRACKS, _CORNERS = 0, 1, 2, 3
-"""Numbers of the kinds of contacts (rows.py): node-face, edge-edge, across cracks, at corners, the last one for each
-block."""
+"""Numbers of the kinds of contacts (rows.py): node-face, edge-edge, across cracks, at corners. Each block has a
+separate number for contacts at corners."""
 _JOIN = 0.6
-"""Share of the distance from its line at which a slot must be registered again. In a step in which one rank has to
-register slots, all other ranks register their slots beyond this share too, so that the ranks register in the same
-step and wait for each other only once. No bit of the answer depends on this share."""
+"""Fraction of the distance from its line at which a slot must be registered again. In a step in which a rank must
+register slots, all other ranks register their slots beyond this fraction. With this rule ranks register in the same
+steps and wait for each other less often. The answer does not depend on this fraction."""
 
 _NONE: Ints = np.zeros(0, np.int64)
 
 
 @dataclass
 class Detected:
-    """Results of a detection; the active contacts are rows of the scene."""
+    """Results of a detection. The active contacts are rows of the scene."""
 
     approach: float
-    """Inverse of the step in which no node passes more than half of a tet with which it is in contact, or will be in
-    contact in the next step, 1/s."""
+    """Inverse of the largest step, 1/s, in which no node passes more than half of a tet with which it is in contact, or
+    will be in contact in the next step."""
     opening: Ints
-    """Rows of the cracks that have become wide enough to open."""
+    """Rows of the cracks that are wide enough to open."""
     stray: bool
-    """True if a slot will depart so far from its line in the next step that the slot must be registered again. After
-    the reduction of the step: true if this holds on any rank."""
+    """True if a slot will depart so far from its line in the next step that it must be registered again. After the
+    reduction of the step the value is that of any rank."""
 
     @classmethod
     def nothing(cls) -> "Detected":
-        """Returns the results before the first step."""
+        """Returns the results that are valid before the first step."""
         return cls(0.0, np.zeros(0, np.int64), False)
 
 
 @dataclass(frozen=True)
 class Ahead:
-    """Look-ahead time of the detection of contacts."""
+    """Parameters of the detection for the time after the step."""
 
     dt: float
     """Length of the time step, s."""
@@ -73,16 +73,16 @@ class Ahead:
     size: float
     """Typical size of a face, m."""
     rebound: float
-    """See tables.Step."""
+    """Largest velocity change divided by the closing speed; see tables.Step."""
     give: float = 0.0
-    """See tables.PUSH_OUT."""
+    """Fraction of a penetration that is corrected; see tables.PUSH_OUT."""
 
 
 class Detection:
     """Finds the active contacts of a rank, on the threads of its ``team``."""
 
     def __init__(self, team: Team, registered: Registration, *, lasting: bool = False) -> None:
-        """``lasting``: True if the surface of the bodies does not change in the run."""
+        """``lasting``: whether the surface of the bodies is constant during the run."""
         self._registered, self._lasting, self.clearance = registered, lasting, Clearance()
         self.tied: Tied | None = None
         """Tied bonds of the slots of the scene."""
@@ -94,15 +94,15 @@ class Detection:
         self._program = Program(team, self._stages(), control)
         self._corner_tables: list[Arguments] = []
         self._families = np.zeros(0, np.int64)
-        """(blocks,) number of families of each block."""
+        """(blocks,) number of families in each block."""
         self._scratch = StepRoom()
         self._sizes: tuple[int, ...] = ()
         self._sums: list[np.ndarray] = []
         self._rows_of_corner = 1
-        """Number of rows reserved for each corner of a narrow side, on average over a task."""
+        """Number of rows that are reserved for each corner of a narrow side, on average over a task."""
 
     def _stages(self) -> list[Span]:
-        """Returns the stages of a step, in the order of their numbers."""
+        """Returns the stages of a step. The order is that of their numbers."""
         slots, pairs, some, sides = SLOTS_OF_A_TASK, PAIRS_OF_A_TASK, CONTACTS_OF_A_TASK, SIDES_OF_A_TASK
         every = [
             (stages.take, layout.OWN_N, slots), (stages.ahead, layout.SLOTS_N, slots), (stages.spread, layout.ONE, 1),
@@ -138,9 +138,9 @@ class Detection:
     ) -> Detected:  # fmt: skip
         """Detects the active contacts of the step from positions and velocities of the scene's nodes.
 
-        ``surface``: of this rank; ``mu`` (parts, parts): friction, NaN where two parts may not be in contact;
-        ``redraw``: True if new short lines begin in this step (reference_motion.py); ``together``: True if any rank
-        registers departed slots in this step.
+        ``surface``: surface of this rank; ``mu`` (parts, parts): coefficient of friction, NaN if two parts cannot be in
+        contact; ``redraw``: whether new short lines begin in this step (reference_motion.py); ``together``: whether any
+        rank registers departed slots in this step.
         """
         reference = now.reference
         reference.advance(ahead.dt, ahead.most)
@@ -162,8 +162,8 @@ class Detection:
         return self.found
 
     def retarget(self, now: Scene, share: float, give: float) -> None:
-        """Sets the target velocities of active contacts: see restitution.rebound for ``share``, and ``hold_back`` if
-        contact has no energy to ``give`` back (tables.PUSH_OUT).
+        """Sets the target velocities of active contacts. ``share``: see restitution.rebound; ``give``: if 0, contact
+        has no energy to return, and ``hold_back`` is applied (tables.PUSH_OUT).
         """
         counts = self._counts
         counts[layout.RETARGETS] = (share > 0.0) + 2 * (give == 0.0)
@@ -172,7 +172,7 @@ class Detection:
             self._program.run(stages.RETARGET, stages.CORNERS_FROM)
 
     def _moved(self, now: Scene, ahead: Ahead, redraw: bool, together: bool) -> bool:
-        """Measures the motion of the slots in the step, and registers the slots that must be registered; returns True
+        """Measures the motion of the slots in the step, and registers the slots that must be registered. Returns True
         if a slot will depart too far in the next step, by linear extrapolation.
         """
         of, reference, reals = now.surface_nodes, now.reference, self._reals
@@ -192,8 +192,8 @@ class Detection:
         return 2.0 * reference.strayed - before > most
 
     def _far(self, now: Scene, together: bool) -> bool:
-        """Measures the slots only; returns True if no pair has to be tested and no slot registered, so that there is no
-        active contact.
+        """Measures the motion of the slots only. Returns True if no pair must be tested and no slot must be registered;
+        in this case no contact is active.
         """
         of, reference, most = now.surface_nodes, now.reference, 0.5 * now.rules.skin
         strayed = self._registered.deviation.of_slots(reference, of.x, of.v, now.slots.tracked)
@@ -204,7 +204,7 @@ class Detection:
         return True
 
     def _met(self, now: Scene, surface: Exterior, step: Step) -> Ints:
-        """Finds the active contacts of the step; returns the cracks that open."""
+        """Finds the active contacts of the step. Returns the cracks that open."""
         rows, counts = now.active, self._counts
         narrow = surface.narrow()
         self._reserve(now, narrow)
@@ -219,12 +219,12 @@ class Detection:
         return np.concatenate([opening[k : k + m] for k, m in zip(begins, wide, strict=True) if m])
 
     def _reserve(self, now: Scene, narrow: list[tuple[Block, Corners]]) -> None:
-        """Reserves the rows of the contacts."""
+        """Reserves the rows for the contacts of the step."""
         corners = [self._rows_of_corner * len(each.corners) for _, each in narrow]
         now.active.begin(len(now.node_face), len(now.edge_edge), 3 * len(now.cracks), *corners)
 
     def _bound(self, now: Scene, step: Step) -> Ints:
-        """Sets the arguments of the stages; returns the array of the cracks that open."""
+        """Sets the arguments of the stages. Returns the array of the cracks that open."""
         rows, counts, on, off, m = now.active, self._counts, len(now.node_face), len(now.edge_edge), len(now.cracks)
         if (sizes := (on, off, m)) != self._sizes:
             self._sizes, self._sums = sizes, self._rooms(*sizes)
@@ -241,8 +241,8 @@ class Detection:
         return opening
 
     def _rooms(self, on: int, off: int, m: int) -> list[np.ndarray]:
-        """Working arrays for ``on`` node-face pairs, ``off`` edge-edge pairs and ``m`` cracks: see layout.py, CRACKS
-        and SUMS.
+        """Working arrays for ``on`` node-face pairs, ``off`` edge-edge pairs and ``m`` cracks; see CRACKS and SUMS in
+        layout.py.
         """
         faces, edges, cracks = -(-on // PAIRS_OF_A_TASK), -(-off // PAIRS_OF_A_TASK), -(-m // CRACKS_OF_A_TASK)
         some, real = self._scratch.of, np.float64
@@ -253,7 +253,7 @@ class Detection:
         ]  # fmt: skip
 
     def _corners(self, now: Scene, narrow: list[tuple[Block, Corners]], cracks: Cracks, step: Step) -> int:
-        """Adds contacts at the corners of the blocks; returns their number."""
+        """Adds the contacts at the corners of all blocks. Returns the number of these contacts."""
         if len(narrow) != len(self._corner_tables):
             self._prepare(len(narrow))
         n = 0
@@ -271,7 +271,7 @@ class Detection:
         return n
 
     def _prepare(self, blocks: int) -> None:
-        """Makes the program of the corners of ``blocks``."""
+        """Makes the program that processes the corners of ``blocks``."""
         self._families = np.zeros(blocks, np.int64)
         self._corner_tables = [Arguments(*stages.AT_CORNERS) for _ in range(blocks)]
         some = enumerate(self._corner_tables)
@@ -281,8 +281,8 @@ class Detection:
     def _at_block(
         self, now: Scene, k: int, block: Block, corners: Corners, cracks: Cracks, step: Step
     ) -> tuple[Ints, Ints, Ints]:  # fmt: skip
-        """Sets the arguments of the stage of block number ``k``; returns for each task the number of contacts, to be
-        filled, the first corner, and the number of corners.
+        """Sets the arguments of the stage of block number ``k``. Returns three arrays over the tasks: number of
+        contacts, which the stage sets, first corner, and number of corners.
         """
         n = len(corners.start) - 1
         begins = corners.start[:n:FAMILIES_OF_A_TASK].astype(np.int64)
@@ -296,5 +296,5 @@ class Detection:
 
 @cache
 def _offsets(many: int) -> Ints:
-    """(many,) first pair of each task."""
+    """(many,) index of the first pair of each task."""
     return PAIRS_OF_A_TASK * np.arange(many)

@@ -1,7 +1,7 @@
-"""Narrow phase of sharp edges: contacts of the step ahead, and deactivation of distant pairs.
+"""Narrow phase of sharp edges: finds the contacts of the next step and deactivates distant pairs.
 
-Two edges are in contact where they cross, except near their ends: an end is a node, and nodes are in contact with
-faces.
+Two edges are in contact where they cross, except near their ends, because an end is a node, and nodes are in contact
+with faces.
 """
 
 import numpy as np
@@ -12,32 +12,33 @@ from ..geometry import VECTOR, at, beyond, cross, distance, dot, lowest_height, 
 from .tables import CONTACT_ROWS, DEEP, DEEP_SELF, EDGES, NEAR, PAIRS, STEP, bonded, needed
 
 _PARALLEL = 1e-3
-"""Sine of the smallest angle between two edges in edge-edge contact; at smaller angles only nodes and faces are in
-contact. Nearly parallel ridges could penetrate by this share of the length of an edge. At this angle the crossing
-point is accurate to 1e-10 of the length of an edge."""
+"""Sine of the smallest angle between two edges in edge-edge contact. At smaller angles only nodes and faces are in
+contact, and two nearly parallel ridges could penetrate by this fraction of the length of an edge. At this angle the
+crossing point is accurate to 1e-10 of the length of an edge."""
 _END = 1e-4
-"""Share of the length of an edge, at each end, in which the edge has no edge-edge contact, because the node at the
-end is in contact with faces. Chosen value: a tenth of MARGIN, the distance by which the foot of a node may lie
-outside of a face. When an edge slides over a rim, edge-edge contact therefore ends only after the contact of the
-node has begun."""
+"""Fraction of the length of an edge, at each end, in which the edge has no edge-edge contact, because the node at the
+end is in contact with faces. Chosen value: a tenth of MARGIN, the distance by which the foot of a node may lie outside
+of a face. Therefore, when an edge slides over a rim, edge-edge contact ends only after the contact of the node has
+begun."""
 _FLUSH = 0.05
-"""Sine of the largest angle by which the normal of a contact may lie outside of the sector between the normals of
-the two faces. Where faces lie on each other, their edges cross with normals slightly outside of this sector. Chosen
-value, by tests of fragments that are pressed together (docs/theory/contact.md, "Face on face")."""
+"""Sine of the largest angle by which the normal of a contact may lie outside of the sector between the normals of the
+two faces. If two faces lie on each other, their edges cross with normals slightly outside of this sector. Chosen value,
+by tests of fragments that are pressed together (docs/theory/contact.md, "Face on face")."""
 _ROUND = 0.01
-"""Tolerance for rounding, as a share of the length of an edge; it is added to the distance of contact."""
+"""Tolerance for round-off, as a fraction of the length of an edge. It is added to the distance of contact."""
 _WORTH = 0.02
-"""Smallest slack, as a share of the length of an edge, for which a pair is deactivated. Pairs with less slack are
-tested in every step, which takes less time than the computation of the slack."""
+"""Smallest slack, as a fraction of the length of an edge, for which a pair is deactivated. A pair with less slack is
+tested in every step, which takes less time than the computation of its slack."""
 _STRETCH = 0.1
-"""Largest motion of ends relative to each other, over the lengths of two edges, for which the bounds of
-``beyond_ends`` hold."""
+"""Largest relative motion of the ends of two edges, divided by the lengths of the edges, for which the bounds of
+``beyond_ends`` are valid."""
 _SPARE = 0.006
-"""Smallest slack, as a share of the length of an edge, for which a pair of edges that cross beyond an end is
-deactivated (see _WORTH). Chosen value: in shattering glass the ends of edges depart from their short lines by a
+"""Smallest slack, as a fraction of the length of an edge, for which a pair is deactivated because the edges cross
+beyond an end (compare _WORTH). Chosen value: in shattering glass the ends of edges depart from their short lines by a
 fifth of this value."""
 _SOON, _NEXT = 16, 8
-"""Prefetch distances, in pairs of edges: for the numbers of the ends of edges, and for the positions of the ends."""
+"""Prefetch distances, in pairs of edges: for the node numbers of the ends of edges, and for the positions of the
+ends."""
 _X2, _V2, _N2 = "float64[:, :]", "float64[:, ::1]", "int32[:, ::1]"
 _SECTOR = f"Tuple((float64, {VECTOR}, {VECTOR}))"
 _I, _F, _N1 = types.int64, types.float64, types.int32[::1]
@@ -45,8 +46,9 @@ _I, _F, _N1 = types.int64, types.float64, types.int32[::1]
 
 @njit(f"{_SECTOR}({VECTOR}, {_X2}, {_V2}, {_N2}, int64, float64)", cache=True, error_model="numpy")
 def _sector(u, x, v, edges, e, h):  # type: ignore[no-untyped-def]
-    """Cross products of u with the normals of the two faces of edge e, along u, after a time ``h``; and before them
-    the sense of rotation from the first normal to the second, 0 for an edge that is not convex.
+    """Four numbers of edge e after a time ``h``. The first is the sense of rotation from the normal of its first face
+    to that of its second face; 0 for an edge that is not convex. The others are the cross products of u with the two
+    normals, along u.
     """
     a, c, d = edges[e, 0], edges[e, 2], edges[e, 3]
     to, fro = minus(at(x, c), at(x, a)), minus(at(x, d), at(x, a))
@@ -59,8 +61,9 @@ def _sector(u, x, v, edges, e, h):  # type: ignore[no-untyped-def]
 
 @njit(f"boolean({_SECTOR}, {VECTOR}, float64)", cache=True)
 def _points_out(sector, n, sign):  # type: ignore[no-untyped-def]
-    """Returns True if ``sign`` n, perpendicular to a convex edge, lies between the normals of the two faces of the edge
-    (``_sector``), or within _FLUSH of one of the normals. The second case occurs where faces lie on each other.
+    """Returns True if the vector ``sign`` n lies between the normals of the two faces of a convex edge (``_sector``),
+    or within _FLUSH of one of these normals. n is perpendicular to the edge. The tolerance _FLUSH is needed if faces
+    lie on each other.
     """
     sense, one, two = sector
     along = sense * sign
@@ -74,7 +77,7 @@ def _points_out(sector, n, sign):  # type: ignore[no-untyped-def]
     error_model="numpy",
 )
 def _apart(m, x, v, a, b, c, d, s, t, h):  # type: ignore[no-untyped-def]
-    """Distance of point t of cd beyond point s of ab along m after a time ``h``, m."""
+    """Distance along m from point s of ab to point t of cd, after a time ``h``, m."""
     gap = 0.0
     for k in range(3):
         near = (1.0 - s) * (x[a, k] + h * v[a, k]) + s * (x[b, k] + h * v[b, k])
@@ -84,27 +87,30 @@ def _apart(m, x, v, a, b, c, d, s, t, h):  # type: ignore[no-untyped-def]
 
 @njit(f"float64({VECTOR}, {VECTOR}, {VECTOR})", cache=True)
 def _volume(u, w, r):  # type: ignore[no-untyped-def]
-    """Returns u x w . r: six times the volume, m^3, between two edges; it changes sign when their lines cross."""
+    """Returns u x w . r, which is six times the volume, m^3, between two edges. The value changes sign when the lines
+    of the edges cross.
+    """
     return dot(cross(u, w), r)
 
 
 @njit(f"float64({_V2}, int64, int64, int64, int64)", cache=True)
 def _fastest(course, a, b, c, d):  # type: ignore[no-untyped-def]
-    """Returns the largest relative speed of an end of ab and an end of cd, m/s."""
+    """Returns the largest speed of an end of ab relative to an end of cd, m/s."""
     p, q, r, s = at(course, a), at(course, b), at(course, c), at(course, d)
     return max(distance(p, r), distance(p, s), distance(q, r), distance(q, s))
 
 
 @njit(f"float64({VECTOR}, {VECTOR}, {VECTOR}, float64, float64)", cache=True, error_model="numpy")
 def beyond_ends(u, w, r, s, t):  # type: ignore[no-untyped-def]
-    """Returns a bound of the motion of the ends of edge u relative to the ends of edge w, m, while the edges cross
-    beyond an end of u or w: at ``s`` of u and ``t`` of w now, with ``r`` from the beginning of u to the beginning of w.
-    0 if they cross within both.
+    """Returns a bound of the motion of the ends of edge u relative to the ends of edge w, m. Up to this motion the
+    edges cross beyond an end of u or w. The result is 0 if they cross within both edges. Now they cross at ``s`` of u
+    and ``t`` of w; ``r``: vector from the beginning of u to the beginning of w.
 
-    Let the edges cross beyond an end of edge a, at a share S of its length from that end, k the vector from that end
-    to an end of the other edge b, and n = a x b. Then (k x b) . n = -S n . n, and they cross there while this is
-    negative. If ends move by h relative to each other, a and b change by 2 h and k by h, so n by at most B h and k x
-    b by at most A h with the bounds below, if h is a small share (_STRETCH) of |a| and |b|.
+    Derivation: the edges cross beyond an end of edge a, at a fraction S of its length from this end. Let k be the
+    vector from this end to an end of the other edge b, and n = a x b. Then (k x b) . n = -S n . n, and the edges cross
+    there while this number is negative. If ends move by h relative to each other, a and b change by 2 h, and k changes
+    by h. Then n changes by at most B h, and k x b by at most A h, with the bounds A and B in the code, if h is a small
+    fraction (_STRETCH) of |a| and |b|.
     """
     past_s, past_t, uu, ww = max(-s, s - 1.0), max(-t, t - 1.0), dot(u, u), dot(w, w)
     share, a, b, k = past_s, u, w, r if s < 0.0 else minus(r, u)
@@ -124,7 +130,9 @@ def beyond_ends(u, w, r, s, t):  # type: ignore[no-untyped-def]
 
 @njit(types.float64(types.float64[:, :], EDGES, types.int64), cache=True, error_model="numpy")
 def _deep(x, edges, e):  # type: ignore[no-untyped-def]
-    """Greatest depth of a contact of edge e, m: at most DEEP of the lowest height of the tets of its faces."""
+    """Greatest depth of a contact of edge e, m. It is at most DEEP times the lowest height of the tets of the faces of
+    the edge.
+    """
     least = DEEP_SELF * edges.size[e]
     if not edges.deep[e] > least:
         return edges.deep[e]
@@ -135,8 +143,8 @@ def _deep(x, edges, e):  # type: ignore[no-untyped-def]
 
 @njit(f"boolean({_N2}, int64, int64)", cache=True)
 def _opposite(edges, one, two):  # type: ignore[no-untyped-def]
-    """Returns True if an edge joins the third nodes of the two faces of another edge: the two are then opposite edges
-    of one tet.
+    """Returns True if an edge joins the third nodes of the two faces of another edge. The two edges are then opposite
+    edges of one tet.
     """
     a, b, c, d = edges[one, 2], edges[one, 3], edges[two, 0], edges[two, 1]
     return (a == c and b == d) or (a == d and b == c)
@@ -177,7 +185,9 @@ def _opposite(edges, one, two):  # type: ignore[no-untyped-def]
     cache=True,
 )
 def _due(rows, until, speed, left, fresh, active, end, many):  # type: ignore[no-untyped-def]
-    """Selects the first ``many`` of the pairs ``rows`` to be tested, in ``active``; returns their number."""
+    """Selects the pairs to be tested among the first ``many`` of the pairs ``rows``, and writes them to ``active``.
+    Returns their number.
+    """
     n = 0
     for p in range(many):
         one, two = rows[p, 0], rows[p, 1]
@@ -192,7 +202,9 @@ def _due(rows, until, speed, left, fresh, active, end, many):  # type: ignore[no
     forceinline=True,
 )
 def _crossing(x, ahead, a, b, c, d):  # type: ignore[no-untyped-def]
-    """Share tau of the step after which the lines ab and cd cross, 1 if they do not in the step; and u, w, r then."""
+    """Fraction tau of the step after which the lines ab and cd cross, 1 if they do not cross in the step. Then the
+    vectors u, w and r at this time.
+    """
     u0, w0, r0 = minus(at(x, b), at(x, a)), minus(at(x, d), at(x, c)), minus(at(x, c), at(x, a))
     u, w = minus(at(ahead, b), at(ahead, a)), minus(at(ahead, d), at(ahead, c))
     r = minus(at(ahead, c), at(ahead, a))
@@ -209,11 +221,12 @@ def _crossing(x, ahead, a, b, c, d):  # type: ignore[no-untyped-def]
     error_model="numpy",
 )
 def edge_edge(out, base, pairs, edges, step, course, end, first, stop):  # type: ignore[no-untyped-def]
-    """Writes contacts of edges with edges, of the pairs from ``first`` to ``stop``: rows of ``out`` from
-    ``base + first`` on; returns their number, and the number of tested pairs, ``pairs.active`` from ``first`` on.
+    """Writes the contacts of the pairs of edges from ``first`` to ``stop`` to the rows of ``out`` from ``base + first``
+    on. Writes the tested pairs to ``pairs.active`` from ``first`` on. Returns the number of contacts, and the number of
+    tested pairs.
 
-    ``course`` (slots, 3): velocities of the reference motions, m/s; ``end``: of the step, s after the search. Numbers
-    at the ends of lines: conditions of a contact, listed above.
+    ``course`` (slots, 3): velocities of the reference motions, m/s; ``end``: time of the end of the step, s after the
+    search. The comments have the numbers of the conditions in the drawing.
     """
     rows, until, speed, active = pairs.rows[first:], pairs.until[first:], pairs.speed[first:], pairs.active[first:]
     meets, fresh, corners, size, left = edges.meets, edges.fresh, edges.corners, edges.size, edges.left
@@ -235,7 +248,7 @@ def edge_edge(out, base, pairs, edges, step, course, end, first, stop):  # type:
             continue
         active[tested] = first + p
         tested += 1
-        if len(step.tied) > 0 and bonded(step, a, b, c, d):  # condition 2, listed above
+        if len(step.tied) > 0 and bonded(step, a, b, c, d):  # condition 2: no bond of all four nodes
             continue
         known = not np.isnan(until[p])
         if known:  # deactivate the pair while it cannot be in contact: slack > left_1 + left_2 + U t (pairs.py)
@@ -247,10 +260,10 @@ def edge_edge(out, base, pairs, edges, step, course, end, first, stop):  # type:
         share, u, w, r = _crossing(x, ahead, a, b, c, d)
         uu, uw, ww, ur, wr = dot(u, u), dot(u, w), dot(w, w), dot(u, r), dot(w, r)
         area = uu * ww - uw * uw
-        if not area > _PARALLEL * _PARALLEL * uu * ww:  # condition 3, listed above
+        if not area > _PARALLEL * _PARALLEL * uu * ww:  # condition 3: not parallel
             continue
         s, t = (ww * ur - uw * wr) / area, (uw * ur - uu * wr) / area
-        if not (min(s, t) >= _END and max(s, t) <= 1.0 - _END):  # condition 4, listed above
+        if not (min(s, t) >= _END and max(s, t) <= 1.0 - _END):  # condition 4: crossing within both edges
             if known and share == 1.0 and np.isnan(until[p]):
                 slack = beyond_ends(u, w, r, s, t)
                 if slack > _SPARE * size[one]:
@@ -260,22 +273,22 @@ def edge_edge(out, base, pairs, edges, step, course, end, first, stop):  # type:
         m = m[0] / length, m[1] / length, m[2] / length
         gap0, gap1 = _apart(m, x, v, a, b, c, d, s, t, 0.0), _apart(m, x, v, a, b, c, d, s, t, dt)
         near, deep = NEAR * min(size[one], size[two]), min(edges.deep[one], edges.deep[two])
-        if (gap1 > near or gap0 < -deep) and (-gap1 > near or -gap0 < -deep):  # condition 5, either sign, listed above
+        if (gap1 > near or gap0 < -deep) and (-gap1 > near or -gap0 < -deep):  # condition 5: the gap, for either sign
             continue
         sector = _sector(u, x, v, corners, one, h)
         sign = 1.0 if _points_out(sector, m, 1.0) else -1.0
-        if sign < 0.0 and not _points_out(sector, m, -1.0):  # condition 6, first body, listed above
+        if sign < 0.0 and not _points_out(sector, m, -1.0):  # condition 6: the normal, first body
             continue
         gap0, gap1 = sign * gap0, sign * gap1
-        if gap1 > near or gap0 < -deep:  # condition 5, this sign, listed above
+        if gap1 > near or gap0 < -deep:  # condition 5: the gap, for this sign
             continue
-        if not _points_out(_sector(w, x, v, corners, two, h), m, -sign):  # condition 6, second body, listed above
+        if not _points_out(_sector(w, x, v, corners, two, h), m, -sign):  # condition 6: the normal, second body
             continue
-        if gap0 < 0.0 and gap0 < -min(_deep(x, edges, one), _deep(x, edges, two)):  # condition 7, listed above
+        if gap0 < 0.0 and gap0 < -min(_deep(x, edges, one), _deep(x, edges, two)):  # condition 7: the greatest depth
             continue
         nodes[n, 0], nodes[n, 1], nodes[n, 2], nodes[n, 3] = c, d, a, b
         weights[n, 0], weights[n, 1], weights[n, 2], weights[n, 3] = 1.0 - t, t, s - 1.0, -s
-        rate = 0.0  # n . sum(w_k v_k)
+        rate = 0.0  # normal velocity n . sum(w_k v_k)
         for k in range(3):
             normals[n, k] = sign * m[k]
             rate += normals[n, k] * ((1.0 - t) * v[c, k] + t * v[d, k] - (1.0 - s) * v[a, k] - s * v[b, k])

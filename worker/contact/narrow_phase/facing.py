@@ -1,5 +1,6 @@
-"""Tests on which side of a body a node is: by the orientation of nodes to faces, and for nodes beside a convex edge or
-in front of another face at the edge (docs/theory/contact.md, "Which point" and "Beside a free edge").
+"""Tests that determine on which side of a body a node is. The tests use the orientation of nodes to faces. They also
+treat nodes beside a convex edge, and nodes in front of another face at the edge (docs/theory/contact.md, "Which point"
+and "Beside a free edge").
 """
 
 import numpy as np
@@ -9,42 +10,44 @@ from ..geometry import MARGIN, VECTOR, at, dot, foot, height, minus, off
 from .tables import DEEP, DEEP_SELF, FACES, NEAR, PAIRS, STEP
 
 TOUCHING = 1e-3
-"""Depth over the size of a face: a node that is deeper inside of a part has contact only with the nearest face of
-that part."""
+"""Ratio of the depth to the size of a face. A node that is deeper inside of a part than this ratio has contact only
+with the nearest face of that part."""
 FACING = 0.1
 """A node faces a face when the cosines between the normal of the face and the normals of the node's own faces have a
-mean minus deviation below -FACING, and either a mean below FACING, or the node's own faces rise from the face by a
-mean slope whose sine exceeds FACING. With this definition, the lowest corner of the tet of a flake faces the plane
-below it for any mean of its three normals."""
+mean minus deviation below -FACING, and either a mean below FACING, or the node's own faces rise from the face by a mean
+slope whose sine exceeds FACING. With this definition, the lowest corner of a single tet faces the plane below it for
+any mean of its three normals."""
 _SOME = 0.25
 """A node of another part that passes a face from outside has contact with the face when the mean minus deviation of
 the cosines is below -_SOME, because then at least one face of the node faces the face. If no cosine is negative,
 mean minus deviation is at least (1 - sqrt(2)) / 2 = -0.207."""
 RIM = 0.01
-"""Share of the size of a face: a node that faces both faces of a convex edge, slides along one of the two, and is not
-deeper below that face than this share, is beside the edge. Chosen value: twice the penetration of a sharp edge that
+"""Fraction of the size of a face. A node is beside a convex edge if it faces both faces of the edge, slides along one
+of them, and is not deeper below that face than this fraction. Chosen value: twice the penetration of a sharp edge that
 slides along another edge, 1e-3 to 4e-3, at the moment when the end of the edge reaches the other edge. A node can be
 deeper than this below a face at a rim because edges have no contact at their ends."""
 _SLIDES = 2e-3
-"""Share of the size of a face: a node that slides along a face approaches the face by less in a step. A node above this
-speed counts as beside the edge only up to the depth TOUCHING; otherwise the contact of a fast projectile would be
-detected one step late (test_hard_contact). Chosen value: twice the fastest approach observed in sliding."""
+"""Fraction of the size of a face. A node that slides along a face approaches it by less than this fraction in a step. A
+node that approaches faster counts as beside the edge only up to the depth TOUCHING; otherwise the contact of a fast
+projectile would be detected one step late (test_hard_contact). Chosen value: twice the fastest approach observed in
+sliding."""
 _BEHIND = 0.1
-"""Share of the size of a face: sum of the depths of the corners of the face behind a neighbouring face. If the sum is
-above this value, the common edge is convex. Chosen value: below the sum for an angle of 25 degrees between the faces,
-above rounding."""
+"""Fraction of the size of a face, which is compared with the sum of the depths of the corners of the face behind a
+neighbouring face. If the sum is above this value, the common edge is convex. The chosen value is below the sum for an
+angle of 25 degrees between the faces, and above round-off."""
 _OVER = 0.1
-"""Least component along a face of the mean direction from a node to its faces' midpoints, above which the faces of the
-node reach over that face. The faces of a blunt edge have a component below this value. Chosen value: a third of the
-component for the corner of a cube."""
+"""Smallest component along a face of the mean direction from a node to the midpoints of its own faces. Above this value
+the faces of the node reach over that face. The faces of a blunt edge have a component below this value. Chosen value: a
+third of the component for the corner of a cube."""
 _F, _VECTOR = types.float64, types.UniTuple(types.float64, 3)  # type: ignore[no-untyped-call]
 
 
 @njit(f"UniTuple(float64, 2)(float64[:, ::1], int64, {VECTOR})", cache=True)
 def facing(normals, s, m):  # type: ignore[no-untyped-def]
-    """Returns the angle measures, as differences of cosines, by which m must turn until node s faces a face of this
-    normal (FACING), and until node s or one of its own faces faces the face (_SOME); at most 0 if the condition is
-    fulfilled already, and -1 for a node without faces, because such a node faces any face.
+    """Returns two angle measures, as differences of cosines, by which the normal m must turn until a condition is
+    satisfied: until node s faces a face with this normal (FACING); and until node s or one of its own faces faces that
+    face (_SOME). A measure is at most 0 if its condition is satisfied already. It is -1 for a node without faces,
+    because such a node faces any face.
     """
     mean, square, length, rise = 0.0, 0.0, 0.0, 0.0
     for a in range(3):
@@ -62,10 +65,10 @@ def facing(normals, s, m):  # type: ignore[no-untyped-def]
 
 @njit(f"boolean(float64[:, ::1], int64, {VECTOR}, {VECTOR}, {VECTOR}, float64)", cache=True, error_model="numpy")
 def reaches_over(normals, s, b, e, f, size):  # type: ignore[no-untyped-def]
-    """Returns True if the faces of node s reach over a face, by their mean direction, from the node's foot on its
-    border; ``b``: area coordinates of the foot on the face of edges ``e`` and ``f``.
+    """Returns True if the faces of node s, by their mean direction, reach over another face on whose border the foot of
+    the node is. ``b``: area coordinates of the foot on the face with the edges ``e`` and ``f``.
 
-    In that case the body of the node moves onto the face, not beside it. Example: if two bodies collide with equal
+    In that case the body of the node moves onto the face, not past the face. Example: if two bodies collide with equal
     faces, all nodes have their feet on the border of a face, and no node is ever inside of the other body.
     """
     way = normals[s, 9], normals[s, 10], normals[s, 11]
@@ -81,7 +84,7 @@ def reaches_over(normals, s, b, e, f, size):  # type: ignore[no-untyped-def]
 
 @njit(_VECTOR(FACES, types.float64[:, :], types.int64), cache=True, error_model="numpy", forceinline=True)
 def plane(faces, ahead, f):  # type: ignore[no-untyped-def]
-    """Unit normal of face ``f`` at the end of the step; ``ahead``: positions of the slots then."""
+    """Unit normal of face ``f`` at the end of the step. ``ahead``: positions of the slots at the end of the step."""
     i, j, k = faces.corners[f, 0], faces.corners[f, 1], faces.corners[f, 2]
     _, m = height(at(ahead, i), at(ahead, i), at(ahead, j), at(ahead, k))
     return m
@@ -89,8 +92,8 @@ def plane(faces, ahead, f):  # type: ignore[no-untyped-def]
 
 @njit(types.boolean(PAIRS, FACES, types.int32[::1], types.int64, types.int64, _F, _F), cache=True, forceinline=True)
 def _asked(pairs, faces, part, q, body, strayed, end):  # type: ignore[no-untyped-def]
-    """Returns True if the face of pair ``q`` is exposed, belongs to the part ``body`` and is near enough for a test;
-    see outside.
+    """Returns True if the face of pair ``q`` must be tested: it is exposed, belongs to the part ``body``, and is near
+    enough; see outside.
     """
     f = pairs.rows[q, 1]
     far = pairs.until[q] > strayed + faces.left[f] + pairs.speed[q] * end and not pairs.turned[q]
@@ -104,14 +107,15 @@ def _asked(pairs, faces, part, q, body, strayed, end):  # type: ignore[no-untype
     forceinline=True,
 )
 def outside(pairs, first, faces, x, part, p, depth, strayed, end):  # type: ignore[no-untyped-def]
-    """Returns True if the node of pair ``p``, ``depth`` below its face, is nearer to the front of another face of that
-    part.
+    """Returns True if the node of pair ``p`` is nearer to the front of another face of the same part than to the face
+    of the pair. ``depth``: depth of the node below the face of the pair.
 
-    A node whose nearest face is another face is beside an acute edge and not inside the body: the nearest face decides
-    on which side of the surface a node is. Only faces at a distance below a fraction of their size are tested: all
-    candidate lists include faces up to this distance. A face whose pair is deactivated is further away and is not
-    tested. ``strayed``: distance of the node from its line, infinite if the pairs have no valid bounds; ``end``: of the
-    step plus one more step, because another thread may have just measured a pair at its end.
+    A node whose nearest face is another face is beside an acute edge and not inside the body: the nearest face
+    determines on which side of the surface a node is. Only faces at a distance below a fraction of their size are
+    tested: all candidate lists include faces up to this distance. A face whose pair is deactivated is further away and
+    is not tested. ``strayed``: distance of the node from its line, infinite if the pairs have no valid bounds. ``end``:
+    time of the end of the step, plus one further step, because another thread may have just measured a pair at the end
+    of the step.
     """
     rows, corners, size = pairs.rows, faces.corners, faces.size
     s, body = rows[p, 0], part[corners[rows[p, 1], 0]]
@@ -152,11 +156,11 @@ def outside(pairs, first, faces, x, part, p, depth, strayed, end):  # type: igno
     forceinline=True,
 )
 def in_front(pairs, first, faces, step, normals, p, gap0, gap1, strayed, end):  # type: ignore[no-untyped-def]
-    """Returns True if the node of pair ``p``, whose foot is on the border (RIM) of its face, is beside this face, and
-    in front of another face of that part which the node faces.
+    """Returns True if the node of pair ``p`` is beside the face of the pair, and in front of another face of the same
+    part that it faces. The foot of the node is on the border (RIM) of the face of the pair.
 
-    ``gap0``, ``gap1``: height over its own face at the beginning and end of the step; ``strayed``, ``end``: see
-    outside.
+    ``gap0``, ``gap1``: height of the node over the face of the pair at the beginning and at the end of the step;
+    ``strayed``, ``end``: see outside.
     """
     rows, corners, size, ahead, part = pairs.rows, faces.corners, faces.size, step.ahead, step.part
     s, g = rows[p, 0], rows[p, 1]
@@ -168,12 +172,12 @@ def in_front(pairs, first, faces, step, normals, p, gap0, gap1, strayed, end):  
             continue
         f = rows[q, 1]
         i, j, k = corners[f, 0], corners[f, 1], corners[f, 2]
-        if a not in (i, j, k) and b not in (i, j, k) and c not in (i, j, k):  # condition 1, listed above
+        if a not in (i, j, k) and b not in (i, j, k) and c not in (i, j, k):  # condition 1: a common corner with g
             continue
         o, e, h = at(ahead, i), at(ahead, j), at(ahead, k)
         m = plane(faces, ahead, f)
         behind = dot(m, minus(at(ahead, a), o)) + dot(m, minus(at(ahead, b), o)) + dot(m, minus(at(ahead, c), o))
-        if not behind < -_BEHIND * size[g]:  # condition 2, listed above
+        if not behind < -_BEHIND * size[g]:  # condition 2: the edge is convex
             continue
         above, _ = height(point, o, e, h)
         before, _ = height(at(step.x, s), at(step.x, i), at(step.x, j), at(step.x, k))
@@ -182,7 +186,7 @@ def in_front(pairs, first, faces, step, normals, p, gap0, gap1, strayed, end):  
         if not ((slides or (above > gap1 and least > -TOUCHING * size[f])) and above <= NEAR * size[f]):  # condition 3
             continue
         every, some = facing(normals, s, m)
-        if not (every if part[s] == body else some) <= 0.0:  # condition 4, listed above
+        if not (every if part[s] == body else some) <= 0.0:  # condition 4: s faces f
             continue
         on, _ = foot(minus(point, o), minus(e, o), minus(h, o))
         if on:

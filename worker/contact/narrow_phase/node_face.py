@@ -1,7 +1,7 @@
-"""Narrow phase of nodes and faces: contacts of the step ahead, and deactivation of distant pairs.
+"""Narrow phase of nodes and faces: finds the contacts of the next step and deactivates distant pairs.
 
-The contact point is the point at which the node passes the plane of the face. A node that slides over several faces
-therefore changes from one face to the next at their common edge.
+The contact point is the point at which the node passes the plane of the face. Therefore a node that slides over several
+faces changes from one face to the next at their common edge.
 """
 
 import numpy as np
@@ -14,13 +14,13 @@ from .facing import RIM, TOUCHING, facing, in_front, outside, plane, reaches_ove
 from .tables import CONTACT_ROWS, DEEP, DEEP_SELF, FACES, NEAR, PAIRS, SLOTS, STEP, bonded, needed
 
 _ROUND = 0.01
-"""Tolerance for rounding, as a share of the size of a face; it is added to the distance of contact."""
+"""Tolerance for round-off, as a fraction of the size of a face. It is added to the distance of contact."""
 _WORTH = 0.02
-"""Smallest slack, as a share of the size of a face, for which a pair is deactivated. Pairs with less slack are
-tested in every step, which takes less time than the computation of the slack."""
+"""Smallest slack, as a fraction of the size of a face, for which a pair is deactivated. A pair with less slack is
+tested in every step, which takes less time than the computation of its slack."""
 _BEND = 0.1
-"""Largest relative motion of two corners of a face, over the lengths of its two edges, for which the bound of
-``_bent`` holds."""
+"""Largest relative motion of two corners of a face, divided by the lengths of its two edges, for which the bound of
+``_bent`` is valid."""
 
 _SOON, _NEXT = 8, 4
 """Prefetch distances, in pairs: for a node and a face, and for the corners of a face."""
@@ -31,8 +31,8 @@ _VECTOR = types.UniTuple(types.float64, 3)  # type: ignore[no-untyped-call]
 
 @njit("void(int32[::1], int32[::1], int32[:, ::1], int64)", cache=True)
 def chain(first, following, pairs, begin):  # type: ignore[no-untyped-def]
-    """Adds the pairs of node and face from row ``begin`` on to the linked lists of their nodes: ``first`` (slots,),
-    and ``following`` (p,) the next pair of the same node, -1 for none.
+    """Adds the pairs of a node and a face from row ``begin`` on to the linked lists of their nodes. ``first`` (slots,):
+    first pair of each list; ``following`` (p,): next pair of the same node, -1 for none.
     """
     for p in range(begin, len(pairs)):
         following[p], first[pairs[p, 0]] = first[pairs[p, 0]], p
@@ -51,9 +51,10 @@ def _distance(x, s, i, j, k):  # type: ignore[no-untyped-def]
 
 @njit(f"float64(float64, {_X2}, int64, int64, int64)", cache=True, error_model="numpy")
 def _bent(turn, x, i, j, k):  # type: ignore[no-untyped-def]
-    """Half of the motion D, m, that turns the normal of a face by less than ``turn``.
+    """Half of a motion D, m. If no two corners of a face move by D relative to each other, the normal of the face turns
+    by less than ``turn``.
 
-    The normal of a face of edges e, f and area A changes by less than D (|e| + |f| + D) / A while no two of its
+    The normal of a face with edges e, f and area A changes by less than D (|e| + |f| + D) / A while no two of its
     corners have moved by D relative to each other.
     """
     e, f = minus(at(x, j), at(x, i)), minus(at(x, k), at(x, i))
@@ -68,8 +69,9 @@ def _bent(turn, x, i, j, k):  # type: ignore[no-untyped-def]
     error_model="numpy",
 )
 def _passes(x, ahead, corners, s, f, m, gap0, gap1, most):  # type: ignore[no-untyped-def]
-    """Returns True if node s, at height ``gap0`` over face f of normal ``m`` and ``gap1`` at the end of the step,
-    passes the face, no deeper than ``most``; and the area coordinates of its foot at that moment.
+    """Returns two results: True if node s passes face f and is no deeper than ``most``; and the area coordinates of the
+    foot of s at that moment. ``m``: normal of the face; ``gap0``, ``gap1``: height of s over the face at the beginning
+    and at the end of the step.
     """
     i, j, k, d = corners[f, 0], corners[f, 1], corners[f, 2], corners[f, 3]
     deep = not gap0 >= -most
@@ -96,8 +98,9 @@ def _passes(x, ahead, corners, s, f, m, gap0, gap1, most):  # type: ignore[no-un
     error_model="numpy",
 )
 def _coming(step, normals, faces, s, f, m, gap):  # type: ignore[no-untyped-def]
-    """Returns ``closing_rate`` of node s and face f if they will be in contact in a step of ``step.beyond`` after
-    this one; else 0. ``m``, ``gap``: normal of the face, and height over it, m, at the end of this step.
+    """Returns ``closing_rate`` of node s and face f if they will be in contact in a step of length ``step.beyond``
+    after this step; else 0. ``m``: normal of the face at the end of this step; ``gap``: height of the node over the
+    face at that time, m.
     """
     v, ahead, corners = step.v, step.ahead, faces.corners
     i, j, k = corners[f, 0], corners[f, 1], corners[f, 2]
@@ -119,12 +122,13 @@ def _coming(step, normals, faces, s, f, m, gap):  # type: ignore[no-untyped-def]
 
 @njit(_I(PAIRS, SLOTS, FACES, _F, _I, _I), cache=True, error_model="numpy")
 def due(pairs, slots, faces, end, first, stop):  # type: ignore[no-untyped-def]
-    """Selects the pairs from ``first`` to ``stop`` to be tested: ``pairs.active`` from ``first`` on; returns their
-    number. ``end``: end of the step and of the time tested ahead, s after the search.
+    """Selects the pairs to be tested among those from ``first`` to ``stop``, and writes them to ``pairs.active`` from
+    ``first`` on. Returns the number of selected pairs. ``end``: end of the time for which contact is tested, s after
+    the search.
 
     The bound of a selected pair is set to "too close to be deactivated" during the test, so that a thread that reads
-    the bound (facing.py) while another thread tests the pair treats the pair as near. Pairs without exposed face or
-    surface node are deactivated until that changes.
+    the bound (facing.py) while another thread tests the pair treats the pair as near. A pair whose face is not exposed
+    or whose node is not on the surface is deactivated until this changes.
     """
     rows, until, speed, turned = pairs.rows[first:], pairs.until[first:], pairs.speed[first:], pairs.turned[first:]
     active, exposed, on_surface = pairs.active[first:], faces.exposed, slots.on_surface
@@ -189,13 +193,13 @@ def _bring(rows, corners, normals, x, active, q, last):  # type: ignore[no-untyp
     error_model="numpy",
 )
 def node_face(out, depth, base, pairs, slots, faces, step, end, first, stop):  # type: ignore[no-untyped-def]
-    """Writes contacts of nodes with faces, of the pairs in ``pairs.active`` from ``first`` to ``stop``: rows of ``out``
-    from ``base + first`` on; returns their number, and the largest square of a speed over the altitude of a tet, 1/s^2,
-    of the pairs that will be in contact in the next step (``_coming``).
+    """Writes contacts of nodes with faces to the rows of ``out`` from ``base + first`` on, for the pairs in
+    ``pairs.active`` from ``first`` to ``stop``. Returns the number of contacts, and the largest square of speed /
+    altitude of a tet, 1/s^2, of the pairs that will be in contact in the next step (``_coming``).
 
-    ``depth`` (room,): depth of a node that is inside, m, else 0; of the faces of a part the nearest face keeps the
-    contact (``nearest``). ``end``: of the step, s after the search. Numbers at the ends of lines: conditions listed
-    above.
+    ``depth`` (rows,): depth of a node that is inside of a body, m, else 0; only the nearest face of a part keeps its
+    contact (``nearest``). ``end``: time of the end of the step, s after the search. The comments have the numbers of
+    the conditions in the drawing.
     """
     rows, until, speed, turned, active = pairs.rows, pairs.until, pairs.speed, pairs.turned, pairs.active
     corners, size, left = faces.corners, faces.size, faces.left
@@ -208,7 +212,7 @@ def node_face(out, depth, base, pairs, slots, faces, step, end, first, stop):  #
         _bring(rows, corners, normals, x, active, q, stop - 1)
         s, f = rows[p, 0], rows[p, 1]
         i, j, k = corners[f, 0], corners[f, 1], corners[f, 2]
-        if len(step.tied) > 0 and bonded(step, s, i, j, k):  # condition 1, listed above
+        if len(step.tied) > 0 and bonded(step, s, i, j, k):  # condition 1: no bond of all four nodes
             continue
         m = plane(faces, ahead, f)
         gap1 = dot(m, minus(at(ahead, s), at(ahead, i)))
@@ -226,18 +230,18 @@ def node_face(out, depth, base, pairs, slots, faces, step, end, first, stop):  #
                 rate = max(distance(a, b), distance(a, c))
             speed[p], turned[p] = rate, bends
             until[p] = slack - strayed[s] - left[f] + rate * end if slack > _WORTH * size[f] else np.nan
-        if not gap1 <= NEAR * size[f]:  # condition 2, listed above
+        if not gap1 <= NEAR * size[f]:  # condition 2: the gap at the end of the step
             if step.beyond > 0.0:
                 most = max(most, _coming(step, normals, faces, s, f, m, gap1))
             continue
         every, some = facing(normals, s, m)
-        if not (every if part[s] == part[i] else some) <= 0.0:  # condition 3, listed above
+        if not (every if part[s] == part[i] else some) <= 0.0:  # condition 3: compatible normals
             continue
         gap0, now = height(at(x, s), at(x, i), at(x, j), at(x, k))
-        if not (every <= 0.0 or gap0 >= -NEAR * size[f]):  # condition 4, listed above
+        if not (every <= 0.0 or gap0 >= -NEAR * size[f]):  # condition 4: s passes from outside
             continue
         passes, b = _passes(x, ahead, corners, s, f, now, gap0, gap1, reach * size[f])
-        if not passes:  # condition 5, listed above
+        if not passes:  # condition 5: foot and depth
             continue
         leaves, until_end = np.inf if other[s] else strayed[s], end + step.dt
         sides = minus(at(x, j), at(x, i)), minus(at(x, k), at(x, i))
@@ -246,12 +250,12 @@ def node_face(out, depth, base, pairs, slots, faces, step, end, first, stop):  #
             continue
         depth[n] = 0.0
         if gap0 < -TOUCHING * size[f]:
-            if outside(pairs, chains, faces, x, part, p, -gap0, leaves, until_end):  # condition 7, listed above
+            if outside(pairs, chains, faces, x, part, p, -gap0, leaves, until_end):  # condition 7: nearer elsewhere
                 continue
             depth[n] = -gap0
         nodes[n, 0], nodes[n, 1], nodes[n, 2], nodes[n, 3] = s, i, j, k
         weights[n, 0], weights[n, 1], weights[n, 2], weights[n, 3] = 1.0, -b[0], -b[1], -b[2]
-        rate = 0.0  # m . sum(w_k v_k)
+        rate = 0.0  # normal velocity m . sum(w_k v_k)
         for a in range(3):
             out_normals[n, a] = m[a]
             rate += m[a] * (v[s, a] - (b[0] * v[i, a] + b[1] * v[j, a] + b[2] * v[k, a]))
@@ -263,9 +267,9 @@ def node_face(out, depth, base, pairs, slots, faces, step, end, first, stop):  #
 
 @njit(_I(_N1, CONTACT_ROWS, types.float64[::1], PAIRS, FACES, _N1, _N1), cache=True)
 def nearest(found, out, depth, pairs, faces, part, holder):  # type: ignore[no-untyped-def]
-    """Removes contacts from ``found``, rows of ``out``: a node that is behind several faces of a part keeps only its
-    contact with the nearest face; of two faces at the same depth, with the face of lower id. Returns their number;
-    ``holder`` (slots,): working array, -1 before and after.
+    """Removes contacts from ``found``, which has numbers of rows of ``out``. A node that is behind several faces of a
+    part keeps only its contact with the nearest face; of two faces at the same depth, with the face of lower id.
+    Returns the number of remaining contacts. ``holder`` (slots,): working array, -1 before and after the call.
     """
     earlier, m = np.empty(len(found), np.int32), 0
     for q in range(len(found)):

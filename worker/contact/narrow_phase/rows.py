@@ -1,4 +1,6 @@
-"""Rows of the active contacts of a step: the ranges in which passes write them, and the numbers of the active ones."""
+"""Rows of the active contacts of a step. The module has the ranges in which passes write the rows, and the list of the
+active rows.
+"""
 
 from dataclasses import dataclass, field
 from itertools import accumulate
@@ -10,27 +12,27 @@ from ...model.state import Floats, Indices
 from .tables import ContactRows
 
 _SPARE = 4
-"""Needed rows per spare row. Rows are reserved for all candidate pairs, twenty times as many as become active: more
-spare rows take memory, fewer are allocated again more often."""
+"""Number of needed rows for each spare row. Rows are reserved for all candidate pairs, which are twenty times as many
+as active contacts. More spare rows take memory; fewer spare rows require new allocations more often."""
 
 
 @dataclass
 class ActiveRows:
-    """Rows of active contacts. Every kind of contact has a range of the ``room`` allocated rows, and every task has a
-    part of that range. Rows are not moved; the first ``n`` entries of ``found`` are the numbers of the rows with active
+    """Rows of active contacts. Every kind of contact has a range of the allocated rows, and every task has a part of
+    this range. Rows are not moved. The first ``n`` elements of ``found`` are the numbers of the rows with active
     contacts.
     """
 
     room: ContactRows = field(default_factory=lambda: ContactRows.room(0))
     found: Indices = field(default_factory=lambda: np.zeros(0, np.int32))
     depth: Floats = field(default_factory=lambda: np.zeros(0))
-    """(room,) depth of a node behind a face, m; see node_face."""
+    """(rows,) depth of a node behind a face, m; see node_face."""
     n: int = 0
     _ends: list[int] = field(default_factory=lambda: [0], init=False)
     _holder: Indices = field(default_factory=lambda: np.zeros(0, np.int32), init=False)
 
     def begin(self, *many: int) -> None:
-        """Begins a step without contacts; reserves ``many`` rows for each kind."""
+        """Begins a step without contacts. Reserves ``many`` rows for each kind of contact."""
         self._ends, self.n = [0, *accumulate(many)], 0
         self._reserve(self._ends[-1])
 
@@ -44,15 +46,15 @@ class ActiveRows:
         return np.asarray(self.room.nodes[self.found[: self.n]])
 
     def holder(self, slots: int) -> Indices:
-        """Working array of a number for each slot, all -1, at least ``slots`` long. Each function that uses the array
-        must reset it to -1.
+        """Returns a working array with at least ``slots`` elements, all -1. Each function that uses the array must
+        reset it to -1.
         """
         if len(self._holder) < slots:
             self._holder = np.full(slots + slots // _SPARE, -1, np.int32)
         return self._holder
 
     def _reserve(self, most: int) -> None:
-        """Allocates at least ``most`` rows; copies only rows with active contacts."""
+        """Allocates at least ``most`` rows. Only the rows with active contacts are copied."""
         if most > len(self.found):
             found, room, depth, many = self.found[: self.n], self.room, self.depth, most + most // _SPARE
             self.room, self.depth, self.found = ContactRows.room(many), np.empty(many), np.empty(many, np.int32)
@@ -64,8 +66,8 @@ class ActiveRows:
 
 @njit("int64(int32[::1], int64, int64, int64, int64[::1], int64)", cache=True)
 def collected(found, n, base, size, counts, tasks):  # type: ignore[no-untyped-def]
-    """Writes the row numbers of ``tasks`` into ``found`` from ``n`` on: of task k, ``counts[k]`` rows from ``base``
-    plus k times ``size`` on. Returns the new length.
+    """Writes the row numbers of ``tasks`` into ``found`` from ``n`` on. Task k has ``counts[k]`` rows, from ``base``
+    plus k times ``size`` on. Returns the new length of ``found``.
     """
     for k in range(tasks):
         for row in range(base + k * size, base + k * size + counts[k]):
@@ -76,8 +78,8 @@ def collected(found, n, base, size, counts, tasks):  # type: ignore[no-untyped-d
 
 @njit("int64(int32[::1], int64, int64[::1], int64[::1])", cache=True)
 def gathered(found, n, begins, counts):  # type: ignore[no-untyped-def]
-    """Writes the row numbers of tasks, ``counts`` from each of ``begins`` on, into ``found`` from ``n`` on; returns the
-    new length.
+    """Writes the row numbers of tasks into ``found`` from ``n`` on. Task k has ``counts[k]`` rows, from ``begins[k]``
+    on. Returns the new length of ``found``.
     """
     for k in range(len(counts)):
         for row in range(begins[k], begins[k] + counts[k]):

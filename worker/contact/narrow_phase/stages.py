@@ -1,6 +1,7 @@
-"""Stages of the narrow phase: kernels over slots, faces, edges, cracks, pairs and contacts; tables: layout.py.
+"""Stages of the narrow phase: kernels over slots, faces, edges, cracks, pairs and contacts. Their tables are in
+layout.py.
 
-Each task writes its rows from its own offset on, and the number of its rows into its place of the sums. The kernels
+Each task writes its rows from its own offset on, and writes the number of its rows to its element of the sums. Kernels
 without a range are run by one thread.
 """
 
@@ -51,27 +52,28 @@ from .rows import collected
 from .tables import CONTACT_ROWS, STEP
 
 PAIRS_OF_A_TASK = 1024
-"""Number of candidate pairs in a task. Chosen value: a task takes about 20 us; to start a parallel region takes 2
-us."""
+"""Number of candidate pairs in a task. Chosen value: a task takes about 20 us, compared with 2 us to start a parallel
+region."""
 CRACKS_OF_A_TASK, FAMILIES_OF_A_TASK, CONTACTS_OF_A_TASK, SLOTS_OF_A_TASK, SIDES_OF_A_TASK = 512, 128, 1024, 2048, 8192
-"""Numbers of cracks, families, contacts, slots, and of faces or edges in a task. Chosen values, by the same comparison
-as PAIRS_OF_A_TASK."""
+"""Numbers of cracks, of families, of contacts, of slots, and of faces or edges in a task. Chosen values: a task takes
+about 20 us, compared with 2 us to start a parallel region."""
 TAKE, AHEAD, SPREAD, LEAVE, LARGEST_FACES, LARGEST_EDGES, CHECK, ACROSS, DUE, NODE_FACE, NEAREST, APPROACH = range(12)
 EDGE_EDGE, COLLECT, RETARGET, CORNERS_FROM = range(12, 16)
-"""Numbers of the stages, in their order; the last is the first of the stages over corners, one for each block."""
+"""Numbers of the stages, in the order of execution. The last number is that of the first of the stages over corners;
+each block has one such stage."""
 AT_CORNERS = CONTACT_ROWS, types.int64, types.int64, NARROW, CORNERS, STEP, types.int64[::1]
 _at_corners = reader(*AT_CORNERS)
 
 
 @njit("int64(int64, int64)", cache=True)
 def tasks_of(n, size):  # type: ignore[no-untyped-def]
-    """Number of the tasks of length ``size`` of a range to ``n``."""
+    """Number of tasks of length ``size`` in a range from 0 to ``n``."""
     return (n + size - 1) // size
 
 
 @njit(TASK, cache=True)
 def take(table, first, stop, thread):  # type: ignore[no-untyped-def]
-    """Copies positions and velocities of the nodes of this rank to their slots."""
+    """Task: copies positions and velocities of the nodes of this rank to their slots."""
     slots, local, node_x, node_v = own_of(table)
     x, v, _, _, _ = places_of(table)
     slot_numbers.take(x, v, slots, node_x, node_v, local, first, stop)
@@ -79,7 +81,7 @@ def take(table, first, stop, thread):  # type: ignore[no-untyped-def]
 
 @njit(TASK, cache=True)
 def ahead(table, first, stop, thread):  # type: ignore[no-untyped-def]
-    """``tables.place`` and ``closing_speed.bound``."""
+    """Task: runs ``tables.place`` and ``closing_speed.bound``."""
     x, v, places, _, boxes = places_of(table)
     tables.place(places, x, v, numbers_of(table)[1][DT], first, stop)
     closing_speed.bound(boxes, first // SLOTS_OF_A_TASK, v, first, stop)
@@ -87,9 +89,9 @@ def ahead(table, first, stop, thread):  # type: ignore[no-untyped-def]
 
 @njit(TASK, cache=True)
 def spread(table, first, stop, thread):  # type: ignore[no-untyped-def]
-    """Sets the time beyond the step for which closing pairs are detected: the largest length of the next step if
-    velocities that differ by as much as those of the slots may close in it a distance of FAST_SIZE, else 0. Slower
-    pairs cannot limit a step, so ranks that have only slow nodes need no data of other ranks.
+    """Sets the time after the step for which closing pairs are detected. If two slots may approach by FAST_SIZE in the
+    longest next step, as their velocities differ, it is the length of this step, else 0. Slower pairs cannot limit a
+    step, so ranks that have only slow nodes need no data of other ranks.
     """
     (counts, reals, _), boxes = numbers_of(table), places_of(table)[4]
     fastest = closing_speed.spread(boxes, tasks_of(counts[SLOTS_N], SLOTS_OF_A_TASK))
@@ -98,7 +100,7 @@ def spread(table, first, stop, thread):  # type: ignore[no-untyped-def]
 
 @njit(TASK, cache=True)
 def leave(table, first, stop, thread):  # type: ignore[no-untyped-def]
-    """Distances of slots from their lines (reference_motion.py)."""
+    """Task: computes the distances of slots from their lines (reference_motion.py)."""
     x, v, _, _, _ = places_of(table)
     left, line, course, near, short, mean, tracked, strayed = lines_of(table)
     _, reals, _ = numbers_of(table)
@@ -110,21 +112,21 @@ def leave(table, first, stop, thread):  # type: ignore[no-untyped-def]
 
 @njit(TASK, cache=True)
 def largest_faces(table, first, stop, thread):  # type: ignore[no-untyped-def]
-    """``reference_motion.largest`` of faces."""
+    """Task: runs ``reference_motion.largest`` for faces."""
     left, corners, _, _ = sides_of(table)
     reference_motion.largest(left, corners, 3, lines_of(table)[3], first, stop)
 
 
 @njit(TASK, cache=True)
 def largest_edges(table, first, stop, thread):  # type: ignore[no-untyped-def]
-    """``reference_motion.largest`` of edges."""
+    """Task: runs ``reference_motion.largest`` for edges."""
     _, _, left, corners = sides_of(table)
     reference_motion.largest(left, corners, 2, lines_of(table)[3], first, stop)
 
 
 @njit(TASK, cache=True)
 def check(table, first, stop, thread):  # type: ignore[no-untyped-def]
-    """Sets the largest distance of a slot from its search line."""
+    """Sets the largest distance of a slot from its search line to the maximum over the tasks."""
     (counts, reals, _), strayed = numbers_of(table), lines_of(table)[7]
     reals[STRAYED] = 0.0
     for k in range(tasks_of(counts[SLOTS_N], SLOTS_OF_A_TASK)):
@@ -133,7 +135,7 @@ def check(table, first, stop, thread):  # type: ignore[no-untyped-def]
 
 @njit(TASK, cache=True)
 def across(table, first, stop, thread):  # type: ignore[no-untyped-def]
-    """``crack_contact.across``."""
+    """Task: runs ``crack_contact.across``."""
     (counts, reals, _), (cracks, opening), k = numbers_of(table), cracks_of(table), first // CRACKS_OF_A_TASK
     _, _, _, _, _, _, found, wide = sums_of(table)
     found[k], wide[k] = crack_contact.across(
@@ -143,7 +145,7 @@ def across(table, first, stop, thread):  # type: ignore[no-untyped-def]
 
 @njit(TASK, cache=True)
 def due(table, first, stop, thread):  # type: ignore[no-untyped-def]
-    """``node_face.due``."""
+    """Task: runs ``node_face.due``."""
     (pairs, slots, faces), (_, reals, _) = face_pairs_of(table), numbers_of(table)
     many = sums_of(table)[0]
     end = reals[END] + reals[BEYOND]
@@ -152,7 +154,7 @@ def due(table, first, stop, thread):  # type: ignore[no-untyped-def]
 
 @njit(TASK, cache=True)
 def on_faces(table, first, stop, thread):  # type: ignore[no-untyped-def]
-    """``node_face.node_face`` of the pairs to be tested."""
+    """Task: runs ``node_face.node_face`` for the pairs to be tested."""
     (out, _, depth, _), (pairs, slots, faces), (step,) = rows_of(table), face_pairs_of(table), now_of(table)
     (counts, reals, _), (many, found, coming, _, _, _, _, _) = numbers_of(table), sums_of(table)
     k = first // PAIRS_OF_A_TASK
@@ -163,7 +165,7 @@ def on_faces(table, first, stop, thread):  # type: ignore[no-untyped-def]
 
 @njit(TASK, cache=True)
 def nearest(table, first, stop, thread):  # type: ignore[no-untyped-def]
-    """Lists the contacts of nodes with faces; ``node_face.nearest``."""
+    """Lists the contacts of nodes with faces, and runs ``node_face.nearest``."""
     (out, found, depth, holder), (pairs, _, faces) = rows_of(table), face_pairs_of(table)
     (counts, reals, _), (_, many, coming, _, _, _, _, _) = numbers_of(table), sums_of(table)
     tasks = tasks_of(counts[FACE_PAIRS_N], PAIRS_OF_A_TASK)
@@ -177,7 +179,7 @@ def nearest(table, first, stop, thread):  # type: ignore[no-untyped-def]
 
 @njit(TASK, cache=True)
 def approach(table, first, stop, thread):  # type: ignore[no-untyped-def]
-    """``closing_speed.approach``."""
+    """Task: runs ``closing_speed.approach``."""
     (out, found, _, _), (pairs, _, faces) = rows_of(table), face_pairs_of(table)
     most, begin = sums_of(table)[3], numbers_of(table)[0][FIRST]
     most[first // CONTACTS_OF_A_TASK] = closing_speed.approach(
@@ -187,7 +189,7 @@ def approach(table, first, stop, thread):  # type: ignore[no-untyped-def]
 
 @njit(TASK, cache=True)
 def on_edges(table, first, stop, thread):  # type: ignore[no-untyped-def]
-    """``edge_edge.edge_edge``."""
+    """Task: runs ``edge_edge.edge_edge``."""
     (out, _, _, _), (pairs, edges, course), (step,) = rows_of(table), edge_pairs_of(table), now_of(table)
     (counts, reals, _), (_, _, _, _, tested, found, _, _) = numbers_of(table), sums_of(table)
     k = first // PAIRS_OF_A_TASK
@@ -198,7 +200,9 @@ def on_edges(table, first, stop, thread):  # type: ignore[no-untyped-def]
 
 @njit(TASK, cache=True)
 def collect(table, first, stop, thread):  # type: ignore[no-untyped-def]
-    """Lists the other contacts, and sums up over the tasks: the limit of the next step, and the cracks that open."""
+    """Lists all other contacts. Combines the results of the tasks: the limit of the next step, and the cracks that
+    open.
+    """
     (_, found, _, _), (counts, reals, _) = rows_of(table), numbers_of(table)
     _, _, _, most, _, on_edge, on_crack, wide = sums_of(table)
     for k in range(tasks_of(counts[ON_FACES], CONTACTS_OF_A_TASK)):
@@ -214,7 +218,7 @@ def collect(table, first, stop, thread):  # type: ignore[no-untyped-def]
 
 @njit(TASK, cache=True)
 def retarget(table, first, stop, thread):  # type: ignore[no-untyped-def]
-    """``restitution.rebound`` and ``restitution.hold_back``."""
+    """Task: runs ``restitution.rebound`` and ``restitution.hold_back``."""
     (out, found, _, _), (_, v, _, before, _), (counts, reals, _) = rows_of(table), places_of(table), numbers_of(table)
     if counts[RETARGETS] & 1:
         restitution.rebound(out, found, v, before, reals[SHARE], first, stop)
@@ -224,6 +228,6 @@ def retarget(table, first, stop, thread):  # type: ignore[no-untyped-def]
 
 @njit(TASK, cache=True)
 def at_corners(table, first, stop, thread):  # type: ignore[no-untyped-def]
-    """``corner_contact.entering``."""
+    """Task: runs ``corner_contact.entering``."""
     out, base, each, narrow, of, step, counts = _at_corners(table)
     counts[first // FAMILIES_OF_A_TASK] = corner_contact.entering(out, base, each, narrow, of, step, first, stop)

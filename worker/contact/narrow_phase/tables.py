@@ -1,5 +1,5 @@
-"""Records of the narrow phase: its input, and its output, one row for each active contact, of four nodes, their weights
-and a normal.
+"""Records of the narrow phase: its input and its output. The output has one row for each active contact: four nodes,
+their weights and a normal.
 
 The gap is the gap at the end of a step without contact, positive outside. The gap is linear in the velocities: gap = dt
 n . sum(w_k v_k) plus a constant, with the weights w of ``weights``: 1 for the node and minus the area coordinates of
@@ -18,24 +18,25 @@ from ..geometry import at, cross, dot, minus
 from .tied import NOTHING
 
 NEAR = 0.02
-"""Largest gap at the end of the step at which a contact is active, as a share of the size of a face."""
+"""Largest gap at the end of the step at which a contact is active, as a fraction of the size of a face."""
 DEEP = 0.25
-"""Largest depth of a penetration, as a share of the size of a face, or of the length of an edge and the height of
-its tets. A node or edge that is deeper is on the other side of a thin body."""
+"""Largest depth of a penetration, as a fraction of the size of a face, or of the length of an edge and the height of
+its tets. A node or edge that is deeper counts as being on the other side of a thin body."""
 DEEP_SELF = 0.05
-"""Largest depth of a penetration, as a share of the size of a face, for a node and a face of the same part, because
-all nodes of a part lie behind its own faces. This share is also the smallest value used for the largest depth of a
-contact of edges, for tets of any height."""
+"""Largest depth of a penetration, as a fraction of the size of a face, for a node and a face of the same part, because
+all nodes of a part lie behind its own faces. For edges this fraction is also the smallest value of the largest depth of
+a contact, for tets of any height."""
 FAST = 0.1
-"""Pairs whose distance decreases in a step by less than this share of the typical size of a face limit the time step
-only when they are active. The altitude of a tet of the typical size is several times this distance."""
+"""Fraction of the typical size of a face. A pair whose distance decreases by less in a step limits the time step only
+if it is active. The altitude of a tet of the typical size is several times this distance."""
 PUSH_OUT = 0.1
-"""Largest share of a penetration that is corrected in a step, and largest share of the closing speed that is returned
-for the correction. The two fractions are 0 while contact has no energy to return (``account.Account``)."""
+"""Largest fraction of a penetration that is corrected in a step, and largest fraction of the closing speed that is
+returned for the correction. The two fractions are 0 while contact has no energy to return (``account.Account``)."""
 CRACK = -2
-"""First number of pairs of nodes across a crack; these pairs have negative numbers from here downwards."""
+"""Number of the first pair of nodes across a crack. The numbers of further pairs of nodes across cracks decrease from
+this negative number."""
 _FEWEST = 2
-"""Smallest number of rows of a table of cache lines; a slice of a single row would be contiguous, which is a
+"""Smallest number of rows of a table of cache lines. A table with a single row would be contiguous, which is a
 different type in numba."""
 
 
@@ -46,18 +47,18 @@ class ContactRows(NamedTuple):
     """Arrays of active contacts."""
 
     nodes: Indices
-    """(room, 4) slots of the nodes of each contact."""
+    """(rows, 4) slots of the four nodes of each contact."""
     weights: Floats
-    """(room, 4) weight of each of these slots in the gap of the contact."""
+    """(rows, 4) weight of each of the four slots in the gap of the contact."""
     normals: Floats
-    """(room, 3) unit normals, outward from the face or from the body of the first edge."""
+    """(rows, 3) unit normals, outward from the face or from the body of the first edge."""
     wanted: Floats
-    """(room,) target: n . sum(w_k v_k) must not be below it, m/s."""
+    """(rows,) target, m/s: n . sum(w_k v_k) must not be below this value."""
     friction: Floats
-    """(room,) coefficient of Coulomb friction."""
+    """(rows,) coefficient of Coulomb friction."""
     pair: Indices
-    """(room,) row of the candidate pair of node and face; CRACK - (3 c + k) for the pair of nodes k across crack c;
-    -1 for others."""
+    """(rows,) row of the candidate pair of a node and a face; CRACK - (3 c + k) for the pair of nodes k across crack c;
+    -1 for all other contacts."""
 
     @classmethod
     def room(cls, n: int) -> "ContactRows":
@@ -67,8 +68,8 @@ class ContactRows(NamedTuple):
 
 
 class StepRoom(Scratch):
-    """Working arrays of a step. The arrays are reused for many steps, because the operating system must clear new pages
-    of memory. Tables of arguments stay valid while the number of slots does not change.
+    """Working arrays of a step. They are reused for many steps, because the operating system must clear new pages of
+    memory. Tables of arguments stay valid while the number of slots does not change.
     """
 
     def __init__(self) -> None:
@@ -76,8 +77,8 @@ class StepRoom(Scratch):
         self._room = self._places = cache_lines(0)
 
     def lines(self, slots: int) -> tuple[Floats, Floats, Floats]:
-        """Cache lines of the slots, and views of these for the positions at the beginning and at the end of the
-        step.
+        """Returns the cache lines of the slots, and views of them for the positions at the beginning and at the end of
+        the step.
         """
         n = max(slots, _FEWEST)
         if n != len(self._places):
@@ -88,7 +89,7 @@ class StepRoom(Scratch):
         return self._places, *self._halves
 
     def least(self, slots: int) -> Floats:
-        """(slots,) filled with infinity: see Step.least."""
+        """Returns an array (slots,) filled with infinity, for Step.least."""
         least: Floats = self.of("least", slots, np.float64)
         least.fill(np.inf)
         return least
@@ -98,36 +99,36 @@ class Step(NamedTuple):
     """State of the slots (contact nodes) in the present step."""
 
     x: Floats
-    """(slots, 3) positions at its beginning, m; in one cache line with ``ahead``."""
+    """(slots, 3) positions at the beginning of the step, m. They are in one cache line with ``ahead``."""
     v: Floats
     """(slots, 3) velocities without contact, m/s."""
     ahead: Floats
-    """(slots, 3) positions at its end without contact, m."""
+    """(slots, 3) positions at the end of the step without contact, m."""
     part: Indices
     """(slots,) part of each slot."""
     mu: Floats
-    """(parts, parts) Coulomb's coefficient, NaN where two parts may not be in contact."""
+    """(parts, parts) Coulomb's coefficient; NaN if two parts cannot be in contact."""
     give: float
-    """Share of a penetration that is corrected in the step (PUSH_OUT)."""
+    """Fraction of a penetration that is corrected in the step (PUSH_OUT)."""
     dt: float
-    """s."""
+    """Length of the step, s."""
     beyond: float
     """Largest length of the next step, s, for which closing pairs are detected; 0 if no pair is fast enough."""
     fast: float
-    """Distance, m; pairs whose distance decreases by less in the next step are ignored."""
+    """Distance, m. Pairs whose distance decreases by less than this in the next step are ignored."""
     rebound: float
-    """Largest velocity change by contact over the closing speed: 1 + restitution."""
+    """Largest ratio of the velocity change by contact to the closing speed: 1 + restitution."""
     least: Floats
-    """(slots,) square of the least altitude of a node in the tets of its exposed faces, m^2; (0,) without
-    ``beyond``.
+    """(slots,) square of the least altitude of a node in the tets of its exposed faces, m^2; (0,) if ``beyond`` is
+    0.
     """
     tied: Ints
-    """(slots,) bonds of each slot, as bits: nodes with a common bond are not in contact; (0,) without bonds
-    (tied.py)."""
+    """(slots,) bonds of each slot, as bits. Nodes with a common bond are not in contact. The array is (0,) if there are
+    no bonds (tied.py)."""
 
     @classmethod
     def of(cls, x: Floats, v: Floats, part: Indices, mu: Floats, give: float, dt: float) -> "Step":
-        """Returns the record of a step ``dt`` from ``x`` on."""
+        """Returns the record of a step of length ``dt`` that begins at the positions ``x``."""
         places, begin, end = StepRoom().lines(len(x))
         place(places, x, v, dt, 0, len(x))
         return cls.between(begin, end, v, part, mu, give, dt)
@@ -136,11 +137,13 @@ class Step(NamedTuple):
     def between(
         cls, begin: Floats, end: Floats, v: Floats, part: Indices, mu: Floats, give: float, dt: float
     ) -> "Step":  # fmt: skip
-        """Returns the record of a step ``dt`` from the positions ``begin`` to ``end`` (StepRoom.lines)."""
+        """Returns the record of a step of length ``dt`` from the positions ``begin`` to the positions ``end``
+        (StepRoom.lines).
+        """
         return cls(begin, v, end, part, mu, give, dt, 0.0, 0.0, 1.0, _NONE, NOTHING)
 
     def followed(self, beyond: float, fast: float, rebound: float, faces: "FaceTable", room: StepRoom) -> "Step":
-        """Returns the record with a step of up to ``beyond`` that may follow."""
+        """Returns the record extended by data of the next step, whose length is at most ``beyond``."""
         least = _NONE
         if beyond > 0.0:
             least = room.least(len(self.x))
@@ -149,71 +152,73 @@ class Step(NamedTuple):
 
 
 class Pairs(NamedTuple):
-    """Candidate pairs of one kind, and the bounds until which each is deactivated (pairs.py)."""
+    """Candidate pairs of one kind, and the bounds up to which each pair is deactivated (pairs.py)."""
 
     rows: Indices
-    """(p, 2) slot of a node and face, or two edges."""
+    """(p, 2) slot of the node and row of the face, or rows of the two edges."""
     until: Floats
-    """(p,) bound, m; minus infinity if unknown, NaN for a pair that is too close to be deactivated."""
+    """(p,) bound of each pair, m; minus infinity if it is unknown, NaN for a pair that is too close to be
+    deactivated."""
     speed: Floats
-    """(p,) relative speed of the reference motions, m/s; NaN if unknown."""
+    """(p,) relative speed of the reference motions of each pair, m/s; NaN if it is unknown."""
     turned: Flags
-    """(p,) whether a pair is deactivated because its node does not face the face, by the mean normals of the node."""
+    """(p,) whether each pair is deactivated because its node does not face the face, by the mean normals of the
+    node."""
     next: Indices
-    """(p,) next node-face pair of the same node, -1 for none; (0,) for edges."""
+    """(p,) next node-face pair of the same node, -1 for none; (0,) for pairs of edges."""
     active: Indices
     """(p,) working array: numbers of the tested pairs."""
 
 
 class SlotTable(NamedTuple):
-    """Slots (nodes of the scene) with the data for node-face contact."""
+    """Slots (contact nodes of the scene) with the data for node-face contact."""
 
     normals: Floats
-    """(slots, 12) means over a node's faces of their normal n, of n n (xx, yy, zz, yz, zx, xy) and of the unit
-    vector to the midpoint of the opposite edge; zero without faces."""
+    """(slots, 12) means over the faces of each node: of their normal n, of n n (xx, yy, zz, yz, zx, xy), and of the
+    unit vector to the midpoint of the opposite edge. Zero for a node without faces."""
     on_surface: Flags
-    """(slots,) True for nodes on the surface; only these are in contact with faces."""
+    """(slots,) whether each node is on the surface. Only nodes on the surface are in contact with faces."""
     first: Indices
-    """(slots,) first pair with a face, -1 for none."""
+    """(slots,) first pair of each slot with a face, -1 for none."""
     left: Floats
     """(slots,) distance of each slot from its reference motion, m."""
     course: Floats
     """(slots, 3) velocities of the reference motions, m/s."""
     fresh: Flags
-    """(slots,) True if the mean normals of the slot have changed."""
+    """(slots,) whether the mean normals of each slot have changed."""
 
 
 class FaceTable(NamedTuple):
     """Faces of the scene."""
 
     corners: Indices
-    """(f, 4) slots, counter-clockwise seen from outside, the opposite node last."""
+    """(f, 4) slots of each face, counter-clockwise seen from outside; the node opposite to the face is last."""
     size: Floats
     """(f,) square root of twice the initial area, m."""
     id: Ints
     exposed: Flags
-    """(f,) True for exposed faces; only these have contacts."""
+    """(f,) whether each face is exposed. Only exposed faces have contacts."""
     left: Floats
     """(f,) largest distance of a corner from its reference motion, m."""
     fresh: Flags
-    """(f,) faces with new corners, or exposed since the last step."""
+    """(f,) whether each face has new corners or was exposed after the last step."""
 
 
 class EdgeTable(NamedTuple):
-    """Edges of the scene; only sharp edges have candidate pairs."""
+    """Edges of the scene. Only sharp edges have candidate pairs."""
 
     corners: Indices
-    """(e, 6) slots: records.Edges."""
+    """(e, 6) slots of each edge; see records.Edges."""
     size: Floats
     """(e,) initial length of each edge, m."""
     deep: Floats
-    """(e,) greatest depth of a contact, m: records.Edges."""
+    """(e,) greatest depth of a contact of each edge, m; see records.Edges."""
     meets: Flags
-    """(e,) whether the states of both faces admit edge-edge contact: records.Edges."""
+    """(e,) whether the states of the two faces of each edge admit edge-edge contact; see records.Edges."""
     left: Floats
-    """(e,) larger distance of an end from its reference motion, m."""
+    """(e,) larger distance of the two ends of each edge from their reference motions, m."""
     fresh: Flags
-    """(e,) edges with new corners, or a face exposed since the last step."""
+    """(e,) whether each edge has new corners, or a face that was exposed after the last step."""
 
 
 _N1, _N2, _I1, _B1, _B2 = (
@@ -230,9 +235,9 @@ EDGES = record(EdgeTable, _N2, _F1, _F1, _B1, _F1, _B1)
 
 @njit("float64(float64, float64, float64, float64, float64)", cache=True, error_model="numpy")
 def needed(gap0, gap1, speed, give, dt):  # type: ignore[no-untyped-def]
-    """Returns the smallest change of the normal speed, m/s, with which the node does not pass the face, or, if it is
-    behind the face already, does not move deeper: (min(gap0, 0) - gap1) / dt, plus the correction of a share ``give``
-    of the penetration (PUSH_OUT).
+    """Returns the smallest change of the normal speed, m/s, with which the node does not pass the face. If the node is
+    already behind the face, the change prevents it from moving deeper. The change is (min(gap0, 0) - gap1) / dt, plus
+    the correction of a fraction ``give`` of the penetration (PUSH_OUT).
     """
     back = give * min(max(-gap0, 0.0) / dt, max(-speed, 0.0))
     return (min(gap0, 0.0) - gap1) / dt + back
@@ -240,14 +245,14 @@ def needed(gap0, gap1, speed, give, dt):  # type: ignore[no-untyped-def]
 
 @njit(types.boolean(STEP, _I, _I, _I, _I), cache=True)
 def bonded(step, a, b, c, d):  # type: ignore[no-untyped-def]
-    """Returns True if one bond ties all four slots, which belong to two parts."""
+    """Returns True if one bond ties all four slots. The slots belong to two parts."""
     tied, part = step.tied, step.part
     return tied[a] & tied[b] & tied[c] & tied[d] != 0 and not part[a] == part[b] == part[c] == part[d]
 
 
 @njit("void(float64[:, ::1], float64[:, ::1], float64[:, ::1], float64, int64, int64)", cache=True)
 def place(places, x, v, dt, first, stop):  # type: ignore[no-untyped-def]
-    """Writes the positions now and after ``dt`` of the slots from ``first`` to ``stop``, side by side."""
+    """Writes the positions of the slots from ``first`` to ``stop``, now and after ``dt``, side by side."""
     for a in range(first, stop):
         for i in range(3):
             places[a, i], places[a, 3 + i] = x[a, i], x[a, i] + dt * v[a, i]
@@ -263,7 +268,7 @@ def altitude(x, a, i, j, k):  # type: ignore[no-untyped-def]
 
 @njit("void(float64[::1], float64[:, :], int32[:, ::1], boolean[::1])", cache=True)
 def least_altitudes(least, x, corners, exposed):  # type: ignore[no-untyped-def]
-    """Updates Step.least from all exposed faces."""
+    """Lowers Step.least to the altitudes at all exposed faces."""
     for f in range(len(corners)):
         if exposed[f]:
             a, b, c, d = corners[f, 0], corners[f, 1], corners[f, 2], corners[f, 3]

@@ -1,4 +1,4 @@
-"""Bonds of the slots (worker/bonds): pairs whose nodes are all tied by one bond have no contact."""
+"""Tied bonds of the slots (worker/bonds). A pair whose nodes are all tied by one bond has no contact."""
 
 from typing import Protocol
 
@@ -12,7 +12,7 @@ NOTHING: Ints = np.zeros(0, np.int64)
 
 
 class Ties(Protocol):
-    """Interface of the bonds."""
+    """Interface of the tied bonds."""
 
     version: int
 
@@ -21,13 +21,13 @@ class Ties(Protocol):
 
 
 class Tied:
-    """Bonds of the slots of a scene, updated when the bonds or the slots change."""
+    """Tied bonds of the slots of a scene. They are updated when the bonds or the slots change."""
 
     def __init__(self, bonds: Ties) -> None:
         self._bonds, self._ids, self._version, self._found = bonds, NOTHING, -1, NOTHING
 
     def bits(self, surface_nodes: SurfaceNodes) -> Ints:
-        """(slots,) bonds of each slot: see Ties.bits."""
+        """(slots,) bonds of each slot, as bits; see Ties.bits."""
         if self._ids is not surface_nodes.id or self._version != self._bonds.version:
             self._ids, self._version = surface_nodes.id, self._bonds.version
             self._found = self._bonds.bits(surface_nodes.id)
