@@ -1,9 +1,9 @@
-"""Contact in the time step: searches candidate pairs if scheduled, detects active contacts, applies impulses and books
-the work of the impulses.
+"""Contact in the time step. The stage searches candidate pairs if a search is scheduled, detects active contacts,
+applies impulses and computes the work of the impulses.
 
-Every contact is computed by one rank: the owner of its node, or the rank of its first edge. Ghosts of other ranks'
-surfaces provide the data. Impulses on a node are summed over all ranks that hold the node or compute a contact of the
-node, so that all copies get the same velocity, to the bit.
+Every contact is computed by one rank: the owner of its node, or the rank of its first edge. This rank has ghosts of the
+surfaces of other ranks. Impulses on a node are summed over all ranks that have the node or compute a contact of the
+node. Therefore the velocities of all copies of the node are bit-identical.
 """
 
 from dataclasses import dataclass
@@ -45,11 +45,11 @@ _FORESIGHT = 32
 
 @dataclass(frozen=True)
 class _Scheme:
-    """Settings of contact, constant over the run."""
+    """Settings of contact that are constant during the run."""
 
     restitution: float
     interval: int
-    """Number of steps between two searches for edges that became sharp."""
+    """Number of steps between two searches for edges that have become sharp."""
     sharp: Floats
     """(parts,) cosine of the smallest angle between the normals of the two faces of a sharp edge."""
 
@@ -68,7 +68,9 @@ class Contact:
         self, case: Case, model: Model, neighbours: list[Neighbour], bounds: list[Boundary],
         comm: Comm, clock: Clock, timers: Timers, team: Team, extremes: tuple[float, float], rigid: Rigid | None = None,
     ) -> None:  # fmt: skip
-        """``extremes``: largest nodal mass, kg, and speed, m/s, of the scene; ``rigid``: the rigid bodies."""
+        """``extremes``: largest nodal mass, kg, and largest speed, m/s, of the scene; ``rigid``: rigid bodies of the
+        case.
+        """
         assert case.contact is not None
         self._fractures, self._comm, self._clock, self._timers = case.fractures, comm, clock, timers
         self.exterior = Exterior(model, neighbours, bounds, case.contact.edges, comm, team)
@@ -82,16 +84,16 @@ class Contact:
         self._scheme, self.sweep_count = _Scheme.of(case), SweepCount(sweeps(case))
         self.detection = Detection(team, registered, lasting=not (case.fractures or case.erodes))
         self.limit = 0.0
-        """Inverse of the step in which no node of any rank passes more than half of a tet with which the node is in
-        contact, 1/s."""
+        """Inverse of the largest step, 1/s, in which no node of any rank passes more than half of a tet with which it
+        is in contact."""
         self.last_push = 0.0
         """Time of the last contact impulse on a node of this rank, s."""
         self._mean_dt = 0.0
-        """Mean time step (duration of the kick) at the last step with a scene, s."""
+        """Mean time step at the last step with a scene, s. The kick of this step took this time."""
 
     def keep(self, parcel: Parcel) -> None:
-        """Adds everything except the candidate pairs, which a search finds again, to the ``parcel`` of a checkpoint or
-        migration message."""
+        """Adds the state of contact to the ``parcel`` of a checkpoint or migration message. Candidate pairs are not
+        added, because a search finds them again."""
         books = self.books
         parcel.known["contact"] = (
             books.scale, books.friction.scale, self.limit, self.searches.many, self._mean_dt, self.exterior.size,
@@ -102,7 +104,7 @@ class Contact:
         self.searches.keep(parcel)
 
     def resume(self, parcel: Parcel) -> None:
-        """Restores the state that ``keep`` has added to a parcel. Collective."""
+        """Restores the state of contact from a parcel. Collective."""
         books = self.books
         (
             books.scale, books.friction.scale, self.limit, self.searches.many, self._mean_dt, size,
@@ -116,7 +118,7 @@ class Contact:
         self.searches.resume(parcel)
 
     def require_faces(self) -> None:
-        """Raises InputError on all ranks when a part that may be in contact has no exposed face."""
+        """Raises InputError on all ranks if a part that may be in contact has no exposed face."""
         self.exterior.require_faces(~np.isnan(self.searches.mu))
 
     @property
@@ -126,34 +128,34 @@ class Contact:
 
     @property
     def on_surface(self) -> Flags:
-        """(nodes,) surface nodes that this rank owns."""
+        """(nodes,) whether each node is a surface node that this rank owns."""
         return self.exterior.owned
 
     def effort(self) -> Floats:
-        """(nodes, 2) cost of contact by node on this rank, in units of 50 ns: see ``effort.effort``."""
+        """(nodes, 2) cost of contact for each node of this rank, in units of 50 ns; see ``effort.effort``."""
         return effort(self.searches.scene, self.on_surface)
 
     def impulses(self) -> Floats:
-        """(parts, 3) impulses of contact on each part so far, N s. Collective."""
+        """(parts, 3) sum of the contact impulses on each part so far, N s. Collective."""
         return self.books.impulses(self._comm)
 
     def uncover(self, gone: Ints, loose: Flags, removed: Flags) -> None:
-        """Updates the surface after erosion of the tets ``gone`` (k, exposure.WORDS) of this rank; ``loose`` (nodes,):
-        nodes without tets that stay in the model; ``removed`` (nodes,): nodes that are removed from the model.
-        Collective.
+        """Updates the surface after erosion. ``gone`` (k, exposure.WORDS): removed tets of this rank; ``loose``
+        (nodes,): nodes without tets that stay in the model; ``removed`` (nodes,): nodes that are removed from the
+        model. Collective.
         """
         with self._timers.phase("contact"):
             self.searches.due |= self.exterior.uncover(gone, loose, removed, self.searches.scene)
 
     def crack(self, faces: Ints, nodes: Indices, sides: Indices) -> None:
-        """Adds broken facets with a side on this rank and the local ``nodes`` (m, 3) of the sides; see ``Cracks``
-        for ``faces`` and ``sides``.
+        """Adds broken facets that have a side on this rank. ``nodes`` (m, 3): local nodes of the sides; ``faces`` and
+        ``sides``: see ``Cracks``.
         """
         self.exterior.cracks.add(faces, nodes, sides)
 
     @property
     def costs(self) -> Ints:
-        """(4,) words of the account of this rank."""
+        """(4,) words of the energy account of this rank."""
         return self.books.account.words.reshape(-1)
 
     def agree(self, all_ranks: StepReduction) -> None:
@@ -173,28 +175,28 @@ class Contact:
 
     @property
     def approach(self) -> float:
-        """Inverse of the step in which no node in contact on this rank passes more than half of a tet, 1/s."""
+        """Inverse of the largest step, 1/s, in which no node in contact on this rank passes more than half of a tet."""
         return self.found.approach
 
     @property
     def stray(self) -> bool:
-        """True if a slot must be registered again, since it will depart too far from its reference motion."""
+        """True if a slot will depart too far from its reference motion, so that it must be registered again."""
         return self.found.stray
 
     @property
     def opening(self) -> bool:
-        """True if a crack became wide enough in the last step to open."""
+        """True if a crack is wide enough to open after the last step."""
         return len(self.found.opening) > 0
 
     def open_cracks(self) -> None:
-        """Adds the sides of cracks that became wide to the surface. Collective."""
+        """Adds the sides of wide cracks to the surface. Collective."""
         with self._timers.phase("contact"):
             received = self._comm.join(self.exterior.widened(self.found.opening))
             self.found.opening = self.found.opening[:0]
             self.searches.due |= self.exterior.open(received, self.searches.scene)
 
     def separate(self, split: Split) -> None:
-        """Updates contact after the separation of nodes; called on all ranks, see topology_updates.py."""
+        """Updates contact after the separation of nodes. All ranks must call the method; see topology_updates.py."""
         self.searches.separate(split, self.exterior.separate(split))
 
     def grow(self, split: Split, ids: Ints) -> None:
@@ -202,7 +204,9 @@ class Contact:
         self.exterior.grow(split)
 
     def note(self, state: Nodes) -> None:
-        """Before the kick: stores v(n-1/2), and books the second half of the work of the last impulses."""
+        """Stores v(n-1/2), and adds the second half of the work of the last impulses. Must be called before the
+        kick.
+        """
         now = self.searches.scene
         self.books.due()
         self.sweep_count.unsettled[:] = 0
@@ -221,11 +225,13 @@ class Contact:
                 self.searches.begin(state)
 
     def spent(self, state: Nodes) -> bool:
-        """Returns True if a surface node will depart in one step more than the last search allows."""
+        """Returns True if a surface node will depart in one step by more than the last search allows."""
         return self.searches.spent(state)
 
     def look_ahead(self, state: Nodes) -> bool:
-        """Bounds the first step by the pairs that approach each other; returns whether there are any. Collective."""
+        """Bounds the first step by the pairs that approach each other. Returns whether there are any such pairs.
+        Collective.
+        """
         if (now := self.searches.scene) is None:
             return False
         with self._timers.phase("contact"):
@@ -236,7 +242,9 @@ class Contact:
         return self.limit > 0.0
 
     def solve(self, state: Nodes, dt: float, t: float) -> None:
-        """After the kick: corrects v(n+1/2) by the impulses of active contacts at time ``t``, s. Collective."""
+        """Corrects v(n+1/2) by the impulses of active contacts at time ``t``, s. Must be called after the kick.
+        Collective.
+        """
         if (now := self.searches.scene) is not None:
             with self._timers.phase("contact"):
                 self._push(now, state, dt, t)
@@ -263,8 +271,9 @@ class Contact:
         shared.free()
 
     def _resume(self, give: float) -> float:
-        """Ratio of this step to the last one: the factor of stored impulses. Without restitution the factor is 0 while
-        contact has no energy to return, ``give`` = 0, because a stored impulse that is too large adds energy.
+        """Ratio of this step to the last step, which is the factor of the stored impulses. Without restitution the
+        factor is 0 while contact has no energy to return (``give`` = 0), because a stored impulse that is too large
+        adds energy.
         """
         mean_dt = self._clock.mean_dt
         ratio = mean_dt / self._mean_dt if self._mean_dt > 0.0 else 0.0
@@ -272,7 +281,7 @@ class Contact:
         return ratio if give > 0.0 or self._scheme.restitution > 0.0 else 0.0
 
     def _meet(self, now: Scene, give: float, dt: float) -> None:
-        """Detects the active contacts of the step; ``give``: share of a penetration that is corrected
+        """Detects the active contacts of the step. ``give``: fraction of a penetration that is corrected
         (tables.PUSH_OUT)."""
         step = self._clock.step
         if step % _FORESIGHT == 0:

@@ -1,3 +1,3 @@
-"""The surface near one rank: the faces, edges and nodes of the rank, ghosts of other ranks, candidate pairs; and
-updates of these between two searches.
+"""The scene: the surface near one rank. It has the faces, edges and nodes of the rank, ghosts of other ranks, and
+candidate pairs. The modules also update a scene between two searches.
 """

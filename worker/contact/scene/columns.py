@@ -1,4 +1,4 @@
-"""Tables of a scene: columns of its slots, faces and edges."""
+"""Tables of a scene: the columns of its slots, faces and edges."""
 
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -15,30 +15,30 @@ from .incidence import Incidence
 
 @dataclass
 class OwnSlots:
-    """Slots of the nodes on this rank, and of nodes of other ranks."""
+    """Slots of the nodes on this rank, and slots of nodes of other ranks."""
 
     slots: Indices
     """(h,) slots of local nodes."""
     local: Indices
-    """(h,) local indices of the nodes of these slots."""
+    """(h,) local indices of the nodes of ``slots``."""
     place: Indices
     """(nodes,) slot of each local node, -1 for a node without slot."""
     far: Indices
     """(k,) slots of nodes that are not on this rank."""
     far_ids: Ints
-    """(k,) global ids of the nodes that are not on this rank, ascending."""
+    """(k,) global ids, ascending, of the nodes of ``far``, which are not on this rank."""
     _rooms: Rooms = field(default_factory=lambda: Rooms("slots", "local"), init=False, repr=False)
 
     @classmethod
     def of(cls, surface_nodes: SurfaceNodes, nodes: int) -> "OwnSlots":
-        """Maps all slots to the local nodes, ``nodes`` in number."""
+        """Maps all slots to the local nodes; ``nodes``: number of local nodes."""
         slots, none = np.zeros(0, np.int32), np.zeros(0, np.int64)
         own = cls(slots, slots, np.full(nodes, -1, np.int32), slots, none)
         own.add(0, surface_nodes)
         return own
 
     def add(self, first: int, rows: SurfaceNodes) -> None:
-        """Adds the slots of ``rows``, from ``first`` on."""
+        """Adds the slots of the nodes ``rows``. The new slots have numbers from ``first`` on."""
         held = np.flatnonzero(rows.local >= 0)
         slots, local = (first + held).astype(np.int32), rows.local[held]
         self._rooms.append(self, len(held), slots=slots, local=local)
@@ -60,40 +60,41 @@ SLOT_COLUMNS = {
 
 @dataclass
 class SceneSlots:
-    """Columns of the slots."""
+    """Columns with one value for each slot."""
 
     owned: Flags
-    """(slots,) True for owned surface nodes; this rank computes the contacts of such nodes with faces."""
+    """(slots,) whether each node is a surface node that this rank owns. This rank computes the contacts of such nodes
+    with faces."""
     pushes: Flags
-    """(slots,) True for nodes to which a contact of this rank may apply an impulse."""
+    """(slots,) whether a contact of this rank may apply an impulse to each node."""
     live: Flags
-    """(slots,) True for owned nodes in the broad phase."""
+    """(slots,) whether each node is owned by this rank and is in the broad phase."""
     new: Flags
-    """(slots,) True for nodes whose candidate pairs must be searched again (registration)."""
+    """(slots,) whether the candidate pairs of each node must be searched again (registration)."""
     fresh: Flags
-    """(slots,) True for nodes whose pairs must be tested because the mean normals of the node have changed."""
+    """(slots,) whether the pairs of each node must be tested because its mean normals have changed."""
     tracked: Flags
-    """(slots,) True for nodes in the broad phase, and for nodes of faces and edges in the broad phase; the motion of
-    these nodes is measured."""
+    """(slots,) whether the motion of each node is measured. It is measured for nodes in the broad phase, and for nodes
+    of faces and edges in the broad phase."""
     on_surface: Flags
-    """(slots,) local nodes on the surface: only these are in contact with faces."""
+    """(slots,) whether each node is a local node on the surface. Only these nodes are in contact with faces."""
     first: Indices
-    """(slots,) first pair with a face, -1 for none."""
+    """(slots,) first pair of each slot with a face, -1 for none."""
     root: Indices
-    """(slots,) for each slot, the slot at the last search of which it is a copy or which it is itself; -1 for a slot
-    that was added after the search."""
+    """(slots,) slot at the last search of which each slot is a copy; for a slot that is no copy, the slot itself; -1
+    for a slot that was added after the search."""
     normals: Floats
-    """(slots, COLUMNS) mean normals; see tables.SlotTable."""
+    """(slots, COLUMNS) mean normals of each node; see tables.SlotTable."""
     total: Ints
-    """(slots, 3) impulses of the last step, quanta."""
+    """(slots, 3) impulses of the last step on each node, quanta."""
     before: Floats
     """(slots, 3) v(n-1/2), m/s."""
     columns: Columns = field(default_factory=Columns, init=False, repr=False)
-    """All columns by slot of the scene."""
+    """All columns of the scene with one value for each slot."""
 
     @classmethod
     def at_rest(cls, owned: Flags, pushes: Flags) -> "SceneSlots":
-        """Returns the columns; no row is in the broad phase yet."""
+        """Returns the columns for the start of a scene, when no row is in the broad phase."""
         n = len(owned)
         live, new, fresh, tracked, on_surface = np.zeros((5, n), bool)
         first, root = np.full(n, -1, np.int32), np.arange(n, dtype=np.int32)
@@ -105,30 +106,31 @@ class SceneSlots:
 
 @dataclass
 class SceneFaces:
-    """Columns of the faces."""
+    """Columns with one value for each face."""
 
     corners: Indices
-    """(f, 4) slots of the corners of each face; the opposite node of the tet is last."""
+    """(f, 4) slots of the corners of each face. The last slot is the opposite node of the tet."""
     id: Ints
     """(f,) global ids of the faces, ascending."""
     size: Floats
     exposed: Flags
-    """(f,) True for exposed faces; only these have contacts."""
+    """(f,) whether each face is exposed. Only exposed faces have contacts."""
     live: Flags
-    """(f,) True for faces in the broad phase: exposed faces, and faces that may be exposed soon."""
+    """(f,) whether each face is in the broad phase. Exposed faces are in the broad phase, and faces that may be exposed
+    soon."""
     new: Flags
-    """(f,) True for faces whose candidate pairs must be searched again (registration)."""
+    """(f,) whether the candidate pairs of each face must be searched again (registration)."""
     fresh: Flags
-    """(f,) True for faces whose pairs must be tested because a corner is new or the face is newly exposed."""
+    """(f,) whether the pairs of each face must be tested, because a corner is new or the face is newly exposed."""
 
     @classmethod
     def at_rest(cls, corners: Indices, ids: Ints, size: Floats, exposed: Flags) -> "SceneFaces":
-        """Returns the columns; no row is in the broad phase yet."""
+        """Returns the columns for the start of a scene, when no row is in the broad phase."""
         return cls(corners, ids, size, exposed, *np.zeros((3, len(corners)), bool))
 
     @cached_property
     def incidence(self) -> Incidence:
-        """Rows of the table at each slot of the last search. The first call must come before any corner has become a
+        """Rows of the table at each slot of the last search. The first call must be made before any corner has become a
         copy.
         """
         return Incidence(self.corners)
@@ -136,39 +138,39 @@ class SceneFaces:
 
 @dataclass
 class SceneEdges:
-    """Columns of the edges; only sharp edges are in the broad phase."""
+    """Columns with one value for each edge. Only sharp edges are in the broad phase."""
 
     corners: Indices
-    """(e, 6) slots: see records.Edges."""
+    """(e, 6) slots of each edge; see records.Edges."""
     sides: Ints
     """(e, 2) ids of the two faces of each edge."""
     faces: Indices
-    """(e, 2) rows of the two faces of each edge, -1 for a face that this rank does not have."""
+    """(e, 2) rows of the two faces of each edge; -1 for a face that this rank does not have."""
     lengths: Floats
-    """(2, e) ``size`` and ``deep`` of records.Edges, m."""
+    """(2, e) columns ``size`` and ``deep`` of records.Edges, m."""
     opened: Bits
-    """(e, 2) states of the two faces of each edge: see records.Edges."""
+    """(e, 2) states of the two faces of each edge; see records.Edges."""
     meets: Flags
-    """(e,) whether the states of both faces admit edge-edge contact: see records.Edges."""
+    """(e,) whether the states of the two faces of each edge admit edge-edge contact; see records.Edges."""
     sharp: Flags
-    """(e,) True for edges that are or have been sharp (sharp.py)."""
+    """(e,) whether each edge is sharp or has been sharp (sharp.py)."""
     own: Flags
-    """(e,) True for edges whose face of smaller id is on this rank."""
+    """(e,) whether the face of smaller id of each edge is on this rank."""
     rank: Ints
-    """(e,) order of the edges: a pair belongs to the edge of lower rank."""
+    """(e,) order of the edges. A pair belongs to its edge of lower rank."""
     live: Flags
-    """(e,) True for edges in the broad phase."""
+    """(e,) whether each edge is in the broad phase."""
     new: Flags
-    """(e,) True for edges whose candidate pairs must be searched again (registration)."""
+    """(e,) whether the candidate pairs of each edge must be searched again (registration)."""
     fresh: Flags
-    """(e,) True for edges whose pairs must be tested."""
+    """(e,) whether the pairs of each edge must be tested."""
 
     @classmethod
     def at_rest(
         cls, corners: Indices, sides: Ints, faces: Indices, lengths: Floats, opened: Bits, sharp: Flags, own: Flags,
         rank: Ints,
     ) -> "SceneEdges":  # fmt: skip
-        """Returns the columns; no row is in the broad phase yet."""
+        """Returns the columns for the start of a scene, when no row is in the broad phase."""
         one, two = opened.T
         meets = np.asarray((np.minimum(one, two) >= AGED) & (np.maximum(one, two) == OPEN))
         return cls(
@@ -187,17 +189,19 @@ class SceneEdges:
 
     @cached_property
     def far(self) -> Ints:
-        """Rows of edges with a face that this rank does not have."""
+        """Rows of the edges that have a face which this rank does not have."""
         return np.flatnonzero((self.faces < 0).any(axis=1))
 
     @cached_property
     def incidence(self) -> Incidence:
-        """Rows of the table at each slot of the last search. The first call must come before any corner has become a
+        """Rows of the table at each slot of the last search. The first call must be made before any corner has become a
         copy.
         """
         return Incidence(self.corners)
 
     @property
     def names(self) -> Ints:
-        """(e,) ids of the two faces of each edge as one number: two faces have at most one edge in common."""
+        """(e,) ids of the two faces of each edge, combined into one number. The number identifies the edge, because two
+        faces have at most one edge in common.
+        """
         return (self.sides[:, 0] << 32) + self.sides[:, 1]

@@ -1,5 +1,5 @@
-"""Ghosts: copies of other ranks' surface nodes, their state in every step, and the lists of shared nodes with
-impulses."""
+"""Ghosts: copies of surface nodes of other ranks. The module has the state of ghosts in every step, and the lists of
+shared nodes with impulses."""
 
 from itertools import pairwise
 
@@ -13,14 +13,14 @@ from ...parallel.tags import Tag
 from ..surface.records import Edges, Faces, SurfaceNodes
 
 _CROWD_WORDS = 15
-"""Number of words of a node in a message (``pack``)."""
+"""Number of words for a node in a message (``pack``)."""
 _ROOM = 32
-"""Number of rows by which the message of a rank is enlarged, so that separated nodes seldom need a new message.
+"""Number of rows by which the message of a rank is enlarged, so that separated nodes rarely require a new message.
 Chosen value: 2 kB."""
 
 
 def pack(faces: Faces, edges: Edges, surface_nodes: SurfaceNodes) -> Ints:
-    """Packs faces, edges and their nodes into one flat message; floats by their bits."""
+    """Packs faces, edges and their nodes into one flat message. Floats are packed as bit patterns."""
     return np.concatenate([
         np.array([faces.n, edges.n], np.int64),
         faces.id, faces.nodes.reshape(-1), faces.size.view(np.int64), faces.exposed,
@@ -31,7 +31,7 @@ def pack(faces: Faces, edges: Edges, surface_nodes: SurfaceNodes) -> Ints:
 
 
 def unpack(words: Ints) -> tuple[Faces, Edges, SurfaceNodes]:
-    """Unpacks a message of ``pack``."""
+    """Unpacks a message that ``pack`` made."""
     f, e = int(words[0]), int(words[1])
     ends = np.cumsum([2, f, 4 * f, f, f, 6 * e, 2 * e, e, e, 2 * e, e])
     pieces = [words[a:b] for a, b in pairwise(ends)]
@@ -50,7 +50,7 @@ def pack_nodes(surface_nodes: SurfaceNodes) -> Ints:
 
 
 def unpack_nodes(words: Ints) -> SurfaceNodes:
-    """Returns the nodes of ``pack_nodes``, as ghosts."""
+    """Returns the nodes that ``pack_nodes`` packed, as ghosts."""
     rows = words.reshape(-1, _CROWD_WORDS)
     floats = np.ascontiguousarray(rows[:, 3:]).view(np.float64)
     return SurfaceNodes(
@@ -60,8 +60,8 @@ def unpack_nodes(words: Ints) -> SurfaceNodes:
 
 
 def fetch(ids: Ints, owners: Indices, held: SurfaceNodes, comm: Comm) -> SurfaceNodes:
-    """Receives the data of nodes that are not on this rank, given by ids and owners, from their owners; ``held``: all
-    local nodes. Collective.
+    """Receives the data of nodes that are not on this rank from the owners of these nodes. ``ids``, ``owners``: ids and
+    owners of the nodes; ``held``: all local nodes. Collective.
     """
     asked = comm.swap({rank: ids[owners == rank] for rank in ranks(owners)})
     answers = comm.swap({rank: pack_nodes(held.take(held.places(want))) for rank, want in asked.items()})
@@ -69,11 +69,11 @@ def fetch(ids: Ints, owners: Indices, held: SurfaceNodes, comm: Comm) -> Surface
 
 
 def members(used: Ints, owners: Indices, holders: list[Neighbour], nodes: Nodes, comm: Comm) -> dict[int, Ints]:
-    """Returns for every other rank the ids, ascending, of the nodes for which both ranks need the sum of impulses.
+    """Returns, for every other rank, the ids, ascending, of the nodes for which the two ranks need the sum of impulses.
 
-    ``used`` (k,): ids of the nodes to which contacts of this rank may apply impulses; ``owners`` (k,): their owners;
-    ``holders``: shared nodes. The owner of a node collects the ranks with such contacts and sends the list to all ranks
-    in the list, and to all ranks that hold the node.
+    ``used`` (k,): ids of the nodes to which contacts of this rank may apply impulses; ``owners`` (k,): owners of these
+    nodes; ``holders``: shared nodes. The owner of a node collects the ranks with such contacts. It sends the list of
+    these ranks to all ranks in the list, and to all ranks that have the node.
     """
     pushed, rows = np.zeros(nodes.n, bool), [used[:0]]
     pushed[nodes.places(used[owners == comm.rank])] = True
@@ -97,17 +97,17 @@ def members(used: Ints, owners: Indices, holders: list[Neighbour], nodes: Nodes,
 
 
 def _begins(values: Ints) -> Flags:
-    """(n,) True for the first occurrence of each of the ascending values."""
+    """(n,) whether each element is the first of equal elements; ``values`` is ascending."""
     return np.concatenate([np.ones(min(len(values), 1), bool), values[1:] != values[:-1]])
 
 
 def _rows(ids: Ints, rank: int, comm: Comm) -> Ints:
-    """Returns node and rank as one number."""
+    """Returns node and rank, combined into one number."""
     return ids * comm.size + rank
 
 
 def _company(node: Ints, holder: Ints, group: Ints, member: int) -> Ints:
-    """Returns the rows (node, holder) of the nodes of the rank ``member``, without the rows of that rank itself;
+    """Returns rows (node, rank that has it) for the nodes of the rank ``member``, without the rows of that rank itself.
     ``group`` (n,): number of the node of each row.
     """
     held = np.zeros(group[-1] + 1, bool)
@@ -117,20 +117,18 @@ def _company(node: Ints, holder: Ints, group: Ints, member: int) -> Ints:
 
 
 class Copies:
-    """Persistent MPI messages of the state of ghosts: positions and velocities before and after the kick, in every
-    step.
+    """Persistent MPI messages with the state of ghosts, in every step: positions, and velocities before and after the
+    kick.
     """
 
     def __init__(self, sends: list[Neighbour], receives: list[Neighbour], comm: Comm, tag: Tag) -> None:
-        """``sends``: local nodes that are sent to each rank; ``receives``: slots of the ghosts that are received from
-        each rank.
-        """
+        """``sends``: local nodes that are sent to each rank; ``receives``: slots of the ghosts that each rank sends."""
         self._comm, self._tag = comm, tag
         self._rows: tuple[list[int], list[int]] | None = None
         self.take(sends, receives)
 
     def take(self, sends: list[Neighbour], receives: list[Neighbour]) -> None:
-        """Replaces the nodes. Messages that are large enough are reused."""
+        """Replaces the nodes of the messages. A message that is large enough is used again."""
         self.sends, self.receives = sends, receives
         rows = _rooms(sends), _rooms(receives)
         self._from, self._to = _padded(sends, rows[0]), _padded(receives, rows[1])
@@ -148,13 +146,13 @@ class Copies:
         _pack(self._out, 6, nodes.v, self._from)
 
     def begin(self, nodes: Nodes) -> None:
-        """Sends positions and velocities."""
+        """Sends positions and velocities of the nodes."""
         _pack(self._out, 0, nodes.x, self._from)
         _pack(self._out, 3, nodes.v, self._from)
         self._exchange.begin()
 
     def finish(self, x: Floats, v: Floats, before: Floats) -> None:
-        """Receives the ghosts' rows of ``x``, ``v`` and v(n-1/2), (surface_nodes, 3) each."""
+        """Receives the rows of the ghosts in ``x``, ``v`` and v(n-1/2), (surface_nodes, 3) each."""
         self._exchange.finish()
         _unpack(x, v, before, self._to, self._in)
 
@@ -185,7 +183,7 @@ def _rooms(others: list[Neighbour]) -> list[int]:
 
 
 def _padded(others: list[Neighbour], rooms: list[int]) -> Indices:
-    """Returns the nodes of all ranks, rank after rank; the nodes of a rank are filled with -1 up to the number of rows
+    """Returns the nodes of all ranks, rank after rank. The nodes of a rank are filled with -1 up to the number of rows
     of its message, ``rooms``.
     """
     rows, begin = np.full(sum(rooms), -1, np.int32), 0
@@ -196,14 +194,14 @@ def _padded(others: list[Neighbour], rooms: list[int]) -> Indices:
 
 
 def _slices(buffer: Floats, others: list[Neighbour], rooms: list[int]) -> list[tuple[int, Ints]]:
-    """Returns the range of each rank in the buffer."""
+    """Returns the range of each rank in the ``buffer``."""
     words, ends = buffer.view(np.int64), np.cumsum(rooms).tolist()
     return [(other.rank, words[end - room : end]) for other, room, end in zip(others, rooms, ends, strict=True)]
 
 
 def copies(surface_nodes: SurfaceNodes, nodes: Nodes, comm: Comm, tag: Tag) -> Copies:
-    """Sets up the persistent ghost exchange of the ``surface_nodes`` that this rank does not hold, with their
-    owners. Collective.
+    """Makes the persistent messages with the ghosts among the ``surface_nodes``. The messages are exchanged with the
+    owners of the ghosts. Collective.
     """
     far = np.flatnonzero(surface_nodes.local < 0)
     owners = surface_nodes.owner[far]

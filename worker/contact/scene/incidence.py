@@ -1,8 +1,8 @@
-"""Faces and edges by their corners. The table gives the rows of a scene that a split (node separation) can change,
-without a pass over the whole scene.
+"""Table from corners to faces and edges. With this table the rows of a scene that a node separation can change are
+found without a pass over the whole scene.
 
-The faces and edges of a scene do not change between two searches. When nodes separate, corners are replaced by copies.
-The rows of a copy are therefore among the rows of the slot that was its original at the search.
+The rows of faces and edges of a scene do not change between two searches. When nodes separate, corners are replaced by
+copies. Therefore the rows of a copy are among the rows of the slot that was its original at the search.
 """
 
 import numpy as np
@@ -14,22 +14,22 @@ _I, _I1, _N1, _N2 = types.int64, types.int64[::1], types.int32[::1], types.int32
 
 
 class Incidence:
-    """The rows of faces or edges at each slot, with the corners at the last search."""
+    """Rows of faces or edges at each slot, according to the corners at the last search."""
 
     def __init__(self, corners: Indices) -> None:
         """``corners`` (n, k): slots, before any corner has separated."""
         self._begin, self._row = _by_slot(corners, int(corners.max(initial=-1)) + 1)
 
     def at(self, slots: Indices) -> Ints:
-        """Returns the rows, ascending, with a corner that was among the ``slots`` (m,) at the search; -1 stands for no
-        slot of the search.
+        """Returns the rows, ascending, with a corner that was among the ``slots`` (m,) at the search. The value -1 in
+        ``slots`` is ignored.
         """
         return np.asarray(_at(self._begin, self._row, slots))
 
 
 @njit(several(_I1, _N1)(_N2, _I), cache=True)
 def _by_slot(corners, slots):  # type: ignore[no-untyped-def]
-    """Returns the offsets of the rows of each of the ``slots``, (slots + 1,), and the rows."""
+    """Returns the offsets (slots + 1,) of the rows of each slot, and the rows."""
     begin, many = np.zeros(slots + 1, np.int64), corners.shape[1]
     for r in range(len(corners)):
         for k in range(many):
@@ -47,7 +47,7 @@ def _by_slot(corners, slots):  # type: ignore[no-untyped-def]
 
 @njit(_I1(_I1, _N1, _N1), cache=True)
 def _at(begin, row, slots):  # type: ignore[no-untyped-def]
-    """See Incidence.at."""
+    """Returns the rows for Incidence.at."""
     n, last = 0, len(begin) - 1
     for s in slots:
         if 0 <= s < last:

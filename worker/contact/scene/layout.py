@@ -1,4 +1,4 @@
-"""Construction of a scene: slots, faces and edges, without pairs."""
+"""Construction of a scene: its slots, faces and edges, without pairs."""
 
 import numpy as np
 
@@ -16,10 +16,10 @@ def build(
     sides: NearSurface, rules: Rules, horizon: float, drift: Floats, nodes: Nodes, comm: Comm,
     passes: ScenePasses | None = None,
 ) -> Scene:  # fmt: skip
-    """Returns the scene of ``sides`` for the next ``horizon``, s, without pairs; ``drift`` (3,), m/s, is equal on all
-    ranks; ``passes`` of the scene, None for one thread. Collective.
+    """Returns the scene of the surface ``sides`` for the next ``horizon``, s, without pairs. ``drift`` (3,): mean
+    velocity, m/s, equal on all ranks; ``passes``: passes of the scene, None for one thread. Collective.
 
-    A SplitUpdate adds the lists of shared nodes.
+    The lists of shared nodes are added later, by a SplitUpdate.
     """
     seen = with_ghosts(sides, rules, horizon, drift, comm) if comm.size > 1 else sides
     passes = passes or ScenePasses(team(1))

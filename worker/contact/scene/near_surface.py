@@ -14,32 +14,32 @@ from ..surface.records import Edges, Faces, SurfaceNodes, merged
 from . import ghosts
 
 HALO = 1.0
-"""Width of the halo over the typical size of a face. Candidate pairs of slots of different ranks are complete only
-while each slot has departed from its reference motion by less than half of the width. All ranks search again before
-a slot departs further."""
+"""Ratio of the width of the halo to the typical size of a face. Candidate pairs between slots of different ranks are
+complete only while each slot has departed from its reference motion by less than half of this width. Before a slot
+departs further, all ranks search again."""
 
 
 @dataclass(frozen=True)
 class Rules:
-    """Parameters of the searches, equal on all ranks."""
+    """Parameters of the searches. All ranks have equal values."""
 
     domain: str
     allowed: Flags
-    """(parts, parts) True for pairs of parts that may be in contact."""
+    """(parts, parts) whether each pair of parts may be in contact."""
     cell: float
     """Edge of a cell of the contact domain, m."""
     skin: float
-    """Skin, m: two slots that both depart from their reference motions by less than half of the skin cannot be in
+    """Skin, m. If two slots both depart from their reference motions by less than half of the skin, they cannot be in
     contact without being candidates."""
     halo: float
-    """Skin for slots of different ranks, m."""
+    """Skin for pairs of slots of different ranks, m."""
     self_contact: Flags
-    """(parts,) True if the body of the part may be in contact with itself."""
+    """(parts,) whether the body of each part may be in contact with itself."""
 
 
 @dataclass
 class NearSurface:
-    """Part of the surface, with its nodes."""
+    """A part of the surface, with its nodes."""
 
     faces: Faces
     """Faces by ascending id."""
@@ -47,7 +47,7 @@ class NearSurface:
     surface_nodes: SurfaceNodes
     """Nodes of all faces and edges, and all local surface nodes."""
     owned: Ints
-    """Ids of the owned nodes of the surface, and of cracks that may open."""
+    """Ids of the nodes that this rank owns, on the surface and on cracks that may open."""
 
     @cached_property
     def face_places(self) -> Indices:
@@ -60,8 +60,8 @@ class NearSurface:
         return self.surface_nodes.places(self.edges.nodes)
 
     def boxes(self, horizon: float, drift: Floats, margin: float) -> list[Boxes]:
-        """Bounding boxes of owned nodes, faces and edges, swept over ``horizon``, s, with ``margin``, m, on all
-        sides."""
+        """Bounding boxes of owned nodes, faces and edges. The boxes are swept over ``horizon``, s, and enlarged by
+        ``margin``, m, on all sides."""
         x, course = self.surface_nodes.x, self.surface_nodes.course - drift
         owned = Primitives(self.surface_nodes.places(self.owned[:, None]), np.full(len(self.owned), margin))
         faces = Primitives(np.ascontiguousarray(self.face_places[:, :3]), margin + DEEP * self.faces.size)
@@ -70,7 +70,7 @@ class NearSurface:
 
 
 def with_ghosts(sides: NearSurface, rules: Rules, horizon: float, drift: Floats, comm: Comm) -> NearSurface:
-    """Returns ``sides`` with the ghosts near this rank's surface, own edges first."""
+    """Returns ``sides`` together with the ghosts near this rank's surface. The edges of this rank come first."""
     nodes, faces, edges = sides.boxes(horizon, drift, 0.5 * rules.halo)
     askers = Boxes(np.concatenate([nodes.low, edges.low]), np.concatenate([nodes.high, edges.high]))
     chosen = domain.choose(rules.domain, askers, [faces, edges], rules.cell, comm)
@@ -80,7 +80,7 @@ def with_ghosts(sides: NearSurface, rules: Rules, horizon: float, drift: Floats,
 
 
 def _some_of(sides: NearSurface, faces: Flags, edges: Flags) -> tuple[Faces, Edges, SurfaceNodes]:
-    """Selects faces and edges, with their nodes."""
+    """Selects faces and edges, and the nodes of these faces and edges."""
     nodes = np.zeros(sides.surface_nodes.n, bool)
     nodes[sides.face_places[faces]] = nodes[sides.edge_places[edges]] = True
     return sides.faces.take(faces), sides.edges.take(edges), sides.surface_nodes.take(nodes)

@@ -1,4 +1,4 @@
-"""Passes over the slots, faces and edges of a scene, on the threads of a rank."""
+"""Passes over the slots, faces and edges of a scene, run by the threads of a rank."""
 
 import numpy as np
 
@@ -14,13 +14,13 @@ from ..surface.records import AGED, OPEN
 from ..surface.sharp import TURNED
 
 _SLOTS, _EDGES, _TURNED = 2048, 8192, 2048
-"""Number of slots in a task, of faces or edges, and of edges whose angle is computed. Chosen values: a task takes 10 to
-20 us, compared with 2 us to start a parallel region."""
+"""Number of slots in a task, number of faces or edges in a task, and number of edges in a task that computes angles.
+Chosen values: a task takes 10 to 20 us, compared with 2 us to start a parallel region."""
 _AHEAD = 16
-"""Prefetch distance of the data of nodes, in nodes."""
+"""Distance, in nodes, by which data of nodes are prefetched."""
 _SPARSE = 32
-"""Largest id over the number of wanted ids above which the ids are bisected: a table of all ids takes longer to fill
-(model/ids.py)."""
+"""Largest ratio of the largest id to the number of wanted ids for which a table of all ids is used. Above this ratio
+the ids are found by bisection, because the table takes longer to fill (model/ids.py)."""
 _I, _I1, _B1, _U2, _F2, _N1, _N2 = (
     types.int64, types.int64[::1], types.boolean[::1], types.uint8[:, ::1], types.float64[:, ::1], types.int32[::1],
     types.int32[:, ::1],
@@ -54,8 +54,8 @@ def _store(table, first, stop, thread):  # type: ignore[no-untyped-def]
 
 @njit(TASK, cache=True)
 def _expose(table, first, stop, thread):  # type: ignore[no-untyped-def]
-    """Task: sets the state OPEN of edges whose ``faces`` (e, 2) are exposed, ``shown`` (f,), and updates ``meets``,
-    True for edges in edge-edge contact; see SceneEdges.
+    """Task: sets the state OPEN of edges whose faces are exposed, and updates ``meets``, which is True for edges in
+    edge-edge contact (SceneEdges). ``faces`` (e, 2): faces of the edges; ``shown`` (f,): exposed faces.
     """
     opened, meets, fresh, faces, shown = _read_expose(table)
     for e in range(first, stop):
@@ -69,7 +69,7 @@ def _expose(table, first, stop, thread):  # type: ignore[no-untyped-def]
 def _enliven(table, first, stop, thread):  # type: ignore[no-untyped-def]
     """Task: adds ``sharp`` edges to the broad phase.
 
-    Condition: both ``faces`` (e, 2) of the edge are ``searched`` (f,); for one of the two faces it is enough to be
+    An edge is added if its two ``faces`` (e, 2) are ``searched`` (f,); for one of the two faces it is sufficient to be
     ``opened`` (e, 2). A face that this rank does not have is treated as searched, because its exposure is unknown.
     """
     live, new, edges, faces, opened, sharp, searched = _read_enliven(table)
@@ -84,7 +84,7 @@ def _enliven(table, first, stop, thread):  # type: ignore[no-untyped-def]
 
 @njit(TASK, cache=True)
 def _flag(table, first, stop, thread):  # type: ignore[no-untyped-def]
-    """Task: flags the faces or edges with a flagged slot among the first ``many`` of their ``corners``."""
+    """Task: flags the faces or edges that have a flagged slot among the first ``many`` of their ``corners``."""
     out, corners, many, slots = _read_flag(table)
     for f in range(first, stop):
         for k in range(many):
@@ -93,7 +93,7 @@ def _flag(table, first, stop, thread):  # type: ignore[no-untyped-def]
 
 @njit(TASK, cache=True)
 def _look_up(table, first, stop, thread):  # type: ignore[no-untyped-def]
-    """Task: sets ``out`` to the rows of ids by a table of all ids up to the largest."""
+    """Task: sets ``out`` to the rows of ids, by a table of all ids up to the largest id."""
     out, ids, rows = _read_look_up(table)
     for k in range(first, stop):
         out[k] = rows[ids[k]] if ids[k] < len(rows) else -1
@@ -101,21 +101,21 @@ def _look_up(table, first, stop, thread):  # type: ignore[no-untyped-def]
 
 @njit(TASK, cache=True)
 def _turn(table, first, stop, thread):  # type: ignore[no-untyped-def]
-    """Task: ``sharp.turned``."""
+    """Task: runs ``sharp.turned``."""
     found, is_sharp, corners, meets, x, part, least = _read_turn(table)
     sharp.turned(found, is_sharp, corners, meets, x, part, least, first, stop)
 
 
 @njit(TASK, cache=True)
 def _curve(table, first, stop, thread):  # type: ignore[no-untyped-def]
-    """Task: ``buckets.interleaved``."""
+    """Task: runs ``buckets.interleaved``."""
     codes, x, origin, inverse = _read_curve(table)
     buckets.interleaved(codes, x, origin, inverse, first, stop)
 
 
 @njit(TASK, cache=True)
 def _flag_corners(table, first, stop, thread):  # type: ignore[no-untyped-def]
-    """Task: flags the slots that are the first ``many`` corners of faces or edges."""
+    """Task: flags the slots that are among the first ``many`` corners of faces or edges."""
     out, corners, many = _read_flag_corners(table)
     for f in range(first, stop):
         for k in range(many):
@@ -127,20 +127,20 @@ class ScenePasses:
 
     def __init__(self, team: Team) -> None:
         self.store = Pass(team, _store, *_STORE, size=_SLOTS)
-        """Copies velocities to slots."""
+        """Pass that copies velocities to slots."""
         self.expose = Pass(team, _expose, *_EXPOSE, size=_EDGES)
-        """Updates the states of edges."""
+        """Pass that updates the states of edges."""
         self.enliven = Pass(team, _enliven, *_ENLIVEN, size=_EDGES)
-        """Adds edges to the broad phase."""
+        """Pass that adds edges to the broad phase."""
         self.flag_faces, self.flag_edges = (Pass(team, _flag, *_FLAG, size=_EDGES) for _ in range(2))
-        """Flag the faces and the edges at flagged slots."""
+        """Passes that flag the faces and the edges at flagged slots."""
         self._turn, self._curve = Pass(team, _turn, *TURNED, size=_TURNED), Pass(team, _curve, *_CURVE, size=_SLOTS)
         self._look_up = Pass(team, _look_up, *_LOOK_UP, size=_EDGES)
         self._flag_corners = Pass(team, _flag_corners, *_FLAG_CORNERS, size=_EDGES)
 
     def located(self, known: Ints, wanted: Ints) -> Indices:
-        """Positions of ``wanted`` ids in ``known``, which may have any order, in the shape of ``wanted``; -1 for ids
-        that are not in ``known``.
+        """Positions in ``known`` of the ids ``wanted``, in the shape of ``wanted``; -1 for ids that are not in
+        ``known``. ``known`` may have any order.
         """
         if _SPARSE * wanted.size < (largest := int(known.max(initial=-1))):
             return IdIndex(known).places(wanted)
@@ -150,18 +150,18 @@ class ScenePasses:
         return out
 
     def flag_corners(self, out: Flags, corners: Indices, many: int) -> None:
-        """Flags the slots, ``out`` (slots,), that are among the first ``many`` columns of ``corners`` (n, k)."""
+        """Flags, in ``out`` (slots,), the slots that are among the first ``many`` columns of ``corners`` (n, k)."""
         self._flag_corners.run(len(corners), out, corners, many)
 
     def turned(self, sharp: Flags, corners: Indices, meets: Flags, x: Floats, part: Indices, least: Floats) -> Flags:
-        """(e,) edges that become sharp; see sharp.turned."""
+        """(e,) whether each edge becomes sharp; see sharp.turned."""
         found = np.empty(len(sharp), bool)
         self._turn.run(len(sharp), found, sharp, corners, meets, x, part, least)
         return found
 
     def curve(self, x: Floats, edge: float) -> Ints:
-        """(n,) position of each point (n, 3) on a space-filling curve (Morton 1966), by cells of ``edge``, m:
-        neighbours on the curve are neighbours in space.
+        """(n,) position of each point (n, 3) on a space-filling curve (Morton 1966) through cells with the edge
+        ``edge``, m. Neighbours on the curve are neighbours in space.
         """
         codes = np.empty(len(x), np.int64)
         if len(x):

@@ -1,4 +1,4 @@
-"""Scene: the surface near this rank, its candidate pairs, and their working arrays."""
+"""Scene: the surface near this rank, its candidate pairs, and the working arrays for the pairs."""
 
 from dataclasses import dataclass, field
 
@@ -28,12 +28,12 @@ from .passes import ScenePasses
 
 @dataclass
 class Messages:
-    """Persistent MPI messages between ranks, in every step."""
+    """Persistent MPI messages between ranks that are sent in every step."""
 
     company: SharedSums
     """Sums of impulses at nodes to which contacts of several ranks apply impulses."""
     copies: Copies
-    """Positions and velocities of the ghosts."""
+    """Messages with positions and velocities of the ghosts."""
 
     def free(self) -> None:
         """Frees the persistent MPI messages."""
@@ -43,7 +43,7 @@ class Messages:
 
 @dataclass
 class Scene:
-    """Scene: result of the last search of all ranks, with the updates after the search."""
+    """The result of the last search of all ranks, with the updates after the search."""
 
     surface_nodes: SurfaceNodes
     own: OwnSlots
@@ -53,12 +53,12 @@ class Scene:
     rules: Rules
     reference: ReferenceMotion
     cracks: Indices
-    """(m, 6) slots of the nodes on either side of the cracks, -1 for a crack that this rank does not compute
+    """(m, 6) slots of the nodes on the two sides of each crack; -1 for a crack that this rank does not compute
     (narrow_phase/cracks.py).
     """
     passes: ScenePasses
     node_face: PairTable = field(default_factory=PairTable)
-    """Candidate node-face pairs: slot and face."""
+    """Candidate pairs of a node (slot) and a face."""
     edge_edge: PairTable = field(default_factory=PairTable)
     active: ActiveRows = field(default_factory=ActiveRows)
     """Active contacts of the last step."""
@@ -68,7 +68,7 @@ class Scene:
     """Argument of the last call of ``stored``."""
 
     def __post_init__(self) -> None:
-        """Declares the columns by slot."""
+        """Declares the columns with one value for each slot."""
         columns = self.slots.columns
         columns.declare(self.surface_nodes, **dict.fromkeys(vars(self.surface_nodes), ZERO))
         columns.declare(self.slots, **SLOT_COLUMNS)
@@ -86,11 +86,11 @@ class Scene:
         self.own.add(first, rows)
 
     def connect(self, company: list[Neighbour], nodes: Nodes, comm: Comm) -> None:
-        """Sets up the messages: sums over the shared nodes ``company``, and copies of the ghosts. Collective."""
+        """Makes the messages: sums over the shared nodes ``company``, and copies of the ghosts. Collective."""
         self.messages = Messages(SharedSums(company, comm), ghosts.copies(self.surface_nodes, nodes, comm, Tag.GHOST))
 
     def extend(self, company: list[Neighbour], sends: list[Neighbour], receives: list[Neighbour]) -> None:
-        """Extends the messages after a split; messages with unchanged lists are reused."""
+        """Extends the messages after a node separation. Messages with unchanged lists of nodes are used again."""
         messages = self.messages
         if not same(messages.company.neighbours, company):
             messages.company.take(company)
@@ -98,14 +98,14 @@ class Scene:
             messages.copies.take(sends, receives)
 
     def store_before(self, nodes: Nodes) -> None:
-        """Stores v(n-1/2), before the kick."""
+        """Stores v(n-1/2). Must be called before the kick."""
         own = self.own
         self.passes.store.run(len(own.local), self.slots.before, nodes.v, own.slots, own.local)
         self.messages.copies.note(nodes)
 
     def stored(self, cracks: Floats) -> Kept:
-        """Stored impulses of the pairs and of the ``cracks`` (m, 12); it is the same object while the arrays use the
-        same memory.
+        """Stored impulses of the pairs and of the ``cracks`` (m, 12). The same object is returned while the arrays use
+        the same memory.
         """
         before, pairs = self._stored, self.node_face.kept
         if before is not None and before.pairs is pairs and cracks is self._cracks:
@@ -117,7 +117,9 @@ class Scene:
 
     @property
     def kept(self) -> tuple[Ints, Floats]:
-        """(k, 2) ids of node and face of the pairs with impulses in the last step, and (k, 4) their stored impulses."""
+        """Two arrays about the pairs that had impulses in the last step: (k, 2) ids of node and face, and (k, 4) stored
+        impulses.
+        """
         table = self.node_face
         some = table.pushed
         node, face = table.rows[some].T
@@ -126,7 +128,8 @@ class Scene:
     def remember(self, keys: Ints, kept: Floats, nodes: Nodes, comm: Comm) -> None:
         """Copies the stored impulses ``kept`` of the pairs ``keys`` from the scene of the last search. Collective.
 
-        The pairs of a copied node were on the rank of its parent, and are from now on on the rank that owns the copy.
+        Before the call the pairs of a copied node were on the rank of its parent; now they are on the rank that owns
+        the copy.
         """
         rows = np.column_stack([keys, kept.view(np.int64)])
         if comm.size > 1:
@@ -140,12 +143,12 @@ class Scene:
         self.node_face.recall(self.slots.first, pairs, np.ascontiguousarray(rows[here, 2:]).view(np.float64))
 
     def rows_of(self, faces: Ints) -> Indices:
-        """(k,) rows of the ``faces`` (ids) that this rank has."""
+        """(k,) rows of those ``faces``, given by ids, that this rank has."""
         rows = places(self.faces.id, faces)
         return rows[rows >= 0]
 
     def expose(self, faces: Ints) -> None:
-        """Adds the faces of these ids to the surface."""
+        """Adds faces to the surface; ``faces``: ids."""
         rows = self.rows_of(faces)
         self.faces.exposed[rows] = self.faces.fresh[rows] = True
         edges = self.edges
@@ -158,8 +161,8 @@ class Scene:
         self.enliven(rows)
 
     def uncover(self, gone: Ints, bare: Ints, removed: Indices) -> None:
-        """Removes the faces ``gone`` from the surface and adds the faces ``bare``; ids, ascending; ``removed``: slots
-        of the nodes that left the model, -1 for nodes without slot.
+        """Removes the faces ``gone`` from the surface and adds the faces ``bare``. The faces are given by ids,
+        ascending. ``removed``: slots of the nodes that left the model, -1 for nodes without slot.
         """
         rows, removed = self.rows_of(gone), removed[removed >= 0]
         self.faces.exposed[rows] = self.faces.live[rows] = False
@@ -168,15 +171,15 @@ class Scene:
         self.expose(bare)
 
     def enliven(self, rows: Indices) -> None:
-        """Adds faces, with their nodes, to the broad phase."""
+        """Adds the faces ``rows`` and the nodes of these faces to the broad phase."""
         self.faces.new[rows] |= ~self.faces.live[rows]
         self.faces.live[rows] = True
         slots = self.slots
         _enliven(slots.live, slots.new, slots.owned, self.faces.corners, rows.astype(np.int32, copy=False))
 
     def settle_live(self) -> Flags:
-        """Updates the nodes and edges in the broad phase, and the slots whose motion is measured; returns (slots,)
-        the new ones among these.
+        """Updates which nodes and edges are in the broad phase, and which slots are measured. Returns (slots,) whether
+        the motion of each slot is measured from now on.
         """
         before = self.slots.tracked.copy()
         nodes = self.slots.owned & self.slots.on_surface & ~self.slots.live
@@ -191,7 +194,7 @@ class Scene:
         return self.slots.tracked & ~before
 
     def renew_at(self, slots: Flags) -> None:
-        """Schedules the flagged ``slots`` (slots,), and the faces and edges at them, for registration."""
+        """Schedules the flagged ``slots`` (slots,) for registration, and the faces and edges at these slots."""
         self.slots.new |= slots
         self.passes.flag_faces.run(len(self.faces.new), self.faces.new, self.faces.corners, 3, slots)
         self.passes.flag_edges.run(len(self.edges.new), self.edges.new, self.edges.corners, 2, slots)
@@ -202,7 +205,9 @@ class Scene:
         return bool(self.faces.new.any() or self.slots.new.any() or self.edges.new.any())
 
     def sharpen(self, least: Floats) -> Flags:
-        """(e,) edges that became sharp, by the cosines ``least`` (parts,); adds them to the broad phase."""
+        """(e,) whether each edge has become sharp, by the cosines ``least`` (parts,). Edges that have become sharp are
+        added to the broad phase.
+        """
         edges, surface_nodes = self.edges, self.surface_nodes
         turned = self.passes.turned(edges.sharp, edges.corners, edges.meets, surface_nodes.x, surface_nodes.part, least)
         edges.sharp |= turned
@@ -210,22 +215,22 @@ class Scene:
         return turned
 
     def chain(self) -> None:
-        """Rebuilds the linked lists of the pairs of each node."""
+        """Builds the linked lists of the pairs of each node again."""
         self.slots.first[:] = -1
         self.node_face.hang(self.slots.first, 0)
 
     def slot_table(self) -> SlotTable:
-        """Slots as a record for kernels."""
+        """Returns the slots as a record for kernels."""
         slots, lines = self.slots, self.reference.short
         return SlotTable(slots.normals, slots.on_surface, slots.first, lines.left, lines.course, slots.fresh)
 
     def face_table(self) -> FaceTable:
-        """Faces as a record for kernels."""
+        """Returns the faces as a record for kernels."""
         faces = self.faces
         return FaceTable(faces.corners, faces.size, faces.id, faces.exposed, self.reference.faces, faces.fresh)
 
     def edge_table(self) -> EdgeTable:
-        """Edges as a record for kernels."""
+        """Returns the edges as a record for kernels."""
         edges = self.edges
         return EdgeTable(edges.corners, edges.size, edges.deep, edges.meets, self.reference.edges, edges.fresh)
 
@@ -236,7 +241,7 @@ class Scene:
 
 @njit("void(boolean[::1], boolean[::1], boolean[::1], int32[:, ::1], int32[::1])", cache=True)
 def _enliven(live, new, owned, corners, rows):  # type: ignore[no-untyped-def]
-    """Adds the ``owned`` (slots,) slots of the faces ``rows`` (k,) to the broad phase."""
+    """Adds the slots of the faces ``rows`` (k,) to the broad phase, if the slots are ``owned`` (slots,)."""
     for f in rows:
         for k in range(3):
             a = corners[f, k]
@@ -246,7 +251,7 @@ def _enliven(live, new, owned, corners, rows):  # type: ignore[no-untyped-def]
 
 @njit("void(boolean[::1], int32[:, ::1], int64, boolean[::1])", cache=True)
 def _track(tracked, corners, many, live):  # type: ignore[no-untyped-def]
-    """Flags the first ``many`` corners of the rows that are ``live`` (n,)."""
+    """Flags the first ``many`` corners of each row that is ``live`` (n,)."""
     for f in range(len(live)):
         if live[f]:
             for k in range(many):

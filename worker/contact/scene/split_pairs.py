@@ -1,5 +1,6 @@
-"""Faces, edges and candidate pairs after a split (node separation): copies by parent, new corners, and new pairs. New
-pairs are the pairs that a copy gets from its parent, and pairs whose members had a common node before the split.
+"""Faces, edges and candidate pairs after a node separation (split). Corners are replaced by copies, and new pairs are
+found. New pairs are the pairs that a copy gets from its parent, and pairs whose members had a common node before the
+separation.
 """
 
 from typing import NamedTuple
@@ -14,26 +15,26 @@ _I, _I1, _I2, _N1, _N2, _B1 = (
     types.int64, types.int64[::1], types.int64[:, ::1], types.int32[::1], types.int32[:, ::1], types.boolean[::1],
 )  # fmt: skip
 _NAMES = several(_I1, _I1, _N1)
-"""Ids of the nodes, ``key`` of a Split, and the slots that replace the nodes of the keys."""
+"""Types of three arguments: ids of the nodes, ``key`` of a Split, and the slots that replace the nodes of the keys."""
 
 
 class Family(NamedTuple):
-    """Family: separated nodes and the copies of each."""
+    """Separated nodes, and the copies of each separated node."""
 
     first: Indices
-    """(surface_nodes,) row of ``member`` of the first copy of a node, -1 for a node without copies."""
+    """(surface_nodes,) row of ``member`` of the first copy of each node; -1 for a node without copies."""
     member: Indices
-    """(c, 2) slot of each copy, and whether it is the last of its parent."""
+    """(c, 2) slot of each copy, and whether the copy is the last one of its parent."""
     most: int
-    """Largest number of copies of a node."""
+    """Largest number of copies of one node."""
     pairs: Indices
     """(c, 2) slots of parent and copy."""
 
 
 @njit(several(_N1, _N2, _I, _N2)(_N2, _I), cache=True)
 def families(places, n):  # type: ignore[no-untyped-def]
-    """Returns the ``Family`` of the parents and copies at the slots ``places`` (c, 2), ordered by parent, among
-    ``n`` surface nodes; -1 for a node without slot.
+    """Returns the ``Family`` of parents and copies. ``places`` (c, 2): slots of each parent and copy, ordered by
+    parent, -1 for a node without slot; ``n``: number of surface nodes.
     """
     first, k = np.full(n, np.int32(-1), np.int32), 0
     member, pairs = np.empty_like(places), np.empty_like(places)
@@ -56,8 +57,8 @@ def families(places, n):  # type: ignore[no-untyped-def]
 
 @njit(types.int32(_I1, _I1, _N1, types.int32, _I), cache=True)
 def _become(ids, key, became, node, tet):  # type: ignore[no-untyped-def]
-    """Returns the node that replaces ``node`` in a tet (global id); ``ids`` of the nodes; ``key`` and ``became``:
-    TopologyUpdate.
+    """Returns the node that replaces ``node`` in a tet, which is given by its global id. ``ids``: ids of the nodes;
+    ``key`` and ``became``: see SplitOfGhosts.
     """
     wanted = ids[node] * KEY + tet
     at = np.searchsorted(key, wanted)
@@ -66,7 +67,7 @@ def _become(ids, key, became, node, tet):  # type: ignore[no-untyped-def]
 
 @njit(_I1(_N2, _N1, _I1), cache=True)
 def _torn(corners, first, near):  # type: ignore[no-untyped-def]
-    """Returns the rows among ``near`` of ``corners`` (n, 4 or 6) that contain a node with copies; ``first``: see
+    """Returns those of the rows ``near`` of ``corners`` (n, 4 or 6) that contain a node with copies; ``first``: see
     Family.
     """
     rows, n = np.empty(len(near), np.int64), 0
@@ -81,9 +82,11 @@ def _torn(corners, first, near):  # type: ignore[no-untyped-def]
 
 @njit(several(_I1, _N2)(_I1, _N2, _B1, _I1, _N1, _I1, _I1, _N1), cache=True)
 def follow_faces(near, corners, fresh, faces, first, ids, key, became):  # type: ignore[no-untyped-def]
-    """Replaces the ``corners`` (f, 4) of faces, of the ids ``faces`` (f,), by their copies; ``near``: rows of all faces
-    whose corners may have copies; ``first``: see Family; ``ids`` of the nodes; ``key`` of a Split, and the
-    slots ``became``. Returns the rows of the changed faces, and their corners before.
+    """Replaces ``corners`` (f, 4) of faces by copies of separated nodes. Returns the rows of the changed faces, and the
+    corners of these faces before the change.
+
+    ``near``: rows of all faces whose corners may have copies; ``faces`` (f,): ids of the faces; ``first``: see Family;
+    ``ids``: ids of the nodes; ``key``: keys of a Split; ``became``: slots of the copies.
     """
     rows = _torn(corners, first, near)
     old = np.empty((len(rows), 4), np.int32)
@@ -99,8 +102,8 @@ def follow_faces(near, corners, fresh, faces, first, ids, key, became):  # type:
 
 @njit(several(_I1, _N2, _B1)(_I1, _N2, _B1, _I2, _N1, _I1, _I1, _N1), cache=True)
 def follow_edges(near, corners, fresh, sides, first, ids, key, became):  # type: ignore[no-untyped-def]
-    """Replaces the nodes of edges between ``sides`` (e, 2), ids of faces, by their copies, as for faces; also returns
-    which edges are removed because their two faces have separated there.
+    """Replaces nodes of edges by copies of separated nodes, in the same way as ``follow_faces``. Also returns which
+    edges are removed because their two faces have separated there. ``sides`` (e, 2): ids of the two faces of each edge.
     """
     rows = _torn(corners, first, near)
     old, gone = np.empty((len(rows), 6), np.int32), np.zeros(len(rows), np.bool_)
@@ -124,8 +127,8 @@ def follow_edges(near, corners, fresh, sides, first, ids, key, became):  # type:
 
 @njit("int32[:, ::1](int32[:, ::1], int32[::1], int32[::1], int32[:, ::1])", cache=True)
 def inherited(family, first, following, pairs):  # type: ignore[no-untyped-def]
-    """(p, 2) candidate pairs, node and face, of the copies of a ``family`` (c, 2), slots of parents and copies. Each
-    copy gets the pairs of its parent. ``first`` (nodes,), ``following`` and ``pairs``: see node_face.chain.
+    """(p, 2) candidate pairs of a node and a face that the copies get from their parents. ``family`` (c, 2): slots of
+    parents and copies; ``first`` (nodes,), ``following`` and ``pairs``: see node_face.chain.
     """
     n = 0
     for write in range(2):
@@ -148,9 +151,11 @@ def inherited(family, first, following, pairs):  # type: ignore[no-untyped-def]
     cache=True,
 )
 def apart_from_faces(pairs, rows, old, now, first, member, owned, meets):  # type: ignore[no-untyped-def]
-    """Writes the pairs of nodes and faces ``rows`` that had a corner in common before the split and have none now.
+    """Writes the pairs of a node and a face whose face had the node as a corner before the separation and does not have
+    it now. Returns the number of pairs.
 
-    ``old`` and ``now`` (r, 4): corners before and after; ``first`` and ``member``: Family; returns their number.
+    ``rows``: rows of the faces; ``old`` and ``now`` (r, 4): corners of these faces before and after; ``first`` and
+    ``member``: see Family.
     """
     n = 0
     for r in range(len(rows)):
@@ -172,10 +177,10 @@ def apart_from_faces(pairs, rows, old, now, first, member, owned, meets):  # typ
 
 @njit(_I2(_N2, _N2, _N1, _B1), cache=True)
 def apart_from_edges(old, now, first, own):  # type: ignore[no-untyped-def]
-    """(p, 2) pairs of edges, by ascending faces, with a common end before the split and none now, where the first, of
-    smaller faces, is this rank's.
+    """(p, 2) pairs of edges that had a common end before the separation and have none now. The edge with the smaller
+    faces is first; only pairs whose first edge is this rank's are returned.
 
-    ``old`` and ``now`` (e, 6): nodes before and after; ``first``: see Family.
+    ``old`` and ``now`` (e, 6): nodes of the edges before and after; ``first``: see Family.
     """
     ends, m = np.empty(2 * len(old), np.int32), 0
     at = np.empty(2 * len(old), np.int64)
@@ -218,9 +223,9 @@ def apart_from_edges(old, now, first, own):  # type: ignore[no-untyped-def]
     cache=True,
 )
 def tear_faces(near, corners, fresh, live, faces, part, in_contact, first, member, most, owned, names):  # type: ignore[no-untyped-def]
-    """Replaces the corners of faces by their copies, see ``follow_faces``, and returns the new pairs, see
-    ``apart_from_faces``, of the ``live`` faces (f,) of bodies that may be in contact with themselves: ``part`` of the
-    nodes, ``in_contact`` (parts,).
+    """Replaces the corners of faces by their copies (``follow_faces``). Returns the new pairs (``apart_from_faces``) of
+    the ``live`` faces (f,) of bodies that may be in contact with themselves. ``part``: part of each node;
+    ``in_contact`` (parts,): parts with contact with themselves.
     """
     rows, old = follow_faces(near, corners, fresh, faces, first, names[0], names[1], names[2])
     now, searched = np.empty((len(rows), 4), np.int32), np.empty(len(rows), np.bool_)
@@ -235,9 +240,8 @@ def tear_faces(near, corners, fresh, live, faces, part, in_contact, first, membe
 
 @njit(_N2(_I1, _N2, _B1, _B1, _B1, _I2, _N1, _B1, _N1, _NAMES), cache=True)
 def tear_edges(near, corners, fresh, live, mine, sides, part, in_contact, first, names):  # type: ignore[no-untyped-def]
-    """Replaces the nodes of edges by their copies, see ``follow_edges``, and returns the new pairs, see
-    ``apart_from_edges``, of the ``live`` edges (e,); ``mine``: SceneEdges.own; ``part``, ``in_contact``: see
-    ``tear_faces``.
+    """Replaces the nodes of edges by their copies (``follow_edges``). Returns the new pairs (``apart_from_edges``) of
+    the ``live`` edges (e,). ``mine``: SceneEdges.own; ``part``, ``in_contact``: see ``tear_faces``.
     """
     rows, old, gone = follow_edges(near, corners, fresh, sides, first, names[0], names[1], names[2])
     some, pair, n = np.empty(len(rows), np.int64), np.empty(len(rows), np.int64), 0

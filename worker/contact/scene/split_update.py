@@ -1,7 +1,7 @@
-"""Update of a scene after a split, without a search.
+"""Update of a scene after a node separation (split), without a search.
 
-The result of the last search stays valid while nodes separate: faces get the copies of their corners, and a copy
-inherits the candidate pairs of its parent, on the same rank.
+The result of the last search stays valid while nodes separate: faces get the copies of their corners, and a copy gets
+the candidate pairs of its parent, on the same rank.
 """
 
 import numpy as np
@@ -20,7 +20,7 @@ from .topology_updates import SplitOfGhosts, meets
 
 
 class SplitUpdate:
-    """Update of one scene by a split."""
+    """Update of one scene by a node separation."""
 
     def __init__(self, scene: Scene, here: SurfaceNodes, nodes: Nodes) -> None:
         """``here``: all nodes of this rank, by local index."""
@@ -28,7 +28,7 @@ class SplitUpdate:
         self._nodes = nodes
 
     def places(self, ids: Ints) -> Indices:
-        """Returns the slots of global ids, in the shape of ``ids``; -1 for a node without slot."""
+        """Returns the slots of global ``ids``, in the shape of ``ids``; -1 for a node without slot."""
         own = self._scene.own
         found = _located(ids.ravel(), self._nodes.id, own.place, own.far_ids, own.far)
         return np.asarray(found.reshape(ids.shape))
@@ -37,8 +37,8 @@ class SplitUpdate:
         self, split: Split, received: SplitOfGhosts | None, cracks: Cracks, rows: Ints, blocks: list[Block],
         neighbours: list[Neighbour],
     ) -> None:  # fmt: skip
-        """Updates slots, faces, edges, candidate pairs, and the slots of the cracks; ``rows``: cracks at separated
-        nodes.
+        """Updates slots, faces, edges, candidate pairs, and the slots of the cracks. ``rows``: rows of the cracks at
+        separated nodes.
         """
         near, family = cracks.beside(rows, blocks), split.family
         self._join(near, family, neighbours)
@@ -54,8 +54,8 @@ class SplitUpdate:
         self._across(cracks, rows, near)
 
     def _join(self, near: Indices, family: Indices, neighbours: list[Neighbour]) -> None:
-        """Adds the local nodes ``near``, the families of the scene's nodes and of nodes that other ranks hold to the
-        scene, and updates the mobilities of all separated nodes.
+        """Adds nodes to the scene: the local nodes ``near``, and the families of nodes that are in the scene or on
+        other ranks. Updates the mobilities of all separated nodes.
         """
         scene, here = self._scene, self._here
         have = np.zeros(len(family), bool)
@@ -67,7 +67,7 @@ class SplitUpdate:
         _renew(scene.surface_nodes.mobility, scene.own.place, family, here.mobility)
 
     def _join_ghosts(self, received: SplitOfGhosts) -> None:
-        """Adds the families of ghosts to the scene, and updates the mobilities of separated ghosts."""
+        """Adds the families of ghosts to the scene. Updates the mobilities of separated ghosts."""
         have, rows = self.places(received.family[:, 0]) >= 0, received.rows
         new = rows.take(_joining(rows.id, self.places(rows.id), received.family, have))
         if new.n:
@@ -76,7 +76,7 @@ class SplitUpdate:
         self._scene.surface_nodes.mobility[at[at >= 0]] = rows.mobility[at >= 0]
 
     def cracks(self, cracks: Cracks, blocks: list[Block]) -> None:
-        """Finds the slots of all cracks that this rank computes."""
+        """Finds the slots of the nodes of all cracks that this rank computes."""
         every = np.arange(len(cracks.nodes))
         near = cracks.beside(every, blocks)
         cracks.places[:] = -1
@@ -85,8 +85,8 @@ class SplitUpdate:
         cracks.arrange()
 
     def _across(self, cracks: Cracks, rows: Ints, near: Indices) -> None:
-        """Finds the slots of the cracks ``rows`` that this rank computes. Their separated nodes, and the separated
-        nodes among ``near``, may get impulses.
+        """Finds the slots of the nodes of those cracks ``rows`` that this rank computes. Marks the separated nodes of
+        these cracks, and the separated nodes among ``near``, as nodes that may get impulses.
         """
         scene = self._scene
         _place(cracks.places, scene.slots.pushes, rows, cracks.nodes, cracks.sides, scene.own.place)
@@ -108,8 +108,8 @@ class SplitUpdate:
 
     def share(self, split: Split, received: SplitOfGhosts | None, neighbours: list[Neighbour]) -> None:
         """Updates the lists of shared nodes without a message. A copy is shared by the ranks that share its parent,
-        because the same ranks hold, send and use the copy and its parent. A separated node is shared by all ranks that
-        hold the node, because contacts across the crack may apply impulses to the node.
+        because the same ranks have, send and use the copy and its parent. A separated node is shared by all ranks that
+        have the node, because contacts across the crack may apply impulses to it.
         """
         messages, surface_nodes, nodes = self._scene.messages, self._scene.surface_nodes, self._nodes
         family = nodes.id[split.family]
@@ -132,8 +132,8 @@ class SplitUpdate:
 
     def _tear(self, family: Family, key: Ints, became: Indices) -> None:
         """Replaces the corners of faces and edges by their copies, and removes edges whose faces have separated. Adds
-        pairs: a copy gets the pairs of its parent, a face gets the nodes that were its corners before, and an edge gets
-        the edges with which it had a common end before. ``key``: column of Split; ``became``: slots of the copies.
+        pairs: a copy gets the pairs of its parent; a face is paired with its former corners; an edge is paired with the
+        edges with which it had a common end. ``key``: column of Split; ``became``: slots of the copies.
         """
         scene, parents = self._scene, family.pairs[:, 0]
         faces, edges, slots, of = scene.faces, scene.edges, scene.slots, scene.surface_nodes
@@ -152,7 +152,7 @@ class SplitUpdate:
         ))  # fmt: skip
 
     def _add_pairs(self, pairs: Indices) -> None:
-        """Adds node-face pairs."""
+        """Adds pairs of a node and a face."""
         if len(pairs):
             scene, n = self._scene, len(self._scene.node_face)
             scene.node_face.add(pairs)
@@ -160,8 +160,8 @@ class SplitUpdate:
 
 
 def _heirs(some: Neighbour, family: Indices, flags: Flags) -> Neighbour:
-    """Appends the copies of the nodes shared with a rank to the list of these nodes; ``family`` (c, 2): parents and
-    copies, -1 for a node that is not present; ``flags``: working array, all false.
+    """Appends copies of nodes to the list of the nodes shared with a rank, ``some``. ``family`` (c, 2): parents and
+    copies, -1 for a node that is not present; ``flags``: working array, all False.
     """
     heirs = family[meets(flags, some.nodes, family), 1]
     return Neighbour(some.rank, extended(some.nodes, heirs)) if len(heirs) else some
@@ -169,7 +169,7 @@ def _heirs(some: Neighbour, family: Indices, flags: Flags) -> Neighbour:
 
 @njit("void(boolean[::1], int32[::1], int32[::1])", cache=True)
 def _mark(flags, some, others):  # type: ignore[no-untyped-def]
-    """Sets the flag of each of ``some`` that is among the ascending ``others``."""
+    """Sets the flag of each element of ``some`` that is among the ascending ``others``."""
     for i in range(len(some)):
         at = np.searchsorted(others, some[i])
         if at < len(others) and others[at] == some[i]:
@@ -178,9 +178,7 @@ def _mark(flags, some, others):  # type: ignore[no-untyped-def]
 
 @njit("int64[::1](int64[::1], int32[::1], int64[:, ::1], boolean[::1])", cache=True)
 def _joining(ids, places, family, have):  # type: ignore[no-untyped-def]
-    """Returns the rows of ``ids`` without a slot that belong to a ``family`` (c, 2) which must be in the scene,
-    ``have``.
-    """
+    """Returns the rows of ``ids`` without slot, of a ``family`` (c, 2) that must be in the scene (``have``)."""
     wanted = np.sort(family[have].reshape(-1))
     rows, n = np.empty(len(ids), np.int64), 0
     for i in range(len(ids)):
@@ -193,8 +191,8 @@ def _joining(ids, places, family, have):  # type: ignore[no-untyped-def]
 
 @njit("int32[::1](int32[::1], int32[:, ::1], boolean[::1], int32[::1])", cache=True)
 def _lacking(near, family, have, place):  # type: ignore[no-untyped-def]
-    """Nodes, ascending, without a slot: those of ``near``, and those of the families (c, 2), parents and copies, whose
-    parent has a slot or for which ``have`` (c,) is true.
+    """Nodes without a slot, ascending, that must get one: nodes among ``near``, and nodes of families (c, 2), parents
+    and copies, whose parent has a slot or for which ``have`` (c,) is True.
     """
     some, n = np.empty(len(near) + 2 * len(family), np.int32), 0
     for a in near:
@@ -215,8 +213,8 @@ def _lacking(near, family, have, place):  # type: ignore[no-untyped-def]
 
 @njit("void(float64[:, ::1], int32[::1], int32[:, ::1], float64[:, ::1])", cache=True)
 def _renew(mobility, place, family, here):  # type: ignore[no-untyped-def]
-    """Sets the ``mobility`` (slots, 3) of the local nodes of a ``family`` (c, 2) that have slots to that of ``here``
-    (nodes, 3).
+    """Sets the ``mobility`` (slots, 3) of the local nodes of a ``family`` (c, 2) to the values in ``here`` (nodes, 3),
+    if the nodes have slots.
     """
     for c in range(len(family)):
         for k in range(2):
@@ -228,8 +226,8 @@ def _renew(mobility, place, family, here):  # type: ignore[no-untyped-def]
 
 @njit("void(int32[:, ::1], boolean[::1], int64[::1], int32[:, ::1], int32[:, :, ::1], int32[::1])", cache=True)
 def _place(places, pushes, rows, nodes, sides, place):  # type: ignore[no-untyped-def]
-    """Finds the slots of the nodes of those cracks ``rows`` that this rank computes: cracks with separated nodes whose
-    first side is on this rank. Flags the separated nodes in ``pushes``.
+    """Finds the slots of the nodes of those cracks ``rows`` that this rank computes. These cracks have separated nodes,
+    and their first side is on this rank. Flags the separated nodes in ``pushes``.
     """
     for c in rows:
         apart = nodes[c, 0] != nodes[c, 3] or nodes[c, 1] != nodes[c, 4] or nodes[c, 2] != nodes[c, 5]
@@ -251,8 +249,8 @@ def _push(pushes, near, ring, place):  # type: ignore[no-untyped-def]
 
 @njit("int32[::1](int64[:], int32[:], int32[:], int32[::1], int32[::1], boolean[::1])", cache=True)
 def _newly_shared(ids, local, places, holds, shares, flags):  # type: ignore[no-untyped-def]
-    """Returns the slots, by ascending id, without duplicates, of the parents that a rank ``holds`` but does not yet
-    ``share``; ``flags``: working array, all false. ``ids``, ``local`` and ``places``: of the parents.
+    """Returns the slots of the parents that a rank ``holds`` but does not yet ``share``, by ascending id, each once.
+    ``ids``, ``local`` and ``places`` belong to the parents; ``flags``: working array, all False.
     """
     some, n = np.empty(len(ids), np.int64), 0
     for i in range(len(ids)):
@@ -283,8 +281,8 @@ def _newly_shared(ids, local, places, holds, shares, flags):  # type: ignore[no-
 
 @njit("int32[::1](int64[::1], int64[::1], int32[::1], int64[::1], int32[::1])", cache=True)
 def _located(wanted, ids, place, far_ids, far):  # type: ignore[no-untyped-def]
-    """(n,) slot of each node: from ``place`` for nodes among the ``ids`` of this rank, from ``far`` for other nodes, -1
-    for a node without slot.
+    """(n,) slot of each node; -1 for a node without slot. Nodes among the ``ids`` of this rank have their slot in
+    ``place``; other nodes have their slot in ``far``.
     """
     found = np.empty(len(wanted), np.int32)
     for i in range(len(wanted)):

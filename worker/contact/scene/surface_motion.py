@@ -16,19 +16,19 @@ from . import ghosts
 from .near_surface import HALO, NearSurface
 
 _HORIZONS = np.array([10.0, 20.0, 40.0, 80.0, 160.0, 300.0])
-"""Smallest and largest horizon of a search, in steps."""
+"""Smallest horizon and largest horizon of a search, in steps."""
 _SWEPT = 8.0
-"""Largest mean number of cells that a node may sweep in a horizon: two cells along each axis."""
+"""Largest mean number of cells that a node may sweep in a horizon. Chosen value: two cells along each axis."""
 _SPENT = 0.4
-"""Share of the width of the halo. A node that departs further from its extrapolated position makes a search of all
-ranks necessary."""
+"""Fraction of the width of the halo. If a node departs further from its extrapolated position, all ranks must
+search."""
 
 
 class SurfaceMotion:
-    """Motion of the surface of one rank since the last search."""
+    """Motion of the surface of one rank after the last search."""
 
     COLUMNS: ClassVar = {"mobility": COPIED, "_watched": COPIED, "_x": COPIED, "_course": COPIED, "loose": ZERO}
-    """Columns by node (model/columns.py)."""
+    """Columns with one value for each node (model/columns.py)."""
 
     def __init__(self, found: Surface, nodes: Nodes, mobility: Floats, size: float, comm: Comm) -> None:
         """``mobility`` (nodes, 3): see records.SurfaceNodes; ``size``: typical size of a face, m."""
@@ -37,7 +37,7 @@ class SurfaceMotion:
         """Time up to which the last search is valid, s, if no node departs too far."""
         self.mobility = mobility
         self.loose = np.zeros(nodes.n, bool)
-        """(nodes,) nodes without tets."""
+        """(nodes,) whether each node has no tets."""
         self.begin(nodes, nodes.v, 0.0)
         self.follow(found, nodes)
 
@@ -50,7 +50,7 @@ class SurfaceMotion:
         """Returns faces, edges and nodes of the surface."""
 
     def forget(self, removed: Flags) -> None:
-        """Ignores ``removed`` (nodes,) nodes from now on."""
+        """Marks the nodes ``removed`` (nodes,) as removed, so that they are ignored from now on."""
         self._watched &= ~removed
 
     def begin(self, nodes: Nodes, course: Floats, t: float) -> None:
@@ -58,8 +58,8 @@ class SurfaceMotion:
         self._x, self._course, self._t = spacious_copy(nodes.x), spacious_copy(course), t
 
     def spent(self, nodes: Nodes, t: float, dt: float) -> bool:
-        """Returns True if the candidate list will be invalid a step ``dt`` after ``t``: the horizon has passed, or a
-        node departs so far that another rank may lack its ghost.
+        """Returns True if the candidate list will be invalid at the time ``t`` + ``dt``. The reason is that the horizon
+        has passed, or that a node departs so far that its ghost may be missing on another rank.
         """
         if t + dt > self.until:
             return True
@@ -69,12 +69,12 @@ class SurfaceMotion:
         return bool(far > (_SPENT * HALO * self._size) ** 2)
 
     def here(self, nodes: Nodes) -> SurfaceNodes:
-        """All nodes of this rank, by local index."""
+        """Returns all nodes of this rank. The order is that of the local indices."""
         every = np.arange(nodes.n, dtype=np.int32)
         return SurfaceNodes(nodes.id, every, nodes.owner, nodes.part, self.mobility, nodes.x, nodes.v, self._course)
 
     def _whole(self, nodes: Nodes) -> NearSurface:
-        """Returns the faces, edges and nodes of the surface. With several ranks, the tet of an edge may be on another
+        """Returns the faces, edges and nodes of the surface. With several ranks, a tet at an edge may be on another
         rank although the opposite node of the tet is on this rank.
         """
         found, here = self.found, self.here(nodes)
@@ -104,8 +104,9 @@ class SurfaceMotion:
     def foresight(self, dt: float) -> tuple[float, Floats]:
         """Returns the horizon of a search in steps ``dt``, and the mean velocity (3,), m/s. Collective.
 
-        The largest horizon with which the mean volume swept by a node is below ``_SWEPT`` cells of a face's size: The
-        swept length is about the length of a face if all nodes move, and much more if only few nodes are fast.
+        The horizon is the largest one with which the mean volume swept by a node is below ``_SWEPT`` cells of the size
+        of a face. The swept length is about the length of a face if all nodes move, and much more if only few nodes are
+        fast.
         """
         surface_nodes, owned = self.sides.surface_nodes, self.sides.owned
         v = surface_nodes.course[surface_nodes.places(owned)]
@@ -140,6 +141,8 @@ def _strayed(x, v, x_then, v_then, flags, dt, ahead):  # type: ignore[no-untyped
 
 
 def typical(sizes: Floats, comm: Comm) -> float:
-    """Harmonic mean of the sizes of all faces, m: dominated by the small ones of a graded mesh; 0 without faces."""
+    """Harmonic mean of the sizes of all faces, m; 0 if there are no faces. In a graded mesh the small faces dominate
+    this mean.
+    """
     total, count = exact_sums(comm, np.column_stack([1.0 / sizes, np.ones(len(sizes))]))
     return float(count / total) if count > 0.0 else 0.0

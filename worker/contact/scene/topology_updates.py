@@ -1,5 +1,5 @@
-"""Topology changes of a split (node separation) near one rank: changes of the nodes of the rank, and changes of ghosts,
-which are received from other ranks.
+"""Topology changes by a node separation (split) near one rank: changes of the nodes of the rank, and changes of ghosts.
+The changes of ghosts are received from other ranks.
 """
 
 from dataclasses import dataclass
@@ -17,22 +17,22 @@ from .scene import Scene
 
 @dataclass
 class SplitOfGhosts:
-    """Topology change of the ghosts of one step, received from other ranks: new node of each tet."""
+    """Topology change of the ghosts in one step, received from other ranks."""
 
     key: Ints
-    """(r,) ids of a node and of a tet as one number."""
+    """(r,) ids of a node and of a tet, combined into one number."""
     became: Ints
-    """(r,) id of the copy that replaces the node in that tet."""
+    """(r,) id of the copy that replaces the node in the tet."""
     family: Ints
-    """(c, 2) ids of parents, ascending, and of their copies."""
+    """(c, 2) ids of parents, ascending, and ids of their copies."""
     rows: SurfaceNodes
-    """Parents and copies."""
+    """Data of the parents and copies."""
 
 
 def exchange(split: Split, scene: Scene, here: SurfaceNodes, comm: Comm) -> SplitOfGhosts | None:
-    """Sends the splits of nodes to the ranks that have them as ghosts; returns the splits of the ghosts of this rank,
-    None if no ghost has split. ``here``: all nodes of this rank, by local index. Splits of ghosts are received from the
-    rank that sends the state of the ghosts; only ranks with such messages take part.
+    """Sends the separations of nodes to the ranks that have the nodes as ghosts. Returns the separations of the ghosts
+    of this rank; None if no ghost has separated. ``here``: all nodes of this rank, by local index. Separations of
+    ghosts are received from the rank that sends the state of the ghosts. Only ranks with such messages take part.
     """
     sources = [other.rank for other in scene.messages.copies.receives if split.touched[other.rank]]
     if not (sources or split.touched[comm.rank]):
@@ -53,7 +53,9 @@ def exchange(split: Split, scene: Scene, here: SurfaceNodes, comm: Comm) -> Spli
 
 
 def _messages(split: Split, scene: Scene, here: SurfaceNodes) -> dict[int, Ints]:
-    """Messages by rank: rows of SplitOfGhosts.key and became, families, and their nodes."""
+    """Returns the messages, keyed by rank: columns key and became of SplitOfGhosts, families, and the nodes of the
+    families.
+    """
     messages, flags = {}, np.zeros(here.n, bool)
     table, local = np.column_stack([split.key, here.id[split.node]]), split.family
     for other in scene.messages.copies.sends:
@@ -74,7 +76,7 @@ def _messages(split: Split, scene: Scene, here: SurfaceNodes) -> dict[int, Ints]
 @njit("int64[::1](boolean[::1], int32[::1], int32[:, ::1])", cache=True)
 def meets(flags, nodes, family):  # type: ignore[no-untyped-def]
     """Returns the rows of a ``family`` (c, 2) whose parents are among the ``nodes``; ``flags``: working array, all
-    false.
+    False.
     """
     rows, n = np.empty(len(family), np.int64), 0
     for a in nodes:

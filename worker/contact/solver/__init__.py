@@ -1,1 +1,1 @@
-"""Impulses of the active contacts: projected Jacobi sweeps, and sums over ranks."""
+"""Solver of contact: computes the impulses of the active contacts by projected Jacobi sweeps, and sums over ranks."""

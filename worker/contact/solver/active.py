@@ -1,7 +1,7 @@
 """Records of the solver: active contacts, their nodes, and the contacts with an impulse.
 
-The nodes of active contacts are numbered densely: a **slot** each. All data of a node that a sweep needs lie in one
-cache line, floats and integers side by side.
+The nodes of active contacts are numbered without gaps; such a number is called a **slot**. All data of a node that a
+sweep needs are in one cache line, floats and integers side by side.
 """
 
 from typing import NamedTuple
@@ -13,86 +13,86 @@ from ...model.cache_lines import LINE, cache_lines
 from ...model.state import Floats, Indices, Ints
 
 V, IMPULSE = 0, 3
-"""Places in a row of ``ActiveNodes.moving``: first word of the velocity of a slot, m/s, and first word of the
-impulse of the sweep on the slot, quanta."""
+"""Indices in a row of ``ActiveNodes.moving``: first word of the velocity of the slot, m/s; first word of the impulse of
+the sweep on the slot, quanta."""
 MOBILITY, TOTAL, CHANGED = 0, 3, 6
-"""Places in a row of ``ActiveNodes.fixed``: first word of the mobility of a slot, 1/kg; first word of the impulse of
-the step on the slot, quanta; and the l1 norm of the change of that impulse by the last sweep, quanta."""
+"""Indices in a row of ``ActiveNodes.fixed``: first word of the mobility of the slot, 1/kg; first word of the impulse of
+the step on the slot, quanta; l1 norm of the change of this impulse by the last sweep, quanta."""
 WANTED, ROW_NORM, PUSH, MU, LAST = 3, 4, 5, 6, 7
-"""Numbers of the columns of ``Loaded.normal`` after the unit normal."""
+"""Indices of the columns of ``Loaded.normal`` that follow the unit normal."""
 ROW_NORM_T, PUSH_T = 4, 5
-"""Numbers of the columns of ``Loaded.tangent`` after the weights."""
+"""Indices of the columns of ``Loaded.tangent`` that follow the weights."""
 
 
 class ActiveContacts(NamedTuple):
-    """Active contacts in the order of their sets (zones.py), and the rows of the narrow phase: see
-    tables.ContactRows.
-    """
+    """Active contacts in the order of their sets (zones.py), and the rows of the narrow phase (tables.ContactRows)."""
 
     row: Indices
     """(contacts,) row of each contact in the arrays of the narrow phase."""
     slots: Indices
-    """(contacts, 4) slots of the nodes; the third is -1 in a contact of two nodes, of weights 1 and -1."""
+    """(contacts, 4) slots of the nodes. The third slot is -1 in a contact of two nodes, which have the weights 1 and
+    -1."""
     reach: Floats
-    """(contacts,) reach of each contact, m/s: an idle contact stays idle while the sum of the velocity changes of
-    its nodes is below this value; infinite for a loaded one."""
+    """(contacts,) reach of each contact, m/s. An idle contact stays idle while the sum of the velocity changes of its
+    nodes is below its reach. The reach of a loaded contact is infinite."""
     weights: Floats
-    """(room, 4) weights, see tables.ContactRows."""
+    """(rows, 4) weights; see tables.ContactRows."""
     normals: Floats
-    """(room, 3) normals, see tables.ContactRows."""
+    """(rows, 3) normals; see tables.ContactRows."""
     wanted: Floats
-    """(room,) target normal velocity, m/s."""
+    """(rows,) target of the normal velocity, m/s."""
     friction: Floats
-    """(room,) coefficient of Coulomb friction."""
+    """(rows,) coefficient of Coulomb friction."""
     pair: Indices
-    """(room,) row of the candidate pair, see tables.ContactRows."""
+    """(rows,) row of the candidate pair; see tables.ContactRows."""
 
 
 class Kept(NamedTuple):
-    """Stored impulses of the last step times their row norms, for the warm start, m/s: along the normal (1) and across
-    (3). Zero for a pair that had no impulse.
+    """Stored impulses of the last step times their row norms, m/s, for the warm start: along the normal (1) and across
+    it (3). Zero for a pair that had no impulse.
     """
 
     pairs: Floats
-    """(candidates, 4) stored impulses of node-face pairs."""
+    """(candidates, 4) stored impulses of pairs of a node and a face."""
     cracks: Floats
-    """(3 cracks, 4) stored impulses of node pairs across cracks."""
+    """(3 cracks, 4) stored impulses of pairs of nodes across cracks."""
 
 
 class ActiveNodes(NamedTuple):
-    """Data of the slots. The float and the integer view of a cache line use the same memory."""
+    """Data of the slots. The float view and the integer view of a cache line use the same memory."""
 
     moving: Floats
-    """(slots, 8) velocities and impulses, read and written by a sweep; a cache line each."""
+    """(slots, 8) velocities and impulses, which a sweep reads and writes. A row is a cache line."""
     moving_words: Ints
     fixed: Floats
-    """(slots, 8) mobilities and impulses of the step."""
+    """(slots, 8) mobilities, and impulses of the step."""
     fixed_words: Ints
     row_weights: Ints
-    """(slots, 4) sums of |w| |n_i| and of |w| over the contacts of all ranks, in quanta."""
+    """(slots, 4) sums of |w| |n_i| and of |w| over the contacts of all ranks, quanta."""
     path: Floats
-    """(slots,) sum of the l1 norms of the velocity changes in the step, m/s."""
+    """(slots,) sum of the l1 norms of the velocity changes of each slot in the step, m/s."""
 
     @classmethod
     def of(cls, n: int) -> "ActiveNodes":
-        """Allocates arrays for ``n`` slots, aligned to cache lines."""
+        """Allocates arrays for ``n`` slots. The rows are aligned to cache lines."""
         moving, fixed = cache_lines(2 * n).reshape(2, n, LINE)
         sums, path = np.empty((n, 4), np.int64), np.empty(n)
         return cls(moving, moving.view(np.int64), fixed, fixed.view(np.int64), sums, path)
 
 
 class Loaded(NamedTuple):
-    """Loaded contacts, which have an impulse in the step, in the order of their sets (zones.py); the contacts of set k
-    begin at row ``begin[k]``.
+    """Loaded contacts, which are the contacts with an impulse in the step, in the order of their sets (zones.py). The
+    contacts of set k begin at row ``begin[k]``.
     """
 
     normal: Floats
-    """(contacts, 8) unit normal, target velocity, row norm along it, 1/kg, impulse along it, N s, Coulomb's
-    coefficient, impulse without momentum."""
+    """(contacts, 8) unit normal (3), target velocity, row norm along the normal, 1/kg, impulse along the normal, N s,
+    Coulomb's coefficient, impulse before the extrapolation."""
     tangent: Floats
-    """(contacts, 8) weights, row norm across, 1/kg, impulse of friction (3), N s."""
+    """(contacts, 8) weights (4), row norm across the normal, 1/kg, impulse of friction (3), N s."""
     slots: Indices
-    """(contacts, 4) slots of the nodes; the third is -1 in a contact of two nodes, of weights 1 and -1."""
+    """(contacts, 4) slots of the nodes. The third slot is -1 in a contact of two nodes, which have the weights 1 and
+    -1."""
     row: Indices
     """(contacts,) row of each contact in the arrays of the narrow phase."""
     begin: Ints
@@ -102,7 +102,7 @@ class Loaded(NamedTuple):
 
     @classmethod
     def of(cls, room: int, sets: int) -> "Loaded":
-        """Allocates arrays for ``room`` contacts and ``sets`` sets."""
+        """Allocates arrays for ``room`` contacts and ``sets`` sets of contacts."""
         lines, slots, row = np.empty((2, room, 8)), np.empty((room, 4), np.int32), np.empty(room, np.int32)
         return cls(lines[0], lines[1], slots, row, np.zeros(sets + 1, np.int64), np.zeros(sets, np.int64))
 

@@ -1,4 +1,6 @@
-"""Work of the contact impulses of a step: along the normals, by friction, and by the supports of held nodes."""
+"""Work of the contact impulses of a step. It is computed for the normal impulses, for friction, and for the supports of
+held nodes.
+"""
 
 import numpy as np
 
@@ -11,11 +13,13 @@ _F1, _F2, _F, _I = types.float64[::1], types.float64[:, ::1], types.float64, typ
 
 @njit(types.void(_I2, LOADED, NODES, _F2, _N1, _F, _I), cache=True)
 def cost(words, loaded, active, before, places, joule, k):  # type: ignore[no-untyped-def]
-    """Adds the energy that the impulses along the normals of set ``k`` take from the bodies, and the energy that the
-    first half of the impulses returns to the bodies, to two limbs (rows of ``words``) of quanta of 1 / ``joule`` J.
+    """Adds two energies to ``words``: the energy that the normal impulses of set ``k`` take from the bodies, and the
+    energy that the first half of the impulses returns to the bodies. The rows of ``words`` are two limbs, in quanta of
+    1 / ``joule`` J.
 
-    An impulse J between the speeds u(n-1/2), of ``before`` (surface_nodes, 3) at the ``places`` of the slots, and
-    u(n+1/2) takes -J (u(n-1/2) + u(n+1/2)) / 2; the ledger at time n contains the first half of this energy.
+    An impulse J that changes the normal speed from u(n-1/2) to u(n+1/2) takes the energy -J (u(n-1/2) + u(n+1/2)) / 2.
+    The energy ledger at time n contains the first half of this energy. ``before`` (surface_nodes, 3): velocities
+    v(n-1/2); ``places``: rows of the slots.
     """
     values, normal, tangent, slots = active.moving, loaded.normal, loaded.tangent, loaded.slots
     value = np.empty(2)
@@ -39,9 +43,9 @@ def cost(words, loaded, active, before, places, joule, k):  # type: ignore[no-un
 
 @njit(types.void(_I2, LOADED, NODES, _F2, _N1, _F, _I), cache=True)
 def heat(words, loaded, active, before, places, joule, k):  # type: ignore[no-untyped-def]
-    """Adds the work of friction of set ``k``, mean sliding velocity times impulse, and the half of this work with
-    v(n+1/2), which the ledger at time n does not contain, to two limbs (rows of ``words``) of quanta of 1 / ``joule``
-    J.
+    """Adds two energies to ``words``: the work of friction of set ``k``, which is mean sliding velocity times impulse;
+    and the half of this work with v(n+1/2), which the energy ledger at time n does not contain. The rows of ``words``
+    are two limbs, in quanta of 1 / ``joule`` J.
     """
     values, normal, tangent, slots = active.moving, loaded.normal, loaded.tangent, loaded.slots
     value = np.empty(2)
@@ -63,9 +67,9 @@ def heat(words, loaded, active, before, places, joule, k):  # type: ignore[no-un
 
 @njit(types.void(types.int64[:, :, ::1], LOADED, _N1, _N1, _F, _I), cache=True)
 def between(words, loaded, places, part, scale, k):  # type: ignore[no-untyped-def]
-    """Adds the impulses of the contacts of set ``k`` between two parts, along the normals and across, to ``words``
-    (parts, parts, 3) in quanta of 1 / ``scale`` N s, with opposite signs for the two parts. ``part``
-    (surface_nodes,) of the nodes at the ``places`` of the slots.
+    """Adds the impulses of the contacts of set ``k`` between two parts to ``words`` (parts, parts, 3), in quanta of 1 /
+    ``scale`` N s. The two parts get opposite signs. ``part`` (surface_nodes,): part of each node; ``places``: rows of
+    the slots.
     """
     normal, tangent, slots = loaded.normal, loaded.tangent, loaded.slots
     for q in range(loaded.begin[k], loaded.begin[k] + loaded.many[k]):
@@ -87,8 +91,8 @@ def between(words, loaded, places, part, scale, k):  # type: ignore[no-untyped-d
 
 @njit(types.void(_F1, _F1, _N1, _N1, _F2, _I2, _F2, _F, _I, _I), cache=True)
 def book(loss, external, places, index, before, total, mobility, scale, first, stop):  # type: ignore[no-untyped-def]
-    """Adds half of impulse times velocity at the ``places`` from ``first`` to ``stop`` to the energy lost by
-    contact, and where a velocity is held to the external work. ``index``: see slot_numbers.py.
+    """Adds half of impulse times velocity, at the ``places`` from ``first`` to ``stop``, to the energy lost by contact.
+    Where a velocity is held, the work is added to the external work. ``index``: see slot_numbers.py.
     """
     for s in range(first, stop):
         a = places[s]

@@ -1,7 +1,7 @@
-"""Tables of the solver: one handle for all stages of a step (parallel/arguments.py), and the numbers that the stages
-share.
+"""Tables of the solver, under one handle for all stages of a step (parallel/arguments.py), and the numbers that the
+stages share.
 
-A table is set by the owner of its arrays and changes only when an array is replaced.
+A table is set by the owner of its arrays. It changes only if one of its arrays is replaced.
 """
 
 import numpy as np
@@ -17,8 +17,8 @@ _I1, _I2, _I3 = types.int64[::1], types.int64[:, ::1], types.int64[:, :, ::1]
 _F1, _F2 = types.float64[::1], types.float64[:, ::1]
 
 STEP, ROWS, NODES_OF, ROOM, SORTED, STORED, BOUNDS, BODIES, BOOKS, SUMS = range(10)
-"""Numbers of the tables: numbers of the step; rows of the narrow phase; surface nodes; working arrays; contacts in the
-order of their sets; stored impulses; walls and planes; nodes of the rank; energies; sums by task."""
+"""Indices of the tables: numbers of the step; rows of the narrow phase; surface nodes; working arrays; contacts in the
+order of their sets; stored impulses; walls and planes; nodes of the rank; energies; sums of each task."""
 _KINDS = {
     STEP: (_I1, _F1, _I1),
     ROWS: (CONTACT_ROWS, _N1),
@@ -32,43 +32,45 @@ _KINDS = {
     SUMS: (_I1, _I2, _I2, _I1, _F1, _I3, _I3, _I2, _I3),
 }
 rows_of = table_of(ROWS, *_KINDS[ROWS])
-"""Rows of the narrow phase (ContactRows), and the numbers of the active rows."""
+"""Fields of the table ROWS: rows of the narrow phase (ContactRows), and the numbers of the active rows."""
 nodes_of = table_of(NODES_OF, *_KINDS[NODES_OF])
-"""Surface nodes: Surface, v(n-1/2), impulse of the step, zone."""
+"""Fields of the table NODES_OF, for the surface nodes: Surface, v(n-1/2), impulse of the step, zone."""
 room_of = table_of(ROOM, *_KINDS[ROOM])
-"""ActiveNodes; row, slots, reach and set of each contact; places, slot, touched, shared (slot_numbers.py); Loaded,
-Braced."""
+"""Fields of the table ROOM: ActiveNodes; row, slots, reach and set of each contact; places, slot, touched, shared
+(slot_numbers.py); Loaded, Braced."""
 sorted_of = table_of(SORTED, *_KINDS[SORTED])
-"""Active contacts (ActiveContacts)."""
+"""Fields of the table SORTED: active contacts (ActiveContacts)."""
 stored_of = table_of(STORED, *_KINDS[STORED])
-"""Stored impulses of the pairs (Kept)."""
+"""Fields of the table STORED: stored impulses of the pairs (Kept)."""
 bounds_of = table_of(BOUNDS, *_KINDS[BOUNDS])
-"""Walls that stop nodes, and nodes without tets."""
+"""Fields of the table BOUNDS: walls and symmetry planes that stop nodes, and nodes without tets."""
 bodies_of = table_of(BODIES, *_KINDS[BODIES])
-"""Nodes of the rank: velocity, part, whether the rank owns it."""
+"""Fields of the table BODIES, for the nodes of the rank: velocity, part, whether the rank owns the node."""
 books_of = table_of(BOOKS, *_KINDS[BOOKS])
-"""Nodes of the rank: energy lost by contact, external work."""
+"""Fields of the table BOOKS, for the nodes of the rank: energy lost by contact, external work."""
 step_of = table_of(STEP, *_KINDS[STEP])
-"""Counts, real numbers, control word of the program."""
+"""Fields of the table STEP: integers, floating point numbers, control word of the program."""
 sums_of = table_of(SUMS, *_KINDS[SUMS])
-"""By task: contacts that need an impulse; contacts of each set, and first row of each set; touched nodes; largest
-velocity; by set: work along the normals, work of friction; by task: residual, impulses of the parts."""
+"""Fields of the table SUMS. For each task: contacts that need an impulse; contacts of each set, and first row of each
+set; touched nodes; largest velocity. For each set: work along the normals, work of friction. For each task: residual,
+impulses of the parts."""
 
 CONTACTS_N, NODES_N, SLOTS_N, PAIRS_N, CRACKS_N, ONE, TURN, SWEEPS, WORKS, COUNTS = range(10)
-"""Numbers of the counts: active contacts; surface nodes; slots; node-face pairs; node pairs across cracks; the number
-1; number of the sweep; sweeps of the step; which work is booked: 1 along the normals, 2 of friction, 3 both."""
+"""Indices of the integers: numbers of active contacts; surface nodes; slots; node-face pairs; node pairs across cracks;
+the number 1; number of the sweep; sweeps of the step; which work is computed: 1 along the normals, 2 of friction, 3
+both."""
 DT, RATIO, SCALE, FASTEST, SIZE, JOULE, RUB, REALS = range(8)
-"""Numbers of the reals: time step, s; factor of the stored impulses; quanta per N s; bound of the velocities, m/s; size
-of a face, m; quanta per J of the account and of friction."""
+"""Indices of the floating point numbers: time step, s; factor of the stored impulses; quanta per N s; bound of the
+velocities, m/s; size of a face, m; quanta per J of the account and of friction."""
 
 
 def handle() -> Handle:
-    """Returns the tables of a solver."""
+    """Returns the handle of the tables of a solver."""
     return Handle(*_KINDS.values())
 
 
 def numbers() -> "tuple[np.ndarray, np.ndarray]":
-    """Returns the counts and the reals of a solver."""
+    """Returns the integers and the floating point numbers of a solver."""
     counts, reals = np.zeros(COUNTS, np.int64), np.zeros(REALS)
     counts[ONE] = 1
     return counts, reals

@@ -1,9 +1,9 @@
-"""Selection of the contacts that are swept: a contact is loaded if it has needed an impulse in the step; all other
+"""Selection of the contacts that are swept. A contact is loaded if it has needed an impulse in the step; all other
 contacts are idle.
 
-An idle contact closes at less than its allowed speed. An idle contact needs no new test until sweeps have changed the
-velocities of its nodes by more than its margin, the ``reach``. The reach of loaded contacts is infinite; the data of
-loaded contacts are contiguous.
+An idle contact closes more slowly than allowed. It needs no new test until sweeps have changed the velocities of its
+nodes by more than a margin, its ``reach``. The reach of loaded contacts is infinite. The data of loaded contacts are
+contiguous in memory.
 """
 
 import numpy as np
@@ -13,21 +13,21 @@ from ..narrow_phase.tables import CRACK
 from .active import CONTACTS, KEPT, LAST, LOADED, MOBILITY, MU, NODES, PUSH, PUSH_T, ROW_NORM, ROW_NORM_T, WANTED, V
 
 SHARES = float(2**30)
-"""Quanta per unit of weight."""
+"""Number of quanta for a weight of 1."""
 _ACROSS = (1.0, -1.0, 0.0, 0.0)
 """Weights of the two nodes of a contact across a crack."""
 _ROUNDING = 2.0**-40
-"""Allowance for rounding, relative to the velocities. The allowance is far above the rounding error of the speed of
-a contact, which is a sum of twelve products."""
+"""Allowance for round-off, as a fraction of the velocities. The allowance is far above the round-off of the speed of a
+contact, which is a sum of twelve products."""
 _ROWS, _F1, _F, _I = types.int32[::1], types.float64[::1], types.float64, types.int64
 
 
 @njit(types.void(LOADED, CONTACTS, NODES, _I, _I), cache=True, error_model="numpy")
 def fill(loaded, contacts, active, first, end):  # type: ignore[no-untyped-def]
-    """Writes the data of the loaded contacts from ``first`` to ``end``, with zero impulses; on entry ``loaded.row`` has
-    their numbers, on return their rows.
+    """Writes the data of the loaded contacts from ``first`` to ``end``, with zero impulses. On entry ``loaded.row`` has
+    the numbers of these contacts, on return their rows.
 
-    Row norms are bounds of the l1 norms along the normal and across, 1/kg; infinite where all nodes are held.
+    The row norms are bounds of the l1 norms along the normal and across it, 1/kg; infinite if all nodes are held.
     """
     slots, weights, normals, fixed, sums = (
         contacts.slots, contacts.weights, contacts.normals, active.fixed, active.row_weights,
@@ -56,9 +56,12 @@ def fill(loaded, contacts, active, first, end):  # type: ignore[no-untyped-def]
 
 @njit(_I(_ROWS, CONTACTS, _F1, _I, _I), cache=True)
 def _due(due, contacts, path, first, end):  # type: ignore[no-untyped-def]
-    """Finds the contacts from ``first`` to ``end`` whose nodes have changed their velocity, by ``path`` (slots,), at
-    least as much as the reach of the contact; returns the number of these contacts. Every sweep tests all contacts, and
-    few of them pass. A test takes 1 ns; with signed slot numbers 2 ns.
+    """Finds the contacts from ``first`` to ``end`` whose nodes have changed their velocities at least as much as the
+    reach of the contact. ``path`` (slots,): sum of the velocity changes of each slot. Returns the number of these
+    contacts.
+
+    Every sweep tests all contacts, and few of them pass the test. A test takes 1 ns; with signed slot numbers it would
+    take 2 ns.
     """
     slots, reach, n = contacts.slots, contacts.reach, 0
     for q in range(first, end):
@@ -76,8 +79,8 @@ def _due(due, contacts, path, first, end):  # type: ignore[no-untyped-def]
     cache=True, forceinline=True,
 )  # fmt: skip
 def normal_speed(normals, weights, p, v, column, a, b, c, d, two):  # type: ignore[no-untyped-def]
-    """Returns n . sum(w_k v_k) of contact ``p``, m/s, with the nodes a and b, or a to d if not ``two``; the velocities
-    are the columns of ``v`` from ``column`` on.
+    """Returns n . sum(w_k v_k) of contact ``p``, m/s. The nodes are a and b if ``two``, else a, b, c and d. The
+    velocities are columns of ``v`` from ``column`` on.
     """
     speed = 0.0
     for i in range(column, column + 3):
@@ -94,9 +97,9 @@ def normal_speed(normals, weights, p, v, column, a, b, c, d, two):  # type: igno
 def load(loaded, contacts, active, fastest, k):  # type: ignore[no-untyped-def]
     """Adds the idle contacts of set ``k`` that close faster than allowed to the loaded contacts.
 
-    The speed of a contact changes by at most the paths of its nodes times its largest weight w, so its reach is
-    (speed - wanted) / max |w|, less rounding. ``fastest``: bound of the l1 norm of any velocity at the start of the
-    step, m/s.
+    The speed of a contact changes by at most the paths of its nodes times its largest weight w. Therefore its reach is
+    (speed - wanted) / max |w|, less an allowance for round-off. ``fastest``: bound of the l1 norm of any velocity at
+    the start of the step, m/s.
     """
     slots, weights, normals, wanted = contacts.slots, contacts.weights, contacts.normals, contacts.wanted
     moving, path, reach, first, end = active.moving, active.path, contacts.reach, loaded.begin[k], loaded.begin[k + 1]
@@ -124,8 +127,8 @@ def load(loaded, contacts, active, fastest, k):  # type: ignore[no-untyped-def]
 
 @njit(types.void(LOADED, CONTACTS, NODES, KEPT, _I), cache=True)
 def load_kept(loaded, contacts, active, kept, k):  # type: ignore[no-untyped-def]
-    """Adds the contacts of set ``k``, all idle, that have a stored impulse of the last step, ``kept``, to the loaded
-    contacts.
+    """Adds those contacts of set ``k`` that have a stored impulse ``kept`` of the last step to the loaded contacts. On
+    entry all contacts of the set are idle.
     """
     pair, pairs, cracks, first = contacts.pair, kept.pairs, kept.cracks, loaded.begin[k]
     n = first

@@ -1,9 +1,9 @@
 """Sums over the ranks that share a node with an impulse.
 
-In a step, most nodes that two ranks share get no impulse from either rank. The ranks therefore first exchange two bits
-for each shared node: whether the rank has an active contact of the node, and whether it needs the sum, because it has
-such a contact or holds the node. In the step, a sum is sent only if one rank has it and the other rank needs it. Sums
-are integers, and the sums that are not sent are zero.
+In a step, most nodes that two ranks share get no impulse from either rank. Therefore the ranks first exchange two bits
+for each shared node: whether the rank has an active contact of the node; and whether it needs the sum, because it has
+such a contact or has the node. In the step, a sum is sent only if one rank has a contribution and the other rank needs
+the sum. Sums are integers, and contributions that are not sent are zero.
 """
 
 import numpy as np
@@ -25,10 +25,10 @@ _COLUMNS = 4
 
 
 class SharedSums:
-    """Flags of the shared slots of every other rank, and the messages that exchange them."""
+    """Flags of the shared slots for every other rank, and the messages that exchange these flags."""
 
     def __init__(self, neighbours: list[Neighbour], comm: Comm) -> None:
-        """``neighbours``: shared slots, in the same order on both ranks."""
+        """``neighbours``: shared slots for each other rank. The two ranks have the slots in the same order."""
         self._comm = comm
         self._words = np.zeros(0, np.int64)
         self._exchange: Exchange | None = None
@@ -37,7 +37,7 @@ class SharedSums:
         self.take(neighbours)
 
     def take(self, neighbours: list[Neighbour]) -> None:
-        """Replaces the shared slots. Messages that are large enough are reused."""
+        """Replaces the shared slots. A message that is large enough is used again."""
         self.neighbours = neighbours
         self._every = np.concatenate([np.zeros(0, np.int32), *(some.nodes for some in neighbours)])
         self._ends = np.cumsum([0, *(len(some.nodes) for some in neighbours)])
@@ -54,8 +54,8 @@ class SharedSums:
         return [(o.rank, words[a:b]) for o, a, b in zip(self.neighbours, begins, ends, strict=True)]
 
     def agree(self, contacts: ActiveRows, local: Indices) -> "ActiveSum":
-        """Returns the sums of a step with active ``contacts``; ``local`` (surface_nodes,): -1 for nodes that this
-        rank does not hold."""
+        """Returns the sums for a step with the active ``contacts``. ``local`` (surface_nodes,): local index of each
+        node, -1 for nodes that this rank does not have."""
         if not self.neighbours:
             return self._nothing
         assert self._exchange is not None
@@ -73,10 +73,12 @@ class SharedSums:
 
 
 class ActiveSum:
-    """Completion of sums over the ranks at the nodes with an impulse, in one step."""
+    """Completion of sums over the ranks in one step, at the nodes with an impulse."""
 
     def __init__(self, ranks: list[int], sends: Indices, receives: Indices, counts: Ints, comm: Comm) -> None:
-        """``sends`` and ``receives``: slots, rank after rank; ``counts`` (ranks, 2): number of each by rank."""
+        """``sends`` and ``receives``: slots, ordered by rank; ``counts`` (ranks, 2): number of sent and of received
+        slots of each rank.
+        """
         self._sends, self._receives = sends, receives
         self.shared: Indices = np.concatenate([sends, receives])
         """Slots whose sums are sent or received; a slot may occur several times."""
@@ -85,16 +87,16 @@ class ActiveSum:
         self._exchange = comm.exchange(out, into, Tag.CONTACT)
 
     def number(self, slots: Indices) -> None:
-        """Replaces slots by their rows of the summed arrays, ``slots`` (surface_nodes,)."""
+        """Replaces slots by rows of the summed arrays; ``slots`` (surface_nodes,): row of each slot."""
         self._sends, self._receives = slots[self._sends], slots[self._receives]
 
     def begin(self, words: Ints, first: int, columns: int) -> None:
-        """Sends ``columns`` columns of ``words`` (rows, k) from ``first`` on: the sums of this rank."""
+        """Sends the sums of this rank: ``columns`` columns of ``words`` (rows, k), from ``first`` on."""
         _pack(self._out, self._sends, words, first, columns)
         self._exchange.begin()
 
     def finish(self, words: Ints, first: int, columns: int) -> None:
-        """Receives the sums of the other ranks and adds them."""
+        """Receives the sums of the other ranks and adds them to ``words``."""
         self._exchange.finish()
         _add(words, first, self._receives, self._in, columns)
 
@@ -104,7 +106,7 @@ class ActiveSum:
 
 
 def _parts(words: Ints, ranks: list[int], counts: Ints) -> list[tuple[int, Ints]]:
-    """Returns the range of rows of each rank that has rows."""
+    """Returns the range of rows of each rank. Ranks without rows are left out."""
     parts, end = [], 0
     for rank, many in zip(ranks, counts.tolist(), strict=True):
         end += many
@@ -115,7 +117,7 @@ def _parts(words: Ints, ranks: list[int], counts: Ints) -> list[tuple[int, Ints]
 
 @njit("void(int64[::1], int32[::1], int64[::1], int64[::1], int32[:, ::1], int32[::1])", cache=True)
 def _flag(out, nodes, ends, words, contacts, local):  # type: ignore[no-untyped-def]
-    """Writes bits of the shared nodes of each rank into ``out``: first whether this rank has an active contact of
+    """Writes the bits of the shared nodes of each rank into ``out``: first whether this rank has an active contact of
     the node, then whether it needs the sum."""
     pushed = np.zeros(len(local), np.bool_)
     for p in range(len(contacts)):
@@ -138,8 +140,8 @@ def _flag(out, nodes, ends, words, contacts, local):  # type: ignore[no-untyped-
     cache=True,
 )
 def _agreed(mine, theirs, nodes, ends, words):  # type: ignore[no-untyped-def]
-    """Returns the nodes to send and the nodes to receive, rank after rank, and the number of nodes to send and to
-    receive for each rank (ranks, 2).
+    """Returns the nodes to send and the nodes to receive, ordered by rank, and for each rank the number of nodes to
+    send and to receive (ranks, 2).
     """
     sends, receives = np.empty(len(nodes), np.int32), np.empty(len(nodes), np.int32)
     counts = np.zeros((len(ends) - 1, 2), np.int64)

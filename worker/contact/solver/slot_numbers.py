@@ -1,5 +1,5 @@
-"""Numbering of the nodes of active contacts: copies between local nodes, surface nodes of the scene and slots of the
-solver.
+"""Numbering of the nodes of active contacts. The kernels copy data between local nodes, surface nodes of the scene and
+slots of the solver.
 
 ``held`` (h,) are rows of surface nodes and ``local`` (h,) the local indices of the same nodes. ``places`` (slots,) are
 the rows of the nodes of active contacts, and ``index`` (surface_nodes,) the local index of each surface node, -1 for a
@@ -12,10 +12,10 @@ from ...kernels.jit import njit, prefetch, types
 from .active import CHANGED, IMPULSE, MOBILITY, NODES, TOTAL, V
 
 _SMALL = 16
-"""Number of low bits of an impulse that the residual ignores: 2^-30 of the largest (fixed_point.py), so that the sum
-over 2^28 nodes does not overflow."""
+"""Number of low bits of an impulse that the residual ignores. The ignored part is below 2^-30 of the largest impulse
+(fixed_point.py), so that the sum over 2^28 nodes does not overflow."""
 _AHEAD = 16
-"""Prefetch distance of the data of nodes, in nodes."""
+"""Distance, in nodes, by which data of nodes are prefetched."""
 _I2, _N1, _N2, _U1 = types.int64[:, ::1], types.int32[::1], types.int32[:, ::1], types.uint8[::1]
 _F1, _F2, _F, _I, _I1, _B1 = (
     types.float64[::1], types.float64[:, ::1], types.float64, types.int64, types.int64[::1], types.boolean[::1],
@@ -24,7 +24,7 @@ _F1, _F2, _F, _I, _I1, _B1 = (
 
 @njit(types.void(_F2, _F2, _N1, _F2, _F2, _N1, _I, _I), cache=True)
 def take(x, v, held, node_x, node_v, local, first, stop):  # type: ignore[no-untyped-def]
-    """Copies positions and velocities of the held nodes from ``first`` to ``stop``."""
+    """Copies positions and velocities of the local nodes ``held`` from ``first`` to ``stop`` to the surface nodes."""
     for h in range(first, stop):
         near = 3 * local[min(h + _AHEAD, len(held) - 1)]
         prefetch(node_x, near)
@@ -35,11 +35,11 @@ def take(x, v, held, node_x, node_v, local, first, stop):  # type: ignore[no-unt
 
 @njit(types.void(_U1, _N1, _N2, _N1, _N1, _U1, _I2, _I, _I, _I), cache=True)
 def mark(touched, set_of, nodes, found, zone, shared, many, task, first, stop):  # type: ignore[no-untyped-def]
-    """Task: writes the number of the set of each contact in ``found[first:stop]`` to ``set_of``, and counts the
-    contacts of this task in each set (``many``, (tasks, sets)).
+    """Task: writes the number of the set of each contact in ``found[first:stop]`` to ``set_of``. Counts the contacts of
+    this task in each set, in ``many`` (tasks, sets).
 
-    A contact belongs to the smallest box (zones.py) with all its nodes; ``zone`` (surface_nodes,): of each node. There
-    are two groups of sets: first the sets of contacts with a ``shared`` (surface_nodes,) node, then the sets of
+    A contact belongs to the smallest box (zones.py) with all its nodes; ``zone`` (surface_nodes,): zone of each node.
+    There are two groups of sets: first the sets of contacts with a ``shared`` (surface_nodes,) node, then the sets of
     contacts without such a node. ``nodes`` (room, 4); ``touched`` (surface_nodes,): set to 1 for all nodes of the
     contacts.
     """
@@ -64,7 +64,7 @@ def mark(touched, set_of, nodes, found, zone, shared, many, task, first, stop): 
 
 @njit(_I(_I1, _I), cache=True)
 def offsets(counts, many):  # type: ignore[no-untyped-def]
-    """Replaces the first ``many`` of the ``counts`` by the sums of those before them; returns the sum of all."""
+    """Replaces each of the first ``many`` counts by the sum of the counts before it. Returns the sum of all counts."""
     n = 0
     for k in range(many):
         counts[k], n = n, n + counts[k]
@@ -73,8 +73,8 @@ def offsets(counts, many):  # type: ignore[no-untyped-def]
 
 @njit(types.void(_I1, _I2, _I2, _I), cache=True)
 def set_offsets(begin, begins, many, tasks):  # type: ignore[no-untyped-def]
-    """Sets ``begin`` (sets + 1,) to the first row of each set and ``begins`` (tasks, sets) to the first row of each of
-    the first ``tasks`` tasks in it, from the number of contacts ``many`` (tasks, sets).
+    """Sets ``begin`` (sets + 1,) to the first row of each set. Sets ``begins`` (tasks, sets) to the first row of each
+    task in each set. ``many`` (tasks, sets): number of contacts. Only the first ``tasks`` tasks are used.
     """
     n = 0
     for kind in range(many.shape[1]):
@@ -87,8 +87,8 @@ def set_offsets(begin, begins, many, tasks):  # type: ignore[no-untyped-def]
 
 @njit(types.void(_N1, _N1, _U1, _I, _I, _I), cache=True)
 def number(places, slot, touched, n, first, stop):  # type: ignore[no-untyped-def]
-    """Numbers the ``touched`` surface nodes from ``first`` to ``stop`` in their order, from ``n`` on, and clears the
-    flags. ``slot`` (surface_nodes,) is the inverse of ``places``.
+    """Numbers the ``touched`` surface nodes from ``first`` to ``stop`` in their order, with numbers from ``n`` on.
+    Clears the flags ``touched``. ``slot`` (surface_nodes,) becomes the inverse of ``places``.
     """
     for a in range(first, stop):
         if touched[a]:
@@ -98,9 +98,11 @@ def number(places, slot, touched, n, first, stop):  # type: ignore[no-untyped-de
 
 @njit(types.void(_N1, _N2, _F1, _I2, _N1, _N1, _N2, _N1, _I, _I, _I), cache=True)
 def sort(row, slots, reach, begins, set_of, found, nodes, slot, task, first, stop):  # type: ignore[no-untyped-def]
-    """Orders the contacts ``found`` from ``first`` to ``stop`` by their sets, all idle: their rows, slots and
-    ``reach``, -1, with which the contacts are computed in the first sweep. ``begins`` (tasks, sets): offset of this
-    task in each set, advanced to its end; ``slot`` (surface_nodes,): see ``number``.
+    """Orders the contacts ``found`` from ``first`` to ``stop`` by their sets, as idle contacts: writes their rows and
+    slots, and the ``reach`` -1, with which every contact is computed in the first sweep.
+
+    ``begins`` (tasks, sets): offset of this task in each set, which is advanced to its end; ``slot`` (surface_nodes,):
+    see ``number``.
     """
     for q in range(first, stop):
         p, kind = found[q], set_of[q]
@@ -115,8 +117,8 @@ def sort(row, slots, reach, begins, set_of, found, nodes, slot, task, first, sto
 
 @njit(_F(NODES, _N1, _F2, _F2, _I, _I), cache=True)
 def load(active, places, v, mobility, first, stop):  # type: ignore[no-untyped-def]
-    """Copies velocities and mobilities (surface_nodes, 3) to the slots from ``first`` to ``stop`` and clears their
-    impulses. Returns the largest l1 norm of a velocity, m/s.
+    """Copies velocities and mobilities (surface_nodes, 3) to the slots from ``first`` to ``stop``, and clears the
+    impulses of these slots. Returns the largest l1 norm of a velocity, m/s.
     """
     moving, words, fixed, total, sums = (
         active.moving, active.moving_words, active.fixed, active.fixed_words, active.row_weights,
@@ -134,10 +136,10 @@ def load(active, places, v, mobility, first, stop):  # type: ignore[no-untyped-d
 
 @njit(types.void(_F2, _I2, _I1, _I2, NODES, _N1, _N1, _N1, _B1, _I, _I), cache=True)
 def leave(node_v, parts, unsettled, total, active, places, index, part, owned, first, stop):  # type: ignore[no-untyped-def]
-    """Copies the velocities of the slots from ``first`` to ``stop`` to the local nodes, and the impulses of the step
-    to ``total`` (surface_nodes, 3). Adds the impulses of owned nodes to the sums of their parts and to the residual
-    ``unsettled`` (3,): its first two words as in sweep_count.py, the third the number of local nodes with an
-    impulse.
+    """Copies the velocities of the slots from ``first`` to ``stop`` to the local nodes, and the impulses of the step to
+    ``total`` (surface_nodes, 3). Adds the impulses of owned nodes to the sums of their parts and to the residual
+    ``unsettled`` (3,). The first two words of the residual are those of sweep_count.py; the third word is the number of
+    local nodes with an impulse.
     """
     moving, words = active.moving, active.fixed_words
     for s in range(first, stop):

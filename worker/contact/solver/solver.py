@@ -1,4 +1,6 @@
-"""Impulses of a step: from the active contacts of the narrow phase to the velocities v(n+1/2)."""
+"""Solver of the impulses of a step. The input is the active contacts of the narrow phase; the output is the velocities
+v(n+1/2).
+"""
 
 from typing import Protocol
 
@@ -22,30 +24,30 @@ _NONE: Indices = np.zeros(0, np.int32)
 _ROW_WEIGHTS = 4
 """Number of columns of ``ActiveNodes.row_weights``."""
 _SPARE = 1.25
-"""Allocated rows over the present number of nodes and contacts. While a body breaks, these numbers increase in
-nearly every step, and each new allocation costs time because the operating system clears new pages. Chosen value: a
+"""Ratio of the allocated rows to the present number of nodes or contacts. While a body breaks, these numbers increase
+in nearly every step, and each new allocation takes time because the operating system clears new pages. Chosen value: a
 bar of glass has a quarter more rows after 400 steps."""
 
 
 class Bodies(Protocol):
-    """Interface of rigid bodies, whose nodes are slots (rigid/rows.py)."""
+    """Interface of rigid bodies whose nodes are slots (rigid/rows.py)."""
 
     active: bool
     """True if any rank has an active contact with a rigid body."""
 
     def take_up(self, places: Indices, surface_nodes: SurfaceNodes, scale: float) -> None:
-        """Finds the slots of rigid bodies."""
+        """Finds the slots that belong to rigid bodies."""
 
     def weigh(self, active: ActiveNodes) -> None:
-        """Sets the row weights of the slots of rigid bodies, after all contacts have added their row weights.
-        Collective.
+        """Sets the row weights of the slots of rigid bodies. Must be called after all contacts have added their row
+        weights. Collective.
         """
 
     def give(self, active: ActiveNodes) -> None:
         """Moves the rigid bodies by the impulses on their slots, and sets the velocities of the slots. Collective."""
 
     def unsettled(self) -> Ints:
-        """Residual of the sweeps, see sweep_count.py."""
+        """Returns the residual of the sweeps; see sweep_count.py."""
 
     def of_contact(self, parts: Ints) -> None:
         """Adds the impulses of the step to the sums ``parts`` (parts, 3), quanta."""
@@ -57,16 +59,15 @@ class Bodies(Protocol):
 
 
 class ActiveSet:
-    """Active contacts of a rank in a step, and the slots of their nodes."""
+    """Active contacts of a rank in a step, and the slots of the nodes of these contacts."""
 
     def __init__(self, scale: float, near: Stops, team: Team, bodies: Bodies | None = None) -> None:
-        """``scale``: quanta per N s, a power of two; ``near``: walls and planes of symmetry; ``bodies``: rigid
-        bodies."""
+        """``scale``: quanta per N s, a power of two; ``near``: walls and symmetry planes; ``bodies``: rigid bodies."""
         self.scale, self.stops, self._bodies = scale, near, bodies
         self.places: Indices = np.zeros(0, np.int32)
         """(slots,) rows in the scene of the nodes that were slots in the last step."""
         self.tests_rest = True
-        """Whether the contacts of a step are tested first whether they need an impulse."""
+        """Whether a test is made first whether the contacts of a step need impulses."""
         self._zones = Zones(team.threads)
         self._room = _Room(0, 0, near.sides.shape, self._zones.many)
         self._handle, (self._counts, self._reals) = layout.handle(), layout.numbers()
@@ -74,12 +75,12 @@ class ActiveSet:
         self._stored = True
 
     def go_on(self, scale: float, sides: Floats) -> None:
-        """Sets the scale, and the ``sides`` of the stops, after a restart or a repartition."""
+        """Sets the scale, and the ``sides`` of the stops. Must be called after a restart or a repartition."""
         self.scale, self._stored = scale, True
         self.stops = self.stops._replace(sides=sides.reshape(self.stops.sides.shape))
 
     def _stages(self, team: Team) -> Program:
-        """Returns the stages of a step, in the order of their numbers."""
+        """Returns the stages of a step. The order is that of their numbers."""
         table, counts, control = self._handle.address, self._counts, np.zeros(1, np.int64)
         self._handle.set(layout.STEP, counts, self._reals, control)
         border, inner = zones.tasks(self._zones.many)
@@ -106,7 +107,7 @@ class ActiveSet:
         return Program(team, every, control)
 
     def bind(self, step: SolverStep) -> None:
-        """Begins a step: sets the arguments of the stages."""
+        """Begins a step: sets the arguments of all stages."""
         self._step, rows, nodes = step, step.rows, step.nodes
         if rows.n > len(self._room.row) or nodes.n > len(self._room.touched):
             of = int(_SPARE * rows.n), int(_SPARE * nodes.n)
@@ -126,8 +127,8 @@ class ActiveSet:
         reals[:] = step.dt, step.ratio, self.scale, reals[layout.FASTEST], step.size, *joules
 
     def solve(self, step: SolverStep, shared: ActiveSum) -> bool:
-        """Computes the impulses of a step, applies and books them; ``shared``: sums over ranks. Returns whether there
-        was any impulse on a node of this rank.
+        """Computes the impulses of a step, applies them, and adds their work to the accounts. ``shared``: sums over
+        ranks. Returns whether a node of this rank got an impulse.
         """
         self.bind(step)
         if not len(shared.shared) and self._bodies is None:
@@ -138,7 +139,7 @@ class ActiveSet:
         return self.leave()
 
     def _solved(self) -> bool:
-        """Runs all stages in one call. If no contact needs an impulse, no velocity changes."""
+        """Runs all stages in one call. If no contact needs an impulse, the velocities do not change."""
         if self._step.rows.n and self._program.run(stages.QUIET if self.tests_rest else stages.MARK, END) == END:
             self._stored = True
             self._numbered()
@@ -151,7 +152,7 @@ class ActiveSet:
         return False
 
     def begin(self, shared: ActiveSum) -> None:
-        """Numbers the contacts and their nodes; ``shared``: sums over ranks."""
+        """Numbers the contacts and the nodes of the contacts. ``shared``: sums over ranks."""
         room, self._sum = self._room, shared
         room.touched[shared.shared] = room.shared[shared.shared] = 1
         self._program.run(stages.MARK, stages.SORT)
@@ -168,8 +169,8 @@ class ActiveSet:
             self.places = room.places[:slots]
 
     def _complete(self, border: int, inner: int, words: Ints, first: int, columns: int) -> None:
-        """Runs two stages over all contacts and completes ``columns`` columns of ``words`` over the ranks. Contacts
-        without shared slots are computed while the sums of contacts with shared slots are exchanged.
+        """Runs two stages over all contacts, and completes ``columns`` columns of ``words`` over the ranks. While the
+        sums of contacts with shared slots are exchanged, the contacts without shared slots are computed.
         """
         if not len(self._sum.shared):
             self._program.run(inner, inner + 1)
@@ -180,14 +181,14 @@ class ActiveSet:
         self._sum.finish(words, first, columns)
 
     def weigh(self) -> None:
-        """Computes the row weights, completed over the ranks."""
+        """Computes the row weights and completes them over the ranks."""
         active = self._room.active
         self._complete(stages.WEIGH_BORDER, stages.WEIGH, active.row_weights, 0, _ROW_WEIGHTS)
         if self._bodies is not None:
             self._bodies.weigh(active)
 
     def resume(self) -> None:
-        """Warm start with the stored impulses."""
+        """Warm start: applies the stored impulses of the last step."""
         active = self._room.active
         self._complete(stages.RESUME_BORDER, stages.RESUME, active.moving_words, IMPULSE, 3)
         if self._bodies is not None:
@@ -195,7 +196,7 @@ class ActiveSet:
         self._program.run(stages.START, stages.SWEEP)
 
     def sweep(self) -> None:
-        """Runs the sweeps, in one call if no other rank and no rigid body takes part."""
+        """Runs the sweeps. If no other rank and no rigid body takes part, all sweeps are run in one call."""
         active, bodies, counts = self._room.active, self._bodies, self._counts
         counts[layout.TURN] = 0
         if not len(self._sum.shared) and (bodies is None or not bodies.active):
@@ -215,8 +216,8 @@ class ActiveSet:
         self._program.run(stages.STORE_BORDER, stages.WORK_BORDER)
 
     def work(self) -> None:
-        """Books the energy that the impulses take from the bodies, the work of friction, and the impulses between parts
-        if a probe needs them.
+        """Adds the energy that the impulses take from the bodies, the work of friction, and, if a probe needs them, the
+        impulses between parts.
         """
         self._program.run(stages.WORK, stages.LEAVE)
         self._program.run(stages.WORK_BORDER, stages.WORK_BORDER + 1)
@@ -235,8 +236,8 @@ class ActiveSet:
             impulse_work.between(books.pairs, room.loaded, self.places, step.nodes.part, self.scale, k)
 
     def leave(self) -> bool:
-        """Copies velocities to the local nodes, and adds impulses to the impulses of the scene, to the sums of the
-        parts and to the residual, and books half of their work; returns whether there was any impulse.
+        """Copies velocities to the local nodes. Adds the impulses to the impulses of the scene, to the sums of the
+        parts and to the residual, and adds half of their work. Returns whether there was any impulse.
         """
         self._program.run(stages.LEAVE, END)
         return self._left()
@@ -252,13 +253,15 @@ class ActiveSet:
         return bool(left[2])
 
     def press(self, pressed: Ints) -> None:
-        """Adds the impulses of rigid bodies in the step to ``pressed`` (nodes, 3), quanta, if ``pressed`` has rows."""
+        """Adds the impulses of rigid bodies in the step to ``pressed`` (nodes, 3), quanta. Nothing is done if
+        ``pressed`` has no rows.
+        """
         if self._bodies is not None and len(pressed):
             self._bodies.add_pressed(pressed)
 
     def pushes(self) -> tuple[Indices, Floats]:
-        """Rows of the contacts with an impulse in the step, and (k, 4) their impulses along the normal, and of
-        friction, N s.
+        """Returns the rows of the contacts with an impulse in the step, and (k, 4) their normal impulses and friction
+        impulses, N s.
         """
         loaded = self._room.loaded
         some = np.concatenate([np.arange(a, a + n) for a, n in zip(loaded.begin[:-1], loaded.many, strict=True)])
@@ -266,8 +269,8 @@ class ActiveSet:
 
 
 class _Room:
-    """Working arrays for ``contacts`` contacts, ``nodes`` surface nodes, ``sides``: numbers of stops and parts, and
-    ``of`` zones.
+    """Working arrays for ``contacts`` contacts and ``nodes`` surface nodes. ``sides``: numbers of stops and of parts;
+    ``of``: number of zones.
     """
 
     def __init__(self, contacts: int, nodes: int, sides: tuple[int, ...], of: int) -> None:

@@ -1,6 +1,6 @@
-"""Stages of the solver: kernels over contacts, nodes, slots and sets of contacts, with the tables of layout.py.
+"""Stages of the solver: kernels over contacts, nodes, slots and sets of contacts. Their tables are in layout.py.
 
-``number`` and the kernels without a range are run by one thread.
+The kernel ``number`` and kernels without a range are run by one thread.
 """
 
 from ...kernels.jit import njit
@@ -33,21 +33,21 @@ from .layout import (
 from .quiet import needs_impulse
 
 CONTACTS_OF_A_TASK, SLOTS_OF_A_TASK, KEPT_OF_A_TASK = 1024, 2048, 8192
-"""Numbers of contacts, of nodes or slots, and of stored impulses in a task. Chosen values: a task takes some 20 us; to
-start a region takes 2 us."""
+"""Numbers of contacts, of nodes or slots, and of stored impulses in a task. Chosen values: a task takes some 20 us,
+compared with 2 us to start a parallel region."""
 (
     QUIET, REST, MARK, COUNT, ORDER, NUMBER, SORT, LOAD, BEGIN, WEIGH, RESUME, START, SWEEP, GIVE, TURN_OVER,
     CLEAR_PAIRS, CLEAR_CRACKS, STORE, WORK, LEAVE, END,
 ) = range(21)  # fmt: skip
-"""Numbers of the stages, in their order, and of the end."""
+"""Numbers of the stages in the order of execution, and the number of the end."""
 WEIGH_BORDER, RESUME_BORDER, SWEEP_BORDER, STORE_BORDER, WORK_BORDER, RESTED = range(END, END + 6)
-"""Numbers of the stages over contacts with a node that other ranks share; the number with which a step ends that needs
-no impulse."""
+"""Numbers of the stages over contacts with a node that other ranks share; and the number with which a step ends if it
+needs no impulse."""
 
 
 @njit(TASK, cache=True)
 def quiet(table, first, stop, thread):  # type: ignore[no-untyped-def]
-    """Writes 1 if a contact of the range may need an impulse, else 0."""
+    """Task: writes 1 if a contact of the range may need an impulse, else 0."""
     rows, found = rows_of(table)
     (kept,), (planes, loose), (_, reals, _) = stored_of(table), bounds_of(table), step_of(table)
     flags = sums_of(table)[0]
@@ -58,7 +58,7 @@ def quiet(table, first, stop, thread):  # type: ignore[no-untyped-def]
 
 @njit(TASK, cache=True)
 def rest(table, first, stop, thread):  # type: ignore[no-untyped-def]
-    """Ends the program if no contact needs an impulse: the next stage is RESTED."""
+    """Ends the program if no contact needs an impulse: RESTED becomes the number of the next stage."""
     (counts, _, control), flags = step_of(table), sums_of(table)[0]
     many = (counts[CONTACTS_N] + CONTACTS_OF_A_TASK - 1) // CONTACTS_OF_A_TASK
     for k in range(many):
@@ -69,7 +69,7 @@ def rest(table, first, stop, thread):  # type: ignore[no-untyped-def]
 
 @njit(TASK, cache=True)
 def mark(table, first, stop, thread):  # type: ignore[no-untyped-def]
-    """``slot_numbers.mark``."""
+    """Task: runs ``slot_numbers.mark``."""
     (rows, found), zone, many = rows_of(table), nodes_of(table)[3], sums_of(table)[1]
     _, _, _, _, set_of, _, _, touched, shared, _, _ = room_of(table)
     k = first // CONTACTS_OF_A_TASK
@@ -79,7 +79,7 @@ def mark(table, first, stop, thread):  # type: ignore[no-untyped-def]
 
 @njit(TASK, cache=True)
 def count(table, first, stop, thread):  # type: ignore[no-untyped-def]
-    """Counts the touched nodes of the range."""
+    """Task: counts the touched nodes of the range."""
     touched, counted, n = room_of(table)[7], sums_of(table)[3], 0
     for a in range(first, stop):
         n += touched[a]
@@ -88,8 +88,8 @@ def count(table, first, stop, thread):  # type: ignore[no-untyped-def]
 
 @njit(TASK, cache=True)
 def order(table, first, stop, thread):  # type: ignore[no-untyped-def]
-    """Sets the first slot of each range of nodes, and the first row of each set of contacts and of each task in it.
-    The loaded contacts and the work of all sets are set to zero.
+    """Sets the first slot of each range of nodes, the first row of each set of contacts, and the first row of each task
+    in each set. Sets the loaded contacts and the work of all sets to zero.
     """
     counts, _, _ = step_of(table)
     _, many, begins, counted, _, along, friction, _, _ = sums_of(table)
@@ -103,14 +103,14 @@ def order(table, first, stop, thread):  # type: ignore[no-untyped-def]
 
 @njit(TASK, cache=True)
 def number(table, first, stop, thread):  # type: ignore[no-untyped-def]
-    """``slot_numbers.number``."""
+    """Task: runs ``slot_numbers.number``."""
     _, _, _, _, _, places, slot, touched, _, _, _ = room_of(table)
     slot_numbers.number(places, slot, touched, sums_of(table)[3][first // SLOTS_OF_A_TASK], first, stop)
 
 
 @njit(TASK, cache=True)
 def sort(table, first, stop, thread):  # type: ignore[no-untyped-def]
-    """``slot_numbers.sort``."""
+    """Task: runs ``slot_numbers.sort``."""
     (rows, found), begins = rows_of(table), sums_of(table)[2]
     _, row, slots, reach, set_of, _, slot, _, _, _, _ = room_of(table)
     k = first // CONTACTS_OF_A_TASK
@@ -119,7 +119,7 @@ def sort(table, first, stop, thread):  # type: ignore[no-untyped-def]
 
 @njit(TASK, cache=True)
 def load(table, first, stop, thread):  # type: ignore[no-untyped-def]
-    """``slot_numbers.load``; finds the slots near stops, and stops them."""
+    """Task: runs ``slot_numbers.load``, then finds the slots near stops and stops these slots."""
     active, _, _, _, _, places, _, _, _, _, braced = room_of(table)
     nodes = nodes_of(table)[0]
     (planes, loose), (_, reals, _) = bounds_of(table), step_of(table)
@@ -132,7 +132,7 @@ def load(table, first, stop, thread):  # type: ignore[no-untyped-def]
 
 @njit(TASK, cache=True)
 def begin(table, first, stop, thread):  # type: ignore[no-untyped-def]
-    """Sets the bound of the velocities of the slots."""
+    """Sets the bound of the velocities of the slots to the maximum over the tasks."""
     (counts, reals, _), fastest, most = step_of(table), sums_of(table)[4], 0.0
     for k in range((counts[SLOTS_N] + SLOTS_OF_A_TASK - 1) // SLOTS_OF_A_TASK):
         most = max(most, fastest[k])
@@ -141,7 +141,7 @@ def begin(table, first, stop, thread):  # type: ignore[no-untyped-def]
 
 @njit(TASK, cache=True)
 def weigh(table, first, stop, thread):  # type: ignore[no-untyped-def]
-    """``sweeps.add_row_weights`` of a range of sets."""
+    """Task: runs ``sweeps.add_row_weights`` for a range of sets."""
     (contacts,), room = sorted_of(table), room_of(table)
     for k in range(first, stop):
         sweeps.add_row_weights(room[0], contacts, room[9], k)
@@ -149,7 +149,7 @@ def weigh(table, first, stop, thread):  # type: ignore[no-untyped-def]
 
 @njit(TASK, cache=True)
 def resume(table, first, stop, thread):  # type: ignore[no-untyped-def]
-    """``loading.load_kept`` and ``sweeps.resume`` of a range of sets."""
+    """Task: runs ``loading.load_kept`` and ``sweeps.resume`` for a range of sets."""
     (contacts,), (kept,), room, (_, reals, _) = sorted_of(table), stored_of(table), room_of(table), step_of(table)
     for k in range(first, stop):
         loading.load_kept(room[9], contacts, room[0], kept, k)
@@ -158,7 +158,7 @@ def resume(table, first, stop, thread):  # type: ignore[no-untyped-def]
 
 @njit(TASK, cache=True)
 def sweep(table, first, stop, thread):  # type: ignore[no-untyped-def]
-    """``loading.load`` and ``sweeps.sweep`` of a range of sets."""
+    """Task: runs ``loading.load`` and ``sweeps.sweep`` for a range of sets."""
     (contacts,), room, (counts, reals, _) = sorted_of(table), room_of(table), step_of(table)
     ahead = sweeps.momentum(counts[TURN], counts[SWEEPS])
     for k in range(first, stop):
@@ -168,7 +168,7 @@ def sweep(table, first, stop, thread):  # type: ignore[no-untyped-def]
 
 @njit(TASK, cache=True)
 def give(table, first, stop, thread):  # type: ignore[no-untyped-def]
-    """``sweeps.give``, then stops the slots."""
+    """Task: runs ``sweeps.give``, then stops the slots at walls and symmetry planes."""
     room, (counts, reals, _) = room_of(table), step_of(table)
     sweeps.give(room[0], reals[SCALE], counts[TURN] + 1 == counts[SWEEPS], first, stop)
     planes = len(bounds_of(table)[0].points)
@@ -178,7 +178,7 @@ def give(table, first, stop, thread):  # type: ignore[no-untyped-def]
 
 @njit(TASK, cache=True)
 def turn(table, first, stop, thread):  # type: ignore[no-untyped-def]
-    """Increases the number of the sweep by one; the next stage is SWEEP until all sweeps are done."""
+    """Increases the number of the sweep by one. Until all sweeps are done, the next stage is SWEEP."""
     counts, _, control = step_of(table)
     counts[TURN] += 1
     if counts[TURN] < counts[SWEEPS]:
@@ -187,21 +187,21 @@ def turn(table, first, stop, thread):  # type: ignore[no-untyped-def]
 
 @njit(TASK, cache=True)
 def clear_pairs(table, first, stop, thread):  # type: ignore[no-untyped-def]
-    """Sets the stored impulses of a range of node-face pairs to zero."""
+    """Task: sets the stored impulses of a range of node-face pairs to zero."""
     (kept,) = stored_of(table)
     kept.pairs[first:stop] = 0.0
 
 
 @njit(TASK, cache=True)
 def clear_cracks(table, first, stop, thread):  # type: ignore[no-untyped-def]
-    """Sets the stored impulses of a range of node pairs across cracks to zero."""
+    """Task: sets the stored impulses of a range of node pairs across cracks to zero."""
     (kept,) = stored_of(table)
     kept.cracks[first:stop] = 0.0
 
 
 @njit(TASK, cache=True)
 def store(table, first, stop, thread):  # type: ignore[no-untyped-def]
-    """``sweeps.store`` of a range of sets."""
+    """Task: runs ``sweeps.store`` for a range of sets."""
     (contacts,), (kept,), room = sorted_of(table), stored_of(table), room_of(table)
     for k in range(first, stop):
         sweeps.store(kept, room[9], contacts.pair, k)
@@ -209,7 +209,9 @@ def store(table, first, stop, thread):  # type: ignore[no-untyped-def]
 
 @njit(TASK, cache=True)
 def work(table, first, stop, thread):  # type: ignore[no-untyped-def]
-    """``impulse_work.cost`` and ``impulse_work.heat`` of a range of sets; added to the sums of the sets."""
+    """Task: runs ``impulse_work.cost`` and ``impulse_work.heat`` for a range of sets, and adds the results to the sums
+    of the sets.
+    """
     room, (counts, reals, _), before = room_of(table), step_of(table), nodes_of(table)[1]
     _, _, _, _, _, along, friction, _, _ = sums_of(table)
     active, places, loaded = room[0], room[5], room[9]
@@ -222,7 +224,9 @@ def work(table, first, stop, thread):  # type: ignore[no-untyped-def]
 
 @njit(TASK, cache=True)
 def leave(table, first, stop, thread):  # type: ignore[no-untyped-def]
-    """Removes the impulses of stops; then ``slot_numbers.leave`` and ``impulse_work.book``, with sums by task."""
+    """Task: removes the impulses of stops. Then runs ``slot_numbers.leave`` and ``impulse_work.book``, with separate
+    sums for each task.
+    """
     room, (v, of, owned), (loss, external), (_, reals, _) = (
         room_of(table), bodies_of(table), books_of(table), step_of(table),
     )  # fmt: skip

@@ -1,4 +1,4 @@
-"""Input of the solver in a step: arrays of the scene, of the rank and of the accounts, and numbers."""
+"""Input of the solver in a step: arrays of the scene, of the rank and of the accounts, and some numbers."""
 
 from dataclasses import dataclass
 
@@ -16,21 +16,21 @@ class SolverStep:
     rows: ActiveRows
     """Active contacts."""
     nodes: SurfaceNodes
-    """Surface nodes, with the positions, and the velocities before contact."""
+    """Surface nodes with their positions, and their velocities before contact."""
     before: Floats
     """(surface_nodes, 3) v(n-1/2), m/s."""
     total: Ints
-    """(surface_nodes, 3) impulses of the step, quanta; written."""
+    """(surface_nodes, 3) impulses of the step, quanta. The solver writes this array."""
     state: Nodes
-    """Nodes of the rank; their velocities are written."""
+    """Nodes of the rank. The solver writes their velocities."""
     loose: Flags
-    """(nodes,) nodes without tets."""
+    """(nodes,) whether each node has no tets."""
     books: Books
-    """Accounts; written."""
+    """Accounts of energies and impulses. The solver adds to them."""
     unsettled: Ints
-    """(2,) residual of the sweeps; see sweep_count.py; written."""
+    """(2,) residual of the sweeps (sweep_count.py). The solver writes this array."""
     kept: Kept
-    """Stored impulses of the last step; replaced by those of this step."""
+    """Stored impulses of the last step. The solver replaces them by those of this step."""
     ratio: float
     """Factor of the stored impulses at the start of the step."""
     sweeps: int

@@ -1,10 +1,11 @@
-"""Walls and planes of symmetry within the sweeps: a node at a plane is stopped there after every sweep.
+"""Walls and symmetry planes within the sweeps. A node that reaches a plane is stopped at the plane after every sweep.
 
-Walls and mirror images act after contact (walls.py, mirrors.py), node by node. Without stops, the sweeps would treat a
-node between a body and a wall as free, and the wall would then cancel the result of the sweeps. Each node that would
-end the step behind a plane therefore gets an impulse that stops the node at the plane, and an impulse of friction along
-the plane. Later sweeps may reduce the normal impulse, but not below zero. After the last sweep these impulses are
-removed: the boundary applies and books them. Every rank with a copy of a node computes the same stop.
+The boundaries for walls and mirror images act after contact (walls.py, mirrors.py), on each node alone. Without stops,
+the sweeps would treat a node between a body and a wall as free, and the wall would then cancel the result of the
+sweeps. Therefore each node that would end the step behind a plane gets an impulse that stops the node at the plane, and
+a friction impulse along the plane. Later sweeps may reduce the normal impulse, but not below zero. After the last sweep
+the impulses of stops are removed, because the boundary applies them and computes their work. Every rank with a copy of
+a node computes the same stop.
 """
 
 from typing import NamedTuple
@@ -23,28 +24,30 @@ from ...scene.selection import named
 from .active import MOBILITY, NODES, V
 
 _NEAR = 0.25
-"""Distance from a plane over the typical size of a face; nodes beyond this distance are ignored. Chosen value: no step
-moves a node so far (clock.py). If a step did, the boundary would still stop the node."""
+"""Ratio of the distance from a plane to the typical size of a face. Nodes with a larger ratio are ignored. Chosen
+value: no step moves a node so far (clock.py). If a step did, the boundary would still stop the node."""
 
 
 class Stops(NamedTuple):
-    """Half spaces of the plain walls and planes of symmetry."""
+    """Half spaces that are bounded by fixed plane walls and symmetry planes."""
 
     points: Floats
     """(k, 3) a point on each plane, m."""
     normals: Floats
     """(k, 3) unit normals, towards the free side."""
     sides: Floats
-    """(k, parts) 1 for a part in front, -1 behind, 0 for a part that the plane does not hold."""
+    """(k, parts) 1 for a part in front of the plane, -1 for a part behind it, 0 for a part that the plane does not
+    hold."""
     friction: Floats
     """(k,) Coulomb's coefficient."""
     mirrors: Flags
-    """(k,) True for planes of symmetry, which nodes without tets may pass."""
+    """(k,) whether each plane is a symmetry plane. Nodes without tets may pass symmetry planes."""
 
     @classmethod
     def of(cls, case: Case, model: Model, comm: Comm) -> "Stops":
-        """Returns the walls and planes of symmetry of a case. A part with nodes on both sides of a plane has no stop
-        there; only the boundary acts on it. Prescribed motions are not considered, only held components. Collective.
+        """Returns the walls and symmetry planes of a case. For a part with nodes on both sides of a plane there is no
+        stop at this plane; only the boundary acts on such a part. Prescribed motions are not considered, only held
+        components. Collective.
         """
         walls, planes = case.boundaries_of(schema.Wall), case.boundaries_of(schema.Symmetry)
         axes = [np.eye(3)[AXES[plane.axis]] for _, plane in planes]
@@ -57,7 +60,7 @@ class Stops(NamedTuple):
             held[k] = named(wall, model.parts)
         for k, (_, plane) in enumerate(planes, len(walls)):
             held[k] = part_sides(case, plane, model, comm)
-        held[:, case.rigid] = 0.0  # rigid bodies have stops of their own (rigid/stops.py)
+        held[:, case.rigid] = 0.0  # rigid bodies have other stops (rigid/stops.py)
         normals /= np.linalg.norm(normals, axis=1)[:, None]
         friction = np.array([*(wall.friction for _, wall in walls), *(0.0 for _ in planes)])
         mirrors = np.arange(len(points)) >= len(walls)
@@ -65,7 +68,7 @@ class Stops(NamedTuple):
 
 
 class Surface(NamedTuple):
-    """Columns of the surface nodes, see SurfaceNodes."""
+    """Columns of the surface nodes that the stops need; see SurfaceNodes."""
 
     x: Floats
     v: Floats
@@ -75,28 +78,28 @@ class Surface(NamedTuple):
 
 
 class Braced(NamedTuple):
-    """Slots near stops: one row for each pair of a slot and a stop. The rows of a task, a range of slots, begin at the
-    first of these slots times the number of stops.
+    """Slots near stops. There is one row for each pair of a slot and a stop. The rows of a task, which has a range of
+    slots, begin at the number of its first slot times the number of stops.
     """
 
     rows: Indices
-    """(room, 2) slot and stop of each pair."""
+    """(rows, 2) slot and stop of each pair."""
     normal: Floats
-    """(room, 3) unit normal of the stop towards the side of the node, zero in held components."""
+    """(rows, 3) unit normal of the stop, towards the side of the node; zero in held components."""
     least: Floats
-    """(room,) normal speed with which the node reaches the plane at the end of the step, m/s."""
+    """(rows,) normal speed with which the node reaches the plane exactly at the end of the step, m/s."""
     push: Floats
-    """(room,) change of the normal speed by the stop so far, m/s."""
+    """(rows,) change of the normal speed by the stop so far, m/s."""
     rub: Floats
-    """(room, 3) change of the velocity across the normal by friction at the stop so far, m/s."""
+    """(rows, 3) change of the velocity across the normal by friction at the stop so far, m/s."""
     mu: Floats
-    """(room,) coefficient of friction."""
+    """(rows,) coefficient of friction."""
     many: Ints
     """(tasks,) number of pairs of each task."""
 
     @classmethod
     def room(cls, n: int, tasks: int) -> "Braced":
-        """Allocates arrays for ``n`` rows of ``tasks`` tasks."""
+        """Allocates arrays for ``n`` rows and ``tasks`` tasks."""
         return cls(
             np.empty((n, 2), np.int32), np.empty((n, 3)), np.empty(n), np.empty(n), np.empty((n, 3)), np.empty(n),
             np.zeros(tasks, np.int64),
@@ -112,9 +115,9 @@ BRACED = record(Braced, _N2, _F2, _F1, _F1, _F2, _F1, types.int64[::1])
 
 @njit(types.void(BRACED, NODES, STOPS, _N1, SURFACE, _B1, _F, _F, _I, _I, _I), cache=True)
 def find(braced, active, stops, places, nodes, loose, size, dt, task, first, stop):  # type: ignore[no-untyped-def]
-    """Finds the slots from ``first`` to ``stop`` near a stop in a step ``dt``, s, which are the slots of a ``task``;
-    ``nodes``: surface nodes; ``loose`` (nodes,): nodes of this rank without tets, which no other rank has; ``size`` of
-    a face, m.
+    """Finds the slots of a ``task``, from ``first`` to ``stop``, that are near a stop in a step of length ``dt``, s.
+    ``nodes``: surface nodes; ``loose`` (nodes,): nodes of this rank without tets, which no other rank has; ``size``:
+    size of a face, m.
     """
     fixed, begin, x, part, local = active.fixed, first * len(stops.points), nodes.x, nodes.part, nodes.local
     n = begin
@@ -142,10 +145,10 @@ def find(braced, active, stops, places, nodes, loose, size, dt, task, first, sto
 
 @njit(types.void(NODES, BRACED, _I, _I), cache=True)
 def stop(active, braced, task, begin):  # type: ignore[no-untyped-def]
-    """Stops the nodes of a ``task``, whose rows begin at ``begin``, that would end the step behind a plane, and reduces
-    the impulse of nodes that would not.
+    """Stops those nodes of a ``task`` that would end the step behind a plane. Reduces the impulse of nodes that would
+    not. The rows of the task begin at ``begin``.
 
-    push = max(0, push + (least - n.v) / n.n), and friction limited to mu push.
+    The formula is push = max(0, push + (least - n.v) / n.n). Friction is limited to mu push.
     """
     v, path, slide = active.moving, active.path, np.empty(3)
     for r in range(begin, begin + braced.many[task]):
@@ -179,7 +182,7 @@ def stop(active, braced, task, begin):  # type: ignore[no-untyped-def]
 
 @njit(types.void(NODES, BRACED, _I, _I), cache=True)
 def release(active, braced, task, begin):  # type: ignore[no-untyped-def]
-    """Removes the impulses of the stops of a ``task``, whose rows begin at ``begin``."""
+    """Removes the impulses of the stops in a ``task``, whose rows begin at ``begin``."""
     for r in range(begin, begin + braced.many[task]):
         for i in range(3):
             active.moving[braced.rows[r, 0], V + i] -= braced.push[r] * braced.normal[r, i] + braced.rub[r, i]

@@ -1,4 +1,4 @@
-"""Number of sweeps of a step, adapted to the residual of the previous step."""
+"""Number of sweeps in a step. It is adapted to the residual of the previous step."""
 
 import numpy as np
 
@@ -7,41 +7,41 @@ from conoid.cases.estimates.impact import Sweeps
 from ...model.state import Ints
 
 _SETTLED = 0.0015
-"""Target residual: change of the impulses by the last sweep of a step, over the impulses of the step. Chosen value:
-with it, rubble between a ram and walls is as stiff as with many more sweeps (docs/theory/contact.md, "Sweeps by
-need"). Metals are below the target with the smallest number of sweeps."""
+"""Target of the residual, which is the ratio of the change of the impulses by the last sweep to the impulses of the
+step. Chosen value: with it, rubble between a ram and walls is as stiff as with many more sweeps
+(docs/theory/contact.md, "Sweeps by need"). Metals are below the target with the smallest number of sweeps."""
 _ENOUGH = 0.5
-"""The number of sweeps is reduced by one if the residual is below this share of the target."""
+"""Fraction of the target. If the residual is below this fraction, the number of sweeps is reduced by one."""
 _MORE = 4
-"""Inverse of the share by which the number of sweeps is increased in a step."""
+"""Inverse of the fraction by which the number of sweeps is increased in a step."""
 _WARNED = 2.0
-"""A warning is given if the residual of the whole run is above this multiple of _SETTLED. Chosen value."""
+"""Multiple of _SETTLED. If the residual of the whole run is above this multiple, a warning is given. Chosen value."""
 
 
 class SweepCount:
-    """Number of sweeps, decided by integer sums over all nodes: equal on any number of ranks."""
+    """Number of sweeps. It is determined by integer sums over all nodes, so it is equal for any number of ranks."""
 
     def __init__(self, bounds: Sweeps) -> None:
         self._bounds = bounds
         self.sweeps = bounds.least
         """Number of sweeps in the next step."""
         self.unsettled: Ints = np.zeros(2, np.int64)
-        """(2,) l1 norms over the nodes that this rank owns: of the changes by the last sweep of the step, and of the
-        impulses of the step; in units of 2^16 quanta.
+        """(2,) l1 norms over the nodes that this rank owns, in units of 2^16 quanta: of the changes of impulses by the
+        last sweep of the step, and of the impulses of the step.
         """
         self._changed, self._impulse = 0, 0
 
     def known(self) -> tuple[int, int, int]:
-        """Returns the state, equal on all ranks."""
+        """Returns the state for a checkpoint. All ranks return equal values."""
         return self.sweeps, self._changed, self._impulse
 
     def resume(self, known: tuple[int, int, int]) -> None:
-        """Restores the state."""
+        """Restores the state from a checkpoint."""
         self.sweeps, self._changed, self._impulse = known
 
     @property
     def warnings(self) -> list[str]:
-        """Returns a warning of one line if the residual of the run is above the limit."""
+        """Returns a warning if the residual of the run is above the limit."""
         if not self._changed > _WARNED * _SETTLED * self._impulse:
             return []
         left, limit = 100.0 * self._changed / self._impulse, 100.0 * _WARNED * _SETTLED
@@ -56,7 +56,7 @@ class SweepCount:
         return self._bounds.least == self._bounds.most
 
     def agree(self, unsettled: Ints) -> None:
-        """Adapts the number of sweeps to the residual; ``unsettled`` (2,): sum over all ranks."""
+        """Adapts the number of sweeps to the residual. ``unsettled`` (2,): sums over all ranks."""
         changed, impulse = (int(word) for word in unsettled)
         self._changed, self._impulse = self._changed + changed, self._impulse + impulse
         if changed > _SETTLED * impulse:

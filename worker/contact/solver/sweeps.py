@@ -1,19 +1,21 @@
 """Impulses of active contacts: projected Jacobi sweeps, independent of the order of contacts (docs/theory/contact.md).
 
-Every contact has a target for its normal velocity: u >= ``wanted``. A sweep corrects its impulse by (wanted - u) over a
-bound of the l1 norm of its row of the contact matrix (Baker, Falgout, Kolev and Yang 2011): the sum over its nodes k
-and axes i of |w_k| |n_i| S_ki / m_k, where S_ki is the sum of |w| |n_i| over all contacts at the node. The correction
-is exact for a single contact and for any number of contacts along one normal, and never overshoots when contacts share
-nodes. The bound is far above the diagonal where many contacts share a node, and plain sweeps converge slowly there: so
-normal impulses are extrapolated by Nesterov's ``momentum``. Normal impulses are never negative; friction is Coulomb's,
-on the sum over the sweeps. Impulses are integers: the impulses of a contact add up to zero, and no bit of the result
-depends on the order of contacts or ranks. Node-face pairs and node pairs across a crack start from their impulses of
-the last step (warm start): with any number of sweeps, sticking contacts do not creep and the penetration of compressed
-contacts does not increase.
+Every contact has a target for its normal velocity: u >= ``wanted``. A sweep corrects the impulse of a contact by
+(wanted - u) / bound. The bound is a bound of the l1 norm of the contact's row of the contact matrix (Baker, Falgout,
+Kolev and Yang 2011): the sum over its nodes k and axes i of |w_k| |n_i| S_ki / m_k, where S_ki is the sum of |w| |n_i|
+over all contacts at the node. The correction is exact for a single contact and for any number of contacts along one
+normal, and never overshoots when contacts share nodes. If many contacts share a node, the bound is far above the
+diagonal of the matrix, and plain sweeps converge slowly. Therefore normal impulses are extrapolated by Nesterov's
+``momentum``. Normal impulses are never negative. Friction is Coulomb friction and is limited by the normal impulse
+summed over the sweeps. Impulses are integers: the impulses of a contact add up to zero, and the result does not depend
+on the order of contacts or ranks. Node-face pairs and node pairs across a crack start from their impulses of the last
+step (warm start). With the warm start, for any number of sweeps, sticking contacts do not creep and the penetration of
+compressed contacts does not increase.
 
 The sweeps include only contacts that have needed an impulse in this step (loading.py).
 
-Kernels call no kernel within a loop over contacts: numba counts a reference for each array of a record at each call.
+Kernels call no kernel within a loop over contacts, because numba counts a reference for each array of a record at each
+call.
 """
 
 import numpy as np
@@ -41,17 +43,19 @@ from .active import (  # fmt: skip
 from .loading import SHARES
 
 _PAIR, _CRACK = 0.8, 1.0
-"""Shares of the stored normal impulse that the warm start applies, for node-face pairs and for node pairs across a
-crack. Node-face pairs: the whole impulse is out of date by one step and would add energy. Node pairs across a crack:
-so many pairs press on each other that the sweeps could not restore a missing part (docs/theory/contact.md, "Dust
-under pressure")."""
+"""Fractions of the stored normal impulse that the warm start applies: for node-face pairs, and for node pairs across a
+crack. For node-face pairs the whole impulse would be out of date by one step and would add energy. Node pairs across a
+crack get a larger fraction, because so many of them press on each other that the sweeps could not restore a missing
+part (docs/theory/contact.md, "Dust under pressure")."""
 
 _ROWS, _F, _I = types.int32[::1], types.float64, types.int64
 
 
 @njit(types.void(NODES, CONTACTS, LOADED, _I), cache=True)
 def add_row_weights(active, contacts, loaded, k):  # type: ignore[no-untyped-def]
-    """Adds |w| |n_i| and |w| of the contacts of set ``k`` to the row weights of their nodes, in quanta."""
+    """Adds |w| |n_i| and |w| of the contacts of set ``k`` to the row weights of the nodes of these contacts, in
+    quanta.
+    """
     sums, slots, weights, normals = active.row_weights, contacts.slots, contacts.weights, contacts.normals
     for q in range(loaded.begin[k], loaded.begin[k + 1]):
         p, two = contacts.row[q], slots[q, 2] < 0
@@ -64,9 +68,9 @@ def add_row_weights(active, contacts, loaded, k):  # type: ignore[no-untyped-def
 
 @njit(types.void(NODES, LOADED, KEPT, _ROWS, _F, _F, _I), cache=True)
 def resume(active, loaded, kept, pair, ratio, scale, k):  # type: ignore[no-untyped-def]
-    """Warm start of the loaded contacts of set ``k``: ``ratio`` times their stored impulses ``kept``, along the present
-    normal and across, divided by the present row norms. The row norms reduce the start value of a node that has lost
-    mass by separation, or that shares its load with new contacts.
+    """Warm start of the loaded contacts of set ``k``. The start value is ``ratio`` times the stored impulses ``kept``,
+    along the present normal and across it, divided by the present row norms. The row norms reduce the start value of a
+    node that has lost mass by separation, or that shares its load with new contacts.
     """
     words, normal, tangent, slots, row = active.moving_words, loaded.normal, loaded.tangent, loaded.slots, loaded.row
     pairs, cracks, last = kept.pairs, kept.cracks, np.empty(4)
@@ -90,17 +94,17 @@ def resume(active, loaded, kept, pair, ratio, scale, k):  # type: ignore[no-unty
 
 @njit(types.float64(_I, _I), cache=True)
 def momentum(k, many):  # type: ignore[no-untyped-def]
-    """Nesterov's factor of sweep ``k`` of ``many`` (Nesterov 1983; Mazhar, Heyn, Negrut and Tasora 2015 for contact); 0
-    in the last sweep, so that the last sweep is a plain sweep.
+    """Nesterov's factor for sweep ``k`` of ``many`` (Nesterov 1983; Mazhar, Heyn, Negrut and Tasora 2015 for contact).
+    The factor is 0 in the last sweep, so the last sweep is a plain sweep.
     """
     return k / (k + 3.0) if k + 1 < many else 0.0
 
 
 @njit(types.void(NODES, LOADED, _F, _F, _I), cache=True, error_model="numpy")
 def sweep(active, loaded, ahead, scale, k):  # type: ignore[no-untyped-def]
-    """Adds the corrections of the loaded contacts of set ``k`` to the impulses of their nodes; the corrections of one
-    contact add up to zero. ``ahead``: Nesterov's factor. Row norms R and R_t: docs/theory/contact.md, "Several contacts
-    of a node".
+    """Adds the corrections of the loaded contacts of set ``k`` to the impulses of the nodes. The corrections of one
+    contact add up to zero. ``ahead``: Nesterov's factor. The row norms R and R_t are explained in
+    docs/theory/contact.md, "Several contacts of a node".
     """
     values, words = active.moving, active.moving_words
     first = loaded.begin[k]
@@ -127,7 +131,7 @@ def sweep(active, loaded, ahead, scale, k):  # type: ignore[no-untyped-def]
         normal[q, PUSH] = push
         for i in range(3):
             change[i] = (push - old) * normal[q, i]
-        # 3. Compute the friction t = t_old - (rate - u n) / R_t, scaled back to |t| <= mu p.
+        # 3. Compute the friction impulse t = t_old - (rate - u n) / R_t, scaled back to |t| <= mu p.
         if mu > 0.0:
             size = 0.0
             for i in range(3):
@@ -138,7 +142,7 @@ def sweep(active, loaded, ahead, scale, k):  # type: ignore[no-untyped-def]
             for i in range(3):
                 change[i] += factor * rate[i] - tangent[q, PUSH_T + i]
                 tangent[q, PUSH_T + i] = factor * rate[i]
-        # 4. Add w_k (dp n + dt) to node k, in quanta; add minus the sum of the others to the first node.
+        # 4. Add w_k (dp n + dt) to node k, in quanta. Add minus the sum of the others to the first node.
         for i in range(3):
             if c < 0:
                 rest = np.int64(np.rint(-change[i] * scale))
@@ -156,9 +160,9 @@ def sweep(active, loaded, ahead, scale, k):  # type: ignore[no-untyped-def]
 
 @njit(types.void(NODES, _F, types.boolean, _I, _I), cache=True)
 def give(active, scale, last, first, stop):  # type: ignore[no-untyped-def]
-    """Converts the completed impulses of a sweep at the slots from ``first`` to ``stop`` into velocities, dv = j / m,
-    adds the impulses to the impulses of the step and sets the impulses of the sweep to zero; in the ``last`` sweep of a
-    step stores their l1 norm.
+    """Converts the completed impulses of a sweep at the slots from ``first`` to ``stop`` into velocity changes dv = j /
+    m. Adds the impulses to the impulses of the step, and sets the impulses of the sweep to zero. In the ``last`` sweep
+    of a step, stores the l1 norm of the impulses.
     """
     v, words, path = active.moving[first:stop], active.moving_words[first:stop], active.path[first:stop]
     mobility, total, a_quantum = active.fixed[first:stop], active.fixed_words[first:stop], 1.0 / scale
@@ -180,7 +184,7 @@ def give(active, scale, last, first, stop):  # type: ignore[no-untyped-def]
 
 @njit(types.void(KEPT, LOADED, _ROWS, _I), cache=True)
 def store(kept, loaded, pair, k):  # type: ignore[no-untyped-def]
-    """Stores the impulses of the loaded contacts of set ``k`` in ``kept``, times their row norms."""
+    """Stores the impulses of the loaded contacts of set ``k``, times their row norms, in ``kept``."""
     pairs, cracks, normal, tangent, row = kept.pairs, kept.cracks, loaded.normal, loaded.tangent, loaded.row
     last = np.empty(4)
     for q in range(loaded.begin[k], loaded.begin[k] + loaded.many[k]):

@@ -1,10 +1,10 @@
-"""Zones: boxes in space. Different threads sweep the contacts of different zones at the same time.
+"""Zones: boxes in space. Different threads sweep the contacts of different zones simultaneously.
 
 Every surface node belongs to the zone in which it enters the scene. Zones are made by recursive halving of boxes. A
-contact belongs to the smallest box that contains all its nodes. The contacts of a box are a set. Boxes that have been
-halved equally often have no node in common, so different threads sweep their sets: first the sets of the zones, then
-the sets of contacts across the border of two zones, and so on, until the set across the border of the first two halves.
-With one thread there is one zone. No bit of the answer depends on zones.
+contact belongs to the smallest box that contains all its nodes. All contacts of a box are a set. Boxes of the same
+level have no node in common, so different threads can sweep their sets. First the sets of the zones are swept, then the
+sets of contacts across the border of two zones, and so on. The last set has the contacts across the border of the first
+two halves. With one thread there is one zone. The answer does not depend on zones.
 
 Box 1 has all nodes, its halves are the boxes 2 and 3, and the halves of box k are the boxes 2 k and 2 k + 1; the zones
 are the boxes of the last level.
@@ -16,24 +16,26 @@ from ...model.state import Floats, Indices, Ints
 from ..surface.records import SurfaceNodes
 
 _SAMPLE = 8192
-"""Largest sample of the nodes by which boxes are halved."""
+"""Largest number of sampled nodes by which boxes are halved."""
 _PER_THREAD = 4
 """Number of zones for each thread. The number is above 1 because contacts are not distributed evenly: a thread that
 has finished its zones computes a zone of another thread. Chosen value."""
 
 
 class Zones:
-    """Recursive bisection of the surface nodes; each box is halved across its longest side. Nodes that are added later
-    belong to the box that contains them.
+    """Recursive bisection of the surface nodes. Each box is halved across its longest side. A node that is added later
+    belongs to the box that contains it.
     """
 
     def __init__(self, threads: int) -> None:
-        """The number of zones is a power of two, from the number of ``threads``."""
+        """``threads``: number of threads, from which the number of zones is chosen. The number of zones is a power of
+        two.
+        """
         self.many = 1 if threads == 1 else 1 << (_PER_THREAD * threads - 1).bit_length()
         """Number of zones."""
         self._surface_nodes: SurfaceNodes | None = None
         self._axis, self._at = np.zeros(self.many - 1, np.int64), np.zeros(self.many - 1)
-        """(many - 1,) axis and position of the cut of each part; part k is divided into the parts 2 k + 1 and 2 k +
+        """(many - 1,) axis and position of the cut of each part. Part k is divided into the parts 2 k + 1 and 2 k +
         2.
         """
         self._zone: Indices = np.zeros(0, np.int32)
@@ -66,15 +68,16 @@ class Zones:
 
 
 def sets(zones: int) -> int:
-    """Number of sets of contacts with a node that other ranks share, and number of sets of contacts without such a
-    node; the set of box k has the number ``sets(zones) - k``.
+    """Two numbers: of the sets of contacts with a node that other ranks share, and of the sets of contacts without such
+    a node. The set of box k has the number ``sets(zones) - k``.
     """
     return 2 * zones - 1
 
 
 def tasks(zones: int) -> tuple[tuple[Ints, Ints], tuple[Ints, Ints]]:
-    """Tasks and starts, for a team, of the sets of contacts with a node that other ranks share, and of the sets
-    without: every zone, then every larger box, boxes of one size at the same time.
+    """Returns tasks and starts for a team, for two groups of sets: contacts with a node that other ranks share, and
+    contacts without such a node. The order is every zone, then every larger box; boxes of one size are swept
+    simultaneously.
     """
     first = np.arange(sets(zones))
     border = np.column_stack([first, first + 1])

@@ -1,7 +1,7 @@
 """Faces of the neighbours of eroded tets become surface without a search.
 
-A tet is near erosion when its strain or damage is above a share of its limit. A search therefore includes the inner
-faces of tets near erosion, in the same way as the sides of cracks: with their nodes, on all ranks near the faces, but
+A tet is near erosion if its strain or damage is above a certain fraction of its limit. A search includes the inner
+faces of tets near erosion in the same way as the sides of cracks: with their nodes, on all ranks near the faces, but
 without candidate pairs. When the tet erodes, the faces of its neighbours are exposed in the same step. A search of all
 ranks is needed only if a tet erodes that was not near erosion at the last search, for example by early inversion.
 """
@@ -19,26 +19,26 @@ from ...parallel.comm import Comm
 from ...parallel.ownership import Neighbour
 
 NEAR_EROSION = 0.5
-"""A tet is near erosion if its plastic strain or damage is above this share of the limit. Counts of one run of the case
-long_rod to 20 us: 1.6 to 5.7 % of the eroded tets were below this fraction 50 to 200 steps before they eroded."""
+"""Fraction of the limit of plastic strain or damage above which a tet is near erosion. In one run of the case long_rod
+to 20 us, 1.6 to 5.7 % of the eroded tets were below this fraction 50 to 200 steps before they eroded."""
 WORDS = 9
-"""Number of words of a message about a tet that erodes: its id, the faces across (state.Block.across), and its
-nodes."""
+"""Number of words of a message about a tet that erodes. The words are its id, the faces across (state.Block.across),
+and its nodes."""
 
 
 class Exposure(NamedTuple):
-    """Faces exposed by the erosion of tets of all ranks, given by ids, ascending."""
+    """Faces that the erosion of tets of all ranks exposes. They are given by ids, ascending."""
 
     gone: Ints
     """Ids of the faces of the eroded tets."""
     bare: Ints
     """Ids of the faces of other tets that coincide with the faces of eroded tets."""
     nodes: Ints
-    """Ids of the nodes of the exposed faces."""
+    """Ids of the nodes of all exposed faces."""
 
 
 def near_erosion(blocks: list[Block]) -> Ints:
-    """Ids, ascending, of the local tets near erosion."""
+    """Ids, ascending, of the local tets that are near erosion."""
     found = [np.zeros(0, np.int64)]
     for block in blocks:
         tired = np.zeros(block.n, bool)
@@ -50,8 +50,8 @@ def near_erosion(blocks: list[Block]) -> Ints:
 
 
 def covered(blocks: list[Block], tired: Ints, neighbours: list[Neighbour], comm: Comm) -> Indices:
-    """(k, 3) block, row and face of this rank's tets behind tets near erosion, ``tired``, of this rank and its
-    neighbours. Collective.
+    """(k, 3) block, row and face of those faces of this rank's tets that are behind tets near erosion. ``tired``: tets
+    near erosion on this rank and its neighbours. Collective.
     """
     received = comm.swap({other.rank: tired for other in neighbours})
     every = np.unique(np.concatenate([tired, *received.values()]))
@@ -63,12 +63,12 @@ def covered(blocks: list[Block], tired: Ints, neighbours: list[Neighbour], comm:
 
 
 def leaving(block: Block, worn: Ints, ids: Ints) -> Ints:
-    """(k, WORDS) words of the tets in the rows ``worn`` (k,); ``ids``: global ids of the local nodes."""
+    """(k, WORDS) words of the tets in the rows ``worn`` (k,). ``ids``: global ids of the local nodes."""
     return np.column_stack([block.id[worn], block.across[worn], ids[block.tets[worn]]])
 
 
 def exposed_by(rows: Ints) -> Exposure:
-    """Returns the faces exposed by the erosion of the tets of ``rows`` (k, WORDS), of all ranks."""
+    """Returns the faces that the erosion of the tets ``rows`` (k, WORDS) of all ranks exposes."""
     gone = np.sort((4 * rows[:, :1] + np.arange(4)).reshape(-1))
     behind, nodes = rows[:, 1:5], rows[:, 5:][:, FACES]
     bare: Flags = (behind >= 0) & ~among(gone, behind)
@@ -76,7 +76,7 @@ def exposed_by(rows: Ints) -> Exposure:
 
 
 def expose(blocks: list[Block], bare: Ints) -> None:
-    """Marks the local faces among ``bare``, ids, ascending, as exposed by erosion."""
+    """Marks the local faces that are among ``bare`` (ids, ascending) as exposed by erosion."""
     tets = np.unique(bare // 4)
     for block in blocks:
         rows = np.flatnonzero(among(tets, block.id))

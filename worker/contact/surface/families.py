@@ -1,5 +1,5 @@
-"""Families: a family is all copies of one original node of the start, with the node itself. A rank with a tet at a node
-has all nodes of the family.
+"""Families. A family consists of an original node of the start and all its copies. A rank with a tet at a node has all
+nodes of the family.
 """
 
 from dataclasses import dataclass
@@ -24,28 +24,29 @@ values: a task takes 5 to 10 us with 20,000 cracks, compared with 2 us to start 
 _ROWS = 4096
 """Number of cracks in a task. Chosen value: a task takes 10 to 20 us, compared with 2 us to start a parallel region."""
 _SPARE = 1 << 15
-"""Working arrays have multiples of so many items."""
+"""Number of items of which the lengths of working arrays are multiples."""
 
 
 @dataclass
 class Families:
-    """Families of the local nodes."""
+    """Families of the local nodes of a rank."""
 
     COLUMNS: ClassVar = {"root": COPIED, "ring": ZERO, "leader": COPIED, "marks": ZERO}
-    """Columns by node (model/columns.py)."""
+    """Columns with one value for each node (model/columns.py)."""
 
     root: Ints
-    """(nodes,) global id of the original node at the start of the run."""
+    """(nodes,) global id of the original node of each node, at the start of the run."""
     ring: Indices
-    """(nodes,) next local node of the family, cyclic; the node itself if the family has one node."""
+    """(nodes,) next local node of the family of each node, in cyclic order; the node itself if the family has one
+    node."""
     leader: Indices
-    """(nodes,) local node that represents the family."""
+    """(nodes,) local node that represents the family of each node."""
     marks: Bits
-    """(nodes,) marks for kernels that list nodes; all 0 between two calls."""
+    """(nodes,) marks that kernels use to list nodes. All marks are 0 between two calls."""
 
     @classmethod
     def of(cls, root: Ints) -> "Families":
-        """Links the nodes of each ``root`` (nodes,) in a ring."""
+        """Links the nodes with equal ``root`` (nodes,) in a ring."""
         (ring, leader), order = np.empty((2, len(root)), np.int32), np.argsort(root, kind="stable")
         first = np.flatnonzero(np.append(True, np.diff(root[order]) != 0)[: len(root)])
         following, ends = np.roll(order, -1), np.append(first, len(root))[1:]
@@ -54,30 +55,34 @@ class Families:
         return cls(root, ring, leader, np.zeros(len(root), np.uint8))
 
     def link(self, split: Split) -> None:
-        """Adds the copies of a split, whose rows the columns have already, to the rings of their parents."""
+        """Adds the copies of a node separation to the rings of their parents. The columns must already have the rows of
+        the copies.
+        """
         _insert(self.ring, split.copies.parents, split.first)
 
 
 @njit("void(int32[::1], int64[::1], int64)", cache=True)
 def _insert(ring, parents, first):  # type: ignore[no-untyped-def]
-    """Inserts copies, numbered from ``first`` on, into the ring after their parents."""
+    """Inserts copies into the ring after their parents. The copies have numbers from ``first`` on."""
     for c in range(len(parents)):
         ring[first + c], ring[parents[c]] = ring[parents[c]], first + c
 
 
 class Corners(NamedTuple):
-    """Corners of narrow sides at nodes that have separated into three pieces or more, by family."""
+    """Corners of narrow sides, at nodes that have separated into three pieces or more. The corners are ordered by
+    family.
+    """
 
     members: Indices
-    """Nodes of the families, one family after the other."""
+    """Nodes of the families, family after family."""
     begin: Indices
-    """(families + 1,) offsets of the members of each family."""
+    """(families + 1,) index in ``members`` of the first member of each family."""
     among: Indices
-    """(nodes,) position of a node of a family in ``members``."""
+    """(nodes,) index in ``members`` of each node of a family."""
     corners: Indices
-    """Codes 8 crack + 4 side + corner (0 to 2), one family after the other."""
+    """Codes of the corners, family after family. A code is 8 crack + 4 side + corner (0 to 2)."""
     start: Indices
-    """(families + 1,) offsets of the corners of each family."""
+    """(families + 1,) index in ``corners`` of the first corner of each family."""
 
 
 CORNERS = record(Corners, _N1, _N1, _N1, _N1, _N1)
@@ -94,8 +99,8 @@ _read_gather, _read_spread, _read_count, _read_list = (
 
 
 class CornerLists:
-    """Passes that list the corners of narrow sides by family: a counting sort by the leader of the family, first by
-    ranges of leaders, then within each range.
+    """Passes that list the corners of narrow sides by family. The list is made by a counting sort of the leaders of
+    families, first by ranges of leaders, then within each range.
     """
 
     def __init__(self, team: Team) -> None:
@@ -130,7 +135,9 @@ class CornerLists:
         return found
 
     def _rooms(self, n: int) -> list[Indices]:
-        """Working arrays of at least ``n`` items, the same ones while the number of corners grows little."""
+        """Returns working arrays of at least ``n`` items. The same arrays are returned while the number of corners
+        grows little.
+        """
         enough = -(-n // _SPARE) * _SPARE
         return [self._scratch.of(name, enough, np.int32) for name in ("code", "leader", "codes", "leaders", "heads")]
 
@@ -148,7 +155,9 @@ class CornerLists:
 
 @njit(TASK, cache=True)
 def _gather(table, first, stop, thread):  # type: ignore[no-untyped-def]
-    """Task: lists the corners of narrow sides in families of three nodes or more, and counts them by range."""
+    """Task: lists the corners of narrow sides in families of three nodes or more, and counts the corners in each range
+    of leaders.
+    """
     code, leader, counts, by_range, cracks, sides, block, ring, leads, shift = _read_gather(table)
     k, n = first // _CRACKS, 6 * first
     for r in range(by_range.shape[1]):
@@ -168,7 +177,7 @@ def _gather(table, first, stop, thread):  # type: ignore[no-untyped-def]
 
 @njit(TASK, cache=True)
 def _spread(table, first, stop, thread):  # type: ignore[no-untyped-def]
-    """Task: sorts corners by ranges of leaders."""
+    """Task: sorts the corners by ranges of leaders."""
     codes, leaders, places, code, leader, counts, shift = _read_spread(table)
     k = first // _CRACKS
     for i in range(6 * first, 6 * first + counts[k]):
@@ -179,8 +188,8 @@ def _spread(table, first, stop, thread):  # type: ignore[no-untyped-def]
 
 @njit(TASK, cache=True)
 def _count(table, first, stop, thread):  # type: ignore[no-untyped-def]
-    """Task: sets ``number`` (nodes,) to the number of corners of each leader of some ranges, lists the leaders with
-    corners in ``heads``, and counts these and the members of their families.
+    """Task: sets ``number`` (nodes,) to the number of corners of each leader in some ranges. Lists the leaders with
+    corners in ``heads``, and counts these leaders and the members of their families.
     """
     number, heads, some, members, leaders, begins, ring, shift = _read_count(table)
     for r in range(first, stop):
@@ -200,7 +209,7 @@ def _count(table, first, stop, thread):  # type: ignore[no-untyped-def]
 
 @njit(TASK, cache=True)
 def _list(table, first, stop, thread):  # type: ignore[no-untyped-def]
-    """Task: lists the families of some ranges, with their members and corners."""
+    """Task: lists the families of some ranges of leaders, with the members and corners of the families."""
     out, number, heads, some, first_family, first_member, codes, leaders, begins, ring = _read_list(table)
     for r in range(first, stop):
         f, m, n = first_family[r], first_member[r], begins[r]
@@ -221,13 +230,13 @@ _read_touching = reader(*_TOUCHING)
 
 
 class TouchingRows:
-    """Pass that finds the rows of a table that contain a marked entry."""
+    """Pass that finds the rows of a table that contain a marked element."""
 
     def __init__(self, team: Team) -> None:
         self._pass, self._scratch = Pass(team, _touching, *_TOUCHING, size=_ROWS), Scratch()
 
     def of(self, table: Indices, marks: Bits) -> Ints:
-        """Returns the rows, ascending, of ``table`` (n, 6) that contain an entry with a mark."""
+        """Returns the rows, ascending, of ``table`` (n, 6) that contain a marked element."""
         rows, counts = self._scratch.of("rows", len(table)), self._scratch.of("counts", self._pass.many(len(table)))
         self._pass.run(len(table), rows, counts, table, marks)
         return np.asarray(_packed(rows, counts))
@@ -235,7 +244,7 @@ class TouchingRows:
 
 @njit(TASK, cache=True)
 def _touching(table, first, stop, thread):  # type: ignore[no-untyped-def]
-    """Task: lists the rows with a marked entry."""
+    """Task: lists the rows that contain a marked element."""
     rows, counts, nodes, marks = _read_touching(table)
     n = first
     for i in range(first, stop):
@@ -249,7 +258,7 @@ def _touching(table, first, stop, thread):  # type: ignore[no-untyped-def]
 
 @njit("int64[::1](int64[::1], int64[::1])", cache=True)
 def _packed(rows, counts):  # type: ignore[no-untyped-def]
-    """Returns the rows that the tasks have listed."""
+    """Returns the rows that the tasks have listed, as one array."""
     out, n = np.empty(counts.sum(), np.int64), 0
     for k in range(len(counts)):
         for i in range(_ROWS * k, _ROWS * k + counts[k]):

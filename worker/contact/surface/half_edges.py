@@ -1,6 +1,8 @@
-"""Pairs of half edges: edges between two faces, found by a counting sort of the half edges by their lower nodes.
+"""Search for pairs of half edges, which are the edges between two faces. The half edges are found by a counting sort by
+their lower nodes.
 
-The sort is first by ranges of nodes, then by nodes within each range, so that the threads of a rank share all passes.
+The sort is first by ranges of nodes, then by nodes within each range, so that the threads of a rank can share all
+passes.
 """
 
 import numpy as np
@@ -14,10 +16,10 @@ from ...parallel.passes import Pass
 from ...parallel.team import TASK, Team
 
 _FACES, _BITS, _RANGES = 1024, 6, 4
-"""Number of faces in a task; bits of the index of a range of nodes; number of ranges in a task. Chosen values:
-a task takes some 20 us with 60,000 faces, compared with 2 us to start a parallel region."""
+"""Number of faces in a task; number of bits of the index of a range of nodes; number of ranges in a task. Chosen
+values: a task takes some 20 us with 60,000 faces, compared with 2 us to start a parallel region."""
 _EACH = 3
-"""Number of edges of a face for which memory is reserved, on average over a task."""
+"""Number of edges for each face for which memory is reserved, on average over a task."""
 _I, _F, _I1, _I2, _N1, _N2 = (
     types.int64, types.float64, types.int64[::1], types.int64[:, ::1], types.int32[::1], types.int32[:, ::1],
 )  # fmt: skip
@@ -32,7 +34,7 @@ _read_arrange, _read_match = reader(*_ARRANGE), reader(*_MATCH)
 
 @njit(TASK, cache=True)
 def _count(table, first, stop, thread):  # type: ignore[no-untyped-def]
-    """Task: counts the half edges of faces by ranges of their lower nodes."""
+    """Task: counts the half edges of faces in each range of their lower nodes."""
     counts, corners, half, shift = _read_count(table)
     task = first // _FACES
     for r in range(counts.shape[1]):
@@ -45,8 +47,8 @@ def _count(table, first, stop, thread):  # type: ignore[no-untyped-def]
 
 @njit(TASK, cache=True)
 def _spread(table, first, stop, thread):  # type: ignore[no-untyped-def]
-    """Task: sorts the half edges of faces by ranges of their lower nodes; a half edge is its higher node and 3 face +
-    corner.
+    """Task: sorts the half edges of faces by ranges of their lower nodes. A half edge is stored as its higher node and
+    the number 3 face + corner.
     """
     higher, which, places, corners, half, shift = _read_spread(table)
     task = first // _FACES
@@ -68,7 +70,9 @@ def _lower(corners, which):  # type: ignore[no-untyped-def]
 
 @njit(TASK, cache=True)
 def _arrange(table, first, stop, thread):  # type: ignore[no-untyped-def]
-    """Task: sorts the half edges of some ranges by their lower nodes, and sets ``begin`` (nodes + 1,)."""
+    """Task: sorts the half edges of some ranges by their lower nodes. Sets ``begin`` (nodes + 1,) to the first half
+    edge of each node.
+    """
     begin, higher, which, mixed_higher, mixed_which, begins, corners, shift = _read_arrange(table)
     for r in range(first, stop):
         low, high = min(r << shift, len(begin) - 1), min((r + 1) << shift, len(begin) - 1)
@@ -88,7 +92,7 @@ def _arrange(table, first, stop, thread):  # type: ignore[no-untyped-def]
 
 @njit(TASK, cache=True)
 def _match(table, first, stop, thread):  # type: ignore[no-untyped-def]
-    """Task: finds the edges of faces, and writes those for which ``found`` has rows, see HalfEdges.pairs."""
+    """Task: finds the edges of faces. Writes as many edges as ``found`` has rows; see HalfEdges.pairs."""
     found, places, counts, begin, higher, which, corners, half, units, sharp = _read_match(table)
     task = first // _FACES
     n, end = places[task], places[task + 1]
@@ -128,11 +132,12 @@ class HalfEdges:
         self._scratch = Scratch()
 
     def pairs(self, corners: Indices, half: Flags, units: Floats, nodes: int, sharp: float) -> Indices:
-        """(p, 5) edges: a face, the number of its half edge, the same of the other face, and sharpness; by face, then
-        by other face.
+        """(p, 5) edges, ordered by face and then by other face. Columns: a face and the number of its half edge; the
+        other face and the number of its half edge; sharpness.
 
-        ``corners`` (f, 3 or more) of faces by ascending id, below ``nodes``; ``half`` (f, 3): half edges to be matched,
-        k from corner k to the next; ``sharp``: cosine of the least angle between their ``units``.
+        ``corners`` (f, 3 or more): corners of faces in the order of ascending face ids; corners are below ``nodes``.
+        ``half`` (f, 3): whether each half edge must be matched; half edge k is from corner k to the next corner.
+        ``sharp``: cosine of the smallest angle between the normals ``units`` of the two faces.
         """
         n, shift, ranges, of = len(corners), max(0, (nodes - 1).bit_length() - _BITS), 1 << _BITS, self._scratch.of
         tasks = self._count.many(n)

@@ -1,8 +1,9 @@
-"""Mean normals of surface nodes and mean directions of their faces: they decide which faces a node may contact
-(facing.facing).
+"""Mean normals of surface nodes, and mean directions of the faces of these nodes. The means determine with which faces
+a node may be in contact (facing.facing).
 
-The normals are recomputed at every ``EVERY``-th step and after erosion; a face that a crack exposes in between adds its
-contribution to its nodes. Therefore the normals do not depend on the steps in which searches take place.
+The normals are recomputed at every ``EVERY``-th step and after erosion. A face that a crack exposes between two
+computations adds its contribution to the sums of its nodes. Therefore the normals do not depend on the steps in which
+searches take place.
 """
 
 import numpy as np
@@ -23,9 +24,9 @@ EVERY = 16
 """Number of steps between two computations of the mean normals. Between two computations, a fragment that rotates at
 1e5 rad/s (100 m/s over 1 mm) rotates by 3 degrees."""
 COLUMNS, SHARE = 12, 18
-"""Number of sums of a node, and number of words that a face adds to the sums of its three nodes."""
+"""Number of sums at a node; and number of words that a face contributes to the sums of its three nodes."""
 _NOTHING = 1e-300
-"""Least area, m^2: prevents a division by zero for a degenerate face."""
+"""Smallest area, m^2. It prevents a division by zero for a degenerate face."""
 _I2, _F2, _N1, _N2 = types.int64[:, ::1], types.float64[:, ::1], types.int32[::1], types.int32[:, ::1]
 _EXPOSED = (
     _I2, _F2, types.uint32[:, ::1], _N2, types.uint8[:, ::1], types.boolean[:, ::1], types.float64,
@@ -35,33 +36,34 @@ _read_exposed, _read_means = reader(*_EXPOSED), reader(*_MEANS)
 
 
 class MeanNormals:
-    """Passes over tets and nodes, on the threads of a team."""
+    """Passes over tets and nodes that compute mean normals, run by the threads of a team."""
 
     def __init__(self, team: Team) -> None:
         self._exposed, self._means = TetPass(team, _add_exposed, *_EXPOSED), Pass(team, _mean, *_MEANS)
 
     def moments(self, model: Model, planes: Flags, size: float, neighbours: list[Neighbour], comm: Comm) -> Ints:
-        """(nodes, COLUMNS) sums over the exposed faces of all ranks at each node, in quanta of ``size``^2 / SHARES
-        m^2: area times n, area times n n (xx, yy, zz, yz, zx, xy), and area times the unit vector from the node to the
-        midpoint of the opposite edge. ``planes``: see SurfaceBuilder.build. Collective.
+        """(nodes, COLUMNS) sums at each node over the exposed faces of all ranks, in quanta of ``size``^2 / SHARES m^2.
+        The terms are area times n, area times n n (xx, yy, zz, yz, zx, xy), and area times the unit vector from the
+        node to the midpoint of the opposite edge. ``planes``: see SurfaceBuilder.build. Collective.
         """
         nodes, scale = model.nodes, SHARES / size**2
-        sums = np.zeros((nodes.n + nodes.n // 2, COLUMNS), np.int64)[: nodes.n]  # with spare rows
+        sums = np.zeros((nodes.n + nodes.n // 2, COLUMNS), np.int64)[: nodes.n]  # the array has spare rows
         for block in model.blocks:
             self._exposed.run(block, nodes.n, sums, nodes.x, block.tets, block.across, block.bond, planes, scale)
         complete(comm, neighbours, sums, Tag.NORMAL)
         return sums
 
     def means(self, out: Floats, place: Indices, sums: Ints, nodes: Indices) -> None:
-        """Sets ``out`` (slots, COLUMNS) at ``place`` (k,) to the area-weighted means of n, n n and the directions to
-        the faces of the ``nodes`` (k,), by their ``sums`` (nodes, COLUMNS); zero for a node without faces.
+        """Sets the rows ``place`` (k,) of ``out`` (slots, COLUMNS) to means for the ``nodes`` (k,), computed from their
+        ``sums`` (nodes, COLUMNS). The means are area-weighted: of n, of n n, and of the directions to the faces. Zero
+        for a node without faces.
         """
         self._means.run(len(nodes), out, place, sums, nodes)
 
 
 @njit(TASK, cache=True)
 def _mean(table, first, stop, thread):  # type: ignore[no-untyped-def]
-    """Task: ``MeanNormals.means``."""
+    """Task: computes the means of ``MeanNormals.means``."""
     out, place, sums, nodes = _read_means(table)
     for k in range(first, stop):
         a, s = nodes[k], place[k]
@@ -72,8 +74,8 @@ def _mean(table, first, stop, thread):  # type: ignore[no-untyped-def]
 
 
 def shares(x: Floats, faces: Indices, size: float) -> Ints:
-    """(f, SHARE) contributions of the ``faces`` (f, 3) to the ``moments`` of their nodes: 9 words for all three
-    nodes, and 3 more for each.
+    """(f, SHARE) contributions of the ``faces`` (f, 3) to the ``moments`` of their nodes. A contribution has 9 words
+    for all three nodes, and 3 further words for each node.
     """
     out = np.empty((len(faces), SHARE), np.int64)
     for f in range(len(faces)):
@@ -103,7 +105,7 @@ def _share(out, x, a, b, c, scale):  # type: ignore[no-untyped-def]
 
 @njit("void(int64[:, ::1], int64, int64[::1], int64)", cache=True)
 def _add(sums, node, share, corner):  # type: ignore[no-untyped-def]
-    """Adds the ``share`` of a face to the sums of the node that is its ``corner``."""
+    """Adds the contribution ``share`` of a face to the sums of the node at its ``corner``."""
     for i in range(9):
         sums[node, i] += share[i]
     for i in range(3):
@@ -112,7 +114,7 @@ def _add(sums, node, share, corner):  # type: ignore[no-untyped-def]
 
 @njit(TASK, cache=True)
 def _add_exposed(table, first, stop, thread):  # type: ignore[no-untyped-def]
-    """Task: adds the contributions of the exposed faces of some chunks."""
+    """Task: adds the contributions of the exposed faces of the tets in some chunks."""
     sums, x, tets, across, bond, planes, scale = _read_exposed(table)
     share = np.empty(SHARE, np.int64)
     for e in range(first * CHUNK, min(stop * CHUNK, len(tets))):
@@ -133,8 +135,8 @@ def _add_exposed(table, first, stop, thread):  # type: ignore[no-untyped-def]
 
 @njit("void(int64[:, ::1], int64[:, ::1], int32[:, ::1])", cache=True)
 def add(sums, some, faces):  # type: ignore[no-untyped-def]
-    """Adds ``some`` shares (f, SHARE) to the sums of the nodes of ``faces`` (f, 3); -1 for nodes that are not on this
-    rank.
+    """Adds contributions ``some`` (f, SHARE) to the sums of the nodes of ``faces`` (f, 3). The value -1 in ``faces`` is
+    a node that is not on this rank.
     """
     for f in range(len(faces)):
         for m in range(3):

@@ -1,8 +1,7 @@
-"""Tables of a surface: faces and edges as rows of global node ids, nodes with their state.
+"""Tables of a surface: faces and edges, given by global node ids, and nodes with their state.
 
-A face has three nodes, counter-clockwise seen from outside, and the opposite node of its tet. An edge has its two
-nodes and, for each of its two faces, the third node and the opposite node of the tet. Ranks exchange these rows
-unchanged.
+A face has three nodes, counter-clockwise seen from outside, and the opposite node of its tet. An edge has its two nodes
+and, for each of its two faces, the third node and the opposite node of the tet. Ranks exchange these rows unchanged.
 """
 
 from collections.abc import Sequence
@@ -16,7 +15,7 @@ from ...model.ids import located
 from ...model.state import Bits, Flags, Floats, Indices, Ints
 
 AGED, OPEN = 1, 2
-"""States of a face of an edge (Edges.opened)."""
+"""States of a face at an edge (Edges.opened)."""
 
 
 @dataclass
@@ -38,10 +37,10 @@ class Rows:
         return type(self)(*(column.take(rows, axis=0) for column in self.columns()))
 
     def spacious(self, rows: Ints) -> Self:
-        """Returns the ``rows`` as a table whose columns have spare rows."""
+        """Returns a table of the ``rows`` whose columns have spare rows."""
         taken = [spacious(len(rows), column.shape[1:], column.dtype) for column in self.columns()]
         for out, column in zip(taken, self.columns(), strict=True):
-            np.take(column, rows, axis=0, out=out, mode="clip")  # "raise" would copy the result
+            np.take(column, rows, axis=0, out=out, mode="clip")  # the mode "raise" would copy the result
         return type(self)(*taken)
 
     @classmethod
@@ -57,18 +56,18 @@ class Faces(Rows):
     id: Ints
     """(n,) id of each face: 4 * global tet id + local face."""
     nodes: Ints
-    """(n, 4) global ids of the corners of each face, then of the opposite node."""
+    """(n, 4) global ids of the three corners of each face, and of the opposite node."""
     size: Floats
     """(n,) square root of twice the initial area, m."""
     exposed: Flags
-    """(n,) False for a side of a crack that is not open yet."""
+    """(n,) whether each face is exposed; False for a side of a crack that is not open yet."""
 
 
 @dataclass
 class Edges(Rows):
-    """Edges; a row (a, b, c, d, e, f) means: edge ab between face abc of tet abce and face bad of tet badf, the face of
-    smaller id first. If more than two faces share an edge, each pair of these faces that may enclose material has a
-    row.
+    """Edges. A row (a, b, c, d, e, f) means the edge ab between the face abc of tet abce and the face bad of tet badf;
+    the face of smaller id is first. If more than two faces share an edge, each pair of these faces that may enclose
+    material has a row.
     """
 
     nodes: Ints
@@ -78,43 +77,45 @@ class Edges(Rows):
     size: Floats
     """(n,) initial length of each edge, m."""
     deep: Floats
-    """(n,) depth, m, beyond which the edge has no contact, for any deformation of its tets; see sharp.depths."""
+    """(n,) greatest depth of a contact of each edge, m, for any deformation of its tets; see sharp.depths."""
     opened: Bits
-    """(n, 2) state of either face: OPEN if it is exposed, AGED for a side of a crack older than cracks.AGE, else 0.
-    The edge is in edge-edge contact when it is sharp, neither state is 0 and one is OPEN."""
+    """(n, 2) state of each of the two faces: OPEN if it is exposed, AGED for a side of a crack older than cracks.AGE,
+    else 0. An edge is in edge-edge contact if it is sharp, no state is 0 and at least one state is OPEN."""
     sharp: Flags
-    """(n,) True for sharp edges, see sharp.py."""
+    """(n,) whether each edge is sharp; see sharp.py."""
 
     @property
     def names(self) -> Ints:
-        """(n,) ids of the two faces of each edge as one number: two faces have at most one edge in common."""
+        """(n,) ids of the two faces of each edge, combined into one number. The number identifies the edge, because two
+        faces have at most one edge in common.
+        """
         return (self.sides[:, 0] << 32) + self.sides[:, 1]
 
 
 @dataclass(frozen=True)
 class CrackSides:
-    """Sides of cracks on a rank: rows of block, tet and face."""
+    """Sides of cracks on a rank. Each row has block, tet and face of a side."""
 
     young: Indices
-    """(k, 3) sides of young cracks, whose edges are not in edge-edge contact yet."""
+    """(k, 3) sides of young cracks. The edges of these sides are not in edge-edge contact yet."""
     aged: Indices
-    """(m, 3) sides of aged cracks, whose edges are in edge-edge contact."""
+    """(m, 3) sides of aged cracks. The edges of these sides are in edge-edge contact."""
 
 
 @dataclass
 class SurfaceNodes(Rows):
-    """Nodes by ascending global id: nodes of this rank, and ghosts of nodes of other ranks."""
+    """Nodes in the order of ascending global ids: nodes of this rank, and ghosts of nodes of other ranks."""
 
     id: Ints
     """(n,) global ids of the nodes."""
     local: Indices
-    """(n,) local index on this rank, -1 for a ghost."""
+    """(n,) local index of each node on this rank; -1 for a ghost."""
     owner: Indices
-    """(n,) rank that owns the node."""
+    """(n,) rank that owns each node."""
     part: Indices
     """(n,) index of the part of each node."""
     mobility: Floats
-    """(n, 3) inverse of the mass, 1/kg; zero where a component of the velocity is held."""
+    """(n, 3) inverse of the mass of each node, 1/kg; zero for a component of the velocity that is held."""
     x: Floats
     """(n, 3) position of each node, m."""
     v: Floats
@@ -123,12 +124,14 @@ class SurfaceNodes(Rows):
     """(n, 3) extrapolated velocity for a search, m/s; see extrapolation.py."""
 
     def places(self, ids: Ints) -> Indices:
-        """Returns the rows of the global ids, in the shape of ``ids``; all must be present."""
+        """Returns the rows of the nodes with the global ids ``ids``, in the shape of ``ids``. All nodes must be
+        present.
+        """
         return located(self.id, ids)
 
 
 def merged(groups: list[SurfaceNodes]) -> SurfaceNodes:
-    """Returns all nodes once, by ascending id; a node in several groups has the row of the first."""
+    """Returns all nodes once, by ascending id. A node that is in several groups has the row of the first group."""
     groups = [group for group in groups if group.n] or groups[:1]
     if len(groups) == 1 and (groups[0].id[1:] > groups[0].id[:-1]).all():
         return groups[0]

@@ -1,9 +1,11 @@
-"""Edges between two faces of the surface, and which of them are sharp: sharp edges are in edge-edge contact.
+"""Edges between two faces of the surface. The module finds the edges and determines which of them are sharp; sharp
+edges are in edge-edge contact.
 
 A half edge is an edge of one face, (a, b) of the face abc. Two half edges of opposite direction between the same nodes
-make an edge, except the two sides of one facet. An edge is sharp when its faces enclose an angle at the start, or when
-they do so and the edge is convex at a later check: every normals.EVERY steps, or every PRESSED steps, because plastic
-flow also makes sharp edges. Therefore sharpness does not depend on the steps in which searches take place.
+make an edge, except the two sides of one facet. An edge is sharp if its faces enclose an angle at the start. An edge
+also becomes sharp if its faces enclose an angle and the edge is convex at a later check, because plastic flow makes
+sharp edges. The check is made every normals.EVERY steps, or every PRESSED steps. Therefore sharpness does not depend on
+the steps in which searches take place.
 """
 
 import math
@@ -27,16 +29,16 @@ from .records import Edges, Faces
 SHARP = sine_and_cosine(math.radians(25.0))[1]
 """Cosine of the smallest angle between the normals of the two faces of a sharp edge. Chosen value."""
 BENT, PRESSED = sine_and_cosine(math.radians(5.0))[1], 4
-"""Cosine of the smallest angle of a sharp edge for parts that are pressed together beyond their strength
-(cases/estimates/impact.py), and number of steps between two checks of these parts. The angle is smaller than that of
-other parts because ridges of initially flat surfaces may cross without a node inside of the other body, and contact
-exerts no pressure on overlapping material. Chosen values, by tests of flyer plates of copper at 1 to 2.4 km/s
+"""Two values for parts that are pressed together beyond their strength (cases/estimates/impact.py): cosine of the
+smallest angle of a sharp edge, and number of steps between two checks. The angle is smaller than for other parts,
+because ridges of initially flat surfaces may cross without a node inside of the other body, and contact exerts no
+pressure on overlapping material. Chosen values, by tests of flyer plates of copper at 1 to 2.4 km/s
 (docs/theory/contact.md, "Ridges under pressure")."""
 
 _A, _B, _C, _D, _OWNER, _TOP, _FACE, _OPEN, _LENGTH, _LOW, _NORMAL = range(11)
-"""Columns of a half edge that is sent: its nodes, the third node of its face and the opposite one, the owners of
-these two, the face, its state, initial length, m, lowest initial height of its tet, m, and the unit normal of the
-face; floats by their bits."""
+"""Columns of a half edge that is sent to another rank: its nodes, the third node of its face and the opposite node, the
+owners of the last two, the face, its state, initial length, m, lowest initial height of its tet, m, and the unit normal
+of the face. Floats are sent as bit patterns."""
 _EDGES = 1024
 """Number of edges in a task. Chosen value: a task takes some 30 us, compared with 2 us to start a parallel region."""
 _I1, _I2, _U1, _U2, _N2, _F1, _F2 = (
@@ -48,7 +50,7 @@ _B1 = types.boolean[::1]
 TURNED = _B1, _B1, _N2, _B1, _F2, types.int32[::1], _F1
 _read_fill = reader(*_FILL)
 _HALF, _ROW = 13, 17
-"""Number of columns of a half edge, and number of columns of an edge (``_matched``)."""
+"""Number of columns of a half edge; and number of columns of an edge (``_matched``)."""
 
 
 def none() -> tuple[Edges, Ints, Indices]:
@@ -60,7 +62,7 @@ def none() -> tuple[Edges, Ints, Indices]:
 
 
 class EdgeFinder:
-    """Passes over faces and edges, on the threads of a team."""
+    """Passes over faces and edges that find the edges, run by the threads of a team."""
 
     def __init__(self, team: Team) -> None:
         self._halves, self._fill = HalfEdges(team), Pass(team, _fill, *_FILL, size=_EDGES)
@@ -69,12 +71,13 @@ class EdgeFinder:
         self, model: Model, faces: Faces, local: Indices, units: Floats, heights: Floats, some: Flags, opened: Bits,
         neighbours: list[Neighbour], comm: Comm,
     ) -> tuple[Edges, Ints, Indices]:  # fmt: skip
-        """Returns the edges, sorted by the ids of their faces, and ids and owners of the nodes of edges that this rank
-        does not hold.
+        """Returns the edges, sorted by the ids of their faces. Returns also the ids and owners of the nodes of edges
+        that this rank does not have.
 
-        Of ``some`` (f,) of the faces, with the ``local`` nodes (f, 4), unit normals (f, 3) and the lowest ``heights``
-        (f,) of their tets, m; ``opened`` (f,): see Edges. Where other ranks may hold faces of an edge, the owner of
-        the lower node matches them, and the rank of the face of smaller id gets the edge.
+        ``some`` (f,): faces whose edges are wanted; ``local`` (f, 4): local nodes of the faces; ``units`` (f, 3): unit
+        normals; ``heights`` (f,): lowest heights of their tets, m; ``opened`` (f,): see Edges. If other ranks may have
+        faces of an edge, the owner of the lower node of the edge matches the faces, and the rank with the face of
+        smaller id gets the edge.
         """
         half = np.repeat(some[:, None], 3, axis=1)
         away = half & _common(local, model.nodes.n, neighbours) if neighbours else np.zeros_like(half)
@@ -100,13 +103,15 @@ class EdgeFinder:
 
 
 def depths(size: Floats, low: Floats) -> Floats:
-    """(e,) greatest depth of a contact, m, of edges of the initial length ``size`` whose tets have the initial
-    height ``low``."""
+    """(e,) greatest depth of a contact of edges, m. ``size``: initial length of each edge; ``low``: initial height of
+    its tets."""
     return np.maximum(DEEP * np.minimum(size, low), DEEP_SELF * size)
 
 
 def _common(local: Indices, n: int, neighbours: list[Neighbour]) -> Flags:
-    """(f, 3) half edges with two of the ``n`` nodes that other ranks hold too."""
+    """(f, 3) whether both nodes of each half edge are nodes that other ranks also have; ``n``: number of local
+    nodes.
+    """
     shared = np.zeros(n, bool)
     for other in neighbours:
         shared[other.nodes] = True
@@ -118,8 +123,8 @@ def _elsewhere(
     model: Model, faces: Faces, local: Indices, units: Floats, heights: Floats, away: Flags, opened: Bits, comm: Comm,
     matching: HalfEdges,
 ) -> Ints:  # fmt: skip
-    """Rows (``_matched``) of this rank's edges among the half edges ``away`` (f, 3); ``heights`` (f,): lowest
-    heights of their tets, m. Collective.
+    """Rows (``_matched``) of this rank's edges among the half edges ``away`` (f, 3). ``heights`` (f,): lowest heights
+    of the tets of the faces, m. Collective.
     """
     nodes, (f, k) = model.nodes, np.nonzero(away)
     a, b, c, d = (*(local[f, (k + i) % 3] for i in range(3)), local[f, 3])
@@ -135,8 +140,9 @@ def _elsewhere(
 
 
 def _matched(halves: Ints, sender: Ints, matching: HalfEdges) -> tuple[Ints, Ints]:
-    """Rows (nodes of records.Edges, owners of the last four, face abc, face bad, length, lowest height of either
-    tet, states of either face, sharpness) of the edges of ``halves``, and the sender of the first face of each.
+    """Rows of the edges that are made of the half edges ``halves``, and the sender of the first face of each edge. The
+    columns are: nodes (records.Edges), owners of the last four nodes, face abc, face bad, length, lowest height of each
+    tet, states of each face, sharpness.
     """
     order = np.argsort(halves[:, _FACE], kind="stable")
     halves, sender = halves[order], sender[order]
@@ -155,7 +161,9 @@ def _matched(halves: Ints, sender: Ints, matching: HalfEdges) -> tuple[Ints, Int
 
 @njit(TASK, cache=True)
 def _fill(table, first, stop, thread):  # type: ignore[no-untyped-def]
-    """Task: writes the columns of the edges ``pairs``; ``low``: the lower of the ``heights`` (f,) of their tets."""
+    """Task: writes the columns of the edges ``pairs``. ``low`` becomes the lower of the ``heights`` (f,) of the tets of
+    an edge.
+    """
     nodes, sides, size, low, opened, pairs, local, face_nodes, face_id, face_opened, x, heights = _read_fill(table)
     for p in range(first, stop):
         f, k, g, m = pairs[p, 0], pairs[p, 1], pairs[p, 2], pairs[p, 3]
@@ -171,9 +179,10 @@ def _fill(table, first, stop, thread):  # type: ignore[no-untyped-def]
 
 @njit(types.void(*TURNED, types.int64, types.int64), cache=True)
 def turned(found, sharp, corners, meets, x, part, least, first, stop):  # type: ignore[no-untyped-def]
-    """Sets ``found`` (e,) for edges from ``first`` to ``stop`` that become sharp: both faces allow contact, ``meets``,
-    the edge is not ``sharp`` yet, is convex at the positions ``x`` (slots, 3), m, and the cosine between its faces'
-    normals is below the ``least`` (parts,) of its ``part`` (slots,); ``corners`` (e, 6): see records.Edges.
+    """Sets ``found`` (e,) for edges from ``first`` to ``stop`` that become sharp. An edge becomes sharp under these
+    conditions: its two faces allow contact (``meets``), it is not ``sharp`` yet, it is convex at the positions ``x``
+    (slots, 3), m, and the cosine between the normals of its faces is below ``least`` (parts,). ``part`` (slots,): part
+    of each slot; ``corners`` (e, 6): see records.Edges.
     """
     for e in range(first, stop):
         found[e] = False

@@ -21,8 +21,8 @@ from .records import CrackSides, Edges, Faces
 from .sharp import EdgeFinder
 
 _UNSEEN, _COVERED, _YOUNG, _AGED, _EXPOSED, _BARE = range(6)
-"""Numbers of the kinds of faces: not on the surface; exposed if a tet erodes; side of a crack that may open, without
-or with edge-edge contact; exposed; exposed by erosion."""
+"""Numbers of the kinds of faces: not on the surface; exposed if a tet erodes; side of a crack that may open, without or
+with edge-edge contact; exposed; exposed by erosion."""
 
 _TETS, _FACES = 8192, 1024
 """Number of tets in a task, and number of faces in a task. Chosen values: a task takes 10 to 50 us, compared with 2 us
@@ -39,34 +39,34 @@ _read_sort, _read_list, _read_measure = reader(*_SORT), reader(*_LIST), reader(*
 
 @dataclass
 class Surface:
-    """Surface on one rank."""
+    """Surface of the bodies on one rank."""
 
     faces: Faces
-    """Faces of this rank's tets."""
+    """Faces of the tets of this rank."""
     edges: Edges
-    """Edges whose face of smaller id is of this rank's tets, sharp or not."""
+    """Edges whose face of smaller id belongs to a tet of this rank. Edges that are not sharp are included."""
     flags: Flags
-    """(nodes,) local nodes that are or have been on the surface, by a face of any rank."""
+    """(nodes,) whether each local node is or has been on the surface, by a face of any rank."""
     waiting: Flags
-    """(nodes,) local nodes of faces of any rank that may become surface before the next search."""
+    """(nodes,) whether each local node belongs to a face of any rank that may become surface before the next search."""
     far: Ints
-    """(k,) ids of nodes of ``edges`` that this rank does not hold."""
+    """(k,) ids of those nodes of ``edges`` that this rank does not have."""
     far_owner: Indices
-    """(k,) owners of the nodes of ``edges`` that this rank does not hold."""
+    """(k,) owners of those nodes of ``edges`` that this rank does not have."""
     corners: Indices
-    """(f, 4) local nodes of ``faces``, by the numbers of the nodes when the surface was built."""
+    """(f, 4) local nodes of ``faces``, with the numbers that the nodes had when the surface was built."""
     turned: Ints = field(default_factory=lambda: np.zeros(0, np.int64))
-    """(t,) names of the ``edges`` that became sharp during the run, ascending."""
+    """(t,) names, ascending, of the ``edges`` that have become sharp during the run."""
 
     def sharpen(self, names: Ints) -> None:
-        """Marks the edges with these ``names``, ascending, as sharp."""
+        """Marks the edges with the ``names``, which are ascending, as sharp."""
         if len(names):
             own = self.edges.names
             self.turned, self.edges.sharp[among(names, own)] = np.intersect1d(own, names), True
 
 
 class SurfaceBuilder:
-    """Passes over tets, faces and edges, on the threads of a team."""
+    """Passes over tets, faces and edges that build the surface, run by the threads of a team."""
 
     def __init__(self, team: Team) -> None:
         self._sort_out, self._list = Pass(team, _sort_out, *_SORT, size=_TETS), Pass(team, _list, *_LIST, size=_TETS)
@@ -84,11 +84,11 @@ class SurfaceBuilder:
     ) -> Surface:
         """Builds the surface. Collective.
 
-        ``planes`` (nodes, planes): membership of nodes in symmetry planes. A face with all three nodes on one plane is
-        not on the surface; a face of a body one tet thick, with nodes on two parallel planes, is. ``cracks``: sides
-        that may open before the next search; ``covered`` (m, 3): block, row and face of faces that erosion may expose.
-        Faces exposed by erosion are in contact with nodes; the edges of such faces are not in edge-edge contact,
-        because nearly all of them would be sharp.
+        ``planes`` (nodes, planes): whether each node is on each symmetry plane. A face with all three nodes on one
+        plane is not on the surface. A face of a body that is one tet thick, with nodes on two parallel planes, is on
+        the surface. ``cracks``: sides that may open before the next search; ``covered`` (m, 3): block, row and face of
+        faces that erosion may expose. Faces exposed by erosion are in contact with nodes; the edges of such faces are
+        not in edge-edge contact, because nearly all of them would be sharp.
         """
         local, ids, kind = self._faces(model, planes, cracks, covered)
         nodes, n = model.nodes, len(ids)
@@ -103,8 +103,8 @@ class SurfaceBuilder:
         return Surface(faces, found[0], counts[:, 0] > 0, counts[:, 1] > 0, *found[1:], local)
 
     def _faces(self, model: Model, planes: Flags, cracks: CrackSides, covered: Indices) -> tuple[Indices, Ints, Bits]:
-        """(f, 4) local nodes of the exposed faces, the sides of ``cracks`` and the ``covered`` faces, the opposite node
-        last; their ids, ascending; and their kinds.
+        """Returns three arrays over the exposed faces, the sides of ``cracks`` and the ``covered`` faces: (f, 4) local
+        nodes of each face, the opposite node last; its id, ascending; and its kind.
         """
         marked, begin = [], 0
         for b, block in enumerate(model.blocks):
@@ -128,8 +128,8 @@ class SurfaceBuilder:
 
 @njit(TASK, cache=True)
 def _sort_out(table, first, stop, thread):  # type: ignore[no-untyped-def]
-    """Task: completes the kinds ``kind`` (n, 4) of the faces of some tets, which mark the faces that may become surface
-    on entry, and counts the faces that are on the surface or may be.
+    """Task: completes the kinds ``kind`` (n, 4) of the faces of some tets. On entry ``kind`` marks the faces that may
+    become surface. Counts the faces that are on the surface or may become surface.
     """
     kind, counts, tets, across, bond, planes = _read_sort(table)
     n = 0
@@ -151,7 +151,7 @@ def _sort_out(table, first, stop, thread):  # type: ignore[no-untyped-def]
 
 @njit(TASK, cache=True)
 def _list(table, first, stop, thread):  # type: ignore[no-untyped-def]
-    """Task: lists the faces of some tets that are on the surface or may be."""
+    """Task: lists the faces of some tets that are on the surface or may become surface."""
     local, ids, kept, kind, tets, tet_id, begins = _read_list(table)
     n = begins[first // _TETS]
     for e in range(first, stop):
@@ -166,9 +166,9 @@ def _list(table, first, stop, thread):  # type: ignore[no-untyped-def]
 
 @njit(TASK, cache=True, error_model="numpy")
 def _measure(table, first, stop, thread):  # type: ignore[no-untyped-def]
-    """Task: computes the global ``nodes`` (f, 4), sizes, m, unit normals (f, 3) and lowest heights of the tets, m, of
-    faces with the ``local`` nodes, and sets ``counts`` (nodes, 2) to one for the nodes of ``exposed`` faces, and of
-    others.
+    """Task: computes properties of faces with the ``local`` nodes: global ``nodes`` (f, 4), sizes, m, unit normals (f,
+    3), and lowest heights of the tets, m. Sets ``counts`` (nodes, 2) to one: in the first column for nodes of
+    ``exposed`` faces, in the second column for nodes of other faces.
     """
     nodes, size, units, heights, counts, local, exposed, ids, x = _read_measure(table)
     for f in range(first, stop):
