@@ -1,4 +1,6 @@
-"""``conoid sweep --adaptive``: reads the goal from the arguments and prints the result as lines or JSON."""
+"""The command ``conoid sweep --adaptive``: it reads the goal from the arguments and prints the result as lines or
+JSON.
+"""
 
 import hashlib
 from collections.abc import Sequence
@@ -20,7 +22,7 @@ from .options import aloud, complain
 
 
 def file_of(case: str, goal: str, sets: Sequence[str]) -> Path:
-    """Returns the default file of an adaptive sweep. The same arguments of the command give the same file."""
+    """Returns the default file of an adaptive sweep; equal arguments of the command give the same file."""
     keys = sorted(word.partition("=")[0].strip() for word in sets)
     digest = hashlib.sha256("\n".join([goal.replace(" ", ""), *keys]).encode()).hexdigest()[:6]
     return Path(f"{locate(case).stem}-{digest}.sweep.json")
@@ -30,9 +32,10 @@ def adaptive(
     session: Session, case: str, goal: str, sets: Sequence[str], more: Sequence[str], tolerance: str | None,
     at_once: int | None, most: int | None, out: Path | None, *, new: bool, as_json: bool,
 ) -> Found:  # fmt: skip
-    """Runs the search and prints its result. ``more``: further overrides. Raises CaseError, ClientError."""
+    """Runs the search and prints its result. ``more``: overrides of the case besides the varied key. Raises
+    CaseError, ClientError."""
     if not sets:
-        raise UsageError("--adaptive takes --set KEY=LOW:HIGH, the key that varies")
+        raise UsageError("--adaptive needs --set KEY=LOW:HIGH for the key that varies")
     spans, constants = spans_of(sets)
     data = apply_overrides(data_of(case, more), constants)
     path = out or file_of(case, goal, sets)
@@ -44,7 +47,7 @@ def adaptive(
                 session, data, folder_of(case), goal, spans, tolerance, at_once, most or MOST, path, complain, name
             )
     except KeyboardInterrupt:
-        complain(f"{path} has the results so far; the same command continues from there")
+        complain(f"{path} has the results so far; to continue the search, repeat the command")
         raise
     if as_json:
         echo_json(found)
@@ -54,6 +57,6 @@ def adaptive(
 
 
 def finish(found: Found) -> None:
-    """Ends the command: exit code 0 if the bracket has the requested width, else 1."""
+    """Ends the command: exit code 0 if the search has reached the requested width of the bracket, else 1."""
     if not found.reached:
         raise typer.Exit(ExitCode.CRASHED)

@@ -1,5 +1,5 @@
-"""``conoid batch``: submits a run as a job of Slurm, without a server. The folder and the result have the same content
-as for a run on a server.
+"""The command ``conoid batch``: it submits a run as a job of Slurm, without a server. The run folder has the same
+content as that of a run on a server.
 """
 
 import json
@@ -33,13 +33,13 @@ from .console import echo, echo_json
 from .options import CaseArgument, Json, Overrides, Ranks, Threads, aloud, on_cores, warn
 
 _CASE = "case.json"
-"""Command that starts the worker for this case."""
+"""Name of the case file in the run folder; the job's command reads this file."""
 _PLACES = ("~/.config/conoid/site.toml", "/etc/conoid/site.toml")
 
 
 @dataclass(frozen=True)
 class Handed:
-    """The submitted job."""
+    """A run that was submitted to Slurm."""
 
     folder: Path
     job: str
@@ -52,19 +52,23 @@ def batch_run(
     ranks: Ranks = None,
     threads: Threads = None,
     profile: Annotated[
-        str, typer.Option("--slurm", metavar="PROFILE", help="Profile of the site; default: that of the site.")
+        str,
+        typer.Option(
+            "--slurm", metavar="PROFILE", help="Profile of the batch system; default: the site's default profile."
+        ),
     ] = "",
-    out: Annotated[Path | None, typer.Option("--out", help="The run's folder; default: runs/<name>.")] = None,
+    out: Annotated[Path | None, typer.Option("--out", help="Folder of the run; default: runs/<name>.")] = None,
     overrides: Overrides = None,
     site: Annotated[
-        Path | None, typer.Option("--site", help="The site's settings file [CONOID_SITE, or the default place].")
+        Path | None,
+        typer.Option("--site", help="Settings file of the site; default: CONOID_SITE, else the usual place."),
     ] = None,
     as_json: Json = False,
 ) -> None:
-    """Submit a case to Slurm without a server; prints the job's number.
+    """Submit a case to Slurm without a server, and print the number of the job.
 
-    conoid watch FOLDER follows it. A repeated command makes no second job: it prints the existing one, or continues
-    a run that was lost.
+    conoid watch FOLDER follows the run. If the command is repeated, no second job is made: the command prints the
+    existing job, or continues a run that was lost.
     """
     words = [*(overrides or ()), *on_cores(ranks, threads)]
     with aloud("reading mesh files"):
@@ -78,8 +82,8 @@ def batch_run(
 
 
 def slurm_of(site: Path | None) -> Slurm:
-    """Returns the Slurm settings of the site; without a settings file one profile with Slurm's defaults. Raises
-    ClientError.
+    """Returns the Slurm settings of the site. Without a settings file there is one profile with Slurm's defaults.
+    Raises ClientError.
     """
     named = site or (Path(os.environ["CONOID_SITE"]) if os.environ.get("CONOID_SITE") else None)
     found = named or next((path for place in _PLACES if (path := Path(place).expanduser()).is_file()), None)
@@ -91,17 +95,19 @@ def slurm_of(site: Path | None) -> Slurm:
 
 
 def job_of(folder: Path) -> Job | None:
-    """Returns the record in a run's folder; None for a folder without a record. Raises ClientError for an unreadable
-    record.
+    """Returns the record of the Slurm job in a run folder; None if the folder has no record. Raises ClientError if
+    the record is unreadable.
     """
     try:
         return batch.read_job(folder)
     except msgspec.MsgspecError as error:
-        raise ClientError(f"{folder / layout.JOB}: this record cannot be read: {error}") from None
+        raise ClientError(f"{folder / layout.JOB}: the record of the job cannot be read: {error}") from None
 
 
 def hand_over(case: str, overrides: Iterable[str], out: Path | None, profile: str, site: Slurm) -> Handed:
-    """Makes one job for the run in a folder, for any earlier state of the folder. Raises CaseError, ClientError."""
+    """Submits one job for the run in a folder; the folder may be new or have an earlier job. Raises CaseError,
+    ClientError.
+    """
     data = data_of(case, overrides)
     files = Hashes().of(data, folder_of(case))
     data = with_hashes(data, files)
@@ -122,7 +128,9 @@ def hand_over(case: str, overrides: Iterable[str], out: Path | None, profile: st
         noted = batch.Job(**{**{name: getattr(job, name) for name in job.__struct_fields__}, "job": number})
         whole.write(folder / layout.JOB, batch.to_json(noted))
     except slurm_call.AwayError as error:
-        raise ClientError(f"{error}; it is unknown whether there is a job: repeat the command to find out") from None
+        raise ClientError(
+            f"{error}; it is unknown whether Slurm has made a job: repeat the command to find out"
+        ) from None
     except (slurm_call.SlurmError, ValueError) as error:
         raise ClientError(str(error)) from None
     except OSError as error:
@@ -131,22 +139,28 @@ def hand_over(case: str, overrides: Iterable[str], out: Path | None, profile: st
 
 
 def _known(folder: Path, resolved: bytes, profile: str, site: Slurm) -> Job | None:
-    """Returns the record of the job of a folder that was submitted before. A lost job is replaced by a new one.
-    Raises ClientError if the folder belongs to another case, or to another ``profile`` than the requested one.
+    """Returns the record of the job that was submitted before for a folder. A lost job is replaced by a new job.
+    Raises ClientError if the folder belongs to another case, or if its job has another profile than ``profile``.
     """
     job = job_of(folder)
     if job is None:
         if any(folder.iterdir()):
-            raise ClientError(f"{folder}: not empty, and not a run of Slurm; --out names another folder")
+            raise ClientError(
+                f"{folder}: the folder is not empty and has no run of Slurm; choose another folder with --out"
+            )
         return None
     if (folder / layout.OUTCOME).exists():
-        raise ClientError(f"{folder}: this run has ended; --out names another folder")
+        raise ClientError(f"{folder}: the run in this folder has ended; choose another folder with --out")
     if resolved_json(parse_case(json.loads((folder / _CASE).read_bytes()))) != resolved:
         raise ClientError(
-            f"{folder}: submitted to Slurm with another case, other ranks or threads; --out names another folder"
+            f"{folder}: this folder was submitted to Slurm with another case, other ranks or threads; choose "
+            "another folder with --out"
         )
     if profile not in ("", job.profile):
-        raise ClientError(f"{folder}: submitted to Slurm with the profile {job.profile!r}; --out names another folder")
+        raise ClientError(
+            f"{folder}: this folder was submitted to Slurm with the profile {job.profile!r}; choose another folder "
+            "with --out"
+        )
     chosen = batch.profile_of(site, job.profile)
     command = _command(folder, job.ranks, job.threads, chosen[1])
     known = slurm.jobs(site.bin, job.name)
@@ -160,7 +174,7 @@ def _known(folder: Path, resolved: bytes, profile: str, site: Slurm) -> Job | No
 def _prepared(
     folder: Path, data: dict[str, Any], resolved: bytes, run: Run, profile: tuple[str, batch.Profile], place: str
 ) -> Job:  # fmt: skip
-    """Creates the run's folder, complete on disk before Slurm gets the job."""
+    """Creates the run folder; the folder is complete on disk before Slurm gets the job."""
     (folder / layout.LOGS).mkdir(parents=True, exist_ok=True)
     case = folder / _CASE
     case.write_text(json.dumps(data, indent=2, default=str), encoding="utf-8")
@@ -173,8 +187,8 @@ def _prepared(
 
 
 def _command(folder: Path, ranks: int, threads: int, profile: batch.Profile) -> list[str]:
-    """Returns the command that starts the ranks. The command is made again for every job: a record in a folder must
-    not choose a program.
+    """Returns the command that starts the ranks. The command is computed again for each job, because a record in a
+    folder must not choose the program that runs.
     """
     worker = [sys.executable, "-P", "-m", "mpi4py", "-m", "conoid.worker", str(folder / _CASE), "--out", str(folder)]
     words = ["--run", folder.name, "--ranks", str(ranks), "--interruptible"]
@@ -192,15 +206,15 @@ def _mpiexec() -> list[str]:
     beside = Path(sys.executable).with_name("mpiexec")
     found = str(beside) if beside.is_file() else shutil.which("mpiexec")
     if found is None:
-        raise ClientError("no mpiexec: install conoid[mpich], or name the site's own in the profile")
+        raise ClientError("no mpiexec: install conoid[mpich], or name the mpiexec of the site in the profile")
     return [found]
 
 
 def cancel_folder(folder: Path) -> str:
-    """Cancels the run in a folder, and the waiting job of the run; returns one line about the result.
+    """Cancels the run in a folder and its waiting job; returns one line about the result.
 
-    The Slurm commands are taken from the settings file of the site, or from PATH. The job number of the record is used
-    only if a job of this number has the name in the record. Raises UnfinishedError for a folder that is not a run's,
+    The Slurm commands are taken from the settings file of the site, or from PATH. A job is cancelled only if Slurm
+    has a job with the number and the name of the record. Raises UnfinishedError if the folder is not that of a run,
     ClientError, OSError.
     """
     LocalFolder(folder).path(layout.JOURNAL)
@@ -208,7 +222,7 @@ def cancel_folder(folder: Path) -> str:
         return f"{folder} has ended"
     job = job_of(folder)
     if job is None and not slurm.held(folder):
-        return f"{folder}: no worker writes into it; a run of a server is cancelled by its id"
+        return f"{folder}: no worker writes into this folder; cancel a run of a server by its id"
     whole.touch(folder / layout.STOP_REQUEST)
     if job is None or not job.job:
         return f"{folder} is requested to stop"

@@ -1,4 +1,4 @@
-"""The command ``conoid bench``: measures the speed-up of a case."""
+"""The command ``conoid bench``: it measures the speed-up of a case."""
 
 import tempfile
 from collections.abc import Callable
@@ -25,32 +25,30 @@ from .options import CaseArgument, Overrides, aloud, complain
 bench = typer.Typer(no_args_is_help=True, help="Measure speed-up and scaling.")
 
 
-@bench.command(
-    name="scale", short_help="Run a case on several ranks and threads: speed-up, projected beyond the cores."
-)
+@bench.command(name="scale", short_help="Measure the speed-up of a case on several numbers of ranks and threads.")
 def bench_scale(
     case: CaseArgument,
     ranks: Annotated[
         str,
         typer.Option(
-            "--ranks", metavar="R,RxT,...", help="Numbers of ranks, or ranks x threads; 1 is always included."
+            "--ranks", metavar="R,RxT,...", help="Numbers of ranks, or of ranks x threads; 1 is always included."
         ),
     ] = "1,2,4,8",
     overrides: Overrides = None,
-    latency: Annotated[str, typer.Option("--latency", help="Latency of a message, for the projection.")] = "2 us",
+    latency: Annotated[str, typer.Option("--latency", help="Latency of an MPI message, for the projection.")] = "2 us",
     width: Annotated[
-        str, typer.Option("--bandwidth", help="Bandwidth of a rank's messages, for the projection.")
+        str, typer.Option("--bandwidth", help="Bandwidth of the messages of one rank, for the projection.")
     ] = "5 GB/s",
     out: Annotated[
         Path | None,
-        typer.Option(
-            "--out", help="Folder for scale.md, .json, .svg and the runs; runs of an earlier call are used again."
-        ),
+        typer.Option("--out", help="Folder for scale.md, .json, .svg and the runs; runs in it are used again."),
     ] = None,
 ) -> None:
-    """Run a case on several numbers of ranks and threads: speed-up, its losses, and whether all answers are equal.
+    """Run a case on several numbers of ranks and threads; print the speed-up, its losses, and whether all answers are
+    equal.
 
-    With more threads than cores the time is projected from the tasks of one thread. Exit code 1 when answers differ.
+    If a run has more threads than the machine has cores, its time is projected from the measured times of the tasks.
+    Exit code 1 if answers differ.
     """
     layouts = layouts_of(ranks)
     network = Network(_read("--latency", latency, _time), _read("--bandwidth", width, bandwidth))
@@ -70,7 +68,9 @@ def bench_scale(
 
 
 def layouts_of(text: str) -> list[Layout]:
-    """Returns the numbers of ranks, and of threads for each rank, in a text such as ``1,2,4x4``. Raises ClientError."""
+    """Returns the layouts (numbers of ranks, and of threads for each rank) of a text such as ``1,2,4x4``. Raises
+    ClientError.
+    """
     found = []
     for word in text.split(","):
         numbers = [int(each[:9]) if each.isascii() and each.isdigit() else 0 for each in word.strip().split("x")]
@@ -86,7 +86,7 @@ def layouts_of(text: str) -> list[Layout]:
 
 
 def _read(option: str, text: str, reading: Callable[[str], float]) -> float:
-    """Reads the value of an option. Raises ClientError with the name of the option."""
+    """Reads the value of an option with the function ``reading``. Raises ClientError with the name of the option."""
     try:
         return reading(text)
     except ValueError as error:

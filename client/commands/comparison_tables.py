@@ -1,4 +1,4 @@
-"""Tables of the comparison of two runs on the command line."""
+"""Tables of the comparison of two runs for the command line."""
 
 from rich.table import Table
 
@@ -8,11 +8,11 @@ from ..reports.compare import AT_THE_END, Comparison
 from .tables import pairs, table
 
 _LONGEST = 60
-"""Largest number of characters of a key's value that are shown. Chosen value: two columns fit side by side; a
-description may have a page."""
+"""Largest number of characters of a value that are shown. Chosen value: the values of two runs fit side by side;
+some values, such as descriptions, are longer."""
 _NUMBERS = ("A", "B", "B - A", "% of A")
 _LEAST = 26
-"""Largest number of characters of names beside numbers. Chosen value: most names fit, and the line has 80
+"""Smallest number of characters of the column of names. Chosen value: most names fit, and a table line has 80
 characters."""
 
 
@@ -21,13 +21,13 @@ def _brief(text: str) -> str:
 
 
 def comparison_tables(found: Comparison) -> list[Table | str]:
-    """Prints the differences between two runs, their outcomes and fragments."""
-    same = "the same answer, to the bit" if found.same_answer else "different answers"
+    """Returns the differences between two runs: keys of the case, outcomes and fragments."""
+    same = "both runs have the same answer, bit for bit" if found.same_answer else "different answers"
     keys = table("key", "A", "B", wide=("A", "B"))
     for each in found.keys:
         keys.add_row(each.key, *("–" if value is None else _brief(str(value)) for value in (each.a, each.b)))
     runs = pairs(dict(zip("AB", found.names, strict=True)))
-    parts: list[Table | str] = [runs, same, "", keys if found.keys else "no key of the case differs"]
+    parts: list[Table | str] = [runs, same, "", keys if found.keys else "the cases of both runs have equal keys"]
     for title, values in (("at the end", found.ends), ("fragments", found.sizes)):
         if values:
             made = table(title, "unit", *_NUMBERS, right=_NUMBERS, wide=(title,), least=_LEAST)

@@ -1,4 +1,4 @@
-"""The command ``conoid converge``: convergence study of a case, with the error over the cost of each mesh."""
+"""The command ``conoid converge``: it runs a case on several meshes and reports the error and the cost of each mesh."""
 
 import tempfile
 from collections.abc import Iterator, Sequence
@@ -31,8 +31,8 @@ from .options import CaseArgument, Overrides, Token, Url, aloud, complain
 from .reports import drawing
 
 _ENSEMBLE = 5
-"""Number of members for each point of a scene with fracture. Chosen value: the standard deviation of five is good to
-a third."""
+"""Number of runs in the ensemble of each point if the case has fracture. Chosen value: the standard deviation of
+five runs has an uncertainty of about a third."""
 
 
 def converge(
@@ -44,7 +44,9 @@ def converge(
     ensemble: Annotated[
         int | None, typer.Option("--ensemble", min=1, help="Runs for each point; default: 5 with fracture, else 1.")
     ] = None,
-    vary: Annotated[str, typer.Option("--vary", help="Difference within an ensemble: steps or seeds.")] = STEPS,
+    vary: Annotated[
+        str, typer.Option("--vary", help="Difference between runs of an ensemble: steps or seeds.")
+    ] = STEPS,
     ranks: Annotated[int, typer.Option("--ranks", min=1, help="Ranks of each run.")] = 1,
     threads: Annotated[int, typer.Option("--threads", min=1, help="Threads of each rank.")] = 1,
     quantity: Annotated[str | None, typer.Option("--quantity", help="Quantity of the advice.")] = None,
@@ -56,14 +58,14 @@ def converge(
     url: Url = None,
     token: Token = None,
 ) -> None:
-    """Speed against error for any case: orders, limits with their uncertainty, error over cost, one line of advice.
+    """Measure error against cost for any case: orders, limits with uncertainty, error over cost, advice.
 
-    Exit code 1 when a run did not succeed.
+    Exit code 1 if a run did not succeed.
     """
     data = data_of(case, overrides or ())
     checked = parse_case(data)
     if quantity is not None and not any(quantity in name for name in names(checked)):
-        raise UsageError(f"--quantity = {shown(quantity)}: a part of a name; {allowed(quantity, names(checked))}")
+        raise UsageError(f"--quantity = {shown(quantity)}: no such quantity; {allowed(quantity, names(checked))}")
     members = ensemble or (_ENSEMBLE if chaotic(checked) else 1)
     plan = Plan(_numbers("--meshes", meshes), _forms(forms), _numbers("--dt-safety", safeties), members,
                 _one_of("--vary", vary, (STEPS, SEEDS)), ranks, threads)  # fmt: skip
@@ -85,7 +87,7 @@ def converge(
 
 @contextmanager
 def _session(out: Path, cores: int, on_server: bool, url: str | None, token: str | None) -> Iterator[Session]:
-    """Returns the named server, or starts one with a slot for each core."""
+    """Yields a session on the named server, or on a server of its own with a slot for each core."""
     if on_server or url is not None:
         with connect(url, token) as session:
             yield session
@@ -123,7 +125,7 @@ def _write(book: Book, quantity: str | None, out: Path | None) -> None:
 
 
 def _numbers(option: str, text: str) -> list[float]:
-    """Returns positive, different numbers from a list with commas. Raises ClientError."""
+    """Returns the numbers of a text with commas; the numbers are positive and different. Raises ClientError."""
     try:
         values = [float(word) for word in text.split(",")] if text.strip() else []
     except ValueError:

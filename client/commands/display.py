@@ -1,4 +1,4 @@
-"""Display of a run in the terminal: a panel that is redrawn, or one line for each update without a terminal."""
+"""Display of a run in the terminal: a panel that is redrawn, or, without a terminal, one text line for each update."""
 
 import time
 from collections import Counter
@@ -31,27 +31,27 @@ _PHASE_STYLE = {
 }
 _LEVEL_STYLE = {"warning": "yellow", "error": "red"}
 _MOST_RANKS = 12
-"""Largest number of ranks with a bar in the panel. Chosen value: more bars do not fit a terminal."""
+"""Largest number of ranks with a bar in the panel. Chosen value: a terminal has no space for more bars."""
 _BAR = 36
-"""Characters of a full bar. Chosen value for a terminal of 80 columns; a narrower one has shorter bars."""
+"""Largest length of a bar in characters. Chosen value for a terminal of 80 columns."""
 _FRAME = 4
-"""Number of characters of the border in each line."""
+"""Number of characters that the border takes from each text line."""
 _APART = 2
-"""Number of characters between two columns."""
+"""Number of blanks between two columns."""
 _DETAILS = (_MOST_RANKS, 6, True), (4, 3, True), (2, 2, True), (2, 2, False), (1, 1, False)
-"""Layouts from large to small: ranks, lines of the log, whether terms of the energy are shown. The first layout that
-fits the height of the terminal is used."""
+"""Layouts of the panel from large to small: number of ranks, number of lines of the log, whether energy terms are
+shown. The first layout that fits the height of the terminal is used."""
 _SMALL = 0.005
-"""Fraction of the whole energy below which terms of the energy are on a common line. Chosen value: such a term has a
-bar of no length."""
+"""Fraction of the total energy below which energy terms share one text line. Chosen value: the bar of such a term
+would have no length."""
 Pair = tuple[str, str]
 
 
 class panel:  # noqa: N801
-    """The panel of a run for rich.live, with the width and height of the terminal."""
+    """The panel of a run, drawn by rich.live with the width and height of the terminal."""
 
     def __init__(self, live: Live, log_lines: int = 6) -> None:
-        """Makes the panel; ``log_lines``: largest number of log lines."""
+        """``log_lines``: largest number of lines of the log in the panel."""
         self.live, self.log_lines = live, log_lines
 
     def __rich_console__(self, console: Console, options: ConsoleOptions) -> RenderResult:
@@ -78,7 +78,7 @@ class panel:  # noqa: N801
 
 
 def _under(live: Live) -> str | None:
-    """Returns the name of the run and of the subscription for the line below the panel."""
+    """Returns the names of the run and of its subscription, for the line below the panel."""
     return " ".join([*([live.run] if live.title else []), *([f"over {live.link}"] if live.link else [])]) or None
 
 
@@ -89,14 +89,14 @@ def _state(live: Live) -> Text:
 
 
 def _why(live: Live) -> list[Text]:
-    """Returns cause and message as separate lines."""
+    """Returns the cause of the end and the message as separate text lines."""
     return [Text(one_line(" · ".join(words)), overflow="fold")] if (words := _explained(live)) else []
 
 
 def _explained(live: Live) -> list[str]:
-    """Returns cause and message, if they add to the state, and a line if no server answers."""
+    """Returns the cause of the end and the message, unless the state implies them, and a note if no server answers."""
     if live.away:
-        return ["at its last message; no server answers"]
+        return ["state of the last message; no server answers"]
     return [part for part in (live.cause, live.explanation) if part and part != live.state.value]
 
 
@@ -112,7 +112,7 @@ def _bar(live: Live) -> RenderableType:
 
 
 def _numbers(facts: list[Pair], width: int) -> list[RenderableType]:
-    """Returns names and values in as many columns as fit; a text longer than a column has a line of its own."""
+    """Returns names and values in as many columns as fit into the width; a long text has a line of its own."""
     columns = next((n for n in (3, 2) if _fits(facts, width, n)), 1)
     share = (width - _APART * (columns - 1)) // columns
     name = max((len(name) for name, _ in facts), default=0)
@@ -127,7 +127,7 @@ def _numbers(facts: list[Pair], width: int) -> list[RenderableType]:
 
 
 def _fits(facts: list[Pair], width: int, columns: int) -> bool:
-    """Returns True if at least three quarters of the facts fit into that many columns."""
+    """Returns True if at least three quarters of ``facts`` fit into ``columns`` columns."""
     share, name = (width - _APART * (columns - 1)) // columns, max((len(name) for name, _ in facts), default=0)
     return sum(name + 1 + len(value) > share for _, value in facts) <= max(2, len(facts) // 4)
 
@@ -163,7 +163,7 @@ def _time(live: Live) -> str:
 
 
 def _ranks(live: Live, width: int, most: int) -> list[RenderableType]:
-    """Returns a bar for each rank, the legend of the colours, and the imbalance."""
+    """Returns a bar for each rank, the legend of the colours, and the load imbalance."""
     phases, busy = live.phases, live.busy
     totals = [sum(seconds) for seconds in zip(*phases.values(), strict=True)]
     longest = max(totals, default=0.0) or 1.0
@@ -187,7 +187,7 @@ def _ranks(live: Live, width: int, most: int) -> list[RenderableType]:
 
 
 def _flow(items: list[Text], width: int) -> list[Text]:
-    """Joins items into as few lines as possible; no item is broken."""
+    """Joins items into as few text lines as possible; no item is broken across lines."""
     lines = [items[0]] if items else []
     for item in items[1:]:
         if len(lines[-1]) + _APART + len(item) <= width:
@@ -198,13 +198,13 @@ def _flow(items: list[Text], width: int) -> list[Text]:
 
 
 def _helped(live: Live, rank: int) -> str:
-    """Returns the load of the further threads of a rank."""
+    """Returns the CPU load of the threads of a rank without its first thread."""
     return f", its threads {percent(live.helped[rank], 0)}" if rank < len(live.helped) else ""
 
 
 def _stacked(parts: dict[str, float], longest: float, cells: int) -> Text:
-    """Returns a bar of at most so many cells. The pieces of the bar end at the cumulative sums, so that rounding errors
-    do not add up.
+    """Returns a bar of at most ``cells`` characters. The pieces of the bar end at the cumulative sums, so that
+    rounding errors do not add up.
     """
     edges, total = [0], 0.0
     for seconds in parts.values():
@@ -217,9 +217,9 @@ def _stacked(parts: dict[str, float], longest: float, cells: int) -> Text:
 
 
 def _ledger(energy: Energy, width: int, *, terms: bool) -> RenderableType:
-    """Returns a bar for each term of the energy; small terms have one line. Without ``terms``: only the residual."""
+    """Returns a bar for each energy term, with small terms in one line; without ``terms`` only the residual."""
     residual = Text("energy residual ", style="bright_black").append(_residual(energy.residual))
-    supplied = f"of {si(energy.initial, 'J')} at the start and {si(energy.external, 'J')} from outside"
+    supplied = f"energy: {si(energy.initial, 'J')} at the start, {si(energy.external, 'J')} from outside"
     residual.append(f"  {supplied}", style="bright_black")
     if not terms:
         return residual
@@ -254,9 +254,7 @@ def _residual(residual: float) -> Text:
 
 
 def _once(live: Live) -> list[tuple[Log, int]]:
-    """Returns the lines of the log, warnings last: each text once, at its last position, with its number of
-    repetitions.
-    """
+    """Returns each log text once, at its last position, with the number of repetitions; warnings are last."""
     times = Counter(entry.text for entry in live.log)
     last = {entry.text: entry for entry in live.log}
     ordered = sorted(last.values(), key=lambda entry: (entry.level in _LEVEL_STYLE, entry.seq))
@@ -264,7 +262,7 @@ def _once(live: Live) -> list[tuple[Log, int]]:
 
 
 def _log_line(entry: Log, times: int) -> Text:
-    """Returns a log message as text: a warning is complete, others are cut to one line."""
+    """Returns a log message as text: a warning is shown completely, another message is cut to one line."""
     warns = entry.level in _LEVEL_STYLE
     text = Text(overflow="fold" if warns else "ellipsis", no_wrap=not warns)
     text.append(f"{clock(entry.wall)} ", style="bright_black")
@@ -273,17 +271,17 @@ def _log_line(entry: Log, times: int) -> Text:
 
 
 def _who(entry: Log) -> str:
-    """Returns the level of a log line, or its rank."""
+    """Returns the level of a log message, or the rank that wrote it."""
     return f"{entry.level}: " if entry.level in _LEVEL_STYLE else f"[{entry.rank}] "
 
 
 def seen(snapshot: Snapshot) -> str:
-    """Describes a snapshot of the fragments in a few words."""
+    """Returns a short description of a snapshot of the fragments."""
     return f"snapshot {snapshot.n} at t {si(snapshot.t, 's')}: {counted(snapshot.fragments, 'fragment')}"
 
 
 def line(live: Live) -> str:
-    """Returns one update as one plain line."""
+    """Returns an update of the run as one plain text line."""
     parts = [clock(live.wall) if live.wall else "", live.run, live.state.value]
     parts += _explained(live)
     progress = live.progress

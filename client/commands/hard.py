@@ -1,4 +1,6 @@
-"""The command ``conoid hard``: runs the suite of hard cases, several at a time, and prints a verdict for each."""
+"""The command ``conoid hard``: it runs the suite of hard cases, several at a time, and prints a verdict for each
+case.
+"""
 
 import json
 import math
@@ -39,7 +41,7 @@ class Verdict:
     title: str
     outcome: Outcome
     drifted: float | None
-    """Drift of the momentum; None for a case with an external force."""
+    """Drift of the momentum during the run; None for a case with an external force."""
     faults: list[str]
 
 
@@ -47,16 +49,18 @@ def hard(
     names: Annotated[
         list[str] | None, typer.Argument(metavar="[NAME]...", help="Names of cases, or rows such as H14.")
     ] = None,
-    ranks: Annotated[int, typer.Option("--ranks", min=1, help="Ranks of each run; the answers are the same.")] = 1,
+    ranks: Annotated[
+        int, typer.Option("--ranks", min=1, help="Ranks of each run; the answer does not depend on them.")
+    ] = 1,
     threads: Annotated[
-        int, typer.Option("--threads", min=1, help="Threads of each rank; the answers are the same.")
+        int, typer.Option("--threads", min=1, help="Threads of each rank; the answer does not depend on them.")
     ] = 1,
     listed: Annotated[bool, typer.Option("--list", help="List the cases without a run.")] = False,
     out: Annotated[Path | None, typer.Option("--out", help="Folder for hard.md, hard.json and the runs.")] = None,
 ) -> None:
-    """Run the hard cases: state, largest energy residual, drift of the momentum, steps.
+    """Run the suite of hard cases; print state, largest energy residual, drift of the momentum and steps of each.
 
-    Exit code 1 when a case fails.
+    Exit code 1 if a case fails.
     """
     some = chosen(suite(), names or ())
     if listed:
@@ -82,18 +86,20 @@ def hard(
 
 
 def chosen(known: Sequence[Hard], words: Sequence[str]) -> list[Hard]:
-    """Returns the cases with these names or in these rows; all without arguments. Raises ClientError for an unknown
-    word.
+    """Returns the cases with the given names or catalogue rows; all cases without arguments. Raises ClientError if a
+    word is unknown.
     """
     for word in words:
         if not any(word == each.name or word in each.rows for each in known):
             names = allowed(word, [each.name for each in known])
-            raise UsageError(f"hard = {word!r}: a row as H14, or a name; {names}")
+            raise UsageError(
+                f"hard = {word!r}: allowed: a row of the catalogue such as H14, or the name of a case; {names}"
+            )
     return [each for each in known if not words or each.name in words or set(each.rows) & set(words)]
 
 
 def run_all(session: Session, some: Sequence[Hard], ranks: int, threads: int = 1) -> Iterator[Verdict]:
-    """Submits all cases, and yields the result of each case after its end. Raises CaseError for an invalid case."""
+    """Submits all cases, and yields the verdict on each case after its run. Raises CaseError for an invalid case."""
     quiet = {
         "run.ranks": ranks, "run.threads": threads, "run.frames": 0, "run.snapshots": 0,
         "run.checkpoint_every": "none",
@@ -118,7 +124,7 @@ def _momenta(columns: Columns) -> list[tuple[float, float, float]]:
 
 
 def to_markdown(ended: Sequence[Verdict]) -> str:
-    """Prints one line for each case, then the failures."""
+    """Returns a Markdown table with one line for each case, and then the failures."""
     head = ("case", "rows", "state", "worst residual", "momentum drift", "steps", "tets", "CPU s", "references")
     rows = [
         [
@@ -131,7 +137,7 @@ def to_markdown(ended: Sequence[Verdict]) -> str:
     ]  # fmt: skip
     bad = [f"- **{verdict.hard.name}**: {'; '.join(verdict.faults)}" for verdict in ended if verdict.faults]
     spent = sum(v.outcome.cpu for v in ended if not math.isnan(v.outcome.cpu))
-    summary = f"{len(ended) - len(bad)} of {len(ended)} passed, in {duration(spent)} of CPU time."
+    summary = f"{len(ended) - len(bad)} of {len(ended)} cases passed, in {duration(spent)} of CPU time."
     return "\n\n".join(filter(None, [table(head, rows), summary, "\n".join(bad)])) + "\n"
 
 

@@ -1,4 +1,4 @@
-"""Help of the command line: commands in groups, with examples for each."""
+"""Help of the command line: commands in groups, and examples for each command."""
 
 import typer
 from typer.core import TyperCommand, TyperGroup
@@ -12,7 +12,7 @@ GROUPS: dict[str, tuple[str, ...]] = {
     "Server": ("serve",),
     "Measure Conoid itself": ("bench", "hard"),
 }
-"""Commands by purpose, in the order of a user's work."""
+"""Commands grouped by purpose, in the order in which a user needs them."""
 EXAMPLES: dict[str, tuple[str, ...]] = {
     "cases": ("conoid cases", "conoid cases copy taylor_copper"),
     "validate": ("conoid validate my_case.toml", "conoid validate demo --set run.end_time='20 us'"),
@@ -53,12 +53,13 @@ EXAMPLES: dict[str, tuple[str, ...]] = {
     "bench": ("conoid bench --help",),
     "hard": ("conoid hard",),
 }
-"""Lines of the help. A line that begins with blanks continues the line before."""
+"""Examples for the help of each command, one text line each. A line that begins with blanks continues the line
+before."""
 
 
 class Grouped(TyperGroup):
-    """A group of commands. GROUPS orders the list of commands, and EXAMPLES has examples for the help of each
-    command.
+    """The group of all commands. GROUPS gives the order of the list of commands, and EXAMPLES the examples in the
+    help of a command.
     """
 
     def format_commands(self, ctx: typer.Context, formatter: object) -> None:  # type: ignore[override]
@@ -78,7 +79,7 @@ class Grouped(TyperGroup):
                     formatter.write_dl(rows)  # type: ignore[attr-defined]
 
     def get_command(self, ctx: typer.Context, cmd_name: str) -> TyperCommand | None:  # type: ignore[override]
-        """Writes the help of the command, with its examples."""
+        """Writes the help of a command with its examples."""
         command = super().get_command(ctx, cmd_name)
         if command is not None and cmd_name in EXAMPLES and not command.epilog:
             lines = "\n".join(f"  {line}" for line in EXAMPLES[cmd_name])

@@ -1,4 +1,4 @@
-"""``conoid runs``: the list of runs."""
+"""The command ``conoid runs``: it lists the runs of a server."""
 
 from typing import Annotated
 
@@ -14,19 +14,20 @@ from .options import Json, Labels, Token, Url, labels_of, show_lines
 from .times import moment
 
 _VALUES = 4
-"""Largest number of values that are shown of a run. Chosen value: as many as fit into a line."""
+"""Largest number of values of the case that are shown for a run. Chosen value: as many as fit into a text line."""
 
 
 Words = Annotated[
     list[str] | None,
     typer.Argument(
-        metavar="[WORD]...", help="Words that all occur in the name, title, a label, the state or the message."
+        metavar="[WORD]...", help="Words that must all occur in name, title, labels, state or message of a run."
     ),
 ]
 Case = Annotated[str, typer.Option("--case", help="Name of the case; * stands for any characters.")]
 States = Annotated[list[State] | None, typer.Option("--state", help="Only runs in this state; may be repeated.")]
 Since = Annotated[
-    str, typer.Option("--since", metavar="WHEN", help="Submitted at this time or later: a date, today, 3d, 12h.")
+    str,
+    typer.Option("--since", metavar="WHEN", help="Only runs submitted at this time or later: a date, today, 3d, 12h."),
 ]
 Until = Annotated[str, typer.Option("--until", metavar="WHEN", help="Submitted before this time.")]
 Limit = Annotated[int, typer.Option("--limit", min=1, help="Largest number of runs.")]
@@ -46,7 +47,7 @@ def runs(
 ) -> None:
     """List runs, newest first, with the values of their cases that differ.
 
-    Ids are short: each is the shortest unique prefix, which every command accepts.
+    The list shows short ids: the shortest unique prefix of each id. Every command accepts such a prefix.
     """
     first = moment(since, "--since") if since else None
     last = moment(until, "--until") if until else None

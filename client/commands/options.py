@@ -1,4 +1,4 @@
-"""Common parts of the commands: options, selection of a run, output."""
+"""Definitions that several commands use: options, selection of a run, output."""
 
 import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -27,23 +27,22 @@ from . import progress
 from .console import PlainConsole, echo, one_line
 
 _MOST_WARNINGS = 12
-"""Largest number of warnings that are printed. Chosen value: half a screen."""
+"""Largest number of warnings that are printed. Chosen value: they fill half a screen."""
 
 _RARER = 1.2
-"""Growth of the time between two progress lines, relative to the whole duration. Chosen value: a day has some forty
-lines."""
+"""Growth factor of the time between two progress lines. Chosen value: a command of one day prints about forty lines."""
 
 _NO_WIDTH = 1000
-"""Width of a line in a file or a pipe, characters. Chosen value: wider than any table."""
+"""Width of a text line in a file or a pipe, characters. Chosen value: wider than any table."""
 
 FILE_OPTIONS = ("--out", "--view", "--list", "--runs", "--site")
 """Options whose value is the name of a file or a folder."""
 
 Url = Annotated[
-    str | None, typer.Option("--url", help="Address of the server [CONOID_URL, or the configuration file].")
+    str | None, typer.Option("--url", help="Address of the server; default: CONOID_URL or the configuration file.")
 ]
 Token = Annotated[
-    str | None, typer.Option("--token", help="Token of the user [CONOID_TOKEN, or the configuration file].")
+    str | None, typer.Option("--token", help="Token of the user; default: CONOID_TOKEN or the configuration file.")
 ]
 Json = Annotated[bool, typer.Option("--json", help="Print JSON, for scripts.")]
 
@@ -71,89 +70,94 @@ def _complete_files(incomplete: str) -> list[str]:
 
 
 def named(text: str) -> str:
-    """Returns the given id of a run or a sweep, or a folder. Raises UsageError for an empty text, such as an unset
-    variable; NotFoundError for a path without a folder: no id contains ``/``.
+    """Returns an argument that names a run or a sweep: an id or a folder. Raises UsageError if the text is empty, as
+    from an unset variable. Raises NotFoundError if the text is a path and no folder; an id contains no ``/``.
     """
     sweep_named(text)
     if ("/" in text or "\0" in text) and folder_of(text) is None:
-        raise NotFoundError(f"{text}: not the folder of a run; write its folder, its id, or 'last'")
+        raise NotFoundError(f"{text}: this is not the folder of a run; write the folder or the id of a run, or 'last'")
     return text
 
 
 def sweep_named(text: str) -> str:
-    """Returns the given id of a sweep. Raises UsageError for an empty text."""
+    """Returns an argument that names a sweep. Raises UsageError for an empty text."""
     if not text.strip():
-        raise UsageError("the name is empty: write an id, or 'last'")
+        raise UsageError("the name of the sweep is empty: write an id, or 'last'")
     return text
 
 
 def folder_of(text: str) -> Path | None:
-    """Returns the path of a folder with this name; None without such a folder."""
+    """Returns the path of an existing folder; None if there is no folder with this name."""
     try:
         return Path(text) if Path(text).is_dir() else None
-    except (OSError, ValueError):  # a name that is too long or not allowed
+    except (OSError, ValueError):  # The name is too long or not allowed.
         return None
 
 
 CaseArgument = Annotated[
     str,
     typer.Argument(
-        metavar="CASE", help="A .toml or .json file, or a shipped case by name.", autocompletion=_complete_files
+        metavar="CASE", help="A .toml or .json file, or the name of a shipped case.", autocompletion=_complete_files
     ),
 ]
 Overrides = Annotated[
     list[str] | None,
     typer.Option("--set", metavar="KEY=VALUE", help="Change a key of the case, such as run.end_time='20 us'."),
 ]
-Ranks = Annotated[int | None, typer.Option("--ranks", min=1, help="MPI ranks; the case's own number if not given.")]
+Ranks = Annotated[
+    int | None, typer.Option("--ranks", min=1, help="Number of MPI ranks; default: run.ranks of the case.")
+]
 Threads = Annotated[
-    int | None, typer.Option("--threads", min=1, help="Threads of each rank; the case's own number if not given.")
+    int | None, typer.Option("--threads", min=1, help="Threads of each rank; default: run.threads of the case.")
 ]
 MaxSteps = Annotated[
-    int | None, typer.Option("--max-steps", min=1, help="run.max_steps of the new run; the case's own if not given.")
+    int | None, typer.Option("--max-steps", min=1, help="run.max_steps of the new run; default: as in the old run.")
 ]
 Labels = Annotated[
     list[str] | None,
     typer.Option("--label", metavar="NAME=VALUE", help="Label to find runs again; may be repeated."),
 ]
 SourceArgument = Annotated[
-    str, typer.Argument(metavar="RUN", callback=named, help="The id of a run or its beginning, 'last', or its folder.")
+    str,
+    typer.Argument(
+        metavar="RUN", callback=named, help="The id of a run, the beginning of an id, 'last', or a run folder."
+    ),
 ]
 
 
 def on_cores(ranks: int | None, threads: int | None) -> list[str]:
-    """Returns the overrides of these options."""
+    """Returns the overrides of the case for the options ``--ranks`` and ``--threads``."""
     chosen = (("run.ranks", ranks), ("run.threads", threads))
     return [f"{key}={number}" for key, number in chosen if number is not None]
 
 
 def labels_of(words: Sequence[str] | None) -> dict[str, str]:
-    """Returns labels of ``NAME=VALUE``. Raises ClientError."""
+    """Returns the labels from words of the form ``NAME=VALUE``. Raises ClientError."""
     pairs = [word.partition("=") for word in words or ()]
     for name, equals, _ in pairs:
         if not (name and equals):
             raise UsageError(f"label = {name!r}: write NAME=VALUE")
     labels = {name: value for name, _, value in pairs}
     if len(labels) < len(pairs):
-        raise UsageError(f"label: each name may have one value; given are {', '.join(words or ())}")
+        raise UsageError(f"label: each name may have only one value; given are {', '.join(words or ())}")
     return labels
 
 
 def complain(*lines: str) -> None:
-    """Prints each problem in one line."""
+    """Prints problems, each in one line."""
     for line in lines:
         echo(f"conoid: {one_line(line)}", err=True)
 
 
 def warn(odd: Sequence[Problem]) -> None:
-    """Prints each warning in one line, and the number of warnings that are not printed."""
+    """Prints warnings, each in one line, and the number of warnings that are left out."""
     complain(*(f"warning: {each}" for each in odd[:_MOST_WARNINGS]))
     if len(odd) > _MOST_WARNINGS:
-        complain(f"warning: and {len(odd) - _MOST_WARNINGS} more; conoid validate --json has all")
+        complain(f"warning: {len(odd) - _MOST_WARNINGS} more warnings; conoid validate --json prints all")
 
 
 def warn_of(case: str, overrides: Iterable[str]) -> None:
-    """Prints the warnings of a case that is about to run; its errors are reported by the caller."""
+    """Prints the warnings of a case before its run; the caller reports errors of the case."""
     with suppress(CaseError, ArithmeticError):
         data = data_of(case, overrides)
         checked = parse_case(data)
@@ -167,7 +171,9 @@ def show(thing: RenderableType) -> None:
 
 
 def show_lines(rows: RenderableType) -> None:
-    """Prints a table with one line for each entry; without a terminal the width is unlimited and lines stay whole."""
+    """Prints a table with one text line for each entry. Without a terminal the width is unlimited, so that lines
+    stay whole.
+    """
     console = PlainConsole()
     if not console.is_terminal:
         console.width = _NO_WIDTH
@@ -176,7 +182,9 @@ def show_lines(rows: RenderableType) -> None:
 
 @contextmanager
 def aloud(what: str) -> Iterator[Callable[[str], None]]:
-    """Prints ``what`` is in progress while the block inside takes long; the lines become rarer with time."""
+    """Context that prints progress lines with ``what`` while the code inside takes long; the lines become rarer with
+    time.
+    """
     at, began, due = what, time.monotonic(), 0.0
 
     def name(now: str) -> None:
@@ -195,7 +203,9 @@ def aloud(what: str) -> Iterator[Callable[[str], None]]:
 
 
 def find(session: Session, run: str) -> Run:
-    """Returns the run of an id or a prefix of it, or the newest one for ``last``. Raises NotFoundError, UsageError."""
+    """Returns a run by its id or a prefix of the id; ``last`` means the newest run. Raises NotFoundError,
+    UsageError.
+    """
     if "/" in run:
         raise UsageError(f"run = {shown(run)}: this command needs a server; write the id of a run, or 'last'")
     return session.run(run)
@@ -203,7 +213,7 @@ def find(session: Session, run: str) -> Run:
 
 @contextmanager
 def opened(source: str, url: str | None, token: str | None) -> Iterator[Result]:
-    """Returns the result of a run by its id or its folder."""
+    """Context with the result of a run; ``source``: id or folder of the run."""
     if (folder := folder_of(source)) is not None:
         yield Result.open(folder)
         return

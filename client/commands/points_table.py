@@ -1,4 +1,4 @@
-"""Table of a sweep in a terminal: keys, state, the most informative results."""
+"""Table of a sweep in a terminal: changed keys, state, and the most informative results."""
 
 import csv
 import io
@@ -15,16 +15,19 @@ from .sweep_columns import Row, number_of, telling
 from .tables import short_names, table
 
 _MOST = 4
-"""Number of results that are shown by default. Chosen value: keys, state and these results fit 80 characters."""
+"""Number of result columns that are shown by default. Chosen value: keys, state and these results fit into 80
+characters."""
 
 
 def narrowed(text: str, keys: Sequence[str], columns: Sequence[str]) -> str:
-    """Returns CSV with the columns of the keys, the state and the named columns only. Raises UsageError."""
+    """Returns the CSV text with only the columns of the changed keys, the state and the named columns. Raises
+    UsageError.
+    """
     rows = list(csv.DictReader(io.StringIO(text)))
     titles = {split(title)[0]: title for title in (rows[0] if rows else ())}
     names = dict.fromkeys([*(key for key in keys if key in titles), "run", "state", *columns])
     if missing := [name for name in names if name not in titles and name not in titles.values()]:
-        raise UsageError(f"{missing[0]!r}: the table has {', '.join(titles)}")
+        raise UsageError(f"{missing[0]!r}: not a column of the table; known: {', '.join(titles)}")
     out = io.StringIO()
     made = csv.DictWriter(out, [titles.get(name, name) for name in names], extrasaction="ignore", lineterminator="\n")
     made.writeheader()
@@ -33,8 +36,8 @@ def narrowed(text: str, keys: Sequence[str], columns: Sequence[str]) -> str:
 
 
 def table_of(rows: Sequence[Row], keys: Sequence[str], *, whole: bool) -> Table | Group:
-    """Prints keys, state and results of a table. With ``whole`` all results are printed, otherwise the most
-    informative ones and the number of further results that differ.
+    """Returns a table of keys, state and results. With ``whole`` all results are shown; otherwise the most
+    informative results, and the number of further results that differ.
     """
     titles = list(rows[0]) if rows else []
     changed = [title for title in titles if split(title)[0] in keys]
@@ -43,7 +46,8 @@ def table_of(rows: Sequence[Row], keys: Sequence[str], *, whole: bool) -> Table 
     more = 0 if whole else len(telling(rows, changed)) - len(shown)
     made = _made(rows, keys, [*changed, "state", *shown])
     hint = (
-        f"{more} more {'results differ' if more > 1 else 'result differs'}: --column NAME, or all with --out FILE.csv"
+        f"{more} more {'results differ' if more > 1 else 'result differs'}: "
+        "--column NAME shows one, --out FILE.csv writes all"
     )
     return Group(made, hint) if more else made
 

@@ -1,4 +1,4 @@
-"""Progress lines: a command that is silent for almost 10 s prints what it does, from a thread."""
+"""Progress lines: if a command is silent for almost 10 s, a thread prints what the command does."""
 
 import threading
 import time
@@ -6,17 +6,17 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
 LONGEST = 8.0
-"""Time in s without output after which a line is printed."""
+"""Time without output, s, after which a progress line is printed."""
 _RARER = 1.2
-"""Growth of the time between two lines, relative to the silent time. Chosen value: a day has some forty lines."""
+"""Growth factor of the time between two progress lines. Chosen value: a command of one day prints about forty lines."""
 _LOOK = 0.125
-"""Time between two checks of the thread, over ``LONGEST``."""
+"""Time between two checks by the thread, as a fraction of ``LONGEST``."""
 
 
 @contextmanager
 def broken(write: Callable[[str], None], words: Callable[[], str]) -> Iterator[Callable[[str], None]]:
-    """Context in which the caller prints with ``write``. After ``LONGEST`` s without a line, the context writes
-    ``words()``, and again each time that the silent time has increased by a fifth.
+    """Context in which the caller prints lines with ``write``. After ``LONGEST`` s without a line a thread prints
+    ``words()``. It prints ``words()`` again each time that the silent time has grown by a fifth.
     """
     last, spoken, over = time.monotonic(), 0.0, threading.Event()
 

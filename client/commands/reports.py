@@ -1,4 +1,4 @@
-"""Commands that print and draw results of a run, and that compare two runs."""
+"""Commands that print or draw results of a run, and the command that compares two runs."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -28,7 +28,7 @@ OutArgument = Annotated[Path, typer.Argument(metavar="OUT.png", help="PNG, SVG o
 
 @contextmanager
 def drawing() -> Iterator[None]:
-    """Context for imports of modules that need matplotlib. Raises ViewError without matplotlib."""
+    """Context for imports of modules that need matplotlib. Raises ViewError if matplotlib is not installed."""
     try:
         yield
     except ModuleNotFoundError as error:
@@ -39,7 +39,9 @@ def drawing() -> Iterator[None]:
 
 @figures.command(name="energy")
 def energy_figure(source: SourceArgument, out: OutArgument, url: Url = None, token: Token = None) -> None:
-    """Draw the energy ledger over time, with and without its kinetic term, the residual, and each part's energy."""
+    """Draw the energy balance over time, with and without the kinetic energy, the residual, and the energy of each
+    part.
+    """
     with drawing():
         from ..reports import curves
     with opened(source, url, token) as result, aloud(f"drawing {out}"):
@@ -48,7 +50,7 @@ def energy_figure(source: SourceArgument, out: OutArgument, url: Url = None, tok
 
 @figures.command(name="dt")
 def dt_figure(source: SourceArgument, out: OutArgument, url: Url = None, token: Token = None) -> None:
-    """Draw the length of the time step, and what limits it."""
+    """Draw the length of the time step over time, and what limits the time step."""
     with drawing():
         from ..reports import curves
     with opened(source, url, token) as result, aloud(f"drawing {out}"):
@@ -57,7 +59,7 @@ def dt_figure(source: SourceArgument, out: OutArgument, url: Url = None, token: 
 
 @figures.command(name="fragments")
 def fragments_figure(source: SourceArgument, out: OutArgument, url: Url = None, token: Token = None) -> None:
-    """Draw the number of fragments over time, and the distribution of their masses at the end."""
+    """Draw the number of fragments over time, and the distribution of fragment masses at the end."""
     with drawing():
         from ..reports import curves
     with opened(source, url, token) as result, aloud(f"drawing {out}"):
@@ -71,12 +73,12 @@ def history_figure(
     out: OutArgument,
     column: Annotated[
         list[str] | None,
-        typer.Option("--column", help="A column of history.csv; may be repeated. Default: probes."),
+        typer.Option("--column", help="A column of history.csv; may be repeated; default: the probes."),
     ] = None,
     url: Url = None,
     token: Token = None,
 ) -> None:
-    """Draw columns of history.csv over time; columns of one unit share a panel."""
+    """Draw columns of history.csv over time; columns with the same unit share a panel."""
     with drawing():
         from ..reports import curves
     with opened(source, url, token) as result, aloud(f"drawing {out}"):
@@ -85,15 +87,18 @@ def history_figure(
 
 def report(
     source: SourceArgument,
-    out: Annotated[Path | None, typer.Option("--out", help="The HTML file; named after the run if not given.")] = None,
+    out: Annotated[
+        Path | None, typer.Option("--out", help="Name of the HTML file; default: the id of the run with .html.")
+    ] = None,
     field: Annotated[
-        list[str] | None, typer.Option("--field", help="A field to draw; may be repeated. Default: by the case.")
+        list[str] | None,
+        typer.Option("--field", help="A field to draw; may be repeated; default: depends on the case."),
     ] = None,
     pictures: Annotated[bool, typer.Option("--pictures/--no-pictures", help="Draw frames.")] = True,
     url: Url = None,
     token: Token = None,
 ) -> None:
-    """Write a run as one HTML file that needs no server and no network."""
+    """Write the report of a run: one HTML file that needs no server and no network."""
     with opened(source, url, token) as result:
         for each in field or ():
             require_field(each)
@@ -107,17 +112,19 @@ def compare(
     a: SourceArgument,
     b: Annotated[str, typer.Argument(metavar="OTHER", callback=named, help="Another run, likewise.")],
     out: Annotated[
-        Path | None, typer.Option("--out", help="File for a chart of both histories and fragment masses.")
+        Path | None, typer.Option("--out", help="File for a chart with histories and fragment masses of both runs.")
     ] = None,
     column: Annotated[
         list[str] | None,
-        typer.Option("--column", help="A column of history.csv to draw; may be repeated. Default: energies, probes."),
+        typer.Option(
+            "--column", help="A column of history.csv to draw; may be repeated; default: energies and probes."
+        ),
     ] = None,
     url: Url = None,
     token: Token = None,
     as_json: Json = False,
 ) -> None:
-    """Print how two runs differ: keys, final values, fragments; draw their histories in one chart."""
+    """Print how two runs differ (keys, final values, fragments), or draw their histories in one chart."""
     with opened(a, url, token) as first, opened(b, url, token) as second, aloud("comparing the runs"):
         found = comparing.compare(first, second)
         if out is not None:
@@ -135,7 +142,7 @@ def compare(
 
 @figures.command(name="balance")
 def balance_figure(source: SourceArgument, out: OutArgument, url: Url = None, token: Token = None) -> None:
-    """Draw the surface nodes of each rank with the balance events, and the CPU time by phase."""
+    """Draw the number of surface nodes of each rank with the changes of the load balance, and the CPU time by phase."""
     with drawing():
         from ..reports import charts
     with opened(source, url, token) as result, aloud(f"drawing {out}"):
@@ -148,18 +155,23 @@ def replay_balance(
     source: SourceArgument,
     policy: Annotated[
         str | None,
-        typer.Option("--policy", help="measured, outside, every, every:N or never; the run's own if not given."),
+        typer.Option("--policy", help="measured, outside, every, every:N or never; default: the policy of the run."),
     ] = None,
     alpha: Annotated[float | None, typer.Option("--alpha", help="Parameter alpha of the policy 'outside'.")] = None,
-    ranks: Annotated[int | None, typer.Option("--ranks", min=1, help="Ranks; those of the run if not given.")] = None,
+    ranks: Annotated[
+        int | None, typer.Option("--ranks", min=1, help="Number of ranks; default: as in the run.")
+    ] = None,
     cost: Annotated[
-        float | None, typer.Option("--cost", min=0.0, help="Cost of a cut in s; default: as measured in the run.")
+        float | None,
+        typer.Option("--cost", min=0.0, help="Cost of one new decomposition in s; default: as measured in the run."),
     ] = None,
     url: Url = None,
     token: Token = None,
     as_json: Json = False,
 ) -> None:
-    """Print what other balance policies would have cost and saved, from the measured loads of a run."""
+    """Print what other policies of load balance would have cost and saved, computed from the measured loads of a
+    run.
+    """
     with opened(source, url, token) as result, aloud("reading the run"):
         spec = Balance.model_validate(result.case.get("balance", {}))
         record = replay.read(result.messages, replay.named(spec))
@@ -171,7 +183,8 @@ def replay_balance(
         return
     show(tables.balance_table(accounts, record.happened))
     echo(
-        f"on {counted(accounts[0].ranks, 'rank')}, the run had {record.happened.ranks}; a cut costs {si(each, 's')}; "
+        f"on {counted(accounts[0].ranks, 'rank')}, the run had {record.happened.ranks}; a new decomposition costs "
+        f"{si(each, 's')}; "
         f"{counted(len(record.moments), 'moment')}, {counted(len(record.centres), 'group')}, "
         f"of which the heaviest has {percent(record.heaviest)} of the work"
     )

@@ -1,4 +1,4 @@
-"""``conoid run``: runs one case on this machine, from its check to a picture."""
+"""The command ``conoid run``: it runs one case on this machine, from the check of the case to a picture."""
 
 import signal
 from contextlib import ExitStack
@@ -33,7 +33,7 @@ from .console import PlainConsole, echo_json, one_line
 from .options import complain
 
 _LAST_WORDS = 30.0
-"""Time in s in which the server must report the end of a run after its last message."""
+"""Wall time in s within which the server must report the end of a run after the last message of the run."""
 
 
 def run_once(
@@ -47,8 +47,8 @@ def run_once(
     check: bool = False,
     as_json: bool = False,
 ) -> int:
-    """Runs a case with a separate server and returns the exit code. A case without ``run.threads`` runs on all cores of
-    this machine. Ctrl-C and SIGTERM cancel the run, wait for its end and stop the server. Raises CaseError,
+    """Runs a case with a server of its own and returns the exit code. A case without ``run.threads`` uses all cores
+    of this machine. Ctrl-C and SIGTERM cancel the run, wait for its end and stop the server. Raises CaseError,
     ClientError.
     """
     if field is not None and field not in FIELDS:
@@ -87,24 +87,23 @@ def run_once(
 
 
 def all_cores(ranks: int) -> int:
-    """Returns the number of threads of each of ``ranks`` ranks with which a run uses all cores of this machine."""
+    """Returns the number of threads for each of ``ranks`` ranks so that a run uses all cores of this machine."""
     return min(max(1, usable_cores() // ranks), MOST_THREADS)
 
 
 def _warn_of_cores(case: Case) -> None:
-    """Prints a warning if there are more threads than cores: such a run is slower."""
+    """Prints a warning if a run has more threads than this machine has cores, because such a run is slower."""
     run, there = case.run, usable_cores()
     if run.cores > there:
         wanted = f"{crew(run.ranks, run.threads)} want {counted(run.cores, 'core')}"
         complain(
-            f"warning: {wanted}, and there {'is' if there == 1 else 'are'} {there}: they share cores and run slower"
+            f"warning: {wanted}, and there {'is' if there == 1 else 'are'} {there}: threads share cores and run slower"
         )
 
 
 def _follow(run: Run, case: Case, out: Console, plain: bool) -> tuple[RunInfo, set[str]]:
-    """Prints the state of the run until the run ends. The first Ctrl-C cancels the run; a second Ctrl-C has no effect.
-    The function also returns the log texts that were printed as lines, because a panel shows only the last lines of the
-    log.
+    """Shows the progress of a run until the run ends. The first Ctrl-C cancels the run; a second Ctrl-C has no
+    effect. Also returns the log texts that were printed as lines: a panel shows only the last lines of the log.
     """
     known, printed = Live(run.id, title=case.title or case.name), set[str]()
     try:
@@ -127,7 +126,7 @@ def _follow(run: Run, case: Case, out: Console, plain: bool) -> tuple[RunInfo, s
 
 
 def _report(result: Result, outcome: Outcome, printed: set[str], out: Console) -> None:
-    """Prints the outcome; ``printed``: warnings that were printed before."""
+    """Prints the outcome of a run. ``printed``: warnings that have already been printed."""
     out.print()
     for part in tables.end_tables(outcome, printed):
         out.print(part)
@@ -136,8 +135,8 @@ def _report(result: Result, outcome: Outcome, printed: set[str], out: Console) -
 
 
 def _telling_field(case: Case) -> str:
-    """Returns the field of the picture: fragments if something can break, plastic strain if something can yield,
-    else the stress.
+    """Returns the field of the picture: fragments if a part can break, plastic strain if a part can yield, else the
+    stress.
     """
     if case.fractures:
         return "fragment"

@@ -1,4 +1,4 @@
-"""Commands on the runs of a server: submit, list, show, follow, cancel, request, fetch files."""
+"""Commands for runs on a server: submit, list, show, follow, cancel, request, copy files."""
 
 import sys
 from collections.abc import Callable
@@ -48,16 +48,16 @@ from .options import (
 
 
 def _filled(key: str | None) -> str | None:
-    """Returns the idempotency key. Raises UsageError for an empty key, such as that of an unset variable: it would
-    make a second run.
+    """Returns the idempotency key. Raises UsageError if the key is empty, as from an unset variable: an empty key
+    would allow a second run.
     """
     if key is not None and not key.strip():
-        raise UsageError("--key is empty: write one, or leave it out")
+        raise UsageError("--key is empty: write a key, or leave the option out")
     return key
 
 
 RunArgument = Annotated[
-    str, typer.Argument(metavar="RUN", callback=named, help="The id of a run or its beginning, or 'last'.")
+    str, typer.Argument(metavar="RUN", callback=named, help="The id of a run, the beginning of an id, or 'last'.")
 ]
 
 
@@ -66,20 +66,22 @@ def submit(
     overrides: Overrides = None,
     key: Annotated[
         str | None,
-        typer.Option("--key", callback=_filled, help="Idempotency key: the same one makes no second run."),
+        typer.Option(
+            "--key", callback=_filled, help="Idempotency key: a second call with the same key makes no second run."
+        ),
     ] = None,
     ranks: Ranks = None,
     threads: Threads = None,
     label: Labels = None,
     profile: Annotated[
-        str, typer.Option("--profile", help="Profile of the site's batch system; default: that of the site.")
+        str, typer.Option("--profile", help="Profile of the batch system; default: the site's default profile.")
     ] = "",
     priority: Annotated[int, typer.Option("--priority", help="Priority among your own runs: -100 to 100.")] = 0,
     url: Url = None,
     token: Token = None,
     as_json: Json = False,
 ) -> None:
-    """Submit a case to the server; prints the run's id."""
+    """Submit a case to the server, and print the id of the run."""
     changes = [*(overrides or ()), *on_cores(ranks, threads)]
     warn_of(case, changes)
     with connect(url, token) as session:
@@ -100,7 +102,9 @@ def restart(
     token: Token = None,
     as_json: Json = False,
 ) -> None:
-    """Continue from the newest checkpoint of a run, as a new run with the same answer; prints its id."""
+    """Continue from the newest checkpoint of a run as a new run with the same answer, and print the id of the new
+    run.
+    """
     with connect(url, token) as session:
         made = session.restart(find(session, run).id, ranks, threads=threads, max_steps=max_steps)
         if as_json:
@@ -110,7 +114,7 @@ def restart(
 
 
 def show_run(run: SourceArgument, url: Url = None, token: Token = None, as_json: Json = False) -> None:
-    """Show one run: its progress, or its outcome."""
+    """Show the progress or the outcome of one run."""
     if (folder := folder_of(run)) is not None:
         info = local_run.status(folder)
     else:
@@ -128,13 +132,13 @@ def show_run(run: SourceArgument, url: Url = None, token: Token = None, as_json:
 
 def watch_run(
     run: SourceArgument,
-    plain: Annotated[bool, typer.Option("--plain", help="Print lines instead of the panel.")] = False,
+    plain: Annotated[bool, typer.Option("--plain", help="Print text lines instead of the panel.")] = False,
     url: Url = None,
     token: Token = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print every message as one line of JSON.")] = False,
 ) -> None:
-    """Follow a run until it ends: 0 succeeded, 1 failed, 2 bad input, 4 cancelled. Ctrl-C ends the command, not the
-    run.
+    """Follow a run until it ends. Exit codes: 0 succeeded, 1 failed, 2 bad input, 4 cancelled. Ctrl-C ends the
+    command; the run continues.
     """
     if (folder := folder_of(run)) is not None:
         LocalFolder(folder).path(layout.JOURNAL)
@@ -154,19 +158,19 @@ def _watched(run: str, plain: bool, url: str | None, token: str | None, as_json:
         found = find(session, run)
         try:
             known = _print_messages(found) if as_json else watch(found, False if plain else None)
-            if not known.state.final:  # a journal without its end
+            if not known.state.final:  # The journal has no record of the end of the run.
                 info = found.status()
                 known.state, known.cause, known.message = info.state, info.cause, info.message
             if not as_json:
                 _tell_probes(found.status)
             return known
         except KeyboardInterrupt:
-            complain(f"the run continues; conoid watch {found.id} shows it again")
+            complain(f"the run continues; conoid watch {found.id} shows the run again")
             raise
 
 
 def _tell_probes(status: Callable[[], RunInfo]) -> None:
-    """Prints the probes if the server sends them; the run itself has been shown before."""
+    """Prints the probes of a run if the server sends them."""
     with suppress(ClientError):
         ended = status().outcome
         if ended is not None and ended.probes:
@@ -193,8 +197,8 @@ def _ask(
     run: str, here: Callable[[Path], str], there: Callable[[Run], RunInfo], done: str, url: Url, token: Token,
     as_json: Json,
 ) -> None:  # fmt: skip
-    """Applies ``here`` to the folder of the run if its worker runs in this folder, else ``there`` to the run on the
-    server. Prints one line; ``done``: what was requested, empty for the state of the run.
+    """Acts on a run: ``here`` is called if a worker runs in the folder ``run``, else ``there`` with the run of the
+    server. Prints one line; ``done``: what was requested, empty if the state of the run is printed.
     """
     if (folder := folder_of(run)) is not None and local_run.at_hand(folder):
         echo(here(folder))
@@ -205,18 +209,18 @@ def _ask(
 
 
 def cancel(run: SourceArgument, url: Url = None, token: Token = None, as_json: Json = False) -> None:
-    """Stop a run at its next step; for a run without a server give its folder."""
+    """Stop a run at its next step; name a run without a server by its folder."""
     _ask(run, cancel_folder, Run.cancel, "", url, token, as_json)
 
 
 def checkpoint(run: SourceArgument, url: Url = None, token: Token = None, as_json: Json = False) -> None:
-    """Request a checkpoint, from which a lost run can continue."""
+    """Request a checkpoint of a run, from which the run can continue if it is lost."""
     here = partial(local_run.ask, request=layout.CHECKPOINT_REQUEST, wish="checkpoint")
     _ask(run, here, Run.checkpoint, "checkpoint requested", url, token, as_json)
 
 
 def snapshot(run: SourceArgument, url: Url = None, token: Token = None, as_json: Json = False) -> None:
-    """Request a snapshot of the fragments; watch reports it when it is there."""
+    """Request a snapshot of the fragments of a run; conoid watch reports the snapshot when it is complete."""
     here = partial(local_run.ask, request=layout.SNAPSHOT_REQUEST, wish="snapshot")
     _ask(run, here, Run.take_snapshot, "snapshot requested", url, token, as_json)
 
@@ -232,8 +236,8 @@ def get(
     token: Token = None,
     as_json: Annotated[bool, typer.Option("--json", help="List the run's files as JSON; copies nothing.")] = False,
 ) -> None:
-    """Copy a run's files to this machine. If files are missing, the command lists these files and ends with the exit
-    code 1.
+    """Copy files of a run to this machine. If files are missing, the command lists the missing files and ends with
+    exit code 1.
     """
     if (folder := folder_of(run)) is not None and local_run.at_hand(folder):
         _copy(local_run.FolderFiles(folder), names, out, as_json)

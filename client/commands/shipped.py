@@ -1,4 +1,4 @@
-"""Commands on the files of the installation: keys of a case, shipped cases, material library."""
+"""Commands for files of the installation: keys of a case, shipped cases, material library."""
 
 from pathlib import Path
 from typing import Annotated
@@ -16,17 +16,17 @@ from . import tables
 from .console import echo, echo_json
 from .options import Json, complete_cases, complete_materials, show
 
-cases = typer.Typer(invoke_without_command=True, help="The shipped cases: list them, copy one.")
+cases = typer.Typer(invoke_without_command=True, help="List the shipped cases, or copy one of them.")
 OutOption = Annotated[Path | None, typer.Option("--out", help="File to write.")]
 
 
 def schema(
     as_page: Annotated[
-        bool, typer.Option("--page", help="As a page for people (docs/reference/case.md), in Markdown.")
+        bool, typer.Option("--page", help="Print a Markdown page (docs/reference/case.md) instead of the JSON schema.")
     ] = False,
     out: OutOption = None,
 ) -> None:
-    """Print the keys of a case: as JSON schema, for editors, or as a page with unit, range, default and meaning."""
+    """Print the keys of a case: as JSON schema for editors, or as a page with unit, range, default and meaning."""
     text = page() if as_page else json_schema.schema_text()
     if out is None:
         echo(text, nl=False)
@@ -40,7 +40,7 @@ def materials(
     ] = None,
     as_json: Json = False,
 ) -> None:
-    """List the material library, or every constant of one material with its source."""
+    """List the material library, or all constants of one material with their sources."""
     if name is None:
         known = library.library()
         if as_json:
@@ -77,8 +77,8 @@ def copy_case(
     name: Annotated[str, typer.Argument(metavar="NAME", help="A shipped case.", autocompletion=complete_cases)],
     out: OutOption = None,
 ) -> None:
-    """Copy a shipped case into this folder, with the files that it names, and the schema by which editors complete
-    its keys.
+    """Copy a shipped case into the current folder, with the files that the case names, and the JSON schema with
+    which editors complete keys.
     """
     shipped = load.shipped_path(name)
     text = shipped.read_text(encoding="utf-8")

@@ -1,4 +1,4 @@
-"""The most informative columns of the table of a sweep. The lines of the table are mappings of titles to texts."""
+"""Selection of the most informative columns of the table of a sweep. A row of the table maps column titles to texts."""
 
 from collections.abc import Mapping, Sequence
 from typing import TypeAlias
@@ -19,23 +19,25 @@ _FIRST = (
     "energy.plastic",
     "energy.kinetic",
 )
-"""Columns that are shown first."""
+"""Names of the columns that are shown first."""
 _NEVER = frozenset({"time", "elapsed", "cpu", "elements", "nodes", "worst_residual", "reference.worst_residual",
                     "energy.residual", "energy.initial", "steps", "warnings"})  # fmt: skip
-"""Columns that are shown only on request: they depend on the machine or on the mesh."""
+"""Columns that are shown only on request, because their values depend on the machine or on the mesh."""
 
 
 def known(rows: Sequence[Row], name: str) -> str:
-    """Returns the title of a column of numbers by its name. Raises UsageError."""
+    """Returns the title of a numeric column by its name. Raises UsageError if the table has no such column."""
     there = [column for column in rows[0] if any(number_of(row[column]) is not None for row in rows)]
     titles = {_bare(column): column for column in there} | {column: column for column in there}
     if name not in titles:
-        raise UsageError(f"{name!r}: the table has the numbers {', '.join(map(_bare, there))}")
+        raise UsageError(f"{name!r}: not a numeric column of the table; known: {', '.join(map(_bare, there))}")
     return titles[name]
 
 
 def telling(rows: Sequence[Row], titles: Sequence[str]) -> list[str]:
-    """Returns the columns of numbers that differ between the points; the most informative columns come first."""
+    """Returns the titles of the numeric columns with values that differ between the points; the most informative
+    columns are first.
+    """
 
     def differs(name: str) -> bool:
         found = {value for row in rows if (value := number_of(row[name])) is not None}
@@ -47,7 +49,7 @@ def telling(rows: Sequence[Row], titles: Sequence[str]) -> list[str]:
 
 
 def _rank(title: str) -> tuple[bool, int]:
-    """Sort key of a title: smallest first, extremes of probes last."""
+    """Returns the sort key of a column title; extremes of probes are last."""
     first = next((n for n, begins in enumerate(_FIRST) if title.startswith(begins)), len(_FIRST))
     return _bare(title).endswith((".min", ".max")), first
 
@@ -58,7 +60,7 @@ def _bare(column: str) -> str:
 
 
 def number_of(text: str) -> float | None:
-    """Returns None for a text that is not a number."""
+    """Returns the number in a text; None if the text is not a number."""
     try:
         return float(text)
     except ValueError:

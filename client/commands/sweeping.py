@@ -1,4 +1,4 @@
-"""``conoid sweep``: submit, show, cancel, table and plot."""
+"""The commands ``conoid sweep``, ``sweep-table``, ``sweep-plot`` and ``sweep-cancel``."""
 
 import hashlib
 import json
@@ -34,15 +34,13 @@ from .reports import drawing
 
 SweepArgument = Annotated[
     str,
-    typer.Argument(
-        metavar="SWEEP", callback=sweep_named, help="The id of a sweep or its beginning, 'last', or the file of one."
-    ),
+    typer.Argument(metavar="SWEEP", callback=sweep_named, help="Id of a sweep (or its beginning), 'last', or a file."),
 ]
 Sets = Annotated[
     list[str] | None,
     typer.Option(
         "--set", metavar="KEY=A,B,C",
-        help="Values of a key, or one for all points; KEY=LOW:HIGH with --adaptive. May be repeated.",
+        help="Values of a key, or one value for all points; KEY=LOW:HIGH with --adaptive; may be repeated.",
     ),
 ]  # fmt: skip
 Adaptive = Annotated[
@@ -50,28 +48,28 @@ Adaptive = Annotated[
     typer.Option(
         "--adaptive",
         metavar="'RESULT = VALUE'",
-        help="Search for the point at which a result of the table passes a value.",
+        help="Search for the point at which a result of the table crosses a value.",
     ),
 ]
 Tolerance = Annotated[
     str | None,
-    typer.Option("--tolerance", help="With --adaptive: width of the bracket; default: 1 % of the larger end."),
+    typer.Option("--tolerance", help="With --adaptive: final width of the bracket; default: 1 % of its larger end."),
 ]
 Listed = Annotated[
-    Path | None, typer.Option("--list", metavar="FILE", help="Points from a CSV file; its first line has the keys.")
+    Path | None, typer.Option("--list", metavar="FILE", help="CSV file with the points; its first line has the keys.")
 ]
 Most = Annotated[
     int | None, typer.Option("--most", min=2, help="With --adaptive: largest number of runs; default: 40.")
 ]
-Wait = Annotated[bool, typer.Option("--wait", help="Wait until all runs have ended; exit code 1 when one failed.")]
+Wait = Annotated[bool, typer.Option("--wait", help="Wait until all runs have ended; exit code 1 if a run failed.")]
 Answer = Annotated[
-    Path | None, typer.Option("--out", help="File for the table (CSV); with --adaptive for the answer (JSON).")
+    Path | None, typer.Option("--out", help="File for the table (CSV); with --adaptive, file for the result (JSON).")
 ]
 
 
 @dataclass(frozen=True)
 class Place:
-    """Place of the runs: a server, or a folder of this machine with a server of its own."""
+    """Place where runs are computed: a named server, or a folder of this machine with a server of its own."""
 
     local: bool
     runs: Path
@@ -80,13 +78,13 @@ class Place:
 
     @contextmanager
     def session(self, data: Mapping[str, Any]) -> Iterator[Session]:
-        """Yields a session. An own server has a slot for each core, and at least as many as the case needs."""
+        """Yields a session. A server of its own has slots for all cores, and at least the slots of one run."""
         if not self.local:
             with connect(self.url, self.token) as session:
                 yield session
             return
         cores = usable_cores()
-        with suppress(CaseError):  # errors are reported when the points are made
+        with suppress(CaseError):  # Errors of the case are reported when the points are made.
             cores = max(cores, parse_case(data).run.cores)
         with LocalServer(self.runs, cores) as server:
             yield server.session
@@ -104,7 +102,7 @@ def sweep(
     threads: Threads = None,
     at_once: Annotated[int | None, typer.Option("--at-once", min=1, help="Largest number of runs at a time.")] = None,
     wait: Wait = False,
-    new: Annotated[bool, typer.Option("--new", help="Start a new sweep, even if the same one exists.")] = False,
+    new: Annotated[bool, typer.Option("--new", help="Start a new sweep, even if an equal sweep exists.")] = False,
     local: Annotated[bool, typer.Option("--local", help="Run on this machine, without a server.")] = False,
     runs: Annotated[Path, typer.Option("--runs", help="With --local: folder of the runs.")] = Path("runs/local"),
     out: Answer = None,
@@ -112,14 +110,15 @@ def sweep(
     token: Token = None,
     as_json: Json = False,
 ) -> None:
-    """Run a case at many points, or search for the point at which a result passes a value.
+    """Run a case at many points, or search for the point at which a result crosses a value.
 
-    If the same command is repeated, an interrupted sweep continues: points that have succeeded are not run again.
+    If the same command is repeated, an interrupted sweep continues: points whose runs have succeeded are not
+    computed again.
     """
     cores, place = on_cores(ranks, threads), Place(local, runs, url, token)
     if adaptive is not None:
         if grid or listed is not None:
-            raise UsageError("--adaptive takes --set KEY=LOW:HIGH, and neither --grid nor --list")
+            raise UsageError("--adaptive needs --set KEY=LOW:HIGH and allows neither --grid nor --list")
         with place.session(data_of(case, cores)) as session:
             found = adapting.adaptive(
                 session, case, adaptive, sets or (), cores, tolerance, at_once, most, out, new=new, as_json=as_json
@@ -127,7 +126,7 @@ def sweep(
         adapting.finish(found)
         return
     if tolerance is not None or most is not None:
-        raise UsageError("--tolerance and --most are for --adaptive 'RESULT = VALUE'")
+        raise UsageError("--tolerance and --most are allowed only with --adaptive 'RESULT = VALUE'")
     if (listed is None) == (not sets):
         raise UsageError("give the points with --set KEY=A,B,C, or with --list FILE")
     points = points_in(listed) if listed is not None else points_of(sets or (), grid=grid)
@@ -140,7 +139,7 @@ def sweep(
 
 
 def _same(case: str, points: Sequence[Point], cores: Sequence[str], at_once: int | None) -> str:
-    """Returns the idempotency key of the sweep with these arguments."""
+    """Returns the idempotency key of the sweep; equal arguments give the same key."""
     identity = json.dumps([locate(case).stem, points, list(cores), at_once], default=str)
     return f"sweep-{hashlib.sha256(identity.encode()).hexdigest()[:40]}"
 
@@ -155,16 +154,16 @@ def _handed_in(
         if error.problem.get("code") != "key_reused":
             raise
         keys = _changed(session, str(error.problem.get("detail", "")), data, points[0], folder_of(case))
-        hint = f"the case has changed since this sweep was begun{keys}; --new begins another one"
+        hint = f"the case has changed since the start of this sweep{keys}; --new starts a new sweep"
         raise UsageError(f"{case}: {hint}") from None
     except KeyboardInterrupt:
-        complain("the server may have the points already; conoid sweep-cancel last stops them once it has taken all in")
+        complain("the server may already have the points; if all are there, conoid sweep-cancel last stops them")
         raise
 
 
 def _changed(session: Session, detail: str, data: Mapping[str, Any], point: Point, folder: Path) -> str:
-    """Returns the keys in which the case differs from that of an earlier sweep, whose id is at the end of
-    ``detail``; empty if unknown.
+    """Returns the keys in which the case differs from the case of an earlier sweep; empty if unknown. The id of the
+    earlier sweep is at the end of ``detail``.
     """
     try:
         (_, sweep), first = detail.rsplit(": ", 1), session.outbox.ready(apply_overrides(data, point), folder)
@@ -188,7 +187,8 @@ def _waited(made: Sweep) -> SweepInfo:
             return made.wait(say=say)
     except KeyboardInterrupt:
         complain(
-            f"the same command continues; conoid sweep-table {made.id} shows the runs, conoid sweep-cancel {made.id} "
+            f"repeat the command to continue; conoid sweep-table {made.id} shows the runs, conoid sweep-cancel "
+            f"{made.id} "
             "stops them"
         )
         raise
@@ -208,14 +208,14 @@ def _end(made: Sweep, info: SweepInfo, out: Path | None, *, as_json: bool) -> No
 
 
 def _how(point: SweepPoint) -> str:
-    """Prints a point and the end of its run."""
+    """Returns a text with the values of a point and the end of its run."""
     values = ", ".join(f"{key} = {value}" for key, value in point.values.items())
     why = f": {point.run.message or point.run.cause}" if point.run.state is not State.SUCCEEDED else ""
     return f"{values}: {point.run.state.value}{why}"
 
 
 def failures(failed: list[SweepPoint], total: int) -> str:
-    """Prints the number of runs without success, and the first few of these runs."""
+    """Returns a text with the number of runs without success, and the first of these runs."""
     values, run = failed[0].values, failed[0].run
     point = ", ".join(f"{key} = {value}" for key, value in values.items())
     why = run.message or run.cause
@@ -227,16 +227,16 @@ def sweep_table(
     sweep: SweepArgument,
     columns: Annotated[
         list[str] | None,
-        typer.Option("--column", help="Column of the table; may be repeated. Default: those that differ."),
+        typer.Option("--column", help="Column of the table; may be repeated; default: the columns that differ."),
     ] = None,
-    out: Annotated[Path | None, typer.Option("--out", help="CSV file to write; standard output if not given.")] = None,
+    out: Annotated[Path | None, typer.Option("--out", help="CSV file to write; default: standard output.")] = None,
     url: Url = None,
     token: Token = None,
 ) -> None:
     """Print a sweep: one line for each point with its values, state and results.
 
-    A terminal gets a table of the results that differ, or of the named columns; a pipe and --out get CSV with all
-    columns, or with the keys, the state and the named columns.
+    In a terminal the command prints a table with the results that differ, or with the named columns. In a pipe or a
+    file (--out) it writes CSV with all columns, or with the keys, the state and the named columns.
     """
     if (path := file_named(sweep)) is not None:
         made = columns_of(path)
@@ -258,20 +258,20 @@ def sweep_table(
 
 def sweep_plot(
     sweep: SweepArgument,
-    out: Annotated[Path, typer.Option("--out", help="PNG file to write; another ending selects its format.")] = Path(
-        "sweep.png"
-    ),
+    out: Annotated[
+        Path, typer.Option("--out", help="Picture file to write; the ending of its name selects the format.")
+    ] = Path("sweep.png"),
     columns: Annotated[
         list[str] | None,
-        typer.Option("--column", help="Column of the table; may be repeated. Default: those that differ."),
+        typer.Option("--column", help="Column of the table; may be repeated; default: the columns that differ."),
     ] = None,
     x: Annotated[
-        str | None, typer.Option("--x", metavar="KEY", help="Key on the axis; default: the first that varies.")
+        str | None, typer.Option("--x", metavar="KEY", help="Key on the x axis; default: the first key that varies.")
     ] = None,
     url: Url = None,
     token: Token = None,
 ) -> None:
-    """Draw the results of a sweep over the changed key: a panel for each result, a curve for each value of the other
+    """Draw the results of a sweep over the varied key: a panel for each result, a curve for each value of the other
     keys.
     """
     with aloud(f"drawing {out}"):
@@ -289,7 +289,7 @@ def sweep_plot(
 
 
 def sweep_cancel(sweep: SweepArgument, url: Url = None, token: Token = None, as_json: Json = False) -> None:
-    """Cancel every open run of a sweep."""
+    """Cancel all open runs of a sweep."""
     with connect(url, token) as session:
         info: SweepInfo = session.find_sweep(sweep).cancel()
     if as_json:

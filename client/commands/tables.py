@@ -1,4 +1,6 @@
-"""Tables on the command line: lists of runs, one run, outcomes, reference numbers; estimates are in ``validated``."""
+"""Tables for the command line: list of runs, one run, outcome, reference numbers. The tables of estimates are in
+``validated``.
+"""
 
 import math
 from collections import Counter
@@ -41,8 +43,8 @@ from .display import STATE_STYLE
 
 
 def table(*columns: str, right: Sequence[str] = (), wide: Sequence[str] = ("case",), least: int | None = None) -> Table:
-    """Returns a table without borders. Columns in ``right`` are numbers. Columns in ``wide`` are wrapped if
-    necessary; the first of these has at least ``least`` characters.
+    """Returns a table without borders. Columns in ``right`` are aligned to the right. Columns in ``wide`` are
+    wrapped if necessary; the first of these columns has at least ``least`` characters.
     """
     made = Table(box=box.SIMPLE_HEAD, header_style="bold", pad_edge=False, show_edge=False, padding=(0, 1, 0, 0))
     for column in columns:
@@ -55,7 +57,7 @@ def table(*columns: str, right: Sequence[str] = (), wide: Sequence[str] = ("case
 
 
 def pairs(entries: Mapping[str, str] | Mapping[str, str | Text]) -> Table:
-    """Returns names and values in two columns; entries without a value are left out."""
+    """Returns a table of names and values in two columns, without entries that have no value."""
     grid = Table.grid(padding=(0, 2))
     grid.add_column(style="bright_black", no_wrap=True)
     grid.add_column(overflow="fold")
@@ -66,13 +68,15 @@ def pairs(entries: Mapping[str, str] | Mapping[str, str | Text]) -> Table:
 
 
 def state_text(state: State, cause: str | None = None) -> Text:
-    """Returns the state in its colour, with the cause of the end."""
+    """Returns the state of a run in its colour, with the cause of the end."""
     text = Text(state.value, style=STATE_STYLE.get(state, "bold"))
     return text.append(f" ({cause})", style="default") if cause and cause != state.value else text
 
 
 def runs_table(rows: Sequence[RunRow], keys: Sequence[str]) -> Table:
-    """Prints one line for each run, with the values of ``keys``; in a narrow terminal texts end with an ellipsis."""
+    """Returns a table with one row for each run and the values of ``keys``; in a narrow terminal long texts end with
+    an ellipsis.
+    """
     last = ("cores", "submitted", "took")
     named = short_names(keys)
     texts_of_values = [_differs(row, named) for row in rows]
@@ -92,7 +96,7 @@ def runs_table(rows: Sequence[RunRow], keys: Sequence[str]) -> Table:
 
 
 def row_of(row: RunRow) -> dict[str, Any]:
-    """Returns a row of the table as plain data."""
+    """Returns a row of the list of runs as plain data."""
     return {
         **row.info.listed, "values": row.values, "results": row.results, "units": row.units,
         "references": row.references, "missed": row.missed,
@@ -100,12 +104,12 @@ def row_of(row: RunRow) -> dict[str, Any]:
 
 
 def _own(run: RunInfo) -> dict[str, str]:
-    """Returns the labels of a run without the labels that a sweep sets."""
+    """Returns the labels of a run without the labels that a sweep has set."""
     return {name: value for name, value in run.labels.items() if name not in ("sweep", "point")}
 
 
 def _how(row: RunRow) -> Text:
-    """Returns the state, the progress, and the number of failed references."""
+    """Returns the state of a run, its progress, and the number of failed references."""
     run, text = row.info, state_text(row.info.state, row.info.cause)
     if run.progress is not None and not run.state.final and run.progress.end_time > 0.0:
         text.append(f" {percent(run.progress.t / run.progress.end_time, 0)}", style="default")
@@ -115,14 +119,14 @@ def _how(row: RunRow) -> Text:
 
 
 def short_names(keys: Sequence[str]) -> dict[str, str]:
-    """Returns a short name for each key: as many of its last parts as make the name unique."""
+    """Returns a short name for each key: as many parts from its end as make the name unique."""
     tails = {key: [".".join(key.split(".")[-n:]) for n in range(1, key.count(".") + 2)] for key in keys}
     times = Counter(tail for own in tails.values() for tail in own)
     return {key: next((tail for tail in own if times[tail] == 1), key) for key, own in tails.items()}
 
 
 def _differs(row: RunRow, named: Mapping[str, str]) -> str:
-    """Returns the values of some keys, each with its short name."""
+    """Returns the values of the case that differ between the runs, each with the short name of its key."""
     there = [(key, name, row.values[key]) for key, name in named.items() if key in row.values]
     return ", ".join(
         f"{name} {exact(value, row.units.get(key, '')) if _is_number(value) else value}" for key, name, value in there
@@ -138,7 +142,7 @@ def _cores(run: RunInfo) -> str:
 
 
 def run_table(run: RunInfo) -> Table:
-    """Prints everything about one run."""
+    """Returns a table with all information about one run."""
     progress = run.progress
     done = progress.t / progress.end_time if progress is not None and progress.end_time > 0.0 else None
     return pairs({
@@ -152,14 +156,14 @@ def run_table(run: RunInfo) -> Table:
         "started": day(run.started) if run.started else "",
         "finished": day(run.finished) if run.finished else "",
         "progress": "" if progress is None or done is None else (
-            f"{percent(done)}, step {count(progress.step)}, dt {si(progress.dt, 's')} held by {progress.limiter}, "
+            f"{percent(done)}, step {count(progress.step)}, dt {si(progress.dt, 's')} limited by {progress.limiter}, "
             f"{duration(progress.eta)} left"
         ),
     })  # fmt: skip
 
 
 def cases_table(cases: Mapping[str, Case]) -> Table:
-    """Prints one line for each shipped case, with its approximate CPU time."""
+    """Returns a table with one row for each shipped case and its approximate CPU time."""
     made = table("case", "title", "tets", "core time", right=("tets", "core time"), wide=("title",))
     for name, case in cases.items():
         expected = estimate(case)
@@ -169,7 +173,7 @@ def cases_table(cases: Mapping[str, Case]) -> Table:
 
 
 def materials_table(materials: Mapping[str, Material]) -> Table:
-    """Prints one line for each material of the library."""
+    """Returns a table with one row for each material of the library."""
     made = table("material", "kg/m^3", "what it is", right=("kg/m^3",), wide=("what it is",))
     for name, each in sorted(materials.items()):
         made.add_row(name, number(each.density), each.description)
@@ -177,7 +181,7 @@ def materials_table(materials: Mapping[str, Material]) -> Table:
 
 
 def constants_table(constants: Sequence[Constant]) -> Table:
-    """Prints one line for each constant of a material, with its confidence and the key of its source."""
+    """Returns a table with one row for each constant of a material, with its confidence and the key of its source."""
     made = table("key", "value", "known", "source", right=("value",))
     for each in constants:
         made.add_row(each.key, each.value, each.confidence, each.source)
@@ -185,12 +189,14 @@ def constants_table(constants: Sequence[Constant]) -> Table:
 
 
 def sources_table(constants: Sequence[Constant]) -> Table:
-    """Returns the sources of these keys."""
+    """Returns a table of the sources of ``constants``."""
     return pairs({each.source: each.cited for each in constants})
 
 
 def outcome_table(outcome: Outcome, printed: Collection[str] = ()) -> Table:
-    """Prints the outcome of a run and its warnings, except warnings in ``printed``, which were printed before."""
+    """Returns a table of the outcome of a run with its warnings, except the warnings in ``printed``, which have
+    already been printed.
+    """
     energy, ranks = outcome.energy, crew(outcome.ranks, outcome.threads)
     entries: dict[str, str | Text] = {"state": state_text(State(outcome.state), outcome.cause), "why": outcome.message}
     speed, setup, worst = outcome.element_updates_per_second, outcome.setup, rough(outcome.worst_residual)
@@ -210,31 +216,31 @@ def outcome_table(outcome: Outcome, printed: Collection[str] = ()) -> Table:
 
 
 def _a_step(outcome: Outcome) -> str:
-    """Returns the serial and the parallel shares of the rank with the longest serial part."""
+    """Returns the serial and the parallel fraction of a step, for the rank with the longest serial part."""
     alone, steps = [sum(each) for each in zip(*outcome.serial.values(), strict=True)], outcome.steps
     if not alone or not steps:
         return ""
     rank = alone.index(max(alone))
     shared = sum(each[rank] for each in outcome.parallel.values())
     serial, regions = alike((alone[rank] / steps, shared / steps), "s")
-    times = f"{serial} by one thread alone, {regions} in what threads share"
+    times = f"{serial} in serial code, {regions} in parallel regions"
     if outcome.threads == 1 or not shared:
         return times
     busy = outcome.helped[rank] / ((outcome.threads - 1) * shared)
-    return f"{times}, in which the others are busy for {percent(busy, 0)}"
+    return f"{times}, in which the other threads are busy for {percent(busy, 0)}"
 
 
 def _compressed(met: Compressed) -> str:
-    """Returns the largest compressive stress of a part whose law has no failure in compression, over that of
-    Griffith's criterion.
+    """Returns the largest compressive stress of a part whose law has no failure in compression, relative to the
+    strength of Griffith's criterion.
     """
-    beyond = f", {counted(met.tets, 'tet')} beyond it at once" if met.tets else ""
+    beyond = f", {counted(met.tets, 'tet')} beyond the criterion at the same time" if met.tets else ""
     return f"{met.part} up to {si(met.most, 'Pa')}, {fixed(met.times)} times Griffith's criterion{beyond}"
 
 
 def balance_table(accounts: Sequence[Account], happened: Account) -> Table:
-    """Prints costs of other balance policies beside the costs of the run; the saved time is relative to a run
-    without balancing.
+    """Returns a table with the costs of other policies of load balance beside the costs of the run. The saved time
+    is relative to a run without load balance.
     """
     made = table(
         "policy", "cuts", "lost", "cost of cuts", "total", "saved", "imbalance",
@@ -255,7 +261,7 @@ def balance_table(accounts: Sequence[Account], happened: Account) -> Table:
 
 
 def checks_table(checks: Sequence[Check]) -> Table:
-    """Prints the reference numbers: value, expected value, tolerance, verdict."""
+    """Returns a table of the reference numbers: value, expected value, tolerance, verdict."""
     made = table("reference", "value", "expected", "tolerance", "", right=("value", "expected", "tolerance"))
     for check in checks:
         verdict = Text("pass", style="bold green") if check.passed else Text("FAIL", style="bold red")
@@ -265,7 +271,7 @@ def checks_table(checks: Sequence[Check]) -> Table:
 
 
 def probes_table(probes: Sequence[Measured]) -> Table:
-    """Prints the last value of each probe, its minimum and its maximum."""
+    """Returns a table with the last value, the minimum and the maximum of each probe."""
     made = table("probe", "at the end", "min", "max", right=("at the end", "min", "max"), wide=("probe",))
     for probe in probes:
         made.add_row(probe.name, *exacts((probe.value, probe.least, probe.most), probe.unit))
@@ -273,7 +279,9 @@ def probes_table(probes: Sequence[Measured]) -> Table:
 
 
 def end_tables(outcome: Outcome, printed: Collection[str] = ()) -> list[Table | str]:
-    """Prints the outcome of a run, its probes and reference numbers, with an empty line between them."""
+    """Returns the tables of the outcome, probes and reference numbers of a run, with an empty line between the
+    tables.
+    """
     parts: list[Table | str] = [outcome_table(outcome, printed)]
     if outcome.probes:
         parts += ["", probes_table(outcome.probes)]

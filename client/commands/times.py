@@ -1,4 +1,4 @@
-"""Times on the command line: a date, a date with a time of day, or a duration before now."""
+"""Notation of times on the command line: a date, a date with a time of day, or a duration before now."""
 
 import re
 from datetime import datetime, timedelta
@@ -13,7 +13,9 @@ _ALLOWED = "write a date such as 2026-11-28 or '2026-11-28 14:30', today, yester
 
 
 def moment(text: str, named: str, now: datetime | None = None) -> float:
-    """Returns the Unix time in s; dates are in the local time zone. Raises UsageError with the name ``named``."""
+    """Returns the Unix time in s of a text; dates are in the local time zone. Raises UsageError with the name
+    ``named`` of the option.
+    """
     here = now or datetime.now()
     words = text.strip().lower()
     midnight = here.replace(hour=0, minute=0, second=0, microsecond=0)

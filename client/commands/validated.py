@@ -1,4 +1,4 @@
-"""Output of ``conoid validate``: parts, files, loads, contacts, cost."""
+"""Output of the command ``conoid validate``: parts, files, loads, contacts, cost."""
 
 import math
 from collections.abc import Callable, Sequence
@@ -21,8 +21,8 @@ from .tables import pairs, table
 
 
 def estimate_table(case: Case, expected: Estimate) -> Table:
-    """Prints the approximate needs of a case, and the fraction of each stage; a dash replaces numbers of a mesh file
-    that is not read.
+    """Returns a table of the approximate needs of a case and the fraction of each stage; a dash stands for numbers
+    of a mesh file that is not read.
     """
     total = expected.core_seconds or 1.0
     shares = sorted(expected.costs.items(), key=lambda cost: -cost[1])
@@ -40,7 +40,7 @@ def estimate_table(case: Case, expected: Estimate) -> Table:
 
 
 def _clock(case: Case, expected: Estimate) -> str:
-    """Prints the time on these ranks and threads, and its assumptions."""
+    """Returns the estimated wall time on the ranks and threads of the case, and the assumptions of the estimate."""
     clock, run = expected.clock, case.run
     if clock is None:
         return UNKNOWN
@@ -48,22 +48,27 @@ def _clock(case: Case, expected: Estimate) -> str:
     assumed = [f"ranks {percent(clock.ranks, 0)} efficient"] if run.ranks > 1 else []
     if run.threads > 1:
         assumed.append(
-            f"threads share {percent(clock.shared, 0)} of the core time, {percent(clock.threads, 0)} efficient"
+            f"{percent(clock.shared, 0)} of the core time in parallel regions, {percent(clock.threads, 0)} efficient"
         )
     return f"{took}, on {crew(run.ranks, run.threads)}{'; assumed: ' if assumed else ''}{', '.join(assumed)}"
 
 
 def _up_to(
-    value: float | None, more: float, shown: Callable[[float], str], when: str = "all that may break turns to dust"
+    value: float | None,
+    more: float,
+    shown: Callable[[float], str],
+    when: str = "all breakable parts break into single tets",
 ) -> str:
-    """Returns the memory as text; with ``more``, also the larger memory ``when`` bodies break into single tets."""
+    """Returns the memory as text. With ``more``, the text also has the larger memory that is needed ``when`` bodies
+    break into single tets.
+    """
     if value is None or not more:
         return _about(value, shown)
     return f"{_about(value, shown)}, up to {shown(value + more)} if {when}"
 
 
 def parts_table(case: Case, expected: Estimate) -> Table:
-    """Prints the model of each part: its approximate size and its initial state."""
+    """Returns a table of the models of each part, with its approximate size and its initial state."""
     right = ("tets", "mass", "extent", "momentum", "energy")
     made = table("part", "material", *right, right=right, wide=("material",))
     brought = _brings([each.bulk for each in expected.parts])
@@ -73,8 +78,8 @@ def parts_table(case: Case, expected: Estimate) -> Table:
 
 
 def files_table(case: Case, survey: Survey) -> Table:
-    """Prints measurements of mesh files, combinations and CAD: the volumes, and the smallest altitude of a tet,
-    which determines the time step.
+    """Returns a table of mesh files, combined shapes and CAD files: their volumes, and the smallest altitude of a
+    tet, which determines the time step.
     """
     right = ("nodes", "volume", "smallest altitude")
     made = table("part", "from", "group", *right, right=right, wide=("from",))
@@ -86,7 +91,7 @@ def files_table(case: Case, survey: Survey) -> Table:
 
 
 def _source(mesh: Mesh) -> tuple[str, str]:
-    """Returns the source of a mesh: file and part of the file, or combination."""
+    """Returns the source of a mesh: a file and the part of the file, or a combination of shapes."""
     if isinstance(mesh, MeshFile):
         return mesh.path, mesh.group or "all tets"
     if isinstance(mesh, Cad):
@@ -95,8 +100,8 @@ def _source(mesh: Mesh) -> tuple[str, str]:
 
 
 def touching_table(case: Case, touches: Sequence[Touch]) -> Table:
-    """Prints pairs of parts that touch at the start and have no bond: such parts are not joined."""
-    title = "parts that touch, not joined (a [[bond]] joins them)"
+    """Returns a table of pairs of parts that touch at the start and have no bond; contact does not join such parts."""
+    title = "parts that touch and are not joined (a [[bond]] joins parts)"
     made = table(title, "area", right=("area",), wide=(title,))
     for touch in touches:
         names = " and ".join(case.parts[i].name for i in (touch.one, touch.other))
@@ -105,7 +110,7 @@ def touching_table(case: Case, touches: Sequence[Touch]) -> Table:
 
 
 def loads_table(case: Case, acted_on: Sequence[Load]) -> Table:
-    """Prints the approximate area of each traction and each prescribed velocity on the modelled bodies."""
+    """Returns a table of the loads: the approximate area on which each traction and each prescribed velocity acts."""
     columns = ("area", "faces", "nodes")
     made = table("boundary", "acts by", *columns, right=columns, wide=("acts by",))
     for load in acted_on:
@@ -125,7 +130,7 @@ def _acts(spec: Boundary) -> str:
 
 
 def _brings(parts: Sequence[Bulk | None]) -> list[tuple[str, ...]]:
-    """Prints mass, extent, momentum and kinetic energy of each part; dashes if a mesh file is not read."""
+    """Returns mass, extent, momentum and kinetic energy of each part; dashes if a mesh file is not read."""
     known = [bulk for bulk in parts if bulk is not None]
     columns = (
         alike([bulk.mass for bulk in known], "kg"), vectors([bulk.extent for bulk in known], "m", between=" x "),

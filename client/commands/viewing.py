@@ -1,4 +1,4 @@
-"""The command ``view``: frames as a picture or a film."""
+"""The command ``conoid view``: it draws frames as a picture or a film."""
 
 import re
 from collections.abc import Sequence
@@ -18,7 +18,8 @@ from .console import echo, echo_json
 from .options import Json, Token, Url, aloud, complain, find
 
 _NEAR = 0.005
-"""Relative difference of times below which no note is printed. Chosen value: three digits of a time are shown."""
+"""Relative difference between the requested and the drawn time below which no note is printed. Chosen value: times
+are shown with three digits."""
 
 
 def view_frames(
@@ -55,7 +56,7 @@ def view_frames(
     token: Token = None,
     as_json: Json = False,
 ) -> None:
-    """Draw frames off screen: a PNG, several frames side by side, or a film (--out x.gif or x.mp4, all frames)."""
+    """Draw frames off screen: a PNG, several frames side by side, or all frames as a film (--out x.gif or x.mp4)."""
     options: dict[str, Any] = {
         "out": out, "frame": frame, "time": [seconds(each) for each in time or ()], "mirror": mirror,
         "section": section, "whole": whole or [], "hide": hide or [], "on": on, "opacity": _shares(opacity or ()),
@@ -73,7 +74,7 @@ def view_frames(
 
 
 def _drawn(source: str, field: str, options: dict[str, Any], url: str | None, token: str | None) -> Drawn:
-    """Draws a frame file or a run of a folder; a run of a server if ``source`` is an id."""
+    """Draws a frame file or a run in a folder. Draws a run of a server if ``source`` is an id."""
     with aloud("drawing"):
         if not re.fullmatch(ID, source) or Path(source).exists() or Path(source).suffix:
             return view(source, field, **options)
@@ -82,7 +83,7 @@ def _drawn(source: str, field: str, options: dict[str, Any], url: str | None, to
 
 
 def _shares(texts: Sequence[str]) -> dict[str, float]:
-    """Returns the opacity of each part of ``PART=SHARE``. Raises LookError."""
+    """Returns the opacity of each part from texts of the form ``PART=SHARE``. Raises LookError."""
     found = {}
     for text in texts:
         part, _, share = text.rpartition("=")
@@ -96,7 +97,7 @@ def _shares(texts: Sequence[str]) -> dict[str, float]:
 
 
 def _tell_of_times(asked: list[float], drawn: list[float | None]) -> None:
-    """Prints for each time the distance of the nearest frame if this distance is not negligible."""
+    """Prints, for each requested time, the time of the nearest frame if the difference is not negligible."""
     for wanted, found in zip(asked, drawn[len(drawn) - len(asked) :], strict=True):
         if found is not None and abs(found - wanted) > _NEAR * max(abs(wanted), abs(found)):
-            complain(f"time = {si(wanted, 's')}: the nearest frame is of {si(found, 's')}")
+            complain(f"time = {si(wanted, 's')}: the nearest frame has the time {si(found, 's')}")

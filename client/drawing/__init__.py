@@ -1,1 +1,3 @@
-"""Pictures of frames. ``picture`` describes a picture; ``render`` draws the picture in a process of its own."""
+"""Pictures of frames. The module ``picture`` has the description of a picture; ``render`` draws the picture in a
+process of its own.
+"""

@@ -1,5 +1,5 @@
-"""Vectors on the surface of the body as arrows. A few vectors are drawn, one in each cell of a grid over the
-picture: the vector nearest to the camera.
+"""Arrows for vectors on the surface of a body. Only a few vectors are drawn: in each cell of a grid over the
+picture, the vector that is nearest to the camera.
 """
 
 from collections.abc import Sequence
@@ -14,17 +14,17 @@ from .shot import Shot
 _ACROSS = 22
 """Number of arrows along the longer side of a panel. Chosen value."""
 _LONGEST = 1.8
-"""Length of the longest arrow over the distance of two arrows. Chosen value."""
+"""Length of the longest arrow, relative to the distance between two arrows. Chosen value."""
 
 
 def longest(shots: Sequence[Shot]) -> float:
-    """Returns the length of the longest vector of all shots."""
+    """Returns the length of the longest vector in all shots."""
     return max(float(np.linalg.norm(vectors, axis=1).max()) for shot in shots for _, vectors in [_all(shot)])
 
 
 def on(shot: Shot, eye: Camera, aspect: float, most: float) -> Any | None:
-    """Returns the arrows of a shot, or None if no vector is above 2 % of ``most``. A vector of length ``most`` has
-    the longest arrow.
+    """Returns the arrows of a shot; None if no vector is longer than 2 % of ``most``. The length ``most`` is drawn
+    as the longest arrow.
     """
     places, vectors = _all(shot)
     step = 2.0 * eye.half * max(aspect, 1.0) / _ACROSS

@@ -1,5 +1,6 @@
-"""Position of the camera, number of columns of panels, and round lengths; numpy only. The projection is parallel: a
-length across the view has the same size in pixels everywhere, and the scale bar is valid for the whole picture.
+"""Position of the camera, number of columns of panels, and lengths for the scale bar; the module uses only numpy.
+The projection is parallel: a length across the view has the same size in pixels everywhere, so that the scale bar is
+valid for the whole picture.
 """
 
 import math
@@ -19,24 +20,24 @@ Array: TypeAlias = "np.ndarray[Any, np.dtype[np.float64]]"
 FROM = (1.0, -1.55, 0.62)
 """Default direction from the body to the camera: from the front, the right and above. Chosen value."""
 _ASIDE = 1.55
-"""Component of the direction to the camera along the normal of a plane of symmetry; along other sides it is 1.
-Chosen value."""
+"""Component of the direction to the camera along the normal of a plane of symmetry; the components along other sides
+are 1. Chosen value."""
 _LONG = 2.2
-"""Ratio of the first to the second extent above which a body is long. A long body lies horizontally in the picture.
-Chosen value."""
+"""Ratio of the largest extent to the second largest above which a body counts as long. A long body lies horizontally
+in the picture. Chosen value."""
 _ALONG = (0.45, 0.5)
-"""Components of the direction to the camera along a long body and along the axis that points upwards. The component
-along the side that faces the camera is 1.55. Chosen values."""
+"""Components of the direction to the camera along a long body and along the upward axis. The component along the
+third axis is 1.55. Chosen values."""
 _FILL = 0.84
 """Fraction of a panel that the body fills. Chosen value."""
 _SCALE = 0.28
-"""Largest length of the scale bar over the width of a panel. Chosen value."""
+"""Largest length of the scale bar, relative to the width of a panel. Chosen value."""
 
 
 @dataclass(frozen=True)
 class Camera:
-    """A camera with parallel projection. ``towards``, ``right`` and ``above`` are unit vectors. ``half`` is half the
-    height that a panel shows, m. All of the body lies within the distance ``deep`` of the centre, m.
+    """A camera with parallel projection. ``towards``, ``right`` and ``above`` are unit vectors. ``half`` is half of
+    the height that a panel shows, m. The whole body lies within the distance ``deep`` of the centre, m.
     """
 
     centre: Array
@@ -48,11 +49,11 @@ class Camera:
 
 
 def settled(picture: Picture, bounds: Array) -> Picture:
-    """Returns the picture with a camera and an upward direction; ``bounds`` (3, 2): lowest and highest coordinates of
+    """Returns the picture with a camera and an upward direction. ``bounds`` (3, 2): lowest and highest coordinates of
     the body, m.
 
-    A camera of the user stays. The default camera sees the planes of symmetry, or the front, the right side and the
-    top. A long body lies horizontally, unless the user gave an upward direction.
+    A camera that the user has chosen stays. The default camera shows the planes of symmetry, else the front, the
+    right side and the top. A long body lies horizontally unless the user has chosen an upward direction.
     """
     if picture.camera is not None:
         return picture
@@ -68,7 +69,7 @@ def settled(picture: Picture, bounds: Array) -> Picture:
 
 
 def _before(sides: dict[int, float]) -> tuple[float, float, float]:
-    """Returns the direction to a camera that sees the given sides (-1 or 1) across x and y."""
+    """Returns the direction to a camera that shows the given sides (-1 or 1) across x and y."""
     if not sides:
         return FROM
     x, y = sides.get(0, 0.8), sides.get(1, -0.8)
@@ -76,10 +77,10 @@ def _before(sides: dict[int, float]) -> tuple[float, float, float]:
 
 
 def _beside(along: int, sides: dict[int, float]) -> tuple[tuple[float, ...], tuple[float, ...]]:
-    """Returns the direction to a camera that sees a long body from its side, and the upward direction.
+    """Returns the direction to a camera that shows a long body from its side, and the upward direction.
 
-    The low end of the body is at the left of the picture and z points upwards. For a body along z, the side that is
-    not shown points upwards: planes of symmetry are seen from the front and from above.
+    The lower end of the body is at the left of the picture, and z points upwards. If the body lies along z, the side
+    that is not visible points upwards; planes of symmetry are seen from the front and from above.
     """
     if along < 2:
         shown, upper, face, top = 1 - along, 2, sides.get(1 - along, 1.0 if along else -1.0), 1.0
@@ -93,8 +94,8 @@ def _beside(along: int, sides: dict[int, float]) -> tuple[tuple[float, ...], tup
 
 
 def axes(direction: Sequence[float], up: Sequence[float] | None) -> tuple[Array, Array, Array]:
-    """Returns the unit vectors to the camera, to the right and upwards. The default of ``up`` is z, or y for a camera
-    along z.
+    """Returns the unit vectors to the camera, to the right and upwards. Without ``up`` the upward axis is z, or y for
+    a camera along z.
     """
     towards = np.array(direction, float) / np.linalg.norm(direction)
     for above in (np.array(up, float) if up is not None else np.array([0.0, 0.0, 1.0]), np.array([0.0, 1.0, 0.0]),
@@ -103,11 +104,11 @@ def axes(direction: Sequence[float], up: Sequence[float] | None) -> tuple[Array,
         if np.linalg.norm(right) > 1e-6 * np.linalg.norm(above):
             right /= np.linalg.norm(right)
             return towards, right, np.cross(towards, right)
-    raise AssertionError("of y and x one is not along the view")
+    raise AssertionError("at least one of y and x is not parallel to the view")
 
 
 def reach(points: Sequence[Array], right: Array, above: Array) -> tuple[float, float, Array]:
-    """Returns width and height of the smallest rectangle round all points in the view, and the centre of the points
+    """Returns width and height of the smallest rectangle around all points in the view, and the centre of the points
     in space.
     """
     seen = [np.stack([each @ right, each @ above]) for each in points if len(each)]
@@ -120,7 +121,9 @@ def reach(points: Sequence[Array], right: Array, above: Array) -> tuple[float, f
 
 
 def panels(n: int, body: tuple[float, float], room: tuple[float, float]) -> int:
-    """Returns the number of columns for ``n`` panels with which a body of this width and height is drawn largest."""
+    """Returns the number of columns, for ``n`` panels, with which a body of the given width and height is drawn
+    largest.
+    """
     width, height = body
 
     def largest(columns: int) -> float:
@@ -131,7 +134,7 @@ def panels(n: int, body: tuple[float, float], room: tuple[float, float]) -> int:
 
 
 def place(points: Sequence[Array], every: Sequence[Array], picture: Picture, aspect: float) -> Camera:
-    """Returns a camera whose panel shows all ``points`` and that stands outside of ``every``; ``aspect`` is the
+    """Returns a camera that shows all ``points`` in a panel and stands outside of the points ``every``. ``aspect``:
     width of the panel over its height.
     """
     towards, right, above = axes(picture.camera or FROM, picture.up)
@@ -142,12 +145,12 @@ def place(points: Sequence[Array], every: Sequence[Array], picture: Picture, asp
 
 
 def round_length(most: float) -> float:
-    """Returns the largest of the numbers 1, 2, 5, 10 ... that is at most ``most``."""
+    """Returns the largest number of the sequence 1, 2, 5, 10, ... that is not above ``most``."""
     power = 10.0 ** math.floor(math.log10(most))
     return next(factor * power for factor in (5.0, 2.0, 1.0) if factor * power <= most * (1.0 + 1e-9))
 
 
 def scale_bar(camera: Camera, aspect: float, room: float = math.inf) -> tuple[float, str]:
-    """Returns a round length of at most ``room``, m, for the scale bar below the body, and its text."""
+    """Returns the length and the text of the scale bar below the body: a round length of at most ``room``, m."""
     length = round_length(min(_SCALE * 2.0 * camera.half * aspect, room))
     return length, exact(length, "m", 3)

@@ -1,4 +1,4 @@
-"""Texts beside the bodies: title, colour bar or legend, axes and scale bar."""
+"""Texts beside the drawn bodies: title, colour bar or legend, axes and scale bar."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -19,7 +19,7 @@ from .scales import Scale
 
 _AXES = "#d1495b", "#2f9e60", "#3f74d8"
 _MOST_NAMES = 24
-"""Largest number of lines of a legend. Chosen value."""
+"""Largest number of text lines of a legend. Chosen value."""
 
 
 @dataclass(frozen=True)
@@ -38,7 +38,7 @@ NEUTRAL = Ink("#7d8894", "#7d8894", "#ffffff")
 
 @cache
 def face(size: int) -> Any:
-    """Returns DejaVu Sans, which matplotlib installs; without matplotlib, the font of Pillow."""
+    """Returns the font DejaVu Sans of matplotlib; without matplotlib, the font of Pillow."""
     found = find_spec("matplotlib")
     if found is not None and found.origin is not None:
         path = Path(found.origin).parent / "mpl-data" / "fonts" / "ttf" / "DejaVuSans.ttf"
@@ -48,12 +48,12 @@ def face(size: int) -> Any:
 
 
 def width(text: str, size: int) -> int:
-    """Returns the length of a line of text, pixels."""
+    """Returns the width of a text line, pixels."""
     return int(face(size).getlength(text) + 1.0)
 
 
 def fitted(text: str, size: int, room: float) -> str:
-    """Returns the text; a text that is too long ends in dots."""
+    """Returns a text that is at most ``room`` pixels wide; the end of a longer text is replaced by dots."""
     if width(text, size) <= room:
         return text
     while text and width(f"{text}…", size) > room:
@@ -62,7 +62,7 @@ def fitted(text: str, size: int, room: float) -> str:
 
 
 def folded(text: str, size: int, room: float) -> list[str]:
-    """Breaks the text into lines of at most ``room`` pixels. Each line has at least one word."""
+    """Breaks a text into lines of at most ``room`` pixels. Each line has at least one word."""
     lines: list[str] = []
     for word in text.split():
         if lines and width(f"{lines[-1]} {word}", size) <= room:
@@ -73,7 +73,7 @@ def folded(text: str, size: int, room: float) -> list[str]:
 
 
 class Painter:
-    """Writes texts on a picture in the colours for its background."""
+    """Writes texts on a picture, in colours that suit the background."""
 
     def __init__(self, image: Any, laid: Sheet, ink: Ink) -> None:
         self._draw, self._laid, self._ink = ImageDraw.Draw(image), laid, ink
@@ -95,7 +95,9 @@ class Painter:
             self._text((across - margin, 0.55 * down), when, "rm", soft=True)
 
     def bar(self, field: Field, scale: Scale, extremes: tuple[float, float]) -> None:
-        """Draws the colour bar and its values, and writes the extremes that lie beyond the ends of the bar."""
+        """Draws the colour bar with its values, and writes extremes of the field that lie beyond the ends of the
+        bar.
+        """
         left, top, across, down = self._laid.side
         lines = heading(field, across - self._font, self._font)
         step = round(1.35 * self._font)
@@ -156,11 +158,11 @@ class Painter:
                 y += round(1.35 * self._font)
 
     def when(self, panel: Box, text: str) -> None:
-        """Writes the time of a panel; used if a picture has several panels."""
+        """Writes the time of a panel; only pictures with several panels call this function."""
         self._text((panel[0] + self._font, panel[1] + 0.6 * self._font), text)
 
     def notes(self, panel: Box, lines: Sequence[str]) -> None:
-        """Writes a note below the body, for example about pieces outside of the picture."""
+        """Writes notes below the body, for example about pieces of debris outside of the picture."""
         small = max(8, round(0.85 * self._font))
         room = panel[2] - 14 * self._font
         for n, line in enumerate(reversed(lines)):
@@ -168,7 +170,7 @@ class Painter:
             self._text((panel[0] + 7 * self._font, y), fitted(line, small, room), "ls", small, soft=True)
 
     def triad(self, panel: Box) -> None:
-        """Draws the axes. Axes that point away from the camera are drawn first."""
+        """Draws the coordinate axes. Axes that point away from the camera are drawn first."""
         eye = self._laid.eye
         seen = np.stack([eye.right, -eye.above, eye.towards])
         ends = 2.1 * self._font * seen[:2]
@@ -182,7 +184,7 @@ class Painter:
             self._draw.text(place, "xyz"[axis], fill=_AXES[axis], font=face(self._font), anchor="mm")
 
     def length(self, panel: Box) -> None:
-        """Draws the scale bar: a line of a round length, below the colour bar or at the lower right of the panel."""
+        """Draws the scale bar, a line of a round length, below the colour bar or at the lower right of the panel."""
         room = self._laid.pixel * (self._laid.side[2] - 1.6 * self._font) if self._laid.side[2] else np.inf
         length, text = camera.scale_bar(self._laid.eye, self._laid.aspect, room)
         panel = self._laid.side if self._laid.side[2] else panel
@@ -195,12 +197,12 @@ class Painter:
 
 
 def heading(field: Field, room: float, size: int) -> list[str]:
-    """Returns the label of a field with its unit, broken into lines."""
+    """Returns the label of a field with its unit, broken into text lines."""
     return folded(f"{field.label}, {field.unit}" if field.unit else field.label, size, room)
 
 
 def beside_bar(field: Field, scale: Scale, size: int) -> int:
-    """Returns the width of a colour bar with its texts, pixels."""
+    """Returns the width of a colour bar together with its texts, pixels."""
     small = max(8, round(0.85 * size))
     uniform = scale.uniform is not None
     texts = exacts([scale.uniform], field.unit, 5) if uniform else exacts(scale.ticks, "", 5)
@@ -217,7 +219,7 @@ def beside_legend(entries: Sequence[tuple[str, str]], note: str, size: int) -> i
 
 
 def entries(field: str, present: Sequence[int], parts: Sequence[str]) -> list[tuple[str, str]]:
-    """Returns names and colours of the parts or ranks in the picture."""
+    """Returns the names and colours of the parts or ranks that the picture shows."""
     names = parts if field in ("part", "fragment") else []
     colours = part_colours.of_names(present)
     kind = "part" if field == "fragment" else field

@@ -1,4 +1,4 @@
-"""Composition of the images of a picture from panels and captions."""
+"""Composition of a picture from panels and captions."""
 
 from collections.abc import Sequence
 from typing import Any, Self
@@ -17,17 +17,15 @@ from .scales import Scale, rgb
 from .shot import Shot
 
 _FINE, _FINEST = 2, 4096
-"""Factor by which a picture is drawn larger than its size, and the number of pixels each way below which the factor
-is used. Chosen values."""
+"""Factor by which a picture is drawn larger before it is reduced, and the largest width or height in pixels for
+which the factor is used. Chosen values."""
 _LINE = rgb(captions.LIGHT.ink)
 _GLASS = 0.55
-"""Opacity of walls in a picture with a transparent background."""
+"""Opacity of rigid walls in a picture with a transparent background."""
 
 
 class Printer:
-    """Composes the images of a picture from shots. Each image of a film has one shot; another picture has all shots
-    side by side.
-    """
+    """Composes images from shots. An image of a film has one shot; any other picture has all shots side by side."""
 
     def __init__(self, picture: Picture, shots: Sequence[Shot], scale: Scale | None) -> None:
         self._picture, self._shots, self._scale = picture, shots, scale
@@ -41,7 +39,7 @@ class Printer:
         self._clear = picture.look.transparent and not picture.film
         self._longest = arrows.longest(shots) if picture.look.vectors else 0.0
         self.beyond = max(shot.beyond(self._inside) for shot in shots)
-        """Number of pieces of debris outside of the picture, the largest of all shots."""
+        """Largest number of pieces of debris outside of the picture, over all shots."""
 
     def __enter__(self) -> Self:
         return self
@@ -50,7 +48,7 @@ class Printer:
         self._studio.close()
 
     def image(self, shots: Sequence[Shot]) -> Any:
-        """Composes one image with a panel for each of the shots."""
+        """Composes one image with a panel for each shot."""
         look = self._picture.look
         clear = self._clear
         image = Image.new("RGBA" if clear else "RGB", look.size, (0, 0, 0, 0) if clear else self._ground.paper)
@@ -62,7 +60,7 @@ class Printer:
     # The panels ---------------------------------------------------------------------------------------------------
 
     def _panel(self, shot: Shot) -> Any:
-        """Draws one panel with its lines at a larger size and reduces the panel to its size."""
+        """Draws one panel with its lines at a larger size, and reduces the panel to its final size."""
         laid, look = self._laid, self._picture.look
         on = arrows.on(shot, laid.eye, laid.aspect, self._longest) if look.vectors else None
         exposure = self._studio.expose(shot, laid.eye, on)
@@ -75,7 +73,7 @@ class Printer:
         return Image.fromarray(_smaller(layers, self._fine, self._clear))
 
     def _inside(self, places: Any) -> Any:
-        """Returns (n,) True for the points of ``places`` (n, 3) that lie in a panel."""
+        """Returns (n,) True for the points of ``places`` (n, 3) that lie inside of a panel."""
         eye = self._laid.eye
         seen = places - eye.centre
         return (np.abs(seen @ eye.right) < eye.half * self._laid.aspect) & (np.abs(seen @ eye.above) < eye.half)
@@ -122,32 +120,32 @@ class Printer:
             painter.bar(field, self._scale, (min(map(np.min, every)), max(map(np.max, every))))
 
     def _notes(self) -> list[str]:
-        """Returns the note about debris outside of the picture."""
+        """Returns the notes about arrows and about debris outside of the picture."""
         notes = []
         if self._longest > 0.0:
             unit = {"velocity": "m/s", "displacement": "m"}[self._picture.look.vectors]
-            notes.append(f"arrows: {self._picture.look.vectors}, the longest {exact(self._longest, unit, 3)}")
+            notes.append(f"arrows: {self._picture.look.vectors}, longest {exact(self._longest, unit, 3)}")
         if self.beyond:
             notes.append(f"{counted(self.beyond, 'piece')} outside the picture")
         return notes
 
 
 def _present(picture: Picture, shots: Sequence[Shot]) -> list[int]:
-    """Returns the numbers of the parts or ranks in the shots."""
+    """Returns the numbers of the parts or ranks that the shots show."""
     if picture.field == "rank":
         return sorted({int(n) for shot in shots for n in np.unique(shot.shown)})
     return sorted({piece.part for shot in shots for piece in shot.pieces})
 
 
 def _counted(shots: Sequence[Shot]) -> str:
-    """Returns the number of fragments that are visible in the shots of an image."""
+    """Returns a text with the number of fragments that are visible in the shots."""
     most = [len(np.unique(shot.shown)) for shot in shots]
     return counted(most[0], "fragment") if len(most) == 1 else f"{count(most[0])} to {counted(most[-1], 'fragment')}"
 
 
 def _smaller(layers: Any, fine: int, clear: bool) -> Any:
-    """Returns (height, width, 3 or 4) bytes: the mean over squares of ``fine`` by ``fine`` pixels. Colours are
-    weighted by opacity.
+    """Returns (height, width, 3 or 4) bytes: means over squares of ``fine`` by ``fine`` pixels. Colours are weighted
+    by opacity.
     """
     height, width, depth = layers.shape
     blocks = layers.reshape(height // fine, fine, width // fine, fine, depth).mean(axis=(1, 3))

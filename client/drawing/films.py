@@ -1,4 +1,4 @@
-"""Films: images one after the other in one file. Pillow writes GIF, ffmpeg writes MP4."""
+"""Films: a sequence of images in one file. Pillow writes GIF, ffmpeg writes MP4."""
 
 import shutil
 import subprocess
@@ -13,12 +13,12 @@ from PIL import Image
 from ..errors import ViewError
 
 _LOOKED_AT = 5
-"""Number of frames from which the 256 colours of a GIF are taken, evenly over the film. Chosen value."""
+"""Number of frames, distributed evenly over the film, from which the 256 colours of a GIF are taken. Chosen value."""
 
 
 def save(images: Iterator[Any], n: int, rate: float, out: Path) -> None:
-    """Writes ``n`` images of one size as a film with ``rate`` images per second. Raises ViewError for an MP4 without
-    ffmpeg.
+    """Writes ``n`` images of equal size as a film with ``rate`` images per second. Raises ViewError for an MP4
+    without ffmpeg.
     """
     if out.suffix.lower() == ".gif":
         _gif(list(images), rate, out)
@@ -27,7 +27,7 @@ def save(images: Iterator[Any], n: int, rate: float, out: Path) -> None:
 
 
 def _gif(images: list[Any], rate: float, out: Path) -> None:
-    """Writes a GIF. All frames use the same palette: a colour keeps its meaning over the film."""
+    """Writes a GIF. All frames use one palette, so that a colour keeps its meaning over the film."""
     some = [images[k * (len(images) - 1) // max(_LOOKED_AT - 1, 1)] for k in range(_LOOKED_AT)]
     width, height = images[0].size
     strip = Image.new("RGB", (width, height * len(some)))
@@ -39,7 +39,9 @@ def _gif(images: list[Any], rate: float, out: Path) -> None:
 
 
 def _mp4(images: Iterator[Any], rate: float, out: Path) -> None:
-    """Writes H.264 in a form that browsers and presentations can play. Width and height are even numbers of pixels."""
+    """Writes an MP4 with H.264 in a form that browsers and presentations can play. Width and height are even numbers
+    of pixels.
+    """
     first = next(images)
     width, height = (side - side % 2 for side in first.size)
     command = [
@@ -55,12 +57,13 @@ def _mp4(images: Iterator[Any], rate: float, out: Path) -> None:
 
 
 def ffmpeg() -> str:
-    """Returns the path of ffmpeg, which writes an MP4. Raises ViewError if ffmpeg is not installed."""
+    """Returns the path of the program ffmpeg, which writes MP4 files. Raises ViewError if ffmpeg is not installed."""
     if found := shutil.which("ffmpeg"):
         return found
     try:
         return str(import_module("imageio_ffmpeg").get_ffmpeg_exe())
     except (ImportError, RuntimeError):
         raise ViewError(
-            "an .mp4 needs ffmpeg: pip install imageio-ffmpeg, or your system's ffmpeg; a .gif does not"
+            "an .mp4 needs ffmpeg: install it with pip install imageio-ffmpeg or with your system; a .gif needs no "
+            "ffmpeg"
         ) from None

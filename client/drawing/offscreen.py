@@ -1,5 +1,5 @@
-"""Draws the pieces of a frame off screen: colours with light, and for each pixel the number of the nearest part or
-fragment and its depth.
+"""Drawing of the pieces of a frame off screen: shaded colours, and for each pixel the number and the depth of the
+nearest part or fragment.
 """
 
 from collections.abc import Sequence
@@ -18,28 +18,29 @@ from .shot import Shot
 from .surfaces import Piece
 
 FAR = 4.0
-"""Distance of the camera from the centre over the radius of the body. Chosen value: the camera stands beyond walls."""
+"""Distance of the camera from the centre, relative to the radius of the body. Chosen value: the camera stands
+outside of the walls."""
 _SHADE = 0.04
-"""Radius of the ambient occlusion over that of the body. Hollows that are deeper than this are drawn darker. Chosen
-value."""
+"""Radius of the ambient occlusion, relative to the radius of the body. Hollows that are deeper than this radius are
+drawn darker. Chosen value."""
 _LIGHTS = ((-0.7, 0.9, 1.6), 0.66), ((1.3, 0.2, 1.0), 0.34)
-"""A key light from the upper left and a weaker light from the right."""
+"""Position and intensity of the lights: a strong light from the upper left and a weaker light from the right."""
 _WALL = "#aab6c3"
 _MATTER = {"ambient": 0.45, "diffuse": 0.85, "specular": 0.10, "specular_power": 20.0}
 _ROUND = {"lighting": True, "ambient": 0.75, "diffuse": 0.45, "specular": 0.0, "smooth_shading": True}
-"""Shading of round walls: pale, with a shape that is visible."""
+"""Shading of curved walls: pale colours with a visible shape."""
 _FEATURE = 35.0
-"""Angle between two faces above which the shading of their edge is not smoothed, degrees. Chosen value: the faces of a
-curved surface differ by less than this angle."""
+"""Angle between two faces, degrees, above which the shading of their common edge is not smoothed. Chosen value:
+neighbouring faces of a curved surface differ by a smaller angle."""
 
 
 @dataclass(frozen=True)
 class Exposure:
-    """A panel as it was drawn, arrays (height, width).
+    """A drawn panel; arrays (height, width).
 
-    ``colour`` is the image. ``part`` and ``fragment`` are the numbers of the nearest part and fragment, from 1 on, 0
-    for the background. ``depth`` is in m. ``wall`` is True where a wall is visible. ``glass`` is as ``part`` and
-    includes the transparent parts.
+    ``colour`` is the image. ``part`` and ``fragment`` are the numbers, from 1, of the nearest part and fragment; 0
+    for the background. ``depth`` is in m. ``wall`` is True for pixels that show a wall. ``glass`` has the same
+    numbers as ``part``, but it includes transparent parts.
     """
 
     colour: Any
@@ -51,14 +52,14 @@ class Exposure:
 
 
 class Studio:
-    """A window of one size for frames that are drawn one after the other."""
+    """A window of fixed size in which frames are drawn one after the other."""
 
     def __init__(self, size: tuple[int, int], picture: Picture, scale: Scale | None, paper: str) -> None:
         self._picture, self._scale, self._paper = picture, scale, paper
         self._plotter = vtk.window(size, paper)
 
     def expose(self, shot: Shot, eye: Camera, arrows: Any | None) -> Exposure:
-        """Draws the pieces of a frame, its walls, and arrows on the pieces."""
+        """Draws the pieces of a frame, its rigid walls, and arrows on the pieces."""
         plotter, pieces = self._plotter, shot.pieces
         plotter.clear()
         labels, table = _labels(pieces)
@@ -84,7 +85,7 @@ class Studio:
         self._plotter.close()
 
     def _flat(self, piece: Piece, label: Any) -> Any:
-        """Adds a piece whose cells have their number as colour."""
+        """Adds a piece to the window; the colour of each cell encodes the number of the cell."""
         numbers = np.stack([label & 255, label >> 8 & 255, label >> 16], axis=1).astype(np.uint8)
         copy = piece.surface.copy()
         copy.clear_data()
@@ -93,7 +94,9 @@ class Studio:
                                       reset_camera=False)  # fmt: skip
 
     def _numbers(self, eye: Camera) -> tuple[Any, Any]:
-        """Returns two arrays (height, width): the nearest number, 0 for the background, and its depth, m."""
+        """Returns two arrays (height, width): the number of the nearest cell group, 0 for the background, and its
+        depth, m.
+        """
         plotter = self._plotter
         plotter.set_background("black")
         plotter.renderer.ResetCameraClippingRange()
@@ -105,7 +108,7 @@ class Studio:
         return red + (green << 8) + (blue << 16), depth
 
     def _lit(self, shot: Shot, eye: Camera, arrows: Any | None) -> tuple[Any, Any]:
-        """Returns the colour of each pixel, and an array that is True for pixels of walls."""
+        """Returns the colour of each pixel, and a mask that is True for pixels of walls."""
         plotter, picture = self._plotter, self._picture
         for position, intensity in _LIGHTS:
             plotter.add_light(vtk.light(position, intensity))
@@ -116,7 +119,7 @@ class Studio:
         glassy = bool(picture.opacity)
         if glassy:
             plotter.enable_depth_peeling(number_of_peels=8)
-        elif not picture.film:  # ambient occlusion takes 1 s per picture
+        elif not picture.film:  # Ambient occlusion takes 1 s for each picture.
             plotter.enable_ssao(radius=_SHADE * eye.deep, bias=0.1 * _SHADE * eye.deep, kernel_size=64, blur=True)
         plotter.renderer.ResetCameraClippingRange()
         colour = self._taken()
@@ -134,7 +137,7 @@ class Studio:
         return np.asarray(self._plotter.screenshot(None, return_img=True))[..., :3]
 
     def _add(self, piece: Piece) -> None:
-        """Adds a piece with the colours of its field."""
+        """Adds a piece with the colours of the drawn field."""
         picture, scale, surface = self._picture, self._scale, piece.surface
         raw, field = picture.look.raw, FIELDS[picture.field]
         look = {
@@ -153,13 +156,13 @@ class Studio:
             self._plotter.add_mesh(surface, scalars="shown", **colours, **look, **smooth)
 
     def _add_wall(self, points: Any, wall: Wall) -> None:
-        """Adds a pale wall. The fit of the camera does not include it."""
+        """Adds a pale wall. The camera is not fitted to walls."""
         matter = {"lighting": False} if wall.shape == "plane" else _ROUND
         self._plotter.add_mesh(walls.surface(points, wall), color=_WALL, opacity=0.55, reset_camera=False, **matter)
 
     def _look(self, eye: Camera) -> None:
-        """Sets a parallel camera outside of the body. The near and the far plane enclose the body closely: depths
-        have single precision.
+        """Sets a parallel camera outside of the body. The near and the far plane are close to the body, because
+        depths have single precision.
         """
         camera = self._plotter.camera
         camera.focal_point = eye.centre
@@ -171,7 +174,7 @@ class Studio:
 
 
 def named(field: Field, surface: Any, bodies: int) -> Any:
-    """Returns (cells, 3) colours of parts, ranks or fragments."""
+    """Returns (cells, 3) colours for parts, ranks or fragments."""
     shown = surface.cell_data["shown"]
     if field.kind == "fragments":
         return part_colours.of_fragments(shown, surface.cell_data["part"], max(bodies, 1))
@@ -179,8 +182,8 @@ def named(field: Field, surface: Any, bodies: int) -> Any:
 
 
 def _labels(pieces: Sequence[Piece]) -> tuple[list[Any], Any]:
-    """Returns for each piece (cells,) numbers of its fragments, from 1 on, and for all pieces (fragments, 2) the
-    part and the number of each fragment.
+    """Returns two results: for each piece the numbers (cells,) of its fragments, from 1; for all pieces together an
+    array (fragments, 2) with the part and the fragment of each number.
     """
     pairs = [
         np.stack([np.full(piece.surface.n_cells, piece.part), np.asarray(piece.surface.cell_data["fragment"])], axis=1)

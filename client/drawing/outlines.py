@@ -1,4 +1,4 @@
-"""Lines round parts and fragments and along sharp edges. The lines are computed from the pixels of a drawn panel."""
+"""Lines around parts and fragments and along sharp edges. The lines are computed from the pixels of a drawn panel."""
 
 from typing import Any
 
@@ -7,22 +7,22 @@ import numpy as np
 from .offscreen import Exposure
 
 _STRONG, _MIDDLE, _WEAK = 0.85, 0.6, 0.4
-"""Darkness of the lines round a part, at a jump of the depth, round a fragment and along an edge. Chosen values."""
+"""Darkness of lines: around a part and at a jump of the depth, around a fragment, along an edge. Chosen values."""
 _BEND = np.radians(38.0)
-"""Angle between two faces above which their edge has a line. Chosen value: the faces of a curved surface differ by less
-than this angle."""
+"""Angle between two faces above which a line is drawn along their common edge. Chosen value: neighbouring faces of a
+curved surface differ by a smaller angle."""
 _EVEN = np.radians(12.0)
-"""Difference of angles below which the pixels of a face have the same slope. Chosen value: a crack with a width of
-one pixel has a larger difference."""
+"""Difference of slopes, as an angle, below which neighbouring pixels count as one face. Chosen value: a crack with a
+width of one pixel has a larger difference."""
 _WIDER = 1300
-"""Number of pixels of a panel for each pixel of the width of a line. Chosen value."""
+"""Height of a panel, pixels, for each pixel of line width. Chosen value."""
 _JUMP = 5.0
-"""Smallest jump of the depth between two bodies, in sizes of a pixel. Chosen value."""
+"""Smallest jump of the depth between two bodies, as a multiple of the size of a pixel. Chosen value."""
 
 
 def lines(shown: Exposure, pixel: float, height: int) -> Any:
-    """Returns (height, width) darkness of the lines, 0 to 1; ``pixel``: size of a pixel, m; ``height`` of the panel,
-    pixels.
+    """Returns the darkness of the lines, (height, width), 0 to 1. ``pixel``: size of a pixel on the body, m;
+    ``height``: height of the panel, pixels.
     """
     dark = np.zeros(shown.part.shape)
     for axis in (0, 1):
@@ -38,19 +38,19 @@ def lines(shown: Exposure, pixel: float, height: int) -> Any:
 
 
 def _ahead(values: Any, axis: int, n: int = 1) -> Any:
-    """Returns the array shifted by ``n`` pixels along an axis. Values at the border are repeated."""
+    """Returns the array shifted by ``n`` pixels along an axis; values at the border are repeated."""
     places = np.clip(np.arange(values.shape[axis]) + n, 0, values.shape[axis] - 1)
     return np.take(values, places, axis=axis)
 
 
 def _differs(number: Any, axis: int) -> Any:
-    """Returns the pixels beside a pixel with another number."""
+    """Returns True for pixels that have a neighbour with another number along an axis."""
     return (number != _ahead(number, axis)) | (number != _ahead(number, axis, -1))
 
 
 def _jumps(shown: Exposure, pixel: float, axis: int) -> Any:
-    """Returns the pixels of the nearer side of a jump of the depth. A jump is larger than the slopes on both sides
-    explain.
+    """Returns True for pixels on the nearer side of a jump of the depth. A jump is larger than the slopes on both of
+    its sides explain.
     """
     steps = [_ahead(shown.depth, axis, n + 1) - _ahead(shown.depth, axis, n) for n in (-2, -1, 0, 1)]
     on = _is_jump(steps[2], steps[1], steps[3], _JUMP * pixel)
@@ -66,7 +66,7 @@ def _is_jump(step: Any, before: Any, after: Any, most: float) -> Any:
 
 
 def _bends(shown: Exposure, pixel: float, axis: int) -> Any:
-    """Returns the pixels of a part at which two faces form an edge."""
+    """Returns True for pixels at which two faces of one part form an edge."""
     slopes = [_slope(shown, pixel, axis, n) for n in (-2, 1)]
     even = np.ones(shown.part.shape, bool)
     for n, slope in ((-3, slopes[0]), (2, slopes[1])):
@@ -77,12 +77,12 @@ def _bends(shown: Exposure, pixel: float, axis: int) -> Any:
 
 
 def _slope(shown: Exposure, pixel: float, axis: int, n: int) -> Any:
-    """Returns the angle of the face between the pixels at the distances ``n`` and ``n + 1``, rad."""
+    """Returns the angle, rad, of the face between the pixels at the distances ``n`` and ``n + 1``."""
     return np.arctan((_ahead(shown.depth, axis, n + 1) - _ahead(shown.depth, axis, n)) / pixel)
 
 
 def _steep(slopes: Any) -> Any:
-    """Returns the pixels of faces that are seen nearly edge on. At these faces a slope cannot be distinguished from
-    a jump.
+    """Returns True for pixels of faces that are nearly parallel to the view. On such faces a slope cannot be
+    distinguished from a jump.
     """
     return np.maximum(np.abs(slopes[0]), np.abs(slopes[1])) > np.radians(86.0)

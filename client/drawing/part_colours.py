@@ -1,5 +1,6 @@
-"""Colours for names: a hue for each part, and variations of the hue for the fragments of the part; numpy only.
-web/colours.js has the same function: page, report and pictures show a fragment in the same colour.
+"""Colours of parts and fragments: each part has a hue, and its fragments have variations of this hue. The module
+uses only numpy. The function of web/colours.js is the same, so that page, report and pictures show a fragment in the
+same colour.
 """
 
 from typing import Any, TypeAlias
@@ -10,29 +11,29 @@ Array: TypeAlias = "np.ndarray[Any, np.dtype[np.float64]]"
 Bytes: TypeAlias = "np.ndarray[Any, np.dtype[np.uint8]]"
 
 HUES = np.array([252.0, 70.0, 165.0, 15.0, 305.0, 120.0, 205.0, 345.0])
-"""Hues of the first parts in OKLCH, degrees. Chosen values: colour-blind users can distinguish the first two."""
+"""Hues of the first parts in OKLCH, degrees. Chosen values: colour-blind users can distinguish the first two hues."""
 _STEPS = tuple(np.uint64(step) for step in (0xD1B54A32D192ED03, 0xABC98388FB8FAC03, 0x8CB92BA72F3D8DD7))
-"""2^64 over the powers of 1.2207, the root of g^4 = g + 1. The multiples of these numbers fill a cube evenly
+"""Factors 2^64 / g^k with g = 1.2207, the root of g^4 = g + 1. The multiples of these factors fill a cube evenly
 (Roberts 2018, R3)."""
 _STRONG, _MUTED = (0.66, 0.12), (0.84, 0.045)
-"""Lightness and chroma of the colour of a part, and of the colour of its intact body. The second colour is muted,
-because fragments have stronger colours."""
+"""Lightness and chroma of the colour of a part, and of the colour of its intact body. The colour of the intact body
+is muted, because fragments have stronger colours."""
 _DARKER = 0.13
-"""Difference of lightness between two parts with the same hue. Hues repeat after the first parts."""
+"""Difference of lightness between two parts with the same hue. After the last hue the hues repeat."""
 REST = (140, 146, 152)
-"""Number of fragments without a row in the table of fragments: -1."""
+"""Colour of fragments that have no row in the table of fragments (number -1)."""
 
 
 def of_names(numbers: Any) -> Bytes:
-    """Returns (n, 3) colours of parts or ranks by their numbers from 0 on."""
+    """Returns (n, 3) colours for the numbers of parts or ranks, from 0."""
     found = np.asarray(numbers).astype(int).reshape(-1)
     light = _STRONG[0] - _DARKER * (found // len(HUES) % 3)
     return rgb(light, np.full(len(found), _STRONG[1]), HUES[found % len(HUES)])
 
 
 def of_fragments(numbers: Any, parts: Any, bodies: int) -> Bytes:
-    """Returns (n, 3) colours of the fragments ``numbers`` (n,) of the parts ``parts`` (n,). The first ``bodies``
-    numbers are the bodies at the start.
+    """Returns (n, 3) colours for fragments with the numbers ``numbers`` (n,) in the parts ``parts`` (n,). The first
+    ``bodies`` numbers stand for the bodies at the start.
     """
     pairs = np.stack([np.asarray(numbers).astype(np.int64).reshape(-1), np.asarray(parts).astype(np.int64).reshape(-1)])
     (number, part), which = np.unique(pairs, axis=1, return_inverse=True)
@@ -46,12 +47,14 @@ def of_fragments(numbers: Any, parts: Any, bodies: int) -> Bytes:
 
 
 def _share(bits: Any) -> Array:
-    """Returns 24 bits of a hash as a number from 0 to 1."""
+    """Returns 24 bits of a hash value as a number from 0 to 1."""
     return np.asarray(bits.astype(np.float64) / 2.0**24)
 
 
 def rgb(light: Any, chroma: Any, hue: Any) -> Bytes:
-    """Returns (n, 3) sRGB of colours in OKLCH (Ottosson 2020), each (n,); the hue in degrees."""
+    """Returns (n, 3) sRGB colours for OKLCH colours (Ottosson 2020) with light, chroma and hue (n,); the hue is in
+    degrees.
+    """
     angle = np.asarray(hue) * (np.pi / 180.0)
     a, b = chroma * np.cos(angle), chroma * np.sin(angle)
     long = (light + 0.3963377774 * a + 0.2158037573 * b) ** 3
@@ -67,5 +70,5 @@ def rgb(light: Any, chroma: Any, hue: Any) -> Bytes:
 
 
 def css(colour: Any) -> str:
-    """Returns three bytes as text, such as ``#4c78a8``."""
+    """Returns a colour of three bytes as text, such as ``#4c78a8``."""
     return "#" + "".join(f"{int(byte):02x}" for byte in colour)

@@ -1,5 +1,5 @@
-"""Input and result of ``render``. A ``Picture`` is a drawing of one frame, of several frames side by side, or of
-several frames one after the other (a film).
+"""Input and result of ``render``. A ``Picture`` describes a drawing of one frame, of several frames side by side, or
+of several frames one after the other (a film).
 """
 
 import msgspec
@@ -9,7 +9,7 @@ from .view_options import FILMS, Look
 
 
 class Picture(msgspec.Struct, kw_only=True, frozen=True):
-    """Input of ``render`` for one file. All frames have the same camera and the same colours."""
+    """Input of ``render`` for one picture file. All frames have the same camera and the same colours."""
 
     frames: list[str]
     out: str
@@ -20,17 +20,17 @@ class Picture(msgspec.Struct, kw_only=True, frozen=True):
     mirrors: list[Mirror] = []
     sections: list[Mirror] = []
     cuts: list[Mirror] = []
-    """Planes of symmetry that are not mirrored. The camera faces these planes."""
+    """Planes of symmetry that are not mirrored; the camera faces these planes."""
     walls: list[Wall] = []
     parts: list[str] = []
     whole: list[int] = []
     hidden: list[int] = []
     focus: list[int] = []
-    """Numbers of parts: ``whole`` parts are not cut by sections, ``hidden`` parts are not drawn, ``focus`` parts
-    fill the picture."""
+    """Numbers of parts: sections do not cut the parts ``whole``, the parts ``hidden`` are not drawn, the parts
+    ``focus`` fill the picture."""
     opacity: dict[int, float] = {}
     range_of: list[str] = []
-    """Frames whose values set the ends of the colour bar; empty: the drawn frames."""
+    """Frames whose values set the ends of the colour bar; if empty, the drawn frames set them."""
     title: str = ""
 
     @property
@@ -40,9 +40,9 @@ class Picture(msgspec.Struct, kw_only=True, frozen=True):
 
 
 class Drawn(msgspec.Struct, kw_only=True, frozen=True):
-    """Result of ``render``: the file, the extremes of the field over the drawn surfaces, the number of faces, the
-    ends of the colour bar and the times of the frames in s. The ends are None if colours are names or the field is
-    uniform.
+    """Result of ``render``: the file, the extremes of the field on the drawn surfaces, the number of faces, the ends
+    of the colour bar, and the times of the frames in s. The ends of the colour bar are None for a uniform field and
+    for a field of names.
     """
 
     out: str

@@ -12,16 +12,18 @@ from .camera import Camera
 from .picture import Picture
 
 Box = tuple[int, int, int, int]
-"""Left, top, width and height, pixels."""
+"""A rectangle: left, top, width and height, pixels."""
 _FILL = 0.34
-"""Largest width of the colour bar or legend over the width of the picture. Chosen value."""
+"""Largest width of the colour bar or legend, relative to the width of the picture. Chosen value."""
 LEAST = 200
 """Shortest side of a picture that has captions, pixels. Chosen value."""
 
 
 @dataclass(frozen=True)
 class Sheet:
-    """Rectangles of a picture. ``panels`` have the same size and are in rows; ``head`` and ``side`` may be empty."""
+    """Rectangles of a picture. The rectangles ``panels`` have equal sizes and form rows; ``head`` and ``side`` may
+    be empty.
+    """
 
     panels: list[Box]
     head: Box
@@ -33,12 +35,12 @@ class Sheet:
 
     @property
     def aspect(self) -> float:
-        """Width of a panel over its height."""
+        """Width of a panel divided by its height."""
         return self.panels[0][2] / self.panels[0][3]
 
     @property
     def pixel(self) -> float:
-        """Size of a pixel in the body, m."""
+        """Length on the body that one pixel shows, m."""
         return 2.0 * self.eye.half / self.panels[0][3]
 
 
@@ -53,8 +55,8 @@ def font(size: tuple[int, int]) -> int:
 
 
 def lay(near: Sequence[Any], every: Sequence[Any], n: int, picture: Picture, head: int, side: int) -> Sheet:
-    """Returns a sheet of ``n`` panels. Each panel shows all points of ``near`` by a camera outside of ``every``,
-    arrays (., 3). ``head`` is the height of the title and ``side`` the width of the captions at the right, pixels.
+    """Returns the layout of ``n`` panels. Each panel shows all points ``near``, with a camera outside of the points
+    ``every``; arrays (., 3). ``head``: height of the title; ``side``: width of the captions at the right, pixels.
     """
     width, height = picture.look.size
     side = min(side, round(_FILL * width))
@@ -70,5 +72,5 @@ def lay(near: Sequence[Any], every: Sequence[Any], n: int, picture: Picture, hea
 
 
 def when(times: Sequence[float | None]) -> list[str]:
-    """Returns the times of frames as text; empty for an unknown time."""
+    """Returns the times of frames as texts; the text of an unknown time is empty."""
     return ["" if time is None else f"t = {text}" for time, text in zip(times, exacts(times, "s", 4), strict=True)]

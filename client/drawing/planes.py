@@ -13,7 +13,7 @@ Vector = tuple[float, float, float]
 
 
 class Mirror(msgspec.Struct, frozen=True):
-    """The plane ``axis = at``; ``axis`` is 0, 1 or 2, ``at`` in m. In a section, ``at`` may be None: the plane
+    """The plane ``axis = at``; ``axis`` is 0, 1 or 2, ``at`` is in m. If the ``at`` of a section is None, the plane
     passes through the middle of the body.
     """
 
@@ -22,7 +22,7 @@ class Mirror(msgspec.Struct, frozen=True):
 
     @property
     def place(self) -> float:
-        """Position ``at`` of a plane with a known position, m."""
+        """Position ``at`` of a plane whose position is given, m."""
         assert self.at is not None
         return self.at
 
@@ -31,21 +31,21 @@ class Wall(msgspec.Struct, frozen=True):
     """A rigid wall to draw: ``plane``, ``cylinder`` or ``sphere``."""
 
     point: Vector
-    """A point of the plane or of the axis at the start, or the centre, m."""
+    """A point of the plane or of the cylinder axis at the start, or the centre of the sphere, m."""
     direction: Vector = (0.0, 0.0, 1.0)
     """Normal of a plane, or axis of a cylinder."""
     shape: str = "plane"
     radius: float = 0.0
     """Radius of a cylinder or a sphere, m."""
     moves: bool = False
-    """True for a wall whose position is in the frames."""
+    """True if the wall moves; the frames have the position of a moving wall."""
 
 
 VIEWS: dict[str, Vector] = {
     "front": (0.0, -1.0, 0.0), "back": (0.0, 1.0, 0.0), "left": (-1.0, 0.0, 0.0), "right": (1.0, 0.0, 0.0),
     "top": (0.0, 0.0, 1.0), "bottom": (0.0, 0.0, -1.0), "iso": (1.0, -1.0, 1.0),
 }  # fmt: skip
-"""Standard views: direction from the body to the camera."""
+"""Standard views, each with the direction from the body to the camera."""
 _FARTHEST = 1e6
 """Largest distance of a plane from the origin, m. Chosen value: VTK draws in single precision."""
 _NUMBER = r"[+-]?[0-9]*\.?[0-9]+(?:[eE][+-]?\d+)?"
@@ -55,38 +55,42 @@ _DIRECTION = re.compile(rf"\s*({_NUMBER})\s*,\s*({_NUMBER})\s*,\s*({_NUMBER})\s*
 
 
 def mirrors(text: str, symmetry: tuple[Mirror, ...]) -> tuple[Mirror, ...]:
-    """Returns the planes of a text: ``auto`` (the planes of ``symmetry``), ``none``, or ``x,y=0.002`` with one plane
-    for each axis. Raises LookError.
+    """Returns the mirror planes for a text: ``auto`` (the planes of ``symmetry``), ``none``, or ``x,y=0.002`` with
+    at most one plane for each axis. Raises LookError.
     """
     if text == "auto":
         return symmetry
     found = planes(text, "mirror")
     if len({plane.axis for plane in found}) < len(found):
-        raise LookError(f"mirror = {text!r}: one plane across each axis")
+        raise LookError(f"mirror = {text!r}: allowed: one plane for each axis")
     return found
 
 
 def planes(text: str, option: str) -> tuple[Mirror, ...]:
-    """Returns the planes of ``x,y=0.002``; no planes for ``none`` and for an empty text. Raises LookError."""
+    """Returns the planes for a text such as ``x,y=0.002``; no planes for ``none`` and for an empty text. Raises
+    LookError.
+    """
     if text in {"none", ""}:
         return ()
     read = [_PLANE.fullmatch(plane) for plane in text.split(",")]
     middles = [plane[2] == "middle" for plane in read if plane is not None]
     if None in read or (option == "mirror" and any(middles)):
         auto, middle = ("auto, none, or ", "") if option == "mirror" else ("", ", y=middle")
-        raise LookError(f"{option} = {text!r}: write {auto}planes such as x or x,y=0.002{middle} (in m)")
+        raise LookError(f"{option} = {text!r}: allowed: {auto}planes such as x or x,y=0.002{middle} (in m)")
     found = tuple(
         Mirror("xyz".index(plane[1]), None if middle else float(plane[2] or 0.0))
         for plane, middle in zip(read, middles, strict=True)
         if plane is not None
     )
     if not all(plane.at is None or abs(plane.at) < _FARTHEST for plane in found):
-        raise LookError(f"{option} = {text!r}: a plane within {number(_FARTHEST)} m")
+        raise LookError(f"{option} = {text!r}: allowed: a plane within {number(_FARTHEST)} m of the origin")
     return found
 
 
 def direction(text: str, option: str) -> Vector | None:
-    """Returns ``-x``, ``1,-1.5,0.6`` or the name of a view as a vector; None for an empty text. Raises LookError."""
+    """Returns the vector for a text: an axis such as ``-x``, components such as ``1,-1.5,0.6``, or the name of a
+    view. Returns None for an empty text. Raises LookError.
+    """
     if not text:
         return None
     if option == "camera" and text.strip() in VIEWS:
@@ -99,6 +103,6 @@ def direction(text: str, option: str) -> Vector | None:
     largest = max(map(abs, parts), default=0.0)
     if not 0.0 < largest < math.inf:
         named = f", or one of {', '.join(VIEWS)}" if option == "camera" else ""
-        raise LookError(f"{option} = {text!r}: write an axis such as -x, a direction such as 1,-1.5,0.6{named}")
+        raise LookError(f"{option} = {text!r}: allowed: an axis such as -x, a direction such as 1,-1.5,0.6{named}")
     x, y, z = (each / largest for each in parts)
     return x, y, z

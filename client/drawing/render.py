@@ -1,7 +1,9 @@
-"""Draws frames as one file: ``python -m conoid.client.drawing.render`` reads a Picture as JSON and prints a Drawn.
+"""Program that draws frames into one file: ``python -m conoid.client.drawing.render`` reads a Picture as JSON and
+prints a Drawn.
 
-``surfaces`` makes the surfaces of a frame (a ``shot``), ``camera`` sets the view, ``offscreen`` draws the shot and
-``outlines`` adds lines. ``composition`` puts the panels on a ``picture_layout`` and adds ``captions``.
+The module ``surfaces`` makes the surfaces of a frame (a ``shot``), ``camera`` sets the view, ``offscreen`` draws the
+shot and ``outlines`` adds lines. The module ``composition`` puts the panels on a ``picture_layout`` and adds
+``captions``.
 """
 
 import sys
@@ -24,7 +26,7 @@ from .shot import Shot
 
 
 def draw(picture: Picture) -> Drawn:
-    """Draws and writes ``picture.out``. Raises ViewError for a frame that cannot be drawn."""
+    """Draws a picture and writes the file ``picture.out``. Raises ViewError if a frame cannot be drawn."""
     field = FIELDS[picture.field]
     picture, shots = _shots(picture)
     values = [shot.shown for shot in shots]
@@ -42,7 +44,7 @@ def draw(picture: Picture) -> Drawn:
 
 
 def _shots(picture: Picture) -> tuple[Picture, list[Shot]]:
-    """Reads all frames, and sets the camera of the picture from the first frame."""
+    """Reads all frames, and returns the picture with the camera that fits the first frame."""
     shots, bounds = [], []
     for path in picture.frames:
         mesh, time = vtk.read(path)
@@ -58,8 +60,8 @@ def _shots(picture: Picture) -> tuple[Picture, list[Shot]]:
 
 
 def _in_the_middle(picture: Picture, bulk: Any) -> Picture:
-    """Returns the picture with the positions of its sections. A section without a position passes through the middle
-    of the body and its mirror images.
+    """Returns the picture with a position for each section. A section without position passes through the middle of
+    the body and its mirror images.
     """
     middle = dict(enumerate(bulk.mean(axis=1).tolist())) | {one.axis: one.place for one in picture.mirrors}
     sections = [Mirror(one.axis, middle[one.axis]) if one.at is None else one for one in picture.sections]
@@ -67,12 +69,12 @@ def _in_the_middle(picture: Picture, bulk: Any) -> Picture:
 
 
 def _all_values(picture: Picture) -> list[Any]:
-    """Returns the field of all tets or nodes of the frames that set the range of the colour bar."""
+    """Returns the values of the field, for all tets or nodes, in the frames that set the range of the colour bar."""
     return [surfaces.values(vtk.read(path)[0], picture.field)[0] for path in picture.range_of]
 
 
 def _save(picture: Picture, shots: Sequence[Shot], scale: Scale | None) -> int:
-    """Writes the file and returns the number of pieces of debris outside of the picture."""
+    """Writes the picture file, and returns the number of pieces of debris outside of the picture."""
     with Printer(picture, shots, scale) as printer:
         if picture.film:
             films.save((printer.image([shot]) for shot in shots), len(shots), picture.look.rate, Path(picture.out))
@@ -82,8 +84,8 @@ def _save(picture: Picture, shots: Sequence[Shot], scale: Scale | None) -> int:
 
 
 def main() -> int:
-    """Reads a Picture from standard input, draws, and prints the result as one line of JSON. An error is one line on
-    standard error.
+    """Reads a Picture from standard input, draws it, and prints the result as one line of JSON. An error is one line
+    on standard error.
     """
     code, line = answer(sys.stdin.buffer.read())
     print(line, file=sys.stderr if code else sys.stdout)
@@ -91,7 +93,7 @@ def main() -> int:
 
 
 def answer(asked: bytes) -> tuple[int, str]:
-    """Returns the exit code and the line to print for a Picture as JSON."""
+    """Returns the exit code and the line to print; ``asked``: a Picture as JSON."""
     picture = msgspec.json.decode(asked, type=Picture)
     try:
         return 0, msgspec.json.encode(draw(picture)).decode()

@@ -1,6 +1,6 @@
-"""Process that draws one picture. A process that hangs is ended, and a failure is reported in one line. VTK ends the
-process with a segmentation fault if it cannot draw off screen. The fault ends the child process only, and the user
-gets an error message.
+"""Control of the process that draws a picture. A process that hangs is ended, and a failure is reported in one line.
+If VTK cannot draw off screen, it ends its process with a segmentation fault. The process is a child process, so that
+the user gets an error message.
 """
 
 import os
@@ -23,8 +23,8 @@ _SECONDS = 180.0
 
 
 def render(picture: Picture) -> Drawn:
-    """Draws in a child process. The file appears when it is complete. Raises ViewError with the reason if the
-    picture cannot be drawn.
+    """Draws a picture in a child process. The file appears only when it is complete. Raises ViewError with the
+    reason if the picture cannot be drawn.
     """
     with whole(Path(picture.out)) as part:
         code, answer, errors = child(msgspec.structs.replace(picture, out=str(part)))
@@ -34,8 +34,8 @@ def render(picture: Picture) -> Drawn:
 
 
 def child(picture: Picture) -> tuple[int, bytes, str]:
-    """Returns the exit code, the last line of standard output, and standard error. Raises ViewError for a process
-    that hangs.
+    """Returns the exit code, the last line of standard output, and the standard error of the child process. Raises
+    ViewError if the process hangs.
     """
     command = [sys.executable, "-P", "-m", "conoid.client.drawing.render"]
     seconds = _SECONDS * max(1, len(picture.frames))
@@ -49,14 +49,14 @@ def child(picture: Picture) -> tuple[int, bytes, str]:
 
 
 def reason(error: Exception, out: str) -> str:
-    """Returns the error message of a failed child; ``out`` is the file that it should have written."""
+    """Returns the error message for a failed child process. ``out``: file that the process should have written."""
     if isinstance(error, OSError) and error.strerror:
         return f"{error.filename or out}: {error.strerror}"
     return " ".join(str(error).split()) or type(error).__name__
 
 
 def explain(code: int, errors: str) -> ClientError:
-    """Returns the reason of a failure, from the exit ``code`` and the text on standard error."""
+    """Returns the reason of a failure, found from the exit code and the text on standard error."""
     if code < 0 or code >= 128:
         return ViewError(
             f"the renderer crashed (signal {-code if code < 0 else code - 128}): VTK found no way to draw off screen; "
@@ -77,7 +77,9 @@ def _package(library: str) -> str:
 
 
 def _environment() -> dict[str, str]:
-    """Sets the variable that selects the off-screen window of VTK, if the right window is known."""
+    """Returns the environment of the child process, with the variable that selects the off-screen window of VTK if
+    the right window is known.
+    """
     environment = dict(os.environ)
     if sys.platform.startswith("linux") and "VTK_DEFAULT_OPENGL_WINDOW" not in environment:
         for library, window in (("EGL", "vtkEGLRenderWindow"), ("OSMesa", "vtkOSOpenGLRenderWindow")):

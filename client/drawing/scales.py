@@ -1,4 +1,4 @@
-"""Scale of a picture: the colours of the colour bar, and its ends at round numbers; numpy only."""
+"""Scale of a picture: the colours of the colour bar, and round numbers at its ends. The module uses only numpy."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -11,12 +11,12 @@ from .fields import Field
 from .view_options import Look
 
 _PARTS = 6
-"""Largest number of intervals of a colour bar. Chosen value."""
+"""Largest number of intervals between the values of a colour bar. Chosen value."""
 _UNIFORM = "#9fb0c0"
-"""Colour of a field with the same value everywhere. The colour is in none of the scales: a uniform field cannot be
-mistaken for a low or a high value. Chosen value."""
+"""Colour of a uniform field. No colour scale contains this colour, so that a uniform field cannot be mistaken for a
+low or a high value. Chosen value."""
 _ALIKE = 1e-9
-"""Relative difference below which two values differ only by rounding. Chosen value."""
+"""Relative difference below which two values are equal except for rounding. Chosen value."""
 
 
 def rgb(colour: str) -> tuple[int, int, int]:
@@ -25,7 +25,7 @@ def rgb(colour: str) -> tuple[int, int, int]:
 
 
 def blend(colours: Sequence[str], n: int = 256) -> list[str]:
-    """Returns a number of colours between the first and the last colour."""
+    """Returns ``n`` colours from the first to the last colour, interpolated between ``colours``."""
     corners = np.array([rgb(colour) for colour in colours], float)
     places = np.linspace(0, len(colours) - 1, n)
     channels = np.stack([np.interp(places, range(len(colours)), corners[:, i]) for i in range(3)], axis=1)
@@ -34,8 +34,8 @@ def blend(colours: Sequence[str], n: int = 256) -> list[str]:
 
 @dataclass(frozen=True)
 class Scale:
-    """The colour bar: its ends in the field's unit, the values that are written beside it, and its colours from low
-    to high. A uniform field has the value ``uniform``, one colour and no ends.
+    """The colour bar: its ends in the unit of the field, the values that are written beside it, and its colours from
+    low to high. A uniform field has the value ``uniform``, one colour and no ends.
     """
 
     low: float
@@ -46,11 +46,11 @@ class Scale:
 
 
 def of(values: Sequence[Any], field: Field, look: Look) -> Scale:
-    """Returns the scale of all ``values`` together."""
+    """Returns the scale for ``values``, the field in all panels."""
     every = np.concatenate([np.asarray(each, float).reshape(-1) for each in values])
     known = every[np.isfinite(every)]
     if not len(known):
-        raise ViewError(f"{field.label}: no value of these frames is a number")
+        raise ViewError(f"{field.label}: no value of the drawn frames is a number")
     least, most = float(known.min()), float(known.max())
     if look.limits is None and most - least <= max(field.floor, _ALIKE * max(abs(least), abs(most))):
         return Scale(least, most, [], [_UNIFORM], 0.5 * (least + most))
@@ -77,14 +77,14 @@ def rounded(low: float, high: float) -> tuple[float, float]:
 
 
 def ticks(low: float, high: float) -> list[float]:
-    """Returns both ends and the round numbers between them. Numbers next to an end are left out."""
+    """Returns both ends and the round numbers between them. Round numbers that are close to an end are left out."""
     step = _step(low, high)
     first, last = np.ceil(low / step + 0.4), np.floor(high / step - 0.4)
     return [low, *(float(n * step) for n in np.arange(first, last + 1)), high]
 
 
 def _step(low: float, high: float) -> float:
-    """Returns a round interval such that at most ``_PARTS`` intervals lie between the two numbers."""
+    """Returns a round interval with which at most ``_PARTS`` intervals lie between ``low`` and ``high``."""
     span = max(high - low, 1e-9 * max(abs(low), abs(high)), 1e-30)
     power = 10.0 ** np.floor(np.log10(span / 4))
     return float(next(f * power for f in (1, 2, 2.5, 5, 10) if span / (f * power) <= _PARTS + 1e-9))

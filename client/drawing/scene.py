@@ -1,4 +1,4 @@
-"""Data of a case for its pictures, and ``draw``, which makes a picture from frame files."""
+"""Data of a case for pictures, and the function ``draw``, which makes a picture from frame files."""
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
@@ -17,7 +17,7 @@ from .view_options import chosen
 
 @dataclass(frozen=True)
 class Scene:
-    """Data that a picture takes from the case of a run; all empty without a readable case."""
+    """Data that a picture takes from the case of a run; all fields are empty if the case is not readable."""
 
     mirrors: tuple[Mirror, ...] = ()
     walls: tuple[Wall, ...] = ()
@@ -32,9 +32,9 @@ def draw(
 ) -> Drawn:
     """Draws frame files.
 
-    A picture of one frame is a PNG. Several frames are side by side in a PNG, or one after the other in a GIF or MP4.
-    ``options`` are the fields of ``Look``. The default of ``out`` is a file in the current folder, named after ``name``
-    and the field. Raises ViewError.
+    One frame is drawn as a PNG. Several frames are drawn side by side in a PNG, or one after the other in a GIF or
+    MP4. ``options`` are the fields of ``Look``. By default ``out`` is a file in the current folder, named after
+    ``name`` and the field. Raises ViewError.
     """
     require_field(field)
     target = Path(out or f"{name}-{field}.png").resolve()
@@ -54,8 +54,8 @@ def draw(
 
 
 def numbers(names: Iterable[str], parts: Sequence[str], option: str) -> list[int]:
-    """Returns the numbers of parts by name. Without a case, the names are the numbers in the frame. Raises
-    LookError.
+    """Returns the numbers of parts with the given names. If the case is not readable, the names must be the numbers
+    of parts in the frame. Raises LookError.
     """
     found = []
     for name in names:
@@ -64,6 +64,6 @@ def numbers(names: Iterable[str], parts: Sequence[str], option: str) -> list[int
         elif not parts and name.isdigit():
             found.append(int(name))
         else:
-            hint = allowed(name, parts) if parts else "this frame has no names of parts, write their numbers"
+            hint = allowed(name, parts) if parts else "the frame has no names of parts; write the numbers of the parts"
             raise LookError(f"{option} = {name!r}: {hint}")
     return found

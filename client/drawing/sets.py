@@ -1,4 +1,4 @@
-"""Sets of mesh files in the frames of a run."""
+"""Sets of nodes of mesh files, in the frames of a run."""
 
 from typing import Any
 
@@ -13,17 +13,17 @@ _SET = layout.set_array("")
 
 
 def of_set(mesh: Any, name: str) -> Any:
-    """Returns the tets of a frame that have a node in a set, or the whole mesh for an empty name. Raises LookError for
-    a set that the frame does not have, or without tets.
+    """Returns the tets of a frame that have a node in the set ``name``, or the whole mesh if ``name`` is empty.
+    Raises LookError if the frame does not have the set, or if no tet has a node in it.
     """
     if not name:
         return mesh
     known = {array.removeprefix(_SET): array for array in mesh.point_data if array.startswith(_SET)}
     array = layout.set_array(name)
     if array not in known.values():
-        hint = allowed(name, known) if known else "this frame has no set; a case names sets in run.sets"
+        hint = allowed(name, known) if known else "the frame has no sets; a case names its sets in run.sets"
         raise LookError(f"on = {name!r}: {hint}")
     chosen = mesh.extract_points(np.flatnonzero(mesh.point_data[array]), adjacent_cells=True, include_cells=True)
     if not chosen.n_cells:
-        raise LookError(f"on = {name!r}: no tet of this frame has a node in the set")
+        raise LookError(f"on = {name!r}: no tet of the frame has a node in the set")
     return chosen

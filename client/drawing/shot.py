@@ -1,4 +1,4 @@
-"""Drawn surfaces of one frame."""
+"""The surfaces of one frame that are drawn (a shot)."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -12,36 +12,36 @@ from .surfaces import Piece
 
 @dataclass(frozen=True)
 class Shot:
-    """Drawn surfaces of one frame; ``time`` in s."""
+    """The surfaces of one frame that are drawn, and the ``time`` of the frame, s."""
 
     pieces: list[Piece]
     time: float | None
     bounds: Any
-    """(3, 2) lowest and highest coordinates of the whole body, m."""
+    """Lowest and highest coordinates (3, 2) of the whole body, m."""
     walls: Sequence[Wall] = ()
     """Rigid walls at the time of the frame."""
 
     @property
     def shown(self) -> Any:
-        """Field values of all surfaces as one array."""
+        """Field values of all surfaces of the shot, as one array."""
         return np.concatenate([np.asarray(piece.surface["shown"]).reshape(-1) for piece in self.pieces])
 
     @property
     def points(self) -> Any:
-        """(., 3) points of all surfaces, m."""
+        """Points (., 3) of all surfaces of the shot, m."""
         return np.concatenate([np.asarray(piece.surface.points, float) for piece in self.pieces])
 
     def near(self, focus: Sequence[int]) -> Any:
-        """Returns (., 3) points of the surfaces without debris, of the parts in ``focus`` if any of these parts is
-        drawn.
+        """Returns the points (., 3) of the surfaces without debris. If parts in ``focus`` are drawn, only their
+        points are returned.
         """
         some = [piece for piece in self.pieces if piece.part in focus] or self.pieces
         found = [_corners(piece.surface) for piece in some]
         return np.concatenate(found) if any(map(len, found)) else self.points
 
     def beyond(self, inside: Any) -> int:
-        """Returns the number of pieces of debris without a face in the picture; ``inside`` returns (n,) True for
-        points (n, 3) in the picture.
+        """Returns the number of pieces of debris that have no face in the picture. ``inside``: function that returns
+        (n,) True for those of the points (n, 3) that lie in the picture.
         """
         seen: set[tuple[int, int]] = set()
         debris: set[tuple[int, int]] = set()
@@ -56,6 +56,6 @@ class Shot:
 
 
 def _corners(surface: Any) -> Any:
-    """Returns (., 3) corners of the cells that are not debris."""
+    """Returns the corners (., 3) of the cells of a surface that are not debris."""
     cells = np.flatnonzero(np.asarray(surface.cell_data["far"]) == 0)
     return np.asarray(surface.extract_cells(cells).points, float) if len(cells) else np.zeros((0, 3))

@@ -1,5 +1,5 @@
-"""Drawn surfaces of a frame. The surface of each part has the field, is cut at sections and is mirrored. A section
-cuts the tets; the field is interpolated on the cut surface.
+"""Surfaces of a frame for a picture. The surface of each part has the values of the field; it is cut at sections and
+mirrored. A section cuts the tets, and the field is interpolated on the cut surface.
 """
 
 import itertools
@@ -21,18 +21,18 @@ from .planes import Mirror
 Array: TypeAlias = "np.ndarray[Any, np.dtype[np.float64]]"
 
 _DEBRIS = 0.003
-"""Fraction of the volume of a part that lies beyond each end of its bulk."""
+"""Fraction of the volume of a part that lies beyond each end of the bulk of the part."""
 _ASIDE = 0.25
-"""Distance from the bulk at which debris begins, over the length of the bulk. _DEBRIS and _ASIDE are chosen so that a
-few fragments far ahead do not make the body small in the picture: the camera frames the bulk."""
+"""Distance from the bulk at which debris begins, relative to the length of the bulk. The camera frames the bulk
+only; with the chosen _DEBRIS and _ASIDE a few fragments far ahead do not make the body small in the picture."""
 _ONE = 1e-6
-"""Distance below which two points are merged, over the length of a body. Chosen value."""
+"""Distance below which two points are merged, relative to the length of a body. Chosen value."""
 
 
 @dataclass(frozen=True)
 class Piece:
-    """A part as drawn. The surface has the field as ``shown``, by cell or by point. Each cell has the number of its
-    fragment (0 for a frame without fragments) and a flag for debris far from the bulk of the part.
+    """A part as it is drawn. The surface has the field in the array ``shown``, by cell or by point. Each cell has
+    the number of its fragment (0 in a frame without fragments), and a flag for debris far from the bulk of the part.
     """
 
     part: int
@@ -46,8 +46,8 @@ def read_mesh(path: Path) -> Any:
 
 
 def pieces(grid: Any, picture: Picture, towards: Sequence[float]) -> list[Piece]:
-    """Returns the parts of a ``prepared`` frame for a camera in the direction ``towards``. Raises LookError for
-    sections that leave no tets.
+    """Returns the pieces of a ``prepared`` frame for a camera in the direction ``towards``. Raises LookError if the
+    sections leave no tets.
     """
     sections = [Section(plane, towards[plane.axis] >= 0.0) for plane in picture.sections]
     found = []
@@ -61,7 +61,7 @@ def pieces(grid: Any, picture: Picture, towards: Sequence[float]) -> list[Piece]
 
 
 def _without_seams(found: list[Piece], picture: Picture) -> list[Piece]:
-    """Removes the faces that two opaque parts have in common: these faces are not visible."""
+    """Removes the faces that two opaque parts have in common, because these faces are not visible."""
     kept = {piece.part: piece for piece in found}
     for whole in (False, True):
         group = [piece for piece in found if piece.opacity == 1.0 and (piece.part in picture.whole) == whole]
@@ -72,7 +72,7 @@ def _without_seams(found: list[Piece], picture: Picture) -> list[Piece]:
 
 
 def _seams(surfaces: Sequence[Any]) -> list[Any]:
-    """Returns for each surface (cells,) True for the faces that another surface also has."""
+    """Returns a mask (cells,) for each surface: True for faces that another surface also has."""
     if len(surfaces) < 2:
         return [np.zeros(surface.n_cells, bool) for surface in surfaces]
     sizes = [surface.n_cells for surface in surfaces]
@@ -91,15 +91,18 @@ def _left(surface: Any, seam: Any) -> Any:
 
 
 def bulk(grid: Any, picture: Picture) -> Array:
-    """Returns (3, 2) lowest and highest coordinates of the visible part of a ``prepared`` frame without debris, m."""
+    """Returns the lowest and highest coordinates (3, 2), m, of the visible part of a ``prepared`` frame without
+    debris.
+    """
     parts = np.asarray(grid["part"])
     seen = np.isin(parts, picture.focus) if picture.focus else ~np.isin(parts, picture.hidden)
     return extent(grid, seen & (np.asarray(grid["far"]) == 0))
 
 
 def extent(grid: Any, cells: Any) -> Array:
-    """Returns (3, 2) lowest and highest coordinates of the corners of the chosen cells, m; of all cells if ``cells``
-    (n,) has no True. Points without cells do not count: a frame also contains nodes that have left the body.
+    """Returns the lowest and highest coordinates (3, 2), m, of the corners of the cells in the mask ``cells`` (n,);
+    of all cells if the mask is nowhere True. Points without cells are ignored, because a frame also contains nodes
+    that have left the body.
     """
     chosen = np.repeat(cells if cells.any() else np.ones(grid.n_cells, bool), np.diff(grid.offset))
     corners = np.asarray(grid.points, float)[np.asarray(grid.cell_connectivity)[chosen]]
@@ -107,7 +110,9 @@ def extent(grid: Any, cells: Any) -> Array:
 
 
 def require_sections(picture: Picture, bounds: Array) -> None:
-    """Raises LookError for a section outside of the bodies in all frames; ``bounds`` (frames, 3, 2), m."""
+    """Raises LookError for a section that lies outside of the bodies in every frame. ``bounds``: coordinates
+    (frames, 3, 2), m.
+    """
     for plane in picture.sections:
         low, high = bounds[:, plane.axis, 0].min(), bounds[:, plane.axis, 1].max()
         for mirror in picture.mirrors:
@@ -134,15 +139,15 @@ def _beyond(axis: str, at: float, low: float, high: float) -> LookError:
 
 
 def values(mesh: Any, name: str) -> tuple[Array, bool]:
-    """Returns the field in the unit of pictures, and True for a field of points. Raises ViewError for a frame
-    without the field.
+    """Returns the field in the unit of pictures, and True if the values belong to points. Raises ViewError if the
+    frame does not have the field.
     """
     field = FIELDS[name]
     array = field.array or name
     of_points = array in mesh.point_data
     data = mesh.point_data if of_points else mesh.cell_data
     if array not in data:
-        raise ViewError(f"this frame has no field {array!r}; it has: {', '.join(data.keys()) or 'none'}")
+        raise ViewError(f"the frame has no field {array!r}; it has: {', '.join(data.keys()) or 'none'}")
     found = np.asarray(data[array])
     if found.ndim == 2:
         found = np.linalg.norm(found, axis=1) if field.component is None else found[:, field.component]
@@ -150,8 +155,8 @@ def values(mesh: Any, name: str) -> tuple[Array, bool]:
 
 
 def prepared(mesh: Any, picture: Picture) -> Any:
-    """Returns the mesh with the arrays ``shown``, ``part``, ``fragment``, ``far`` and, for arrows, ``vector`` only.
-    Raises ViewError for a missing field.
+    """Returns the mesh with only the arrays ``shown``, ``part``, ``fragment``, ``far`` and, if arrows are drawn,
+    ``vector``. Raises ViewError for a missing field.
     """
     bare = vtk.bare(mesh)
     found, of_points = values(mesh, picture.field)
@@ -162,14 +167,14 @@ def prepared(mesh: Any, picture: Picture) -> Any:
     bare.cell_data["far"] = _far(bare)
     if vectors := picture.look.vectors:
         if vectors not in mesh.point_data:
-            raise ViewError(f"this frame has no {vectors} to draw as vectors")
+            raise ViewError(f"the frame has no field {vectors} to draw as vectors")
         bare.point_data["vector"] = np.asarray(mesh.point_data[vectors], float)
     return bare
 
 
 def _part(grid: Any, part: int, picture: Picture) -> Any:
-    """Returns the tets of one part. The field is a mean at the nodes, which other parts may share, or a value by
-    tet.
+    """Returns the tets of one part. The field has one value for each tet, or means at the nodes; the mean at a node
+    may include tets of other parts.
     """
     own = grid.extract_cells(np.flatnonzero(grid["part"] == part))
     cells = picture.look.raw or FIELDS[picture.field].kind in NAMED
@@ -183,7 +188,7 @@ def _part(grid: Any, part: int, picture: Picture) -> Any:
 
 
 def _far(grid: Any) -> Any:
-    """Returns (cells,) True for tets far from the bulk of their part."""
+    """Returns a mask (cells,) that is True for tets far from the bulk of their part."""
     tets = grid.cells.reshape(-1, 5)[:, 1:] if len(grid.cells) == 5 * grid.n_cells else None
     if tets is None:
         return np.zeros(grid.n_cells, np.uint8)
@@ -211,7 +216,7 @@ def _bulk(places: Array, weights: Array) -> tuple[float, float]:
 
 @dataclass(frozen=True)
 class Section:
-    """A cut that removes the side above ``plane`` on its axis, or the side below."""
+    """A cut that removes one side of ``plane``: the side above it on its axis, or the side below it."""
 
     plane: Mirror
     below: bool
@@ -242,7 +247,7 @@ def _same(one: Mirror, other: Mirror, length: float) -> bool:
 
 
 def _chosen(mirrors: Sequence[Mirror]) -> Iterator[list[Mirror]]:
-    """Returns all combinations of mirrors; the first is the body itself."""
+    """Returns all combinations of mirrors; the first combination has no mirror and stands for the body itself."""
     for flips in itertools.product((False, True), repeat=len(mirrors)):
         yield [mirror for mirror, flip in zip(mirrors, flips, strict=True) if flip]
 
@@ -255,22 +260,22 @@ def _before(section: Section, mirrors: Sequence[Mirror]) -> Section:
 
 def _clipped(mesh: Any, sections: Sequence[Section]) -> Any:
     for section in sections:
-        side, shift = (1.0 if section.below else -1.0), 0.2 * _ONE * mesh.length  # no node lies in the plane
+        side, shift = (1.0 if section.below else -1.0), 0.2 * _ONE * mesh.length  # No node lies in the shifted plane.
         normal, origin = np.zeros(3), np.zeros(3)
         normal[section.plane.axis], origin[section.plane.axis] = side, section.plane.place + side * shift
         if mesh.n_cells:
             left = mesh.clip(normal=normal, origin=origin)
             thick = np.ptp(np.reshape(left.bounds, (3, 2))[section.plane.axis]) > _ONE * mesh.length
-            mesh = left if thick else left.extract_cells([])  # a cut along the surface leaves tets without volume
+            mesh = left if thick else left.extract_cells([])  # A cut along the surface would leave tets without volume.
     return mesh
 
 
 def _faces(mesh: Any, mirrors: Sequence[Mirror], length: float) -> Any:
-    """Returns the outer faces without the faces in the plane of a mirror."""
+    """Returns the outer faces of a mesh without the faces that lie in a mirror plane."""
     surface = mesh.extract_surface(algorithm="dataset_surface")
     if not mirrors or not surface.n_cells:
         return surface
-    surface = surface.triangulate()  # a section leaves faces with three to six corners
+    surface = surface.triangulate()  # A section leaves faces with three to six corners.
     outer = np.ones(surface.n_cells, bool)
     for mirror in mirrors:
         near = np.abs(np.asarray(surface.points)[:, mirror.axis] - mirror.place) < _ONE * length
@@ -279,7 +284,7 @@ def _faces(mesh: Any, mirrors: Sequence[Mirror], length: float) -> Any:
 
 
 def _reflected(surface: Any, mirrors: Sequence[Mirror], field: str) -> Any:
-    """Returns the mirror image of a surface across all given planes."""
+    """Returns the mirror image of a surface across all planes in ``mirrors``."""
     image = surface.copy() if mirrors else surface
     for mirror in mirrors:
         image.points[:, mirror.axis] = 2.0 * mirror.place - image.points[:, mirror.axis]

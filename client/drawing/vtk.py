@@ -1,4 +1,4 @@
-"""The only module that imports pyvista: meshes, lights and the off-screen window."""
+"""All functions that use pyvista: meshes, lights and the off-screen window. Only this module imports pyvista."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -22,12 +22,12 @@ def read(path: str) -> tuple[Any, float | None]:
         data = pieces[0].field_data if pieces and "time" not in data else data
         mesh = pv.merge(pieces, merge_points=False)
     if mesh.n_cells == 0:
-        raise ViewError(f"{path}: this frame has no elements")
+        raise ViewError(f"{path}: the frame has no elements")
     return mesh, float(np.ravel(data["time"])[0]) if "time" in data else None
 
 
 def bare(mesh: Any) -> Any:
-    """Returns the mesh with points in double precision and without fields."""
+    """Returns a copy of a mesh with points in double precision and without fields."""
     return pv.UnstructuredGrid(mesh.cells, mesh.celltypes, np.asarray(mesh.points, dtype=float))
 
 
@@ -37,7 +37,7 @@ def joined(surfaces: Sequence[Any]) -> Any:
 
 
 def window(size: tuple[int, int], ground: str) -> Any:
-    """Returns an off-screen window without anti-aliasing: pictures are drawn larger and then reduced."""
+    """Returns an off-screen window without anti-aliasing, because pictures are drawn larger and then reduced."""
     plotter: Any = pv.Plotter(off_screen=True, window_size=list(size), lighting="none", border=False)
     plotter.set_background(ground)
     plotter.render_window.SetMultiSamples(0)
@@ -50,12 +50,12 @@ def light(position: Sequence[float], intensity: float) -> Any:
 
 
 def disk(centre: Any, normal: Any, radius: float) -> Any:
-    """Returns a flat disk."""
+    """Returns a flat circular disk with a centre, a normal and a radius."""
     return pv.Disc(center=centre, inner=0.0, outer=radius, normal=normal, r_res=1, c_res=96)
 
 
 def tube(centre: Any, axis: Any, radius: float, height: float) -> Any:
-    """Returns the side of a cylinder, open at its ends."""
+    """Returns the side surface of a cylinder, open at both ends."""
     return pv.Cylinder(center=centre, direction=axis, radius=radius, height=height, resolution=96, capping=False)
 
 
@@ -73,7 +73,7 @@ def arrows(places: Any, vectors: Any, factor: float) -> Any:
 
 
 def depths(plotter: Any) -> Any:
-    """Returns (height, width) the depth of the last drawing: 0 at the near plane, 1 at the far plane and at the
+    """Returns the depth (height, width) of the last drawing: 0 at the near plane, 1 at the far plane and at the
     background.
     """
     width, height = plotter.window_size

@@ -1,4 +1,4 @@
-"""Rigid walls in pictures: their positions in a frame, and their surfaces."""
+"""Rigid walls in pictures: positions of the walls in a frame, and surfaces of the walls."""
 
 from typing import Any
 
@@ -11,7 +11,9 @@ from .planes import Wall
 
 
 def placed(mesh: Any, picture: Picture) -> list[Wall]:
-    """Returns the walls of a picture at the time of a frame; no wall that moves if the frame has no positions."""
+    """Returns the walls of a picture at the time of a frame. A moving wall is left out if the frame does not have
+    its position.
+    """
     if "wall_position" not in mesh.field_data:
         return [wall for wall in picture.walls if not wall.moves]
     places = np.asarray(mesh.field_data["wall_position"], float).reshape(-1, 3)
@@ -22,8 +24,8 @@ def placed(mesh: Any, picture: Picture) -> list[Wall]:
 
 
 def surface(points: Any, wall: Wall) -> Any:
-    """Returns the surface of a wall: a disk a little larger than the body with the ``points`` (n, 3), the side of a
-    cylinder a little longer than the body, or a sphere.
+    """Returns the surface of a wall: for a plane a disk a little larger than the body with the ``points`` (n, 3),
+    for a cylinder a side surface a little longer than the body, or a sphere.
     """
     along = np.asarray(wall.direction) / np.linalg.norm(wall.direction)
     centre = 0.5 * (points.min(axis=0) + points.max(axis=0))

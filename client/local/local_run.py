@@ -67,7 +67,9 @@ def ask(folder: Path, request: str, wish: str) -> str:
     """
     LocalFolder(folder).path(layout.JOURNAL)
     if not slurm.held(folder):
-        raise UnfinishedError(f"{folder}: no worker writes into it; a run that is running can be asked")
+        raise UnfinishedError(
+            f"{folder}: no worker writes into this folder; only a run with a worker can get a request"
+        )
     whole.touch(folder / request)
     return f"{folder} {wish} requested"
 

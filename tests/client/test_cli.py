@@ -101,7 +101,7 @@ def test_warnings_of_a_case_in_si_do_not_fill_the_screen(quiet_home: Path) -> No
     (quiet_home / "si.json").write_bytes(resolved_json(read_case(shipped_path("long_rod"))))
     lines = conoid("validate", "si.json").stderr.splitlines()
     assert len(lines) == 13
-    assert lines[-1].endswith(" more; conoid validate --json has all")
+    assert lines[-1].endswith(" more warnings; conoid validate --json prints all")
 
 
 def test_a_case_that_is_about_to_run_gets_its_warnings(user: Path) -> None:
@@ -124,7 +124,10 @@ def test_a_label_is_a_name_and_a_value(quiet_home: Path) -> None:
     result = conoid("ls", "--label", "batch", "--url", "http://127.0.0.1:1")
     assert (result.exit_code, result.stderr) == (2, "conoid: label = 'batch': write NAME=VALUE\n")
     result = conoid("ls", "--label", "a=1", "--label", "a=2", "--url", "http://127.0.0.1:1")
-    assert (result.exit_code, result.stderr) == (2, "conoid: label: each name may have one value; given are a=1, a=2\n")
+    assert (result.exit_code, result.stderr) == (
+        2,
+        "conoid: label: each name may have only one value; given are a=1, a=2\n",
+    )
 
 
 @pytest.mark.usefixtures("warm")
@@ -144,7 +147,7 @@ def test_view_takes_times_with_their_units(quiet_home: Path) -> None:
     words = ("view", folder, "--camera", "-x", "--size", 200, 150, "--json", "--out", "p.png", "--time")
     near = conoid(*words, "79 us")
     assert read(near)["times"] == [80e-6]
-    assert near.stderr == "conoid: time = 79.0 µs: the nearest frame is of 80.0 µs\n"
+    assert near.stderr == "conoid: time = 79.0 µs: the nearest frame has the time 80.0 µs\n"
     assert conoid(*words, "80 us").stderr == ""
     assert conoid(*words, "1 ms").stderr == "conoid: time = 1.00 ms: the frames of bar are of 0 s to 80.0 µs\n"
     one = conoid("view", folder / "frames" / "000007.vtkhdf", "--time", "80 us")
@@ -339,7 +342,7 @@ def test_watch_can_be_left(user: Path) -> None:
     child.send_signal(signal.SIGINT)
     _, errors = child.communicate(timeout=60)
     assert child.returncode == 130
-    assert errors == f"conoid: the run continues; conoid watch {run} shows it again\n"
+    assert errors == f"conoid: the run continues; conoid watch {run} shows the run again\n"
     assert read(conoid("show", run, "--json"))["state"] in {"starting", "running"}
     conoid("cancel", run)
 

@@ -79,7 +79,7 @@ def test_the_command_prints_and_draws(runs: tuple[Result, Result], tmp_path: Pat
     out = tmp_path / "both.png"
     printed = CliRunner().invoke(app, ["compare", str(tmp_path / "a"), str(tmp_path / "b"), "--out", str(out)])
     assert printed.exit_code == 0, printed.output
-    assert "the same answer, to the bit" in printed.stdout
+    assert "both runs have the same answer, bit for bit" in printed.stdout
     assert "parts.rod.mesh.element_size" in printed.stdout
     assert out.read_bytes().startswith(b"\x89PNG")
     drawn = curves.comparison(material(*runs))

@@ -225,7 +225,7 @@ def test_the_quantity_of_the_advice_is_checked_before_any_run(name: str) -> None
     [
         (["--meshes", "1,x"], "--meshes"), (["--meshes", "1,,2"], "--meshes"), (["--meshes", "1,1"], "each once"),
         (["--forms", "nodal,cubic"], "--forms"), (["--forms", "nodal,"], "--forms"),
-        (["--vary", "moods"], "--vary"), (["--quantity", "nope"], "--quantity = 'nope': a part of a name; allowed: "),
+        (["--vary", "moods"], "--vary"), (["--quantity", "nope"], "--quantity = 'nope': no such quantity; allowed: "),
     ],
 )  # fmt: skip
 def test_options_that_mean_nothing_are_refused(words: list[str], message: str) -> None:

@@ -70,7 +70,7 @@ def test_cases_are_chosen_by_name_and_by_row() -> None:
 
 def test_the_table_lists_all_failures() -> None:
     text = to_markdown([Verdict(named("wedge"), "", GOOD, 1e-12, []), Verdict(named("tile"), "", GOOD, None, ["lost"])])
-    assert "1 of 2 passed" in text
+    assert "1 of 2 cases passed" in text
     assert "- **tile**: lost" in text
 
 

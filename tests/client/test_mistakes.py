@@ -103,7 +103,7 @@ def test_a_link_out_of_a_folder_is_not_read(damaged: Path) -> None:
 @pytest.mark.parametrize("command", ["watch", "show", "report", "get", "cancel"])
 def test_a_path_without_a_run_sends_no_request(command: str, quiet_home: Path) -> None:
     assert refused(1, command, "runs/none") == (
-        "conoid: runs/none: not the folder of a run; write its folder, its id, or 'last'"
+        "conoid: runs/none: this is not the folder of a run; write the folder or the id of a run, or 'last'"
     )
 
 

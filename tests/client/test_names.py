@@ -136,7 +136,7 @@ def test_a_run_in_a_folder_is_shown_and_asked(folder: Path) -> None:
 
 def test_a_run_in_a_folder_without_a_worker_is_lost(folder: Path) -> None:
     assert json.loads(conoid("show", folder, "--json"))["state"] == "lost"
-    assert "no worker writes into it" in refused(1, "checkpoint", folder)
+    assert "no worker writes into this folder" in refused(1, "checkpoint", folder)
 
 
 def test_the_end_of_a_run_in_a_folder_is_shown(folder: Path) -> None:
@@ -167,7 +167,7 @@ def test_a_copy_of_a_run_does_not_stand_for_the_one_of_the_server(folder: Path, 
     server.answers[f"/v1/runs/{name}"] = answering(run_info(id=name))
     server.answers[f"/v1/runs/{name}:cancel"] = answering(run_info(id=name, state="stopping"))
     assert conoid("cancel", name, "--url", server.url) == f"{name} stopping\n"
-    assert "no worker writes into it" in conoid("cancel", f"./{name}/../{name}")
+    assert "no worker writes into this folder" in conoid("cancel", f"./{name}/../{name}")
 
 
 @pytest.mark.parametrize("name", ["-x", "a%b", "a\\b", "a b", "ü", "[red]", "%s{0}"])

@@ -279,7 +279,7 @@ def test_a_film_goes_to_ffmpeg_and_its_absence_is_one_line(tmp_path: Path, monke
         films.save(iter(images), 2, 12.5, tmp_path / "b.mp4")
     monkeypatch.setenv("PATH", str(tmp_path / "nowhere"))
     monkeypatch.setitem(__import__("sys").modules, "imageio_ffmpeg", None)
-    with pytest.raises(ViewError, match="needs ffmpeg: pip install imageio-ffmpeg"):
+    with pytest.raises(ViewError, match="needs ffmpeg: install it with pip install imageio-ffmpeg"):
         films.save(iter(images), 2, 12.5, tmp_path / "b.mp4")
 
 

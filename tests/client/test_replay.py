@@ -189,7 +189,7 @@ def test_the_command_compares_all_policies_in_a_folder(tmp_path: Path) -> None:
     shown = CliRunner().invoke(app, ["replay-balance", folder, "--cost", "1", "--ranks", "4"])
     assert shown.exit_code == 0, shown.output
     assert shown.stdout.splitlines()[2].split()[:2] == ["every:10", "15"]
-    assert "on 4 ranks, the run had 2; a cut costs 1.00 s; 17 moments, 8 groups" in shown.stdout
+    assert "on 4 ranks, the run had 2; a new decomposition costs 1.00 s; 17 moments, 8 groups" in shown.stdout
     assert "the run: every:10" in shown.stdout
     refused = CliRunner().invoke(app, ["replay-balance", folder, "--policy", "sometimes"])
     assert (refused.exit_code, refused.stderr[:30]) == (2, "conoid: policy = 'sometimes', ")

@@ -145,7 +145,7 @@ def test_the_parts_have_their_energies_where_there_are_several(folder: Path, tmp
 
 def test_a_field_that_cannot_be_drawn_is_a_line(folder: Path, tmp_path: Path) -> None:
     text = read(report.write(Result.open(folder), tmp_path / "bar.html", ["fragment"])).text
-    assert "fragment: this frame has no field 'fragment'" in text
+    assert "fragment: the frame has no field 'fragment'" in text
 
 
 def test_the_command_names_the_file_after_the_run(folder: Path, quiet_home: Path) -> None:

@@ -125,7 +125,9 @@ def test_words_on_the_axis_and_columns_by_name() -> None:
     assert [label.get_text() for label in made.axes[0].get_xticklabels()] == ["law 1", "law 2", "law 3"]
 
 
-@pytest.mark.parametrize(("x", "columns", "words"), [("w", [], "x = 'w'"), (None, ["mass"], "'mass': the table has")])
+@pytest.mark.parametrize(
+    ("x", "columns", "words"), [("w", [], "x = 'w'"), (None, ["mass"], "'mass': not a numeric column")]
+)
 def test_a_plot_of_what_is_not_there_is_refused(x: str | None, columns: list[str], words: str) -> None:
     with pytest.raises(ClientError, match=words):
         sweep_plot.figure(ROWS, ["v", "run.ranks"], x, columns)

@@ -74,8 +74,8 @@ def test_a_changed_case_is_refused_in_one_line(user: Path) -> None:
     refused = conoid(*words)
     assert (refused.exit_code, refused.stdout) == (2, "")
     assert refused.stderr.splitlines() == [
-        f"conoid: {case}: the case has changed since this sweep was begun: run.end_time was '1 us' and is '3 us'; "
-        "--new begins another one"
+        f"conoid: {case}: the case has changed since the start of this sweep: run.end_time was '1 us' and is '3 us'; "
+        "--new starts a new sweep"
     ]
 
 
@@ -129,7 +129,7 @@ def test_the_same_threshold_from_python(server: LocalServer, quiet_home: Path) -
     [
         (("--adaptive", "probe.left = 0"), "KEY=LOW:HIGH"),
         (("--adaptive", "probe.left = 0", "--grid", "--set", "a=1:2"), "neither --grid nor --list"),
-        (("--tolerance", "1", "--set", "run.ranks=1"), "are for --adaptive"),
+        (("--tolerance", "1", "--set", "run.ranks=1"), "are allowed only with --adaptive"),
     ],
 )
 def test_options_that_do_not_go_together(user: Path, words: tuple[str, ...], message: str) -> None:

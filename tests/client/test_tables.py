@@ -70,7 +70,7 @@ def test_the_outcome_has_the_largest_compression_of_laws_for_tension_only() -> N
         PlainConsole(file=out, width=160, highlight=False).print(table)
     (line,) = [line for line in out.getvalue().splitlines() if "Griffith" in line]
     assert line.split(maxsplit=1)[1].strip() == (
-        "tile up to 50.6 GPa, 21.10 times Griffith's criterion, 509 tets beyond it at once"
+        "tile up to 50.6 GPa, 21.10 times Griffith's criterion, 509 tets beyond the criterion at the same time"
     )
 
 
@@ -80,8 +80,8 @@ def test_the_outcome_has_the_serial_time_of_one_thread() -> None:
         serial={"elements": [0.5, 1.0], "rest": [0.25, 1.0]}, parallel={"elements": [5.0, 6.0], "rest": [0.0, 0.0]},
     )  # fmt: skip
     for outcome, text in (
-        (ended, "2.00 ms by one thread alone, 6.00 ms in what threads share, in which the others are busy for 25 %"),
-        (msgspec.structs.replace(ended, threads=1), "2.00 ms by one thread alone, 6.00 ms in what threads share"),
+        (ended, "2.00 ms in serial code, 6.00 ms in parallel regions, in which the other threads are busy for 25 %"),
+        (msgspec.structs.replace(ended, threads=1), "2.00 ms in serial code, 6.00 ms in parallel regions"),
     ):
         out = io.StringIO()
         PlainConsole(file=out, width=160, highlight=False).print(outcome_table(outcome))
@@ -138,9 +138,9 @@ def test_a_sweep_in_a_terminal_has_keys_state_and_what_differs() -> None:
         "[J]",
     ]
     assert first.split() == ["100", "200", "succeeded", "33.3333", "100", "100", "10000"]
-    assert more == "1 more result differs: --column NAME, or all with --out FILE.csv"
+    assert more == "1 more result differs: --column NAME shows one, --out FILE.csv writes all"
     some = points_table.narrowed(SWEEP, ["a.v", "b.v"], ["broken", "probe.x [mm]"])
     assert some.splitlines()[0] == "a.v [m/s],b.v [m/s],run,state,broken,probe.x [mm]"
     assert printed(some, whole=True)[2].split() == ["100", "200", "succeeded", "100", "33.3333"]
-    with pytest.raises(UsageError, match=r"'mass': the table has a.v, b.v, run"):
+    with pytest.raises(UsageError, match=r"'mass': not a column of the table; known: a.v, b.v, run"):
         points_table.narrowed(SWEEP, ["a.v"], ["mass"])

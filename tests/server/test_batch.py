@@ -181,7 +181,7 @@ def test_a_folder_is_handed_over_for_one_case(elsewhere: Path) -> None:
     ):
         other = conoid(*words, *more)
         assert other.exit_code == 1
-        assert f"{wrong}; --out names another folder" in other.output
+        assert f"{wrong}; choose another folder with --out" in other.output
     assert "job 101" in conoid(*words, "--slurm", "standard").stdout
 
 
@@ -214,7 +214,7 @@ def test_a_job_has_its_own_copy_of_a_mesh_file(elsewhere: Path, monkeypatch: pyt
     assert located("bar.inp", digest, folder).parent == folder / layout.FILES
     assert "job 101" in conoid(*words).stdout
     (here / "bar.inp").write_text(MESH.replace("0, 0, 10\n", "0, 0, 11\n"))
-    assert "another case, other ranks or threads; --out names another folder" in conoid(*words).output
+    assert "another case, other ranks or threads; choose another folder with --out" in conoid(*words).output
 
 
 def evil(folder: Path, **changes: str) -> Path:
@@ -260,7 +260,7 @@ def test_a_text_of_a_record_is_no_option_of_a_command(changes: dict[str, str], e
     result = conoid("cancel", folder)
     (line,) = result.stderr.splitlines()
     assert result.exit_code == 1
-    assert "this record cannot be read" in line
+    assert "the record of the job cannot be read" in line
 
 
 def test_a_run_that_goes_on_is_started_by_a_command_of_this_machine(elsewhere: Path) -> None:

@@ -40,8 +40,8 @@ REFUSED: dict[str, str] = {
     "ROTARY INERTIA": "masses at nodes: Conoid has no such masses", "SPRING": "springs: Conoid has none",
     "DASHPOT": "dashpots: Conoid has none", "COUPLING": "joins nodes in a way that is not translated",
     "KINEMATIC": "joins nodes in a way that is not translated", "MPC": "joins nodes in a way that is not translated",
-    "EQUATION": "joins nodes in a way that is not "
-                "translated", "EMBEDDED ELEMENT": "embedded bodies: Conoid has no such bodies",
+    "EQUATION": "joins nodes in a way that is not translated",
+    "EMBEDDED ELEMENT": "embedded bodies: Conoid has no such bodies",
     "RIGID BODY": "a rigid body that is not one whole section of solids",
     "CONTACT EXCLUSIONS": "pairs without contact; in Conoid all parts of contact.parts are in contact",
     "DSLOAD": "a load on surfaces is not translated; use [[boundaries]] kind = \"traction\"",
