@@ -1,4 +1,6 @@
-"""Address of the server and token: from options, else the environment, else the user's configuration file."""
+"""Address of the server and token of the user. They are taken from options, else from the environment, else from the
+user's configuration file.
+"""
 
 import os
 import re
@@ -14,26 +16,26 @@ from ..errors import ClientError, UsageError
 
 DEFAULT_URL = "http://127.0.0.1:8750"
 _SIGNS = re.compile(r"[!-\[\]-~]+")
-"""Characters of an address: visible ASCII without the backslash, which some programs read as a slash."""
+"""Characters that an address may have: visible ASCII without the backslash, which some programs read as a slash."""
 
 
 @dataclass(frozen=True)
 class Target:
-    """Address of a server, and the token for it (None: a server without access control)."""
+    """Address of a server and the token for this server; the token is None for a server without access control."""
 
     url: str
     token: str | None
 
 
 def config_file() -> Path:
-    """Path of ``~/.config/conoid/client.toml``; XDG_CONFIG_HOME is respected."""
+    """Path of the user's configuration file ``~/.config/conoid/client.toml``, or below XDG_CONFIG_HOME if it is set."""
     base = os.environ.get("XDG_CONFIG_HOME") or str(Path.home() / ".config")
     return Path(base) / "conoid" / "client.toml"
 
 
 def target(url: str | None = None, token: str | None = None) -> Target:
-    """Returns the server to use. A token from the file is only sent to the server that the file names. Raises
-    ClientError.
+    """Returns the server to use. A token of the configuration file is sent only to the server that the file names.
+    Raises ClientError.
     """
     saved = read_config()
     chosen = address(url or os.environ.get("CONOID_URL") or saved.get("url") or DEFAULT_URL)
@@ -44,26 +46,30 @@ def target(url: str | None = None, token: str | None = None) -> Target:
 
 
 def address(url: str) -> str:
-    """Returns the address of a server: scheme, host, and optionally port and path, without a slash at its end.
-    Raises UsageError.
+    """Returns the address of a server: scheme, host, optional port and path, without a slash at the end. Raises
+    UsageError.
     """
     try:
         parts = urlsplit(url)
         fits = parts.port is None or parts.port > 0
     except ValueError:
         fits = False
-    wanted = f"write it with http:// or https://, such as {DEFAULT_URL}"
+    wanted = f"write the address with http:// or https://, such as {DEFAULT_URL}"
     if not (fits and parts.scheme in {"http", "https"} and parts.hostname and _SIGNS.fullmatch(url)):
         raise UsageError(f"url = {shown(url)}: {wanted}")
     if "@" in parts.netloc:
-        raise UsageError(f"url: a user or password in it is not sent; {wanted}, and the token with --token")
+        raise UsageError(
+            f"url: a user or password in the address is not sent; {wanted}, and give the token with --token"
+        )
     if parts.query or parts.fragment or url.endswith(("?", "#")):
         raise UsageError(f"url = {shown(url)}: no ? or # may follow the address; {wanted}")
     return url.rstrip("/")
 
 
 def read_config() -> dict[str, str]:
-    """Returns the keys of the configuration file; empty without one. Raises ClientError for an unusable file."""
+    """Returns the keys of the configuration file; empty if there is no file. Raises ClientError for an unusable
+    file.
+    """
     path = config_file()
     try:
         data = tomllib.loads(whole.read_text(path))
@@ -73,5 +79,5 @@ def read_config() -> dict[str, str]:
         raise ClientError(f"{path}: cannot be read: {error}") from None
     for key, value in data.items():
         if key not in {"url", "token"} or not isinstance(value, str):
-            raise ClientError(f"{path}: {key} = {value!r}: allowed are url and token, each as text")
+            raise ClientError(f"{path}: {key} = {value!r}: allowed keys: url and token, each with a text as value")
     return data

@@ -1,7 +1,7 @@
-"""Requests to a server over HTTP; a refusal becomes one clear line.
+"""Requests to a server over HTTP; a refusal of the server becomes one clear line.
 
-Answers have limits: the time until the head has arrived, the number of bytes, and the mean rate of the bytes. No
-request waits for ever, and no answer fills the memory or the disk.
+Answers have limits: the time until the headers have arrived, the number of bytes, and the mean rate of the bytes.
+Therefore no request waits for ever, and no answer fills the memory or the disk.
 """
 
 import base64
@@ -29,31 +29,32 @@ from .config import address
 T = TypeVar("T")
 
 _AS_IT_IS = {"Accept-Encoding": "identity"}
-"""Header of a request for a file: the answer must have its length."""
+"""Header of a request for a file, so that the answer contains the length of the file."""
 
 _ANSWER, _CONNECTION = 30.0, 5.0
-"""Timeouts in s: an answer may take a while with a slow disk, a connection may not. Chosen value."""
+"""Time limits in s for an answer and for a connection; an answer may take long if the server's disk is slow. Chosen
+values."""
 _TIMEOUT = httpx2.Timeout(_ANSWER, connect=_CONNECTION)
 _STREAM_TIMEOUT = httpx2.Timeout(60.0, connect=_CONNECTION)
 """Longest silence of a stream, s: four times the 15 s after which the server sends a comment
 (server/answers/stream.py)."""
 _SPARE = 10.0
-"""Time beyond the allowed silence after which an answer is given up whose head arrives byte by byte, s."""
+"""Additional time, s, for an answer whose headers arrive byte by byte; after it the request is given up."""
 _SLOWEST = 1000.0
 """Smallest mean rate of an answer after its first 30 s, bytes per s. Chosen value: slower than any real connection."""
 UNAUTHORIZED = 401
 """HTTP status of a request without a valid token."""
 NOT_FOUND = 404
 _TRIES = 3
-"""Number of tries of a request that may be repeated, 0.3 and 0.6 s apart. Chosen value: most lost connections are
-back after this time."""
+"""Number of tries of a request that may be repeated; the pauses are 0.3 s and 0.6 s. Chosen value: most lost
+connections are back after these pauses."""
 _PATIENCE = 10.0
 """Time after which a failed request is not repeated, s. Chosen value: a server that is silent for this time hangs.
-The time allows three timeouts of a connection, or one of an answer."""
+In this time three connections, or one answer, can reach their time limit."""
 
 
 class Router(msgspec.Struct, kw_only=True, frozen=True):
-    """Address of the Zenoh router, and user and password for the router (both None: without access control)."""
+    """Address of the Zenoh router, with user and password (both None for a router without access control)."""
 
     endpoint: str
     user: str | None = None
@@ -61,8 +62,8 @@ class Router(msgspec.Struct, kw_only=True, frozen=True):
 
 
 class Me(msgspec.Struct, kw_only=True, frozen=True):
-    """Name of the user on the server, scopes of the token, access to Zenoh (None: none), and the cores for runs:
-    ``total`` and ``used``.
+    """Name of the user on the server, scopes of the token, access to Zenoh (None if there is none), and the numbers
+    of cores for runs (``total``, ``used``).
     """
 
     owner: str
@@ -72,15 +73,15 @@ class Me(msgspec.Struct, kw_only=True, frozen=True):
 
 
 class Http:
-    """A client of a server. Use it as a context manager, or close it."""
+    """An HTTP client of one server. It is a context manager; otherwise call ``close``."""
 
     def __init__(self, url: str, token: str | None = None, transport: httpx2.BaseTransport | None = None) -> None:
-        """Connects at the first request. ``transport`` replaces the network, for a server in the same process.
-        Raises UsageError for an impossible token or address.
+        """Stores address and token; the first request opens the connection. ``transport`` replaces the network, for
+        a server in the same process. Raises UsageError for an impossible token or address.
         """
         shown = (token or "").strip()
         if not replies.visible(shown):
-            raise UsageError("token: only visible ASCII characters are allowed; was it copied whole?")
+            raise UsageError("token: only visible ASCII characters are allowed; was the token copied completely?")
         headers = {"Authorization": f"Bearer {shown}"} if shown else {}
         self.url = address(url)
         self._has_token = bool(shown)
@@ -90,7 +91,7 @@ class Http:
             raise UsageError(f"url = {self.url!r}: {error}") from None
 
     def __enter__(self) -> Self:
-        """Returns this client."""
+        """Returns the client itself."""
         return self
 
     def __exit__(self, *_: object) -> None:
@@ -106,8 +107,8 @@ class Http:
         return self.get(Me, "/v1/me")
 
     def get(self, kind: type[T], path: str, **query: str | float | list[str]) -> T:
-        """Returns the answer of a GET; a parameter with a list is sent several times. Raises ServiceError,
-        UnreachableError.
+        """Returns the answer of a GET request. A parameter with a list is sent once for each element. Raises
+        ServiceError, UnreachableError.
         """
         return self._decoded(kind, self._request("GET", path, params=query))
 
@@ -115,8 +116,8 @@ class Http:
         self, kind: type[T], path: str, body: bytes = b"", content: str = "", key: str | None = None,
         more: float = 0.0,
     ) -> T:  # fmt: skip
-        """Returns the answer of a POST. After a network error a POST is repeated only with an idempotency key.
-        ``more``: additional time for the answer, s.
+        """Returns the answer of a POST request. After a network error the request is repeated only if it has an
+        idempotency key. ``more``: additional time for the answer, s.
         """
         headers = {"Content-Type": content} if content else {}
         if key is not None:
@@ -128,21 +129,21 @@ class Http:
         return self._decoded(kind, response)
 
     def put(self, kind: type[T], path: str, body: bytes, headers: Mapping[str, str], more: float = 0.0) -> T:
-        """Returns the answer of a PUT, which is sent once. ``more`` as for ``post``."""
+        """Returns the answer of a PUT request, which is sent only once. ``more``: additional time for the answer, s."""
         timeout = httpx2.Timeout(_ANSWER + more, connect=_CONNECTION)
         return self._decoded(kind, self._request("PUT", path, content=body, headers=headers, timeout=timeout))
 
     def delete(self, path: str) -> None:
-        """Sends a DELETE. Raises ServiceError, UnreachableError."""
+        """Sends a DELETE request. Raises ServiceError, UnreachableError."""
         self._request("DELETE", path)
 
     def fetch(self, path: str) -> bytes:
-        """Returns the body of a GET. Raises ServiceError, UnreachableError."""
+        """Returns the content of the answer to a GET request. Raises ServiceError, UnreachableError."""
         return self._request("GET", path)
 
     def download(self, path: str, target: Path, listed: int | None = None) -> None:
-        """Downloads a body to a file, completely or not at all; checks the server's sha256 and the ``listed`` size,
-        if known. Raises ServiceError, UnreachableError, and OSError with the name of the file.
+        """Downloads a file completely or not at all. The file is compared with the sha256 of the server and with the
+        ``listed`` size, if known. Raises ServiceError, UnreachableError, and OSError with the name of the file.
         """
         beside = target.with_name(f".{uuid.uuid4().hex}.part")
         try:
@@ -153,7 +154,7 @@ class Http:
                     digest.update(chunk)
                     file.write(chunk)
             if listed is not None and (got := beside.stat().st_size) != listed:
-                raise AnswerError(f"{path} has {got} bytes, where the list of files has {listed}")
+                raise AnswerError(f"{path} has {got} bytes instead of the {listed} in the list of files")
             expected = response.headers.get("Repr-Digest")
             if expected is not None and expected != f"sha-256=:{base64.b64encode(digest.digest()).decode()}:":
                 raise AnswerError(f"{path} arrived damaged: its sha256 is not that of the server")
@@ -165,7 +166,9 @@ class Http:
             beside.unlink(missing_ok=True)
 
     def stream(self, path: str, after: int = 0) -> Iterator[AnyMessage]:
-        """Yields the messages of an SSE stream after a number, as they arrive, until the server ends the stream."""
+        """Yields the messages of an SSE stream after the message number ``after``, as they arrive, until the server
+        ends the stream.
+        """
         headers = {"Accept": "text/event-stream", "Last-Event-ID": str(after)}
         with self._opened("GET", path, headers=headers, timeout=_STREAM_TIMEOUT) as response:
             for event in httpx2.EventSource(response) if response.status_code == 200 else ():
@@ -173,14 +176,16 @@ class Http:
                     yield self.line(event.data)
 
     def line(self, data: str | msgspec.Raw) -> AnyMessage:
-        """Decodes a message of the server. Raises AnswerError."""
+        """Decodes a message from the server. Raises AnswerError."""
         try:
             return from_line(data)
         except (msgspec.MsgspecError, RecursionError) as error:
             raise self._unreadable(error) from None
 
     def _request(self, method: str, path: str, repeat: bool = False, **options: Any) -> bytes:
-        """Returns the whole answer. A GET, and a request with ``repeat``, is repeated after a network error."""
+        """Returns the complete answer to a request. After a network error, a GET request is repeated, and any
+        request with ``repeat``.
+        """
         tries, began = _TRIES if repeat or method == "GET" else 1, time.monotonic()
         for attempt in range(tries):
             try:
@@ -194,13 +199,13 @@ class Http:
 
     @contextmanager
     def _opened(self, method: str, path: str, **options: Any) -> Iterator[httpx2.Response]:
-        """Opens the answer as a stream. Raises ServiceError for a refusal, UnreachableError for a broken connection,
-        AnswerError.
+        """Context with the answer to a request as a stream. Raises ServiceError for a refusal, UnreachableError for
+        a broken connection, AnswerError.
         """
         try:
             with closing(self._begun(method, path, **options)) as response:
                 if 300 <= response.status_code < 400:
-                    raise AnswerError(f"{self.url} redirects to {replies.place(response)}; write that address")
+                    raise AnswerError(f"{self.url} redirects to {replies.place(response)}; write this new address")
                 if response.status_code >= 400:
                     raise refusal(response.status_code, self._refusal(response))
                 yield response
@@ -212,8 +217,8 @@ class Http:
             raise self._unreadable(error) from None
 
     def _begun(self, method: str, path: str, timeout: httpx2.Timeout = _TIMEOUT, **options: Any) -> httpx2.Response:
-        """Returns the answer once its head has arrived, within a time limit. httpx limits only the silence between
-        two bytes.
+        """Returns the answer as soon as its headers have arrived, within a time limit. httpx limits only the silence
+        between two bytes.
         """
         request = self._http.build_request(method, path, timeout=timeout, **options)
         done: queue.SimpleQueue[httpx2.Response | Exception] = queue.SimpleQueue()
@@ -238,7 +243,9 @@ class Http:
         return b"".join(self._chunks(response, replies.LONGEST))
 
     def _chunks(self, response: httpx2.Response, most: int) -> Iterator[bytes]:
-        """Yields at most ``most`` bytes of an answer. Raises AnswerError for a larger answer, or a slow one."""
+        """Yields the content of an answer. Raises AnswerError if the answer has more than ``most`` bytes or is too
+        slow.
+        """
         began, got = time.monotonic(), 0
         for chunk in response.iter_bytes():
             got += len(chunk)
@@ -246,19 +253,25 @@ class Http:
                 raise AnswerError(f"the answer of {self.url} is longer than {size(most)}")
             spent = time.monotonic() - began
             if spent > _ANSWER + got / _SLOWEST:
-                raise AnswerError(f"the answer of {self.url} comes too slowly: {size(got)} in {duration(spent)}")
+                raise AnswerError(f"the answer of {self.url} is too slow: {size(got)} in {duration(spent)}")
             yield chunk
 
     def _refusal(self, response: httpx2.Response) -> Mapping[str, Any]:
-        """Returns the message of the server; for a missing token, a text about how to set a token for this client."""
+        """Returns the problem that the server reports. For a missing token the problem explains how this client gets
+        a token.
+        """
         message = replies.problem(response.status_code, self._body(response))
         if response.status_code != UNAUTHORIZED:
             return message
         if self._has_token:
-            hint = "the one of --token, CONOID_TOKEN or the configuration file is not known there, or was revoked"
+            hint = (
+                "the server does not have the token of --token, CONOID_TOKEN or the configuration file, or the token "
+                "was revoked"
+            )
         else:
             hint = (
-                "none was sent: set CONOID_TOKEN, or give --token; the operator makes one with conoid serve token add"
+                "no token was sent: set CONOID_TOKEN, or give --token; the operator makes a token with conoid serve "
+                "token add"
             )
         return {**message, "hint": f"server {self.url}: {hint}"}
 
@@ -269,10 +282,12 @@ class Http:
             raise self._unreadable(error) from None
 
     def endless(self, what: str) -> ClientError:
-        """Returns the error for a list whose pages do not end."""
+        """Returns the error for a list that has more pages than allowed."""
         return AnswerError(f"the list of {what} of {self.url} has no end")
 
     def _unreadable(self, error: Exception) -> ClientError:
-        """Returns the error for an answer of another program, or of a newer server."""
+        """Returns the error for an answer that this client cannot read: of another program or of a newer server."""
         why = " ".join(str(error).split())[: replies.WORDS]
-        return AnswerError(f"the answer of {self.url} cannot be read: {why}; is it a Conoid server, and no newer?")
+        return AnswerError(
+            f"the answer of {self.url} cannot be read: {why}; is this a Conoid server of the same or an older version?"
+        )

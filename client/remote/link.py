@@ -1,4 +1,4 @@
-"""Interface of a subscription to a run's messages, over any transport."""
+"""Interface of a subscription to the messages of a run, for any transport."""
 
 from typing import Protocol
 
@@ -6,14 +6,14 @@ from conoid.cases.messages import AnyMessage
 
 
 class Link(Protocol):
-    """A source of messages as they arrive, possibly with gaps and repetitions."""
+    """A source of messages as they arrive; messages may be missing or repeated."""
 
     name: str
     trouble: str
-    """Reason for which no message arrives any more; empty for a working subscription."""
+    """Reason why no more messages arrive; empty for a working subscription."""
 
     def get(self, timeout: float) -> AnyMessage | None:
-        """Returns the next message; None after ``timeout`` s without one."""
+        """Returns the next message; None if no message arrives within ``timeout`` s."""
 
     def close(self) -> None:
         """Closes the subscription; a second call has no effect."""

@@ -15,24 +15,24 @@ from .sending import send
 from .submission import CaseSource, body_of, data_of, folder_of, to_json
 
 SURVEY = 330.0
-"""Time limit for the answer to a case with files, which the server reads before it answers, s.
-server/intake/reader.py has 300. Chosen value."""
+"""Time limit for the answer to a case with files, s. The server reads the files before it answers, within at most
+300 s (server/intake/reader.py). Chosen value."""
 _POINT = 30.0
-"""Additional time for each point of a sweep with other files than the point before, s. Chosen value."""
+"""Additional time, s, for each point of a sweep whose files differ from those of the point before. Chosen value."""
 
 
 class Outbox:
-    """Files of cases; each file is hashed once for each state."""
+    """Uploader of files of cases. A file is hashed again only if it has changed."""
 
     def __init__(self, http: Http) -> None:
-        """Prepares uploads; nothing is sent yet."""
+        """``http``: client of the server; nothing is sent yet."""
         self._http, self._hashes = http, Hashes()
         self.say: Callable[[str], None] = lambda text: None
-        """Callback with the progress of the upload."""
+        """Function that is called with the progress of the upload."""
 
     def ready(self, case: Mapping[str, Any], folder: Path) -> dict[str, Any]:
-        """Returns a case in plain data with the hash of each file that the case names. On return the server has all
-        of these files. Relative paths are relative to ``folder``. Raises CaseError for unusable files, ClientError.
+        """Returns a case as plain data with the hash of each file that the case names. On return the server has all
+        these files. Relative paths are relative to ``folder``. Raises CaseError for unusable files, ClientError.
         """
         files = self._hashes.of(case, folder)
         for file in {file.sha256: file for file in files}.values():
@@ -42,8 +42,9 @@ class Outbox:
     def body(
         self, case: CaseSource, overrides: Overrides = (), folder: Path | str | None = None
     ) -> tuple[str, bytes, float]:
-        """Returns content type and body of a case, and the additional time in s for its answer, because the server
-        reads its files. A case without files is sent unchanged, and the server reports its problems.
+        """Returns content type and content of the request with a case, and the additional time for its answer, s,
+        because the server reads the files of the case. A case without files is sent unchanged; the server reports
+        its problems.
         """
         changes = list(overrides) if isinstance(overrides, Iterator) else overrides
         try:
@@ -58,8 +59,8 @@ class Outbox:
     def sweep(
         self, case: CaseSource, points: Sequence[Point], folder: Path | str | None = None
     ) -> tuple[dict[str, Any], Sequence[Point], float]:
-        """Returns the case and the points of a sweep with the hashes of their files, and the additional time in s as
-        in ``body``. A point has a hash if it names another file than the case.
+        """Returns the case and the points of a sweep with the hashes of their files, and the additional time for the
+        answer, s. A point has a hash if it names another file than the case.
         """
         data = data_of(case)
         try:
@@ -78,20 +79,20 @@ class Outbox:
 
 
 def place_of(case: CaseSource, folder: Path | str | None) -> Path:
-    """Returns the folder of relative paths: ``folder`` if it is given, else the folder of the case. Raises
-    CaseError.
+    """Returns the folder to which paths are relative: ``folder`` if it is given, else the folder of the case file.
+    Raises CaseError.
     """
     return folder_of(case) if folder is None else Path(folder)
 
 
 def _with_those_of(data: dict[str, Any], ready: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
-    """Returns the case with the hashes of the files that at least one point does not change."""
+    """Returns the case with the hashes of its files, without files that every point changes."""
     hashes = {(file.table, file.path): file.sha256 for each in ready for file in files_of(each)}
     known = {file.table: hashes[file.table, file.path] for file in files_of(data) if (file.table, file.path) in hashes}
     return apply_overrides(data, {f"{dotted(table)}.sha256": sha256 for table, sha256 in known.items()})
 
 
 def _with_hashes(point: Point, ready: Mapping[str, Any], data: Mapping[str, Any]) -> Point:
-    """Returns a point with the hashes of its own files."""
+    """Returns a point with the hashes of the files that the point itself names."""
     own = [file for file in files_of(ready) if file not in files_of(data)]
     return {**point, **{f"{dotted(file.table)}.sha256": file.sha256 for file in own}}

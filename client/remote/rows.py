@@ -1,4 +1,4 @@
-"""The table of runs: values of their cases and results, in one answer for many runs."""
+"""The table of runs: values of the cases and results of many runs, in one answer of the server."""
 
 from collections import Counter
 from collections.abc import Iterator, Sequence
@@ -11,7 +11,7 @@ from conoid.cases.reference.flat import Scalar
 from .run_info import RunInfo
 
 _NEVER = frozenset({"run.ranks", "run.threads", "run.profile"})
-"""Keys of a case that other columns of a list show."""
+"""Keys of a case that have columns of their own in a list of runs."""
 
 
 class Result(msgspec.Struct, kw_only=True, frozen=True):
@@ -22,7 +22,7 @@ class Result(msgspec.Struct, kw_only=True, frozen=True):
 
 
 class Alike(msgspec.Struct, kw_only=True, frozen=True):
-    """A group of similar cases: common values and units by key, and the results of their runs."""
+    """Data of a group of similar cases: common values and units by key, and the results of the runs."""
 
     values: dict[str, Scalar]
     units: dict[str, str]
@@ -30,7 +30,7 @@ class Alike(msgspec.Struct, kw_only=True, frozen=True):
 
 
 class TableRow(RunInfo, kw_only=True, frozen=True):
-    """A run in the table; ``case``: index of its group of similar cases."""
+    """A run in the table; ``case``: index of the group of similar cases to which the run belongs."""
 
     case: int | None
     values: dict[str, Scalar | None]
@@ -40,7 +40,9 @@ class TableRow(RunInfo, kw_only=True, frozen=True):
 
 
 class TablePage(msgspec.Struct, kw_only=True, frozen=True):
-    """A page of the table; the results of ``pending`` of its runs are not read yet."""
+    """A page of the table of runs; ``pending``: number of runs on the page whose results the server has not read
+    yet.
+    """
 
     runs: list[TableRow]
     cases: list[Alike]
@@ -54,21 +56,21 @@ class RunRow:
 
     info: RunInfo
     values: dict[str, Scalar]
-    """Values of the case in SI units by key, such as ``parts[0].velocity[2]``."""
+    """Values of the case in SI units; the keys are such as ``parts[0].velocity[2]``."""
     results: dict[str, float | None]
-    """Results in SI units by name, such as ``probe.speed``; empty before the end of the run."""
+    """Results of the run in SI units by name, such as ``probe.speed``; empty before the end of the run."""
     units: dict[str, str]
-    """Units of the values and results that have one."""
+    """Units of those values and results that have a unit."""
     references: int
     """Number of reference values with which the run was compared."""
     missed: list[str]
-    """Names of the reference values that the run misses."""
+    """Names of the reference values that the run does not reproduce."""
     alike: Alike | None
-    """Common data of its group of similar cases in the same answer."""
+    """Common data of the group of similar cases to which the run belongs."""
 
 
 def rows_of(page: TablePage) -> Iterator[RunRow]:
-    """Yields the rows of a page."""
+    """Yields the rows of a page of the table."""
     for run in page.runs:
         alike = page.cases[run.case] if run.case is not None else None
         values = {**(alike.values if alike is not None else {}), **run.values}
@@ -84,7 +86,9 @@ def rows_of(page: TablePage) -> Iterator[RunRow]:
 
 
 def differing(rows: Sequence[RunRow], most: int) -> list[str]:
-    """Returns the keys whose values differ between rows of similar cases; keys that differ in most rows are first."""
+    """Returns at most ``most`` keys whose values differ between runs of similar cases; keys that differ in most runs
+    are first.
+    """
     found = Counter[str]()
     for alike in {id(row.alike): row.alike for row in rows if row.alike is not None}.values():
         own = [row for row in rows if row.alike is alike]

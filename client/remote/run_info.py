@@ -1,4 +1,4 @@
-"""Data of a run on a server: its state, its files, its messages."""
+"""Data of a run on a server: state, files, messages."""
 
 from html import escape
 from typing import Annotated, Any
@@ -14,13 +14,13 @@ from ..errors import ClientError
 from ..result import outcome_of
 
 ID = r"^[A-Za-z0-9][A-Za-z0-9_.-]{0,127}\Z"
-"""Pattern of the id of a run or a sweep, which is also the name of a folder."""
+"""Pattern of the id of a run or a sweep; the id is also the name of a folder."""
 _OF_ONE = {"estimate", "progress", "outcome_json"}
-"""Fields of a single run that lists do not have."""
+"""Fields that only a single run has; runs in lists do not have these fields."""
 
 
 class RunInfo(msgspec.Struct, kw_only=True, frozen=True):
-    """A run on a server. Times are Unix s, None before the event."""
+    """A run on a server. Times are Unix s; a time is None before its event."""
 
     id: Annotated[str, msgspec.Meta(pattern=ID)]
     owner: str
@@ -31,22 +31,22 @@ class RunInfo(msgspec.Struct, kw_only=True, frozen=True):
     cause: str | None = None
     message: str = ""
     reason: str = ""
-    """Reason for which a queued run waits."""
+    """Reason why a queued run waits."""
     started: float | None = None
     finished: float | None = None
     labels: dict[str, str] = {}
     threads: int = 1
-    """Threads of each rank."""
+    """Number of threads of each rank."""
     title: str = ""
     short: str = ""
-    """Shortest unique prefix of the id; in lists only."""
+    """Shortest unique prefix of the id; only runs in lists have it."""
     estimate: dict[str, Any] = {}
-    """The fields from here on are those of a single run; lists do not have these fields (_OF_ONE)."""
+    """Estimate of the needs of the run. Runs in lists have neither this field nor the fields below (_OF_ONE)."""
     progress: Progress | None = None
     outcome_json: msgspec.Raw = msgspec.field(name="outcome", default=msgspec.Raw(b"null"))
 
     def _repr_html_(self) -> str:
-        """Table for notebooks."""
+        """The run as an HTML table, for notebooks."""
         labels = ", ".join(f"{name}={value}" for name, value in self.labels.items())
         rows = {
             "run": self.id,
@@ -60,12 +60,12 @@ class RunInfo(msgspec.Struct, kw_only=True, frozen=True):
 
     @property
     def listed(self) -> dict[str, Any]:
-        """The fields of a list, as plain data."""
+        """The fields that a run in a list has, as plain data."""
         return {name: getattr(self, name) for name in self.__struct_fields__ if name not in _OF_ONE}
 
     @property
     def outcome(self) -> Outcome | None:
-        """The outcome; None before the end. Raises ClientError if this client cannot read it."""
+        """The outcome of the run; None before its end. Raises ClientError if this client cannot read the outcome."""
         if bytes(self.outcome_json) == b"null":
             return None
         try:
@@ -75,8 +75,8 @@ class RunInfo(msgspec.Struct, kw_only=True, frozen=True):
 
 
 class FileInfo(msgspec.Struct, kw_only=True, frozen=True):
-    """A file in a run's folder: its path, its size in bytes, its address. Bytes of a name that are not UTF-8 are
-    shown as ``\xff``; only the address has the exact name.
+    """A file in the folder of a run: path, size in bytes, address. Bytes of a name that are not UTF-8 are shown as
+    ``ÿ``; only the address contains the exact name.
     """
 
     path: str
@@ -86,13 +86,13 @@ class FileInfo(msgspec.Struct, kw_only=True, frozen=True):
 
 
 class Listing(msgspec.Struct, kw_only=True, frozen=True):
-    """The files of a run's folder."""
+    """The files in the folder of a run."""
 
     files: list[FileInfo]
 
 
 class EventPage(msgspec.Struct, kw_only=True, frozen=True):
-    """Lines of the journal, the number of the last one, and whether more exist."""
+    """Messages of the journal, the number of the last message, and whether there are more messages."""
 
     events: list[msgspec.Raw]
     last: int

@@ -1,4 +1,6 @@
-"""Upload of files: the missing bytes are sent in pieces, and the upload continues after a broken connection."""
+"""Upload of files: the bytes that the server lacks are sent in pieces, and the upload continues after a broken
+connection.
+"""
 
 import time
 from collections.abc import Callable
@@ -14,33 +16,35 @@ from ..local.local_files import LocalFile
 from .http import Http
 
 _LARGEST, _SMALLEST = 1 << 20, 1 << 14
-"""Smallest and largest size of a piece in bytes. Chosen value: a proxy takes bodies of 1 MiB; at 1 kB/s 16 KiB are
-sent before a timeout."""
+"""Smallest and largest size of a piece, bytes. Chosen values: a proxy accepts requests of 1 MiB; at 1 kB/s a piece
+of 16 KiB arrives within the time limit."""
 _FIRST = 1 << 17
-"""Bytes of the first piece, before the speed of the connection is known. Chosen value."""
+"""Size of the first piece, bytes, used before the speed of the connection is known. Chosen value."""
 _WANTED = 2.0
-"""Target duration of sending a piece, s; after a slower piece the next pieces are smaller. Chosen value: a broken
+"""Intended time for sending a piece, s; after a slower piece the next pieces are smaller. Chosen value: a broken
 connection loses at most one piece."""
 _PATIENCE = 60.0
-"""Time in s without progress after which the upload is given up. Chosen value: a restarted server is back by then."""
+"""Time without progress, s, after which the upload is given up. Chosen value: a server restarts in less time."""
 _PAUSE = 0.5
-"""Time in s after a break before the server is asked for its number of bytes."""
+"""Pause, s, after a broken connection before the client asks the server how many bytes have arrived."""
 _LAST = 120.0
-"""Time in s for the answer to the last piece: the server reads the whole file again and writes it to disk."""
+"""Time limit, s, for the answer to the last piece: the server then reads the whole file again and writes it to disk."""
 _PASSING = frozenset({408, 500, 502, 503, 504})
-"""Statuses after which the same piece may be sent again."""
+"""HTTP statuses after which the same piece may be sent again."""
 
 
 class SentFile(msgspec.Struct, kw_only=True, frozen=True):
-    """State of an upload on the server: ``offset`` bytes have arrived; ``whole``: the file is complete and verified."""
+    """State of an upload on the server. ``offset``: number of bytes that have arrived; ``whole``: True if the file
+    is complete and verified.
+    """
 
     offset: int
     whole: bool
 
 
 def send(http: Http, file: LocalFile, say: Callable[[str], None] = lambda text: None) -> None:
-    """Sends a file; on return the server has it with the hash that was computed before. ``say`` is called with the
-    progress. Raises ClientError if the file has changed, ServiceError, UnreachableError.
+    """Sends a file. On return the server has the file with the hash that was computed before. ``say`` is called with
+    the progress. Raises ClientError if the file has changed, ServiceError, UnreachableError.
     """
     sent = _status(http, file)
     if sent is not None and sent.whole:
@@ -69,8 +73,8 @@ class _Sending:
         self._piece, self._again = min(_FIRST, _LARGEST), True
 
     def go_on(self, offset: int) -> None:
-        """Sends piece after piece. Waits and continues when the connection breaks or another client sends the same
-        file.
+        """Sends piece after piece from the byte ``offset``. Waits and continues if the connection breaks or if
+        another client sends the same file.
         """
         moved = time.monotonic()
         while True:
@@ -94,7 +98,7 @@ class _Sending:
             offset = there
 
     def _sent(self, offset: int) -> SentFile:
-        """Sends one piece, and adapts the size of the next one to the time."""
+        """Sends one piece, and adapts the size of the next piece to the time that this piece took."""
         self._opened.seek(offset)
         data = self._opened.read(min(self._piece, self._file.size - offset)) or b""
         end = offset + len(data)
@@ -112,7 +116,9 @@ class _Sending:
         return sent
 
     def _passes(self, error: ClientError) -> bool:
-        """Returns True if the upload may continue. Raises ClientError if the file has changed since it was hashed."""
+        """Returns True if the upload may continue after ``error``. Raises ClientError if the file has changed since
+        its hash was computed.
+        """
         if not isinstance(error, ServiceError):
             return isinstance(error, UnreachableError)
         code = error.problem.get("code")
@@ -120,12 +126,14 @@ class _Sending:
             self._file.check(self._opened.fileno())
             if not self._again:
                 raise self._file.changed()
-            self._again = False  # the bytes on the server may be damaged: start again once
+            self._again = False  # The bytes on the server may be damaged: start again once.
             return True
         return code in {"wrong_offset", "in_progress", "incomplete", "busy"} or error.status in _PASSING
 
     def _offset(self, known: int) -> int | None:
-        """Returns the byte to continue with, None if the server has the file; ``known`` if it cannot be asked now."""
+        """Returns the number of bytes that the server has; None if the server has the whole file; ``known`` if the
+        server does not answer.
+        """
         try:
             sent = _status(self._http, self._file)
         except (ServiceError, UnreachableError):

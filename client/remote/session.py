@@ -31,23 +31,24 @@ from .run_query import Moment, query_of, words_of
 from .submission import CaseSource, data_of, to_json
 
 _CANDIDATES = 8
-"""Largest number of ids that are listed for an ambiguous prefix. Chosen value: as many as fit into a line."""
+"""Largest number of ids that are listed for an ambiguous prefix. Chosen value: as many as fit into one text line."""
 _LAST = "z" * 22
-"""Text that, after a prefix of an id, sorts after every id with this prefix."""
+"""Text that, appended to a prefix of an id, sorts after every id with this prefix."""
 _MOST_PAGES = 10_000
-"""Largest number of pages of a list. Chosen value: a million runs; more pages are an error of the server."""
+"""Largest number of pages of a list. Chosen value: a list of a million runs; a longer list is an error of the
+server."""
 _POINT = 0.5
-"""Time in s for each point of a sweep, which the server reads, checks and writes to disk before it answers. Chosen
-value: ten times the time on two cores at a load of 4.
+"""Time, s, for each point of a sweep. The server reads, checks and writes all points to disk before it answers.
+Chosen value: ten times the time on two cores at a load of 4.
 """
 _PAGE = 500
-"""Rows of a page of the table: the largest number that a server sends."""
+"""Number of rows of a page of the table of runs: the largest number that a server sends."""
 _READING, _REST = 60.0, 0.2
-"""Time limit for results that a server still reads, and time between two requests, s. Chosen values."""
+"""Time limit for results that the server has not read yet, and pause between two requests, s. Chosen values."""
 
 
 class _Known(Protocol):
-    """A run or a sweep in a list."""
+    """The id of a run or a sweep in a list of the server."""
 
     @property
     def id(self) -> str:
@@ -63,24 +64,24 @@ class Verdict(msgspec.Struct, kw_only=True, frozen=True):
 
 
 class Page(msgspec.Struct, kw_only=True, frozen=True):
-    """A page of a list of runs; ``next`` is the cursor of the next page."""
+    """A page of the list of runs; ``next``: cursor of the next page."""
 
     runs: list[RunInfo]
     next: str | None = None
 
 
 class Session(Http):
-    """A session with a server. Use it as a context manager, or close it."""
+    """A session with a server. It is a context manager; otherwise call ``close``."""
 
     def __init__(self, url: str, token: str | None = None, transport: httpx2.BaseTransport | None = None) -> None:
-        """Takes the arguments of ``Http``."""
+        """Accepts the arguments of ``Http``."""
         super().__init__(url, token, transport)
         self.outbox = Outbox(self)
-        """Uploads of files that cases name."""
+        """Uploader of the files that cases name."""
 
     def validate(self, case: CaseSource, overrides: Overrides = (), folder: Path | str | None = None) -> dict[str, Any]:
-        """Checks a case on the server, and returns its estimate; ``folder`` as for ``submit``. Raises CaseError with
-        every problem.
+        """Checks a case on the server, and returns the estimate of its needs. ``folder``: folder to which paths in
+        the case are relative. Raises CaseError with every problem.
         """
         kind, body, more = self.outbox.body(case, overrides, folder)
         answer = self.post(Verdict, "/v1/cases:validate", body, kind, more=more)
@@ -100,12 +101,12 @@ class Session(Http):
     ) -> Run:
         """Submits a case: a file, the name of a shipped case, or plain data.
 
-        Files that the case names are sent first if the server lacks them; relative paths are relative to the ``folder``
-        of the case, for plain data to the working folder, unless it is given. ``overrides`` change keys:
-        ``["run.ranks=2"]``, ``{"run.ranks": 2}``. ``key`` is the Idempotency-Key; without one a random key is used, so
-        that a retry never makes a second run. ``labels`` are words by which runs can be found, ``profile`` is a profile
-        of the site's batch system. Among the runs of a user, runs with a higher ``priority`` start first. Raises
-        CaseError, ServiceError, UnreachableError.
+        Files that the case names are sent first if the server lacks them. Relative paths are relative to ``folder``;
+        its default is the folder of the case file, or the working folder for plain data. ``overrides`` change keys:
+        ``["run.ranks=2"]``, ``{"run.ranks": 2}``. ``key`` is the idempotency key. The default is a random key, so
+        that a retry never makes a second run. ``labels`` are names and values with which runs can be found,
+        ``profile`` is a profile of the site's batch system. Among the runs of a user, runs with a higher
+        ``priority`` start first. Raises CaseError, ServiceError, UnreachableError.
         """
         kind, body, more = self.outbox.body(case, overrides, folder)
         words = [("label", word) for word in words_of(labels)]
@@ -120,9 +121,9 @@ class Session(Http):
     ) -> Run:  # fmt: skip
         """Submits a new run of the same case that continues from the newest checkpoint of ``run``.
 
-        ``ranks``, ``threads`` and ``max_steps`` (``run.max_steps``) replace the values of the case if given. The
-        final answer is the same as without an interruption. Raises ServiceError for a run without a checkpoint, and
-        for a run that has used up its steps if ``max_steps`` is not larger.
+        ``ranks``, ``threads`` and ``max_steps`` (``run.max_steps``) replace values of the case. The final answer is
+        the same as that of a run without interruption. Raises ServiceError if ``run`` has no checkpoint. Raises
+        ServiceError if ``run`` has used all its steps and ``max_steps`` is not larger.
         """
         numbers = {"ranks": ranks, "threads": threads, "max_steps": max_steps}
         words = {name: str(number) for name, number in numbers.items() if number is not None}
@@ -134,11 +135,12 @@ class Session(Http):
         self, case: CaseSource, points: Sequence[Point] | Mapping[str, Iterable[Any]], at_once: int | None = None,
         key: str | None = None, *, grid: bool = False, folder: Path | str | None = None, again: bool = False,
     ) -> Sweep:  # fmt: skip
-        """Submits a case at many points, each a mapping of keys to values. All points become runs, or none.
+        """Submits a case at many points; each point maps keys to values. Either all points become runs or none.
 
-        A mapping of keys to lists of the same length gives one point for each position, or all combinations for a
-        ``grid``. At most ``at_once`` runs run at a time. ``key`` and ``folder`` as for ``submit``: the same key is
-        the same sweep, whose points without success run again with ``again``. Raises CaseError, ServiceError.
+        A mapping of keys to lists of equal lengths gives one point for each position. With ``grid`` it gives all
+        combinations. At most ``at_once`` runs are computed at the same time. ``key`` is the idempotency key: the
+        same key is the same sweep. With ``again``, points of this sweep without success run again. ``folder``:
+        folder to which paths are relative. Raises CaseError, ServiceError.
         """
         chosen = listed(points_along(points, grid=grid) if isinstance(points, Mapping) else points)
         data, sent, more = self.outbox.sweep(case, chosen, folder)
@@ -154,17 +156,17 @@ class Session(Http):
         overrides: Overrides = (), at_once: int | None = None, most: int = MOST, out: Path | str | None = None,
         folder: Path | str | None = None, say: Callable[[str], None] = lambda text: None,
     ) -> Found:  # fmt: skip
-        """Runs an adaptive sweep: finds where a result passes a threshold.
+        """Runs an adaptive sweep: it finds where a result crosses a threshold.
 
-        ``goal``: result and threshold, such as ``"probe.core_speed = 0"``, with any column of the table of a sweep.
-        ``spans`` has the keys that vary together, and both ends of each: ``{"parts[0].velocity[2]": ("-200 m/s", "-800
-        m/s")}``.
+        ``goal``: result and threshold, such as ``"probe.core_speed = 0"``; the result is a column of the table of a
+        sweep. ``spans`` has the keys that vary together, with both ends of each key: ``{"parts[0].velocity[2]": ("-200
+        m/s", "-800 m/s")}``.
 
-        At most ``most`` runs are made, ``at_once`` of them at a time (None: as the free slots allow), until the
-        bracket of the threshold has the width ``tolerance``. The tolerance is a quantity of the first key; None: a
-        hundredth of the larger end. ``out`` is a JSON file from which a later call continues without repeating
-        points that have succeeded. ``say`` receives a line for each run. Raises CaseError, UsageError for a file of
-        another sweep, ClientError.
+        At most ``most`` runs are made, ``at_once`` at the same time (None: as many as slots are free), until the
+        bracket of the threshold has the width ``tolerance``. The tolerance is a quantity of the first key; the
+        default is a hundredth of the larger end of the bracket. ``out`` is a JSON file from which a later call
+        continues without repeating successful points. ``say`` is called with a text line for each run. Raises
+        CaseError, UsageError if ``out`` belongs to another sweep, ClientError.
         """
         data = data_of(case, overrides)
         return found_by(
@@ -173,11 +175,11 @@ class Session(Http):
         )  # fmt: skip
 
     def sweeps(self) -> list[SweepInfo]:
-        """Yields the user's sweeps, newest first, without their points."""
+        """Returns the sweeps of the user, newest first, without their points."""
         return list(self._sweeps())
 
     def _sweeps(self, beginning: str = "") -> Iterator[SweepInfo]:
-        """Yields sweeps, newest first, beginning with ids of this prefix."""
+        """Yields the sweeps whose ids begin with a prefix, newest first."""
         query = {"before": beginning + _LAST} if beginning else {}
         for _ in range(_MOST_PAGES):
             page = self.get(SweepPage, "/v1/sweeps", limit=500, **query)
@@ -188,8 +190,8 @@ class Session(Http):
         raise self.endless("sweeps")
 
     def find_sweep(self, sweep_id: str) -> Sweep:
-        """Returns a handle of a sweep: by its id, by a unique prefix of it, or of the newest one for ``last``.
-        Raises NotFoundError for an unknown sweep, UsageError for an ambiguous prefix.
+        """Returns a sweep by its id or by a unique prefix of the id; ``last`` means the newest sweep. Raises
+        NotFoundError if the sweep is unknown, UsageError if the prefix is ambiguous.
         """
         if sweep_id == "last":
             newest = next(self._sweeps(), None)
@@ -199,8 +201,8 @@ class Session(Http):
         return Sweep(self, self._named("sweep", "/v1/sweeps", sweep_id, self._sweeps))
 
     def run(self, run_id: str) -> Run:
-        """Returns a handle of a run: by its id, by a unique prefix of it, or of the newest one for ``last``. Raises
-        NotFoundError for an unknown run, UsageError for an ambiguous prefix.
+        """Returns a run by its id or by a unique prefix of the id; ``last`` means the newest run. Raises
+        NotFoundError if the run is unknown, UsageError if the prefix is ambiguous.
         """
         if run_id == "last":
             newest = self.runs(limit=1)
@@ -213,9 +215,11 @@ class Session(Http):
         return self.get(Page, "/v1/runs", limit=_CANDIDATES + 1, prefix=beginning).runs
 
     def _named(self, what: str, path: str, name: str, after: Callable[[str], Iterable[_Known]]) -> str:
-        """Returns the id that begins with a prefix; ``after`` returns runs, or sweeps, from a prefix on."""
+        """Returns the id that begins with the prefix ``name``. ``after``: function that returns runs or sweeps,
+        sorted by id, from a prefix on.
+        """
         if not re.fullmatch(ID, name):
-            raise NotFoundError(f"{what} {shown(name)}: there is none; an id has letters and digits")
+            raise NotFoundError(f"{what} {shown(name)}: not found; an id has letters and digits")
         try:
             self.get(dict[str, Any], f"{path}/{quoted(name)}")
         except MissingError as error:
@@ -228,11 +232,13 @@ class Session(Http):
             return name
         if len(found) > 1:
             more = " and more" if len(found) > _CANDIDATES else ""
-            raise UsageError(f"{what} = {name!r}: several ids begin so: {', '.join(found[:_CANDIDATES])}{more}")
+            raise UsageError(
+                f"{what} = {name!r}: several ids have this beginning: {', '.join(found[:_CANDIDATES])}{more}"
+            )
         return found[0]
 
     def _candidates(self, name: str, after: Callable[[str], Iterable[_Known]]) -> list[str]:
-        """Returns some ids with this prefix; an empty list from a server that is too old for the request."""
+        """Returns some ids with the prefix ``name``; an empty list if the server is too old for this request."""
         try:
             named = takewhile(lambda one: one.id.startswith(name), after(name))
             return [one.id for one in islice(named, _CANDIDATES + 1)]
@@ -243,10 +249,10 @@ class Session(Http):
         self, states: Sequence[str] = (), limit: int = 50, labels: Mapping[str, str] | None = None, *, case: str = "",
         text: str = "", since: Moment = None, until: Moment = None,
     ) -> list[RunInfo]:  # fmt: skip
-        """Returns the user's runs, newest first, at most ``limit``.
+        """Returns at most ``limit`` runs of the user, newest first.
 
-        ``labels``: all of them must match. ``case``: name of the case, with ``*`` for any characters. ``text``:
-        words that all occur in the name, the title, a label, the state or the message, or that begin the id.
+        ``labels``: a run must have all these labels. ``case``: name of the case, with ``*`` for any characters.
+        ``text``: words that must all occur in name, title, labels, state or message of a run, or begin its id.
         ``since`` and ``until``: limits of the time of submission, Unix s or a datetime.
         """
         found: list[RunInfo] = []
@@ -263,7 +269,8 @@ class Session(Http):
         self, states: Sequence[str] = (), limit: int = 50, labels: Mapping[str, str] | None = None, *, case: str = "",
         text: str = "", since: Moment = None, until: Moment = None,
     ) -> list[RunRow]:  # fmt: skip
-        """Returns the same runs with the values of their cases and their results, in SI units."""
+        """Returns runs with the values of their cases and their results, in SI units. The arguments are those of
+        ``runs``."""
         found: list[RunRow] = []
         query = query_of(states, labels, case, text, since, until)
         for _ in range(_MOST_PAGES):
@@ -275,7 +282,9 @@ class Session(Http):
         raise self.endless("runs")
 
     def _table(self, limit: int, query: Mapping[str, Any]) -> TablePage:
-        """Returns a page of the table. Repeats the request for a limited time while the server still reads results."""
+        """Returns a page of the table of runs. Repeats the request for a limited time while the server is still
+        reading results.
+        """
         until = time.monotonic() + _READING
         while (page := self.get(TablePage, "/v1/table", limit=limit, **query)).pending and time.monotonic() < until:
             time.sleep(_REST)
@@ -283,8 +292,8 @@ class Session(Http):
 
 
 def connect(url: str | None = None, token: str | None = None) -> Session:
-    """Opens a session with the server of the arguments, of CONOID_URL and CONOID_TOKEN, or of the configuration
-    file.
+    """Opens a session with a server. Address and token are the arguments, else CONOID_URL and CONOID_TOKEN, else
+    from the configuration file.
     """
     chosen = target(url, token)
     return Session(chosen.url, chosen.token)

@@ -1,7 +1,7 @@
 """Live messages of a run: over Zenoh if the router can be reached, else over SSE. Missing messages are read over REST.
 
-No other module of the client imports zenoh. A client subscribes first, then reads the past messages, then the stream:
-no message is missing, and no message comes twice.
+No other module of the client imports zenoh. A client first subscribes, then reads the past messages, and then the
+stream, so that no message is missing or comes twice.
 """
 
 import hashlib
@@ -29,26 +29,29 @@ from .message_order import InOrder, Refill
 T = TypeVar("T")
 
 _CAPACITY = 4096
-"""Largest number of messages that wait to be read. Chosen value: minutes of a run, which sends some ten per second."""
+"""Largest number of messages that wait to be read. Chosen value: a run sends about ten messages per second, so that
+they last for minutes."""
 _BLOBS = 4
-"""Number of snapshots that are stored until they are read. Chosen value: a reader is at most seconds late."""
+"""Number of snapshots that are kept until they are read. Chosen value: a reader is late by seconds at most."""
 _OPEN_SECONDS = 5.0
-"""Time limit for the answer of a router before SSE is used, s. Chosen value."""
+"""Time limit for the answer of the Zenoh router, s; afterwards SSE is used. Chosen value."""
 _CLOSE_SECONDS = 2.0
-"""Time limit for closing a subscription, s. Chosen value: an open subscription does no harm."""
+"""Time limit for closing a subscription, s. Chosen value: a subscription that stays open does no harm."""
 _SILENCE = 3.0
-"""Time without a message after which the journal is read, s. Chosen value: a run reports four times a second."""
+"""Time without a message after which the journal is read, s. Chosen value: a run sends a message four times a
+second."""
 _PATIENCE = 60.0
-"""Time without a server after which following a run ends, s. Chosen value: a restart takes less."""
+"""Time without an answer of the server after which the client stops following a run, s. Chosen value: a server
+restarts in less time."""
 
 
 class StreamError(ClientError):
-    """Error: Zenoh cannot be used, because there is no router, or the router refuses the user."""
+    """Zenoh cannot be used, because there is no router or because the router refuses the user."""
 
 
 class Mailbox:
-    """A bounded queue between the receiving threads and the reading thread. A full queue drops new messages; gaps in
-    ``seq`` are filled from the journal.
+    """A bounded queue of messages between receiving threads and the reading thread. A full queue drops new messages;
+    gaps in ``seq`` are filled from the journal.
     """
 
     def __init__(self) -> None:
@@ -56,12 +59,12 @@ class Mailbox:
         self._queue: queue.Queue[AnyMessage] = queue.Queue(_CAPACITY)
 
     def put(self, message: AnyMessage) -> None:
-        """Adds a message without waiting."""
+        """Adds a message without waiting; a full queue drops the message."""
         with suppress(queue.Full):
             self._queue.put_nowait(message)
 
     def get(self, timeout: float) -> AnyMessage | None:
-        """Returns the oldest message, or None after ``timeout`` s."""
+        """Returns the oldest message; None if there is no message within ``timeout`` s."""
         try:
             return self._queue.get(timeout=timeout)
         except queue.Empty:
@@ -69,15 +72,15 @@ class Mailbox:
 
 
 class ZenohLink:
-    """A native subscription to all messages of a run."""
+    """A Zenoh subscription to all messages of a run."""
 
     name, trouble = "Zenoh", ""
 
     def __init__(self, router: Router, prefix: str) -> None:
-        """Opens a session and subscribes. Raises StreamError if the subscription fails or takes too long."""
+        """Opens a Zenoh session and subscribes. Raises StreamError if the subscription fails or takes too long."""
         self._mailbox = Mailbox()
         self.blobs: dict[str, bytes] = {}
-        """The newest snapshots that have arrived, by their sha256."""
+        """The newest snapshots that have arrived; the keys are their sha256."""
         self._session = _within(_OPEN_SECONDS, lambda: zenoh.open(_config(router)))
         self._subscriber = self._session.declare_subscriber(keys.everything(prefix), self._receive)
 
@@ -90,7 +93,7 @@ class ZenohLink:
             self._mailbox.put(message)
 
     def _keep(self, message: Snapshot, payload: bytes) -> None:
-        """Returns the bytes of a snapshot; None if they have not arrived or are incomplete."""
+        """Returns the bytes of a snapshot; None if the bytes have not arrived or are incomplete."""
         with suppress(msgspec.MsgspecError):
             data = fragments_from_msgpack(payload).blob
             if hashlib.sha256(data).hexdigest() == message.sha256:
@@ -98,11 +101,11 @@ class ZenohLink:
                 self.blobs = dict([*kept, (message.sha256, data)])
 
     def get(self, timeout: float) -> AnyMessage | None:
-        """Returns the next message; None after ``timeout`` s without one."""
+        """Returns the next message; None if no message arrives within ``timeout`` s."""
         return self._mailbox.get(timeout)
 
     def close(self) -> None:
-        """Closes the session, without waiting for a router that does not answer."""
+        """Closes the session without waiting for a router that does not answer."""
         with suppress(StreamError):
             _within(_CLOSE_SECONDS, self._session.close)
 
@@ -122,8 +125,8 @@ def _config(router: Router) -> zenoh.Config:
 
 
 def _within(seconds: float, work: Callable[[], T]) -> T:
-    """Returns the result of ``work``, computed in a thread. Raises StreamError if ``work`` fails or exceeds the time
-    limit.
+    """Returns the result of ``work``, which is computed in a thread. Raises StreamError if ``work`` fails or exceeds
+    the time limit.
     """
     done: queue.Queue[tuple[T | None, Exception | None]] = queue.Queue()
 
@@ -144,14 +147,14 @@ def _within(seconds: float, work: Callable[[], T]) -> T:
 
 
 class SseLink:
-    """The SSE stream of the server, read in a thread. After a break the stream returns no more messages, and the
-    journal is read.
+    """Subscription to the SSE stream of the server, which is read in a thread. After a break of the stream no more
+    messages come from the subscription, and the journal is read.
     """
 
     name, trouble = "SSE", ""
 
     def __init__(self, events: Callable[[], Iterator[AnyMessage]]) -> None:
-        """``events`` opens the stream and yields its messages."""
+        """``events``: function that opens the stream and yields its messages."""
         self._mailbox = Mailbox()
         self._closed = threading.Event()
         threading.Thread(target=self._read, args=(events,), name="sse", daemon=True).start()
@@ -163,27 +166,27 @@ class SseLink:
                     return
                 self._mailbox.put(message)
         except AnswerError as error:
-            self.trouble = f"the events cannot be followed, and the journal is read instead: {error}"
-        except ClientError:  # a broken or refused stream: the journal is read instead
+            self.trouble = f"the event stream of the server broke, and the journal is read instead: {error}"
+        except ClientError:  # The stream is broken or refused: the journal is read instead.
             return
 
     def get(self, timeout: float) -> AnyMessage | None:
-        """Returns the next message; None after ``timeout`` s without one."""
+        """Returns the next message; None if no message arrives within ``timeout`` s."""
         return self._mailbox.get(timeout)
 
     def close(self) -> None:
-        """Ends the thread that reads the stream, at the next message or with the process."""
+        """Requests the end of the reading thread; the thread ends at the next message or with the process."""
         self._closed.set()
 
 
 def follow(link: Link, refill: Refill, ended: Callable[[], bool], after: int = 0) -> Generator[AnyMessage]:
-    """Yields every message after ``after`` once and in order, until the final status of the run; closes ``link``.
+    """Yields every message after the number ``after`` once and in order, until the final status of the run; then closes
+    ``link``.
 
-    ``refill`` reads the journal, ``ended`` asks the server whether the run has ended. While the link is silent both
-    are called every few seconds: a failed router delays messages and loses none. A server that does not answer, or
-    is temporarily unavailable, has a minute to return; then UnreachableError or ServiceError is raised. A message
-    that cannot be decoded is not in the journal and has no number; a warning about this message precedes the next
-    one.
+    ``refill`` reads the journal, ``ended`` asks the server whether the run has ended. While the link is silent, both
+    are called every few seconds, so that a failed router delays messages and loses none. UnreachableError or
+    ServiceError is raised if the server does not answer, or is unavailable, for a minute. A message that cannot be
+    decoded has no number and is not in the journal; a warning about it precedes the next message.
     """
     order, warned = InOrder(_patient(refill), after), False
     try:
@@ -211,7 +214,7 @@ def _in_order(link: Link, order: InOrder, ended: Callable[[], bool]) -> Iterator
 
 
 def _asked(ended: Callable[[], bool]) -> bool:
-    """Returns True if the run has ended; False while no server answers."""
+    """Returns True if the run has ended, False if it has not ended or no server answers."""
     try:
         return ended()
     except ClientError as error:

@@ -1,5 +1,5 @@
-"""Chart of speed-up over cores as SVG: projected values, values measured with a core for each thread, and values of
-another source.
+"""Chart of the speed-up over cores as SVG: projected values, values measured with a core for each thread, and values
+of another source.
 """
 
 import math
@@ -9,13 +9,14 @@ from dataclasses import dataclass
 from .study import Study
 
 _WIDTH, _HEIGHT, _LEFT, _TOP, _SIDE = 424, 464, 56, 36, 320
-"""Sizes in pixels: the picture, and the square of the axes inside it with room for numbers and legend. Chosen value."""
+"""Sizes in pixels: width and height of the picture; left, top and side of the square of the axes. Numbers and legend
+have space around the square. Chosen values."""
 _BLUE, _RED, _GREY = "#1b6ca8", "#c8553d", "#999999"
 
 
 @dataclass(frozen=True)
 class _Frame:
-    """Logarithmic axes from 1 to 2^``most`` ranks, and to the same speed-up from 2^``least``."""
+    """Logarithmic axes: cores from 1 to 2^``most``, and speed-up from 2^``least`` to 2^``most``."""
 
     least: int
     most: int
@@ -48,7 +49,9 @@ class _Frame:
 
 
 def speed_up(study: Study, others: Mapping[int, float] | None = None, source: str = "") -> str:
-    """Returns the figure; both axes are logarithmic. ``others``: the speed-ups that ``source`` measured, by ranks."""
+    """Returns the chart with logarithmic axes. ``others``: speed-ups measured by ``source``; the keys are numbers of
+    ranks.
+    """
     best = {run.cores: run for run in sorted(study.runs, key=study.speed_up)}
     projected = {cores: study.speed_up(run) for cores, run in sorted(best.items())}
     worst = {cores: study.runs[0].time / best[cores].worst for cores in projected}
@@ -67,7 +70,7 @@ def speed_up(study: Study, others: Mapping[int, float] | None = None, source: st
         frame.marks(projected, _BLUE, _BLUE), frame.marks(measured, _BLUE, "white"),
         frame.marks(others, _RED, _RED), frame.labels(others, 8, 4),
         frame.labels({ranks: value for ranks, value in projected.items() if ranks > 1}, -10, -10),
-        _legend(0, "projected, the best ranks x threads; dots: at worst", _BLUE, _BLUE),
+        _legend(0, "projected, best ranks x threads; dots: worst case", _BLUE, _BLUE),
         _legend(1, "wall time, this machine", _BLUE, "white"),
         *([_legend(2, f"measured, {source}", _RED, _RED)] if others else []),
         f'<text x="{_LEFT}" y="20" font-size="14">{study.case}: speed-up</text>',

@@ -1,4 +1,4 @@
-"""Report of a convergence study: values by mesh with their limits, error over cost, advice; as text and JSON."""
+"""Report of a convergence study as text and JSON: values on each mesh with their limits, error over cost, advice."""
 
 import math
 from collections.abc import Sequence
@@ -24,14 +24,14 @@ _ENOUGH = 0.05
 
 @dataclass(frozen=True)
 class Book:
-    """A complete convergence study."""
+    """All results of a convergence study."""
 
     case: str
     changes: Sequence[str]
     own: Variant
-    """Name of the case."""
+    """Pressure form and time step that the case itself has."""
     own_size: float
-    """The smallest element size of the case, m."""
+    """Smallest element size of the case, m."""
     members: int
     vary: str
     accuracy: float
@@ -41,17 +41,19 @@ class Book:
 
     @property
     def failed(self) -> list[Done]:
-        """Points that failed."""
+        """Runs of the study that failed."""
         return [each for each in self.done if each.problem]
 
     def goals(self) -> dict[str, tuple[Number, Target]]:
-        """Results by quantity, references first, if any variant converges."""
+        """Targets of the errors by name of the quantity, references first; only quantities for which at least one
+        variant converges.
+        """
         found = {each.name: (each, trade.target(self.series, each, self.own)) for each in self.numbers}
         return {name: (each, goal) for name, (each, goal) in found.items() if goal is not None}
 
     def leading(self, wanted: str | None = None) -> str | None:
-        """Quantity of the advice: the requested one, otherwise the first quantity that converges and differs between
-        the meshes. A quantity without differences is excluded if a reference has no limit.
+        """Quantity of the advice: the requested quantity, otherwise the first quantity that converges and differs
+        between the meshes. A quantity without differences between meshes is not used if a reference has no limit.
         """
         goals = self.goals()
         if wanted is not None:
@@ -59,7 +61,7 @@ class Book:
         return next(iter(self.moving() or ([] if self.open_references() else goals)), None)
 
     def open_references(self) -> list[Number]:
-        """References of the case that have no limit on these meshes."""
+        """References of the case for which no limit was found on these meshes."""
         goals = self.goals()
         return [each for each in self.numbers if each.expected is not None and each.name not in goals]
 
@@ -72,7 +74,7 @@ class Book:
         ]
 
     def advice(self, wanted: str | None = None) -> str:
-        """The advice in one line."""
+        """The advice of the study in one line."""
         name = self.leading(wanted)
         if name is None and wanted is not None:
             return f"No quantity named {wanted!r} converges on these meshes."
@@ -82,10 +84,10 @@ class Book:
         return trade.advice(self.series, each, goal, self.accuracy, self.own_size)
 
     def _nothing(self) -> str:
-        """Returns the words for a study without an error to compare with the cost."""
-        text = "Nothing converges on these meshes: there is no error to weigh against the cost"
+        """Returns the advice of a study without an error that can be compared with the cost."""
+        text = "No quantity converges on these meshes, so the study has no error to compare with the cost"
         if len(self.series) > 1:
-            text += "; how far the variants differ is in their table"
+            text += "; the table of variants shows the differences between variants"
         own = next((each for each in self.series if each.variant == self.own), None)
         for each in self.open_references():
             if own is None or each.name not in own.meshes[0].samples:
@@ -99,7 +101,7 @@ class Book:
 
 
 def to_markdown(book: Book, wanted: str | None = None) -> str:
-    """Returns the tables, with explanations."""
+    """Returns the report as Markdown: tables with explanations."""
     name = book.leading(wanted)
     parts = [
         ", ".join(f"`{text}`" for text in (book.case, *book.changes)),
@@ -120,8 +122,14 @@ def to_markdown(book: Book, wanted: str | None = None) -> str:
 def _ensembles(book: Book) -> str:
     if book.members == 1:
         return ""
-    how = "steps shorter by 0 and by 0.1 to 1 %" if book.vary == "steps" else "other seeds of the scatter of strength"
-    return f"Every point is an ensemble of {book.members} runs ({how}); values are means, costs those of one run."
+    how = (
+        "steps shorter by 0 and by 0.1 to 1 %" if book.vary == "steps" else "different seeds of the scattered strength"
+    )
+    return (
+        f"Every point is an ensemble of {book.members} runs ({how}); values are means over the ensemble, costs are "
+        "those "
+        "of one run."
+    )
 
 
 def _costs(book: Book, series: Series) -> str:
@@ -134,7 +142,7 @@ def _costs(book: Book, series: Series) -> str:
 
 
 def _values(book: Book, series: Series) -> str:
-    """Returns the table of a quantity from the coarse to the fine mesh, and its limit."""
+    """Returns the table of a quantity, from the coarse to the fine mesh, and the limit of the quantity."""
     meshes = series.meshes[::-1]
     rows = []
     for each in book.numbers:
@@ -158,7 +166,7 @@ def _titled(each: Number) -> str:
 
 
 def _unresolved(book: Book) -> str:
-    """Returns the quantities that no variant resolves, by name, with their behaviour."""
+    """Returns the names of the quantities for which no variant has a limit, with their behaviour."""
     lost: dict[Trend, list[str]] = {}
     for each in book.numbers:
         trends = [series.limits[each.name].trend for series in book.series]
@@ -168,7 +176,7 @@ def _unresolved(book: Book) -> str:
 
 
 def _between(book: Book) -> str:
-    """Returns the limits of each variant for a quantity on its finest mesh, and their differences."""
+    """Returns the table of limits or values on the finest mesh of each variant, with their differences."""
     if len(book.series) == 1:
         return ""
     rows = []
@@ -186,7 +194,9 @@ def _between(book: Book) -> str:
 
 
 def _scatter(book: Book) -> str:
-    """Returns the deviations on the finest mesh of each variant, and the number of runs that a difference needs."""
+    """Returns the standard deviations on the finest mesh of each variant, and the number of runs that is needed to
+    detect a difference.
+    """
     rows = []
     for each in book.series:
         mesh = each.meshes[0]
@@ -204,7 +214,7 @@ def _scatter(book: Book) -> str:
         "mean",
         "deviation",
         "%",
-        f"runs a side to tell {number(100 * _ENOUGH)} %",
+        f"runs for each side to detect {number(100 * _ENOUGH)} %",
     )
     return table(head, rows)
 
@@ -221,8 +231,10 @@ def _worth(book: Book, name: str) -> str:
         for p in points
     ]  # fmt: skip
     text = (
-        f"From the limit {number(goal.value)} {each.unit} of {goal.variant}, itself uncertain by "
-        f"{_percent(goal.uncertainty)} %, by way of each variant's own: errors that cancel by chance do not count."
+        f"Errors are distances from the limit {number(goal.value)} {each.unit} of {goal.variant}, which is uncertain "
+        f"by {_percent(goal.uncertainty)} %. A distance is measured to the limit of the point's own variant, and "
+        "from there "
+        "to the target, so that errors which cancel by chance do not count as accuracy."
     )
     others = [str(variant) for variant in trade.elsewhere(book.series, each, goal)]
     far = f" The limit of another variant differs by more than both uncertainties: {'; '.join(others)}."
@@ -235,12 +247,12 @@ def _seconds(value: float) -> str:
 
 
 def _percent(share: float) -> str:
-    """Returns a number with two digits, without its sign."""
+    """Returns a fraction as a percentage with two digits, without its sign."""
     return exact(100.0 * share, "", 2)
 
 
 def to_json(book: Book, wanted: str | None = None) -> bytes:
-    """Returns all numbers as plain data."""
+    """Returns all numbers of the study as JSON."""
     data: dict[str, Any] = {
         "case": book.case, "changes": book.changes, "own_size": book.own_size, "members": book.members,
         "vary": book.vary, "series": [_plain(each) for each in book.series], "advice": book.advice(wanted),

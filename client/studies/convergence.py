@@ -1,4 +1,6 @@
-"""A convergence study: every point as a run of a server, several at a time, and the results by quantity."""
+"""Execution of a convergence study: each point is a run on a server, several at a time; the results are sorted by
+quantity.
+"""
 
 import hashlib
 import json
@@ -23,36 +25,36 @@ from .variants import Plan, Point, Variant
 
 @dataclass(frozen=True)
 class Done:
-    """A run that has ended."""
+    """A finished run of the study."""
 
     point: Point
     run: str
     tets: int = 0
     steps: int = 0
     cpu: float = 0.0
-    """CPU time of all ranks in the step loop, s."""
+    """CPU time of all ranks in the time steps, s."""
     numbers: tuple[Number, ...] = ()
     problem: str = ""
-    """Reason of the failure; empty for a successful run."""
+    """Reason why the run failed; empty for a successful run."""
 
 
 @dataclass(frozen=True)
 class Mesh:
-    """All members of a variant on one mesh."""
+    """All members of the ensemble of a variant on one mesh."""
 
     factor: float
     tets: int
     size: float
-    """Representative element size over that of the case: (tets of the case / tets)^(1/3)."""
+    """Representative element size relative to the case: (tets of the case / tets)^(1/3)."""
     steps: float
     cpu: float
-    """CPU time, s, mean of the members."""
+    """CPU time of one run, s, as a mean over the members of the ensemble."""
     samples: Mapping[str, Sample]
 
 
 @dataclass(frozen=True)
 class Series:
-    """A variant on all its meshes, the finest first, and the limit of each quantity."""
+    """A variant on all its meshes, the finest mesh first, and the limit of each quantity."""
 
     variant: Variant
     meshes: Sequence[Mesh]
@@ -60,10 +62,10 @@ class Series:
 
 
 def run_all(session: Session, data: Mapping[str, Any], plan: Plan, folder: Path) -> Iterator[Done]:
-    """Submits every point and yields each point after its end, in the order of the points.
+    """Submits the runs of all points, and yields each run after its end, in the order of the points.
 
-    A point that the same server has run before is not run again. Relative paths of files begin in ``folder``. Before
-    any run is submitted, raises CaseError for a point that is not a valid case.
+    A point that the same server has computed before is not computed again. Relative paths of files are relative to
+    ``folder``. Raises CaseError, before any run is submitted, if a point is not a valid case.
     """
     points = plan.points(parse_case(data))
     cases = [apply_overrides(data, point.changes) for point in points]
@@ -81,8 +83,8 @@ def run_all(session: Session, data: Mapping[str, Any], plan: Plan, folder: Path)
 
 
 def _key(case: Mapping[str, Any]) -> str:
-    """Returns the idempotency key of a point. The key is the same for the same case and version: an interrupted
-    study continues.
+    """Returns the idempotency key of a point. Equal cases and versions give equal keys, so that an interrupted study
+    continues.
     """
     text = json.dumps([metadata.version("conoid"), case], sort_keys=True, default=str)
     return f"converge-{hashlib.sha256(text.encode()).hexdigest()[:40]}"
@@ -98,10 +100,12 @@ def _ended(point: Point, case: Case, run: Run) -> Done:
 
 
 def series(done: Sequence[Done]) -> list[Series]:
-    """Returns the points in their variants and meshes. Raises ClientError if no run has succeeded."""
+    """Sorts the runs by variant and mesh. Raises ClientError if no run has succeeded."""
     good = [each for each in done if not each.problem]
     if not good:
-        raise ClientError(f"no run has succeeded; the first: {done[0].problem if done else 'there is none'}")
+        raise ClientError(
+            f"no run has succeeded; problem of the first run: {done[0].problem if done else 'there is none'}"
+        )
     own = min(good, key=lambda each: abs(each.point.factor - 1.0))
     known = {number.name: number for each in good for number in each.numbers}
     variants = dict.fromkeys(each.point.variant for each in done)
@@ -127,8 +131,8 @@ def _mesh(factor: float, members: Sequence[Done], own: Done) -> Mesh:
 
 
 def _limit(name: str, meshes: Sequence[Mesh], floor: float) -> Limit:
-    """Returns the limit of the means; SCATTERS instead of an order where the scatter exceeds the differences between
-    meshes.
+    """Returns the limit of the means of a quantity. The trend is SCATTERS, without an order, if the scatter is
+    larger than the differences between the meshes.
     """
     there = [mesh for mesh in meshes if name in mesh.samples]
     samples = [mesh.samples[name] for mesh in there]

@@ -1,4 +1,6 @@
-"""Picture of error over cost: a panel for each quantity that converges, with the Pareto front. Needs matplotlib."""
+"""Picture of error over cost: one panel for each quantity that converges, with the Pareto front. The module needs
+matplotlib.
+"""
 
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -14,12 +16,12 @@ _COLOURS = ("#4c78a8", "#f58518", "#54a24b", "#e45756", "#72b7b2", "#b279a2")
 _PANELS = 6
 """Largest number of quantities in the picture. Chosen value."""
 _LEAST = 1e-6
-"""Relative error drawn for 0: the axis is logarithmic. Chosen value."""
+"""Relative error that is drawn for an error of 0, because the axis is logarithmic. Chosen value."""
 
 
 def figure(book: Book) -> Figure:
-    """Draws error over cost of each quantity. Quantities without differences between the meshes are omitted if other
-    quantities have differences.
+    """Draws error over cost for each quantity. Quantities without differences between the meshes are left out if
+    other quantities have differences.
     """
     goals = book.goals()
     shown = (book.moving() or list(goals))[:_PANELS]

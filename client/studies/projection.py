@@ -1,15 +1,15 @@
-"""Time of a run on P ranks with a core for each thread: projected from CPU seconds and messages, rank by rank,
-report by report.
+"""Projected time of a run on P ranks with a core for each thread, computed from the CPU times and the messages of each
+rank in each interval between two reports.
 
 ::
 
     T_P = sum over windows ( max over ranks (work) + max over ranks (messages * latency + bytes / bandwidth)
                              + collectives * 2 ceil(log2 P) * latency + bytes put into them by all / bandwidth )
 
-A window is the time between two reports of the worker; work is the CPU time of a rank without waiting. The projection
-assumes that ranks wait for each other once in each window, and that messages do not overlap with work. For a run whose
-tasks were timed one after the other (``--use project`` of the worker), work is the projected time of a rank with the
-given number of threads.
+A window is the interval between two reports of the worker. Work is the CPU time of a rank without waiting. The
+projection assumes that ranks wait for each other once in each window, and that messages do not overlap with work. If
+the tasks of a run were timed one after the other (``--use project`` of the worker), work is the projected time of a
+rank with the given number of threads.
 """
 
 import re
@@ -26,113 +26,117 @@ from conoid.cases.output import layout
 from ..journal import from_line
 
 Seconds = dict[str, list[float]]
-"""CPU time by phase, one number per rank, s."""
+"""CPU time in s by phase; each phase has one number for each rank."""
 _BANDWIDTH = re.compile(r"([\d.]+(?:e[+-]?\d+)?) ?([kMGT]?)B/s")
 
 
 @dataclass(frozen=True)
 class Network:
-    """Cost of messages."""
+    """Cost of messages between ranks."""
 
     latency: float
-    """Latency, s per message."""
+    """Latency of a message, s."""
     bandwidth: float
-    """Bandwidth of a rank, bytes/s."""
+    """Bandwidth of the messages of one rank, bytes/s."""
 
 
 class Phase(msgspec.Struct, frozen=True):
-    """Time of a phase, s."""
+    """Time of one phase of the step, s."""
 
     total: float
-    """Time of all ranks."""
+    """Time of the phase, sum over all ranks, s."""
     imbalance: float
-    """Sum over windows of largest minus mean over ranks."""
+    """Imbalance of the phase, s: largest time of a rank minus the mean, summed over all windows."""
 
 
 class Projection(msgspec.Struct, frozen=True, kw_only=True):
-    """A run and its projection to a core for each thread; times in s, communication per step."""
+    """Measured times of a run, and its projection to a core for each thread. Times are in s; communication is per
+    step.
+    """
 
     ranks: int
     steps: int
     windows: int
     wall: float
-    """Wall time of the run, from the first step."""
+    """Wall time of the run, s, from the first step."""
     work: float
-    """CPU time of all ranks without waiting."""
+    """CPU time of all ranks without waiting, s."""
     longest: float
-    """Sum over windows of the largest work of a rank."""
+    """Largest work of a rank in each window, summed over the windows, s."""
     longest_coarse: float
-    """Sum of the largest work of a rank over windows of twice the length."""
+    """Largest work of a rank in windows of twice the length, summed over these windows, s."""
     messages: float
-    """Time of messages between two ranks."""
+    """Projected time of messages between pairs of ranks, s."""
     collectives: float
-    """Time of collectives."""
+    """Projected time of collective operations, s."""
     phases: dict[str, Phase]
     messages_sent: float
-    """Messages of a rank to other ranks."""
+    """Number of messages that a rank sends to other ranks in a step."""
     bytes_sent: float
-    """Bytes in these messages, per rank."""
+    """Number of bytes that a rank sends to other ranks in a step."""
     collectives_made: float
     bytes_shared: float
-    """Bytes in these messages, by all ranks, per shared node."""
+    """Bytes that all ranks send in a step, for each shared node."""
     rebalances: int
     digest: str
     threads: int = 1
-    """Threads of each rank."""
+    """Number of threads of each rank."""
     by_tasks: bool = False
-    """True if ``work`` is computed from tasks that were timed one after the other; otherwise it is measured with so
-    many threads."""
+    """True if ``work`` is computed from tasks that were timed one after the other; False if it was measured with
+    ``threads`` threads."""
     helped: float = 0.0
-    """Working time of all threads of each rank except the first thread."""
+    """Working time of all threads of each rank except the first thread, s."""
     serial: dict[str, float] = {}
-    """Serial wall time by phase, of the rank with the largest sum over all phases."""
+    """Wall time of serial code by phase, s, for the rank with the largest sum over all phases."""
     parallel: dict[str, float] = {}
-    """Parallel wall time by phase (in regions, which threads share), of the same rank."""
+    """Wall time of parallel regions by phase, s, for the rank with the largest serial time."""
     sharing: Sharing | None = None
 
     @property
     def cores(self) -> int:
-        """Number of cores: one for each thread."""
+        """Number of cores of the projection: one core for each thread."""
         return self.ranks * self.threads
 
     @property
     def name(self) -> str:
-        """Name of the layout: ``4``, or ``4x4`` with several threads; with a star if ``by_tasks``."""
+        """Name of the layout: ``4``, or ``4x4`` with several threads; a star is appended if ``by_tasks``."""
         threads = f"x{self.threads}" if self.threads > 1 or self.by_tasks else ""
         return f"{self.ranks}{threads}{'*' if self.by_tasks else ''}"
 
     @property
     def time(self) -> float:
-        """The projected time T_P."""
+        """Projected time T_P of the run, s."""
         return self.longest + self.messages + self.collectives
 
     @property
     def coarse(self) -> float:
-        """T_P from windows twice as long: the sensitivity to the windows."""
+        """Projected time T_P from windows of twice the length, s; it shows the sensitivity to the length of the
+        windows.
+        """
         return self.time - self.longest + self.longest_coarse
 
     @property
     def worst(self) -> float:
-        """T_P if ranks waited for each other after every phase of a window."""
+        """Projected time T_P, s, if ranks waited for each other after every phase of a window."""
         imbalance = sum(phase.imbalance for phase in self.phases.values())
         return self.work / self.ranks + imbalance + self.messages + self.collectives
 
     @property
     def imbalance(self) -> float:
-        """Largest work over the mean, averaged over the run by time."""
+        """Largest work of a rank relative to the mean, averaged over the time of the run."""
         return self.longest * self.ranks / self.work
 
 
 def bandwidth(text: str) -> float:
-    """Reads bytes/s from a text such as ``5 GB/s``. Raises ValueError."""
+    """Returns the bandwidth, bytes/s, of a text such as ``5 GB/s``. Raises ValueError."""
     match = _BANDWIDTH.fullmatch(text.strip())
     if match is None or not float(match[1]) > 0.0:
-        raise ValueError(f"{text!r} is no bandwidth; write it like '5 GB/s'")
+        raise ValueError(f"{text!r} is not a bandwidth; write a value such as '5 GB/s'")
     return float(match[1]) * 1000.0 ** " kMGT".index(match[2] or " ")
 
 
 def read(folder: Path, network: Network, threads: int | None = None) -> Projection:
-    """Returns the projection of a run that has ended; see ``project``."""
+    """Returns the projection of the finished run in ``folder``."""
     lines = (folder / layout.JOURNAL).read_bytes().splitlines()
     return project(map(from_line, lines), from_json((folder / layout.OUTCOME).read_bytes()), network, threads)
 
@@ -140,7 +144,9 @@ def read(folder: Path, network: Network, threads: int | None = None) -> Projecti
 def project(
     journal: Iterable[AnyMessage], outcome: Outcome, network: Network, threads: int | None = None
 ) -> Projection:
-    """Returns the projection of a run's messages and outcome; with ``threads`` by its tasks, None: as measured."""
+    """Returns the projection for the messages and the outcome of a run. With ``threads`` the tasks of the run are
+    projected to this number of threads; with None the measured times are used.
+    """
     loads: list[Load] = []
     shared_steps = shared = 0
     for message in journal:
@@ -170,13 +176,13 @@ def project(
 
 
 def _of_one(outcome: Outcome, seconds: Seconds) -> dict[str, float]:
-    """Returns serial and parallel times of the rank with the largest serial time."""
+    """Returns the serial and parallel times of the rank with the largest serial time."""
     totals = _busy(outcome.serial) if outcome.serial else []
     return {name: each[totals.index(max(totals))] for name, each in seconds.items()} if totals else {}
 
 
 def _work(load: Load) -> Seconds:
-    """Returns the phases without waiting, which is in ``exchange``."""
+    """Returns the times of the phases without waiting; the phase ``exchange`` contains waiting."""
     packing = [spent - idle for spent, idle in zip(load.phases["exchange"], load.waiting, strict=True)]
     return {**load.phases, "exchange": packing}
 
@@ -195,8 +201,8 @@ def _messages(load: Load, network: Network) -> float:
 
 
 def _collectives(load: Load, network: Network) -> float:
-    """Returns the time of a collective: up a binary tree and down again; the bytes of all ranks pass through every
-    rank.
+    """Returns the time of the collective operations: up a binary tree and down again, with the bytes of all ranks
+    through every rank.
     """
     levels = (len(load.collectives) - 1).bit_length()
     if not levels:

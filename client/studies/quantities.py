@@ -12,14 +12,14 @@ from ..columns import Columns
 
 _COUNTS = ("broken", "fragments", "eroded")
 _NO_STORE = ("initial", "external", "stepping", "averaging", "residual")
-"""Lines of the ledger that are not energies at the end."""
+"""Terms of the energy balance that are not energies of the final state."""
 _FLOOR, _SHARE = 1e-6, 0.01
 """Negligible differences: a millionth of the value, and a hundredth of the tolerance of a reference. Chosen values."""
 
 
 @dataclass(frozen=True)
 class Number:
-    """A quantity of a run."""
+    """A quantity of a run that a study compares."""
 
     name: str
     value: float
@@ -30,28 +30,30 @@ class Number:
 
     @property
     def floor(self) -> float:
-        """Smallest significant difference."""
+        """Smallest difference that is significant."""
         return max(_FLOOR * abs(self.value), _SHARE * self.tolerance)
 
     @property
     def of_nothing(self) -> bool:
-        """True if the expected value is about 0: then there is no relative error."""
+        """True if the expected value is about 0; then the quantity has no relative error."""
         return self.expected is not None and abs(self.expected) <= self.tolerance
 
     @property
     def scale(self) -> float:
-        """Divisor of errors: the expected value; the measured value if zero is expected."""
+        """Divisor of errors: the expected value, or the measured value if zero is expected."""
         return max(abs(self.expected if self.expected is not None else self.value), self.tolerance)
 
 
 def of_run(case: Case, outcome: Outcome, columns: Columns) -> list[Number]:
-    """Returns references in their order, then probes, then energies at the end over the initial one, then counts."""
+    """Returns the quantities of a run: references in their order, then probes, then final energies relative to the
+    initial energy, then counts.
+    """
     found = [*_references(outcome), *_probes(case, columns), *_energies(outcome), *_counts(case, outcome)]
     return [number for number in found if "worst_residual" not in number.name]
 
 
 def names(case: Case) -> list[str]:
-    """Names of all quantities that ``of_run`` can return."""
+    """Returns the names of all quantities that ``of_run`` can return."""
     of_probes = (f"{what} of {probe.name}" for probe in case.probes for what in ("mean", "peak", "end"))
     energies = (f"{name} energy, share" for name in history.LEDGER if name not in _NO_STORE)
     counts = (f"{name}, number" for name in _COUNTS if case.fractures or case.erodes)
@@ -60,7 +62,7 @@ def names(case: Case) -> list[str]:
 
 
 def _numbered(titles: Iterable[str]) -> Iterator[str]:
-    """Numbers names that occur more than once."""
+    """Yields the names; names that occur more than once get a number."""
     seen: dict[str, int] = {}
     for title in titles:
         seen[title] = seen.get(title, 0) + 1
@@ -74,7 +76,9 @@ def _references(outcome: Outcome) -> Iterator[Number]:
 
 
 def _probes(case: Case, columns: Columns) -> Iterator[Number]:
-    """Returns the mean over time, the value of the largest magnitude, and the last value."""
+    """Returns three quantities for each probe: the mean over time, the value with the largest magnitude, and the
+    last value.
+    """
     for name in (probe.name for probe in case.probes):
         values, unit = columns.numbers(name), columns.units[name]
         finite = [value for value in values if value == value]

@@ -1,8 +1,9 @@
-"""The loads of a run under another balance policy, without the solver: what cuts would have cost and saved.
+"""Replay of the measured loads of a run with another policy of load balance, without the solver. It shows what new
+decompositions would have cost and saved.
 
-A run reports at intervals what each group of tets costs (worker/migration/groups.py). Cuts decide which rank has
-which group, as in the run: the first by numbers of tets, later ones by measured loads. See
-docs/performance/balance.md.
+A run reports the cost of each group of tets at intervals (worker/migration/groups.py). A decomposition assigns
+groups to ranks in the same way as in the run: the first decomposition by numbers of tets, later decompositions by
+measured loads. See docs/performance/balance.md.
 """
 
 from collections.abc import Iterable, Iterator, Sequence
@@ -17,36 +18,36 @@ from ..errors import ClientError, UsageError
 
 Point = tuple[float, float, float]
 Shares = list[tuple[int, float]]
-"""Groups of a rank, and the rank's fraction of each group."""
+"""Groups of a rank, each with the fraction of the group that the rank has."""
 
 
 @dataclass
 class Account:
-    """Result of a policy. Times in s."""
+    """Cost and saving of a policy. Times are in s."""
 
     policy: str
     ranks: int
     cuts: list[int] = field(default_factory=list)
     """Steps before which the mesh was decomposed."""
     lost: float = 0.0
-    """Time lost by imbalance: work of the most loaded rank above the mean."""
+    """Time lost by imbalance, s: work of the most loaded rank minus the mean work."""
     cost: float = 0.0
-    """Time of all decompositions."""
+    """Time of all decompositions, s."""
     work: float = 0.0
-    """Mean work of a rank."""
+    """Mean work of a rank, s."""
     imbalance: float = 1.0
-    """Largest load over the mean, both over all steps."""
+    """Largest load of a rank relative to the mean, over all steps."""
     total: float = 0.0
-    """Time lost, and time of the decompositions."""
+    """Time lost by imbalance plus the time of the decompositions, s."""
 
     def book(self, loads: Sequence[float], steps: int) -> None:
-        """Adds the ``loads`` of all ranks, s per step, over some steps."""
+        """Adds the loads of all ranks, s per step, for a number of steps."""
         self.lost += lost(loads) * steps
         self.work += sum(loads) / len(loads) * steps
         self._close()
 
     def cut(self, step: int, cost: float) -> None:
-        """Adds a decomposition."""
+        """Adds a decomposition before a step with its cost, s."""
         self.cuts.append(step)
         self.cost += cost
         self._close()
@@ -58,27 +59,27 @@ class Account:
 
 @dataclass
 class Record:
-    """Loads of the groups of a run."""
+    """Measured loads of the groups of tets of a run."""
 
     centres: list[Point]
-    """Centres of the groups at the start, m."""
+    """Centres of the groups of tets at the start, m."""
     tets: list[int]
     moments: list[Groups]
-    """Load messages; the first has no loads yet."""
+    """Messages with the loads of the groups; the first message has no loads yet."""
     cost: float
-    """Mean cost of a decomposition of the run, s, or the assumed cost if there was none."""
+    """Mean cost of a decomposition in the run, s, or an assumed cost if the run had no decomposition."""
     happened: Account
-    """Result of the run itself."""
+    """Cost and saving of the policy that the run itself used."""
 
     @property
     def heaviest(self) -> float:
-        """Largest fraction of all work that one group has at any time."""
+        """Largest fraction of the total work that one group has at any time."""
         return max((max(m.load) / sum(m.load) for m in self.moments if any(m.load)), default=0.0)
 
 
 def read(messages: Iterable[AnyMessage], policy: str = "") -> Record:
-    """Reads the loads in a journal. Raises ClientError if the journal has no loads. Messages of steps beyond the
-    checkpoint from which a run continued are dropped.
+    """Reads the loads of a run from its messages. Messages of steps beyond the checkpoint from which the run
+    continued are dropped. Raises ClientError if the messages have no loads.
     """
     moments: list[Groups] = []
     first, costs, expected = None, [], 0.0
@@ -100,17 +101,17 @@ def read(messages: Iterable[AnyMessage], policy: str = "") -> Record:
             costs.append(message.cost)
             happened.cut(message.step, message.cost)
     if first is None or len(moments) < 2:
-        raise ClientError("the journal of this run has no loads of groups")
+        raise ClientError("the journal of the run has no loads of groups of tets")
     cost = sum(costs) / len(costs) if costs else expected
     return Record(first.centres, first.tets, moments, cost, happened)
 
 
 def replay(record: Record, spec: Spec, ranks: int, cost: float, scale: Point = (1.0, 1.0, 1.0)) -> Account:
-    """Returns the result of the policy of ``spec`` on so many ``ranks`` with a decomposition cost ``cost``, s.
-    ``scale``: factors of positions before every decomposition. At most as many ranks as groups.
+    """Returns the result of the policy ``spec`` on ``ranks`` ranks; each decomposition costs ``cost`` s. ``scale``:
+    factors of positions before each decomposition. There must not be more ranks than groups.
     """
     if not 1 <= ranks <= len(record.centres):
-        raise UsageError(f"ranks = {ranks}: 1 to {len(record.centres)}, the number of groups")
+        raise UsageError(f"ranks = {ranks}: allowed: 1 to {len(record.centres)}, the number of groups")
     places = [(x * scale[0], y * scale[1], z * scale[2]) for x, y, z in record.centres]
     account, trigger, first = Account(named(spec), ranks), Trigger(spec, cost), record.moments[0]
     held = divide(places, record.tets, ranks)
@@ -133,8 +134,8 @@ def replay(record: Record, spec: Spec, ranks: int, cost: float, scale: Point = (
 
 
 def compare(record: Record, spec: Spec, ranks: int, cost: float, scale: Point) -> list[Account]:
-    """Returns the policy of ``spec``, then the other policies with the parameters ``alpha`` and ``every`` of
-    ``spec``.
+    """Returns the results of the policy ``spec`` and of the other policies; all use the parameters ``alpha`` and
+    ``every`` of ``spec``.
     """
     policies = [spec.policy, *(p for p in ("measured", "outside", "every", "never") if p != spec.policy)]
     specs = [spec.model_copy(update={"policy": policy}) for policy in policies]
@@ -142,7 +143,9 @@ def compare(record: Record, spec: Spec, ranks: int, cost: float, scale: Point) -
 
 
 def chosen(spec: Spec, words: str, alpha: float | None = None) -> Spec:
-    """Returns the ``spec`` of a case with another policy, as a user writes it: ``every:500``. Raises UsageError."""
+    """Returns the ``spec`` of a case with another policy in the notation of a user, such as ``every:500``. Raises
+    UsageError.
+    """
     policy, colon, every = words.partition(":")
     options = {"policy": policy} | ({"every": every} if every else {}) | ({"alpha": alpha} if alpha is not None else {})
     try:
@@ -157,19 +160,21 @@ def chosen(spec: Spec, words: str, alpha: float | None = None) -> Spec:
 
 
 def named(spec: Spec) -> str:
-    """Returns the policy and its parameter."""
+    """Returns the name of the policy with its parameter."""
     return spec.policy + {"outside": f" {number(spec.alpha)}", "every": f":{spec.every}"}.get(spec.policy, "")
 
 
 def _looks(spec: Spec, before: int, now: int) -> Iterator[int]:
-    """Yields the steps after ``before`` and up to ``now`` before which the policy decides; ``now`` is the last."""
+    """Yields the steps, after ``before`` and up to ``now``, before which the policy decides about a decomposition.
+    The last yielded step is ``now``.
+    """
     if spec.policy == "every":
         yield from range((before // spec.every + 1) * spec.every, now, spec.every)
     yield now
 
 
 def _weights(spec: Spec, record: Record, moment: Groups) -> Sequence[float]:
-    """Returns the balanced quantity."""
+    """Returns the quantity of each group that the decomposition balances."""
     weights = {"measured": moment.load, "outside": moment.outside, "tets": record.tets}[spec.weights]
     return weights if any(weights) else record.tets
 
@@ -179,14 +184,14 @@ def _guards(spec: Spec, moment: Groups, held: list[Shares]) -> list[Guard]:
 
 
 def _sums(held: list[Shares], values: Sequence[float]) -> list[float]:
-    """(ranks,) sum of the ``values`` (groups,) of each rank."""
+    """Returns (ranks,) the sums of ``values`` (groups,) over the groups of each rank."""
     return [sum(share * values[group] for group, share in shares) for shares in held]
 
 
 def divide(places: Sequence[Point], weights: Sequence[float], ranks: int) -> list[Shares]:
-    """Returns the groups of each rank: boxes cut across their longest axis so that the ``weights`` (groups,) are
-    equal. A group on a cut is divided, as its tets would be. A number of ranks that is not a power of two is split
-    as floor : ceiling.
+    """Returns the groups of each rank. Boxes are cut across their longest axis so that the sums of ``weights``
+    (groups,) are equal. A group at a cut is divided between two ranks. If the number of ranks is not a power of two,
+    it is split as floor : ceiling.
     """
     return _halved([(group, 1.0) for group in range(len(places))], places, weights, ranks)
 

@@ -1,4 +1,5 @@
-"""Convergence with the mesh: observed order, Richardson extrapolation, grid convergence index. Pure numbers.
+"""Convergence with the mesh: observed order, Richardson extrapolation, grid convergence index. The module works on
+plain numbers.
 
 Sources: Celik, Ghia, Roache and Freitas, J. Fluids Eng. 130 (2008) 078001 (the procedure of ASME V&V 20-2009,
 section 2); Eca and Hoekstra, J. Comput. Phys. 262 (2014) 104, for the weighted least squares and the safety factors.
@@ -11,21 +12,21 @@ from enum import StrEnum
 from itertools import pairwise
 
 FORMAL = 2.0
-"""Order of linear tets and of the leapfrog scheme in smooth motion: the largest order used for an extrapolation."""
+"""Order of linear tets and of the leapfrog scheme in smooth motion. An extrapolation uses at most this order."""
 SAFETY, CAUTION = 1.25, 3.0
 """Safety factors of V&V 20: with an observed order from at least three meshes, and without an observed order."""
 SLOWEST = 0.5
 """Order below which Eca and Hoekstra do not trust an extrapolation."""
 _ORDERS = (0.01, 12.0)
-"""Range in which an order is searched. Chosen value: relative differences below this value are not significant."""
+"""Range in which the observed order is searched. Chosen value: relative differences below 0.01 are not significant."""
 _GOLDEN = (math.sqrt(5.0) - 1.0) / 2.0
 _SCAN, _HALVINGS = 240, 80
-"""Number of orders that are tried, and number of golden-section steps about the best one. Chosen values: with these
-numbers the order has an error of 1e-12."""
+"""Number of orders that are tried, and number of golden-section steps around the best order. Chosen values: the
+error of the order is 1e-12."""
 
 
 class Trend(StrEnum):
-    """Behaviour of a quantity with decreasing element size."""
+    """Behaviour of a quantity as the element size decreases."""
 
     CONVERGES = "converges"
     SETTLED = "settled"
@@ -37,20 +38,20 @@ class Trend(StrEnum):
 
 @dataclass(frozen=True)
 class Limit:
-    """Limit of a quantity from several meshes, with its uncertainty."""
+    """Limit of a quantity that is computed on several meshes, with its uncertainty."""
 
     trend: Trend
     value: float
     """Value extrapolated to the element size 0 if the quantity converges; otherwise the value on the finest mesh."""
     uncertainty: float
-    """Absolute uncertainty of the value on the finest mesh, at 95 %: the grid convergence index times the value."""
+    """Absolute uncertainty of the value on the finest mesh at 95 %: the grid convergence index times the value."""
     order: float = math.nan
     """Observed order; NaN if there is none."""
 
 
 @dataclass(frozen=True)
 class Fit:
-    """Curve f(h) = ``value`` + ``slope`` h^``order``, and the standard deviation of the values from this curve."""
+    """Curve f(h) = ``value`` + ``slope`` h^``order``, and the standard deviation of the values from the curve."""
 
     value: float
     slope: float
@@ -59,9 +60,10 @@ class Fit:
 
 
 def observed_order(sizes: Sequence[float], values: Sequence[float]) -> float:
-    """Returns the observed order of three meshes, the finest first; NaN if there is none.
+    """Returns the observed order of three meshes, the finest mesh first; NaN if there is no order.
 
-    p ln r21 = ln|e32 / e21| + ln((r21^p - s) / (r32^p - s)), s the sign of e32 / e21 (Celik and others, eq. 3).
+    p ln r21 = ln|e32 / e21| + ln((r21^p - s) / (r32^p - s)), where s is the sign of e32 / e21 (Celik and others, eq.
+    3).
     """
     fine, coarse = values[1] - values[0], values[2] - values[1]
     if fine == 0.0 or coarse == 0.0:
@@ -83,7 +85,7 @@ def observed_order(sizes: Sequence[float], values: Sequence[float]) -> float:
 
 
 def extrapolated(fine: float, coarse: float, ratio: float, order: float) -> float:
-    """Returns the extrapolated value from two meshes with this ratio of sizes (above 1)."""
+    """Returns the value extrapolated from two meshes; ``ratio``: ratio of their element sizes, above 1."""
     return fine + (fine - coarse) / (float(ratio**order) - 1.0)
 
 
@@ -93,7 +95,9 @@ def grid_convergence_index(fine: float, coarse: float, ratio: float, order: floa
 
 
 def fitted(sizes: Sequence[float], values: Sequence[float], order: float | None = None) -> Fit:
-    """Returns the curve through three meshes or more by least squares weighted by 1 / h; ``order`` fixes it."""
+    """Returns the curve through three or more meshes, found by least squares with the weights 1 / h. ``order``
+    prescribes the order of the curve.
+    """
     if order is not None:
         return _line(sizes, values, order)
     grid = [_ORDERS[0] * (_ORDERS[1] / _ORDERS[0]) ** (k / _SCAN) for k in range(_SCAN + 1)]
@@ -107,7 +111,7 @@ def fitted(sizes: Sequence[float], values: Sequence[float], order: float | None 
 
 
 def _line(sizes: Sequence[float], values: Sequence[float], order: float) -> Fit:
-    """Fits a weighted straight line in h^order."""
+    """Fits a straight line in h^order by weighted least squares."""
     weights = [1.0 / h for h in sizes]
     total = math.fsum(weights)
     x = [(h / max(sizes)) ** order for h in sizes]
@@ -124,11 +128,12 @@ def _line(sizes: Sequence[float], values: Sequence[float], order: float) -> Fit:
 
 
 def limit(sizes: Sequence[float], values: Sequence[float], floor: float = 0.0, formal: float = FORMAL) -> Limit:
-    """Returns the limit of the values of meshes of these sizes; differences up to ``floor`` are negligible.
+    """Returns the limit of values on meshes with the element sizes ``sizes``. Differences up to ``floor`` are
+    negligible.
 
-    Monotone with an order of at least 0.5: it converges, and the uncertainty is 1.25 times the sum of the distance from
-    the limit and the deviation of the curve. If the values do not converge, the uncertainty is three times the range of
-    the values.
+    Monotone values with an order of at least 0.5 converge. Their uncertainty is 1.25 times the sum of the distance
+    from the limit and the deviation of the curve. If the values do not converge, the uncertainty is three times
+    their range.
     """
     order = sorted(range(len(sizes)), key=lambda k: sizes[k])
     sizes, values = [sizes[k] for k in order], [values[k] for k in order]
@@ -147,9 +152,9 @@ def limit(sizes: Sequence[float], values: Sequence[float], floor: float = 0.0, f
 
 
 def _monotone(sizes: Sequence[float], values: Sequence[float], formal: float) -> Limit:
-    """Returns the limit of monotone values. An order above the formal one is reported, and the formal one extrapolates.
-    If the order is above twice the formal order, the meshes are too coarse or too similar, and the factor ``CAUTION``
-    is used.
+    """Returns the limit of monotone values. If the observed order is above the formal order, it is reported, and the
+    formal order is used for the extrapolation. If the observed order is above twice the formal order, the meshes are
+    too coarse or too similar, and the safety factor is ``CAUTION``.
     """
     free = fitted(sizes, values)
     if free.order < SLOWEST:

@@ -1,4 +1,4 @@
-"""A scaling study: a case on several numbers of ranks and threads, with measured and projected times."""
+"""Execution of a scaling study: a case on several numbers of ranks and threads, with measured and projected times."""
 
 import os
 import shlex
@@ -26,34 +26,35 @@ _ENVIRONMENT = {**dict.fromkeys(_THREADS, "1"), "HYDRA_LAUNCHER": "fork", "HYDRA
 
 
 Layout = tuple[int, int]
-"""Number of ranks, and threads of each."""
+"""A layout of a run: number of ranks, and number of threads of each rank."""
 
 
 @dataclass(frozen=True)
 class Trial:
-    """A run of a study."""
+    """A run of a scaling study."""
 
     ranks: int
     threads: int
     by_tasks: bool = False
-    """True if the run uses one thread per rank and times its tasks, from which times with ``threads`` and fewer
-    threads follow."""
+    """True if the run uses one thread for each rank and times its tasks. Times with ``threads`` or fewer threads are
+    computed from these task times."""
 
     @property
     def folder(self) -> str:
-        """Name of the folder of the run, below that of the study."""
+        """Name of the folder of the run inside the folder of the study."""
         threads = f"x{self.threads}" if self.threads > 1 else ""
         return f"ranks-{self.ranks}{threads}{'-tasks' if self.by_tasks else ''}"
 
     def changes(self, overrides: Sequence[str]) -> list[str]:
-        """Changed keys of the case."""
+        """Returns the overrides of the case for this run, after ``overrides``."""
         return [*overrides, f"run.ranks={self.ranks}", f"run.threads={self.threads}"]
 
 
 def trials(layouts: Iterable[Layout], cores: int) -> list[Trial]:
-    """Returns the runs of a study of ``layouts`` on a machine with so many ``cores``: one rank first; then layouts
-    with enough cores, and ranks of one thread, which can share cores; then, for layouts without enough cores for
-    their threads, runs with timed tasks, and two threads that check the projection.
+    """Returns the runs of a study of ``layouts`` on a machine with ``cores`` cores. The first run has one rank.
+    Layouts with enough cores, and layouts with one thread for each rank, follow; ranks can share cores. For layouts
+    with more threads than cores there are runs with timed tasks, and a run with two threads that checks the
+    projection.
     """
     wanted = sorted({(1, 1), *layouts})
     beyond = {ranks: threads for ranks, threads in wanted if threads > 1 and ranks * threads > cores}
@@ -67,8 +68,8 @@ def trials(layouts: Iterable[Layout], cores: int) -> list[Trial]:
 def scale(
     case: str, overrides: Sequence[str], layouts: Sequence[Layout], folder: Path, network: Network
 ) -> Iterator[Projection]:
-    """Runs a case on one rank and in each of the ``layouts``, one after the other, each in its own folder. A
-    finished run of the same case is only read. Raises CaseError, and ClientError for a run that fails.
+    """Runs a case on one rank and in each of the ``layouts``, one after the other, each in a folder of its own. A
+    finished run of the same case is only read. Raises CaseError, and ClientError if a run fails.
     """
     for trial in trials(layouts, CORES):
         run(case, overrides, trial, folder)
@@ -76,8 +77,8 @@ def scale(
 
 
 def run(case: str, overrides: Sequence[str], trial: Trial, folder: Path, seconds: float | None = None) -> None:
-    """Makes a run of a study if it does not exist yet. Raises ClientError if the run fails, TimeoutExpired if the run
-    has not ended after so many ``seconds``.
+    """Computes a run of a study if it does not exist yet. Raises ClientError if the run fails, TimeoutExpired if the
+    run has not ended after ``seconds``.
     """
     place = folder / trial.folder
     if not _there(place, resolved_json(case_of(case, trial.changes(overrides)))):
@@ -85,28 +86,31 @@ def run(case: str, overrides: Sequence[str], trial: Trial, folder: Path, seconds
 
 
 def found(trial: Trial, folder: Path, layouts: Sequence[Layout], network: Network) -> list[Projection]:
-    """Returns the projections of a run: of its layout, or of all ``layouts`` that can be computed from its tasks."""
+    """Returns the projections from a run: for its own layout, or for all ``layouts`` that can be computed from its
+    timed tasks.
+    """
     place = folder / trial.folder
     if not trial.by_tasks:
         return [read(place, network)]
-    also = {1, 2} if trial.ranks == 1 else set()  # to compare with, and beside two threads that are measured
+    # Layouts with 1 and 2 threads are compared with the measured run of two threads.
+    also = {1, 2} if trial.ranks == 1 else set()
     known = from_json((place / layout.OUTCOME).read_bytes()).projected
     asked = {threads for ranks, threads in layouts if ranks == trial.ranks and ranks * threads > CORES}
     return [read(place, network, threads) for threads in sorted((asked | also) & set(known))]
 
 
 def _there(folder: Path, case: bytes) -> bool:
-    """Returns True if the run exists. Raises ClientError if the folder contains another run."""
+    """Returns True if the run exists and has succeeded. Raises ClientError if the folder contains another run."""
     if not folder.exists():
         return False
     names = (layout.OUTCOME, layout.RESOLVED_CASE)
     if all((folder / name).is_file() for name in names) and (folder / layout.RESOLVED_CASE).read_bytes() == case:
         return _succeeded(folder)
-    raise ClientError(f"{folder} holds another run, or one that did not end; choose another folder")
+    raise ClientError(f"{folder} contains another run, or a run that did not end; choose another folder")
 
 
 def _succeeded(folder: Path) -> bool:
-    """Returns True. Raises ClientError for a run that failed."""
+    """Returns True if the run has succeeded. Raises ClientError if the run has failed."""
     ended = folder / layout.OUTCOME
     outcome = from_json(ended.read_bytes()) if ended.is_file() else None
     if outcome is None or outcome.state != State.SUCCEEDED:
@@ -130,18 +134,18 @@ def _run(case: Path, trial: Trial, overrides: Sequence[str], folder: Path, secon
         try:
             child.wait(seconds)
         finally:
-            child.terminate()  # mpiexec signals its ranks
+            child.terminate()  # mpiexec forwards the signal to its ranks.
             child.wait()
     _succeeded(folder)
 
 
 def mpiexec() -> list[str]:
-    """Returns the mpiexec of the site if it names one, otherwise that beside this Python or in PATH. Raises
-    ClientError.
+    """Returns the mpiexec of the site if CONOID_MPIEXEC is set, else the mpiexec beside this Python or in PATH.
+    Raises ClientError.
     """
     beside = Path(sys.executable).with_name("mpiexec")
     chosen = shlex.split(os.environ.get("CONOID_MPIEXEC", ""))
     found = str(beside) if beside.is_file() else shutil.which("mpiexec")
     if not chosen and found is None:
-        raise ClientError("no mpiexec: install conoid[mpich], or name the site's own in CONOID_MPIEXEC")
+        raise ClientError("no mpiexec: install conoid[mpich], or set CONOID_MPIEXEC to the mpiexec of the site")
     return chosen or [str(found)]

@@ -1,17 +1,17 @@
-"""Ensembles of a scene that is sensitive to small changes: mean, deviation, and significance of differences."""
+"""Ensembles of runs of a scene that is sensitive to small changes: mean, deviation, and significance of differences."""
 
 import math
 from dataclasses import dataclass
 from statistics import NormalDist, fmean, stdev
 
 CONFIDENCE, POWER = 0.95, 0.8
-"""Significance level, and power of the test. Chosen value: usual in experiments."""
+"""Significance level and power of statistical tests. Chosen values: usual in experiments."""
 _NORMAL = NormalDist()
 
 
 @dataclass(frozen=True)
 class Sample:
-    """The values of one quantity over the members of an ensemble."""
+    """Values of one quantity for the members of an ensemble."""
 
     values: tuple[float, ...]
 
@@ -22,7 +22,7 @@ class Sample:
 
     @property
     def deviation(self) -> float:
-        """Standard deviation of a member; 0 for a single one."""
+        """Standard deviation of the members; 0 for a single member."""
         return stdev(self.values) if len(self.values) > 1 else 0.0
 
     @property
@@ -32,15 +32,15 @@ class Sample:
 
 
 def perturbations(members: int, least: float = 1e-3, most: float = 1e-2) -> list[float]:
-    """Returns the share by which each member's steps are shorter: 0 for the first, then ``least`` to ``most``,
-    evenly in log.
+    """Returns the fraction by which the time steps of each member are shorter: 0 for the first member, then
+    ``least`` to ``most``, evenly spaced in the logarithm.
     """
     last = max(members - 2, 1)
     return [0.0, *(least * (most / least) ** (k / last) for k in range(members - 1))][:members]
 
 
 def runs_needed(deviation: float, difference: float, confidence: float = CONFIDENCE, power: float = POWER) -> int:
-    """Returns the number of members of each of two ensembles to detect a difference of their means.
+    """Returns the number of members that each of two ensembles needs, so that a difference of their means is detected.
 
     2 ((z_a + z_b) s / d)^2 + z_a^2 / 4, two-sided (Guenther, The American Statistician 35 (1981) 243).
     """
@@ -53,7 +53,7 @@ def runs_needed(deviation: float, difference: float, confidence: float = CONFIDE
 
 
 def differ(a: Sample, b: Sample, confidence: float = CONFIDENCE) -> bool:
-    """Returns True if two means differ significantly: Welch's test; single values differ if they are not equal."""
+    """Returns True if two means differ significantly by Welch's test; single values differ if they are not equal."""
     variances = a.error**2, b.error**2
     if sum(variances) == 0.0:
         return a.mean != b.mean
@@ -63,7 +63,9 @@ def differ(a: Sample, b: Sample, confidence: float = CONFIDENCE) -> bool:
 
 
 def student(probability: float, free: float) -> float:
-    """Quantile of Student's t: exact up to two degrees of freedom, otherwise Abramowitz and Stegun 26.7.5."""
+    """Returns the quantile of Student's t distribution: exact up to two degrees of freedom, otherwise by Abramowitz
+    and Stegun 26.7.5.
+    """
     if free < 2.0:
         return math.tan(math.pi * (probability - 0.5))
     if free < 3.0:

@@ -1,4 +1,4 @@
-"""Report of a scaling study: speed-up, losses by phase, communication, serial parts."""
+"""Report of a scaling study: speed-up, losses by phase, communication, serial times."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -12,40 +12,42 @@ from .projection import Network, Projection
 
 @dataclass(frozen=True)
 class Study:
-    """Runs of a case by their ranks and threads; the first is on one of each."""
+    """Runs of a case with different numbers of ranks and threads; the first run has one rank and one thread."""
 
     case: str
     changes: Sequence[str]
-    """Changed keys of the case."""
+    """Keys of the case that the study changes."""
     cores: int
     network: Network
     runs: Sequence[Projection]
 
     @property
     def equal(self) -> bool:
-        """True if all runs have the same answer."""
+        """True if all runs of the study have the same answer."""
         return len({run.digest for run in self.runs}) == 1
 
     def speed_up(self, run: Projection) -> float:
-        """Projected speed-up; with threads by timed tasks, relative to one thread by the same tasks, under the same
-        load of the cores.
+        """Returns the projected speed-up of a run. For a run with timed tasks it is relative to one thread, computed
+        from the same tasks under the same load of the cores.
         """
         alone = next((each for each in self.runs if each.by_tasks and each.cores == 1), self.runs[0])
         return (alone if run.by_tasks else self.runs[0]).time / run.time
 
     def within(self, run: Projection) -> bool:
-        """Returns True if each thread had its own core, so that the wall time is significant."""
+        """Returns True if each thread of the run had its own core, so that the wall time is significant."""
         return run.cores <= self.cores and not run.by_tasks
 
     @property
     def error(self) -> tuple[Projection, Projection] | None:
-        """Speed-up of two threads by the tasks of one, and as measured; None without both."""
+        """Two runs with two threads: projected from the tasks of one thread, and measured; None if one of these runs
+        is missing.
+        """
         two = {run.by_tasks: run for run in self.runs if (run.ranks, run.threads) == (1, 2)}
         return (two[True], two[False]) if len(two) == 2 else None
 
     def losses(self, run: Projection) -> dict[str, tuple[float, float]]:
-        """Returns the additional time of each phase per rank, s: its share of the work beyond that of one rank, and
-        imbalance.
+        """Returns, for each phase, two additional times of a rank, s: the work beyond the equal division of the work
+        of one rank, and the imbalance.
         """
         one = self.runs[0].phases
         share = {name: one[name].total / run.threads for name in run.phases}
@@ -54,7 +56,7 @@ class Study:
 
 
 def to_json(study: Study) -> bytes:
-    """Returns all numbers as plain data."""
+    """Returns all numbers of the study as JSON."""
     runs = [
         {
             **msgspec.to_builtins(run), "projected": run.time, "coarser": run.coarse, "at_worst": run.worst,
@@ -70,7 +72,7 @@ def to_json(study: Study) -> bytes:
 
 
 def from_json(data: bytes) -> Study:
-    """Reads the output of ``to_json``."""
+    """Returns the study from the JSON text that ``to_json`` makes."""
     document = msgspec.json.decode(data)
     network = msgspec.convert(document["network"], Network)
     runs = msgspec.convert(document["runs"], tuple[Projection, ...])
@@ -78,19 +80,20 @@ def from_json(data: bytes) -> Study:
 
 
 def to_markdown(study: Study) -> str:
-    """Returns the tables, with explanations."""
+    """Returns the report as Markdown: tables with explanations."""
     network, crowded = study.network, [run.name for run in study.runs if run.cores > study.cores and not run.by_tasks]
     parts = [
         ", ".join(f"`{text}`" for text in (study.case, *study.changes)),
-        f"On {study.cores} cores. Projected: with a core a thread, {si(network.latency, 's')} a message, "
-        f"{si(network.bandwidth, 'B/s')}; coarser: from windows twice as long; at worst: if ranks waited for each "
-        "other after every phase.",
-        f"Ranks took turns on the cores, with MPIR_CVAR_ENABLE_HEAVY_YIELD=1: {', '.join(crowded)}." if crowded else "",
+        f"On {study.cores} cores. Projected times assume a core for each thread, {si(network.latency, 's')} latency "
+        "and "
+        f"{si(network.bandwidth, 'B/s')} bandwidth; coarser: from windows twice as long; at worst: if ranks waited for "
+        "each other after every phase.",
+        f"Ranks shared cores, with MPIR_CVAR_ENABLE_HEAVY_YIELD=1: {', '.join(crowded)}." if crowded else "",
         _speeds(study),
         _by_tasks(study),
         *_serial(study),
-        "Projected time of a rank beyond that of one rank over ranks and threads, s: more work + imbalance, and the "
-        "share in all of it.",
+        "Additional projected time of a rank compared with an equal division of the work of one rank, s: additional "
+        "work + imbalance, and the share of the phase in the sum.",
         _losses(study),
         *_traffic(study),
         f"Digests: equal, {study.runs[0].digest[:16]}." if study.equal else "Digests: NOT EQUAL.",
@@ -119,20 +122,23 @@ def _speeds(study: Study) -> str:
 
 
 def _by_tasks(study: Study) -> str:
-    """Returns the explanation of stars, with the error of projections."""
+    """Returns the explanation of the stars in the tables, with the error of projections."""
     sharing = next((run.sharing for run in study.runs if run.by_tasks), None)
     if sharing is None:
         return ""
-    a_step = f"{fixed(sharing.regions / sharing.steps, 1)} regions a step"
+    a_step = f"{fixed(sharing.regions / sharing.steps, 1)} parallel regions per step"
     made = (
-        f"{fixed(sharing.colours / sharing.regions, 1)} colours a region, {fixed(sharing.tasks / sharing.colours, 1)}"
+        f"{fixed(sharing.colours / sharing.regions, 1)} colours per region, {fixed(sharing.tasks / sharing.colours, 1)}"
     )
     turn, call, wake = alike((sharing.turn, sharing.call, sharing.wake), "s")
     text = (
-        "With a star: there are fewer cores than threads, so the tasks of each region were timed one after the other, "
-        f"and their times given out to so many threads, colour after colour: {a_step}, {made} tasks a colour. "
-        f"To share a colour was taken to cost {turn}, to call a sleeping thread {call}, until it works {wake}, as "
-        "measured here. That threads slow each other down through the memory is not in it."
+        "With a star: the machine has fewer cores than the run has threads. Therefore the tasks of each parallel "
+        "region "
+        f"were timed one after the other, and their times were distributed to the threads, colour after colour: "
+        f"{a_step}, {made} tasks per colour. Assumed costs, as measured on this machine: {turn} for sharing a colour, "
+        f"{call} for calling a sleeping thread, and {wake} until it works. The projection does not include that "
+        "threads "
+        "slow each other down through the memory."
     )
     if study.error is None:
         return text
@@ -144,17 +150,14 @@ def _by_tasks(study: Study) -> str:
 
 
 def _serial(study: Study) -> list[str]:
-    """Returns the limits of the gain by threads; empty for runs without these data."""
+    """Returns the limits of the gain by threads; empty if the runs lack the data."""
     runs = [run for run in study.runs if run.serial and not run.by_tasks]
     names = [name for name in (runs[0].serial if runs else ()) if any(run.serial[name] for run in runs)]
     rows = [[name, *(_parted(run, [name]) for run in runs)] for name in names]
     if not runs:
         return []
     rows.append(["all", *(_parted(run, names) for run in runs)])
-    caption = (
-        "Milliseconds a step of the busiest rank, by the clock: what one thread does alone + what is in regions, which "
-        "threads share."
-    )
+    caption = "Wall time of a step on the busiest rank, ms: serial code + parallel regions."
     return [caption, table(["phase", *(run.name for run in runs)], rows)]
 
 
@@ -200,7 +203,7 @@ def _seconds(value: float) -> str:
 
 
 def table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
-    """Returns a Markdown table with aligned columns; the first column is aligned left."""
+    """Returns a Markdown table with aligned columns; the first column is aligned to the left."""
     widths = [max(len(line[i]) for line in (head, *rows)) for i in range(len(head))]
     rule = ["-" * widths[0], *("-" * (width - 1) + ":" for width in widths[1:])]
     lines = [

@@ -13,12 +13,12 @@ from .richardson import FORMAL, Trend
 from .variants import Variant
 
 _VAGUE = 0.3
-"""Relative uncertainty of a limit above which it is not used as target. Chosen value."""
+"""Relative uncertainty above which a limit is not used as the target of errors. Chosen value."""
 
 
 @dataclass(frozen=True)
 class Worth:
-    """A variant on a mesh: cost, CPU s, and relative error."""
+    """A variant on one mesh, with its cost in CPU s and its relative error."""
 
     variant: Variant
     mesh: Mesh
@@ -28,7 +28,7 @@ class Worth:
 
 @dataclass(frozen=True)
 class Target:
-    """The limit from which errors are measured, its relative uncertainty, and its variant."""
+    """The limit from which errors are measured, with its relative uncertainty and its variant."""
 
     value: float
     uncertainty: float
@@ -37,9 +37,9 @@ class Target:
 
 
 def target(all_series: Sequence[Series], number: Number, own: Variant | None = None) -> Target | None:
-    """Returns the limit of ``own``, the variant of the case, if it converges; otherwise the least uncertain one of
-    all variants. A form that locks can converge to a wrong limit with a small uncertainty, so it is not preferred.
-    None if nothing converges.
+    """Returns the limit that is the target of errors. It is the limit of ``own``, the variant of the case, if this
+    variant converges; otherwise the limit with the smallest uncertainty. The smallest uncertainty alone does not
+    decide, because a pressure form that locks can converge to a wrong limit. None if no variant converges.
     """
     found = [(each.limits[number.name], each.variant) for each in all_series if _sure(each, number)]
     if not found:
@@ -55,7 +55,7 @@ def _sure(series: Series, number: Number) -> bool:
 
 
 def elsewhere(all_series: Sequence[Series], number: Number, goal: Target) -> list[Variant]:
-    """Returns the variants whose limit differs from the target by more than the uncertainties of both."""
+    """Returns the variants whose limit differs from the target by more than the uncertainties of both limits."""
     return [
         each.variant
         for each in all_series
@@ -66,7 +66,7 @@ def elsewhere(all_series: Sequence[Series], number: Number, goal: Target) -> lis
 
 
 def worths(all_series: Sequence[Series], number: Number, goal: Target) -> list[Worth]:
-    """Returns every point that has the quantity, the cheapest first."""
+    """Returns all points of the study that have the quantity, the cheapest point first."""
     found = [
         Worth(each.variant, mesh, mesh.cpu, _error(mesh.samples[number.name].mean, each, number, goal) / goal.scale)
         for each in all_series
@@ -77,8 +77,9 @@ def worths(all_series: Sequence[Series], number: Number, goal: Target) -> list[W
 
 
 def _error(value: float, series: Series, number: Number, goal: Target) -> float:
-    """Returns the distance to the variant's own limit plus its distance to the target: errors that cancel by chance
-    do not count as accuracy. Without a limit, the uncertainty of the variant replaces the first.
+    """Returns the distance of a value to the limit of its own variant, plus the distance of this limit to the
+    target. Errors that cancel by chance therefore do not count as accuracy. If the variant has no limit, its
+    uncertainty replaces the first distance.
     """
     own = series.limits[number.name]
     if _sure(series, number):
@@ -98,8 +99,9 @@ def front(points: Sequence[Worth]) -> list[Worth]:
 
 
 def advice(all_series: Sequence[Series], number: Number, goal: Target, accuracy: float, own_size: float) -> str:
-    """Returns one line: the cheapest point that is accurate enough, or the best one, and the gain of half its size.
-    ``accuracy`` is relative, ``own_size`` the smallest element size of the case, m.
+    """Returns one line of advice: the cheapest point that is accurate enough, or else the most accurate point, and
+    what half of its element size would give. ``accuracy``: required relative error; ``own_size``: smallest element
+    size of the case, m.
     """
     line = front(worths(all_series, number, goal))
     enough = [worth for worth in line if worth.error <= accuracy]
@@ -109,9 +111,9 @@ def advice(all_series: Sequence[Series], number: Number, goal: Target, accuracy:
     text += f"; {name} {WORDS}" if name == "split" else ""
     order, growth = _order(all_series, number, chosen.variant), _growth(all_series, chosen.variant)
     if math.isnan(order):
-        return f"{text}; no order was observed, so nothing is known of finer meshes"
+        return f"{text}; no order was observed, so the errors on finer meshes are unknown"
     halved, dearer = chosen.error * (1.0 - 0.5**order), chosen.cost * 2.0**growth
-    text += f"; halving the size buys {_percent(halved)} for {duration(dearer)}"
+    text += f"; half of this size would give {_percent(halved)} for {duration(dearer)}"
     if enough:
         return text
     share = (accuracy / chosen.error) ** (1.0 / order)
@@ -125,8 +127,8 @@ def _order(all_series: Sequence[Series], number: Number, variant: Variant) -> fl
 
 
 def _growth(all_series: Sequence[Series], variant: Variant) -> float:
-    """Returns the exponent of the cost in 1 / size, from the finest and the coarsest mesh. With one mesh the
-    theoretical value 4 is returned.
+    """Returns the exponent of the cost as a power of 1 / size, from the finest and the coarsest mesh. With one mesh
+    the theoretical value 4 is returned.
     """
     meshes = next(each for each in all_series if each.variant == variant).meshes
     fine, coarse = meshes[0], meshes[-1]

@@ -1,4 +1,4 @@
-"""The runs of a convergence study: the changed keys of each."""
+"""The runs of a convergence study, with the keys that each run changes."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -14,18 +14,18 @@ from .scatter import perturbations
 
 FORMS = ("standard", "nodal", "split")
 STEPS, SEEDS = "steps", "seeds"
-"""Difference between the members of an ensemble."""
+"""Names of what differs between the members of an ensemble: time steps, or seeds of scattered strengths."""
 
 
 @dataclass(frozen=True)
 class Variant:
-    """A numerical method: pressure form and time step."""
+    """A numerical method: pressure form and factor of the time step."""
 
     form: str
     safety: float
 
     def __str__(self) -> str:
-        """Name in tables."""
+        """Name of the variant in tables."""
         return f"{self.form}, dt_safety {number(self.safety)}"
 
 
@@ -38,12 +38,12 @@ class Point:
     """Factor on the element sizes of the case."""
     member: int
     changes: Mapping[str, Any]
-    """Changed keys with their values."""
+    """Changed keys of the case with their new values."""
 
 
 @dataclass(frozen=True)
 class Plan:
-    """The varied parameters."""
+    """Parameters that a convergence study varies."""
 
     factors: Sequence[float]
     forms: Sequence[str] = ()
@@ -56,12 +56,14 @@ class Plan:
     threads: int = 1
 
     def variants(self, case: Case) -> list[Variant]:
-        """All combinations."""
+        """Returns all combinations of pressure forms and time steps."""
         forms, safeties = self.forms or (case.numerics.pressure,), self.safeties or (case.numerics.dt_safety,)
         return [Variant(form, safety) for form in forms for safety in safeties]
 
     def points(self, case: Case) -> list[Point]:
-        """Returns every run, the most expensive first. Raises UsageError for a case without a mesh to scale."""
+        """Returns all runs of the study, the most expensive run first. Raises UsageError if the case has no mesh
+        whose element size can change.
+        """
         shares = perturbations(self.members) if self.vary == STEPS else [0.0] * self.members
         return [
             Point(variant, factor, member, {
@@ -75,8 +77,8 @@ class Plan:
 
 
 def sizes(case: Case, factor: float) -> dict[str, float]:
-    """Returns keys and values of all element sizes times ``factor``. Sizes of mesh files and loose tets do not
-    change. Raises UsageError if no part has a generated mesh.
+    """Returns the keys of all element sizes with values multiplied by ``factor``. Sizes of mesh files and of loose
+    tets do not change. Raises UsageError if no part has a generated mesh.
     """
     found: dict[str, float] = {}
     for index, part in enumerate(case.parts):
@@ -93,17 +95,21 @@ def sizes(case: Case, factor: float) -> dict[str, float]:
 
 
 def seeds(case: Case, member: int) -> dict[str, int]:
-    """Returns keys and values of the seeds of scattered strengths for a member. Raises UsageError without scatter."""
+    """Returns the keys of the seeds of scattered strengths with their values for a member. Raises UsageError if no
+    material has a scatter.
+    """
     found = {}
     for name in {part.material for part in case.parts if part.fracture is not None}:
         scatter = getattr(material(case, name).brittle, "scatter", None)
         if scatter is not None and name in case.materials:
             found[f"materials.{name}.brittle.scatter.seed"] = scatter.seed + member
     if not found:
-        raise UsageError(f"{case.name}: no material of its own has a scatter of its strength; vary steps instead")
+        raise UsageError(
+            f"{case.name}: no material that the case defines has a scattered strength; use --vary steps instead"
+        )
     return found
 
 
 def chaotic(case: Case) -> bool:
-    """Returns True if the case is sensitive to small changes: parts break or erode."""
+    """Returns True if the answer of the case is sensitive to small changes, because parts break or erode."""
     return case.fractures or case.erodes

@@ -116,7 +116,7 @@ def test_a_case_that_is_about_to_run_gets_its_warnings(user: Path) -> None:
 def test_no_server_is_one_line(words: tuple[str, ...], quiet_home: Path) -> None:
     result = conoid(*words, "--url", "http://127.0.0.1:1")
     assert result.exit_code == 1
-    hint = "is it running there? (conoid serve; another address: CONOID_URL or --url)"
+    hint = "is a server running there? (conoid serve; another address: CONOID_URL or --url)"
     assert result.stderr == f"conoid: no answer from http://127.0.0.1:1: {hint}\n"
 
 
@@ -185,7 +185,7 @@ def test_submit_show_ls_get(user: Path) -> None:
     assert some.exit_code == 1
     assert "has no nothing.csv" in some.stderr
     assert some.stdout.split() == ["there/history.csv"]
-    assert conoid("replay-balance", "last").stderr == "conoid: the journal of this run has no loads of groups\n"
+    assert conoid("replay-balance", "last").stderr == "conoid: the journal of the run has no loads of groups of tets\n"
 
 
 @pytest.mark.parametrize(

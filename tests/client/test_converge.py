@@ -79,7 +79,7 @@ def test_the_front_has_what_nothing_cheaper_beats() -> None:
 def test_the_advice_gives_the_gain_of_halving_and_the_cost_of_the_wanted_error() -> None:
     advice = book(two_forms()).advice()
     assert advice == (
-        "nodal at 500 µm: length within 1.2 % for 2 min 40 s of CPU time; halving the size buys 0.94 % for 42 min 40 s"
+        "nodal at 500 µm: length within 1.2 % for 2 min 40 s of CPU time; half of this size would give 0.94 % for 42 min 40 s"
     )
     assert "0.1 % would need about 141 µm and 6 h 56 min" in book(two_forms(), accuracy=1e-3).advice()
 
@@ -99,7 +99,7 @@ def test_scatter_gives_no_order_and_a_growing_error_is_reported() -> None:
     assert "No limit, within scatter: length." in text
     assert "No limit, does not converge: broken, number." in text
     assert "ensemble of 3 runs" in text
-    assert found.advice().startswith("Nothing converges")
+    assert found.advice().startswith("No quantity converges")
 
 
 def test_a_reference_that_the_finest_mesh_lacks_is_skipped() -> None:
@@ -108,7 +108,9 @@ def test_a_reference_that_the_finest_mesh_lacks_is_skipped() -> None:
     finest = [Done(Point(NODAL, 0.5, 0, {}), "r", 64_000, 200, 160.0, numbers)]
     done = [run(NODAL, h, length, 10.0 * h**-4, broken=7.0) for h, length in ((1.0, 2.4), (2.0, 2.1), (4.0, 2.2))]
     found = Book("made", (), NODAL, 1e-3, 1, "steps", 0.02, done, series([*finest, *done]), done[0].numbers)
-    assert found.advice() == "Nothing converges on these meshes: there is no error to weigh against the cost."
+    assert (
+        found.advice() == "No quantity converges on these meshes, so the study has no error to compare with the cost."
+    )
 
 
 def test_variants_on_one_mesh_are_distinguished_from_their_scatter() -> None:
@@ -127,7 +129,9 @@ def test_variants_on_one_mesh_are_distinguished_from_their_scatter() -> None:
     rows = {cells[1]: cells[2:6] for line in table.splitlines() if len(cells := re.split(r" *\| *", line)) == 7}
     assert rows["length, m"] == ["1.81", "2.01", "10", "yes"]
     assert rows["broken, number"][2:] == ["0.96", "no"]
-    assert found.advice().endswith("to weigh against the cost; how far the variants differ is in their table.")
+    assert found.advice().endswith(
+        "to compare with the cost; the table of variants shows the differences between variants."
+    )
     assert "nan" not in text
 
 
@@ -137,7 +141,7 @@ def test_a_count_that_has_settled_does_not_stand_for_a_reference_without_a_limit
     found = book([run(NODAL, h, length, 10.0 * h**-4, broken=7.0) for h, length in lengths.items()])
     assert found.leading() is None
     assert found.leading("broken") == "broken, number"
-    assert found.advice().startswith("Nothing converges on these meshes")
+    assert found.advice().startswith("No quantity converges on these meshes")
     assert "length oscillates: 2.2 m at 500 µm, uncertain by" in found.advice()
     pareto.figure(found).savefig(tmp_path / "front.png")
 

@@ -112,4 +112,4 @@ def test_an_ambiguous_prefix_is_reported(made: dict[str, str]) -> None:
     common = made["slow"][:2]
     done = conoid("show", common)
     assert done.exit_code == 2
-    assert f"run = '{common}': several ids begin so: " in done.stderr
+    assert f"run = '{common}': several ids have this beginning: " in done.stderr

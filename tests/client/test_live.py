@@ -225,7 +225,7 @@ class Deserted(Queued):
 
     def status(self) -> "Queued":
         if self.asked:
-            raise UnreachableError("no answer from http://x: is it running there? (conoid serve)")
+            raise UnreachableError("no answer from http://x: is a server running there? (conoid serve)")
         self.asked = True
         return self
 

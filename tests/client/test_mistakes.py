@@ -206,13 +206,15 @@ def test_without_slurm_nothing_is_prepared(quiet_home: Path, monkeypatch: pytest
 @pytest.mark.parametrize("url", ["http://[", "http://[::1", "http://a:b", "http://a b", "http://h:99999", "http://:1"])
 def test_an_invalid_address_is_refused_in_one_line(url: str, quiet_home: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("CONOID_URL", url)
-    assert refused(2, "ls") == f"conoid: url = {url!r}: write it with http:// or https://, such as {DEFAULT_URL}"
+    assert (
+        refused(2, "ls") == f"conoid: url = {url!r}: write the address with http:// or https://, such as {DEFAULT_URL}"
+    )
 
 
 @pytest.mark.parametrize("token", ["conoid_12ab…", "two words", "line\nfeed"])
 def test_a_token_that_no_server_makes_is_not_sent(quiet_home: Path, token: str) -> None:
     line = refused(2, "ls", "--url", "http://127.0.0.1:1", "--token", token)
-    assert line == "conoid: token: only visible ASCII characters are allowed; was it copied whole?"
+    assert line == "conoid: token: only visible ASCII characters are allowed; was the token copied completely?"
 
 
 @pytest.mark.parametrize("key", ["é", "line\nfeed"])

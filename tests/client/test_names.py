@@ -71,17 +71,17 @@ def test_a_unique_prefix_is_enough(server: Hostile) -> None:
 
 def test_an_ambiguous_prefix_is_one_line_with_all_matches(server: Hostile) -> None:
     with Session(server.url) as session:
-        with pytest.raises(UsageError, match="run = '1kbb': several ids begin so: 1kbbx, 1kbbw"):
+        with pytest.raises(UsageError, match="run = '1kbb': several ids have this beginning: 1kbbx, 1kbbw"):
             session.run("1kbb")
-        with pytest.raises(UsageError, match="sweep = '1kbb': several ids begin so: 1kbbx, 1kbbw"):
+        with pytest.raises(UsageError, match="sweep = '1kbb': several ids have this beginning: 1kbbx, 1kbbw"):
             session.find_sweep("1kbb")
         assert session.run("1kbbx").id == "1kbbx", "the whole id is that of one"
-    assert "several ids begin so" in refused(2, "cancel", "1kbb", "--url", server.url)
+    assert "several ids have this beginning" in refused(2, "cancel", "1kbb", "--url", server.url)
 
 
 def test_the_message_of_a_server_without_prefix_search_is_shown(server: Hostile) -> None:
     server.answers["/v1/runs"] = answering({"detail": "prefix: no such parameter"}, 400)
-    with Session(server.url) as session, pytest.raises(NotFoundError, match="there is none"):
+    with Session(server.url) as session, pytest.raises(NotFoundError, match="not found; an id has letters and digits"):
         session.run("1kb")
 
 
@@ -157,7 +157,7 @@ def test_files_of_a_folder_are_copied(folder: Path, quiet_home: Path) -> None:
 
 def test_a_command_that_needs_a_server_is_refused_for_a_folder(folder: Path) -> None:
     assert "this command needs a server" in refused(2, "restart", folder)
-    assert "there is none" in refused(1, "sweep-table", folder)
+    assert "not found; an id has letters and digits" in refused(1, "sweep-table", folder)
 
 
 def test_a_copy_of_a_run_does_not_stand_for_the_one_of_the_server(folder: Path, server: Hostile) -> None:

@@ -124,7 +124,7 @@ def test_a_run_without_load_messages_is_refused() -> None:
     for sent in ([], wandering()[:1], wandering()[1:]):
         with pytest.raises(ClientError, match="has no loads of groups"):
             replay.read(sent)
-    with pytest.raises(ClientError, match="ranks = 9: 1 to 8"):
+    with pytest.raises(ClientError, match="ranks = 9: allowed: 1 to 8"):
         account("never", ranks=9)
 
 

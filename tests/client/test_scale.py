@@ -60,7 +60,7 @@ def test_losses_are_all_that_lies_between_the_ideal_and_the_worst() -> None:
 
 def test_the_tables_contain_the_results() -> None:
     text = to_markdown(study(one_rank(), two_ranks()))
-    assert "1.00 ms a message, 1.00 MB/s" in text
+    assert "1.00 ms latency and 1.00 MB/s bandwidth" in text
     row = next(line for line in text.splitlines() if line.startswith("| 2 "))
     cells = [cell.strip() for cell in row.strip("|").split("|")]
     assert cells == ["2", "4", "2.0", "7.0", "90", "5.28", "4.53", "5.78", "1.33", "66", "1.21", "1.35", "1"]
@@ -95,7 +95,7 @@ def test_a_projection_by_tasks_takes_the_work_of_so_many_threads() -> None:
     assert found.speed_up(run) == 2.0
     assert found.losses(run)["elements"] == pytest.approx((1.5 - 5.0 / 4, 0.0))
     text = to_markdown(found)
-    assert "10.0 regions a step, 3.0 colours a region, 4.0 tasks a colour" in text
+    assert "10.0 parallel regions per step, 3.0 colours per region, 4.0 tasks per colour" in text
     assert "off." not in text, "nothing was measured with two threads"
     two = to_markdown(study(one, two_threads(), by_tasks(2), run))
     assert "Two threads are 1.40 times as fast as one so, and 1.75 times when they are there: -20 % off." in two
@@ -131,7 +131,7 @@ def test_bandwidths(text: str, value: float) -> None:
 
 @pytest.mark.parametrize("text", ["5", "GB/s", "0 GB/s", "5 Gb/s", "-1 GB/s"])
 def test_an_invalid_bandwidth_is_refused(text: str) -> None:
-    with pytest.raises(ValueError, match="is no bandwidth"):
+    with pytest.raises(ValueError, match="is not a bandwidth"):
         bandwidth(text)
 
 
@@ -180,7 +180,7 @@ def test_a_folder_with_something_else_is_left_alone(tmp_path: Path) -> None:
     (tmp_path / "ranks-1").mkdir()
     result = conoid("demo", "--out", tmp_path)
     assert result.exit_code == 1
-    assert "ranks-1 holds another run" in result.stderr
+    assert "ranks-1 contains another run" in result.stderr
 
 
 @pytest.mark.slow

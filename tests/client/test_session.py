@@ -59,7 +59,9 @@ def test_one_text_is_no_list_of_assignments(overrides: Any, message: str) -> Non
 
 @pytest.mark.parametrize("case", [None, 5, ["demo"]])
 def test_a_file_that_is_not_a_case_is_reported(case: Any) -> None:
-    with pytest.raises(CaseError, match=r"^case = .*: a case is a file, the name of a shipped one, or plain data$"):
+    with pytest.raises(
+        CaseError, match=r"^case = .*: a case must be a file, the name of a shipped case, or plain data$"
+    ):
         body_of(case)
 
 
@@ -71,7 +73,7 @@ def test_labels_are_names_with_values_and_one_state_is_a_list_of_one() -> None:
         return httpx2.Response(200, json={"runs": []})
 
     session = served(answer)
-    with pytest.raises(UsageError, match=r"^labels = a list: write names with their values, such as"):
+    with pytest.raises(UsageError, match=r"^labels = a list: allowed: names with values, such as"):
         session.submit("demo", labels=["a=b"])  # type: ignore[arg-type]
     assert session.runs(states="succeeded") == session.runs(states=["succeeded"]) == []
     assert asked == ["limit=50&state=succeeded"] * 2
@@ -87,7 +89,10 @@ def test_a_refusal_is_its_detail_and_hint() -> None:
 
 @pytest.mark.parametrize(
     ("token", "message"),
-    [(None, "none was sent: set CONOID_TOKEN"), ("conoid_1_old", "the one of --token, CONOID_TOKEN or the")],
+    [
+        (None, "no token was sent: set CONOID_TOKEN"),
+        ("conoid_1_old", "the server does not have the token of --token, CONOID_TOKEN or the"),
+    ],
 )
 def test_a_token_that_is_missing_or_wrong_names_where_it_comes_from(token: str | None, message: str) -> None:
     answer = problem(401, detail="this needs a valid token", hint="send the header 'Authorization: Bearer <token>'")
@@ -130,7 +135,7 @@ def test_an_answer_without_problem_json_is_one_line() -> None:
 def test_a_missing_server_is_reported_with_the_command_that_starts_one() -> None:
     with Session("http://127.0.0.1:1") as session, pytest.raises(UnreachableError) as caught:
         session.me()
-    hint = "is it running there? (conoid serve; another address: CONOID_URL or --url)"
+    hint = "is a server running there? (conoid serve; another address: CONOID_URL or --url)"
     assert str(caught.value) == f"no answer from http://127.0.0.1:1: {hint}"
 
 
@@ -289,7 +294,7 @@ def test_a_saved_token_is_not_shown_to_another_server(quiet_home: Path) -> None:
 
 @pytest.mark.parametrize(
     ("text", "message"),
-    [("url = 3", "allowed are url and token"), ("key = 'x'", "allowed are"), ("url = ", "cannot be read")],
+    [("url = 3", "allowed keys: url and token"), ("key = 'x'", "allowed keys"), ("url = ", "cannot be read")],
 )
 def test_a_wrong_configuration_names_the_file(quiet_home: Path, text: str, message: str) -> None:
     save(quiet_home, text)
@@ -325,9 +330,9 @@ def listing(size: int, state: str = "succeeded") -> Answer:
 def test_a_file_that_is_not_as_large_as_it_is_listed_is_refused(tmp_path: Path) -> None:
     run = Run(served(listing(5)), "r1")
     (file,) = run.files()
-    with pytest.raises(AnswerError, match=r"a.csv has 3 bytes, where the list of files has 5"):
+    with pytest.raises(AnswerError, match=r"a.csv has 3 bytes instead of the 5"):
         run.fetch(tmp_path, file, run.over())
-    with pytest.raises(AnswerError, match=r"a.csv has 3 bytes, where the list of files has 5"):
+    with pytest.raises(AnswerError, match=r"a.csv has 3 bytes instead of the 5"):
         run.download(tmp_path)
     assert not list(tmp_path.iterdir())
     for fits in (Run(served(listing(3)), "r1"), Run(served(listing(5, "running")), "r1")):
@@ -353,7 +358,5 @@ def test_a_server_that_hangs_is_asked_once(seconds: float, times: int, monkeypat
 
 def test_an_empty_name_of_a_case_is_reported() -> None:
     for name in ("", " "):
-        with pytest.raises(
-            CaseError, match=r"^case = '': the name is empty: write a .toml or .json file, or a shipped"
-        ):
+        with pytest.raises(CaseError, match=r"^case = '': the name is empty: write a .toml or .json file, or the name"):
             body_of(name)

@@ -206,4 +206,6 @@ def test_an_unreadable_stream_is_reported_once_and_the_journal_is_read() -> None
     warning, *received = follow(link, journal.after, lambda: True)
     assert [message.seq for message in received] == [1, 2]
     assert isinstance(warning, Log)
-    assert warning.text.startswith("the events cannot be followed, and the journal is read instead: the answer of http")
+    assert warning.text.startswith(
+        "the event stream of the server broke, and the journal is read instead: the answer of http"
+    )
