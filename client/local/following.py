@@ -1,4 +1,6 @@
-"""``conoid watch FOLDER``: follows a run by the journal in its folder, without a server; asks Slurm about its job."""
+"""Following a run in a folder of this machine by its journal, without a server (``conoid watch FOLDER``). Slurm is
+asked about the job of the run.
+"""
 
 import time
 from collections.abc import Callable, Iterator
@@ -19,16 +21,17 @@ from ..journal import from_line
 from ..remote.link import Link
 
 _PAUSE = 0.5
-"""Time in s between two readings of the journal. Chosen value: a run reports four times a second."""
+"""Pause between two readings of the journal, s. Chosen value: a run sends a message four times a second."""
 _ASK_EVERY = 10.0
-"""Time in s of silence after which Slurm is asked. Chosen value: a few hundred watchers make one request in 30 ms."""
+"""Time without a message after which Slurm is asked, s. Chosen value: a few hundred users who follow runs cause one
+request in 30 ms."""
 _AT_WORK = {State.STARTING, State.RUNNING}
-"""States in which a worker writes into the folder."""
+"""States of a run in which a worker writes into the folder."""
 
 
 @dataclass(frozen=True)
 class Titled:
-    """Id and title for the head of the display."""
+    """Id and title of a run, for the head of the display."""
 
     title: str
 
@@ -45,18 +48,16 @@ class _File:
 
 
 class FolderRun:
-    """A run in a folder of this machine, followed by its journal."""
+    """A run in a folder of this machine; its journal gives the messages."""
 
     def __init__(self, folder: Path, place: str = "") -> None:
-        """Prepares to follow a run; ``place``: the folder of Slurm's commands. If it is empty, the commands are in
-        PATH.
-        """
+        """``folder``: folder of the run; ``place``: folder of the Slurm commands, empty if they are in PATH."""
         self.folder, self._place = folder.resolve(), place
         self.id = self.folder.name
         self._asked, self._reported = time.monotonic(), ""
 
     def status(self) -> Titled:
-        """Title of the run's case, if the case exists already."""
+        """Returns the id of the run and the title of the case, if the case exists already."""
         try:
             case = msgspec.json.decode(whole.read(self.folder / layout.RESOLVED_CASE), type=dict[str, Any])
         except (OSError, msgspec.MsgspecError):
@@ -64,21 +65,21 @@ class FolderRun:
         return Titled(str(case.get("title") or case.get("name", "")))
 
     def link(self) -> Link:
-        """Returns a subscription without messages: the messages come from the journal."""
+        """Returns a subscription without messages, because the messages come from the journal."""
         return _File()
 
     def messages(
         self, *, link: Link | None = None, pause: Callable[[float], None] = time.sleep
     ) -> Iterator[AnyMessage]:
-        """Yields every line once and in order, until the end of the run."""
+        """Yields every message of the journal once and in order, until the end of the run."""
         offset, state = 0, State.QUEUED
         while True:
-            end = self._outcome()  # the outcome is written last: the journal is complete
+            end = self._outcome()  # The outcome is written last; when it exists, the journal is complete.
             raw, offset = self._read(offset)
             for line in raw:
                 try:
                     message = from_line(line)
-                except msgspec.DecodeError:  # a killed worker may leave an incomplete line
+                except msgspec.DecodeError:  # A killed worker may leave an incomplete line.
                     continue
                 yield message
                 if isinstance(message, Status):
@@ -98,7 +99,9 @@ class FolderRun:
                 self._asked = time.monotonic()
 
     def _read(self, offset: int) -> tuple[list[bytes], int]:
-        """Returns the complete lines from ``offset`` on, and the offset of the next one."""
+        """Returns the complete lines of the journal from the byte ``offset`` on, and the offset of the line after
+        them.
+        """
         try:
             with (self.folder / layout.JOURNAL).open("rb") as file:
                 file.seek(offset)
@@ -115,7 +118,7 @@ class FolderRun:
             return None
 
     def _pending(self, state: State, message: str) -> Iterator[Status]:
-        """Returns the reason for which a queued run waits, if it has changed."""
+        """Yields the reason why a queued run waits, if the reason has changed."""
         if state is State.QUEUED and message != self._reported:
             self._reported = message
             yield self._status(state, message)
@@ -131,8 +134,8 @@ class FolderRun:
         return Status(run=self.id, wall=time.time(), state=state, cause=cause, message=message)
 
     def _ask(self, state: State) -> Iterator[Status]:
-        """Returns new information about a silent job from Slurm. Without a job, returns whether the worker still
-        exists. ``state``: the last reported state.
+        """Yields news from Slurm about a job without messages. Without a job, it yields whether the worker still
+        exists. ``state``: last state in the journal.
         """
         if time.monotonic() - self._asked <= _ASK_EVERY:
             return
@@ -141,7 +144,9 @@ class FolderRun:
         if job is None:
             if state in _AT_WORK and not slurm.held(self.folder) and self._outcome() is None:
                 yield self._status(
-                    State.LOST, "no worker writes into its folder, and none has left an outcome", Cause.NODE
+                    State.LOST,
+                    "no worker writes into the folder of the run, and no worker has written an outcome",
+                    Cause.NODE,
                 )
             return
         try:
@@ -153,5 +158,5 @@ class FolderRun:
             if entry.state in slurm.PENDING:
                 yield from self._pending(State.QUEUED, f"Slurm job {entry.job} is pending: {entry.reason}")
             elif entry.state in slurm.FINAL and not slurm.held(self.folder):
-                message = f"Slurm job {entry.job} ended as {entry.state} and left no outcome"
+                message = f"Slurm job {entry.job} ended as {entry.state} and wrote no outcome"
                 yield self._outcome() or self._status(State.LOST, message, Cause.NODE)

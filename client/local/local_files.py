@@ -23,37 +23,37 @@ from .atomic import whole as whole_file
 
 _CHUNK = 1 << 20
 State = tuple[int, int, int, int]
-"""Device, inode, size in bytes, and time of the last change in ns."""
+"""State of a file: device, inode, size in bytes, and time of the last change in ns."""
 
 
 @dataclass(frozen=True)
 class LocalFile:
-    """A file that a case names, with its state at the time of hashing."""
+    """A file that a case names, with the state of the file when its hash was computed."""
 
     named: Named
     path: Path
     sha256: str
     state: State
     named_in: str = ""
-    """Hash of the deck itself; used for a deck with includes, which is written as one file to ``path``."""
+    """Hash of the deck itself. It is set for a deck with includes, which is written as one file to ``path``."""
 
     @property
     def size(self) -> int:
-        """Size in bytes."""
+        """Size of the file in bytes."""
         return self.state[2]
 
     def check(self, file: int) -> None:
-        """Raises ClientError if the open file is not the one that was hashed."""
+        """Raises ClientError if the open file is not the file whose hash was computed."""
         if state_of(file) != self.state:
             raise self.changed()
 
     def changed(self) -> ClientError:
-        """Returns the error line for a file that has changed since it was hashed."""
-        return ClientError(f"{self.path}: has changed since it was hashed; nothing is handed in: try again")
+        """Returns the error for a file that has changed since its hash was computed."""
+        return ClientError(f"{self.path}: the file changed while it was read; nothing was submitted: try again")
 
 
 class Hashes:
-    """Hashes of files, computed once for each state of a file."""
+    """Store of the hashes of files. A hash is computed once for each state of a file."""
 
     def __init__(self) -> None:
         """Makes an empty store of hashes."""
@@ -63,8 +63,9 @@ class Hashes:
         """Temporary folder for decks that are written as one file."""
 
     def of(self, case: Mapping[str, Any], folder: Path) -> list[LocalFile]:
-        """Returns the files that a case in plain data names, relative to its ``folder``. A missing file with a hash
-        in the case is left out: the server may have it. Raises CaseError with every unusable file.
+        """Returns the files that a case (plain data) names; paths are relative to ``folder``. A missing file whose
+        hash is in the case is left out, because the server may have the file. Raises CaseError with every unusable
+        file.
         """
         found, problems = [], list[Problem]()
         for named in files_of(case):
@@ -74,7 +75,7 @@ class Hashes:
             except FileNotFoundError:
                 if named.sha256 is None:
                     problems.append(_wrong(named, "path", named.path, f"no such file ({path.absolute()})"))
-            except (OSError, ValueError) as error:  # a name with a null byte
+            except (OSError, ValueError) as error:  # The name contains a null byte.
                 reason = error.strerror if isinstance(error, OSError) else str(error)
                 problems.append(_wrong(named, "path", named.path, f"{reason} ({path.absolute()})"))
             else:
@@ -86,7 +87,7 @@ class Hashes:
         return found
 
     def _hashed(self, named: Named, path: Path) -> LocalFile:
-        """Opens and hashes a file. Raises OSError; IsADirectoryError for a path or a link that does not lead to a
+        """Opens and hashes a file. Raises OSError; IsADirectoryError if the path or a link does not lead to a
         regular file; ValueError for a deck with unusable includes.
         """
         itself = self._read(named, path)
@@ -125,7 +126,7 @@ class _Deck:
 
 
 def state_at(path: Path) -> State:
-    """Returns the state of a file by its path. Raises OSError."""
+    """Returns the state of the file at a path. Raises OSError."""
     with whole.opened(path) as file:
         return state_of(file.fileno())
 
@@ -141,7 +142,7 @@ def state_of(file: int) -> State:
 
 
 def with_hashes(case: Mapping[str, Any], files: Iterable[LocalFile]) -> dict[str, Any]:
-    """Returns the case with the hash of each file in the table that names it."""
+    """Returns the case with the hash of each file in the table that names the file."""
     made: dict[str, Any] = copy.deepcopy(dict(case))
     for file in files:
         table: Any = made
@@ -153,7 +154,7 @@ def with_hashes(case: Mapping[str, Any], files: Iterable[LocalFile]) -> dict[str
 
 def keep_copies(files: Iterable[LocalFile], folder: Path) -> None:
     """Copies files into the folder of a run; the copies are named by their hashes. Raises ClientError for a file
-    that has changed since it was hashed, OSError.
+    that has changed since its hash was computed, OSError.
     """
     for file in files:
         target = folder / layout.FILES / Named(file.named.table, file.named.path, file.sha256).copy

@@ -21,13 +21,13 @@ from .folders import LocalFolder
 from .safe_paths import inside
 
 _ID = re.compile(r"[0-9a-z]{22}")
-"""Id of a run on a server. ``conoid get`` copies the run into a folder with this name."""
+"""Pattern of the id of a run on a server. ``conoid get`` copies a run into a folder with the id as name."""
 _AT_WORK = {State.STARTING, State.RUNNING, State.STOPPING}
-"""States in which a worker writes into the folder."""
+"""States of a run in which a worker writes into the folder."""
 
 
 def status(folder: Path) -> RunInfo:
-    """Returns the status of the run by its folder. Raises UnfinishedError for a folder that is not a run's."""
+    """Returns the status of the run in a folder. Raises UnfinishedError if the folder is not that of a run."""
     result = Result.open(folder)
     messages = result.messages
     known = Live(result.folder.name)
@@ -41,7 +41,7 @@ def status(folder: Path) -> RunInfo:
         text = b"null"
         if known.state in _AT_WORK and not slurm.held(folder):
             known.state, known.cause = State.LOST, Cause.NODE
-            known.message = "no worker writes into its folder, and none has left an outcome"
+            known.message = "no worker writes into the folder of the run, and no worker has written an outcome"
     case = result.case if (folder / layout.RESOLVED_CASE).is_file() else {}
     first, last = (messages[0].wall, messages[-1].wall) if messages else (0.0, 0.0)
     return RunInfo(
@@ -54,7 +54,7 @@ def status(folder: Path) -> RunInfo:
 
 
 def _cores(case: dict[str, Any], known: Live, what: str) -> int:
-    """Returns ``ranks`` or ``threads`` of the started worker; before its start, of the case."""
+    """Returns ``ranks`` or ``threads`` of the worker; before the worker starts, those of the case."""
     if known.started is not None:
         return int(getattr(known.started, what))
     asked = case.get("run", {}).get(what, 1) if isinstance(case.get("run"), dict) else 1
@@ -62,7 +62,7 @@ def _cores(case: dict[str, Any], known: Live, what: str) -> int:
 
 
 def ask(folder: Path, request: str, wish: str) -> str:
-    """Writes a request file that the worker reads; returns one line about the request. Raises OSError, and
+    """Writes a request file that the worker reads; returns one text line about the request. Raises OSError, and
     UnfinishedError if no worker runs.
     """
     LocalFolder(folder).path(layout.JOURNAL)
@@ -75,13 +75,15 @@ def ask(folder: Path, request: str, wish: str) -> str:
 
 
 def at_hand(folder: Path) -> bool:
-    """Returns True if the worker runs in this folder. A copy of a server's run by ``conoid get`` has no worker."""
+    """Returns True if a worker runs in this folder. A copy of a run of a server, made by ``conoid get``, has no
+    worker.
+    """
     copied = _ID.fullmatch(str(folder)) is not None
     return not copied or (folder / layout.JOB).exists() or slurm.held(folder)
 
 
 class FolderFiles:
-    """The files of a run in a folder, with the interface of a run on a server."""
+    """The files of a run in a folder, with the same interface as a run on a server."""
 
     def __init__(self, folder: Path) -> None:
         """Stores the folder; reads nothing yet."""
@@ -93,16 +95,16 @@ class FolderFiles:
         return [FileInfo(path=name, size=(self._folder.root / name).stat().st_size) for name in self._folder.names()]
 
     def over(self) -> bool:
-        """Always False: copies from a folder are complete in any state of the run."""
+        """Always False, because copies from a folder are complete in any state of the run."""
         return False
 
     def fetch(self, folder: Path, file: FileInfo, final: bool) -> Path:
-        """Copies a file and returns the path of the copy. Raises UnfinishedError, ClientError, OSError."""
+        """Copies a file of the run and returns the path of the copy. Raises UnfinishedError, ClientError, OSError."""
         name = file.path
         inside(self._folder.root, name)
         source, target = self._folder.path(name), inside(folder, name)
         if target.exists() and source.samefile(target):
-            raise ClientError(f"{target}: is the file itself; --out names another folder")
+            raise ClientError(f"{target}: source and target are the same file; choose another folder with --out")
         target.parent.mkdir(parents=True, exist_ok=True)
         with whole_file(target) as part:
             shutil.copyfile(source, part)

@@ -1,4 +1,4 @@
-"""A deck with all its includes as one file, which is hashed and sent."""
+"""Joins a deck and all files that it includes into one file, which is then hashed and sent."""
 
 import re
 from collections.abc import Callable, Iterator
@@ -9,10 +9,10 @@ from conoid.cases.reading import inp, whole
 from conoid.cases.reading.included import LONGEST_LINE, Included, flattened, included_by, lines
 
 ENDINGS = (".k", ".key", ".dyn")
-"""Endings of keyword decks."""
+"""Endings of the names of keyword decks."""
 _PLAIN: dict[str, Callable[[str], str | None]] = {".inp": inp.included_by, ".rad": included_by}
-"""Endings of the other decks, each with a pattern of a line that includes a file. The lines of the included file
-replace this line."""
+"""Endings of the names of other decks, each with a function that recognises a line that includes a file. The lines
+of the included file replace this line."""
 _INCLUDES = re.compile(rb"(?im)^[ \t]*[*#][ \t]*INCLUDE")
 _CHUNK = 1 << 24
 """Number of bytes that are searched at a time. Chosen value."""
@@ -20,7 +20,7 @@ _STANDARD = "*KEYWORD"
 
 
 def includes(path: Path) -> bool:
-    """Returns True if a file is a deck that may include others. Raises OSError."""
+    """Returns True if a file is a deck that may include other files. Raises OSError."""
     if path.suffix.lower() not in (*ENDINGS, *_PLAIN):
         return False
     rest = b""
@@ -33,8 +33,8 @@ def includes(path: Path) -> bool:
 
 
 def write(deck: Path, target: Path) -> list[Path]:
-    """Writes the deck with all its includes to ``target``; returns every source file. Raises ValueError for unusable
-    includes, OSError.
+    """Writes a deck with all its includes to ``target``; returns the paths of all source files. Raises ValueError
+    for unusable includes, OSError.
     """
     included, plain = Included(deck), _PLAIN.get(deck.suffix.lower())
     with target.open("w", encoding="utf-8", newline="\n") as made:
@@ -47,18 +47,18 @@ def write(deck: Path, target: Path) -> list[Path]:
 
 @dataclass
 class _Flat:
-    """Yields the lines of a deck with the lines of its includes in their places.
+    """Yields the lines of a deck; the lines of an included file replace the line that includes it.
 
-    The format of ``*KEYWORD`` holds in its own file and in the files that this file includes afterwards. After a
-    file that has changed the format, the format line is written again.
+    The format of a ``*KEYWORD`` line holds in its own file and in the files that are included after it. If a file
+    has changed the format, the earlier format line is written again after this file.
     """
 
     included: Included
     stands: str = _STANDARD
-    """The line that set the format of the last written line."""
+    """The text line that set the format of the last written line."""
 
     def of(self, path: Path, stands: str, *, top: bool = False) -> Iterator[str]:
-        """Yields the lines of a file that begins in the format ``stands``."""
+        """Yields the lines of a file whose format at the beginning is ``stands``."""
         names: list[str] | None = None
         for _, text in lines(path):
             name = _name(text) if text.startswith("*") else ""
@@ -80,7 +80,7 @@ class _Flat:
             yield "*END"
 
     def _follow(self, names: list[str], path: Path, stands: str) -> Iterator[str]:
-        """Yields the lines of included files; a name that ends with `` +`` continues in the next line."""
+        """Yields the lines of included files. A file name that ends with `` +`` continues in the next text line."""
         for name in "\n".join(names).replace(" +\n", "").splitlines():
             yield f"$ begin of {name}"
             yield from self.of(self.included.enter(name, path), stands)
@@ -92,6 +92,6 @@ class _Flat:
 
 
 def _name(text: str) -> str:
-    """Returns the keyword of a line in upper case, with its suffix; "?" for another line."""
+    """Returns the keyword of a line in upper case, with its suffix; "?" for a line without a keyword."""
     word = text[1:].partition("$")[0].split()
     return word[0].upper() if word[:1] and (len(word) == 1 or word[0].upper() == "KEYWORD") else "?"

@@ -1,4 +1,4 @@
-"""A server for the duration of one run: started as a process, found by its server.json, stopped afterwards."""
+"""A server for the duration of one run: a process that is started, found by its server.json, and stopped afterwards."""
 
 import os
 import subprocess
@@ -20,36 +20,37 @@ ADDRESS_FILE = "server.json"
 LOG_FILE = "server.log"
 OWNER = "local"
 _START_SECONDS = 60.0
-"""Time limit for the start of a server, s. Chosen value: a start takes one or two seconds, and many times that on a
-busy machine."""
+"""Time limit for the start of a server, s. Chosen value: a start takes one or two seconds, and many times longer on
+a busy machine."""
 _STOP_SECONDS = 15.0
-"""Time limit for the end of the server before it is killed, s: ``GRACE`` for its workers, and five for itself."""
+"""Time, s, after which a server that does not end is killed: ``GRACE`` for its workers, and 5 s for the server
+itself."""
 GRACE = 10.0
-"""Time limit for the end of a cancelled worker before it is killed, s."""
+"""Time, s, after which a cancelled worker that does not end is killed."""
 
 
 class Address(msgspec.Struct, kw_only=True, frozen=True):
-    """Content of server.json."""
+    """Content of the file server.json."""
 
     url: str
     pid: int
 
 
 class LocalServer:
-    """A server on free loopback ports, with a token that only this process has; a context manager.
+    """A server on free loopback ports with a token that only this process has; it is a context manager.
 
-    The server runs inside the context and is stopped afterwards. The server is not in the terminal's process group:
-    Ctrl-C reaches only this process. On Linux the server ends when this process dies.
+    The server runs inside the context and is stopped afterwards. The server is not in the process group of the
+    terminal, so that Ctrl-C reaches only this process. On Linux the server ends when this process dies.
     """
 
     def __init__(self, runs: Path, slots: int) -> None:
-        """``runs``: folder of the runs; ``slots``: number of cores that runs may use at a time."""
+        """``runs``: folder of the runs; ``slots``: number of cores that runs may use at the same time."""
         self.runs = runs.resolve()
         self.slots = slots
         self._process: subprocess.Popen[bytes] | None = None
 
     def __enter__(self) -> Self:
-        """Starts the server and waits until it answers. Raises ClientError with the last line of its log."""
+        """Starts the server and waits until it answers. Raises ClientError with the last line of the server's log."""
         self.runs.mkdir(parents=True, exist_ok=True)
         self.token = _token(self.runs)
         options = ["--port", "0", "--zenoh-port", "0", "--slots", str(self.slots), "--grace", str(GRACE)]
@@ -66,7 +67,7 @@ class LocalServer:
         return self
 
     def __exit__(self, *_: object) -> None:
-        """Cancels open runs, then stops the server: workers would continue without it."""
+        """Cancels open runs and then stops the server, because workers would continue without a server."""
         with suppress(ClientError, TimeoutError):
             for run in self.session.runs([state.value for state in State if not state.final]):
                 self.session.run(run.id).cancel()
@@ -87,7 +88,7 @@ class LocalServer:
         raise ClientError(f"the server did not start within {duration(_START_SECONDS)}; see {self.runs / LOG_FILE}")
 
     def stop(self) -> None:
-        """Asks the server to end, and kills the server after a time limit."""
+        """Requests the server to end, and kills the server after a time limit."""
         if self._process is None or self._process.poll() is not None:
             return
         self._process.terminate()
@@ -110,11 +111,12 @@ if sys.platform == "linux":
 runpy.run_module("conoid.server", run_name="__main__", alter_sys=True)
 """
 _TETHERED = [sys.executable, "-P", "-c", _TETHER]
-"""Command of the server. The kernel sends SIGTERM to the server when the process of the first argument dies."""
+"""Command that starts the server. The kernel sends SIGTERM to the server when the process whose id is the first
+argument dies."""
 
 
 def _token(runs: Path) -> str:
-    """Returns a new token for this server. Raises ClientError with the last line of the server's log."""
+    """Returns a new token for the server. Raises ClientError with the last line of the server's log."""
     command = [*_SERVER, "token", "add", OWNER, "--runs", str(runs)]
     try:
         made = subprocess.run(
@@ -126,13 +128,15 @@ def _token(runs: Path) -> str:
     if made.returncode != 0 or not made.stdout.strip():
         lines = made.stderr.strip().splitlines()
         raise ClientError(
-            f"the server did not start: {lines[-1] if lines else f'it ended with code {made.returncode}'}"
+            f"the server did not start: {lines[-1] if lines else f'the command ended with code {made.returncode}'}"
         )
     return made.stdout.split()[-1]
 
 
 def _environment() -> dict[str, str]:
-    """Returns the environment without a site's database, which a server of one run must not use."""
+    """Returns the environment without the database setting of a site, because a server for one run must not use the
+    site's database.
+    """
     return {name: value for name, value in os.environ.items() if name not in {"CONOID_DATABASE", "CONOID_RUNS"}}
 
 

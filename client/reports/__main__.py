@@ -1,5 +1,5 @@
-"""``python -m conoid.client.reports FOLDER OUT`` writes the report of the run in a folder. The server makes reports
-by this command.
+"""Program that writes a report: ``python -m conoid.client.reports FOLDER OUT`` reads the run in a folder. The server
+makes reports with this program.
 """
 
 import sys
@@ -11,7 +11,7 @@ from .report import write
 
 
 def main(folder: str, out: str) -> int:
-    """Writes a report; returns the exit code: 0, or 1 after one line with the error."""
+    """Writes a report; returns the exit code: 0, or 1 after it has printed one line with the error."""
     try:
         write(Result.open(folder), Path(out))
     except ClientError as error:

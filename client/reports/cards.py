@@ -1,4 +1,4 @@
-"""Texts and tables of a report, card by card; ``pictures`` has pictures and charts."""
+"""Texts and tables of a report, one function for each card. The module ``pictures`` makes pictures and charts."""
 
 import json
 from collections.abc import Sequence
@@ -16,12 +16,12 @@ from . import html
 from .compare import summary
 
 _CUTS = 50
-"""Largest number of balance events in the table. Chosen value."""
+"""Largest number of changes of the load balance in the table. Chosen value."""
 _PARAMETERS = {"rayleigh": "mode", "exponential": "mean", "power": "exponent"}
 
 
 def strip(ended: Outcome | None) -> str:
-    """Returns the five main numbers of a run; nothing for a run that has not ended."""
+    """Returns the five main numbers of a run; empty for a run that has not ended."""
     if ended is None:
         return ""
     passed = sum(check.passed for check in ended.reference)
@@ -37,12 +37,12 @@ def strip(ended: Outcome | None) -> str:
 
 
 def references(ended: Outcome | None) -> str:
-    """Returns each reference with its value, expected value, deviation, verdict and source."""
+    """Returns a table of the references: value, expected value, deviation, verdict and source."""
     return html.references(ended)
 
 
 def results(ended: Outcome | None) -> str:
-    """Returns the last value and the extremes of each probe."""
+    """Returns a table of the probes: last value and extremes."""
     rows = []
     for probe in ended.probes if ended is not None else ():
         last, least, most = alike((probe.value, probe.least, probe.most), probe.unit)
@@ -76,17 +76,17 @@ def case(entries: dict[str, object]) -> str:
 
 
 def cost(ended: Outcome | None) -> str:
-    """Returns the cost of the run and its errors."""
+    """Returns a table of the cost of the run and of its errors."""
     if ended is None:
         return ""
     updates = (ended.steps or 0) * (ended.elements or 0)
     each = ended.cpu / updates if updates else None
     rows = [
-        ["core time of the steps", duration(ended.cpu)],
+        ["core time of the time steps", duration(ended.cpu)],
         ["clock time", f"{duration(ended.elapsed)} on {crew(ended.ranks, ended.threads)}"],
         ["tets", f"{count(ended.elements)}, of which {count(ended.eroded)} eroded"],
-        ["nodes", f"{count(ended.nodes_initial)} at first, {count(ended.nodes)} at the end"],
-        ["core time a tet and step", si(each, "s")], ["worst energy residual", rough(ended.worst_residual)],
+        ["nodes", f"{count(ended.nodes_initial)} at the start, {count(ended.nodes)} at the end"],
+        ["core time for each tet and step", si(each, "s")], ["worst energy residual", rough(ended.worst_residual)],
     ]  # fmt: skip
     off = [
         (abs(check.value - check.expected) / abs(check.expected), check.name)
@@ -97,12 +97,12 @@ def cost(ended: Outcome | None) -> str:
         worst, name = max(off)
         rows.append(["largest deviation of a reference", f"{percent(worst)} ({name})"])
     if ended.peak_memory:
-        rows.append(["memory of the largest rank", si(max(ended.peak_memory), "B")])
+        rows.append(["memory of the rank with most memory", si(max(ended.peak_memory), "B")])
     return html.table(["", ""], rows) + f'<p class="hint digest">digest {escape(ended.digest)}</p>'
 
 
 def energy(result: Result, ended: Outcome | None) -> str:
-    """Returns the ledger and the energies of the parts at the end."""
+    """Returns the energy balance, and the energies of the parts at the end."""
     rows = []
     if ended is not None and ended.energy is not None:
         terms = ((name, getattr(ended.energy, name)) for name in ended.energy.__struct_fields__ if name != "residual")
@@ -126,7 +126,7 @@ def _parts(result: Result) -> str:
 
 
 def fragments(result: Result) -> str:
-    """Returns the totals of the fragments, and the laws of their masses and extents."""
+    """Returns the totals of the fragments, and the fitted laws of their masses and extents."""
     found = summary(result)
     if found is None:
         return ""
@@ -141,7 +141,7 @@ def fragments(result: Result) -> str:
 
 
 def _laws(what: str, fits: Sequence[Fit], unit: str) -> list[list[str]]:
-    """Returns the rows of the laws, the likeliest law first. The exponent of a power law has no unit."""
+    """Returns the table rows of the fitted laws, the likeliest law first. The exponent of a power law has no unit."""
     return [
         [what, fit.law, _PARAMETERS[fit.law], exact(fit.parameter, "" if fit.law == "power" else unit, 4),
          exact(fit.log_likelihood, "", 5)]
@@ -150,7 +150,7 @@ def _laws(what: str, fits: Sequence[Fit], unit: str) -> list[list[str]]:
 
 
 def balance(result: Result, ended: Outcome | None) -> str:
-    """Returns the balance events of the run."""
+    """Returns the changes of the load balance in the run."""
     cuts = [message for message in result.messages if isinstance(message, Balance)]
     if not cuts:
         return ""
@@ -162,15 +162,16 @@ def balance(result: Result, ended: Outcome | None) -> str:
         [t, count(cut.step), cut.cause, count(cut.tets), spent, saved]
         for cut, t, spent, saved in zip(some, times, costs, gains, strict=True)
     ]
-    text = f"<p>{counted(len(cuts), 'cut')}{f', the first {_CUTS} of them:' if len(cuts) > _CUTS else ''}</p>"
+    text = f"<p>{counted(len(cuts), 'cut')}{f', the first {_CUTS}:' if len(cuts) > _CUTS else ''}</p>"
     text += html.table(["time", "step", "cause", "tets moved", "cost", "saved by those before"], rows, [1, 3, 4, 5])
     if ended is not None:
-        text += f"<p>They cost {si(ended.balancing_cost, 's')} and saved {si(ended.balancing_saved, 's')}.</p>"
+        cost, saved = si(ended.balancing_cost, "s"), si(ended.balancing_saved, "s")
+        text += f"<p>The changes of the load balance cost {cost} and saved {saved}.</p>"
     return text
 
 
 def messages(result: Result) -> str:
-    """Returns all lines of the log."""
+    """Returns all messages of the log."""
     lines = [f"{message.level}: {message.text}" for message in result.messages if isinstance(message, Log)]
     return f"<pre class=log tabindex=0>{escape(chr(10).join(lines))}</pre>" if lines else ""
 

@@ -1,4 +1,4 @@
-"""Charts of a run's journal. Only this module and ``curves`` import matplotlib, which loads slowly."""
+"""Charts from the journal of a run. Only this module and ``curves`` import matplotlib, because it loads slowly."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -18,37 +18,37 @@ _COLOURS = {
     "elements": "#4c78a8", "nodes": "#72b7b2", "contact": "#f58518", "fracture": "#e45756", "output": "#54a24b",
     "exchange": "#b5bcc4",
 }  # fmt: skip
-"""Colours of the phases, in the order of a bar from bottom to top."""
+"""Colours of the phases, in the order in a bar from bottom to top."""
 _RANKS = ["#4c78a8", "#f58518", "#54a24b", "#e45756", "#72b7b2", "#b279a2", "#eeca3b", "#9d755d"]
 _INK, _FAINT = "#1d2733", "#b5bcc4"
 _NAMED = len(_RANKS)
-"""Largest number of ranks with a colour each. With more ranks, only the ranks with the most and the fewest nodes at
-the end have a colour."""
+"""Largest number of ranks that have colours of their own. With more ranks, only the ranks with the most and the
+fewest nodes at the end have a colour."""
 PAPER = {
     "glass_steel_bar": (
         "Moon, Kim and Lee, fig. 17: 18 cuts on 16 processors, domain 4, by the impact, grows most; "
         "fig. 18: contact and its communication take most of the time"
     ),
 }
-"""Result of the paper for comparison, by case."""
+"""Results of the paper for comparison; the keys are the names of cases."""
 
 
 @dataclass
 class Course:
-    """Loads of the ranks over time."""
+    """Loads of the ranks of a run over time."""
 
     times: list[float] = field(default_factory=list)
-    """Times, s."""
+    """Times of the load messages, s."""
     outside: list[list[int]] = field(default_factory=list)
-    """Number of surface nodes of each rank at these times."""
+    """Number of surface nodes of each rank at the times of the load messages."""
     cuts: list[float] = field(default_factory=list)
-    """Times of the balance events, s."""
+    """Times at which the load balance changed, s."""
     seconds: dict[str, list[float]] = field(default_factory=dict)
     """CPU time of each rank by phase, s."""
 
 
 def course(messages: Sequence[AnyMessage]) -> Course:
-    """Returns the loads of the ranks over time. Raises ClientError for a journal without loads.
+    """Returns the loads of the ranks over time. Raises ClientError if the journal has no loads.
 
     A run that continued from a checkpoint computes some times twice. The first loads of these times are dropped;
     their CPU time is counted.
@@ -67,12 +67,14 @@ def course(messages: Sequence[AnyMessage]) -> Course:
         elif isinstance(message, Balance):
             made.cuts = [t for t in made.cuts if t < message.t] + [message.t]
     if not made.times:
-        raise ClientError("this run has no messages with the loads of its ranks")
+        raise ClientError("the run has no messages with the loads of its ranks")
     return made
 
 
 def balance(balances: Course, title: str, case: str, out: Path) -> None:
-    """Writes a PNG of the surface nodes of each rank with the balance events, and of the CPU time by phase and rank."""
+    """Writes a PNG file: surface nodes of each rank with the changes of the load balance, and CPU time by phase and
+    rank.
+    """
     figure = balance_figure(balances)
     figure.suptitle(title, fontsize=11, color=_INK)
     figure.supxlabel(PAPER.get(case, ""), fontsize=8, color=_INK)
@@ -80,7 +82,7 @@ def balance(balances: Course, title: str, case: str, out: Path) -> None:
 
 
 def balance_figure(balances: Course) -> Figure:
-    """Draws surface nodes of each rank with the balance events, and CPU time by phase and rank."""
+    """Draws the surface nodes of each rank with the changes of the load balance, and the CPU time by phase and rank."""
     figure = Figure(figsize=(11, 4.8), layout="constrained")
     left, right = figure.subplots(1, 2)
     _outside(left, balances)

@@ -1,4 +1,4 @@
-"""Comparison of two runs: keys that differ, results at the end, fragments."""
+"""Comparison of two runs: keys of the case that differ, results at the end, fragments."""
 
 import math
 from collections.abc import Iterator, Sequence
@@ -18,7 +18,7 @@ from ..errors import UnfinishedError
 from ..result import Result
 
 _NAMED = 3
-"""Largest number of changed keys that are named."""
+"""Largest number of changed keys that a message names."""
 _OUTCOME = (
     "steps", "time", "ranks", "elapsed", "cpu", "elements", "nodes", "fragments", "broken", "first_break", "eroded",
     "eroded_mass", "inside", "deepest", "overlapping", "overlap", "rebalances", "worst_residual",
@@ -28,7 +28,7 @@ _DRAWN = (
     "kinetic", "elastic", "plastic", "contact", "friction", "eroded", "fracture", "cohesive", "stepping", "averaging",
 )  # fmt: skip
 AT_THE_END = ", at the end"
-"""Suffix for the name of a column of the history, for its last value."""
+"""Suffix of the name of a history column, for the last value of the column."""
 _UNITS = {"time": "s", "elapsed": "s", "cpu": "s", "eroded_mass": "kg", "element_updates_per_second": "1/s"}
 
 
@@ -41,7 +41,7 @@ class Key(msgspec.Struct, frozen=True):
 
 
 class Value(msgspec.Struct, frozen=True):
-    """The same number in two runs; NaN if the number is unknown. ``difference`` is b - a, ``relative`` is (b - a) /
+    """A number of two runs; NaN if a run does not have it. ``difference`` is b - a, ``relative`` is (b - a) /
     abs(a).
     """
 
@@ -57,7 +57,7 @@ class Value(msgspec.Struct, frozen=True):
 
     @property
     def relative(self) -> float:
-        """Difference over the magnitude of a; 0 for equal values, NaN for an unknown value or for a = 0."""
+        """Difference b - a divided by the magnitude of a; 0 for equal values, NaN for an unknown value or for a = 0."""
         if self.difference == 0.0:
             return 0.0
         return self.difference / abs(self.a) if self.a else math.nan
@@ -73,7 +73,7 @@ class Comparison:
     keys: list[Key]
     ends: list[Value]
     sizes: list[Value]
-    """Fragment statistics of the last tables."""
+    """Totals of the last tables of fragments of both runs."""
 
 
 def compare(a: Result, b: Result) -> Comparison:
@@ -93,15 +93,15 @@ def differing(a: Any, b: Any) -> list[Key]:
 
 
 def changes(before: Any, now: Any) -> str:
-    """Returns the first keys that differ, each with both values; empty if all are equal."""
+    """Returns a text with the first keys that differ, each with both values; empty if all values are equal."""
     found = differing(before, now)
     keys = ", ".join(f"{one.key} was {shown(one.a)} and is {shown(one.b)}" for one in found[:_NAMED])
     return keys + (f", and {counted(len(found) - _NAMED, 'more key')}" if len(found) > _NAMED else "")
 
 
 def _flat(data: Any, path: str = "") -> Iterator[tuple[str, Any]]:
-    """Yields keys and values of the leaves. An entry of a list is identified by its name, or by its index if it has
-    no name.
+    """Yields the keys and values of nested data. An entry of a list is identified by its name, or by its index if it
+    has no name.
     """
     if isinstance(data, dict):
         for key, value in data.items():
@@ -115,8 +115,8 @@ def _flat(data: Any, path: str = "") -> Iterator[tuple[str, Any]]:
 
 
 def _outcomes(a: Result, b: Result) -> list[Value]:
-    """Returns the numbers of both outcomes, NaN for a number that one run lacks. The comparison omits a number that
-    both runs lack.
+    """Returns the numbers of both outcomes; NaN for a number that one run lacks. A number that both runs lack is
+    left out.
     """
     pairs = ((name, _known(a.outcome, name), _known(b.outcome, name)) for name in _OUTCOME)
     return [Value(n, _UNITS.get(n, ""), *both) for n, *both in pairs if not all(map(math.isnan, both))]
@@ -141,7 +141,7 @@ def _references(a: Result, b: Result) -> list[Value]:
 
 
 def _last(a: Result, b: Result) -> list[Value]:
-    """Returns the last values of columns of both histories that no outcome has: momentum, probes."""
+    """Returns the last values of history columns that are not in the outcomes: momentum, probes."""
     try:
         first, second = a.history, b.history
     except UnfinishedError:
@@ -159,7 +159,7 @@ def common(a: Columns, b: Columns) -> list[str]:
 
 @dataclass(frozen=True)
 class Material:
-    """Data for a figure of two runs, by the names of the runs."""
+    """Data for a figure of two runs; the keys are the names of the runs."""
 
     histories: dict[str, Columns]
     fragments: dict[str, Columns]
@@ -167,8 +167,8 @@ class Material:
 
 
 def material(a: Result, b: Result, names: Sequence[str] = ()) -> Material:
-    """Returns the histories and the last fragment tables. The default of ``names`` is the energies that are not all
-    0 and the probes that both runs have.
+    """Returns the histories and the last fragment tables of two runs. ``names``: columns of the history; by default
+    the energies that are not always 0 and the probes that both runs have.
     """
     runs = {a.folder.name: a, b.folder.name: b} if a.folder.name != b.folder.name else {"A": a, "B": b}
     histories = {name: run.history for name, run in runs.items()}
@@ -197,7 +197,7 @@ def _sizes(a: Result, b: Result) -> list[Value]:
 
 
 def summary(result: Result) -> Summary | None:
-    """Returns the totals of the last table of fragments; None for a run without tables."""
+    """Returns the totals of the last table of fragments; None for a run without such tables."""
     if not result.fragment_tables:
         return None
     table = result.fragments_of()

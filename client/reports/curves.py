@@ -1,5 +1,5 @@
-"""Curves of a run: energy, fragments, time step and columns of its history; also two runs in one figure. With
-matplotlib.
+"""Curves of a run: energy, fragments, time step and columns of the history, also for two runs in one figure. The
+module needs matplotlib.
 """
 
 import math
@@ -28,14 +28,14 @@ _LEDGER = (
 )  # fmt: skip
 _DASHES = ("-", "--", ":")
 _LIMITERS = 6
-"""Largest number of limiters of the time step with a colour each. Chosen value."""
+"""Largest number of limits of the time step that have colours of their own. Chosen value."""
 _PROBES = 8
 """Largest number of curves in a panel. Chosen value."""
 
 
 def save(figure: Figure, out: Path) -> Path:
-    """Writes a figure as PNG, or in the format of the file's ending. Raises ClientError, UsageError for an unknown
-    ending.
+    """Writes a figure as PNG, or in the format of the file's ending. Raises ClientError, UsageError if the ending is
+    unknown.
     """
     try:
         with whole(out) as part:
@@ -46,8 +46,8 @@ def save(figure: Figure, out: Path) -> Path:
 
 
 def energy(course: Columns) -> Figure:
-    """Draws the whole ledger; its terms without the kinetic energy; the residual; and, for several parts, the
-    kinetic and the internal energy of each part.
+    """Draws four panels: the energy balance; its terms without the kinetic energy; the residual; and, for several
+    parts, the kinetic and the internal energy of each part.
     """
     parts = {name: _largest(some) for name, some in by_part(course).items()}
     figure, (left, middle, right, *others) = _panels(3 + len(parts))
@@ -65,7 +65,7 @@ def energy(course: Columns) -> Figure:
     right.semilogy(t, positive, color=_INK, linewidth=1.2)
     _name(left, "energy", "energy, J", ylim=(0, None))
     _name(middle, "without the kinetic term", "energy, J")
-    _name(right, "residual of the ledger", "of the largest energy input")
+    _name(right, "residual of the ledger", "relative to the largest energy input")
     for axes, (name, some) in zip(others, parts.items(), strict=True):
         for (part, values), colour in zip(some.items(), _COLOURS * len(some), strict=False):
             axes.plot(t, values, color=colour, label=part, linewidth=1.4)
@@ -74,13 +74,13 @@ def energy(course: Columns) -> Figure:
 
 
 def _largest(curves: dict[str, Sequence[float]]) -> dict[str, Sequence[float]]:
-    """Returns the curves with the largest maxima, as many as fit in a panel."""
+    """Returns the curves with the largest maxima, as many as one panel can have."""
     chosen = sorted(curves, key=lambda name: -max(curves[name], default=0.0))[:_PROBES]
     return {name: curves[name] for name in curves if name in chosen}
 
 
 def steps(course: Columns) -> Figure:
-    """Draws the length of the time step in the colour of its limiter."""
+    """Draws the length of the time step in the colour of the condition that limits it."""
     figure, (axes,) = _panels(1)
     held = [_limiter(text) for text in course["limiter"] if isinstance(text, str)] or [""] * course.rows
     often = sorted(set(held), key=lambda name: -held.count(name))[:_LIMITERS]
@@ -90,22 +90,24 @@ def steps(course: Columns) -> Figure:
         some = [(t, 1e9 * dt) for t, dt, by in points if by == name or (name == "others" and by not in often)]
         if some:
             axes.plot(*zip(*some, strict=True), ".", markersize=3, color=colour, label=name or "not known")
-    _name(axes, "time step, and its limiter", "dt, ns", ylim=(0, None))
+    _name(axes, "time step, coloured by its limiter", "dt, ns", ylim=(0, None))
     return figure
 
 
 def _limiter(text: str) -> str:
-    """Returns the kind of limiter and its part: ``stability: glass`` for ``stability: tet 12 of glass``."""
+    """Returns the condition that limits the time step, and its part: ``stability: glass`` for ``stability: tet 12 of
+    glass``.
+    """
     what, _, where = text.partition(":")
     return f"{what}: {where.rpartition(' of ')[2].strip()}" if where else what
 
 
 def fragments(tables: Sequence[Columns]) -> Figure:
-    """Draws the number of fragments in each frame, the share of the largest one, and N(m) of the last frame with its
-    laws.
+    """Draws the number of fragments in each frame, the mass fraction of the largest fragment, and N(m) of the last
+    frame with its fitted laws.
     """
     if not tables or not any(table.rows for table in tables):
-        raise ClientError("this run has no tables of fragments: nothing in it can break")
+        raise ClientError("the run has no tables of fragments, because no part of it can break")
     figure, (left, right) = _panels(2)
     counted = [table for table in tables if table.rows]
     t = [1e6 * table.numbers("t")[0] for table in counted]
@@ -119,7 +121,7 @@ def fragments(tables: Sequence[Columns]) -> Figure:
 
 
 def distribution(axes: Axes, tables: Mapping[str, Columns]) -> None:
-    """Draws N(m), the number of fragments of mass m or more, on two logarithmic axes."""
+    """Draws N(m), the number of fragments with the mass m or more, with two logarithmic axes."""
     for (name, table), colour in zip(tables.items(), _COLOURS, strict=False):
         masses = sorted((1e3 * mass for mass in table.numbers("mass") if mass > 0.0), reverse=True)
         when = exact(table.numbers("t")[0], "s", 4) if table.rows else ""
@@ -131,14 +133,14 @@ def distribution(axes: Axes, tables: Mapping[str, Columns]) -> None:
 
 
 def columns(course: Columns, names: Sequence[str] = ()) -> Figure:
-    """Draws columns of a history, with one panel for each unit. The default is the columns of the probes. Raises
-    ClientError.
+    """Draws columns of a history, with one panel for each unit. By default the columns of the probes are drawn.
+    Raises ClientError.
     """
     return overlaid({"": course}, names or probes(course) or ["momentum_x", "momentum_y", "momentum_z"])
 
 
 def probes(course: Columns) -> list[str]:
-    """Returns the columns of the case's probes."""
+    """Returns the names of the history columns that belong to probes."""
     return [name for name in course if name not in history.COLUMNS and history.part_of(name) is None]
 
 
@@ -160,12 +162,14 @@ def overlaid(runs: Mapping[str, Columns], names: Sequence[str], spare: int = 0) 
 
 
 def _dashed(runs: Mapping[str, Columns]) -> str:
-    """Returns the legend that assigns dash patterns to runs."""
+    """Adds a legend that assigns dash patterns to runs."""
     return ", ".join(f"{run} {mark}" for run, mark in zip(runs, ("——", "– –", "· ·"), strict=False))
 
 
 def comparison(material: Material) -> Figure:
-    """Draws two runs: the columns of both histories in the same panels, and the masses of their fragments."""
+    """Draws two runs: the columns of both histories in the same panels, and the masses of the fragments of both
+    runs.
+    """
     figure = overlaid(material.histories, material.columns, 1 if material.fragments else 0)
     if material.fragments:
         distribution(figure.axes[-1], material.fragments)
@@ -173,7 +177,9 @@ def comparison(material: Material) -> Figure:
 
 
 def _by_unit(runs: Mapping[str, Columns], names: Sequence[str]) -> dict[str, list[str]]:
-    """Returns the names by unit, in their order. A unit has at most as many names as a panel has curves."""
+    """Returns the names of columns by unit, in their order. A unit has at most as many names as a panel can have
+    curves.
+    """
     groups: dict[str, list[str]] = {}
     for name in names:
         course = next((course for course in runs.values() if name in course), next(iter(runs.values())))

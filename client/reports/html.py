@@ -1,4 +1,4 @@
-"""HTML elements of reports and notebooks."""
+"""HTML elements for reports and notebooks."""
 
 import base64
 from collections.abc import Sequence
@@ -10,7 +10,7 @@ from conoid.cases.outcome import Outcome
 
 
 def table(head: Sequence[str], rows: Sequence[Sequence[str]], numbers: Sequence[int] = ()) -> str:
-    """Returns a table of escaped text; ``numbers`` are the columns that are aligned right."""
+    """Returns an HTML table with escaped text; ``numbers``: indices of the columns that are aligned to the right."""
 
     def cells(row: Sequence[str], tag: str) -> str:
         return "".join(f"<{tag}{' class=n' * (i in numbers)}>{escape(each)}</{tag}>" for i, each in enumerate(row))
@@ -21,12 +21,12 @@ def table(head: Sequence[str], rows: Sequence[Sequence[str]], numbers: Sequence[
 
 
 def image(data: bytes, kind: str, alt: str) -> str:
-    """Returns an image whose data are embedded in the page."""
+    """Returns an HTML image whose data are embedded in the page."""
     return f'<img alt="{escape(alt)}" src="data:image/{kind};base64,{base64.b64encode(data).decode()}">'
 
 
 def head(name: str, title: str, ended: Outcome | None) -> str:
-    """Returns title, state and numbers of a run; ``ended`` is None before the run's end."""
+    """Returns title, state and main numbers of a run; ``ended`` is None before the end of the run."""
     release = f"Conoid {metadata.version('conoid')}"
     if ended is None:
         state, rows = "<span class=bad>not ended</span>", [["run", name], ["written by", release]]
@@ -37,7 +37,7 @@ def head(name: str, title: str, ended: Outcome | None) -> str:
             ["run", name], ["simulated", f"{si(ended.time, 's')} in {counted(ended.steps, 'step')}"],
             ["took", f"{duration(ended.elapsed)} on {crew(ended.ranks, ended.threads)}"],
             ["tets", f"{count(ended.elements)}, of which {count(ended.eroded)} eroded"],
-            ["nodes", f"{count(ended.nodes_initial)} at first, {count(ended.nodes)} at the end"],
+            ["nodes", f"{count(ended.nodes_initial)} at the start, {count(ended.nodes)} at the end"],
             ["fragments", f"{count(ended.fragments)}; {counted(ended.broken, 'facet')} broken"],
             ["worst energy residual", rough(ended.worst_residual)], ["digest", ended.digest],
             ["written by", release],
@@ -46,7 +46,7 @@ def head(name: str, title: str, ended: Outcome | None) -> str:
 
 
 def references(ended: Outcome | None) -> str:
-    """Returns the references of a run with pass or fail; empty for a run without references."""
+    """Returns the references of a run, each with pass or fail; empty for a run without references."""
     if ended is None or not ended.reference:
         return ""
     rows = []

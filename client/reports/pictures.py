@@ -18,16 +18,17 @@ from ..result import Result
 from . import html
 
 _SHOTS = 3
-"""Number of times at which a field is drawn, evenly over the frames. Chosen value: three pictures fit side by side."""
+"""Number of frames in which a field is drawn, evenly spaced over the run. Chosen value: three pictures fit side by
+side."""
 _SIZE = (1500, 860)
 _INK, _FAINT = "#1d2733", "#b5bcc4"
-"""Colours of charts. A report replaces these two by the colours of its text: a chart is readable on a light and on a
-dark background."""
+"""Colours of text and faint lines in charts. A report replaces these colours by its own text colours, so that a
+chart is readable on a light and on a dark background."""
 
 
 def pictures(result: Result, fields: Sequence[str], at: Callable[[str], None]) -> str:
-    """Draws each field at some times, and the last state of one field on a section. A picture that fails is replaced
-    by a line with the error.
+    """Draws each field at several times, and the last state of one field on a section. If a picture fails, a text
+    line with the error replaces it.
     """
     frames = [frame.index for frame in result.frames]
     if not frames or not fields:
@@ -39,14 +40,14 @@ def pictures(result: Result, fields: Sequence[str], at: Callable[[str], None]) -
         drawn.append(_picture(result, field, f"at {len(some)} times", frame=some, mirror="auto"))
     inside = next((field for field in fields if FIELDS[field].kind not in ("classes", "fragments")), "")
     if inside:
-        at(f"drawing {inside} on a cut")
+        at(f"drawing {inside} on a section")
         drawn.append(_picture(result, inside, "on a cut", frame=[frames[-1]], **_cut(result)))
     return "".join(drawn)
 
 
 def _cut(result: Result) -> dict[str, str]:
-    """Returns the options for a view of the inside. A model with planes of symmetry shows its inside without
-    mirrors; another model is cut through the middle.
+    """Returns the options of a picture that shows the inside of the bodies. A model with planes of symmetry is drawn
+    without mirroring; another model is cut through the middle.
     """
     return {} if result.scene().mirrors else {"section": "y=middle", "camera": "0.35,-1,0.3"}
 
@@ -65,8 +66,8 @@ def _picture(result: Result, field: str, how: str, **options: Any) -> str:
 
 
 def _webp(path: Path) -> bytes:
-    """Returns the picture as WebP, a tenth of the bytes."""
-    from PIL import Image  # a dependency of the package that has drawn the picture
+    """Returns a picture as WebP, which has a tenth of the bytes of PNG."""
+    from PIL import Image  # Pillow is a dependency of the package that has drawn the picture.
 
     packed = io.BytesIO()
     with Image.open(path) as image:
@@ -75,10 +76,12 @@ def _webp(path: Path) -> bytes:
 
 
 def _key(drawn: Drawn) -> str:
-    """Returns the colour bar of a picture as text and a stripe."""
+    """Returns the colour bar of a picture as a coloured stripe with texts."""
     field = FIELDS[drawn.field]
     if field.kind == "fragments":
-        return "<span class=hint>a hue for each part, fragments vary it; unbroken parts are pale</span>"
+        return (
+            "<span class=hint>each part has a hue, its fragments have variations of it; unbroken parts are pale</span>"
+        )
     if field.kind == "classes":
         return ""
     low, high = exacts((drawn.low, drawn.high), drawn.unit, 4)
@@ -95,24 +98,24 @@ def _key(drawn: Drawn) -> str:
 
 
 def curve(result: Result, name: str) -> list[str]:
-    """Returns the charts of a history; a line with the error if matplotlib is not installed."""
+    """Returns the charts of the history named ``name``; a text line with the error if matplotlib is not installed."""
     return charts(lambda: _curves().__dict__[name](result.history))
 
 
 def fragments(result: Result) -> list[str]:
-    """Returns charts of the number of fragments over time and of their masses."""
+    """Returns charts of the number of fragments over time and of the masses of fragments."""
     tables = (result.fragments_of(index) for index in result.fragment_tables)
     return charts(lambda: _curves().fragments(list(tables)))
 
 
 def balance(result: Result) -> list[str]:
-    """Returns charts of surface nodes and CPU time by rank."""
+    """Returns charts of surface nodes and CPU time of each rank."""
     messages = result.messages
     if not any(isinstance(message, Load) for message in messages):
         return []
 
     def draw() -> Any:
-        from . import charts as drawing  # matplotlib is loaded when it is needed
+        from . import charts as drawing  # Loaded only if needed, because matplotlib loads slowly.
 
         return drawing.balance_figure(drawing.course(messages))
 
@@ -120,13 +123,13 @@ def balance(result: Result) -> list[str]:
 
 
 def _curves() -> Any:
-    from . import curves  # matplotlib is loaded when it is needed
+    from . import curves  # Loaded only if needed, because matplotlib loads slowly.
 
     return curves
 
 
 def charts(draw: Callable[[], Any]) -> list[str]:
-    """Returns each panel of a figure as an SVG in the colours of the text; nothing for a run without these data."""
+    """Returns each panel of a figure as an SVG in the colours of the text; empty if the run does not have the data."""
     try:
         figure = draw()
     except UnfinishedError:

@@ -1,8 +1,9 @@
-"""Replay in 3-D inside a report: the page's modules, three.js and the snapshots of a run in one file.
+"""Replay in 3-D inside of a report: one file with the modules of the page, three.js and the snapshots of a run.
 
-The modules import each other by relative addresses, which a page without an address cannot resolve. In a report an
-import map has an entry ``conoid/NAME`` for each module. Modules that send requests to the server are replaced by small
-modules that read the embedded data. Modules and snapshots are compressed by gzip, which browsers can decompress.
+The modules import each other by relative addresses, which a page without an address cannot resolve. Therefore a
+report has an import map with an entry ``conoid/NAME`` for each module. Small modules that read the embedded data
+replace the modules that send requests to the server. Modules and snapshots are compressed with gzip, which browsers
+can decompress.
 """
 
 import base64
@@ -23,19 +24,20 @@ from ..errors import ClientError
 from ..result import Result
 
 FIRST = "body.js"
-"""Module that shows the body. A report embeds this module and all modules that it imports."""
+"""Module that draws the bodies in 3-D. A report embeds this module and all modules that it imports."""
 PACKAGE, VERSION = "nicegui", "3.18.0"
 THREE = (
     "nicegui/elements/scene/dist/index.js",
     "f55227d12dac0eb037cae13b1992091746fc017a275748e4a1bebd0f6244e7e5",
 )
-"""three.js, the same file as in the live page: its path in the package, and its sha256 in the wheel of ``VERSION``
-on PyPI."""
+"""Path of three.js in its package, and its sha256 in the wheel of ``VERSION`` on PyPI. The live page uses the same
+file."""
 MOST = 24
-"""Largest number of embedded snapshots, evenly over the run; fewer if they are too large. Chosen value."""
+"""Largest number of snapshots in a report, evenly spaced over the run; fewer if the snapshots are too large. Chosen
+value."""
 BUDGET = 2_200_000
-"""Largest number of compressed bytes of all snapshots in a report. Base64 makes the snapshots a third larger. Chosen
-value: the whole report stays below 5 MB."""
+"""Largest total size of the compressed snapshots in a report, bytes. Base64 makes the snapshots a third larger.
+Chosen value: the whole report stays below 5 MB."""
 _WEB = Path(__file__).parent.parent / "web"
 _IMPORT = re.compile(r"""(?:import|export)\s*(?:\{([^}]*)\}|\*)?[^;'"]*["']\./([\w-]+\.js)["']""")
 _RELATIVE = re.compile(r"""(from\s*|import\s*\(\s*|import\s+)(["'])\./""")
@@ -52,7 +54,7 @@ _OF_SERVER = {
     },
     "libraries.js": {"three": '() => import("conoid/three")'},
 }
-"""Exports of the modules that replace those with requests to the server."""
+"""Exports of the small modules that replace the modules with requests to the server."""
 _ABSENT = '() => { throw new Error("a report has no server"); }'
 _START = """
 import { Body } from "conoid/body.js";
@@ -80,8 +82,8 @@ _BOOT = """
 
 
 def html(result: Result) -> str:
-    """Returns the replay of a run's snapshots; a line with the reason without three.js; empty for a run without
-    snapshots.
+    """Returns the HTML of the replay; a text line with the reason if three.js is not installed; empty for a run
+    without snapshots.
     """
     names = [name for name in result.folder.names() if re.fullmatch(rf"{layout.SNAPSHOTS}/\d+\.snap", name)]
     if not names or not (_WEB / FIRST).is_file():
@@ -102,8 +104,8 @@ def html(result: Result) -> str:
 
 
 def _snapshots(result: Result, names: Sequence[str]) -> tuple[list[dict[str, Any]], list[str]]:
-    """Returns the entries of the snapshots for the body, and scripts with their bytes. Snapshots of all tets are
-    added while the total size stays below the limit.
+    """Returns the entries of the list of snapshots, and scripts with the bytes of the snapshots. Snapshots of all
+    tets are added while the total size stays below the limit.
     """
     announced = {message.n: message for message in _messages(result) if isinstance(message, Snapshot)}
     packed = _packed(result, names)
@@ -125,7 +127,7 @@ def _snapshots(result: Result, names: Sequence[str]) -> tuple[list[dict[str, Any
 
 
 def _packed(result: Result, names: Sequence[str]) -> dict[str, bytes]:
-    """Returns as many compressed snapshots as the size limit allows, at least the first and the last one."""
+    """Returns as many compressed snapshots as the size limit allows, at least the first and the last snapshot."""
     packed = {name: gzip.compress(result.folder.path(name).read_bytes(), mtime=0) for name in spread(names, MOST)}
     while len(packed) > 2 and sum(map(len, packed.values())) > BUDGET:
         kept = spread(list(packed), max(2, len(packed) * 4 // 5))
@@ -141,12 +143,12 @@ def _messages(result: Result) -> list[Any]:
 
 
 def spread(names: Sequence[str], most: int) -> list[str]:
-    """Returns at most a given number of names, evenly spaced in the list, with the first and the last name."""
+    """Returns at most ``most`` names, evenly spaced in the list, with the first and the last name."""
     return sorted({names[round(k * (len(names) - 1) / max(most - 1, 1))] for k in range(most)})
 
 
 def modules(library: str) -> dict[str, str]:
-    """Returns all modules of the replay by their names in the import map; ``library``: code of three.js."""
+    """Returns the code of all modules of the replay by their names in the import map; ``library``: code of three.js."""
     found, asked, waiting = {"conoid/three": library}, {name: set(known) for name, known in _OF_SERVER.items()}, [FIRST]
     while waiting:
         name = waiting.pop()
@@ -167,7 +169,7 @@ def _stand_in(module: str, wanted: set[str]) -> str:
 
 def three() -> bytes:
     """Reads three.js from the installed package without importing the package. Raises ClientError for another
-    version than the tested one.
+    version than the tested version.
     """
     cure = f"pip install --no-deps {PACKAGE}=={VERSION}"
     try:
@@ -176,7 +178,7 @@ def three() -> bytes:
     except (metadata.PackageNotFoundError, OSError):
         raise ClientError(f"{PACKAGE} {VERSION} is not installed: {cure}") from None
     if hashlib.sha256(content).hexdigest() != THREE[1]:
-        raise ClientError(f"{PACKAGE} {installed.version} is installed, tested is {VERSION}: {cure}")
+        raise ClientError(f"{PACKAGE} {installed.version} is installed, but the tested version is {VERSION}: {cure}")
     return content
 
 

@@ -1,5 +1,6 @@
-"""``conoid report``: a run as one HTML file that needs no server, no network and no other file. The report has the
-style sheets of the live page: the body is at the left, the main numbers are beside it, and charts are below.
+"""Report of a run as one HTML file that needs no server, no network and no other file (``conoid report``). The
+report has the style sheets of the live page: the bodies are drawn at the left, the main numbers stand beside them,
+and charts stand below.
 """
 
 from collections.abc import Callable, Sequence
@@ -51,8 +52,8 @@ _MARK = (
 def write(
     result: Result, out: Path, fields: Sequence[str] | None = None, at: Callable[[str], None] = lambda _: None
 ) -> Path:
-    """Writes the report of a run. ``fields`` are drawn; the default is the most informative fields, and an empty list
-    draws no pictures. ``at`` is called with a description of each step.
+    """Writes the report of a run. ``fields``: fields to draw; by default the most informative fields, and an empty list
+    draws no pictures. ``at`` is called with a description of each step of the work.
 
     Raises ClientError, UnfinishedError for a run without a case.
     """
@@ -109,7 +110,7 @@ def _head(name: str, title: str, case: str, ended: Outcome | None) -> str:
 
 
 def _now(ended: Outcome | None) -> str:
-    """Returns the column beside the body."""
+    """Returns the column beside the 3-D view."""
     return "".join([
         _card("Run", cards.strip(ended)), _card("Warnings", cards.warnings(ended)),
         _card("Results", cards.results(ended)),
@@ -165,7 +166,7 @@ def _has_journal(result: Result) -> bool:
 
 
 def telling(result: Result) -> list[str]:
-    """Returns the most informative fields of a run: fragments, plastic strain or stress; and speed."""
+    """Returns the most informative fields of a run: fragments, plastic strain or stress, and speed."""
     ended = _outcome(result)
     if result.fragment_tables:
         return ["fragment", "speed"]

@@ -1,4 +1,4 @@
-"""Adaptive sweep: runs of a case at points that narrow the bracket in which a result passes a threshold."""
+"""Adaptive sweep: runs of a case at points that narrow the bracket in which a result crosses a threshold."""
 
 import hashlib
 import json
@@ -26,17 +26,17 @@ from .goal import Goal, Span, changes, goal_of, tolerance_of
 from .reporting import Reported, Reporter, in_si
 
 MOST = 40
-"""Default of the largest number of runs. Chosen value: 20 bisections narrow a bracket to a millionth."""
+"""Largest number of runs if the user gives no number. Chosen value: 20 bisections narrow a bracket to a millionth."""
 _AT_ONCE = 8
-"""Largest number of points that run at the same time by default. Chosen value: n points divide the bracket by n + 1,
-and more points bring little."""
+"""Largest number of points that are computed at the same time if the user gives no number. Chosen value: n points
+divide the bracket by n + 1, so that more points gain little."""
 _ATTEMPTS = 100
-"""Largest number of attempts to run a point."""
+"""Largest number of attempts to compute a point."""
 Say = Callable[[str], None]
 
 
 class Server(Protocol):
-    """Session that runs the points: the methods of ``Session`` that an adaptive sweep calls."""
+    """Session that computes the points, with the methods of ``Session`` that an adaptive sweep calls."""
 
     outbox: Outbox
 
@@ -61,18 +61,19 @@ class Search:
     """Input of an adaptive sweep: case, goal, spans, tolerance and limits."""
 
     case: Mapping[str, Any]
-    """The case as plain data, with the constant overrides of the sweep and the hashes of the case's files."""
+    """The case as plain data, with the overrides that are equal for all points and the hashes of the files of the
+    case."""
     folder: Path
     goal: Goal
     spans: Sequence[Span]
     """Spans of the keys that vary together; x is the value of the first key."""
     tolerance: float
-    """Largest width of the bracket at the end, in the unit of the first span."""
+    """Required width of the bracket, in the unit of the first span."""
     at_once: int | None = None
     most: int = MOST
     since: str = ""
-    """Id of the newest run before this search. Ids increase with time: a run with a greater id belongs to this
-    search."""
+    """Id of the newest run before this search. Ids increase with time, so that a run with a greater id belongs to
+    this search."""
 
     @property
     def ends(self) -> tuple[float, float]:
@@ -85,9 +86,10 @@ def found_by(
     session: Server, data: Mapping[str, Any], folder: Path, goal: str, spans: Sequence[Span], tolerance: Any,
     at_once: int | None, most: int, out: Path | None, say: Say, at: Say = lambda text: None,
 ) -> Found:  # fmt: skip
-    """Runs ``Session.adaptive_sweep`` for a case as plain data; the case's files lie below ``folder``."""
+    """Runs an adaptive sweep for a case as plain data, like ``Session.adaptive_sweep``. ``folder``: folder to which
+    the paths of the case's files are relative."""
     if not spans:
-        raise UsageError("spans: name at least one key that varies, with both of its ends")
+        raise UsageError("spans: name at least one key that varies, with both ends of its range")
     first = apply_overrides(data, changes(spans, spans[0].low))
     wish = goal_of(goal, parse_case(first))
     ready = session.outbox.ready(data, folder)
@@ -107,12 +109,12 @@ def _reporter(session: Server, wanted: Search) -> Reporter:
 
 
 def search(session: Server, wanted: Search, book: Book, reporter: Reporter, say: Say, at: Say) -> Found:
-    """Runs points until the bracket is as narrow as the tolerance, or until no further point can narrow the bracket.
-    ``say`` receives a line for each run that has ended, ``at`` a line about the present round. ``reporter`` sends
-    reports to the server.
+    """Computes points until the bracket is as narrow as the tolerance, or until no further point can narrow the
+    bracket. ``say`` is called with a text line for each finished run, ``at`` with a line about the present round.
+    ``reporter`` sends reports to the server.
 
-    Points of the ``book`` that have succeeded are not run again. Each new point is written to the book at once.
-    Raises CaseError for ends with which the case is not valid, ClientError.
+    Points of the ``book`` that have succeeded are not computed again. Each new point is written to the book at once.
+    Raises CaseError if the case is not valid at an end of the range, ClientError.
     """
     for x in wanted.ends:
         parse_case(apply_overrides(wanted.case, changes(wanted.spans, x)))
@@ -135,7 +137,7 @@ def search(session: Server, wanted: Search, book: Book, reporter: Reporter, say:
 
 
 def _counted(wanted: Search, book: Book, fresh: Sequence[Tried]) -> list[Tried]:
-    """Returns the points of earlier commands and of this command within the range, each once."""
+    """Returns the points of earlier commands and of this command that lie within the range, each once."""
     every = {each.x: each for each in (*book.good(), *fresh)}
     return [each for x, each in every.items() if wanted.ends[0] <= x <= wanted.ends[1]]
 
@@ -148,7 +150,7 @@ def _report(wanted: Search, reporter: Reporter, tried: Sequence[Tried], *, over:
 
 
 def _next(wanted: Search, tried: Sequence[Tried], spent: int, many: int) -> tuple[list[float], str]:
-    """Returns the points of the next round. At the end of the search, returns no points and the reason."""
+    """Returns the points of the next round. At the end of the search it returns no points and the reason of the end."""
     low, high = wanted.ends
     left = wanted.most - spent
     taken = [each.x for each in tried]
@@ -171,8 +173,8 @@ def _next(wanted: Search, tried: Sequence[Tried], spent: int, many: int) -> tupl
     return between(found.low.x, found.high.x, taken, max(enough, 0)), _USED_UP
 
 
-_USED_UP = "as many runs as are allowed have been made"
-_CANCELLED = "it was cancelled on the server; the same command continues it"
+_USED_UP = "the largest number of runs (--most) has been reached"
+_CANCELLED = "the sweep was cancelled on the server; repeat the command to continue"
 
 
 def _samples(tried: Sequence[Tried]) -> list[Sample]:
@@ -182,8 +184,8 @@ def _samples(tried: Sequence[Tried]) -> list[Sample]:
 def _round(
     session: Server, wanted: Search, reporter: Reporter, tried: Sequence[Tried], at: Sequence[float]
 ) -> Iterator[tuple[Tried, list[Tried]]]:
-    """Runs points at the same time. Yields each point in its order when its run has ended, with the points whose
-    runs have not ended.
+    """Computes points at the same time. Yields each point, in order, when its run has ended, together with the
+    points whose runs have not ended.
     """
     runs = [(x, _submitted(session, wanted, reporter, x)) for x in at]
     started = [Tried(x=x, values=changes(wanted.spans, x), run=run.id, state="") for x, run in runs]
@@ -193,8 +195,8 @@ def _round(
 
 
 def _submitted(session: Server, wanted: Search, reporter: Reporter, x: float) -> Run:
-    """Returns the run of a point. A run of an earlier search is used if it has succeeded or has not ended, else a
-    new run is submitted.
+    """Returns the run of a point. A run of an earlier search is used if it has succeeded or has not ended; otherwise
+    a new run is submitted.
     """
     case = apply_overrides(wanted.case, changes(wanted.spans, x))
     name = f"adaptive-{_hash(wanted.goal.result, [span.key for span in wanted.spans], case, reporter.id)[:12]}"
@@ -204,7 +206,7 @@ def _submitted(session: Server, wanted: Search, reporter: Reporter, x: float) ->
         try:
             run = session.submit(case, key=key, labels=labels, folder=wanted.folder)
             info = run.status()
-        except MissingError:  # the folder of the run was removed
+        except MissingError:  # The folder of the run was removed.
             continue
         if run.id > wanted.since or info.state is State.SUCCEEDED or not info.state.final:
             return run
@@ -226,7 +228,9 @@ def _ended(wanted: Search, x: float, run: Run) -> Tried:
     value = found.get((wanted.goal.result, wanted.goal.unit))
     columns = {history.header({name: unit})[0]: cell for (name, unit), cell in found.items()}
     if not isinstance(value, int | float):
-        return tried.but(results=columns, cpu=_cpu(ended), problem=f"{wanted.goal.result} is not a number there")
+        return tried.but(
+            results=columns, cpu=_cpu(ended), problem=f"{wanted.goal.result} is not a number at this point"
+        )
     return tried.but(results=columns, cpu=_cpu(ended), value=float(value), f=float(value) - wanted.goal.threshold)
 
 
@@ -235,7 +239,7 @@ def _cpu(ended: Outcome | None) -> float:
 
 
 def _free(session: Server, case: Mapping[str, Any]) -> int:
-    """Returns how many runs of the case the free slots can hold, from 1 to ``_AT_ONCE``."""
+    """Returns the number of runs of the case for which the server has free slots, from 1 to ``_AT_ONCE``."""
     slots = session.me().slots
     cores = parse_case(case).run.cores
     free = (slots.get("total", cores) - slots.get("used", 0)) // cores
@@ -260,7 +264,7 @@ def _found(wanted: Search, tried: Sequence[Tried], why: str, fresh: int) -> Foun
 
 
 def _fit(wanted: Search, tried: Sequence[Tried], made: Bracket) -> ballistic.Fit | None:
-    """Fits the law of residual velocity over impact velocity, or a line near the point at which the result passes
+    """Fits the law of residual velocity over impact velocity, or a line near the point at which the result crosses
     the threshold.
     """
     samples = _samples(tried)

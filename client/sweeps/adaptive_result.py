@@ -22,7 +22,7 @@ from .goal import Goal
 
 class Tried(msgspec.Struct, kw_only=True, frozen=True):
     """A point of an adaptive sweep. ``x`` is the value of the first key, ``values`` are the changed keys, ``f`` is
-    ``value`` minus the threshold, ``cpu`` is in s. A point without a result has the reason in ``problem``.
+    ``value`` minus the threshold, ``cpu`` is in s. If the point has no result, ``problem`` is the reason.
     """
 
     x: float
@@ -34,17 +34,17 @@ class Tried(msgspec.Struct, kw_only=True, frozen=True):
     cpu: float = 0.0
     problem: str = ""
     results: dict[str, int | float | str | None] = {}
-    """Results of the run, by column of the table of a sweep."""
+    """Results of the run; the keys are the columns of the table of a sweep."""
 
     def but(self, **changes: Any) -> "Tried":
-        """Returns a copy with some fields changed."""
+        """Returns a copy of the point with some fields changed."""
         return msgspec.structs.replace(self, **changes)
 
 
 class Found(msgspec.Struct, kw_only=True, frozen=True):
-    """Value of the key at which the result passes the threshold: ``limit`` +- ``uncertainty``, half the width of the
-    bracket. ``ends`` are key and result at the ends of the bracket, or at the ends of the range if ``limit`` is
-    None.
+    """Result of the search: the result of the runs crosses the threshold at the value ``limit`` +- ``uncertainty``
+    of the key; the uncertainty is half of the width of the bracket. ``ends`` are key and result at the ends of the
+    bracket, or at the ends of the range if ``limit`` is None.
     """
 
     key: str
@@ -56,21 +56,21 @@ class Found(msgspec.Struct, kw_only=True, frozen=True):
     uncertainty: float | None = None
     fit: Fit | None = None
     changes: int = 0
-    """Number of times that the result passes the threshold."""
+    """Number of times that the result crosses the threshold."""
     mixed: tuple[float, float] | None = None
-    """Interval of the key in which the result passes the threshold several times."""
+    """Interval of the key in which the result crosses the threshold several times."""
     why: str = ""
-    """Reason for an end before the tolerance was reached."""
+    """Reason why the search ended before it reached the tolerance."""
     points: int
-    """Number of runs in the result, including the runs of earlier commands; ``failed`` runs have no result."""
+    """Number of runs, including the runs of earlier commands; ``failed`` is the number of runs without a result."""
     fresh: int
-    """Number of runs of this command."""
+    """Number of runs that this command has made."""
     failed: int
     cpu: float
     """CPU time of all runs, s."""
 
     def but(self, **changes: Any) -> "Found":
-        """Returns a copy with some fields changed."""
+        """Returns a copy of the result with some fields changed."""
         return msgspec.structs.replace(self, **changes)
 
     @property
@@ -80,21 +80,24 @@ class Found(msgspec.Struct, kw_only=True, frozen=True):
 
     @property
     def unsettled(self) -> str:
-        """Reason for a bracket wider than the tolerance; empty if the tolerance is reached."""
-        return self.why or ("" if self.limit is not None else "the threshold is not passed in the range")
+        """Reason why the bracket is wider than the tolerance; empty if the tolerance is reached."""
+        return self.why or ("" if self.limit is not None else "the result does not cross the threshold in the range")
 
     def lines(self) -> list[str]:
-        """Returns the result as lines for the terminal."""
+        """Returns the result of the search as text lines for the terminal."""
         text = [self._first(), *self._passes()]
         if self.fit is not None:
             text.append(_curve(self.fit, self.unit))
             if not self._within(self.fit.limit):
-                text.append("the curve has its limit outside of the bracket: near it the results do not follow the law")
+                text.append(
+                    "the limit of the fitted curve lies outside of the bracket, because the results near the "
+                    "bracket do not follow the law"
+                )
         if self.why:
             text.append(f"bracket wider than requested ({self._x(self.tolerance)}): {self.why}")
-        failed = f", {self.failed} of them without a result" if self.failed else ""
+        failed = f", {self.failed} without a result" if self.failed else ""
         text.append(
-            f"{counted(self.points, 'run')}{failed}, {self.fresh} of them now; {duration(self.cpu)} of CPU time"
+            f"{counted(self.points, 'run')}{failed}, {self.fresh} in this command; {duration(self.cpu)} of CPU time"
         )
         return text
 
@@ -109,11 +112,13 @@ class Found(msgspec.Struct, kw_only=True, frozen=True):
         if self.mixed is None:
             return []
         a, b = self.mixed
-        again = f"passed {self.changes} times between {number(min(a, b))} and {self._x(max(a, b))}"
-        return [f"not monotonic, or it scatters: the threshold is {again}; the first of them is given"]
+        again = f"crossed {self.changes} times between {number(min(a, b))} and {self._x(max(a, b))}"
+        return [f"the result is not monotonic, or it scatters: the threshold is {again}; the first crossing is given"]
 
     def _within(self, limit: float) -> bool:
-        """True if the limit of a curve lies in the bracket. The limit of a law of velocities is a magnitude."""
+        """True if the limit of the fitted curve lies in the bracket. The limit of a law of velocities is a
+        magnitude.
+        """
         low, high = sorted(abs(x) for x, _ in self.ends)
         return low <= abs(limit) <= high
 
@@ -143,11 +148,13 @@ class Kept(msgspec.Struct, kw_only=True):
 
 
 class Book:
-    """Points of an adaptive sweep, in a file that is written after each point; without a path, in memory only."""
+    """Points of an adaptive sweep, stored in a file that is written after each point. Without a path the points are
+    kept only in memory.
+    """
 
     def __init__(self, path: Path | None, case: Mapping[str, Any], goal: Goal, keys: Sequence[str]) -> None:
-        """Reads the file if it exists. Raises UsageError for a file with another goal or version, or of another
-        kind; ClientError for a changed case.
+        """Reads the file if it exists. Raises UsageError if the file is of another kind or has another goal or
+        version, ClientError if the case has changed.
         """
         self.path = path
         fresh = Kept(version=metadata.version("conoid"), case=_plain(case), goal=goal, keys=list(keys))
@@ -157,16 +164,16 @@ class Book:
             _require_same(path, self.kept, fresh)
 
     def good(self) -> list[Tried]:
-        """Returns the points with a result."""
+        """Returns the points that have a result."""
         return [each for each in self.kept.points if each.f is not None]
 
     def add(self, tried: Tried) -> None:
-        """Adds a point; an earlier point with the same x is replaced."""
+        """Adds a point, which replaces an earlier point with the same x."""
         self.kept.points = [*(each for each in self.kept.points if each.x != tried.x), tried]
         self._write()
 
     def close(self, found: Found) -> Found:
-        """Stores the result."""
+        """Stores the result of the search."""
         self.kept.found = found
         self._write()
         return found
@@ -177,34 +184,36 @@ class Book:
 
 
 def read(path: Path) -> Kept:
-    """Reads the file of an adaptive sweep. Raises UsageError."""
+    """Reads the file of an adaptive sweep. Raises UsageError if the file is of another kind."""
     try:
         return msgspec.json.decode(whole.read(path), type=Kept)
     except OSError as error:
         raise UsageError(f"{path}: {error.strerror}") from None
     except msgspec.MsgspecError:
-        raise UsageError(f"{path}: not a file of an adaptive sweep; name another one with --out") from None
+        raise UsageError(f"{path}: this is not a file of an adaptive sweep; choose another file with --out") from None
 
 
 def _require_same(path: Path, kept: Kept, fresh: Kept) -> None:
-    other = "name another file with --out, or remove it"
+    other = "choose another file with --out, or remove this file"
     if (kept.goal, kept.keys) != (fresh.goal, fresh.keys):
         question = f"{kept.goal.result} = {number(kept.goal.threshold)} over {', '.join(kept.keys)}"
-        raise UsageError(f"{path}: holds another sweep, {question}; {other}")
+        raise UsageError(f"{path}: contains another sweep, {question}; {other}")
     if kept.version != fresh.version:
-        raise UsageError(f"{path}: its runs are of Conoid {kept.version}, this is {fresh.version}; {other}")
+        raise UsageError(
+            f"{path}: the runs in the file are of Conoid {kept.version}, this is Conoid {fresh.version}; {other}"
+        )
     if changed := changes(kept.case, fresh.case):
-        raise ClientError(f"{path}: the case has changed since: {changed}; {other}")
+        raise ClientError(f"{path}: the case has changed since the first run: {changed}; {other}")
 
 
 def _plain(case: Mapping[str, Any]) -> dict[str, Any]:
-    """Returns the case as it is after it was written as JSON and read again."""
+    """Returns the case in the form that it has after writing and reading JSON."""
     data: dict[str, Any] = msgspec.json.decode(msgspec.json.encode(case))
     return data
 
 
 def table(kept: Kept) -> list[points.Column]:
-    """Returns the table of the points, in the order of x."""
+    """Returns the table of the points, sorted by x."""
     return points.table([
         points.Point(
             values=each.values, run=each.run, state=each.state, cause=each.problem,

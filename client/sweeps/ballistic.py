@@ -1,4 +1,6 @@
-"""Curve through the points of an adaptive sweep: residual velocity over impact velocity, or a line; with scipy."""
+"""Curve through the points of an adaptive sweep: residual velocity over impact velocity, or a straight line. The fit
+uses scipy.
+"""
 
 import math
 from collections.abc import Callable, Sequence
@@ -9,57 +11,59 @@ import msgspec
 from .bracket import Bracket, Sample
 
 _FREE, _FIXED = 4, 3
-"""Smallest number of points for a fit with the exponent, and for a fit without it. Each number is one more than the
-number of constants, for an estimate of the error."""
+"""Smallest number of points for a fit with a free exponent, and for a fit with a fixed exponent. Each number is one
+more than the number of constants, so that the error can be estimated."""
 _NEAREST = 4
-"""Number of points for the fit of a line. Chosen value: the curve between the points nearest to the root is nearly
+"""Number of points for the fit of a line. Chosen value: between the points nearest to the root the curve is nearly
 straight."""
 _EXPONENT = 1.0, 6.0
-"""Bounds of p. Chosen values: an energy balance has p = 2, long rods at high speed up to 5 (Lambert and Jonas 1976)."""
+"""Bounds of the exponent p. Chosen values: an energy balance has p = 2, long rods at high speed have up to 5
+(Lambert and Jonas 1976)."""
 _COURSE = 60
-"""Number of points of a curve in a chart. Chosen value: a chart is some hundred pixels wide."""
+"""Number of points of a curve in a chart. Chosen value: a chart is a few hundred pixels wide."""
 _AT_END = 1e-6
-"""Relative distance of a constant from an end of its range below which it is at that end. Chosen value: larger than
-the tolerance of the least squares."""
+"""Relative distance of a constant from an end of its range below which the constant counts as being at this end.
+Chosen value: larger than the tolerance of the least squares."""
 _STOPPED = 0.2
-"""Largest residual velocity below the limit over the largest residual velocity. Chosen value: a rebound has a few
-per cent."""
+"""Largest residual velocity below the ballistic limit, relative to the largest residual velocity. Chosen value: a
+rebound has a few per cent."""
 
 
 class Fit(msgspec.Struct, kw_only=True, frozen=True):
-    """A fitted curve. ``limit`` is the velocity at which the curve begins, or the x at which a line passes the
-    threshold; ``error`` is its standard error. The limit and its standard error have the unit of x.
+    """A fitted curve. ``limit`` is the velocity at which the curve begins, or the x at which a line crosses the
+    threshold. ``error`` is the standard error of the limit. Both have the unit of x.
     """
 
     law: str
     limit: float
     error: float | None
-    """Standard error of ``limit``; None if the number of points does not exceed the number of constants."""
+    """Standard error of ``limit``; None if there are not more points than constants."""
     points: int
     factor: float
-    """Constant a of the law, or the slope of the line."""
+    """Constant a of the law, or slope of the line."""
     exponent: float | None = None
-    """Exponent p of the law."""
+    """Exponent p of the law; None for a line."""
     scale: float = 1.0
-    """The unit of x in the unit of the result, for a law of velocities."""
+    """Value of the unit of x in the unit of the result, for a law of velocities."""
     covariance: tuple[tuple[float, ...], ...] = ()
     """Covariance of ``limit``, ``factor`` and, if fitted, ``exponent``; empty if ``error`` is None."""
 
 
 def stops(samples: Sequence[Sample], found: Bracket, threshold: float) -> bool:
-    """True for a result that is a residual velocity: it is nearly zero at impact velocities below the bracket."""
+    """Returns True if the result is a residual velocity: it is nearly zero at impact velocities below the bracket."""
     before, beyond = _sides(samples, found, threshold)
     return found.changes == 1 and max(y for _, y in before) <= _STOPPED * max(y for _, y in beyond)
 
 
 def residual_velocity(samples: Sequence[Sample], found: Bracket, threshold: float, scale: float = 1.0) -> Fit | None:
-    """Fits v_r = a (v^p - v_bl^p)^(1/p) to the points above the limit (Lambert and Jonas, BRL R-1828, 1976; with p = 2
-    Recht and Ipson, J. Appl. Mech. 30, 1963, where a is the mass of the projectile over the sum of the masses of
-    projectile and plug).
+    """Fits v_r = a (v^p - v_bl^p)^(1/p) to the points above the limit (Lambert and Jonas, BRL R-1828, 1976). With p = 2
+    this is the law of Recht and Ipson (J. Appl. Mech. 30, 1963), in which a is the mass of the projectile over the sum
+    of the masses of projectile and plug.
 
-    v is the impact velocity, v_r the residual velocity, v_bl the ballistic limit. Velocities may be negative:
-    magnitudes are fitted. ``scale`` is the unit of x in the unit of the result. Returns None for too few points,
-    without scipy, and for points that do not follow the law: a constant is then at an end of its range.
+    v is the impact velocity, v_r the residual velocity, v_bl the ballistic limit. Velocities may be negative,
+    because magnitudes are fitted. ``scale``: value of the unit of x in the unit of the result. Returns None for too
+    few points, without scipy, and if a fitted constant lies at an end of its range, because such points do not
+    follow the law.
     """
     x, y = zip(*_sides(samples, found, threshold)[1], strict=True)
     if len(x) < _FIXED:
@@ -80,8 +84,8 @@ def _in_unit(fit: Fit, scale: float) -> Fit:
 def _sides(
     samples: Sequence[Sample], found: Bracket, threshold: float
 ) -> tuple[list[tuple[float, float]], list[tuple[float, float]]]:
-    """Returns magnitudes of key and result: first of the points up to the lower end of the bracket, then from its
-    upper end on.
+    """Returns the magnitudes of key and result: first for the points up to the lower end of the bracket, then for
+    the points from its upper end on.
     """
     known = sorted((abs(s.x), abs(s.f + threshold)) for s in samples if s.f is not None)
     low, high = sorted((abs(found.low.x), abs(found.high.x)))
@@ -106,7 +110,9 @@ def _straight(v: Any, root: float, a: float) -> Any:
 
 
 def line(samples: Sequence[Sample], found: Bracket) -> Fit | None:
-    """Fits a line to the points nearest to the bracket. Returns None if the fit fails or scipy is not installed."""
+    """Fits a straight line to the points nearest to the bracket. Returns None if the fit fails or scipy is not
+    installed.
+    """
     centre = 0.5 * (found.low.x + found.high.x)
     known = sorted((s for s in samples if s.f is not None), key=lambda s: abs(s.x - centre))[:_NEAREST]
     x, y = zip(*sorted((s.x, s.f) for s in known), strict=True)
@@ -119,9 +125,9 @@ def line(samples: Sequence[Sample], found: Bracket) -> Fit | None:
 def course(fit: Fit, low: float, high: float) -> list[tuple[float, float, float | None]]:
     """Returns x, value and standard error of the value along the curve from ``low`` to ``high``.
 
-    Values are magnitudes for a law of velocities, distances from the threshold for a line. The error is computed
-    from the covariance and the derivatives by the constants. Near the limit a law of velocities is steep; if the
-    error exceeds the value there, the error is None.
+    For a law of velocities the values are magnitudes, for a line distances from the threshold. The standard error is
+    computed from the covariance and from the derivatives with respect to the constants. A law of velocities is steep
+    near its limit; where the standard error exceeds the value, None is returned for the error.
     """
     import numpy as np
 
@@ -139,7 +145,7 @@ def course(fit: Fit, low: float, high: float) -> list[tuple[float, float, float 
 
 
 def _slope(curve: Callable[..., Any], x: Any, constants: Sequence[float], n: int) -> Any:
-    """Returns the derivative of a curve with respect to constant ``n``, by central differences."""
+    """Returns the derivative of a curve with respect to its constant number ``n``, by central differences."""
     step = 1e-6 * (abs(constants[n]) or 1.0)
     up, down = ([c + (k == n) * way * step for k, c in enumerate(constants)] for way in (1, -1))
     return (curve(x, *up) - curve(x, *down)) / (2.0 * step)
@@ -149,8 +155,8 @@ def _fitted(
     law: str, curve: Callable[..., Any], x: Sequence[float], y: Sequence[float], start: Sequence[float],
     bounds: tuple[Sequence[float], Sequence[float]] | None = None, exponent: float | None = None,
 ) -> Fit | None:  # fmt: skip
-    """Fits the constants by least squares; ``exponent`` is the exponent of a law in which it is fixed. Returns None
-    if the fit does not converge.
+    """Fits the constants of a curve by least squares. ``exponent``: exponent of a law whose exponent is fixed.
+    Returns None if the fit does not converge.
     """
     try:
         import numpy as np
@@ -177,7 +183,7 @@ def _fitted(
 
 
 def _at_end(values: Any, bounds: tuple[Sequence[float], Sequence[float]]) -> bool:
-    """True if the fit has left a constant at an end of its range."""
+    """True if a fitted constant lies at an end of its range."""
     return any(
         math.isclose(v, end, rel_tol=_AT_END, abs_tol=_AT_END)
         for ends in bounds

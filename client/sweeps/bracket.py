@@ -1,4 +1,4 @@
-"""Bracketing: the interval in which a result passes a threshold, and the points to run next."""
+"""Bracketing: the interval in which a result crosses a threshold, and the points to compute next."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -7,7 +7,7 @@ from itertools import pairwise
 
 @dataclass(frozen=True)
 class Sample:
-    """A result at ``x``: ``f`` is the result minus the threshold, None for a run without a result."""
+    """A result at ``x``. ``f`` is the result minus the threshold; None for a run without a result."""
 
     x: float
     f: float | None
@@ -15,16 +15,16 @@ class Sample:
 
 @dataclass(frozen=True)
 class Bracket:
-    """Interval between two neighbouring points, in the order of x, in which the result passes the threshold."""
+    """Interval between two neighbouring points, sorted by x, in which the result crosses the threshold."""
 
     low: Sample
     high: Sample
     changes: int = 1
-    """Number of passages of the threshold between all points; more than 1 if the result is not monotonic, or
-    scatters."""
+    """Number of crossings of the threshold between all points. More than 1 crossing means that the result is not
+    monotonic or scatters."""
     mixed: tuple[float, float] | None = None
-    """Interval of x with all passages, if there are several: from the first point beyond the threshold to the last one
-    before the threshold."""
+    """Interval of x with all crossings if there are several: from the first point beyond the threshold to the last
+    point before the threshold."""
 
     @property
     def width(self) -> float:
@@ -33,10 +33,11 @@ class Bracket:
 
 
 def bracket(samples: Sequence[Sample]) -> Bracket | None:
-    """Returns the bracket of the passage with the smallest x; None if all points are on the same side of the threshold.
+    """Returns the bracket of the crossing with the smallest x; None if all points are on the same side of the
+    threshold.
 
-    If the result at the low end equals the threshold, that point counts as before the threshold: the residual
-    velocity of a stopped projectile is 0, and that of a rebounding projectile is negative.
+    A result at the low end that equals the threshold counts as before the threshold: the residual velocity of a
+    stopped projectile is 0, and that of a rebounding projectile is negative.
     """
     known = sorted((sample for sample in samples if sample.f is not None), key=lambda sample: sample.x)
     beyond = _beyond(known)
@@ -50,7 +51,7 @@ def bracket(samples: Sequence[Sample]) -> Bracket | None:
 
 
 def _beyond(known: Sequence[Sample]) -> list[bool]:
-    """Returns for each point True if it is on the other side of the threshold than the first point."""
+    """Returns True for each point that is on the other side of the threshold than the first point."""
     signs = [_sign(sample.f) for sample in known]
     first = signs[0] if signs else 0
     if first:
@@ -64,7 +65,7 @@ def _sign(value: float | None) -> int:
 
 
 def between(low: float, high: float, taken: Sequence[float], many: int) -> list[float]:
-    """Returns ``many`` new points between ``low`` and ``high``. With the points ``taken``, the new points divide the
+    """Returns ``many`` new points between ``low`` and ``high``. Together with the points ``taken`` they divide the
     interval as evenly as possible.
     """
     ends = sorted({low, high, *(x for x in taken if low < x < high)})

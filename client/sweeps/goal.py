@@ -1,4 +1,4 @@
-"""Goal of an adaptive sweep, parsed from text: a result and its threshold, and the spans of the keys that vary."""
+"""Goal of an adaptive sweep, read from text: a result with its threshold, and the spans of the keys that vary."""
 
 import math
 from collections.abc import Sequence
@@ -15,13 +15,14 @@ from conoid.cases.units import parse_quantity, written
 
 _ADAPTIVE, _SET, _TOLERANCE = "--adaptive", "--set", "--tolerance"
 _SHARE = 0.01
-"""Default tolerance over the magnitude of the larger end. Chosen value: smaller than the scatter of ballistic tests."""
+"""Default tolerance, relative to the larger end of the span. Chosen value: smaller than the scatter of ballistic
+tests."""
 _DIGITS = 9
-"""Number of digits of a value that is run. Chosen value: more than any case is sensitive to."""
+"""Number of digits of a value at which a run is made. Chosen value: no case is sensitive to further digits."""
 
 
 class Goal(msgspec.Struct, kw_only=True, frozen=True):
-    """A result and the threshold that the result shall pass; both in ``unit``."""
+    """A result and the threshold that the result shall cross; both are in ``unit``."""
 
     result: str
     threshold: float
@@ -37,34 +38,38 @@ class Span(msgspec.Struct, kw_only=True, frozen=True):
     unit: str = ""
 
     def value(self, x: float) -> str | float:
-        """Returns the value in the form in which it is written into the case."""
+        """Returns a value of the span in the form in which it is written into the case."""
         rounded = float(f"{x:.{_DIGITS}g}")
         return f"{rounded!r} {self.unit}" if self.unit else rounded
 
     def along(self, other: "Span", x: float) -> str | float:
-        """Returns the value of this key that corresponds to ``x`` of the span ``other`` by linear interpolation."""
+        """Returns the value of this key that corresponds to ``x`` of the span ``other``, by linear interpolation."""
         return self.value(self.low + (self.high - self.low) * (x - other.low) / (other.high - other.low))
 
 
 def goal_of(words: str, case: Case) -> Goal:
-    """Parses ``probe.NAME = 0``: the name of a result without its unit, and a threshold. Raises CaseError."""
+    """Reads a text such as ``probe.NAME = 0``: the name of a result without its unit, and a threshold. Raises
+    CaseError.
+    """
     name, equals, text = (part.strip() for part in words.rpartition("="))
     known = points.names(case)
     if not equals or not name or not text:
         raise _wrong(_ADAPTIVE, words, "write a result and its threshold, such as 'probe.NAME = 0'")
     if name not in known:
-        raise _wrong(_ADAPTIVE, name, f"no result of this name; {nearest(name, known)}")
+        raise _wrong(_ADAPTIVE, name, f"unknown result; {nearest(name, known)}")
     return Goal(result=name, threshold=_number(_ADAPTIVE, text, known[name]), unit=known[name])
 
 
 def spans_of(words: Sequence[str]) -> tuple[list[Span], dict[str, Any]]:
-    """Returns the spans of ``KEY=LOW:HIGH`` and the values of ``KEY=VALUE``. Raises CaseError."""
+    """Returns the spans of texts such as ``KEY=LOW:HIGH``, and the values of texts such as ``KEY=VALUE``. Raises
+    CaseError.
+    """
     from .sweep import axes_of
 
     spans, constants = list[Span](), dict[str, Any]()
     for key, values in axes_of(words).items():
         if len(values) > 1:
-            message = f"{key} has {len(values)} values; an adaptive sweep takes KEY=LOW:HIGH, or one value"
+            message = f"{key} has {len(values)} values; allowed in an adaptive sweep: KEY=LOW:HIGH, or one value"
             raise _wrong(_SET, ",".join(map(str, values)), message)
         text = values[0]
         if isinstance(text, str) and ":" in text and (span := _span(key, text)) is not None:
@@ -72,24 +77,28 @@ def spans_of(words: Sequence[str]) -> tuple[list[Span], dict[str, Any]]:
         else:
             constants[key] = text
     if not spans:
-        raise _wrong(_SET, " ".join(words), "a key varies from LOW to HIGH, such as parts[0].velocity[2]=-200:-800 m/s")
+        raise _wrong(
+            _SET, " ".join(words), "give a key that varies as KEY=LOW:HIGH, such as parts[0].velocity[2]=-200:-800 m/s"
+        )
     return spans, constants
 
 
 def span_of(key: str, ends: Any) -> Span:
     """Returns the span between two values of a key. Raises CaseError."""
     if not isinstance(ends, Sequence) or isinstance(ends, str) or len(ends) != 2:
-        raise _wrong("spans", ends, f"{key} varies between two values, such as ('-200 m/s', '-800 m/s')")
+        raise _wrong("spans", ends, f"{key} needs two values, such as ('-200 m/s', '-800 m/s')")
     unit, (low, high) = points.in_one_unit(key, list(ends))
     if not isinstance(low, int | float) or not isinstance(high, int | float):
-        raise _wrong("spans", ends, f"{key}: two numbers of one kind, such as ('-200 m/s', '-800 m/s')")
+        raise _wrong(
+            "spans", ends, f"{key}: allowed: two numbers of the same dimension, such as ('-200 m/s', '-800 m/s')"
+        )
     if low == high:
-        raise _wrong("spans", ends, f"{key}: both ends are the same")
+        raise _wrong("spans", ends, f"{key}: both ends of the range are equal")
     return Span(key=key, low=float(low), high=float(high), unit=unit)
 
 
 def _span(key: str, text: str) -> Span | None:
-    """Returns the span of ``LOW:HIGH``, None for another text. A unit after HIGH also applies to LOW."""
+    """Returns the span of the text ``LOW:HIGH``; None for another text. A unit after HIGH also applies to LOW."""
     low, _, high = (part.strip() for part in text.partition(":"))
     first, second = written(low), written(high)
     if first is None or second is None:
@@ -98,7 +107,9 @@ def _span(key: str, text: str) -> Span | None:
 
 
 def tolerance_of(given: Any, span: Span) -> float:
-    """Returns the tolerance in the unit of the span; a number without a unit has that unit. Raises CaseError."""
+    """Returns the tolerance in the unit of the span. A number without a unit has the unit of the span. Raises
+    CaseError.
+    """
     if given is None:
         return _SHARE * max(abs(span.low), abs(span.high))
     pair = written(given)
@@ -123,7 +134,7 @@ def _wrong(option: str, value: Any, message: str) -> CaseError:
 
 
 def changes(spans: Sequence[Span], x: float) -> dict[str, Any]:
-    """Returns the changed keys at a point. ``x`` is the value of the first span; the other keys are interpolated at
-    the same relative position.
+    """Returns the values of the changed keys at a point. ``x`` is the value of the first span; the other keys are
+    interpolated at the same relative position.
     """
     return {span.key: span.along(spans[0], x) for span in spans}

@@ -1,4 +1,6 @@
-"""Reports of an adaptive sweep to the server, which the page shows: the points so far, the bracket and the result."""
+"""Reports of an adaptive sweep to the server, so that the page can show them: the points so far, the bracket and the
+result.
+"""
 
 import math
 import time
@@ -19,31 +21,33 @@ from .bracket import Bracket
 from .goal import Goal, Span
 
 _PROBLEM, _WHY = 200, 1000
-"""Largest numbers of characters of texts in a report (cases/output/search.py)."""
+"""Largest numbers of characters of the texts ``problem`` and ``why`` in a report (cases/output/search.py)."""
 
 
 class Reported(msgspec.Struct, kw_only=True, frozen=True):
-    """Answer of the server to a report: the id of the sweep; ``stop`` is True after a cancel on the server."""
+    """Answer of the server to a report: the id of the sweep, and ``stop``, which is True if the sweep was cancelled
+    on the server.
+    """
 
     id: str
     stop: bool = False
 
 
 class Put(Protocol):
-    """Type of ``Http.put``."""
+    """Type of the method ``Http.put``."""
 
     def __call__(self, kind: type[Reported], path: str, body: bytes, headers: Mapping[str, str]) -> Reported:
         """Sends a PUT request and returns the answer."""
 
 
 class Reporter:
-    """Sends reports of an adaptive sweep to a server. A report contains all points: if sending fails, the next
-    report has the missing data. The runs and the file of the sweep do not depend on reports.
+    """Sender of the reports of an adaptive sweep to a server. A report contains all points, so that the next report
+    replaces a report that was not sent. The runs and the file of the sweep do not depend on reports.
     """
 
     def __init__(self, put: Put, name: str, case: str, goal: Goal, spans: Sequence[Span], tolerance: float) -> None:
-        """Prepares reports; nothing is sent yet. ``name`` identifies the sweep and is the same in each command of a
-        sweep; ``case`` is the name of the case.
+        """Stores the data of all reports; nothing is sent yet. ``name`` identifies the sweep and is equal in all
+        commands of a sweep; ``case``: name of the case.
         """
         self._put, self._path, self._goal = put, f"/v1/sweeps/adaptive/{quoted(name)}", goal
         span = spans[0]
@@ -55,16 +59,16 @@ class Reporter:
             tolerance=self._scale * tolerance,
         )  # fmt: skip
         self.id = ""
-        """Id of the sweep on the server; empty if the server stores no adaptive sweeps."""
+        """Id of the sweep on the server; empty if the server does not store adaptive sweeps."""
         self.stop = False
-        """True after the sweep was cancelled on the server."""
+        """True if the sweep was cancelled on the server."""
 
     def tell(
         self, tried: Sequence[Tried], made: Bracket | None, fit: Fit | None = None, *, over: bool = False,
         why: str = "",
     ) -> None:  # fmt: skip
-        """Sends a report: all points, also those whose runs have not ended, the bracket, and the fitted curve if
-        there is one.
+        """Sends a report with all points, including points whose runs have not ended, the bracket, and the fitted
+        curve if there is one.
         """
         points = sorted((self._point(each) for each in tried), key=lambda point: point.x)[:MOST_RUNS]
         search = msgspec.structs.replace(
@@ -75,7 +79,7 @@ class Reporter:
         )  # fmt: skip
         try:
             answer = self._put(Reported, self._path, msgspec.json.encode(search), {"Content-Type": "application/json"})
-        except ClientError:  # the server is not reachable, or is older than these reports
+        except ClientError:  # The server cannot be reached, or is too old for reports.
             return
         self.id, self.stop = answer.id, answer.stop
 
@@ -92,7 +96,9 @@ class Reporter:
         )  # fmt: skip
 
     def _curve(self, fit: Fit, made: Bracket, tried: Sequence[Tried]) -> Curve:
-        """Returns the curve with the signs of key and result. A law of velocities is fitted to magnitudes."""
+        """Returns the fitted curve with the signs of key and result, because a law of velocities is fitted to
+        magnitudes.
+        """
         values = [each for each in tried if each.value is not None]
         law = fit.law != "line"
         way = math.copysign(1.0, made.low.x + made.high.x) if law else 1.0
@@ -108,7 +114,7 @@ class Reporter:
 
 
 def in_si(span: Span) -> tuple[float, str]:
-    """Returns the unit of a span in the SI unit of its key, and the SI unit."""
+    """Returns the value of the span's unit in SI, and the SI unit of the key."""
     unit = unit_of_key(span.key)
     if not span.unit or not unit:
         return 1.0, span.unit or unit

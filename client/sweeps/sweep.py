@@ -1,4 +1,6 @@
-"""Sweeps: one case at many points, on a server. Points parsed from text, the handle of a sweep, and its table."""
+"""Sweeps: one case at many points on a server. The module reads points from text, controls a sweep, and reads its
+table.
+"""
 
 import csv
 import io
@@ -26,11 +28,11 @@ from ..remote.run_info import ID, RunInfo
 from ..run import Run
 
 _LOOK = 2.0
-"""Time between two checks for ended runs, s. Chosen value."""
+"""Pause between two checks for finished runs, s. Chosen value."""
 _COLUMNS = {"run", "state"}
-"""Columns that the table of each sweep has."""
+"""Columns that the table of every sweep has."""
 Point = dict[str, Any]
-"""Changed keys of a point with their values: ``{"parts[0].velocity[2]": "-200 m/s"}``."""
+"""Values of the changed keys at a point, such as ``{"parts[0].velocity[2]": "-200 m/s"}``."""
 
 
 class SweepPoint(msgspec.Struct, kw_only=True, frozen=True):
@@ -62,12 +64,14 @@ class SweepInfo(msgspec.Struct, kw_only=True, frozen=True):
 
     @property
     def over(self) -> bool:
-        """True if every run has ended or was removed after its end."""
+        """True if every run of the sweep has ended or was removed after its end."""
         return sum(n for state, n in self.states.items() if State(state).final) + self.removed == self.total
 
 
 class SweepPage(msgspec.Struct, kw_only=True, frozen=True):
-    """Sweeps, newest first; ``next`` requests the page of older sweeps, None on the last page."""
+    """A page of the list of sweeps, newest first. ``next`` is the cursor of the page with older sweeps; None on the
+    last page.
+    """
 
     sweeps: list[SweepInfo]
     next: str | None = None
@@ -75,7 +79,7 @@ class SweepPage(msgspec.Struct, kw_only=True, frozen=True):
 
 @dataclass
 class Sweep:
-    """Handle of a sweep on a server. A request is sent only when a method is called."""
+    """A sweep on a server. Only the methods send requests."""
 
     session: Http
     id: str
@@ -90,14 +94,14 @@ class Sweep:
         return self.session.get(SweepInfo, self.path)
 
     def runs(self) -> list[Run]:
-        """Returns a handle of each run of the sweep, in the order of the points."""
+        """Returns the runs of the sweep in the order of the points."""
         return [Run(self.session, point.run.id) for point in self.status().points]
 
     def wait(
         self, timeout: float | None = None, say: Callable[[SweepInfo, SweepPoint], None] = lambda info, point: None
     ) -> SweepInfo:
-        """Returns when all runs have ended. Raises TimeoutError after ``timeout`` s. ``say`` receives the state of
-        the sweep and each point whose run has ended.
+        """Waits until all runs of the sweep have ended. Raises TimeoutError after ``timeout`` s. ``say`` is called
+        with the state of the sweep for each point whose run has ended.
         """
         deadline = math.inf if timeout is None else time.monotonic() + timeout
         announced = set[str]()
@@ -117,17 +121,18 @@ class Sweep:
                 raise TimeoutError(f"sweep {self.id}: {len(left)} of {info.total} runs have not ended")
 
     def cancel(self) -> SweepInfo:
-        """Cancels all runs. A second call has no further effect."""
+        """Cancels all runs of the sweep. A second call has no further effect."""
         return self.session.post(SweepInfo, f"{self.path}:cancel")
 
     def csv(self) -> str:
-        """Returns the table as CSV with a line for each point: changed keys, state of the run, results. Raises
-        AnswerError for another text.
+        """Returns the table of the sweep as CSV, one line for each point: changed keys, state of the run, results.
+        Raises AnswerError if the server answers with another text.
         """
         text = self.session.fetch(f"{self.path}/table").decode(errors="replace")
         if not set(next(csv.reader(io.StringIO(text)), [])) >= _COLUMNS:
             raise AnswerError(
-                f"the answer of {self.session.url} is no table of a sweep: it begins with {shown(text[:40])}"
+                f"the answer of {self.session.url} is not the table of a sweep; the answer begins with "
+                f"{shown(text[:40])}"
             )
         return text
 
@@ -136,11 +141,11 @@ class Sweep:
         return list(dict.fromkeys(key for point in self.status().points for key in point.values))
 
     def table(self) -> list[dict[str, str]]:
-        """Returns the lines of the table by column, as text."""
+        """Returns the rows of the table; a row maps column titles to texts."""
         return text_rows(self.csv())
 
     def frame(self) -> Any:
-        """Returns the table as a pandas.DataFrame. Raises ClientError without pandas."""
+        """Returns the table as a pandas.DataFrame. Raises ClientError if pandas is not installed."""
         try:
             import pandas
         except ImportError:
@@ -148,11 +153,11 @@ class Sweep:
         return pandas.read_csv(io.StringIO(self.csv()))
 
     def plot(self, out: Path | str, columns: Sequence[str] = (), x: str | None = None) -> Path:
-        """Draws results over the changed keys. ``columns`` are the drawn results; the default is the most informative
+        """Draws results over the changed keys. ``columns`` are the results to draw; the default is the most informative
         columns whose values differ.
 
-        ``x`` is the key on the axis; the default is the first key that varies. Each combination of the other keys
-        has a curve. Raises ClientError.
+        ``x`` is the key on the horizontal axis; the default is the first key that varies. Each combination of the
+        other keys has a curve. Raises ClientError.
         """
         from ..reports import curves
         from . import sweep_plot
@@ -161,19 +166,20 @@ class Sweep:
 
 
 def text_rows(text: str) -> list[dict[str, str]]:
-    """Returns the lines of a table in CSV by column."""
+    """Returns the rows of a CSV table; a row maps column titles to texts."""
     return list(csv.DictReader(io.StringIO(text)))
 
 
 def points_of(words: Iterable[str], *, grid: bool = False) -> list[Point]:
-    """Returns the points of ``key=a,b,c``. All keys change together from point to point; with ``grid``, all values
-    of all keys are combined. A key with one value has this value at every point. Raises CaseError.
+    """Returns the points of texts such as ``key=a,b,c``. All keys change together from point to point; with
+    ``grid``, all values of all keys are combined. A key with one value has this value at every point. Raises
+    CaseError.
     """
     return points_along(axes_of(words), grid=grid, named="--set")
 
 
 def axes_of(words: Iterable[str]) -> dict[str, list[Any]]:
-    """Returns the values of each key of ``key=a,b,c``. Raises CaseError."""
+    """Returns the values of each key from texts such as ``key=a,b,c``. Raises CaseError."""
     axes = [_axis(word) for word in words]
     if not axes:
         raise CaseError([Problem("--set", "", "write at least one key with its values, such as run.ranks=1,2")])
@@ -183,8 +189,8 @@ def axes_of(words: Iterable[str]) -> dict[str, list[Any]]:
 
 def points_along(axes: Mapping[str, Iterable[Any]], *, grid: bool = False, named: str = "points") -> list[Point]:
     """Returns the points for lists of values by key. All keys change together from point to point; with ``grid``,
-    each value is combined with each. A list of one value applies to every point. ``named``: name of the input in
-    error messages. Raises CaseError.
+    all values of all keys are combined. A list with one value applies to every point. ``named``: name of the input
+    in error messages. Raises CaseError.
     """
     lists = {key: _values(key, values, named) for key, values in axes.items()}
     if grid:
@@ -195,7 +201,7 @@ def points_along(axes: Mapping[str, Iterable[Any]], *, grid: bool = False, named
         counts = {key: len(values) for key, values in lists.items()}
         if len(set(counts.values())) > 1:
             lengths = ", ".join(f"{key} has {n}" for key, n in counts.items())
-            raise CaseError([Problem(named, "", f"as many values for each key, or a grid: {lengths}")])
+            raise CaseError([Problem(named, "", f"all keys need the same number of values, or use a grid: {lengths}")])
         rows = zip(*lists.values(), strict=True)
     return [dict(zip(lists, row, strict=True)) for row in rows]
 
@@ -211,7 +217,7 @@ def _values(key: str, values: Any, named: str) -> list[Any]:
 
 
 def listed(points: Any) -> list[Point]:
-    """Returns the points in the form in which they are sent, each a mapping of keys to values. Raises CaseError."""
+    """Returns points in the form in which they are sent; each point maps keys to values. Raises CaseError."""
     found: list[Any] = [points] if isinstance(points, str) or not isinstance(points, Iterable) else list(points)
     hint = "a point is a mapping of keys to values, such as {'run.ranks': 2}"
     wrong = [
@@ -237,22 +243,24 @@ def points_in(path: Path) -> list[Point]:
     keys = [key.strip() for key in head]
     for sign, name in ((";", "semicolons"), ("\t", "tabs")):
         if any(sign in key for key in keys):
-            raise CaseError([Problem("--list", named, f"its columns are parted by {name}; write commas between them")])
+            raise CaseError(
+                [Problem("--list", named, f"the columns are separated by {name}; separate columns by commas")]
+            )
     if not lines or not all(keys) or any(len(line) != len(keys) for line in lines):
-        raise CaseError([Problem("--list", named, "a line of keys, then lines with a value for each")])
-    _once("--list", keys, f"each column of {named} has a key of its own")
+        raise CaseError([Problem("--list", named, "expected: a line with keys, then lines with a value for each key")])
+    _once("--list", keys, f"each column of {named} must have a different key")
     return [dict(zip(keys, map(value_of, line), strict=True)) for line in lines]
 
 
 def _once(named: str, keys: Iterable[str], allowed: str) -> None:
-    """Raises CaseError for a key that is given twice: the intended value is not known."""
+    """Raises CaseError for a key that occurs twice, because the intended value is unknown."""
     twice = [key for key, times in Counter(keys).items() if times > 1]
     if twice:
         raise CaseError(Problem(named, repr(key), f"is given more than once; {allowed}") for key in twice)
 
 
 def value_of(text: str) -> Any:
-    """Returns a TOML value, or the text itself if it is not TOML."""
+    """Returns the TOML value of a text, or the text itself if it is not TOML."""
     return apply_overrides({}, [f"value={text.strip()}"])["value"]
 
 
@@ -260,12 +268,12 @@ def _axis(word: str) -> tuple[str, list[Any]]:
     key, _, text = word.partition("=")
     parts = _parts(text)
     if not all(part.strip() for part in (key, *parts)):
-        raise CaseError([Problem("--set", repr(word), "write a key and its values, such as run.ranks=1,2")])
+        raise CaseError([Problem("--set", repr(word), "write a key with its values, such as run.ranks=1,2")])
     return key.strip(), [value_of(part) for part in parts]
 
 
 def _parts(text: str) -> list[str]:
-    """Returns the texts between commas. Commas in lists and in quotes do not separate."""
+    """Returns the texts between commas. Commas inside of lists and quotes do not separate."""
     parts, depth, quote = [""], 0, ""
     for letter in text:
         if quote or letter in "\"'":

@@ -1,5 +1,5 @@
-"""Table of a sweep from a file, without a server: the file of a sweep in the folder of a server, or that of an
-adaptive sweep.
+"""Table of a sweep from files, without a server: from the file of a sweep in the folder of a server, or from the
+file of an adaptive sweep.
 """
 
 from pathlib import Path
@@ -18,20 +18,20 @@ from . import adaptive_result
 
 
 class _Plan(msgspec.Struct):
-    """File of a sweep that server/intake/sweeps.py writes."""
+    """Content of the file of a sweep, which server/intake/sweeps.py writes."""
 
     points: list[dict[str, Any]]
     runs: list[str]
 
 
 def file_named(text: str) -> Path | None:
-    """Returns the path of a file, None for a text that is the id of a sweep."""
+    """Returns the path of a file; None if the text is the id of a sweep."""
     path = Path(text)
     return path if path.suffix == ".json" and path.is_file() else None
 
 
 def columns_of(path: Path) -> list[Column]:
-    """Returns the table. Raises UsageError for a file of another kind."""
+    """Returns the columns of the table of a sweep. Raises UsageError if the file is of another kind."""
     try:
         plan = msgspec.json.decode(whole.read(path), type=_Plan)
     except OSError as error:
@@ -52,7 +52,7 @@ def _point(folder: Path, values: dict[str, Any]) -> Point:
 
 
 def _outcome(path: Path) -> Outcome | None:
-    """Returns the outcome of a run; None before its end, and for a removed or damaged file."""
+    """Returns the outcome of a run; None for a run that has not ended, was removed, or has a damaged outcome."""
     try:
         return outcome.from_json(whole.read(path))
     except (OSError, ValueError):

@@ -1,4 +1,4 @@
-"""Table of a sweep as a picture: a panel for each result over the changed keys; with matplotlib."""
+"""Chart of the table of a sweep: a panel for each result over the changed keys. The module needs matplotlib."""
 
 from collections.abc import Mapping, Sequence
 
@@ -12,19 +12,19 @@ from ..errors import ClientError, UsageError
 
 _COLOURS = ("#4c78a8", "#f58518", "#54a24b", "#e45756", "#72b7b2", "#b279a2", "#eeca3b", "#9d755d", "#ff9da6")
 _PANELS = 6
-"""Largest number of results that are drawn by default. Chosen value: that many panels are readable on one page."""
+"""Largest number of results that are drawn by default. Chosen value: six panels are readable on one page."""
 
 
 def figure(rows: Sequence[Row], keys: Sequence[str], x: str | None, columns: Sequence[str]) -> Figure:
     """Draws the ``rows`` of a table over the key ``x``; the default is the first key that varies. ``keys`` are the
     changed keys.
 
-    Each combination of the other keys has a curve; keys that change together count as one. Raises ClientError.
+    Each combination of the other keys has a curve; keys that change together count as one key. Raises ClientError.
     """
     titles = {split(title)[0]: title for title in rows[0]} if rows else {}
     changed = {key: titles[key] for key in keys if key in titles}
     if not changed:
-        raise ClientError("no run of the sweep is there any more")
+        raise ClientError("all runs of the sweep have been removed")
     over = _axis(rows, changed, x)
     shown = [known(rows, name) for name in columns] or telling(rows, list(changed.values()))[:_PANELS]
     if not shown:
@@ -43,8 +43,8 @@ def figure(rows: Sequence[Row], keys: Sequence[str], x: str | None, columns: Seq
 
 
 def _together(rows: Sequence[Row], titles: Sequence[str]) -> list[list[str]]:
-    """Returns the columns that vary, in groups of columns that change together: a value of one column determines the
-    values of the others.
+    """Returns the columns that vary, in groups of columns that change together: the value of one column determines
+    the values of the other columns of the group.
     """
     groups: dict[tuple[int, ...], list[str]] = {}
     for title in titles:
@@ -55,9 +55,9 @@ def _together(rows: Sequence[Row], titles: Sequence[str]) -> list[list[str]]:
 
 
 def _axis(rows: Sequence[Row], changed: Mapping[str, str], x: str | None) -> str:
-    """Returns the title of the column on the axis."""
+    """Returns the title of the column on the horizontal axis."""
     if x is not None and x not in changed:
-        raise UsageError(f"x = {x!r}: the sweep changes {', '.join(changed)}")
+        raise UsageError(f"x = {x!r}: allowed: the keys that the sweep changes, {', '.join(changed)}")
     varies = [title for title in changed.values() if len({row[title] for row in rows}) > 1]
     return changed[x] if x is not None else next(iter([*varies, *changed.values()]))
 
@@ -81,13 +81,13 @@ def _panel(axes: Axes, rows: Sequence[Row], over: str, others: Sequence[str], na
 
 
 def _labelled(column: str) -> str:
-    """Returns the label of an axis."""
+    """Returns the label of an axis for a column."""
     name, unit = split(column.removeprefix("reference.").removeprefix("probe."))
     return f"{name}, {unit}" if unit else name
 
 
 def _valued(row: Row, title: str) -> str:
-    """Returns a name with a value and a unit, such as ``speed 200 m/s``."""
+    """Returns the name of a column with its value and unit in a row, such as ``speed 200 m/s``."""
     name, unit = split(title)
     return f"{name} {row[title]} {unit}".strip()
 

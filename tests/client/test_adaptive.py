@@ -175,7 +175,7 @@ def test_a_cancel_on_the_server_ends_it_and_the_next_command_goes_on(tmp_path: P
     at, out = Firing(lambert_jonas(413.7, 0.92, 2.6)), tmp_path / "shot.json"
     at.stop = True
     found = find(at, out=out)
-    assert (found.fresh, found.reached, found.why.split(";")[0]) == (0, False, "it was cancelled on the server")
+    assert (found.fresh, found.reached, found.why.split(";")[0]) == (0, False, "the sweep was cancelled on the server")
     at.stop = False
     assert find(at, out=out).reached
 
@@ -245,7 +245,7 @@ def test_a_failed_point_is_gone_round_and_a_failed_end_ends_it() -> None:
     found = find(Firing(lambda v: "the energy residual" if v == 500.0 else law(v)))
     assert found.reached
     assert found.failed == 1
-    assert "1 of them without a result" in found.lines()[-1]
+    assert "1 without a result" in found.lines()[-1]
     bad = find(Firing(lambda v: "the energy residual" if v > 799 else law(v)))
     assert not bad.reached
     assert f"the run at {KEY} = 800 m/s has no result: failed: the energy residual" in "\n".join(bad.lines())
@@ -262,7 +262,7 @@ def test_a_result_that_is_not_monotonic_is_reported() -> None:
     found = find(Firing(lambda v: float(v > 300) * float(not 500 < v < 700) * v, 7))
     assert found.changes > 1
     assert found.mixed is not None
-    assert "not monotonic, or it scatters: the threshold is passed 3 times between" in found.lines()[1]
+    assert "not monotonic, or it scatters: the threshold is crossed 3 times between" in found.lines()[1]
     (low, _), (high, _) = found.ends
     assert low <= 300.0 <= high
 
@@ -272,7 +272,7 @@ def test_as_many_runs_as_are_allowed() -> None:
     found = find(at, most=4)
     assert len(at.fired) == 4
     assert not found.reached
-    assert "as many runs as are allowed have been made" in "\n".join(found.lines())
+    assert "the largest number of runs (--most) has been reached" in "\n".join(found.lines())
 
 
 def test_the_same_sweep_goes_on_from_its_file(tmp_path: Path) -> None:
@@ -310,9 +310,11 @@ def test_another_case_or_goal_is_refused_with_the_key_that_changed(tmp_path: Pat
     find(Firing(law), out=out, most=2)
     other = json.loads(json.dumps(CASE))
     other["run"]["end_time"] = "2 us"
-    with pytest.raises(ClientError, match=r"the case has changed since: run.end_time was '1 us' and is '2 us'; name"):
+    with pytest.raises(
+        ClientError, match=r"the case has changed since the first run: run.end_time was '1 us' and is '2 us'; choose"
+    ):
         find(Firing(law), out=out, case=other)
-    with pytest.raises(UsageError, match=r"holds another sweep, probe.left = 0 over"):
+    with pytest.raises(UsageError, match=r"contains another sweep, probe.left = 0 over"):
         find(Firing(law), out=out, goal="probe.left = 1 m/s")
     out.write_text("{}")
     with pytest.raises(UsageError, match="not a file of an adaptive sweep"):
@@ -337,10 +339,10 @@ def test_a_run_whose_folder_is_gone_is_made_again() -> None:
 @pytest.mark.parametrize(
     ("goal", "words"),
     [
-        ("probe.lift = 0", "--adaptive = 'probe.lift': no result of this name; did you mean 'probe.left'"),
+        ("probe.lift = 0", "--adaptive = 'probe.lift': unknown result; did you mean 'probe.left'"),
         ("probe.left", "write a result and its threshold"),
         ("probe.left = 3 mm", "--adaptive = '3 mm': '3 mm' has the wrong dimension; expected a speed"),
-        ("digest = 3", "no result of this name"),
+        ("digest = 3", "unknown result"),
     ],
 )
 def test_a_wrong_goal_is_refused_before_any_run(goal: str, words: str) -> None:
@@ -353,9 +355,9 @@ def test_a_wrong_goal_is_refused_before_any_run(goal: str, words: str) -> None:
 @pytest.mark.parametrize(
     ("words", "message"),
     [
-        (["run.ranks=1"], "key varies from LOW to HIGH"),
-        ([f"{KEY}=200:200"], "both ends are the same"),
-        ([f"{KEY}=200 m/s:800 mm"], "two numbers of one kind"),
+        (["run.ranks=1"], "key that varies as KEY=LOW:HIGH"),
+        ([f"{KEY}=200:200"], "both ends of the range are equal"),
+        ([f"{KEY}=200 m/s:800 mm"], "two numbers of the same dimension"),
         ([f"{KEY}=200:800", "run.ranks=1,2"], "run.ranks has 2 values"),
     ],
 )

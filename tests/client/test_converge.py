@@ -79,7 +79,8 @@ def test_the_front_has_what_nothing_cheaper_beats() -> None:
 def test_the_advice_gives_the_gain_of_halving_and_the_cost_of_the_wanted_error() -> None:
     advice = book(two_forms()).advice()
     assert advice == (
-        "nodal at 500 µm: length within 1.2 % for 2 min 40 s of CPU time; half of this size would give 0.94 % for 42 min 40 s"
+        "nodal at 500 µm: length within 1.2 % for 2 min 40 s of CPU time; "
+        "half of this size would give 0.94 % for 42 min 40 s"
     )
     assert "0.1 % would need about 141 µm and 6 h 56 min" in book(two_forms(), accuracy=1e-3).advice()
 

@@ -57,7 +57,7 @@ def test_a_folder_without_a_run_is_not_followed(quiet_home: Path) -> None:
     assert refused(1, "watch", "empty") == "conoid: empty has no journal.jsonl"
     (quiet_home / "many" / "one").mkdir(parents=True)
     (quiet_home / "many" / "one" / layout.JOURNAL).touch()
-    assert "many is not the folder of a run, it holds those of one" in refused(1, "watch", "many")
+    assert "many is not the folder of a run; it contains the folders of the runs one" in refused(1, "watch", "many")
 
 
 @pytest.mark.parametrize(
@@ -97,7 +97,7 @@ def test_a_link_out_of_a_folder_is_not_read(damaged: Path) -> None:
     (damaged / layout.RESOLVED_CASE).unlink()
     (damaged.parent / "secret").write_text("{}")
     (damaged / layout.RESOLVED_CASE).symlink_to(damaged.parent / "secret")
-    assert refused(1, "report", damaged).endswith("this link leads out of the run's folder")
+    assert refused(1, "report", damaged).endswith("the link points to a place outside of the run's folder")
 
 
 @pytest.mark.parametrize("command", ["watch", "show", "report", "get", "cancel"])

@@ -60,7 +60,7 @@ def test_a_folder_of_runs_is_distinguished_from_a_folder_of_a_run(tmp_path: Path
     for number in range(10):
         (tmp_path / f"bar-{number}").mkdir()
         (tmp_path / f"bar-{number}" / "journal.jsonl").touch()
-    with pytest.raises(UnfinishedError, match=r"not the folder of a run, .* of bar-0, .*, bar-7 and 2 more"):
+    with pytest.raises(UnfinishedError, match=r"not the folder of a run; .* of the runs bar-0, .*, bar-7 and 2 more"):
         _ = Result.open(tmp_path).outcome
     (tmp_path / "journal.jsonl").touch()
     with pytest.raises(UnfinishedError, match=r"has no outcome\.json"):

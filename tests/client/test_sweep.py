@@ -86,7 +86,7 @@ def test_what_spreadsheets_write(tmp_path: Path) -> None:
     path.write_bytes(b"\xef\xbb\xbfrun.ranks,run.end_time\r\n1,1 us\r\n\r\n")
     assert points_in(path) == [{"run.ranks": 1, "run.end_time": "1 us"}]
     path.write_text("run.ranks;run.end_time\n1;1,5 us\n")
-    with pytest.raises(CaseError, match=r"its columns are parted by semicolons; write commas between them"):
+    with pytest.raises(CaseError, match=r"the columns are separated by semicolons; separate columns by commas"):
         points_in(path)
 
 

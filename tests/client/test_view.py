@@ -110,7 +110,9 @@ def test_a_folder_of_runs_is_no_run_to_draw(tmp_path: Path, out: str) -> None:
     for name in ("one", "local/two"):
         (tmp_path / name).mkdir(parents=True)
         (tmp_path / name / "journal.jsonl").touch()
-    with pytest.raises(UnfinishedError, match=r"is not the folder of a run, it holds those of local/two, one$"):
+    with pytest.raises(
+        UnfinishedError, match=r"is not the folder of a run; it contains the folders of the runs local/two, one$"
+    ):
         view(tmp_path, "mises", out)
     with pytest.raises(UnfinishedError, match=r"^one has not written any frame$"):
         view(tmp_path / "one", "mises", out)
@@ -309,7 +311,8 @@ def test_cameras_are_read() -> None:
 
 @pytest.mark.parametrize(
     ("options", "message"),
-    [({"percentiles": (50, 50)}, "the smaller number first"), ({"limits": (2, 1)}, "= 2, 1: allowed: two numbers, the smaller"),
+    [({"percentiles": (50, 50)}, "the smaller number first"),
+     ({"limits": (2, 1)}, "= 2, 1: allowed: two numbers, the smaller"),
      ({"zoom": 0}, "above 0"), ({"out": "x.jpg"}, r"must end in \.png, \.gif or \.mp4"),
      ({"colour": "red"}, "colour: unknown option; allowed: mirror, section"),
      ({"size": (10,)}, r"size = \(10,\): expected `array` of length 2"),
