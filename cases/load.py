@@ -224,12 +224,12 @@ def _assign(target: Any, items: list[int | str], value: Any) -> None:
 def _entry(target: Any, item: int | str) -> Any:
     if isinstance(item, str):
         if not isinstance(target, dict):
-            raise ValueError(f"{item!r} cannot be set: what holds it is not a table")
+            raise ValueError(f"{item!r} cannot be set: the value that contains it is not a table")
         if item not in target:
-            raise ValueError(f"there is no list {item!r} to set an item of")
+            raise ValueError(f"there is no list {item!r} whose item could be set")
         return target[item]
     if not isinstance(target, list):
-        raise ValueError(f"[{item}] cannot be set: what holds it is not a list")
+        raise ValueError(f"[{item}] cannot be set: the value that contains it is not a list")
     if item >= len(target):
         raise ValueError(f"[{item}] is outside the list, which has {len(target)} items, counted from 0")
     return target[item]

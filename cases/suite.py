@@ -74,7 +74,7 @@ def faults(hard: Hard, outcome: Outcome, drifted: float | None) -> list[str]:
     found = []
     if hard.refused:
         if outcome.cause != "energy" or f"the line {hard.refused} of the energy" not in outcome.message:
-            found.append(f"not refused for what {hard.refused} makes: {outcome.state}, {outcome.message}")
+            found.append(f"not refused for the energy that {hard.refused} creates: {outcome.state}, {outcome.message}")
     elif outcome.state != "succeeded":
         found.append(f"{outcome.state}: {outcome.message}")
     if not outcome.worst_residual <= hard.limit:

@@ -103,7 +103,7 @@ def _meshes(one: Part, other: Part, breaks: bool, location: Location) -> Iterato
             message = f"a mesh from a file and a generated mesh have no nodes in common; {way}"
             yield problem(location, names, message)
     elif one.mesh.generator != other.mesh.generator:
-        yield problem(location, names, f"their meshes have different generators; use the same for both, or {way}")
+        yield problem(location, names, f"the two meshes have different generators; use the same for both, or {way}")
     elif one.mesh.generator == "structured" and not all(isinstance(mesh, Box | Plate) for mesh in pair):
         message = f"only structured meshes of boxes and plates have nodes in common; use gmsh, or {way}"
         yield problem(location, names, message)
@@ -118,4 +118,4 @@ def _meshes(one: Part, other: Part, breaks: bool, location: Location) -> Iterato
         )
         yield problem(location, names, message)
     if one.turn != other.turn:
-        yield problem(location, names, f"their turns differ, so their nodes would separate; {way}")
+        yield problem(location, names, f"the two parts are turned differently; their nodes would separate; {way}")

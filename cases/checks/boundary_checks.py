@@ -75,7 +75,7 @@ def _out_of_reach(case: Case, number: int) -> Iterator[Problem]:
                 for pick, corners in zip((min, max), zip(*bodies, strict=True), strict=True)
             )
             reach = " to ".join(f"({', '.join(f'{x:g}' for x in corner)})" for corner in (low, high))
-            yield problem(("boundaries", number), ..., f"the box contains none of its bodies, which are in {reach} m")
+            yield problem(("boundaries", number), ..., f"the box contains no body; the bodies are in {reach} m")
         elif isinstance(boundary, Traction) and all(_surrounds(body, wider) for body in reached.values()):
             message = f"the box lies inside {choices(reached)}; tractions act on surfaces"
             yield problem(("boundaries", number), ..., message)
@@ -210,7 +210,7 @@ def _shape(wall: Wall, location: Location) -> Iterator[Problem]:
     if wall.course and wall.mass is not None:
         yield problem((*location, "course"), ..., "a wall with a mass is free; remove course or mass")
     elif wall.course and not any(wall.velocity):
-        yield problem((*location, "course"), ..., "is a factor of velocity, which is zero")
+        yield problem((*location, "course"), ..., "multiplies velocity, which is zero")
 
 
 def _behind(case: Case, number: int, point: Vector, way: Vector, parts: tuple[str, ...]) -> Iterator[Problem]:

@@ -67,7 +67,7 @@ class MohrCoulomb(Law):
             value, intact = getattr(self, f"residual_{key}"), getattr(self, key)
             here = f"residual_{key}"
             if value is not None and self.failure_strain is None:
-                yield here, value, "needs failure_strain, beyond which it holds"
+                yield here, value, "needs failure_strain; it applies at larger strains"
             elif value is not None and value > intact:
                 unit = "Pa" if key == "cohesion" else "rad"
-                yield here, value, f"must not be above {intact:g} {unit}, the {key} of what has not failed"
+                yield here, value, f"must not be above {intact:g} {unit}, the {key} before failure"

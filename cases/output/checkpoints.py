@@ -90,16 +90,16 @@ def manifest_of(place: Path) -> Manifest:
 
 def _check(place: Path, made: Manifest) -> None:
     if made.format != FORMAT:
-        raise DamagedError(f"its format is {made.format}; this version reads {FORMAT}")
+        raise DamagedError(f"the checkpoint has format {made.format}; this version reads {FORMAT}")
     if not made.files or made.step != int(place.name):
-        raise DamagedError(f"{MANIFEST} is that of another checkpoint")
+        raise DamagedError(f"{MANIFEST} belongs to another checkpoint")
     for file in made.files:
         if not _FILE.fullmatch(file.name):
             raise DamagedError(f"{MANIFEST} names a file {file.name[:40]!r}")
         with whole.opened(place / file.name) as opened:
             size = opened.seek(0, 2)
         if size != file.bytes:
-            raise DamagedError(f"{file.name} has {size} bytes of {file.bytes}")
+            raise DamagedError(f"{file.name} has {size} bytes instead of {file.bytes}")
 
 
 def check_bytes(place: Path, made: Manifest) -> None:

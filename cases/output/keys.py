@@ -13,7 +13,7 @@ _CHUNK = re.compile(r"[A-Za-z0-9_.:-]+")
 
 def _chunk(text: str) -> str:
     if not _CHUNK.fullmatch(text):
-        raise ValueError(f"{text!r} cannot stand in a key; allowed: letters, digits and _ . : -")
+        raise ValueError(f"{text!r} is not allowed in a Zenoh key; allowed: letters, digits and _ . : -")
     return text
 
 

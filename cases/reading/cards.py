@@ -121,7 +121,7 @@ class Block:
             found.append(text[at:end].strip())
             at = end
         if rest := text[at:].strip():
-            raise self.error(card, f"{shown(rest)} stands behind the last field, beyond column {at}")
+            raise self.error(card, f"{shown(rest)} is behind the last field, beyond column {at}")
         return found
 
     def _between_commas(self, card: Card, widths: Widths) -> list[str]:
@@ -206,7 +206,7 @@ class Deck:
                 if block.name not in self._without:
                     block.cards.append(Card(number, text))
             elif text.strip():
-                raise CardError(f"{placed(file, number)}: {shown(text.strip())} stands before the first keyword")
+                raise CardError(f"{placed(file, number)}: {shown(text.strip())} is before the first keyword")
         if block is None:
             raise CardError(f"{placed(file, 1)}: the file has no keyword; this is no keyword deck")
         yield block
@@ -221,7 +221,7 @@ class Deck:
         if name == "KEYWORD":
             return _formatted(block, rest)
         if rest and not _REMARK.fullmatch(rest):
-            raise block.error(None, f"{shown(rest)} stands behind *{name}")
+            raise block.error(None, f"{shown(rest)} is behind *{name}")
         return block
 
     def _define(self, block: Block) -> None:

@@ -82,14 +82,14 @@ def _unit(entry: Mapping[str, Any], data: Mapping[str, Any]) -> str:
     quantity = str(entry.get("quantity"))
     if not quantity.startswith("probe_"):
         if quantity not in QUANTITY_UNITS:
-            raise ValueError(f"its unit depends on the quantity; {nearest(quantity, [*QUANTITY_UNITS, *_PROBED])}")
+            raise ValueError(f"the unit depends on the quantity; {nearest(quantity, [*QUANTITY_UNITS, *_PROBED])}")
         return QUANTITY_UNITS[quantity]
     fields = {str(probe.get("name")): str(probe.get("field")) for probe in _tables(data.get("probes"))}
     name = str(entry.get("probe"))
     if name not in fields:
-        raise ValueError(f"its unit depends on the probe, and there is no probe {name!r}; {nearest(name, fields)}")
+        raise ValueError(f"the unit depends on the probe, and there is no probe {name!r}; {nearest(name, fields)}")
     if fields[name] not in FIELD_UNITS:
-        raise ValueError(f"its unit depends on the field of probe {name!r}; {nearest(fields[name], FIELD_UNITS)}")
+        raise ValueError(f"the unit depends on the field of probe {name!r}; {nearest(fields[name], FIELD_UNITS)}")
     return FIELD_UNITS[fields[name]]
 
 

@@ -62,7 +62,7 @@ def jobs(place: str, *names: str) -> list[Entry]:
         some = names[begin : begin + _ONE_BY_ONE]
         output = call(place, [*words, *([f"--name={','.join(some)}"] if some else [])])
         if output and not output.endswith("\n"):
-            raise away("squeue", "squeue has broken off in the middle of its list")
+            raise away("squeue", "the output of squeue ended in the middle of its list")
         found += _entries(output.split("\n")[:-1], set(some))
     return found
 

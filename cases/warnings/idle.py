@@ -19,7 +19,7 @@ def idle(case: Case, number: int) -> Iterator[Problem]:
     assert isinstance(spec, Prescribed | Traction)
     if all(_empty(part, spec) for part in parts_of(case, spec)):
         what = "node" if isinstance(spec, Prescribed) else "face"
-        message = f"no {what} of its bodies lies in its box; enlarge the box beyond the intended nodes"
+        message = f"no {what} of the bodies lies in the box; enlarge the box beyond the intended nodes"
         yield problem(("boundaries", number), ..., message)
 
 
@@ -39,5 +39,5 @@ def unloaded(case: Case) -> Iterator[Problem]:
     for load in loads(case):
         if load.faces == 0 or load.nodes == 0:
             what = "face" if load.faces == 0 else "node"
-            message = f"probably no {what} of its bodies lies in it; if there is none, the run ends with an error"
+            message = f"probably no {what} of the bodies lies in the region; if none does, the run ends with an error"
             yield problem(("boundaries", load.boundary), ..., message)

@@ -55,5 +55,5 @@ def scant_probes(case: Case, expected: Estimate) -> Iterator[Problem]:
         inside = math.prod(max(0.0, min(b, high) - max(a, low)) for a, b, low, high in box)
         holds = (size.elements or 0) * inside / volume(part.mesh)
         if holds < _FEWEST:
-            message = f"the box has room for {holds:.2g} tets of part {part.name!r}; where it holds no centre of one"
+            message = f"the box is as large as {holds:.2g} tets of part {part.name!r}; if no tet has its centre there,"
             yield problem(("probes", i), ..., f"{message} the run does not start")

@@ -31,7 +31,7 @@ def stiff(case: Case, expected: Estimate) -> Iterator[Problem]:
         yields = law is not None and stress > 0.5 * law.flow_stress()
         whole = part.rigid is None and part.fracture is None and part.erosion is None and part.stretch is None
         if whole and not yields and impedances[i] > STIFF * others:
-            message = f"is {impedances[i] / others:.0f} times as stiff against waves as all that {part.name!r} meets"
+            message = f"the impedance of {part.name!r} is {impedances[i] / others:.0f} times that of every other part"
             yield problem(("parts", i, "rigid"), ..., f"{message}; rigid = true {_saves(i, expected)}")
 
 

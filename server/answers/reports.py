@@ -75,7 +75,7 @@ def made(path: Path) -> int:
     except OSError:
         pass
     if lacking := report.missing():
-        detail = f"this server lacks {', '.join(lacking)}: pip install 'conoid[client,view]' there"
+        detail = f"the server lacks {', '.join(lacking)}: pip install 'conoid[client,view]' on the server"
         raise ServiceError(501, "no_drawing", detail, hint=f"conoid report {path.name}")
     for left in path.glob(_LEFT):
         left.unlink(missing_ok=True)
@@ -85,7 +85,7 @@ def made(path: Path) -> int:
         beside.replace(target)
         return target.stat().st_size
     except OSError as error:
-        raise ServiceError(507, "storage", f"the report cannot be kept: {error.strerror}", retryable=True) from error
+        raise ServiceError(507, "storage", f"the report cannot be stored: {error.strerror}", retryable=True) from error
     finally:
         beside.unlink(missing_ok=True)
 

@@ -44,7 +44,7 @@ def require(runs: Path, store: Store) -> None:
     """
     found = _look(runs, store)
     if why := _wrong(found):
-        remedy = f"if it is no longer served there: python -m conoid.server --runs {runs} adopt"
+        remedy = f"if no server uses the database there any more: python -m conoid.server --runs {runs} adopt"
         raise IdentityError(f"--runs {runs}: {why}; {remedy}")
     known = found.folder or found.database or Bond(secrets.token_hex(16), found.place)
     _bind(runs, store, found, known)

@@ -18,7 +18,7 @@ from ..runs.folder import APART
 from .reading import FileName
 from .uploads import Uploads, give
 
-_LACKING = "you have sent no such file, or it has been removed since; send it first (PUT /v1/files/{sha256})"
+_LACKING = "you have uploaded no such file, or it has been removed; upload it first (PUT /v1/files/{sha256})"
 _NAMING = re.compile(rb"""path["']?[ \t]*[=:]|\\[uUx]""")
 Source = Callable[[FileName, Path], None]
 """Function that writes a file, which the case names, to a path. Raises FileNotFoundError if the file does not exist;

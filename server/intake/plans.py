@@ -99,7 +99,7 @@ class Plans:
             self._folder.mkdir(0o700, exist_ok=True)
             durable.write(self._folder / f"{plan.id}.json", msgspec.json.encode(plan))
         except OSError as error:
-            raise ServiceError(507, "storage", f"the sweep cannot be kept: {error.strerror}", retryable=True) from error
+            raise ServiceError(507, "storage", f"the sweep is not stored: {error.strerror}", retryable=True) from error
         self.put(plan)
 
     def remove(self, plan: Plan) -> None:

@@ -42,7 +42,7 @@ _SHIPPED = "demo"
 library."""
 _MOST_FILES = 1000
 """Largest number of files in the list of a case with problems (chosen value)."""
-_UNREAD = "was not read yet: its run reads it"
+_UNREAD = "was not read yet; the run will read the file"
 PID = 4
 """Number of bytes of the process number, which each forked process sends first."""
 

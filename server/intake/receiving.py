@@ -92,14 +92,14 @@ class Receiver:
                 return part, False
             await self._taken(request, transfer, part, check)
             if part.offset < span.end:
-                raise ServiceError(400, "incomplete", f"the body broke off at byte {part.offset}", retryable=True)
+                raise ServiceError(400, "incomplete", f"the request body ended at byte {part.offset}", retryable=True)
             if part.offset < span.total:
                 return Upload(sha256, span.total, part.offset, False, time.time()), False
             transfer.busy = True
             await self._verify(owner, sha256, part)
             return Upload(sha256, span.total, span.total, True, time.time()), True
         except OSError as error:
-            detail = f"the file cannot be kept: {error.strerror}"
+            detail = f"the file cannot be stored: {error.strerror}"
             raise ServiceError(507, "storage", detail, retryable=True) from error
         finally:
             del self._open[owner, sha256]
@@ -154,7 +154,7 @@ class Receiver:
             offset = await self._pool.run(_hashed, total, part, offset)
         if total.hexdigest() != sha256:
             await self._pool.run(self._sent.remove, owner, sha256)
-            detail = f"the bytes that have arrived have the sha256 {total.hexdigest()}: none of them is kept"
+            detail = f"the bytes that have arrived have the sha256 {total.hexdigest()}; the bytes are removed"
             raise ServiceError(422, "wrong_hash", detail, pointer="sha256")
         await self._pool.run(self._sent.finish, owner, part)
 
@@ -169,10 +169,10 @@ async def _next(chunks: AsyncIterator[bytes], transfer: _Transfer) -> bytes | No
     except TimeoutError:
         if transfer.given_up:
             raise _in_progress() from None
-        detail = f"nothing of the body has arrived for {_SILENCE:g} s"
+        detail = f"no part of the request body has arrived for {_SILENCE:g} s"
         raise ServiceError(408, "timeout", detail, retryable=True) from None
     except ClientDisconnect:
-        raise ServiceError(400, "incomplete", "the body broke off", retryable=True) from None
+        raise ServiceError(400, "incomplete", "the request body was interrupted", retryable=True) from None
 
 
 def _in_progress() -> ServiceError:
@@ -201,7 +201,7 @@ def span_of(request: Request) -> Span:
     check_encoding(request)
     length, content_range = request.headers.get("content-length", ""), request.headers.get("content-range")
     if not length.isdecimal():
-        raise ServiceError(411, "length_required", "a file is sent with its Content-Length", pointer="Content-Length")
+        raise ServiceError(411, "length_required", "an upload needs a Content-Length", pointer="Content-Length")
     if content_range is None:
         return Span(0, int(length), int(length), anew=True)
     match = _RANGE.fullmatch(content_range)

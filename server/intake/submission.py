@@ -159,7 +159,7 @@ class Desk:
         try:
             self._supervisor.cancel(run_id)
         except Exception as error:
-            _log.error("run %s is not taken back: %s", run_id, words(error))
+            _log.error("the refused run %s was not cancelled: %s", run_id, words(error))
 
     def _profile(self, name: str, *, named: bool = False) -> str:
         """Returns the batch-system profile of the run; empty if the site has no batch system. ``named``: the profile in
@@ -219,7 +219,7 @@ class Desk:
             self._store.add(run, key, made.labels)
         except OSError as error:
             folder.discard(self._settings.runs, run_id)
-            raise ServiceError(507, "storage", f"the run cannot be kept: {error.strerror}", retryable=True) from error
+            raise ServiceError(507, "storage", f"the run cannot be stored: {error.strerror}", retryable=True) from error
         except CaseError as error:
             folder.discard(self._settings.runs, run_id)
             raise invalid_case(error.problems) from None

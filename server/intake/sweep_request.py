@@ -41,7 +41,7 @@ def changed(case: dict[str, Any], point: dict[str, Any], n: int) -> bytes:
     except CaseError as error:
         raise at_point(n, error) from None
     except RecursionError:
-        raise at_point(n, CaseError([Problem("", "", "its values are nested too deeply")])) from None
+        raise at_point(n, CaseError([Problem("", "", "the values of this point are nested too deeply")])) from None
 
 
 def at_point(n: int, error: CaseError) -> ServiceError:

@@ -80,12 +80,12 @@ class Sweeps:
                 return True
             try:
                 if plan.case is None or plan.key is None:
-                    raise ServiceError(409, "no_key", "its request broke off, and has no Idempotency-Key")
+                    raise ServiceError(409, "no_key", "the request was interrupted and has no Idempotency-Key")
                 self._fill(plan, self._cases(plan))
             except ServiceError as error:
                 if error.body["retryable"] and plan.id not in self._cancelled:
                     return False
-                _log.error("sweep %s is taken back: %s", plan.id, error)
+                _log.error("sweep %s cannot be completed and is cancelled: %s", plan.id, error)
                 self._take_back(plan)
                 return True
             except Exception:
@@ -124,7 +124,7 @@ class Sweeps:
         with self._locks.setdefault(plan.owner, threading.Lock()):
             plan = self.plans.get(plan.id) or plan
             if hashlib.sha256(body).hexdigest() != plan.digest:
-                raise ServiceError(422, "key_reused", f"this is another case, or it has other points, than {plan.id}")
+                raise ServiceError(422, "key_reused", f"the case or the points differ from those of sweep {plan.id}")
             repeated = [n for n, run in failed.items() if plan.whole and plan.runs[n] == run]
             if not repeated:
                 return plan
@@ -163,11 +163,11 @@ class Sweeps:
         if plan is None:
             return ""
         if plan.id in self._filling:
-            return "its sweep is being handed in"
+            return "the other runs of the sweep are not accepted yet"
         if plan.at_once is None:
             return ""
         own = sum(one.sweep == need.sweep and one.owner == need.owner for one in active)
-        return f"{own} runs of its sweep are running, as many as may at a time" if own >= plan.at_once else ""
+        return f"{own} runs of the same sweep are running, the largest number at a time" if own >= plan.at_once else ""
 
     def needed(self) -> set[str]:
         """Returns the hashes of files that sweeps need while the sweeps are being accepted, because future runs of the
@@ -209,7 +209,7 @@ class Sweeps:
         runs, keys = list(plan.earlier), plan.keys
         for n, (body, reading) in cases.items():
             if plan.id in self._cancelled:
-                raise ServiceError(409, "cancelled", f"sweep {plan.id} was cancelled while it was handed in")
+                raise ServiceError(409, "cancelled", f"sweep {plan.id} was cancelled while its runs were submitted")
             wishes = Wishes({"sweep": plan.id, "point": str(n)})
             receipt = self._desk.submit(plan.owner, body, _JSON, keys[n], wishes, reading)
             runs[n : n + 1] = [receipt["id"]]

@@ -149,14 +149,12 @@ class Uploads:
 
     def _check_room(self, owner: str, total: int) -> None:
         rules, there = self._rules, self.of(owner)
-        hint = f"a file that no run has goes {rules.age} after it was last asked for, or with DELETE /v1/files/SHA256"
+        hint = f"a file that no run uses is removed {rules.age} after its last request, or by DELETE /v1/files/SHA256"
         if total > rules.size:
             message = f"the file has {size(total)}; this server allows {size(rules.size)}"
             raise ServiceError(413, "too_large", message)
         if len(there) >= rules.number:
-            raise later(
-                "file_quota", f"you have sent {len(there)} files; this server keeps {rules.number} of a user", hint
-            )
+            raise later("file_quota", f"you have uploaded {len(there)} files; this server allows {rules.number}", hint)
         sent = sum(each.size for each in there)
         if sent + total > rules.bytes:
             message = f"the file has {size(total)}, and your files {size(sent)}; this server allows {size(rules.bytes)}"
@@ -171,7 +169,7 @@ class Uploads:
     def _check_disk(self, more: int) -> None:
         free = shutil.disk_usage(self._runs).free - more
         if free < self._free_disk:
-            detail = f"the server's disk has no room for {size(more)}; it keeps {size(self._free_disk)} free"
+            detail = f"the server's disk has no space for {size(more)}; {size(self._free_disk)} must stay free"
             raise ServiceError(507, "disk_full", detail, retryable=True)
 
     def finish(self, owner: str, part: Part) -> None:

@@ -137,7 +137,7 @@ class Removal:
             if pins.pinned(self._settings.runs / run.id):
                 continue
             left.drop(run.id)
-            yield run, f"older than {self._rules.age}" if old else f"all runs had more than {figures.size(most)}"
+            yield run, f"older than {self._rules.age}" if old else f"all folders had more than {figures.size(most)}"
 
     def _work(self) -> None:
         rest = min(_PATIENCE, self._rules.rest)
@@ -146,9 +146,9 @@ class Removal:
             try:
                 self.look()
             except (OSError, SQLAlchemyError) as error:
-                _log.error("folders are looked at again in %g s: %s", rest, words(error))
+                _log.error("the folders of runs are checked again in %g s: %s", rest, words(error))
             except Exception:
-                _log.exception("folders are looked at again in %g s", rest)
+                _log.exception("the folders of runs are checked again in %g s", rest)
 
 
 def restore(store: Store, lines: RemovedRuns) -> None:

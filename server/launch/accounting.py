@@ -43,4 +43,4 @@ class Accounting:
                 if found := slurm.taken(self._place, job):
                     run.took(found)
             except Exception:
-                _log.exception("what job %s took is not written down", job)
+                _log.exception("the usage of job %s is not stored", job)

@@ -79,7 +79,7 @@ class Arrays:
                 worker.wait(str(error))
             return
         except slurm_call.RefusedError as error:
-            _log.warning("Slurm refuses the array %s, whose runs go one by one: %s", records[0].name, error)
+            _log.warning("Slurm refuses the array %s; its runs are submitted singly: %s", records[0].name, error)
             for worker in members:
                 worker.leave_array()
             return

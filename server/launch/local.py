@@ -118,7 +118,7 @@ def find_mpiexec(chosen: str) -> tuple[str, ...]:
     beside = Path(sys.executable).with_name("mpiexec")
     found = str(beside) if beside.is_file() else shutil.which("mpiexec")
     if found is None:
-        raise LaunchError("no mpiexec: install conoid[mpich], or name the site's own with --mpiexec")
+        raise LaunchError("no mpiexec was found: install conoid[mpich], or name the site's own with --mpiexec")
     return (found,)
 
 

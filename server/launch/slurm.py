@@ -56,7 +56,7 @@ class SlurmLauncher:
             whole.write(job.folder / layout.JOB, batch.to_json(record))
         except (OSError, ValueError) as error:
             failed = DamagedError if isinstance(error, OSError) else LaunchError
-            raise failed(f"the job cannot be written down: {error}") from None
+            raise failed(f"the record of the job cannot be written: {error}") from None
         return self._take(job.run, SlurmWorker(job.folder, record, self._site, job.group, self._accounting))
 
     def find(self, run: str, folder: Path) -> Trace:
@@ -103,7 +103,7 @@ class SlurmLauncher:
             try:
                 self._round()
             except Exception:
-                _log.exception("Slurm is asked again in %g s", self._site.poll)
+                _log.exception("Slurm is queried again in %g s", self._site.poll)
             time.sleep(self._site.poll)
 
     def _round(self) -> None:
@@ -134,7 +134,7 @@ class SlurmLauncher:
         try:
             return self._arrays.hand_over(workers)
         except (slurm_call.SlurmError, OSError) as error:
-            _log.warning("an array is handed over later: %s", error)
+            _log.warning("a job array is submitted later: %s", error)
             return {worker.name for worker in workers if worker.fresh or worker.waits_for_array}
 
     def _attend(self, run: str, worker: SlurmWorker, entries: list[Entry], arrays: Set[str]) -> bool:

@@ -96,12 +96,12 @@ class SlurmWorker:
         """Returns the reason why the job waits, or the time since which Slurm does not answer."""
         entry, number = self._entry, self._job.job
         if self._away:
-            last = f"; job {number} was {entry.state.lower()} then" if entry else ""
+            last = f"; before that, job {number} was {entry.state.lower()}" if entry else ""
             return f"unknown: Slurm has not answered for {time.monotonic() - self._away:.0f} s ({self._why}){last}"
         if self._later and entry is None:
-            return f"Slurm takes no job now, and is asked again: {self._later}"
+            return f"Slurm accepts no job now; the job is submitted again later: {self._later}"
         if entry is None:
-            return f"Slurm is asked about job {number}" if number else "is being handed to Slurm"
+            return f"waiting for the answer of Slurm about job {number}" if number else "is being handed to Slurm"
         return f"Slurm job {number} is pending: {entry.reason}" if entry.state in slurm.PENDING else ""
 
     def exited(self) -> Exit | None:

@@ -146,9 +146,9 @@ def plan(
 def _beyond(need: Need, room: Room) -> str:
     """Returns why a run can never start, for example because the server was restarted with fewer cores."""
     if need.cores > room.cores:
-        return f"it needs {counted(need.cores, 'slot')}, and this server has {room.cores}: it cannot start here"
+        return f"the run needs {counted(need.cores, 'slot')}, this server has {room.cores}: it cannot start here"
     if need.memory > room.memory:
-        return f"it needs {size(need.memory)} of memory, and this server has {size(room.memory)}: it cannot start here"
+        return f"the run needs {size(need.memory)} of memory, this server has {size(room.memory)}: it cannot start here"
     return ""
 
 

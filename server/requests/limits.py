@@ -78,7 +78,7 @@ async def read_body(request: Request) -> bytes:
     except TimeoutError:
         raise ServiceError(408, "timeout", "the body did not arrive in time", retryable=True) from None
     except ClientDisconnect:
-        raise ServiceError(400, "incomplete", "the body broke off", retryable=True) from None
+        raise ServiceError(400, "incomplete", "the request body was interrupted", retryable=True) from None
 
 
 def check_encoding(request: Request) -> None:
@@ -87,7 +87,7 @@ def check_encoding(request: Request) -> None:
     """
     encoding = request.headers.get("content-encoding", "identity").strip().lower()
     if encoding not in {"", "identity"}:
-        detail = f"Content-Encoding {encoding[:80]!r}: a body is sent as it is"
+        detail = f"Content-Encoding {encoding[:80]!r}: a request body must not be encoded"
         headers = {"Accept-Encoding": "identity"}
         raise ServiceError(415, "unsupported_encoding", detail, pointer="Content-Encoding", headers=headers)
 
@@ -158,7 +158,7 @@ def _files(case: Case) -> Iterator[Problem]:
     """
     for file in files_of(case.model_dump(include={"parts"})):
         if file.sha256 is None:
-            message = "this key is missing: a server finds a file by its hash; conoid submit and its like fill it in"
+            message = "this key is missing: a server finds a file by its hash; conoid submit adds this key"
             yield problem((*file.table, "sha256"), ..., message)
 
 
@@ -218,5 +218,5 @@ def check_room(runs: Path, open_runs: int, caps: Caps, more: int = 1) -> None:
         raise later("queue_full", detail)
     free = shutil.disk_usage(runs).free
     if free < caps.free_disk:
-        detail = f"{size(free)} are free on the server's disk; it keeps {size(caps.free_disk)}"
+        detail = f"{size(free)} are free on the server's disk; {size(caps.free_disk)} must stay free"
         raise ServiceError(507, "disk_full", detail, retryable=True)

@@ -12,7 +12,7 @@ from ..settings import StartError
 SCOPES = {
     "read": "see own runs, their events and files, and subscribe over Zenoh",
     "submit": "validate, submit and cancel",
-    "metrics": "read /metrics, which counts everybody's runs",
+    "metrics": "read /metrics, which counts the runs of all users",
 }
 _PREFIX = "conoid"
 _OWNER = re.compile(r"[A-Za-z0-9][A-Za-z0-9_-]{0,62}")

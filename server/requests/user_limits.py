@@ -104,4 +104,4 @@ async def _turn(turn: asyncio.Semaphore) -> None:
         async with asyncio.timeout(PATIENCE):
             await turn.acquire()
     except TimeoutError:
-        raise busy(f"your other requests are in progress since {PATIENCE:g} s") from None
+        raise busy(f"your other requests have been in progress for {PATIENCE:g} s") from None

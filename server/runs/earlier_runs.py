@@ -72,6 +72,6 @@ class EarlierRuns:
         except (OSError, ValueError, SQLAlchemyError) as error:
             self._failed[path] = words(error)
             if reason != words(error):
-                _log.error("run %s cannot be taken up: %s", path.name, words(error))
+                _log.error("run %s of an earlier server cannot be read: %s", path.name, words(error))
             return
         self._found(left)

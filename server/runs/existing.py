@@ -76,4 +76,4 @@ class ExistingRuns:
         the disk may not be mounted, and no run counts as removed.
         """
         if not (self._runs / FILE).exists():
-            raise FileNotFoundError(errno.ENOENT, "the folder of all runs is not there now", str(self._runs))
+            raise FileNotFoundError(errno.ENOENT, "the folder of all runs is missing at present", str(self._runs))

@@ -157,13 +157,13 @@ def _renamed(run: Run, event: WorkerExited, outcome: Outcome) -> Outcome:
     for a cancel, a stop does not count as a cancel.
     """
     if run.stopping_for is Cause.STORAGE:
-        state, message = State.FAILED, "its output has passed what this server allows a run"
+        state, message = State.FAILED, "the output of the run is larger than this server allows"
         return msgspec.structs.replace(outcome, state=state, cause=Cause.STORAGE, message=message)
     if event.reading is not None:
         state, cause, message = event.reading
         return msgspec.structs.replace(outcome, state=state, cause=cause, message=message)
     if run.stopping_for is Cause.WALLTIME:
-        state, message = State.TIMED_OUT, "its wall time is used up"
+        state, message = State.TIMED_OUT, "the run has reached its limit of wall time"
         return msgspec.structs.replace(outcome, state=state, cause=Cause.WALLTIME, message=message)
     message = "the worker was asked to stop from outside, not by its owner"
     return msgspec.structs.replace(outcome, state=State.FAILED, cause=Cause.PREEMPTED, message=message)
@@ -234,6 +234,6 @@ def _found(run: Run, event: Found, now: float) -> Next:
             threads=run.threads,
         )
     else:
-        message = "the worker ended without an outcome while no server was there to see it"
+        message = "the worker ended without an outcome while no server was running"
         lost = Outcome(state=State.LOST, cause=Cause.SERVICE, message=message, ranks=run.ranks, threads=run.threads)
     return _end(run, _at(run, event, now), lost)

@@ -116,7 +116,7 @@ class Performer:
             for left in (layout.OUTCOME, layout.STOP_REQUEST):
                 folder.put_away(path / left)
             if not folder.is_as_accepted(path, made):
-                raise DamagedError(f"{made.case_file} is not what was accepted")
+                raise DamagedError(f"{made.case_file} differs from the accepted case")
             case = path / made.case_file
             group = f"{made.owner}/{made.labels['sweep']}" if "sweep" in made.labels else ""
             job = Job(run.id, run.ranks, case, path, access, made.profile, made.wall_time, group, run.threads)

@@ -35,7 +35,7 @@ def look(path: Path, known: Run | None, launcher: Launcher) -> Left:
     """
     made = _submission(path)
     if made is None and known is None:
-        raise ValueError(f"{layout.SUBMISSION} cannot be read, and the database does not know the run")
+        raise ValueError(f"{layout.SUBMISSION} cannot be read, and the database does not contain the run")
     accepted = folder.first(made) if made is not None else _as_accepted(known)
     statuses = _statuses(path)
     trace = launcher.find(accepted.id, path)

@@ -99,7 +99,7 @@ def _why(source: Path) -> str:
     """Returns why the run has no checkpoint, and how the user can get a checkpoint."""
     ended = outcome(source)
     if ended is not None and ended.state == State.SUCCEEDED:
-        return "one that has succeeded keeps none"
+        return "a run that has succeeded keeps no checkpoint"
     reason = "it began no step" if ended is not None and not ended.steps else "it has written none"
     every = f"run.checkpoint_every ({_every(source)} in its case)"
     return f"{reason}; one is written every {every}, and when 'conoid checkpoint' asks for one"

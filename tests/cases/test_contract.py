@@ -111,9 +111,9 @@ def test_keys() -> None:
 
 @pytest.mark.parametrize("chunk", ["", "a/b", "*", "a b", "$", "@x", "?", "#", "é"])
 def test_a_key_cannot_be_broken_out_of(chunk: str) -> None:
-    with pytest.raises(ValueError, match="cannot stand in a key"):
+    with pytest.raises(ValueError, match="is not allowed in a Zenoh key"):
         keys.run_prefix(chunk, "run")
-    with pytest.raises(ValueError, match="cannot stand in a key"):
+    with pytest.raises(ValueError, match="is not allowed in a Zenoh key"):
         keys.run_prefix("owner", chunk)
 
 

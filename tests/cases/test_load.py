@@ -225,8 +225,8 @@ def test_overrides_leave_their_source_alone() -> None:
         ("=2", "write an assignment"),
         ("run..ranks=2", "write an assignment"),
         ("parts[1].name=a", "[1] is outside the list, which has 1 items"),
-        ("parts[0][0]=a", "what holds it is not a list"),
-        ("name.x=a", "what holds it is not a table"),
+        ("parts[0][0]=a", "the value that contains it is not a list"),
+        ("name.x=a", "the value that contains it is not a table"),
         ("nothing[0].x=a", "there is no list 'nothing'"),
     ],
 )

@@ -90,7 +90,7 @@ def test_an_unknown_area_is_none() -> None:
 
 def test_a_region_without_a_face_gets_a_warning() -> None:
     (odd,) = unloaded(pressed(TUBE, {"cylinder": {"radius": 4e-3}}))
-    assert str(odd).startswith("boundaries[0]: probably no face of its bodies lies in it")
+    assert str(odd).startswith("boundaries[0]: probably no face of the bodies lies in the region")
     assert list(unloaded(pressed(TUBE, BORE))) == []
 
 

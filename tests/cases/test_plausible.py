@@ -412,7 +412,7 @@ def test_a_probe_box_smaller_than_a_tet_is_reported(side: float, warned: bool) -
     probe = {"name": "p", "part": "plate", "field": "pressure", **box}
     odd = warnings_of({**target(), "probes": [probe]})
     assert list(odd) == (["probes[0]"] if warned else [])
-    assert all("where it holds no centre of one the run does not start" in each for each in odd.values())
+    assert all("if no tet has its centre there, the run does not start" in each for each in odd.values())
 
 
 @pytest.mark.parametrize(

@@ -81,7 +81,7 @@ INERTIA = "parts[0].rigid={{mass='4 g', inertia=[{}]}}"
         ),
         ("boundaries=[{kind='wall', shape='cylinder', point=[0, 0, -1], radius=1}]", "boundaries[0].axis: this key is"),
         (WALL.replace("}", ", mass=1, velocity=[0, 0, 1], course=[[0, 1]]}"), "remove course or mass"),
-        (WALL.replace("}", ", course=[[0, 1]]}"), "is a factor of velocity, which is zero"),
+        (WALL.replace("}", ", course=[[0, 1]]}"), "multiplies velocity, which is zero"),
         (WALL.replace("}", ", side='inside'}"), "a plane has no inside"),
     ],
 )
@@ -119,7 +119,7 @@ def test_a_stiff_part_could_be_rigid() -> None:
         return [str(each) for each in oddities(case, estimate(case)) if "rigid = true" in str(each)]
 
     (line,) = warned("parts[0].rigid=false")
-    assert line.startswith("parts[0].rigid: is 318 times as stiff against waves as all that 'ball' meets")
+    assert line.startswith("parts[0].rigid: the impedance of 'ball' is 318 times that of every other part")
     assert warned() == []
     assert warned("parts[0].rigid=false", "parts[1].material=steel") == []
 

@@ -1,5 +1,6 @@
-"""Bodies for the tests of contact: cases of several blocks, their pieces on several ranks, tables of nodes and
-faces."""
+"""Bodies for the tests of contact: cases of several blocks, the pieces of the blocks on several ranks, tables of nodes
+and faces.
+"""
 
 from collections.abc import Sequence
 from itertools import product
@@ -27,7 +28,7 @@ Flags = npt.NDArray[np.bool_]
 
 
 def moved(mesh: TetMesh, by: Sequence[float], turn: Floats | None = None) -> TetMesh:
-    """Returns the mesh turned about its middle, then moved by ``by``, m."""
+    """Returns the mesh turned about its middle and then moved by ``by``, m."""
     middle = 0.5 * (mesh.points.min(axis=0) + mesh.points.max(axis=0))
     turned = mesh.points if turn is None else middle + (mesh.points - middle) @ turn.T
     return TetMesh(turned + np.asarray(by), mesh.tets)
@@ -41,8 +42,9 @@ def rotation(axis: Sequence[float], angle: float) -> Floats:
 
 
 def meeting_of(motions: Sequence[dict[str, Any]], contact: dict[str, Any] | None = None, **keys: Any) -> schema.Case:
-    """Returns a case with a part, body0, body1 ..., for each of the ``motions`` (velocity, spin), in contact with
-    each other."""
+    """Returns a case with one part for each of the ``motions`` (velocity, spin), body0, body1 ..., all in contact with
+    each other.
+    """
     parts = tuple(
         schema.Part(name=f"body{i}", material="metal", mesh=DUMMY, **motion) for i, motion in enumerate(motions)
     )
@@ -50,7 +52,7 @@ def meeting_of(motions: Sequence[dict[str, Any]], contact: dict[str, Any] | None
 
 
 def pieces_of(case: schema.Case, meshes: Sequence[TetMesh], ranks: int = 1) -> list[tuple[domain.Piece, Model]]:
-    """Returns the piece of each rank of a scene whose parts have these meshes."""
+    """Returns the piece of each rank of a scene whose parts have the given meshes."""
     ready = iter(meshes)
     with patch.object(assembly, "build_mesh", lambda *_, **__: next(ready)):
         whole = assembly.assemble(case, Path())
@@ -60,7 +62,9 @@ def pieces_of(case: schema.Case, meshes: Sequence[TetMesh], ranks: int = 1) -> l
 def surface_of(
     piece: domain.Piece, model: Model, comm: Comm | None = None, planes: Flags | None = None, edges: bool = True
 ) -> Surface:
-    """Returns the surface of a rank's piece; ``planes`` (nodes, planes): membership of nodes in symmetry planes."""
+    """Returns the surface of a rank's piece; ``planes`` (nodes, planes): whether each node belongs to each symmetry
+    plane.
+    """
     on_planes = np.zeros((model.nodes.n, 0), bool) if planes is None else planes
     none = np.zeros((0, 3), np.int32)
     nothing = CrackSides(none, none), none
@@ -68,7 +72,7 @@ def surface_of(
 
 
 def nodes_of(x: Floats, v: Floats | None = None, part: Indices | None = None) -> SurfaceNodes:
-    """Returns free nodes of 1 kg with ids 0, 1, ... at ``x``."""
+    """Returns free nodes of 1 kg with ids 0, 1, ... at the positions ``x``."""
     n = len(x)
     flown = np.zeros((n, 3)) if v is None else v
     return SurfaceNodes(

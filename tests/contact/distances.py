@@ -6,7 +6,7 @@ from ..worker.meshes import Floats
 
 
 def _along(p: Floats, a: Floats, b: Floats) -> Floats:
-    """Returns distances of points from segments; all arrays have one shape (..., 3)."""
+    """Returns distances of points from segments; all arrays have the same shape (..., 3)."""
     along = b - a
     length = np.maximum((along * along).sum(axis=-1), 1e-300)
     share = np.clip(((p - a) * along).sum(axis=-1) / length, 0.0, 1.0)
@@ -14,8 +14,9 @@ def _along(p: Floats, a: Floats, b: Floats) -> Floats:
 
 
 def above(p: Floats, a: Floats, b: Floats, c: Floats) -> Floats:
-    """Returns distances of points from triangles abc, all of one shape (..., 3): the height above the triangle if
-    the foot of the point is inside, else the distance from its border."""
+    """Returns distances of points from triangles abc, all of one shape (..., 3). The distance is the height above the
+    triangle if the foot of the point is inside, else the distance from the border of the triangle.
+    """
     rim = np.minimum(np.minimum(_along(p, a, b), _along(p, b, c)), _along(p, c, a))
     normal = np.cross(b - a, c - a)
     normal /= np.maximum(np.linalg.norm(normal, axis=-1), 1e-300)[..., None]
@@ -47,7 +48,7 @@ def point_triangle(points: Floats, triangles: Floats) -> Floats:
 
 
 def segment_segment(segments: Floats) -> Floats:
-    """Returns (n, n) distances between segments (n, 2, 3), none of them parallel."""
+    """Returns (n, n) distances between segments (n, 2, 3), no two of which are parallel."""
     a, b = segments[:, None, 0], segments[:, None, 1]
     c, d = segments[None, :, 0], segments[None, :, 1]
     return across(a, b, c, d)

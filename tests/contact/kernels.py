@@ -38,24 +38,25 @@ from .bodies import Indices
 
 def every_pair(tested: "np.ndarray", things: int) -> Indices:
     """Returns (p, 2) all pairs of one of the nodes ``tested`` and one of the ``things``, sorted by node, then by
-    thing."""
+    thing.
+    """
     return np.column_stack([np.repeat(tested, things), np.tile(np.arange(things), len(tested))]).astype(np.int32)
 
 
 def face_sizes(x: Floats, faces: Indices) -> Floats:
-    """Returns (f,) square roots of twice the areas, m."""
+    """Returns (f,) face sizes: square roots of twice the areas, m."""
     a, b, c = (x[faces[:, k]] for k in range(3))
     return np.asarray(np.sqrt(np.linalg.norm(np.cross(b - a, c - a), axis=1)))
 
 
 def edge_sizes(x: Floats, edges: Indices) -> Floats:
-    """Returns (e,) lengths, m."""
+    """Returns (e,) lengths of edges, m."""
     return np.asarray(np.linalg.norm(x[edges[:, 1]] - x[edges[:, 0]], axis=1))
 
 
 def edge_depths(x: Floats, edges: Indices) -> Floats:
-    """Returns (e,) the largest depth of a contact, m: DEEP times the length of the edge or the lowest height of the
-    tets of its faces, at least DEEP_SELF times the length.
+    """Returns (e,) the largest depth of a contact of each edge, m. The depth is DEEP times the length of the edge or
+    times the lowest height of the tets of its faces, at least DEEP_SELF times the length.
     """
     (a, b, c, d, e, f), size = edges.T, edge_sizes(x, edges)
     low = np.minimum(lowest_heights(x[np.stack([a, b, c, e], 1)]), lowest_heights(x[np.stack([a, b, d, f], 1)]))
@@ -63,7 +64,7 @@ def edge_depths(x: Floats, edges: Indices) -> Floats:
 
 
 def lowest_heights(tets: Floats) -> Floats:
-    """Returns (n,) lowest heights of tets (n, 4, 3), m: three volumes over the largest face."""
+    """Returns (n,) lowest heights of tets (n, 4, 3), m: three times the volume over the largest face."""
     volumes = np.abs(np.linalg.det(tets[:, 1:] - tets[:, :1])) / 6.0
     one, two, three = (tets[:, [[0, 0, 0, 1], [1, 1, 2, 2], [2, 3, 3, 3]][k]] for k in range(3))
     areas = 0.5 * np.linalg.norm(np.cross(two - one, three - one), axis=2)
@@ -76,13 +77,13 @@ def many(met: ContactRows) -> int:
 
 
 def taken(met: ContactRows, rows: "np.ndarray") -> ContactRows:
-    """Returns some of the active contacts, in this order."""
+    """Returns some of the active contacts, in the order of the given indices."""
     return ContactRows(*(column[rows] for column in met))
 
 
 def moments(out: Floats) -> Floats:
-    """Returns (n, 12) means of n and of n n (xx, yy, zz, yz, zx, xy) of the normals (n, faces, 3) of the faces of
-    nodes, with zero mean direction to the faces.
+    """Returns (n, 12) means of n and of n n (xx, yy, zz, yz, zx, xy) over the normals n (n, faces, 3) of the faces of
+    nodes, and zero as the mean direction to the faces.
     """
     squares = np.einsum("nfi,nfj->nij", out, out) / out.shape[1]
     pairs = [squares[:, i, j] for i, j in ((0, 0), (1, 1), (2, 2), (1, 2), (2, 0), (0, 1))]
@@ -90,8 +91,9 @@ def moments(out: Floats) -> Floats:
 
 
 def step_of(x: Floats, v: Floats, part: "np.ndarray", dt: float, mu: Floats | None = None) -> Step:
-    """Returns the step record of slots at ``x`` with velocities ``v``; without ``mu`` (parts, parts) there is no
-    friction."""
+    """Returns the step record of slots at ``x`` with velocities ``v``; without ``mu`` (parts, parts) the contacts have
+    no friction.
+    """
     friction = np.zeros((9, 9)) if mu is None else mu
     return Step.of(x, v, part.astype(np.int32), friction, PUSH_OUT, dt)
 
@@ -115,14 +117,16 @@ def edge_table(corners: Indices, size: Floats, deep: Floats, left: Floats) -> Ed
 
 
 def pair_table(pairs: Indices) -> PairTable:
-    """Returns pairs that have not been tested yet."""
+    """Returns candidate pairs that have not been tested yet."""
     table = PairTable()
     table.add(np.asarray(pairs, np.int32))
     return table
 
 
 def faces_met(pairs: Pairs, slots: SlotTable, faces: FaceTable, step: Step, end: float) -> tuple[ContactRows, int]:
-    """Returns the contacts of nodes and faces, and the number of tested pairs: ``pairs.active`` begins with them."""
+    """Returns the active contacts of nodes and faces, and the number of tested pairs; ``pairs.active`` begins with the
+    active contacts.
+    """
     n = len(pairs.rows)
     room, depth, found = ContactRows.room(n), np.zeros(n), np.arange(n, dtype=np.int32)
     tested = int(face_kernels.due(pairs, slots, faces, end + step.beyond, 0, n))
@@ -134,7 +138,9 @@ def faces_met(pairs: Pairs, slots: SlotTable, faces: FaceTable, step: Step, end:
 
 
 def edges_met(pairs: Pairs, edges: EdgeTable, step: Step, course: Floats, end: float) -> tuple[ContactRows, int]:
-    """Returns the contacts of edges, and the number of tested pairs: ``pairs.active`` begins with them."""
+    """Returns the active contacts of edges, and the number of tested pairs; ``pairs.active`` begins with the active
+    contacts.
+    """
     room = ContactRows.room(len(pairs.rows))
     met, tested = edge_kernels.edge_edge(room, 0, pairs, edges, step, course, end, 0, len(pairs.rows))
     return taken(room, np.arange(met)), int(tested)
@@ -144,8 +150,8 @@ def node_face(
     x: Floats, v: Floats, faces: Indices, pairs: Indices, dt: float, part: "np.ndarray | None" = None,
     mu: Floats | None = None, out: Floats | None = None, normals: Floats | None = None,
 ) -> ContactRows:  # fmt: skip
-    """Returns the contacts of nodes that pass a face; the nodes are of another part unless ``part`` is given.
-    ``out`` (n, faces, 3): unit normals of the faces of a node, all of one area, zero for a node without faces; or
+    """Returns the contacts of nodes that pass a face; the nodes are of another part unless ``part`` is given. ``out``
+    (n, faces, 3): unit normals of the faces of a node, which have equal areas, zero for a node without faces; or
     ``normals`` (n, 12), see SlotTable.
     """
     own = np.where(np.isin(np.arange(len(x)), faces), 0, 1) if part is None else part
@@ -173,7 +179,7 @@ def edge_edge(
 
 
 def column(n: int) -> ContactRows:
-    """Returns ``n`` nodes in a row along x; each node touches the next one."""
+    """Returns ``n`` nodes in a row along x; each node touches the next node."""
     nodes = np.column_stack([np.arange(1, n), np.arange(n - 1), np.arange(n - 1), np.arange(n - 1)]).astype(np.int32)
     weights, normals = np.tile([1.0, -1.0, 0.0, 0.0], (n - 1, 1)), np.tile([1.0, 0.0, 0.0], (n - 1, 1))
     none = np.full(n - 1, -1, np.int32)
@@ -189,8 +195,9 @@ def unit(random: np.random.Generator, n: int) -> Floats:
 def network(
     seed: int, meetings: int = 30, nodes: int = 25, friction: float = 0.0, wanted: float = 0.0, one_normal: bool = False
 ) -> tuple[ContactRows, Floats, Floats]:
-    """Returns random contacts with common nodes, of nodes with faces and of edges; also velocities, and masses up to
-    1000:1."""
+    """Returns random contacts with common nodes, of nodes with faces and of edges; also returns velocities, and masses
+    with ratios up to 1000:1.
+    """
     random = np.random.default_rng(seed)
     rows = np.array([random.choice(nodes, 4, replace=False) for _ in range(meetings)], np.int32).reshape(-1, 4)
     share, s, t = random.dirichlet(np.ones(3), meetings), random.uniform(size=meetings), random.uniform(size=meetings)
@@ -205,14 +212,14 @@ def network(
 
 
 class Solver:
-    """Sweeps over contacts of nodes with a mobility (nodes, 3), 1/kg; impulses in quanta of 1 / ``scale`` N s."""
+    """Sweeps over contacts of nodes with a mobility (nodes, 3), 1/kg; impulses are in quanta of 1 / ``scale`` N s."""
 
     def __init__(
         self, met: ContactRows, v: Floats, mobility: Floats, scale: float = 2.0**40, active: ActiveSet | None = None,
         stops: Stops | None = None,
     ) -> None:  # fmt: skip
-        """``active``: arrays of another step, to be used again; ``stops``: all nodes are at the origin, the first
-        node belongs to part 0, the others to part 1.
+        """Creates the sweeps; ``active``: arrays of another step, to be used again. ``stops``: all nodes are at the
+        origin, the first node belongs to part 0, all other nodes belong to part 1.
         """
         self.met, self.v, self.scale, n = met, v.copy(), scale, len(v)
         self.unsettled = np.zeros(2, np.int64)
@@ -251,14 +258,14 @@ class Solver:
 
     @property
     def push(self) -> Floats:
-        """Returns (n, 4) impulses along the normal and of friction, N s."""
+        """Returns (n, 4) impulses of contacts along the normal and of friction, N s."""
         push = np.zeros((many(self.met), 4))
         rows, push_of = self.active.pushes()
         push[rows] = push_of
         return push
 
     def sweep(self, times: int = 1) -> Floats:
-        """Returns the velocities after ``many`` plain sweeps."""
+        """Returns the velocities after ``many`` sweeps without momentum."""
         self._go_on(sweeps=1)
         for _ in range(times):
             self.active.sweep()
@@ -285,14 +292,14 @@ class Solver:
         return kept
 
     def resume(self, kept: Kept, ratio: float = 1.0) -> None:
-        """Warm start with ``ratio`` times the impulses ``kept``."""
+        """Applies a warm start with ``ratio`` times the impulses ``kept``."""
         self._go_on(kept=kept, ratio=ratio)
         self.active.resume()
         self._leave()
 
     def solve(self, sweeps: int, shared: Indices) -> tuple[Ints, Ints]:
         """Runs a whole step in which other ranks share the nodes ``shared`` and have no impulses; returns the words of
-        the work along the normals and of friction.
+        the work along the normals and of the work of friction.
         """
         self.books.account.words, self.books.friction = np.zeros((2, 2), np.int64), Tally(np.ones(2))
         self._step = replace(self._step, sweeps=sweeps, kept=Kept(*np.zeros((2, many(self.met), 4))))
@@ -301,7 +308,9 @@ class Solver:
         return self.books.account.words, self.books.friction.words
 
     def heat(self, v_old: Floats) -> float:
-        """Returns the work of friction, J, of the contacts with an impulse, from the velocities ``v_old``."""
+        """Returns the work of friction, J, of the contacts that have an impulse, computed with the velocities
+        ``v_old``.
+        """
         self.books.friction = Tally(np.ones(2))
         self._go_on(before=v_old)
         self.active.work()

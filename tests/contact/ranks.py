@@ -1,4 +1,4 @@
-"""Several ranks in one process: each is a thread with a communicator that implements the protocol of the worker. A
+"""Several ranks in one process: each rank is a thread with a communicator that implements the protocol of the worker. A
 rank that fails wakes all other ranks, so that a test ends with the first error instead of a timeout.
 """
 
@@ -18,11 +18,11 @@ Floats = npt.NDArray[np.float64]
 T = TypeVar("T")
 _TRADE_TAG = 91
 _PATIENCE = 60.0
-"""Timeout, s, of a rank that waits for another rank."""
+"""Time limit, s, of a rank that waits for another rank."""
 
 
 class World:
-    """State that the ranks share."""
+    """State that all ranks have in common."""
 
     def __init__(self, size: int) -> None:
         self.size = size
@@ -37,7 +37,7 @@ class World:
         return [name for name, box in self._mail.items() if not box.empty()]
 
     def box(self, source: int, target: int, tag: int) -> SimpleQueue[Ints]:
-        """Returns the place of messages; the same object for both ranks."""
+        """Returns the queue of messages between two ranks; the same object for both ranks."""
         with self._lock:
             return self._mail.setdefault((source, target, tag), SimpleQueue())
 
@@ -134,7 +134,7 @@ class Finished:
 
 
 class Mail:
-    """Persistent messages of fixed partners and buffers; a message of the wrong length is an error."""
+    """Persistent messages with fixed partners and buffers; a message of the wrong length is an error."""
 
     def __init__(
         self, world: World, comm: ThreadComm, sends: list[tuple[int, Ints]], receives: list[tuple[int, Ints]], tag: int
@@ -159,7 +159,9 @@ class Mail:
 
 
 def on_ranks(size: int, work: Callable[[ThreadComm], T]) -> list[T]:
-    """Returns the result of ``work`` on each of ``size`` ranks, which have to receive all messages sent to them."""
+    """Returns the result of ``work`` on each of ``size`` ranks; the ranks have to receive all messages that are sent to
+    them.
+    """
     world = World(size)
 
     def one(rank: int) -> T:

@@ -1,4 +1,4 @@
-"""Contact gives back at most the energy that it has taken, for any step."""
+"""Contact gives back at most the energy that it has taken, for any time step."""
 
 from pathlib import Path
 
@@ -22,13 +22,14 @@ from .ranks import on_ranks
 SPHERES = (
     "run.frames=0", "run.end_time=27e-6", "parts[0].mesh.element_size=0.2e-3", "parts[1].mesh.element_size=0.2e-3"
 )  # fmt: skip
-"""Hertz's spheres, elastic and without viscosity, on a coarse mesh, to the turning point."""
+"""Hertz's spheres, elastic and without viscosity, on a coarse mesh, up to the turning point."""
 
 
 @pytest.mark.parametrize("safety", [1.0, 0.9, 0.5])
 def test_spheres_that_meet_get_no_energy_from_contact(safety: float) -> None:
-    """Before the account was introduced, nodes penetrated under a small force and were pushed out under a large
-    force, which added 9e-4 of the energy."""
+    """In an earlier version nodes penetrated under a small force and were pushed out under a large force, which added
+    9e-4 of the energy.
+    """
     data = apply_overrides(read_data(shipped_path("hertz_spheres")), [*SPHERES, f"numerics.dt_safety={safety}"])
     sim, lines = simulation.build(parse_case(data), Path(), SerialComm()), list[float]()
 
@@ -44,9 +45,9 @@ def test_spheres_that_meet_get_no_energy_from_contact(safety: float) -> None:
 
 @pytest.mark.parametrize("mu", [0.1, 0.8])
 def test_the_ledger_has_the_same_half_of_friction_and_of_the_normal_impulse(mu: float) -> None:
-    """A block slides over another block and is pressed on it. The line of the first time has half of the work of the
-    first impulses, with the initial velocities: the ratio of friction to contact is mu times the sliding speed over
-    the closing speed. After the second half of the last impulses all work is booked.
+    """A block slides over another block and is pressed on it. The history line of the first time has half of the work
+    of the first impulses, with the initial velocities. The ratio of friction to contact is then mu times the sliding
+    speed over the closing speed. After the second half of the last impulses all work is booked.
     """
     size, sliding, closing = 1e-3, 15.0, 5.0
     low, high = block((4, 4, 2), size, seed=1), block((3, 3, 2), size, seed=2)
@@ -65,7 +66,7 @@ def test_the_ledger_has_the_same_half_of_friction_and_of_the_normal_impulse(mu: 
 
 
 def test_contact_that_makes_energy_ends_the_run() -> None:
-    """The energy from contact is above run.made_limit, relative to the incoming energy."""
+    """The energy from contact is above run.made_limit, relative to the energy that enters."""
     low, high = block((2, 2, 2), 1e-3), block((2, 2, 2), 1e-3)
     case = meeting_of([{}, {"velocity": (0.0, 0.0, -5.0)}], {}, end=1e-7)
     sim = build(case, [low, moved(high, (0.0, 0.0, 2.1e-3))])
@@ -89,7 +90,9 @@ def test_contact_that_makes_energy_ends_the_run() -> None:
 
 
 def test_the_cost_of_an_impulse_is_the_work_between_two_half_steps() -> None:
-    """The contacts have nodes of 1 and 3 kg and two nodes of infinite mobility; the second contact has no impulse."""
+    """The first contact and the second contact have nodes of 1 and 3 kg and two nodes of infinite mobility; the second
+    contact has no impulse.
+    """
     before, v = np.zeros((4, 3)), np.zeros((4, 3))
     before[:2, 0], v[:2, 0] = (2.0, -1.0), (-1.0, 0.0)
     loaded, active, account = Loaded.of(2, 1), ActiveNodes.of(4), Account(1.0)
@@ -105,12 +108,14 @@ def test_the_cost_of_an_impulse_is_the_work_between_two_half_steps() -> None:
 
 
 def booked(account: Account, taken: float, early: float = 0.0) -> None:
-    """Returns the decision of a step in which contact has taken ``taken``, J."""
+    """Returns the decision of a step in which contact has taken the energy ``taken``, J."""
     account.words[0] += np.rint(np.array([taken, early]) * account.scale).astype(np.int64)
 
 
 def test_contact_gives_back_no_energy_that_it_has_not_taken() -> None:
-    """Contact gives back energy only while the balance is at least twice the largest energy given back in one step."""
+    """Contact gives back energy only while the balance of taken energy is at least twice the largest energy given back
+    in one step.
+    """
     account = Account(1.0)
     assert account.settle(account.words)
     for taken, early, may in (

@@ -1,4 +1,6 @@
-"""Bodies that collide: momentum, energy, and the same answer for any search, cut and frame of reference."""
+"""Bodies that collide: momentum, energy, and equal answers for any broad phase, decomposition and frame of
+reference.
+"""
 
 import math
 from collections.abc import Callable
@@ -34,8 +36,8 @@ MESHES = [
     block((3, 3, 3), SIZE, seed=1),
     moved(block((2, 3, 2), 1.2 * SIZE, seed=2), (3.89 * SIZE, 0.4 * SIZE, 0.6 * SIZE), rotation((1, 2, 3), 0.5)),
 ]
-"""Two blocks whose meshes do not match; the second block is turned, and one of its corners is nearly on the face of
-the first."""
+"""Scene: two blocks whose meshes do not match; the second block is turned, and one of its corners is nearly on the face
+of the first block."""
 MOTIONS: list[dict[str, Any]] = [
     {"velocity": (60.0, 5.0, 0.0), "spin": {"centre": (1.5 * SIZE,) * 3, "rate": (3e3, 0.0, 1e4)}},
     {"velocity": (-70.0, 0.0, 10.0)},
@@ -48,7 +50,7 @@ def case_of(**contact: Any) -> schema.Case:
 
 
 def state_of(sim: Simulation) -> tuple[str | None, int]:
-    """Returns the digest, and the number of searches."""
+    """Returns the digest of a run, and the number of broad phases."""
     assert sim.contact is not None
     return digest(sim.model, sim.comm, []), sim.contact.searches.many
 
@@ -68,8 +70,9 @@ def momenta(sim: Simulation) -> tuple[Floats, Floats]:
 
 @pytest.mark.parametrize("friction", [0.0, 0.3])
 def test_a_collision_keeps_the_momentum(friction: float) -> None:
-    """Linear momentum is conserved to round-off. Angular momentum is conserved up to the moment of the gaps over
-    which impulses act, which is zero along the normal."""
+    """Linear momentum is conserved to round-off. Angular momentum is conserved up to the moment of the impulses across
+    the gaps of contacts, which is zero along the normal.
+    """
     sim = build(case_of(friction=friction), MESHES)
     assert sim.contact is not None
     linear, angular = momenta(sim)
@@ -84,7 +87,7 @@ def test_a_collision_keeps_the_momentum(friction: float) -> None:
 
 @pytest.mark.parametrize("friction", [0.0, 0.3])
 def test_a_step_without_impulses_needs_no_solver(friction: float) -> None:
-    """The solver leaves all velocities as they are in the steps that are found to rest: the answers are equal."""
+    """In steps that are found to rest the solver changes no velocity: the answers are equal."""
     case, solve, found = case_of(friction=friction), ActiveSet.solve, list[tuple[bool, bool]]()
 
     def noted(active: ActiveSet, step: SolverStep, shared: ActiveSum) -> bool:
@@ -104,7 +107,7 @@ def test_a_step_without_impulses_needs_no_solver(friction: float) -> None:
 
 
 def test_pairs_are_not_tested_before_they_can_be_active() -> None:
-    """Two blocks that approach each other have the same answer if all pairs are visited in every step."""
+    """Two blocks that approach each other have an equal answer if all pairs are tested in every step."""
     meshes, holds, far = [MESHES[0], moved(MESHES[1], (SIZE, 0.0, 0.0))], Detection._far, list[bool]()
 
     def noted(of: Detection, now: Scene, together: bool) -> bool:
@@ -133,7 +136,7 @@ def test_the_ledger_closes_and_contact_only_loses(friction: float) -> None:
 
 
 FLAT = [block((3, 3, 3), SIZE, seed=1), moved(block((2, 2, 2), 1.3 * SIZE, seed=2), (3.02 * SIZE, 0.0, 0.0))]
-"""Two blocks a small distance apart along x, with two sides in common planes."""
+"""Scene: two blocks a small distance apart along x, with two sides in common planes."""
 BOUNDARIES: dict[str, Any] = {
     "pusher": ({"kind": "velocity", "parts": ("body0",), "x": 50.0, "y": 0.0, "z": 0.0},),
     "guide": ({"kind": "velocity", "parts": ("body0",), "x": 50.0},),
@@ -146,7 +149,7 @@ BOUNDARIES: dict[str, Any] = {
 @pytest.mark.parametrize("friction", [0.0, 0.2])
 @pytest.mark.parametrize("kind", BOUNDARIES)
 def test_the_ledger_closes_where_boundaries_hold_what_contact_pushes(kind: str, friction: float) -> None:
-    """The supports of held nodes take the impulse; a node on a symmetry plane stays on it, to the bit."""
+    """The supports of held nodes take the impulse; a node on a symmetry plane stays exactly on the plane."""
     motions: list[dict[str, Any]] = [{"velocity": (50.0, 0.0, 0.0)}, {}]
     sim = build(meeting_of(motions, {"friction": friction}, end=3e-6, boundaries=BOUNDARIES[kind]), FLAT)
     lines: list[Energy] = []
@@ -173,7 +176,9 @@ def test_equal_runs_have_equal_digests() -> None:
 
 
 def test_a_search_in_every_step_changes_no_bit() -> None:
-    """The bits are equal, because the candidate list contains every pair that becomes active before the next search."""
+    """The results are bit-identical, because the candidate list contains every pair that becomes active before the next
+    broad phase.
+    """
 
     def search(sim: Simulation, before: Floats) -> None:
         assert sim.contact is not None
@@ -215,7 +220,8 @@ def on_threads(ranks: int, case: schema.Case, work: Callable[[Simulation], Any],
 @pytest.mark.parametrize("ranks", [2, 3, 5])
 def test_any_number_of_ranks_gives_the_same_bits(ranks: int, kind: str) -> None:
     """The scene has friction and edges; the result does not depend on the faces that the ranks send each other. All
-    ranks search together; one rank alone searches less often."""
+    ranks repeat the broad phase together; a rank alone needs fewer broad phases.
+    """
     whole = answer(case_of(friction=0.3))
     case = case_of(friction=0.3, domain=kind)
     parts = on_threads(ranks, case, lambda sim: state_of(run(sim)), MESHES)
@@ -253,7 +259,7 @@ def test_bodies_that_never_meet_move_as_if_there_were_no_contact() -> None:
 
 
 def test_a_common_velocity_does_not_change_a_collision() -> None:
-    """A common velocity has no effect, except the round-off of positions."""
+    """A common velocity of all bodies has no effect, except the round-off of positions."""
     results = []
     drift = np.array([200.0, -300.0, 100.0])
     for flight in (0.0 * drift, drift):
@@ -264,8 +270,9 @@ def test_a_common_velocity_does_not_change_a_collision() -> None:
 
 
 def crossed(edges: bool) -> float:
-    """Returns the mean velocity along z, m/s, of the upper of two crossed bars that collide with one edge each, 1e-5
-    s later."""
+    """Returns the mean velocity along z, m/s, of the upper of two crossed bars, 1e-5 s after the bars collide with one
+    edge each.
+    """
     bar = block((6, 2, 2), SIZE, 0.0)
     meshes = [moved(bar, (0.0, 0.0, 0.0), rotation((1, 0, 0), np.pi / 4))]
     turn = rotation((0, 0, 1), np.pi / 2) @ rotation((1, 0, 0), np.pi / 4)
@@ -282,15 +289,16 @@ def test_crossed_edges_bounce_and_pass_where_edges_are_off() -> None:
 
 
 SLABS = [block((3, 2, 1), SIZE, seed=1), moved(block((2, 3, 1), SIZE, seed=2), (3.01 * SIZE, -0.4 * SIZE, 0.0))]
-"""Two plates one tet thick, whose ends are opposite to each other along x."""
+"""Scene: two plates that are one tet thick, whose ends are opposite to each other along x."""
 THIN = tuple({"kind": "symmetry", "axis": "z", "at": at} for at in (0.0, SIZE))
 """Plane strain: every node of the plates is on one of the two planes."""
 
 
 @pytest.mark.parametrize("ranks", [1, 3])
 def test_bodies_one_tet_thick_between_two_symmetry_planes_do_not_pass_each_other(ranks: int) -> None:
-    """At 20 m/s each the plates are in contact after 0.25 us; without contact they would overlap by 0.3 mm 8 us
-    later."""
+    """At 20 m/s each, the plates are in contact after 0.25 us; without contact the plates would overlap by 0.3 mm 8 us
+    later.
+    """
     case = meeting_of([{"velocity": (20.0, 0.0, 0.0)}, {"velocity": (-20.0, 0.0, 0.0)}], end=8e-6, boundaries=THIN)
 
     def ended(sim: Simulation) -> tuple[float, float, str | None]:
@@ -308,8 +316,9 @@ def test_bodies_one_tet_thick_between_two_symmetry_planes_do_not_pass_each_other
 
 
 def test_only_a_face_in_one_symmetry_plane_is_no_surface() -> None:
-    """The surface of a plate one tet thick includes its sides, two faces for each cell; the surface of a plate
-    between planes normal to two axes includes its ends."""
+    """The surface of a plate one tet thick includes its sides, two faces for each cell; the surface of a plate between
+    planes normal to two axes includes its ends.
+    """
     walls = (*THIN, *({"kind": "symmetry", "axis": "y", "at": at, "parts": ("body0",)} for at in (0.0, 2.0 * SIZE)))
     case = meeting_of([{}, {}], end=END, boundaries=walls)
     sim = build(case, SLABS)
@@ -321,7 +330,7 @@ def test_only_a_face_in_one_symmetry_plane_is_no_surface() -> None:
 
 @pytest.mark.parametrize(("parts", "named"), [(("body1",), "body1"), ((), "body0")])
 def test_a_part_whose_faces_all_lie_on_symmetry_planes_is_named(parts: tuple[str, ...], named: str) -> None:
-    """The first part is named if no part has a face."""
+    """The error names the first part if no part has a face."""
     cube = block((2, 2, 2), SIZE, shake=0.0)
     planes = tuple(
         schema.Symmetry(kind="symmetry", axis=axis, at=at, parts=parts)
@@ -334,7 +343,7 @@ def test_a_part_whose_faces_all_lie_on_symmetry_planes_is_named(parts: tuple[str
 
 
 def collided(share: float) -> tuple[Simulation, list[Energy], Floats]:
-    """Returns energy balances and the drift of the momentum of two colliding blocks whose meshes do not match."""
+    """Returns the energies and the drift of the momentum of two colliding blocks whose meshes do not match."""
     sim, lines = build(case_of(restitution=share), MESHES), []
     start = np.concatenate(momenta(sim))
     run(sim, lambda sim, before: lines.append(sim.ledger.close(before)))
@@ -356,8 +365,9 @@ def test_an_impact_with_restitution_1_takes_no_energy() -> None:
 
 @pytest.mark.parametrize("gap", [0.0, 0.02])
 def test_the_force_of_contact_is_what_changes_the_momentum(gap: float) -> None:
-    """The sum of force times time over all lines of the history is the change of momentum, for blocks that touch
-    from the start and for blocks that do not."""
+    """The sum of force times time over all history lines is the change of momentum, for blocks that touch from the
+    start and for blocks that do not.
+    """
     case = meeting_of(
         [{}, {"velocity": (-80.0, 10.0, 0.0)}], end=1e-6,
         probes=tuple(
@@ -382,7 +392,7 @@ def test_the_force_of_contact_is_what_changes_the_momentum(gap: float) -> None:
 
 
 def _momenta_of_parts(sim: Simulation) -> Floats:
-    """Returns (6,) momentum from v(n+1/2) of body0 and body1, kg m/s."""
+    """Returns (6,) the momentum from v(n+1/2) of body0 and body1, kg m/s."""
     nodes = sim.model.nodes
     p = nodes.mass[:, None] * nodes.v
     return np.array([math.fsum(column) for part in range(2) for column in p[nodes.part == part].T])
@@ -398,8 +408,9 @@ def test_the_answer_with_restitution_is_the_same_on_three_ranks() -> None:
 
 @pytest.mark.parametrize(("gap", "restitution"), [(0.0, 0.0), (0.1, 0.0), (0.1, 1.0), (2.5, 0.0), (2.5, 1.0)])
 def test_the_step_in_which_fast_bodies_meet_first_is_short(gap: float, restitution: float) -> None:
-    """The bodies move at 10 km/s from a ``gap`` in edge lengths: the impulse of contact moves a node by at most half
-    of a tet."""
+    """The bodies move at 10 km/s from a ``gap`` in edge lengths: the impulse of contact moves a node by at most half of
+    a tet.
+    """
     striker = moved(block((2, 2, 2), SIZE, seed=2), ((3.0 + gap) * SIZE, 0.4 * SIZE, 0.6 * SIZE))
     case = meeting_of([{}, {"velocity": (-1e4, 0.0, 0.0)}], {"restitution": restitution}, end=1e-6)
     sim = build(case, [block((3, 3, 3), SIZE, seed=1), striker])

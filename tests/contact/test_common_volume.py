@@ -1,4 +1,4 @@
-"""The common volume of bodies or fragments is measured, with and without nodes inside of another body."""
+"""The common volume of bodies or fragments is measured, with and without nodes inside of the other body."""
 
 import numpy as np
 import pytest
@@ -18,7 +18,7 @@ REGULAR = np.array([[1.0, 1.0, 1.0], [-1.0, 1.0, -1.0], [1.0, -1.0, -1.0], [-1.0
 
 
 def common(one: Floats, other: Floats) -> float:
-    """Returns the common volume over the volume of the first tet."""
+    """Returns the common volume of two tets divided by the volume of the first tet."""
     rooms = np.empty((2, 81, 4, 3))
     whole = float(np.linalg.det(one[1:] - one[:1]))
     return float(intersection(rooms[0], rooms[1], np.ascontiguousarray(one), np.ascontiguousarray(other))) / whole
@@ -34,13 +34,14 @@ def common(one: Floats, other: Floats) -> float:
         (0.5 * CORNER, CORNER, 1.0),
         (CORNER, CORNER + np.array([1.0, 0.0, 0.0]), 0.0),
         (CORNER, CORNER + np.array([5.0, 0.0, 0.0]), 0.0),
-        (REGULAR, -REGULAR[[0, 1, 3, 2]], 0.5),  # the octahedron that two tets of a stella octangula have in common
+        (REGULAR, -REGULAR[[0, 1, 3, 2]], 0.5),  # the octahedron that is common to the two tets of a stella octangula
         (CORNER, np.array([[0.2, 0.2, -1.0], [0.25, 0.2, -1.0], [0.2, 0.25, -1.0], [0.2, 0.2, 9.0]]), None),
     ],
 )
 def test_what_two_tets_have_in_common(one: Floats, other: Floats, share: float | None) -> None:
-    """The expected value, if it is not given, is counted with points on a fine grid. No node of a tet needs to be
-    in the other tet."""
+    """The expected common volume, if it is not given, is counted with points on a fine grid. The common volume is found
+    even if no node of a tet is in the other tet.
+    """
     both = (
         common(one, other),
         common(other, one) * np.linalg.det(other[1:] - other[:1]) / np.linalg.det(one[1:] - one[:1]),
@@ -93,7 +94,7 @@ def seen(sim: Simulation) -> CommonVolume:
 
 @pytest.mark.parametrize("depth", [-0.1e-3, 0.0, 0.02e-3, 0.3e-3, 0.9e-3])
 def test_a_block_that_has_sunk_into_another(depth: float) -> None:
-    """The whole common volume is in tets with a corner on the surface, of both blocks: the volume counts twice."""
+    """The whole common volume is in tets of both blocks with a corner on the surface: the volume counts twice."""
     found, deep = sunk(build(CASE, [LOWER, UPPER]), depth), max(depth, 0.0)
     whole = 4.0**3 - core() + 8.0
     assert found.share * whole == pytest.approx(2 * 4.0 * deep / 1e-3, rel=1e-6)
@@ -102,7 +103,7 @@ def test_a_block_that_has_sunk_into_another(depth: float) -> None:
 
 
 def core() -> float:
-    """Returns the volume of the tets of the larger block without a corner on its surface, mm^3."""
+    """Returns the volume of those tets of the larger block that have no corner on its surface, mm^3."""
     outer = np.any((LOWER.points < 1e-9) | (LOWER.points > 4e-3 - 1e-9), axis=1)
     return float((~np.asarray(outer)[LOWER.tets].any(axis=1)).sum()) / 6.0
 
@@ -126,7 +127,7 @@ def test_bars_that_cross_without_a_node_inside() -> None:
 
 
 def test_loose_tets_of_one_part_that_meets_itself() -> None:
-    """Without fracture there are no fragments: the common volume of tets without a common node counts."""
+    """Without fracture there are no fragments; the common volume of tets without a common node counts."""
     mesh = block((2, 1, 1), 1e-3, shake=0.0)
     loose = TetMesh(mesh.points[mesh.tets].reshape(-1, 3), np.arange(4 * len(mesh.tets), dtype=np.int32).reshape(-1, 4))
     centres = np.repeat(loose.points.reshape(-1, 4, 3).mean(axis=1), 4, axis=0)

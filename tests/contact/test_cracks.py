@@ -1,4 +1,4 @@
-"""Cracks and families: updates of their tables."""
+"""Cracks and node families: updates of their tables."""
 
 from types import SimpleNamespace
 
@@ -49,8 +49,9 @@ def test_a_crack_that_comes_after_others_have_opened_stands_behind_those_that_ar
 
 
 def test_a_rank_with_both_sides_of_a_crack_has_the_row_of_the_first() -> None:
-    """Ranks with one side each begin with different nodes, and the last bit of a normal depends on the first node.
-    The rank of the first side has computed the crack."""
+    """Two ranks with one side each begin with different nodes, and the last bit of a normal depends on the first node.
+    The rank of the first side has computed the crack for both ranks.
+    """
     ids, places, zeros = np.array([10, 11, 12]), np.zeros(3, np.int32), np.zeros((3, 3))
     none, force = np.zeros(3), zeros.astype(np.int64)
     nodes = Nodes(ids, places, places, np.ones(3, bool), zeros, zeros, zeros, none, force, none)
@@ -139,7 +140,7 @@ def test_copies_join_the_families_of_their_parents() -> None:
 
 @pytest.mark.parametrize("seed", range(3))
 def test_the_nodes_beside_cracks_are_those_of_their_tets_and_families(seed: int) -> None:
-    """Random cracks between random tets, some of another rank; compared with sets."""
+    """Random cracks between random tets, some of them on another rank, are compared with sets."""
     random = np.random.default_rng(seed)
     families = Families.of(random.integers(0, 25, 40))
     tets, n = random.integers(0, 40, (30, 4)).astype(np.uint32), 50

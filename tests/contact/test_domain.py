@@ -1,5 +1,6 @@
-"""The contact domain: all faces and edges that touch the boxes of another rank are sent; cells send at most as much
-as bounding boxes."""
+"""The contact domain: all faces and edges that touch the boxes of another rank are sent to this rank. Domains of cells
+send at most as many faces and edges as bounding boxes.
+"""
 
 import numpy as np
 import pytest
@@ -18,7 +19,7 @@ KINDS = ("box", "arbitrary")
 
 class Share:
     """Boxes of one rank: the box of its nodes and edges, the box of its faces, and the box of its edges. Some ranks
-    lack one of these boxes.
+    lack one of these three boxes.
     """
 
     def __init__(self, rank: int, seed: int, ranks: int) -> None:
@@ -42,7 +43,7 @@ def chosen(kind: str, shares: list[Share], edge: float) -> list[dict[int, list[F
 
 
 def touched(things: Boxes, askers: Boxes) -> Flags:
-    """Returns (things,) whether each thing touches a box of the requesting ranks, by comparison of all pairs."""
+    """Returns (things,) whether each thing touches a box of the requesting ranks, by a comparison of all pairs."""
     low, high = askers.low[None], askers.high[None]
     touch = np.asarray(((things.low[:, None] <= high) & (things.high[:, None] >= low)).all(axis=2))
     return np.asarray(touch.any(axis=1))
@@ -91,8 +92,9 @@ def test_a_rank_that_needs_no_ghosts_is_left_out() -> None:
 
 
 def faces_received(kind: str, drift: float, ranks: int = 3) -> int:
-    """Returns the number of ghost faces of all ranks for two blocks that approach at 10 m/s, and move together in x,
-    y and z, m/s."""
+    """Returns the number of ghost faces of all ranks for two blocks that approach each other at 10 m/s, and move
+    together in x, y and z, m/s.
+    """
     meshes = [
         block((4, 4, 4), 1e-3),
         moved(block((3, 3, 3), 1e-3), (1e-3, 1e-3, 4.5e-3), rotation((1, 2, 0), 0.2)),

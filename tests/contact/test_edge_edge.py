@@ -1,4 +1,4 @@
-"""Contacts of edges in a step: if convex bodies begin to overlap in the step, they always have a contact."""
+"""Contacts of edges in a step: convex bodies that begin to overlap in the step always have a contact."""
 
 import numpy as np
 import pytest
@@ -13,7 +13,7 @@ from .kernels import edge_edge, every_pair, lowest_heights, many, node_face
 ONE = np.array([[-1.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, -1.0], [0.0, -1.0, -1.0]])
 """An edge along x on top of a body: its two ends, and the third nodes of its two faces."""
 EDGES = np.array([[0, 1, 2, 3, 3, 2], [4, 5, 6, 7, 7, 6]], np.int32)
-"""Opposite nodes of two tets."""
+"""Opposite nodes of the two tets at the edge ``ONE``."""
 PAIR = np.array([[0, 1]], np.int32)
 
 
@@ -27,8 +27,9 @@ def meets(
     gap: float = 0.1, speed: float = -0.2, angle: float = np.pi / 2, shift: tuple[float, float] = (0.0, 0.0),
     one: Floats = ONE, width: float = 1.0, tilt: float = 0.0,
 ) -> ContactRows:  # fmt: skip
-    """Returns the contacts of two edges ``gap`` apart; the upper edge moves at ``speed`` for a step of 1 s; ``tilt``
-    turns the lower body."""
+    """Returns the contacts of two edges that are ``gap`` apart; the upper edge moves at ``speed`` for a step of 1 s;
+    ``tilt`` turns the lower body.
+    """
     lower = one @ rotation((1, 0, 0), tilt).T
     x = np.concatenate([lower, turned(angle, width) + np.array([*shift, gap])])
     v = np.concatenate([np.zeros((4, 3)), np.tile([0.0, 0.0, speed], (4, 1))])
@@ -77,7 +78,9 @@ def test_edges_that_cross_beyond_an_end_do_not_meet() -> None:
 
 
 def crossings(ends: Floats) -> tuple[Floats, Floats]:
-    """Returns the crossing points of two edges each of ``ends`` (..., 4, 3), as fractions of both lengths, (...)."""
+    """Returns the crossing points of the two edges of each of ``ends`` (..., 4, 3), as fractions of both lengths,
+    (...).
+    """
     u, w, r = ends[..., 1, :] - ends[..., 0, :], ends[..., 3, :] - ends[..., 2, :], ends[..., 2, :] - ends[..., 0, :]
     uu, uw, ww, ur, wr = ((a * b).sum(axis=-1) for a, b in ((u, u), (u, w), (w, w), (u, r), (w, r)))
     return (ww * ur - uw * wr) / (uu * ww - uw * uw), (uw * ur - uu * wr) / (uu * ww - uw * uw)
@@ -85,8 +88,8 @@ def crossings(ends: Floats) -> tuple[Floats, Floats]:
 
 @pytest.mark.parametrize("seed", range(4))
 def test_edges_that_cross_beyond_an_end_do_so_while_ends_move_by_less_than_the_bound(seed: int) -> None:
-    """The ends are near each other, at any angle. The bound is not far from the exact value: if ends move by 20
-    times as much, some edges cross between their ends.
+    """The ends of the two edges are near each other, at any angle. The bound is not far from the exact value: if ends
+    move by 20 times as much, some edges cross between their ends.
     """
     random = np.random.default_rng(seed)
     ends = random.normal(size=(400, 4, 3))
@@ -108,7 +111,7 @@ def test_edges_that_cross_beyond_an_end_do_so_while_ends_move_by_less_than_the_b
 
 
 def test_edges_meet_where_they_cross_not_where_they_end_the_step() -> None:
-    """The upper edge moves to the side in the same step, after it has passed, or comes from the side."""
+    """The upper edge moves to the side in the same step, after it has passed the lower edge, or comes from the side."""
     x = np.concatenate([ONE, turned(np.pi / 2) + np.array([0.5, 0.0, 0.1])])
     for sideways, found in ((0.9, 1), (1.1, 0), (-1.0, 1)):
         v = np.concatenate([np.zeros((4, 3)), np.tile([sideways, 0.0, -0.2], (4, 1))])
@@ -125,8 +128,9 @@ def test_a_concave_edge_meets_nothing() -> None:
 
 @pytest.mark.parametrize(("tilt", "found"), [(0.0, 1), (0.7, 1), (0.85, 0), (-0.7, 1), (-0.85, 0), (np.pi, 0)])
 def test_an_edge_meets_only_what_comes_between_its_faces(tilt: float, found: int) -> None:
-    """The faces of the lower edge have a slope of 45 degrees. If the body is turned by more, one face is directed
-    upwards and has contacts with nodes."""
+    """The faces of the lower edge have a slope of 45 degrees. If the lower body is turned by more than this slope, one
+    face is directed upwards and has contacts with nodes.
+    """
     assert many(meets(tilt=tilt)) == found
 
 
@@ -144,7 +148,7 @@ def test_edges_meet_when_they_pass_or_are_near_and_not_too_deep(gap: float, spee
 
 @pytest.mark.parametrize(("gap", "found"), [(-0.95 * DEEP_SELF, 1), (-1.05 * DEEP_SELF, 0)])
 def test_edges_of_flat_tets_hold_to_a_share_of_their_length(gap: float, found: int) -> None:
-    """The edges are 2 m long, and their tets are ten times flatter than in the test before."""
+    """The edges are 2 m long, and their tets are ten times flatter than those of the previous test."""
     flat = np.array([1.0, 1.0, 0.1])
     x = np.concatenate([ONE * flat, turned(np.pi / 2) * flat + np.array([0.0, 0.0, 2.0 * gap])])
     assert many(edge_edge(x, np.zeros((8, 3)), EDGES, PAIR, 1.0)) == found
@@ -153,7 +157,7 @@ def test_edges_of_flat_tets_hold_to_a_share_of_their_length(gap: float, found: i
 @pytest.mark.parametrize("thick", [0.6, 0.9, 1.5, 6.0])
 @pytest.mark.parametrize("which", [0, 1])
 def test_edges_between_two_tets_hold_to_a_quarter_of_the_lower_one(thick: float, which: int) -> None:
-    """One of the two tets below ONE is ``thick``; the upper edge belongs to a tet four times as large."""
+    """One of the two tets below the edge ``ONE`` is ``thick``; the upper edge belongs to a tet four times as large."""
     apexes = np.array([[0.0, 0.5, -0.5], [0.0, -0.5, -0.5]]) - 4.0 * np.array([[0.0, 1.0, 1.0], [0.0, -1.0, 1.0]])
     apexes[which] *= thick / 6.0
     edges = EDGES.copy()
@@ -169,8 +173,9 @@ def test_edges_between_two_tets_hold_to_a_quarter_of_the_lower_one(thick: float,
 
 @pytest.mark.parametrize("order", [1, -1])
 def test_the_opposite_edges_of_a_flat_tet_do_not_meet(order: int) -> None:
-    """The edges are behind each other by the thickness of the tet; two such edges of two different tets have passed
-    each other."""
+    """The two edges are behind each other by the thickness of the tet; two such edges of two different tets have passed
+    each other.
+    """
     flat = np.array([[-1.0, 0.0, 0.01], [1.0, 0.0, 0.01], [0.0, -1.0, -0.01], [0.0, 1.0, -0.01]])
     one, two = [0, 1, 3, 2, 2, 3], [2, 3, 1, 0, 0, 1]
     v = np.zeros((8, 3))
@@ -191,7 +196,7 @@ _OUT = ((1, 2, 3, 0), (0, 3, 2, 1), (0, 1, 3, 2), (0, 2, 1, 3))
 
 
 def surface_of(tet: "np.ndarray") -> tuple[Indices, Indices]:
-    """Returns faces and edges of a tet with positive volume of these nodes, in the form of the worker."""
+    """Returns faces and edges of a tet with positive volume that has the given nodes, in the form of the worker."""
     faces = np.array([[tet[k] for k in row] for row in _OUT], np.int32)
     edges = []
     for i in range(4):
@@ -215,7 +220,7 @@ RIDGES = np.concatenate([surface_of(tet)[1] for tet in TETS])
 
 
 def overlap(x: Floats, y: Floats) -> bool:
-    """Returns whether two tets (4, 3) have a common point: no face and no two edges have a separating plane."""
+    """Returns whether two tets (4, 3) have a common point: no face and no two edges give a separating plane."""
     sides = [np.array([p[j] - p[i] for i in range(4) for j in range(i + 1, 4)]) for p in (x, y)]
     axes = [np.cross(p[[1, 0, 0, 0]] - p[[2, 3, 1, 2]], p[[3, 2, 3, 1]] - p[[2, 3, 1, 2]]) for p in (x, y)]
     axes.append(np.cross(sides[0][:, None], sides[1][None]).reshape(-1, 3))
@@ -225,7 +230,9 @@ def overlap(x: Floats, y: Floats) -> bool:
 
 
 def approach(random: np.random.Generator) -> tuple[Floats, Floats]:
-    """Returns two tets shortly before contact, and the motion (3,) of the second with which they begin to overlap."""
+    """Returns two tets shortly before contact, and the motion (3,) of the second tet with which the tets begin to
+    overlap.
+    """
     while True:
         pair = random.normal(size=(2, 4, 3))
         volumes = np.linalg.det(pair[:, 1:] - pair[:, :1])
@@ -246,7 +253,9 @@ def approach(random: np.random.Generator) -> tuple[Floats, Floats]:
 
 
 def meet(x: Floats, step: Floats) -> tuple[int, int]:
-    """Returns the numbers of contacts of nodes and of edges when the second tet moves by ``step``."""
+    """Returns the number of contacts of nodes and the number of contacts of edges when the second tet moves by
+    ``step``.
+    """
     v = np.concatenate([np.zeros((4, 3)), np.tile(step, (4, 1))])
     pairs = [every_pair(TETS[i], 4) + np.array([0, 4 * (1 - i)], np.int32) for i in (0, 1)]
     nodes = sum(many(node_face(x, v, FACES, p, 1.0, np.repeat([0, 1], 4))) for p in pairs)
@@ -254,15 +263,15 @@ def meet(x: Floats, step: Floats) -> tuple[int, int]:
 
 
 def lowest_altitude(x: Floats) -> float:
-    """Returns the lowest altitude of two tets with these corners, m."""
+    """Returns the lowest altitude of two tets with the given corners, m."""
     return float(lowest_heights(x[TETS]).min())
 
 
 @pytest.mark.parametrize(("share", "late"), [(0.5, 3), (0.05, 0)])
 def test_convex_bodies_that_come_to_overlap_in_a_step_meet_in_it(share: float, late: int) -> None:
-    """Random tets move in random directions by a fraction of their lowest altitude (contact allows at most half of
-    it in a step). Half of the collisions begin with two edges only. Edges that do not cross in a step are tested
-    only at its end: with the longest steps one pair in a thousand is found one step later.
+    """Random tets move in random directions by a fraction of their lowest altitude (contact allows at most half of it
+    in a step). Half of the collisions begin only between two edges. Edges that do not cross in a step are tested only
+    at the end of the step: with the longest steps one pair in a thousand is found one step later.
     """
     random, alone, missed = np.random.default_rng(1), 0, 0
     for _ in range(200):

@@ -1,8 +1,8 @@
-"""Bodies that collide with one face each, equal or nearly equal.
+"""Bodies that collide with one face each; the two faces are equal or nearly equal.
 
-All nodes of one have their feet on the border of the other's face. No node is ever inside of the other body if this
-body becomes narrower behind its face, so contacts are not found later; and edges cross in the plane of both faces, at
-the limit of their contacts.
+All nodes of one face have their feet on the border of the other face. If a body becomes narrower behind its face, no
+node is ever inside of it, so that contacts are not found later. The edges cross in the plane of both faces, at the
+limit of their contacts.
 """
 
 import numpy as np
@@ -15,30 +15,31 @@ from ..worker.meshes import Floats
 from .bodies import meeting_of
 
 MANY = 25
-"""Number of pairs, each computed on its own."""
+"""Number of pairs of faces; each pair is computed separately."""
 APART, MM = 8.0, 1e-3
 CORNERS = np.array([[1.0, 0.0], [-0.5, 0.75**0.5], [-0.5, -(0.75**0.5)]])
-"""Corners of a face of circumradius 1."""
+"""Corners of a triangular face of circumradius 1."""
 POINTS = np.random.default_rng(7).dirichlet([0.6] * 4, 200)
-"""Area coordinates of points of a tet, many of them near its border."""
+"""Area coordinates of points of a tet, many of the points near its border."""
 
 
 def turned(degrees: float) -> Floats:
-    """(2, 2) rotation."""
+    """Returns a (2, 2) rotation matrix."""
     c, s = np.cos(np.radians(degrees)), np.sin(np.radians(degrees))
     return np.array([[c, s], [-s, c]])
 
 
 def tets(corners: list[Floats], heights: float) -> TetMesh:
-    """A tet on each of the faces (3, 3), mm, with its tip ``heights`` above or below their middle."""
+    """Returns a tet on each of the faces (3, 3), mm, with its tip ``heights`` above or below the middle of the face."""
     points = np.concatenate([np.vstack([face, face.mean(axis=0) + np.array([0.0, 0.0, heights])]) for face in corners])
     rows = np.arange(len(points), dtype=np.int32).reshape(-1, 4)
     return TetMesh(MM * points, rows if heights > 0.0 else rows[:, [0, 2, 1, 3]])
 
 
 def common(one: Floats, two: Floats) -> float:
-    """Returns the fraction of POINTS of a tet, corners (4, 3), that are inside of another tet by more than 0.01 of
-    it."""
+    """Returns the fraction of POINTS of a tet, corners (4, 3), that are inside of another tet by more than 0.01 of its
+    size.
+    """
     inside = np.linalg.solve((two[1:] - two[0]).T, (POINTS @ one - two[0]).T).T
     return float((np.column_stack([inside, 1.0 - inside.sum(axis=1)]).min(axis=1) > 0.01).mean())
 
@@ -48,7 +49,7 @@ def common(one: Floats, two: Floats) -> float:
     [(2.0, 0.0, 0.0), (2.0, 0.05, 0.0), (2.0, 0.2, 0.0), (1.41, 0.1, 3.0), (6.0, 0.1, 3.0), (0.5, 0.2, 180.0)],
 )
 def test_equal_faces_do_not_pass_each_other(height: float, shift: float, turn: float) -> None:
-    """The faces are shifted by up to ``shift`` of their circumradius, and rotated by up to ``turn`` degrees."""
+    """The two faces are shifted by up to ``shift`` of their circumradius, and rotated by up to ``turn`` degrees."""
     random, upper, lower = np.random.default_rng(1), [], []
     for k in range(MANY):
         place = np.array([APART * (k % 5), APART * (k // 5), 0.0])

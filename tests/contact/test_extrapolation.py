@@ -1,4 +1,4 @@
-"""Extrapolated velocities of a search: rigid motions are preserved, vibrations are removed."""
+"""Extrapolated velocities of the broad phase: rigid motions are preserved, vibrations are removed."""
 
 import numpy as np
 import pytest
@@ -30,7 +30,7 @@ def test_a_rigid_motion_is_kept() -> None:
 
 @pytest.mark.parametrize("seed", range(3))
 def test_the_rigid_motion_has_the_momentum_and_spin_of_the_tet(seed: int) -> None:
-    """The rigid motion is that of least squares: the removed part has neither momentum nor spin."""
+    """The rigid motion is that of least squares: the removed part of the velocities has neither momentum nor spin."""
     v = np.random.default_rng(seed).normal(0.0, 100.0, (4, 3))
     left = v - course(TET, v, [[0, 1, 2, 3]])
     assert np.abs(left.sum(axis=0)).max() < 4 * QUANTUM
@@ -54,8 +54,9 @@ def test_a_node_of_two_tets_has_the_mean_of_their_motions() -> None:
 
 
 def test_other_nodes_keep_their_velocities() -> None:
-    """Nodes of a metal, nodes without tets, and nodes of a tet too flat for a spin have their own or mean
-    velocities."""
+    """Nodes of a metal, and nodes without tets, are extrapolated with their own velocities or with mean velocities; so
+    are nodes of a tet that is too flat for a spin.
+    """
     v = np.random.default_rng(2).normal(0.0, 100.0, (4, 3))
     assert np.array_equal(course(TET, v, [[0, 1, 2, 3]], brittle=False), v)
     assert np.array_equal(course(np.concatenate([TET, TET[:1]]), np.concatenate([v, v[:1]]), [[0, 1, 2, 3]])[4], v[0])

@@ -1,6 +1,6 @@
 """Bodies that pass the free edges of another body: flush, or nearer than the tolerance of a node on a face. A node
-beside a convex edge is in front of one of the two faces of the edge, and therefore outside of the body, also if it
-is only slightly beyond the border of the other face.
+beside a convex edge is in front of one of the two faces of the edge, and therefore outside of the body, even if the
+node is only slightly beyond the border of the other face.
 """
 
 import numpy as np
@@ -20,12 +20,12 @@ LEAN = float(np.tan(np.radians(12.5)))
 
 
 def box(cells: tuple[int, int, int], size: float, low: tuple[float, float, float]) -> TetMesh:
-    """Returns cubes of ``size`` from ``low`` on, mm."""
+    """Returns cubes of the edge length ``size`` from ``low`` on, mm."""
     return moved(block(cells, MM * size, 0.0), [MM * value for value in low])
 
 
 def passed(*meshes: TetMesh) -> Simulation:
-    """Returns the result after the first body has moved along x towards the others, without friction."""
+    """Returns the result after the first body has moved along x towards the other bodies, without friction."""
     motions = [{"velocity": (SPEED, 0.0, 0.0)}, *({} for _ in meshes[1:])]
     return run(build(meeting_of(motions, end=END), meshes))
 
@@ -59,14 +59,14 @@ def test_bars_fly_past_each_other_side_by_side() -> None:
 
 @pytest.mark.parametrize("depth", [0.0, 0.1, 1.0, 5.9])
 def test_a_body_below_the_top_of_the_plate_hits_the_plate(depth: float) -> None:
-    """The plates collide head-on, with flush tops and with a smaller overlap, down to a tenth of a millimetre."""
+    """The two plates collide head-on, with flush tops and with a smaller overlap, down to a tenth of a millimetre."""
     low = -6.0 + depth
     assert speed(passed(box((5, 5, 3), 2.0, (-4.0, -5.0, low)), PLATE)) < 0.9 * SPEED
 
 
 @pytest.mark.parametrize("above", [0.0, 0.001])
 def test_a_body_that_slides_on_a_floor_hits_the_wall_at_its_end(above: float) -> None:
-    """The body is concave: a node in front of the floor enters through the wall."""
+    """The body is concave: a node in front of the floor of the body enters through its wall."""
     whole = box((12, 6, 6), 2.0, (-6.0, -6.0, -6.0))
     middles = whole.points[whole.tets].mean(axis=1)
     tets = whole.tets[(middles[:, 0] > 8.0 * MM) | (middles[:, 2] < 0.0)]
@@ -79,8 +79,9 @@ def test_a_body_that_slides_on_a_floor_hits_the_wall_at_its_end(above: float) ->
 
 
 def ridge(node: float) -> TetMesh:
-    """Returns a bar of two layers whose sharp front edge is inclined by 12.5 degrees; its middle ``node``, mm, is at
-    y = 0."""
+    """Returns a bar of two layers whose sharp front edge is inclined by 12.5 degrees; the ``node``, mm, in the middle
+    of the edge is at y = 0.
+    """
     mesh = block((2, 2, 2), 1.0, 0.0)
     across, along, up = (mesh.points / (2, 2, 1)).T
     z = np.interp(up, [0.0, 1.0, 2.0], [-1.0, node, 2.0])
@@ -92,8 +93,8 @@ def ridge(node: float) -> TetMesh:
 @pytest.mark.parametrize("node", [0.23, 0.26, 0.35, 0.44, 0.53])
 def test_a_leaning_ridge_slides_down_a_rim(node: float) -> None:
     """A thin block is pressed against the ridge by its weight and moves back. In an earlier version the top of the
-    block stopped a node of the ridge some 1e-3 of a face behind the rim: the external work was 164, 9, 23 and 120 mJ
-    instead of 0.7 mJ, but not at 0.26.
+    block stopped a node of the ridge some 1e-3 of a face behind the rim. The external work was then 164, 9, 23 and 120
+    mJ instead of 0.7 mJ, but not for the position 0.26.
     """
     drive = {"kind": "velocity", "parts": ("body0",), "x": 0.0, "y": 0.0, "z": -20.0}
     held = {"kind": "symmetry", "axis": "z", "at": -0.25 * MM, "parts": ("body1",)}

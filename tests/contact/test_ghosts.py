@@ -1,4 +1,4 @@
-"""Ghosts: messages contain every bit, and all ranks with impulses on a common node have the same lists."""
+"""Ghosts: messages contain every bit of a ghost, and all ranks with impulses on a common node have equal lists."""
 
 from collections import defaultdict
 from itertools import permutations
@@ -29,7 +29,7 @@ def random_nodes(random: np.random.Generator, n: int) -> SurfaceNodes:
 
 
 def same(one: SurfaceNodes, two: SurfaceNodes) -> bool:
-    """Returns whether all columns except ``local`` are equal to the bit."""
+    """Returns whether all columns except ``local`` are bit-identical."""
     names = ("id", "owner", "part", "mobility", "x", "v")
     return all(
         getattr(one, name).dtype == getattr(two, name).dtype
@@ -114,8 +114,8 @@ def test_a_fetched_node_is_its_owners(ranks: int) -> None:
 @pytest.mark.parametrize("ranks", [1, 2, 3, 5, 8])
 @pytest.mark.parametrize("share", [0.0, 0.05, 0.5])
 def test_all_ranks_of_a_node_have_the_same_lists(ranks: int, share: float) -> None:
-    """The lists of a node with a contact on any rank are on its owner, on the ranks with the node and on the ranks with
-    contacts; each pair of these ranks has the same ids.
+    """The lists of a node that has a contact on any rank are on its owner, on the ranks with the node and on the ranks
+    with contacts. Each two of these ranks have lists with equal ids.
     """
     models, neighbours = models_of(ranks)
     random = np.random.default_rng([ranks, int(100 * share)])

@@ -1,4 +1,4 @@
-"""Rows of faces and edges at the slots of a search are found through all copies of the slots."""
+"""Rows of faces and edges at the slots of a broad phase are found through all copies of the slots."""
 
 import numpy as np
 import pytest
@@ -8,7 +8,9 @@ from conoid.worker.contact.scene.incidence import Incidence
 
 @pytest.mark.parametrize("seed", range(5))
 def test_every_row_with_a_slot_or_a_copy_of_it_is_found_once(seed: int) -> None:
-    """Corners become copies, and copies become copies again; the rows may contain copies of the same slot."""
+    """Corners of faces are replaced by copies, and copies by further copies; the rows may contain copies of the same
+    slot.
+    """
     draw, slots = np.random.default_rng(seed), 40
     corners = draw.integers(0, slots, (60, 4)).astype(np.int32)
     incidence, root = Incidence(corners), np.arange(slots, dtype=np.int32)

@@ -1,4 +1,4 @@
-"""Nodes inside of other bodies are found, and their depth is computed."""
+"""Nodes inside of other bodies are found, and the depths of these nodes are computed."""
 
 import numpy as np
 import pytest
@@ -15,7 +15,9 @@ SIZE = 1e-3
 
 
 def sunk(depth: float) -> Simulation:
-    """Returns a small block that penetrates the top of a larger block by ``depth``, m, between four of its nodes."""
+    """Returns a small block that penetrates the top of a larger block by ``depth``, m, between four nodes of the larger
+    block.
+    """
     lower, upper = block((4, 4, 4), SIZE, shake=0.0), block((2, 2, 2), 0.4 * SIZE, shake=0.0)
     case = meeting_of([{}, {}], end=2e-7)
     sim = build(case, [lower, moved(upper, (1.13 * SIZE, 1.08 * SIZE, 4.5 * SIZE))])
@@ -37,8 +39,8 @@ def test_separate_touching_or_hardly_deep_bodies_are_not_inside(depth: float) ->
 
 @pytest.mark.parametrize("depth", [0.2 * SIZE, 0.3 * SIZE])
 def test_the_lower_nodes_of_a_block_are_as_deep_as_it_has_sunk(depth: float) -> None:
-    """Nine nodes are inside. For nodes in tets without a face on top the depth is the distance from the nearest face
-    of the tet, which may be small.
+    """Nine nodes are inside of the other block. For nodes in tets without a face on top, the depth is the distance from
+    the nearest face of the tet, which may be small.
     """
     sim = sunk(depth)
     found = seen(sim)
@@ -50,7 +52,7 @@ def test_the_lower_nodes_of_a_block_are_as_deep_as_it_has_sunk(depth: float) -> 
 
 
 def test_a_node_below_the_outermost_tets_counts_as_inside() -> None:
-    """The middle of the larger block consists of tets without a corner on its surface."""
+    """The middle of the larger block consists of tets that have no corner on its surface."""
     found = seen(sunk(2.0 * SIZE))
     assert found.nodes > 9
     assert found.buried > 0
@@ -61,7 +63,7 @@ def test_a_node_below_the_outermost_tets_counts_as_inside() -> None:
 
 @pytest.mark.parametrize(("depth", "buried"), [(0.025 * SIZE, False), (0.1 * SIZE, True)])
 def test_a_node_that_touches_a_surface_of_flat_tets_is_not_inside(depth: float, buried: bool) -> None:
-    """The top layer of the larger block is compressed to a hundredth: the tets below it have no corner on the
+    """The top layer of the larger block is compressed to a hundredth: the tets below this layer have no corner on the
     surface.
     """
     sim = sunk(depth)
@@ -90,8 +92,8 @@ def test_parts_that_do_not_meet_may_be_in_each_other() -> None:
 
 
 def test_nodes_on_faces_between_tets_are_inside() -> None:
-    """A cube penetrates an equal cube: all nodes of each cube are on edges and faces of tets of the other. The nodes
-    in the middle of the two faces and of the body are on edges and faces only.
+    """A cube penetrates an equal cube: all nodes of each cube are on edges and faces of tets of the other cube. The
+    nodes in the middle of the two faces and of the body are only on edges and faces of tets.
     """
     cube = block((2, 2, 2), SIZE, shake=0.0)
     sim = build(meeting_of([{}, {}], end=2e-7), [cube, moved(cube, (0.0, 0.0, 2.0 * SIZE))])
@@ -103,8 +105,9 @@ def test_nodes_on_faces_between_tets_are_inside() -> None:
 
 
 def test_no_node_is_deeper_than_it_is_away_from_a_corner_on_the_surface() -> None:
-    """The only open face of the tet is far from the node; at the other corner of the tet the surface belongs to the
-    neighbours."""
+    """The only open face of the tet is far from the node; at the other corner of the tet the surface belongs to
+    neighbouring tets.
+    """
     corners = np.vstack([np.zeros(3), np.eye(3)])[None]
     opened, outer = np.array([[True, False, False, False]]), np.array([[False, True, True, True]])
     near = np.full((1, 3), 0.1)
@@ -114,8 +117,9 @@ def test_no_node_is_deeper_than_it_is_away_from_a_corner_on_the_surface() -> Non
 
 
 def test_how_far_points_are_from_triangles() -> None:
-    """The points are above the middle, beyond an edge, and behind a corner of a triangle, and near a triangle of
-    zero area."""
+    """The points are above the middle of a triangle, beyond its edge, behind its corner, and near a triangle of zero
+    area.
+    """
     triangle = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
     points = np.array([[0.2, 0.2, -0.3], [0.5, -0.4, 0.3], [-3.0, 0.0, 4.0], [0.5, 0.0, 2.0]])
     corners = np.array([triangle, triangle, triangle, triangle[[0, 1, 1]]])
@@ -123,7 +127,7 @@ def test_how_far_points_are_from_triangles() -> None:
 
 
 def test_a_node_on_an_edge_between_two_corners_on_the_surface_touches() -> None:
-    """The tet has an open face elsewhere, and the node is deep below this face."""
+    """The tet has an open face elsewhere, and the node is deep below this open face."""
     corners, on = np.concatenate([np.zeros((1, 3)), np.eye(3)])[None], np.array([[0.4, 0.0, 0.0]])
     opened, outer = np.array([[False, True, False, False]]), np.ones((1, 4), bool)
     assert _depths(on, corners, opened, outer) == pytest.approx(0.4)

@@ -1,4 +1,4 @@
-"""Contacts of nodes and faces in a step: their choice, their point, and their target velocity."""
+"""Contacts of nodes and faces in a step: choice of the contacts, contact point, and target velocity."""
 
 import numpy as np
 import pytest
@@ -23,14 +23,14 @@ SIZE = 1.0
 
 
 def height(x: Floats, corners: Floats) -> tuple[float, Floats]:
-    """Returns the height of a point over a face, and the unit normal of the face."""
+    """Returns the height of a point above a face, and the unit normal of the face."""
     normal = np.cross(corners[1] - corners[0], corners[2] - corners[0])
     normal /= np.linalg.norm(normal)
     return float(normal @ (x - corners[0])), normal
 
 
 def foot(x: Floats, corners: Floats) -> Floats:
-    """Returns the area coordinates of the point in the plane of a face that is nearest to x."""
+    """Returns the area coordinates of the point in the plane of a face that is nearest to ``x``."""
     sides = (corners[1:3] - corners[0]).T
     b = np.linalg.lstsq(sides, x - corners[0], rcond=None)[0]
     return np.array([1.0 - b.sum(), *b])
@@ -72,9 +72,9 @@ def random_scene(seed: int, nodes: int = 40, faces: int = 12) -> tuple[Floats, F
 def expected(
     x: Floats, v: Floats, faces: Indices, part: "np.ndarray", tested: "np.ndarray", dt: float
 ) -> list[Expected]:
-    """Returns the contacts sorted by node, then by face. A node inside of several faces of a part has contact with
-    the nearest face. A node has no contact with a part if the node is nearer to the front of another face of this
-    part."""
+    """Returns the contacts sorted by node, then by face. A node inside of several faces of a part has contact with the
+    nearest face. A node has no contact with a part if the node is nearer to the front of another face of this part.
+    """
     sizes, rows = face_sizes(x, faces), []
     for s in tested:
         mine = [Expected(x, v, s, f, sizes[i], part[s] == part[f[0]], dt) for i, f in enumerate(faces)]
@@ -89,8 +89,9 @@ def expected(
 
 
 def test_a_node_inside_of_two_parts_is_held_by_the_nearest_face_of_each() -> None:
-    """A corner of a body is in two other bodies: 0.05 and 0.1 below two faces of the first, and 0.02 below a face of
-    the second."""
+    """A corner of a body is in two other bodies: 0.05 and 0.1 below two faces of the first body, and 0.02 below a face
+    of the second body.
+    """
     steep = np.array([[0, 0, 0], [0, 1, 0], [0, 0, 1], [-1, 0.2, 0.2]], float)
     first, second = TRIANGLE + np.array([-0.3, -0.3, 0.05]), steep + np.array([0.02, -0.3, -0.3])
     x = np.concatenate([first, first + np.array([0.0, 0.0, 0.05]), second, np.zeros((1, 3))])
@@ -136,7 +137,7 @@ def test_the_target_velocity_ends_the_step_on_the_face_or_corrects_a_tenth_of_th
 
 
 def met_from(start: Floats, speed: Floats, dt: float = 1.0, own: bool = False, below: float = -1.0) -> ContactRows:
-    """Returns the contacts of one node with the triangle, whose tet reaches down to ``below``."""
+    """Returns the contacts of one node with the triangle of a tet that reaches down to ``below``."""
     x = np.concatenate([TRIANGLE, start[None]])
     x[3, 2] = below
     v = np.concatenate([np.zeros((4, 3)), speed[None]])
@@ -152,8 +153,9 @@ def met_from(start: Floats, speed: Floats, dt: float = 1.0, own: bool = False, b
     ],
 )  # fmt: skip
 def test_a_node_deeper_than_the_limit_has_no_contact(gap: float, own: bool, below: float, meets: bool) -> None:
-    """The limits are a quarter of the size of the face, a twentieth within one part, and half the height of the tet
-    of the face."""
+    """The limits of the depth are a quarter of the size of the face, a twentieth within one part, and half the height
+    of the tet of the face.
+    """
     assert (many(met_from(np.array([0.3, 0.3, gap]), np.zeros(3), own=own, below=below)) == 1) == meets
 
 
@@ -172,8 +174,8 @@ def test_a_node_that_stays_near_is_watched(gap: float, meets: bool) -> None:
     ],
 )  # fmt: skip
 def test_a_node_is_in_contact_with_the_faces_that_it_faces(faces: list[tuple[float, ...]], meets: bool) -> None:
-    """The rim of a bar has no contact with the side of another bar of the same width, and the surface below a block
-    has none with its front. A blunt and a sharp edge, and a node without faces, have contact.
+    """The rim of a bar has no contact with the side of another bar of the same width; the surface below a block has no
+    contact with the front of the block. A blunt and a sharp edge, and a node without faces, have contact.
     """
     x, v = np.concatenate([TRIANGLE, [[0.3, 0.3, -0.01]]]), np.zeros((5, 3))
     out = np.zeros((5, len(faces), 3))
@@ -182,14 +184,15 @@ def test_a_node_is_in_contact_with_the_faces_that_it_faces(faces: list[tuple[flo
 
 
 FLAKE = np.array([[0.0, 0.0, 0.0], [-0.9, 0.9, 0.3], [-0.2, -0.9, 0.4], [-0.8, -0.7, 0.9]])
-"""A tet whose first corner is its lowest corner; the cosines of its faces at this corner, -0.82, 0.73 and 0.76, have
-a mean of 0.25."""
+"""A tet whose first corner is its lowest corner; the cosines of the faces at this corner, -0.82, 0.73 and 0.76, have a
+mean of 0.25."""
 
 
 @pytest.mark.parametrize(("height", "own"), [(0.01, True), (0.01, False), (-0.01, True), (-0.1, False)])
 def test_the_lowest_corner_of_a_flake_meets_what_it_enters(height: float, own: bool) -> None:
-    """The mean of the cosines may have any value, and the corner is tested before it is inside and when it is
-    inside."""
+    """The mean of the cosines may have any value; the corner is tested before it is inside of the other body and when
+    it is inside.
+    """
     x, v = np.concatenate([TRIANGLE, FLAKE + np.array([0.3, 0.3, height])]), np.zeros((8, 3))
     v[4:, 2] = -0.05
     sums, faces = np.zeros((8, normals.COLUMNS), np.int64), (FACES + 4).astype(np.int32)
@@ -203,7 +206,8 @@ def test_the_lowest_corner_of_a_flake_meets_what_it_enters(height: float, own: b
 @pytest.mark.parametrize(("height", "own", "meets"), [(0.01, False, True), (0.01, True, False), (-0.1, False, False)])
 def test_a_node_of_another_part_meets_what_it_passes_from_outside(height: float, own: bool, meets: bool) -> None:
     """At least one normal of the node is opposite to the face, although the mean normal is not, and the faces of the
-    node do not rise."""
+    node do not rise.
+    """
     x, v, out = np.concatenate([TRIANGLE, [[0.3, 0.3, height]]]), np.zeros((5, 3)), np.zeros((5, 3, 3))
     v[4, 2], out[4] = -0.05, [(0.6, 0.0, 0.8), (-0.6, 0.0, 0.8), (0.0, 0.8, -0.6)]
     part = np.array([0] * 4 + [0 if own else 1])
@@ -211,8 +215,9 @@ def test_a_node_of_another_part_meets_what_it_passes_from_outside(height: float,
 
 
 def test_a_node_beside_an_acute_edge_is_not_inside() -> None:
-    """The node is below the plane of a face, with its foot on the face, but in front of another face that encloses
-    an acute angle with the first."""
+    """The node is below the plane of a face, with its foot on the face, but in front of another face at an acute angle
+    to the first face.
+    """
     x = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.2, 0.9, -0.7], [0.45, 0.0, -0.1]])
     faces = np.array([[0, 1, 2, 3], [0, 3, 1, 2], [1, 3, 2, 0], [0, 2, 3, 1]], np.int32)
     x[4, 1] = 0.02
@@ -223,8 +228,9 @@ def test_a_node_beside_an_acute_edge_is_not_inside() -> None:
 
 
 def test_a_node_in_a_convex_corner_is_held_by_the_nearest_face() -> None:
-    """The node is in the corner of a cube, where three faces have a common node: deep, or by less than the tolerance
-    of a node on a face."""
+    """The node is in the corner of a cube, where three faces have a common node: deep, or by less than the tolerance of
+    a node on a face.
+    """
     ((piece, model),) = pieces_of(meeting_of([{}], {"self_contact": ("body0",)}), [block((1, 1, 1), shake=0.0)])
     faces = surface_of(piece, model).faces.nodes.astype(np.int32)
     for depth in (np.array([0.03, 0.02, 0.04]), np.array([3e-4, 2e-4, 4e-4])):
@@ -236,8 +242,9 @@ def test_a_node_in_a_convex_corner_is_held_by_the_nearest_face() -> None:
 
 @pytest.mark.parametrize("gap", [0.0, 5e-4, -5e-4, -0.05])
 def test_a_sliding_node_changes_between_coplanar_facets(gap: float) -> None:
-    """The node is always in contact at its present position, and with one facet only if it is inside of one facet,
-    or deep."""
+    """The node is always in contact at its present position; it is in contact with only one facet if it is inside of
+    one facet, or deep.
+    """
     x, faces = sheet(6, 1.0)
     faces = np.column_stack([faces, np.full(len(faces), len(x))]).astype(np.int32)
     random = np.random.default_rng(3)
@@ -265,8 +272,9 @@ def test_a_sliding_node_changes_between_coplanar_facets(gap: float) -> None:
 
 
 def crossings(start: Floats, path: Floats, corners: Floats) -> tuple["np.ndarray", Floats]:
-    """Returns exactly the straight paths that pass triangles from the front, and the area coordinates (n, f, 3) of
-    the crossing."""
+    """Returns which straight paths pass which triangles from the front, exactly, and the area coordinates (n, f, 3) of
+    the crossing points.
+    """
     a, b, c = (corners[None, :, k] for k in range(3))
     normal = np.cross(b - a, c - a)
     before = ((start[:, None] - a) * normal).sum(axis=2)
@@ -282,9 +290,9 @@ def crossings(start: Floats, path: Floats, corners: Floats) -> tuple["np.ndarray
 
 @pytest.mark.parametrize("seed", range(10))
 def test_no_fast_node_passes_a_closed_surface_without_contact(seed: int) -> None:
-    """10^4 nodes each start outside of a moving body, with any direction and speed, also with paths longer than the
-    body. The pairs are those of the search. The first face that a node passes is among its contacts; a face beside
-    the path is not.
+    """Each of 10^4 nodes starts outside of a moving body, with any direction and speed; some paths are longer than the
+    body. The pairs of nodes and faces are those of the broad phase. The first face that a node passes is among the
+    contacts of the node; a face beside the path is not.
     """
     random = np.random.default_rng(seed)
     ((piece, model),) = pieces_of(

@@ -1,4 +1,4 @@
-"""Bodies that overlap at the start are refused with place and depth, or moved apart without stress."""
+"""Bodies that overlap at the start are refused with position and depth, or are moved apart without stress."""
 
 from typing import Any
 
@@ -18,7 +18,7 @@ SLOPE = float(np.tan(np.radians(20.0)))
 
 
 def lowered(depth: float, across: float = 0.0) -> list[TetMesh]:
-    """Returns a block four cubes high, and a block on top of it that penetrates it by ``depth``, m."""
+    """Returns a block four cubes high, and a block on top that penetrates the first block by ``depth``, m."""
     upper = block((2, 2, 2), SIZE, seed=3)
     return [
         block((4, 4, 4), SIZE, seed=2),
@@ -67,7 +67,9 @@ def test_bodies_are_moved_apart_without_a_stress(across: float) -> None:
 
 
 def test_bodies_are_moved_apart_by_no_more_than_they_overlap() -> None:
-    """A ridge of the dent is nearest to a corner node of the smaller block, but its foot lies on the far side."""
+    """A ridge of the dent is nearest to a corner node of the smaller block, but the foot of the node lies on the far
+    side.
+    """
     wide, small = block((4, 4, 2), SIZE, shake=0.0), block((4, 4, 3), 0.8 * SIZE, shake=0.0)
     low = np.array([-2 * SIZE, -2 * SIZE, 0.0])
     bodies = [
@@ -88,7 +90,7 @@ WIDE = block((4, 4, 4), SIZE, shake=0.0)
 
 
 def test_bodies_that_are_one_cannot_be_pushed_apart() -> None:
-    """No node is inside of the other body: each node lies on a face of it."""
+    """No node is inside of the other body: each node lies on a face of the other body."""
     with pytest.raises(InputError, match=TOO_DEEP):
         pushed(WIDE, WIDE)
 
@@ -110,7 +112,7 @@ def test_bodies_that_overlap_by_elements_cannot_be_pushed_apart(depth: float, ac
 @pytest.mark.parametrize("cells", [1, 4])
 @pytest.mark.parametrize("depth", [0.01, 0.5])
 def test_the_rims_of_bodies_with_sides_in_one_plane_are_pushed_apart_too(cells: int, depth: float) -> None:
-    """The nodes lie on faces of the sides of the other body, but penetrate it."""
+    """The nodes lie on faces of the sides of the other body, but penetrate the other body."""
     body = block((cells, cells, 4), SIZE, shake=0.0)
     sim = pushed(body, TetMesh(body.points + np.array([0.0, 0.0, (4.0 - depth) * SIZE]), body.tets))
     lower, upper = np.split(sim.model.nodes.x[:, 2], 2)
@@ -128,8 +130,9 @@ def test_the_common_plane_of_flush_bodies_is_no_overlap() -> None:
 
 
 def wedge(cells: int) -> TetMesh:
-    """Returns a wedge 4 mm high and 3 mm thick with an angle of 40 degrees, whose tip is cut off 0.2 mm from the
-    line at which its sides would intersect, at the origin."""
+    """Returns a wedge 4 mm high and 3 mm thick with an angle of 40 degrees. The tip of the wedge is cut off 0.2 mm from
+    the line at which its sides would intersect, at the origin.
+    """
     mesh = block((1, 1, cells), 1.0, shake=0.0)
     across, along, up = (mesh.points / (1, 1, cells)).T
     z = 0.2 + 4.0 * up
@@ -137,7 +140,9 @@ def wedge(cells: int) -> TetMesh:
 
 
 def beside_wedge(cells: int, moved: float = 0.0) -> TetMesh:
-    """Returns a block 3.3 mm thick that touches the whole left side of the wedge, ``moved``, m, to the right."""
+    """Returns a block 3.3 mm thick that touches the whole left side of the wedge and is moved to the right by
+    ``moved``, m.
+    """
     mesh = block((1, 1, cells), 1.0, shake=0.0)
     across, along, up = (mesh.points / (1, 1, cells)).T
     z = 0.2 + 4.0 * up
@@ -147,8 +152,9 @@ def beside_wedge(cells: int, moved: float = 0.0) -> TetMesh:
 
 @pytest.mark.parametrize("cells", [(6, 5), (1, 2), (5, 6), (7, 5), (3, 7), (11, 9)])
 def test_a_corner_on_the_rim_of_two_slanted_sides_touches(cells: tuple[int, int]) -> None:
-    """The mean of the normals of the corner may be compatible with neither side. An earlier version reported a depth
-    of 3.15 mm, from the far side."""
+    """The mean of the normals of the corner may be compatible with neither side of the wedge. An earlier version
+    reported a depth of 3.15 mm, from the far side of the wedge.
+    """
     case = meeting_of([{}, {"velocity": (0.0, 0.0, 0.0)}], {}, end=1e-7)
     build(case, [wedge(cells[0]), beside_wedge(cells[1])])
     with pytest.raises(InputError, match=r"overlaps .* by 4\.7e-05 m"):

@@ -1,5 +1,6 @@
-"""Deactivated pairs are not in contact: random motions, jumps of velocity and cracks, compared with tests of all
-pairs."""
+"""Deactivated pairs are not in contact: random motions, jumps of velocity and cracks are compared with tests of all
+pairs.
+"""
 
 from pathlib import Path
 
@@ -36,11 +37,11 @@ from .shards import CORNERS, EDGES, FACES
 
 SHARDS, STEPS = 60, 40
 SHORT = 8
-"""Steps between two renewals of the short lines."""
+"""Number of steps between two renewals of the reference lines of the pairs."""
 
 
 def apart(one: "np.ndarray", two: "np.ndarray") -> Indices:
-    """Returns (p, 2) all rows of ``one`` with all rows of ``two`` that belong to another shard."""
+    """Returns (p, 2) all rows of ``one`` combined with all rows of ``two`` that belong to another tet of the cloud."""
     pairs = np.stack(np.meshgrid(np.arange(len(one)), np.arange(len(two)), indexing="ij"), axis=-1).reshape(-1, 2)
     return np.asarray(pairs[one[pairs[:, 0]] != two[pairs[:, 1]]], np.int32)
 
@@ -52,21 +53,21 @@ def wake(pairs: Pairs) -> Pairs:
 
 
 def known_of(pairs: Pairs, one: Flags, two: Flags) -> Flags:
-    """Returns (p,) pairs with valid bounds and without a change by the flags ``one`` and ``two``."""
+    """Returns (p,) pairs with valid bounds and without a change in the flags ``one`` and ``two``."""
     return np.asarray(~np.isneginf(pairs.until) & ~one[pairs.rows[:, 0]] & ~two[pairs.rows[:, 1]])
 
 
 class Tables:
-    """Pairs of nodes and faces, and of edges, and the contacts of a step."""
+    """Pairs of nodes and faces, pairs of edges, and the contacts of a step."""
 
     def __init__(self, nodes: Indices, ridges: Indices, every: bool) -> None:
-        """``every``: no pair is deactivated."""
+        """Creates the object; with ``every``, no pair is deactivated."""
         self.node_face, self.edge_edge, self._every = pair_table(nodes), pair_table(ridges), every
         self.tested, self.unforced = 0, 0
-        """Pairs that were tested, and those of them with valid bounds."""
+        """Number of tested pairs, and number of tested pairs that had valid bounds."""
 
     def meet(self, shards: "Shards", dt: float) -> list[ContactRows]:
-        """Returns the active contacts of a step, of nodes and of edges."""
+        """Returns the active contacts of nodes and of edges in a step."""
         if self._every:
             wake(self.node_face.arrays())
             wake(self.edge_edge.arrays())
@@ -83,9 +84,9 @@ class Tables:
 
 
 class Shards:
-    """Tets that move, rotate, get other velocities and break; some faces and nodes are not on the surface at first.
-    The normals of a node point approximately away from its tet, and one node in four has normals compatible with
-    every face.
+    """Tets that move, rotate, get other velocities and break; some faces and nodes are not on the surface at first. The
+    normals of a node point approximately away from its tet; one node in four has normals that are compatible with every
+    face.
     """
 
     def __init__(self, seed: int, violence: float) -> None:
@@ -119,12 +120,12 @@ class Shards:
         return moments(out)
 
     def pairs(self) -> tuple[Indices, Indices]:
-        """Returns all pairs of nodes and faces, and of edges, of different shards."""
+        """Returns all pairs of nodes and faces, and all pairs of edges, of different tets."""
         ridges = apart(np.repeat(np.arange(SHARDS), 6), np.repeat(np.arange(SHARDS), 6))
         return apart(self.shard, self.face_shard), ridges[ridges[:, 0] < ridges[:, 1]]
 
     def tables(self, first: Indices, dt: float) -> tuple[SlotTable, FaceTable, EdgeTable, Step]:
-        """Returns slots, faces, edges and the step, as records for kernels."""
+        """Returns slots, faces, edges and the step as records for kernels."""
         reference, part = self.reference, self.shard % 3
         slots = slot_table(first, self.normals, reference.short.left, reference.short.course)
         slots = slots._replace(on_surface=self.on_surface, fresh=self.node_fresh)
@@ -175,7 +176,7 @@ class Shards:
             table.node_face.add(more)
 
     def renew(self, *tables: Tables) -> None:
-        """Removes the pairs of some nodes and faces, and adds them again."""
+        """Removes the pairs of some nodes and faces, and adds these pairs again."""
         nodes, faces = (self.draw.uniform(size=len(of)) < 0.05 for of in (self.x, self.faces))
         for table in tables:
             rows = table.node_face.rows
@@ -184,7 +185,7 @@ class Shards:
             table.node_face.add(again)
 
     def begin(self, dt: float, short: bool, *tables: Tables) -> None:
-        """Begins a step; ``short``: with new reference lines of the pairs."""
+        """Begins a step; with ``short`` the pairs get new reference lines."""
         self.reference.advance(dt)
         if short:
             self.reference.shorten(self.x)
@@ -197,16 +198,16 @@ class Shards:
 
 
 def equal(one: list[ContactRows], two: list[ContactRows]) -> bool:
-    """Returns whether two sets of contacts are equal in all columns, to the bit, and in the same order."""
+    """Returns whether two sets of contacts are bit-identical in all columns, and in the same order."""
     columns = ContactRows._fields
     pairs = [(getattr(a, name), getattr(b, name)) for a, b in zip(one, two, strict=True) for name in columns]
     return all(np.array_equal(a, b) for a, b in pairs)
 
 
 def flown(seed: int, violence: float, blind: bool = False) -> tuple[int, int, float, float]:
-    """Returns the number of steps whose contacts differ from those of all pairs, the number of contacts, and the
-    fractions of pairs that were tested, and tested without a change; ``blind``: the distance of slots from their
-    lines is treated as zero.
+    """Returns the number of steps whose contacts differ from those of all pairs, the number of contacts, and two
+    fractions of pairs. The fractions are those of tested pairs, and of pairs that were tested without a change;
+    ``blind``: the distance of slots from their lines is treated as zero.
     """
     shards = Shards(seed, violence)
     some, every = (Tables(*shards.pairs(), every=flag) for flag in (False, True))
@@ -234,8 +235,7 @@ def flown(seed: int, violence: float, blind: bool = False) -> tuple[int, int, fl
 @pytest.mark.parametrize("seed", range(4))
 @pytest.mark.parametrize("violence", [0.0, 0.02, 0.5])
 def test_a_deactivated_pair_is_not_in_contact(seed: int, violence: float) -> None:
-    """In every step the contacts are equal to the bit. Most tested pairs have changed, and few other pairs are
-    tested."""
+    """In every step the contacts are bit-identical. Most tested pairs have changed, and few other pairs are tested."""
     wrong, met, tested, unforced = flown(seed, violence)
     assert wrong == 0
     assert met > 20
@@ -244,12 +244,12 @@ def test_a_deactivated_pair_is_not_in_contact(seed: int, violence: float) -> Non
 
 
 def test_contacts_are_missed_where_leaving_a_line_does_not_count() -> None:
-    """Control: with the distance from the lines treated as zero, the check above fails."""
+    """Control: with the distance from the reference lines treated as zero, the check of equal contacts fails."""
     assert sum(flown(seed, 0.5, blind=True)[0] for seed in range(4)) > 0
 
 
 class Pair:
-    """A node far above one face."""
+    """Returns a node far above one face."""
 
     def __init__(self) -> None:
         self.x = np.array([[0.2, 0.2, 9.0], *CORNERS])
@@ -271,8 +271,9 @@ class Pair:
 
 @pytest.mark.parametrize("cause", ["corners", "normals", "lines", "stray"])
 def test_a_pair_is_tested_again_when_something_has_changed(cause: str) -> None:
-    """The changes are: new corners of the face, new mean normals of the node, new lines of all slots, or a node that
-    has departed from its line."""
+    """The changes are: new corners of the face, new mean normals of the node, new reference lines of all slots, or a
+    node that has departed from its line.
+    """
     pair = Pair()
     assert [pair.tested() for _ in range(3)] == [1, 0, 0]
     pair.face_fresh[0], pair.node_fresh[0] = cause == "corners", cause == "normals"
@@ -291,7 +292,7 @@ def test_a_pair_stays_deactivated_while_its_node_departs_by_less_than_the_slack(
 
 @pytest.mark.parametrize("kind", ["face", "node"])
 def test_a_pair_inside_a_body_is_tested_when_it_becomes_surface(kind: str) -> None:
-    """New lines do not activate the pair; the surface flag does."""
+    """New reference lines do not activate the pair; the surface flag does."""
     pair = Pair()
     flags, fresh = (pair.exposed, pair.face_fresh) if kind == "face" else (pair.on_surface, pair.node_fresh)
     flags[0] = False
@@ -346,7 +347,7 @@ def test_pairs_are_carried_over_to_other_numbers_in_the_order_of_the_first_with_
 
 
 def test_the_chains_of_pairs_hold_each_pair_of_a_node_once() -> None:
-    """Pairs that were appended to the table are in the chains too."""
+    """Pairs that were appended to the table are also in the chains of pairs."""
     table, first = random_table(1), np.full(20, -1, np.int32)
     table.hang(first, 0)
     table.add(np.array([[3, 16], [3, 17], [4, 16]], np.int32))
@@ -385,7 +386,7 @@ def test_how_far_a_slot_leaves_its_line_is_the_larger_of_the_steps_beginning_and
 
 
 def test_lines_are_copied_to_other_slots() -> None:
-    """New slots begin at their positions; the other slots keep their lines, at any time."""
+    """New slots begin at their positions; all other slots keep their reference lines, at any time."""
     draw = np.random.default_rng(4)
     old = Lines(draw.normal(size=(4, 3)), draw.normal(size=(4, 3)))
     old.begin_anew(np.arange(4) < 2, draw.normal(size=(4, 3)), 1.0)
@@ -402,7 +403,7 @@ def test_lines_are_copied_to_other_slots() -> None:
 
 
 def test_a_body_that_breaks_comes_to_the_same_when_every_pair_is_tested(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The results are equal to the bit, including pairs of copies and of faces with new corners."""
+    """The results are bit-identical, including pairs of copies and of faces with new corners."""
     case = parse_case(read_data(Path(__file__).parents[1] / "parallel" / "breaking.toml"))
     arrays = PairTable.arrays
 

@@ -1,4 +1,4 @@
-"""Quantum of the impulses of contact: set by the lighter of two parts in contact, independent of other parts."""
+"""Quantum of the impulses of contact: set by the lighter of two parts in contact, independent of all other parts."""
 
 import numpy as np
 import pytest
@@ -15,9 +15,9 @@ ABOVE = moved(SMALL, (0.13e-3, 0.07e-3, 1.01e-3))
 
 
 def losses(size: float, away: float, hit: bool) -> Floats:
-    """Returns (3,) kinetic energy, and the energy taken by contact and viscosity, of a block that falls onto another
-    block. With ``hit`` the block falls onto a cube of six tets of this ``size``, m; else the cube is ``away`` below
-    both, m.
+    """Returns (3,) kinetic energy, energy taken by contact, and energy taken by viscosity, of a block that falls onto
+    another block. With ``hit`` the block falls onto a cube of six tets of the given ``size``, m; else the cube is
+    ``away`` below both blocks, m.
     """
     top = 1e-3 if hit else -away
     cube = moved(block((1, 1, 1), size), (-0.4 * size, -0.4 * size, top - size))
@@ -48,7 +48,8 @@ def test_a_huge_body_is_hit_as_a_large_one() -> None:
 
 def test_the_lighter_of_two_parts_in_contact_counts() -> None:
     """Parts 0 and 1 are in contact with each other, part 2 with itself, and part 3 with no part; held nodes transmit
-    any impulse."""
+    any impulse.
+    """
     sizes = enumerate((1.0, 3.0, 2.0, 9.0))
     sim = build(meeting_of([{}] * 4), [moved(block((1, 1, 1), size), (20.0 * k, 0.0, 0.0)) for k, size in sizes])
     nodes = sim.model.nodes

@@ -1,4 +1,4 @@
-"""Passes that sort by ranges find what plain loops find, in the same order on any number of threads."""
+"""Loops over the surface that sort by ranges find what plain loops find, in the same order on any number of threads."""
 
 import numpy as np
 import pytest
@@ -10,7 +10,7 @@ from conoid.worker.parallel.team import team
 from .bodies import Flags, Floats, Indices
 
 NODES, MANY = 3000, 5000
-"""Numbers of nodes, and of cracks or faces: several tasks and all ranges."""
+"""Numbers of nodes, and of cracks or faces, that need several tasks and all ranges."""
 Corner = tuple[int, int, int]
 
 
@@ -26,7 +26,7 @@ def cracks_and_families(seed: int) -> tuple[Indices, Indices, Families]:
 
 
 def by_family(cracks: Indices, sides: Indices, block: int, root: "np.ndarray") -> dict[int, list[int]]:
-    """Codes of the corners of each root, from the definition."""
+    """Codes of the corners of each root node, from the definition."""
     many, found = np.bincount(root), dict[int, list[int]]()
     for c, h, k in np.ndindex(len(cracks), 2, 3):
         p = cracks[c, 3 * h + k]
@@ -53,7 +53,7 @@ def test_corners_of_narrow_sides_are_listed_by_family(threads: int) -> None:
 
 
 def faces_of(seed: int) -> tuple[Indices, Flags, Floats]:
-    """Random faces with few different nodes, so that many faces share an edge; their flags and normals."""
+    """Random faces with few different nodes, so that many faces share an edge; flags and normals of the faces."""
     draw = np.random.default_rng(seed)
     first = draw.integers(0, NODES // 40, MANY)
     corners = (20 * first[:, None] + draw.permuted(np.tile(np.arange(6), (MANY, 1)), axis=1)[:, :3]).astype(np.int32)
@@ -62,7 +62,7 @@ def faces_of(seed: int) -> tuple[Indices, Flags, Floats]:
 
 
 def edges_of(corners: Indices, half: Flags, units: Floats, sharp: float) -> list[list[int]]:
-    """Edges, from the definition."""
+    """Edges of the faces, from the definition."""
     halves, found = dict[Corner | tuple[int, int], list[tuple[int, int]]](), []
     for f, k in np.argwhere(half).tolist():
         ends = int(corners[f, k]), int(corners[f, (k + 1) % 3])
@@ -78,7 +78,7 @@ def edges_of(corners: Indices, half: Flags, units: Floats, sharp: float) -> list
 
 @pytest.mark.parametrize("threads", [1, 3])
 def test_half_edges_of_opposite_direction_make_an_edge(threads: int) -> None:
-    """With more edges than there is memory at first."""
+    """The search begins with more edges than there is memory for."""
     corners, half, units = faces_of(2)
     expected = edges_of(corners, half, units, 0.3)
     found = HalfEdges(team(threads)).pairs(corners, half, units, NODES, 0.3)

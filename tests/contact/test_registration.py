@@ -1,7 +1,7 @@
-"""Registration of changes: no pair is missed or found twice, for any order of departures, cracks and surfaces.
-Shards move and get other velocities. Some shards are hidden, like the sides of cracks; their distances from their
-lines are not measured until they are in the broad phase. In every step all pairs in the broad phase are measured.
-Shards hardly rotate; test_swept_filter.py has shards that rotate.
+"""Registration of changes: no pair is missed or found twice, for any order of departures, cracks and surfaces. Separate
+tets move and get other velocities. Some tets are hidden, like the sides of cracks; the distances of their nodes from
+the reference lines are not measured until they are in the broad phase. In every step all pairs in the broad phase are
+measured. The tets hardly rotate; test_swept_filter.py has tets that rotate.
 """
 
 from types import SimpleNamespace
@@ -30,15 +30,15 @@ from .shards import CORNERS, EDGES, FACES
 
 SHARDS, STEPS, SKIN = 50, 40, 0.2
 SEEDS = (0, 1, 4, 5)
-"""Seeds of random scenes; some of these scenes reveal each of the faults below."""
+"""Seeds of random scenes; some scenes reveal each of the faults that the controls of this module introduce."""
 ALLOWED = np.array([[True, True, True], [True, True, False], [True, False, False]])
 """Pairs of the three parts that may be in contact."""
 SIDES = np.array([[k for k in range(4) if {a, b} <= set(FACES[k, :3])] for a, b, *_ in EDGES])
-"""(6, 2) the faces of a tet at each of its edges."""
+"""(6, 2) the two faces of a tet at each of its edges."""
 
 
 class World:
-    """The shards, and the contact scene of the shards on this rank."""
+    """The separate tets, and the contact scene of the tets on this rank."""
 
     def __init__(self, seed: int) -> None:
         self.draw, first, shard = np.random.default_rng(seed), 4 * np.arange(SHARDS), np.arange(SHARDS)
@@ -58,7 +58,7 @@ class World:
         self.scene = self.search(None)
 
     def search(self, old: Scene | None) -> Scene:
-        """Returns the scene of the shards on this rank, with the state of ``old``."""
+        """Returns the contact scene of the tets on this rank, with the state of ``old``."""
         shards = np.flatnonzero(self.here)
         faces, edges, nodes = (self.rows(shards, many) for many in (4, 6, 4))
         shown = np.repeat(self.shown, 4)
@@ -84,31 +84,31 @@ class World:
         return now
 
     def measure(self, now: Scene) -> None:
-        """Measures the distances of slots from their lines."""
+        """Measures the distances of slots from their reference lines."""
         of, faces, edges = now.surface_nodes, now.faces.corners, now.edges.corners
         self.passes.deviation.measure(now.reference, of.x, of.v, faces, edges, now.slots.tracked)
 
     @staticmethod
     def rows(shards: "np.ndarray", many: int) -> "np.ndarray":
-        """Returns the rows of the things of ``some`` shards; all shards have the same number of things."""
+        """Returns the rows of the things of ``some`` tets; all tets have the same number of things."""
         return np.asarray((many * shards[:, None] + np.arange(many)).reshape(-1))
 
     def knock(self) -> None:
-        """Gives some shards, and some single nodes, another velocity."""
+        """Gives some tets, and some single nodes, another velocity."""
         shards, nodes = self.draw.uniform(size=(SHARDS, 1)) < 0.2, self.draw.uniform(size=(len(self.v), 1)) < 0.05
         self.v = self.v + np.repeat(self.draw.normal(0.0, 0.35, (SHARDS, 3)) * shards, 4, axis=0)
         self.v = self.v + self.draw.normal(0.0, 0.02, self.v.shape) * nodes
 
     def some(self, flags: Flags, share: float) -> "np.ndarray":
-        """Returns a random fraction of the flagged shards."""
+        """Returns a random fraction of the flagged tets."""
         return np.flatnonzero(flags & (self.draw.uniform(size=SHARDS) < share))
 
     def foresee(self) -> None:
-        """Adds the faces of some hidden shards to the broad phase."""
+        """Adds the faces of some hidden tets to the broad phase."""
         self.scene.enliven(self.scene.rows_of(self.rows(self.some(self.here & ~self.shown, 0.1), 4)))
 
     def open(self) -> None:
-        """Adds some hidden shards to the surface, whether they were foreseen or not."""
+        """Adds some hidden tets to the surface, whether they were foreseen or not."""
         shards = self.some(self.here & ~self.shown, 0.1)
         self.shown[shards] = True
         self.opened += len(shards)
@@ -116,14 +116,14 @@ class World:
         self.scene.slots.on_surface[:] = np.repeat(self.shown, 4)[self.scene.surface_nodes.id]
 
     def another_surface(self) -> None:
-        """Removes some shards, adds others and uncovers hidden shards; the state of the other shards is copied."""
+        """Removes some tets, adds other tets and uncovers hidden tets; the state of all remaining tets is copied."""
         gone, come, bare = self.some(self.here, 0.1), self.some(~self.here, 0.3), self.some(~self.shown, 0.2)
         self.here[gone], self.here[come], self.shown[bare] = False, True, True
         self.opened += len(bare)
         self.scene = self.search(self.scene)
 
     def begin(self, dt: float) -> None:
-        """Begins a step as the stage of contact does; in some steps another rank registers departed slots."""
+        """Begins a step in the same way as the contact stage; in some steps another rank registers departed slots."""
         now, of = self.scene, self.scene.surface_nodes
         of.x[:], of.v[:] = self.x[of.id], self.v[of.id]
         now.reference.advance(dt)
@@ -134,7 +134,7 @@ class World:
             self.registered += 1
 
     def step(self, number: int) -> None:
-        """Makes random changes and a step."""
+        """Makes random changes of the scene and a step."""
         dt = float(self.draw.uniform(0.02, 0.04))
         self.knock()
         if self.scene.reference.end + dt > self.scene.reference.until:
@@ -153,7 +153,7 @@ class World:
 
 
 def matrix(rows: Indices, one: int, two: int) -> Flags:
-    """Returns (one, two) the pairs as flags; no pair may be in the table twice."""
+    """Returns (one, two) flags of the pairs in the table; no pair may be in the table twice."""
     counts = np.zeros((one, two), int)
     np.add.at(counts, tuple(rows.T), 1)
     assert counts.max(initial=0) <= 1
@@ -161,19 +161,20 @@ def matrix(rows: Indices, one: int, two: int) -> Flags:
 
 
 def common(one: Indices, two: Indices) -> Flags:
-    """Returns (n, m) whether two things have a common corner."""
+    """Returns (n, m) whether each two things have a common corner."""
     return np.asarray((one[:, None, :, None] == two[None, :, None, :]).any(axis=(2, 3)))
 
 
 def allowed(now: Scene, one: Indices, two: Indices) -> Flags:
-    """Returns (n, m) whether the parts of things with these corners may be in contact."""
+    """Returns (n, m) whether the parts of things with the given corners may be in contact."""
     part = now.surface_nodes.part
     return np.asarray(ALLOWED[part[one[:, 0]][:, None], part[two[:, 0]][None, :]])
 
 
 def near_faces(now: Scene) -> Flags:
-    """Returns (slots, faces) pairs in the broad phase that are nearer than half of the remaining skin and depth, of
-    parts that may be in contact."""
+    """Returns (slots, faces) the pairs in the broad phase that are nearer than half of the remaining skin plus depth,
+    of parts that may be in contact.
+    """
     x, left, part = now.surface_nodes.x, now.reference.searched.left, now.surface_nodes.part
     corners, nodes = now.faces.corners[:, :3], np.arange(now.surface_nodes.n, dtype=np.int32)[:, None]
     deep = np.where(part[:, None] == part[corners[:, 0]][None], DEEP_SELF, DEEP) * now.faces.size
@@ -185,7 +186,7 @@ def near_faces(now: Scene) -> Flags:
 
 
 def near_edges(now: Scene) -> Flags:
-    """Returns (edges, edges) such pairs of two edges; the edge of lower rank is first."""
+    """Returns (edges, edges) the near pairs of two edges; the edge of lower rank is first."""
     ends, rank = now.edges.corners[:, :2], now.edges.rank
     left = now.reference.searched.left[ends].max(axis=1)
     deep = np.minimum(now.edges.deep[:, None], now.edges.deep[None])
@@ -195,9 +196,9 @@ def near_edges(now: Scene) -> Flags:
 
 
 def check(now: Scene) -> Ints:
-    """Checks that no pair is missed or listed twice, that no pair has a common corner or is outside of the broad
-    phase, and that all slots in the broad phase are near their lines. Returns the numbers of near pairs of nodes and
-    of edges.
+    """Checks that no pair is missed or listed twice, that no pair has a common corner or is outside of the broad phase,
+    and that all slots in the broad phase are near their reference lines. Returns the number of near pairs of nodes and
+    the number of near pairs of edges.
     """
     corners, ends = now.faces.corners[:, :3], now.edges.corners[:, :2]
     nodes = np.arange(now.surface_nodes.n, dtype=np.int32)[:, None]
@@ -217,7 +218,7 @@ def check(now: Scene) -> Ints:
 
 
 def flown(seed: int) -> World:
-    """Returns a scene after its steps; each step has been checked."""
+    """Returns a scene after its steps, each of which has been checked."""
     world = World(seed)
     for number in range(STEPS):
         world.step(number)
@@ -226,8 +227,9 @@ def flown(seed: int) -> World:
 
 @pytest.mark.parametrize("seed", SEEDS)
 def test_changed_slots_are_registered_after_any_event(seed: int) -> None:
-    """The changes are departures, foreseen cracks, exposed faces, new scenes that copy pairs, and searches without
-    previous pairs."""
+    """The changes are departures, foreseen cracks, exposed faces, new scenes that copy pairs, and broad phases without
+    previous pairs.
+    """
     world = flown(seed)
     assert world.registered > 10
     assert world.carried > 3
@@ -246,8 +248,9 @@ def fails() -> bool:
 
 
 def test_slots_that_are_searched_for_the_first_time_need_new_lines() -> None:
-    """Control: the check can fail. Slots that are searched for the first time have moved unmeasured, and the
-    distance from their old lines is unknown."""
+    """Control: the check of missed pairs can fail. Slots that are searched for the first time have moved unmeasured, so
+    that the distance from their old lines is unknown.
+    """
     with patch.object(Registration, "register_new", _blind(Registration.register_new)):
         assert fails()
     with patch.object(Registration, "renew", _blind(Registration.renew)):
@@ -266,8 +269,9 @@ def _blind(function: Any) -> Any:
 
 
 def test_a_new_scene_has_to_copy_the_tracked_slots() -> None:
-    """Control: the check can fail. If lines of slots begin again without a search of pairs, they differ from the lines
-    of the pairs."""
+    """Control: the check of missed pairs can fail. If reference lines of slots begin again without a search of pairs,
+    they differ from the lines of the pairs.
+    """
     carry = registration.carry
 
     def forgetful(now: Scene, old: Scene) -> None:
@@ -296,14 +300,14 @@ def test_pairs_that_are_found_again_keep_their_impulses(seed: int) -> None:
 
 
 def named(now: Scene) -> dict[tuple[int, int], Floats]:
-    """Returns the stored impulse of each pair of a node and a face, by ids."""
+    """Returns the stored impulse of each pair of a node and a face, by the ids of both."""
     node, face = now.node_face.rows.T
     names = zip(now.surface_nodes.id[node].tolist(), now.faces.id[face].tolist(), strict=True)
     return dict(zip(names, now.node_face.kept.copy(), strict=True))
 
 
 def test_a_slot_that_is_knocked_beyond_the_skin_in_one_step_finds_what_it_passes() -> None:
-    """A shard at rest suddenly gets a velocity with which it passes a distant face in one step."""
+    """A tet at rest suddenly gets a velocity with which it passes a distant face in one step."""
     world = World(0)
     world.here[:], world.shown[:] = False, False
     world.here[:2], world.shown[:2], world.v[:] = True, True, 0.0

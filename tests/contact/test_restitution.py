@@ -19,7 +19,7 @@ from .kernels import Solver, column
 
 
 def every(met: ContactRows) -> Indices:
-    """Returns the numbers of all rows."""
+    """Returns the indices of all contact rows."""
     return np.arange(len(met.nodes), dtype=np.int32)
 
 
@@ -29,7 +29,9 @@ def energy(v: Floats, mobility: Floats) -> float:
 
 @pytest.mark.parametrize("share", [0.0, 0.3, 1.0])
 def test_a_node_parts_from_a_face_with_a_share_of_its_speed(share: float) -> None:
-    """Masses of 1, 2, 3 and 4: the contact takes (1 - e^2) of the energy of the approach, and momentum is conserved."""
+    """The four nodes have masses of 1, 2, 3 and 4: the contact takes (1 - e^2) of the energy of the approach, and
+    momentum is conserved.
+    """
     nodes, weights = np.array([[0, 1, 2, 3]], np.int32), np.array([[1.0, -0.2, -0.3, -0.5]])
     normals, wanted = np.array([[0.0, 0.6, 0.8]]), np.zeros(1)
     met = ContactRows(nodes, weights, normals, wanted, np.zeros(1), np.full(1, -1, np.int32))
@@ -45,8 +47,9 @@ def test_a_node_parts_from_a_face_with_a_share_of_its_speed(share: float) -> Non
 
 
 def test_a_contact_that_was_opening_gets_no_energy() -> None:
-    """Elastic forces close the contact again at twice the speed. The nodes may approach by the distance that the
-    contact has opened, without an impulse."""
+    """Elastic forces close the contact again at twice the speed. The nodes may approach without an impulse by the
+    distance by which the contact has opened.
+    """
     nodes, weights = np.array([[0, 1, 2, 3]], np.int32), np.array([[1.0, -0.2, -0.3, -0.5]])
     normals, wanted = np.array([[0.0, 0.6, 0.8]]), np.zeros(1)
     met = ContactRows(nodes, weights, normals, wanted, np.zeros(1), np.full(1, -1, np.int32))
@@ -64,7 +67,9 @@ def test_a_contact_that_was_opening_gets_no_energy() -> None:
 
 
 def test_contacts_that_share_nodes_conserve_energy() -> None:
-    """In a column in which every contact closes, all relative velocities are reversed, and the energy is conserved."""
+    """In a column of nodes in which every contact closes, all relative velocities are reversed, and the energy is
+    conserved.
+    """
     v = np.zeros((6, 3))
     v[:, 0] = -np.array([0.0, 1.0, 3.0, 4.0, 4.5, 7.0])
     mobility = np.repeat(np.array([1.0, 2.0, 0.5, 1.0, 3.0, 1.0])[:, None], 3, axis=1)
@@ -92,8 +97,9 @@ mesh = { shape = "sphere", centre = [X, Y, Z], radius = 4e-3, element_size = 1e-
 
 
 def test_glancing_balls_that_rebound_get_no_energy() -> None:
-    """Balls of glass collide at 120 m/s. In an earlier version the step varied by 5 % during the impacts, which
-    added 5 % of the energy."""
+    """Balls of glass collide at 120 m/s. In an earlier version the time step varied by 5 % during the impacts, which
+    added 5 % of the energy.
+    """
     text = BALLS
     for name, side, y, z in (("left", -1.0, 1.5e-3, 3e-4), ("right", 1.0, -1.5e-3, 0.0)):
         values = {"NAME": name, "SPEED": -120.0 * side, "X": 4.02e-3 * side, "Y": y, "Z": z}
@@ -111,8 +117,9 @@ def test_glancing_balls_that_rebound_get_no_energy() -> None:
 
 
 def test_layers_that_rebound_conserve_energy() -> None:
-    """Five sweeps leave -4e-3 of the energy, ten sweeps 3e-4, and the forty sweeps of the default with restitution
-    2e-8."""
+    """Five sweeps leave an error of -4e-3 of the energy, ten sweeps 3e-4, and the forty sweeps of the default with
+    restitution 2e-8.
+    """
     case = load.read_case(load.shipped_path("plate_stack"))
     assert case.contact is not None
     contact = case.contact.model_copy(update={"restitution": 1.0})

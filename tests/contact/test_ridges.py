@@ -1,5 +1,5 @@
-"""Ridges that collide: bodies do not penetrate each other where two edges cross, at any angle, for edges that are
-sharp at the start and edges that become sharp by flow.
+"""Ridges that collide: bodies do not penetrate each other where two edges cross, at any angle. The edges are sharp at
+the start, or become sharp by plastic flow.
 """
 
 from itertools import product
@@ -25,7 +25,7 @@ from .ranks import on_ranks
 
 SIZE = 1e-3
 ROOF = SIZE * np.array([[-0.5, 0.0, 0.0], [0.5, 0.0, 0.0], [0.0, 0.5, -0.6], [0.0, -0.5, -0.6]])
-"""A tet with an edge along x on its top, whose faces have a slope of 50 degrees."""
+"""A tet with an edge along x on its top; the faces at this edge have a slope of 50 degrees."""
 TET = np.array([[0, 1, 2, 3]])
 
 
@@ -34,8 +34,9 @@ def tet(points: Floats) -> TetMesh:
 
 
 def deep(x: Floats, y: Floats) -> float:
-    """Returns the overlap of two tets (4, 3) along the direction in which it is least, m; negative if the tets are
-    apart."""
+    """Returns the overlap of two tets (4, 3) along the direction in which it is smallest, m; negative if the tets are
+    apart.
+    """
     sides = [np.array([p[j] - p[i] for i in range(4) for j in range(i + 1, 4)]) for p in (x, y)]
     axes = [np.cross(p[[1, 0, 0, 0]] - p[[2, 3, 1, 2]], p[[3, 2, 3, 1]] - p[[2, 3, 1, 2]]) for p in (x, y)]
     every = np.concatenate([*axes, np.cross(sides[0][:, None], sides[1][None]).reshape(-1, 3)])
@@ -48,8 +49,9 @@ def deep(x: Floats, y: Floats) -> float:
 
 @pytest.mark.parametrize("angle", [0.5, 3.0, 30.0])
 def test_tets_that_come_ridge_on_ridge_do_not_pass_into_each_other(angle: float) -> None:
-    """Angles between the ridges, degrees. In an earlier version ridges at 2.9 degrees and less had contacts of nodes
-    and faces only, which do not prevent the penetration."""
+    """Angles between the ridges, degrees. In an earlier version ridges at 2.9 degrees and less had only contacts of
+    nodes and faces, which do not prevent the penetration.
+    """
     over = ROOF @ rotation((1, 0, 0), np.pi).T @ rotation((0, 0, 1), np.radians(angle)).T + [0.0, 0.0, 0.01 * SIZE]
     motions = [{"velocity": (0.0, 0.0, 30.0)}, {"velocity": (0.0, 0.0, -30.0)}]
     sim = build(meeting_of(motions, end=4e-6), [tet(ROOF), tet(over)])
@@ -61,21 +63,23 @@ def test_tets_that_come_ridge_on_ridge_do_not_pass_into_each_other(angle: float)
 
 
 FLAT = SIZE * np.array([[-0.5, 0.0, 0.0], [0.5, 0.0, 0.0], [0.0, 0.5, 0.0], [0.0, -0.5, 0.0], [0.0, 0.0, -1.2]])
-"""Two adjacent tets with a flat top, whose middle is an edge along x."""
+"""Two adjacent tets with a flat top; the middle of the top is an edge along x."""
 PAIR = np.array([[0, 1, 2, 4], [1, 0, 3, 4]])
 
 
 def folded(angle: float) -> Floats:
-    """Returns ``FLAT`` with its top folded about the middle edge until the normals of its halves differ by
-    ``angle``, degrees."""
+    """Returns ``FLAT`` with its top folded about the middle edge until the normals of the two halves differ by
+    ``angle``, degrees.
+    """
     points, half = FLAT.copy(), np.radians(0.5 * angle)
     points[2:4] = points[2:4] * np.cos(half) - [0.0, 0.0, 0.5 * SIZE * np.sin(half)]
     return points
 
 
 def test_tets_that_flow_has_folded_do_not_pass_into_each_other() -> None:
-    """The tops are flat at the start and folded by 80 degrees later. In an earlier version the middle edges had no
-    contact, and their nodes are far away."""
+    """The tops are flat at the start and are folded by 80 degrees later. In an earlier version the middle edges, whose
+    nodes are far away, had no contact.
+    """
     half_turn = rotation((1, 0, 0), np.pi).T @ rotation((0, 0, 1), 0.5 * np.pi).T
     gap = [0.0, 0.0, 0.01 * SIZE]
     motions = [{"velocity": (0.0, 0.0, 30.0)}, {"velocity": (0.0, 0.0, -30.0)}]
@@ -108,8 +112,9 @@ COLLIDING = Path(__file__).parents[1] / "parallel" / "colliding.toml"
 
 
 def flown(comm: Comm, folder: Path, stops: tuple[int, ...]) -> tuple[str | None, int]:
-    """Returns the digest of the scene, and the number of edges that became sharp by flow; the run is stored and
-    restored at ``stops``, steps."""
+    """Returns the digest of the scene, and the number of edges that became sharp by flow. The run is stored and
+    restored at the steps ``stops``.
+    """
     case = parse_case(apply_overrides(read_data(COLLIDING), ["run.frames=0", "balance.weights=tets"]))
     sim = simulation.build(case, Path(), comm)
     step.prepare(sim)

@@ -1,5 +1,6 @@
-"""The answer does not depend on the steps of searches, nor on the pairs that a search includes in addition to active
-contacts."""
+"""The answer does not depend on the steps at which a broad phase is made, nor on the pairs that it includes in addition
+to active contacts.
+"""
 
 from collections.abc import Iterator
 from functools import cache
@@ -26,7 +27,9 @@ CRUSHED = "../../cases/hard/crush_cohesive"
 
 
 def stepping(name: str, steps: int, comm: Comm, every: int = 0, *changes: str) -> Iterator[Simulation]:
-    """Returns a scene after each of its first ``steps``; ``every``: a search at least after this number of steps."""
+    """Returns a scene after each of its first ``steps``; ``every``: number of steps after which a broad phase is made
+    at the latest.
+    """
     case = parse_case(apply_overrides(read_data(SCENES / f"{name}.toml"), ["run.frames=0", *changes]))
     sim = simulation.build(case, Path(), comm)
     assert sim.contact is not None
@@ -40,7 +43,7 @@ def stepping(name: str, steps: int, comm: Comm, every: int = 0, *changes: str) -
 
 
 def ran(name: str, comm: Comm, every: int = 0, *changes: str) -> tuple[str | None, int]:
-    """Returns the digest and the number of searches at the end."""
+    """Returns the digest and the number of broad phases at the end of the run."""
     *_, sim = stepping(name, STEPS[name], comm, every, *changes)
     assert sim.contact is not None
     return digest(sim.model, comm, []), sim.contact.searches.many
@@ -48,7 +51,7 @@ def ran(name: str, comm: Comm, every: int = 0, *changes: str) -> tuple[str | Non
 
 @cache
 def alone(name: str) -> tuple[str | None, int]:
-    """Returns the result on one rank."""
+    """Returns the result of a run on one rank."""
     return ran(name, SerialComm())
 
 
@@ -68,7 +71,7 @@ def test_no_answer_depends_on_how_often_is_searched(name: str) -> None:
 
 
 def doubled(sim: Simulation) -> int:
-    """Returns the number of candidate pairs of a rank that are in their tables more than once."""
+    """Returns the number of candidate pairs of a rank that are in its tables more than once."""
     assert sim.contact is not None
     scene = sim.contact.searches.scene
     assert scene is not None
@@ -78,8 +81,9 @@ def doubled(sim: Simulation) -> int:
 
 @pytest.mark.parametrize("ranks", [1, 3])
 def test_no_pair_is_listed_twice(ranks: int) -> None:
-    """A pair listed twice would have two impulses until the next search. In an earlier version edges of opposite
-    direction between two separated nodes were listed twice."""
+    """A pair listed twice would have two impulses until the next broad phase. In an earlier version edges of opposite
+    direction between two separated nodes were listed twice.
+    """
     found = on_ranks(ranks, lambda comm: [doubled(sim) for sim in stepping(CRUSHED, 40, comm)])
     assert found == [[0] * 40] * ranks
 
@@ -96,8 +100,9 @@ def test_no_answer_depends_on_which_cracks_a_search_foresees(monkeypatch: pytest
 def test_no_answer_depends_on_which_tets_a_search_expects_to_leave(
     monkeypatch: pytest.MonkeyPatch, ranks: int, share: float
 ) -> None:
-    """The search includes the inner faces of all tets, few tets or no tet: faces exposed by a tet that was not
-    expected to erode are added by a search."""
+    """The broad phase includes the inner faces of all tets, of few tets or of no tet. Faces that are exposed by an
+    unexpected erosion of a tet are added by another broad phase.
+    """
     usual, many = exposure.NEAR_EROSION, on_ranks(ranks, lambda comm: ran("eroding", comm))[0][1]
     monkeypatch.setattr(exposure, "NEAR_EROSION", share)
     other, more = on_ranks(ranks, lambda comm: ran("eroding", comm))[0]
@@ -114,13 +119,13 @@ def test_no_answer_depends_on_the_horizon(monkeypatch: pytest.MonkeyPatch, name:
 
 @pytest.mark.parametrize(("ranks", "changes"), [(2, ("contact.skin=0.15",)), (3, ("contact.domain=box",))])
 def test_no_answer_on_several_ranks_depends_on_the_skin_or_the_domain(ranks: int, changes: tuple[str, ...]) -> None:
-    """Every rank searches when one of them must; the ghosts depend on the skin and the contact domain."""
+    """Every rank makes a broad phase if one of them must; the ghosts depend on the skin and the contact domain."""
     one = alone("breaking")[0]
     assert on_ranks(ranks, lambda comm: ran("breaking", comm, 5, *changes))[0][0] == one
 
 
 def test_a_horizon_ends_with_one_search(monkeypatch: pytest.MonkeyPatch) -> None:
-    """At the end of a horizon there is one search, and not a second search one or two steps later."""
+    """At the end of a horizon there is one broad phase, and not a second one one or two steps later."""
     monkeypatch.setattr(surface_motion, "_HORIZONS", surface_motion._HORIZONS[:1])
     good_for = surface_motion._HORIZONS[0] - searches._AHEAD
     assert ran("colliding", SerialComm())[1] <= 1 + STEPS["colliding"] / good_for

@@ -1,4 +1,4 @@
-"""Candidate pairs: none is missed, each is found once, and memory does not depend on distances."""
+"""Candidate pairs: no pair is missed, each pair is found once, and the memory does not depend on distances."""
 
 import tracemalloc
 from collections.abc import Iterator
@@ -18,13 +18,14 @@ from .distances import point_triangle, segment_segment
 
 SETS = 250
 LOOKS = np.linspace(0.0, 1.0, 5)
-"""Times of the horizon at which distances are measured."""
+"""Times of the horizon at which distances are measured, as fractions."""
 NEVER_SELF = ~np.eye(3, dtype=bool)
 
 
 class Cloud:
-    """Random things: nodes, faces and edges of sizes up to 100:1, in three moving parts; some things are far away
-    and fast."""
+    """Random things: nodes, faces and edges of sizes up to 100:1, in three moving parts; some things are far away and
+    fast.
+    """
 
     def __init__(self, seed: int, n: int = 36) -> None:
         random = np.random.default_rng(seed)
@@ -49,7 +50,7 @@ class Cloud:
         return Primitives(corners.astype(np.int32), 10.0 ** random.uniform(-2.0, 0.0, len(corners)))
 
     def at(self, things: Primitives, share: float) -> Floats:
-        """Returns (n, k, 3) corners after a fraction of the horizon."""
+        """Returns (n, k, 3) corners of the things after a fraction of the horizon."""
         return np.asarray((self.x + share * self.horizon * self.v)[things.corners])
 
     def find(
@@ -64,8 +65,9 @@ def clouds() -> Iterator[Cloud]:
 
 
 def reached(cloud: Cloud, small: Primitives, large: Primitives, distance: Floats) -> Flags:
-    """Returns (small, large) pairs of parts in contact that come within reach, by their distances at the times
-    TIMES."""
+    """Returns (small, large) the pairs of parts in contact that come within reach, by their distances at the times
+    TIMES.
+    """
     near = distance.min(axis=0) < small.reach[:, None] + large.reach[None, :]
     of = [cloud.part[things.corners[:, 0]] for things in (small, large)]
     return np.asarray(near & NEVER_SELF[of[0][:, None], of[1][None, :]])
@@ -110,7 +112,7 @@ def test_no_edge_that_comes_near_an_edge_is_missed_and_each_pair_is_found_once()
 
 @pytest.mark.parametrize("seed", range(20))
 def test_two_ranks_that_see_each_others_edges_find_every_pair_once_between_them(seed: int) -> None:
-    """Each rank has its own edges first, then copies of the edges of the other rank, in any order."""
+    """Each rank lists its own edges first, then copies of the edges of the other rank, in any order."""
     cloud, n = Cloud(seed), 36
     half = np.random.default_rng(seed).permutation(n)
     total = np.zeros((n, n), int)
@@ -130,7 +132,9 @@ def test_two_ranks_that_see_each_others_edges_find_every_pair_once_between_them(
 
 
 def test_candidates_are_the_boxes_that_touch() -> None:
-    """The list is not much longer than necessary: it contains boxes around the paths, in a moving frame."""
+    """The list of candidate pairs is not much longer than necessary: it contains pairs of boxes around the paths, in a
+    moving frame.
+    """
     for seed in range(50):
         cloud = Cloud(seed)
         frame = cloud.v.mean(axis=0)
@@ -148,7 +152,7 @@ def test_candidates_are_the_boxes_that_touch() -> None:
 
 
 def test_each_pair_is_found_once_where_all_meet_all() -> None:
-    """The table has a tenth of the needed rows at first: the search is interrupted and continued."""
+    """At first the table has a tenth of the needed rows: the search is interrupted and continued."""
     n = 120
     cloud = Cloud(5, n)
     huge = Primitives(cloud.faces.corners, np.full(n, 1e5))
@@ -156,7 +160,7 @@ def test_each_pair_is_found_once_where_all_meet_all() -> None:
 
 
 def test_pairs_and_their_order_are_the_same_on_any_number_of_threads() -> None:
-    """With so many nodes and faces that every pass has several tasks; the second search has enough memory at once."""
+    """With so many nodes and faces every loop has several tasks; the second search has enough memory at once."""
     cloud = Cloud(7, 3000)
     lines, finder = Lines(cloud.x, cloud.v - cloud.v.mean(axis=0), cloud.horizon, cloud.part), Finder(team(3))
     alone = cloud.find(cloud.nodes, cloud.faces)
@@ -194,8 +198,9 @@ def test_without_primitives_there_are_no_candidates(empty: str) -> None:
 
 
 def peak_of(away: float, coarse: int = 40) -> tuple[int, int]:
-    """Returns the bytes that the search needs for two sheets, of which a hundredth of the nodes is ``away``, and the
-    number of pairs."""
+    """Returns the bytes that the search needs for two sheets, and the number of pairs; a hundredth of the nodes of the
+    sheets is ``away``.
+    """
     (x0, _), (x1, faces1) = sheet(40, 1.0), sheet(coarse, 40.0 / coarse)
     x1, faces1 = x1 + np.array([0.0, 0.0, 0.1]), faces1 + np.int32(len(x0))
     x = np.concatenate([x0, x1])
@@ -222,8 +227,9 @@ def test_memory_does_not_follow_the_extent() -> None:
 
 @pytest.mark.parametrize("coarse", [4, 400])
 def test_memory_stays_with_the_number_of_things_where_sizes_differ_tenfold(coarse: int) -> None:
-    """Faces are ten times as large, or as small, as their partners: the bytes for each candidate or thing are the
-    same as for equal sizes."""
+    """Faces are ten times as large, or as small, as their partners: the bytes for each candidate or thing are the same
+    as for equal sizes.
+    """
     equal, pairs = peak_of(0.0)
     other, their_pairs = peak_of(0.0, coarse)
     assert other / (their_pairs + 2 * coarse * coarse) < 4.0 * equal / (pairs + 2 * 40 * 40)
@@ -231,8 +237,9 @@ def test_memory_stays_with_the_number_of_things_where_sizes_differ_tenfold(coars
 
 @pytest.mark.parametrize("size", [1e2, 1e3, 1e4])
 def test_memory_does_not_follow_a_huge_thing(size: float) -> None:
-    """A long edge lies across two sheets of short edges: the number of cells of this edge does not depend on the
-    distance of other things."""
+    """A long edge lies across two sheets of short edges: the number of cells of the long edge does not depend on the
+    distance of other things.
+    """
     (x0, faces), (x1, _) = sheet(20, 1.0), sheet(20, 1.0)
     short = faces[:, :2]
     x = np.concatenate([x0, x1 + np.array([0.0, 0.0, 0.1]), [[-size, -size, -size], [size, size, size]]])
@@ -266,7 +273,7 @@ def cells_of(table: Table, low: Floats, high: Floats) -> set[int]:
 def test_position_codes_have_every_box_once_in_each_cell_that_it_touches(
     spread: tuple[float, ...], edge: float
 ) -> None:
-    """The entries of a hash are contiguous. Some boxes are wide, and one box is a point."""
+    """The entries of a hash are contiguous in the table. Some boxes of the test are wide, and one box is a point."""
     random = np.random.default_rng(2)
     low: Floats = random.uniform(0.0, 1.0, (400, 3)) * np.array(spread)
     high: Floats = low + edge * random.uniform(0.0, 3.0, (400, 3)) * (

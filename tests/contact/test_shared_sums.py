@@ -15,8 +15,9 @@ NODES, RANKS = 400, 4
 
 
 def scene(seed: int) -> tuple["np.ndarray", "np.ndarray", "np.ndarray"]:
-    """Returns three arrays (ranks, nodes): ranks that may have a contact of a node or have the node; ranks that have
-    the node; ranks that have a contact in this step."""
+    """Returns three arrays (ranks, nodes). The arrays are: ranks that may have a contact of a node or have the node;
+    ranks that have the node; ranks that have a contact in this step.
+    """
     draw = np.random.default_rng(seed)
     held = draw.uniform(size=(RANKS, NODES)) < 0.3
     known = held | (draw.uniform(size=(RANKS, NODES)) < 0.4)
@@ -31,7 +32,7 @@ def test_ranks_that_need_a_sum_have_it_and_nothing_else_is_sent(seed: int) -> No
     def rank(comm: Comm) -> tuple["np.ndarray", int]:
         me = comm.rank
         slots = np.random.default_rng(me).permutation(NODES).astype(np.int32)
-        """Returns the local numbers of the nodes, which differ between ranks."""
+        """Returns the local numbers of the nodes; the numbers differ between ranks."""
         both = [np.flatnonzero(known[me] & known[other]) for other in range(RANKS)]
         company = SharedSums([Neighbour(k, slots[both[k]]) for k in range(RANKS) if k != me], comm)
         local = np.full(NODES, -1, np.int32)
@@ -65,7 +66,7 @@ def test_ranks_that_need_a_sum_have_it_and_nothing_else_is_sent(seed: int) -> No
 
 
 def _concerned(known: "np.ndarray", held: "np.ndarray", pushed: "np.ndarray", me: int) -> "np.ndarray":
-    """Returns (nodes,) whether this rank sends or receives sums of a node."""
+    """Returns (nodes,) whether this rank sends or receives the sum of each node."""
     concerned = np.zeros(NODES, bool)
     for other in range(RANKS):
         if other != me:

@@ -14,8 +14,9 @@ _QUANTA, _SCALE = 2.0**30, 2.0**40
 
 
 def scene(seed: int) -> tuple[ContactRows, Floats, Floats]:
-    """Returns contacts of nodes on faces, edges and cracks in a cloud that closes slowly, most of them without
-    friction and some with held nodes: half of the contacts are idle at first, and some of these are loaded later.
+    """Returns contacts of nodes on faces, edges and cracks in a cloud that closes slowly. Most contacts have no
+    friction and some have held nodes; half of the contacts are idle at first, and some of the idle contacts are loaded
+    later.
     """
     random = np.random.default_rng(seed)
     rows = np.array([random.choice(NODES, 4, replace=False) for _ in range(CONTACTS)], np.int32)
@@ -34,7 +35,7 @@ def scene(seed: int) -> tuple[ContactRows, Floats, Floats]:
 
 
 class Plain:
-    """Sweeps over all contacts in plain Python."""
+    """Sweeps over all contacts, in plain Python."""
 
     def __init__(self, met: ContactRows, v: Floats, mobility: Floats) -> None:
         self.met, self.v, self.mobility = met, v.copy(), mobility
@@ -48,7 +49,7 @@ class Plain:
         self.norms = np.array([self._norms(p, sums) for p in range(CONTACTS)])
 
     def _norms(self, p: int, sums: "np.ndarray") -> tuple[float, float]:
-        """Returns the row norms along the normal and across it."""
+        """Returns the row norms of contacts along the normal and across it."""
         met, along, across = self.met, 0.0, 0.0
         for k in range(4):
             a, weight = met.nodes[p, k], abs(met.weights[p, k]) / _QUANTA
@@ -58,7 +59,7 @@ class Plain:
         return along or np.inf, across or np.inf
 
     def give(self, changes: Floats) -> None:
-        """Applies changes (contacts, 3) of the impulses of contacts to the velocities."""
+        """Applies the changes (contacts, 3) of the impulses of contacts to the velocities."""
         impulse, met = np.zeros((NODES, 3), np.int64), self.met
         for p in range(CONTACTS):
             parts = [np.rint(met.weights[p, k] * changes[p] * _SCALE).astype(np.int64) for k in (1, 2, 3)]
@@ -69,7 +70,7 @@ class Plain:
         self.v = np.where(impulse != 0, self.v + impulse * (self.mobility / _SCALE), self.v)
 
     def resume(self, kept: Kept, ratio: float) -> None:
-        """Warm start from the stored impulses of pairs and cracks."""
+        """Applies a warm start from the stored impulses of pairs and cracks."""
         met, changes = self.met, np.zeros((CONTACTS, 3))
         for p in np.flatnonzero(met.pair != -1):
             share, last = (0.8, kept.pairs[p]) if met.pair[p] >= 0 else (1.0, kept.cracks[p])
@@ -84,7 +85,7 @@ class Plain:
         self.give(np.array([self.change(p, ahead) for p in range(CONTACTS)]))
 
     def change(self, p: int, ahead: float) -> Floats:
-        """Corrects one contact."""
+        """Corrects the impulse of one contact."""
         met, normal, old = self.met, self.met.normals[p], self.push[p].copy()
         rate = np.zeros(3)
         for k in range(4):
@@ -130,7 +131,7 @@ def test_kernels_have_the_bits_of_the_formula(seed: int, resumed: bool) -> None:
 
 @pytest.mark.parametrize("seed", range(12))
 def test_a_step_has_the_bits_of_sweeps_with_momentum(seed: int) -> None:
-    """The factor is Nesterov's k / (k + 3), and the last sweep has no extrapolation."""
+    """The factor of extrapolation is Nesterov's k / (k + 3), and the last sweep has no extrapolation."""
     met, v, mobility = scene(seed)
     for many in (1, 2, 5, 20):
         plain, solver = Plain(met, v, mobility), Solver(met, v, mobility, _SCALE)
@@ -141,7 +142,7 @@ def test_a_step_has_the_bits_of_sweeps_with_momentum(seed: int) -> None:
 
 
 def test_idle_contacts_are_skipped_until_others_load_them() -> None:
-    """The scenes of the test above contain idle contacts and contacts that are loaded later."""
+    """The scenes of the comparison contain idle contacts, and contacts that are loaded later."""
     idle = np.array([[CONTACTS - len(rows) for rows in loaded(seed)] for seed in range(12)])
     assert (idle[:, -1] > 0).all()
     assert (idle[:, -1] < idle[:, 0]).any()

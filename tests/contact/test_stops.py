@@ -1,4 +1,4 @@
-"""Walls and planes of symmetry within the sweeps: nodes that they stop do not move into them."""
+"""Walls and planes of symmetry within the sweeps: nodes at a wall or plane do not move into it."""
 
 import numpy as np
 import pytest
@@ -16,7 +16,7 @@ CUBE = block((1, 1, 1), 1.0)
 
 
 def wall(normal: Floats, side: float = 1.0, at: float = 0.0, friction: float = 0.0) -> Stops:
-    """Returns a wall that acts on the first node only."""
+    """Returns a wall that acts only on the first node."""
     unit = np.array([normal]) / np.linalg.norm(normal)
     return Stops(np.array([[at, 0.0, 0.0]]), unit, np.array([[side, 0.0]]), np.array([friction]), np.zeros(1, bool))
 
@@ -32,8 +32,9 @@ def pressed(stops: Stops, speed: float = 1.0, n: int = 3, mobility: Floats | Non
 
 @pytest.mark.parametrize("stops", [wall(np.array([2.0, 0.0, 0.0])), wall(np.array([-1.0, 0.0, 0.0]), side=-1.0)])
 def test_a_node_between_a_wall_and_a_body_does_not_yield(stops: Stops) -> None:
-    """The impulse of the last node passes through all nodes to the wall; the wall returns it to the first node
-    afterwards."""
+    """The impulse of the last node passes through all nodes to the wall; the wall returns the impulse to the first node
+    afterwards.
+    """
     v = pressed(stops).v
     assert v[:, 0] == pytest.approx([-1.0, 0.0, 0.0], abs=5e-3)
     assert (v[:, 1:] == 0.0).all()
@@ -45,14 +46,16 @@ def test_without_a_wall_they_share_the_impulse() -> None:
 
 
 def test_a_wall_does_not_pull() -> None:
-    """A node that moves away from the wall, or is farther from it than its motion in the step, is not changed."""
+    """The wall does not change a node that moves away from it, or that is farther from the wall than its motion in the
+    step.
+    """
     assert pressed(wall(np.array([1.0, 0.0, 0.0])), speed=-1.0).v[:, 0].tolist() == [0.0, 0.0, 1.0]
     away = wall(np.array([1.0, 0.0, 0.0]), at=-0.2)
     assert pressed(away, speed=0.3).v[:, 0] == pytest.approx([-0.1] * 3, abs=1e-4)
 
 
 def test_a_slanted_wall_stops_along_what_is_free() -> None:
-    """A plane of symmetry holds the node along y, so the wall stops it by an impulse along x only."""
+    """A plane of symmetry holds the node along y, so that the wall stops the node by an impulse along x only."""
     mobility = np.ones((3, 3))
     mobility[0, 1] = 0.0
     v = pressed(wall(np.array([1.0, 1.0, 0.0])), mobility=mobility).v
@@ -60,7 +63,9 @@ def test_a_slanted_wall_stops_along_what_is_free() -> None:
 
 
 def test_a_stop_reduces_an_impulse_that_was_too_large() -> None:
-    """The first node moves to the wall, and a contact moves it away again, faster than the wall has to stop it."""
+    """The first node moves to the wall, and a contact moves the node away again, faster than the wall has to stop
+    it.
+    """
     v = np.array([[-1.0, 0.0, 0.0], [3.0, 0.0, 0.0]])
     solver = Solver(column(2), v, np.ones((2, 3)), stops=wall(np.array([1.0, 0.0, 0.0])))
     solver.step(60)
@@ -74,8 +79,9 @@ def test_a_stop_reduces_an_impulse_that_was_too_large() -> None:
 
 @pytest.mark.parametrize(("friction", "left"), [(0.0, 0.5), (0.2, 0.4), (0.6, 0.2), (2.0, 0.0)])
 def test_friction_at_a_wall_takes_what_its_push_allows(friction: float, left: float) -> None:
-    """Another node presses the node on the wall, both with 0.5 m/s along the wall. The second node sticks to the
-    first, so that its velocity shows the friction."""
+    """A second node presses the first node on the wall; both nodes move at 0.5 m/s along the wall. The second node
+    sticks to the first node, so that the velocity of the second node shows the friction.
+    """
     v = np.array([[0.0, 0.5, 0.0], [-1.0, 0.5, 0.0]])
     met = column(2)._replace(friction=np.full(1, 10.0))
     solver = Solver(met, v, np.ones((2, 3)), stops=wall(np.array([1.0, 0.0, 0.0]), friction=friction))
@@ -83,8 +89,9 @@ def test_friction_at_a_wall_takes_what_its_push_allows(friction: float, left: fl
 
 
 def test_walls_and_planes_hold_the_parts_that_they_name_on_their_side() -> None:
-    """The scene has bodies above and below a plane, and a body in two pieces on both sides of the plane, on which
-    only the boundary acts."""
+    """The scene has bodies above and below a plane, and a body of two pieces on both sides of the plane, on which only
+    the boundary acts.
+    """
     both = TetMesh(
         np.concatenate([CUBE.points, CUBE.points - [0.0, 0.0, 3.0]]),
         np.concatenate([CUBE.tets, CUBE.tets + len(CUBE.points)]),

@@ -1,5 +1,6 @@
-"""The surface: every exposed face once, directed outward; every edge, and the sharp edges, at which faces enclose an
-angle."""
+"""The surface: every exposed face once, directed outward; every edge; and the sharp edges, at which two faces enclose
+an angle.
+"""
 
 from collections import Counter
 from typing import NamedTuple
@@ -21,7 +22,7 @@ CELLS = (2, 3, 4)
 SIZE = 1e-3
 BOX = SIZE * np.array(CELLS)
 CUBES = {1: [(0, 0, 0)], 2: [(0, 0, 0), (1, 1, 0)], 3: [(0, 0, 0), (1, 0, 0), (0, 1, 0)]}
-"""Corners of unit cubes: one cube; two cubes with a common edge only; three cubes in the form of an L."""
+"""Corners of unit cubes: one cube; two cubes with only a common edge; three cubes in the form of an L."""
 
 
 class Cut(NamedTuple):
@@ -49,7 +50,7 @@ def whole(mesh: TetMesh, planes: list[int] | None = None, edges: bool = True) ->
 
 
 def cubes(corners: list[tuple[int, int, int]]) -> TetMesh:
-    """Returns unit cubes at the corners, with common nodes where they touch."""
+    """Returns unit cubes at the given corners, with common nodes where the cubes touch."""
     unit = block((1, 1, 1), 1.0, 0.0)
     points = np.concatenate([unit.points + np.array(corner) for corner in corners])
     tets = np.concatenate([unit.tets + i * len(unit.points) for i in range(len(corners))])
@@ -58,7 +59,9 @@ def cubes(corners: list[tuple[int, int, int]]) -> TetMesh:
 
 
 def table(edges: Edges) -> "np.ndarray":
-    """Returns (n, 8) words: ids of the two faces, nodes, the bits of the length, and whether the edge is sharp."""
+    """Returns (n, 8) words of edges: ids of the two faces, nodes, the bit pattern of the length, and whether the edge
+    is sharp.
+    """
     return np.column_stack([edges.sides, edges.nodes, edges.size.view(np.int64), edges.sharp])
 
 
@@ -118,7 +121,7 @@ def test_nodes_of_the_skin_and_no_others_are_flagged() -> None:
 
 
 def test_sharp_edges_of_a_box_are_its_twelve_edges() -> None:
-    """The mesh divides the twelve edges; diagonals of the flat faces are not sharp."""
+    """The mesh divides the twelve edges of the cube; diagonals of the flat faces are not sharp."""
     found, model = whole(shuffled(block(CELLS, SIZE), 4))
     x, edges = model.nodes.x0, sharp_ones(found)
     assert found.edges.n == 1.5 * found.faces.n
@@ -200,7 +203,7 @@ def test_far_nodes_are_those_of_its_edges_that_a_rank_does_not_hold(ranks: int) 
 
 
 def test_concave_edges_belong_to_the_list_too() -> None:
-    """Concave edges are sharp; the narrow phase tests whether an edge is convex."""
+    """Concave edges are also sharp; the narrow phase tests whether an edge is convex."""
     found, model = whole(cubes(CUBES[3]))
     edges = sharp_ones(found)
     inner = (model.nodes.x0[edges.nodes[:, :2]][..., :2] == 1.0).all(axis=(1, 2))
@@ -221,8 +224,9 @@ def test_an_edge_with_four_faces_gives_one_answer_on_any_number_of_ranks(ranks: 
 
 
 def test_where_four_faces_meet_every_two_that_run_against_each_other_make_an_edge() -> None:
-    """The edges are those of the two cubes, and those of the two gaps between the cubes, which are convex only if
-    the gaps are closed."""
+    """The edges are those of the two cubes and those of the two gaps between the cubes; the edges of the gaps are
+    convex only if the gaps are closed.
+    """
     found, model = whole(cubes(CUBES[2]))
     x = model.nodes.x0[found.edges.nodes[:, :2]]
     common = (x[..., :2] == 1.0).all(axis=(1, 2))

@@ -12,7 +12,7 @@ from .kernels import Solver, column
 
 @pytest.mark.parametrize("seed", range(4))
 def test_the_residual_is_the_change_by_the_last_sweep(seed: int) -> None:
-    """The sum over two plain sweeps is in units of 2^16 quanta; the value of each node is rounded down."""
+    """The sum over two sweeps without momentum is in units of 2^16 quanta; the value of each node is rounded down."""
     v = np.random.default_rng(seed).normal(size=(20, 3))
     solver = Solver(column(20), v, np.ones((20, 3)))
     solver.sweep()
@@ -26,7 +26,8 @@ def test_the_residual_is_the_change_by_the_last_sweep(seed: int) -> None:
 
 def share(links: int, sweeps: int) -> float:
     """Returns the change by the last of a number of sweeps, when one end of a row of touching nodes moves into the
-    others."""
+    other nodes.
+    """
     v = np.zeros((links, 3))
     v[0, 0] = 1.0
     solver = Solver(column(links), v, np.ones((links, 3)))
@@ -41,7 +42,7 @@ def test_a_long_row_needs_more_sweeps() -> None:
 
 
 def steps(need: SweepCount, shares: Floats) -> list[int]:
-    """Returns the numbers of sweeps after steps with these residuals."""
+    """Returns the numbers of sweeps after steps with the given residuals."""
     found = []
     for one in shares:
         need.agree(np.array([round(1e6 * one), 1_000_000]))
@@ -50,8 +51,9 @@ def steps(need: SweepCount, shares: Floats) -> list[int]:
 
 
 def test_the_sweep_count_follows_the_residual() -> None:
-    """The number grows by a quarter, at least by one, or falls by one, within its bounds; without an impulse it does
-    not change."""
+    """The number of sweeps grows by a quarter, at least by one, or falls by one, within its bounds; without an impulse
+    it does not change.
+    """
     need = SweepCount(Sweeps(5, 12))
     assert need.sweeps == 5
     assert steps(need, np.full(6, 0.002)) == [6, 7, 8, 10, 12, 12]
@@ -67,7 +69,8 @@ def test_a_number_that_is_given_stays() -> None:
 
 def test_a_run_warns_if_the_residual_is_too_large() -> None:
     """The residual is relative to all impulses of the run, so that a first or weak step has no effect; a restart
-    continues the sums."""
+    continues the sums.
+    """
     few, own = SweepCount(Sweeps(5, 5)), SweepCount(Sweeps(5, 40))
     for need in (few, own):
         need.agree(np.array([9, 10]))

@@ -1,5 +1,6 @@
-"""Sweeps: exact for one contact, without overshoot for many contacts, independent of their order, and without loss
-of impulse."""
+"""Sweeps: exact for one contact, without overshoot for many contacts, independent of the order of contacts, and without
+loss of impulse.
+"""
 
 import numpy as np
 import pytest
@@ -14,7 +15,7 @@ SEEDS = range(40)
 
 
 def energy(v: Floats, mobility: Floats) -> float:
-    """Returns the kinetic energy, J, of the components that can move."""
+    """Returns the kinetic energy, J, of the velocity components that can move."""
     mass = np.divide(1.0, mobility, out=np.zeros_like(mobility), where=mobility > 0.0)
     return float(0.5 * (mass * v * v).sum())
 
@@ -25,7 +26,7 @@ def rates(met: ContactRows, v: Floats) -> Floats:
 
 
 def speeds(met: ContactRows, v: Floats) -> Floats:
-    """Returns (n,) the relative velocity along the normals."""
+    """Returns (n,) the relative velocities along the normals of the contacts."""
     return np.asarray((rates(met, v) * met.normals).sum(axis=1))
 
 
@@ -52,7 +53,7 @@ def dense(met: ContactRows, v: Floats, mobility: Floats) -> Floats:
 
 
 def alone(seed: int, friction: float = 0.0) -> tuple[ContactRows, Floats, Floats]:
-    """Returns one contact of a random network, oriented so that it needs an impulse."""
+    """Returns one contact of a random network, oriented so that the contact needs an impulse."""
     met, v, mobility = network(seed, 1, 4, friction)
     v *= np.sign(-speeds(met, v)[0])
     return met, v, mobility
@@ -60,7 +61,7 @@ def alone(seed: int, friction: float = 0.0) -> tuple[ContactRows, Floats, Floats
 
 @pytest.mark.parametrize("seed", SEEDS)
 def test_one_contact_is_solved_in_one_sweep(seed: int) -> None:
-    """The contact has any masses and weights, and some held components."""
+    """The contact has any masses and weights, and some held velocity components."""
     met, v, mobility = alone(seed)
     random = np.random.default_rng(seed)
     met.wanted[:] = random.uniform(0.0, 5.0)
@@ -86,7 +87,7 @@ def test_impulses_add_up_to_exactly_nothing_and_act_along_the_normals(seed: int)
 @pytest.mark.parametrize("seed", SEEDS)
 def test_a_contact_never_pulls(seed: int) -> None:
     """No impulse of a contact is negative after any sweep. A contact that opens without an impulse is not changed, to
-    the bit.
+    the last bit.
     """
     met, v, mobility = network(seed, wanted=20.0, friction=0.4)
     solver = Solver(met, v, mobility)
@@ -99,8 +100,9 @@ def test_a_contact_never_pulls(seed: int) -> None:
 
 @pytest.mark.parametrize("seed", SEEDS)
 def test_an_impulse_that_was_too_large_is_reduced(seed: int) -> None:
-    """The sum over the sweeps cannot be negative, but the change in one sweep can be negative: at the end no open
-    contact has an impulse."""
+    """The sum of the changes over the sweeps cannot be negative, but the change in one sweep can be negative: at the
+    end no open contact has an impulse.
+    """
     met, v, mobility = network(seed)
     solver = Solver(met, v, mobility)
     solver.sweep(4000)
@@ -112,8 +114,9 @@ def test_an_impulse_that_was_too_large_is_reduced(seed: int) -> None:
 @pytest.mark.parametrize("wanted", [0.0, 10.0])
 @pytest.mark.parametrize("seed", SEEDS)
 def test_kinetic_energy_never_rises_where_nothing_overlaps(seed: int, wanted: float) -> None:
-    """The kinetic energy does not rise for any number of sweeps, also with held components. Without prescribed motions
-    the energy does not rise from sweep to sweep."""
+    """The kinetic energy does not rise for any number of sweeps, even with held velocity components. Without prescribed
+    motions the energy does not rise from sweep to sweep.
+    """
     met, v, mobility = network(seed, wanted=wanted)
     mobility *= np.random.default_rng(seed).uniform(size=mobility.shape) > 0.1
     v[mobility == 0.0] = 0.0
@@ -214,7 +217,7 @@ def test_sweeps_converge_to_the_solution_of_the_dense_problem(seed: int) -> None
 
 @pytest.mark.parametrize("seed", range(10))
 def test_the_error_falls_with_every_sweep(seed: int) -> None:
-    """The error is measured in the norm of the kinetic energy, from the first sweep on."""
+    """The error of the sweeps is measured in the norm of the kinetic energy, from the first sweep on."""
     met, v, mobility = network(seed, one_normal=seed % 2 == 0)
     exact, mass = dense(met, v, mobility), 1.0 / mobility
     solver, errors = Solver(met, v, mobility), []
@@ -243,8 +246,8 @@ def test_friction_is_bounded_by_mu_times_the_normal_impulse(mu: float) -> None:
 
 @pytest.mark.parametrize("seed", SEEDS)
 def test_one_contact_sticks_when_it_can_and_slides_when_it_must(seed: int) -> None:
-    """A contact that sticks has no relative velocity afterwards. In a contact that slides, friction acts against the
-    motion, with mu times the normal impulse.
+    """A contact that sticks has no relative velocity after the sweeps. In a contact that slides, friction acts against
+    the motion, with mu times the normal impulse.
     """
     met, v, mobility = alone(seed)
     met.friction[:] = 1e3
@@ -272,7 +275,9 @@ def test_friction_is_isotropic(seed: int) -> None:
 @pytest.mark.parametrize("mu", [0.0, 0.2, 50.0])
 @pytest.mark.parametrize("seed", SEEDS)
 def test_energy_lost_is_friction_heat_and_the_work_of_the_normal_impulse(seed: int, mu: float) -> None:
-    """The energy of one contact is -1/2 push (speed before + speed after); heat and work are never negative."""
+    """The energy of one contact is -1/2 times the impulse times the sum of the speeds before and after the impulse;
+    heat and work are never negative.
+    """
     met, v, mobility = alone(seed, friction=mu)
     solver = Solver(met, v, mobility)
     after = solver.sweep(4)
@@ -287,8 +292,9 @@ def test_energy_lost_is_friction_heat_and_the_work_of_the_normal_impulse(seed: i
 
 @pytest.mark.parametrize(("cracks", "share"), [(False, 0.8), (True, 1.0)])
 def test_a_step_begins_with_the_impulses_of_the_one_before(cracks: bool, share: float) -> None:
-    """The start values are the whole friction impulse, across the present normal, and a part of the normal impulse,
-    or for cracks the whole normal impulse."""
+    """The start values are the whole friction impulse, across the present normal, and a fraction of the normal impulse;
+    for cracks they include the whole normal impulse.
+    """
     met, v, mobility = network(7, friction=0.4)
     if cracks:
         met.nodes[:, 2:], met.weights[:] = met.nodes[:, 1:2], (1.0, -1.0, 0.0, 0.0)
@@ -303,8 +309,9 @@ def test_a_step_begins_with_the_impulses_of_the_one_before(cracks: bool, share: 
 
 
 def test_a_node_that_has_become_lighter_begins_with_less() -> None:
-    """The start value has the same speed as before: with an eighth of the mass on each side it is an eighth of the
-    impulse."""
+    """The start value gives the same speed as in the previous step: with an eighth of the mass on each side it is an
+    eighth of the impulse.
+    """
     met, v, mobility = network(7, friction=0.4)
     heavy, same, light = Solver(met, v, mobility), Solver(met, v, mobility), Solver(met, v, 8.0 * mobility)
     heavy.sweep(2000)

@@ -1,4 +1,6 @@
-"""Swept filter: removed pairs do not come near during the horizon, and most pairs that stay away are removed."""
+"""Swept filter: removed pairs do not come near each other during the horizon, and most pairs that stay apart are
+removed.
+"""
 
 import numpy as np
 import pytest
@@ -17,8 +19,8 @@ TIMES = np.linspace(0.0, HORIZON, 41)
 
 
 def flights(seed: int, many: int, turn: float) -> tuple[Floats, Floats]:
-    """Returns (pairs, 2, many, 3) positions and velocities of two things of ``many`` corners about 1 m long: each
-    moves by about its length and rotates by about ``turn``, rad.
+    """Returns (pairs, 2, many, 3) positions and velocities of pairs of things. A thing has ``many`` corners and is
+    about 1 m long; it moves by about its length and rotates by about ``turn``, rad.
     """
     draw = np.random.default_rng(seed)
     shape = draw.normal(size=(PAIRS, 2, many, 3))
@@ -31,20 +33,21 @@ def flights(seed: int, many: int, turn: float) -> tuple[Floats, Floats]:
 
 
 def lines(x: Floats, v: Floats, horizon: float) -> Lines:
-    """Extrapolation of nodes of one part."""
+    """Extrapolation of the nodes of one part."""
     flat = x.reshape(-1, 3).copy()
     return Lines(flat, v.reshape(-1, 3).copy(), horizon, np.zeros(len(flat), np.int32))
 
 
 def kept_edges(pairs: Indices, corners: Indices, deep: Floats, of: Lines, skin: float) -> Flags:
-    """(p,) pairs, no two with the same first edge, that the filter keeps."""
+    """(p,) pairs that the filter keeps, no two with the same first edge."""
     left = SweptFilter(team(1)).edges(pairs.copy(), corners, deep, of, skin)
     return np.asarray(np.isin(pairs[:, 0], left[:, 0]))
 
 
 def wrong_edges(seed: int, turn: float) -> tuple[int, float]:
     """Returns the number of removed pairs of edges that come nearer than half the skin, and the fraction of removed
-    pairs."""
+    pairs.
+    """
     x, v = flights(seed, 2, turn)
     ends = np.arange(4 * PAIRS, dtype=np.int32).reshape(-1, 2)
     pairs = np.arange(2 * PAIRS, dtype=np.int32).reshape(-1, 2)
@@ -65,7 +68,9 @@ def test_no_edges_are_removed_that_come_near(turn: float) -> None:
 
 
 def wrong_faces(seed: int, turn: float) -> tuple[int, float]:
-    """Returns the same numbers for nodes and faces."""
+    """Returns the number of removed pairs of nodes and faces that come nearer than half the skin, and the fraction of
+    removed pairs.
+    """
     x, v = flights(seed, 3, turn)
     corners = np.arange(6 * PAIRS, dtype=np.int32).reshape(PAIRS, 2, 3)
     faces = np.column_stack([corners[:, 1], corners[:, 1, :1]]).astype(np.int32)
@@ -87,8 +92,8 @@ def test_no_node_is_removed_that_comes_near_a_face(turn: float) -> None:
 
 
 def test_edges_that_come_near_between_two_moments_are_not_removed() -> None:
-    """The edges are 0.13 m apart after a twelfth of the horizon. At the beginning, the middle and the end the
-    crossing is beyond an end of an edge.
+    """The edges are 0.13 m apart after a twelfth of the horizon. At the beginning, the middle and the end of the
+    horizon the crossing is beyond an end of an edge.
     """
     x = np.array([[-1.0, 1.175, -1.896], [-0.046, 0.775, -0.536], [0.263, 1.232, -0.359], [-0.201, 1.28, -0.777]])
     v = np.array([[-0.677, 2.596, -0.252], [0.334, 2.861, 0.613], [-0.615, 0.038, -1.033], [-0.528, 0.628, -0.385]])

@@ -1,5 +1,6 @@
-"""Zones of the surface nodes: boxes with about equal numbers of nodes; a step on many threads equals a step on one
-thread, to the bit."""
+"""Zones of the surface nodes: boxes with about equal numbers of nodes; a step on many threads is bit-identical to a
+step on one thread.
+"""
 
 from itertools import pairwise
 from types import SimpleNamespace
@@ -51,7 +52,7 @@ def test_one_thread_has_one_zone() -> None:
 
 
 def test_sets_of_one_colour_share_no_node() -> None:
-    """Every contact belongs to one set, and most contacts belong to a set within a zone."""
+    """Every contact belongs to one contact set, and most contacts belong to a set within a zone."""
     draw, nodes = np.random.default_rng(3), 600
     x = np.sort(draw.uniform(size=(nodes, 3)), axis=0)
     zones = Zones(2)
@@ -112,7 +113,7 @@ def test_impulses_of_many_threads_are_those_of_one(threads: int, seed: int) -> N
 
 
 def test_a_step_alone_books_no_work_of_a_step_with_shared_nodes() -> None:
-    """A rank that has lost its neighbours has no contacts in the sets at the border any more."""
+    """A rank that has lost its neighbours has no contacts in the contact sets at the border any more."""
     met, v, mobility = network(4, friction=0.3)
     nobody = np.zeros(0, np.int32)
     before = Solver(met, v, mobility)

@@ -126,7 +126,7 @@ def test_tets_are_read_in_one_line_and_in_two(tmp_path: Path) -> None:
         (f"{TWO}/PART/1\n", "line 29: /PART/1 is defined twice"),
         (f"{TWO}/SPHCEL/1\n{row(30, 1)}", "1 lines of /SPHCEL, whose elements are not read"),
         (TWO.replace("1" + " " * 19 + "0", "1" + " " * 19 + "x"), "line 2: .* has no three coordinates"),
-        ("hello\n", "line 1: 'hello' stands before the first keyword"),
+        ("hello\n", "line 1: 'hello' is before the first keyword"),
     ],
 )  # fmt: skip
 def test_what_cannot_be_read_is_refused_with_its_line(text: str, message: str, tmp_path: Path) -> None:

@@ -151,7 +151,7 @@ def test_wall_time(outcome: Outcome | None) -> None:
     assert (run.state, run.cause) == (State.TIMED_OUT, Cause.WALLTIME)
     assert isinstance(actions[0], WriteOutcome)
     assert (actions[0].outcome.state, actions[0].outcome.cause) == ("timed_out", "walltime")
-    assert actions[0].outcome.message == "its wall time is used up"
+    assert actions[0].outcome.message == "the run has reached its limit of wall time"
 
 
 @pytest.mark.parametrize(

@@ -97,7 +97,7 @@ def test_a_file_is_used_by_those_who_have_sent_it(server: Running, quick: list[P
         refusals = [hand(server.bob, case(sha256=each), 422) for each in (HASH, nobodys)]
         assert json.dumps(refusals[0]).replace(HASH, "?") == json.dumps(refusals[1]).replace(nobodys, "?")
         (entry,) = refusals[0]["errors"] if "errors" in refusals[0] else refusals[0]["problems"]
-        assert (entry["key"], entry["message"][:25]) == ("parts[0].mesh.sha256", "you have sent no such fil")
+        assert (entry["key"], entry["message"][:25]) == ("parts[0].mesh.sha256", "you have uploaded no such")
     assert not quick, "nothing was read"
     assert not list(server.ann.runs.glob(".new*"))
     send(server.bob)
@@ -149,7 +149,7 @@ def test_a_file_that_is_removed_at_the_last_moment_makes_no_run(
         real(owner, more)
 
     monkeypatch.setattr(server.service.desk, "_check_room", removed)
-    assert "you have sent no such file" in hand_in(server.ann, case(), 422)["detail"]
+    assert "you have uploaded no such file" in hand_in(server.ann, case(), 422)["detail"]
     assert server.ann.http.get("/v1/runs").json()["runs"] == []
     assert not list(server.ann.runs.glob(".new*"))
 
@@ -198,7 +198,7 @@ def test_points_of_a_sweep_have_files_of_their_own(server: Running, quick: list[
     assert len(quick) == 2
     points[1]["parts[0].mesh.sha256"] = "0" * 64
     sweep = server.ann.http.post("/v1/sweeps", content=json.dumps(wish), headers=JSON).json()
-    assert "you have sent no such file" in sweep["detail"]
+    assert "you have uploaded no such file" in sweep["detail"]
     assert sweep["detail"].endswith("(point 1)")
 
 

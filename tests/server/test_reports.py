@@ -78,7 +78,7 @@ def test_a_server_without_packages_names_them(server: Running, monkeypatch: pyte
     monkeypatch.setattr(importlib.util, "find_spec", lambda name: None if name == "pyvista" else real(name))
     answer = server.ann.http.post(f"/v1/runs/{run}:report")
     assert (answer.status_code, answer.json()["hint"]) == (501, f"conoid report {run}")
-    assert answer.json()["detail"] == "this server lacks pyvista: pip install 'conoid[client,view]' there"
+    assert answer.json()["detail"] == "the server lacks pyvista: pip install 'conoid[client,view]' on the server"
 
 
 def test_a_link_in_its_place_is_not_followed(server: Running, tmp_path: Path) -> None:

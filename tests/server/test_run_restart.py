@@ -63,7 +63,7 @@ def test_without_a_checkpoint_there_is_nothing_to_go_on_from(server: Running) ->
     server.ann.wait_for(run)
     answer = server.ann.http.post(f"/v1/runs/{run}:restart")
     assert (answer.status_code, answer.json()["code"]) == (409, "no_checkpoint")
-    assert answer.json()["detail"] == f"run {run} has no checkpoint: one that has succeeded keeps none"
+    assert answer.json()["detail"] == f"run {run} has no checkpoint: a run that has succeeded keeps no checkpoint"
     assert len(server.ann.http.get("/v1/runs").json()["runs"]) == 1
     assert not list(server.ann.runs.glob(".new-*"))
     assert server.bob.http.post(f"/v1/runs/{run}:restart").status_code == 404

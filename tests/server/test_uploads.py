@@ -155,7 +155,7 @@ def test_bytes_that_have_another_hash_are_not_kept(server: Running) -> None:
 @pytest.mark.parametrize(
     ("headers", "status", "code", "line"),
     [
-        ({"Content-Encoding": "gzip"}, 415, "unsupported_encoding", "a body is sent as it is"),
+        ({"Content-Encoding": "gzip"}, 415, "unsupported_encoding", "a request body must not be encoded"),
         ({"Content-Range": "bytes 0-9/9"}, 400, "bad_range", "does not fit"),
         ({"Content-Range": "bytes 5-4/9"}, 400, "bad_range", "does not fit"),
         ({"Content-Range": "bytes 0-5/1000"}, 400, "bad_range", "does not fit Content-Length 10"),
@@ -200,7 +200,7 @@ def test_bytes_and_number_of_files_are_a_users_quota(server: Running) -> None:
         assert put(server.ann, sha256, small).status_code == 201
     tiny, sha256 = made(1, 9)
     line = refused(put(server.ann, sha256, tiny), 429, "file_quota")
-    assert line == "you have sent 4 files; this server keeps 4 of a user"
+    assert line == "you have uploaded 4 files; this server allows 4"
     assert put(server.ann, one, first[10:], "10-2999/3000").status_code == 201, "what has begun may end"
 
 
@@ -257,12 +257,12 @@ def test_a_full_disk_refuses_in_one_line_and_keeps_what_has_come(
     with monkeypatch.context() as patch:
         patch.setattr(os, "pwrite", full)
         line = refused(put(server.ann, sha256, data[300:], "300-999/1000"), 507, "storage")
-    assert line == "the file cannot be kept: No space left on device"
+    assert line == "the file cannot be stored: No space left on device"
     assert server.ann.http.head(f"/v1/files/{sha256}").headers["Upload-Offset"] == "500"
     assert put(server.ann, sha256, data[500:], "500-999/1000").status_code == 201
     server.service.uploads._free_disk = 1 << 60
     other, name = made(1000, 2)
-    assert "the server's disk has no room for 1.00 kB" in refused(put(server.ann, name, other), 507, "disk_full")
+    assert "the server's disk has no space for 1.00 kB" in refused(put(server.ann, name, other), 507, "disk_full")
     assert files_of(server.ann) == [sha256]
 
 

@@ -129,8 +129,8 @@ def test_a_run_that_can_never_start_delays_no_other() -> None:
     made = plan([need("0", ranks=4), need("1", memory=9e9), need("2")], [], Room(2, 4e9), NOW, free)
     assert made.start == ["2"]
     assert made.why == {
-        "0": "it needs 4 slots, and this server has 2: it cannot start here",
-        "1": "it needs 9.00 GB of memory, and this server has 4.00 GB: it cannot start here",
+        "0": "the run needs 4 slots, this server has 2: it cannot start here",
+        "1": "the run needs 9.00 GB of memory, this server has 4.00 GB: it cannot start here",
     }
 
 

@@ -268,7 +268,7 @@ def test_a_box_between_planes_is_refused_before_a_run_and_in_it() -> None:
     bar = {"shape": "box", "low": [0, 0, 0], "high": [2e-3, 2e-3, 4e-3], "element_size": 5e-4}
     between = {"low": [0, 0, 1.1e-3], "high": [2e-3, 2e-3, 1.4e-3]}
     for kind, what in ((PUSH, "node"), (PRESSURE, "face")):
-        with pytest.raises(CaseError, match=rf"^boundaries\[0\]: no {what} of its bodies lies in its box"):
+        with pytest.raises(CaseError, match=rf"^boundaries\[0\]: no {what} of the bodies lies in the box"):
             case_of({**bar, "generator": "structured"}, {**kind, **between})
     file = case_of({"shape": "file", "path": "a.inp", "unit": "1 mm"}, {**PUSH, **between})
     with pytest.raises(InputError, match=r"^boundaries\[0\]: holds no node"):

@@ -64,7 +64,7 @@ def blocks(deck: Included) -> Iterator[Block]:
             elif block is not None:
                 block.rows.append((number, text))
             elif text.strip():
-                raise MeshError(f"line {number}: {shown(text.strip())} stands before the first keyword")
+                raise MeshError(f"line {number}: {shown(text.strip())} is before the first keyword")
     except ValueError as error:
         raise error if isinstance(error, MeshError) else MeshError(str(error)) from None
     if block is None:
