@@ -1,7 +1,7 @@
 """The Python client: ``import conoid.client as c; c.connect().submit("taylor_copper").watch()``.
 
-Its methods have the names of the commands: a session can validate, submit and list; a run can be watched, cancelled and
-waited for, and has a result; a result can be viewed.
+The methods of the client have the names of the commands: a session can validate, submit and list. A run can be
+watched, cancelled and waited for, and has a result; a result can be viewed.
 """
 
 from conoid.cases.reading.problems import CaseError, ConoidError

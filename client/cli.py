@@ -1,4 +1,6 @@
-"""The command line: ``conoid serve | validate | submit | runs | show | watch | get | view | run``, and more."""
+"""The command line ``conoid`` with its commands ``serve``, ``validate``, ``submit``, ``runs``, ``show``, ``watch``,
+``get``, ``view``, ``run`` and others.
+"""
 
 import os
 import sys
@@ -27,14 +29,14 @@ from .examination import examine
 from .remote.submission import data_of, locate
 
 _Mistake = cast(type[typer.BadParameter], typer.BadParameter.__base__)
-"""Error of typer for an unknown command, option or value; it has no public name."""
+"""Error of typer for an unknown command, option or value; the class has no public name."""
 
 
 class Guarded(Grouped):
-    """Prints an error as one clear line on standard error, and returns the exit code."""
+    """Group of commands that prints an error as one clear line on standard error and returns the exit code."""
 
     def main(self, *arguments: Any, **options: Any) -> Any:
-        """Parses the arguments and runs the command; a full disk is reported for a help text as well."""
+        """Parses the arguments and runs the command. A full disk is reported in one line, for a help text as well."""
         if sys.stdout is None:
             complain("standard output is closed; redirect it to a file or to /dev/null")
             sys.exit(1)
@@ -45,8 +47,8 @@ class Guarded(Grouped):
             sys.exit(1)
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
-        """Parses the arguments. Refuses an empty name of a file, such as an unset variable, which would be the working
-        folder."""
+        """Parses the arguments. Refuses an empty file name, as from an unset variable, because it would mean the
+        working folder."""
         for option, value in pairwise([*args, "-"]):
             if option.removesuffix("=") in FILE_OPTIONS and (not value or option.endswith("=")):
                 complain(f"{option.removesuffix('=')} is empty: write the name of a file or a folder")
@@ -54,7 +56,7 @@ class Guarded(Grouped):
         return super().parse_args(ctx, args)
 
     def invoke(self, ctx: Any) -> Any:
-        """Runs the command."""
+        """Runs the command, and prints an error as one line."""
         try:
             return super().invoke(ctx)
         except CaseError as error:
@@ -72,7 +74,7 @@ class Guarded(Grouped):
 
 app = typer.Typer(
     cls=Guarded, no_args_is_help=True, pretty_exceptions_enable=False, rich_markup_mode=None,
-    help="Impact simulations: submit, watch, view.",
+    help="Submit, watch and view impact simulations.",
 )  # fmt: skip
 app.add_typer(benches.bench, name="bench")
 
@@ -89,7 +91,7 @@ def every(
         bool, typer.Option("--version", callback=_version, is_eager=True, help="Print the version.")
     ] = False,
 ) -> None:
-    """Impact simulations: submit, watch, view."""
+    """Submit, watch and view impact simulations."""
 
 
 @app.command(
@@ -97,7 +99,7 @@ def every(
     short_help="Start the job server.",
 )  # fmt: skip
 def serve(ctx: typer.Context) -> None:
-    """Start the job server; takes the options of the server (conoid serve --help)."""
+    """Start the job server; the options are those of the server (conoid serve --help)."""
     page = Path(__file__).parent / "web"
     web = [] if "token" in ctx.args else ["--web", str(page)]
     command = [sys.executable, "-P", "-m", "conoid.server", *web, *ctx.args]
@@ -105,11 +107,11 @@ def serve(ctx: typer.Context) -> None:
     os.execv(command[0], command)
 
 
-@app.command(short_help="Check a case and estimate what it needs.")
+@app.command(short_help="Check a case and estimate its needs.")
 def validate(case: CaseArgument, overrides: Overrides = None, as_json: Json = False) -> None:
     """Check a case: errors, warnings, content of its parts, cost.
 
-    Mesh files are read. No server is needed. Warnings go to standard error and leave the exit code 0.
+    The command reads mesh files and needs no server. Warnings go to standard error and leave the exit code 0.
     """
     with aloud("reading mesh files"):
         found = examine(data_of(case, overrides or ()), locate(case).parent)
@@ -143,7 +145,7 @@ def validate(case: CaseArgument, overrides: Overrides = None, as_json: Json = Fa
 app.command(short_help="Submit a case to the server.")(server_runs.submit)
 app.command(name="runs", short_help="List runs, newest first.")(listing.runs)
 app.command(name="ls", hidden=True)(listing.runs)
-app.command(name="show", short_help="Show one run: its progress, or its outcome.")(server_runs.show_run)
+app.command(name="show", short_help="Show the progress or the outcome of one run.")(server_runs.show_run)
 app.command(name="watch", short_help="Follow a run until it ends.")(server_runs.watch_run)
 app.command(short_help="Stop a run at its next step.")(server_runs.cancel)
 app.command(short_help="Request a checkpoint of a run.")(server_runs.checkpoint)
@@ -175,14 +177,16 @@ def run_case(
     ranks: Ranks = None,
     threads: Annotated[
         int | None,
-        typer.Option("--threads", min=1, help="Threads of each rank; without it the case's own, else all cores."),
+        typer.Option("--threads", min=1, help="Threads of each rank; default: those of the case, else all cores."),
     ] = None,
     overrides: Overrides = None,
     out: Annotated[Path, typer.Option("--out", help="Folder of the runs.")] = Path("runs/local"),
     picture: Annotated[Path | None, typer.Option("--view", help="PNG file for a picture of the last frame.")] = None,
     field: Annotated[str | None, typer.Option("--field", help=f"Field of the picture: {', '.join(FIELDS)}.")] = None,
-    plain: Annotated[bool, typer.Option("--plain", help="Print lines instead of the panel.")] = False,
-    check: Annotated[bool, typer.Option("--check", help="Exit code 1 when a reference number is missed.")] = False,
+    plain: Annotated[bool, typer.Option("--plain", help="Print text lines instead of the panel.")] = False,
+    check: Annotated[
+        bool, typer.Option("--check", help="Exit code 1 if a reference number is not reproduced.")
+    ] = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print the outcome as JSON and nothing else.")] = False,
 ) -> None:
     """Run a case on this machine: start a server, submit, watch, check, draw, stop the server. Ctrl-C cancels the
@@ -196,20 +200,20 @@ def demo(
     out: Annotated[Path, typer.Option("--out", help="Picture of the last frame.")] = Path("demo.png"),
     ranks: Ranks = None,
 ) -> None:
-    """Run the case glass_steel_demo on this machine, check its reference numbers and draw its last frame.
+    """Run the case glass_steel_demo on this machine, check its reference numbers, and draw its last frame.
 
-    The demo takes some ten seconds and needs only this installation; the run is stored below runs/local.
+    The demonstration takes about ten seconds and needs only this installation; the run is stored below runs/local.
     """
     raise typer.Exit(run_once("glass_steel_demo", on_cores(ranks, None), Path("runs/local"), out, check=True))
 
 
 app.add_typer(shipped.cases, name="cases")
-app.command(short_help="Print the keys of a case, for editors or people.")(shipped.schema)
+app.command(short_help="Print the keys of a case, as JSON schema or as a page.")(shipped.schema)
 app.command(short_help="List the material library, or one material.")(shipped.materials)
 
 
 def main() -> None:
-    """Entry point ``conoid``."""
+    """Entry point of the command ``conoid``."""
     prepare()
     app()
 

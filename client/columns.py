@@ -1,4 +1,4 @@
-"""Tables as columns, without any package, or as a pandas.DataFrame if pandas is installed."""
+"""Tables stored by columns. No package is needed; with pandas installed, a table can become a pandas.DataFrame."""
 
 import csv
 import io
@@ -13,13 +13,15 @@ from conoid.cases.output import fragments, history
 from .errors import ClientError, UsageError
 
 Column: TypeAlias = "array[float] | list[str]"
-"""Numbers as a double array; text, such as the limiter of dt, as a list."""
+"""A column: numbers as an array of doubles, or text, such as the limiter of dt, as a list."""
 _SHOWN = 5
-"""Number of lines of the head and the end of a table that are shown. Chosen values."""
+"""Number of rows from the beginning and from the end of a table that notebooks show. Chosen value."""
 
 
 class Columns(dict[str, Column]):
-    """Columns by name, all of the same length, in the order of the file; ``units`` has the unit of each, or ''."""
+    """Columns of a table by name, in the order of the file; all columns have the same length. ``units`` has the unit
+    of each column, '' for no unit.
+    """
 
     def __init__(self, columns: Mapping[str, Column], units: Mapping[str, str]) -> None:
         """Stores the columns unchanged."""
@@ -28,11 +30,11 @@ class Columns(dict[str, Column]):
 
     @property
     def rows(self) -> int:
-        """Number of lines."""
+        """Number of rows of the table."""
         return len(next(iter(self.values()), ()))
 
     def numbers(self, name: str) -> Sequence[float]:
-        """Returns a column of numbers. Raises ClientError for an unknown column and for text."""
+        """Returns a column of numbers. Raises ClientError if the column is unknown or contains text."""
         column = self.get(name)
         if not isinstance(column, array):
             known = ", ".join(each for each, values in self.items() if isinstance(values, array))
@@ -40,7 +42,9 @@ class Columns(dict[str, Column]):
         return column
 
     def frame(self) -> Any:
-        """Returns a pandas.DataFrame; its ``attrs["units"]`` has the units. Raises ClientError without pandas."""
+        """Returns a pandas.DataFrame; its ``attrs["units"]`` has the units. Raises ClientError if pandas is not
+        installed.
+        """
         try:
             import pandas
         except ModuleNotFoundError:
@@ -50,7 +54,7 @@ class Columns(dict[str, Column]):
         return made
 
     def _repr_html_(self) -> str:
-        """Head and end of the table, for notebooks."""
+        """The beginning and the end of the table as HTML, for notebooks."""
         head = "".join(f"<th>{escape(title)}</th>" for title in history.header({n: self.units[n] for n in self}))
         rows = list(range(self.rows))
         chosen = rows if len(rows) <= 2 * _SHOWN else [*rows[:_SHOWN], *rows[-_SHOWN:]]
@@ -65,7 +69,9 @@ def _text(value: float | str) -> str:
 
 
 def read_columns(text: str) -> Columns:
-    """Reads CSV text with a header line; columns by names without units. A column with any text stays text."""
+    """Reads CSV text with a header line; returns the columns by name, without the units of the header. A column that
+    contains any text is a list of texts.
+    """
     rows = csv.reader(io.StringIO(text))
     named = [history.split(name) for name in next(rows, [])]
     columns: list[list[str]] = [list(column) for column in zip(*_whole(rows, len(named)), strict=True)]
@@ -74,7 +80,7 @@ def read_columns(text: str) -> Columns:
 
 
 def _whole(rows: Iterator[list[str]], length: int) -> Iterator[list[str]]:
-    """Returns the rows with all columns; the last line of a growing file may be incomplete."""
+    """Yields the rows that have all columns, because the last line of a growing file may be incomplete."""
     return (row for row in rows if len(row) == length)
 
 
@@ -86,7 +92,7 @@ def _column(column: list[str]) -> Column:
 
 
 def by_part(columns: Columns) -> dict[str, dict[str, Sequence[float]]]:
-    """Returns the energies of the parts in a history, by energy and part; empty for a case with one part."""
+    """Returns the energies of the parts in a history, first by energy, then by part; empty for a case with one part."""
     found: dict[str, dict[str, Sequence[float]]] = {}
     for column in columns:
         if (named := history.part_of(column)) is not None:
@@ -95,7 +101,7 @@ def by_part(columns: Columns) -> dict[str, dict[str, Sequence[float]]]:
 
 
 def joined(tables: Iterable[tuple[int, Columns]]) -> Columns:
-    """Joins fragment tables; the column ``frame`` has the number of each table's frame."""
+    """Joins tables of fragments; the column ``frame`` has the number of the frame of each row."""
     names = list(fragments.COLUMNS)
     found: dict[str, list[Any]] = {name: [] for name in ("frame", *names)}
     for index, table in tables:

@@ -24,17 +24,17 @@ from typing import Any
 from conoid.cases.reading.problems import CaseError, ConoidError, Problem
 
 _LONGEST = 1000
-"""Largest number of characters of a server's message that are shown. Chosen value: half a screen."""
+"""Largest number of characters of a server's message that are shown. Chosen value: they fill half a screen."""
 
 
 class ClientError(ConoidError):
-    """An error for the user. The text of the error is one line; ``exit_code`` is the exit code of the command."""
+    """An error for the user, with a text of one line. ``exit_code``: exit code of the command."""
 
     exit_code = 1
 
 
 class ServiceError(ClientError):
-    """A refusal of the server. ``status`` is the HTTP status, ``problem`` the body of the answer."""
+    """Refusal of a request by the server. ``status``: HTTP status; ``problem``: content of the answer."""
 
     def __init__(self, status: int, problem: Mapping[str, Any]) -> None:
         """``problem`` has the members of RFC 9457 (title, detail) and members of Conoid (code, pointer, hint,
@@ -46,7 +46,7 @@ class ServiceError(ClientError):
 
     @property
     def exit_code(self) -> int:  # type: ignore[override]
-        """Exit code: 2 for input that was refused, 1 for other errors."""
+        """Exit code of the command: 2 if input was refused, 1 for other errors."""
         return 2 if self.status in {400, 413, 422} else 1
 
     @property
@@ -64,18 +64,18 @@ class MissingError(ServiceError, NotFoundError):
 
 
 class UnreachableError(ClientError):
-    """No server answered at the address, or the answer broke off."""
+    """No server has answered at the address, or the answer was interrupted."""
 
 
 class AnswerError(UnreachableError):
-    """The answer of the server cannot be read, is too long, comes too slowly, or redirects elsewhere. A repeated
+    """The answer of the server cannot be read, is too long, is too slow, or redirects to another address. A repeated
     request does not help.
     """
 
 
 def passes(error: ClientError) -> bool:
-    """Returns True if the same request may succeed soon: no server answered, or the server reported a temporary
-    problem.
+    """Returns True if the same request may succeed soon, because no server answered or the server reported a
+    temporary problem.
     """
     if isinstance(error, UnreachableError):
         return not isinstance(error, AnswerError)
@@ -93,7 +93,7 @@ class UsageError(ClientError):
 
 
 class ViewError(ClientError):
-    """No picture could be made; the text has the missing part."""
+    """A picture cannot be drawn; the text of the error names what is missing."""
 
 
 class LookError(UsageError, ViewError):
@@ -107,13 +107,15 @@ def _line(status: int, problem: Mapping[str, Any]) -> str:
 
 
 def _brief(message: object) -> str:
-    """Returns a message of a server as text for people."""
+    """Returns a message of a server as text for people, shortened if necessary."""
     text = str(message)
     return text if len(text) <= _LONGEST else f"{text[:_LONGEST]} ..."
 
 
 def refusal(status: int, problem: Mapping[str, Any]) -> ConoidError:
-    """Returns the error class of a refusal: the class of the same problem on this machine."""
+    """Returns the error for a refusal of the server. Its class is the class that the same problem has on this
+    machine.
+    """
     errors = problem.get("errors")
     entries = [entry for entry in errors if isinstance(entry, Mapping)] if isinstance(errors, list) else []
     if status == 422 and entries:

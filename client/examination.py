@@ -1,6 +1,6 @@
-"""Check of a case before it runs: errors, warnings, cost.
+"""Check of a case before the run: errors, warnings, cost.
 
-A program of the worker, if it is installed, reads mesh files in a process of its own.
+Mesh files are read by a program of the worker, in a process of its own, if the worker is installed.
 """
 
 import subprocess
@@ -30,8 +30,8 @@ from .errors import ClientError
 
 @dataclass(frozen=True)
 class Examination:
-    """A valid case: ``odd`` are its warnings, ``survey`` is the content of its mesh files, ``touching`` are the
-    parts whose surfaces coincide.
+    """Result of the check of a valid case: ``odd`` are the warnings, ``survey`` is the content of the mesh files,
+    ``touching`` are the pairs of parts whose surfaces coincide.
     """
 
     case: Case
@@ -42,8 +42,8 @@ class Examination:
 
 
 def examine(data: Mapping[str, Any], folder: Path) -> Examination:
-    """Checks a case in plain data whose mesh files are in ``folder``, or have full paths. Raises CaseError with
-    every known reason for a refusal, ClientError if the program that reads mesh files fails.
+    """Checks a case given as plain data; relative paths of mesh files are relative to ``folder``. Raises CaseError
+    with every known reason for a refusal, ClientError if the program that reads mesh files fails.
     """
     case = parse_case(data)
     if missing := list(missing_files((part.mesh for part in case.parts), folder)):
@@ -61,18 +61,22 @@ def examine(data: Mapping[str, Any], folder: Path) -> Examination:
 
 
 def _named(part: int, mesh: Any) -> tuple[tuple[str | int, ...], object]:
-    """Returns the key of the file of a part, or of its mesh if it has several files, and the value."""
+    """Returns the key of the file of a part, or the key of its mesh if the part has several files, and the value of
+    the key.
+    """
     path = getattr(mesh, "path", None)
     return (("parts", part, "mesh"), ...) if path is None else (("parts", part, "mesh", "path"), path)
 
 
 def _survey(case: Case, folder: Path) -> tuple[Survey, list[Problem]]:
-    """Returns the content of the mesh files, and a warning for each file that no program here can read."""
+    """Returns the content of the mesh files, and a warning for each file that cannot be read on this machine."""
     files = [(i, part.mesh) for i, part in enumerate(case.parts) if isinstance(part.mesh, Measured)]
     if not files:
         return Survey(), []
     if not survey.installed():
-        cure = "was not read: the solver is not installed here (pip install 'conoid[worker]')"
+        cure = (
+            "the file was not read, because the solver is not installed on this machine (pip install 'conoid[worker]')"
+        )
         return Survey(), [problem(*_named(i, mesh), cure) for i, mesh in files]
     asked = survey.question(case.model_dump(mode="json"), folder)
     ended = subprocess.run([sys.executable, "-P", "-m", survey.PROGRAM], input=asked, capture_output=True, check=False)
@@ -82,5 +86,5 @@ def _survey(case: Case, folder: Path) -> tuple[Survey, list[Problem]]:
         return survey.from_json(ended.stdout), []
     except (ValueError, msgspec.MsgspecError):
         lines = ended.stderr.decode("utf-8", "replace").strip().splitlines()
-        why = lines[-1] if lines else f"it ended with code {ended.returncode}"
+        why = lines[-1] if lines else f"the program ended with code {ended.returncode}"
         raise ClientError(f"the program that reads mesh files has failed: {why}") from None

@@ -1,4 +1,4 @@
-"""The history of a run from its file, with a warning about lines that are missing."""
+"""The history of a run, read from its file, with a warning if rows are missing."""
 
 import warnings
 from array import array
@@ -14,15 +14,15 @@ from .columns import Columns, read_columns
 from .errors import ClientError, UnfinishedError
 
 _ROUNDING = 1e-9
-"""Relative tolerance of the time of the last line."""
+"""Relative tolerance for the comparison of the last time of the history with the end of the run."""
 
 
 def read_history(text: str, name: str, outcome: Callable[[], Outcome]) -> Columns:
-    """Returns the columns of a history; ``name``: name of the file, ``outcome`` returns the outcome of the run, or
-    raises ClientError.
+    """Returns the columns of a history. ``name``: name of the file; ``outcome``: function that returns the outcome of
+    the run, or raises ClientError.
 
-    Raises UnfinishedError for a file without columns. Warns if the lines are not in the order of time, or end before
-    the end of a run that has succeeded.
+    Raises UnfinishedError for a file without columns. Gives a warning if the times do not increase, or if the
+    history ends before the end of a successful run.
     """
     found = read_columns(text)
     if not found:
@@ -36,7 +36,7 @@ def read_history(text: str, name: str, outcome: Callable[[], Outcome]) -> Column
 
 
 def _lost(history: Columns, ended: Outcome | None) -> str:
-    """Returns the damage of the lines; empty if there is none."""
+    """Returns a text about missing or damaged rows; empty if the history is complete."""
     times = history.get("t")
     if times is None:
         return ""

@@ -1,4 +1,4 @@
-"""State of a run from the messages read so far: messages in, one picture out, without input or output."""
+"""State of a run, computed from the messages read so far, without input or output."""
 
 import time
 from collections import deque
@@ -9,16 +9,16 @@ from conoid.cases.messages import AnyMessage, Counts, Finished, Frame, Load, Log
 from conoid.cases.run import Cause, ExitCode, State
 
 DESCHEDULED = "descheduled"
-"""Wall time without CPU time: the rank was not scheduled, or slept."""
+"""Wall time without CPU time: the rank was not scheduled by the operating system, or slept."""
 PHASE_GROUPS = ("compute", "contact", "exchange", "output", "wait", DESCHEDULED)
 _IDLE = "exchange", "wait", DESCHEDULED
 _LOG_TAIL = 200
-"""Number of log lines that are kept for display: some screens full. Chosen value."""
+"""Number of log messages that are kept for display. Chosen value: they fill several screens."""
 
 
 @dataclass
 class Live:
-    """The newest message of each kind, and the end of the log. ``seq``: number of the last message."""
+    """The newest message of each kind, and the last messages of the log. ``seq``: number of the last message."""
 
     run: str
     title: str = ""
@@ -28,9 +28,9 @@ class Live:
     cause: str | None = None
     message: str = ""
     reason: str = ""
-    """Reason for which the run waited at the last request to the server."""
+    """Reason why the run waited at the last request to the server."""
     away: float = 0.0
-    """Unix time, s, since which no server answers; 0 while a server answers."""
+    """Unix time, s, at which the server stopped answering; 0 while the server answers."""
     seq: int = 0
     wall: float = 0.0
     """Unix time of the last message, s."""
@@ -42,20 +42,21 @@ class Live:
     progress: Progress | None = None
     load: Load | None = None
     phases: dict[str, list[float]] = field(default_factory=dict)
-    """Seconds of each rank in each of PHASE_GROUPS between the last two Load messages."""
+    """Seconds that each rank spent in each of PHASE_GROUPS between the last two Load messages."""
     helped: list[float] = field(default_factory=list)
-    """Fraction of that interval in which the further threads of each rank were busy; empty for ranks of one thread."""
+    """Fraction of the time between the last two Load messages in which the further threads of each rank were busy;
+    empty if ranks have one thread."""
     loaded: float = 0.0
-    """Unix time of the last Load message, s; before the first Load message, of the message Started."""
+    """Unix time of the last Load message, s; before the first Load message, the time of the message Started."""
     counts: Counts | None = None
     finished: Finished | None = None
     frames: int = 0
     snapshot: Snapshot | None = None
-    """The newest snapshot."""
+    """The newest snapshot of the fragments."""
     log: deque[Log] = field(default_factory=lambda: deque(maxlen=_LOG_TAIL))
 
     def take(self, message: AnyMessage) -> None:
-        """Adds a message."""
+        """Updates the state with a message."""
         self.seq, self.wall, self.away = message.seq, message.wall, 0.0
         match message:
             case Status():
@@ -93,7 +94,7 @@ class Live:
 
     @property
     def explanation(self) -> str:
-        """Message of the state; for a queued run, the reason for which the run waits."""
+        """Message of the state of the run; for a queued run, the reason why it waits."""
         return self.message or (self.reason if self.state is State.QUEUED else "")
 
     @property
@@ -107,14 +108,18 @@ class Live:
 
     @property
     def elapsed(self) -> float:
-        """Wall time since the worker began, s: until now for a running worker, until its last message after the end."""
+        """Wall time since the worker began, s: until now while the worker runs, until the last message after its
+        end.
+        """
         if self.began is None:
             return 0.0
         return max(0.0, (self.wall if self.state.final else time.time()) - self.began)
 
     @property
     def busy(self) -> list[float]:
-        """Fraction of the last interval in which each rank computed: without exchange, waiting and descheduled time."""
+        """Fraction of the last interval between Load messages in which each rank computed. Message exchange, waiting
+        and descheduled time are not included.
+        """
         totals = [sum(seconds) for seconds in zip(*self.phases.values(), strict=True)]
         idle = [sum(self.phases[name][rank] for name in _IDLE if name in self.phases) for rank in range(len(totals))]
         return [1.0 - lost / total if total > 0 else 0.0 for lost, total in zip(idle, totals, strict=True)]
@@ -123,9 +128,9 @@ class Live:
 def grouped(
     phases: dict[str, list[float]], interval: float = 0.0, waiting: Sequence[float] = ()
 ) -> dict[str, list[float]]:
-    """Sums the phases of the worker into PHASE_GROUPS, as the page does: ``elements``, ``nodes`` and others are
-    compute; ``waiting`` is the part of the exchange in which a rank waits for others. In the rest of the ``interval``,
-    s, the rank had no core or slept.
+    """Sums the phases of the worker into PHASE_GROUPS, in the same way as the page: ``elements``, ``nodes`` and
+    others are compute. ``waiting``: part of the exchange in which a rank waits for other ranks. In the rest of the
+    ``interval``, s, the rank had no core or slept.
     """
     sums: dict[str, list[float]] = {}
     for name, seconds in phases.items():
@@ -141,7 +146,7 @@ def grouped(
 
 
 def exit_code(state: State, cause: str | None) -> int:
-    """Exit code of ``watch`` and ``run``: 0 succeeded, 2 bad input, 4 cancelled, 1 anything else."""
+    """Returns the exit code of ``watch`` and ``run``: 0 succeeded, 2 bad input, 4 cancelled, 1 anything else."""
     if state is State.SUCCEEDED:
         return ExitCode.SUCCEEDED
     if state is State.CANCELLED:

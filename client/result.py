@@ -1,4 +1,4 @@
-"""Results of a run: outcome, time history, frames, resolved case. Each of these files is read at its first use."""
+"""Results of a run: outcome, time history, frames, resolved case. Each file is read at its first use."""
 
 import json
 import re
@@ -32,13 +32,12 @@ from .reports import html
 
 _TABLE = re.compile(rf"{fragments.FOLDER}/fragments_(\d+)\.csv")
 _BEYOND = 0.01
-"""Fraction of the time between the first and the last frame by which a requested time may lie outside. Chosen value:
-a run ends within a step of its end time.
-"""
+"""Fraction of the simulated time from the first to the last frame by which a requested time may lie outside. Chosen
+value: a run ends within one step of its end time."""
 
 
 class _Part(msgspec.Struct):
-    """Fields of a part that pictures use."""
+    """Fields of a part of the case that pictures use."""
 
     name: str
     material: str | None = None
@@ -48,7 +47,7 @@ class _Part(msgspec.Struct):
 
 
 class _Boundary(msgspec.Struct):
-    """Fields of a boundary that pictures use. The axis of a plane of symmetry is a name, that of a wall a vector."""
+    """Fields of a boundary of the case that pictures use. The axis of a plane is a name, that of a wall a vector."""
 
     kind: str
     axis: Literal["x", "y", "z"] | tuple[float, float, float] | None = None
@@ -63,7 +62,7 @@ class _Boundary(msgspec.Struct):
 
 
 class _Case(msgspec.Struct):
-    """Fields of a case that pictures use. A file of another form is refused with the wrong place."""
+    """Fields of a case that pictures use. A file with another structure is refused; the error names the wrong field."""
 
     name: str | None = None
     title: str | None = None
@@ -74,9 +73,7 @@ class _Case(msgspec.Struct):
 
 @dataclass(frozen=True)
 class FrameFile:
-    """A written frame: number, simulated time in s (None for a frame that is not in the list), and name in the
-    folder.
-    """
+    """A written frame: number, simulated time in s (None if unknown), and file name in the folder of the run."""
 
     index: int
     time: float | None
@@ -87,15 +84,17 @@ class Result:
     """Result of a run. Data is read at its first use and kept."""
 
     def __init__(self, folder: Folder) -> None:
-        """Reads nothing yet."""
+        """Stores the folder of the run; no file is read yet."""
         self.folder = folder
 
     @classmethod
     def open(cls, path: Path | str) -> "Result":
-        """Opens the result in a run's folder on this machine. Raises NotFoundError for a missing folder."""
+        """Opens the result in the folder of a run on this machine. Raises NotFoundError if the folder does not
+        exist.
+        """
         root = Path(path)
         if not root.is_dir():
-            raise NotFoundError(f"{root}: there is no such folder")
+            raise NotFoundError(f"{root}: this folder does not exist")
         return cls(LocalFolder(root))
 
     def __repr__(self) -> str:
@@ -103,7 +102,7 @@ class Result:
         return f"<result of {self.folder.name}>"
 
     def _repr_html_(self) -> str:
-        """State and reference numbers, for notebooks."""
+        """State and reference numbers of the run as HTML, for notebooks."""
         try:
             name, ended = str(self.case.get("title") or self.case.get("name")), self.outcome
         except UnfinishedError:
@@ -111,40 +110,38 @@ class Result:
         return html.head(self.folder.name, name, ended) + html.references(ended)
 
     def mesh(self, time: float | None = None) -> Any:
-        """Returns the frame nearest to ``time``, s, as a pyvista.UnstructuredGrid with all its fields; None: the
-        last one. Raises UnfinishedError, ViewError without pyvista.
+        """Returns the frame nearest to ``time``, s, with all its fields as a pyvista.UnstructuredGrid; None means
+        the last frame. Raises UnfinishedError, ViewError if pyvista is not installed.
         """
         try:
-            from .drawing.surfaces import read_mesh  # pyvista is loaded when it is needed
+            from .drawing.surfaces import read_mesh  # Loaded only if needed, because pyvista loads slowly.
         except ModuleNotFoundError as error:
             raise ViewError(f"meshes need the extra 'view': pip install 'conoid[view]' ({error})") from None
         return read_mesh(self.frame(-1 if time is None else self.nearest(time)))
 
     @cached_property
     def outcome(self) -> Outcome:
-        """The outcome. Raises UnfinishedError before the end of the run."""
+        """The outcome of the run. Raises UnfinishedError before the end of the run."""
         path = self.folder.path(layout.OUTCOME)
         try:
             return outcome_of(path.read_bytes())
         except msgspec.MsgspecError as error:
-            raise ClientError(f"{self.folder.named(layout.OUTCOME)}: this outcome cannot be read: {error}") from None
+            raise ClientError(f"{self.folder.named(layout.OUTCOME)}: the outcome cannot be read: {error}") from None
 
     @cached_property
     def case(self) -> dict[str, Any]:
-        """The case with all defaults in SI units, as plain data. Raises UnfinishedError, ClientError."""
+        """The case with all defaults, in SI units, as plain data. Raises UnfinishedError, ClientError."""
         path = self.folder.path(layout.RESOLVED_CASE)
         try:
             data = msgspec.json.decode(path.read_bytes(), type=dict[str, Any])
             msgspec.convert(data, _Case)
         except (msgspec.MsgspecError, RecursionError) as error:
-            raise ClientError(f"{self.folder.named(layout.RESOLVED_CASE)}: this case cannot be read: {error}") from None
+            raise ClientError(f"{self.folder.named(layout.RESOLVED_CASE)}: the case cannot be read: {error}") from None
         return data
 
     @cached_property
     def history(self) -> Columns:
-        """The columns of history.csv in their order: step, t (s), dt (s), the energies (J), the probes.
-        ``history.frame()`` returns a pandas.DataFrame. Warns if lines are missing.
-        """
+        """The columns of history.csv: step, t (s), dt (s), the energies (J), the probes. Warns if rows are missing."""
         text = self.folder.path(layout.HISTORY).read_text("utf-8", "replace")
         return read_history(text, self.folder.named(layout.HISTORY), lambda: self.outcome)
 
@@ -154,13 +151,14 @@ class Result:
         return sorted(int(found[1]) for name in self.folder.names() if (found := _TABLE.fullmatch(name)))
 
     def fragments_of(self, index: int = -1) -> Columns:
-        """Returns the fragments of frame ``index`` (-1: the last one), with the columns of
-        ``cases/output/fragments.py``. Raises UnfinishedError without such a table.
-        """
+        """Returns the table of fragments of a frame (-1: the last frame). Raises UnfinishedError if the frame has "
+        "none."""
         known = self.fragment_tables
         if not known or (index != -1 and index not in known):
             wanted = "any frame" if index == -1 else f"frame {index}"
-            raise UnfinishedError(f"{self.folder.name} has no fragments of {wanted}; it has tables of {len(known)}")
+            raise UnfinishedError(
+                f"{self.folder.name} has no fragments of {wanted}; there are {len(known)} tables of fragments"
+            )
         name = f"{fragments.FOLDER}/{fragments.path(Path(), known[-1] if index == -1 else index).name}"
         return read_columns(self.folder.path(name).read_text(encoding="utf-8"))
 
@@ -190,7 +188,9 @@ class Result:
         ]
 
     def frame(self, index: int = -1) -> Path:
-        """Returns the file of a frame by its number; -1 is the last one. Raises UnfinishedError for a missing frame."""
+        """Returns the path of a frame by its number; -1 means the last frame. Raises UnfinishedError if the frame
+        does not exist.
+        """
         found = self.frames[-1:] if index == -1 else [frame for frame in self.frames if frame.index == index]
         if not found:
             wanted = "any frame" if index == -1 else f"frame {index}"
@@ -206,14 +206,14 @@ class Result:
         time: float | str | Sequence[float | str] | None = None,
         **options: Any,
     ) -> Drawn:
-        """Draws frames: as a PNG, several frames side by side, or as a film (``out`` ends in .gif or .mp4).
-        ``frame`` has their numbers, ``time`` times in s or as ``"60 us"``: the nearest frame is drawn. Without both,
-        the last frame is drawn; a film has every frame. ``options`` are the fields of
+        """Draws frames as a PNG, several frames side by side, or as a film (``out`` ends in .gif or .mp4). ``frame``
+        has the numbers of the frames. ``time`` has times in s or texts such as ``"60 us"``; the nearest frames are
+        drawn. Without both, a picture has the last frame and a film has every frame. ``options`` are the fields of
         ``conoid.client.drawing.view_options.Look``. Raises ViewError.
         """
         every = str(out or "").lower().endswith(FILMS)
         if not self.frames:
-            self.folder.path(layout.JOURNAL)  # a folder without frames is possibly not that of a run
+            self.folder.path(layout.JOURNAL)  # A folder without frames may not be the folder of a run.
             raise UnfinishedError(f"{self.folder.name} has not written any frame")
         chosen = self._chosen(_listed(frame), [seconds(one) for one in _listed(time)], every)
         scene = self.scene()
@@ -222,26 +222,24 @@ class Result:
         return draw([self.frame(one) for one in chosen], scene, self.folder.name, field, out, **options)
 
     def _chosen(self, frames: Sequence[int], times: Sequence[float], every: bool) -> list[int]:
-        """Returns numbers of frames, in the order of the request."""
+        """Returns the numbers of the requested frames, in the order of the request."""
         if not frames and not times:
             return [one.index for one in self.frames] if every else [-1]
         return [*frames, *(self.nearest(time) for time in times)]
 
     def nearest(self, time: float) -> int:
-        """Returns the number of the frame nearest to ``time``, s. Raises UnfinishedError if no time is known,
-        ViewError if the time lies before or after all frames.
-        """
+        """Returns the number of the frame nearest to ``time``, s. Raises UnfinishedError, ViewError."""
         known = {one.time: one.index for one in self.frames if one.time is not None}
         if not known:
-            raise UnfinishedError(f"{self.folder.name} has no frame whose time is known")
+            raise UnfinishedError(f"{self.folder.name} has no frame with a known time")
         first, last = min(known), max(known)
         if not first - _BEYOND * (last - first) <= time <= last + _BEYOND * (last - first):
-            range_of_frames = f"the frames of {self.folder.name} are of {si(first, 's')} to {si(last, 's')}"
+            range_of_frames = f"the frames of {self.folder.name} have times from {si(first, 's')} to {si(last, 's')}"
             raise LookError(f"time = {si(time, 's')}: {range_of_frames}")
         return known[min(known, key=lambda at: abs(at - time))]
 
     def scene(self) -> Scene:
-        """Returns the data of the case that a picture uses; empty for a run without a case."""
+        """Returns the data of the case that a picture uses; empty if the run has no readable case."""
         try:
             case = self.case
         except ClientError:
@@ -267,7 +265,7 @@ class Result:
 
 
 def _wall(boundary: dict[str, Any]) -> Wall:
-    """Returns the wall of a boundary of the kind ``wall``."""
+    """Returns the wall for a boundary of the kind ``wall``."""
     moves = any(boundary.get("velocity") or ()) or boundary.get("mass") is not None
     along = boundary.get("normal") or boundary.get("axis") or (0.0, 0.0, 1.0)
     shape, radius = boundary.get("shape", "plane"), float(boundary.get("radius") or 0.0)
@@ -275,20 +273,18 @@ def _wall(boundary: dict[str, Any]) -> Wall:
 
 
 def outcome_of(text: bytes) -> Outcome:
-    """Decodes an outcome from its file or from a server. Raises msgspec.MsgspecError, also for an unknown state."""
+    """Decodes an outcome. Raises msgspec.MsgspecError if the data or the state of the run is unknown."""
     ended = outcome.from_json(text)
     msgspec.convert(ended.state, State)
     return ended
 
 
 def seconds(time: object) -> float:
-    """Returns the time in s of a number or of a text such as ``60 us``. A text without a unit is refused, since it
-    could be meant in another unit than s. Raises LookError.
-    """
+    """Returns a time in s from a number or a text with a unit, such as ``60 us``. Raises LookError without a unit."""
     try:
         if not isinstance(time, str) or time.strip()[-1:].isalpha():
             return parse_quantity(time, "s")
-        reason = "write it with its unit, such as '60 us'"
+        reason = "write the time with its unit, such as '60 us'"
     except ValueError as error:
         reason = str(error)
     raise LookError(f"time = {time!r}: {reason}")

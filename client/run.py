@@ -1,4 +1,4 @@
-"""Handle of a run on a server: status, wait, watch, cancel, events, files, download, result."""
+"""A run on a server: status, wait, watch, cancel, events, files, download, result."""
 
 import math
 import shutil
@@ -26,21 +26,22 @@ from .result import Result
 from .snapshots import Snapshot
 
 _WAIT = 20.0
-"""Time limit of a single request that waits for the end of a run, s: below the 30 s after which a request is given
+"""Time limit of one request that waits for the end of a run, s. It is below the 30 s after which a request is given
 up (http.py)."""
 _PATIENCE = 120.0
-"""Time without a server after which waiting for a run ends, s. Chosen value: twice the time of a restart."""
+"""Time without an answer of the server, s, after which waiting for a run ends. Chosen value: twice the time of a
+restart."""
 
 
 @dataclass
 class Run:
-    """A run on a server. A request is sent only when a method is called."""
+    """A run on a server. Only the methods send requests."""
 
     session: Http
     id: str
 
     def _repr_html_(self) -> str:
-        """Status of the run, for notebooks."""
+        """Status of the run as HTML, for notebooks."""
         return self.status()._repr_html_()
 
     # State ------------------------------------------------------------------------------------------------------------
@@ -55,8 +56,8 @@ class Run:
         return self.session.get(RunInfo, self.path)
 
     def wait(self, timeout: float | None = None) -> RunInfo:
-        """Waits for the end of the run. Raises TimeoutError after ``timeout`` s. If the server does not answer, or
-        is too busy, the client repeats the request for two minutes.
+        """Waits for the end of the run. Raises TimeoutError after ``timeout`` s. If the server does not answer or is
+        too busy, the request is repeated for two minutes.
         """
         deadline = math.inf if timeout is None else time.monotonic() + timeout
         received = time.monotonic()
@@ -82,21 +83,21 @@ class Run:
         return self.session.post(RunInfo, f"{self.path}:cancel")
 
     def purge(self) -> None:
-        """Removes the run with all its files from the server after its end. A removal cannot be undone."""
+        """Removes a run that has ended, with all its files, from the server. A removal cannot be undone."""
         self.session.delete(self.path)
 
     def checkpoint(self) -> RunInfo:
-        """Requests a checkpoint; a ``Checkpoint`` message reports it when it is on disk."""
+        """Requests a checkpoint. When the checkpoint is on disk, a ``Checkpoint`` message reports it."""
         return self.session.post(RunInfo, f"{self.path}:checkpoint")
 
     def take_snapshot(self) -> RunInfo:
-        """Requests a snapshot of the fragments; a ``Snapshot`` message reports it when it is on disk."""
+        """Requests a snapshot of the fragments. When the snapshot is on disk, a ``Snapshot`` message reports it."""
         return self.session.post(RunInfo, f"{self.path}:snapshot")
 
     # Messages ---------------------------------------------------------------------------------------------------------
 
     def events(self, after: int = 0) -> list[AnyMessage]:
-        """Returns the messages of the journal with a number above ``after``."""
+        """Returns the messages of the journal whose number is above ``after``."""
         found: list[AnyMessage] = []
         while True:
             page = self.session.get(EventPage, f"{self.path}/events", after=after)
@@ -108,17 +109,17 @@ class Run:
             after = page.last
 
     def messages(self, after: int = 0, link: Link | None = None) -> Generator[AnyMessage]:
-        """Yields every message after ``after`` once and in order, past messages and new ones, until the end of the run.
+        """Yields every message with a number above ``after`` once and in order, until the end of the run.
 
-        Messages come over Zenoh if the router can be reached, else over SSE; ``link`` selects one.
+        Messages come over Zenoh if the router can be reached, else over SSE; ``link`` selects one of both.
         """
-        from .remote.stream import follow  # zenoh is loaded when it is needed
+        from .remote.stream import follow  # Loaded only if needed, because zenoh loads slowly.
 
         return follow(link or self.link(), self.events, lambda: self.status().state.final, after)
 
     def link(self) -> Link:
-        """Opens a subscription to the run: over Zenoh if it can be reached, else over SSE."""
-        from .remote.stream import SseLink, StreamError, ZenohLink  # zenoh is loaded when it is needed
+        """Opens a subscription to the messages of the run: over Zenoh if the router can be reached, else over SSE."""
+        from .remote.stream import SseLink, StreamError, ZenohLink  # Loaded only if needed, because zenoh loads slowly.
 
         me = self.session.me()
         if me.zenoh is not None:
@@ -127,15 +128,15 @@ class Run:
         return SseLink(lambda: self.session.stream(f"{self.path}/stream"))
 
     def watch(self, live: bool | None = None) -> Live:
-        """Shows the run in the terminal until it ends. ``live`` selects the panel or plain lines; None: by the
-        terminal.
+        """Shows the run in the terminal until it ends. ``live``: True for the panel, False for plain text lines,
+        None to choose by the terminal.
         """
-        from .watch import watch  # rich is loaded when it is needed
+        from .watch import watch  # Loaded only if needed, because rich loads slowly.
 
         return watch(self, live)
 
     def history(self, points: int = 1000) -> dict[str, Any]:
-        """Returns the history of the run with at most ``points`` reports; the keys are ``series``, ``ranks``,
+        """Returns the history of the run with at most ``points`` reports. Its keys are ``series``, ``ranks``,
         ``balance``, ``snapshots``, ``last``.
         """
         return self.session.get(dict[str, Any], f"{self.path}/history", points=points)
@@ -143,11 +144,13 @@ class Run:
     # Snapshots --------------------------------------------------------------------------------------------------------
 
     def snapshots(self) -> list[SnapshotMessage]:
-        """Returns the messages of the journal about the snapshots of the fragments."""
+        """Returns the messages of the journal about snapshots of the fragments."""
         return self.session.get(SnapshotPage, f"{self.path}/snapshots").snapshots
 
     def snapshot(self, n: int = -1) -> Snapshot:
-        """Returns snapshot ``n``; -1: the newest. Raises UnfinishedError if there is none."""
+        """Returns the snapshot with the number ``n``; -1 means the newest. Raises UnfinishedError if the snapshot
+        does not exist.
+        """
         number = n if n >= 0 else max((message.n for message in self.snapshots()), default=0)
         try:
             return Snapshot(self.session.fetch(f"{self.path}/snapshots/{number}"))
@@ -155,9 +158,9 @@ class Run:
             raise self._lacks(f"snapshot {number}") from None
 
     def fragments(self, after: int = 0, link: Link | None = None) -> Generator[Snapshot]:
-        """Yields every snapshot whose message comes after message ``after``, until the end of the run.
+        """Yields every snapshot whose message has a number above ``after``, until the end of the run.
 
-        Over Zenoh the data comes with the message; missing data is fetched from the server.
+        Over Zenoh the data comes with the message; missing data is read from the server.
         """
         chosen = link or self.link()
         for message in self.messages(after, chosen):
@@ -168,12 +171,12 @@ class Run:
     # Files ------------------------------------------------------------------------------------------------------------
 
     def files(self) -> list[FileInfo]:
-        """Lists the files of the run's folder."""
+        """Lists the files in the folder of the run."""
         return self.session.get(Listing, f"{self.path}/files").files
 
     def download(self, folder: Path | str, name: str | None = None) -> Path:
-        """Copies one file, or all, into ``folder``; returns the path of the file, or the folder. Raises AnswerError
-        if a file of a run that has ended differs in size from the list.
+        """Copies one file, or all files, into ``folder``. Returns the path of the file, or the folder. Raises
+        AnswerError if the run has ended and the size of a file differs from the list.
         """
         root = Path(folder)
         if name is not None:
@@ -184,12 +187,12 @@ class Run:
         return root
 
     def over(self) -> bool:
-        """Returns True if the run has ended: the files of the run no longer change."""
+        """Returns True if the run has ended, so that its files no longer change."""
         return self.status().state.final
 
     def fetch(self, folder: Path, file: FileInfo, final: bool = False) -> Path:
-        """Copies a file of the list into ``folder`` and returns its path. If the run has ended (``final``), the size
-        must be that of the list.
+        """Copies a listed file into ``folder`` and returns its path. If the run has ended (``final``), the size of
+        the copy must be the listed size.
         """
         target = inside(folder, file.path)
         try:
@@ -199,8 +202,8 @@ class Run:
         return target
 
     def _address(self, file: FileInfo) -> str:
-        """Returns the address that the server lists if this address belongs to the run; else the address of the
-        path.
+        """Returns the address of a file. It is the address in the list if that belongs to the run; else it is made
+        from the path.
         """
         own = f"{self.path}/files/"
         return file.url if file.url.startswith(own) else f"{own}{quoted(file.path, safe='/')}"
@@ -214,17 +217,19 @@ class Run:
         return UnfinishedError(f"run {self.id} has no {what}")
 
     def result(self) -> Result:
-        """The result of the run: files are fetched at their first use, and kept until the result is deleted."""
+        """The result of the run. Files are copied from the server at their first use, and kept until the result is
+        deleted.
+        """
         return Result(RemoteFolder(self))
 
 
 class RemoteFolder:
-    """A run's folder on a server. Each file is fetched once, into a temporary folder that is removed with this
+    """The folder of a run on a server. Each file is copied once into a temporary folder, which is removed with this
     object.
     """
 
     def __init__(self, run: Run) -> None:
-        """Fetches nothing yet."""
+        """Stores the run; no file is copied yet."""
         self.run = run
         self.root = Path(tempfile.mkdtemp(prefix="conoid-"))
         weakref.finalize(self, shutil.rmtree, self.root, ignore_errors=True)
@@ -235,14 +240,14 @@ class RemoteFolder:
         return self.run.id
 
     def names(self) -> list[str]:
-        """Every file, relative to the folder."""
+        """Lists all files of the run; names are relative to the folder."""
         return [file.path for file in self.run.files()]
 
     def path(self, name: str) -> Path:
-        """Returns the path of a local copy."""
+        """Returns the path of a local copy of a file."""
         target = inside(self.root, name)
         return target if target.is_file() else self.run.download(self.root, name)
 
     def named(self, name: str) -> str:
-        """Returns the text with run and server: the local copy is temporary."""
+        """Returns the name of a file with its run and server, because the local copy is temporary."""
         return f"{name} of run {self.run.id} at {self.run.session.url}"

@@ -15,10 +15,10 @@ if TYPE_CHECKING:
 
 
 class Snapshot:
-    """Content of a snapshot. Arrays are views of its bytes where possible."""
+    """Content of a snapshot. Where possible, the arrays are views of the snapshot's bytes."""
 
     def __init__(self, data: bytes) -> None:
-        """Raises ClientError for bytes that are not a snapshot."""
+        """Decodes a snapshot. Raises ClientError if ``data`` is not a snapshot."""
         self.data = data
         try:
             self.header = snapshot.header_of(data)
@@ -26,13 +26,13 @@ class Snapshot:
             raise ClientError(str(error)) from None
 
     def __repr__(self) -> str:
-        """Text with number, time and content."""
+        """Text with the number, the time and the content of the snapshot."""
         head = self.header
         seen = counted(head.fragments_total, "fragment")
         return f"<snapshot {head.n}: step {head.step}, t {exact(head.t, 's')}, {seen}>"
 
     def array(self, name: str) -> "np.ndarray":
-        """Returns an array of the snapshot. Raises ClientError for an unknown name."""
+        """Returns an array of the snapshot. Raises ClientError if the name is unknown."""
         import numpy as np
 
         array = self.header.arrays.get(name)
@@ -51,8 +51,8 @@ class Snapshot:
         return np.asarray(low + self.array("positions") / 65535.0 * (high - low))
 
     def field(self, name: str) -> "np.ndarray":
-        """Returns a field by triangle, (triangles,), in the unit of ``header.fields[name].unit``. Raises
-        ClientError."""
+        """Returns a field with one value for each triangle, (triangles,), in the unit ``header.fields[name].unit``.
+        Raises ClientError."""
         import numpy as np
 
         levels, field = self.array(snapshot.FIELD + name), self.header.fields[name]
@@ -60,13 +60,15 @@ class Snapshot:
 
     @property
     def fragments(self) -> "dict[str, np.ndarray]":
-        """The table of fragments by column: id, mass, size, centre, velocity, tets, birth."""
+        """The columns of the table of fragments: id, mass, size, centre, velocity, tets, birth."""
         begin = "fragment_"
         return {name.removeprefix(begin): self.array(name) for name in self.header.arrays if name.startswith(begin)}
 
 
 def read(path: Path | str) -> Snapshot:
-    """Reads a snapshot from a file, or the file with all its tets (``.tets``). Raises OSError, ClientError."""
+    """Reads a snapshot from a file; the file may also be that of all tets of the snapshot (``.tets``). Raises
+    OSError, ClientError.
+    """
     data = Path(path).read_bytes()
     try:
         return Snapshot(gzip.decompress(data) if Path(path).suffix == layout.TETS_SUFFIX else data)

@@ -1,4 +1,4 @@
-"""``view``: draws frames of a result, a folder or a file."""
+"""The function ``view``, which draws frames of a result, a folder or a file."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -20,7 +20,7 @@ def view(
     time: float | str | Sequence[float | str] | None = None,
     **options: Any,
 ) -> Drawn:
-    """Draws frames of a result, of a run's folder, or of a frame file: a PNG, a GIF or an MP4. Frames are selected
+    """Draws frames of a result, of a run folder, or of a frame file, as a PNG, a GIF or an MP4. Frames are selected
     as in ``Result.view``; ``options`` are the fields of ``conoid.client.drawing.view_options.Look``. Raises
     ViewError.
     """
@@ -31,9 +31,9 @@ def view(
     if path.is_dir():
         return Result.open(path).view(field, out, frame=frame, time=time, **options)
     if not path.is_file():
-        raise ViewError(f"{path}: there is no such run, folder or frame")
+        raise ViewError(f"{path}: this run, folder or frame does not exist")
     if path.suffix not in {".vtkhdf", ".vtu"}:
         raise LookError(f"{path}: a frame file ends in .vtkhdf")
     if frame not in (None, []) or time not in (None, []):
-        raise LookError(f"{path}: this is one frame; a frame or a time is chosen of a run")
+        raise LookError(f"{path}: this is one frame; the options frame and time need a run")
     return draw([path], Scene(), path.resolve().stem, field, out, **options)

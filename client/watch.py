@@ -1,4 +1,4 @@
-"""Shows a run in the terminal until it ends: a live panel on a terminal, plain lines anywhere else."""
+"""Display of a run in the terminal until it ends: a live panel on a terminal, plain text lines otherwise."""
 
 import threading
 import time
@@ -21,12 +21,12 @@ from .live import Live
 from .remote.link import Link
 
 REASON_EVERY = 3.0
-"""Time between two requests for the reason for which a queued run waits, s. Chosen value: below the 8 s after which
-a progress line is printed."""
+"""Time between two requests for the reason why a queued run waits, s. Chosen value: below the 8 s after which a
+progress line is printed."""
 
 
 class Titled(Protocol):
-    """Interface of a status with a title."""
+    """Interface of a status of a run that has a title."""
 
     @property
     def title(self) -> str:
@@ -45,11 +45,13 @@ class Watched(Protocol):
         """Opens a subscription to the messages of the run."""
 
     def messages(self, *, link: Link) -> Iterable[AnyMessage]:
-        """Yields all messages once and in order."""
+        """Yields all messages of the run once and in order."""
 
 
 def watch(run: Watched, live: bool | None = None, console: Console | None = None) -> Live:
-    """Shows ``run`` until its end. ``live``: the panel (True), plain lines (False), by the terminal (None)."""
+    """Shows ``run`` until its end. ``live``: True for the panel, False for plain text lines, None to choose by the
+    terminal.
+    """
     out = console or PlainConsole()
     known = Live(run.id, title=run.status().title)
     link = run.link()
@@ -63,8 +65,8 @@ def watch(run: Watched, live: bool | None = None, console: Console | None = None
 
 @contextmanager
 def explained(run: Watched, known: Live) -> Iterator[None]:
-    """Asks the server in a thread while ``run`` is queued or silent: for the reason of waiting, and whether the
-    server answers.
+    """Context in which a thread asks the server, while ``run`` is queued or sends no messages, why the run waits and
+    whether the server answers.
     """
     over = threading.Event()
 
@@ -88,12 +90,12 @@ def _ask(run: Watched, known: Live) -> None:
         known.reason, known.away = getattr(run.status(), "reason", ""), 0.0
     except UnreachableError:
         known.away = known.away or time.time()
-    except (ClientError, RuntimeError):  # the session may be closed already
+    except (ClientError, RuntimeError):  # The session may be closed already.
         return
 
 
 def show(messages: Iterable[AnyMessage], known: Live, out: Console) -> Live:
-    """The panel, drawn four times a second."""
+    """Shows the panel, which is drawn four times a second, until the messages end."""
     with Screen(get_renderable=lambda: panel(known), console=out, refresh_per_second=4) as screen:
         for message in messages:
             known.take(message)
@@ -102,8 +104,8 @@ def show(messages: Iterable[AnyMessage], known: Live, out: Console) -> Live:
 
 
 def tell(messages: Iterable[AnyMessage], known: Live, write: Callable[[str], None]) -> Live:
-    """Prints one plain line for each change of state, each warning and each percent of progress. While no message
-    arrives, prints progress lines, which become rarer.
+    """Prints one plain text line for each change of state, each warning and each percent of progress. While no
+    message arrives, it prints progress lines, which become rarer.
     """
     printed, texts = -1, set[str]()
     with progress.broken(write, lambda: _waiting(known)) as say:

@@ -1,7 +1,7 @@
-// Addresses of the page: `#/` the runs, `#/runs/ID` a run, `#/compare/ID/ID/…` several runs, `#/sweeps/NAME` a sweep,
-// `#/new` a new run; a `?` may add parameters.
+// Addresses of the page: `#/` the list of runs, `#/runs/ID` one run, `#/compare/ID/ID/…` several runs, `#/sweeps/NAME`
+// a sweep, `#/new` a new run. Parameters may follow after a `?`.
 
-// Decoded text of an address; null if it is malformed.
+// Returns the decoded text of an address, or null if the address is malformed.
 function decoded(word) {
   try {
     return decodeURIComponent(word);
@@ -10,11 +10,11 @@ function decoded(word) {
   }
 }
 
-// Least and largest number of names of each page.
+// Smallest and largest number of names in the address of each page.
 const NAMES = { runs: [0, 1], compare: [2, Infinity], sweeps: [1, 1], new: [0, 0] };
 
-// Returns { page, names, query }: page is "runs", "run", "compare", "sweep" or "new". A malformed address gives the
-// page of the runs.
+// Returns { page, names, query }; page is "runs", "run", "compare", "sweep" or "new". A malformed address means the
+// list of runs.
 export function place(hash) {
   const [path, search = ""] = hash.replace(/^#\/?/, "").split("?", 2);
   const [page, ...words] = path.split("/").filter((word) => word !== "");
@@ -27,5 +27,5 @@ export function place(hash) {
 
 const WORDS = { run: "runs", sweep: "sweeps", compare: "compare" };
 
-// Returns the address of a page with its names.
+// Returns the address of a page for a list of names.
 export const addressOf = (page, names) => `#/${[WORDS[page], ...names.map(encodeURIComponent)].join("/")}`;

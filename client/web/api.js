@@ -1,10 +1,11 @@
-// The server's REST and SSE, with the token of this tab. EventSource cannot send headers, so SSE is read with fetch.
+// Requests to the server over REST and SSE, with the token of this tab. EventSource cannot send headers, so SSE is read
+// with fetch.
 
 import { token } from "./token.js";
 
 export { token };
 
-// A refusal of the server with its message (RFC 9457).
+// A refusal by the server with the server's message (RFC 9457).
 export class Problem extends Error {
   constructor(status, body) {
     const detail = body?.detail && body.detail !== body.title ? `: ${body.detail}` : "";
@@ -13,7 +14,7 @@ export class Problem extends Error {
   }
 }
 
-// True if a later request would fail as well. A proxy answers 502 and 503 while the server restarts.
+// True if a repeated request would be refused as well. A proxy answers 502 and 503 while the server restarts.
 export const refused = (error) => error instanceof Problem && error.status < 500 && error.status !== 429;
 
 const address = (path) => new URL(path, document.baseURI);
@@ -25,14 +26,14 @@ export async function send(path, { method = "GET", headers = {}, body, signal, c
   return response;
 }
 
-// Snapshots never change: the cache headers of the server let the browser keep them.
+// Snapshots never change, so the server's cache headers let the browser keep them.
 export const binary = async (path, options) => (await send(path, { ...options, cache: "default" })).arrayBuffer();
 
 export const text = async (path, options) => (await send(path, options)).text();
 
-const TAIL = 65536; // Number of bytes at the end of a log that are shown.
+const TAIL = 65536; // Number of bytes from the end of a log that are shown.
 
-// Fetches the end of the log of a rank, or of "launcher". A Range request of an empty file would fail.
+// Fetches the end of the log of a rank, or of "launcher". A request with Range would fail for an empty file.
 export async function tail(run, rank) {
   const path = `v1/runs/${encodeURIComponent(run)}/logs/${rank}`;
   const { headers } = await send(path, { method: "HEAD" });
@@ -42,14 +43,14 @@ export async function tail(run, rank) {
 
 export const call = async (path, options) => (await send(path, options)).json();
 
-const LARGE = 64 << 20; // Size in bytes from which a file is streamed to disk, if the browser can do that.
-const MOST = 1 << 30; // Largest size in bytes of a file that the browser holds in memory until it is saved.
+const LARGE = 64 << 20; // File size in bytes from which a file is streamed to disk, if the browser supports streaming.
+const MOST = 1 << 30; // Largest size in bytes of a file that the browser keeps in memory before the file is saved.
 
-// Saves a file of the server as `name`. A link cannot send the token, so the page fetches the bytes; `onBytes` is called
-// with the number of bytes so far. Throws Error for a file that is too large for memory.
+// Saves a file of the server as `name`. A link cannot send the token, so the page fetches the bytes. `onBytes` is
+// called with the number of bytes fetched so far. Throws Error if the file is too large for memory.
 export async function download(path, name, size, onBytes) {
   const place = size > LARGE ? await globalThis.showSaveFilePicker?.({ suggestedName: name }) : null;
-  if (!place && size > MOST) throw new Error("too large for this browser; conoid get copies it");
+  if (!place && size > MOST) throw new Error("the file is too large for this browser; conoid get copies it");
   const { body } = await send(path);
   let there = 0;
   const counted = body.pipeThrough(new TransformStream({ transform(chunk, out) {
@@ -62,7 +63,8 @@ export async function download(path, name, size, onBytes) {
   return setTimeout(() => URL.revokeObjectURL(href), 60000);
 }
 
-// Yields messages of a run after the number `after` as they arrive, until the server ends the stream; calls `onOpen` at its start.
+// Yields the messages of a run after the number `after` as they arrive, until the server ends the stream. `onOpen` is
+// called when the stream begins.
 export async function* messages(run, after, signal, onOpen) {
   const headers = { Accept: "text/event-stream", "Last-Event-ID": String(after) };
   const response = await send(`v1/runs/${encodeURIComponent(run)}/stream`, { headers, signal });

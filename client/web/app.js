@@ -1,4 +1,4 @@
-// Router of the page, and the sign-in form.
+// Router of the page, and form for signing in.
 
 import { Problem, call, token } from "./api.js";
 import { h } from "./figures.js";
@@ -15,7 +15,7 @@ const page = document.getElementById("page");
 const who = document.getElementById("who");
 const pages = document.getElementById("pages");
 const leave = document.getElementById("leave");
-const AWAY = 3000; // ms after which a request to a server that does not answer is repeated.
+const AWAY = 3000; // Time in ms after which a request is repeated if the server does not answer.
 let shown = null;
 let again = 0;
 
@@ -41,7 +41,7 @@ function signIn(reason = "") {
     h("h1", {}, "Sign in"),
     h("p.hint", {}, "Paste the token that the server gave you. This tab keeps it until you close it."),
     field,
-    h("label.check", {}, remembered, h("span", {}, "Remember it in this browser, until I sign out")),
+    h("label.check", {}, remembered, h("span", {}, "Remember the token in this browser until I sign out")),
     reason ? h("p.problem", { role: "alert" }, reason) : "",
     h("div", {}, h("button", {}, "Sign in")));
   show({ element: form, signsIn: true });
@@ -62,7 +62,7 @@ const PAGES = {
   new: (_, query) => new NewPage(query, refuse),
 };
 
-// Replaces a short id in the address by the whole one.
+// Replaces a short id in the address by the complete id.
 async function route() {
   clearTimeout(again);
   const { page: name, names, query } = place(location.hash);
@@ -87,7 +87,8 @@ function away(error) {
   again = setTimeout(start, AWAY);
 }
 
-// A server with tokens gets no request before a token is known. Without an answer the request is repeated.
+// A server that requires tokens gets no request before the page has a token. If the server does not answer, the request
+// is repeated.
 async function start() {
   clearTimeout(again);
   try {
@@ -113,7 +114,7 @@ leave.addEventListener("click", () => {
   token.clear();
   signIn();
 });
-// Another tab has stored or removed the token.
+// Called when another tab has stored or removed the token.
 token.listen((text) => {
   if (text && shown?.signsIn) start();
   else if (!text) {

@@ -1,9 +1,10 @@
-// Velocities as arrows, of a few triangles that are spread evenly over the body (docs/snapshots.md).
+// Arrows for the velocities of a few triangles that are spread evenly over the body (docs/snapshots.md).
 
-const LONGEST = 0.09; // Length of the arrow of the largest speed over the diagonal of the frame.
+const LONGEST = 0.09; // Length of the arrow of the largest speed, relative to the diagonal of the framed region.
 const SIDES = 6;
-const [SHAFT, HEAD, TIP] = [0.014, 0.05, 0.26]; // Radii of shaft and head, and length of the head, over the arrow's length.
-const MOST = 600; // Largest number of arrows, with all images.
+// Radii of shaft and head, and length of the head, relative to the length of the arrow.
+const [SHAFT, HEAD, TIP] = [0.014, 0.05, 0.26];
+const MOST = 600; // Largest number of arrows, including those of mirror images.
 
 export class Arrows {
   constructor(THREE) {
@@ -13,7 +14,8 @@ export class Arrows {
     Object.assign(this.mesh, { frustumCulled: false, visible: false, count: 0 });
   }
 
-  // Draws the arrows and returns the largest speed, m/s. `keep` (part, place) selects the arrows, `reach` is the size of the framed region, m.
+  // Draws the arrows and returns the largest speed, m/s. The function `keep(part, place)` selects the arrows; `reach`
+  // is the size of the framed region, m.
   show(snapshot, { explode, middle, mirrors, keep, ink, reach }) {
     const { Matrix4, Quaternion, Vector3 } = this.three;
     const found = collect(snapshot, explode, middle, keep);
@@ -73,7 +75,7 @@ function reflected({ place, way }, mirrors, image) {
   return [at, along];
 }
 
-// Geometry of a shaft and a head along y with length 1.
+// Returns the geometry of an arrow of length 1 along y, with a shaft and a head.
 function shape({ BufferGeometry, BufferAttribute }) {
   const out = [];
   const ring = (k, radius, y) => [radius * Math.cos((2 * Math.PI * k) / SIDES), y, radius * Math.sin((2 * Math.PI * k) / SIDES)];

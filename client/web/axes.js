@@ -1,25 +1,26 @@
-// Parts of a chart's option for ECharts: axes with one unit each, lines and areas, marks, the tooltip.
+// Parts of the ECharts option of a chart: axes with one unit each, lines and areas, marks, the tooltip.
 
 import { exact, onAxis, percent, scaleOf, si } from "./figures.js";
 
 export const FONT = 12;
-const MOST_LINES = 3; // Largest number of lines of a legend.
-const LINE = 18; // Height of a line of a legend, px.
-const MARGIN = 7; // Space between the symbol of a legend and its text, px.
+const MOST_LINES = 3; // Largest number of text lines of a legend.
+const LINE = 18; // Height of a text line of a legend, px.
+const MARGIN = 7; // Space between the symbol and the text of a legend entry, px.
 const DASHES = ["solid", [7, 4], [2, 3]];
-const HUES = 6; // Colours of the style sheet, --line-0 and so on, safe for colour blindness (Okabe and Ito 2008).
+// Number of line colours of the style sheet (--line-0 and so on), safe for colour blindness (Okabe and Ito 2008).
+const HUES = 6;
 export const colour = (name) => getComputedStyle(document.documentElement).getPropertyValue(`--${name}`).trim() || name;
 
-// Colour and dash of line number `i`: the first eighteen combinations differ.
+// Returns colour and dash pattern of line number `i`; the first eighteen combinations are different.
 export const lineStyle = (i) => ({ colour: `line-${i % HUES}`, dash: DASHES[Math.floor(i / HUES) % DASHES.length] });
 
-// Adds the common options of all charts to the option of a chart. Its tooltip escapes names, so they stay text.
+// Adds the options that all charts share to the option of a chart. The tooltip escapes names, so that they stay text.
 export function whole(alone, option) {
   const all = common(alone);
   return { ...all, ...option, tooltip: { ...all.tooltip, ...option.tooltip } };
 }
 
-// An option whose legend has as many lines as it needs, up to MOST_LINES; a longer one has pages.
+// Returns an option whose legend has as many text lines as it needs, up to MOST_LINES; a longer legend has pages.
 export function wrapped(option, width) {
   const { legend, grid, series } = option;
   const names = legend.data ?? series.map(({ name }) => name).filter(Boolean);
@@ -40,8 +41,8 @@ function linesOf(names, width, { itemWidth, itemGap, left, right }) {
   return lines;
 }
 
-// Common options of all charts: colours of the theme, zoom with Ctrl and the wheel. A chart that is `alone` has a tooltip
-// for one item, the others a cursor, whose values cursorbox.js shows.
+// Returns the options that all charts share: colours of the theme, zoom with Ctrl and the wheel. A chart that is
+// `alone` has a tooltip for one item. Any other chart has a cursor, whose values cursorbox.js shows.
 export function common(alone) {
   return {
     animation: false,
@@ -65,7 +66,7 @@ export const time = (end, more = {}) => ({
   axisPointer: { label: { show: false, formatter: ({ value }) => exact(Number(value), "s", 4) } }, ...more,
 });
 
-// An axis in one unit, which is written above it; `most` is the largest magnitude on it.
+// Returns an axis with one unit, which is written above the axis; `most` is the largest magnitude on the axis.
 export function axis(unit, most, more = {}) {
   const scale = scaleOf(most, unit);
   return {
@@ -74,14 +75,14 @@ export function axis(unit, most, more = {}) {
   };
 }
 
-// Labels at powers of ten; the unit of each label has its own prefix.
+// Returns a logarithmic axis with labels at powers of ten; the unit of each label has a prefix of its own.
 export const logarithmic = (unit, more = {}) => ({
   type: "log", splitLine: rule(), axisLabel: label((value) => exact(value, unit, 1)), ...more,
 });
 
 export const shares = (more = {}) => ({ ...axis("", 1), min: 0, max: 1, interval: 0.25, axisLabel: label((value) => percent(value, 0)), ...more });
 
-// Largest magnitude in some series; for stacked series, of the sum at each point.
+// Returns the largest magnitude in a list of series. For stacked series it is the magnitude of the sum at each point.
 export function largest(list) {
   let most = 0;
   const sums = new Map();
@@ -96,8 +97,8 @@ export function largest(list) {
   return most;
 }
 
-// series({ name, data: [[t, value]], colour, unit, … }): a line, or with `stack` an area on those before. `text` formats
-// a value; its second argument is the point.
+// series({ name, data: [[t, value]], colour, unit, … }) returns a line, or with `stack` an area on top of the areas
+// before. The function `text` formats a value; its second argument is the point.
 export function series({ name, data, colour: tone, unit = "", stack, dash = "solid", width = 1.8, text = (value) => si(value, unit, 4), ...more }) {
   return {
     name, unit, type: "line", data, showSymbol: data.length === 1, sampling: stack || data.length < 2000 ? undefined : "minmax", color: colour(tone), connectNulls: false,
@@ -106,7 +107,7 @@ export function series({ name, data, colour: tone, unit = "", stack, dash = "sol
   };
 }
 
-// Expected value with its tolerance over its time interval: a dashed line in a band.
+// Returns the marks of an expected value with its tolerance over a time interval: a dashed line in a band.
 export function expected({ value, tolerance, since, until }, tone) {
   return {
     markLine: { silent: true, symbol: "none", animation: false, label: { show: false }, lineStyle: { color: colour(tone), type: [4, 3], width: 1.4 },
@@ -115,14 +116,14 @@ export function expected({ value, tolerance, since, until }, tone) {
   };
 }
 
-// Events as pins; a click opens them.
+// Returns events as pins on the time axis; a click opens an event.
 export const pins = (name, data) =>
   ({ name, aside: true, type: "scatter", data, symbol: "pin", symbolSize: 22, color: colour("accent"), cursor: "pointer", z: 5, tooltip: { valueFormatter: () => "click to open" } });
 
-// Points without a result, as crosses.
+// Returns points without a result, drawn as crosses.
 export const crosses = (name, data) => ({ type: "scatter", aside: true, name, data, symbol: CROSS, symbolSize: 11, color: colour("bad"), cursor: "pointer", z: 6 });
 const CROSS = "path://M2 0L5 3L8 0L10 2L7 5L10 8L8 10L5 7L2 10L0 8L3 5L0 2Z";
 
-// A horizontal line for the limit of a value.
+// Returns a horizontal line for the limit of a value.
 export const limit = (value) =>
   ({ silent: true, symbol: "none", label: { show: false }, lineStyle: { color: colour("bad"), type: "dashed" }, data: [{ yAxis: value }] });

@@ -1,4 +1,4 @@
-// Card of the 3-D body: the view, its tools, a selected fragment, and the snapshots over time.
+// Card of the body in 3-D: the view, its tools, the selected fragment, and the snapshots over time.
 
 import { call } from "./api.js";
 import { count, counted, h, si } from "./figures.js";
@@ -14,14 +14,15 @@ import { Tools } from "./tools.js";
 import { View3d } from "./view3d.js";
 import { wallsOf } from "./walls.js";
 
-const MOST_KEPT = 40; // Largest number of decoded snapshots, about 1 MB each.
-const PLAY = 400; // ms for each snapshot.
+const MOST_KEPT = 40; // Largest number of decoded snapshots in memory, about 1 MB each.
+const PLAY = 400; // Time for which a playing film shows each snapshot, ms.
 
 export class Body {
-  // `onShow` is called with the snapshot on the screen.
+  // `onShow` is called with the snapshot that is shown on the screen.
   constructor(run, onShow = () => {}) {
     Object.assign(this, { run, onShow, entries: [], snapshots: new Snapshots(run, MOST_KEPT), following: true, picked: null, wanted: null, planes: [] });
-    this.drawn = new Promise((done) => { this.ready = done; }); // Fulfilled when the first snapshot is drawn, or none can be.
+    // Fulfilled when the first snapshot is drawn, or when no snapshot can be drawn.
+    this.drawn = new Promise((done) => { this.ready = done; });
     this.path = `v1/runs/${encodeURIComponent(run)}`;
     this.build();
     three().catch(() => {}); // start() reports an error.
@@ -51,7 +52,8 @@ export class Body {
     this.playing.onclick = () => (this.player ? this.pause() : this.play());
   }
 
-  // All snapshots of the run so far, from its messages. The newest is shown, unless the user has chosen an earlier one.
+  // Takes all snapshots of the run so far, from the messages of the run. The newest snapshot is shown unless the user
+  // has chosen an earlier one.
   update(entries) {
     if (entries.length <= this.entries.length) return;
     const first = !this.entries.length;
@@ -87,7 +89,7 @@ export class Body {
 
   // Snapshots -----------------------------------------------------------------------------------------------------------
 
-  // Only the last requested snapshot is fetched when the slider moves faster than the network.
+  // If the slider moves faster than the network, only the last requested snapshot is fetched.
   async show(place) {
     this.scrub.value = place;
     this.moment.textContent = si(this.entries[place].t, "s");
@@ -129,7 +131,7 @@ export class Body {
     this.pick(this.picked === null ? -1 : rowOf(snapshot, this.picked), true);
     this.list();
     this.element.dataset.shown = header.n;
-    requestAnimationFrame(() => setTimeout(this.ready)); // Runs after the frame that draws the snapshot.
+    requestAnimationFrame(() => setTimeout(this.ready)); // Called after the frame that draws the snapshot.
   }
 
   offer() {
@@ -197,7 +199,7 @@ export class Body {
 
   // Fragments -----------------------------------------------------------------------------------------------------------
 
-  // `kept`: the selection stays in a new snapshot, which may lack the fragment.
+  // With `kept`, the selection stays in a new snapshot; the new snapshot may lack the fragment.
   pick(row, kept = false) {
     const found = row >= 0 ? fragment(this.snapshot, row) : null;
     this.view.mark(row);
@@ -215,7 +217,7 @@ export class Body {
     if (focused) [...heaviest.querySelectorAll("button")].find(({ innerText }) => innerText === focused)?.focus({ preventScroll: true });
   }
 
-  // Returns { t, mass, speed } of a fragment: from the server, or from the snapshots in memory.
+  // Returns { t, mass, speed } of a fragment over time: from the server, or from the snapshots in memory.
   async history(id) {
     return call(`${this.path}/fragments/${id}`).catch(() => this.remembered(id));
   }

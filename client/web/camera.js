@@ -1,21 +1,23 @@
-// The camera: fits the framed region, follows a part or stays, turns to the axes, and can be shared by several views.
+// The camera: it fits the framed region, follows a part or stays, turns to the axes, and can be shared by several
+// views.
 
 import { mirrored, points, stand } from "./framing.js";
 
-const ANGLE = 30; // Vertical angle of view, degrees.
-const MARGIN = 1.06; // Margin round the framed region.
-const TURN = Math.PI / 24; // Turn of one arrow key.
-const FREE = 0.16; // Fraction of the height that is left free for axes and scale bar.
-const LEGEND = [90, 0.2]; // Space at the right for the legend: px, and largest fraction of the width.
+const ANGLE = 30; // Vertical angle of view of the camera, degrees.
+const MARGIN = 1.06; // Margin around the framed region, as a factor.
+const TURN = Math.PI / 24; // Angle by which one press of an arrow key turns the camera.
+const FREE = 0.16; // Fraction of the height of the view that is left free for axes and scale bar.
+const LEGEND = [90, 0.2]; // Space at the right of the view for the legend: px, and largest fraction of the width.
 const VIEWS = { "+x": [1, 0, 0], "-x": [-1, 0, 0], "+y": [0, 1, 0], "-y": [0, -1, 0], "+z": [0, 0, 1], "-z": [0, 0, -1] };
 
-// Numbers of client/drawing/camera.py: the direction to the camera, its component along the side that is seen, and the
-// ratio of the first to the second extent above which a body is long.
+// Numbers of client/drawing/camera.py: the default direction to the camera, the component of this direction along the
+// visible side, and the ratio of the largest to the second extent above which a body is long.
 const [FROM, ASIDE, LONG] = [[1, -1.55, 0.62], 1.55, 2.2];
 export const VIEW_NAMES = [...Object.keys(VIEWS), "isometric"];
 
 export class ViewCamera {
-  // `changed` is called when the picture must be redrawn; `framed` returns what the frame depends on: { snapshot, explode, mirrors, shown }.
+  // `changed` is called when the picture must be redrawn. `framed` returns { snapshot, explode, mirrors, shown }, on
+  // which the framed region depends.
   constructor({ THREE, OrbitControls }, canvas, changed, framed) {
     Object.assign(this, { three: THREE, framed, changed, mode: "fit", part: null, others: new Set() });
     this.camera = new THREE.PerspectiveCamera(ANGLE, 1, 1e-3, 10);
@@ -31,7 +33,7 @@ export class ViewCamera {
   // Unit vector from the target to the camera.
   back() { return this.camera.position.clone().sub(this.controls.target).normalize().toArray(); }
 
-  // Extent of the framed region along a direction: [from, to], m.
+  // Returns the extent of the framed region along a direction: [from, to], m.
   along(normal) {
     const list = this.list();
     const ends = [Infinity, -Infinity];
@@ -42,7 +44,7 @@ export class ViewCamera {
     return ends;
   }
 
-  // Diagonal of the framed region, m.
+  // Returns the diagonal of the framed region, m.
   reach() { return Math.hypot(...[[1, 0, 0], [0, 1, 0], [0, 0, 1]].map((axis) => this.along(axis)).map(([low, high]) => high - low)); }
 
   get distance() { return this.camera.position.distanceTo(this.controls.target); }
@@ -53,14 +55,14 @@ export class ViewCamera {
     for (const other of this.others) other.copy(this);
   }
 
-  // Turning keeps the frame; zooming and shifting end the automatic frame.
+  // Turning keeps the framed region; zooming and shifting end the automatic framing.
   released() {
     const shifted = this.framedAt && this.controls.target.distanceTo(this.framedAt) > 1e-6 * this.distance;
     if (this.mode !== "free" && (shifted || Math.abs(this.distance / this.touched - 1) > 1e-3)) this.follow(this.mode === "part" ? "part" : "free", this.part);
     this.onMode?.();
   }
 
-  // Sets the frame: "fit", "all", "free", or "part" with the number of a part.
+  // Sets what the camera frames: "fit", "all", "free", or "part" with the number of a part.
   follow(mode, part = null) {
     const before = [this.mode, this.part];
     Object.assign(this, { mode, part, home: null });
@@ -75,7 +77,7 @@ export class ViewCamera {
     else if (this.mode === "part") this.carry();
   }
 
-  // Sets the first view, that of the default camera of pictures (client/drawing/camera.py).
+  // Sets the first view, which is the default view of pictures (client/drawing/camera.py).
   first() {
     const list = this.list();
     const sides = new Map(this.framed().cuts.map(({ axis, at }) => [axis, middle(list, axis) > at ? -1 : 1]));
@@ -83,7 +85,7 @@ export class ViewCamera {
     this.look(away, up, top);
   }
 
-  // Sets the view along a direction; `up` is an axis, which points upwards (`top` 1) or downwards (-1).
+  // Sets the view along a direction; the axis `up` points upwards (`top` = 1) or downwards (`top` = -1).
   look(away, up, top = 1) {
     this.direction = true;
     this.camera.up.set(0, 0, 0).setComponent(up, top);
@@ -93,13 +95,14 @@ export class ViewCamera {
     this.fit(this.mode === "part" ? { only: this.part } : {});
   }
 
-  // OrbitControls turn about the upward direction that the camera has when they are made; this sets the present one.
+  // OrbitControls turn about the upward direction that the camera had when they were made; this function sets the
+  // present upward direction.
   pole() {
     this.controls._quat.setFromUnitVectors(this.camera.up, new this.three.Vector3(0, 1, 0));
     this.controls._quatInverse.copy(this.controls._quat).invert();
   }
 
-  // Selects one of VIEW_NAMES.
+  // Selects one of the views in VIEW_NAMES.
   view(name) {
     const away = VIEWS[name] ?? [1, -1, 0.8];
     const up = VIEWS[name]?.[2] ? 1 : 2;
@@ -108,7 +111,7 @@ export class ViewCamera {
     this.onMode?.();
   }
 
-  // Points of the framed regions of all views that share the frame.
+  // Returns the points of the framed regions of all views that share the camera.
   list(more = {}) {
     return [this, ...this.others].flatMap((eye) => eye.places({ all: this.mode === "all", ...more }));
   }
@@ -135,7 +138,7 @@ export class ViewCamera {
     if (this.mode === "part") this.home = this.centre();
   }
 
-  // Exploded fragments need more room.
+  // Exploded fragments need more space in the view.
   pulled(list) {
     const { explode, snapshot: { header: { box } } } = this.framed();
     if (!explode) return list;
@@ -175,7 +178,7 @@ export class ViewCamera {
     if (this.framed().snapshot && this.direction && (this.mode === "fit" || this.mode === "all")) this.fit();
   }
 
-  // A key that turns, shifts (with Shift) or zooms; returns false for any other key.
+  // Handles a key that turns, shifts (with Shift) or zooms the camera; returns false for any other key.
   key(name, shift) {
     const moves = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, -1], ArrowDown: [0, 1] };
     if (moves[name] && shift) this.shift(...moves[name]);
@@ -208,7 +211,7 @@ export class ViewCamera {
     this.onMode?.();
   }
 
-  // Copies the view of another camera. `share` couples several views.
+  // Copies the view of another camera; `share` uses this function to couple several views.
   copy(other) {
     this.quiet = true;
     this.direction = true;
@@ -224,8 +227,9 @@ export class ViewCamera {
   }
 }
 
-// Direction to the camera { away } and the axis that points upwards { up } for a body of so many metres along x, y and z.
-// A long body lies horizontally; planes of symmetry, Map of the axis to the side that is seen, -1 or 1, face the camera.
+// Returns the direction to the camera { away } and the axis that points upwards { up }, for a body with the extents
+// `side` along x, y and z, m. A long body lies horizontally. Planes of symmetry face the camera: `sides` maps an axis
+// to its visible side, -1 or 1.
 export function firstView(side, sides) {
   const [second, longest] = [0, 1, 2].sort((a, b) => side[a] - side[b]).slice(1);
   if (side[longest] > LONG * side[second]) return beside(longest, sides);
@@ -243,7 +247,7 @@ function beside(along, sides) {
   return { away, up, top };
 }
 
-// Couples several views, each { eye }: all views move together. The frame is that of the first view.
+// Couples several views, each { eye }, so that all move together. The framed region is that of the first view.
 export function share(views) {
   for (const { eye } of views) eye.others = new Set(views.map((other) => other.eye).filter((other) => other !== eye));
   if (views[0]?.eye.direction) views[0].eye.moved();

@@ -1,11 +1,11 @@
-// The charts below the body: a grid of cards that can be closed, and one card beside the body. The browser stores
-// which are closed and which one is beside the body.
+// The charts below the body: a grid of cards that can be closed, and one card beside the body. The browser stores which
+// cards are closed and which card is beside the body.
 
 import { h } from "./figures.js";
 import { recall, remember } from "./storage.js";
 
 export class Cards {
-  // `first` is the default card beside the body.
+  // `first` is the name of the card that is beside the body by default.
   constructor(first) {
     Object.assign(this, { first, cards: new Map() });
     this.grid = h("div.cards.charts");
@@ -15,13 +15,14 @@ export class Cards {
 
   get closed() { return recall("cards.closed", []); }
 
-  // Name of the card beside the body; "" for none.
+  // Name of the card beside the body; "" if there is no such card.
   get chosen() {
     const name = recall("cards.beside", this.first);
     return this.cards.has(name) && !this.closed.includes(name) ? name : "";
   }
 
-  // Adds a card with its title, an element beside the title, and its content; `name` is the card's key in the storage.
+  // Adds a card with its title, an element beside the title, and its content. `name` identifies the card in the
+  // browser's storage.
   add(name, title, beside, ...content) {
     const words = typeof title === "string" ? title : title.textContent;
     const tool = (what, tip, act) => h(`button.tool.${what}`, { type: "button", title: tip, "aria-label": `${tip}: ${words}`, onclick: act });
@@ -33,7 +34,7 @@ export class Cards {
     return element;
   }
 
-  // Shows or hides a card, according to whether it has content.
+  // Shows a card if it has content, else hides it.
   show(name, there) {
     const card = this.cards.get(name);
     if (card.there === there) return;
@@ -61,7 +62,8 @@ export class Cards {
     this.cards.get(name).move.focus();
   }
 
-  // Moves every card to its place. Other cards are not touched: a moved element loses focus and canvas.
+  // Moves every card to its place. Cards at their place are not touched, because a moved element loses focus and
+  // canvas.
   place() {
     const { closed, chosen } = this;
     const open = [...this.cards].filter(([name, { there }]) => there && !closed.includes(name));

@@ -1,12 +1,14 @@
-// Positions of the keys of a case in its text, TOML or JSON, and the text with another value of a key. The server reads
-// the case; this module only finds lines, and leaves the rest of the text unchanged.
+// Positions of the keys of a case in its text (TOML or JSON), and replacement of the value of a key in the text. The
+// server reads the case; this module only finds lines, and leaves the rest of the text unchanged.
 
 const HEADER = /^\s*(\[\[?)\s*([^\]]+?)\s*\]\]?/;
 const KEY = /^\s*((?:[\w-]+|"[^"\n]*"|'[^'\n]*')(?:\s*\.\s*(?:[\w-]+|"[^"\n]*"|'[^'\n]*'))*)\s*=\s*/;
-const LITERAL = /^("(?:[^"\\\n]|\\.)*"|'[^'\n]*'|[^#"'\n]*?)(\s*#.*)?$/; // A value on one line, and the comment after it.
+// A value on one line, and the comment after the value.
+const LITERAL = /^("(?:[^"\\\n]|\\.)*"|'[^'\n]*'|[^#"'\n]*?)(\s*#.*)?$/;
 const OPENS = { "[": 1, "{": 1, "]": -1, "}": -1 };
 
-// [{ line, start, end }]: a statement may span several lines, in brackets or in a text in three quotes.
+// Returns [{ line, start, end }] of all statements. A statement with brackets or with a text in three quotes may span
+// several lines.
 export function statements(text) {
   const found = [];
   let [start, line, depth, quote] = [0, 0, 0, ""];
@@ -22,7 +24,8 @@ export function statements(text) {
     if (quote) {
       if (text[at] === "\\" && quote[0] === '"') lines += text[++at] === "\n" ? 1 : 0;
       else if (text.startsWith(quote, at)) [at, quote] = [at + quote.length - 1, ""];
-      else if (quote.length === 1 && text[at] === "\n") [at, lines, quote] = [at - 1, lines - 1, ""]; // A text that does not end.
+      // A quoted text without an end.
+      else if (quote.length === 1 && text[at] === "\n") [at, lines, quote] = [at - 1, lines - 1, ""];
     } else if (three === '"""' || three === "'''") [quote, at] = [three, at + 2];
     else if (text[at] === '"' || text[at] === "'") quote = text[at];
     else if (text[at] === "#") {
@@ -38,8 +41,9 @@ export function statements(text) {
 
 const plain = (key) => key.split(/\s*\.\s*/).map((word) => word.replace(/^["']|["']$/g, "")).join(".");
 
-// [{ line, start, end, table, key, value }]: `table` is the path of the statement, `parts[0].mesh`; `key` the text
-// before its "=", "" for a header; `value` the start of its value.
+// Returns [{ line, start, end, table, key, value }] of all statements. `table` is the path of the table, such as
+// `parts[0].mesh`. `key` is the text before the "=", "" for a header. `value` is the position at which the value
+// starts.
 export function placed(text) {
   const counts = {};
   let table = "";
@@ -63,7 +67,7 @@ export function placed(text) {
   });
 }
 
-// A number or a text as it is written; "" for a missing one.
+// Returns a number or a text as it is written in the case; "" if the key is missing.
 export function valueOf(text, table, name) {
   if (isJson(text)) return String((table ? read(text)?.[table] : read(text))?.[name] ?? "");
   const found = placed(text).find((one) => full(one) === (table ? `${table}.${name}` : name));
@@ -81,7 +85,7 @@ function read(text) {
   }
 }
 
-// Malformed JSON stays unchanged: the server reports the error.
+// Malformed JSON stays unchanged, because the server reports the error.
 function changed(text, change) {
   const data = read(text);
   if (!data) return text;
@@ -97,7 +101,7 @@ function eachTable(value, act) {
 
 const full = ({ table, key }) => [table, key].filter(Boolean).join(".");
 
-// Line (from 0) of a key, or of its nearest parent; -1 if there is none.
+// Returns the line (from 0) of a key or of its nearest existing parent; -1 if there is none.
 export function lineOf(text, key) {
   const all = placed(text).map((one) => [full(one), one.line]);
   for (let name = key; name; name = name.slice(0, Math.max(0, name.lastIndexOf("."), name.lastIndexOf("[")))) {
@@ -107,7 +111,7 @@ export function lineOf(text, key) {
   return -1;
 }
 
-// The text with `name = literal` in a table of the case ("" for the top level); a missing table is added.
+// Returns the text with `name = literal` in a table of the case ("" for the top level); a missing table is added.
 export function withKey(text, table, name, literal) {
   if (isJson(text)) return changed(text, (data) => { (table ? (data[table] ??= {}) : data)[name] = JSON.parse(literal); });
   const all = placed(text);
@@ -120,7 +124,7 @@ export function withKey(text, table, name, literal) {
   return `${text.trimEnd()}\n\n[${table}]\n${name} = ${literal}\n`;
 }
 
-// Rest of the line after a number or a quoted text.
+// Returns the rest of a line after a number or a quoted text.
 const comment = (value) => LITERAL.exec(value)?.[2] ?? "";
 
 // Returns the text with the sha256 of a file in each table that names the file by `path`.
@@ -137,7 +141,8 @@ export function withHash(text, path, sha256) {
 const literals = (path) => [JSON.stringify(path), `'${path}'`];
 const reads = (text, { value, end }, path) => literals(path).some((one) => text.slice(value, end).startsWith(one));
 
-// For `mesh.path = "…"` on a line of its own, the hash becomes the next line, or replaces the hash in the same table.
+// For `mesh.path = "…"` on a line of its own, the hash is written on the next line, or replaces an existing hash in the
+// same table.
 function beside(text, all, one, sha256) {
   const name = `${one.key.slice(0, -"path".length)}sha256`;
   const known = all.find(({ table, key }) => table === one.table && key === name);
@@ -145,7 +150,7 @@ function beside(text, all, one, sha256) {
   return { start: one.end, end: one.end, words: `\n${/^[ \t]*/.exec(text.slice(one.start, one.end))[0]}${name} = "${sha256}"` };
 }
 
-// `{ path = "…" }`: the braces around it, which may be nested.
+// For `{ path = "…" }`, the hash is written inside of the braces around the path, which may be nested.
 function inside(text, { value, end }, path, sha256) {
   const words = literals(path).map((one) => one.replace(/[.*+?^${}()|[\]\\]/g, "\\$&")).join("|");
   const body = text.slice(value, end);

@@ -1,10 +1,12 @@
-// A case in JSON, as Python and the command line send it, as TOML for the editor: one key a line.
+// Conversion of a case from JSON, as Python and the command line send it, to TOML for the editor, with one key in each
+// line.
 
-const WIDE = 100; // Largest number of characters of a table or a list of tables that is written in one line.
+const WIDE = 100; // Largest number of characters of a table, or of a list of tables, that is written in one line.
 const BARE = /^[\w-]+$/;
-const DIGITS = /\d{16}/; // JavaScript rounds such numbers.
+const DIGITS = /\d{16}/; // JavaScript rounds numbers with 16 or more digits.
 
-// The text as TOML if it is a JSON object; any other text is unchanged, and a case that TOML cannot express stays JSON.
+// Returns the text as TOML if it is a JSON object, any other text unchanged. A case that TOML cannot express stays
+// JSON.
 export function asToml(text) {
   if (!text.trimStart().startsWith("{") || DIGITS.test(text)) return text;
   try {
@@ -18,7 +20,7 @@ const isTable = (value) => typeof value === "object" && !Array.isArray(value);
 const areTables = (value) => Array.isArray(value) && value.length > 0 && value.every((one) => one !== null && isTable(one));
 const name = (key) => (BARE.test(key) ? key : JSON.stringify(key));
 
-// A value in one line. Throws Error for null, which TOML lacks.
+// Returns a value in one line. Throws Error for null, which TOML lacks.
 function inline(value) {
   if (value === null) throw new Error("TOML has no null");
   if (Array.isArray(value)) return `[${value.map(inline).join(", ")}]`;
@@ -26,7 +28,7 @@ function inline(value) {
   return JSON.stringify(value);
 }
 
-// A table has a section of its own if it is long, or has tables itself; so have the tables at the top of the case.
+// A table has a section of its own if it is long or contains tables, or if it is at the top level of the case.
 const hasSection = (value, path) =>
   (isTable(value) ? !path.length || inline(value).length > WIDE || Object.values(value).some((one) => isTable(one) || areTables(one)) : areTables(value) && (!path.length || inline(value).length > WIDE));
 

@@ -1,4 +1,5 @@
-// A chart of a run with ECharts: one cursor and one zoom for all charts of a page, pointer and keys, saved as CSV and SVG.
+// A chart of a run, drawn with ECharts. All charts of a page share one cursor and one zoom; charts react to pointer and
+// keys, and are saved as CSV and SVG.
 
 import { colour, whole, wrapped } from "./axes.js";
 import { h } from "./figures.js";
@@ -7,16 +8,20 @@ import { readout } from "./cursorbox.js";
 import { save, tableOf, toCsv } from "./tables.js";
 
 const GROUP = "run";
-const NEAR = "100px"; // Distance to the window: a chart farther off is drawn when the browser is idle, and again when it comes near.
-const KINDS = ["CSV", "SVG"]; // Forms in which a chart is saved.
-const PICTURE = { width: 960, height: 420 }; // px of a saved picture.
-const IDLE = 2000; // ms after which a chart out of view is drawn by a browser that is never idle.
-const whenIdle = (work) => globalThis.requestIdleCallback?.(work, { timeout: IDLE }) ?? setTimeout(work, 200); // Some browsers lack this function.
+// Distance from the window within which a chart is drawn at once. A chart farther away is drawn when the browser is
+// idle, and again when it comes near.
+const NEAR = "100px";
+const KINDS = ["CSV", "SVG"]; // File formats in which a chart is saved.
+const PICTURE = { width: 960, height: 420 }; // Size of a saved picture, px.
+const IDLE = 2000; // Time in ms after which a chart out of view is drawn even if the browser is never idle.
+// Some browsers lack requestIdleCallback.
+const whenIdle = (work) => globalThis.requestIdleCallback?.(work, { timeout: IDLE }) ?? setTimeout(work, 200);
 
-// A chart of `height` px. `option()` returns an option of ECharts, or null without data.
-// `unit` is that of its x axis; only charts over time share the cursor. Enter calls `onEnter` with the index of the cursor in the first series; `table()` resolves to
-// the saved table, { head, rows }, instead of the drawn points; `name()` is the beginning of its file names. The chart
-// is drawn after `before`, a promise. `missing()` returns the text of a chart without data.
+// A chart of `height` px. `option()` returns an ECharts option, or null without data. `unit` is the unit of the x axis;
+// only charts over time share the cursor. Enter calls `onEnter` with the index of the cursor in the first series.
+// `table()` resolves to { head, rows }, which is saved instead of the drawn points. `name()` is the beginning of the
+// names of saved files. The chart is drawn after the promise `before`. `missing()` returns the text of a chart without
+// data.
 export class Chart {
   constructor(height, label, option, { alone = false, unit = "s", onClick, onEnter, table, before, missing = () => "", name = () => "chart" } = {}) {
     this.element = h("div.plot", { tabindex: 0, role: "img", style: { height: `${height}px` } },
@@ -59,7 +64,7 @@ export class Chart {
     if (stale) this.draw();
   }
 
-  // A chart out of view is drawn while the browser is idle: the first time, and later when it is `needed`.
+  // A chart out of view is drawn while the browser is idle: the first time, and later if it is `needed`.
   draw(needed = false) {
     if (this.seen) this.paint();
     else if ((needed || !this.chart) && !this.waiting) this.waiting = whenIdle(() => this.late());
@@ -67,7 +72,8 @@ export class Chart {
 
   resize() {
     this.chart?.resize();
-    if (this.chart && this.wide !== this.element.clientWidth) this.draw(); // The legend may need another number of lines.
+    // The new width may require another number of text lines in the legend.
+    if (this.chart && this.wide !== this.element.clientWidth) this.draw();
   }
 
   late() {
@@ -88,9 +94,11 @@ export class Chart {
     const places = new Map(option.series.map(({ name, xAxisIndex = 0 }) => [name, xAxisIndex]));
     const moved = [...places].some(([name, place]) => (this.places?.get(name) ?? place) !== place) || panels !== (this.places?.panels ?? panels);
     const gone = [...(this.places?.keys() ?? [])].some((name) => !places.has(name));
-    if (gone) this.chart.dispatchAction({ type: "hideTip", escapeConnect: true }); // ECharts fails when its cursor has the number of a removed series.
+    // ECharts fails if its cursor refers to a removed series.
+    if (gone) this.chart.dispatchAction({ type: "hideTip", escapeConnect: true });
     this.places = Object.assign(places, { panels });
-    const how = moved ? { notMerge: true } : { replaceMerge: ["series"] }; // ECharts fails when a line moves to another panel.
+    // ECharts fails if a line moves to another panel.
+    const how = moved ? { notMerge: true } : { replaceMerge: ["series"] };
     this.chart.setOption(wrapped(whole(this.alone, option), this.element.clientWidth), { ...how, lazyUpdate: false });
     this.wide = this.element.clientWidth;
     this.series = option.series;
@@ -99,7 +107,7 @@ export class Chart {
     this.points = Math.max(...option.series.map((one) => one.data?.length ?? 0));
   }
 
-  // Height of a chart: several panels, one below the other, need more.
+  // Sets the height of a chart, which is larger for several panels below each other.
   stretch(panels) {
     this.panels = panels;
     this.element.style.height = `${Math.round(this.height * (0.4 + 0.6 * panels))}px`;
@@ -118,7 +126,7 @@ export class Chart {
     return chart;
   }
 
-  // All charts show the cursor; only the chart with the pointer or the focus shows the values of its lines.
+  // All charts show the cursor. Only the chart with the pointer or the focus shows the values of its lines.
   read(cursor) {
     const focused = document.activeElement === this.element;
     if (!this.reads || !cursor || !(this.pointer || focused)) return;
@@ -143,7 +151,7 @@ export class Chart {
     if (point) this.read({ value: (point.value ?? point)[0] });
   }
 
-  // Highlights one series; null: none.
+  // Highlights the series with this name; null removes the highlight.
   highlight(seriesName) {
     this.chart?.dispatchAction({ type: "downplay" });
     if (seriesName !== null) this.chart?.dispatchAction({ type: "highlight", seriesName });

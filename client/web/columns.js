@@ -1,4 +1,4 @@
-// Columns of the tables of runs: the value of a row that a column shows, and its unit.
+// Columns of the tables of runs: each column shows one value of a run, with its unit.
 
 import { count, duration, exact, percent, scaleOf, si, UNKNOWN, when } from "./figures.js";
 import { FINAL } from "./live.js";
@@ -6,16 +6,18 @@ import { prominent, valueOf } from "./runtable.js";
 import { titles } from "./titles.js";
 
 const STATES = ["running", "stopping", "starting", "queued", "accepted", "succeeded", "cancelled", "timed_out", "failed", "lost"];
-const ID = 9; // Number of characters of a short id beside the name.
-const [NOTE, LONG] = [10, 60]; // Largest number of characters of the reason beside a state: in a full table, and with room to spare.
+const ID = 9; // Number of characters of a short id beside the name of a run.
+// Largest number of characters of the detail beside a state: in a full table, and in a table with free space.
+const [NOTE, LONG] = [10, 60];
 
 export const share = (row) => (row.state === "succeeded" ? 1 : row.progress?.end_time > 0 ? row.progress.t / row.progress.end_time : 0);
 export const cores = ({ ranks, threads }) => (threads > 1 ? `${ranks}×${threads}` : String(ranks));
 export const took = (row) => (row.started && FINAL.has(row.state) ? row.finished - row.started : null);
 
-// { id, title, group, number, value(row), text(row) }: rows are sorted by `value`, which is null if missing;
-// Columns with a smaller `rank` stay in a narrow window; `letters(row)` is the width of a cell that is not its text, `most(row)` with room to spare.
-// `number` columns are right-aligned, and may have a `unit`, in which `write(value)` formats a number.
+// A column is { id, title, group, number, value(row), text(row) }. Rows are sorted by `value`, which is null for a
+// missing value. Columns with a smaller `rank` stay in a narrow window. `letters(row)` is the width of a cell whose
+// width differs from its text, `most(row)` its width with free space. Columns with `number` are aligned to the right,
+// and may have a `unit`, in which `write(value)` formats a number.
 const FIRST = [
   { id: "run", title: "run", value: (row) => row.name, text: (row) => row.name, letters: ({ name }) => name.length + ID },
   { id: "state", title: "state", value: (row) => STATES.indexOf(row.state) - share(row), text: (row) => row.state, letters: (row) => letters(row, NOTE), most: (row) => letters(row, LONG) },
@@ -30,24 +32,26 @@ const LAST = [
   { id: "title", title: "title", value: (row) => row.title, text: (row) => row.title, shown: false },
   { id: "message", title: "message", value: (row) => row.message || null, text: (row) => row.message, shown: false },
 ];
-const IF_ANY = new Set(["references", "labels"]); // Columns that are shown if a row has a value.
-const unsure = ({ state }) => state !== "succeeded"; // True for a run whose result belongs to a time before its end.
-const TELLING = /^(fragments|reference\.penetration.*)$/; // Results that are shown by default.
-const MOST_PROBES = 4; // Largest number of probes that are shown by default.
-const MOST_VALUES = 6; // Largest number of keys that are shown by default.
+const IF_ANY = new Set(["references", "labels"]); // Columns that are shown only if at least one row has a value.
+// True for a run that did not succeed, whose results belong to a time before its end.
+const unsure = ({ state }) => state !== "succeeded";
+const TELLING = /^(fragments|reference\.penetration.*)$/; // Results whose columns are shown by default.
+const MOST_PROBES = 4; // Largest number of probes whose columns are shown by default.
+const MOST_VALUES = 6; // Largest number of keys of the case whose columns are shown by default.
 
 function labels(row) {
   const own = Object.entries(row.labels).filter(([name]) => name !== "sweep" && name !== "point");
   return own.map(([name, value]) => `${name}=${value}`).join(" ");
 }
 
-// The state and its detail: progress, reason of waiting, or cause of the end.
+// Returns the detail of the state of a run: progress, reason of waiting, or cause of the end.
 export function detail(row) {
   const note = FINAL.has(row.state) || !row.progress ? (row.state === "succeeded" ? "" : row.message || row.reason || row.cause || "") : percent(share(row), 0);
   return note.startsWith(row.state) ? "" : note;
 }
 
-// Number of characters that the state and `most` characters of its detail need; a bar of the progress takes as much as seven.
+// Returns the number of characters for the state and at most `most` characters of its detail; a progress bar is as wide
+// as seven characters.
 function letters(row, most) {
   const note = Math.min(most, detail(row).length);
   return 0.9 * row.state.length + 4 + 0.9 * (note && 2 + note) + (row.progress && !FINAL.has(row.state) ? 7 : 0);
@@ -58,7 +62,7 @@ function references(row) {
   return row.missed.length ? `${row.missed.length} of ${row.references} missed` : `${row.references} pass`;
 }
 
-// All columns of some rows. `keys`: keys of cases that differ between rows; `units`: units of results by name.
+// Returns all columns for some rows. `keys`: keys of cases that differ between rows; `units`: units of results by name.
 export function columnsOf(rows, keys, units) {
   const called = titles(keys, rows);
   const first = [...prominent(rows, keys)].slice(0, MOST_VALUES);
@@ -81,7 +85,7 @@ export function columnsOf(rows, keys, units) {
 
 const titled = (name) => name.replace(/worst_residual/, "worst energy residual").replace(/^first_break$/, "first broken facet").replace(/^probe\./, "").replace(/^reference\.(.*)$/, "$1, reference").replace(/\.(min|max)$/, " $1");
 
-// A column of numbers, in the unit that fits most of them; words stay unchanged.
+// Returns a column of numbers in the unit that fits most of them; words stay unchanged.
 function numeric(rows, column) {
   const { unit, value } = column;
   const values = rows.map(value).filter((one) => one !== null);

@@ -1,4 +1,4 @@
-// Comparison of several runs: their histories in common charts, different keys, results, bodies side by side.
+// Page that compares several runs: their histories in common charts, keys that differ, results, bodies side by side.
 
 import { axis, largest, lineStyle, logarithmic, series, time } from "./axes.js";
 import { binary, call, refused } from "./api.js";
@@ -15,13 +15,13 @@ import { SideBySide } from "./sidebyside.js";
 import { decode } from "./snapshot.js";
 
 const TALL = 260;
-const AGAIN = 5000; // ms after which open runs, and runs without an answer, are read again.
-const POINTS = 600; // Number of points of a line; twelve lines are drawn at a time.
-const REPORTS = 200; // Number of points of a line of reports.
+const AGAIN = 5000; // Time in ms after which open runs, and runs without an answer, are read again.
+const POINTS = 600; // Number of points of a line; up to twelve lines are drawn in a chart.
+const REPORTS = 200; // Number of points of a line that is made from reports of a run.
 const AT_ONCE = 4; // Number of runs that are read at the same time.
 const MOST_CHARTS = 8;
 const LEDGER = ["kinetic", "elastic", "plastic", "viscous", "contact", "friction", "eroded", "fracture", "cohesive", "external", "residual"];
-const JOURNAL = { fragments: "", nodes: "", imbalance: "" }; // Quantities of reports, with their units.
+const JOURNAL = { fragments: "", nodes: "", imbalance: "" }; // Quantities in the reports of a run, with their units.
 
 export class ComparePage {
   constructor(ids, again = AGAIN) {
@@ -71,7 +71,7 @@ export class ComparePage {
     this.timer = setTimeout(() => this.read(), this.again);
   }
 
-  // The last snapshot of each run, for the sizes of its fragments; it is read last.
+  // Reads the last snapshot of each run, for the sizes of its fragments; snapshots are read after the histories.
   async readSnapshots() {
     const { signal } = this.abort;
     await inTurn(this.runs, AT_ONCE, async (run) => {
@@ -92,7 +92,7 @@ export class ComparePage {
 
   get key() { return `compare.${this.runs[0]?.plan?.name ?? ""}`; }
 
-  // { group: [name, …] } of quantities that all runs have.
+  // Returns the quantities that all runs have, by group: { group: [name, …] }.
   offered() {
     const columns = common(this.runs.map(({ columns: { units } }) => Object.keys(units)));
     const probes = common(this.runs.map(({ plan }) => (plan?.probes ?? []).map(({ name }) => name))).filter((name) => columns.includes(name));
@@ -185,7 +185,7 @@ export class ComparePage {
 
   keep() { remember(this.key, this.charts.map(({ name }) => name)); }
 
-  // Reads missing data of the visible charts, and draws them.
+  // Reads missing data of the visible charts, and draws these charts.
   async fill(charts) {
     const { signal } = this.abort;
     const names = charts.map(({ name }) => name);
@@ -212,7 +212,7 @@ export class ComparePage {
       xAxis: time(Math.max(...ends)), yAxis: log ? logarithmic(unit) : axis(unit, largest(list), { scale: true }), series: list };
   }
 
-  // All lines of all runs in one table.
+  // Returns all lines of all runs in one table.
   async table(name) {
     const unit = this.runs.map(({ columns }) => columns.units[name]).find((one) => one !== undefined) ?? "";
     const each = await Promise.all(this.runs.map(async (run) => (name in JOURNAL ? points(run, name) : (await everyLine(run.id, [name])).rows)));
@@ -232,7 +232,7 @@ export class ComparePage {
 
 const about = (name) => `${inWords(name)} of all runs over time`;
 
-// A button that shows a card further down.
+// Returns a button that scrolls to a card further down.
 const jump = (name, card) => h("button.quiet", { type: "button", "aria-label": `${name}: go to the card`, onclick: () => {
   card.tabIndex = -1;
   card.scrollIntoView({ block: "start" });
@@ -241,7 +241,7 @@ const jump = (name, card) => h("button.quiet", { type: "button", "aria-label": `
 
 const empty = (ends) => ({ xAxis: time(Math.max(...ends)), yAxis: axis("", 1), series: [] });
 
-// [[t, value]] of a run.
+// Returns the points [[t, value]] of a quantity of a run.
 function points({ curves }, name) {
   const { t = [], values = [] } = curves[name] ?? {};
   return t.map((at, i) => [at, values[i]]);
@@ -258,14 +258,14 @@ async function readRun(id, signal) {
   return { id, info, plan, columns, curves: {} };
 }
 
-// The units of the keys of a case, by key.
+// Returns the units of the keys of a case, by key.
 async function readUnits(name, signal) {
   if (!name) return {};
   const { cases = [] } = await call(`v1/table?limit=1&case=${encodeURIComponent(name)}`, { signal }).catch(() => ({}));
   return cases[0]?.units ?? {};
 }
 
-// Calls work for each item, a few at a time.
+// Calls `work` for each item of a list, for `atOnce` items at the same time.
 async function inTurn(list, atOnce, work) {
   const left = [...list];
   await Promise.all(Array.from({ length: atOnce }, async () => {

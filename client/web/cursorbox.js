@@ -1,12 +1,12 @@
-// Values of the lines of a chart at its cursor: a box beside the pointer, or beside the focused chart.
+// Box with the values of all lines of a chart at its cursor, beside the pointer or beside the focused chart.
 
 import { colour } from "./axes.js";
 import { exact, h } from "./figures.js";
 
 const AWAY = 14; // Distance of the box from the pointer, px.
-const MOST = 24; // Largest number of lines in the box.
+const MOST = 24; // Largest number of text lines in the box.
 
-// Index in `data` nearest to x; data is sorted by x.
+// Returns the index of the point in `data` nearest to x; the points are sorted by x.
 export function nearestTo(data, x) {
   let [low, high] = [0, data.length - 1];
   const at = (i) => (data[i].value ?? data[i])[0];
@@ -18,7 +18,8 @@ export function nearestTo(data, x) {
   return Math.abs(at(high) - x) < Math.abs(at(low) - x) ? high : low;
 }
 
-// Returns [{ name, value, colour, dash, text }] of series at x, sorted by value, the largest first; a stack from its top.
+// Returns [{ name, value, colour, dash, text }] of the series at x, the largest value first. Stacked series are sorted
+// from the top of the stack.
 export function worth(list, x) {
   const known = list.filter(({ data, aside, tooltip }) => data?.length && !aside && tooltip);
   const entries = known.flatMap(({ name, data, color, lineStyle, tooltip: { valueFormatter }, stack }) => {
@@ -29,14 +30,14 @@ export function worth(list, x) {
   return entries.some(({ stack }) => stack) ? entries.reverse() : entries.sort((a, b) => b.value - a.value);
 }
 
-// One box for the whole page, which the active chart uses.
+// The page has one box, which the chart with the pointer or the focus uses.
 class Readout {
   get element() {
     if (!this.made) document.body.append(this.made = h("div.readout", { role: "status", hidden: "" }));
     return this.made;
   }
 
-  // `of` is the chart, `place` the [x, y] in the window of the box.
+  // Shows the box for the chart `of` at the point `place`, [x, y] in the window.
   show(of, x, list, place) {
     const rows = worth(list, x);
     if (!rows.length) return this.hide(of);

@@ -1,29 +1,30 @@
-// Differences between runs: their names, the keys of their cases that differ, their results.
+// Differences between runs: names of the runs, keys of the cases that differ, results.
 
 import { count, duration, exact, fixed, number, rough, scaleOf, words } from "./figures.js";
 
-const NEVER = /^(name|title|description|reference\b.*)$/; // Keys that do not affect the answer.
+const NEVER = /^(name|title|description|reference\b.*)$/; // Keys that do not affect the answer of a run.
 const FEW = 3; // Largest number of keys in the name of a run.
-const PLACES = new Set(["parts", "run", "boundaries", "materials", "numerics"]); // Tables that names leave out.
-const SHORT = 8; // Least number of characters of an id.
+// Names of tables that are left out of the words for a key.
+const PLACES = new Set(["parts", "run", "boundaries", "materials", "numerics"]);
+const SHORT = 8; // Smallest number of characters of a short id.
 
 const AXES = ["x", "y", "z"];
 
-// { "run.ranks": 2, "parts[0].velocity[2]": 210, … } of a case with all defaults, by key.
+// Returns a case with all defaults as a flat object by key: { "run.ranks": 2, "parts[0].velocity[2]": 210, … }.
 export function flat(value, key = "") {
   if (value === null || typeof value !== "object") return { [key]: value };
   const under = (name) => (Array.isArray(value) ? `${key}[${name}]` : key ? `${key}.${name}` : name);
   return Object.assign({}, ...Object.keys(value).map((name) => flat(value[name], under(name))));
 }
 
-// [[key, value of the first, of the second, …], …] of the keys that differ between cases.
+// Returns [[key, value of the first case, of the second, …], …] for the keys that differ between cases.
 export function differences(plans) {
   const all = plans.map((plan) => flat(plan ?? {}));
   const keys = [...new Set(all.flatMap(Object.keys))];
   return keys.filter((key) => !NEVER.test(key) && all.some((one) => (one[key] ?? null) !== (all[0][key] ?? null))).map((key) => [key, ...all.map((one) => one[key])]);
 }
 
-// Words for a key: "steel velocity z" for "parts[0].velocity[2]".
+// Returns words for a key, such as "steel velocity z" for "parts[0].velocity[2]".
 export function about(key, plan) {
   let at = plan;
   const parts = key.split(/[.[\]]+/).filter(Boolean).map((word) => {
@@ -39,7 +40,7 @@ export function shown(value) {
   return typeof value === "number" ? number(value) : String(value);
 }
 
-// Shortest unique prefixes of ids.
+// Returns the shortest unique prefixes of ids.
 export function shortened(ids) {
   let length = SHORT;
   const longest = Math.max(0, ...ids.map((id) => id.length));
@@ -47,7 +48,7 @@ export function shortened(ids) {
   return ids.map((id) => id.slice(0, length));
 }
 
-// Names of runs: the name of the case; for equal names the few keys that differ, else the ids.
+// Returns names of runs: the name of the case; if names are equal, the few keys that differ, else the ids.
 export function called(runs, differing, units = {}) {
   const names = runs.map(({ info }) => info.name || info.id);
   const ids = shortened(runs.map(({ info }) => info.id));
@@ -58,7 +59,7 @@ export function called(runs, differing, units = {}) {
 
 const keyed = ([key, ...values], i, runs, units) => `${about(key, runs[0].plan)} ${typeof values[i] === "number" ? exact(values[i], units[key] ?? "") : shown(values[i])}`;
 
-// A column for each of the first keys that differ: words, key, unit, values.
+// Returns a column for each of the first keys that differ: words, key, unit, values.
 export const keyColumns = (differing, plan, units) => differing.map(([key, ...values]) => {
   const numbers = values.filter(Number.isFinite);
   const scale = scaleOf(Math.max(0, ...numbers.map(Math.abs)), units[key] ?? "");
@@ -66,7 +67,7 @@ export const keyColumns = (differing, plan, units) => differing.map(([key, ...va
   return { title: about(key, plan), key, si: units[key] ?? "", unit: numbers.length ? scale.unit : "", values, text };
 });
 
-// Quantities of every run, in words.
+// Words for the quantities that every run has.
 const QUANTITIES = {
   kinetic: "kinetic energy", elastic: "elastic energy", plastic: "plastic work", viscous: "work of bulk viscosity", contact: "energy lost in contact", friction: "work of friction",
   eroded: "energy of eroded tets", fracture: "energy of fracture", cohesive: "energy in cohesive facets", external: "work from outside", residual: "energy residual", dt: "time step",
@@ -76,8 +77,8 @@ export const inWords = (name) => QUANTITIES[name] ?? words(name.replace(/^(kinet
 
 // Results ----------------------------------------------------------------------------------------------------------------
 
-// [{ title, unit, values, text }] of comparable results, one value for each run; null if a run has none.
-// `which`: last, least or most of probes.
+// Returns columns [{ title, unit, values, text }] of comparable results, with one value for each run; null if a run has
+// no value. `which`: whether the last, least or largest value of a probe is compared.
 export function results(runs, which) {
   const probes = common(runs.map(({ plan }) => (plan?.probes ?? []).map(({ name }) => name)));
   const references = [...new Set(runs.flatMap(({ info }) => (info.outcome?.reference ?? []).map(({ name }) => name)))];
@@ -99,7 +100,7 @@ const check = (info, name) => (info.outcome?.reference ?? []).find((one) => one.
 const unitOf = (runs, name) => runs.map(({ columns }) => columns.units[name]).find((unit) => unit !== undefined) ?? "";
 export const common = (lists) => (lists.length ? lists[0].filter((name) => lists.every((list) => list.includes(name))) : []);
 
-// Numbers of a column have one unit, in its header.
+// Returns a column whose numbers have one unit, which is written in the header.
 function column(title, unit, values, text) {
   const scale = scaleOf(Math.max(0, ...values.filter(Number.isFinite).map(Math.abs)), unit);
   return { title: words(title), si: unit, unit: text ? "" : scale.unit, values, text: (value) => (value === null ? "–" : text ? text(value) : exact(Number(scale.text(value)), "", 5)) };

@@ -1,4 +1,4 @@
-// A text with line numbers. Lines with a problem are marked.
+// Text editor with line numbers; lines with a problem are marked.
 
 import { h } from "./figures.js";
 
@@ -14,7 +14,7 @@ export class Editor {
 
   get text() { return this.area.value; }
 
-  // Keeps the caret on its line when the text around it has changed.
+  // Sets the text, and keeps the caret on its line if the text around it has changed.
   set text(text) {
     if (this.area.value === text) return;
     const { selectionStart: at, scrollTop } = this.area;
@@ -31,7 +31,7 @@ export class Editor {
     onInput();
   }
 
-  // Marks lines, from 0 on.
+  // Marks the lines with the given numbers, from 0.
   mark(lines) {
     this.marks = new Set(lines);
     this.drawn = 0;
@@ -45,7 +45,7 @@ export class Editor {
     this.numbers.replaceChildren(...Array.from({ length: lines }, (_, i) => h(this.marks.has(i) ? "span.wrong" : "span", {}, `${i + 1}\n`)));
   }
 
-  // Selects a line and brings it into view.
+  // Selects a line and scrolls it into view.
   goTo(line) {
     const lines = this.area.value.split("\n");
     const start = lines.slice(0, line).reduce((sum, one) => sum + one.length + 1, 0);

@@ -1,4 +1,5 @@
-// Energy of a run over time: the ledger, whose terms add up to the energy input, and the energies of the parts.
+// Charts of the energy of a run over time: the energy balance, whose terms add up to the energy input, and the energies
+// of the parts.
 
 import { axis, common, largest, limit, logarithmic, series, time } from "./axes.js";
 import { named } from "./colours.js";
@@ -6,9 +7,11 @@ import { rough } from "./figures.js";
 import { TERMS } from "./live.js";
 
 export const VIEWS = { ledger: "all terms of the ledger", lost: "without the kinetic energy", internal: "internal energy by part", kinetic: "kinetic energy by part" };
-const SMALL = 0.01; // Share of the largest energy below which a term, too thin to be seen, is not in the legend.
+// Fraction of the largest energy below which an energy term is not in the legend, because its area is too thin to be
+// seen.
+const SMALL = 0.01;
 const FLOOR = 1e-10; // Residuals below this value are rounding errors.
-const RESIDUAL = 1e-2; // Limit of the residual.
+const RESIDUAL = 1e-2; // Limit of the residual of the energy balance.
 
 export const end = ({ plan, progress, columns, ledger }) => plan?.run?.end_time ?? progress?.end_time ?? columns.values.t.at(-1) ?? ledger.at(-1)?.t ?? 1;
 export const parts = ({ ledger, columns }) => {
@@ -16,7 +19,7 @@ export const parts = ({ ledger, columns }) => {
   return names.length ? names : Object.keys(ledger.at(-1)?.parts ?? {});
 };
 
-// [[t, value]] of a column of the history; without a history, of the reports.
+// Returns the points [[t, value]] of a column of the history; without a history, of the reports of the run.
 export function course(live, name) {
   const { values } = live.columns;
   if (values[name]) return values.t.map((t, i) => [t, values[name][i]]);
@@ -35,7 +38,8 @@ export function ofEnergy(live, view) {
   return { xAxis: time(end(live)), yAxis: axis("J", most), series: list, legend: { ...common(false).legend, data: named } };
 }
 
-// Stacked areas, negative terms below zero; with the kinetic energy their sum is the energy input, a line.
+// Returns the energy terms as stacked areas, negative terms below zero. With the kinetic energy, their sum is the
+// energy input, which is drawn as a line.
 function ofTerms(live, view) {
   const all = TERMS.filter(([name]) => view === "ledger" || name !== "kinetic").map(([name, tone]) => ({ name: words(name), colour: tone, unit: "J", stack: "energy", data: course(live, name) }));
   const list = all.filter(({ data }) => data.some(([, value]) => value)).map(series);
@@ -47,7 +51,7 @@ function ofTerms(live, view) {
 
 const words = (name) => ({ stepping: "time stepping", averaging: "pressure averaging", viscous: "viscosity" })[name] ?? name;
 
-// One area for each part, in the colours of the parts in the 3-D view.
+// Returns one area for each part, in the colours of the parts in the 3-D view.
 export const ofParts = (live, view) => parts(live).map((part, i) =>
   series({ name: part, colour: named(i), unit: "J", stack: "energy", data: course(live, `${view}.${part}`).filter(([, value]) => value !== null) }));
 

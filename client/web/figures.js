@@ -1,9 +1,10 @@
-// Numbers and times as text, and creation of elements.
-// The same rules as cases/figures.py; tests/figures.json has inputs and texts for both.
+// Formats of numbers and times as text, and creation of elements. The rules are those of cases/figures.py;
+// tests/figures.json has inputs and texts for both modules.
 
 const UP = [[1e12, "T"], [1e9, "G"], [1e6, "M"], [1e3, "k"]];
 const DOWN = [[1, ""], [1e-3, "m"], [1e-6, "µ"], [1e-9, "n"], [1e-12, "p"]];
-const PREFIXED = ["m", "g", "J", "Pa", "N", "W", "B", "Hz", "m/s", "N s", "N m", "J/m^2", "B/s"]; // Units that take every prefix.
+// Units that can have any prefix.
+const PREFIXED = ["m", "g", "J", "Pa", "N", "W", "B", "Hz", "m/s", "N s", "N m", "J/m^2", "B/s"];
 const named = (unit, steps) => steps.map(([factor, prefix]) => [factor, prefix + unit]);
 const LADDERS = {
   ...Object.fromEntries(PREFIXED.map((unit) => [unit, named(unit, [...UP, ...DOWN])])),
@@ -13,7 +14,9 @@ const LADDERS = {
   "m^3": [[1e-3, "m^3"], [1e-12, "mm^3"], [1e-18, "µm^3"]],
 };
 const WORTH = { "m^2": 1, "mm^2": 1e-6, "µm^2": 1e-12, "m^3": 1, "mm^3": 1e-9, "µm^3": 1e-18 };
-const PLAIN = [1e-3, 5]; // A power of ten is written for numbers below the first value, and for as many digits before the point as the second.
+// Limits of plain numbers: a number below the first value, or with more digits before the point than the second value,
+// is written with a power of ten.
+const PLAIN = [1e-3, 5];
 const MOST = 1e12; // Integers above this value are written with a power of ten.
 const MOST_HOURS = 10000;
 export const UNKNOWN = "–";
@@ -21,13 +24,13 @@ export const UNKNOWN = "–";
 const known = (value) => (typeof value === "number" ? value : NaN);
 const tied = (text, unit) => (text === UNKNOWN ? text : `${text} ${unit}`.trim());
 
-// Returns a number with significant digits and the unit, with a fitting prefix if the unit takes a prefix.
+// Returns a number with `digits` significant digits and its unit, with a fitting prefix if the unit can have one.
 export const si = (value, unit = "", digits = 3) => alike([value], unit, digits)[0];
 
 // Returns the text of `si` without trailing zeros.
 export const exact = (value, unit = "", digits = 6) => trimmed(si(value, unit, digits));
 
-// Values of one group: all have the prefix of the largest magnitude.
+// Returns the texts of a group of values; all have the prefix of the largest magnitude.
 export function alike(values, unit = "", digits = 3) {
   const [worth, name] = unitOf(values.map(known), unit, digits);
   return values.map(known).map((value) => (Number.isNaN(value) ? UNKNOWN : tied(significant(value / worth, digits), name)));
@@ -35,26 +38,26 @@ export function alike(values, unit = "", digits = 3) {
 
 export const exacts = (values, unit = "", digits = 6) => alike(values, unit, digits).map(trimmed);
 
-// Components of a vector with one unit: "1, 200 mm".
+// Returns the components of a vector with one unit, such as "1, 200 mm".
 export function vector(values, unit = "", digits = 3, between = ", ") {
   const [worth, name] = unitOf(values.map(known), unit, digits);
   return tied(values.map((value) => trimmed(significant(known(value) / worth, digits))).join(between), name);
 }
 
-// Labels of an axis from 0 to `most` with the same prefix.
+// Returns a function that labels an axis from 0 to `most` with one prefix.
 export function onAxis(most, unit) {
   const [worth, name] = unitOf([known(most)], unit, 3);
   return (value) => tied(trimmed(significant(value / worth, 3)), name);
 }
 
-// Unit with prefix of an axis or a column whose largest magnitude is `most`, its factor, and the texts of
-// numbers without it.
+// Returns the unit with prefix for an axis or a column whose largest magnitude is `most`, its factor, and functions for
+// texts without the unit.
 export function scaleOf(most, unit) {
   const [worth, name] = unitOf([known(most)], unit, 3);
   return { worth, unit: name, text: (value) => exact(value / worth) };
 }
 
-// A number without a unit, with k, M, G or T where it is large.
+// Returns a number without a unit; a large number has k, M, G or T.
 export function large(value) {
   const [worth, name] = step(Math.abs(known(value)), [...UP, [1, ""]], 3);
   return tied(significant(known(value) / worth, 3), name);
@@ -71,7 +74,7 @@ const step = (most, ladder, digits) => ladder.find(([factor]) => most >= factor 
 
 export const number = (value) => exact(value);
 
-// Two significant digits and the power of ten, for residuals.
+// Returns two significant digits and the power of ten, as used for residuals.
 export const rough = (value) => (Number.isFinite(value) && value !== 0 ? power(value, 2) : significant(known(value), 2));
 
 export const fixed = (value, decimals = 2) => (Number.isFinite(value) ? rounded(value, decimals) : UNKNOWN);
@@ -81,7 +84,7 @@ export function percent(share, decimals = 1) {
   return text === UNKNOWN ? text : `${text} %`;
 }
 
-// Thousands are separated by a space that does not break.
+// Returns an integer whose thousands are separated by a space that does not break.
 export function count(value) {
   if (!Number.isFinite(value)) return UNKNOWN;
   if (Math.abs(value) >= MOST) return power(value, 3);
@@ -102,7 +105,7 @@ function significant(value, digits) {
   return rounded(value, Math.max(0, digits - 1 - at));
 }
 
-// Rounds halves away from zero.
+// Rounds to a number of decimals; halves are rounded away from zero.
 function rounded(value, decimals) {
   const text = Math.abs(value).toFixed(decimals);
   return value < 0 && Number(text) !== 0 ? `-${text}` : text;
@@ -138,7 +141,7 @@ const HOUR = new Intl.DateTimeFormat("en-GB", { hour: "2-digit", minute: "2-digi
 const DAY = new Intl.DateTimeFormat("en-GB", { day: "numeric", month: "short" });
 const DATE = new Intl.DateTimeFormat("en-GB", { day: "numeric", month: "short", year: "numeric" });
 
-// A time in a column: the year is written if it is not the present one.
+// Returns a time for a table column; the year is written only if it is not the present year.
 export function when(wall) {
   const [then, now] = [new Date(1000 * wall), new Date()];
   const day = then.getFullYear() === now.getFullYear() ? DAY : DATE;
@@ -147,7 +150,7 @@ export function when(wall) {
 
 export const words = (text) => String(text).replaceAll("_", " ");
 
-// h("p.hint#id", { title: "…" }, "text", child, …): text is always set as text, never as markup.
+// h("p.hint#id", { title: "…" }, "text", child, …) creates an element. Text is always set as text, never as markup.
 export function h(what, attributes = {}, ...children) {
   const [, tag, rest] = /^([a-z0-9]+)(.*)$/s.exec(what);
   const element = document.createElement(tag);

@@ -1,4 +1,4 @@
-// Files of a run: names, sizes, and a download of each.
+// Card with the files of a run: names, sizes, and a download of each file.
 
 import { call, download } from "./api.js";
 import { counted, h, size } from "./figures.js";
@@ -19,7 +19,8 @@ export class Files {
     if (this.fold.open) this.read();
   }
 
-  // Files of the run: [{ path, size }], null while unknown; unchanged if the server does not answer.
+  // Reads the list of files of the run, [{ path, size }]; null while unknown. The list stays unchanged if the server
+  // does not answer.
   async read() {
     try {
       const { files } = await call(this.path);
@@ -32,7 +33,7 @@ export class Files {
     return this.known ?? null;
   }
 
-  // Files of the run's folder itself, then each folder inside it, closed.
+  // Returns the rows of the table: first the files in the run's folder itself, then each folder inside of it, closed.
   rows(files) {
     return grouped(files).map(([folder, inside]) => {
       const table = h("table.listing", {}, h("tbody", {}, inside.slice(0, MOST).map((file) => this.row(file, folder))));
@@ -60,7 +61,7 @@ export class Files {
   }
 }
 
-// [[folder, files]] by the first part of their paths; "" for the run's folder itself, which is first.
+// Returns [[folder, files]] by the first part of the paths; "" stands for the run's folder itself, which is first.
 export function grouped(files) {
   const folders = new Map([["", []]]);
   for (const file of files) {

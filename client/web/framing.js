@@ -1,12 +1,14 @@
-// Region of a body that the frame shows, and the camera position from which all of it is visible.
+// Region of a body that the camera frames, and the camera position from which the whole region is visible.
 
-const HEAVY = 0.02; // A fragment with more than this fraction of the mass of its part is always in the frame.
-const ENOUGH = 0.9; // Fraction of the mass of a part: with fragments sorted by mass, the fragments beyond this fraction are debris.
-const INNER = [0.05, 0.95]; // Fractions by mass between which the debris lies in the frame along each axis.
-const MOST = 6000; // Largest number of points.
+const HEAVY = 0.02; // A fragment with more than this fraction of the mass of its part is always framed.
+// Fraction of the mass of a part: if fragments are sorted by mass, the fragments beyond this fraction are debris.
+const ENOUGH = 0.9;
+const INNER = [0.05, 0.95]; // Quantiles by mass between which debris is framed along each axis.
+const MOST = 6000; // Largest number of points that describe the framed region.
 
-// Points (m, three numbers each) of the framed region: heavy fragments of every visible part completely, and
-// the inner part of its debris if that has much of the mass. `all`: everything; `shown`: by part; `only`: a part, or null.
+// Returns the points (m, three numbers each) of the framed region: heavy fragments of every visible part completely,
+// and the inner part of its debris if the debris has much of the mass. `all`: everything is framed; `shown(part)`:
+// whether a part is visible; `only`: the only part to frame, or null.
 export function points(snapshot, { all = false, only = null, shown = () => true } = {}) {
   const { arrays } = snapshot;
   const part = partOf(arrays);
@@ -17,21 +19,22 @@ export function points(snapshot, { all = false, only = null, shown = () => true 
   return found.length + debris.length ? [...found, ...debris] : corners(snapshot, () => true);
 }
 
-// Part of each row of the table: that of its first triangle; 255 for rows that are not drawn.
+// Returns the part of each row of the table of fragments, which is the part of its first triangle; 255 for rows that
+// are not drawn.
 export function partOf({ fragment_id: ids, triangles, vertex_fragment: rows, triangle_part: parts }) {
   const out = new Uint8Array(ids.length).fill(255);
   for (let i = parts.length - 1; i >= 0; i -= 1) out[rows[triangles[3 * i]]] = parts[i];
   return out;
 }
 
-// True if a row is a heavy fragment of its part.
+// Returns true if a row is a heavy fragment of the wanted part.
 function heavy({ fragment_mass: masses, fragment_id: ids }, part, wanted) {
   const total = new Float64Array(256);
   for (let row = 0; row < masses.length; row += 1) total[part[row]] += masses[row];
   return (row) => wanted(row) && ids[row] >= 0n && masses[row] >= HEAVY * total[part[row]];
 }
 
-// Corners of the box of the inner debris of each part, if its mass is not small.
+// Returns the corners of the box of the inner debris of a part, if the mass of the debris is not small.
 function inner({ fragment_mass: masses, fragment_centre: centres, fragment_id: ids }, part, light) {
   const out = [], total = new Float64Array(256), rows = new Map();
   for (let row = 0; row < masses.length; row += 1) {
@@ -71,9 +74,9 @@ function corners({ header: { box: [low, high] }, arrays: { positions, vertex_fra
   return out;
 }
 
-// Camera position that points along -`back` with all points in view: { place, depth }, `depth` the distance to their middle.
-// `right`, `up`, `back`: unit vectors; `toLeft`, `toRight`, `tall`: tangents of the angles to the left, to the right, and of half the
-// height. The closest such position.
+// Returns the closest camera position, with the view along -`back`, from which all points are in view: { place, depth };
+// `depth` is the distance to the middle of the points. `right`, `up`, `back`: unit vectors; `toLeft`, `toRight`,
+// `tall`: tangents of the angles to the left, to the right, and of half of the height.
 export function stand(list, { right, up, back }, [toLeft, toRight], tall) {
   const far = [-Infinity, -Infinity, -Infinity, -Infinity, Infinity, -Infinity];
   for (let i = 0; i < list.length; i += 3) {
@@ -89,7 +92,7 @@ export function stand(list, { right, up, back }, [toLeft, toRight], tall) {
   return { place, depth: away - (far[4] + far[5]) / 2 };
 }
 
-// Returns the same points together with their images behind planes of symmetry, { axis, at } each.
+// Returns the points together with their mirror images behind planes of symmetry, { axis, at } each.
 export function mirrored(list, planes) {
   let out = list;
   for (const { axis, at } of planes) out = [...out, ...out.map((value, i) => (i % 3 === axis ? 2 * at - value : value))];

@@ -1,20 +1,20 @@
-// Element of the table of runs: sortable columns, visible rows, groups, marks.
+// Table of runs as an element: sortable columns, visible rows, groups, marks.
 
 import { counted, exact, duration, h, meter, pill } from "./figures.js";
 import { FINAL } from "./live.js";
 import { detail, share } from "./columns.js";
 import { Windowed } from "./windowed.js";
 
-const TALL = { wide: 34, narrow: 108 }; // Height of a row, px; the same as in runs.css.
-const SAMPLED = 200; // Number of rows that determine the width of a column.
-const LETTERS = [7, 30]; // Least and largest width of a column in characters.
+const TALL = { wide: 34, narrow: 108 }; // Height of a table row, px; runs.css has the same values.
+const SAMPLED = 200; // Number of rows from which the width of a column is computed.
+const LETTERS = [7, 30]; // Smallest and largest width of a column in characters.
 const BOX = 38; // Width of the column of marks, px.
 const BAR = 18; // Width of a scroll bar, px.
-const FIELDS = 5; // Number of values of a run in a narrow window.
+const FIELDS = 5; // Number of values of a run that a narrow window shows.
 const NARROW = matchMedia("(max-width: 760px)");
 
 export class Grid {
-  // `on`: { sort(column), mark(row, on, far), markAll(rows, on), toggle(group) }
+  // `on` has the callbacks { sort(column), mark(row, on, far), markAll(rows, on), toggle(group) }.
   constructor(label, on) {
     Object.assign(this, { on, columns: [], marked: new Set(), shorts: new Map() });
     this.head = h("thead");
@@ -31,7 +31,8 @@ export class Grid {
     NARROW.removeEventListener("change", this.redraw);
   }
 
-  // `items`: { row } or { group }, in order; `all`: all rows, which have changed if `stamp` has changed.
+  // Draws the table. `items`: { row } or { group }, in order; `all`: all rows; a different `stamp` means that `all` has
+  // changed.
   draw({ columns, sort, items, all, marked, shorts, stamp }) {
     Object.assign(this, { columns, marked, shorts, all, sorted: sort.id });
     this.drawHead(columns, sort);
@@ -60,7 +61,8 @@ export class Grid {
     return h(`th${column.number ? ".right" : ""}${column.id === "run" ? ".first" : ""}`, { scope: "col", "aria-sort": here ? (sort.down ? "descending" : "ascending") : false }, button);
   }
 
-  // The columns that have room, without those of the largest rank; those in `kept` stay in any case.
+  // Returns the columns that fit into the width; columns with the largest rank are left out first. Columns in `kept`
+  // always stay.
   fitting(columns, kept, rows) {
     const all = columns.map((column, n) => ({ column, n, wide: width(column, sampled(rows)) }));
     let over = all.reduce((sum, { wide }) => sum + wide, 0) - this.room();
@@ -74,13 +76,13 @@ export class Grid {
     return columns.filter((_, n) => !gone.has(n));
   }
 
-  // Room for columns in characters; a narrow window shows the values of a run below each other.
+  // Returns the width for columns in characters; a narrow window shows the values of a run below each other.
   room() {
     const wide = this.region.clientWidth || this.region.parentElement?.clientWidth;
     return NARROW.matches || !wide ? Infinity : (wide - BOX - BAR) / letterOf(this.table);
   }
 
-  // Widths that stay constant while the rows scroll.
+  // Computes column widths that stay constant while the rows scroll.
   measure(columns, stamp) {
     const room = this.room();
     if (`${stamp} ${room}` === this.measured) return;
@@ -105,7 +107,8 @@ export class Grid {
       h("td.mark", { onclick: (event) => event.stopPropagation() }, box), (NARROW.matches ? this.few(row) : this.columns).map((column) => this.cell(row, column)));
   }
 
-  // The columns of a row in a narrow window: that of the order, some keys, then results, then others.
+  // Returns the columns of a row in a narrow window: the column of the sort order, some keys, then results, then other
+  // columns.
   few(row) {
     const named = (...ids) => this.columns.filter(({ id }) => ids.includes(id));
     const own = this.columns.filter(({ id, text }) => !["run", "state", "submitted"].includes(id) && text(row));
@@ -135,7 +138,7 @@ export class Grid {
   }
 }
 
-// A click on a row opens its run, except on a control inside it or while text is selected.
+// A click on a row opens the run, except on a control inside of the row or while text is selected.
 function opened(event, address) {
   if (event.target.closest("a, button, input") || String(getSelection?.() ?? "")) return;
   location.hash = address;
@@ -148,10 +151,10 @@ const sampled = (rows) => {
   return rows.filter((_, i) => i % every === 0);
 };
 
-// Width of a column in characters.
+// Returns the width of a column in characters.
 const width = (column, rows) => column.width ?? Math.min(LETTERS[1], Math.max(LETTERS[0], heading(column), ...rows.map(column.letters ?? ((row) => column.text(row).length)))) + 2;
 
-// Width of the digit 0 in an element, px: the unit ch of CSS.
+// Returns the width of the digit 0 in an element, px, which is the unit ch of CSS.
 function letterOf(element) {
   const ctx = (letterOf.ctx ??= document.createElement("canvas").getContext("2d"));
   const { fontSize, fontFamily } = getComputedStyle(element);

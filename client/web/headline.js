@@ -1,13 +1,13 @@
-// Head of a run: title, state, connection, actions, progress.
+// Head of the page of a run: title, state, connection, actions, progress.
 
 import { duration, h, meter, percent, pill } from "./figures.js";
 import { FINAL } from "./live.js";
 
-const BRIEF = 9; // Characters of the id that are shown.
-const OLD = 5; // s without a message or an answer after which the age of the numbers is shown.
+const BRIEF = 9; // Number of characters of the id that are shown.
+const OLD = 5; // Time in s without a message or an answer after which the age of the shown numbers is displayed.
 
 export class Headline {
-  // `ask(verb)` requests a checkpoint, a snapshot or a cancel.
+  // `ask(verb)` requests a checkpoint, a snapshot or a cancellation.
   constructor(run, ask) {
     this.title = h("h1");
     this.sub = h("div.sub");
@@ -24,7 +24,7 @@ export class Headline {
       this.progress, this.message);
   }
 
-  // `connection` is [kind, words]; `busy` has the names of the requests in progress.
+  // Draws the head. `connection` is [kind, words]; `busy` has the names of the requests in progress.
   draw(live, info, { connection: [kind, words], state, notice, busy }) {
     const over = FINAL.has(state);
     const old = !over && live.age > OLD ? `numbers ${duration(live.age)} old` : "";
@@ -49,7 +49,7 @@ export class Headline {
   }
 }
 
-// An unchanged text is not set again: this would clear a selection.
+// Sets the text of an element only if it has changed, because setting it would clear a selection.
 function say(element, text) {
   if (element.printed !== text) element.textContent = element.printed = text;
 }

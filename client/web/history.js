@@ -1,13 +1,14 @@
-// Fills the record of a run from the server's history: one answer instead of all messages.
+// Reads the history of a run from the server, so that one answer replaces all past messages.
 
 import { Problem, call, refused, text } from "./api.js";
 import { FINAL, TERMS, compared, grouped, totals } from "./live.js";
 import { pick } from "./tables.js";
 
 const POINTS = 1000;
-const MOST = 4096; // Largest number of reports of the server.
-const SOON = 2000; // ms after which missing columns of the history are requested again.
-const LATER = 15000; // ms after which the columns of an open run are requested again: the stream has only some of the lines.
+const MOST = 4096; // Largest number of reports that the server sends.
+const SOON = 2000; // Time in ms after which missing columns of the history are requested again.
+// Time in ms after which the columns of an open run are requested again, because the stream has only some of the rows.
+const LATER = 15000;
 
 const path = (run) => `v1/runs/${encodeURIComponent(run)}`;
 const pause = (ms, signal) => new Promise((resolve) => {
@@ -15,7 +16,8 @@ const pause = (ms, signal) => new Promise((resolve) => {
   signal.addEventListener("abort", () => { clearTimeout(timer); resolve(); }, { once: true });
 });
 
-// `info`: the run from the server. The case with all defaults is null while missing.
+// Fills the record `live` of a run. `info`: the run from the server. The case with all defaults is null while it is
+// missing.
 export async function fill(live, info, signal) {
   const columns = readColumns(live.run, undefined, undefined, signal).catch(() => live.columns);
   const [history, plan] = await Promise.all([call(`${path(live.run)}/history?points=${POINTS}`, { signal }), readPlan(live.run, signal)]);
@@ -23,7 +25,7 @@ export async function fill(live, info, signal) {
   live.columns = await columns;
 }
 
-// The named columns of history.csv; without names all: { units, values, lines, extremes }.
+// Returns the named columns of history.csv, or all columns: { units, values, lines, extremes }.
 export async function readColumns(run, names = ["*"], points = POINTS, signal = undefined) {
   const words = [...names.map((name) => `name=${encodeURIComponent(name)}`), `points=${points}`];
   let answer = await call(`${path(run)}/columns?${words.join("&")}`, { signal });
@@ -32,7 +34,7 @@ export async function readColumns(run, names = ["*"], points = POINTS, signal = 
   return { units, values: { t: [], ...answer.values }, lines: answer.lines, extremes: answer.columns };
 }
 
-// Updates the columns of an open run until its end; calls `onNews` after a change.
+// Updates the columns of an open run until its end; `onNews` is called after a change.
 export async function followColumns(live, signal, onNews) {
   for (let over = FINAL.has(live.state); !over && !signal.aborted;) {
     await untilLater(live, signal);
@@ -54,17 +56,17 @@ async function untilLater(live, signal) {
   while (Date.now() < until && !FINAL.has(live.state) && !signal.aborted) await pause(SOON / 4, signal);
 }
 
-// { head, rows } of columns of history.csv with every line.
+// Returns { head, rows } of columns of history.csv with every row of the file.
 export const everyLine = async (run, names) => pick(await text(`${path(run)}/files/history.csv`), names);
 
-// A record of the same run with as many reports as the server has.
+// Returns a record of the same run with as many reports as the server has.
 export async function everyReport(live, make) {
   const whole = make(live.run);
   take(whole, await call(`${path(live.run)}/history?points=${MOST}`), {}, live.plan);
   return whole;
 }
 
-// The case of a run with all defaults, null until it is written.
+// Returns the case of a run with all defaults; null until the case is written.
 export async function readPlan(run, signal) {
   try {
     return await call(`v1/runs/${encodeURIComponent(run)}/files/case.resolved.json`, { signal });
@@ -92,7 +94,7 @@ export function take(live, history, info = {}, plan = null) {
   if (rows.length) latest(live, rows.at(-1), ranks, info.progress, plan);
 }
 
-// The newest report, which the head and the bars show until the next message.
+// Returns the newest report, which the head and the bars show until the next message.
 function latest(live, row, ranks, progress, plan) {
   const ledger = live.ledger.at(-1);
   const end = plan?.run?.end_time ?? progress?.end_time ?? row.t;
@@ -104,7 +106,7 @@ function latest(live, row, ranks, progress, plan) {
   live.load = { imbalance: row.imbalance, groups, totals: totals(groups) };
 }
 
-// Values of { part: { kinetic: […], internal: […] } } at one time.
+// Returns the values of { part: { kinetic: […], internal: […] } } at one time.
 const at = (parts, i) => Object.fromEntries(Object.entries(parts).map(([part, columns]) =>
   [part, Object.fromEntries(Object.entries(columns).map(([name, values]) => [name, values[i]]))]));
 

@@ -1,4 +1,4 @@
-// Keys of the body, besides those of the camera (camera.js).
+// Keyboard commands of the 3-D view, in addition to those of the camera (camera.js).
 
 const AXES = ["x", "y", "z"];
 const KEYS = {

@@ -1,14 +1,14 @@
-// three.js and ECharts from the package on the server; each is loaded once, at its first use.
+// Loading of three.js and ECharts from the server; each library is loaded once, at its first use.
 
 const known = {};
 
-// Returns the result of `read`, which runs once; after a failure it runs again.
+// Returns the result of `read`, which is called once; after a failure it is called again.
 const once = (name, read) => (known[name] ??= read().catch((error) => {
   delete known[name];
   throw error;
 }));
 
-// { auth, problem, three, echarts }: libraries of the server. No token is needed.
+// Returns { auth, problem, three, echarts }, the libraries of the server. The request needs no token.
 export const offer = () => once("offer", () => fetch(new URL("lib/index.json", document.baseURI)).then((answer) => answer.json()));
 
 async function library(name) {

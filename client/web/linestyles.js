@@ -1,9 +1,9 @@
-// Colours and dashes of the lines of runs, outside of charts.
+// Colours and dash patterns of the lines of runs, for use outside of charts.
 
 import { lineStyle } from "./axes.js";
 import { h } from "./figures.js";
 
-// A sample of line number `i` as in the charts, with its colour and dash.
+// Returns an element that shows the colour and the dash pattern of line number `i` in the charts.
 export function swatch(i) {
   const { colour, dash } = lineStyle(i);
   return h(`i.swatch.dash-${dash === "solid" ? "none" : dash[0]}`, { style: { color: `var(--${colour})` } });

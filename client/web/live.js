@@ -1,4 +1,4 @@
-// State of a run: its history first, then its messages; one record, without drawing.
+// Record of a run: first its history, then its messages; the module draws nothing.
 
 export const FINAL = new Set(["succeeded", "failed", "cancelled", "timed_out", "lost"]);
 export const GROUPS = ["compute", "contact", "exchange", "waiting", "output", "descheduled"];
@@ -6,24 +6,26 @@ export const TERMS = [["kinetic", "kinetic"], ["elastic", "elastic"], ["plastic"
 
 const MOST_POINTS = 2000;
 const MOST_LINES = 1500;
-const OWN = new Set(["contact", "exchange", "output"]); // Phases with a group of their own; all others are computing.
+// Phases that have a group of their own; all other phases count as computing.
+const OWN = new Set(["contact", "exchange", "output"]);
 
 export class Live {
   constructor(run) {
     Object.assign(this, { run, seq: 0, state: "", cause: null, message: "", began: null, wall: 0, received: 0 });
     Object.assign(this, { started: null, progress: null, load: null, counts: null, finished: null, loaded: 0 });
-    this.plan = null; // Case with all defaults, null while missing
-    this.columns = { units: {}, values: { t: [] }, lines: 0 }; // Columns of history.csv: by name, each as long as t
+    this.plan = null; // Case with all defaults; null while it is missing.
+    this.columns = { units: {}, values: { t: [] }, lines: 0 }; // Columns of history.csv by name, each as long as t.
     this.ledger = []; // { t, dt, limiter, energy, parts: { name: { kinetic, internal } } }
-    this.loads = []; // { t, imbalance, by: { group: share of the CPU time }, shares: [work of each rank / busiest rank] }
+    // Entries { t, imbalance, by: { group: fraction of the CPU time }, shares: [work of each rank / busiest rank] }.
+    this.loads = [];
     this.sizes = []; // { t, nodes, facets, fragments }
-    this.spread = null; // { t, smallest, sizes }: newest size distribution of the fragments
+    this.spread = null; // { t, smallest, sizes }: newest size distribution of the fragments.
     this.found = -1; // Step of the newest state with known fragments
-    this.balances = []; // the messages
+    this.balances = []; // Messages about changes of the load balance.
     this.snapshots = []; // { n, t, fragments, … }
-    this.log = []; // messages for people: log, states, checkpoints
-    this.leftOut = 0; // Number of messages in the middle of a long log that the server left out
-    this.warnings = new Map(); // Level of every warning and error, by text
+    this.log = []; // Messages for people: log, states, checkpoints.
+    this.leftOut = 0; // Number of messages in the middle of a long log that the server left out.
+    this.warnings = new Map(); // Level of every warning and error, by its text.
   }
 
   take(message) {
@@ -55,7 +57,8 @@ export class Live {
     this.follow(message);
   }
 
-  // The newest line of the history, as in a report; missing columns come with the next answer of the server.
+  // Stores the newest row of the history, which has the form of a report; missing columns come with the next answer of
+  // the server.
   follow({ sampled, energy, parts = {}, probes = {} }) {
     const { values } = this.columns;
     if (!(sampled > (values.t.at(-1) ?? Infinity))) return;
@@ -67,13 +70,13 @@ export class Live {
   on_load(message) {
     const interval = this.loaded ? message.wall - this.loaded : 0;
     const groups = grouped(message, interval);
-    const others = ((message.threads ?? 1) - 1) * interval; // s of the other threads of a rank
+    const others = ((message.threads ?? 1) - 1) * interval; // Time of the other threads of a rank, s.
     this.loaded = message.wall;
     this.load = { ...message, groups, totals: totals(groups), helped: others > 0 ? message.helped.map((seconds) => seconds / others) : [] };
     keep(this.loads, { t: message.t, imbalance: message.imbalance, ...compared(groups) });
   }
 
-  // Handles a Counts message. Its fragments may belong to an earlier step than those of a snapshot.
+  // Handles a Counts message. Its number of fragments may belong to an earlier step than the number in a snapshot.
   on_counts(message) {
     const { t, step, nodes, facets, counted = -1 } = message;
     const fragments = this.spreads(counted < 0 ? step : counted, message) ? message.fragments : this.counts?.fragments ?? message.fragments;
@@ -81,7 +84,7 @@ export class Live {
     keep(this.sizes, { t, nodes, facets, fragments });
   }
 
-  // True if the fragments of a message are the newest; then their sizes are stored.
+  // Returns true if the number of fragments in a message is the newest; then the sizes of the fragments are stored.
   spreads(step, { t, smallest, sizes }) {
     if (step < this.found) return false;
     this.found = step;
@@ -91,7 +94,7 @@ export class Live {
 
   on_balance(message) { this.balances.push(message); }
 
-  // Handles a Snapshot message, which also has the number of fragments.
+  // Handles a Snapshot message, which also contains the number of fragments.
   on_snapshot(message) {
     if (this.spreads(message.step, message) && this.counts) this.counts = { ...this.counts, fragments: message.fragments };
     if (!this.snapshots.some(({ n }) => n === message.n)) this.snapshots.push(message);
@@ -107,7 +110,7 @@ export class Live {
     if (this.log.length > MOST_LINES) this.log.shift();
   }
 
-  // A repeated warning is stored once.
+  // Stores a warning; a repeated warning is stored only once.
   warn(level, text) {
     if ((level === "warning" || level === "error") && !this.warnings.has(text)) this.warnings.set(text, level);
   }
@@ -119,7 +122,7 @@ export class Live {
     return this.progress ? Math.min(1, Math.max(0, this.progress.t / this.progress.end_time)) : 0;
   }
 
-  // Wall time since the first step of the run's first start, s.
+  // Wall time since the first step of the first start of the run, s.
   get elapsed() {
     if (this.began === null) return undefined;
     return (FINAL.has(this.state) ? this.wall : Date.now() / 1000) - this.began;
@@ -137,8 +140,8 @@ function keep(series, point) {
   series.splice(0, half, ...series.slice(0, half).filter((_, i) => i % 2 === 0));
 }
 
-// CPU seconds of each rank by GROUPS. Waiting for other ranks uses CPU time and is measured; the rest of the wall
-// time is not: the rank was not scheduled, or slept.
+// Returns the CPU seconds of each rank by GROUPS. Waiting for other ranks uses CPU time and is measured. The rest of
+// the wall time is not measured: the rank was not scheduled, or slept.
 export function grouped({ phases = {}, waiting = [] }, interval) {
   const sums = {};
   for (const [name, seconds] of Object.entries(phases)) {
@@ -160,7 +163,8 @@ export function totals(groups) {
 
 const sum = (values = []) => values.reduce((total, value) => total + value, 0);
 
-// Work of each rank relative to the busiest one, and the share of each group in the CPU time of all ranks.
+// Returns the work of each rank relative to the busiest rank, and the fraction of each group in the CPU time of all
+// ranks.
 export function compared(groups) {
   const work = totals(Object.fromEntries(["compute", "contact", "output"].filter((name) => groups[name]).map((name) => [name, groups[name]])));
   const most = Math.max(...work, 1e-300);

@@ -1,13 +1,14 @@
-// Load balance of the ranks over time: imbalance, work of each rank, CPU time by phase.
+// Charts of the load balance of the ranks over time: imbalance, work of each rank, CPU time by phase.
 
 import { FONT, axis, colour, common, label, pins, series, shares, time } from "./axes.js";
 import { end } from "./energies.js";
 import { fixed, percent, si } from "./figures.js";
 import { GROUPS } from "./live.js";
 
-const MOST_COLUMNS = 240; // Largest number of columns of the map of work; more would be thinner than a pixel on a phone.
-const MOST_ROWS = 64; // Largest number of rows; with more ranks, neighbours share a row.
-// Names of the groups of live.js.
+// Largest number of columns in the map of work; more columns would be thinner than a pixel on a phone.
+const MOST_COLUMNS = 240;
+const MOST_ROWS = 64; // Largest number of rows in the map of work; with more ranks, neighbouring ranks share a row.
+// Descriptions of the groups of phases in live.js.
 export const SPENT = { compute: "elements, nodes, facets", exchange: "messages between ranks", waiting: "waiting for other ranks", descheduled: "not scheduled" };
 
 export function ofImbalance(live) {
@@ -20,7 +21,8 @@ export function ofImbalance(live) {
   ] };
 }
 
-// Index of the balance event nearest to an index in live.loads; the first of several.
+// Returns the index of the balance event nearest to the report with the index `at` in live.loads; of several equal ones
+// the first.
 export function nearest({ loads, balances }, at) {
   const away = balances.map(({ t }) => Math.abs(t - loads[at].t));
   return Math.max(0, away.indexOf(Math.min(...away)));
@@ -34,8 +36,8 @@ export function ofSpent(live) {
     series({ name: SPENT[name] ?? name, colour: name, stack: "spent", data: loads.map(({ t, by }) => [t, by[name] ?? 0]), text: (value) => percent(value) })) };
 }
 
-// Cells { from, to, row, share }: a report covers the time since the previous one; many reports are joined to columns of
-// equal duration, many ranks to rows.
+// Returns the cells { from, to, row, share } of the map of work. A report covers the time since the previous report.
+// Many reports are joined to columns of equal duration, many ranks to rows.
 export function cells(loads, ranks, last) {
   const rows = Math.min(ranks, MOST_ROWS);
   const known = loads.map((one, i) => ({ ...one, from: i ? loads[i - 1].t : 0 })).filter(({ shares: each }) => each.length === ranks);
@@ -53,7 +55,7 @@ export function cells(loads, ranks, last) {
   return [...columns.values()].flatMap(({ from, to, sums, of }) => sums.map((sum, row) => ({ from, to, row, share: sum / of[row] })));
 }
 
-// The first and the last rank of a row.
+// Returns the name of a row: its first and last rank.
 export function rowName(row, ranks) {
   const rows = Math.min(ranks, MOST_ROWS);
   const [first, last] = [Math.ceil((row * ranks) / rows), Math.ceil(((row + 1) * ranks) / rows) - 1];
@@ -83,7 +85,7 @@ function drawCell(_, api) {
   return { type: "rect", shape: { x: left, y: middle - height / 2, width: Math.max(0.5, right - left + 0.4), height: height - (height > 4 ? 1 : 0) }, style: { fill: api.visual("color") } };
 }
 
-// One row for each report and one column for each rank: work relative to the busiest rank.
+// Returns a table with one row for each report and one column for each rank: work relative to the busiest rank.
 export const workTable = ({ loads }) => ({
   head: ["t [s]", ...(loads.at(-1)?.shares ?? []).map((_, rank) => `rank ${rank}`)], rows: loads.map(({ t, shares: each }) => [t, ...each]),
 });

@@ -1,10 +1,10 @@
-// Messages of a run: its warnings, its log, and the log file of each rank.
+// Messages of a run: warnings, log, and the log file of each rank.
 
 import { tail } from "./api.js";
 import { clock, count, counted, h, size } from "./figures.js";
 import { fold } from "./storage.js";
 
-// Warnings and errors of the whole run, each text once.
+// List of the warnings and errors of the whole run, each text once.
 export class Warnings {
   constructor() {
     this.list = h("ul.warnings", { tabindex: 0, "aria-label": "warnings" });
@@ -21,7 +21,7 @@ export class Warnings {
   }
 }
 
-// The arrow keys move between the tabs.
+// Tabs of the logs; the arrow keys move between the tabs.
 export class Logs {
   constructor(live) {
     Object.assign(this, { live, tab: "messages", ranks: 0, logged: "" });
@@ -73,7 +73,7 @@ export class Logs {
 
 const line = (message) => h(`div.${message.level ?? "state"}`, {}, h("time", {}, clock(message.wall)), `  ${words(message)}`);
 
-// A message of the log, of a state or of a checkpoint as a line for people.
+// Returns a message of the log, of a state or of a checkpoint as a text line for people.
 export function words({ type, text, rank, state, cause, message, step, bytes }) {
   if (type === "status") return [state, cause && cause !== state ? `(${cause})` : "", message && `: ${message}`].filter(Boolean).join(" ").replace(" : ", ": ");
   if (type === "checkpoint") return `checkpoint of step ${count(step)}, ${size(bytes)}${cause ? `: ${cause}` : ""}`;

@@ -1,4 +1,4 @@
-// A new run: its case in an editor, the files that it names, the check by the server, and the start.
+// Page for a new run: the case in an editor, the files that the case names, the check by the server, and the start.
 
 import { Problem, call, send } from "./api.js";
 import { isJson, lineOf, valueOf, withKey } from "./casetext.js";
@@ -9,14 +9,14 @@ import { Outbox } from "./outbox.js";
 import { recall, remember } from "./storage.js";
 import { filesTable, verdict } from "./validation.js";
 
-const IDLE = 500; // ms without a key after which the case is checked.
-const AGAIN = 3000; // ms after which a request without an answer is repeated.
+const IDLE = 500; // Time in ms without a key press after which the case is checked.
+const AGAIN = 3000; // Time in ms after which a request is repeated if the server does not answer.
 const DRAFT = 200000; // Largest number of characters of a case that the browser stores.
-const OWN = /^(restart|keep|sweep.*|point)$/; // Labels that belong to a single run.
+const OWN = /^(restart|keep|sweep.*|point)$/; // Names of labels that belong to a single run and are not copied.
 const FIELDS = [["title", "Title", "", "title"], ["ranks", "Ranks", "run", "ranks"], ["threads", "Threads", "run", "threads"]];
 
 export class NewPage {
-  // `query` may have a run whose case is loaded (`from`), or a shipped case (`case`).
+  // `query` may name a run whose case is loaded (`from`), or a shipped case (`case`).
   constructor(query, onRefused) {
     Object.assign(this, { from: query.get("from") ?? "", onRefused, checks: null, checked: null, abort: new AbortController(), key: fresh() });
     this.outbox = new Outbox(this.from, () => this.news());
@@ -26,7 +26,7 @@ export class NewPage {
     document.title = "New run · Conoid";
   }
 
-  // Files may be dropped anywhere on the page: otherwise the browser would open them and leave the page.
+  // Files may be dropped anywhere on the page; otherwise the browser would open a dropped file and leave the page.
   listen() {
     const { signal } = this.abort;
     const mark = (over) => this.element.classList.toggle("dropping", over);
@@ -65,7 +65,7 @@ export class NewPage {
     this.element = h("div.work.new", { onkeydown: (event) => this.pressed(event) },
       h("div.run-head", {}, h("h1", {}, this.from ? "Start again with changes" : "New run"), h("span.grow"), this.gallery, file),
       h("div.bench", {},
-        h("section.card.stage-editor", { "aria-label": "case" }, h("p.hint", {}, "Paste a case, drop it here with the files that it names, or start from a shipped one."), this.editor.element),
+        h("section.card.stage-editor", { "aria-label": "case" }, h("p.hint", {}, "Paste a case, drop it here with the files that it names, or start from a shipped case."), this.editor.element),
         h("aside.now", { "aria-label": "check and start" },
           h("section.card.start", { "aria-label": "start" }, ...this.fields.map(({ element }) => element), h("label.form-row", {}, h("span", {}, "Labels"), this.labels),
             h("div.actions", {}, this.startButton, h("span.hint", {}, "Ctrl+Enter")), this.status),
@@ -111,7 +111,7 @@ export class NewPage {
     this.typed();
   }
 
-  // A case goes into the editor; all other files may be named by it.
+  // A dropped case is put into the editor; all other dropped files are available for the case.
   async drop(files) {
     const cases = files.filter(({ name }) => /\.(toml|json)$/i.test(name));
     if (cases.length) this.show(await cases[0].text());
@@ -145,7 +145,7 @@ export class NewPage {
     this.timer = setTimeout(() => this.check(), ms);
   }
 
-  // The page runs one check of the present text at a time; text that is typed meanwhile is checked afterwards.
+  // The page runs one check at a time. Text that is typed during a check is checked afterwards.
   async check() {
     const { text } = this.editor;
     if (this.checking || this.checked === text || this.abort.signal.aborted) return;
@@ -192,7 +192,7 @@ export class NewPage {
 
   // The start -------------------------------------------------------------------------------------------------------------
 
-  // The same key for the same case: a repeated start is one run.
+  // Starts the run. Equal cases have equal idempotency keys, so that a repeated start makes one run.
   async start() {
     const labels = this.labels.value.split(",").map((one) => one.trim()).filter(Boolean);
     const query = labels.map((label) => `label=${encodeURIComponent(label)}`).join("&");
@@ -217,7 +217,7 @@ export class NewPage {
 
   say(text) { this.status.replaceChildren(text ? h("span.problem", {}, text) : ""); }
 
-  // Problems of the case; missing files are shown in the list of files.
+  // Shows the problems of the case; missing files are shown in the list of files instead.
   problems(named) {
     const wanted = new Set(named.filter((file) => !file.sha256 || this.outbox.stateOf(file).state !== "sent").map(({ key }) => `${key}.sha256`));
     return (this.checks?.problems ?? []).filter(({ key }) => !wanted.has(key));
@@ -237,20 +237,20 @@ export class NewPage {
     if (this.seen !== state || this.shown !== this.checks) {
       [this.seen, this.shown] = [state, this.checks];
       this.editor.mark(lines.filter((line) => line >= 0));
-      this.verdict.replaceChildren(verdict(text, current ? "" : named.length ? "checking, and reading its files …" : "checking …", this.checks && { ...this.checks, problems }, lines, (line) => this.editor.goTo(line)));
+      this.verdict.replaceChildren(verdict(text, current ? "" : named.length ? "checking the case and reading its files …" : "checking …", this.checks && { ...this.checks, problems }, lines, (line) => this.editor.goTo(line)));
     }
     this.files.replaceChildren(filesTable(named, this.outbox));
   }
 }
 
-// Line of a problem: that of its key, or the one that its message names.
+// Returns the line of a problem: the line of its key, or the line number in its message.
 function place(text, { key, message }) {
   const line = /at line (\d+)/.exec(message);
   const named = key || /^([a-z][\w.[\]]*) = /.exec(message)?.[1];
   return line ? Number(line[1]) - 1 : named ? lineOf(text, named) : -1;
 }
 
-// A file that several parts name is listed once.
+// Returns the named files; a file that several parts name is listed once.
 export const once = (named) => [...new Map(named.map((file) => [file.path, file])).values()];
 
 const fresh = () => [...crypto.getRandomValues(new Uint8Array(16))].map((byte) => byte.toString(16).padStart(2, "0")).join("");

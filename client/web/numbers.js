@@ -1,10 +1,10 @@
-// Numbers of a run: five main numbers, and all other numbers.
+// Numbers of a run: the five main numbers, and all other numbers.
 
 import { alike, count, duration, fixed, h, large, moment, rough, si, vector } from "./figures.js";
 import { FINAL } from "./live.js";
 import { fold } from "./storage.js";
 
-const FINE = 1e-3; // Residual below which the energy closes.
+const FINE = 1e-3; // Residual of the energy balance below which the balance counts as closed.
 const entry = (name, value, note) =>
   h("div", {}, h("dt", {}, name), h("dd", {}, h("span.value", {}, value), note ? h("small", {}, note) : null));
 
@@ -21,7 +21,7 @@ export class Numbers {
   }
 }
 
-// Time and remaining time, dt and its limiter, residual, fragments, imbalance.
+// Returns the main numbers: time with remaining time, dt with its limiter, residual, fragments, imbalance.
 function five(live, outcome) {
   const { progress, load, counts, state } = live;
   const over = FINAL.has(state);
@@ -36,7 +36,7 @@ function five(live, outcome) {
   ];
 }
 
-// True for a run on one rank, which has no imbalance.
+// True for a run on one rank, which has no load imbalance.
 export const alone = ({ plan, loads }) => (plan?.run?.ranks ?? loads.at(-1)?.shares.length) === 1;
 
 function others(live, info, outcome) {
@@ -58,23 +58,25 @@ function others(live, info, outcome) {
   ].filter(Boolean);
 }
 
-// Time of the first broken facet, known by the reports: between the last one without and the first one with a broken facet.
+// Returns the time interval in which the first facet broke: from the last report without a broken facet to the first
+// report with a broken facet.
 export function firstCrack({ sizes }) {
   const at = sizes.findIndex(({ facets }) => facets > 0);
   if (at < 0) return "";
   return at ? vector([sizes[at - 1].t, sizes[at].t], "s", 3, " to ") : `up to ${si(sizes[at].t, "s")}`;
 }
 
-// Present state of a run: from its outcome, else from its newest report. `residual`: [value, whether it is above the limit].
+// Returns the present state of a run, from its outcome or its newest report. `residual` is [value, whether the value is
+// above the limit].
 export function ended(progress, outcome) {
   const failed = outcome?.cause === "energy";
   const energy = failed ? outcome.worst_residual : outcome?.energy?.residual;
   const value = energy ?? progress?.energy?.residual;
-  const beyond = failed && !(value < FINE); // The run may have failed by one line of the ledger.
+  const beyond = failed && !(value < FINE); // The run may have failed because of one term of the energy balance.
   return { t: outcome?.time ?? progress?.t, step: outcome?.steps ?? progress?.step, residual: Number.isFinite(value) ? [value, beyond] : null };
 }
 
-// The time so far and "of …" the end, in one unit.
+// Returns the present time and "of …" the end time, both in one unit.
 function timed(now, end) {
   const [first, last] = alike([now, end], "s");
   return first === last ? last : `${first} of ${last}`;

@@ -1,4 +1,4 @@
-// Upload of the files that a case names: they are hashed in the browser, and sent if the server lacks them.
+// Upload of the files that a case names: the files are hashed in the browser, and sent if the server lacks them.
 
 import { binary } from "./api.js";
 import { withHash } from "./casetext.js";
@@ -9,14 +9,15 @@ const baseOf = (path) => path.split(/[/\\]/).at(-1);
 const ENDING = /\.[a-z0-9]{1,8}$/;
 
 export class Outbox {
-  // `run`: run whose case is edited, "" for none; `shipped`: shipped case whose files are needed. `onChange` is called after a change of a file.
+  // `run`: run whose case is edited, "" for none. `shipped`: shipped case whose files are needed. `onChange` is called
+  // after a change of a file.
   constructor(run, onChange) {
     Object.assign(this, { run, onChange, shipped: "", files: new Map(), known: new Map(), abort: new AbortController() });
   }
 
   close() { this.abort.abort(); }
 
-  // Adds a file of the user; it replaces one of the same name.
+  // Adds a file that the user has chosen; the file replaces a file of the same name.
   async add(file) {
     const entry = { file, sha256: "", state: "hashing", done: 0, error: "" };
     this.files.set(file.name, entry);
@@ -44,7 +45,8 @@ export class Outbox {
     }
   }
 
-  // The case with the hashes of known files; uploads of named files begin. `named`: [{ path, sha256 }].
+  // Returns the case with the hashes of known files, and begins the upload of the named files. `named`: [{ path, sha256
+  // }].
   ready(text, named) {
     return named.reduce((made, { path, sha256 }) => {
       const entry = this.files.get(baseOf(path));
@@ -66,7 +68,7 @@ export class Outbox {
     });
   }
 
-  // Checks whether the server has a file with this hash; if not, a copy of the run is sent again.
+  // Asks whether the server has a file with this hash; if not, the copy in the edited run is sent again.
   async look(path, sha256) {
     if (!sha256) return this.fetch(path);
     if (this.known.has(sha256)) return undefined;
@@ -79,7 +81,7 @@ export class Outbox {
     return undefined;
   }
 
-  // A file of a shipped case, fetched once.
+  // Fetches a file of a shipped case once.
   async fetch(path) {
     const place = `v1/cases/${encodeURIComponent(this.shipped)}/files/${encodeURIComponent(path)}`;
     if (this.known.has(place)) return;
@@ -96,7 +98,7 @@ export class Outbox {
     this.known.set(sha256, { whole: true });
   }
 
-  // State of a file that the case names: { state, share, error }.
+  // Returns the state of a file that the case names: { state, share, error }.
   stateOf({ path, sha256 }) {
     const entry = this.files.get(baseOf(path));
     if (entry) return { ...entry, share: entry.file.size ? entry.done / entry.file.size : 1 };
@@ -105,7 +107,7 @@ export class Outbox {
     return { state: known?.whole ? "sent" : known && !known.state ? "missing" : "asking" };
   }
 
-  // Files that the case does not name.
+  // Returns the files that the case does not name.
   spare(named) {
     const names = new Set(named.map(({ path }) => baseOf(path)));
     return [...this.files.keys()].filter((name) => !names.has(name));

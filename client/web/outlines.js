@@ -1,8 +1,9 @@
-// Outlines of the fragments, and a mark round the selected one: where the row numbers of a second drawing change.
+// Outlines of the fragments, and a mark around the selected fragment. Lines are drawn where the fragment numbers of a
+// second drawing change.
 
 import { LINES, OVER } from "./shaders.js";
 
-const MARK = [1, 0.1, 0.75]; // Colour of the selected fragment: no part has this hue at this strength.
+const MARK = [1, 0.1, 0.75]; // Colour of the selected fragment; no part has such a strong colour of this hue.
 const STRENGTH = 0.55;
 
 export class Outlines {
@@ -28,7 +29,7 @@ export class Outlines {
     this.material.uniforms.thick.value = Math.round(2 * ratio);
   }
 
-  // `numbers` draws the numbers of the rows; `camera` is any.
+  // Draws the outlines. `numbers` is a function that draws the fragment numbers; `camera` may be any camera.
   draw(renderer, numbers, camera, { picked, lines, ink }) {
     const { uniforms } = this.material;
     uniforms.picked.value = picked;

@@ -1,18 +1,19 @@
-// Drawing over the body: axes, scale bar, legend, time. The overlay is a canvas, so that a saved picture shows the same
-// as the page.
+// Drawing over the 3-D view: axes, scale bar, legend, time. The drawing is a canvas, so that a saved picture shows the
+// same as the page.
 
 import { alike, si } from "./figures.js";
 
-const PAD = 12; // px.
+const PAD = 12; // Distance of the drawing from the border, px.
 const ARM = 26; // Length of an axis, px.
-const BAR = [12, 150]; // px: width and height of the colour bar.
-const SWATCH = 11; // px.
+const BAR = [12, 150]; // Width and height of the colour bar, px.
+const SWATCH = 11; // Size of a colour sample in the legend, px.
 const NAMES = 12; // Largest number of names in a legend.
 const ROUND = [1, 2, 5];
 const AXIS_TONES = ["#d64545", "#3c9a4e", "#3f73d8"];
 const FONT = '"Segoe UI", system-ui, Roboto, "DejaVu Sans", sans-serif';
 
-// `ctx` in CSS pixels; `frame`: { width, height, camera, distance, legend, caption, bar, axes, ink, soft, paper }.
+// Draws axes, scale bar, legend and time. `ctx` is in CSS pixels; `frame`: { width, height, camera, distance, legend,
+// caption, bar, axes, ink, soft, paper }.
 export function draw(ctx, frame) {
   ctx.clearRect(0, 0, frame.width, frame.height);
   ctx.textBaseline = "middle";
@@ -23,7 +24,7 @@ export function draw(ctx, frame) {
   if (frame.caption) text(ctx, frame, frame.caption, PAD, PAD + 6, 12.5, frame.ink, "left", 600);
 }
 
-// Writes a text with a rim in the colour of the background: the text is readable over any body.
+// Writes a text with a rim in the colour of the background, so that the text is readable in front of any body.
 function text(ctx, { ink, paper }, words, x, y, size = 12, colour = ink, align = "left", weight = 400) {
   ctx.font = `${weight} ${size}px ${FONT}`;
   ctx.textAlign = align;
@@ -50,7 +51,7 @@ function axes(ctx, frame) {
   }
 }
 
-// Draws the scale bar. Its scale is exact at the depth of the point about which the camera turns.
+// Draws the scale bar. The scale is exact at the depth of the point about which the camera turns.
 function bar(ctx, frame) {
   const { width, height, camera, distance } = frame;
   const metre = height / (2 * distance * Math.tan((camera.fov * Math.PI) / 360));
@@ -71,7 +72,7 @@ function bar(ctx, frame) {
   text(ctx, frame, round(length), x + wide / 2, y - 9, 12, frame.ink, "center");
 }
 
-// Writes a length, such as "5 mm" for 5e-3, without zeros at the end of the decimals.
+// Returns the text of a length, such as "5 mm" for 5e-3, without zeros at the end of the decimals.
 const round = (length) => si(length, "m").replace(/(\.\d*?)0+(?= )/, "$1").replace(/\.(?= )/, "");
 
 function legend(ctx, frame) {
@@ -119,5 +120,6 @@ function scale(ctx, frame, x, y) {
   return y + tall;
 }
 
-// Step of the labels of `number` round values with room for `most`: all, every second or third, or the ends.
+// Returns the step between labels if `number` round values have space for `most` labels: all, every second or third, or
+// only the ends.
 const labels = (number, most) => [1, 2, 3].map((step) => (number - 1) / step + 1).find((some) => Number.isInteger(some) && some <= most) ?? 2;

@@ -1,4 +1,5 @@
-// The body of one of several runs side by side: the snapshot nearest to a time, cut and coloured as in the other panes.
+// The 3-D view of one of several runs side by side: the snapshot nearest to a time, cut and coloured as in the other
+// views.
 
 import { counted, h, si } from "./figures.js";
 import { swatch } from "./linestyles.js";
@@ -7,14 +8,17 @@ import { Snapshots } from "./snapshots.js";
 import { View3d } from "./view3d.js";
 import { wallsOf } from "./walls.js";
 
-const MOST_KEPT = 24; // Largest number of decoded snapshots for each run.
-const ALIKE = 0.01; // Largest difference of a snapshot from the time of the clock, over the time of the last snapshot, that is not written.
+const MOST_KEPT = 24; // Largest number of decoded snapshots in memory for each run.
+// Largest difference between the time of a snapshot and the common time for which no note is shown, relative to the
+// time of the last snapshot.
+const ALIKE = 0.01;
 
-// The snapshot nearest to a time.
+// Returns the snapshot nearest to a time.
 export const nearestTo = (entries, t) => entries.reduce((best, one) => (Math.abs(one.t - t) < Math.abs(best.t - t) ? one : best));
 
 export class Pane {
-  // `run`: { id, snapshots, line, called, plan }; `modules` is the result of libraries.three(); `cut()` returns the section of all panes.
+  // `run`: { id, snapshots, line, called, plan }. `modules`: result of libraries.three(). `cut()` returns the common
+  // section of all views.
   constructor(run, modules, cut) {
     Object.assign(this, { run, cut, store: new Snapshots(run.id, MOST_KEPT), planes: symmetry(run.plan), wanted: null });
     this.view = new View3d(modules);
@@ -27,7 +31,7 @@ export class Pane {
     this.element = h("figure.pane", {}, h("div.pane-name", {}, swatch(run.line), run.called), this.view.element, this.caption);
   }
 
-  // Only the last request is fetched when the clock is faster than the network.
+  // If the time changes faster than the network, only the last requested snapshot is fetched.
   async show(t) {
     this.wanted = t;
     if (this.busy) return;
@@ -63,7 +67,7 @@ export class Pane {
     if (volume && !this.closed && volume.header.n === this.snapshot.header.n) this.view.fill(volume);
   }
 
-  // Opacities by the names of the parts.
+  // Sets the opacities of parts by the names of the parts.
   opacities(of) {
     if (this.snapshot) this.view.set({ opacities: this.snapshot.header.parts.map((name) => of.get(name) ?? 1) });
   }
@@ -78,5 +82,6 @@ export class Pane {
   }
 }
 
-// The snapshots of two runs are at different times; a large difference is written.
+// Returns a note if the time of the nearest snapshot differs much from the requested time: snapshots of two runs have
+// different times.
 const off = (late, end) => (Math.abs(late) > ALIKE * end ? ` (the nearest snapshot, ${si(Math.abs(late), "s")} ${late > 0 ? "later" : "earlier"})` : "");

@@ -1,4 +1,4 @@
-// Tables of a run's page: bars of the ranks, balance events, reference numbers.
+// Tables on the page of a run: bars of the ranks, balance events, reference numbers.
 
 import { alike, count, exacts, fixed, h, legend, percent, si } from "./figures.js";
 import { GROUPS } from "./live.js";
@@ -29,9 +29,9 @@ export class Ranks {
   }
 }
 
-// One balance event at a time: reason, work of each rank before and after, its cost, and the saved time.
+// Shows one balance event at a time: reason, work of each rank before and after the event, cost, and saved time.
 export class Balances {
-  // `onOpen` scrolls to the card of the events.
+  // `onOpen` scrolls to the card of the balance events.
   constructor(live, onOpen) {
     Object.assign(this, { live, onOpen, place: null });
     this.element = h("div");
@@ -59,7 +59,7 @@ export class Balances {
       h("p.message", {}, event.cause),
       h("dl.facts", {}, entry("time", si(event.t, "s")), entry("tets moved", count(event.tets)), entry("nodes moved", count(event.nodes)),
         entry("this cut took", si(event.cost, "s")), entry("earlier cuts saved", si(event.saved, "s"))),
-      bars("Work of each rank before, a step", summed(event.before)), bars("Work expected after", event.predicted));
+      bars("Work of each rank in a step before the event", summed(event.before)), bars("Work expected after", event.predicted));
   }
 }
 
@@ -76,7 +76,8 @@ function bars(title, values) {
 
 const COLUMNS = ["quantity", "computed", "expected", "tolerance", "result", "source"];
 
-// A narrow window shows a row as lines, each with the name of its column; the ARIA roles keep the table.
+// In a narrow window each table row becomes several text lines with the names of the columns; ARIA roles keep the
+// structure of a table.
 const cell = (what, column, text) => h(what, { role: "cell", "data-name": COLUMNS[column] }, text);
 
 export function checksTable(checks) {

@@ -1,14 +1,14 @@
-// Data of one fragment, its mass and speed over the snapshots, and the table of the heaviest fragments.
+// Data of the selected fragment, its mass and speed over the snapshots, and the table of the heaviest fragments.
 
 import { alike, count, h, si, vector } from "./figures.js";
 
 const HEAVIEST = 30;
-const [WIDE, TALL] = [200, 40]; // px of a small chart.
+const [WIDE, TALL] = [200, 40]; // Size of a small chart, px.
 
 const entry = (name, value, broad) => h(broad ? "div.broad" : "div", {}, h("dt", {}, name), h("dd", {}, value));
 
 export class Picked {
-  // `onClose` is called when it is closed, `history(id)` resolves to { t, mass, speed }.
+  // `onClose` is called when the card is closed; `history(id)` resolves to { t, mass, speed } of a fragment.
   constructor(onClose, history) {
     this.history = history;
     this.list = h("dl.facts");
@@ -17,7 +17,7 @@ export class Picked {
     this.element = h("section.card.picked", { hidden: "", "aria-label": "the selected fragment" }, close, this.list, this.course);
   }
 
-  // A fragment (snapshot.js) at the time `t` of the snapshot that is shown, or null.
+  // Shows a fragment (snapshot.js) at the time `t` of the shown snapshot; null hides the card.
   show(found, t) {
     this.element.hidden = !found;
     if (!found) return (this.id = null);
@@ -39,7 +39,7 @@ export class Picked {
     this.place();
   }
 
-  // Draws a line at the time of the snapshot.
+  // Draws a line at the time of the shown snapshot.
   place() {
     if (!this.data) return;
     const x = across(this.data.t)(this.t);
@@ -47,7 +47,7 @@ export class Picked {
   }
 }
 
-// The origin is unknown if parts are separated by erosion only.
+// The time of birth is unknown if parts are separated only by erosion.
 const born = (birth) => (birth === 0 ? "at the start" : si(birth, "s"));
 
 function facts(found) {
@@ -69,7 +69,7 @@ function svg(tag, attributes, ...children) {
   return element;
 }
 
-// A line over time from 0 to the largest value, which is written beside its name.
+// Returns a small chart of a quantity over time from 0 to the largest value, which is written beside the name.
 function small(name, t, values, unit) {
   const most = Math.max(...values) || 1;
   const x = across(t);
@@ -80,7 +80,8 @@ function small(name, t, values, unit) {
   return h("figure", {}, h("figcaption", {}, `${name}, up to ${si(most, unit)}`), drawn);
 }
 
-// The heaviest fragments of a snapshot; `onPick` is called with the row of one.
+// Returns the table of the heaviest fragments of a snapshot. `onPick` is called with the table row of the chosen
+// fragment.
 export function table({ arrays, header }, picked, onPick) {
   const { fragment_id: ids, fragment_mass: masses, fragment_size: sizes, fragment_velocity: v, fragment_birth: births } = arrays;
   const rows = [...ids.keys()].filter((row) => ids[row] >= 0n).sort((a, b) => masses[b] - masses[a]).slice(0, HEAVIEST);
@@ -93,6 +94,6 @@ export function table({ arrays, header }, picked, onPick) {
   const more = header.fragments_total - rows.length;
   return [
     h("table.checks.heaviest", {}, h("thead", {}, h("tr", {}, ["number", "mass", "speed", "size", "birth"].map((name, i) => h(i ? "th.number" : "th", { scope: "col" }, name)))), h("tbody", {}, body)),
-    more > 0 ? h("p.hint", {}, `and ${count(more)} lighter ones`) : "",
+    more > 0 ? h("p.hint", {}, `and ${count(more)} lighter fragments`) : "",
   ];
 }

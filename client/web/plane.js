@@ -1,4 +1,4 @@
-// The plane of a section, chosen with the tools of the body: its direction, its place, the side that is cut away.
+// Plane of a section, chosen with the tools of the 3-D view: direction, position, and the side that is cut away.
 
 import { within } from "./section.js";
 
@@ -10,7 +10,8 @@ export class SectionPlane {
     Object.assign(this, { tools, on: false });
   }
 
-  // Moves the plane to the middle of the frame of a camera; `box` is that of the tets. The side towards the camera is cut away.
+  // Moves the plane to the middle of the region that a camera frames; `box` is the box of all tets. The side towards
+  // the camera is cut away.
   choose(eye, box) {
     const { tools } = this;
     const name = tools.across.value;
@@ -24,20 +25,20 @@ export class SectionPlane {
     return tools.slide(...along, within((along[0] + along[1]) / 2, box, this.normal));
   }
 
-  // { normal, at } of View3d.slice, or null.
+  // Returns { normal, at } for View3d.slice, or null without a section.
   get value() {
     if (!this.on) return null;
     const sign = this.tools.flipped ? -1 : 1;
     return { normal: this.normal.map((part) => sign * part), at: sign * this.tools.at };
   }
 
-  // Writes the place beside the slider; `filled`: whether all tets are known.
+  // Writes the position of the plane beside the slider; `filled`: whether all tets are available.
   tell(filled) {
     if (this.on) this.tools.tell(this.tools.at, filled ? "" : HOLLOW);
   }
 }
 
-// The planes of symmetry on whose positive side all parts lie, { axis, at }, one for each axis.
+// Returns the planes of symmetry on whose positive side all parts lie, { axis, at }, at most one for each axis.
 export function symmetry(plan) {
   const found = (plan?.boundaries ?? []).filter(({ kind, parts }) => kind === "symmetry" && !parts?.length);
   return AXES.map((name, axis) => ({ axis, at: found.find((one) => one.axis === name)?.at })).filter(({ at }) => at !== undefined);

@@ -1,4 +1,4 @@
-// Data of each chart of a run: series from the record of the run (live.js).
+// Series of the charts of a run, made from the record of the run (live.js).
 
 import { axis, largest, logarithmic, series, time } from "./axes.js";
 import { Chart } from "./charts.js";
@@ -18,8 +18,8 @@ const COUNTED = [["nodes", "compute"], ["facets", "exchange"], ["fragments", "fr
 const CURVE = 60; // Number of points of the curve of a fitted law.
 const LEAST = 1; // Smallest number of fragments on the axis.
 
-// { name: [chart, title, element beside the title] }; `onBalance` is called with the index of a balance event in live.balances.
-// The charts are drawn after `before`, a promise.
+// Returns { name: [chart, title, element beside the title] }. `onBalance` is called with the index of a balance event
+// in live.balances. The charts are drawn after the promise `before`.
 export function plots(live, onBalance, before) {
   const title = h("span", {}, "Energy");
   const by = h("select", { "aria-label": "energy by", onchange: () => {
@@ -34,14 +34,14 @@ export function plots(live, onBalance, before) {
   const lines = (of) => async () => (live.columns.lines ? everyLine(live.run, of()) : undefined);
   const reports = (of) => async () => tableOf(of(await everyReport(live, (run) => new Live(run))));
   const add = (name, label, titled, beside, option, more) => {
-    const chart = new Chart(TALL, label, option, { ...more, before, missing: () => (FINAL.has(live.state) ? "This run has no such numbers." : "Waiting for the first numbers."), name: () => `${live.plan?.name ?? live.run}_${name}` });
+    const chart = new Chart(TALL, label, option, { ...more, before, missing: () => (FINAL.has(live.state) ? "This run has no numbers for this chart." : "Waiting for the first numbers."), name: () => `${live.plan?.name ?? live.run}_${name}` });
     return [chart, titled, [...beside, chart.tools]];
   };
   const made = {
     energy: add("energy", "energy over time", title, [by], () => ofEnergy(live, view()), { table: lines(() => names(live, view())) }),
     probes: add("probes", "probes over time", "Probes", [chooser.element], () => (chooser.draw(), ofProbes(live, chooser.chosen)), { table: lines(() => chooser.chosen) }),
     forces: add("forces", "contact forces over time", "Contact forces", [], () => ofForces(live), { table: lines(() => columnsOf(live)) }),
-    sizes: add("sizes", "number of fragments of a size and larger", "Fragment sizes", [], () => ofSizes(made.snapshot, live.spread), { unit: "m", table: async () => tableOf({ ...ofSizes(made.snapshot, live.spread), xName: "size [m]" }) }),
+    sizes: add("sizes", "number of fragments of at least a given size", "Fragment sizes", [], () => ofSizes(made.snapshot, live.spread), { unit: "m", table: async () => tableOf({ ...ofSizes(made.snapshot, live.spread), xName: "size [m]" }) }),
     counts: add("counts", "nodes, broken facets and fragments over time", "Nodes and fragments", [], () => ofCounts(live), { table: reports(ofCounts) }),
     residual: add("residual", "energy residual over time", "Energy residual", [], () => ofResidual(live), { table: lines(() => ["residual"]) }),
     dt: add("dt", "time step over time", "Time step", [], () => ofStep(live), { table: reports(ofStep) }),
@@ -53,13 +53,14 @@ export function plots(live, onBalance, before) {
   return made;
 }
 
-// Charts without data in this run: it has no such probes, or one rank only.
+// Returns which charts have no data in this run, because it has no such probes or only one rank.
 export const nothing = (live) => ({ imbalance: alone(live), heat: alone(live), probes: !live.plan?.probes?.length && !Object.keys(live.columns.values).some((name) => name.startsWith("momentum")), forces: !columnsOf(live).length });
 
 function ofCounts(live) {
   const all = live.sizes;
   if (!all.length) return null;
-  const now = { ...all.at(-1), t: Math.max(all.at(-1).t, live.loads.at(-1)?.t ?? 0) }; // Counts are reported when they change.
+  // Numbers of nodes and fragments are reported only when they change.
+  const now = { ...all.at(-1), t: Math.max(all.at(-1).t, live.loads.at(-1)?.t ?? 0) };
   const there = COUNTED.filter(([name]) => all.some((point) => point[name] > 0));
   return { xAxis: time(end(live)), yAxis: logarithmic("", { axisLabel: { formatter: count } }), series: there.map(([name, tone]) =>
     ({ ...series({ name: name === "facets" ? "broken facets" : name, colour: tone, data: [...all, now].map((point) => [point.t, point[name] > 0 ? point[name] : null]), text: count }), showSymbol: all.length < 3 })) };
@@ -73,8 +74,8 @@ function ofStep(live) {
   return { xAxis: time(end(live)), yAxis: axis("s", largest(list), { scale: true }), series: list };
 }
 
-// N(size) over the size, both logarithmic: of the shown snapshot with the best fitting law, and of the newest
-// report in its bins, which includes dust.
+// Returns N(size) over the size, both logarithmic: for the shown snapshot with the best fitting law, and for the bins
+// of the newest report, which include dust.
 function ofSizes(snapshot, spread) {
   const list = [...(snapshot ? ofSnapshot(snapshot) : []), ...(spread ? [ofSpread(spread)] : [])];
   if (!list.length) return null;
@@ -94,7 +95,7 @@ function ofSnapshot(snapshot) {
   return list;
 }
 
-const known = new WeakMap(); // Fits by snapshot: the chart is drawn more often than its points change.
+const known = new WeakMap(); // Fitted laws by snapshot, because the chart is drawn more often than its points change.
 
 export function fitted(snapshot) {
   if (!known.has(snapshot)) known.set(snapshot, sizes(snapshot));
@@ -103,7 +104,7 @@ export function fitted(snapshot) {
 
 const ofSpread = ({ t, ...spread }) => ({ ...series({ name: `with dust, at ${exact(t, "s", 3)}`, colour: "faint", data: longer(spread), text: count }), step: "end", sampling: undefined });
 
-// [size, number of fragments of this size and larger] at the start of each bin of half a power of two.
+// Returns [size, number of fragments of at least this size] at the start of each bin of half a power of two.
 export function longer({ smallest, sizes: counts }) {
   let left = counts.reduce((sum, count_) => sum + count_, 0);
   return counts.map((count_, i) => {

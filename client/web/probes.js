@@ -1,4 +1,4 @@
-// Probes of a run over time in one chart, with a panel for each unit, and their expected values.
+// Chart of the probes of a run over time, with a panel for each unit, and their expected values.
 
 import { axis, expected, largest, lineStyle, series, time } from "./axes.js";
 import { end } from "./energies.js";
@@ -12,13 +12,13 @@ const PUSH = /^(contact|wall)_force_([xyz])$/;
 const probes = ({ plan }) => plan?.probes ?? [];
 const isThere = ({ columns }) => (name) => name in columns.values;
 
-// Names that can be selected: probes of the case in their order, then momenta.
+// Returns the names that can be selected: probes of the case in their order, then momenta.
 export function choices(live) {
   const names = probes(live).map(({ name }) => name);
   return { probes: names.filter(isThere(live)), momenta: Object.keys(live.columns.values).filter((name) => MOMENTA.test(name) && !names.includes(name)) };
 }
 
-// A list of check boxes below its button; the selection is stored by the name of the case.
+// List of check boxes below a button; the selection is stored by the name of the case.
 export class Chooser {
   constructor(live, onChange) {
     Object.assign(this, { live, onChange });
@@ -60,13 +60,13 @@ export class Chooser {
   }
 }
 
-// Expected value of a probe, and its time interval.
+// Returns the expected values of a probe, each with its time interval.
 function references({ plan }, name, last) {
   const own = (plan?.reference ?? []).filter(({ probe, quantity }) => probe === name && quantity.startsWith("probe_"));
   return own.map(({ quantity, value, tolerance, since, until }) => ({ value, tolerance, until: until ?? last, since: quantity === "probe_last" ? 0.97 * last : since ?? 0 }));
 }
 
-// One panel for each unit, with a common time axis.
+// Returns a chart with one panel for each unit and a common time axis.
 export function ofProbes(live, chosen) {
   const { columns: { units, values } } = live;
   const there = chosen.filter(isThere(live));
@@ -80,7 +80,7 @@ export function ofProbes(live, chosen) {
   return panels(list, last);
 }
 
-// Series in a grid for each unit. `last` is the end of the time axis.
+// Arranges series in a panel for each unit. `last` is the end of the time axis.
 export function panels(list, last) {
   const kinds = [...new Set(list.map(({ unit }) => unit))];
   const number = kinds.length;
@@ -95,12 +95,12 @@ export function panels(list, last) {
   };
 }
 
-// Largest magnitude of series and of their expected values.
+// Returns the largest magnitude of series and of their expected values.
 const heights = (list) => Math.max(largest(list), ...list.flatMap(({ markArea }) => (markArea ? markArea.data.flat().map(({ coord }) => Math.abs(coord[1])) : [])));
 
 // Contact forces ---------------------------------------------------------------------------------------------------------
 
-// { "steel on glass": { part, x: column, y: column, z: column } } of the probes of forces.
+// Returns the probes of forces, { "steel on glass": { part, x: column, y: column, z: column } }.
 export function pushes(live) {
   const found = {};
   for (const { name, part, field, by, wall } of probes(live).filter((one) => PUSH.test(one.field) && isThere(live)(one.name))) {
@@ -113,8 +113,8 @@ export function pushes(live) {
 
 export const columnsOf = (live) => Object.values(pushes(live)).flatMap(Object.values);
 
-// The measured components, and the magnitude if all three exist: not for thinned lines, whose components belong
-// to different times.
+// Returns the measured components of forces, and the magnitude if all three components exist. Thinned columns give no
+// magnitude, because their components belong to different times.
 export function ofForces(live) {
   const { columns: { values, lines } } = live;
   const list = Object.entries(pushes(live)).flatMap(([who, columns]) => {

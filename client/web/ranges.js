@@ -1,12 +1,15 @@
-// Ends of the colour scale: of the shown snapshot or of the whole run, with or without extremes, or given by the user.
+// Ends of the colour scale: from the shown snapshot or from the whole run, with or without extremes, or given by the
+// user.
 
 import { rounded, scaleOf } from "./scales.js";
 
-const ALIKE = 1e-9; // Relative difference of values that is rounding only.
-const EXTREMES = [0.005, 0.995]; // Quantiles of the triangles, as in the message of a snapshot (docs/snapshots.md).
+const ALIKE = 1e-9; // Relative difference below which two values are equal except for rounding.
+// Quantiles of the values of triangles, as in the message of a snapshot (docs/snapshots.md).
+const EXTREMES = [0.005, 0.995];
 
-// { low, high, number, uniform } for a field of the shown snapshots. `choice`: { how: "most" | "all" | "hand", over: "run" | "now", hand: [low, high] };
-// `inRun`: ranges of the field in the messages of all snapshots, [least, low, high, most] each.
+// Returns { low, high, number, uniform } for a field of the shown snapshots. `choice`: { how: "most" | "all" | "hand",
+// over: "run" | "now", hand: [low, high] }. `inRun`: ranges of the field in the messages of all snapshots, each [least,
+// low, high, most].
 export function range(choice, name, snapshots, inRun) {
   if (choice.how === "hand" && choice.hand) return { low: choice.hand[0], high: choice.hand[1], number: 5 };
   const all = choice.how === "all";
@@ -19,7 +22,7 @@ export function range(choice, name, snapshots, inRun) {
 
 const extent = ({ header }, name) => [header.fields[name].low, header.fields[name].high];
 
-// Range of the triangles without the extremes.
+// Returns the range of the values of triangles without the extremes.
 function most(snapshot, name) {
   const levels = snapshot.arrays[`field:${name}`];
   const [low, high] = extent(snapshot, name);

@@ -1,20 +1,22 @@
-// Response of a sweep: a result over the changed key as a curve, or a matrix of two keys. No elements are created here.
+// Response of a sweep: a result over the changed key as a curve, or a matrix over two keys. The module creates no
+// elements.
 
 import { FINAL } from "./live.js";
 
-// A run without success has results of an earlier time than the others.
+// A run without success has no response, because its results belong to an earlier time than those of other runs.
 const measured = (row, result) => (row.state === "succeeded" ? result.value(row) : null);
 const number = (value) => typeof value === "number" && Number.isFinite(value);
 
-// Values of a column in the points, in order: numbers by size, words by occurrence.
+// Returns the different values of a column in the points, numbers sorted by size, words by occurrence.
 export function levels(points, column) {
   const found = [...new Map(points.map(({ row }) => [column.text(row), column.value(row)]))];
   const numbers = found.every(([, value]) => number(value));
   return (numbers ? found.sort(([, a], [, b]) => a - b) : found).map(([text, value]) => ({ text, value }));
 }
 
-// The keys that vary, grouped with those that change together: each value of one belongs to one value of the other. The
-// first one stands for its group; `named` has the name or the number of the others. If no key varies, the first one is the axis.
+// Returns the keys that vary, grouped with keys that change together: each value of one key belongs to one value of the
+// others. The first key stands for its group; `named` contains the name or the number of the other keys. If no key
+// varies, the first key is the axis.
 export function together(points, keys) {
   const course = (key) => {
     const texts = points.map(({ row }) => key.text(row));
@@ -31,8 +33,9 @@ export function together(points, keys) {
   });
 }
 
-// { words, curves: [{ name, data: [[x, y, id]] }] } of a result over the column `x`, both in SI units, a curve for each
-// combination of the `others`; `at(row)` is its place on the axis; `words` are the labels of the axis if the values of `x` are not numbers.
+// Returns { words, curves: [{ name, data: [[x, y, id]] }] } of a result over the column `x`, both in SI units, with a
+// curve for each combination of the `others`. `at(row)` is the position of a row on the axis. `words` are the labels of
+// the axis if the values of `x` are not numbers.
 export function curves(points, x, others, result) {
   const places = levels(points, x);
   const words = places.every(({ value }) => number(value)) ? null : places.map(({ text }) => text);
@@ -47,15 +50,15 @@ export function curves(points, x, others, result) {
   return { words, curves: [...found].map(([name, data]) => ({ name, data: data.sort((a, b) => a[0] - b[0]) })), at };
 }
 
-// [[x, y, id, why]] of the points whose run has ended without a result, at the foot of the curves.
+// Returns [[x, y, id, why]] for the points whose run has ended without a result, at the lower end of the curves.
 export function lost(points, { curves: found, at }) {
   const foot = Math.min(...found.flatMap(({ data }) => data.map(([, y]) => y)));
   const over = points.filter(({ row }) => FINAL.has(row.state) && row.state !== "succeeded" && at(row) !== null);
   return over.map(({ row }) => [at(row), Number.isFinite(foot) ? foot : 0, row.id, `${row.state.replaceAll("_", " ")}${row.message ? `: ${row.message}` : ""}`]);
 }
 
-// { rows, columns, cells } of two keys; cells[i][j] has the points there and the mean of their results relative to the
-// range of all, null without results.
+// Returns { rows, columns, cells } over two keys. cells[i][j] has the points at this position and the mean of their
+// results relative to the range of all results; null without results.
 export function matrix(points, down, across, result) {
   const [rows, columns] = [levels(points, down), levels(points, across)];
   const all = points.map(({ row }) => measured(row, result)).filter(number);
@@ -71,7 +74,7 @@ export function matrix(points, down, across, result) {
 
 const INFORMATIVE = [/residual_velocity/, /penetration/, /^result:probe\.[^.]*$/, /^result:reference\.(?!worst_residual)/, /^result:fragments$/, /^result:energy\.kinetic$/];
 
-// The most informative result: the first kind of INFORMATIVE with values that differ between the points.
+// Returns the most informative result: the first kind of INFORMATIVE whose values differ between the points.
 export function telling(points, results) {
   const differs = (column) => new Set(points.map(({ row }) => measured(row, column)).filter(number)).size > 1;
   const there = results.filter(differs);

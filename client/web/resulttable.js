@@ -1,4 +1,4 @@
-// Table of the compared runs: different keys and results, sortable by any column.
+// Table of the compared runs: keys and results that differ, sortable by any column.
 
 import { h, pill } from "./figures.js";
 import { swatch } from "./linestyles.js";
@@ -17,14 +17,15 @@ export class ResultTable {
     this.element = h("section.card", { hidden: "" }, h("div.card-head", {}, h("h2", {}, "Values that differ, and results"), h("span.beside", {}, this.which, h("span.save", {}, csv))), this.place, this.note);
   }
 
-  // `rows`: { name, href, line, state } for each run; `keys`: columns of different keys; `results` returns columns of results.
+  // `rows`: { name, href, line, state } of each run. `keys`: columns of the keys that differ. `results` returns the
+  // columns of results.
   draw(rows = this.rows, keys = this.keys, results = this.results) {
     Object.assign(this, { rows, keys, results });
     this.element.hidden = false;
     this.columns = [...keys.slice(0, MOST_KEYS), ...results(this.which.value || "last")];
     const more = keys.slice(MOST_KEYS);
     this.note.hidden = !more.length;
-    this.note.textContent = `These keys differ too: ${more.map(({ key }) => key).join(", ")}.`;
+    this.note.textContent = `These keys also differ: ${more.map(({ key }) => key).join(", ")}.`;
     const order = this.order();
     const head = this.columns.map((column) => this.head(column));
     const focused = document.activeElement?.dataset?.sorts;
@@ -45,10 +46,10 @@ export class ResultTable {
     this.draw();
   }
 
-  // The result of a run without success belongs to a time before the end.
+  // The result of a run without success belongs to a time before the end of the run.
   unsure(i) { return this.rows[i].state !== "succeeded"; }
 
-  // Order of the rows; missing values are last, results of runs without success before them.
+  // Returns the order of the rows. Missing values are last, preceded by results of runs without success.
   order() {
     const places = this.rows.map((_, i) => i);
     const column = this.columns.find(({ title }) => title === this.by);

@@ -14,9 +14,10 @@ import { Balances, Ranks, checksTable } from "./panels.js";
 import { nothing, plots } from "./plots.js";
 import { RunState } from "./runstate.js";
 
-const FIRST = 3000; // ms; the charts are drawn after the body, or after this time.
-const CHARTS_EVERY = 500; // ms; the head and the bars are drawn with every message.
-const QUEUE_EVERY = 3; // s after which the place in the queue is requested again.
+const FIRST = 3000; // Time in ms: the charts are drawn after the 3-D view, or at the latest after this time.
+// Time in ms between two drawings of the charts; the head and the bars are drawn with every message.
+const CHARTS_EVERY = 500;
+const QUEUE_EVERY = 3; // Time in s after which the position in the queue is requested again.
 const STAGES = { "": "No data of this run has been read yet.", accepted: "The server accepts this run.", queued: "This run waits in the queue.", starting: "This run starts: the mesh is made and the solver is loaded." };
 const pause = (ms) => new Promise((resolve) => setTimeout(resolve, ms));
 
@@ -60,7 +61,7 @@ export class RunPage {
     this.draw();
   }
 
-  // Cards in their order: reference numbers, charts with data, ranks, balance events.
+  // Adds the cards in their order: reference numbers, charts with data, ranks, balance events.
   fillCards() {
     this.cards = new Cards("energy");
     this.checks = h("div");
@@ -76,7 +77,7 @@ export class RunPage {
     this.cards.place();
   }
 
-  // [name, [chart, …]] of all charts.
+  // Returns [name, [chart, …]] for all charts.
   get drawn() { return Object.entries(this.charts).filter(([, made]) => Array.isArray(made)); }
 
   // Messages -----------------------------------------------------------------------------------------------------
@@ -122,13 +123,14 @@ export class RunPage {
     this.later();
   }
 
-  // The body is drawn before the history has been read.
+  // The 3-D view is drawn before the history has been read.
   async readBody() {
     const { snapshots } = await call(`${this.path}/snapshots`, { signal: this.abort.signal }).catch(() => ({ snapshots: [] }));
     if (!snapshots.length) this.body.ready();
     if (this.abort.signal.aborted) return;
     if (this.live.snapshots.length < snapshots.length) this.live.snapshots = snapshots;
-    this.body.update(this.live.snapshots); // Without waiting for a frame: the first frames of a new tab are late.
+    // Called without waiting for a frame, because the first frames of a new tab are late.
+    this.body.update(this.live.snapshots);
     this.later();
   }
 
@@ -152,14 +154,14 @@ export class RunPage {
     for (const text of this.outcome?.warnings ?? []) this.live.warn("warning", text);
   }
 
-  // No message reports the place in the queue: it is requested regularly.
+  // No message reports the position in the queue, so it is requested regularly.
   tick() {
     this.later();
     this.ticks = (this.ticks ?? 0) + 1;
     if (this.live.state === "queued" && this.ticks % QUEUE_EVERY === 0) this.readInfo();
   }
 
-  // Made by the server where it has none yet, then saved here.
+  // Saves the report of the run; the server makes the report if it does not exist yet.
   async saveReport() {
     this.busy.add("report");
     this.notice = "The server makes the report; this may take a minute.";
@@ -192,7 +194,7 @@ export class RunPage {
     return this.later();
   }
 
-  // The run does not exist, or only the record of its removal does.
+  // Shows that the run does not exist, or that only the record of its removal exists.
   fail(error) {
     this.close();
     if (error.status === 401 && this.onRefused) return this.onRefused();
@@ -205,14 +207,14 @@ export class RunPage {
 
   // Drawing ------------------------------------------------------------------------------------------------------
 
-  // The browser's timeline has the time from a message to its pixels as "conoid:event".
+  // Measures the time from a message to its pixels as "conoid:event" in the browser's timeline.
   later(message) {
     if (message) this.born ??= message.wall;
     if (this.due) return;
     this.due = true;
     requestAnimationFrame(() => {
       this.due = false;
-      if (this.abort.signal.aborted) return; // Another page is shown.
+      if (this.abort.signal.aborted) return; // Another page is shown now.
       this.draw();
       const start = 1000 * this.born - performance.timeOrigin;
       this.born = undefined;
@@ -244,7 +246,7 @@ export class RunPage {
     document.title = `${live.state ? `${percent(live.fraction)} ` : ""}${this.info.name ?? live.run} · Conoid`;
   }
 
-  // After the frame that draws the head and the bars.
+  // Draws the charts after the frame that draws the head and the bars.
   drawCharts() {
     if (!this.abort.signal.aborted) for (const [, [chart]] of this.drawn) chart.draw(FINAL.has(this.live.state));
   }
@@ -268,7 +270,7 @@ export class RunPage {
     this.cards.show("checks", true);
   }
 
-  // Before the first snapshot, the place of the body shows the reason.
+  // Before the first snapshot, the place of the 3-D view shows why no snapshot exists.
   drawStage() {
     const { state, message, snapshots } = this.live;
     this.empty.hidden = snapshots.length > 0;

@@ -10,18 +10,20 @@ import { recall, remember } from "./storage.js";
 import { RunTable, differing, shorts } from "./runtable.js";
 import { Toolbar } from "./toolbar.js";
 
-const FIRST = 200; // Runs of the first answer; later pages are larger.
+const FIRST = 200; // Number of runs in the first answer; later pages are larger.
 const PAGE = 500;
 const MOST = 10000; // Largest number of runs that are shown; the command line finds older runs.
-const SOON = 2000; // ms between two answers while a run is open.
-const LATER = 6000; // ms otherwise.
-const ANEW = 60000; // ms after which the newest page is read completely: runs may have been removed, labels changed.
-const SLACK = 10; // s by which the saved state of the server may lag.
-const MOST_VALUES = 24; // Largest number of keys with a column.
+const SOON = 2000; // Time in ms between two requests while a run is open.
+const LATER = 6000; // Time in ms between two requests while no run is open.
+// Time in ms after which the newest page is read completely, because runs may have been removed or labels changed.
+const ANEW = 60000;
+const SLACK = 10; // Time in s by which the saved state of the server may lag.
+const MOST_VALUES = 24; // Largest number of keys that have a column.
 const MOST_TOLD = 100; // Largest number of groups whose changed keys are shown.
 const RANGES = 3; // Largest number of keys in the title of a group.
 const NEWEST = { id: "submitted", down: true };
-const kept = { text: "", state: "", days: "", open: new Set(), marked: new Set(), top: 0 }; // For the life of the tab.
+// Choices of the user, stored as long as the tab exists.
+const kept = { text: "", state: "", days: "", open: new Set(), marked: new Set(), top: 0 };
 
 export class RunsPage {
   // `onRefused` is called when the token is no longer valid.
@@ -89,9 +91,9 @@ export class RunsPage {
 
   ask(query) { return call(`v1/table?${new URLSearchParams(query)}`, { signal: this.abort.signal }); }
 
-  // Page after page, newest first; the first is shown before the others arrive.
+  // Reads all pages, newest first; the first page is shown before the others arrive.
   async readWhole() {
-    const listed = this.readSweeps().catch(() => {}); // Without sweeps the groups have no names.
+    const listed = this.readSweeps().catch(() => {}); // Without the list of sweeps the groups have no names.
     let next = null;
     let pending = 0;
     const all = [];
@@ -142,7 +144,7 @@ export class RunsPage {
 
   get sort() { return recall("runs.sort", NEWEST); }
 
-  // Columns of all runs whose values differ between the shown runs, and the rows.
+  // Returns the rows that match the filters, and a column for each value that differs between these rows.
   pick() {
     const { table } = this;
     const all = [...table.rows.values()];
@@ -181,7 +183,7 @@ export class RunsPage {
     performance.measure?.("conoid:table", "conoid:draw");
   }
 
-  // Columns without room are not shown, except those that the user has selected, sorts by or compares.
+  // Returns the columns that fit into the width. Columns that the user has selected, sorts by or compares always stay.
   fit(columns, choice, rows) {
     const filter = compared(kept.text, columns);
     for (const column of columns) column.shown = (column.wanted ??= column.shown) || filter.has(column.id);
@@ -237,11 +239,11 @@ export class RunsPage {
 
   // Actions -----------------------------------------------------------------------------------------------------------
 
-  // Sorts by a column, the second time in reverse; or "ID up", "ID down".
+  // Sorts by a column, the second time in reverse order; the argument may also be "ID up" or "ID down".
   sortBy(words) {
     const [, id, way] = /^(.*?)(?: (up|down))?$/.exec(words);
     const { sort } = this;
-    const first = id === "submitted" || id.startsWith("result:"); // The newest, the largest first.
+    const first = id === "submitted" || id.startsWith("result:"); // Newest runs and largest results come first.
     remember("runs.sort", { id, down: way ? way === "down" : sort.id === id ? !sort.down : first });
     this.draw();
   }
@@ -251,7 +253,7 @@ export class RunsPage {
     this.draw();
   }
 
-  // With Shift: from the last marked run to this one.
+  // Marks a row; with Shift, all rows from the last marked row to this one.
   mark(row, on, far) {
     const from = far ? this.rows.findIndex(({ id }) => id === this.last) : -1;
     const to = this.rows.findIndex(({ id }) => id === row.id);
@@ -267,20 +269,20 @@ export class RunsPage {
     this.draw();
   }
 
-  // The marked runs in the order of the table, hidden ones last.
+  // Returns the marked runs in the order of the table, hidden runs last.
   chosen() {
     const shown = this.rows.filter(({ id }) => kept.marked.has(id)).map(({ id }) => id);
     return [...shown, ...[...kept.marked].filter((id) => !shown.includes(id))];
   }
 }
 
-// Goal of an adaptive sweep, and its present answer.
+// Returns a text with the goal of an adaptive sweep and its present answer.
 function soughtFor({ key, result, threshold, result_unit: up, bracket, unit }) {
   const found = bracket ? vector([(bracket[0] + bracket[1]) / 2, (bracket[1] - bracket[0]) / 2], unit, 4, " ± ") : "not bracketed";
   return `${result} = ${exact(threshold, up)} at ${key} ${found}`;
 }
 
-// Changed keys of a group: "velocity[2] 60 to 300 m/s".
+// Returns a text with the changed keys of a group, such as "velocity[2] 60 to 300 m/s".
 function ranges(rows, columns) {
   return differing(rows, RANGES).map((key) => columns.find(({ id }) => id === `value:${key}`)).filter(Boolean).map((column) => {
     const there = sorted(rows.filter((row) => column.value(row) !== null), column, false);

@@ -1,16 +1,16 @@
-// Notice for a run that waits, or that ended without success: reason, progress, end of its log,
-// and what the user can do next.
+// Notice for a run that waits, or that ended without success: reason, progress, end of the log, and what the user can
+// do next.
 
 import { call, tail } from "./api.js";
 import { h, rough, si, words } from "./figures.js";
 import { ended } from "./numbers.js";
 
-const LINES = 12; // Number of lines of the log.
+const LINES = 12; // Number of lines of the log that are shown.
 const CAUSES = {
   input: "its case cannot be run", mesh: "its mesh cannot be made", diverged: "its solution has diverged", energy: "its energy does not close",
-  memory: "it ran out of memory", walltime: "it reached its limit of wall time", steps: "it reached run.max_steps before run.end_time",
-  preempted: "the batch system has stopped its job", node: "one of its processes or machines has failed", launch: "it could not be started",
-  storage: "a file could not be written", cancelled: "it was cancelled", service: "the server could not continue it",
+  memory: "it ran out of memory", walltime: "the run reached its limit of wall time", steps: "it reached run.max_steps before run.end_time",
+  preempted: "the batch system has stopped the job of the run", node: "a process or a machine of the run has failed", launch: "it could not be started",
+  storage: "a file could not be written", cancelled: "it was cancelled", service: "the server could not continue the run",
 };
 const HELP = {
   input: "Change the keys that the message names, and start again.", mesh: "Change the mesh, and start again.",
@@ -20,11 +20,12 @@ const HELP = {
   steps: "Continue with a larger run.max_steps; the limiter of dt is shown beside it.", storage: "Free space on the disk, then continue from the last checkpoint.",
 };
 const POINT = /^checkpoints\/(\d+)\/manifest\.json$/;
-const FATED = new Set(["input", "mesh", "diverged", "energy"]); // Causes that would recur with the same case.
+// Causes of failure that would recur with the same case.
+const FATED = new Set(["input", "mesh", "diverged", "energy"]);
 const BAD = new Set(["failed", "lost", "timed_out", "cancelled"]);
 
 export class RunState {
-  // `files()` resolves to the files of the run, null if unknown.
+  // `files()` resolves to the files of the run, or null if unknown.
   constructor(run, files) {
     Object.assign(this, { run, files, keyShown: "" });
     this.path = `v1/runs/${encodeURIComponent(run)}`;
@@ -57,7 +58,7 @@ export class RunState {
     log.scrollTop = log.scrollHeight;
   }
 
-  // A run that used up its steps continues with twice as many.
+  // A run that has used all its steps continues with twice as many steps.
   restart(step, { cause, finished }) {
     const most = cause === "steps" ? 2 * Math.max(step, finished?.steps ?? 0) : 0;
     const button = h("button", { type: "button", onclick: async () => {
@@ -73,7 +74,7 @@ export class RunState {
     return button;
   }
 
-  // From the first log with text: of the launcher if no rank started, else of rank 0.
+  // Returns the end of the first log that has text: the log of the launcher if no rank started, else of rank 0.
   async end(live) {
     for (const name of live.progress ? ["0", "launcher"] : ["launcher", "0"]) {
       const text = (await tail(this.run, name).catch(() => "")).trimEnd();
@@ -92,8 +93,8 @@ function advice(cause, outcome) {
 }
 
 function reached({ progress, snapshots }, outcome) {
-  if (!progress) return "It had not reached its first step.";
+  if (!progress) return "The run had not reached its first step.";
   const { t, step } = ended(progress, outcome);
   const last = snapshots.at(-1);
-  return `It reached ${si(t, "s")} of ${si(progress.end_time, "s")}, step ${step}${last ? `; the last snapshot, of ${si(last.t, "s")}, is shown below` : ""}.`;
+  return `The run reached ${si(t, "s")} of ${si(progress.end_time, "s")}, step ${step}${last ? `; the last snapshot, of ${si(last.t, "s")}, is shown below` : ""}.`;
 }

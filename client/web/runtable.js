@@ -1,17 +1,19 @@
-// Rows of many runs (GET /v1/table), merged page by page. No elements are created here.
+// Rows of many runs (GET /v1/table), merged page by page. The module creates no elements.
 
-const ALIKE = 0.8; // Share of common keys above which the values of two cases are compared; the same as on the server.
+// Fraction of common keys above which two cases are similar, so that their values are compared; the server has the same
+// number.
+const ALIKE = 0.8;
 
 export class RunTable {
   constructor() {
-    this.rows = new Map(); // By id.
+    this.rows = new Map(); // Rows by the id of the run.
     this.kinds = []; // Groups of similar cases: { keys, units }.
     this.units = new Map(); // Units of results, by name.
     this.pending = 0;
     this.version = 0;
   }
 
-  // Merges one answer; true if anything has changed.
+  // Merges an answer of the server; returns true if anything has changed.
   take({ runs, cases, pending = 0 }) {
     const kinds = cases.map((one) => this.kind(one));
     for (const { results } of cases) for (const { name, unit } of results) if (!this.units.has(name)) this.units.set(name, unit);
@@ -21,7 +23,7 @@ export class RunTable {
     return fresh.length > 0;
   }
 
-  // False for an unchanged row.
+  // Stores a row; returns false if the row has not changed.
   put(run, one, kind) {
     const content = JSON.stringify([run, one?.results.length]);
     if (this.rows.get(run.id)?.content === content) return false;
@@ -30,7 +32,8 @@ export class RunTable {
     return true;
   }
 
-  // Removes runs that are newer than the last row of a reread page but are not on it.
+  // Removes runs that should be on a page that was read again, because they are newer than its last row, but are not on
+  // it.
   keepOnly(runs, whole) {
     const last = whole ? "" : runs.at(-1)?.id ?? "";
     const there = new Set(runs.map(({ id }) => id));
@@ -50,7 +53,7 @@ export class RunTable {
     return found ?? this.kinds.at(-1);
   }
 
-  // Unix time in s of the newest submission or end.
+  // Returns the Unix time in s of the newest submission or end of a run.
   get latest() {
     let latest = 0;
     for (const { submitted, finished } of this.rows.values()) latest = Math.max(latest, submitted, finished ?? 0);
@@ -63,22 +66,23 @@ function alike(known, keys) {
   return both >= ALIKE * (known.size + keys.length - both);
 }
 
-// Text that filters search.
+// Returns the text of a row in which filters search.
 const hay = ({ name, title, state, cause, message, labels }) =>
   [name, title, state, cause, message, ...Object.entries(labels).map(([key, value]) => `${key}=${value}`)].join("\n").toLowerCase();
 
 export const valueOf = (row, key) => (key in row.values ? row.values[key] : row.base[key] ?? null);
 
-const NEVER = /^run\.(ranks|threads|profile)$/; // Keys with columns of their own.
+const NEVER = /^run\.(ranks|threads|profile)$/; // Keys that have columns of their own.
 
-const LEAST = 0.1; // Least number of runs that a prominent key sets apart, over that of the first key. Chosen.
-const ASIDE = /^(run\.(?!end_time)|balance\.|probes\[|reference\[)/; // Keys that do not change what is computed.
+// Smallest number of runs that a prominent key distinguishes, relative to the number for the first key. Chosen value.
+const LEAST = 0.1;
+const ASIDE = /^(run\.(?!end_time)|balance\.|probes\[|reference\[)/; // Keys that do not change the answer of a run.
 
-// Keys whose values differ between rows of similar cases; those that set most runs apart first.
+// Returns the keys whose values differ between rows of similar cases; keys that distinguish most runs come first.
 export const differing = (rows, most) => ranked(rows).slice(0, most).map(({ key }) => key);
 
-// The keys among `keys` that are shown at first: not those that only few runs have changed, and of keys with the same
-// values only one.
+// Returns those of the `keys` that are shown at first. Keys that only few runs have changed are left out; of several
+// keys with the same values only one is returned.
 export function prominent(rows, keys) {
   const known = ranked(rows).filter(({ key }) => keys.includes(key));
   const main = known.filter(({ key }) => !ASIDE.test(key));
@@ -93,8 +97,8 @@ export function prominent(rows, keys) {
   return new Set(list.filter((one) => one.apart >= least && fresh(one)).map(({ key }) => key));
 }
 
-// { key, apart, courses }: number of runs whose value is not the most frequent one of their kind; the values of each kind
-// in which the key differs.
+// Returns { key, apart, courses }. `apart`: number of runs whose value is not the most frequent value of their kind.
+// `courses`: the values in each kind in which the key differs.
 function ranked(rows) {
   const found = new Map();
   [...new Set(rows.map((row) => row.kind))].filter(Boolean).forEach((kind, number) => {
@@ -112,14 +116,14 @@ function ranked(rows) {
   return [...found.values()].filter(({ key }) => !NEVER.test(key)).sort((a, b) => b.apart - a.apart);
 }
 
-// Number of values apart from the most frequent one.
+// Returns the number of values that are not the most frequent value.
 function spread(values) {
   const number = new Map();
   for (const value of values) number.set(value, (number.get(value) ?? 0) + 1);
   return values.length - Math.max(...number.values());
 }
 
-// Shortest unique prefix of each id, of at least `least` characters.
+// Returns the shortest unique prefix of each id, with at least `least` characters.
 export function shorts(ids, least = 7) {
   const sorted = [...ids].sort();
   const shared = (a = "", b = "") => {

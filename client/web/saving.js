@@ -1,13 +1,13 @@
-// Picture of the body as shown, and film of its snapshots.
+// Saving of the 3-D view as a picture, and of its snapshots as a film.
 
-const RATE = 8; // Snapshots per second of a film.
-const BITS = 12e6; // Bits per second.
+const RATE = 8; // Number of snapshots per second of a film.
+const BITS = 12e6; // Bit rate of a film, bits per second.
 const KINDS = ["video/webm;codecs=vp9", "video/webm;codecs=vp8", "video/webm"];
-const HOLD = 800; // Time for which the last snapshot of a film is shown, ms.
+const HOLD = 800; // Time for which a film shows its last snapshot, ms.
 
-// Draws the view on the background colour of the page onto `onto` (a canvas, created if missing).
+// Draws the view, on the background colour of the page, onto the canvas `onto`, which is created if it is missing.
 export function composed(view, onto = document.createElement("canvas")) {
-  view.draw(true); // The browser keeps the drawing until the end of this task.
+  view.draw(true); // The browser keeps the drawing only until the end of this task.
   const { width, height } = view.canvas;
   if (onto.width !== width || onto.height !== height) Object.assign(onto, { width, height });
   const ctx = onto.getContext("2d");
@@ -23,13 +23,14 @@ export async function picture(view, name) {
   download(blob, `${name}.png`);
 }
 
-// Reason for which this browser cannot make films, or an empty text.
+// Returns the reason why this browser cannot make films; empty if it can.
 export function hindrance() {
   if (typeof MediaRecorder === "undefined" || !HTMLCanvasElement.prototype.captureStream) return "This browser cannot record films.";
   return KINDS.some((kind) => MediaRecorder.isTypeSupported(kind)) ? "" : "This browser cannot record films in WebM.";
 }
 
-// Records a film; returns its data. `show(i)` shows snapshot i and resolves when it is drawn; `report(i)` is called before each; `signal` stops it.
+// Records a film and returns its data. `show(i)` shows snapshot i and resolves when the snapshot is drawn; `report(i)`
+// is called before each snapshot; `signal` stops the recording.
 export async function film(view, name, number, show, report, signal) {
   const canvas = composed(view);
   const stream = canvas.captureStream(RATE);

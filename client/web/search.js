@@ -1,13 +1,15 @@
-// Page of an adaptive sweep: its answer with the uncertainty; a chart of points, bracket and curve.
+// Page of an adaptive sweep: the result with its uncertainty, and a chart of points, bracket and curve.
 
 import { axis, colour, common, crosses, series } from "./axes.js";
 import { Chart } from "./charts.js";
 import { counted, exact, h, moment, si, vector } from "./figures.js";
 
 const TALL = 340;
-const SILENT = 120; // s without a report and without an open run after which the command counts as ended.
+// Time in s without a report and without an open run after which the command of the sweep counts as ended.
+const SILENT = 120;
 
-// A run may take longer than SILENT: the command reports when it ends.
+// Returns true if the sweep may continue. A run may take longer than SILENT, because the command reports when a run
+// ends.
 export const goesOn = ({ search, reported, states }, now = Date.now() / 1000) =>
   !search.over && (now - reported < SILENT || Object.keys(states).some((state) => OPEN.has(state)));
 const OPEN = new Set(["accepted", "queued", "starting", "running", "stopping"]);
@@ -28,7 +30,7 @@ export class Answer {
 
   close() { this.chart.close(); }
 
-  // `info`: the sweep from the server; `titled(name)`: title of a key or of a result.
+  // `info`: the sweep from the server. `titled(name)`: function that returns the title of a key or of a result.
   draw(info, titled) {
     Object.assign(this, { info, titled });
     const { search } = info;
@@ -81,7 +83,7 @@ export class Answer {
     };
   }
 
-  // Values are in SI units, as in the other saved tables.
+  // Returns the table to save; values are in SI units, as in other saved tables.
   table() {
     const { search: { points, key, unit, result, result_unit: up } } = this.info;
     const head = (name, si_unit) => (si_unit ? `${name} [${si_unit}]` : name);
@@ -95,17 +97,17 @@ function constants({ factor, exponent }) {
   return exponent === null ? `slope ${si(factor, "", 4)}` : `a = ${si(factor, "", 4)}, p = ${si(exponent, "", 4)}`;
 }
 
-// Further data of the sweep.
+// Returns remarks on the sweep, such as the reason of its end.
 function remarks({ why, mixed, curve, bracket }, x) {
   const beyond = curve && bracket && (curve.limit < bracket[0] || curve.limit > bracket[1]);
   return [
     why && `Ended early: ${why}.`,
-    mixed && `The threshold is passed more than once between ${x(mixed)}: the result is not monotonic, or scatters. The first passage is given.`,
-    beyond && "The limit of the curve is outside of the bracket: near it the results do not follow the law.",
+    mixed && `The threshold is crossed more than once between ${x(mixed)}: the result is not monotonic, or scatters. The first crossing is given.`,
+    beyond && "The limit of the curve lies outside of the bracket, because the results near the bracket do not follow the law.",
   ].filter(Boolean);
 }
 
-// Horizontal line: threshold. Vertical band: bracket.
+// Marks in the chart: a horizontal line at the threshold, and a vertical band for the bracket.
 function marks(bracket, threshold) {
   const quiet = { silent: true, animation: false, label: { show: false } };
   return {
@@ -114,7 +116,7 @@ function marks(bracket, threshold) {
   };
 }
 
-// The curve in the band of its standard error.
+// Returns the series of the fitted curve in the band of its standard error.
 function drawn({ law, course }, unit) {
   const line = series({ name: law, unit, colour: "line-1", data: course.map(([x, y]) => [x, y]), width: 1.6 });
   const banded = course.filter(([, , error]) => error !== null);
@@ -122,7 +124,7 @@ function drawn({ law, course }, unit) {
   return [...(banded.length ? [edge(banded.map(([x, y, error]) => [x, y - error])), { ...edge(banded.map(([x, , error]) => [x, 2 * error])), areaStyle: { color: colour("line-1"), opacity: 0.2 } }] : []), line];
 }
 
-// The limit of the curve with its standard error.
+// Returns the series of the limit of the curve with its standard error.
 function interval({ limit, error }, threshold) {
   const bar = { ...series({ name: "", colour: "line-1", data: [[limit - error, threshold], [limit + error, threshold]], width: 2.5 }), silent: true, z: 6, showSymbol: true, symbol: "rect", symbolSize: [2.5, 13] };
   return [...(error === null ? [] : [bar]), { type: "scatter", name: "limit of the curve", data: [[limit, threshold]], symbol: "diamond", symbolSize: 11, color: colour("line-1"), z: 7 }];

@@ -1,15 +1,16 @@
-// Section through the body: polygons in which a plane cuts the tets of a snapshot (docs/snapshots.md).
+// Section through a body: the polygons in which a plane cuts the tets of a snapshot (docs/snapshots.md).
 
 import { decode } from "./snapshot.js";
 
-// { header, arrays, tets }: the file of all tets; `tets` (4 n) are the nodes. Throws Error for other data.
+// Returns { header, arrays, tets } from the file of all tets; `tets` (4 n) are the nodes of the tets. Throws Error for
+// other data.
 export async function unpack(buffer) {
   const stream = new Blob([buffer]).stream().pipeThrough(new DecompressionStream("gzip"));
   const found = decode(await new Response(stream).arrayBuffer());
   return { ...found, tets: nodes(found.arrays.tet_steps) };
 }
 
-// Decodes differences, byte by byte.
+// Decodes node numbers that are stored as differences, byte by byte.
 export function nodes(steps) {
   const n = steps.length / 16;
   const out = new Int32Array(4 * n);
@@ -24,25 +25,27 @@ export function nodes(steps) {
   return out;
 }
 
-const INSET = 0.02; // Distance of a section from the end of the tets along the normal, over the extent of the tets.
+// Smallest distance of a section from the end of the tets along the normal, relative to the extent of the tets.
+const INSET = 0.02;
 
-// The place (m) along `normal` next to `middle` that is inside of the tets, whose box is given: in a half or quarter model the
-// middle of the body with its mirror images is the plane of symmetry, where the tets end.
+// Returns the position (m) along `normal` next to `middle` that lies inside of the tets, whose box is given. In a half
+// or quarter model, the middle of the body with its mirror images is the plane of symmetry, where the tets end.
 export function within(middle, [low, high], normal) {
   const ends = [false, true].map((far) => normal.reduce((sum, part, i) => sum + part * ((part < 0) === far ? low[i] : high[i]), 0));
   const inset = INSET * (ends[1] - ends[0]);
   return Math.min(ends[1] - inset, Math.max(ends[0] + inset, middle));
 }
 
-// { corners, tet, omit }: triangles in the plane `normal` · x = `at` (m), laid out as those of a surface: x, y, z and row of each
-// corner; for each triangle its tet, and which of its edges is not an edge of the tet's section.
+// Returns { corners, tet, omit }: triangles in the plane `normal` · x = `at` (m), stored like those of a surface with
+// x, y, z and row of each corner. `tet` is the tet of each triangle; `omit` is the edge of the triangle that is not an
+// edge of the section of the tet.
 export function cut(volume, normal, at) {
   const distance = distances(volume, normal, at);
   const { tets } = volume;
   const crossed = crossing(tets, distance);
   const { arrays: { positions, tet_row: rows } } = volume;
   const out = { corners: new Uint16Array(12 * crossed.triangles), tet: new Uint32Array(crossed.triangles), omit: new Uint8Array(crossed.triangles) };
-  const point = new Uint16Array(12); // Up to four of a polygon.
+  const point = new Uint16Array(12); // Up to four corners of a polygon, three numbers each.
   let made = 0;
   for (const tet of crossed.tets) {
     const number = polygon(point, positions, tets, tet, distance);
@@ -51,13 +54,14 @@ export function cut(volume, normal, at) {
       corner(out.corners, 12 * made + 4, point, k - 1, rows[tet]);
       corner(out.corners, 12 * made + 8, point, k, rows[tet]);
       out.tet[made] = tet;
-      out.omit[made] = number === 4 ? k - 1 : 0; // 1: the edge from the last corner to the first; 2: that from the first to the second.
+      // 1: the edge from the last corner to the first; 2: the edge from the first corner to the second.
+      out.omit[made] = number === 4 ? k - 1 : 0;
     }
   }
   return out;
 }
 
-// The signed distance of each node from the plane, in any unit; never 0.
+// Returns the signed distance of each node from the plane, in any unit; the distance is never 0.
 function distances({ header: { box: [low, high] }, arrays: { positions } }, normal, at) {
   const [a, b, c] = normal.map((part, i) => (part * (high[i] - low[i])) / 65535);
   const start = normal[0] * low[0] + normal[1] * low[1] + normal[2] * low[2] - at;
@@ -81,7 +85,7 @@ function crossing(tets, distance) {
   return { tets: found, triangles };
 }
 
-// Writes the corners of the polygon to `point`, in order; returns their number.
+// Writes the corners of the polygon in order to `point`; returns the number of corners.
 function polygon(point, positions, tets, tet, distance) {
   const above = [], below = [];
   for (let k = 0; k < 4; k += 1) (distance[tets[4 * tet + k]] > 0 ? above : below).push(tets[4 * tet + k]);
@@ -105,7 +109,7 @@ function corner(out, to, point, number, row) {
   out[to + 3] = row;
 }
 
-// One byte a corner of a section: the value of a field between its low and its high, or the part.
+// Returns one byte for each corner of a section: the value of a field relative to its range, or the part.
 export function cutValues({ arrays }, { tet }, by) {
   const values = by === "part" ? arrays.tet_part : arrays[`field:${by}`];
   const out = new Uint8Array(3 * tet.length);

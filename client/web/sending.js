@@ -1,22 +1,23 @@
-// Upload of a file, in the same way as the command line (docs/meshes.md): in pieces, from the first missing byte on,
-// so that a broken connection costs one piece.
+// Upload of a file, in the same way as by the command line (docs/meshes.md). Pieces are sent from the first missing
+// byte on, so that a broken connection loses at most one piece.
 
 import { Problem, call } from "./api.js";
 
-const LARGEST = 1 << 20; // Bytes of a piece: a proxy takes bodies of 1 MiB.
-const PAUSE = 500; // ms after a break before the server is asked for its number of bytes.
-const PATIENCE = 60000; // ms without progress after which the upload is given up.
+const LARGEST = 1 << 20; // Size of a piece, bytes; a proxy accepts requests of 1 MiB.
+const PAUSE = 500; // Pause in ms after a broken connection before the page asks the server how many bytes have arrived.
+const PATIENCE = 60000; // Time in ms without progress after which the upload is given up.
 const PASSING = new Set(["wrong_offset", "in_progress", "incomplete", "busy"]);
 const pause = (ms) => new Promise((resolve) => setTimeout(resolve, ms));
 
-// { offset, whole } of a file by its sha256; 0 and false for an unknown one. The file is searched in the list of the
-// user's files: a browser logs an answer of 404 as an error of the page.
+// Returns { offset, whole } of a file by its sha256; 0 and false for an unknown file. The page searches the list of the
+// user's files, because a browser logs an answer 404 as an error of the page.
 export async function there(sha256, signal) {
   const { files } = await call("v1/files", { signal });
   return files.find((file) => file.sha256 === sha256) ?? { offset: 0, whole: false };
 }
 
-// On return the server has the file; `onBytes` is called with the number of sent bytes. Throws Problem, Error.
+// Sends a file; on return the server has the file. `onBytes` is called with the number of sent bytes. Throws Problem,
+// Error.
 export async function sendFile(file, sha256, onBytes, signal) {
   let { offset, whole } = await there(sha256, signal);
   let moved = Date.now();
@@ -42,5 +43,5 @@ function piece(file, sha256, offset, signal) {
   return call(`v1/files/${sha256}`, { method: "PUT", headers, body, signal });
 }
 
-// True if the same piece may be sent later: another client sends the file now, or the server does not answer.
+// Returns true if the same piece may be sent later: another client is sending the file, or the server does not answer.
 const passes = (error) => !(error instanceof Problem) || error.status >= 500 || error.status === 408 || PASSING.has(error.body?.code);

@@ -1,8 +1,8 @@
-// sha256 of a file (FIPS 180-4), piece by piece. crypto.subtle needs the whole file in memory, and is missing on
-// pages over plain http from another machine; so all files and addresses use this code.
+// sha256 of a file (FIPS 180-4), computed piece by piece. crypto.subtle needs the whole file in memory, and does not
+// exist on pages over plain http from another machine. Therefore this code is used for all files and addresses.
 
 const BLOCK = 64;
-const PIECE = 1 << 22; // Bytes that are read and hashed at once: some 20 ms.
+const PIECE = 1 << 22; // Number of bytes that are read and hashed at a time, which takes about 20 ms.
 const primes = (n) => {
   const found = [];
   for (let k = 2; found.length < n; k += 1) if (found.every((p) => k % p)) found.push(k);
@@ -20,7 +20,7 @@ export class Sha256 {
     Object.assign(this, { held: 0, length: 0 });
   }
 
-  // Adds the next bytes, a Uint8Array.
+  // Adds the next bytes of the data, a Uint8Array.
   update(bytes) {
     this.length += bytes.length;
     let at = 0;
@@ -38,7 +38,8 @@ export class Sha256 {
     return this;
   }
 
-  // All words are signed: engines keep signed words in registers, unsigned words become floating-point numbers.
+  // All 32-bit words are signed: engines keep signed words in registers, whereas unsigned words become floating-point
+  // numbers.
   block(bytes, at) {
     const { state, words: w } = this;
     for (let i = 0, o = at; i < 16; i += 1, o += 4) w[i] = (bytes[o] << 24) | (bytes[o + 1] << 16) | (bytes[o + 2] << 8) | bytes[o + 3];
@@ -60,7 +61,7 @@ export class Sha256 {
     state[0] += a; state[1] += b; state[2] += c; state[3] += d; state[4] += e; state[5] += f; state[6] += g; state[7] += h;
   }
 
-  // Digest of all bytes in hexadecimal digits; nothing can be added afterwards.
+  // Returns the digest of all bytes in hexadecimal digits; afterwards no bytes can be added.
   digest() {
     const blocks = this.held + 9 > BLOCK ? 2 : 1;
     const view = new DataView(this.rest.buffer);
@@ -73,7 +74,8 @@ export class Sha256 {
   }
 }
 
-// sha256 of a File or Blob; `onBytes` is called with the number of bytes read. The page stays responsive between pieces.
+// Returns the sha256 of a File or Blob. `onBytes` is called with the number of bytes read. The page stays responsive
+// between pieces.
 export async function hashed(file, onBytes, signal) {
   const hash = new Sha256();
   for (let at = 0; at < file.size; at += PIECE) {

@@ -1,10 +1,11 @@
-// Shaders of the body: positions from 16 bits, an offset and a colour of each fragment from small textures.
+// Shaders of the 3-D view: positions from 16-bit numbers, offset and colour of each fragment from small textures.
 
-export const ROWS_WIDTH = 256; // Number of texels in a line of a texture that has one texel for each fragment.
+export const ROWS_WIDTH = 256; // Number of texels in a row of a texture that has one texel for each fragment.
 export const MOST_PARTS = 256;
 
-// `mirrors`: planes, x y z of the normal and the distance; bit k of the image's number: it lies behind plane k.
-// `layer`: -1 draws the opaque parts, k the part k alone. Other vertices are moved outside the view.
+// Vertex shader. `mirrors`: planes with x, y, z of the normal and the distance; bit k of the number of an image means
+// that the image lies behind plane k. `layer`: -1 draws the opaque parts, k draws only part k. Other vertices are moved
+// outside of the view.
 export const VERTEX = `
 precision highp float;
 precision highp int;
@@ -52,9 +53,9 @@ void main() {
   if (layer < 0 ? !solid : (solid || opacity < 0.005 || int(part + 0.5) != layer)) gl_Position = vec4(2.0, 2.0, 2.0, 1.0);
 }`;
 
-// mode 0: the colour of the fragment; 1: the value through the map; 2: the number of the row, to pick by and to find outlines.
-// Faces in a plane of symmetry (nearer than `thin`) lie between a body and its image, and are not drawn.
-// `cap` 1: a section, without light and without cutting. `plane`: the material beyond it is cut away.
+// Fragment shader. mode 0: colour of the fragment; mode 1: colour of the value; mode 2: number of the row, for picking
+// and for outlines. Faces in a plane of symmetry (nearer than `thin`) lie between a body and its image and are not
+// drawn. `cap` 1: a section, without light and without cutting. `plane`: the material beyond the plane is cut away.
 export const FRAGMENT = `
 precision highp float;
 precision highp int;
@@ -99,12 +100,13 @@ void main() {
   colour = vec4(shade, opacity);
 }`;
 
-// One triangle over the whole picture, for the lines where the numbers of `rows` change.
+// Vertex shader of one triangle over the whole picture, for lines where the numbers of `rows` change.
 export const OVER = `
 precision highp float;
 void main() { gl_Position = vec4(gl_VertexID == 1 ? 3.0 : -1.0, gl_VertexID == 2 ? 3.0 : -1.0, 0.0, 1.0); }`;
 
-// Thin lines round every fragment, and a thick line in its own colour round the selected fragment.
+// Fragment shader that draws thin lines around every fragment, and a thick line in its own colour around the selected
+// fragment.
 export const LINES = `
 precision highp float;
 precision highp int;
@@ -125,7 +127,8 @@ void main() {
   for (int i = -1; i <= 1; i += 1) for (int j = -1; j <= 1; j += 1) {
     if (at(here + ivec2(i, j), size) != own) differ += i == 0 || j == 0 ? 1.0 : 0.7;
   }
-  colour = vec4(ink, strength * min(differ / 3.0, 1.0)); // 2.4 at a straight line, less beside its steps.
+  // differ is 2.4 at a straight line, and less at the steps of a line
+  colour = vec4(ink, strength * min(differ / 3.0, 1.0));
   if (picked < 0) return;
   float close = 0.0;
   for (int i = -thick; i <= thick; i += 1) for (int j = -thick; j <= thick; j += 1) {

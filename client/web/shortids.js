@@ -1,11 +1,12 @@
-// Short ids: the shortest unique prefix, as in the table.
+// Short ids of runs: the shortest unique prefixes, as in the table of runs.
 
 import { call, refused } from "./api.js";
 
 const LENGTH = 22;
 const LAST = "z".repeat(LENGTH);
 
-// Whole id of a prefix; the prefix itself if it is unknown or ambiguous: the server reports the problem.
+// Returns the complete id for a prefix. If the prefix is unknown or ambiguous it is returned unchanged, and the server
+// reports the problem.
 async function whole(name, list) {
   if (name.length >= LENGTH || !/^[0-9a-z]+$/.test(name)) return name;
   const found = await list(name);
@@ -15,7 +16,8 @@ async function whole(name, list) {
 const runs = async (name) => (await call(`v1/runs?limit=2&prefix=${name}`)).runs;
 const sweeps = async (name) => (await call(`v1/sweeps?limit=2&before=${name}${LAST}`)).sweeps.filter(({ id }) => id.startsWith(name));
 
-// Whole ids of the names of a page; unchanged after a refusal. Throws Error without an answer.
+// Returns the complete ids for the names in an address; names are unchanged after a refusal by the server. Throws Error
+// if the server does not answer.
 export async function wholeNames(page, names) {
   try {
     return await Promise.all(names.map((name) => whole(name, page === "sweep" ? sweeps : runs)));

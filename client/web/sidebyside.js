@@ -1,4 +1,4 @@
-// Bodies of several runs side by side: one camera, one clock, one section and one colour scale.
+// 3-D views of several runs side by side: one camera, one time, one section and one colour scale for all views.
 
 import { share } from "./camera.js";
 import { h, si } from "./figures.js";
@@ -13,8 +13,8 @@ import { Tools } from "./tools.js";
 
 const MOST = 4;
 const AT_FIRST = matchMedia("(min-width: 1100px)").matches ? 3 : 2;
-const PLAY = 400; // ms for each step of the clock.
-const STEPS = 100; // Steps of the clock.
+const PLAY = 400; // Time in ms for each step of the common time.
+const STEPS = 100; // Number of steps of the common time from the start to the end.
 
 export class SideBySide {
   constructor() {
@@ -34,7 +34,7 @@ export class SideBySide {
     this.row.addEventListener("keydown", (event) => this.key(event));
   }
 
-  // Runs with snapshots, { id, snapshots, line, called, plan }; the first two or three are shown.
+  // Takes the runs with snapshots, { id, snapshots, line, called, plan }; the first two or three runs are shown.
   offer(runs) {
     this.runs = runs;
     this.element.hidden = !runs.length;
@@ -45,7 +45,7 @@ export class SideBySide {
     if (this.seen) this.place();
   }
 
-  // The body is drawn when it comes near the window.
+  // The 3-D views are drawn when they come near the window.
   whenSeen() {
     const eye = new IntersectionObserver((entries) => {
       if (!entries.at(-1).isIntersecting) return;
@@ -71,7 +71,7 @@ export class SideBySide {
     this.place();
   }
 
-  // A pane for each selected run.
+  // Makes a view for each selected run.
   async place() {
     const modules = await three().catch(() => null);
     if (!modules) return this.row.replaceChildren(h("p.hint", {}, "No 3-D: the server has no libraries for it"));
@@ -98,7 +98,8 @@ export class SideBySide {
     this.panes.delete(id);
   }
 
-  // Panes in the order of their selection; the first has the legend and the frame of all.
+  // Returns the views in the order of their selection; the first view has the legend, and its framed region is used for
+  // all.
   get shown() { return this.chosen.map((id) => this.panes.get(id)).filter(Boolean); }
 
   get view() { return this.shown[0]?.view; }
@@ -116,7 +117,7 @@ export class SideBySide {
     this.paint();
   }
 
-  // Colourings that all bodies have, and the parts of all.
+  // Offers the colourings that all bodies have, and the parts of all bodies.
   offerTools() {
     const snapshots = this.shown.map(({ snapshot }) => snapshot).filter(Boolean);
     if (!snapshots.length) return;
@@ -128,7 +129,7 @@ export class SideBySide {
     this.tell();
   }
 
-  // One colour scale for all shown bodies, and for all times unless the user selects another scale.
+  // Sets one colour scale for all shown bodies; the scale is valid for all times unless the user selects another scale.
   paint() {
     const panes = this.shown.filter(({ snapshot }) => snapshot);
     const { by: { value: by }, choice } = this.tools;
@@ -165,7 +166,7 @@ export class SideBySide {
     this.view?.eye.follow(mode, part === undefined ? null : Number(part));
   }
 
-  // Choices of the panel Show, which every new pane gets.
+  // Returns the choices in the panel Show, which every new view gets.
   looks() {
     const { tools } = this;
     return { ...Object.fromEntries(["lines", "edges", "arrows", "axes", "bar"].map((name) => [name, tools[name].checked])), explode: Number(tools.explode.value) };

@@ -1,4 +1,5 @@
-// A snapshot of the fragments: from bytes (docs/reference/snapshots.md) to the data of the view and the tables.
+// Decoding of a snapshot of the fragments: from bytes (docs/reference/snapshots.md) to the data of the view and of the
+// tables.
 
 const MAGIC = "CONOSNAP";
 const VERSION = 1;
@@ -7,9 +8,10 @@ const TYPES = {
   uint8: Uint8Array, uint16: Uint16Array, uint32: Uint32Array, int64: BigInt64Array, float32: Float32Array, float64: Float64Array,
 };
 const DUST = 10; // Smallest number of tets of a fragment that is not dust, as in conoid.cases.output.fragments.
-const MOST_ROWS = 65536; // Largest number of rows: a vertex has the number of its row in 16 bits.
+// Largest number of rows of the table of fragments, because a vertex stores the number of its row in 16 bits.
+const MOST_ROWS = 65536;
 
-// { header, arrays: { name: typed array, flat } }, without a copy. Throws Error for other data.
+// Returns { header, arrays: { name: typed array, flat } } without copying data. Throws Error for other data.
 export function decode(buffer) {
   const bytes = new DataView(buffer);
   if (buffer.byteLength < START || new TextDecoder().decode(new Uint8Array(buffer, 0, 8)) !== MAGIC) throw new Error("not a snapshot");
@@ -23,7 +25,7 @@ export function decode(buffer) {
   return { header, arrays };
 }
 
-// Separate corners of the triangles, without sharing: x, y, z and the row of the fragment.
+// Returns separate corners of all triangles (no shared vertices): x, y, z and the row of the fragment.
 export function corners({ positions, triangles, vertex_fragment: rows }) {
   const out = new Uint16Array(4 * triangles.length);
   for (let i = 0, o = 0; i < triangles.length; i += 1) {
@@ -36,17 +38,17 @@ export function corners({ positions, triangles, vertex_fragment: rows }) {
   return out;
 }
 
-// Colourings of the triangles: "fragment", "part", "rank" and the fields of this case.
+// Returns the colourings of the triangles: "fragment", "part", "rank" and the fields of this case.
 export const colourings = ({ header }) => ["fragment", "part", ...(header.ranks > 1 ? ["rank"] : []), ...Object.keys(header.fields)];
 
-// The colouring of a body before the user has chosen one: bodies that do not break have one colour each, and their plastic
-// strain shows more.
+// Returns the default colouring of a body. Bodies that do not break have one colour each, so that their plastic strain
+// shows more.
 export function telling({ header: { fields, fragments_total: number, parts } }) {
   const breaks = "broken_faces" in fields || number > parts.length;
   return !breaks && "plastic_strain" in fields ? "plastic_strain" : "fragment";
 }
 
-// One byte a corner: the rank and the part by number, a field between its low and its high.
+// Returns one byte for each corner: the number of the rank or part, or the value of a field relative to its range.
 export function cornerValues({ arrays }, by) {
   const name = { rank: "triangle_rank", part: "triangle_part" }[by] ?? `field:${by}`;
   const values = arrays[name];
@@ -56,7 +58,8 @@ export function cornerValues({ arrays }, by) {
   return out;
 }
 
-// A row of the table of fragments, in SI; `rest` if it stands for all fragments without a row of their own.
+// Returns a row of the table of fragments in SI; `rest` is true if the row stands for all fragments without a row of
+// their own.
 export function fragment({ arrays }, row) {
   const vector = (name) => [0, 1, 2].map((axis) => arrays[name][3 * row + axis]);
   return {
@@ -65,11 +68,12 @@ export function fragment({ arrays }, row) {
   };
 }
 
-// Row of a fragment in another snapshot of the run; -1 if it does not exist there.
+// Returns the row of a fragment in another snapshot of the run; -1 if the fragment does not exist there.
 export const rowOf = ({ arrays }, id) => arrays.fragment_id.indexOf(id);
 
-// N(size): number of fragments of a size and larger, from the smallest on, and the best fitting law.
-// Fragments of fewer than DUST tets have no shape of their own and are left out, as in the tables of the run.
+// Returns N(size), the number of fragments of at least a size, beginning with the smallest size, and the best fitting
+// law. Fragments of fewer than DUST tets are left out, as in the tables of the run, because their shape is that of
+// single tets.
 export function sizes({ arrays }) {
   const whole = [...arrays.fragment_size].filter((size, row) => size > 0 && arrays.fragment_id[row] >= 0n && arrays.fragment_tets[row] >= DUST);
   const sorted = whole.sort((a, b) => a - b);
@@ -78,8 +82,9 @@ export function sizes({ arrays }) {
   return { points: sorted.map((size, i) => [size, sorted.length - i]), dust: arrays.fragment_id.length - sorted.length, best };
 }
 
-// Rayleigh, exponential and power law by maximum likelihood of sizes from the shortest on (conoid.cases.output.fragments.fits):
-// each with its parameter, the sum of ln(density), and the share of fragments that are longer than a size.
+// Fits a Rayleigh, an exponential and a power law to sizes by maximum likelihood (conoid.cases.output.fragments.fits).
+// Returns, for each law, its parameter, the sum of ln(density), and the fraction of fragments that are longer than a
+// size.
 export function laws(values) {
   const [n, low, high] = [values.length, values[0], values.at(-1)];
   if (n < 2 || !(low > 0) || low === high) return [];

@@ -1,8 +1,9 @@
-// Sorting, filters and groups of the rows of a table. No elements are created here.
+// Sorting, filters and groups of the rows of a table. The module creates no elements.
 
 const collator = new Intl.Collator("en", { numeric: true });
 
-// Rows sorted by a column. Missing values are last in both directions, `unsure` ones before them; equal ones by age, newest first.
+// Returns rows sorted by a column. Missing values are last in both directions, preceded by `unsure` values; equal
+// values are sorted by age, newest first.
 export function sorted(rows, column, down) {
   const sign = down ? -1 : 1;
   const keyed = rows.map((row) => [column.value(row), row, column.unsure?.(row) ?? false]);
@@ -13,17 +14,17 @@ export function sorted(rows, column, down) {
 }
 
 const COMPARED = /^(.+?)(<=|>=|<|>|=)(-?(?:\d+\.?\d*|\.\d+)(?:e[+-]?\d+)?)$/i;
-const NEAR = 1e-9; // Relative difference of a number that is written in another unit.
+const NEAR = 1e-9; // Relative tolerance for the comparison of a number that is written in another unit.
 const HOLDS = { "<": (way) => way < 0, ">": (way) => way > 0, "<=": (way) => way <= 0, ">=": (way) => way >= 0, "=": (way) => way === 0 };
 
-// A test of rows for words that must all match: text anywhere, the beginning of an id, state:failed, case:bar, or a
-// number of a column in its unit, such as speed_end>12.
+// Returns a test of rows for words that must all match. A word is text anywhere in a row, the beginning of an id,
+// state:failed, case:bar, or a comparison of a column in its unit, such as speed_end>12.
 export function matcher(text, columns) {
   const tests = text.trim().split(/\s+/).filter(Boolean).map((word) => tested(word.toLowerCase(), columns));
   return (row) => tests.every((test) => test(row));
 }
 
-// Ids of the columns whose numbers a filter compares.
+// Returns the ids of the columns whose numbers a filter compares.
 export function compared(text, columns) {
   const names = text.trim().toLowerCase().split(/\s+/).map((word) => COMPARED.exec(word)?.[1]).filter(Boolean);
   return new Set(names.map((name) => named(columns, name)?.id));
@@ -51,7 +52,8 @@ const named = (columns, name) => {
   return by((title) => title === name) ?? by((title) => title.includes(name));
 };
 
-// { key, rows } of each group, in the order of its first row; runs without a sweep have the key "" and come last.
+// Returns { key, rows } for each group, in the order of its first row. Runs without a sweep have the key "" and come
+// last.
 export function grouped(rows, by) {
   const groups = new Map();
   for (const row of rows) {

@@ -1,11 +1,12 @@
-// Values that this browser stores for the next visit. Without storage (a private window, no space) they last as
+// Values that this browser stores for the next visit. Without storage (a private window, no space) the values last as
 // long as the page.
 
 import { h } from "./figures.js";
 
 const here = new Map();
 
-// A value of another type than `otherwise`, which another version of the page may have stored, counts as missing.
+// Returns a stored value. A value of another type than `otherwise`, which another version of the page may have stored,
+// counts as missing.
 export function recall(key, otherwise) {
   const there = stored(key) ?? here.get(key);
   return there !== undefined && alike(there, otherwise) ? there : otherwise;
@@ -19,8 +20,8 @@ function stored(key) {
   }
 }
 
-// Whether a stored value has the type of the example. Objects are compared field by field, a list must contain texts
-// only, and an example null accepts any type.
+// Returns true if a stored value has the type of an example. Objects are compared field by field, a list must contain
+// only texts, and the example null accepts any type.
 function alike(value, example) {
   if (example === null || example === undefined) return true;
   if (Array.isArray(example)) return Array.isArray(value) && value.every((one) => typeof one === "string");
@@ -33,11 +34,11 @@ export function remember(key, value) {
   try {
     localStorage.setItem(`conoid.${key}`, JSON.stringify(value));
   } catch {
-    // The value lasts as long as the page.
+    // Without storage the value lasts as long as the page.
   }
 }
 
-// A section that opens and closes by its title; its state is stored.
+// Returns a section that opens and closes by its title; whether it is open is stored.
 export function fold(key, open, title, ...content) {
   const element = h("details.fold", { open: recall(`fold.${key}`, open) ? "" : false, ontoggle: () => remember(`fold.${key}`, element.open) },
     h("summary", {}, title), ...content);

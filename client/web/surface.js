@@ -1,4 +1,4 @@
-// Meshes of a snapshot: one mesh for all fragments and all images behind planes of symmetry, and the sections.
+// Meshes that show a snapshot: one mesh for all fragments and their mirror images, and meshes for the sections.
 
 import { ofFragment, ofName } from "./colours.js";
 import { partOf } from "./framing.js";
@@ -7,7 +7,7 @@ import { cut, cutValues } from "./section.js";
 import { FRAGMENT, MOST_PARTS, ROWS_WIDTH, VERTEX } from "./shaders.js";
 import { cornerValues, corners } from "./snapshot.js";
 
-export const OPEN = 1e30; // Position of a section plane that cuts nothing, m.
+export const OPEN = 1e30; // Position of a section plane that cuts nothing away, m.
 const LAYERS = ["solid", "depth", "colour"];
 
 export class Surface {
@@ -29,7 +29,7 @@ export class Surface {
     this.opacity = [];
   }
 
-  // A mesh with one material for each layer; they share their uniforms.
+  // Returns a mesh with one material for each layer; the materials share their uniforms.
   mesh(own) {
     const { InstancedBufferGeometry, Mesh, RawShaderMaterial, DoubleSide, GLSL3 } = this.three;
     const more = { solid: {}, depth: { colorWrite: false }, colour: { transparent: true } };
@@ -95,7 +95,7 @@ export class Surface {
     this.replace("tints", this.texture(tints, ROWS_WIDTH, height));
   }
 
-  // `range` { low, high } of the scale of a field, in so many bands.
+  // Sets the colouring; `range` { low, high } is the scale of a field, `bands` the number of its bands.
   colour(by, range, bands) {
     Object.assign(this, { by, range, bands });
     const field = this.snapshot.header.fields[by];
@@ -113,7 +113,7 @@ export class Surface {
     this.shared.shown.value.needsUpdate = true;
   }
 
-  // Images behind planes of symmetry, { axis, at } each. Fragments explode from a middle on these planes.
+  // Sets the planes of mirror images, { axis, at } each. Fragments explode from a middle on these planes.
   reflect(planes) {
     this.planes = planes;
     const [low, high] = this.snapshot.header.box;
@@ -126,7 +126,8 @@ export class Surface {
 
   // Sections ------------------------------------------------------------------------------------------------------------
 
-  // `section`: { normal, at } or null; the material beyond is cut away. Without all tets, or with null, there is no cap.
+  // Sets the section { normal, at }, or null; the material beyond the plane is cut away. Without all tets, or with
+  // null, the section is not filled.
   slice(section) {
     this.section = section;
     if (section) this.shared.plane.value.set(...section.normal, section.at);
@@ -150,7 +151,7 @@ export class Surface {
     this.tintCaps();
   }
 
-  // Section of each image, at the position of the body itself; images with equal sections use one section.
+  // Makes the filled section for each image, at the position of the body itself; images with equal sections share it.
   images() {
     const known = new Map();
     return Array.from({ length: 2 ** this.planes.length }, (_, image) => {
@@ -181,7 +182,8 @@ export class Surface {
 
   // Passes --------------------------------------------------------------------------------------------------------------
 
-  // Draws opaque parts, then each transparent part, the farthest first: only its nearest surface, over what is behind it.
+  // Draws the opaque parts, then each transparent part, the farthest first. Of a transparent part only its nearest
+  // surface is drawn, over what is behind it.
   draw(renderer, camera) {
     this.pass(renderer, camera, "solid", -1);
     for (const part of this.ghosts(camera)) {
@@ -210,7 +212,7 @@ export class Surface {
     return new this.three.Vector3(...centres.subarray(3 * heaviest, 3 * heaviest + 3));
   }
 
-  // Draws the number of the row at each pixel.
+  // Draws the number of the fragment's row at each pixel.
   numbers(renderer, camera, layers = [-1]) {
     const before = [this.own.mode.value, this.capOwn.mode.value];
     this.own.mode.value = this.capOwn.mode.value = 2;
@@ -228,7 +230,7 @@ export class Surface {
 }
 
 function scaled(range, field, { low, high } = {}) {
-  if (!field) return range.set(255 / 256, 0.5 / 256); // The middle of the number's texel.
+  if (!field) return range.set(255 / 256, 0.5 / 256); // Points to the middle of the texel of the number.
   const width = high - low || 1;
   return range.set((field.high - field.low) / width, (field.low - low) / width);
 }

@@ -1,4 +1,4 @@
-// Page of a sweep: number of completed points, a result over the changed keys, each point with its values.
+// Page of a sweep: number of completed points, a result over the changed keys, and each point with its values.
 
 import { Problem, call, download, refused } from "./api.js";
 import { axis, crosses, largest, lineStyle, series } from "./axes.js";
@@ -14,11 +14,11 @@ import { curves, lost, matrix, telling, together } from "./response.js";
 import { RunTable, shorts } from "./runtable.js";
 import { fill } from "./toolbar.js";
 
-const AGAIN = 2000; // ms after which an open sweep is read again.
-const LATER = 10000; // ms for an adaptive sweep whose command may continue.
+const AGAIN = 2000; // Time in ms after which an open sweep is read again.
+const LATER = 10000; // Time in ms after which an adaptive sweep is read again whose command may continue.
 const TALL = 320;
 const PAGE = 500;
-const BRIEF = 9; // Characters of the id that are shown.
+const BRIEF = 9; // Number of characters of the id that are shown.
 
 export class SweepPage {
   // `onRefused` is called when the token is no longer valid.
@@ -64,7 +64,7 @@ export class SweepPage {
     this.grid.region.hidden = true;
   }
 
-  // Key of stored choices: the same for all sweeps of a case.
+  // Returns the key under which choices are stored; it is the same for all sweeps of a case.
   name(what) { return `sweep.${what}.${this.info?.name}`; }
 
   async read() {
@@ -97,7 +97,7 @@ export class SweepPage {
     this.problem.textContent = words;
   }
 
-  // Points whose run has ended or was removed.
+  // Returns the number of points whose run has ended or was removed.
   get ended() { return Object.entries(this.info.states).reduce((sum, [state, n]) => sum + (FINAL.has(state) ? n : 0), this.info.removed); }
 
   get finished() {
@@ -138,19 +138,19 @@ export class SweepPage {
     this.fail("");
   }
 
-  // Title of a key or of a result, as in the table.
+  // Returns the title of a key or of a result, as in the table.
   titled(name) { return [...this.keys, ...this.results].find(({ full }) => full === name)?.title ?? name; }
 
   drawFailed() {
     const failed = this.points.filter(({ row }) => FINAL.has(row.state) && row.state !== "succeeded");
     this.failed.hidden = !failed.length;
-    if (this.failed.number === failed.length) return; // The links keep the focus.
+    if (this.failed.number === failed.length) return; // The list stays unchanged, so that its links keep the focus.
     this.failed.number = failed.length;
     this.failed.replaceChildren(h("div.card-head", {}, h("h2", {}, `${counted(failed.length, "point")} without a result`)),
       h("ul", {}, failed.map(({ n, row }) => h("li", {}, pill(row.state), " ", h("a", { href: `#/runs/${row.id}` }, this.words(row, n)), " ", row.message || row.cause || ""))));
   }
 
-  // Text of a point: the values of its keys.
+  // Returns the text of a point: the values of its keys.
   words(row, n) {
     return this.keys.map((key) => `${key.title} ${key.text(row)}${key.unit ? ` ${key.unit}` : ""}`).join(", ") || `point ${n + 1}`;
   }
@@ -208,7 +208,8 @@ export class SweepPage {
   // The response -------------------------------------------------------------------------------------------------------
 
   choices() {
-    const others = this.results.filter(({ id }) => id !== `result:${this.info.search?.result}`); // The threshold has a chart of its own.
+    // The threshold of an adaptive sweep has a chart of its own.
+    const others = this.results.filter(({ id }) => id !== `result:${this.info.search?.result}`);
     const wanted = recall(this.name("result"), telling(this.points, others.length ? others : this.results)?.id);
     fill(this.result, this.results.map(({ id, full, title }) => [id, full ?? title]), wanted);
     fill(this.over, this.groups.map(({ id, full }) => [id, full]), recall(this.name("over"), this.groups[0]?.id));
@@ -264,7 +265,7 @@ export class SweepPage {
   }
 }
 
-// A cell of the matrix: its number on its colour, or the state of its run.
+// Returns a cell of the matrix: its number on its colour, or the state of its run.
 function square({ points, value, share }, result) {
   if (!points.length) return h("td");
   const { row } = points[0];
@@ -274,8 +275,8 @@ function square({ points, value, share }, result) {
   return h("td", {}, link);
 }
 
-// Keys of a sweep as columns: with the values of the case with all defaults in SI units, if it has the key; else as
-// they were written.
+// Returns the keys of a sweep as columns. The values come from the case with all defaults, in SI units, if it has the
+// key; otherwise they are as written by the user.
 function keyColumns(points, units) {
   const rows = points.map(({ row }) => row);
   const keys = [...new Set(points.flatMap(({ values }) => Object.keys(values)))];

@@ -1,4 +1,4 @@
-// Files made by the page: tables as CSV in SI units, pictures as SVG.
+// Files that the page makes: tables as CSV in SI units, pictures as SVG.
 
 import { h } from "./figures.js";
 
@@ -18,8 +18,8 @@ const cell = (value) => {
 
 export const toCsv = (head, rows) => [head, ...rows].map((row) => row.map(cell).join(",")).join("\n").concat("\n");
 
-// Drawn data as a table: x and a column for each series, a row for each point. Series with the same x share rows;
-// others have empty cells.
+// Returns the drawn data as a table with x and a column for each series. Series with equal x share rows; a missing
+// value is an empty cell.
 export function tableOf({ series, xName = "t [s]" }) {
   const drawn = series.filter(({ data, aside }) => data?.length && !aside);
   const rows = new Map();
@@ -32,7 +32,7 @@ export function tableOf({ series, xName = "t [s]" }) {
   return { head, rows: [...rows.values()].sort((a, b) => a[0] - b[0]) };
 }
 
-// All lines of a history.csv with t and the named columns, even if a chart draws fewer.
+// Returns all rows of a history.csv with t and the named columns, even if a chart draws fewer points.
 export function pick(text, names) {
   const [head, ...lines] = text.split(/\r?\n/).filter(Boolean);
   const columns = head.split(",");
@@ -41,5 +41,5 @@ export function pick(text, names) {
   return { head: places.map((place) => columns[place]), rows: rows.map((cells) => places.map((place) => cells[place])) };
 }
 
-// Cells of a line; a cell with a comma is quoted.
+// Returns the cells of a CSV line; a cell with a comma is quoted.
 const split = (line) => (line.includes('"') ? [...line.matchAll(/(?:^|,)(?:"((?:[^"]|"")*)"|([^,]*))/g)].map(([, quoted, plain]) => quoted?.replaceAll('""', '"') ?? plain) : line.split(","));

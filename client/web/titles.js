@@ -1,12 +1,14 @@
-// Titles of columns for keys of cases: "ball velocity z" for "parts[0].velocity[2]". No elements are created here.
+// Titles of columns for keys of cases, such as "ball velocity z" for "parts[0].velocity[2]". The module creates no
+// elements.
 
 import { words } from "./figures.js";
 
-const LEFT_OUT = new Set(["parts", "run", "boundaries", "materials", "numerics", "mesh"]); // Tables that titles leave out.
+// Names of tables that titles leave out.
+const LEFT_OUT = new Set(["parts", "run", "boundaries", "materials", "numerics", "mesh"]);
 const AXES = ["x", "y", "z"];
 const MEMBER = { parts: "part", boundaries: "boundary", probes: "probe" };
 
-// Map of keys to titles. Keys that would have the same title are their own titles.
+// Returns a map of keys to titles. If several keys would have the same title, each key is its own title.
 export function titles(keys, rows) {
   const bases = [...new Set(rows.map(({ base }) => base))];
   const found = new Map(keys.map((key) => [key, titled(key, bases)]));
@@ -26,7 +28,8 @@ function titled(key, bases) {
   return words(found.filter(Boolean).join(" "));
 }
 
-// A member of a list: an axis of a vector, the name that all cases give it, or its number from 1.
+// Returns the title of a member of a list: an axis for a vector, the name that all cases give to the member, or its
+// number from 1.
 function member(list, name, place, bases) {
   const vector = bases.length > 0 && bases.every((base) => `${list}[2]` in base && !(`${list}[3]` in base));
   if (vector && place < AXES.length) return `${name} ${AXES[place]}`;

@@ -1,4 +1,4 @@
-// Token of this tab, or the one that this browser has stored. Without storage the token lasts as long as the page.
+// Token of this tab, or the token that this browser has stored. Without storage the token lasts as long as the page.
 
 const KEY = "conoid.token";
 let here = "";
@@ -16,7 +16,7 @@ const lasting = () => localStorage;
 export const token = {
   get: () => here || (at(session, (store) => store.getItem(KEY)) ?? at(lasting, (store) => store.getItem(KEY)) ?? ""),
 
-  // `remembered`: also for other tabs and later visits.
+  // Sets the token; with `remembered` it is stored for other tabs and later visits.
   set(text, remembered = false) {
     here = text;
     at(session, (store) => store.setItem(KEY, text));
@@ -30,7 +30,7 @@ export const token = {
     at(lasting, (store) => store.removeItem(KEY));
   },
 
-  // Calls `onChange(text)` when another tab stores a token, or signs out ("").
+  // Calls `onChange(text)` when another tab stores a token or signs out (text "").
   listen(onChange) {
     addEventListener("storage", ({ key, newValue, storageArea }) => {
       if (key === KEY && storageArea === at(lasting, (store) => store)) onChange(newValue ?? "");

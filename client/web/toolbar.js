@@ -5,10 +5,11 @@ import { recall, remember } from "./storage.js";
 
 const DAYS = [["", "any time"], ["1", "last day"], ["7", "last 7 days"], ["30", "last 30 days"]];
 const GROUPS = [["", "no groups"], ["sweep", "by sweep"], ["case", "by case"]];
-const TYPING = 80; // ms without a key after which the table is filtered.
+const TYPING = 80; // Time in ms without a key press after which the table is filtered.
 
 export class Toolbar {
-  // `kept`: { text, state, days, marked }, which is changed here; `on`: { change(), sort(words), compare(), unmark() }.
+  // `kept`: { text, state, days, marked }, which the controls change. `on`: callbacks { change(), sort(words),
+  // compare(), unmark() }.
   constructor(kept, on) {
     Object.assign(this, { kept, on });
     const change = (name) => ({ target }) => {
@@ -56,7 +57,7 @@ export class Toolbar {
     this.search.focus();
   }
 
-  // `rows`: all rows; `choice`: columns that the user has selected or hidden.
+  // Draws the controls. `rows`: all rows; `choice`: columns that the user has selected or hidden.
   draw({ columns, choice, sort, rows }) {
     const states = new Map();
     for (const { state } of rows) states.set(state, (states.get(state) ?? 0) + 1);
@@ -90,8 +91,8 @@ export class Toolbar {
   }
 }
 
-// Options of a list, made again only after a change: an open list would close. An unknown value selects
-// the first option.
+// Sets the options of a list only after a change, because setting them would close an open list. An unknown value
+// selects the first option.
 export function fill(element, choices, value) {
   const stamp = JSON.stringify(choices);
   if (element.stamp !== stamp) element.replaceChildren(...choices.map(([name, shown]) => h("option", { value: name }, shown)));

@@ -1,4 +1,5 @@
-// Tools of the body: colour, section, camera, scale, parts, display, fragments, saving. The browser stores the choices.
+// Tools of the 3-D view: colour, section, camera, scale, parts, display, fragments, saving. The browser stores the
+// choices.
 
 import { named } from "./colours.js";
 import { VIEW_NAMES } from "./camera.js";
@@ -7,8 +8,9 @@ import { hindrance } from "./saving.js";
 import { scaleOf } from "./scales.js";
 
 const CUTS = ["none", "x", "y", "z", "as seen"];
-const STEPS = 400; // Steps of the slider of a section.
-const FILLED = 1_000_000; // Largest number of tets of a snapshot with a file of all tets (MOST_TETS of worker/snapshots/volume.py).
+const STEPS = 400; // Number of steps of the slider of a section.
+// Largest number of tets of a snapshot that has a file of all tets (MOST_TETS of worker/snapshots/volume.py).
+const FILLED = 1_000_000;
 const SIGNS = { "+": "+", "-": "−" };
 const KEYS = {
   "x y z": "look from there", "Shift x y z": "from the other side", i: "isometric", "f, a": "fit the bodies, fit all", "← → ↑ ↓": "turn", "Shift ← →": "move", "+ −": "zoom",
@@ -16,8 +18,8 @@ const KEYS = {
 };
 
 export class Tools {
-  // `act` has the actions: colour(), slice(), camera(name), follow(text), set(changes), opacities(), save(kind), fragments();
-  // `without`: titles of panels that are left out.
+  // `act` has the actions colour(), slice(), camera(name), follow(text), set(changes), opacities(), save(kind),
+  // fragments(). `without`: titles of panels that are left out.
   constructor(act, without = []) {
     Object.assign(this, { act, choice: { how: "most", over: "run", hand: null, bands: 0 }, flipped: false, partNames: [] });
     this.by = choice("colour by", ["fragment", "part"], () => act.colour());
@@ -38,7 +40,7 @@ export class Tools {
     for (const one of this.panels) one.addEventListener("toggle", () => { if (one.open) this.shut(one); });
   }
 
-  // The focus returns to the button of the open panel.
+  // Returns the focus to the button of the open panel.
   leave() {
     const open = this.panels.find((one) => one.open);
     this.shut();
@@ -56,7 +58,7 @@ export class Tools {
     return h("div.lines", {}, h("div.buttons", {}, buttons), field("Frame", this.frame), h("dl.keys", {}, Object.entries(KEYS).map(([keys, what]) => h("div", {}, h("dt", {}, keys), h("dd", {}, what)))));
   }
 
-  // Parts that the camera can follow.
+  // Offers the parts that the camera can follow.
   frames(parts) {
     const names = { fit: "fits the bodies", all: "fits all, with debris", free: "stays" };
     const before = this.frame.value;
@@ -83,7 +85,7 @@ export class Tools {
     return h("div.lines", {}, field("Ends", this.how), field("Over", this.over), field("From", this.low), field("to", this.high, this.unit), field("Colours", this.bands));
   }
 
-  // Inputs for the ends, beside the fields.
+  // Writes the ends of the colour scale into the inputs, with their unit beside the fields.
   ends({ low, high }, unit) {
     const [shown, name] = si(Math.max(Math.abs(low), Math.abs(high)), unit).split(" ");
     this.unit.textContent = name ?? "";
@@ -123,7 +125,7 @@ export class Tools {
     return h("div.lines", {}, h("div.buttons", {}, button("Picture", "save a picture (PNG)", () => this.act.save("picture")), this.filming), this.saved);
   }
 
-  // `make` makes a film, and reports its progress; the result is shown beside the button.
+  // Calls `make`, which makes a film and reports its progress; the result is shown beside the button.
   async whileFilming(make) {
     const problem = hindrance();
     this.saved.textContent = problem;
@@ -134,7 +136,7 @@ export class Tools {
     this.filming.textContent = "Film";
   }
 
-  // `list`: names of the fields to colour by; `first`: the one before the user has chosen.
+  // Offers the names of fields to colour by, `list`; `first` is the default.
   offer(list, first = "fragment") {
     if (list.join() === [...this.by.options].map(({ value }) => value).join()) return;
     const before = this.offered ? this.by.value : first;
@@ -143,25 +145,26 @@ export class Tools {
     this.by.value = list.includes(before) ? before : "fragment";
   }
 
-  // Writes beside the choice of a section that it is not filled, before one is chosen; `tets`: the largest number of a body.
+  // Writes a note beside the choice of a section that sections are not filled, before the user chooses a section.
+  // `tets`: largest number of tets of a body.
   warnOfSize(tets) {
     this.limit.textContent = tets > FILLED ? `hollow: only bodies of up to ${count(FILLED)} tets have filled sections` : "";
   }
 
-  // The slider goes from `low` to `high`, m; its value is `at`.
+  // Sets the slider: it goes from `low` to `high`, m, and its value is `at`.
   slide(low, high, at) {
     Object.assign(this.place, { min: low, max: high, step: (high - low) / STEPS || "any" });
     this.place.value = at;
     this.cutting.hidden = false;
   }
 
-  // Value in m.
+  // Returns the position of the slider, m.
   get at() {
     const { value, min, max } = this.place;
     return Math.abs(value) < 1e-6 * (max - min) ? 0 : Number(value);
   }
 
-  // Text beside the slider.
+  // Writes the position of the section beside the slider.
   tell(at, hollow) {
     this.position.textContent = at === null ? "" : `${si(at, "m")}${hollow ? ", hollow" : ""}`;
     this.position.title = hollow;

@@ -1,10 +1,11 @@
-// Result of the check of a case: problems, warnings, estimate, and its files.
+// Result of the check of a case: problems, warnings, estimate, and the files of the case.
 
 import { count, counted, duration, h, percent, si, size } from "./figures.js";
 
 const MOST = 50; // Largest number of problems that are listed.
 
-// `lines`: line of each problem in the text, -1 if unknown; `onLine` is called with the selected one.
+// Returns the elements of the result. `lines`: line of each problem in the text, -1 if unknown; `onLine` is called with
+// the line that the user selects.
 export function verdict(text, busy, checks, lines, onLine) {
   if (!text.trim()) return h("p.hint", {}, "Nothing to check yet.");
   if (!checks) return h("p.hint", {}, busy || "not checked yet");
@@ -32,7 +33,7 @@ function expected({ elements, nodes, dt, steps, memory_bytes: memory, seconds })
 
 const WORDS = { missing: "needed: drop it here or choose it", asking: "asking the server …", ready: "waits", sent: "on the server" };
 
-// Files that the case names with their progress, then the other files.
+// Returns a table of files: the files that the case names, with their progress, then the other files.
 export function filesTable(named, outbox) {
   const spare = outbox.spare(named);
   if (!named.length && !spare.length) return h("p.hint", {}, "The case names none.");

@@ -1,5 +1,5 @@
-// The body in 3-D: a canvas for the picture and one above it for axes, scale bar and legend. Frames are drawn only
-// after a change. A view fills its element. Several views may exist; share() of camera.js couples their cameras.
+// The 3-D view: a canvas for the picture, and above it a canvas for axes, scale bar and legend. The picture is drawn
+// only after a change. A view fills its element. Several views may exist; share() of camera.js couples their cameras.
 
 import { Arrows } from "./arrows.js";
 import { ViewCamera } from "./camera.js";
@@ -11,8 +11,8 @@ import { css, ofFragment, ofName } from "./colours.js";
 import { Surface } from "./surface.js";
 import { WALL, Walls } from "./walls.js";
 
-const MANY = 60_000; // Number of triangles from which lines are drawn only after the body stops moving.
-const STILL = 160; // ms.
+const MANY = 60_000; // Number of triangles above which lines are drawn only after the body has stopped moving.
+const STILL = 160; // Time in ms without movement after which the body counts as standing still.
 
 export class View3d {
   // `modules` is the result of libraries.three(); `onPick` is called with the row of a fragment, or -1.
@@ -54,28 +54,30 @@ export class View3d {
     this.later();
   }
 
-  // All tets of the shown snapshot (section.js), for filled sections.
+  // Takes all tets of the shown snapshot (section.js), for filled sections.
   fill(volume) {
     this.surface.volume = volume;
     this.surface.cutAll();
     this.later();
   }
 
-  // `range`: { low, high, number } of the scale of a field; number of bands, 0: smooth.
+  // Sets the colouring. `range`: { low, high, number } of the scale of a field; `bands`: number of colour bands, 0 for
+  // a continuous scale.
   colour(by, range, bands = 0) {
     Object.assign(this, { by, range, bands });
     this.surface.colour(by, range, bands);
     this.later();
   }
 
-  // The rigid walls of the case (walls.js).
+  // Takes the rigid walls of the case (walls.js).
   stand(list) {
     this.walls.take(list);
     if (this.snapshot) this.walls.show(this.snapshot);
     this.later();
   }
 
-  // Any of `look`: explode, mirrors and cuts ({ axis, at } each), opacities by part, lines, edges, walls, arrows, axes, bar, legend, caption.
+  // Sets any of the members of `look`: explode, mirrors and cuts ({ axis, at } each), opacities by part, lines, edges,
+  // walls, arrows, axes, bar, legend, caption.
   set(changes) {
     Object.assign(this.look, changes);
     this.surface.shared.explode.value = this.look.explode;
@@ -92,7 +94,7 @@ export class View3d {
     this.later();
   }
 
-  // Cuts away the material beyond `normal` · x = `at`, m; null: nothing.
+  // Cuts away the material beyond the plane `normal` · x = `at`, m; null cuts nothing.
   slice(section) {
     this.section = section;
     if (!this.snapshot) return;
@@ -101,7 +103,7 @@ export class View3d {
     this.later();
   }
 
-  // The largest speed of the arrows is `fastest`.
+  // Draws the arrows; `fastest` is the largest speed of the arrows.
   pointers() {
     if (!this.look.arrows) return this.arrows.hide();
     const { normal, at } = this.section ?? {};
@@ -152,8 +154,8 @@ export class View3d {
     this.later();
   }
 
-  // The browser's timeline has the script time of a frame as "conoid:frame", with the number of draw calls.
-  // `captioned`: with the time in the picture, for saved pictures.
+  // Draws the view; with `captioned`, the time is in the picture, as in saved pictures. The browser's timeline has the
+  // script time of each drawing as "conoid:frame", with the number of draw calls.
   draw(captioned = false) {
     this.due = false;
     if (this.closed || !this.snapshot || !this.sized) return;
@@ -172,7 +174,7 @@ export class View3d {
       this.outlines.draw(renderer, () => surface.numbers(renderer, camera), camera, { picked: this.picked, lines, ink: tones.ink });
     }
     this.drawOver(captioned);
-    if (!this.begun) this.later(); // The first frame is on the screen earlier without lines.
+    if (!this.begun) this.later(); // Without lines the first picture is on the screen earlier.
     this.begun = true;
     performance.measure("conoid:frame", { start, detail: { calls: renderer.info.render.calls } });
     performance.clearMeasures("conoid:frame");
@@ -199,7 +201,7 @@ export class View3d {
     return { title: by === "fragment" && pieces ? "whole bodies | pieces" : by === "fragment" ? "bodies" : by, names: [...list.map((name, i) => ({ name, colours: tones(i) })), ...walls], arrows };
   }
 
-  // Colours of the page, once for each theme.
+  // Returns the colours of the page; they are read once for each theme.
   inks() {
     if (this.tones) return this.tones;
     const style = getComputedStyle(this.element);
@@ -223,7 +225,8 @@ export class View3d {
     });
   }
 
-  // Row of the fragment at a position of the canvas (CSS pixels), -1 beside the body: one pixel is drawn by row number.
+  // Returns the row of the fragment at a position of the canvas (CSS pixels), or -1 outside of the body. For this
+  // purpose one pixel is drawn with row numbers.
   pick(x, y) {
     const { renderer, surface, eye: { camera } } = this;
     const pixel = new Uint8Array(4);

@@ -1,17 +1,19 @@
-// Rigid walls beside the body: a disk for a plane, the side of a cylinder, a sphere. Shapes are those of the case, positions
-// those of the snapshot.
+// Rigid walls in the 3-D view: a disk for a plane, the side of a cylinder, a sphere. The shape of a wall comes from the
+// case, its position from the snapshot.
 
 export const WALL = "#8fa0b3"; // Colour of a wall.
-const OPACITY = { plane: 0.24, round: 0.3 }; // A wall in front of the body must not hide it.
-const WIDER = 1.35; // Radius of a disk, and half of the length of a cylinder, over half of the diagonal of the body.
+// Opacity of a wall, so that a wall in front of the body does not hide the body.
+const OPACITY = { plane: 0.24, round: 0.3 };
+// Radius of a disk, and half of the length of a cylinder, relative to half of the diagonal of the body.
+const WIDER = 1.35;
 
-// The walls of a resolved case: { shape, point, along, radius, moves } each.
+// Returns the walls of a case with all defaults: { shape, point, along, radius, moves } each.
 export function wallsOf(plan) {
   return (plan?.boundaries ?? []).filter(({ kind }) => kind === "wall").map(({ shape, point, normal, axis, radius, velocity, mass }) => (
     { shape: shape ?? "plane", point, along: normal ?? axis ?? [0, 0, 1], radius: radius ?? 0, moves: mass != null || (velocity ?? []).some(Boolean) }));
 }
 
-// Where a wall is drawn in a snapshot: { centre, along, radius, length }, m; null for a wall whose position is not known.
+// Returns { centre, along, radius, length }, m, of a wall in a snapshot; null for a wall whose position is not known.
 export function placed(wall, place, [low, high]) {
   if (wall.moves && !place) return null;
   const size = Math.hypot(...wall.along);
@@ -36,7 +38,7 @@ export class Walls {
     this.light = new HemisphereLight(0xffffff, 0x606a76, 3);
   }
 
-  // Takes the walls of a case (wallsOf).
+  // Takes the walls of a case from wallsOf.
   take(list) {
     const { CircleGeometry, CylinderGeometry, Mesh, SphereGeometry } = this.three;
     this.clear();
@@ -46,7 +48,7 @@ export class Walls {
     if (list.length) this.group.add(this.light);
   }
 
-  // Moves the walls to their places in a snapshot.
+  // Moves the walls to their positions in a snapshot.
   show({ header: { box, walls = [] } }) {
     const { Vector3 } = this.three;
     this.list.forEach((wall, k) => {

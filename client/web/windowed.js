@@ -1,12 +1,13 @@
-// A table with many rows; only the visible rows have elements. All rows have the same height.
+// Table with many rows of equal height, of which only the visible rows have elements.
 
 import { h } from "./figures.js";
 
-const MORE = 8; // Number of rows beyond the view, above and below: the Tab key can continue there.
+// Number of rows with elements above and below the visible rows, so that the Tab key can continue there.
+const MORE = 8;
 
 export class Windowed {
-  // `make(item, n)` returns the row element of an item; it is made again when `item` or `version` has changed.
-  // `region` is the scrolling element, `tall()` the height of a row, px.
+  // `make(item, n)` returns the row element of an item; it is called again when `item` or `version` has changed.
+  // `region`: the scrolling element; `tall()`: height of a row, px.
   constructor(region, make, tall) {
     Object.assign(this, { region, make, tall, items: [], version: 0, made: new Map() });
     this.above = h("tr.space", { "aria-hidden": "true" });
@@ -19,13 +20,13 @@ export class Windowed {
 
   close() { this.watch.disconnect(); }
 
-  // Items have a unique `key`, and a `content` that changes with what they show.
+  // Sets the items of the table. Each item has a unique `key`, and a `content` that changes with what the row shows.
   set(items, version) {
     Object.assign(this, { items, version });
     this.draw();
   }
 
-  // Makes all rows again.
+  // Makes all visible rows again.
   again() {
     this.made = new Map();
     this.draw();
@@ -56,7 +57,7 @@ export class Windowed {
     return element;
   }
 
-  // Restores the focus in a row that is made again.
+  // Gives the focus back to a row that is made again.
   focused() {
     const active = document.activeElement;
     const found = active && this.body.contains?.(active) && [...this.made].find(([, { element }]) => element.contains(active));

@@ -149,10 +149,10 @@ def test_view_takes_times_with_their_units(quiet_home: Path) -> None:
     assert read(near)["times"] == [80e-6]
     assert near.stderr == "conoid: time = 79.0 µs: the nearest frame has the time 80.0 µs\n"
     assert conoid(*words, "80 us").stderr == ""
-    assert conoid(*words, "1 ms").stderr == "conoid: time = 1.00 ms: the frames of bar are of 0 s to 80.0 µs\n"
+    assert conoid(*words, "1 ms").stderr == "conoid: time = 1.00 ms: the frames of bar have times from 0 s to 80.0 µs\n"
     one = conoid("view", folder / "frames" / "000007.vtkhdf", "--time", "80 us")
-    assert one.stderr.endswith("000007.vtkhdf: this is one frame; a frame or a time is chosen of a run\n")
-    assert conoid(*words, "79").stderr == "conoid: time = '79': write it with its unit, such as '60 us'\n"
+    assert one.stderr.endswith("000007.vtkhdf: this is one frame; the options frame and time need a run\n")
+    assert conoid(*words, "79").stderr == "conoid: time = '79': write the time with its unit, such as '60 us'\n"
 
 
 def test_view_prints_the_description_of_a_frame(quiet_home: Path) -> None:

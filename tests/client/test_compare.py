@@ -166,7 +166,7 @@ def test_fragments_of_every_frame_are_one_data_frame(runs: tuple[Result, Result]
     assert list(frame.groupby("frame")["mass"].count()) == [1, 4]
     assert frame.attrs["units"]["mass"] == "kg"
     assert set(frame["part"]) == {"rod"}
-    with pytest.raises(UnfinishedError, match="no fragments of frame 3; it has tables of 2"):
+    with pytest.raises(UnfinishedError, match="no fragments of frame 3; there are 2 tables of fragments"):
         runs[0].fragments_of(3)
 
 

@@ -78,4 +78,7 @@ def test_without_the_worker_an_unread_mesh_file_is_reported(folder: Path, monkey
     monkeypatch.setattr(importlib.util, "find_spec", lambda name: None if name == "conoid.worker" else found(name))
     result = conoid("validate", "bar.toml")
     assert result.exit_code == 0
-    assert "parts[0].mesh.path = 'bar.inp': was not read: the solver is not installed here" in result.stderr
+    assert (
+        "parts[0].mesh.path = 'bar.inp': the file was not read, because the solver is not installed on this machine"
+        in result.stderr
+    )

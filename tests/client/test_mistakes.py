@@ -89,7 +89,7 @@ def test_a_case_of_another_shape_is_one_line(command: str, text: str, damaged: P
     (damaged / layout.RESOLVED_CASE).write_text(text)
     (damaged / layout.OUTCOME).write_text('{"state": "succeeded"}')
     words = (damaged, damaged) if command == "compare" else (damaged,)
-    assert "this case cannot be read" in refused(1, command, *words)
+    assert "the case cannot be read" in refused(1, command, *words)
 
 
 def test_a_link_out_of_a_folder_is_not_read(damaged: Path) -> None:
@@ -161,7 +161,7 @@ def test_messages_of_a_folder_are_json_too(damaged: Path) -> None:
 
 @pytest.mark.parametrize("command", ["report", "replay-balance"])
 def test_a_damaged_case_is_named(damaged: Path, command: str) -> None:
-    assert "case.resolved.json: this case cannot be read: " in refused(1, command, "damaged")
+    assert "case.resolved.json: the case cannot be read: " in refused(1, command, "damaged")
 
 
 # Files ----------------------------------------------------------------------------------------------------------------

@@ -68,7 +68,7 @@ def test_a_folder_of_runs_is_distinguished_from_a_folder_of_a_run(tmp_path: Path
 
 
 def test_no_folder_and_a_damaged_outcome_are_one_line(tmp_path: Path) -> None:
-    with pytest.raises(ClientError, match="no such folder"):
+    with pytest.raises(ClientError, match="this folder does not exist"):
         Result.open(tmp_path / "nothing")
     (tmp_path / "outcome.json").write_text('{"state": 1')
     with pytest.raises(ClientError, match="cannot be read"):

@@ -97,7 +97,7 @@ def test_a_file_that_is_not_a_frame_is_refused_in_one_line(tmp_path: Path) -> No
 
 @pytest.mark.parametrize(
     ("source", "field", "message"),
-    [("nothing", "mises", "no such run, folder or frame"), ("pyproject.toml", "mises", r"ends in \.vtkhdf"),
+    [("nothing", "mises", "this run, folder or frame does not exist"), ("pyproject.toml", "mises", r"ends in \.vtkhdf"),
      (".", "stress", "allowed: mises, pressure")],
 )  # fmt: skip
 def test_an_unknown_field_is_refused_before_the_renderer_starts(source: str, field: str, message: str) -> None:
@@ -318,7 +318,7 @@ def test_cameras_are_read() -> None:
      ({"size": (10,)}, r"size = \(10,\): expected `array` of length 2"),
      ({"size": (0, 0)}, "size = 0, 0: .* at least 64"), ({"zoom": "a"}, "zoom = 'a': expected `float`"),
      ({"limits": (1,)}, r"limits = \(1,\): expected `array` of length 2"),
-     ({"time": "60"}, "time = '60': write it with its unit"), ({"time": "x us"}, "time = 'x us': ")],
+     ({"time": "60"}, "time = '60': write the time with its unit"), ({"time": "x us"}, "time = 'x us': ")],
 )  # fmt: skip
 def test_a_wrong_choice_is_one_line(options: dict[str, Any], message: str, folder: Path) -> None:
     with pytest.raises(ViewError, match=message):

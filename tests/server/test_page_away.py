@@ -193,7 +193,7 @@ def test_the_page_of_an_ended_run_shows_its_cause_and_warnings(web: Path) -> Non
         return shown;
     """
     situation, warnings, log_shown, files = played(web, script % json.dumps([ENDED, history]))
-    assert "Failed: one of its processes or machines has failed" in situation
+    assert "Failed: a process or a machine of the run has failed" in situation
     assert "tet 7 is inside out" in situation
     assert "Continue from step 120" in situation
     assert warnings.split() == ["a", "b", "c"]
