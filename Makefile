@@ -1,4 +1,4 @@
-# make demo       a steel bar breaks a glass bar: submitted over HTTP, run on 2 MPI ranks, checked, drawn (demo.png)
+# make demo       a steel bar breaks a glass bar: submitted over HTTP, run on all cores, checked, drawn (demo.png)
 # make test       linters, types and every fast test; two groups of tests run at the same time
 # make lint       ruff, the checker of words and of commit subjects (tests/plain_words.py) and mypy
 # make bench      speed, and speed against error: tables in build/bench, 15 minutes (BENCH=quick: 2, BENCH=long: 60)
@@ -32,7 +32,7 @@ progress = @echo "$(1)"; began=$$(date +%s); \
 .DEFAULT_GOAL := test
 
 demo: $(READY)
-	$(BIN)/conoid run glass_steel_demo --ranks 2 --view demo.png --check
+	$(BIN)/conoid run glass_steel_demo --view demo.png --check
 	@echo 'on the page: $(BIN)/conoid serve --runs runs/local --no-auth, then open the address that it prints'
 
 test: style

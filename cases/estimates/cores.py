@@ -1,8 +1,15 @@
-"""Number of cores that this process may use, by its CPU affinity and by the CPU quota of its control groups."""
+"""Number of cores that this process may use, by its CPU affinity and by the CPU quota of its control groups. Number of
+threads of a run whose case gives none.
+"""
 
 import os
 from pathlib import Path
 
+from ..model.run import MOST_THREADS
+
+_TETS = 3_000
+"""Smallest number of tets for each thread: eight colours (8 to 10 in bodies of gmsh) of a chunk of 376 tets. With fewer
+tets a thread has no chunk in most colours."""
 _GROUPS, _OWN = Path("/sys/fs/cgroup"), Path("/proc/self/cgroup")
 
 
@@ -10,6 +17,14 @@ def usable_cores() -> int:
     """Returns the number of usable cores, at least one; the machine can have more cores."""
     quotas = _quotas(_GROUPS, _OWN)
     return max(1, min([len(core_numbers()), *(int(quota) for quota in quotas)]))
+
+
+def threads_of(ranks: int, cores: int, tets: int | None = None) -> int:
+    """Returns the threads of each of ``ranks`` ranks with which a run uses all ``cores``, and no more than its number
+    of tets can occupy; None: the number of tets is unknown.
+    """
+    most = MOST_THREADS if tets is None else -(-tets // (_TETS * ranks))
+    return max(1, min(cores // ranks, most, MOST_THREADS))
 
 
 def core_numbers() -> list[int]:

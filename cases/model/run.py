@@ -24,9 +24,9 @@ class Run(Model):
     """Number of MPI processes. The answer does not depend on the number of MPI processes."""
     threads: Annotated[Count, Field(ge=1, le=MOST_THREADS)] = 1
     """Number of threads of each MPI process. The answer does not depend on the number of threads. A run uses ``ranks``
-    times ``threads`` cores; if the machine has fewer cores, the run is slower. ``conoid run`` and ``conoid demo`` use
-    all cores of the machine if a case does not give ``threads``. On a server and in a sweep a run without ``threads``
-    uses one core, because simultaneous runs use the cores better than the threads of one run."""
+    times ``threads`` cores; if the machine has fewer cores, the run is slower. Without ``threads`` in the case,
+    ``conoid run``, ``conoid demo`` and a server that starts runs itself use all cores; a server uses at most one thread
+    for 3,000 tets. In a sweep and in a batch system a run without ``threads`` has one thread for each rank."""
     profile: Annotated[str, Field(pattern=r"^[A-Za-z0-9_-]{0,32}$")] = ""
     """Profile of the site with which a batch system executes the run (docs/howto/cluster.md). A profile that is given
     at submission has priority over this key."""

@@ -5,6 +5,7 @@ Tables of a site's settings file::
     [queue]
     half_life = "168 h"               # after it the past usage of a user counts half
     memory = 64_000_000_000           # bytes for all runs together
+    threads = 4                       # of each rank, if a case does not give run.threads
     [queue.users.ann]
     share = 2.0                       # share relative to other users; their default is 1
     priority = 1                      # before all users with a lower one
@@ -54,6 +55,9 @@ class Queue(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=Tru
     memory: int | None = None
     """Memory for all runs together, bytes, compared with the estimates of the runs; absent: the memory of the
     machine."""
+    threads: int | None = None
+    """Threads of each rank of a run whose case does not give ``run.threads``; absent: all cores of the server divided
+    by the number of ranks, at most one for 3,000 tets, and in a batch system one."""
     users: dict[str, Share] = {}
 
     @property
@@ -183,6 +187,7 @@ def check(queue: Queue, quota: Quota, caps: RunCaps, retention: Retention, http:
         if abs(user.priority) > PRIORITY:
             raise ValueError(f"queue.users.{name}.priority = {user.priority}: -{PRIORITY} to {PRIORITY}")
     _positive("queue", "memory", queue.memory)
+    _positive("queue", "threads", queue.threads)
     _positive("retention", "bytes", retention.bytes)
     for table, values in (("quota", quota), ("caps", caps)):
         for name in values.__struct_fields__:

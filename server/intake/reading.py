@@ -14,11 +14,13 @@ import sys
 import traceback
 from collections.abc import Iterable, Mapping, Sequence
 from contextlib import suppress
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import msgspec
 
+from conoid.cases.estimates.clock_time import clock_time
 from conoid.cases.estimates.estimate import Estimate, estimate
 from conoid.cases.load import CaseError, Problem, json_data, parse_case, resolved_json, shipped_path, toml_data
 from conoid.cases.model.schema import Case
@@ -130,7 +132,7 @@ def _read(question: Question) -> Reading:
         raise CaseError(problems)
     files = _files(case)
     known = not files or question.survey is not None
-    needs, odd = _weighed(case, data, question) if known else ({}, [])
+    case, needs, odd = _weighed(case, data, question) if known else (case, {}, [])
     return Reading(
         name=case.name, title=case.title, ranks=case.run.ranks, threads=case.run.threads, profile=case.run.profile,
         wall_time=limits.wall_time(case, question.limits), estimate=needs,
@@ -156,18 +158,23 @@ def _names(data: Mapping[str, Any]) -> list[FileName]:
     return [FileName(key=dotted(file.table), path=file.path, sha256=file.sha256 or "") for file in files_of(data)]
 
 
-def _weighed(case: Case, data: Mapping[str, Any], question: Question) -> tuple[dict[str, int | float], list[Problem]]:
-    """Returns the needed resources and the warnings of a case. Raises CaseError if the case cannot be run on this
-    server.
+def _weighed(
+    case: Case, data: Mapping[str, Any], question: Question
+) -> tuple[Case, dict[str, int | float], list[Problem]]:
+    """Returns the case with its number of threads, the needed resources and the warnings. Raises CaseError if the case
+    cannot be run on this server.
     """
     survey = from_json(question.survey) if question.survey else Survey()
     if survey.refused:
         raise CaseError(Problem("", "", line) for line in survey.refused)
     expected = _estimate(case, question, survey)
+    case = limits.on_threads(case, expected.elements, question.limits)
+    if expected.clock is not None:
+        expected = replace(expected, clock=clock_time(case, expected.costs, expected.breaking))
     # Contact between parts is reported for mesh files only: for other shapes the search takes seconds.
     unread = [problem((file.key, "path"), file.path, _UNREAD) for file in _files(case) if question.survey == b""]
     odd = [*unread, *bare_numbers(data), *warned(case, expected, survey, survey.touching)]
-    return limits.figures(expected), odd
+    return case, limits.figures(expected), odd
 
 
 def _estimate(case: Case, question: Question, survey: Survey) -> Estimate:

@@ -74,14 +74,17 @@ class Desk:
         """Function that returns the total size in bytes of the folders of an owner's runs."""
 
     def read(
-        self, body: bytes, content_type: str, source: Source, surveys: dict[bytes, bytes] | None = None
-    ) -> Reading:
+        self, body: bytes, content_type: str, source: Source, surveys: dict[bytes, bytes] | None = None,
+        *, swept: bool = False,
+    ) -> Reading:  # fmt: skip
         """Reads the case in ``body``, and the files that the case names from ``source``. ``surveys``: content of mesh
-        files that were read before, by the bodies that are made of the files. Raises CaseError with every problem of
-        the case; raises ServiceError with status 415, 422 or 503.
+        files that were read before, by the bodies that are made of the files. ``swept``: the case is a point of a
+        sweep; without a number of threads it gets one, because simultaneous runs use the cores better than the threads
+        of one run. Raises CaseError with every problem of the case; raises ServiceError with status 415, 422 or 503.
         """
         kind = _file_name(content_type)
-        question = Question(body=body, json=kind == "case.json", limits=self._limits)
+        most = structs.replace(self._limits, threads=1) if swept else self._limits
+        question = Question(body=body, json=kind == "case.json", limits=most)
         reading = self._reader.read(question)
         if not reading.files:
             return reading
@@ -119,7 +122,9 @@ class Desk:
         if earlier := self._earlier(owner, key, digest, wishes):
             return earlier
         try:
-            reading = reading or self.read(body, content_type, self.source(owner, wishes.restart))
+            reading = reading or self.read(
+                body, content_type, self.source(owner, wishes.restart), swept="sweep" in wishes.labels
+            )
         except CaseError as error:
             raise invalid_case(error.problems) from None
         with self._lock:

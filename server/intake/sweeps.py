@@ -193,7 +193,7 @@ class Sweeps:
         cases, source, surveys = {}, self._desk.source(plan.owner), dict[bytes, bytes]()
         for n, text in made.items():
             try:
-                cases[n] = text, self._desk.read(text, _JSON, source, surveys)
+                cases[n] = text, self._desk.read(text, _JSON, source, surveys, swept=True)
             except CaseError as error:
                 raise at_point(n, error) from None
         return cases

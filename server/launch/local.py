@@ -150,6 +150,7 @@ def environment(base: Mapping[str, str], job: Job) -> dict[str, str]:
 
 def _arguments(job: Job) -> list[str]:
     arguments = [str(job.case), "--out", str(job.folder), "--run", job.run, "--ranks", str(job.ranks)]
+    arguments += ["--threads", str(job.threads)]
     if checkpoints.found(job.folder):
         arguments.append("--restart")
     if job.telemetry is not None:

@@ -76,6 +76,7 @@ class SlurmLauncher:
 
     def _words(self, job: Job) -> list[str]:
         words = [*self._worker, str(job.case), "--out", str(job.folder), "--run", job.run, "--ranks", str(job.ranks)]
+        words += ["--threads", str(job.threads)]
         if job.wall_time is not None:
             words += ["--set", f"run.max_wall_time={job.wall_time!r}"]
         return [*words, "--interruptible"]

@@ -15,6 +15,7 @@ from fastapi.dependencies.models import Dependant
 from fastapi.routing import APIRoute
 from starlette.requests import ClientDisconnect
 
+from conoid.cases.estimates.cores import threads_of
 from conoid.cases.estimates.estimate import Estimate
 from conoid.cases.figures import count, crew, number, size
 from conoid.cases.model.schema import Case
@@ -114,18 +115,31 @@ class Limits(msgspec.Struct, frozen=True):
     memory: int | None
     core_seconds: float | None
     wall_time: float | None
+    threads: int | None = None
+    """Threads of each rank of a run whose case gives none; None: as many as the slots and its tets allow."""
 
 
 def of(settings: Settings) -> Limits:
     """Returns the resource limits of a site."""
     caps = settings.caps
     memory = min((most for most in (caps.memory, settings.site.queue.memory) if most is not None), default=None)
-    return Limits(settings.slots, caps.elements, caps.steps, memory, caps.core_seconds, caps.wall_time)
+    threads = settings.site.queue.threads or (1 if settings.site.launcher == "slurm" else None)
+    return Limits(settings.slots, caps.elements, caps.steps, memory, caps.core_seconds, caps.wall_time, threads)
 
 
 def check(case: Case, limits: Limits) -> list[Problem]:
     """Returns all problems that a valid case has with the limits of this server."""
     return [*_cores(case, limits), *_files(case), *_time(case, limits)]
+
+
+def on_threads(case: Case, tets: int | None, limits: Limits) -> Case:
+    """Returns the case with a number of threads, if it gives none."""
+    run = case.run
+    if "threads" in run.model_fields_set:
+        return case
+    wanted = threads_of(run.ranks, limits.slots, tets) if limits.threads is None else limits.threads
+    threads = min(wanted, limits.slots // run.ranks)
+    return case.model_copy(update={"run": run.model_copy(update={"threads": threads})})
 
 
 def check_size(estimate: Estimate, caps: Limits) -> list[Problem]:

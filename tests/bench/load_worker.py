@@ -37,7 +37,8 @@ def main(words: list[str]) -> int:
     parser.add_argument("--out", type=Path)
     for name in ("--run", "--telemetry", "--prefix"):
         parser.add_argument(name)
-    parser.add_argument("--ranks", type=int)
+    for name in ("--ranks", "--threads"):
+        parser.add_argument(name, type=int)
     options = parser.parse_args(words)
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(4))
     telemetry = Telemetry(options.telemetry, options.prefix) if options.telemetry else None

@@ -97,6 +97,7 @@ def main() -> int:
     parser.add_argument("--telemetry")
     parser.add_argument("--prefix")
     parser.add_argument("--ranks")
+    parser.add_argument("--threads")
     parser.add_argument("--set")
     parser.add_argument("--interruptible", action="store_true")
     options = parser.parse_args()

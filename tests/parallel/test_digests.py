@@ -7,6 +7,7 @@ import platform
 import subprocess
 import sys
 import tomllib
+from collections.abc import Sequence
 from pathlib import Path
 
 import pytest
@@ -38,10 +39,10 @@ def shattering() -> str:
     return "\n".join(line for line in lines if not line.startswith(("brittle.scatter", "fracture")))
 
 
-def arguments(name: str, place: Path, threads: int) -> list[str]:
+def arguments(name: str, place: Path, threads: int, changes: Sequence[str]) -> list[str]:
     """Returns the arguments of the worker for a scene, by the name of the scene."""
     case, form = name, name.partition("_")[2]
-    words = ["run.frames=0", "run.samples=10", "reference=[]", f"run.threads={threads}"]
+    words = ["run.frames=0", "run.samples=10", "reference=[]", f"run.threads={threads}", *changes]
     if name in SHORT:
         words.append(f"run.end_time={SHORT[name]}")
     elif name in GIVEN:
@@ -52,10 +53,10 @@ def arguments(name: str, place: Path, threads: int) -> list[str]:
     return [case, *(word for change in words for word in ("--set", change)), "--out", str(place / name), "--use", "all"]
 
 
-def ended(place: Path, ranks: int, threads: int) -> dict[str, str]:
+def ended(place: Path, ranks: int, threads: int, changes: Sequence[str] = ()) -> dict[str, str]:
     """Returns the digest of every scene, by the name of the scene."""
     (place / "shattering.toml").write_text(shattering(), encoding="utf-8")
-    together(ranks, place, [arguments(name, place, threads) for name in EVERYWHERE])
+    together(ranks, place, [arguments(name, place, threads, changes) for name in EVERYWHERE])
     ends = {name: from_json((place / name / layout.OUTCOME).read_bytes()) for name in EVERYWHERE}
     assert {end.state for end in ends.values()} == {"succeeded"}
     assert all((end.broken or 0) > 100 for name, end in ends.items() if name.startswith(("shattering", "breaking")))
@@ -74,9 +75,19 @@ def test_the_digest_is_the_committed_one(name: str, digests: dict[str, str]) -> 
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("ranks", "threads"), [(1, 1), (1, 3), (3, 1), (2, 3), (7, 3), (16, 2)])
+@pytest.mark.parametrize("threads", [1, 2, 3])
+@pytest.mark.parametrize("ranks", [1, 2, 3, 7, 16])
 def test_it_is_on_any_number_of_ranks_and_threads(ranks: int, threads: int, tmp_path: Path) -> None:
     assert ended(tmp_path, ranks, threads) == KNOWN
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("ranks", "threads"), [(3, 2), (7, 1)])
+def test_it_is_with_a_cut_every_fifty_steps(ranks: int, threads: int, tmp_path: Path) -> None:
+    assert ended(tmp_path, ranks, threads, ["balance.policy=every", "balance.every=50"]) == KNOWN
+    ends = {name: from_json((tmp_path / name / layout.OUTCOME).read_bytes()) for name in EVERYWHERE}
+    assert all(end.rebalances == ((end.steps or 0) - 1) // 50 for end in ends.values())
+    assert sum(end.rebalances or 0 for end in ends.values()) > 10
 
 
 @pytest.mark.slow

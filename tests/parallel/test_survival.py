@@ -157,9 +157,8 @@ def test_a_run_goes_on_on_other_ranks(name: str, legs: list[Leg], whole: Made, t
 
 @pytest.mark.parametrize("kills", [2, pytest.param(50, marks=[pytest.mark.slow, pytest.mark.timeout(1200)])])
 def test_a_run_survives_being_killed(kills: int, whole: Made, tmp_path: Path) -> None:
-    """The run writes a checkpoint in every step and is killed at random times, also while it writes a checkpoint; on
-    one rank or on several ranks.
-    """
+    """The run writes a checkpoint in every step and is killed at random moments, also while it writes a checkpoint;
+    on other numbers of ranks and threads after each kill."""
     draw, killed, runs = random.Random(SEED), 0, itertools.count()
     while killed < kills:
         root = tmp_path / str(next(runs))
@@ -174,7 +173,8 @@ def killed_and_ended(draw: random.Random, words: list[str], folder: Path, most: 
     killed = 0
     while not (folder / layout.OUTCOME).exists() or outcome(folder).state != "succeeded":
         again = ["--restart"] if list((folder / layout.CHECKPOINTS).glob("*[0-9]")) else []
-        with started(command(draw.choice([1, 2, 3]), *words, *again)) as launcher:
+        threads = ["--threads", str(draw.choice([1, 2, 3])), "--use", "all"]
+        with started(command(draw.choice([1, 2, 3]), *words, *threads, *again)) as launcher:
             limit = time.monotonic() + (draw.uniform(1.0, 3.5) if killed < most else 120.0)
             while launcher.poll() is None and time.monotonic() < limit:
                 time.sleep(0.01)

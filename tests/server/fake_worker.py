@@ -30,6 +30,7 @@ def main() -> int:
     parser.add_argument("--telemetry")
     parser.add_argument("--prefix")
     parser.add_argument("--ranks")
+    parser.add_argument("--threads")
     parser.add_argument("--set")
     parser.add_argument("--interruptible", action="store_true")
     parser.add_argument("--restart", action="store_true")
@@ -64,7 +65,7 @@ def run(options: argparse.Namespace) -> int:
         print("parts[0].mesh: nothing is left of it", file=sys.stderr)
         return ExitCode.BAD_INPUT
     say(messages.Status(run=name, wall=time.time(), state="running"))
-    size: dict[str, int] = {"ranks": 1, "elements": 5, "nodes": 8}
+    size: dict[str, int] = {"ranks": 1, "threads": int(options.threads), "elements": 5, "nodes": 8}
     say(messages.Started(run=name, wall=time.time(), end_time=1.0, setup=0.1, parts={"rod": 5}, **size))
     if "wait" in plan:
         while not Path(plan["wait"]).exists() and not stop:

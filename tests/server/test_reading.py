@@ -77,9 +77,9 @@ def test_a_case_finds_everything_loaded() -> None:
 def test_each_point_of_a_sweep_is_read_once(server: Running, monkeypatch: pytest.MonkeyPatch) -> None:
     real, read = Desk.read, []
 
-    def counted(self: Desk, *arguments: Any) -> Any:
+    def counted(self: Desk, *arguments: Any, **options: Any) -> Any:
         read.append(arguments)
-        return real(self, *arguments)
+        return real(self, *arguments, **options)
 
     monkeypatch.setattr(Desk, "read", counted)
     sweep = handed_in(server.ann, wish())

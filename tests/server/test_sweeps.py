@@ -326,12 +326,12 @@ def test_a_submitted_run_does_not_wait_for_sweeps(settings: Settings, monkeypatc
     monkeypatch.setattr(reader, "usable_cores", lambda: 1)
     real, reading, go = Desk.read, {"ann": threading.Event(), "bob": threading.Event()}, threading.Event()
 
-    def slow(self: Desk, body: bytes, content_type: str, *more: Any) -> Any:
+    def slow(self: Desk, body: bytes, content_type: str, *more: Any, **options: Any) -> Any:
         case = tomllib.loads(body.decode()) if content_type == "application/toml" else json.loads(body)
         if case["name"] in reading:
             reading[case["name"]].set()
             assert go.wait(20)
-        return real(self, body, content_type, *more)
+        return real(self, body, content_type, *more, **options)
 
     monkeypatch.setattr(Desk, "read", slow)
     with opened(settings) as service, TestClient(build_app(service), base_url="http://127.0.0.1") as client:
