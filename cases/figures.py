@@ -27,8 +27,8 @@ _LADDERS: dict[str, _Ladder] = {
 _WORTH = {"m^2": 1.0, "mm^2": 1e-6, "µm^2": 1e-12, "m^3": 1.0, "mm^3": 1e-9, "µm^3": 1e-18}
 """Value from which a unit of the tables is used, for units whose value differs from their factor."""
 _PLAIN = 1e-3, 5
-"""Exponents between which a number is written without a power of ten (chosen values). The larger exponent limits the
-number of digits before the point."""
+"""A number is written without a power of ten if its decimal exponent is between these two exponents (chosen values).
+The larger exponent limits the number of digits before the decimal point."""
 _MOST = 1e12
 """Value from which a whole number is written with a power of ten, because five groups of digits are hard to read
 (chosen value)."""

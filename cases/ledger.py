@@ -17,7 +17,7 @@ class Energy(msgspec.Struct, kw_only=True, frozen=True):
     """Energy dissipated by contact impulses between bodies and with walls, without friction."""
     friction: float = 0.0
     eroded: float = 0.0
-    """Elastic energy of deleted tets, and kinetic energy of nodes deleted with them."""
+    """Elastic energy of deleted tets, and kinetic energy of the nodes that were deleted with these tets."""
     fracture: float = 0.0
     """Energy dissipated by cohesive facets and tied bonds."""
     cohesive: float = 0.0

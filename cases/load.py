@@ -156,8 +156,8 @@ def apply_overrides(data: Mapping[str, Any], overrides: Overrides) -> dict[str, 
     """Returns a copy of ``data`` with assignments such as ``run.ranks=2`` or ``parts[0].mesh.element_size=0.5 mm``.
 
     The value of an assignment is read as TOML if it is valid TOML, otherwise as text; the value in a mapping is used
-    unchanged, a nested mapping key by key. Missing tables are added; list items must exist. Raises CaseError with every
-    assignment that cannot be made, and with every key that has two values.
+    unchanged, a nested mapping key by key. An assignment adds missing tables of the case; items of lists must exist.
+    Raises CaseError with every assignment that cannot be made, and with every key that has two values.
     """
     if isinstance(overrides, str) or not isinstance(overrides, Iterable):
         message = "write a list of assignments, such as ['run.ranks=2'], or values by key, such as {'run.ranks': 2}"

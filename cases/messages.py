@@ -17,7 +17,9 @@ VERSION = 1
 
 
 class Message(msgspec.Struct, tag_field="type", tag=str.lower, kw_only=True, frozen=True):
-    """Envelope of all messages. The field ``wall`` is the Unix time in s; ``t`` is the simulated time in s."""
+    """Base class of all messages, with the common fields. The field ``wall`` is the Unix time in s; ``t`` is the
+    simulated time in s.
+    """
 
     channel: ClassVar[str] = "event"
     """Class of the Zenoh key under which the message is published (cases/output/keys.py)."""
@@ -31,7 +33,7 @@ class Message(msgspec.Struct, tag_field="type", tag=str.lower, kw_only=True, fro
 
 
 class Status(Message, frozen=True):
-    """A change of the state of the run, or the activity within a state (``message``)."""
+    """Message about a change of the state of the run, or about the present activity (field ``message``)."""
 
     channel: ClassVar[str] = "state"
     state: str
@@ -53,7 +55,9 @@ class Started(Message, frozen=True):
 
 
 class Progress(Message, frozen=True):
-    """Progress of the run. ``eta``: estimated remaining wall time, s; ``limiter``: what limits the time step."""
+    """Message about the progress of the run. ``eta``: estimated remaining wall time, s; ``limiter``: what limits the
+    time step.
+    """
 
     end_time: float
     dt: float
@@ -91,7 +95,7 @@ class Load(Message, frozen=True):
     collective_bytes: list[int] = []
     """Bytes that the rank contributes to collective calls."""
     outside: list[int] = []
-    """Surface nodes that each rank owns."""
+    """Number of surface nodes that each rank owns."""
     serial: list[float] = []
     """Wall time in which only one thread of the rank works, s, without waiting for other ranks."""
     parallel: list[float] = []
@@ -105,8 +109,8 @@ class Load(Message, frozen=True):
 
 
 class Counts(Message, frozen=True):
-    """Present size of the model. ``shared``: number of nodes on more than one rank; ``particles``: number of free
-    nodes, without tets.
+    """Message about the present size of the model. ``shared``: number of nodes on more than one rank; ``particles``:
+    number of free nodes, without tets.
     """
 
     channel: ClassVar[str] = "counts"
@@ -128,7 +132,7 @@ class Counts(Message, frozen=True):
 
 
 class Balance(Message, frozen=True):
-    """A new decomposition: tets have moved to other ranks."""
+    """Message: tets have moved to other ranks in a new decomposition."""
 
     channel: ClassVar[str] = "load"
     cause: str
@@ -168,7 +172,7 @@ class Groups(Message, frozen=True):
 
 
 class Checkpoint(Message, frozen=True):
-    """A complete checkpoint is on disk. ``path`` is relative to the run's folder; ``seconds`` is wall time."""
+    """Message: a complete checkpoint is on disk. ``path`` is relative to the run's folder; ``seconds`` is wall time."""
 
     path: str
     bytes: int
@@ -177,15 +181,15 @@ class Checkpoint(Message, frozen=True):
 
 
 class Frame(Message, frozen=True):
-    """A frame is on disk. The ``path`` of the frame is relative to the run's folder."""
+    """Message: a frame is on disk. The ``path`` of the frame is relative to the run's folder."""
 
     index: int
     path: str
 
 
 class Snapshot(Message, frozen=True):
-    """A snapshot of the fragments (cases/output/snapshot.py) is in the run's folder. ``step`` and ``t`` are the step
-    and the simulated time of the snapshot.
+    """Message: a snapshot of the fragments (cases/output/snapshot.py) is in the run's folder. ``step`` and ``t`` are
+    the step and the simulated time of the snapshot.
     """
 
     channel: ClassVar[str] = "fragments"
@@ -197,7 +201,7 @@ class Snapshot(Message, frozen=True):
     fragments: int
     sha256: str
     cause: str = ""
-    """Reason of the snapshot: ``run.snapshots``, ``asked for``, ``start`` or ``end``."""
+    """Reason for which the snapshot was made: ``run.snapshots``, ``asked for``, ``start`` or ``end``."""
     dropped: int = 0
     """Number of scheduled snapshots that were not made since the previous snapshot."""
     smallest: int = 0
@@ -217,7 +221,7 @@ class Fragments(Snapshot, tag="snapshot", kw_only=True, frozen=True):
 
 
 class Log(Message, frozen=True):
-    """A line of text for the user."""
+    """Message: a line of text for the user."""
 
     channel: ClassVar[str] = "log"
     level: str
@@ -272,10 +276,12 @@ def from_json(line: bytes | str) -> AnyMessage:
 
 
 def from_msgpack(payload: bytes) -> AnyMessage:
-    """Reads a message from a Zenoh sample. Raises the same errors as ``from_json``."""
+    """Reads a message from a Zenoh sample. Raises the errors of the function ``from_json``."""
     return _from_msgpack.decode(payload)
 
 
 def fragments_from_msgpack(payload: bytes) -> Fragments:
-    """Reads a message from a Zenoh sample of the class ``fragments``. Raises the same errors as ``from_json``."""
+    """Reads a message from a Zenoh sample of the class ``fragments``. Raises the errors of the function
+    ``from_json``.
+    """
     return _fragments.decode(payload)

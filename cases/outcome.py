@@ -150,7 +150,7 @@ class Outcome(msgspec.Struct, kw_only=True, frozen=True):
     """Estimated seconds per phase and rank without waiting, by number of threads; only for a run with this option
     (docs/performance/scaling.md)."""
     sharing: "Sharing | None" = None
-    """Measurements from which the estimates for other numbers of threads are computed."""
+    """Measured times of parallel regions, from which the estimates for other numbers of threads are computed."""
     helped: list[float] = []
     """Working time of all threads of the rank except the first, summed, s; at most threads - 1 times ``parallel``."""
     without: list[str] = []
@@ -161,7 +161,7 @@ class Outcome(msgspec.Struct, kw_only=True, frozen=True):
     """Number of tets times steps, per CPU second and core."""
     reference: list[Check] = []
     probes: list[Measured] = []
-    """Last, smallest and largest value of each probe."""
+    """Last, smallest and largest value of each probe, by the name of the probe."""
     warnings: list[str] = []
 
 

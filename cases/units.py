@@ -5,8 +5,9 @@ The grammar is closed (no evaluation of any kind)::
     quantity = number [ unit { ("*" | "/" | " ") unit } ]
     unit     = symbol [ "^" integer ]
 
-A bare number is taken as SI. Factors are exact and a quantity is rounded once: ``0.4 mm`` and ``400 um`` give the same
-bit pattern, and therefore the same run. Errors contain the text of the quantity, the reason, and the allowed form.
+A number without a unit is taken as a value in SI. Factors are exact and a quantity is rounded once: ``0.4 mm`` and
+``400 um`` give the same bit pattern, and therefore the same run. Errors contain the text of the quantity, the reason,
+and the allowed form.
 """
 
 import math
@@ -74,8 +75,8 @@ _FACTOR = re.compile(r"\s*([*/·]?)\s*([A-Za-zµ%]+|1)(?:\^([+-]?\d))?")
 QUANTITY = "the quantity's"
 """Placeholder for the unit of a number if another key determines the unit."""
 _LONGEST = 80
-"""Largest number of characters of a quantity (chosen value). Any number with its unit is shorter than this limit. Text
-above this length is refused before it is parsed."""
+"""Largest number of characters of a quantity (chosen value). Any number with its unit is shorter than this limit. A
+longer text is refused before it is parsed as a quantity."""
 LARGEST = 1e30
 """Largest quantity in SI units; the smallest quantity is its inverse. The energy of any mass and speed below this limit
 is a finite number (reason of the chosen value)."""

@@ -12,7 +12,7 @@ _LOCK = "server.lock"
 
 
 class AloneError(StartError):
-    """Error: another server uses the folder. The text of the error is one line."""
+    """Error: another server uses the folder. The text of this error is one line."""
 
 
 @contextmanager

@@ -58,7 +58,7 @@ def copy(source: Path, target: Path) -> None:
 
 
 def sync_folder(folder: Path) -> None:
-    """Flushes the names of the files in ``folder`` to disk."""
+    """Calls fsync for ``folder``, which flushes the names of its files to disk."""
     descriptor = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
     try:
         with whole.named(folder):

@@ -16,8 +16,8 @@ block so far."""
 
 def share() -> bool:
     """Limits the number of heaps of the C library; must be called before the first thread starts. Returns False if the
-    C library does not have this setting. Without the limit each thread has a separate heap, which stays as large as the
-    largest answer of the thread.
+    C library has no setting for the number of heaps. Without the limit each thread has a separate heap, which stays as
+    large as the largest answer of the thread.
     """
     if not sys.platform.startswith("linux"):
         return False

@@ -34,12 +34,12 @@ _FAREWELL = 3
 
 
 class ServeError(StartError):
-    """Error: the server cannot start. The text of the error is one line."""
+    """Error: the server cannot start. The text of this error is one line."""
 
 
 def serve(settings: Settings) -> None:
     """Runs the server until SIGTERM or SIGINT. Only the user of the server can read the files of the server and its
-    workers. Raises ServeError, and the errors of ``opened``.
+    workers. Raises ServeError, and the errors of the function ``opened``.
     """
     os.umask(0o077)
     sys.setswitchinterval(_SWITCH)
@@ -116,7 +116,7 @@ class _Server(uvicorn.Server):
 
 
 def announce(service: Service, listener: socket.socket, page_problem: str | None) -> bytes:
-    """Prints one line and, if there is a page, the address of the page; None: no page. Returns the content of
+    """Prints one line and, if there is a page, the address of the page; None: no page. Returns the content of the file
     server.json.
     """
     host, port = listener.getsockname()[:2]

@@ -45,7 +45,7 @@ _ANSWERS = ["query", "declare_subscriber"]
 
 
 class TelemetryError(StartError):
-    """Error: the Zenoh router cannot be opened. The text of the error is one line."""
+    """Error: the Zenoh router cannot be opened. The text of this error is one line."""
 
 
 @dataclass(frozen=True)

@@ -19,7 +19,7 @@ from ..warnings.idle import idle
 from .drives import clash
 
 ROUNDING = 1e-9
-"""Relative tolerance of two lengths or times that are meant to be equal. The tolerance is far above the rounding of
+"""Two lengths or times with a smaller relative difference count as equal. The tolerance is far above the rounding of
 units (1e-16) and far below any tolerance of a drawing (chosen value)."""
 
 

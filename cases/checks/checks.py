@@ -57,7 +57,7 @@ def check(case: Case) -> list[Problem]:
 
 
 def check_parts(data: Mapping[str, Any]) -> Iterator[Problem]:
-    """Yields the problems of the parts of a case with errors in other keys: materials, sizes, overlap."""
+    """Yields the problems of the parts of a case if other keys of the case have errors: materials, sizes, overlap."""
     listed, own = data.get("parts"), data.get("materials")
     known = {*library(), *(own if isinstance(own, Mapping) else ())}
     parts: list[tuple[int, Part]] = []
@@ -130,7 +130,7 @@ def _parts(case: Case) -> Iterator[Problem]:
 
 
 def _erosion(spec: Erosion, name: str, law: Strength | None, location: Location) -> Iterator[Problem]:
-    """Yields a problem for limits that the material can never reach."""
+    """Yields a problem for erosion limits that the material of a part can never reach."""
     if law is None and spec.plastic_strain is not None:
         message = f"{name} is elastic (no table strength) and has no plastic strain; remove the key"
         yield problem((*location, "plastic_strain"), spec.plastic_strain, message)

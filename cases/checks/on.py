@@ -16,7 +16,7 @@ MOST = 62
 
 
 class Framed(NamedTuple):
-    """A set that frames contain (``run.sets``)."""
+    """A set of a mesh file that frames contain (``run.sets``)."""
 
     on: str
     parts: tuple[str, ...] = ()

@@ -20,9 +20,9 @@ _USED: dict[str, tuple[str, ...]] = {
     "at": _HOLES,
     "centre": (*_HOLES, "cone_angle"),
 }
-"""Fields for which a key is allowed."""
+"""Probe fields for which each key is allowed, by key."""
 _NEEDED: dict[str, tuple[str, ...]] = {"wall": COURSES, "beyond": BEYOND, "axis": SHAPES, "at": _HOLES}
-"""Fields for which a key is required."""
+"""Probe fields for which each key is required, by key."""
 
 
 def check_probes(case: Case) -> Iterator[Problem]:

@@ -36,7 +36,7 @@ class Guard:
     at_cut: int | None = None
 
     def grown(self, outside: int) -> bool:
-        """Whether the number of ``outside`` nodes has grown beyond the limit."""
+        """Whether the number of ``outside`` nodes of a rank has grown beyond the limit since the last decomposition."""
         if self.at_cut is None:
             self.at_cut = outside
         return outside > self.alpha * self.at_cut
@@ -72,7 +72,9 @@ class Stretch:
 
     @property
     def work(self) -> list[float]:
-        """Work of each rank, s. Waiting that alternates between ranks is not counted as imbalance."""
+        """CPU time of each rank since the last decomposition, s. Waiting that alternates between ranks is not counted
+        as imbalance.
+        """
         return self._moments[-1][1] if self._moments else []
 
     @property
@@ -95,7 +97,7 @@ class Trigger:
     cost: float
     """Cost of the last decomposition, s; before the first decomposition, the cost of a comparable operation."""
     step: int = 0
-    """Step of the last decomposition."""
+    """Number of the time step at which the mesh was last decomposed."""
     stretch: Stretch = field(default_factory=Stretch)
     """Work of each rank since the last decomposition."""
     fruitless: int = 0

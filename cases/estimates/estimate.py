@@ -65,8 +65,8 @@ DUST_BYTES = 38_000
 """Additional memory per tet of a body that has turned to dust: copies of nodes, surface, candidate pairs and their
 tables. Measured as the peak of a rank with half of the facets broken, less its memory before fracture: 20 kB in the
 tile of docs/tutorial/first_case.md with 3,900 tets, 35 and 40 kB with the 57 MB that rank 0 needs at the end to write
-the history as Parquet; 20 kB in glass_ball_cohesive on two ranks. Glass bars with a quarter of the facets broken,
-glass_steel_bar with 9,000 and 39,000 tets, had 7 and 5 kB."""
+the history as Parquet; 20 kB in glass_ball_cohesive on two ranks. Glass bars with a quarter of the facets broken needed
+7 and 5 kB per tet: glass_steel_bar with 9,000 and 39,000 tets."""
 FILE_BYTES = {".msh": 42, ".inp": 48}
 """Bytes per tet of a mesh file in text, including the tet's share of the node lines."""
 
@@ -228,10 +228,10 @@ def _breaking(case: Case, parts: tuple[PartEstimate, ...], steps: int | None) ->
 def broken_share(case: Case, part: Part, speed: float) -> float:
     """Returns the largest share of the facets of a part that can break in an impact at ``speed``, m/s.
 
-    Fragments are as large as the kinetic energy of their stretching can pay for in crack surface: s^3 = 24 G / (density
-    rate^2), Grady 1982 (J. Appl. Phys. 53, 322); facets are one element apart. The rate is the largest of three: the
-    rate of the part's stretch or spin; the speed divided by the length of the part; the rate that strains the part to
-    its strength while a wave crosses it. The share is 1 for mesh files.
+    The size of fragments is such that the kinetic energy of their stretching equals the energy of their crack surface:
+    s^3 = 24 G / (density rate^2), Grady 1982 (J. Appl. Phys. 53, 322); facets are one element apart. The rate is the
+    largest of three: the rate of the part's stretch or spin; the speed divided by the length of the part; the rate that
+    strains the part to its strength while a wave crosses it. The share is 1 for mesh files.
     """
     made, body = material(case, part.material), bounds(part.mesh)
     if made.brittle is None or body is None or isinstance(part.mesh, Measured):

@@ -17,7 +17,7 @@ DEEPEST, DEEPEST_ERODING = 12.0, 4.0
 """Largest reduction of the time step of a crushed body; the limit holds because the flattest tets of a part that erodes
 are deleted."""
 FOOT, SLENDER = 0.9, 4.5
-"""Constant of the function ``shrinkage``."""
+"""Factor of k, and largest ratio of length to width, in the function ``shrinkage``."""
 CROSSINGS = 2.0
 """Duration of a shock in a part, divided by the ratio of its extent and the impact speed. Measured: the time step of
 two copper balls of 1 mm that collide at 10 km/s (cases/hard/head_on_10km.toml) is short for 0.2 us."""
@@ -30,8 +30,8 @@ def shrinkage(case: Case, part: Part, speed: float) -> float:
     A metal that can flow and stops from the speed v takes the mean strain density v^2 / (2 yield stress). Its foot,
     about as long as wide, takes the strain of the whole length: the mean time step falls as exp(k strain) with k = 0.9
     length / width, at most 4 (``slenderness``). Measured: square bars that are 1, 2 and 4 times as long as wide have k
-    up to 0.9, 1.8 and 2.8, less with strong hardening (``python -m tests.bench.flattening``), Taylor bars of copper and
-    steel 4. A part that is enclosed is compressed by a shock.
+    up to 0.9, 1.8 and 2.8, less with strong hardening (``python -m tests.bench.flattening``); Taylor bars of copper and
+    steel have k = 4. A part that is enclosed is compressed by a shock.
     """
     made = material(case, part.material)
     deepest = DEEPEST if part.erosion is None else DEEPEST_ERODING
@@ -50,7 +50,8 @@ def shrinkage(case: Case, part: Part, speed: float) -> float:
 def _shocked(case: Case, part: Part, made: Material, speed: float, flattened: float) -> float:
     """Returns the reduction of the time step of a part that an impact shocks or flattens. Material behind a shock moves
     at u = speed / 2, and waves behind the shock are about 2 S u faster than c0, while the part crosses its own extent.
-    During this time a tet that erodes flattens up to its limit strain; later such tets are deleted.
+    While the shock crosses the part, a tet that erodes flattens up to its limit strain; later the flat tets are
+    deleted.
     """
     body = None if isinstance(part.mesh, Measured) else bounds(part.mesh)
     if part.erosion is None:

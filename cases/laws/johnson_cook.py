@@ -21,9 +21,9 @@ class JohnsonCookDamage(Model):
     """
 
     D1: Ratio
-    """Fracture strain at high tension."""
+    """Constant D1: fracture strain at high tension."""
     D2: Ratio
-    """Increase of the fracture strain without tension."""
+    """Constant D2: increase of the fracture strain at zero tension."""
     D3: Ratio
     """Exponent of the mean stress; negative if tension reduces the fracture strain."""
     D4: Ratio = 0.0
@@ -61,7 +61,8 @@ class JohnsonCook(Law):
     m: Annotated[Ratio, Positive]
     """Exponent of the thermal softening."""
     reference_rate: Annotated[Rate, Positive] = 1.0
-    """Plastic strain rate at which A, B and n were measured. Below the reference rate the strain rate has no effect."""
+    """Plastic strain rate at which the constants A, B and n were measured. Below the reference rate the strain rate has
+    no effect."""
     reference_temperature: Annotated[Temperature, Field(ge=0)] = 293.15
     """Temperature at which A, B and n were measured; below this temperature the flow stress has no softening."""
     melt_temperature: Annotated[Temperature, Positive]

@@ -43,7 +43,8 @@ class JohnsonHolmquist(Law):
     C: Annotated[Ratio, Field(ge=0)] = 0.0
     """Coefficient of the strain rate in the strengths."""
     reference_rate: Annotated[Rate, Positive] = 1.0
-    """Strain rate at which A and B were measured. Below the reference rate the strain rate has no effect."""
+    """Strain rate at which the constants A and B were measured. Below the reference rate the strain rate has no
+    effect."""
     largest_fractured: Annotated[Ratio, Positive] | None = None
     """Largest fractured strength, divided by the strength at the Hugoniot elastic limit. Default: the fractured
     strength has no limit."""

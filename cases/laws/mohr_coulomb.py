@@ -38,7 +38,7 @@ class MohrCoulomb(Law):
     change; equal to ``friction_angle`` (the largest value): associated flow. The key ``dilation_angle`` must not be
     combined with ``eos``."""
     strength_cap: Annotated[Stress, Positive] | None = None
-    """Largest s1 - s3 at any pressure. Default: s1 - s3 has no limit."""
+    """Largest difference s1 - s3 of the principal stresses, at any pressure. Default: s1 - s3 has no limit."""
     failure_strain: Annotated[Ratio, Positive] | None = None
     """Effective plastic strain at failure; at larger strains the residual values apply. Default: the material has no
     failure."""
@@ -46,8 +46,8 @@ class MohrCoulomb(Law):
     """Cohesion after failure; at most ``cohesion``. Default: 0. The key ``residual_cohesion`` needs
     ``failure_strain``."""
     residual_friction_angle: Annotated[Angle, AfterValidator(_acute)] | None = None
-    """Angle of internal friction after failure; at most ``friction_angle``. Default: 30 deg, or ``friction_angle`` if
-    that is smaller. The key ``residual_friction_angle`` needs ``failure_strain``."""
+    """Angle of internal friction after failure; at most ``friction_angle``. Default: the smaller of 30 deg and
+    ``friction_angle``. The key ``residual_friction_angle`` needs ``failure_strain``."""
 
     nanoseconds: ClassVar[float] = 60.0
 

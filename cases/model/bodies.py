@@ -65,7 +65,7 @@ class Slit(Model):
 
 
 class Box(BoxForm, Primitive):
-    """A rectangular block between two corners. A sector is cut at the origin of the coordinates."""
+    """A rectangular block between two corners. A sector of a block is cut at the origin of the coordinates."""
 
     axis: Axis = "z"
     """Direction across which a sector is cut."""
@@ -86,7 +86,7 @@ class Symmetric(Primitive):
 class Plate(PlateForm, Symmetric):
     """A rectangular plate with ``thickness`` along ``axis``, ``width`` and ``height`` across ``axis``.
 
-    ``base`` is the centre of the face at the low end of ``axis``.
+    The key ``base`` is the centre of the face at the low end of ``axis``.
     """
 
     slit: Slit | None = None
@@ -94,11 +94,11 @@ class Plate(PlateForm, Symmetric):
 
 
 class Cylinder(CylinderForm, Symmetric):
-    """A solid cylinder. ``base`` is the centre of the end face at the low end of ``axis``."""
+    """A solid cylinder. The key ``base`` is the centre of the end face at the low end of ``axis``."""
 
 
 class Tube(TubeForm, Symmetric):
-    """A hollow cylinder. ``base`` is the centre of the end face at the low end of ``axis``."""
+    """A hollow cylinder. The key ``base`` is the centre of the end face at the low end of ``axis``."""
 
 
 class Sphere(SphereForm, Symmetric):
@@ -176,7 +176,7 @@ class Shards(Loose):
     shape: Literal["shards"]
     """Selects this shape."""
     base: Point = (0.0, 0.0, 0.0)
-    """Corner of the group with the lowest coordinates."""
+    """Corner with the lowest coordinates of the group of tets."""
     count: tuple[Edge, Edge, Edge]
     """Number of tets along x, y, z."""
     gap: Annotated[Length, Field(ge=0)] = 0.0
@@ -210,12 +210,12 @@ class MeshFile(Measured):
     Abaqus: an element set (``Bar-1.Set-1`` for a set of an instance or a part), an instance or a part. LS-DYNA and
     Radioss: a part, a set or a subset."""
     second_order: Literal["auto", "corners", "eight"] = "auto"
-    """Treatment of tets with 10 nodes. ``corners``: one tet of its 4 corners. ``eight``: eight tets of 4 nodes.
-    ``auto``: ``eight`` if the corners alone would lose more than 0.1 % of the volume, otherwise ``corners``; a warning
-    reports the choice."""
+    """Treatment of tets with 10 nodes. ``corners``: each tet with 10 nodes becomes one tet of its 4 corners. ``eight``:
+    each tet with 10 nodes becomes eight tets of 4 nodes. ``auto``: ``eight`` if the corners alone would lose more than
+    0.1 % of the volume, otherwise ``corners``; a warning reports the choice."""
     sha256: Sha256 | None = None
-    """SHA-256 hash of the file, 64 hexadecimal digits. A file with another hash is refused. Commands that send the file
-    add ``sha256``; a server requires ``sha256``. Default: the hash is not checked."""
+    """SHA-256 hash of the file, 64 hexadecimal digits. A file whose hash differs from ``sha256`` is refused. Commands
+    that send the file add ``sha256``; a server requires ``sha256``. Default: the hash is not checked."""
 
 
 Mesh = Annotated[

@@ -19,7 +19,7 @@ class Bonded(Model):
 
     parts: tuple[Name, Name]
     """Names of the two parts of the bond. A pair of parts has at most one bond; a part may have bonds with several
-    others."""
+    other parts."""
     strength: Annotated[Stress, Positive] | None = None
     """Tensile strength: the interface breaks at this normal traction. Default: the bond never breaks."""
     shear_strength: Annotated[Stress, Positive] | None = None
@@ -80,8 +80,8 @@ class TiedBond(Bonded):
     """Selects a bond with tied nodes."""
     gap: Annotated[Length, Field(ge=0)] | None = None
     """Largest distance between bonded faces; the nodes of one part are moved by this distance onto the other part.
-    Default: a tenth of the size of the smaller face (square root of twice its area). Faces at a larger distance are not
-    bonded, and a warning gives their number."""
+    Default: a tenth of the size of the smaller face; the size of a face is the square root of twice its area. Faces at
+    a larger distance are not bonded, and a warning gives their number."""
 
 
 Bond = Annotated[SharedBond | TiedBond, Field(discriminator="kind")]

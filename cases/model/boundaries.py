@@ -44,7 +44,7 @@ class Wall(Model):
     name: Name = "wall"
     """Name of the wall in messages and for probes. No two walls have the same name."""
     shape: Literal["plane", "cylinder", "sphere"] = "plane"
-    """Shape of the wall's surface. A cylinder is infinitely long."""
+    """Shape of the wall's surface. A wall with the shape of a cylinder is infinitely long."""
     point: Point
     """Position of the wall at the start: any point of a plane, any point of the axis of a cylinder, centre of a
     sphere."""
@@ -64,8 +64,8 @@ class Wall(Model):
     """Factor of ``velocity`` over time, as pairs of time and factor (see ``kind = "velocity"``). The key ``factor``
     must not be combined with ``mass``."""
     mass: Annotated[Mass, Field(gt=0)] | None = None
-    """Mass of a free wall, whose velocity only the impulses of the bodies change. Default: the velocity is
-    prescribed."""
+    """Mass of a free wall, whose velocity only the impulses of the bodies change. Default: the wall has no mass, and
+    its velocity is prescribed."""
     parts: tuple[Name, ...] = ()
     """Names of the parts that the wall stops; all parts if empty."""
     friction: Annotated[Ratio, Field(ge=0)] = 0.0
@@ -81,9 +81,9 @@ class Prescribed(Model):
     """A prescribed velocity of the nodes that start in the box ``low`` to ``high``; without a box, of all nodes of the
     parts.
 
-    Velocity components that the case does not give are free. Two boundaries cannot prescribe different values for the
-    same component of a node. Walls do not stop nodes that have a prescribed velocity component. Nodes outside of the
-    box count as inside if their distance is at most a hundredth of the shortest edge of their part.
+    Velocity components that the case does not give are free. Two boundaries must not prescribe different values for the
+    same velocity component of a node. Walls do not stop nodes that have a prescribed velocity component. Nodes outside
+    of the box count as inside if their distance is at most a hundredth of the shortest edge of their part.
     """
 
     kind: Literal["velocity"]
@@ -118,7 +118,7 @@ class Rotation(Model):
     parts: tuple[Name, ...] = ()
     """Names of the parts that rotate; all parts if empty."""
     spin: Spin
-    """Axis of rotation and angular velocity."""
+    """Axis of rotation and angular velocity of the prescribed rotation."""
     on: SetName | None = None
     """Name of a node set or a surface in the mesh file of the parts (docs/howto/meshes.md): only nodes of this set
     rotate."""

@@ -12,7 +12,7 @@ class ContactPair(Model):
     """A pair of parts with a different coefficient of friction."""
 
     parts: tuple[Name, Name]
-    """Names of the two parts."""
+    """Names of the two parts in contact."""
     friction: Annotated[Ratio, Field(ge=0)]
     """Coulomb's coefficient of friction between the two parts."""
 
@@ -46,11 +46,11 @@ class Contact(Model):
     """Whether sharp edges are in contact with edges. With ``false`` contact is cheaper, but edges can pass through each
     other."""
     overlap: Literal["refuse", "push"] = "refuse"
-    """Treatment of bodies that overlap at the start. ``refuse``: the run ends with an error. ``push``: the bodies are
-    moved apart without stress; the run ends with an error where the bodies overlap too deeply for their tets. Two
-    bodies overlap where their primitives intersect, or where a surface node of one body lies inside the mesh of the
-    other body deeper than a millionth of a face's size; bodies that touch do not overlap. Parts that are not in contact
-    with each other may overlap."""
+    """Treatment of bodies that overlap at the start. ``refuse``: a run with overlapping bodies ends with an error.
+    ``push``: the bodies are moved apart without stress; the run ends with an error where the bodies overlap too deeply
+    for their tets. Two bodies overlap where their primitives intersect, or where a surface node of one body lies inside
+    the mesh of the other body deeper than a millionth of a face's size; bodies that touch do not overlap. Parts between
+    which contact is switched off may overlap."""
     sweeps: Annotated[Count, Field(ge=1, le=1000)] | None = None
     """Number of Jacobi sweeps, with momentum, over the active contacts of a time step. Default: the number of sweeps is
     adaptive, 5 to 80. The number of sweeps increases if the last sweep of the previous step changed the impulses by

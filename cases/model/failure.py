@@ -27,9 +27,9 @@ class Erosion(Model):
     cheaper and deletes more tets."""
     nodes: Literal["strike", "particles", "remove"] = "strike"
     """Treatment of free nodes, which have lost all tets and are particles with mass and without volume. ``strike``: a
-    free node moves on, and is deleted after a face has pushed it. ``particles``: a free node is never deleted; many
-    free nodes can gather on a line and dig a hole that real material would not dig. ``remove``: a node without tets is
-    deleted at once. Mass, momentum and energy of deleted nodes are booked."""
+    free node moves on, and is deleted after its contact with a face. ``particles``: a free node is never deleted; many
+    free nodes can gather on a line and dig a hole that real material would not dig. ``remove``: a free node is deleted
+    at once. The mass, momentum and energy of deleted nodes are recorded in the balances."""
 
 
 class Fracture(Model):
@@ -42,9 +42,10 @@ class Fracture(Model):
     broken facet falls linearly with the opening and absorbs the fracture energy (Camacho and Ortiz 1996)."""
     shear_weight: Annotated[Ratio, Field(ge=0)] | None = None
     """Weight beta_tau of the shear traction in the effective traction ``sqrt(<t_n>^2 + beta_tau t_s^2)``, which is
-    compared with the strength. Default: 0 (largest normal traction) for ``instant``, 1 for ``cohesive``, which needs a
-    value above 0. With the weight 1, shear alone breaks a facet at the tensile strength: material that is compressed
-    across the crack, such as a disc between platens, breaks early unless ``friction`` prevents it."""
+    compared with the strength. Default: 0 for ``instant`` (the largest normal traction decides), 1 for ``cohesive``;
+    the model ``cohesive`` needs a weight above 0. With the weight 1, shear alone breaks a facet at the tensile
+    strength: material that is compressed across the crack, such as a disc between platens, breaks early unless
+    ``friction`` prevents it."""
     friction: Annotated[Ratio, Field(ge=0)] = 0.0
     """Coefficient of internal friction: under a compressive traction |t_n| the shear traction is reduced by
     ``friction * |t_n|``."""

@@ -39,7 +39,7 @@ class PlateForm(Model):
 
 
 class CylinderForm(Model):
-    """A solid cylinder. ``base`` is the centre of the end face at the low end of ``axis``."""
+    """A solid cylinder. The key ``base`` is the centre of the end face at the low end of ``axis``."""
 
     shape: Literal["cylinder"]
     """Selects this shape."""
@@ -95,8 +95,8 @@ class ConeForm(Model):
     radius: Annotated[Length, Field(ge=0)]
     """Radius of the cone at ``base``; 0: the tip of the cone is at ``base``."""
     top_radius: Annotated[Length, Field(ge=0)] = 0.0
-    """Radius of the cone at the high end of ``axis``; 0: the tip of the cone is at the high end. At least one of the
-    two radii is above 0."""
+    """Radius of the cone at the high end of ``axis``; 0: the tip of the cone is at the high end. At least one of
+    ``radius`` and ``top_radius`` is above 0."""
     length: Annotated[Length, Positive]
     """Height of the cone, along ``axis``."""
 
@@ -115,10 +115,10 @@ class OgiveForm(Model):
     radius: Annotated[Length, Positive]
     """Radius of the shank, half of the calibre."""
     shank: Annotated[Length, Field(ge=0)] = 0.0
-    """Length of the cylinder behind the nose."""
+    """Length of the cylindrical shank behind the nose."""
     crh: Annotated[Ratio, Field(ge=0.5, le=1000)] | None = None
-    """Calibre radius head: radius of the arc of the ogive divided by the diameter. At 0.5 a tangent ogive is a
-    hemisphere."""
+    """Calibre radius head: radius of the arc of the ogive divided by the diameter. A tangent ogive with a calibre
+    radius head of 0.5 is a hemisphere."""
     nose: Annotated[Length, Positive] | None = None
     """Length of the nose up to its sharp tip. At least one of ``crh`` and ``nose`` is required. If both are given,
     ``crh`` must be at least that of the tangent ogive, (nose / D)^2 + 1/4, D the diameter."""
@@ -131,7 +131,7 @@ class OgiveForm(Model):
 
 
 class BallPiece(Model):
-    """Keys of segments of a sphere."""
+    """Common keys of segments of a sphere."""
 
     base: Point = (0.0, 0.0, 0.0)
     """Centre of the low end of ``axis``: centre of the flat face, or the pole with ``pointing = "low"``."""

@@ -61,7 +61,7 @@ def cohesive(case: Joined) -> set[int]:
 def meeting(case: Joined) -> list[bool]:
     """Returns an array (parts,): whether parts of the same body can be in contact with each other. The parts of a body
     can be in contact with each other if the body can break, or if one of its parts has self-contact. Parts of one body
-    that cannot separate are not in contact.
+    that cannot separate from each other are not in contact with each other.
     """
     of, names = bodies(case), set(case.self_contact)
     some = {of[i] for i, part in enumerate(case.parts) if part.name in names}

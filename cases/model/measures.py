@@ -97,7 +97,8 @@ class Probe(Model):
     """
 
     name: Name
-    """Name of the column. Columns that every run has (such as ``kinetic`` or ``dt``) cannot be used."""
+    """Name of the probe's column in history.csv. Names of columns that every run has (such as ``kinetic`` or ``dt``)
+    cannot be used for a probe."""
     part: Name = ""
     """Name of the part that is measured. The key ``part`` must be absent with ``wall_position_*`` and
     ``wall_velocity_*``; with ``wall_force_*`` and ``wall_impulse_*`` an absent key means all parts."""
@@ -121,7 +122,7 @@ class Probe(Model):
     beyond: Beyond | None = None
     """With sums and fields behind a target: side of a plane, such as ``{ axis = "z", at = "8 mm" }``."""
     axis: Axis | None = None
-    """With shapes: direction of the line."""
+    """With the fields of shapes: direction of the line."""
     at: Length | None = None
     """With ``hole_width`` and ``hole_diameter``: coordinate along ``axis`` of the plane of the hole."""
     centre: Point | None = None
@@ -147,7 +148,7 @@ class Reference(Model):
     wall or another body exerts a force, s. ``contact_loss``: energy dissipated by contact divided by the initial
     energy. ``penetration``: thickness of all other parts along ``axis`` in front of the end of the hole that the part
     has made around the axis through the origin, m; cavities ahead of the hole do not count. ``worst_residual``: largest
-    residual of the energy ledger. Free nodes do not count for ``extent`` and ``radius``.
+    residual of the energy ledger. The quantities ``extent`` and ``radius`` do not include free nodes.
     """
 
     quantity: Quantity
@@ -166,7 +167,7 @@ class Reference(Model):
     """With ``extent``, ``radius``, ``speed_mean`` and ``penetration``: direction along which the quantity is
     measured."""
     since: Time = 0.0
-    """With ``probe_*``: start of the time window."""
+    """With ``probe_*``: start of the time window in which the probe is evaluated."""
     until: Time | None = None
     """With ``probe_*``: end of the time window; the end of the run if absent."""
 

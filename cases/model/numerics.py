@@ -12,10 +12,10 @@ class Viscosity(Model):
     """Bulk viscosity ``q = density * u * ((linear + shock * S) * c + quadratic * u)``, ``u = l * |rate|``, in
     compression only.
 
-    The symbol c is the wave speed. ``S = u / (u + c / 100)`` is close to 0 in elastic waves and close to 1 in shocks.
-    ``l = 1.2009 / sqrt(sum |grad N|^2)`` is V^(1/3) for a regular tet and follows the altitude of a flat one. The
-    volumetric strain rate in ``u`` is that of the pressure form: with ``nodal`` and ``split`` the mean over the nodes
-    of the tet.
+    The symbol c is the wave speed. The factor ``S = u / (u + c / 100)`` is close to 0 in elastic waves and close to 1
+    in shocks. The length ``l = 1.2009 / sqrt(sum |grad N|^2)`` is V^(1/3) for a regular tet of volume V, and is
+    proportional to the altitude of a flat tet. The volumetric strain rate in ``u`` is that of the pressure form: with
+    ``nodal`` and ``split`` the mean over the nodes of the tet.
     """
 
     linear: Annotated[Ratio, Field(ge=0)] = 0.06
@@ -34,13 +34,13 @@ class Numerics(Model):
 
     pressure: Literal["standard", "nodal", "split"] = "nodal"
     """Pressure form of the tets. ``nodal``: average nodal pressure, for plastic flow and for general use. ``standard``:
-    one pressure for each tet; cheaper, but it locks (is too stiff) in plastic flow. ``split``: operator split,
-    stabilised by pressure-gradient projection; it damps elastic motion (a free ball of 6,400 tets that vibrates
-    radially loses 15 % of its energy in ten periods; with the other pressure forms it loses none). With ``nodal`` and
-    ``split``, a tet whose smallest altitude at the start is below a tenth of its longest edge has its own pressure,
-    which is not averaged."""
+    one pressure for each tet, which costs less than ``nodal``, but locks (is too stiff) in plastic flow. ``split``:
+    operator split, stabilised by pressure-gradient projection; it damps elastic motion (a free ball of 6,400 tets that
+    vibrates radially loses 15 % of its energy in ten periods; with the other pressure forms it loses none). With
+    ``nodal`` and ``split``, a tet whose smallest altitude at the start is below a tenth of its longest edge has its own
+    pressure, which is not averaged."""
     viscosity: Annotated[Viscosity | None, BeforeValidator(off), Switch()] = Viscosity()
-    """Bulk viscosity; ``"none"`` switches it off."""
+    """Bulk viscosity; ``"none"`` switches the bulk viscosity off."""
     dt_safety: Annotated[Ratio, Field(gt=0, le=1)] = 0.9
     """Time step divided by the rigorous stability limit of the tets, ``1 / (c sqrt(sum |grad N|^2))``. Bodies that
     shatter absorb about 15 % less fracture energy at ``dt_safety`` 0.9 than at 0.6 and below, and make fewer fragments.

@@ -30,16 +30,16 @@ class CadForm(Model):
     path: str
     """Path of the file, STEP (ISO 10303-21) or BREP (OpenCASCADE), relative to the folder of the case."""
     unit: Annotated[Length, Positive] | None = None
-    """Length unit of the coordinates in the file, such as ``"1 mm"``. A BREP file requires this key. A STEP file
-    contains its unit: ``unit`` may be absent, and a value that differs from the unit of the file is refused."""
+    """Length unit of the coordinates in the file, such as ``"1 mm"``. A BREP file requires the key ``unit``. A STEP
+    file contains its unit: ``unit`` may be absent, and a value that differs from the unit of the file is refused."""
     solids: tuple[str | Annotated[Count, Field(ge=1)], ...] = ()
     """Solids to use, by their names in the file or by their numbers from 1 in its order; all solids if empty. Several
     solids are one body: their meshes have common nodes where the solids touch."""
     heal: bool = False
     """Whether OpenCASCADE repairs the file first: short edges, small faces, gaps between faces."""
     sha256: Sha256 | None = None
-    """SHA-256 hash of the file, 64 hexadecimal digits. A file with another hash is refused. Default: the hash is not
-    checked."""
+    """SHA-256 hash of the file, 64 hexadecimal digits. A file whose hash differs from ``sha256`` is refused. Default:
+    the hash is not checked."""
 
 
 class StlForm(Model):
@@ -52,8 +52,8 @@ class StlForm(Model):
     unit: Annotated[Length, Positive]
     """Length unit of the coordinates in the file, such as ``"1 mm"``."""
     sha256: Sha256 | None = None
-    """SHA-256 hash of the file, 64 hexadecimal digits. A file with another hash is refused. Default: the hash is not
-    checked."""
+    """SHA-256 hash of the file, 64 hexadecimal digits. A file whose hash differs from ``sha256`` is refused. Default:
+    the hash is not checked."""
 
 
 class UnionForm(Model):

@@ -51,7 +51,7 @@ def read_rigid(value: Any) -> Any:
 
 
 def tensor_problems(inertia: Tensor) -> Iterator[str]:
-    """Yields the reasons why no body can have these moments of inertia."""
+    """Yields the reasons why no body can have the given moments of inertia."""
     xx, yy, zz, yz, zx, xy = inertia
     if not _minors_above((xx, yy, zz, yz, zx, xy), 0.0):
         yield "must be positive definite: every principal moment above 0"

@@ -19,7 +19,7 @@ class Run(Model):
     """Duration of the run, cores, output, and limits at which the run stops."""
 
     end_time: Annotated[Time, Positive]
-    """Simulated time at which the run ends. The simulated time starts at 0."""
+    """Simulated time at which the run ends. The simulated time of a run starts at 0."""
     ranks: Annotated[Count, Field(ge=1, le=MOST_RANKS)] = 1
     """Number of MPI processes. The answer does not depend on the number of MPI processes."""
     threads: Annotated[Count, Field(ge=1, le=MOST_THREADS)] = 1
@@ -32,25 +32,25 @@ class Run(Model):
     at submission has priority over this key."""
     cut_scale: tuple[Scale, Scale, Scale] = (1.0, 1.0, 1.0)
     """Factors of the coordinates for the domain decomposition: cuts across a direction with a small factor are avoided.
-    With a small factor along the direction of impact every rank receives a part of the impact zone. The factors change
-    the cost, not the answer."""
+    With a small factor along the direction of impact, every rank has a part of the impact zone. The factors of
+    ``cut_scale`` change the cost of a run, not its answer."""
     frames: Annotated[Count, Field(ge=0, le=100_000)] = 20
     """Number of frames (complete fields, VTKHDF), evenly spaced up to the end; frame 0 is the initial state. 0: no
     frames. A time step ends at each frame, so that another number of frames changes the time steps. The fracture
     pattern of bodies that shatter then changes, as with another ``dt_safety``."""
     fields: tuple[FrameField, ...] = ()
-    """Additional fields of the frames. ``density``: current density of the tets. ``strain``: logarithmic (Hencky)
-    strain ln V of each tet, six components, and ``effective_strain``, sqrt(2/3 e' : e') of its deviator; where the
-    principal axes do not rotate, this is the integral of the strain rate that other explicit codes store, with tensor
-    shear components. ``strain_rate``: sqrt(2/3 d' : d') of the deviator of the rate of deformation d.
+    """Names of additional fields of the frames. ``density``: current density of the tets. ``strain``: logarithmic
+    (Hencky) strain ln V of each tet, six tensor components, and ``effective_strain``, sqrt(2/3 e' : e') of the deviator
+    e'. If the principal axes do not rotate, the logarithmic strain is the integral of the strain rate that other
+    explicit codes store. ``strain_rate``: sqrt(2/3 d' : d') of the deviator of the rate of deformation d.
     ``contact_pressure``: impulse of contact and walls on a node since the previous frame, along the normal of the
     node's share of the loaded surface, divided by the area of this share and the time; 0 in the first frame. The share
     of a node is a third of each face that is hit at less than 60 degrees. Forces of walls on rigid parts are not
     included in ``contact_pressure``: use a probe of ``wall_force``."""
     sets: tuple[SetName, ...] = ()
     """Names of node sets and surfaces of mesh files. Frames contain these sets, and the sets that boundaries and probes
-    select with ``on``: a point array ``set_NAME`` for each set, 1 on the nodes of the set. ``conoid view --on NAME``
-    draws the tets that have a node in the set."""
+    select with ``on``: a point array ``set_NAME`` for each set, 1 on the nodes of the set. The command ``conoid view
+    --on NAME`` draws the tets that have a node in the set NAME."""
     samples: Annotated[Count, Field(ge=1, le=1_000_000)] = 500
     """Number of lines of history.csv, evenly spaced up to the end."""
     snapshots: Annotated[Count, Field(ge=0, le=100_000)] = 100
@@ -59,7 +59,7 @@ class Run(Model):
     snapshots would use more than 1/200 of the wall time; the first and the last snapshot are always made."""
     max_steps: Annotated[Count, Field(ge=1)] = 100_000_000
     """Largest number of time steps. A run that reaches this number of steps writes a checkpoint and stops with state
-    ``timed_out``, cause ``steps``. ``conoid restart RUN --max-steps NUMBER`` continues the run."""
+    ``timed_out``, cause ``steps``. The command ``conoid restart RUN --max-steps NUMBER`` continues such a run."""
     max_wall_time: Annotated[Time, Positive] | None = None
     """Largest wall time of the run, counted from the first time step. A run that reaches this wall time writes a
     checkpoint and stops. Default: no limit."""
@@ -90,9 +90,9 @@ class Balance(Model):
 
     policy: Literal["measured", "outside", "every", "never"] = "measured"
     """Criterion for a new decomposition of the mesh among the ranks. ``measured``: when the time lost by imbalance
-    since the last decomposition exceeds the cost of a new one. ``outside``: when the outside nodes of a rank have grown
-    by the factor ``alpha`` (criterion of Moon, Kim and Lee). ``every``: after a fixed number of time steps. ``never``:
-    the mesh is not decomposed again."""
+    since the last decomposition exceeds the cost of a new one. ``outside``: the mesh is decomposed again when the
+    number of outside nodes of a rank has grown by the factor ``alpha`` (criterion of Moon, Kim and Lee). ``every``: the
+    mesh is decomposed again after a fixed number of time steps. ``never``: the mesh is not decomposed again."""
     alpha: Annotated[Ratio, Field(gt=1)] = 1.2
     """With ``policy = "outside"``: growth factor of the outside nodes of a rank that triggers a decomposition."""
     every: Annotated[Count, Field(ge=1)] = 1000

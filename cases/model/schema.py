@@ -1,8 +1,8 @@
 """The models of a case: immutable, without unknown keys; every quantity is in SI units after reading.
 
-``parse_case`` in ``cases/load.py`` reads TOML or JSON and reports every error at once. Further models are in the
-modules ``bodies`` (bodies and their meshes), ``motion``, ``materials``, ``boundaries``, ``bonds``, ``failure`` and
-``measures`` (probes and references).
+The function ``parse_case`` in ``cases/load.py`` reads TOML or JSON and reports every error at once. Further models are
+in the modules ``bodies`` (bodies and their meshes), ``motion``, ``materials``, ``boundaries``, ``bonds``, ``failure``
+and ``measures`` (probes and references).
 """
 
 from typing import Annotated, TypeVar
@@ -41,7 +41,7 @@ class Part(Model):
     """Name of a material: one of ``[materials]`` of the case, or one of the library (``conoid materials`` lists
     them)."""
     mesh: Mesh
-    """Shape, place and element size of the body. ``shape`` selects one of the tables ``parts[].mesh`` below."""
+    """Shape, place and element size of the body. The key ``shape`` selects one of the tables ``parts[].mesh``."""
     turn: Turn | None = None
     """Rotation of the mesh before the run starts, for bodies that are inclined to the axes. A rotation requires
     ``sector = "full"``."""
@@ -53,8 +53,8 @@ class Part(Model):
     """Initial uniform stretching of the body, added to ``velocity``."""
     jitter: Annotated[Speed, Field(ge=0)] = 0.0
     """Amplitude of a random initial velocity, added to ``velocity``: each component of each node is uniform between
-    minus and plus this value. Every run of the case has the same random velocities. The key is meant for tests of
-    energy conservation."""
+    minus and plus this value. Every run of the case has the same random velocities. The key ``jitter`` is meant for
+    tests of energy conservation."""
     temperature: Annotated[Temperature, Field(ge=0)] = 293.15
     """Initial temperature of the body. The temperature is used only by ``strength`` with ``model = "johnson_cook"``."""
     erosion: Erosion | None = None

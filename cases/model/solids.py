@@ -75,8 +75,8 @@ class Stl(Meshed):
     edge_angle: Annotated[Angle, Field(gt=0, lt=3.1)] = 0.6981317007977318
     """Largest angle between neighbouring triangles of a smooth surface; at a larger angle the body has an edge."""
     sha256: Sha256 | None = None
-    """SHA-256 hash of the file, 64 hexadecimal digits. A file with another hash is refused. Default: the hash is not
-    checked."""
+    """SHA-256 hash of the file, 64 hexadecimal digits. A file whose hash differs from ``sha256`` is refused. Default:
+    the hash is not checked."""
 
 
 Combination = Union | Difference | Intersection

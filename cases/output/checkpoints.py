@@ -20,7 +20,7 @@ from . import layout
 
 FORMAT = 18
 """Version of the checkpoint files; 17 added the compression of brittle parts and the heat of deleted tets. Checkpoints
-of other versions cannot be read."""
+with another version number cannot be read."""
 MANIFEST, SEAL = "manifest.json", "manifest.sha256"
 _FILE = re.compile(r"rank-[0-9]+\.h5")
 _PIECE = 1 << 24

@@ -10,7 +10,7 @@ LEDGER: dict[str, str] = {name: "" if name == "residual" else "J" for name in En
 MOMENTA: dict[str, str] = {
     **{f"momentum_{axis}": "kg m/s" for axis in "xyz"}, **{f"angular_momentum_{axis}": "kg m^2/s" for axis in "xyz"},
 }  # fmt: skip
-"""Columns of the momentum. The angular momentum is about the origin."""
+"""Columns of the momentum. The angular momentum in the history is about the origin of the coordinates."""
 COLUMNS: dict[str, str] = {**CLOCK, **LEDGER, **MOMENTA}
 """Columns and units that every run has; the columns of parts and of probes follow."""
 OF_PARTS = PartEnergy.__struct_fields__
@@ -27,14 +27,14 @@ def of_parts(parts: Sequence[str]) -> dict[str, str]:
 
 def part_of(column: str) -> tuple[str, str] | None:
     """Returns the energy and the part of a column; None for a column of the whole model. The name of a probe contains
-    no point.
+    no ``.``, which separates energy and part.
     """
     name, point, part = column.partition(".")
     return (name, part) if point and name in OF_PARTS else None
 
 
 def header(columns: Mapping[str, str]) -> list[str]:
-    """Returns the first line of a table with these columns and units."""
+    """Returns the first line of a table with the given columns and units."""
     return [f"{name} [{unit}]" if unit else name for name, unit in columns.items()]
 
 

@@ -1,7 +1,7 @@
 """Zenoh key expressions: ``conoid/v1/<owner>/<run>/<class>``.
 
-The key contains the owner, so that access rules apply to each user. The version is a plain ``v1``, because wildcards do
-not match a chunk that starts with ``@``.
+The key contains the owner, so that access rules apply to each user. The version in the key is a plain ``v1``, because
+Zenoh wildcards do not match a chunk that starts with ``@``.
 """
 
 import re

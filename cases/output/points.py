@@ -33,8 +33,8 @@ KEY, RUN, RESULT = "key", "run", "result"
 _COUNTS = ("fragments", "broken", "eroded")
 _COSTS = {"first_break": "s", "time": "s", "elapsed": "s", "cpu": "s", "steps": "", "elements": "", "nodes": ""}
 _FORMULA = re.compile(r"[=@\t\r]|[+-](?!(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?( [^\W\d][\w*/^ -]*)?$)")
-"""Pattern of the start of a text that a spreadsheet program would compute. A number with a sign, and perhaps a unit,
-does not match."""
+"""Pattern of the start of a text that a spreadsheet program would compute. The pattern does not match a number with a
+sign, with or without a unit."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -198,7 +198,7 @@ def to_csv(columns: Sequence[Column]) -> str:
 
 
 def rows(columns: Sequence[Column]) -> Iterable[tuple[Cell, ...]]:
-    """Yields the lines of the table."""
+    """Yields the lines of the table of a sweep."""
     return zip(*(column.values for column in columns), strict=True)
 
 

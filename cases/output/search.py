@@ -54,7 +54,7 @@ class Search(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=Tr
     threshold: float
     result_unit: _Word = ""
     key: _Word
-    """The key whose value is x. ``more``: keys that vary together with this key."""
+    """The key whose value is x. The field ``more`` has the keys that vary together with the first key."""
     more: Annotated[list[_Word], msgspec.Meta(max_length=20)] = []
     unit: _Word = ""
     low: float
@@ -62,9 +62,9 @@ class Search(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=Tr
     tolerance: float
     points: Annotated[list[SearchPoint], msgspec.Meta(max_length=MOST_RUNS)] = []
     bracket: tuple[float, float] | None = None
-    """The two values of x between which the result crosses the threshold."""
+    """The two values of x between which the result crosses the threshold once."""
     mixed: tuple[float, float] | None = None
-    """The two values of x between which the result crosses the threshold several times."""
+    """The smallest and the largest x of an interval in which the result crosses the threshold several times."""
     curve: Curve | None = None
     over: bool = False
     """Whether the adaptive sweep has ended, so that no further point follows."""

@@ -30,7 +30,9 @@ _PARAMETER = re.compile(r"([IiRrCc])\s*([A-Za-z_][A-Za-z0-9_]*)", re.ASCII)
 
 
 class CardError(ConoidError, ValueError):
-    """Error in a deck. The text of the error is one line, which begins with the place of the error in the deck."""
+    """Error in an LS-DYNA keyword deck. The text of the error is one line, which begins with the place of the error in
+    the deck.
+    """
 
 
 class Card(NamedTuple):
@@ -61,7 +63,7 @@ class Block:
     """Values of ``*PARAMETER`` by name, in lower case."""
 
     def filled(self) -> Iterator[Card]:
-        """The cards that are not empty."""
+        """The cards of the keyword that are not empty."""
         return (card for card in self.cards if card.text.strip())
 
     def parted(self, options: Collection[str]) -> tuple[str, frozenset[str]]:

@@ -34,8 +34,8 @@ class Named:
 
 
 def files_of(case: Mapping[str, Any]) -> list[Named]:
-    """Returns all files that a case in plain data names, in the order of the case. Ignores values that are not tables,
-    lists or text.
+    """Returns all files that a case in plain data names, in the order of the case. Values of the case that are not
+    tables, lists or text are ignored.
     """
     parts = case.get("parts")
     meshes = ((n, part.get("mesh")) for n, part in enumerate(_listed(parts)) if isinstance(part, Mapping))

@@ -22,7 +22,7 @@ _WHOLES = re.compile(r"[0-9,\s]*", re.ASCII)
 _INCLUDE = re.compile(r"\s*\*\s*INCLUDE\s*,", re.ASCII | re.IGNORECASE)
 _D = str.maketrans("dD", "ee")
 _LONGEST = 60
-"""Number of characters of a line that a message shows: half a line of a terminal (chosen value)."""
+"""Largest number of characters of a line that an error message shows: half a line of a terminal (chosen value)."""
 _UTF_16 = (b"\xff\xfe", b"\xfe\xff")
 _UTF_8 = b"\xef\xbb\xbf"
 

@@ -80,7 +80,7 @@ def _tables() -> dict[str, dict[str, Any]]:
 
 
 def _values(table: dict[str, Any]) -> dict[str, Any]:
-    """Returns the table with each ``[value, confidence, source]`` replaced by its value."""
+    """Returns a table of the library in which each list ``[value, confidence, source]`` is replaced by its value."""
     return {key: _value(entry) for key, entry in table.items()}
 
 

@@ -81,7 +81,7 @@ def shown(value: object) -> str:
 
 def from_pydantic(error: ValidationError, data: Mapping[str, Any]) -> list[Problem]:
     """Returns the errors of pydantic in ``error`` with the keys of ``data``, in clearer words of this module where it
-    has them. At most a hundred errors are returned, because the search for similar names takes time.
+    has them. At most a hundred errors are returned, because the search for names similar to a misspelt name takes time.
     """
     details = error.errors(include_url=False, include_context=True)
     places = [detail["loc"] for detail in details]

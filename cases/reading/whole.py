@@ -16,7 +16,7 @@ _NO_LINK = getattr(os, "O_NOFOLLOW", 0)
 _AT_ONCE = getattr(os, "O_NONBLOCK", 0)
 """Flags of open(2) with which opening a pipe without a writer does not block."""
 _NO_FILE = frozenset({errno.ELOOP, errno.ENXIO, errno.ENODEV, errno.EOPNOTSUPP})
-"""Errors of open(2) for a link to itself, a socket, and a device without a driver."""
+"""Errors that open(2) reports for a link to itself, for a socket, and for a device without a driver."""
 
 
 @contextmanager
@@ -105,8 +105,9 @@ def read(path: str | Path, most: int = MOST, *, links: bool = True) -> bytes:
 
 
 def read_text(path: str | Path) -> str:
-    """Returns the text of a file in UTF-8, with line feeds as line ends. Raises UnicodeDecodeError in addition to
-    the errors of ``read``."""
+    """Returns the text of a file in UTF-8, with line feeds as line ends. Raises UnicodeDecodeError if the file is not
+    UTF-8, and the errors of the function ``read``.
+    """
     return TextIOWrapper(BytesIO(read(path)), encoding="utf-8").read()
 
 

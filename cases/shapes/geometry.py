@@ -16,7 +16,7 @@ AXES: tuple[Axis, Axis, Axis] = ("x", "y", "z")
 
 
 def index(axis: Axis) -> int:
-    """Index 0, 1, 2 of the axes x, y, z."""
+    """Index of each axis: 0 for x, 1 for y, 2 for z."""
     return AXES.index(axis)
 
 
@@ -76,7 +76,7 @@ def _reach(mesh: Plate | Cylinder | Tube | Revolved | RingSector) -> tuple[tuple
 
 def _two_tets(mesh: TwoTets, i: int, j: int) -> tuple[Vector, Vector]:
     """Returns the lowest and highest coordinates of two tets, m. The common face of the two tets has a corner in the
-    direction i, and an edge across this direction.
+    direction ``i``, and an edge normal to this direction.
     """
     edge, low, high = mesh.element_size, [0.0, 0.0, 0.0], [0.0, 0.0, 0.0]
     off = altitude(mesh) * math.tan(mesh.lean)

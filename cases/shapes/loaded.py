@@ -190,12 +190,12 @@ def _on_rim(corners: list[list[int]], i: int, j: int) -> bool:
 
 
 def _regular(mesh: Generated) -> bool:
-    """Whether the faces of a mesh are halves of the patches."""
+    """Whether the mesh has two triangular faces in each patch of a surface."""
     return isinstance(mesh, Box | Plate) and mesh.generator == "structured"
 
 
 def _facets(mesh: Generated) -> float:
-    """Relative uncertainty of the area of a body by its facets."""
+    """Relative uncertainty of the area of a body that is caused by the facets of its mesh."""
     if not isinstance(mesh, Cylinder | Tube | Sphere | Revolved | RingSector):
         return _FLAT
     radius = profile(mesh).widest() if isinstance(mesh, Revolved) else mesh.radius

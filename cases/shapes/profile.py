@@ -37,7 +37,7 @@ class Line:
         return math.pi / 3.0 * (self.z1 - self.z0) * (self.r0**2 + self.r0 * self.r1 + self.r1**2)
 
     def side(self) -> float:
-        """Area of the curved face, m^2."""
+        """Area of the curved face that the line makes around the axis, m^2."""
         return math.pi * (self.r0 + self.r1) * math.hypot(self.z1 - self.z0, self.r1 - self.r0)
 
     def section(self) -> float:
@@ -53,7 +53,7 @@ class Line:
         return min(along * self.z0 - out * self.r0, along * self.z1 - out * self.r1)
 
     def length(self) -> float:
-        """Height of the line, m."""
+        """Extent of the line along the axis, m."""
         return math.hypot(self.z1 - self.z0, self.r1 - self.r0)
 
     def mirrored(self, top: float) -> "Line":
@@ -114,7 +114,7 @@ class Arc:
         return min(*ends, *([along * self.zc - out * self.rc - self.radius * length] if inside else []))
 
     def length(self) -> float:
-        """Height of the arc, m."""
+        """Extent of the arc along the axis, m."""
         return self.radius * self._angle()
 
     def mirrored(self, top: float) -> "Arc":
@@ -166,7 +166,7 @@ class Profile:
         return math.fsum([*(each.side() for each in self.segments), *(math.pi * r**2 for r in self.ends)])
 
     def section(self) -> float:
-        """Area of one half of a cut along the axis, m^2."""
+        """Area of one half of a cut through the body along its axis, m^2."""
         return math.fsum(each.section() for each in self.segments)
 
     def widest(self) -> float:
@@ -206,7 +206,7 @@ def _cap(mesh: BallPiece) -> Arc:
 
 def arc_of(mesh: OgiveForm) -> Arc:
     """Returns the arc of the sharp nose, which begins at height 0: through (0, R) and (L, 0), with the centre of the
-    arc beyond the axis. For a tangent ogive the centre is at height 0: L^2 = radius^2 - (radius - R)^2.
+    arc beyond the axis. For a tangent ogive the centre of the arc is at height 0: L^2 = radius^2 - (radius - R)^2.
     """
     if mesh.nose is None or mesh.crh is None:
         radius = (mesh.nose**2 + mesh.radius**2) / (2.0 * mesh.radius) if mesh.nose else arc_radius(mesh)

@@ -33,7 +33,7 @@ from . import policy
 
 
 class SiteError(Exception):
-    """Error in the settings file of a site. The text of the error is one line."""
+    """Error in the settings file of a site. The text of this error is one line."""
 
 
 class Profile(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=True):
@@ -188,7 +188,9 @@ def _check(slurm: Slurm) -> None:
 
 
 def profile_of(slurm: Slurm, name: str) -> tuple[str, Profile]:
-    """Returns the profile ``name``, or the default profile. Raises ValueError with the existing names."""
+    """Returns the profile ``name``, or the default profile. Raises ValueError with the existing names if there is no
+    such profile.
+    """
     chosen = name or slurm.default or next(iter(slurm.profiles))
     if chosen not in slurm.profiles:
         raise ValueError(f"profile = {chosen[:40]!r}: {allowed(chosen, slurm.profiles)}")
@@ -224,7 +226,9 @@ def key_of(name: str, task: int | None) -> str:
 
 
 def script(profile: Profile, python: str) -> str:
-    """Returns the batch script: the site's lines, then the run. The script does not depend on the run or its owner."""
+    """Returns the batch script: the site's lines, then the run. The batch script does not depend on the run or its
+    owner.
+    """
     modules = [f"module load {shlex.quote(module)}" for module in profile.modules]
     lines = "".join(f"{line}\n" for line in [*modules, *profile.lines])
     return _TEMPLATE.format(lines=lines, python=shlex.quote(python))

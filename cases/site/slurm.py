@@ -211,7 +211,9 @@ def kill(place: str, job: str) -> None:
 
 
 def release(place: str, job: str) -> None:
-    """Releases a held job. Raises AwayError; a job that is not held, or has ended, is no error."""
+    """Releases a held job. Raises AwayError if the controller does not answer; a job that is not held, or has ended, is
+    no error.
+    """
     with suppress(RefusedError):
         call(place, ["scontrol", "release", job])
 

@@ -20,8 +20,8 @@ _REFUSALS = (
     "invalid", "not permitted", "unspecified", "violates", "not available", "unrecognized", "denied", "more processors",
     "not supported", "exceeds", "disabled", "limit", "unknown", "ambiguous", "too ",
 )  # fmt: skip
-"""Words of final refusals in the last line of the output of sbatch. All other failures (connection, socket, munge) may
-be temporary."""
+"""Words of final refusals in the last line of the output of sbatch. All other failures of sbatch (connection, socket,
+munge) may be temporary."""
 _PASSING = (
     "submit limit", "submitjob", "not available now", "inactive", "is down", "drain", "temporarily", "try again",
     "standby", "maintenance", "i/o error writing", "maxjobs", "grpjobs", "perusers", "peruser", "peraccount",
@@ -39,12 +39,12 @@ are left out."""
 
 
 class SlurmError(Exception):
-    """Error: a command of Slurm failed. The text of the error is one line."""
+    """Error: a command of Slurm failed. The text of this error is one line."""
 
 
 class AwayError(SlurmError):
-    """Error: the controller was not reached, or not in time, so that the result is unknown. ``command``: the command
-    without a response.
+    """Error: the controller was not reached, or not in time, so that the result is unknown. ``command``: the Slurm
+    command that has not answered.
     """
 
     command = ""

@@ -45,7 +45,8 @@ LIKELY: dict[str, tuple[float, float, str]] = {
     "extent": (1e-6, 5.0, "m: a mesh in mm that was read as m is a thousand times too large"),
     "bulk modulus, density c0^2, over that of elastic,": (0.5, 2.0, "both are of one solid at rest"),
 }
-"""Usual ranges of quantities of solids. The ends of the ranges are near the values of known materials (handbooks)."""
+"""Usual ranges of quantities of solids. The ends of the usual ranges are near the values of known materials
+(handbooks)."""
 SHOCKING = 0.1
 """Fraction of the wave speed; an impact at a higher speed on a material with linear pressure gives a warning. At this
 speed of an impact between two bodies of the same material, u = v / 2, the pressure is some 7 % too low, and 13 % if the

@@ -14,7 +14,8 @@ from .compression import impact_stresses
 
 STIFF = 20.0
 """Ratio of the impedance of a part to that of all other parts, above which a note is given (chosen value). Two bodies
-absorb the energy of an impact in inverse proportion to their impedances; at this ratio the stiffer body absorbs 5 %."""
+absorb the energy of an impact in inverse proportion to their impedances; at the chosen ratio the stiffer body absorbs 5
+%."""
 
 
 def stiff(case: Case, expected: Estimate) -> Iterator[Problem]:

@@ -20,7 +20,7 @@ from ..runs import folder
 from ..runs.journal import DAMAGED
 
 FORM = 1
-"""Version of the stored form of a card. A card of another version is made again."""
+"""Version of the stored form of a card. A stored card with another version is made again."""
 _KEYS, _LETTERS = 1000, 200
 """Largest number of values of a case, and largest number of characters of one value. A case of ten parts has 500 values
 (reason of the chosen limits)."""
@@ -63,7 +63,9 @@ def unpacked(data: bytes) -> Card:
 
 
 def of(path: Path, final: bool) -> Card:
-    """Makes the card of the run in the folder ``path``. Missing and damaged files are left out."""
+    """Makes the card of the run in the folder ``path``. Missing and damaged files of the run are left out of the
+    card.
+    """
     ended = _ended(path) if final else None
     found = {
         pair: _number(value)

@@ -20,14 +20,16 @@ _PATIENCE = 0.5
 
 
 class Cards:
-    """Reads cards from the database and makes missing ones. Methods may be called from any thread."""
+    """Reads cards from the database and makes missing ones. All methods of this class may be called from any thread."""
 
     def __init__(self, runs: Path, store: Store) -> None:
-        """Stores the path of ``runs``, the folder of all runs. No card is read yet."""
+        """Stores the path of ``runs``, the folder of all runs. The constructor reads no card."""
         self._runs, self._store = runs, store
 
     def of(self, runs: Sequence[Run]) -> dict[str, Card]:
-        """Returns cards by run id. Runs whose cards could not be made in time are missing. Raises SQLAlchemyError."""
+        """Returns cards by run id. The result lacks runs whose cards could not be made in time. Raises
+        SQLAlchemyError.
+        """
         known = {each.run: each for each in self._store.cards([run.id for run in runs])}
         found, made, until = dict[str, Card](), list[KeptCard](), time.monotonic() + _PATIENCE
         for run in runs:

@@ -25,7 +25,7 @@ _NUMBERS = 400_000
 _SENT = 200_000
 """Largest number of values in an answer: 4 MB of JSON (chosen value)."""
 _BLOCK = 1 << 20
-"""Number of bytes of one read (chosen value)."""
+"""Number of bytes of one read of history.csv (chosen value)."""
 _AT_ONCE = 32
 """Largest number of blocks of history.csv that are read for one answer: some 100,000 lines, half a second (chosen
 value)."""
@@ -33,10 +33,10 @@ _MOST_COLUMNS = 4000
 """Largest number of columns that are read; further columns are ignored. A case with a thousand probes has slightly more
 than a thousand columns (reason of the chosen limit)."""
 _TEXT = frozenset({"limiter"})
-"""Names of columns that contain text."""
+"""Names of the columns of history.csv whose values are texts."""
 csv.field_size_limit(1 << 30)
-"""Largest length in characters of a field of history.csv. The csv module refuses fields above this length. A field that
-is not a number becomes NaN."""
+"""Largest length in characters of a field of history.csv. The csv module of Python refuses longer fields. A field of
+history.csv that is not a number becomes NaN."""
 
 
 class Columns:
@@ -65,7 +65,9 @@ class Columns:
         self._last: list[float] = []
 
     def catch_up(self) -> None:
-        """Reads at most ``_AT_ONCE`` blocks of new lines. A file that was replaced is read from its beginning."""
+        """Reads at most ``_AT_ONCE`` blocks of new lines. If history.csv was replaced, the new file is read from its
+        beginning.
+        """
         if self._is_another():
             self._begin()
             self._is_another()
@@ -125,7 +127,7 @@ class Columns:
         self._open[at] = values[ends:]
 
     def _merge(self) -> None:
-        """Merges pairs of groups until the number of groups is within the limit."""
+        """Merges pairs of groups of lines until the number of groups is within the limit."""
         most = 2 * max(2, min(_GROUPS, _NUMBERS // max(1, len(self._kept))))
         while self._kept and len(self._kept[0]) > most:
             self._kept = [
@@ -135,7 +137,7 @@ class Columns:
             self._every *= 2
 
     def statistics(self) -> dict[str, dict[str, Any]]:
-        """Returns unit, last value, minimum and maximum of each column."""
+        """Returns unit, last value, minimum and maximum of each numeric column."""
         return {
             name: {"unit": unit, "last": last, "least": low, "most": high}
             for (name, unit), last, (low, high) in zip(self.units.items(), self._last, self._extremes, strict=True)

@@ -173,8 +173,8 @@ def tagged(body: bytes, known: str) -> Response:
 
 
 def _part(request: Request, size: int, etag: str) -> tuple[int, int, int]:
-    """Returns the first byte, the end, and the HTTP status of the answer. A request for several ranges gets the whole
-    file.
+    """Returns the first byte, the end, and the HTTP status of the answer. The answer to a request for several ranges is
+    the whole file.
     """
     match = _RANGE.fullmatch(request.headers.get("range", "").replace(" ", ""))
     if match is None or match[0] == "bytes=-" or request.headers.get("if-range", etag) != etag:

@@ -29,9 +29,9 @@ class Chosen:
     """Words of a search. Each word must occur in the case's name or title, in a label, state, cause or message, or at
     the start of the id."""
     since: float | None = None
-    """Earliest time of submission (inclusive), Unix s."""
+    """Earliest time of submission (inclusive), Unix time in s."""
     until: float | None = None
-    """Latest time of submission (exclusive), Unix s."""
+    """Latest time of submission (exclusive), Unix time in s."""
     runs: Sequence[str] | None = None
     """Ids of the wanted runs; None: no filter by id."""
     changed: float | None = None

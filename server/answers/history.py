@@ -54,7 +54,7 @@ class Sample:
 
     @property
     def size(self) -> int:
-        """Size of the report in bytes, without lines that are shared by several reports."""
+        """Size of the report in bytes, without journal lines that several reports have in common."""
         return len(self.progress) + len(self.load)
 
 

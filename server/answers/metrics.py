@@ -27,7 +27,7 @@ class Metrics:
     """Metrics of one server."""
 
     def __init__(self, service: Service) -> None:
-        """Creates all counters with the value 0."""
+        """Creates all counters of the metrics with the value 0."""
         self.registry = CollectorRegistry()
         ProcessCollector(registry=self.registry)
         self.registry.register(_Runs(service))
@@ -43,7 +43,9 @@ class Metrics:
         return generate_latest(self.registry)
 
     def answered(self, scope: Scope, status: int, seconds: float) -> None:
-        """Counts an answer by the pattern of its route, so that the number of series is the number of routes."""
+        """Counts an answer under the pattern of its route, so that the number of time series is the number of
+        routes.
+        """
         route = getattr(scope.get("route"), "path", "none")
         method = scope["method"] if scope["method"] in _METHODS else "other"
         self.answers.labels(method, route, str(status)).inc()

@@ -57,7 +57,7 @@ _LEVEL = 6
 
 
 class LibraryError(Exception):
-    """Error: the JavaScript libraries cannot be served. The text of the error is one line."""
+    """Error: the JavaScript libraries cannot be served. The text of this error is one line."""
 
 
 @dataclass(frozen=True)

@@ -59,8 +59,8 @@ class Table:
         self._bytes = 0
 
     def add(self, line: dict[str, Any], card: Card | None) -> bool:
-        """Adds the table row of a run. ``line``: data of the run as in the list of runs. Returns False if the answer is
-        full.
+        """Adds the table row of a run. ``line``: data of the run as in the list of runs. Returns False, and adds no
+        row, if the answer has reached its largest size.
         """
         groups = len(self.groups)
         row = msgspec.json.encode({**line, **self._of_card(card)})

@@ -106,7 +106,7 @@ def briefs(service: Service, runs: Sequence[Run]) -> list[dict[str, Any]]:
 
 
 def short_ids(service: Service, runs: Sequence[Run]) -> dict[str, str]:
-    """Returns the shortest unique prefix of each run's id among the runs of the owner, by id."""
+    """Returns, for each run id, the shortest prefix that is unique among the runs of the owner."""
     if not runs:
         return {}
     ids = [run.id for run in runs]

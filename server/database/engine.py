@@ -10,7 +10,7 @@ import sqlalchemy as sa
 from ..settings import StartError
 
 _BUSY = 2000
-"""Time in ms for which SQLite waits for a lock of another process (chosen value). The time is longer than any
+"""Time in ms for which SQLite waits for a lock of another process (chosen value). The waiting time is longer than any
 transaction of this server, and shorter than the time limit of a request."""
 _TABLES = 1 << 16
 """Bytes of free disk space below which SQLite cannot open a database, because SQLite needs space for its log and its
@@ -18,7 +18,7 @@ shared memory. Measured: 32 KiB."""
 
 
 class StoreError(StartError):
-    """Error: the database cannot be used. The text of the error is one line."""
+    """Error: the database cannot be used. The text of this error is one line."""
 
 
 def failure(url: str | sa.URL, error: Exception, deed: str = "used") -> StoreError:

@@ -24,8 +24,8 @@ limit)."""
 
 
 class IdentityError(SettingsError):
-    """Error: folder and database do not belong together, or were moved from another place. The text of the error is one
-    line.
+    """Error: folder and database do not belong together, or were moved from another place. The text of this error is
+    one line.
     """
 
 

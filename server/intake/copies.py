@@ -69,7 +69,7 @@ def fill(files: Sequence[FileName], source: Source, folder: Path) -> None:
 @contextmanager
 def apart(runs: Path, files: Sequence[FileName], source: Source) -> Iterator[Path]:
     """Creates a temporary folder with copies of the files, arranged as in the folder of a run. If the server is killed,
-    the next server removes the temporary folder. Raises the errors of ``fill``.
+    the next server removes the temporary folder. Raises the errors of the function ``fill``.
     """
     place = runs / f"{APART}{secrets.token_hex(8)}"
     place.mkdir(0o700)

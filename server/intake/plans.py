@@ -63,8 +63,8 @@ class Plan(msgspec.Struct, kw_only=True, frozen=True):
 
 
 class Plans:
-    """All sweeps of a server. Methods may be called from any thread. The caller makes sure that only one thread at a
-    time changes a sweep.
+    """All sweeps of a server. All methods of this class may be called from any thread. The caller makes sure that only
+    one thread at a time changes a sweep.
     """
 
     def __init__(self, settings: Settings) -> None:

@@ -52,7 +52,7 @@ def surveyors() -> ThreadPool:
 
 class Reader:
     """Client of a program that reads cases. The reading program is started at the first case, and is started again if
-    it has ended or hangs. Methods may be called from any thread.
+    it has ended or hangs. All methods of this class may be called from any thread.
     """
 
     def __init__(self) -> None:

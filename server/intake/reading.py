@@ -56,8 +56,8 @@ class Question(msgspec.Struct, frozen=True, kw_only=True):
     json: bool
     limits: Limits
     survey: bytes | None = None
-    """Survey of the mesh files that the case names (conoid.cases.reading.survey). Empty: no survey could be made. None:
-    no survey was made yet; a case with files is read and checked, but not estimated."""
+    """Survey of the mesh files that the case names (conoid.cases.reading.survey). An empty value means that no survey
+    could be made. None: no survey was made yet; a case with files is read and checked, but not estimated."""
     folder: str = ""
     """Folder of the files that the case names."""
 
@@ -198,7 +198,9 @@ def _text(body: bytes) -> str:
 
 
 def main() -> int:
-    """Answers requests until standard input ends. The reading program sends one byte when it is ready for requests."""
+    """Answers requests to read a case until standard input ends. The reading program sends one byte when it is ready
+    for requests.
+    """
     signal.signal(signal.SIGCHLD, signal.SIG_IGN)
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     os.nice(_NICE)
@@ -211,8 +213,8 @@ def main() -> int:
 
 
 def _next(control: socket.socket) -> bool:
-    """Answers one case; returns False at the end of standard input. If no process can be forked, the answer is
-    empty.
+    """Answers one case; returns False at the end of standard input. If no process can be forked for the case, the
+    answer is empty.
     """
     message, descriptors, _, _ = socket.recv_fds(control, 1, 1)
     for descriptor in descriptors:

@@ -28,7 +28,7 @@ one; the runs of the replaced sweep stay."""
 
 
 class Searches:
-    """Adaptive sweeps of all users. Methods may be called from any thread."""
+    """Adaptive sweeps of all users. All methods of this class may be called from any thread."""
 
     def __init__(self, plans: Plans, store: Store) -> None:
         """Creates the object. ``plans``: the stored sweeps of the server."""

@@ -44,7 +44,7 @@ _KEY = re.compile(r"[\x21-\x7e]{1,255}")
 
 @dataclass(frozen=True)
 class Wishes:
-    """Parameters of a submission besides the case."""
+    """Parameters of a submission, without the case."""
 
     labels: Mapping[str, str] = field(default_factory=dict)
     profile: str = ""
@@ -61,7 +61,7 @@ class Wishes:
 
 
 class Desk:
-    """Accepts submissions. Methods may be called from any thread."""
+    """Accepts submissions. All methods of this class may be called from any thread."""
 
     def __init__(self, settings: Settings, store: Store, supervisor: Supervisor, sent: Uploads) -> None:
         """Creates the submissions object. A server has only one such object, whose lock makes one run from two requests

@@ -39,7 +39,7 @@ _HASHES = re.compile(r"[0-9a-f]{64}")
 
 
 class Sweeps:
-    """The sweeps of a server. Methods may be called from any thread."""
+    """The sweeps of a server. All methods of this class may be called from any thread."""
 
     def __init__(self, settings: Settings, desk: Desk) -> None:
         """Reads the stored sweeps."""
@@ -70,8 +70,8 @@ class Sweeps:
                 time.sleep(_AGAIN)
 
     def _completed(self, plan: Plan) -> bool:
-        """Completes a sweep; returns False if the server must try again later. A sweep that cannot be completed is
-        removed. An incomplete sweep without an idempotency key is also removed, because the client got no answer and
+        """Completes a sweep; returns False if the server must try again later. A stored sweep that cannot be completed
+        is removed. An incomplete sweep without an idempotency key is also removed, because the client got no answer and
         will send a new sweep.
         """
         with self._locks.setdefault(plan.owner, threading.Lock()):
@@ -106,8 +106,8 @@ class Sweeps:
         return plan if plan is not None and plan.owner == owner else None
 
     def submit(self, owner: str, body: bytes, key: str | None) -> Plan:
-        """Accepts all runs of a sweep, or none. A request with the same idempotency key and body returns the same
-        sweep. Raises ServiceError if the sweep is refused.
+        """Accepts either all runs of a sweep or none of them. A request with the same idempotency key and body returns
+        the same sweep. Raises ServiceError if the sweep is refused.
         """
         digest = hashlib.sha256(body).hexdigest()
         with self._locks.setdefault(owner, threading.Lock()):
@@ -118,8 +118,9 @@ class Sweeps:
             return self._accepted(fresh)
 
     def again(self, plan: Plan, body: bytes, failed: Mapping[int, str]) -> Plan:
-        """Repeats points of a sweep. ``failed``: number and present run of each point to repeat; ``body``: the request
-        of the sweep. Raises ServiceError, and leaves the sweep unchanged, if the repetition is refused.
+        """Repeats points of a sweep with new runs. ``failed``: number and present run of each point to repeat;
+        ``body``: the request of the sweep. Raises ServiceError, and leaves the sweep unchanged, if the repetition is
+        refused.
         """
         with self._locks.setdefault(plan.owner, threading.Lock()):
             plan = self.plans.get(plan.id) or plan

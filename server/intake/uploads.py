@@ -87,8 +87,8 @@ class Part:
 
 
 class Uploads:
-    """Uploaded files of all users. Methods may be called from any thread. No state is kept in memory: the folder of
-    uploads is read each time.
+    """Uploaded files of all users. All methods of this class may be called from any thread. No state is kept in memory:
+    the folder of uploads is read each time.
     """
 
     def __init__(self, runs: Path, rules: Files, free_disk: int) -> None:
@@ -130,8 +130,9 @@ class Uploads:
         return [folder / sha256, *(p for p in folder.glob(f"{sha256}.*{_PART}") if _size_of(p.name) is not None)]
 
     def begin(self, owner: str, sha256: str, total: int, first: int | None = None) -> Part:
-        """Opens an incomplete file at the byte ``first``, or a new one for None. From now on the size of the file
-        counts. Raises ServiceError 409, 413, 429, 507, OSError.
+        """Opens an incomplete file at the byte ``first``; creates a new file if ``first`` is None. From this call on,
+        the whole size of the file counts as disk usage of its owner. Raises ServiceError with status 409, 413, 429 or
+        507; raises OSError.
         """
         path = self._folder / owner / f"{sha256}.{total}{_PART}"
         with self._lock(owner):
@@ -173,7 +174,7 @@ class Uploads:
             raise ServiceError(507, "disk_full", detail, retryable=True)
 
     def finish(self, owner: str, part: Part) -> None:
-        """Gives a complete and verified file its final name; it is on disk on return.
+        """Renames a complete and verified file to its final name; flushes the file to disk before it returns.
 
         Raises OSError.
         """
@@ -186,13 +187,14 @@ class Uploads:
             durable.sync_folder(whole.parent)
 
     def give(self, owner: str, sha256: str, target: Path) -> None:
-        """Links the file into the folder of a run. Raises FileNotFoundError, OSError."""
+        """Makes a hard link to the uploaded file in the folder of a run. Raises FileNotFoundError, OSError."""
         with self._lock(owner):
             give(self._folder / owner / sha256, target)
 
     def remove(self, owner: str, sha256: str) -> bool:
-        """Removes a file, complete or incomplete; False if the file does not exist. Runs keep their own copies.
-        Raises OSError."""
+        """Removes an uploaded file, complete or incomplete; returns False if the file does not exist. Runs keep their
+        copies of the uploaded file. Raises OSError.
+        """
         with self._lock(owner):
             there = [path for path in self._paths(owner, sha256) if path.exists()]
             for path in there:
@@ -213,7 +215,9 @@ class Uploads:
         return gone
 
     def _dropped(self, owner: str, sha256: str, now: float) -> bool:
-        """Whether the file was old and has been removed. The lock prevents requests for the file during the call."""
+        """Removes the file if it is old; returns whether it has been removed. The lock of the owner prevents requests
+        for the file during the call.
+        """
         with self._lock(owner):
             for path in self._paths(owner, sha256):
                 with suppress(FileNotFoundError):
@@ -248,8 +252,8 @@ def _wrong_offset(there: int, first: int | None) -> ServiceError:
 
 
 def give(source: Path, target: Path) -> None:
-    """Links a file that never changes, or copies the file if the file system has no links. File and folder are on
-    disk on return. Raises FileNotFoundError, OSError.
+    """Links a file that never changes, or copies the file if the file system has no links. The file and its folder are
+    flushed to disk before the function returns. Raises FileNotFoundError, OSError.
     """
     try:
         os.link(source, target, follow_symlinks=False)
@@ -280,11 +284,13 @@ def _upload_of(name: str, status: os.stat_result) -> Upload | None:
 
 
 def _asked(name: str, status: os.stat_result) -> float:
-    """Returns the time of the last request, or of the last arrived byte."""
+    """Returns the Unix time of the last request for the file, or of its last arrived byte, s."""
     return max(status.st_atime, status.st_mtime) if name.endswith(_PART) else status.st_atime
 
 
 def _size_of(name: str) -> int | None:
-    """Returns the final size of an incomplete file by its name; None for another name."""
+    """Returns the final size of an incomplete file from its name; None if the name is not that of an incomplete
+    file.
+    """
     size_, _, ending = name.partition(".")[2].partition(".")
     return int(size_) if size_.isdecimal() and f".{ending}" == _PART else None

@@ -45,7 +45,9 @@ def copies(folder: Path) -> Copies:
 
 @dataclass
 class DiskUsage:
-    """Sizes of folders and files, measured at the last pass. The class is not thread-safe."""
+    """Sizes of folders and files, measured at the last pass. The methods of this class must be called by one thread at
+    a time.
+    """
 
     sizes: dict[str, int] = field(default_factory=dict)
     """Size in bytes of the folder of each run, without the files that its case names."""

@@ -29,8 +29,8 @@ passes; the time between two passes is at least this time."""
 
 
 class Removal:
-    """Measures and removes folders in a separate thread. Methods may be called from any thread. Folders are measured
-    only if the site has the table [retention] or the key quota.output_bytes.
+    """Measures and removes folders in a separate thread. All methods of this class may be called from any thread.
+    Folders are measured only if the site has the table [retention] or the key quota.output_bytes.
     """
 
     def __init__(
@@ -93,7 +93,9 @@ class Removal:
             self._kept = self._usage.by_owner()
 
     def look(self) -> None:
-        """Makes one pass over the uploaded files and over all folders. Raises OSError or SQLAlchemyError."""
+        """Checks all uploaded files and all folders of runs once, and removes those that the rules of the site allow to
+        remove. Raises OSError or SQLAlchemyError.
+        """
         for line in self._sent.purge(time.time(), self.needed()):
             _log.info("%s is removed: no run uses it, and it was not requested lately", line)
         if not self._weighs:

@@ -74,8 +74,8 @@ def of(run: Run, path: Path, why: str) -> RemovedRun:
 
 
 class RemovedRuns:
-    """The records of all removed runs. Methods may be called from any thread. Memory contains only the offset of each
-    line of purged.jsonl.
+    """The records of all removed runs. All methods of this class may be called from any thread. Memory contains only
+    the offset of each line of purged.jsonl.
     """
 
     def __init__(self, runs: Path) -> None:

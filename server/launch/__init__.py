@@ -14,7 +14,7 @@ Reading = tuple[State, Cause, str]
 
 
 class LaunchError(Exception):
-    """Error: the worker could not be started. The text of the error is one line."""
+    """Error: the worker could not be started. The text of this error is one line."""
 
 
 class DamagedError(LaunchError):
@@ -86,7 +86,7 @@ class Worker(Protocol):
         """Returns the end of the worker; None while any process of the worker runs."""
 
     def stop(self) -> None:
-        """Requests the worker to stop at its next step."""
+        """Asks the worker to stop at its next time step."""
 
     def kill(self) -> None:
         """Kills all processes of the worker."""

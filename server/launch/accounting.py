@@ -18,7 +18,7 @@ class Taker(Protocol):
 
 
 class Accounting:
-    """Queries of the accounting database. Methods may be called from any thread."""
+    """Queries of the accounting database. All methods of this class may be called from any thread."""
 
     def __init__(self, place: str = "") -> None:
         """Creates the object without a thread; the thread starts with the first job. ``place``: the folder of Slurm's

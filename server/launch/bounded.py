@@ -53,9 +53,9 @@ def run(
     program: str, bounds: Bounds, arguments: Sequence[str] = (), question: bytes = b"", *, folder: Path,
     **more: str,
 ) -> Ended:  # fmt: skip
-    """Runs the module ``program`` in ``folder``. ``question``: bytes of its standard input; ``more``: variables that
-    are added to its environment. The function blocks until the program, and every process that shares its standard
-    output, has ended.
+    """Runs the module ``program`` in ``folder``. ``question``: bytes for the standard input of the program; ``more``:
+    variables that are added to the environment of the program. The function blocks until the program, and every process
+    that shares its standard output, has ended.
     """
     limits = [str(most) for most in (bounds.memory, bounds.cpu, bounds.file)]
     env = {name: value for name, value in os.environ.items() if name not in _SECRET} | more

@@ -131,7 +131,7 @@ class SlurmLauncher:
                 return
 
     def _hand_over_arrays(self, workers: list[SlurmWorker]) -> set[str]:
-        """Returns the names of runs that are submitted later."""
+        """Returns the names of runs that must not be submitted in this turn."""
         try:
             return self._arrays.hand_over(workers)
         except (slurm_call.SlurmError, OSError) as error:
@@ -140,8 +140,8 @@ class SlurmLauncher:
 
     def _attend(self, run: str, worker: SlurmWorker, entries: list[Entry], arrays: Set[str]) -> bool:
         """Performs the next action of one run. Returns False if the Slurm controller has not answered, so that the
-        launcher does not wait again for another run. A command that hangs is not repeated at once, and does not delay
-        other runs.
+        launcher does not wait again for another run. A Slurm command that hangs is not repeated at once, and does not
+        delay other runs.
         """
         try:
             worker.turn(entries, arrays)

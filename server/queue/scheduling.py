@@ -89,8 +89,8 @@ def stranded(runs: Iterable[Run], looked_after: Set[str]) -> list[str]:
 
 
 def ordered(needs: Iterable[Need], taken: Mapping[str, float], users: Mapping[str, Share]) -> list[Need]:
-    """Returns the queue in the order of starting. ``taken``: core-seconds that each owner has used so far, including
-    running runs.
+    """Returns the queued runs in the order in which they should start. ``taken``: core-seconds that each owner has used
+    so far, including running runs.
     """
     of_owner: dict[str, list[Need]] = {}
     for need in sorted(needs, key=lambda need: (-need.priority, need.run)):

@@ -107,7 +107,9 @@ class Pass:
         return await self._service.pool.run(self._valid)
 
     def _valid(self) -> bool:
-        """Reads the token again. If the database does not answer, the streamed answer continues."""
+        """Reads the token of the request again from the database. If the database does not answer, the streamed answer
+        continues.
+        """
         token = self._identity.token
         try:
             return token is None or self._service.store.token(token.id) is not None

@@ -15,8 +15,8 @@ from uvicorn.protocols.http.h11_impl import H11Protocol
 BODY = 1 << 20
 """Largest size of a request body, bytes (module ``limits``)."""
 HEADER = 10.0
-"""Time in s within which the header of a request must arrive (chosen value). The time begins at the first byte of the
-header or at the start of the connection."""
+"""Time in s within which the header of a request must arrive (chosen value). The time limit of a header begins at the
+first byte of the header or at the start of the connection."""
 _PIECES, _PAUSE = 4, 0.5
 """Number of pieces of a header that are parsed at arrival, and time in s between later parses (chosen values). A normal
 client sends its header in one piece; a parse takes 0.1 ms of the event loop."""

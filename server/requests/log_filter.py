@@ -10,7 +10,9 @@ is enough to see the cause."""
 
 
 class FloodFilter(logging.Filter):
-    """Filter for a handler of the log. Log lines are of one kind if the same line of the source code writes them."""
+    """Filter of log lines for a handler of the log. Log lines are of one kind if the same line of the source code
+    writes them.
+    """
 
     def __init__(self) -> None:
         super().__init__()

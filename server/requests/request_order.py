@@ -19,7 +19,7 @@ class RequestOrder:
         self._called = False
 
     async def wait(self, who: str) -> None:
-        """Waits until the next request of the user ``who`` may begin."""
+        """Waits until this request of the user ``who`` may begin."""
         loop = asyncio.get_running_loop()
         turn: asyncio.Future[None] = loop.create_future()
         self._lines.setdefault(who, deque()).append(turn)

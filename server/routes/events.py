@@ -32,8 +32,8 @@ Seconds = Annotated[
 def replay(
     run: OwnedRun, service: ServiceOf, after: After = 0, limit: Annotated[int, Query(ge=1, le=10_000)] = 1000
 ) -> Response:
-    """Returns the events with ``seq`` above ``after``, oldest first, at most ``limit`` and about 1 MiB. The field
-    ``last`` is the ``seq`` for the next request; ``more`` is true if more events exist now.
+    """Returns the events with ``seq`` above ``after``, oldest first: at most ``limit`` events, and at most about 1 MiB.
+    The field ``last`` is the ``seq`` for the next request; ``more`` is true if more events exist now.
     """
     path = service.settings.runs / run.id / layout.JOURNAL
     found: list[journal.Line] = []

@@ -16,7 +16,7 @@ router = APIRouter()
 
 @router.get("/healthz")
 async def alive() -> dict[str, str]:
-    """Returns 200 if the process answers."""
+    """Returns status 200 if the server process can answer requests."""
     return {"status": "ok"}
 
 

@@ -40,9 +40,9 @@ async def log(
     follow: bool = False,
     seconds: Seconds = None,
 ) -> Response:
-    """Sends the log file of one rank, or of the launcher; the header Range works as for other files. With ``follow``
-    the answer continues until the run has ended. After each 15 s without new text the server sends a byte 0, which is
-    not part of the log file.
+    """Sends the log file of one rank, or of the launcher; the header Range works as for other files. With the parameter
+    ``follow`` the answer continues until the run has ended. After each 15 s without new text the server sends a byte 0,
+    which is not part of the log file.
     """
     folder = service.settings.runs / run.id
     relative = f"{layout.LOGS}/{layout.LAUNCHER_LOG if rank == 'launcher' else f'rank-{rank}.log'}"

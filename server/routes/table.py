@@ -34,11 +34,11 @@ def table(
 ) -> Response:
     """Returns the user's runs, newest first, with title, progress, values of the cases, and results.
 
-    ``cases``: groups of similar cases with common values and units. ``case`` of a run: index of its group; ``values``:
-    values that differ from the common values of the group (null: the case of the run has no such key). ``results`` of a
-    run have the order of the results of its group; null before the end of the run, and while the results are not read
-    yet (``pending`` runs of this page: repeat the request). The field ``next`` is the cursor of the next page; ``next``
-    is null on the last page. An answer has at most 500 runs and about 4 MB.
+    The field ``cases`` has groups of similar cases with common values and units. ``case`` of a run: index of its group;
+    ``values``: values that differ from the common values of the group (null: the case of the run has no such key).
+    ``results`` of a run have the order of the results of its group; null before the end of the run, and while the
+    results are not read yet (``pending`` runs of this page: repeat the request). The field ``next`` is the cursor of
+    the next page; ``next`` is null on the last page. An answer has at most 500 runs and about 4 MB.
     """
     asked = replace(chosen, changed=changed, runs=find(service, identity, sweep).runs if sweep else None)
     runs = listed(service, identity.owner, asked, cursor, limit + 1)

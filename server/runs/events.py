@@ -63,7 +63,7 @@ class WorkerStarts:
 @dataclass(frozen=True)
 class WorkerWaits:
     """Event: a batch system has stopped the worker. The worker continues from its last checkpoint when the batch system
-    gives it cores again.
+    starts the worker again.
     """
 
 
@@ -173,7 +173,8 @@ Event = (
 )
 
 ONCE = (LaunchFailed, LaunchPutOff, Broken, Found)
-"""Events that occur only once. If the handling of such an event fails, the event is stored and handled again later."""
+"""Types of events that occur only once for a run. If the handling of such an event fails, the event is stored and
+handled again later."""
 
 # Actions --------------------------------------------------------------------------------------------------------------
 

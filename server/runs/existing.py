@@ -18,8 +18,8 @@ Reading 10,000 names takes 5 ms (reason of the chosen value)."""
 
 
 class ExistingRuns:
-    """The names of the folders of all runs. Methods may be called from any thread; the content of the folders is not
-    read.
+    """The names of the folders of all runs. All methods of this class may be called from any thread; the content of the
+    folders is not read.
     """
 
     def __init__(self, runs: Path) -> None:

@@ -32,7 +32,8 @@ _NEW, _GONE = ".new-", ".gone-"
 APART = f"{_NEW}files-"
 """Beginnings of the names of temporary folders, which a server removes when it starts."""
 _TELLING = (layout.SUBMISSION, layout.JOURNAL, layout.WORKER)
-"""Names of the files of a run. The folder of a run has at least one of these files, even if the file is damaged."""
+"""Names of the files of a run. A folder of a run contains at least one file with such a name, even if the file is
+damaged."""
 _UNREADABLE = "outcome.unreadable.json"
 _TITLE = 200
 """Largest number of characters of a title in lists: one or two lines of text (chosen value)."""
@@ -50,7 +51,7 @@ class Copy(msgspec.Struct, kw_only=True, frozen=True):
 
 
 class Submission(msgspec.Struct, kw_only=True, frozen=True):
-    """File submission.json: the data of a run that the server needs if its database is lost. Times are Unix s."""
+    """File submission.json: the data of a run that a server without its database needs. All times are Unix times, s."""
 
     id: str
     owner: str
@@ -98,9 +99,7 @@ _last_stamp, _stamping = 0, threading.Lock()
 
 
 def new_id() -> tuple[str, float]:
-    """Returns an id of 22 letters and digits, and the Unix time, s. Later ids sort after earlier ids at any clock
-    time.
-    """
+    """Returns an id of 22 letters and digits, and the Unix time, s. Later ids sort after earlier ids."""
     global _last_stamp
     with _stamping:
         _last_stamp = stamp = max(time.time_ns() // 1000, _last_stamp + 1)
@@ -108,7 +107,7 @@ def new_id() -> tuple[str, float]:
 
 
 def begin_after(run_id: str) -> None:
-    """Makes later ids sort after this id, for any time of the clock."""
+    """Makes the ids of later calls sort after ``run_id``."""
     global _last_stamp
     stamp = 0
     for letter in run_id[:11]:

@@ -42,8 +42,8 @@ class Index:
         return True
 
     def add(self, run: Run, key: str | None, labels: Mapping[str, str]) -> None:
-        """Adds a run to the database, or updates its row. A row that cannot be updated keeps its old values for now.
-        Raises SQLAlchemyError if the run is not in the database.
+        """Adds a run to the database, or updates its row. A row of the database that cannot be updated keeps its old
+        values until the next try. Raises SQLAlchemyError if the run is not in the database.
         """
         try:
             self._store.add(run, key, labels)

@@ -106,8 +106,8 @@ def _end(run: Run, now: float, outcome: Outcome, *, written: bool = False) -> Ne
 
 
 def _broken(run: Run, event: Broken, now: float) -> Next:
-    """Marks the run as lost, or as cancelled if its owner has requested a cancel. A worker that may still run is killed
-    first.
+    """Marks the run as lost, or as cancelled if its owner has requested a cancel. Before the state changes, a worker
+    that may still run is killed.
     """
     asked = run.stopping_for is Cause.CANCELLED
     state, cause = (State.CANCELLED, Cause.CANCELLED) if asked else (State.LOST, Cause.STORAGE)

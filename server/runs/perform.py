@@ -77,7 +77,9 @@ class Performer:
         return watch is not None and watch.worker.exited() is None
 
     def beyond_use(self, run_id: str) -> bool:
-        """Whether only the run's folder fails, and files can be written in the folder of all runs."""
+        """Whether files cannot be written in the run's folder, although they can be written in the folder of all
+        runs.
+        """
         if self.gone(run_id):
             return True
         try:
@@ -126,8 +128,9 @@ class Performer:
         return self._watch(path, worker, made.wall_time)
 
     def _watch(self, path: Path, worker: Worker, allowed: float | None) -> Watch:
-        """Watches a worker up to the time limit of the server. The worker itself ends at ``run.max_wall_time``; the
-        server stops the worker a grace period later; a batch system stops it at the limit of the job.
+        """Watches a worker until the time limit that the server applies. The worker itself ends at
+        ``run.max_wall_time``; the server stops the worker a grace period later; a batch system stops it at the limit of
+        the job.
         """
         left = (
             None if allowed is None or self._launcher.queues else allowed + self._settings.grace - folder.runs_for(path)

@@ -33,8 +33,8 @@ def last_request(folder: Path) -> str:
 
 
 def labels(folder: Path) -> dict[str, str]:
-    """Returns the labels of the submission; the label ``keep`` follows the last request. A removed or damaged folder
-    gives no labels.
+    """Returns the labels of the submission; the label ``keep`` follows the last request. If the run's folder is removed
+    or damaged, the result has no labels.
     """
     try:
         made = submission(folder).labels

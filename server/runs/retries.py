@@ -66,7 +66,7 @@ class Retries:
         return error
 
     def rest(self, run_id: str, why: str) -> None:
-        """Delays the start of the run."""
+        """Delays the next try to start the run."""
         self._hold(run_id, why, None)
 
     def _hold(self, run_id: str, why: str, event: Event | None) -> None:
@@ -78,7 +78,7 @@ class Retries:
         self._retries[run_id] = _Hold(now + delay, delay, why, event, before.logged if before and known else now)
 
     def held(self, run_id: str) -> bool:
-        """True before the time of the next try."""
+        """True if the next try of the run must not be made yet."""
         hold = self._retries.get(run_id)
         return hold is not None and hold.until > time.monotonic()
 

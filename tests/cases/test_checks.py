@@ -1,4 +1,4 @@
-"""Checks between keys: each error of a scene is found, and a valid scene has none."""
+"""Checks between the keys of a case: each error of a case is found, and a valid case has no error."""
 
 import pytest
 

@@ -37,7 +37,9 @@ def test_a_given_mass_is_the_reported_mass() -> None:
 
 
 def test_a_given_inertia_gives_the_reported_energy() -> None:
-    """The energy is 1/2 M v^2 + 1/2 w . I w about the given centre, 2 mm away from the axis of the spin."""
+    """The kinetic energy of the rigid ball is 1/2 M v^2 + 1/2 w . I w about the given centre, 2 mm away from the axis
+    of the spin.
+    """
     inertia = "[1e-7, 2e-7, 2.5e-7, 0.2e-7, 0.1e-7, -0.3e-7]"
     spin = "parts[0].spin={centre=[0, 0, 0], rate=[100, 200, 300]}"
     given = f"parts[0].rigid={{mass='4 g', centre=['2 mm', 0, 0], inertia={inertia}}}"

@@ -29,7 +29,7 @@ class Line:
     """Number of bytes sent to the server."""
 
     def carry(self, near: socket.socket) -> None:
-        """Forwards one connection until its end."""
+        """Forwards the bytes of one connection until the connection ends."""
         try:
             far = socket.create_connection(("127.0.0.1", self.server), timeout=10)
         except OSError:

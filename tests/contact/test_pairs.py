@@ -135,7 +135,7 @@ class Shards:
         return slots, faces, edges, step_of(self.x, self.v, part, dt)
 
     def knock(self) -> None:
-        """Gives one node in ten another velocity."""
+        """Gives another velocity to one of ten nodes."""
         some = self.draw.uniform(size=(len(self.v), 1)) < 0.1
         self.v = self.v + self.violence * self.draw.normal(0.0, 1.0, self.v.shape) * some
 

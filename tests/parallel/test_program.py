@@ -16,7 +16,7 @@ SIZE, END = 7, 5
 
 @njit(TASK, cache=False)
 def count(table, first, stop, thread):  # type: ignore[no-untyped-def]
-    """Adds 1 to each number of the range."""
+    """Kernel that adds 1 to each number of the range."""
     done, _, _ = _words(table)
     for k in range(first, stop):
         done[k] += 1

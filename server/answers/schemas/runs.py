@@ -24,7 +24,7 @@ class Receipt(msgspec.Struct, kw_only=True):
     submitted: float
     estimate: dict[str, float]
     files: list[NamedFile]
-    """Files that the case names. The run has its own copy of each file."""
+    """Files that the case names. The folder of the run has a copy of each file that the case names."""
     url: str
 
 
