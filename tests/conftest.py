@@ -1,7 +1,7 @@
-"""Setup of all tests. Numba gets the kernel cache of the worker before any module imports it, so that kernels are
+"""Setup of all tests. Numba gets the kernel cache of the worker before any module imports numba, so that kernels are
 compiled once and not in every run. Ranks that wait leave their core to other processes, because there may be fewer
-cores than ranks. SIGINT is enabled: a shell without job control that runs the tests in the background would disable
-it for all their processes.
+cores than ranks. SIGINT is enabled, because a shell without job control that runs the tests in the background would
+disable SIGINT for all their processes.
 """
 
 import os

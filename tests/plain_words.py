@@ -4,9 +4,9 @@
     python -m tests.plain_words worker/contact   every finding below the given files and folders
     python -m tests.plain_words --subjects       fails where the subject of a recent commit breaks the rule
 
-The subjects are no part of `make test`: a commit that others have built on cannot be changed any more.
+The check of subjects is no part of `make test`: a commit that others have built on cannot be changed any more.
 
-The banned words and first words stand in CONVENTIONS.md, section "Words", in code font. Checked are docstrings,
+The banned words and first words stand in CONVENTIONS.md, section "Words", in code font. The checker reads docstrings,
 comments and messages of Python, comments and strings of JavaScript, Markdown, HTML, TOML, CSS and Makefile.
 """
 
@@ -25,11 +25,11 @@ from typing import NamedTuple
 ROOT = Path(__file__).parents[1]
 FOLDERS = ("cases", "client", "server", "worker", "tests", "docs", "deploy", ".ci")
 GENERATED = {"docs/reference/case.md", "docs/reference/http.md", "docs/verification/accuracy.md"}
-"""Files that are made of texts which are checked where they are written."""
+"""Files that are generated from texts; the texts are checked where they are written."""
 WORDS_THEMSELVES = {"CONVENTIONS.md", "tests/plain_words.py", "tests/test_plain_words.py"}
 """Files that name the banned words."""
 LONGEST_LINE, LONGEST_SUBJECT = 130, 72
-"""Chosen: columns of a line of docs; characters of a commit subject, which ``git log`` shows in one line."""
+"""Chosen values: columns of a line of docs; characters of a commit subject, which ``git log`` shows in one line."""
 SUBJECTS_SINCE = "2026-11-30 14:00"
 """Commits from this time on are checked; earlier subjects stay as they are."""
 PEOPLE = "user|reader|engineer|developer|author|person|people|somebody|someone|anybody|anyone|those|client|operator"
@@ -39,11 +39,12 @@ ALLOWED = {
     r"\bwho (?:asks|am i)\b": "the user of a request",
     r"\"who\"": "the name of an element of the page",
 }
-"""Contexts in which a banned word is correct, and why."""
+"""Contexts in which a banned word is correct, each with the reason."""
 NAMES = ("told", "said", "heard")
-"""Banned words that stood as names for messages, answers and warnings; no variable, attribute or function has them."""
+"""Banned words that were used as names for messages, answers and warnings; no variable, attribute or function has such
+a name."""
 NOT_YET: dict[str, int] = {}
-"""Folders that are not clean yet, with their numbers of findings. These numbers may fall and not rise."""
+"""Folders that are not clean yet, with their numbers of findings. The numbers of findings may fall and not rise."""
 
 
 class Text(NamedTuple):
@@ -55,7 +56,7 @@ class Text(NamedTuple):
 
 
 class Finding(NamedTuple):
-    """One violation: file, line, what is wrong, and the words around it."""
+    """One violation: file, line, what is wrong, and the words around the violation."""
 
     path: str
     line: int
@@ -74,7 +75,7 @@ def section(title: str) -> str:
 
 @cache
 def banned() -> re.Pattern[str]:
-    """Words in code font in the columns "not" of the tables."""
+    """Returns the words in code font in the columns "not" of the tables."""
     found: list[str] = []
     column = None
     for line in section("Words").splitlines():
@@ -90,7 +91,7 @@ def banned() -> re.Pattern[str]:
 
 @cache
 def first_words() -> re.Pattern[str]:
-    """Words in code font in the sentence about the beginning of a docstring."""
+    """Returns the words in code font in the sentence about the beginning of a docstring."""
     sentence = section("Words").partition("A docstring begins")[2].partition("\n\n")[0]
     return re.compile(rf"(?:{'|'.join(re.findall('`([^`]+)`', sentence))})\b")
 
@@ -99,7 +100,7 @@ def first_words() -> re.Pattern[str]:
 
 
 def python(source: str) -> Iterator[Text]:
-    """Docstrings, also those below constants; strings of at least three words; comments."""
+    """Yields docstrings, also those below constants; strings of at least three words; comments."""
     nodes = list(ast.walk(ast.parse(source)))
     docstrings = {id(node.value) for node in nodes if isinstance(node, ast.Expr)}
     for node in nodes:
@@ -113,7 +114,7 @@ def python(source: str) -> Iterator[Text]:
 
 
 def script(source: str) -> Iterator[Text]:
-    """Comments of JavaScript and CSS, and strings of at least three words."""
+    """Yields comments of JavaScript and CSS, and strings of at least three words."""
     pieces = re.compile(r"/\*.*?\*/|(?<![:\"'`])//[^\n]*|\"[^\"\n]*\"|'[^'\n]*'|`[^`]*`", re.DOTALL)
     for found in pieces.finditer(source):
         if len(found[0].split()) >= 3:
@@ -122,7 +123,7 @@ def script(source: str) -> Iterator[Text]:
 
 
 def page(source: str) -> Iterator[Text]:
-    """A page of Markdown without its blocks of code."""
+    """Yields the lines of a page of Markdown without its blocks of code."""
     code = False
     for number, line in enumerate(source.splitlines(), 1):
         code ^= line.lstrip().startswith("```")
@@ -131,13 +132,13 @@ def page(source: str) -> Iterator[Text]:
 
 
 def hypertext(source: str) -> Iterator[Text]:
-    """What stands between tags, and the titles and labels in them."""
+    """Yields the texts between tags, and the titles and labels in tags."""
     for found in re.finditer(r">([^<]+)<|(?:title|aria-label|placeholder)=\"([^\"]+)\"", source):
         yield Text(source.count("\n", 0, found.start()) + 1, False, found[1] or found[2])
 
 
 def lines(source: str) -> Iterator[Text]:
-    """Every line: TOML, Makefile and files of a shell."""
+    """Yields every line of TOML files, Makefiles and files of a shell."""
     for number, line in enumerate(source.splitlines(), 1):
         yield Text(number, False, line)
 
@@ -152,7 +153,9 @@ READERS: dict[str, Callable[[str], Iterator[Text]]] = {
 
 
 def of_names(path: Path, source: str) -> Iterator[tuple[int, str, str]]:
-    """Names of variables and attributes that are banned words: a message, an answer or a warning has its own name."""
+    """Yields names of variables and attributes that are banned words: a message, an answer or a warning has its own
+    name.
+    """
     if path.suffix == ".py":
         tokens = tokenize.generate_tokens(io.StringIO(source).readline)
         names = [(token.start[0], token.string, token.line) for token in tokens if token.type == tokenize.NAME]
@@ -169,7 +172,7 @@ def of_names(path: Path, source: str) -> Iterator[tuple[int, str, str]]:
 
 
 def of_words(text: Text) -> Iterator[tuple[int, str, str]]:
-    """Banned words of a text outside code font; line, rule and words."""
+    """Yields banned words of a text outside code font: line, rule and words."""
     plain = re.sub(r"``[^`]*``|`[^`]*`|https?://\S+", lambda found: "\n" * found[0].count("\n"), text.words)
     allowed = [found.span() for context in ALLOWED for found in re.finditer(context, plain, re.IGNORECASE)]
     for found in banned().finditer(plain):
@@ -181,7 +184,7 @@ def of_words(text: Text) -> Iterator[tuple[int, str, str]]:
 
 
 def of_lengths(source: str) -> Iterator[tuple[int, str, str]]:
-    """Lines of a page over the limit, except code, formulas, tables, pictures, addresses and long commands."""
+    """Yields lines of a page over the limit, except code, formulas, tables, pictures, addresses and long commands."""
     code = False
     for number, line in enumerate(source.splitlines(), 1):
         code ^= line.startswith("```")
@@ -191,7 +194,7 @@ def of_lengths(source: str) -> Iterator[tuple[int, str, str]]:
 
 
 def of_paragraphs(source: str) -> Iterator[tuple[int, str, str]]:
-    """Paragraphs and list items of a page that begin with a pronoun instead of a noun."""
+    """Yields paragraphs and list items of a page that begin with a pronoun instead of a noun."""
     before, code = "", False
     for number, line in enumerate(source.splitlines(), 1):
         code ^= line.lstrip().startswith("```")
@@ -203,7 +206,7 @@ def of_paragraphs(source: str) -> Iterator[tuple[int, str, str]]:
 
 
 def findings(path: Path) -> list[Finding]:
-    """All findings of a file."""
+    """Yields all findings of a file."""
     name = path.relative_to(ROOT).as_posix()
     source = path.read_text(encoding="utf-8")
     found = [*of_lengths(source), *of_paragraphs(source)] if path.suffix == ".md" else []
@@ -214,7 +217,7 @@ def findings(path: Path) -> list[Finding]:
 
 
 def files() -> list[Path]:
-    """Files of the repository that are checked."""
+    """Returns the files of the repository that are checked."""
     below = [path for folder in FOLDERS for path in (ROOT / folder).rglob("*")]
     every = [*ROOT.glob("*.md"), ROOT / "Makefile", ROOT / "pyproject.toml", *below]
     ours = [path for path in every if path.is_file() and path.suffix in READERS and "__pycache__" not in path.parts]
@@ -222,7 +225,7 @@ def files() -> list[Path]:
 
 
 def subjects() -> list[str]:
-    """Subjects of recent commits that are not ``area: what changed``; none outside a git checkout."""
+    """Returns the subjects of recent commits that are not ``area: what changed``; none outside a git checkout."""
     log = ["git", "-C", str(ROOT), "log", "--no-merges", f"--since={SUBJECTS_SINCE}", "--format=%s"]
     try:
         shown = subprocess.run(log, capture_output=True, text=True, timeout=60, check=False).stdout
@@ -232,29 +235,29 @@ def subjects() -> list[str]:
 
 
 def is_subject(subject: str) -> bool:
-    """True for ``area: what changed`` within the limit."""
+    """Returns True for ``area: what changed`` within the limit."""
     return len(subject) <= LONGEST_SUBJECT and re.match(r"[a-z][\w/., -]*: \S", subject) is not None
 
 
 def folder(name: str) -> str:
-    """The folder by which a file is counted, at most two levels deep."""
+    """Returns the folder by which a file is counted, at most two levels deep."""
     return "/".join(name.split("/")[:-1][:2]) or "."
 
 
 def excess(counts: Counter[str]) -> list[str]:
-    """Lines of the folders that have more findings than NOT_YET allows."""
+    """Returns lines about the folders that have more findings than NOT_YET allows."""
     every = sorted(counts.items())
     return [f"{at}: {many} findings, allowed: {NOT_YET.get(at, 0)}" for at, many in every if many > NOT_YET.get(at, 0)]
 
 
 def chosen(places: list[str]) -> list[Finding]:
-    """Findings below the given files and folders."""
+    """Returns the findings below the given files and folders."""
     roots = [Path(place).resolve() for place in places]
     return [found for path in files() if any(path.is_relative_to(root) for root in roots) for found in findings(path)]
 
 
 def main(places: list[str]) -> int:
-    """Print findings below ``places``, or the findings of the folders that have too many; exit status."""
+    """Prints findings below ``places``, or the findings of the folders that have too many; returns the exit status."""
     if places:
         show(chosen(places))
         return 0
@@ -269,13 +272,13 @@ def main(places: list[str]) -> int:
 
 
 def show(every: Iterable[Finding]) -> None:
-    """Print each finding in one line."""
+    """Prints each finding in one line."""
     for found in every:
         print(f"{found.path}:{found.line}: {found.rule}: {found.words}")
 
 
 def check_subjects() -> int:
-    """Print the subjects that break the rule; exit status."""
+    """Prints the subjects that break the rule; returns the exit status."""
     wrong = subjects()
     for subject in wrong:
         print(f"commit subject: {subject}: not `area: what changed` in {LONGEST_SUBJECT} characters")

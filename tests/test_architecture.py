@@ -1,4 +1,4 @@
-"""The borders between the houses, checked in the source tree."""
+"""The borders between the houses are checked in the source tree."""
 
 import ast
 import re
@@ -36,7 +36,7 @@ def tree(path: Path) -> ast.Module:
 
 
 def imported(nodes: Iterator[ast.AST]) -> set[str]:
-    """Returns the absolute names that the nodes import."""
+    """Returns the absolute names of the modules that the nodes import."""
     names: set[str] = set()
     for node in nodes:
         if isinstance(node, ast.Import):
@@ -63,7 +63,9 @@ def test_a_house_imports_only_itself_and_the_contract() -> None:
 
 
 def test_no_process_imports_modules_from_its_working_folder() -> None:
-    """Working folders are the user's, and may have a module ``queue`` or ``conoid``: with -P Python ignores both."""
+    """Working folders belong to the user, and may have a module ``queue`` or ``conoid``: with -P Python ignores such
+    modules.
+    """
     started = re.compile(r'(?:executable,|\{python\}|bin/python) *"?(-\w+)')
     found = [(name_of(path), match[1]) for path in SOURCES for match in started.finditer(path.read_text("utf-8"))]
     found += [
@@ -82,7 +84,7 @@ def test_relative_imports_stay_at_home() -> None:
 
 
 def test_helpers_of_tests_are_modules_of_their_own() -> None:
-    """Code that two tests need is in a separate module, and not in a conftest, which contains fixtures."""
+    """Code that two tests need is in a separate module, and not in a conftest, because a conftest contains fixtures."""
     for path in TESTS:
         for node in ast.walk(tree(path)):
             if isinstance(node, ast.ImportFrom):
@@ -112,7 +114,7 @@ def relatives(path: Path, nodes: Iterable[ast.AST] | None = None) -> set[Path]:
 
 @pytest.mark.parametrize("house", HOUSES)
 def test_no_imports_go_in_a_circle(house: str) -> None:
-    """Imports inside functions, and imports of types only, count too."""
+    """Imports inside functions, and imports of types only, also count."""
     left = {path: relatives(path) for path in SOURCES if name_of(path).startswith(f"{house}/")}
     while free := [path for path, needed in left.items() if not needed & left.keys()]:
         for path in free:
@@ -121,8 +123,8 @@ def test_no_imports_go_in_a_circle(house: str) -> None:
 
 
 def is_a_choice(value: ast.expr) -> bool:
-    """Returns whether a number was chosen: a number that is no layout of arrays (also in the types of kernels),
-    numbering or ratio of integers.
+    """Returns True if a number was chosen, which means that the number is no layout of arrays (also in the types of
+    kernels), numbering or ratio of integers.
     """
     words = {node.id for node in ast.walk(value) if isinstance(node, ast.Name)}
     numbers = [n.value for n in ast.walk(value) if isinstance(n, ast.Constant) and isinstance(n.value, int | float)]
@@ -131,8 +133,8 @@ def is_a_choice(value: ast.expr) -> bool:
 
 
 def test_a_numeric_constant_has_its_source() -> None:
-    """The docstring below the constant, or below its group, has its source, its measurement, or the remark that the
-    value was chosen."""
+    """The docstring below the constant, or below its group of constants, has the source, the measurement, or the remark
+    that the value was chosen."""
     for path in SOURCES:
         explained, line = False, 0
         for node in reversed(tree(path).body):
@@ -245,7 +247,9 @@ for module in {modules!r}:
 
 @cache
 def is_heavy(path: Path) -> bool:
-    """Returns whether the import of a module needs VTK or a library of the worker, or another module that needs one."""
+    """Returns True if the import of a module needs VTK or a library of the worker, or another module that needs such a
+    library.
+    """
     at_import = [node for node in tree(path).body if isinstance(node, ast.ImportFrom)]
     return bool(heads(path) & HEAVY) or any(is_heavy(file) for file in relatives(path, at_import))
 
@@ -316,10 +320,11 @@ TELLS = {
     "worker/output/frames.py", "worker/run/job.py", "worker/snapshots/decimate.py", "worker/snapshots/invariants.py",
     "worker/snapshots/table.py",
 }  # fmt: skip
-"""Files that report, refuse and balance. No answer depends on them, except for parts that are pushed apart at the
-start (docs/theory/sums.md)."""
+"""Files that only report, refuse or balance. No result depends on these files, except for parts that are pushed apart
+at the start (docs/theory/sums.md)."""
 POWERS_OF_TWO, REFUSES, WINDS = "worker/mesh/occ/frame.py", "worker/mesh/frame.py", "worker/mesh/occ/shells.py"
-"""Files with a rounded scale; with a size in a message; with the rounded winding number of a surface round a point."""
+"""Files with a rounded scale; files with a size in a message; files with the rounded winding number of a surface round
+a point."""
 
 
 def blurred(path: Path) -> set[str]:
@@ -342,7 +347,9 @@ def blurred(path: Path) -> set[str]:
 
 
 def test_inputs_of_the_answer_have_the_same_bits_on_every_processor() -> None:
-    """Use worker/materials/elementary.py and worker/materials/turning.py, and write sums of products as sums."""
+    """Kernels use worker/materials/elementary.py and worker/materials/turning.py, and write sums of products as
+    sums.
+    """
     for path in (path for path in SOURCES if name_of(path).startswith("worker/")):
         if name_of(path) not in TELLS | {POWERS_OF_TWO, REFUSES, WINDS}:
             assert not blurred(path)

@@ -65,7 +65,7 @@ def test_a_wheel_of_the_source_distribution_runs_in_an_empty_folder(tmp_path: Pa
     programs = installed(wheel, tmp_path / "environment")
     empty = tmp_path / "empty"
     empty.mkdir()
-    for name in ("conoid", "queue.py", "numpy.py"):  # of the user: no process of ours may import them
+    for name in ("conoid", "queue.py", "numpy.py"):  # of the user: no process of Conoid may import these modules
         (empty / name).mkdir() if name == "conoid" else (empty / name).write_text("raise SystemExit(9)\n")
     place = called(programs / "python", "-P", "-c", "import conoid.cases as c; print(c.__file__)", folder=empty)
     assert Path(place.strip()).is_relative_to(tmp_path)

@@ -1,4 +1,6 @@
-"""Tests of the checker of words: it finds the words that CONVENTIONS.md bans, and ignores code and plain prose."""
+"""Tests of the checker of words: the checker finds the words that CONVENTIONS.md bans, and ignores code and plain
+prose.
+"""
 
 from collections import Counter
 from pathlib import Path

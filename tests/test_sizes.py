@@ -10,7 +10,7 @@ HOUSES = ("cases", "client", "server", "worker")
 LONGEST_FILE, LONGEST_FUNCTION, LONGEST_KERNEL, MOST_ATTRIBUTES = 300, 50, 80, 15
 """Chosen values: a file can be read at one sitting, and a function and an object can be understood at a glance."""
 SMALL, FEWEST_ATTRIBUTES, MOST_PARAMETERS = ("worker/contact/", "worker/fracture/"), 12, 12
-"""Folders with stricter limits, because they were the largest before; chosen values."""
+"""Folders with stricter limits, because these folders were the largest in earlier versions; chosen values."""
 EXCEPTIONS: dict[str, dict[str, int]] = {
     "a record: an attribute for each key, column or account that it holds": {
         "cases/laws/johnson_holmquist.py: JohnsonHolmquist": 18,
@@ -60,12 +60,12 @@ EXCEPTIONS: dict[str, dict[str, int]] = {
         "worker/contact/scene/columns.py: SceneSlots": 13,
     },
 }
-"""Larger files, functions and classes with the reason and their exact sizes: when the code becomes smaller, the
-numbers must be lowered."""
+"""Larger files, functions and classes with the reason and their exact sizes: when the code becomes smaller, the numbers
+must be lowered."""
 
 
 def attributes(cls: ast.ClassDef) -> int:
-    """Returns the fields that a class declares, and the attributes that its methods set."""
+    """Returns the fields that a class declares, and the attributes that the methods of the class set."""
     declared = {n.target.id for n in cls.body if isinstance(n, ast.AnnAssign) and isinstance(n.target, ast.Name)}
     stored = (n for n in ast.walk(cls) if isinstance(n, ast.Attribute) and isinstance(n.ctx, ast.Store))
     return len(declared | {n.attr for n in stored if isinstance(n.value, ast.Name) and n.value.id == "self"})
@@ -77,7 +77,9 @@ def parameters(function: ast.FunctionDef | ast.AsyncFunctionDef) -> int:
 
 
 def excesses(name: str, source: str) -> Iterator[tuple[str, int]]:
-    """Returns the excesses of a file: ``FILE``, ``FILE: CLASS``, ``FILE: FUNCTION`` or ``FILE: FUNCTION(...)``."""
+    """Returns the names that exceed a limit in a file: ``FILE``, ``FILE: CLASS``, ``FILE: FUNCTION`` or
+    ``FILE: FUNCTION(...)``.
+    """
     small = name.startswith(SMALL)
     if (lines := len(source.splitlines())) > LONGEST_FILE:
         yield name, lines
@@ -95,7 +97,7 @@ def excesses(name: str, source: str) -> Iterator[tuple[str, int]]:
 
 @cache
 def found() -> dict[str, int]:
-    """Returns all excesses of the houses."""
+    """Returns all names of the houses that exceed a limit."""
     every = [path for house in HOUSES for path in (ROOT / house).rglob("*") if path.suffix in (".py", ".js", ".css")]
     named = {path.relative_to(ROOT).as_posix(): path for path in sorted(every)}
     return dict(each for name, path in named.items() for each in excesses(name, path.read_text(encoding="utf-8")))

@@ -1,4 +1,4 @@
-"""Two blocks with non-matching meshes, bonded at z = 0, and the ledger of a run."""
+"""Two blocks with non-matching meshes, bonded at z = 0, and the energy balance of a run."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -32,7 +32,7 @@ EVERYWHERE = "low = [-1, -1, {low}]\nhigh = [1, 1, {high}]\n"
 
 
 def start(end: float, poisson: float = 0.0) -> str:
-    """Returns steel, and the end time of the run, s."""
+    """Returns the material steel, and the end time of the run, s."""
     return START.format(end=end, poisson=poisson)
 
 
@@ -68,7 +68,7 @@ def built(text: str) -> Simulation:
 
 
 def run(sim: Simulation, each: Callable[[], None] | None = None) -> Energy:
-    """Runs the case and returns the ledger at the end; ``each`` is called in every step, at time n."""
+    """Runs the case and returns the energy balance at the end; ``each`` is called in every step, at time n."""
     step.prepare(sim)
     while True:
         before: np.ndarray = sim.model.nodes.v.copy()

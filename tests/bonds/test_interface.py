@@ -22,7 +22,7 @@ from .scenes import BOND, built, start
 
 
 def turned(x: Floats, seed: int) -> Floats:
-    """Returns the points with a random rotation."""
+    """Returns the points after a random rotation."""
     q, r = np.linalg.qr(np.random.default_rng(seed).normal(size=(3, 3)))
     q *= np.sign(np.diag(r))
     return np.asarray(x @ (q * np.sign(np.linalg.det(q))).T)
@@ -59,7 +59,9 @@ def test_the_pieces_of_a_face_add_up_to_it(seed: int) -> None:
 
 
 def rows_of(one: TetMesh, other: TetMesh, bond: str = "") -> tuple[Rows, interface.Found, Floats, "np.ndarray"]:
-    """Returns the rows of two blocks, the second on top of the first, and their points and tets."""
+    """Returns the tied rows of two blocks, the second block on top of the first block, and the points and tets of the
+    blocks.
+    """
     case = load.parse_toml(
         scenes.start(1e-6) + scenes.block("below", (0, 0, 0), (1, 1, 1), 1)
         + scenes.block("above", (0, 0, 1), (1, 1, 2), 1) + scenes.BOND + bond
@@ -81,7 +83,7 @@ def on_top(cells: tuple[int, int, int], seed: int, gap: float = 0.0) -> TetMesh:
 
 @pytest.mark.parametrize(("cells", "seed"), [((5, 7, 2), 1), ((3, 3, 1), 2), ((9, 4, 2), 3), ((4, 4, 2), 4)])
 def test_a_constant_stress_passes_between_any_two_meshes(cells: tuple[int, int, int], seed: int) -> None:
-    """Patch test: the forces of a unit traction on the tied nodes are equal to those on the faces of the mortar
+    """Patch test: the forces of a unit traction on the tied nodes are equal to the forces on the faces of the mortar
     side, and a linear motion has no relative velocity.
     """
     one, other = block((4, 4, 2), shake=0.25, seed=seed + 10), on_top(cells, seed)

@@ -1,4 +1,4 @@
-"""Tied bodies: waves, energy, momentum; bonds that are torn, and contact afterwards."""
+"""Tied bodies: waves, energy, momentum; bonds that are torn, and contact after the failure of a bond."""
 
 from typing import Any
 
@@ -25,8 +25,8 @@ high = [1, 1, 0]
 
 
 def pulled(parts: str) -> tuple[np.ndarray, Simulation, float, float]:
-    """Returns time, s, and stress under the interface, Pa, of a bar that is pulled at its upper end; its simulation;
-    at the end its energy residual and the fraction of the external work that the bond has taken.
+    """Returns three results of a bar that is pulled at its upper end: time, s, and stress under the interface, Pa; the
+    simulation; at the end the energy residual and the fraction of the external work that the bond has taken.
     """
     sim = built(start(8e-6) + parts + PULL + SYMMETRY + PROBE)
     record = list[tuple[float, float]]()
@@ -92,7 +92,7 @@ def test_a_spinning_joint_keeps_its_momenta() -> None:
     ("way", "energy"), [((0.0, 0.0, 5.0), 2000.0), ((5.0, 0.0, 0.0), 4000.0), ((3.0, 2.0, 3.6), 2670.0)]
 )
 def test_a_torn_joint_absorbs_its_energy(way: tuple[float, float, float], energy: float) -> None:
-    """In tension, in shear, and in both, the absorbed energy is G A within 2 %."""
+    """In tension, in shear, and in a combination of tension and shear, the absorbed energy is G A within 2 %."""
     law = 'strength = "50 MPa"\nshear_strength = "70 MPa"\nenergy = "2 kJ/m^2"\nshear_energy = "4 kJ/m^2"\n'
     parts = block("below", (0, 0, -4), (8, 8, 0), 2) + block("above", (0, 0, 0), (8, 8, 4), 1.3)
     drives = moved(3.9e-3, 1, way) + moved(-1, -3.9e-3, (0.0, 0.0, 0.0))
@@ -109,8 +109,8 @@ def test_a_torn_joint_absorbs_its_energy(way: tuple[float, float, float], energy
 def test_a_joint_that_opens_in_twenty_steps_absorbs_the_energy_of_its_law(
     way: tuple[float, float, float], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The reference is the sum of 2 G(B) (1 - D) dD A over rows and steps, with the fraction B of shear of a row in
-    a step. At this speed waves bend the blocks, so that a joint in shear also has tension.
+    """The reference energy is the sum of 2 G(B) (1 - D) dD A over rows and steps, with the fraction B of shear of a row
+    in a step. At this speed waves bend the blocks, so that a joint in shear also has tension.
     """
     taken = 0.0
     plain = bond_law.open_bonds

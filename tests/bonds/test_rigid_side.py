@@ -1,4 +1,6 @@
-"""Tied bonds with a rigid part: the nodes of the other part follow its motion, and their impulses move it."""
+"""Tied bonds with a rigid part: the nodes of the other part follow the motion of the rigid part, and their impulses
+move the rigid part.
+"""
 
 from pathlib import Path
 
@@ -38,7 +40,7 @@ def gap(sim: Simulation) -> float:
 
 @pytest.mark.parametrize("sizes", [(2.0, 1.3), (1.3, 2.0)])
 def test_a_tumbling_body_keeps_energy_and_momenta_and_holds_its_nodes(sizes: tuple[float, float]) -> None:
-    """The rigid part is the mortar side also where its faces are the smaller ones."""
+    """The rigid part is the mortar side, also if its faces are smaller than those of the other part."""
     sim = built('contact = "none"\n' + pair(20e-6, SPIN, SPIN, sizes))
     momenta = list[np.ndarray]()
     step.prepare(sim)
@@ -57,12 +59,12 @@ def test_a_tumbling_body_keeps_energy_and_momenta_and_holds_its_nodes(sizes: tup
 
 
 def of_above(drive: str) -> str:
-    """The drive of nodes of the upper part only."""
+    """Drives only nodes of the upper part."""
     return drive.replace('kind = "velocity"', 'kind = "velocity"\nparts = ["above"]')
 
 
 def bar(end: float, below: str, drives: str) -> Simulation:
-    """A bar of steel on a rigid foot, or alone, after its run."""
+    """A bar of steel on a rigid foot, or without a foot, after its run."""
     text = start(end) + below + block("above", (0, 0, 0), (3, 3, 12), 1) + drives
     sim = built(text)
     run(sim)
@@ -71,7 +73,9 @@ def bar(end: float, below: str, drives: str) -> Simulation:
 
 @pytest.mark.parametrize("wall", [False, True])
 def test_a_rigid_foot_is_a_clamp(wall: bool) -> None:
-    """A foot that is driven, and a free foot that a wall stops while the bar presses it: as prescribed nodes."""
+    """A foot that is driven, and a free foot that a wall stops while the bar presses the foot, act like prescribed
+    nodes.
+    """
     top = of_above(moved(11.9e-3, 1, (0.0, 0.0, -20.0)))
     clamp = moved(-1, 0.1e-3, (0.0, 0.0, 0.0))
     foot = block("below", (-1, -1, -2), (4, 4, 0), 1, "rigid = true") + BOND
@@ -87,7 +91,7 @@ def test_a_rigid_foot_is_a_clamp(wall: bool) -> None:
 def test_a_rigid_part_that_is_torn_off_takes_the_energy_of_the_bond(
     way: tuple[float, float, float], energy: float
 ) -> None:
-    """G A within 2 %."""
+    """The absorbed energy is G A within 2 %."""
     sim = built(pair(40e-6, "") + LAW + of_above(moved(2.9e-3, 1, (0.0, 0.0, 0.0))) + DRIVE.format(*way))
     spent = area(sim) * energy
     end = run(sim)
@@ -113,7 +117,7 @@ def ended(sim: Simulation, many: int) -> tuple[str | None, int]:
 
 
 def test_a_bond_that_breaks_at_an_impact_gives_one_answer(tmp_path: Path) -> None:
-    """The answer is the same on 1, 2, 3 and 7 ranks, and from a checkpoint; the body slides along the wall while the
+    """The result is the same on 1, 2, 3 and 7 ranks, and from a checkpoint; the body slides along the wall while the
     bond breaks."""
     case = load.parse_toml(STRUCK)
 

@@ -1,4 +1,6 @@
-"""Tied bonds in minimal cases: no contact, an interface that erodes completely, two velocities at the start."""
+"""Tied bonds in minimal cases: no contact, an interface that erodes completely, two different velocities at the
+start.
+"""
 
 from pathlib import Path
 
@@ -63,7 +65,7 @@ def test_three_parts_of_one_body_have_a_bond_at_each_interface(third: str) -> No
 
 @pytest.mark.parametrize("sizes", [(0.5, 0.4, 0.3), (0.5, 0.33, 0.25)])
 def test_three_parts_tied_in_a_ring_lose_no_energy(sizes: tuple[float, float, float]) -> None:
-    """A node on the common line has one row, since two would be nearly linearly dependent."""
+    """A node on the common line has one row, because two rows would be nearly linearly dependent."""
     corners = {"a": ((0, 0, 0), (2, 1, 1)), "b": ((0, 0, 1), (1, 1, 2)), "c": ((1, 0, 1), (2, 1, 2))}
     blocks = "".join(block(name, *both, size) for (name, both), size in zip(corners.items(), sizes, strict=True))
     bonds = "".join(f'\n[[bond]]\nparts = ["{i}", "{j}"]\nkind = "tied"\n' for i, j in ("ab", "ac", "bc"))

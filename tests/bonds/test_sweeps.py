@@ -1,4 +1,4 @@
-"""Kernels of tied rows against plain numpy: the impulses solve the linear equations."""
+"""Kernels of tied rows compared with plain numpy: the impulses solve the linear equations."""
 
 import numpy as np
 import pytest
@@ -109,8 +109,9 @@ def test_a_bond_carries_what_its_ellipse_allows() -> None:
 
 @pytest.mark.parametrize(("share", "pulls"), [(0.0, [1]), (0.3, [1]), (1.0, [1]), (0.0, 40 * [1] + 30 * [-1])])
 def test_a_bond_that_is_opened_takes_its_energy(share: float, pulls: list[int]) -> None:
-    """The bond is opened at one velocity, with the fraction ``share`` of its square along the interface. It absorbs
-    G per area in all; closing and opening again in between neither takes nor releases energy.
+    """The bond is opened at one velocity, with the fraction ``share`` of the square of the velocity along the
+    interface. The bond absorbs G per area in all; closing the bond and opening it again neither takes nor releases
+    energy.
     """
     normal, shear, area, dt, energies = 3e6, 5e6, 2.0, 1e-3, (40.0, 90.0)
     some = layout(0, np.array([[normal, shear, *energies, 1.0]]))

@@ -1,4 +1,4 @@
-"""Shapes with dimensions by formula, for tests."""
+"""Shapes whose dimensions follow from formulas, for tests."""
 
 from typing import Any
 

@@ -1,4 +1,4 @@
-"""Wall time of ranks and threads compared with computed values, and the assumptions in words."""
+"""Wall time of ranks and threads: the estimate is compared with computed values, and its text names the assumptions."""
 
 import io
 

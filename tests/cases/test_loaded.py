@@ -1,4 +1,4 @@
-"""Estimated areas of tractions compared with formulas and with generated meshes."""
+"""Estimated areas of tractions, compared with formulas and with generated meshes."""
 
 import math
 from typing import Any

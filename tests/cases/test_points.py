@@ -1,4 +1,4 @@
-"""The table of a sweep: numbers, units in the header, every probe and every reference."""
+"""The table of a sweep has numbers, units in the header, every probe and every reference."""
 
 import csv
 import io

@@ -1,4 +1,6 @@
-"""Generated bodies that touch without a gap: approximate area, and a warning if no force acts between them."""
+"""Generated bodies that touch without a gap: the approximate common area, and a warning if no force acts between the
+bodies.
+"""
 
 import math
 from typing import Any

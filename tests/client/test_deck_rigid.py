@@ -1,4 +1,4 @@
-"""Motions of rigid bodies of decks, and initial velocities that a deck gives twice."""
+"""Motions of rigid bodies in decks, and initial velocities that a deck gives twice."""
 
 from pathlib import Path
 from typing import Any
@@ -119,7 +119,7 @@ def test_velocities_of_nodes_and_rigid_bodies_replace_those_of_all_in_any_order(
 
 
 def test_words_of_rarer_keywords(tmp_path: Path) -> None:
-    """A second end of the run and mass properties are refused in plain words; measured forces are output."""
+    """A second end time of the run and mass properties are refused in plain words; measured forces are output."""
     found = read(tmp_path, "a.k", lsdyna(*STEEL, "*CONTROL_TERMINATION", row(0.02)))
     assert any("the end of the run is given twice" in line for line in found.refusals)
     assert found.data["run"]["end_time"] == "0.01 s"

@@ -1,5 +1,5 @@
-"""``conoid validate`` and ``conoid batch`` read mesh files and report their content, or the error that a run would
-report.
+"""``conoid validate`` and ``conoid batch`` read mesh files and report the content of the files, or the error that a run
+would report.
 """
 
 import importlib.util
@@ -34,7 +34,7 @@ mesh = { shape = "file", path = "bar.inp", unit = "1 mm", group = "All" }
 
 @pytest.fixture
 def folder(quiet_home: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """A case with a mesh file of one tet with a size of 10 mm."""
+    """A case with a mesh file of one tet of the size 10 mm."""
     monkeypatch.setenv("CONOID_CACHE_DIR", str(quiet_home / "cache"))
     (quiet_home / "bar.inp").write_text(BAR)
     (quiet_home / "bar.toml").write_text(CASE)

@@ -1,10 +1,10 @@
-"""``python -m tests.drill``: tries all faults in sequence, and writes a table into build/drill.
+"""The command ``python -m tests.drill`` tries all faults in sequence, and writes a table into build/drill.
 
-A later call continues an interrupted drill: faults that build/drill/faults.jsonl lists as true are tried again only
-with ``--fresh``. The table names the groups that have not been tried. ``--shard 2/4`` tries every fourth group, from
-the second on. ``--only WORDS`` tries the groups whose name contains WORDS or whose kind of stand is WORDS, for
-example ``slurm``; the option can be repeated. ``--list`` prints the names of the groups. The exit code is 0 if every
-state became true in time.
+A later call of the command continues an interrupted drill: faults that build/drill/faults.jsonl lists as true are tried
+again only with ``--fresh``. The table names the groups of faults that have not been tried. The option ``--shard 2/4``
+tries every fourth group, from the second group on. The option ``--only WORDS`` tries the groups whose name contains
+WORDS or whose kind of stand is WORDS, for example ``slurm``; the option can be repeated. The option ``--list`` prints
+the names of the groups. The exit code is 0 if every state became true in time.
 """
 
 import argparse
@@ -25,7 +25,7 @@ from .table import write
 
 PLACE = Path("build/drill")
 Group = tuple[str, Callable[[Grounds], Iterator[Row]]]
-"""Kind of stand, and function that tries the faults of the group on such a stand."""
+"""Kind of stand of a group, and the function that tries the faults of the group on such a stand."""
 
 
 def groups() -> dict[str, Group]:
@@ -74,7 +74,7 @@ def main() -> int:
 
 
 def _try(name: str, group: Group, made: Grounds, book: Path) -> None:
-    """Tries one group. An error of the drill itself becomes a row of the table, too."""
+    """Tries the faults of one group. An error of the drill itself also becomes a row of the table."""
     began = time.monotonic()
     if why := made.lacks(group[0]):
         print(f"{name}: not tried: {why}", flush=True)

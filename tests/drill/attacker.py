@@ -1,8 +1,8 @@
-"""``python -m tests.drill.attacker KIND URL TOKEN RUN LONG MANY SWEEP SECONDS``: a user who loads a server as much as
-the server allows.
+"""The command ``python -m tests.drill.attacker KIND URL TOKEN RUN LONG MANY SWEEP SECONDS`` simulates a user who loads
+a server as much as the server allows.
 
-The attack is a process, lasts SECONDS, and has a limited number of connections. It prints as JSON how often each
-status was answered; status 0 counts connections that were closed without an answer.
+The attack is a separate process, lasts SECONDS, and has a limited number of connections. The process prints as JSON the
+number of answers with each status; status 0 counts connections that were closed without an answer.
 """
 
 import itertools
@@ -33,24 +33,25 @@ MOST = 400
 
 @dataclass
 class Attack:
-    """Requests of an attack on each connection, and their rate."""
+    """Requests of an attack on each connection, and the rate of these requests."""
 
     requests: Callable[["Target"], Iterator[bytes]]
-    """Generator of the requests on one connection. The next request is sent after the answer to the previous one."""
+    """Generator of the requests on one connection. The next request is sent after the answer to the previous
+    request."""
     crowd: int
     """Number of simultaneous connections."""
     reads: bool = True
-    """Whether the attacker reads the answers."""
+    """True if the attacker reads the answers."""
     drip: float = 0.0
-    """Pause in s after each byte of a request; 0: a request is sent as a whole."""
+    """Pause in s after each byte of a request; with 0 a request is sent as a whole."""
     pause: float = 0.1
     """Pause in s before the attacker connects again after its connection was closed."""
 
 
 @dataclass
 class Target:
-    """Target of an attack: a server, the token of the attacker, and runs of the attacker: one that is running, one
-    with a long journal, several with longer journals, and a sweep.
+    """Target of an attack: a server, the token of the attacker, and runs of the attacker. The runs are a run in
+    progress, a run with a long journal, several runs with longer journals, and a sweep.
     """
 
     url: str
@@ -68,14 +69,14 @@ class Target:
         return f"{method} {path} HTTP/1.1\r\nHost: 127.0.0.1\r\n{shown}{more}\r\n".encode()
 
     def post(self, path: str, body: bytes, kind: str = "application/toml", length: int | None = None) -> bytes:
-        """Returns a request with a body; ``length`` is the value of its header Content-Length."""
+        """Returns a request with a body; ``length`` is the value of the header Content-Length."""
         size = len(body) if length is None else length
         return self.get(path, "POST", f"Content-Type: {kind}\r\nContent-Length: {size}\r\n") + body
 
 
 def again(*paths: str, method: str = "GET", more: str = "", token: bool = True) -> Callable[[Target], Iterator[bytes]]:
-    """Returns the same requests in an endless sequence. In a path, RUN and LONG are replaced by the two runs, MANY
-    by one of the many runs, SWEEP by the sweep, and {n} by a number that changes.
+    """Returns the given requests in an endless sequence. In a path, RUN and LONG are replaced by the two runs, MANY by
+    one of the many runs, SWEEP by the sweep, and {n} by a number that changes.
     """
 
     def requests(target: Target) -> Iterator[bytes]:
@@ -88,12 +89,12 @@ def again(*paths: str, method: str = "GET", more: str = "", token: bool = True) 
 
 
 def once(*words: str, token: bool = True) -> Callable[[Target], Iterator[bytes]]:
-    """Returns a single request."""
+    """Returns an attack of a single request."""
     return lambda target: itertools.islice(again(*words, token=token)(target), 1)
 
 
 def nothing(target: Target) -> Iterator[bytes]:
-    """Sends no byte."""
+    """Sends no byte to the server."""
     yield b""
 
 
@@ -112,7 +113,7 @@ def half_a_body(target: Target) -> Iterator[bytes]:
 
 
 def endless_chunks(target: Target) -> Iterator[bytes]:
-    """Sends half a mebibyte of a chunked body, and never its end."""
+    """Sends half a mebibyte of a chunked body, and never the end of the body."""
     head = target.get("/v1/cases:validate", "POST", "Content-Type: application/toml\r\nTransfer-Encoding: chunked\r\n")
     yield head + b"8000\r\n%s\r\n" % (b"#" * 0x8000) * 16
 
@@ -151,7 +152,7 @@ def adaptive(target: Target) -> Iterator[bytes]:
 
 
 def swept_again(target: Target) -> Iterator[bytes]:
-    """Starts again a sweep of which all points have failed."""
+    """Starts again a sweep all of whose points have failed."""
     while True:
         yield target.post(f"/v1/sweeps/{target.sweep}:again", sweep_wish(), "application/json")
 
@@ -210,7 +211,7 @@ KINDS: dict[str, Attack] = {
 
 
 def attack(kind: str, target: Target) -> None:
-    """Runs the attack until its time is over; then all connections are closed."""
+    """Runs the attack until its time is over; after that all connections are closed."""
     chosen = KINDS[kind]
     crowd = [threading.Thread(target=one, args=(chosen, target), daemon=True) for _ in range(min(MOST, chosen.crowd))]
     for each in crowd:
@@ -219,7 +220,7 @@ def attack(kind: str, target: Target) -> None:
 
 
 def one(chosen: Attack, target: Target) -> None:
-    """Opens a connection, and a new one each time the server closes it."""
+    """Opens a connection, and a new connection each time the server closes the connection."""
     while time.monotonic() < target.until:
         with suppress(OSError):
             place = urlsplit(target.url)
@@ -229,7 +230,7 @@ def one(chosen: Attack, target: Target) -> None:
 
 
 def talk(chosen: Attack, target: Target, connection: socket.socket) -> None:
-    answers = connection.makefile("rb")  # one reader for all answers: it has read more than the first one
+    answers = connection.makefile("rb")  # one reader for all answers: it may have read bytes of the next answer
     for request in chosen.requests(target):
         if time.monotonic() > target.until:
             return
@@ -248,7 +249,7 @@ def talk(chosen: Attack, target: Target, connection: socket.socket) -> None:
 
 
 def answered(target: Target, answers: BinaryIO) -> bool:
-    """Reads the next answer of a connection. Returns False if the connection was closed."""
+    """Reads the next answer of a connection. Returns False if the server has closed the connection."""
     words = answers.readline().split()
     target.answers[int(words[1]) if len(words) > 1 and words[1].isdigit() else 0] += 1
     length = 0

@@ -1,5 +1,5 @@
-"""Faults of servers and disks that a client sees: every command must end in time, with one line, its exit code, and
-no incomplete file."""
+"""Faults of servers and disks that a client sees: every command must end in time, with one line, the right exit code,
+and no incomplete file."""
 
 import gzip
 import os
@@ -46,7 +46,7 @@ def bomb() -> bytes:
 
 
 def endless(first: bytes, piece: bytes) -> Iterator[bytes]:
-    """Sends a first piece, then another piece again and again."""
+    """Sends the first piece of an answer, and another piece again and again."""
     yield first
     yield from repeat(piece)
 
@@ -86,7 +86,7 @@ ANSWERS: dict[str, Answer] = {
 
 
 def answered(name: str, answer: Answer, stand: Stand) -> Iterator[Row]:
-    """Gives the same answer to every request."""
+    """Gives one answer to every request."""
     asked = list[float]()
 
     def noted() -> Iterable[bytes]:
@@ -150,8 +150,8 @@ def _row(
     name: str, url: str, words: list[str], copy: Path, token: str = "", stdout: Path | None = None,
     place: Path | None = None, asked: Sequence[float] = (),
 ) -> Row:  # fmt: skip
-    """Runs one command in the folder ``place``; ``asked``: times of the requests to the server; the time of the
-    command counts from the first one."""
+    """Runs one command in the folder ``place``; ``asked`` has the times of the requests to the server; the time of the
+    command counts from the first request."""
     began = time.monotonic()
     environment = {**os.environ, "CONOID_URL": url, "CONOID_TOKEN": token, "NO_COLOR": "1"}
     out = stdout.open("w") if stdout else subprocess.PIPE

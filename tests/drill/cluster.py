@@ -1,7 +1,8 @@
-"""Faults of a batch system: of its controller, node, jobs and commands.
+"""Faults of a batch system: faults of its controller, node, jobs and commands.
 
-The Slurm is real (``tests.server.real_slurm``). The server and its jobs call wrapper scripts of the stand in place
-of the commands of Slurm. A wrapper fails as its order file describes; without such a file it calls the command.
+The Slurm of the drill is real (``tests.server.real_slurm``). The server and its jobs call wrapper scripts of the stand
+in place of the Slurm commands. A wrapper script fails as its order file describes; without an order file the script
+calls the command.
 """
 
 import shutil
@@ -49,19 +50,19 @@ ANSWERS = {
     "unheard": "does its work and fails",
 }  # fmt: skip
 ALL_BUT_KILLED = tuple(life for life in situations.ALL if life is not situations.is_killed_meanwhile)
-"""Situations for faults after which Slurm requeues jobs or has lost them: a run with a killed rank then continues
-like all other runs, so its situation is left out."""
+"""Situations after faults in which Slurm requeues or loses jobs. The situation of a killed rank is left out, because
+its run continues in the same way as all other runs."""
 ROUND = 3.0
 """Time in s between two actions of the operator."""
 AGAIN = 6
-"""Largest number of starts of a run whose job is requeued: after the fault, after its end, and when the job is
-scheduled again."""
+"""Largest number of starts of a run whose Slurm job is requeued: after the fault, after the end of the fault, and when
+the job is scheduled again."""
 
 
 @dataclass
 class ClusterStand(Stand):
-    """A server that submits its runs to a Slurm on this machine; ``root`` also contains the wrapper scripts and
-    their order files."""
+    """A server that submits its runs to a Slurm on this machine; ``root`` also contains the wrapper scripts and their
+    order files."""
 
     slots: int = 1000
     large: int = real_slurm.CORES - 3
@@ -69,12 +70,12 @@ class ClusterStand(Stand):
     profile: str = PROFILE
     cluster: Cluster | None = None
     mended: bool = False
-    """Whether the fault has ended and the operator acts."""
+    """True if the fault has ended and the operator acts."""
     rounds: float = 0.0
     """Time of the next action of the operator."""
 
     def jobs(self, *states: str) -> list[str]:
-        """Returns the numbers of the jobs in one of these states."""
+        """Returns the numbers of the Slurm jobs in one of the given states."""
         assert self.cluster is not None
         return [number for number, state in self.cluster.jobs("conoid-") if state in states]
 
@@ -85,15 +86,15 @@ class ClusterStand(Stand):
             self.cluster.command(*words)
 
     def state(self, run: str) -> str:
-        """Returns the state of a run; before that, the operator treats the jobs that need an action."""
+        """Returns the state of a run; before that, the operator treats the Slurm jobs that need an action."""
         if self.mended and time.monotonic() > self.rounds:
             self.rounds = time.monotonic() + ROUND
             self.operate()
         return super().state(run)
 
     def operate(self) -> None:
-        """Acts as an operator of Slurm: resumes a drained node, releases held jobs, and starts requeued jobs at
-        once. Slurm itself would delay a requeued job by two minutes.
+        """Acts as an operator of Slurm: resumes a drained node, releases held jobs, and starts requeued jobs at once.
+        Slurm itself would delay a requeued job by two minutes.
         """
         assert self.cluster is not None
         with suppress(AssertionError):
@@ -103,14 +104,14 @@ class ClusterStand(Stand):
             self.run_command("scontrol", "update", f"jobid={job}", "StartTime=now", "TimeLimit=UNLIMITED")
 
     def close(self) -> None:
-        """Ends the server and all jobs."""
+        """Ends the server and all Slurm jobs."""
         super().close()
         self.run_command("scancel", "--full", "--signal=KILL", "--user=root")
         self.run_command("scancel", "--user=root")
 
 
 def stand(root: Path, cluster: Cluster) -> ClusterStand:
-    """Returns a stand whose wrapper scripts call the commands of Slurm until they get an order."""
+    """Returns a stand whose wrapper scripts call the Slurm commands until the scripts get an order."""
     (root / "bin").mkdir()
     (root / "orders").mkdir()
     for name in COMMANDS:
@@ -122,7 +123,7 @@ def stand(root: Path, cluster: Cluster) -> ClusterStand:
 
 
 def mended(deed: Callable[[ClusterStand, Cluster], None]) -> Deed:
-    """Returns a function that ends a fault; after that the operator acts."""
+    """Returns a function that ends a fault; after its call the operator acts."""
 
     def done(stand: Stand) -> None:
         on(deed)(stand)
@@ -133,7 +134,7 @@ def mended(deed: Callable[[ClusterStand, Cluster], None]) -> Deed:
 
 
 def on(deed: Callable[[ClusterStand, Cluster], None]) -> Deed:
-    """Returns a function of a stand for a function that needs the stand and its cluster."""
+    """Converts a function that needs the stand and its cluster into a function of the stand."""
 
     def done(stand: Stand) -> None:
         assert isinstance(stand, ClusterStand)
@@ -156,7 +157,9 @@ def back(_: ClusterStand, cluster: Cluster) -> None:
 
 
 def killed_often(stand: ClusterStand, cluster: Cluster) -> None:
-    """Restarts the controller twice, each time for about the time of one query of the queue, and leaves it killed."""
+    """Restarts the controller twice, each time for about the time of one query of the queue, and leaves the controller
+    killed.
+    """
     for pause in (0.3, 1.5):
         cluster.kill()
         time.sleep(0.2)
@@ -174,7 +177,9 @@ def goes_on(_: ClusterStand, cluster: Cluster) -> None:
 
 
 def controllers() -> Iterator[Strike]:
-    """Yields the faults of the controller: killed, killed several times, hung; some also with the server killed."""
+    """Yields the faults of the controller: killed, killed several times, hung; in some faults the server is also
+    killed.
+    """
     away, here = on(killed), mended(back)
     still, moves = on(hung), mended(goes_on)
     yield _again("the controller killed", away, here, hold=4.0)
@@ -212,14 +217,14 @@ def looked_after(_: ClusterStand, __: Cluster) -> None:
 
 
 def preempted(stand: ClusterStand, _: Cluster) -> None:
-    """Submits a job of higher priority that needs every core."""
+    """Submits a Slurm job of higher priority that needs every core."""
     wants = ("-p", "high", "-n", str(real_slurm.CORES), "-o", "/dev/null", "--wrap", "sleep 4")
     stand.run_command("sbatch", *wants)
     time.sleep(3.0)
 
 
 def each(state: str, *words: str) -> Callable[[ClusterStand, Cluster], None]:
-    """Returns a function that runs a command of the operator for each job in a state."""
+    """Returns a function that runs a command of the operator for each Slurm job in a state."""
 
     def done(stand: ClusterStand, _: Cluster) -> None:
         for job in stand.jobs(state):
@@ -229,7 +234,7 @@ def each(state: str, *words: str) -> Callable[[ClusterStand, Cluster], None]:
 
 
 def limited(stand: ClusterStand, _: Cluster) -> None:
-    """Sets the time limit of all running jobs to one minute."""
+    """Sets the time limit of all running Slurm jobs to one minute."""
     for job in stand.jobs("RUNNING"):
         stand.run_command("scontrol", "update", f"jobid={job}", "TimeLimit=1")
 
@@ -252,7 +257,7 @@ def nodes() -> Iterator[Strike]:
 
 
 def ordered(what: str, *names: str) -> Deed:
-    """Returns a function that gives these wrapper scripts an order."""
+    """Returns a function that gives an order to the named wrapper scripts."""
 
     def deed(stand: Stand) -> None:
         for name in names:
@@ -262,7 +267,7 @@ def ordered(what: str, *names: str) -> Deed:
 
 
 def obeyed(stand: Stand) -> None:
-    """Removes all orders, so that the wrapper scripts call the commands of Slurm again."""
+    """Removes all orders, so that the wrapper scripts call the Slurm commands again."""
     for path in (stand.root / "orders").iterdir():
         path.unlink()
 
@@ -290,5 +295,5 @@ def _again(name: str, deed: Deed, lift: Deed, hold: float = 2.5) -> Strike:
 
 
 def everything() -> list[Strike]:
-    """Returns all faults of the batch system, in the order in which they are tried."""
+    """Returns all faults of the batch system, in the order in which the drill tries the faults."""
     return [*controllers(), *nodes(), *commands()]

@@ -1,9 +1,10 @@
-"""Effect of one attacker on two other users of the same server. The attacker is a process; the two others send requests
-as people do.
+"""Effect of one attacker on two other users of the same server. The attacker is a separate process; the two other users
+send requests at the rate of a person.
 
-The verdict is true if 99 % of the GET requests of the two others are answered within 0.2 s and all within 1 s, no
-answer is wrong, and the memory of the server does not grow. Other load on the machine delays GET requests, too. A
-thread that only sleeps measures this delay; a slow attack on a busy machine is tried again.
+The verdict is true if three conditions hold. Of the GET requests of the two other users, 99 % are answered within 0.2 s
+and all within 1 s. No answer is wrong. The memory of the server does not grow. Other load on the machine also delays
+GET requests. A thread that only sleeps measures the delay by other load; a slow attack on a busy machine is tried
+again.
 """
 
 import json
@@ -41,30 +42,30 @@ from .stand import Stand
 SECONDS = 6.0
 """Duration of each attack, s."""
 P99, WORST = 0.2, 1.0
-"""Largest time of a GET request of the two others at p99, and of the slowest one, s."""
+"""Largest time of a GET request of the two other users at p99, and of the slowest request, s."""
 BUSY, TRIES = 0.02, 3
 """Delay of a sleeping thread at p99 from which the machine counts as busy, s; largest number of tries on a busy
-machine. Chosen: a GET request changes threads about ten times.
+machine. Chosen values: a GET request changes threads about ten times.
 """
 REST = 2.0
-"""Pause after an attack, in which its remaining requests end, s."""
+"""Pause after an attack, in which the remaining requests of the attack end, s."""
 GROWTH = 200 << 20
 """Largest growth of the memory of the server during an attack, bytes."""
 PAUSE = 0.02
 """Pause between two GET requests of a person, s."""
 RUNS, EVENTS, REPORTS, FILES = 3000, 2500, 20_000, 2000
-"""Data of the attacker: number of runs with labels; number of events of 20 kB and of reports in the journal of the
-long run; number of files of another run."""
+"""Data of the attacker: number of runs with labels; number of events of 20 kB and number of reports in the journal of
+the long run; number of files of another run."""
 MANY, LINES = 20, 1_000_000
-"""Data of the attacker: number of runs with long journals, and number of lines of such a journal. The server caches
-the histories of fewer runs."""
+"""Data of the attacker: number of runs with long journals, and number of lines of such a journal. The server caches the
+histories of fewer runs than this number."""
 ALLOWED = {-1, 200, 202, 204, 206, 304, 400, 401, 404, 405, 408, 409, 410, 413, 415, 416, 422, 429, 500, 503}
-"""Statuses that an attacker may get as an answer; -1: the attacker does not read the answer."""
+"""Statuses that an attacker may get as an answer; -1 means that the attacker does not read the answer."""
 
 
 @dataclass
 class Person:
-    """A user with regular GET requests for a run; ``took``: time of each answer, s."""
+    """A user with regular GET requests for a run; ``took`` has the time of each answer, s."""
 
     http: httpx2.Client
     paths: tuple[str, ...]
@@ -103,12 +104,12 @@ _scenes: dict[int, Scene] = {}
 
 
 def groups() -> dict[str, tuple[str, Callable[[Stand], Iterator[Row]]]]:
-    """Returns the groups: one for each attack."""
+    """Returns the groups of faults; each group is one attack."""
     return {f"beside others: {kind}": ("plain", partial(rows, kind=kind)) for kind in KINDS}
 
 
 def rows(stand: Stand, kind: str) -> Iterator[Row]:
-    """Tries one attack; tries again while the attack is slow and the machine busy."""
+    """Tries one attack; tries the attack again while it is slow and the machine is busy."""
     for n in range(1, TRIES + 1):
         row, late = _tried(stand, kind)
         row.happened += f"; try {n}" if n > 1 else ""
@@ -118,7 +119,7 @@ def rows(stand: Stand, kind: str) -> Iterator[Row]:
 
 
 def _tried(stand: Stand, kind: str) -> tuple[Row, float]:
-    """Returns the row of one try, and the delay of a sleeping thread at p99, s."""
+    """Returns the table row of one try, and the delay of a sleeping thread at p99, s."""
     assert stand.http is not None
     assert stand.child is not None
     scene = _scenes.get(stand.child.pid) or _scenes.setdefault(stand.child.pid, _made(stand))
@@ -207,7 +208,7 @@ class _Growth:
             self.most = max(self.most, _memory(self._stand) - self._before)
 
     def end(self) -> int:
-        """Ends the measurement; returns the largest growth, bytes."""
+        """Ends the measurement; returns the largest growth of the memory, bytes."""
         self._over.set()
         self._thread.join()
         return self.most
@@ -225,7 +226,7 @@ def _memory(stand: Stand) -> int:
 
 
 def _made(stand: Stand) -> Scene:
-    """Creates the data of the attacker: 3,000 runs, one of them with a long journal, and a running one with many
+    """Creates the data of the attacker: 3,000 runs, one of which has a long journal, and a run in progress with many
     files."""
     assert stand.http is not None
     store = Store(Settings(runs=stand.runs).database_url)
@@ -280,7 +281,7 @@ def _person(stand: Stand, store: Store, name: str) -> Person:
 
 
 def _laid(runs: Path, run: str, n: int) -> None:
-    """Creates the folder of a finished run; the values of its case are shared with few other runs."""
+    """Creates the folder of a finished run; few other runs have the same values of the case."""
     (runs / run).mkdir()
     values = {f"key{n % 60}": {f"value{k}": f"{n} {'x' * 40}" for k in range(200)}, "run": {"end_time": n}}
     (runs / run / layout.RESOLVED_CASE).write_text(json.dumps(values))

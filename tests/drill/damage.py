@@ -21,8 +21,8 @@ from .stand import Stand
 CASE = "case.toml"
 GONE = frozenset({"410"})
 IN_A_ROW = 4
-"""Number of runs that wait at the same time. The runs of a group start one after the other, and the time limit of a
-run should not count its time in the queue."""
+"""Number of runs that wait at the same time. The runs of a group start one after the other, and the time limit of a run
+should not count the time of the run in the queue."""
 LOST = frozenset({"lost/service", "lost/storage", "failed/storage", "failed/service"})
 ANY_FAILURE = STORAGE | {"failed/input"}
 
@@ -73,7 +73,7 @@ def endless(path: Path) -> None:
 
 
 def listening(path: Path) -> None:
-    """Replaces a file by a socket that no process listens to. The path is longer than the limit for sockets, so the
+    """Replaces a file with a socket at which no process listens. The path is longer than the limit for sockets, so the
     socket is bound through the folder's descriptor."""
     path.unlink()
     folder = os.open(path.parent, os.O_RDONLY)
@@ -89,15 +89,15 @@ WAYS: dict[str, Callable[[Path], None]] = {
 IRREGULAR: dict[str, Callable[[Path], None]] = {
     "a pipe in its place": pipe, "a link to an endless device": endless, "a socket in its place": listening,
 }  # fmt: skip
-"""Replacements that are no regular files; a program that reads such a path would block."""
+"""Replacements of a file that are no regular files; a program that reads such a path would block."""
 OF_FILES = ("deleted", "emptied", "cut to half", "garbled", "a folder in its place", "not permitted")
 OF_FOLDERS = ("deleted", "emptied", "a file in its place", "not permitted")
 
 
 @dataclass(frozen=True)
 class Damage:
-    """Damage of the file ``name`` in the folder of a run; ``doing``: state of the run; ``down``: True if the server
-    is stopped meanwhile."""
+    """Damage of the file ``name`` in the folder of a run; ``doing`` is the state of the run; ``down`` is True if the
+    server is stopped during the damage."""
 
     name: str
     way: str
@@ -112,7 +112,7 @@ class Damage:
 
     @property
     def beyond_use(self) -> bool:
-        """Whether the path can no longer be written."""
+        """True if the path can no longer be written."""
         return self.way in {"a folder in its place", "a file in its place", "not permitted", *IRREGULAR}
 
     def states(self) -> frozenset[str]:
@@ -120,14 +120,16 @@ class Damage:
         return {"runs": self._runs, "waits": self._waits, "has ended": self._ended}[self.doing]()
 
     def _runs(self) -> frozenset[str]:
-        """Returns the correct states of a running run. A worker that can write continues, because it has its input
-        in memory."""
+        """Returns the correct states of a run in progress. A worker that can write continues, because the worker has
+        its input in memory."""
         if not self.name:
             return {"not permitted": STORAGE, "emptied": STORAGE | SUCCEEDED}.get(self.way, GONE | STORAGE)
         return STORAGE if self.name == layout.JOURNAL and self.beyond_use else SUCCEEDED
 
     def _waits(self) -> frozenset[str]:
-        """Returns the correct states of a waiting run. A run whose case or submission has changed is not started."""
+        """Returns the correct states of a waiting run. The server does not start a run whose case or submission has
+        changed.
+        """
         if not self.name:
             return STORAGE if self.way == "not permitted" else GONE | STORAGE
         if self.name in {CASE, layout.SUBMISSION}:
@@ -140,12 +142,12 @@ class Damage:
 
     @property
     def whole(self) -> bool:
-        """Whether journal and outcome can still agree."""
+        """True if journal and outcome can still agree."""
         return bool(self.name) and self.name not in {layout.JOURNAL, layout.OUTCOME} and not self.beyond_use
 
 
 def damages() -> Iterator[Damage]:
-    """Yields all damages: each file, in each way, for each state of the run, with a running and a stopped server."""
+    """Yields all damages: each file, in each way, for each state of the run, while the server is running or stopped."""
     files = {
         "runs": (layout.SUBMISSION, layout.JOURNAL, layout.WORKER, CASE),
         "waits": (layout.SUBMISSION, layout.JOURNAL, CASE),
@@ -160,7 +162,7 @@ def damages() -> Iterator[Damage]:
 
 
 def rows(stand: Stand, some: Sequence[Damage]) -> Iterator[Row]:
-    """Damages several runs at the same time; the server is running for all of them, or stopped for all."""
+    """Damages several runs at the same time; the server is either running or stopped for all these damages."""
     blockers = [stand.running(ranks=stand.slots - 1)] if some[0].doing == "waits" else []
     made = [_made(stand, one) for one in some]
     lives = blockers + [run for one, run in zip(some, made, strict=True) if one.doing == "runs"]
@@ -211,7 +213,7 @@ def _judged(stand: Stand, some: Sequence[Damage], truths: Sequence[Truth]) -> It
 
 
 def batches(some: Iterable[Damage], size: int) -> Iterator[list[Damage]]:
-    """Yields batches of damages; in a batch the state of the runs is the same, and so is whether the server is
+    """Yields batches of damages; in a batch the state of the runs is the same, and the server is either running or
     stopped."""
     kinds: dict[tuple[str, bool], list[Damage]] = {}
     for one in some:

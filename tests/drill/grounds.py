@@ -1,5 +1,5 @@
-"""Servers under test (stands) of the drill, by kind. A stand is made at its first use; all stands are closed at the
-end."""
+"""Servers under test (stands) of the drill, by kind of stand. A stand is made at its first use; all stands are closed
+at the end of the drill."""
 
 import os
 import shutil
@@ -13,7 +13,7 @@ from . import cluster
 from .stand import UNPRIVILEGED, Stand, can_drop
 
 DISK = "size=1100m,nr_inodes=4000"
-"""Options of the file system in memory of one stand: its size is little more than the space that a server keeps
+"""Options of the file system in memory of one stand: the size is little more than the space that a server keeps
 free."""
 FAKETIME = ("/usr/lib/*/faketime/libfaketimeMT.so.1", "/usr/local/lib/faketime/libfaketimeMT.so.1")
 
@@ -36,7 +36,9 @@ class Grounds:
         }  # fmt: skip
 
     def lacks(self, kind: str) -> str:
-        """Returns the reason why this machine cannot have such a stand; an empty string if it can."""
+        """Returns the reason why this machine cannot have a stand of this kind; an empty string if the stand is
+        possible.
+        """
         if kind in {"unprivileged", "wide", "narrow"} and not can_drop():
             return "root without setpriv: permissions do not hold"
         if kind == "disk" and os.geteuid() != 0:
@@ -46,7 +48,7 @@ class Grounds:
         return real_slurm.missing() if kind == "slurm" else ""
 
     def stand(self, kind: str) -> Stand:
-        """Returns the stand of a kind, with a running server."""
+        """Returns the stand of the given kind, with a running server."""
         if kind not in self._stands:
             root = self._place / kind
             root.mkdir(parents=True)
@@ -57,7 +59,9 @@ class Grounds:
         return found
 
     def renew(self, kind: str, log: Path | None = None) -> None:
-        """Closes the stand of a kind, so that the next one of that kind is new; ``log``: copy of its server's log."""
+        """Closes the stand of a kind, so that the next stand of this kind is new; ``log`` receives a copy of the log of
+        its server.
+        """
         if kind in self._stands:
             found = self._stands.pop(kind)
             if log is not None:
@@ -65,7 +69,7 @@ class Grounds:
             self._close(found)
 
     def close(self) -> None:
-        """Ends all servers and their workers."""
+        """Ends all servers of the stands and their workers."""
         for kind in tuple(self._stands):
             self.renew(kind)
         self._ends.close()
@@ -81,7 +85,7 @@ class Grounds:
         shutil.rmtree(stand.root, ignore_errors=True)
 
     def _slurm(self) -> real_slurm.Cluster:
-        """Returns the cluster that all stands share, because its start takes long."""
+        """Returns the cluster that all stands share, because the start of a cluster takes long."""
         if self._cluster is None:
             self._cluster = self._ends.enter_context(real_slurm.running(self._place / "cluster"))
         return self._cluster
@@ -116,7 +120,7 @@ def _libfaketime() -> str:
 
 @contextmanager
 def grounds(place: Path) -> Iterator[Grounds]:
-    """Yields the stands, and closes them at the end, also after an error."""
+    """Yields the stands, and closes the stands at the end, also after an error."""
     made = Grounds(place)
     try:
         yield made

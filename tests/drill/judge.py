@@ -1,5 +1,5 @@
-"""Checks whether the state that the server reports of a run is true, from the record of the workers, the processes,
-and the folder of the run."""
+"""Checks whether the reported state of a run is true, from the record of the workers, the processes, and the folder of
+the run."""
 
 import time
 from collections.abc import Sequence
@@ -27,7 +27,9 @@ class Row:
 
 
 def settled(stand: Stand, truths: Sequence[Truth], since: float) -> list[tuple[str, float]]:
-    """Returns the final or expected state of each run, and the time from ``since`` at which it was seen, s."""
+    """Returns the final or expected state of each run, and the time from ``since`` at which the state was reported,
+    s.
+    """
     found: dict[str, tuple[str, float]] = {}
     while True:
         late = time.monotonic() > since + stand.patience
@@ -42,12 +44,12 @@ def settled(stand: Stand, truths: Sequence[Truth], since: float) -> list[tuple[s
 
 
 def settle(stand: Stand, truth: Truth, since: float) -> tuple[str, float]:
-    """Returns the same for one run."""
+    """Returns the final or expected state of one run, and the time of this state."""
     return settled(stand, [truth], since)[0]
 
 
 def verdict(stand: Stand, truth: Truth, seen: str, seconds: float) -> str:
-    """Returns the most severe error; ``TRUE`` if there is none."""
+    """Returns the most severe error; ``TRUE`` if there is no error."""
     if truth.run == "none":
         return "never accepted"
     if "two runs" in truth.happened:
@@ -86,8 +88,8 @@ def _orphans(stand: Stand, truth: Truth, seen: str) -> str:
 
 
 def _success(stand: Stand, truth: Truth, seen: str) -> str:
-    """Checks that a worker has succeeded: by the record, or by an outcome that only a worker writes. A worker may
-    hang after its outcome."""
+    """Checks that a worker has succeeded: by the record, or by an outcome that only a worker writes. A worker may hang
+    after it has written its outcome."""
     done = any(entry["what"] == "end" and entry["code"] == 0 for entry in stand.entries(truth.run))
     if not done and (ended := folder.outcome(stand.runs / truth.run)) is not None:
         done = ended.state == "succeeded" and bool(ended.digest)
@@ -95,7 +97,7 @@ def _success(stand: Stand, truth: Truth, seen: str) -> str:
 
 
 def _folder(stand: Stand, truth: Truth, seen: str) -> str:
-    """Checks that journal, outcome and list agree with the answer."""
+    """Checks that journal, outcome and list agree with the reported state."""
     path, state = stand.runs / truth.run, seen.partition("/")[0]
     reported, ended = journal.statuses(path / layout.JOURNAL), folder.outcome(path)
     if not reported or reported[-1].state != state:

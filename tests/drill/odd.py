@@ -1,4 +1,6 @@
-"""Files and addresses with unusual names: each request is answered, and a link leads to the file that it names."""
+"""Files and addresses with unusual names: each request is answered, and a link leads to the file that the link
+names.
+"""
 
 import os
 import time
@@ -37,7 +39,7 @@ def everything() -> list[Strike]:
 
 
 def files(stand: Stand) -> Iterator[Row]:
-    """Creates a file of each name, also in a folder of that name, and reads them through the server."""
+    """Creates a file of each unusual name, also in a folder of that name, and reads the files through the server."""
     run = stand.submit()
     stand.reached(run)
     folder = os.fsencode(stand.runs / run)
@@ -70,7 +72,9 @@ def addresses(stand: Stand) -> Iterator[Row]:
 
 
 def heads(stand: Stand) -> Iterator[Row]:
-    """Sends HEAD requests for a running run, some of them for endless answers. Each answer must come at once."""
+    """Sends HEAD requests for a run in progress, some of them for endless answers. The answer to each HEAD request must
+    come at once.
+    """
     run = stand.running()
     stand.reached(run, "running")
     for path in ("/logs/0?follow=true", "/logs/launcher?follow=true", "/stream", "/stream?after=1", "", "/history"):

@@ -1,4 +1,4 @@
-"""Faults of an operator: irregular files, a second server on the same runs, a server killed while it accepts a
+"""Faults by an operator: irregular files, a second server on the same runs, a server killed while it accepts a
 sweep."""
 
 import json
@@ -39,7 +39,9 @@ Rows = Callable[[Stand], Iterator[Row]]
 
 
 def irregular() -> Iterator[Damage]:
-    """Yields irregular files in place of each file, for each state of the run, with a running and a stopped server."""
+    """Yields irregular files in place of each file, for each state of the run, while the server is running or
+    stopped.
+    """
     files = {
         "runs": (layout.SUBMISSION, layout.JOURNAL, layout.WORKER, CASE),
         "waits": (layout.SUBMISSION, layout.JOURNAL, CASE),
@@ -54,7 +56,7 @@ def irregular() -> Iterator[Damage]:
 
 
 def refused(stand: Stand, runs: Path, database: str = "") -> None:
-    """Starts a server on ``runs``: the server must end at once, with one line."""
+    """Starts a second server on ``runs``: this server must end at once, with one line."""
     command = [sys.executable, "-m", "conoid.server", "--runs", str(runs), "--port", "0", "--no-zenoh"]
     environment = {**os.environ, "CONOID_DATABASE": database}
     done = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=START, check=False)
@@ -79,7 +81,7 @@ def shared(stand: Stand) -> None:
 
 
 def strikes() -> Iterator[Strike]:
-    """Yields the faults with a second server: the first server is not affected."""
+    """Yields the faults with a second server, which do not affect the first server."""
     yield Strike("a copy of the folder served beside it", "operator", copied, nothing, waits=START)
     yield Strike("another folder served with the same database", "operator", shared, nothing, waits=START)
 
@@ -126,8 +128,8 @@ def _runs(stand: Stand) -> list[dict[str, str]]:
 
 
 def _settled(stand: Stand, before: set[str]) -> list[dict[str, str]]:
-    """Returns the runs of the sweep when all of them have ended, or when no further run has ended within the
-    patience of the stand. The runs start one after the other."""
+    """Returns the runs of the sweep when all runs have ended, or when no further run has ended within the patience of
+    the stand. The runs of the sweep start one after the other."""
     ended, deadline = -1, 0.0
     while True:
         made = [run for run in _runs(stand) if run["id"] not in before]

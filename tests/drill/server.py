@@ -1,10 +1,10 @@
-"""A server whose disk fails on demand: ``python -m tests.drill.server ORDER ...`` runs ``conoid.server`` with the other
-arguments.
+"""A server whose disk fails on demand: the command ``python -m tests.drill.server ORDER ...`` runs ``conoid.server``
+with the other arguments.
 
-While the file ORDER exists, file operations of the server below its folder of runs fail as that file describes, in
-JSON. ``errno``: number of the error; 0: the operation hangs until the file is removed. ``what``: "write" (open for
-writing, rename, create, remove, write, flush), "open" (open any file, as without descriptors), "fsync" or "rename".
-``every``: n, if one of n operations fails.
+While the file ORDER exists, file operations of the server below its folder of runs fail as the file ORDER describes, in
+JSON. The key ``errno`` is the number of the error; with 0 the operation hangs until the file ORDER is removed. The key
+``what`` selects operations: "write" (open for writing, rename, create, remove, write, flush), "open" (open any file, as
+without descriptors), "fsync" or "rename". The key ``every`` is n if one of n operations fails.
 """
 
 import errno
@@ -31,7 +31,7 @@ class Order:
         self.calls, self.busy = count(), False
 
     def fail(self, kinds: set[str], path: object = None) -> None:
-        """Raises the ordered error for one of these kinds of operation on ``path``."""
+        """Raises the ordered error if one of the given kinds of operation on ``path`` shall fail."""
         if self.busy or (path is not None and not self._mine(path)):
             return
         words = self._read()

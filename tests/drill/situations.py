@@ -1,5 +1,5 @@
-"""Situations of a run at the time of a fault. A situation is a generator of three parts: before, during and after
-the fault."""
+"""Situations of a run at the time of a fault. A situation is a generator of three parts: before, during and after the
+fault."""
 
 import os
 import signal
@@ -13,7 +13,7 @@ from .stand import Stand
 
 @dataclass(frozen=True)
 class Truth:
-    """Expected result of a run; ``states``: correct states, in the form of ``Stand.state``."""
+    """Expected result of a run; ``states`` are the correct states, in the form of ``Stand.state``."""
 
     run: str
     states: frozenset[str]
@@ -22,7 +22,7 @@ class Truth:
     launches: int = 1
     """Largest number of starts of the run."""
     whole: bool = True
-    """Whether the files in the folder must agree with the answer."""
+    """True if the files in the folder must agree with the answer of the server."""
 
 
 Life = Generator[None, None, Truth]
@@ -30,7 +30,7 @@ Situation = Callable[[Stand, frozenset[str]], Life]
 SUCCEEDED, CANCELLED = frozenset({"succeeded"}), frozenset({"cancelled/cancelled"})
 STORAGE = frozenset({"failed/storage", "lost/storage"})
 UNWRITTEN = frozenset({"failed/storage"})
-"""State of a cancelled run whose worker could not write its files, where the fault affects these files."""
+"""State of a cancelled run whose worker could not write its files, if the fault affects these files."""
 
 
 def is_running(stand: Stand, unsaid: frozenset[str]) -> Life:
@@ -43,7 +43,9 @@ def is_running(stand: Stand, unsaid: frozenset[str]) -> Life:
 
 
 def ends_meanwhile(stand: Stand, unsaid: frozenset[str]) -> Life:
-    """The worker ends during the fault. ``unsaid``: further correct states if the worker could not write its end."""
+    """The worker of the run ends during the fault. The argument ``unsaid`` has further correct states for a worker that
+    could not write its end.
+    """
     run = stand.running()
     yield
     stand.go(run)
@@ -52,7 +54,9 @@ def ends_meanwhile(stand: Stand, unsaid: frozenset[str]) -> Life:
 
 
 def is_cancelled_meanwhile(stand: Stand, unsaid: frozenset[str]) -> Life:
-    """The owner cancels the run during the fault, and tries again after it if the cancellation could not be stored."""
+    """The owner cancels the run during the fault, and tries again after the fault if the cancellation could not be
+    stored.
+    """
     run = stand.running()
     yield
     answer = stand.cancel(run)
@@ -82,7 +86,7 @@ def waits(stand: Stand, unsaid: frozenset[str]) -> Life:
 
 
 def waits_and_is_cancelled(stand: Stand, unsaid: frozenset[str]) -> Life:
-    """The run is cancelled in the queue or just after its start; without the cancellation it would not end."""
+    """The run is cancelled in the queue or just after its start; without the cancellation the run would not end."""
     run = stand.submit(ranks=stand.large, steps=100_000, pace=0.02)
     yield
     answer = stand.cancel(run)
@@ -92,7 +96,7 @@ def waits_and_is_cancelled(stand: Stand, unsaid: frozenset[str]) -> Life:
 
 
 def is_submitted_meanwhile(stand: Stand, unsaid: frozenset[str]) -> Life:
-    """The run is submitted during the fault with an idempotency key, and again after it, as a client does: the
+    """The run is submitted during the fault with an idempotency key, and again after the fault, as a client would: the
     result must be one run."""
     key = f"k{time.monotonic_ns()}"
     yield
@@ -118,7 +122,7 @@ def has_ended(stand: Stand, unsaid: frozenset[str]) -> Life:
 
 
 def cancel_until(stand: Stand, run: str) -> int:
-    """Cancels a run until the request is accepted, as a person would; returns the last status."""
+    """Cancels a run repeatedly, as a person would, until the request is accepted; returns the last status."""
     deadline = time.monotonic() + stand.patience
     while (answer := stand.cancel(run)) != 202 and time.monotonic() < deadline:
         time.sleep(0.2)
@@ -129,4 +133,4 @@ ALL: tuple[Situation, ...] = (
     has_ended, is_running, ends_meanwhile, is_cancelled_meanwhile, is_killed_meanwhile, waits, waits_and_is_cancelled,
     is_submitted_meanwhile,
 )  # fmt: skip
-"""Order in which the situations begin: running runs come before runs that must wait for slots."""
+"""Order in which the situations begin: runs that use cores come before runs that must wait for slots."""

@@ -26,11 +26,11 @@ from ..server.running import TOML, case_text
 
 HERE = Path(__file__).parent
 START = 180.0
-"""Time in s within which a server must have started, or have printed why not."""
+"""Time in s within which a server must have started, or have printed the reason of the failed start."""
 PATIENCE = 60.0
 """Time in s for which a user waits for an answer."""
 UNPRIVILEGED = ("setpriv", "--bounding-set=-dac_override,-dac_read_search")
-"""Prefix of a command that makes root obey the permissions of files like other users."""
+"""Prefix of a command with which root obeys the permissions of files like other users."""
 FINAL = {state.value for state in State if state.final}
 TOLERATED = {503, 507}
 """Statuses of server errors that name a temporary cause."""
@@ -38,24 +38,24 @@ TOLERATED = {503, 507}
 
 @dataclass
 class Stand:
-    """A server with workers that compute no physics; ``root`` contains their record, the order files and the folder
-    of runs."""
+    """A server with workers that compute no physics; ``root`` contains the record of the workers, the order files and
+    the folder of runs."""
 
     root: Path
     options: Sequence[str] = ()
     before: Sequence[str] = ()
-    """Prefix of the server's command."""
+    """Prefix of the command that starts the server."""
     environment: Mapping[str, str] = field(default_factory=dict)
     slots: int = 5
     large: int = 2
-    """Number of ranks of a run that must wait while four other runs are running."""
+    """Number of ranks of a run that must wait while four other runs use cores."""
     patience: float = 30.0
-    """Time in s within which the state must be true after the fault."""
+    """Time in s after the fault within which the state must be true."""
     profile: str = ""
     child: subprocess.Popen[bytes] | None = None
     http: httpx2.Client | None = None
     errors: list[str] = field(default_factory=list)
-    """Answers with unexpected server errors such as 500; each text contains the run."""
+    """Answers with unexpected server errors such as 500; each text contains the id of the run."""
 
     @property
     def runs(self) -> Path:
@@ -123,7 +123,7 @@ class Stand:
         return made
 
     def new_token(self) -> None:
-        """Creates a new token after the loss of the database, which alone contains the tokens."""
+        """Creates a new token after the loss of the database, because only the database contains the tokens."""
         assert self.http is not None
         self.http.headers["Authorization"] = f"Bearer {self.token()}"
 
@@ -133,13 +133,13 @@ class Stand:
         os.kill(self.child.pid, number)
 
     def kill(self) -> None:
-        """Kills the server, as a crash would."""
+        """Kills the server, which simulates a crash."""
         if self.child is not None and self.child.poll() is None:
             self.child.kill()
             self.child.wait(20)
 
     def again(self) -> None:
-        """Kills the server and starts a new one. Raises AssertionError if the server does not start."""
+        """Kills the server and starts a new server. Raises AssertionError if the new server does not start."""
         self.kill()
         assert self.start(), f"the server does not start: {self.last_line()}"
 
@@ -161,7 +161,7 @@ class Stand:
     # Its users --------------------------------------------------------------------------------------------------------
 
     def ask(self, method: str, path: str, **words: Any) -> tuple[int, Any]:
-        """Sends a request; returns status and body, status 0 without an answer."""
+        """Sends a request; returns status and body, or the status 0 if no answer arrives."""
         assert self.http is not None
         try:
             answer = self.http.request(method, path, **words)
@@ -189,13 +189,15 @@ class Stand:
         return self.ask("POST", "/v1/runs", content=case_text(**plan), headers=headers, params=query)
 
     def submit(self, **plan: Any) -> str:
-        """Submits a run; returns its id."""
+        """Submits a run; returns the id of the run."""
         status, answer = self.hand_in(**plan)
         assert status == 202, answer
         return str(answer["id"])
 
     def running(self, **plan: Any) -> str:
-        """Submits a run that waits for the signal of ``go``; returns its id. The run may still be in the queue."""
+        """Submits a run that waits for the signal of ``go``; returns the id of the run. After the submission the run
+        may still be in the queue.
+        """
         name = f"go-{time.monotonic_ns()}"
         run = self.submit(wait=str(self.root / name), **plan)
         (self.root / f"sign-{run}").write_text(name)
@@ -206,20 +208,20 @@ class Stand:
         (self.root / (self.root / f"sign-{run}").read_text()).touch()
 
     def cancel(self, run: str) -> int:
-        """Tries once to cancel a run; returns the status."""
+        """Tries once to cancel a run; returns the status of the answer."""
         return self.ask("POST", f"/v1/runs/{run}:cancel")[0]
 
     def state(self, run: str) -> str:
-        """Returns state and cause of a run, such as ``succeeded`` or ``lost/node``; otherwise the status of the
-        answer."""
+        """Returns state and cause of a run, such as ``succeeded`` or ``lost/node``; if the server refuses, the status
+        of the answer."""
         status, answer = self.ask("GET", f"/v1/runs/{run}")
         if status != 200:
             return str(status)
         return f"{answer['state']}/{answer['cause']}" if answer["cause"] else str(answer["state"])
 
     def reached(self, run: str, *states: str) -> str:
-        """Waits until the run has one of these states, by default any final state; returns its last state, also
-        after the time limit."""
+        """Waits until the run has one of the given states, by default any final state; returns the last state of the
+        run, also after the time limit."""
         deadline = time.monotonic() + self.patience
         while (seen := self.state(run)).partition("/")[0] not in (states or FINAL):
             if time.monotonic() > deadline:
@@ -239,12 +241,12 @@ class Stand:
 
 
 def _children(pid: int) -> Iterator[int]:
-    """Yields the children of a process. setpriv and faketime replace themselves by their command; a wrapper that
-    stays has children."""
+    """Yields the child processes of a process. setpriv and faketime replace themselves with their command; a wrapper
+    that stays has child processes."""
     with suppress(OSError):
         yield from map(int, Path(f"/proc/{pid}/task/{pid}/children").read_text().split())
 
 
 def can_drop() -> bool:
-    """Whether file permissions limit the processes that a stand starts."""
+    """True if file permissions limit the processes that a stand starts."""
     return os.geteuid() != 0 or shutil.which(UNPRIVILEGED[0]) is not None

@@ -14,7 +14,7 @@ Deed = Callable[[Stand], None]
 
 @dataclass(frozen=True)
 class Strike:
-    """``deed`` starts the fault, ``lift`` ends it ``hold`` s later."""
+    """The function ``deed`` starts the fault, ``lift`` ends the fault ``hold`` s later."""
 
     name: str
     family: str
@@ -33,8 +33,8 @@ class Strike:
 
 
 def rows(stand: Stand, strike: Strike) -> Iterator[Row]:
-    """Brings runs into every situation, starts and ends the fault, and yields for each run whether its state became
-    true, and whether a newly started server reports the same state.
+    """Brings runs into every situation, starts and ends the fault, and yields two results for each run: whether its
+    state became true, and whether a newly started server reports the same state.
     """
     lives = [life(stand, strike.unsaid) for life in strike.lives]
     _begin(stand, lives)
@@ -66,15 +66,15 @@ def rows(stand: Stand, strike: Strike) -> Iterator[Row]:
 
 
 def _concerns(error: str, truth: Truth, name: str) -> bool:
-    """Whether a server error concerns a run: an error of a submission concerns the submitted run, an error with the
-    id of a run that run, all other errors every run."""
+    """Decides whether a server error concerns a run: an error of a submission concerns the submitted run, an error with
+    the id of a run concerns this run, all other errors concern every run."""
     if error.startswith("POST /v1/runs:"):
         return "submitted" in name
     return truth.run in error or "/v1/runs/" not in error
 
 
 def _begin(stand: Stand, lives: Sequence[Life]) -> None:
-    """Begins the situations one by one: runs that should be running start before other runs need their slots."""
+    """Begins the situations one by one: runs that should use cores start before other runs need their slots."""
     for life in lives:
         next(life)
         if stand.slots < 100 or stand.profile:

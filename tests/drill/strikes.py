@@ -30,7 +30,9 @@ def nothing(stand: Stand) -> None:
 
 
 def fails(number: int, what: str = "write", every: int = 1) -> Deed:
-    """Returns a function that makes file operations of the server fail; those of its workers do not fail."""
+    """Returns a function that makes file operations of the server fail; the file operations of its workers do not
+    fail.
+    """
     return lambda stand: void(stand.order.write_text(server.order(number, what, every)))
 
 
@@ -56,7 +58,7 @@ def and_killed(deed: Deed) -> Deed:
 
 
 def and_started(lift: Deed) -> Deed:
-    """Returns a function that ends a fault and, as an operator would, starts the server if it is not running."""
+    """Returns a function that ends a fault and, as an operator would, starts the server if no server is running."""
 
     def both(stand: Stand) -> None:
         lift(stand)
@@ -101,8 +103,8 @@ def mode(number: int) -> Deed:
 
 
 def disks() -> Iterator[Strike]:
-    """Yields the faults of the disk: errors of the server's file operations, then real disks; each also with the
-    server killed."""
+    """Yields the faults of the disk: first errors of the server's file operations, then real disks; each fault also
+    with the server killed."""
     codes = ("ENOSPC", "EIO", "EROFS", "EDQUOT", "ESTALE", "EACCES", "ENOMEM")
     for code in codes:
         yield Strike(f"{code} at every write of the server", "storage", fails(getattr(errno, code)), mend)
@@ -150,7 +152,7 @@ def many(stand: Stand) -> None:
 
 
 def descriptors() -> Iterator[Strike]:
-    """Yields the faults of descriptors: no free descriptor, one, and errors when files are opened."""
+    """Yields the faults of descriptors: no free descriptor, one free descriptor, and errors when files are opened."""
     yield Strike("no descriptor left", "descriptors", few(0), many)
     yield Strike("one descriptor left", "descriptors", few(1), many)
     yield Strike("EMFILE at every opening", "descriptors", fails(errno.EMFILE, "open"), mend)
@@ -161,14 +163,14 @@ def descriptors() -> Iterator[Strike]:
 
 
 def clock(words: str) -> Deed:
-    """Returns a function that changes the real-time clock of the server; ``words``: syntax of libfaketime. Workers
-    keep the true clock, because ``sleep`` fails under libfaketime."""
+    """Returns a function that changes the real-time clock of the server; ``words`` have the syntax of libfaketime.
+    Workers keep the true clock, because ``sleep`` fails under libfaketime."""
     return lambda stand: void((stand.root / "clock").write_text(words))
 
 
 def clocks() -> Iterator[Strike]:
-    """Yields the faults of the real-time clock: set forward, set back, too fast, too slow. The monotonic clock is
-    not changed. libfaketime keeps a rate until another one is set."""
+    """Yields the faults of the real-time clock: set forward, set back, too fast, too slow. The monotonic clock is not
+    changed. libfaketime keeps a rate until another rate is set."""
     right = clock("+0 x1")
     for name, words in (
         ("set forward by a day", "+1d"), ("set back by a day", "-1d"), ("set forward by 10 s", "+10"),
@@ -275,8 +277,8 @@ def writable(stand: Stand) -> None:
 
 
 def restored(stand: Stand) -> None:
-    """Restores the database as an operator does if the server does not start or cannot use it: from the backup, or
-    an empty one."""
+    """Restores the database from the backup, or as an empty database, as an operator does if the server does not start
+    or cannot use the database."""
     stand.kill()
     path = stand.runs / DATABASE
     if path.is_dir():
@@ -289,7 +291,7 @@ def restored(stand: Stand) -> None:
 
 
 def renewed(stand: Stand) -> None:
-    """Starts the server if necessary, and creates a new token if the old one was lost."""
+    """Starts the server if necessary, and creates a new token if the old token was lost."""
     if stand.child is None or stand.child.poll() is not None:
         assert stand.start(), stand.last_line()
     if stand.ask("GET", "/v1/me")[0] == 401:
@@ -330,7 +332,7 @@ def started(stand: Stand) -> None:
 
 
 def killed_often(stand: Stand) -> None:
-    """Kills the server three times, before it has found its runs again."""
+    """Kills the server three times, before the server has found its runs again."""
     for pause in (0.0, 0.05, 0.3):
         stand.kill()
         stand.start()
@@ -356,7 +358,7 @@ def reader_gets(stand: Stand, number: signal.Signals) -> None:
 
 
 def kills() -> Iterator[Strike]:
-    """Yields the faults of processes: of the server and of its reader of cases."""
+    """Yields the faults of processes: the server, and its reader of cases."""
     yield Strike("the server killed", "kill", killed, started)
     yield Strike("the server killed three times", "kill", killed_often, started)
     yield Strike("the server stopped by a signal", "kill", stopped, started)
@@ -368,5 +370,5 @@ def kills() -> Iterator[Strike]:
 
 
 def everything() -> list[Strike]:
-    """Returns all faults of a whole server, in the order in which they are tried."""
+    """Returns all faults of a whole server, in the order in which the drill tries the faults."""
     return [*disks(), *descriptors(), *clocks(), *databases(), *kills()]

@@ -7,15 +7,16 @@ from pathlib import Path
 from .judge import TRUE, Row
 
 WORDS = ("stranded", "lie", "orphan", "double", "acknowledged and lost", "late")
-"""First words of wrong verdicts, in the order of the summary. Other wrong verdicts are counted after them."""
+"""First words of wrong verdicts, in the order of the summary. Other wrong verdicts are counted after the verdicts of
+this list."""
 
 NAMED = 12
-"""Number of untried groups that are named."""
+"""Number of untried groups of faults that the table names."""
 
 
 def write(path: Path, rows: Sequence[Row], untried: Sequence[str] = ()) -> int:
-    """Writes and prints the table; returns 0 if all verdicts are true. ``untried``: names of groups without a
-    result."""
+    """Writes and prints the table; returns 0 if all verdicts are true. The argument ``untried`` has the names of groups
+    without a result."""
     head = [*summary(rows), *missing(untried)]
     lines = [*head, "", "| fault | what happened | s to the truth | verdict |", "|---|---|---|---|"]
     lines += [f"| {row.fault} | {row.happened} | {row.seconds:.1f} | {row.verdict} |" for row in rows]

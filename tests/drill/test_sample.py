@@ -1,4 +1,4 @@
-"""Test of twenty faults of the drill on one server. ``python -m tests.drill`` tries all faults."""
+"""Test of twenty faults of the drill on one server. The command ``python -m tests.drill`` tries all faults."""
 
 import errno
 import socket
@@ -31,8 +31,8 @@ FILES = (
     Damage(layout.OUTCOME, "a folder in its place", "has ended", False),
     Damage(layout.LOGS, "a file in its place", "has ended", False), Damage("", "deleted", "has ended", False),
 )  # fmt: skip
-"""Damages that are tried on the server after the strike. Four of the runs are running, which leaves one slot for the
-others."""
+"""Damages that are tried on the server after the strike. Four of the runs use cores, which leaves one slot for the
+other runs."""
 
 
 @pytest.fixture
@@ -52,7 +52,7 @@ def test_twenty_faults_leave_every_state_true(stand: Stand) -> None:
 
 
 def test_no_request_waits_longer_than_its_limit_for_a_server_that_hangs(tmp_path: Path) -> None:
-    """A request to a hung server must give up, else a fault of three seconds would take minutes."""
+    """A request to a hung server must give up, otherwise a fault of three seconds would take minutes."""
     with socket.create_server(("127.0.0.1", 0)) as silent:
         stand = Stand(tmp_path, http=httpx2.Client(base_url=f"http://127.0.0.1:{silent.getsockname()[1]}"))
         began = time.monotonic()

@@ -1,8 +1,8 @@
-"""Fake worker of the tests of the server, with a record of each start and each end: ``worker.py BOOK CASE --out DIR
-...``.
+"""Fake worker of the tests of the server, with a record of each start and each end: the command is
+``worker.py BOOK CASE --out DIR ...``.
 
-The file BOOK is outside of the folder of the run. After any damage of that folder it still contains how often the
-run was started, whether two workers ran at the same time, and how the run ended.
+The file BOOK is outside of the folder of the run. After any damage of the run's folder the file BOOK still contains the
+number of starts of the run, whether two workers ran at the same time, and the end of the run.
 """
 
 import json

@@ -1,4 +1,4 @@
-"""Faults of one worker, detected by the server that started it or by the next server."""
+"""Faults of one worker, detected by the server that started the worker or by the next server."""
 
 import os
 import signal
@@ -22,7 +22,9 @@ Upload = tuple[str, signal.Signals]
 
 @dataclass(frozen=True)
 class Blow:
-    """A fault of a worker; ``states``: correct states after it; ``plan``: arguments of the fake worker."""
+    """A fault of a worker; ``states`` are the correct states after the fault; ``plan`` has the arguments of the fake
+    worker.
+    """
 
     name: str
     states: frozenset[str]
@@ -30,11 +32,11 @@ class Blow:
     plan: tuple[tuple[str, object], ...] = ()
     cancels: bool = False
     goes: bool = False
-    """Whether the worker gets its start signal after the fault, so that the remaining processes can end."""
+    """True if the worker gets its start signal after the fault, so that the remaining processes can end."""
 
 
 def blows() -> Iterator[Blow]:
-    """Yields the faults: signals to ranks, launcher and proxy, and workers with unusual ends."""
+    """Yields the faults of workers: signals to ranks, launcher and proxy, and workers with unusual ends."""
     for number in (signal.SIGKILL, signal.SIGSEGV, signal.SIGABRT, signal.SIGTERM):
         states = {signal.SIGKILL: NODE, signal.SIGTERM: PREEMPTED}.get(number, FAILED)
         yield Blow(f"{number.name} to rank 0", states, ("rank", number))
@@ -55,7 +57,7 @@ def blows() -> Iterator[Blow]:
 
 
 def rows(stand: Stand, adopted: bool) -> Iterator[Row]:
-    """Applies all faults at once, each to another run; ``adopted``: True if an earlier server has started the
+    """Applies all faults at once, each to another run; ``adopted`` is True if an earlier server has started the
     workers."""
     all_ = list(blows())
     runs = [stand.running(ranks=1, **dict(blow.plan)) for blow in all_]
@@ -79,8 +81,8 @@ def rows(stand: Stand, adopted: bool) -> Iterator[Row]:
 
 
 def _states(blow: Blow, adopted: bool) -> frozenset[str]:
-    """Returns the correct states. A server does not get the exit code of an adopted worker if the launcher is gone,
-    too."""
+    """Returns the correct states of the run after the fault. A server does not get the exit code of an adopted worker
+    if the launcher of the worker has also ended."""
     silent = blow.states is FAILED or (blow.sends is not None and blow.sends[0] in {"launcher", "all"})
     return blow.states | {"lost/service"} if adopted and silent else blow.states
 

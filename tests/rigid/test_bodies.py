@@ -33,7 +33,7 @@ RIGID = schema.Rigid()
 def rigid_case(
     motions: Sequence[dict[str, Any]], boundaries: Sequence[schema.Boundary] = (), **keys: Any
 ) -> schema.Case:
-    """Returns a case of bodies in contact, with these keys of parts, and boundaries."""
+    """Returns a case of bodies in contact, with the given keys of parts and the given boundaries."""
     contact = keys.pop("contact", {})
     case = meeting_of(motions, contact, **keys)
     return case.model_copy(update={"boundaries": tuple(boundaries)})
@@ -61,18 +61,18 @@ class Seen:
 
     @property
     def worst(self) -> float:
-        """Returns the largest residual of the energy."""
+        """Returns the largest residual of the energy balance."""
         return max(energy.residual for energy in self.energies)
 
     @property
     def drift(self) -> float:
-        """Returns the largest change of the linear momentum, over its size."""
+        """Returns the largest change of the linear momentum, over the size of the momentum."""
         p: Floats = np.array(self.momenta)[:, :3]
         return float(np.ptp(p, axis=0).max()) / float(np.abs(p).max())
 
 
 def test_energy_and_momentum_at_the_start_are_those_of_the_mesh() -> None:
-    """The reference are sums over the nodes of a deformable body with the same motion."""
+    """The reference values are sums over the nodes of a deformable body with the same motion."""
     motion = {"velocity": (30.0, -20.0, 50.0), "spin": schema.Spin(centre=(1e-3, 0.0, 2e-3), rate=(3e3, 9e3, -5e3))}
     seen = [Seen(rigid_case([{**motion, **how}], contact=None), [TILTED], 1) for how in ({}, {"rigid": RIGID})]
     energy, momenta = ([getattr(each, name)[0] for each in seen] for name in ("energies", "momenta"))
@@ -82,8 +82,8 @@ def test_energy_and_momentum_at_the_start_are_those_of_the_mesh() -> None:
 
 @pytest.mark.parametrize(("mesh", "friction"), [(BOX, 0.0), (TILTED, 0.3)])
 def test_a_rigid_box_hits_a_plate(mesh: TetMesh, friction: float) -> None:
-    """Momentum is conserved to round-off, and the impulses of the two parts are opposite to the bit; the energy is
-    as accurate as without a rigid body."""
+    """Momentum is conserved to round-off, and the impulses of the two parts are opposite to the bit; the energy is as
+    accurate as without a rigid body."""
     motions: list[dict[str, Any]] = [{}, {"rigid": RIGID, "velocity": (0.0, 0.0, -100.0)}]
     seen = Seen(rigid_case(motions, contact={"friction": friction}, end=6e-6), [PLATE, mesh])
     assert seen.sim.contact is not None
@@ -121,8 +121,8 @@ def test_rigid_bodies_rebound_by_newtons_law() -> None:
 
 
 def test_a_rigid_box_lands_flat_and_slides_to_rest() -> None:
-    """The box lands on a wall, with friction and gravity: no rotation, no rebound, and the sliding distance of
-    Coulomb's law, v^2 / (2 mu g)."""
+    """In this test a box lands on a wall, with friction and gravity: there is no rotation and no rebound, and the
+    sliding distance is that of Coulomb's law, v^2 / (2 mu g)."""
     gravity = schema.Gravity(kind="gravity", acceleration=(0.0, 0.0, -1e4))
     case = rigid_case([{"rigid": RIGID, "velocity": (2.0, 0.0, 0.0)}], [GROUND, gravity], contact=None, end=1e-3)
     seen = Seen(case, [block((3, 3, 3), 1e-3)])
@@ -165,8 +165,8 @@ def test_planes_of_symmetry_leave_a_quarter_its_motions() -> None:
 
 @pytest.mark.parametrize("restitution", [0.0, 0.5])
 def test_a_body_beside_a_plane_of_symmetry_meets_its_image(restitution: float) -> None:
-    """The plane does not act on the body before the impact. A corner hits the plane and rebounds with the given
-    fraction of its velocity."""
+    """The plane does not act on the body before the impact. A corner of the body hits the plane and rebounds with the
+    given fraction of its velocity."""
     plane = schema.Symmetry(kind="symmetry", axis="x")
     motion = {"rigid": RIGID, "velocity": (-30.0, 5.0, 0.0)}
     case = rigid_case([motion], [plane], contact={"restitution": restitution}, end=8e-5)
@@ -193,8 +193,8 @@ def test_walls_that_close_on_a_rigid_body_end_the_run() -> None:
 
 
 def test_a_driven_punch_works_from_outside() -> None:
-    """A rigid punch penetrates a plate on a wall: its work is in the energy balance, and its motion is the
-    prescribed one."""
+    """A rigid punch penetrates a plate on a wall: the work of the punch is in the energy balance, and the motion of the
+    punch is the prescribed motion."""
     ramp = ((0.0, 0.0), (0.5e-6, 1.0))
     drive = schema.Prescribed(kind="velocity", parts=("body1",), x=0.0, y=0.0, z=-50.0, course=ramp)
     ground = GROUND.model_copy(update={"parts": ("body0",)})
@@ -221,7 +221,7 @@ RAM = schema.Wall(
 )  # fmt: skip
 FALLING: list[dict[str, Any]] = [{"rigid": RIGID, "velocity": (0.0, 0.0, speed)} for speed in (-100.0, -300.0)]
 SCENE = rigid_case([{}, *FALLING], [GROUND, RAM], contact={"friction": 0.3}, end=6e-6)
-"""A plate between a wall and a ram, and two rigid boxes that fall on it and on each other."""
+"""The scene has a plate between a wall and a ram, and two rigid boxes that fall on the plate and on each other."""
 MESHES = (PLATE, TILTED, ABOVE)
 
 
@@ -256,7 +256,9 @@ def test_two_threads_give_the_answer_of_one() -> None:
 
 
 def test_probes_of_a_whole_body_have_its_inertia_and_centre() -> None:
-    """The values are 1/2 M V^2 + 1/2 w I w, M V, c and V; the values of some of its nodes are sums over these nodes."""
+    """The values are 1/2 M V^2 + 1/2 w I w, M V, c and V of the body; the values of some of its nodes are sums over
+    these nodes.
+    """
     fields = ["kinetic_energy", "momentum_y", "centre_z", "centre_velocity_x", "mass"]
     probes = [schema.Probe(name=field, part="body0", field=field) for field in fields]  # type: ignore[arg-type]
     everywhere = {"low": (-1.0, -1.0, -1.0), "high": (1.0, 1.0, 1.0)}
@@ -287,8 +289,8 @@ def test_a_resumed_run_ends_with_the_same_bits(tmp_path: Path) -> None:
 
 
 def test_a_spin_that_contact_changes_is_the_limit_of_the_step() -> None:
-    """The limit of a rigid body follows its spin. A contact changes the spin after the step was chosen, so the limit
-    of the step is neither that of the body any more nor that of a tet."""
+    """The limit of the time step by a rigid body follows the spin of the body. A contact changes the spin after the
+    step was chosen, so the limit of the step is neither the present limit of the body nor that of a tet."""
     spinning = {
         "rigid": RIGID,
         "spin": schema.Spin(centre=(3e-3, 3e-3, 4e-3), rate=(0.0, 9e4, 0.0)),

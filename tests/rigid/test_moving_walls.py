@@ -26,7 +26,7 @@ PLANE: dict[str, Any] = {"kind": "wall", "point": (0.0, 0.0, 0.0), "normal": (0.
 
 
 class Seen:
-    """Quantities of a bar and its first wall at each time."""
+    """Quantities of a bar and the first wall of its case at each time."""
 
     def __init__(
         self, walls: list[schema.Wall], end: float, speed: tuple[float, float, float] = (0.0, 0.0, 0.0)
@@ -71,8 +71,8 @@ def test_a_wall_with_a_mass_is_stopped_by_a_bar() -> None:
 
 @pytest.mark.parametrize("friction", [0.0, 0.2])
 def test_a_light_wall_is_stable(friction: float) -> None:
-    """The wall has a thousandth of the mass of the nodes that it hits: the wall ends with their velocity, and no
-    energy is created.
+    """The wall has a thousandth of the mass of the nodes that it hits: the wall ends with the velocity of these nodes,
+    and no energy is created.
     """
     wall = schema.Wall(**PLANE, velocity=(3.0, 0.0, 20.0), mass=1e-3 * MASS / 13, friction=friction)
     seen = Seen([wall], 2e-6)
@@ -82,7 +82,7 @@ def test_a_light_wall_is_stable(friction: float) -> None:
 
 
 def test_a_driven_wall_works_from_outside() -> None:
-    """The wall follows its prescribed motion exactly, and its work is external work. A wall that starts at rest
+    """The driven wall follows its prescribed motion exactly, and its work is external work. A wall that starts at rest
     causes no loss of energy."""
     course = ((0.0, 0.0), (5e-6, 1.0), (10e-6, 0.0))
     seen = Seen([schema.Wall(**PLANE, velocity=(0.0, 0.0, 20.0), course=course)], 12e-6)
@@ -94,8 +94,8 @@ def test_a_driven_wall_works_from_outside() -> None:
 
 
 def test_probes_measure_position_velocity_and_force_of_a_wall() -> None:
-    """The position of a driven wall is the integral of its prescribed velocity. A free wall loses the impulse that acts
-    on all parts.
+    """The position of a driven wall is the integral of its prescribed velocity. A free wall loses the impulse that it
+    exerts on all parts.
     """
     fields = ("wall_position_z", "wall_velocity_z", "wall_impulse_z")
     probes = tuple(schema.Probe(name=name, field=name, wall="wall") for name in fields)  # type: ignore[arg-type]

@@ -1,4 +1,4 @@
-"""Free rotation: conserved quantities, and its period compared with elliptic integrals."""
+"""Free rotation: conserved quantities; the period is compared with elliptic integrals."""
 
 import math
 
@@ -9,7 +9,7 @@ from scipy.special import ellipk
 from conoid.worker.rigid import rotation
 
 INERTIA = np.array([1.0, 2.0, 2.5])
-"""Principal moments, kg m^2."""
+"""Principal moments of inertia, kg m^2."""
 STEPS, DT = 100_000, 0.002
 
 
@@ -39,7 +39,7 @@ class Top:
 
 
 def flips(top: Top, dt: float, steps: int) -> list[float]:
-    """Returns the times, s, at which the rate about the middle axis changes its sign."""
+    """Returns the times, s, at which the rotation rate about the middle axis changes its sign."""
     found, last = [], top.body[1]
     for k in range(1, steps + 1):
         top.turn(dt)
@@ -51,9 +51,8 @@ def flips(top: Top, dt: float, steps: int) -> list[float]:
 
 
 def half_period(rate: tuple[float, float, float], moments: np.ndarray = INERTIA) -> float:
-    """Returns the time between two flips, s: 2 K(m) over the rate of the phase (Landau and Lifshitz, Mechanics,
-    section 37). The axes are swapped if twice the energy is below the square of the angular momentum over the middle
-    moment.
+    """Returns the time between two flips, s: 2 K(m) over the rate of the phase (Landau and Lifshitz, Mechanics, section
+    37). The axes are swapped if twice the energy is below the square of the angular momentum over the middle moment.
     """
     a, b, c = moments
     w = np.array(rate)
@@ -81,7 +80,7 @@ def test_a_free_top_keeps_angular_momentum_and_energy() -> None:
 
 @pytest.mark.parametrize("rate", [(0.05, 5.0, 0.0), (0.0, 5.0, 0.1), (0.5, 3.0, 1.0)])
 def test_a_top_flips_with_the_period_of_elliptic_integrals(rate: tuple[float, float, float]) -> None:
-    """The period agrees to 1e-4, and the error is proportional to the square of the step."""
+    """The period agrees with the integrals to 1e-4, and the error is proportional to the square of the step."""
     exact, errors = half_period(rate), []
     for dt in (0.008, 0.004):
         times = flips(Top(rate), dt, int(6.2 * exact / dt))

@@ -1,4 +1,4 @@
-"""Rigid bodies in the sweeps, compared with plain numpy: bounds of rows, sums of impulses and moments."""
+"""Rigid bodies in the sweeps, compared with plain numpy: bounds of contact rows, sums of impulses and moments."""
 
 import numpy as np
 import numpy.typing as npt
@@ -34,8 +34,8 @@ class Bodies:
 
     @property
     def matrix(self) -> Floats:
-        """Returns (contacts, contacts) the part of the bodies in the contact matrix: w n . (w' n' / M + W (r' x w'
-        n') x r)."""
+        """Returns (contacts, contacts) the part of the bodies in the contact matrix: the scalar product of w n and (w'
+        n' / M + W (r' x w' n') x r)."""
         n = len(self.body)
         found = np.zeros((n, n))
         pushes = self.weights[:, None] * self.normals
@@ -59,7 +59,7 @@ class Bodies:
 
 @pytest.mark.parametrize("seed", range(5))
 def test_the_norm_of_a_row_is_a_bound(seed: int) -> None:
-    """The norm is at least the l1 norm of the row, along the normal and in any direction."""
+    """The norm of a contact row is at least the l1 norm of the row, along the normal and in any direction."""
     bodies = Bodies(seed)
     along, across = bodies.norms()
     exact = np.abs(bodies.matrix).sum(axis=1)

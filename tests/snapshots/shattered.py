@@ -16,7 +16,7 @@ PARTS = ["one", "other"]
 
 @dataclass
 class Shattered:
-    """The fragments have their own nodes and are a small distance apart; the other half of the tets is another part."""
+    """The fragments have their own nodes and are a small distance apart; half of the tets are another part."""
 
     x: Floats
     v: Floats
@@ -27,7 +27,7 @@ class Shattered:
     bond: "np.ndarray"
     strain: Floats
     seeds: "np.ndarray"
-    """(tets,) the intended fragment of each tet; an intended fragment may consist of several pieces."""
+    """Intended fragment of each tet, (tets,); an intended fragment may consist of several pieces."""
 
     def shares(self, ranks: int) -> list[Share]:
         """Returns the state of each of several ranks, with the tets distributed at random and in any order."""
@@ -57,7 +57,7 @@ class Shattered:
 
 
 def shattered(cells: int, fragments: int, seed: int = 1) -> Shattered:
-    """Returns a cube of six times ``cells``^3 tets in about this number of fragments."""
+    """Returns a cube of six times ``cells``^3 tets in about the given number of fragments."""
     random = np.random.default_rng(seed)
     mesh = block((cells, cells, cells), size=1e-3)
     centres = mesh.points[mesh.tets].mean(axis=1)

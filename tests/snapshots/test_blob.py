@@ -1,4 +1,4 @@
-"""Snapshots contain the model: the test reads them with numpy only, by the layout in cases/output/snapshot.py."""
+"""Snapshots contain the model: the test reads snapshots with numpy only, by the layout in cases/output/snapshot.py."""
 
 from dataclasses import replace
 
@@ -23,8 +23,8 @@ def places(data: bytes) -> np.ndarray:
 
 
 def pieces(body: Shattered) -> np.ndarray:
-    """Returns (tets,) the number of the fragment of each tet, computed by scipy, in the order of their smallest
-    tets."""
+    """Returns (tets,) the number of the fragment of each tet, computed by scipy, in the order of the smallest tets of
+    the fragments."""
     tet, face = np.nonzero((body.across >= 0) & (body.bond == 0))
     graph = coo_array((np.ones(len(tet)), (tet, body.across[tet, face] // 4)), shape=(len(body.tets),) * 2)
     _, of = connected_components(graph)
@@ -58,7 +58,9 @@ def test_the_table_is_what_numpy_sums() -> None:
 
 
 def test_the_outline_of_every_fragment_is_closed_and_its_own() -> None:
-    """Each edge has a second edge with the opposite direction; the volume inside is that of the tets."""
+    """Each edge of the surface has a second edge with the opposite direction; the volume inside of the surface is that
+    of the tets.
+    """
     body = shattered(5, 8)
     data, label = made(body).data, pieces(body)
     got, at = arrays(data), places(data)

@@ -1,4 +1,4 @@
-"""A separate process makes a snapshot of the state of a rank; its failures do not delay the solver."""
+"""A separate process makes a snapshot of the state of a rank; failures of this process do not delay the solver."""
 
 import hashlib
 import io
@@ -86,8 +86,8 @@ def test_a_folder_that_is_removed_costs_one_snapshot(courier: Courier, tmp_path:
 
 
 def test_a_disk_that_fills_under_the_packer_costs_one_snapshot(courier: Courier, tmp_path: Path) -> None:
-    """No file of the process can grow: a warning names the snapshot and the reason, and no part of it remains on the
-    disk."""
+    """No file of the process can grow: a warning names the snapshot and the reason, and no part of the snapshot remains
+    on the disk."""
     (mine,) = shattered(2, 2).shares(1)
     courier.send(task(0), mine)
     answer(courier)
@@ -115,7 +115,7 @@ def test_a_packer_that_dies_costs_one_snapshot(courier: Courier) -> None:
 
 
 def test_a_request_to_stop_the_run_leaves_the_packer_for_the_last_snapshot(courier: Courier) -> None:
-    """A launcher sends the request to every process of a rank."""
+    """A launcher sends the stop request to every process of a rank."""
     (mine,) = shattered(2, 2).shares(1)
     courier.send(task(0), mine)
     answer(courier)
@@ -156,7 +156,7 @@ def test_the_last_snapshot_does_not_wait_for_what_others_leave(
 
 
 def test_messages_that_wait_for_the_network_are_bounded_and_counted() -> None:
-    """The endpoint has no listener."""
+    """No program listens at the endpoint."""
     telemetry = Telemetry("tcp/127.0.0.1:1", "conoid/v1/ann/run")
     began = time.monotonic()
     for n in range(5):

@@ -1,4 +1,4 @@
-"""Time between snapshots, by their cost (docs/reference/snapshots.md)."""
+"""Time between two snapshots, which depends on the cost of snapshots (docs/reference/snapshots.md)."""
 
 import pytest
 

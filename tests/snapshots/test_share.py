@@ -1,4 +1,4 @@
-"""The state of a rank for a snapshot: the rows that a material has."""
+"""The state of a rank for a snapshot contains the rows of state that a material has."""
 
 import numpy as np
 
@@ -8,8 +8,7 @@ from conoid.worker.snapshots.share import copied
 
 
 def model_of(rows: int) -> Model:
-    """Returns two parts of one tet each, with the given number of rows of state; the damage of part k is (k + 1) /
-    4."""
+    """Returns two parts of one tet each, with the given number of rows of state; part k has the damage (k + 1) / 4."""
     n, x = 4, np.zeros((4, 3))
     nodes = Nodes(
         np.arange(n), np.zeros(n, np.int32), np.zeros(n, np.int32), np.ones(n, bool), x, x, x, np.ones(n),
@@ -25,7 +24,9 @@ def model_of(rows: int) -> Model:
 
 
 def test_damage_is_sent_for_parts_whose_law_counts_it() -> None:
-    """A part may have this row because it has a later row, such as that of pores: then the row is no damage."""
+    """A part may have the damage row because it has a later row, such as that of pores: in this case the damage row is
+    no damage.
+    """
     held = np.zeros((0, 2), np.int64)
     share = copied(model_of(DAMAGE + 2), held, {1})
     assert "0.damage" not in share

@@ -1,4 +1,4 @@
-"""All tets of a snapshot in few bytes: the test reads them with numpy only and compares them with the model."""
+"""All tets of a snapshot in few bytes: the test reads the tets with numpy only and compares them with the model."""
 
 import gzip
 

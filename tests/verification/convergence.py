@@ -1,4 +1,4 @@
-"""Orders of convergence: measured values, compared with the expected values of rates.toml."""
+"""Orders of convergence: measured orders, compared with the expected orders of rates.toml."""
 
 import math
 import tomllib
@@ -10,7 +10,7 @@ RATES = tomllib.loads(Path(__file__).with_name("rates.toml").read_text(encoding=
 
 
 def assert_converges(name: str, errors: Sequence[float]) -> None:
-    """Checks that the errors, each at half the size of the one before, decrease with the order of the table, as far
+    """Checks that the errors, each at half the size of the previous error, decrease with the order of the table, as far
     as the convergence goes.
     """
     rate = RATES[name]

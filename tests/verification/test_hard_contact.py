@@ -29,7 +29,9 @@ SIZE = 1e-3
 
 
 def depth(sim: Simulation) -> float:
-    """Returns the depth of the deepest node inside another part below its surface, m; of two parts on one rank."""
+    """Returns the depth of the deepest node inside another part below the surface of this part, m, for two parts on one
+    rank.
+    """
     assert sim.contact is not None
     x, part = sim.model.nodes.x, sim.model.nodes.part
     faces = sim.contact.exterior.motion.sides.faces.nodes[:, :3]
@@ -52,7 +54,7 @@ CELLS = 8
 
 
 def facets(shake: float, fold: float = 0.0) -> tuple[Floats, "np.ndarray"]:
-    """Returns a sheet of irregular facets of 1 m, and their faces; beyond its middle it rises with the slope
+    """Returns a sheet of irregular facets of 1 m, and their faces; beyond its middle the sheet rises with the slope
     ``fold``."""
     x, faces = sheet(CELLS, 1.0)
     inner = ((x[:, :2] > 0.0) & (x[:, :2] < CELLS)).all(axis=1) & (x[:, 0] != CELLS / 2)
@@ -90,7 +92,9 @@ class Slide:
 
 
 def travellers(n: int, speed: float) -> tuple[Floats, Floats]:
-    """Returns starts on the sheet and velocities; some nodes move along edges and through the nodes of the sheet."""
+    """Returns start positions on the sheet and velocities; some nodes move along edges and through the nodes of the
+    sheet.
+    """
     random = np.random.default_rng(2)
     start, angle = random.uniform(2.5, CELLS - 2.5, (n, 2)), random.uniform(0.0, 2.0 * np.pi, n)
     start[: n // 2] = np.round(start[: n // 2])
@@ -132,7 +136,7 @@ def test_friction_slows_it_down_evenly() -> None:
 
 @pytest.mark.parametrize("slope", [0.3, -0.3])
 def test_where_the_ground_rises_only_the_normal_part_is_lost_and_where_it_falls_nothing(slope: float) -> None:
-    """Without a load: in a fold the node loses v . n, except the tenth that contact may give back for a penetration.
+    """In a fold without a load the node loses v . n, except the tenth that contact may give back for a penetration.
     Over a ridge the node continues along a straight line, without a contact force."""
     start, v = travellers(120, 0.2)
     start[:, 0], v[:, 0] = CELLS / 2 - 0.5, np.abs(v[:, 0]) + 0.05
@@ -158,8 +162,8 @@ LIGHT = materials.Material(density=2500.0, elastic=materials.Elastic(young=72e9,
 @pytest.mark.parametrize("tilt", [0.0, 0.2])
 @pytest.mark.parametrize("heavy_is_fine", [True, False])
 def test_nothing_sinks_in_where_masses_differ_by_a_factor_of_fifty(heavy_is_fine: bool, tilt: float) -> None:
-    """Tungsten alloy hits glass, with elements 1:2, at 100 m/s, flat and with a corner: the penetration is below 1 %
-    of the smaller element."""
+    """Tungsten alloy hits glass at 100 m/s, flat and with a corner, with element sizes 1:2. The penetration is below 1
+    % of the smaller element."""
     coarse = block((5, 5, 4), SIZE, seed=2)
     fine = moved(block((6, 6, 6), SIZE / 2, seed=1), (0.0, 0.0, 0.0), rotation((1, 2, 0), tilt))
     fine = moved(fine, (0.9 * SIZE, 1.1 * SIZE, 4.001 * SIZE - fine.points[:, 2].min()))
@@ -212,7 +216,7 @@ PLATE = np.array([4.0, 4.0, 1.0]) * SIZE
 
 
 class Shot:
-    """A tet of any size and direction that moves at 1 to 50 km/s past or into a plate of one layer of tets."""
+    """A tet of any size and direction moves at 1 to 50 km/s past or into a plate of one layer of tets."""
 
     def __init__(self, seed: int) -> None:
         random = np.random.default_rng(seed)
@@ -227,7 +231,7 @@ class Shot:
 
     def way_in(self, larger: float = 1.0) -> float | None:
         """Returns the exact distance, m, that the tet moves until it touches the plate, with both bodies scaled by
-        ``larger``. The bodies touch where the ray from the origin enters the hull of all differences of their
+        ``larger``. The two bodies touch where the ray from the origin enters the hull of all differences of their
         corners.
         """
         box = np.stack(np.meshgrid(*np.column_stack([np.zeros(3), PLATE]), indexing="ij"), axis=-1).reshape(-1, 3)
@@ -240,8 +244,8 @@ class Shot:
         return float(begin) * SIZE if begin < end else None
 
     def fly(self) -> tuple[float, float] | None:
-        """Returns the distance that the tet has moved, m, at the step in which it first gets an impulse, and after
-        this step; None without an impulse."""
+        """Returns the distance that the tet has moved, m, before and after the step in which it first gets an impulse;
+        None without an impulse."""
         motions: list[dict[str, Any]] = [
             {"velocity": tuple(self.drift + v)} for v in (0.0 * self.way, self.way * self.speed)
         ]
@@ -257,9 +261,9 @@ class Shot:
 
 
 def misjudged(seeds: range) -> tuple[int, list[int]]:
-    """Returns the number of shots that hit, and the seeds of shots that got an impulse too early, too late or
-    wrongly; grazing shots are excluded. A shot is grazing if half a per cent more or less of the size of a body
-    decides; an error of a hundredth of a face is allowed.
+    """Returns the number of shots that hit, and the seeds of shots that got an impulse too early, too late or wrongly;
+    grazing shots are excluded. A shot is grazing if half a per cent more or less of the size of a body decides whether
+    it hits; an error of a hundredth of a face is allowed.
     """
     hits, wrong = 0, []
     for seed in seeds:
@@ -288,8 +292,8 @@ def test_no_shot_of_a_thousand_misses_what_its_ray_hits() -> None:
 
 
 def test_a_fast_fragment_makes_no_searches_for_others() -> None:
-    """Two bodies collide slowly, with one search in 200 steps without the tet; with a tet that passes at 5 km/s
-    there is at most one search in 50 steps."""
+    """Two bodies collide slowly, with one search in 200 steps; if a tet passes at 5 km/s there is at most one search in
+    50 steps."""
     lower, upper = block((12, 12, 12), SIZE, seed=1), block((11, 11, 11), SIZE, seed=2)
     away = TetMesh(REGULAR * SIZE + np.array([-20.0, 16.0, 3.0]) * SIZE, np.array([[0, 1, 2, 3]], np.int32))
     meshes = [lower, moved(upper, (0.4 * SIZE, 0.3 * SIZE, 12.001 * SIZE)), away]
@@ -305,7 +309,7 @@ def test_a_fast_fragment_makes_no_searches_for_others() -> None:
 
 
 def volume_in_common(case: Case) -> common_volume.CommonVolume:
-    """Returns the common volume at the end, after contact."""
+    """Returns the common volume of the bodies at the end, after contact."""
     sim = run(simulation.build(case, Path(), SerialComm()))
     assert sim.contact is not None
     return common_volume.measure(sim.contact, sim.model, None, sim.comm)
@@ -313,8 +317,9 @@ def volume_in_common(case: Case) -> common_volume.CommonVolume:
 
 @pytest.mark.slow
 def test_crossed_blades_do_not_cut_into_each_other() -> None:
-    """The blades are one tet thick and collide edge on edge. If contacts of edges between two tets ended at 0.05 of
-    their length, 34 tets would end with more than a tenth in the other blade, 4.9e-3 of all at the surface.
+    """The blades of this test are one tet thick and collide edge on edge. If contacts of edges between two tets ended
+    at 0.05 of their length, 34 tets would end with more than a tenth of their volume in the other blade, 4.9e-3 of the
+    volume of all surface tets.
     """
     blade = {"shape": "box", "element_size": 0.5e-3, "generator": "structured"}
     upper = {"low": [-4.8e-3, -0.15e-3, 0.05e-3], "high": [5.2e-3, 0.35e-3, 5.05e-3]}
@@ -336,9 +341,9 @@ def test_crossed_blades_do_not_cut_into_each_other() -> None:
 
 
 def test_a_fine_plate_does_not_fold_into_the_rim_of_a_coarse_punch() -> None:
-    """The only sharp edges in front of the rim are those of the plate that the rim bends by 5 to 25 degrees. Without
-    contact of these edges 54 tets ended with more than a tenth in the punch, 4.8e-4 of all at the surface, and 7
-    nodes were 0.22 of a face deep.
+    """The only sharp edges in front of the rim are the edges of the plate that the rim bends by 5 to 25 degrees.
+    Without contact of these edges 54 tets ended with more than a tenth of their volume in the punch, 4.8e-4 of the
+    volume of all surface tets, and 7 nodes were 0.22 of a face deep.
     """
     round_ = {"shape": "cylinder", "axis": "z", "sector": "quarter"}
     punch = {"base": [0, 0, 0.01e-3], "radius": 2e-3, "length": 6e-3, "element_size": 0.6e-3}
@@ -375,10 +380,9 @@ def test_a_fine_plate_does_not_fold_into_the_rim_of_a_coarse_punch() -> None:
     ],
 )
 def test_columns_of_metal_hold_each_other_under_a_shock(metal: str, speed: float) -> None:
-    """The columns are between planes of symmetry, with irregular tets and averaged pressure: behind the shock no
-    node is faster than before the impact. In an earlier version nodes of the interface became faster than the
-    columns, and tets were crushed, at ridges of faces that were flat at the start, and at 4 km/s also with five
-    sweeps.
+    """The columns are between planes of symmetry, with irregular tets and averaged pressure: behind the shock no node
+    is faster than before the impact. In an earlier version nodes of the interface became faster than the columns, and
+    tets were crushed, at ridges of faces that were flat at the start. At 4 km/s this also happened with five sweeps.
     """
     cube = {"shape": "box", "element_size": 0.5e-3, "generator": "gmsh"}
     case = parse_case(
@@ -445,10 +449,10 @@ def test_irregular_plates_keep_the_pressure_of_their_impact() -> None:
 def test_brittle_parts_keep_the_pressure_of_the_impact(
     name: str, speed: float, sweeps: int | None, share: tuple[float, float]
 ) -> None:
-    """The pressure is between that of broken and of intact bodies (1.38 times as large), and near that of broken
-    bodies if everything has broken. Above a tenth of the wave speed only 0.44 of the pressure is left with two
-    sweeps, so the check can fail. At 200 m/s 0.6 of the lower pressure is left if contacts at cracks start from zero
-    in every step. In glass 0.72 is left if edges with one face at a closed crack have no contact with other edges.
+    """The pressure is between that of broken and of intact bodies (1.38 times as large), and near that of broken bodies
+    if all material has broken. Above a tenth of the wave speed only 0.44 of the pressure is left with two sweeps, so
+    the test can fail. At 200 m/s 0.6 of the lower pressure is left if contacts at cracks start from zero in every step.
+    In glass 0.72 of the pressure is left if edges with one face at a closed crack have no contact with other edges.
     """
     low, high = share
     found = dust.measure(dust.flyer(name, speed, sweeps, wide=0.3e-3, long=(1.5e-3, 1.5e-3), end=0.15e-6), 0.07e-6)
@@ -460,8 +464,8 @@ def test_brittle_parts_keep_the_pressure_of_the_impact(
 
 
 def shocked(name: str, viscosity: dict[str, float]) -> Floats:
-    """Returns the pressure over that of theory in the layers of a row of 100 cubes, when the shock has passed
-    seventy layers."""
+    """Returns the pressure over that of theory in the layers of a row of 100 cubes, when the shock has passed seventy
+    layers."""
     shipped_case = parse_case(read_data(shipped()[name]))
     (metal,), speed = shipped_case.materials.values(), -shipped_case.parts[0].velocity[2]
     assert metal.eos is not None
@@ -482,16 +486,16 @@ def shocked(name: str, viscosity: dict[str, float]) -> Floats:
 
 
 def where(profile: Floats, level: float) -> float:
-    """Returns the interpolated layer at which the front has a level."""
+    """Returns the interpolated layer at which the front has the given level of pressure."""
     k = int(np.flatnonzero(profile > level)[-1])
     return k + float((profile[k] - level) / (profile[k] - profile[k + 1]))
 
 
 @pytest.mark.parametrize("name", ["shock_copper", "shock_tungsten"])
 def test_a_shock_of_few_elements_does_not_overshoot(name: str) -> None:
-    """The overshoot is below 5 % of the jump, and at most five layers lie between 5 and 95 % of it, with the default
-    viscosity (standard form). A tet of a cube cut in six has half the length of the cube, so that 0.06 and 1.5 are
-    0.03 and 0.4 of a layer.
+    """With the default viscosity (standard form) the overshoot is below 5 % of the jump, and at most five layers lie
+    between 5 and 95 % of the jump. A tet of a cube that is cut into six tets has half the length of the cube, so that
+    the coefficients 0.06 and 1.5 correspond to 0.03 and 0.4 of a layer.
     """
     profile = shocked(name, {})
     assert profile[5:].max() < 1.05
@@ -501,5 +505,5 @@ def test_a_shock_of_few_elements_does_not_overshoot(name: str) -> None:
 
 @pytest.mark.parametrize("name", ["shock_copper", "shock_tungsten"])
 def test_with_the_usual_two_terms_it_overshoots(name: str) -> None:
-    """Control: the check above fails with the coefficients 0.06 and 1.5 only."""
+    """Control of the test: the check of the overshoot fails with only the coefficients 0.06 and 1.5."""
     assert shocked(name, {"shock": 0.0})[5:].max() > 1.15

@@ -1,8 +1,8 @@
-"""V18: impact of two equal steel spheres compared with Hertz: force and duration over the speed. Theory: with R* = R
-/ 2, E* = E / (2 (1 - nu^2)), m* = m / 2 and k = 4/3 E* sqrt(R*) the largest approach is d = (5 m* v^2 / (4
-k))^(2/5), the force is k d^(3/2) ~ v^(6/5), the duration is 2.9432 d / v ~ v^(-1/5), and the circle of contact has
-the radius sqrt(R* d). The theory treats the balls as half-spaces: measured exponents are closer to it if the circle
-is small compared with the ball.
+"""V18: the impact of two equal steel spheres is compared with Hertz: force and duration over the speed. Theory: with R*
+= R / 2, E* = E / (2 (1 - nu^2)), m* = m / 2 and k = 4/3 E* sqrt(R*), the largest approach is d = (5 m* v^2 / (4
+k))^(2/5). The force is k d^(3/2) ~ v^(6/5), the duration is 2.9432 d / v ~ v^(-1/5), and the circle of contact has the
+radius sqrt(R* d). The theory treats the balls as half-spaces: measured exponents are closer to the theory if the circle
+of contact is small compared with the ball.
 """
 
 import csv
@@ -28,17 +28,17 @@ FINE, COARSE = (0.08e-3, 0.5e-3), (0.1e-3, 0.7e-3)
 
 
 def approach(closing: float) -> float:
-    """Returns the largest approach, m, at a closing speed, m/s."""
+    """Returns the largest approach by the theory, m, at a closing speed, m/s."""
     return float((5 * MASS * closing**2 / (4 * STIFFNESS)) ** 0.4)
 
 
 def force(closing: float) -> float:
-    """Returns the largest force, N."""
+    """Returns the largest force by the theory, N."""
     return float(STIFFNESS * approach(closing) ** 1.5)
 
 
 def duration(closing: float) -> float:
-    """Returns the duration, s."""
+    """Returns the duration of the impact by the theory, s."""
     return 2.9432 * approach(closing) / closing
 
 
@@ -65,7 +65,9 @@ Impacts = Callable[[float, tuple[float, float]], Impact]
 
 @pytest.fixture(scope="module")
 def impacts(tmp_path_factory: pytest.TempPathFactory) -> Impacts:
-    """Returns the shipped spheres at a closing speed, m/s, and a mesh; each is run once."""
+    """Returns the measurements of the shipped spheres at a closing speed, m/s, and with a mesh; each combination is run
+    once.
+    """
     root, done = tmp_path_factory.mktemp("hertz"), dict[tuple[float, tuple[float, float]], Impact]()
 
     def impact(closing: float, mesh: tuple[float, float]) -> Impact:
@@ -77,7 +79,7 @@ def impacts(tmp_path_factory: pytest.TempPathFactory) -> Impacts:
 
 
 def _run(folder: Path, closing: float, mesh: tuple[float, float]) -> Impact:
-    """Runs the case with 200 samples of the mean force: the peak of a half wave is lowered by less than 1e-4."""
+    """Runs the case with 200 samples of the mean force: the samples lower the peak of a half wave by less than 1e-4."""
     changes = [f"run.end_time={1.1 * duration(closing)}", "run.frames=0"]
     for part, way in ((0, 1), (1, -1)):
         changes += [
@@ -96,8 +98,8 @@ def _run(folder: Path, closing: float, mesh: tuple[float, float]) -> Impact:
 
 
 def _parting(folder: Path, upper: float, closing: float) -> float:
-    """Returns the speed after the impact over the closing speed: the meshes of the spheres differ in mass by 6e-5,
-    and the initial momentum gives the speed of the lower sphere.
+    """Returns the speed after the impact over the closing speed. The meshes of the spheres differ in mass by 6e-5, and
+    the initial momentum gives the speed of the lower sphere.
     """
     with (folder / layout.HISTORY).open() as lines:
         first = next(csv.DictReader(lines))
@@ -113,8 +115,8 @@ def exponent(values: tuple[float, float], speeds: tuple[float, float]) -> float:
 
 @pytest.mark.timeout(660)
 def test_at_low_speeds_the_exponents_are_those_of_the_law(impacts: Impacts) -> None:
-    """From 1 to 2 m/s the exponents are 6/5 and -1/5 within 2 % of each, the force within 5 %, and the duration
-    within 3 %."""
+    """From 1 to 2 m/s the exponents are 6/5 and -1/5 within 2 %, the force is within 5 % of the theory, and the
+    duration within 3 %."""
     speeds = (1.0, 2.0)
     assert elements_across(speeds[0], FINE[0]) > 8.0
     slow, fast = (impacts(speed, FINE) for speed in speeds)
@@ -129,7 +131,7 @@ def test_at_low_speeds_the_exponents_are_those_of_the_law(impacts: Impacts) -> N
 
 @pytest.mark.timeout(660)
 def test_up_to_four_times_the_speed_force_and_duration_follow_the_law(impacts: Impacts) -> None:
-    """F / v^(6/5) and T v^(1/5) stay within 2 % of each other at 2, 4 and 8 m/s on one mesh."""
+    """The ratios F / v^(6/5) and T v^(1/5) stay within 2 % of each other at 2, 4 and 8 m/s on one mesh."""
     speeds = (2.0, 4.0, 8.0)
     assert elements_across(speeds[0], COARSE[0]) > 8.0
     seen = [impacts(speed, COARSE) for speed in speeds]

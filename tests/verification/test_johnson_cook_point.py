@@ -1,4 +1,6 @@
-"""V12: one tet of Johnson-Cook metal under constant rates, against its differential equation integrated to 1e-8."""
+"""V12: one tet of Johnson-Cook metal under constant rates is compared with its differential equation, integrated to
+1e-8.
+"""
 
 import math
 
@@ -39,9 +41,9 @@ def plastic_rate(q: float, strain: float, temperature: float) -> float:
 
 
 def integrated(L: Floats, time: float) -> tuple[float, float, float]:
-    """Returns Mises stress, plastic strain and temperature after ``time``: s' = 2 G (dev D - 3/2 e' s / q) + W s - s
-    W. The unknowns are of order one: s in GPa, the strain, the temperature in 1000 K. The integration stops at first
-    yield and continues from there.
+    """Returns the Mises stress, the plastic strain and the temperature after ``time`` from s' = 2 G (dev D - 3/2 e' s /
+    q) + W s - s W. The unknowns of the equation are of order one: s in GPa, the strain, the temperature in 1000 K. The
+    integration stops at first yield and continues from this time.
     """
     rate, spin = formulas.deviator(L[None])[0], 0.5 * (L - L.T)
 

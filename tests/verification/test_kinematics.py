@@ -19,7 +19,9 @@ DT = 1e-8
 
 
 def carry(patch: Patch, maps: list[Floats]) -> None:
-    """Moves every node by linear maps of its initial position, (3, 3) one after the other, in a step of ``DT`` each."""
+    """Moves every node by linear maps (3, 3) of its initial position, one map after the other, in a step of ``DT``
+    each.
+    """
     for old, new in pairwise(maps):
         start, end = MESH.points @ old.T, MESH.points @ new.T
         patch.nodes.v[:] = (end - start) / DT
@@ -73,7 +75,7 @@ def test_a_hundred_turns_leave_no_stress(form: Form) -> None:
 
 
 def test_stress_turns_with_the_body() -> None:
-    """V10: a stress along x is along y after a quarter turn, and along x again after 25 turns."""
+    """V10: a stress along x is a stress along y after a quarter turn, and a stress along x again after 25 turns."""
     patch = Patch(MESH, HARD)
     patch.put(S_XX, 2e8)
     patch.put(S_YY, -1e8)
@@ -100,7 +102,9 @@ def test_a_gradient_at_the_start_of_the_step_would_strain_the_body() -> None:
 
 
 def shear_errors(steps: int) -> float:
-    """Returns the largest error of the stress up to a shear of 10, over G: s_xy = G sin, s_xx = -s_yy = G (1 - cos)."""
+    """Returns the largest error of the stress up to a shear of 10, over G; the exact stress is s_xy = G sin, s_xx =
+    -s_yy = G (1 - cos).
+    """
     patch = Patch(MESH, HARD)
     worst = 0.0
     shear = np.linspace(0.0, 10.0, steps + 1)
@@ -120,7 +124,9 @@ def test_simple_shear_follows_the_jaumann_rate() -> None:
 
 
 def test_an_elastic_body_in_simple_shear_follows_its_potential() -> None:
-    """V11, elastic: s_xy = G g up to a shear of 10, in steps of any size, without the decrease of the Jaumann rate."""
+    """V11, elastic material: s_xy = G g up to a shear of 10, in steps of any size, without the decrease of the Jaumann
+    rate.
+    """
     patch = Patch(MESH)
     for g in (0.1, 1.0, 10.0):
         carry(patch, [np.eye(3), np.array([[1.0, g, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]])])

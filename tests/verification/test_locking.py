@@ -1,6 +1,6 @@
-"""V13: a thick tube of nu = 0.4999 is expanded, and a beam is bent: the effect of averaged pressures on locking, and
-its limits. Walls move slowly, by amounts at which strains stay small, and stop. Then the forces on the walls are
-averaged over a few oscillations and compared with static linear elasticity.
+"""V13: a thick tube of nu = 0.4999 is expanded, and a beam is bent: the tests show the effect of averaged pressures on
+locking, and the limits of this effect. Walls move slowly, by amounts at which strains stay small, and stop. After the
+motion the forces on the walls are averaged over a few oscillations and compared with static linear elasticity.
 """
 
 from dataclasses import dataclass
@@ -43,15 +43,15 @@ class Metal:
 
 
 class Drive(PrescribedVelocity):
-    """Moves nodes by ``travel`` (n, 3), m, NaN for free components, smoothly within ``ramp`` s, and holds them at
-    the end position."""
+    """Moves nodes by ``travel`` (n, 3), m, smoothly within ``ramp`` s, and holds the nodes at the end position;
+    components with NaN are free."""
 
     def __init__(self, nodes: Indices, travel: Floats, ramp: float) -> None:
         super().__init__(nodes, np.where(np.isnan(travel), np.nan, 0.0), Course())
         self._travel, self._ramp = travel, ramp
 
     def apply(self, state: Nodes, dt: float, t: float) -> None:
-        """Sets the mean velocity of the next step."""
+        """Sets the mean velocity of the nodes in the next step."""
         if dt > 0.0:
             self._velocity = self._travel * (self._reached(t + dt) - self._reached(t)) / dt
         super().apply(state, dt, t)
@@ -62,8 +62,8 @@ class Drive(PrescribedVelocity):
 
 
 def held_force(sim: Simulation, drive: Drive, ramp: float, direction: Floats) -> float:
-    """Returns the force that holds the driven nodes, summed along ``direction`` (n, 3), N: the mean over the time
-    after the motion."""
+    """Returns the force that holds the driven nodes, summed along ``direction`` (n, 3), N: the mean over the time after
+    the motion."""
     seen: list[float] = []
 
     def look(sim: Simulation, before: Floats) -> None:
@@ -80,7 +80,7 @@ INNER, OUTER = 10e-3, 20e-3
 
 
 def ring(cells: int) -> TetMesh:
-    """Returns a quarter of the tube, with ``cells`` through the wall and two along z."""
+    """Returns a quarter of the tube, with ``cells`` cells through the wall and two cells along z."""
     size = (OUTER - INNER) / cells
     flat = block((cells, round(0.5 * np.pi * 1.4 * INNER / size), 2), 1.0, shake=0.0)
     radius = INNER + flat.points[:, 0] * size
@@ -112,7 +112,7 @@ def swollen(form: Form, cells: int = 4) -> float:
 
 def test_averaged_pressures_let_a_tube_keep_its_volume() -> None:
     """With four elements through the wall the error is some per cent; with a separate pressure of each tet the
-    resistance is twenty times too large. Measured 22.8, 1.057 and 1.016.
+    resistance is twenty times too large. The measured ratios are 22.8, 1.057 and 1.016.
     """
     standard, nodal, split = (swollen(form) for form in FORMS)
     assert standard > 10.0
@@ -125,8 +125,8 @@ LENGTH, HEIGHT = 40e-3, 4e-3
 
 
 def bent(form: Form, cells: int) -> float:
-    """Returns the moment over E I kappa of a beam with ``cells`` through its height whose ends rotate in opposite
-    directions."""
+    """Returns the moment of a beam over E I kappa, with ``cells`` through its height; the ends of the beam rotate in
+    opposite directions."""
     size = HEIGHT / cells
     mesh = block((round(LENGTH / size), cells, cells), size, shake=0.0)
     swing = 4.0 * LENGTH / np.sqrt(STEEL.young / DENSITY) * LENGTH / HEIGHT
@@ -147,8 +147,9 @@ def bent(form: Form, cells: int) -> float:
 @pytest.mark.parametrize("form", FORMS)
 def test_no_form_bends_well_on_few_tets(form: Form) -> None:
     """Linear tets have constant strains, so averaging of the pressure does not improve bending. With two elements
-    through the height a beam is 2.0 times (standard) or 1.5 times (nodal, split) too stiff, with four 1.26 or 1.13
-    times: the error is proportional to the square of the size. Use six or more elements if bending matters.
+    through the height a beam is 2.0 times (standard) or 1.5 times (nodal, split) too stiff, with four elements 1.26 or
+    1.13 times: the error is proportional to the square of the size. Use six or more elements through the height if
+    bending matters.
     """
     coarse, fine = (bent(form, cells) - 1.0 for cells in (2, 4))
     assert 0.4 < coarse < 1.2

@@ -17,16 +17,16 @@ STEPS = 1500
 
 
 def exact(values: Floats) -> Floats:
-    """Returns (3,) sums of the columns, correctly rounded."""
+    """Returns (3,) the sums of the columns, correctly rounded."""
     return np.array([math.fsum(column) for column in values.T])
 
 
 @pytest.mark.parametrize("form", FORMS)
 @pytest.mark.parametrize("metal", METALS)
 def test_a_spinning_bursting_body_keeps_its_momentum(metal: str, form: Form) -> None:
-    """The body moves, spins and starts with large random velocities; forces add up to zero as integers in every
-    step. The leapfrog conserves x(n) x m v(n+1/2): a velocity has no moment about its own displacement, and forces
-    of a symmetric stress have no moment.
+    """The body moves, spins and starts with large random velocities; the forces add up to zero as integers in every
+    step. The leapfrog scheme conserves x(n) x m v(n+1/2): a velocity has no moment about its own displacement, and
+    forces of a symmetric stress have no moment.
     """
     material: materials.Material = METALS[metal]
     spin = {"centre": (5e-3, 5e-3, 5e-3), "rate": (3e3, 0.0, 1e4)}

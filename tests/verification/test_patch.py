@@ -1,7 +1,7 @@
-"""V21: the contact patch test. Blocks whose meshes do not match carry a uniform pressure through their interface.
-Contacts of nodes with faces from both sides do not pass the patch test exactly: if nodes of one mesh lie between nodes
-of the other, impulses act on whole nodes and not on the areas round them. The limit is an error of 5 % of the pressure
-in the worst tet.
+"""V21: the contact patch test. Blocks whose meshes do not match transmit a uniform pressure through their interface.
+Contacts of nodes with faces from both sides do not pass the patch test exactly. If nodes of one mesh lie between nodes
+of the other mesh, impulses act on whole nodes and not on the areas round the nodes. The limit of the test is an error
+of 5 % of the pressure in the worst tet.
 """
 
 from pathlib import Path
@@ -68,7 +68,9 @@ def pressed(poisson: float, sizes: tuple[float, float]) -> Simulation:
 
 
 def stress(sim: Simulation, part: str) -> tuple[Floats, "np.ndarray"]:
-    """Returns (tets,) the stress normal to the interface, Pa, and which tets have a node on it."""
+    """Returns (tets,) the stress normal to the interface, Pa, and flags of the tets that have a node on the
+    interface.
+    """
     blocks = [block for block in sim.model.blocks if sim.model.parts[block.part] == part]
     values = np.concatenate([block.row(S_ZZ) - block.row(PRESSURE) for block in blocks])
     z = sim.model.nodes.x0[np.concatenate([block.tets for block in blocks]), 2]
@@ -76,7 +78,7 @@ def stress(sim: Simulation, part: str) -> tuple[Floats, "np.ndarray"]:
 
 
 def under_pressure(poisson: float, stretch: float) -> float:
-    """Returns the stress of a free bar of this length over its initial length, Pa: sides without stress, p = -K ln
+    """Returns the stress of a free bar of the given length over its initial length, Pa: sides without stress, p = -K ln
     J."""
     bulk, shear = YOUNG / (3.0 * (1.0 - 2.0 * poisson)), YOUNG / (2.0 * (1.0 + poisson))
 

@@ -7,10 +7,10 @@ import pytest
 from ..bench import plugging
 
 SIZES = (0.6, 0.4)
-"""Element sizes, mm."""
+"""Element sizes of the two meshes, mm."""
 OPEN = {399.6: 0.03, 285.4: 0.10, 244.2: 0.33}
-"""Allowed error with tets of 0.4 mm, as a fraction of the published speed: 0, 8 and 31 % were measured
-(docs/verification/plugging.md).
+"""Allowed error of the residual speed with tets of 0.4 mm, as a fraction of the published speed: 0, 8 and 31 % were
+measured (docs/verification/plugging.md).
 """
 
 

@@ -20,7 +20,9 @@ RUBBERY = materials.Material(density=7850.0, elastic=materials.Elastic(young=10e
 
 
 def roughness(sim: Simulation) -> float:
-    """Returns the root mean square of the pressure minus its mean round each tet, over that of the pressure."""
+    """Returns the roughness of the pressure: the root mean square of the pressure minus its mean round each tet, over
+    that of the pressure.
+    """
     block_ = sim.model.blocks[0]
     tets, pressure = np.asarray(block_.tets, np.int64), block_.row(PRESSURE)
     volume, _ = formulas.gradients(sim.model.nodes.x[tets])
@@ -55,8 +57,8 @@ def noisy_wave(form: Form) -> float:
 
 
 def test_the_split_form_calms_the_checkerboard() -> None:
-    """H2: the roughness is below 5 % on a smooth field. Nodal averaging keeps the noise, and the standard form has
-    only noise."""
+    """H2: the roughness is below 5 % on a smooth field. Nodal averaging keeps the noise, and the standard form has only
+    noise."""
     standard, nodal, split = (noisy_wave(form) for form in FORMS)
     assert split < 0.03
     assert nodal > 2.0 * split
@@ -74,21 +76,21 @@ def stored(sim: Simulation) -> float:
 
 @dataclass(frozen=True)
 class Bar:
-    """Results of a Taylor bar at its end; lengths in mm."""
+    """Results of a Taylor bar at the end of the run; lengths in mm."""
 
     length: float
     radius: float
     strain: float
-    """Largest plastic strain."""
+    """Largest plastic strain of the bar."""
     residual: float
     """Worst residual of the energy balance."""
     whole: list[float]
-    """Kinetic, stored, plastic and viscous energy and the energy taken by the wall, over the initial energy, in
+    """Kinetic, stored, plastic and viscous energy and the energy taken by the wall, over the initial energy, at each
     time."""
 
 
 def taylor(form: Form, split: int = 6) -> Bar:
-    """Returns the results of V15 on a coarse mesh."""
+    """Returns the results of the bar of V15 on a coarse mesh."""
     mesh = structured(
         bodies.Cylinder(
             shape="cylinder", radius=3.2e-3, length=32.4e-3, sector="quarter", element_size=1.07e-3,
@@ -118,8 +120,8 @@ def taylor(form: Form, split: int = 6) -> Bar:
 
 @pytest.mark.parametrize(("form", "split"), [("nodal", 6), ("split", 6), ("split", 5)])
 def test_averaged_pressures_do_not_lock_and_close(form: Form, split: int) -> None:
-    """H1, H3: with 1,620 tets the shape is within a few per cent of the published shape; the balance closes to 1e-3,
-    and no energy is created."""
+    """H1, H3: with 1,620 tets the shape of the bar is within a few per cent of the published shape; the balance closes
+    to 1e-3, and no energy is created."""
     bar = taylor(form, split)
     assert bar.length == pytest.approx(21.6, abs=0.15)
     assert bar.radius == pytest.approx(7.15, abs=0.2)
@@ -130,7 +132,7 @@ def test_averaged_pressures_do_not_lock_and_close(form: Form, split: int) -> Non
 
 
 def test_the_standard_form_locks() -> None:
-    """H1, control: with its own pressure each tet is too stiff, and the foot stays narrow."""
+    """H1, control: with its own pressure each tet is too stiff, and the foot of the bar stays narrow."""
     bar = taylor("standard")
     assert bar.radius < 6.0
     assert bar.residual < 1e-3
@@ -140,9 +142,9 @@ def test_the_standard_form_locks() -> None:
 @pytest.mark.parametrize("poisson", [0.3, 0.45, 0.499])
 @pytest.mark.parametrize("form", FORMS)
 def test_forms_are_stable_at_the_whole_bound(form: Form, poisson: float) -> None:
-    """The mesh has cubes of five tets with random noise, and the step is the element bound: no energy is created in
-    400 steps. With the factor dt instead of dt/2 in the stabilisation, runs with nu = 0.45 and 0.499 diverge within
-    120 steps.
+    """The mesh has cubes of five tets with random noise, and the step is the element bound: no energy is created in 400
+    steps. With the factor dt instead of dt/2 in the stabilisation, runs with nu = 0.45 and 0.499 diverge within 120
+    steps.
     """
     cube = bodies.Box(
         shape="box", low=(0.0, 0.0, 0.0), high=(6e-3, 6e-3, 6e-3), element_size=1e-3, generator="structured", split=5
@@ -173,7 +175,7 @@ def breathing(form: Form) -> float:
 
 
 def test_the_split_form_damps_elastic_motion_and_nodal_does_not() -> None:
-    """The texts of validate, converge and the reference describe this (cases/warnings/damping.py); the value for
+    """The texts of validate, converge and the reference describe this loss (cases/warnings/damping.py); the value for
     6,400 tets is in docs/theory/elements.md."""
     assert breathing("split") > 0.08
     assert 0.0 <= breathing("nodal") < 0.03, "differences within a tet are stored, and come back"

@@ -17,7 +17,7 @@ from ..bench.press import FLYING, GLASS, measure, press
 
 @pytest.mark.slow
 def test_a_driven_pile_is_as_stiff_as_with_many_more_sweeps() -> None:
-    """With five sweeps the work is a third, so the check can fail."""
+    """With five sweeps the work of the ram is a third, so the test can fail."""
     converged, own, few = (measure(press(sweeps)).work for sweeps in (120, None, 5))
     print(converged, own, few)
     assert 0.8 < own / converged < 1.25
@@ -26,7 +26,7 @@ def test_a_driven_pile_is_as_stiff_as_with_many_more_sweeps() -> None:
 
 @pytest.mark.slow
 def test_a_flying_body_rebounds_as_with_many_more_sweeps() -> None:
-    """A ram of 200 m/s rebounds with 112 m/s, and with 40 m/s with five sweeps, so the check can fail."""
+    """A ram of 200 m/s rebounds with 112 m/s, and with 40 m/s with five sweeps, so the test can fail."""
     converged, own, few = (measure(press(sweeps, FLYING)).speed for sweeps in (80, None, 5))
     print(converged, own, few)
     assert 0.85 < own / converged < 1.15
@@ -57,7 +57,7 @@ def pen(friction: float) -> Case:
 
 
 def outcome(case: Case) -> Energy:
-    """Returns the energy balance at the end."""
+    """Returns the energy balance at the end of the run."""
     sim = simulation.build(case, Path(), SerialComm())
     step.prepare(sim)
     while True:

@@ -1,4 +1,4 @@
-"""A quarter and a half of an eroding scene agree with the whole, with any contact of debris at the planes of
+"""A quarter and a half of an eroding scene agree with the whole scene, with any contact of debris at the planes of
 symmetry."""
 
 from functools import cache
@@ -14,7 +14,7 @@ from ..bench.sectors import MM, End, case_of, run
 
 @cache
 def end(sector: str, nodes: str) -> End:
-    """Returns the results at the end; the structured meshes are mirror images of each other."""
+    """Returns the results at the end of the run; the structured meshes are mirror images of each other."""
     target = 6.25 * MM, 10.0 * MM
     case = case_of(sector, 1.25 * MM, 16e-6, 7.5 * MM, target, 0.6, nodes, generator="structured")
     return run(simulation.build(case, Path(), SerialComm()))
@@ -22,8 +22,8 @@ def end(sector: str, nodes: str) -> End:
 
 @pytest.mark.parametrize("sector", ["quarter", "half"])
 def test_a_sector_is_the_whole_while_a_rod_is_used_up(sector: str) -> None:
-    """Momentum and energy agree. In an earlier version debris stopped on the planes, which left 1.5 % more energy in
-    the quarter, and nine times as much mass near the axis as in the whole.
+    """The momentum and the energy of the three scenes agree. In an earlier version debris stopped on the planes, which
+    left 1.5 % more energy in the quarter, and nine times as much mass near the axis as in the whole.
     """
     part, whole = end(sector, "particles"), end("full", "particles")
     assert whole.near[1] > 1e-3

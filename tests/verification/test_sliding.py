@@ -1,5 +1,5 @@
-"""V19, V20, H13, H25: bodies that slide, are stacked, or are struck in a stack. Loads act from the start, so the
-bodies oscillate."""
+"""V19, V20, H13, H25: bodies that slide, are stacked, or are struck in a stack. Loads act from the start of each run,
+so the bodies oscillate."""
 
 from collections.abc import Callable
 from itertools import pairwise
@@ -35,8 +35,8 @@ def mean(sim: Simulation, part: str, values: Floats) -> Floats:
 
 
 class Watch:
-    """Values of a part in every step: time, position and velocity (3,) of its middle, impulse (3,) and energy
-    balance."""
+    """Values of a part in every step: time, position and velocity (3,) of the middle of the part, impulse (3,) and
+    energy balance."""
 
     def __init__(self, part: str) -> None:
         self.part, self.lines = part, list[Energy]()
@@ -102,8 +102,8 @@ def test_a_block_on_a_steep_incline_slides_with_what_friction_leaves() -> None:
 
 @pytest.mark.slow
 def test_a_block_on_a_gentle_incline_stays() -> None:
-    """The slope is 0.25 with mu = 0.3: the block moves by less than 1e-6 of the edge of a tet in 1000 steps, and no
-    energy is created."""
+    """The slope of the incline is 0.25 with mu = 0.3: the block moves by less than 1e-6 of the edge of a tet in 1000
+    steps, and no energy is created."""
     watch = slid(*tilted(0.25), "run.end_time=120 ms")
     _, x, _, force = watch.table
     before, after = x[-2000:-1000].mean(axis=0), x[-1000:].mean(axis=0)
@@ -124,8 +124,8 @@ SMALL_AND_FAST = [
 
 
 def heights(sim: Simulation, part: str, top: bool) -> tuple[Floats, Callable[[Floats], Floats]]:
-    """Returns (k, 3) nodes of the top or bottom of a part, and the height of this surface at points (m, 3); NaN
-    outside of it."""
+    """Returns (k, 3) nodes of the top or bottom of a part, and the height of this surface at points (m, 3); NaN outside
+    of the surface."""
     nodes = sim.model.nodes
     mine = nodes.part == sim.model.parts.index(part)
     z = np.where(mine, nodes.x0[:, 2], -np.inf if top else np.inf)
@@ -136,8 +136,8 @@ def heights(sim: Simulation, part: str, top: bool) -> tuple[Floats, Callable[[Fl
 
 @pytest.mark.parametrize("friction", [0.0, 0.3])
 def test_no_node_of_a_stack_that_is_struck_comes_to_the_far_side_of_a_plate(friction: float) -> None:
-    """A small block hits the stack beside its middle and bends the plates. Nodes of a plate penetrate its neighbours
-    by at most 2 % of their thickness, 2 mm.
+    """A small block hits the stack beside its middle and bends the plates. Nodes of a plate penetrate the neighbouring
+    plates by at most 2 % of their thickness, 2 mm.
     """
     sim = shipped("plate_stack", *SMALL_AND_FAST, f"contact.friction={friction}")
     deepest: list[float] = []

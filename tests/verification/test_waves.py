@@ -1,4 +1,4 @@
-"""V8: a standing plane P-wave between rollers; its frequency converges with the square of the element size."""
+"""V8: the frequency of a standing plane P-wave between rollers converges with the square of the element size."""
 
 import numpy as np
 import pytest
@@ -20,7 +20,8 @@ def ring(
     cells: int, form: Form = "standard", periods: float = 4.0, mirrored: bool = False
 ) -> tuple[Simulation, Floats, Floats]:
     """Runs a bar with v_z = sin(2 pi z / L) at the start; returns times, modal amplitudes of the velocity, and the
-    energy balance. ``mirrored``: the mesh is symmetric about the rollers, so that the wave is one in a wide body.
+    energy balance. If ``mirrored`` is True, the mesh is symmetric about the rollers, so that the wave is a wave in a
+    wide body.
     """
     size = LENGTH / cells
     faces = tuple(
@@ -47,8 +48,8 @@ def ring(
 
 
 def fitted(seen: Floats, first: Floats = START) -> Floats:
-    """Returns the frequency over the exact one, and the amplitude and phase of a cosine fitted to the modal
-    amplitudes; ``first``: a guess."""
+    """Returns the frequency over the exact frequency, and the amplitude and phase of a cosine fitted to the modal
+    amplitudes; ``first`` is a guess of the frequency."""
     omega = 2.0 * np.pi * SPEED / LENGTH
 
     def missed(guess: Floats) -> Floats:
@@ -74,7 +75,7 @@ def test_phase_error_falls_with_the_square_of_the_size(form: Form) -> None:
 @pytest.mark.parametrize("form", FORMS)
 def test_a_wave_of_twenty_elements_keeps_its_height(form: Form) -> None:
     """Without viscosity the amplitude does not decrease, except for the energy that the split form dissipates in its
-    pressure modes. The energy balance closes in all forms.
+    pressure modes. The energy balance closes in all pressure forms.
     """
     _, seen, energies = ring(20, form, periods=8.0, mirrored=True)
     assert -1e-5 < loss(seen) < (1.6e-3 if form == "split" else 1e-5)
@@ -82,6 +83,6 @@ def test_a_wave_of_twenty_elements_keeps_its_height(form: Form) -> None:
 
 
 def test_what_the_split_form_spends_falls_fast() -> None:
-    """The stabilisation acts on fourth differences of the pressure, over a time step: the loss is of third order in
-    the size."""
+    """The stabilisation of the split form acts on fourth differences of the pressure, over a time step: the loss is of
+    third order in the size."""
     assert_converges("split_loss", [loss(ring(cells, "split", 8.0, mirrored=True)[1]) for cells in (10, 20, 40)])

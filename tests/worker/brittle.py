@@ -1,4 +1,4 @@
-"""Glass with the Mohr-Coulomb law for the tests, its random stresses, and time steps centred on the initial mesh."""
+"""Glass with the Mohr-Coulomb law for the tests, random stresses, and time steps centred on the initial mesh."""
 
 import math
 from typing import Any
@@ -53,7 +53,9 @@ def random_deviators(n: int, random: np.random.Generator) -> Floats:
 
 
 def stretched(patch: Patch, L: Floats, dt: float = DT) -> None:
-    """Makes a step with the velocity gradient L (3, 3), 1/s; the initial mesh is the mesh in the middle of the step."""
+    """Makes a step with the velocity gradient L (3, 3), 1/s; in the middle of the step the mesh has its initial
+    positions.
+    """
     patch.nodes.x[:] = patch.sim.model.nodes.x0
     patch.strain(L, dt)
     patch.advance(dt)

@@ -1,5 +1,5 @@
-"""The formulas of the kernels in plain numpy, as a reference for the tests. Tensors are (n, 3, 3), pressure is minus
-the mean stress."""
+"""The formulas of the kernels in plain numpy, as a reference for the tests. Tensors have the shape (n, 3, 3), and the
+pressure is minus the mean stress."""
 
 import numpy as np
 import numpy.typing as npt
@@ -9,8 +9,8 @@ IDENTITY = np.eye(3)
 
 
 def volumes(corners: Floats) -> Floats:
-    """Returns the volumes (n,) of tets with the nodes ``corners`` (n, 4, 3), equal to those of the kernels to the
-    bit."""
+    """Returns the volumes (n,) of tets with the nodes ``corners`` (n, 4, 3); the volumes are equal to those of the
+    kernels to the bit."""
     e1, e2, e3 = ((corners[:, k] - corners[:, 0]).T for k in (1, 2, 3))
     sixth = 1.0 / 6.0
     bx, by = (e2[1] * e3[2] - e2[2] * e3[1]) * sixth, (e2[2] * e3[0] - e2[0] * e3[2]) * sixth
@@ -30,7 +30,7 @@ def velocity_gradient(velocities: Floats, grad: Floats) -> Floats:
 
 
 def deviator(a: Floats) -> Floats:
-    """Returns a - tr(a) / 3 I of the symmetric part of a."""
+    """Returns the deviator of the symmetric part of a, a - tr(a) / 3 I."""
     symmetric = 0.5 * (a + a.transpose(0, 2, 1))
     return np.asarray(symmetric - np.trace(symmetric, axis1=1, axis2=2)[:, None, None] / 3.0 * IDENTITY)
 
@@ -47,8 +47,8 @@ def rotated(s: Floats, L: Floats, dt: float) -> Floats:
 
 
 def stretching(L: Floats, dt: float) -> Floats:
-    """Returns the deviator of D, rotated from the middle of the step to its end by the square root R of Q. I + Q is
-    R times a symmetric positive matrix, so R is the polar rotation of I + Q.
+    """Returns the deviator of D, rotated from the middle of the step to the end of the step by the square root R of Q.
+    I + Q is R times a symmetric positive matrix, so R is the polar rotation of I + Q.
     """
     u, _, v = np.linalg.svd(IDENTITY + cayley(0.5 * (L - L.transpose(0, 2, 1)), dt))
     return np.asarray((u @ v) @ deviator(L) @ (u @ v).transpose(0, 2, 1))

@@ -15,8 +15,8 @@ FILE = {"shape": "file", "path": "joint.inp", "unit": "1 mm"}
 
 
 def halves(whole: TetMesh, second: "np.ndarray") -> list[TetMesh]:
-    """Returns two parts of one mesh in the form of a mesh reader: first the tets that are not ``second`` (m,), then
-    the tets that are.
+    """Returns two parts of one mesh in the form of a mesh reader: first the tets that are not in ``second`` (m,), then
+    the tets in ``second``.
     """
     made = []
     for chosen in (~second, second):
@@ -26,8 +26,8 @@ def halves(whole: TetMesh, second: "np.ndarray") -> list[TetMesh]:
 
 
 def bar(cells: tuple[int, int, int], size: float, at: float, shake: float = 0.1) -> tuple[TetMesh, list[TetMesh]]:
-    """Returns a bar along z as one mesh, whose tets are in the order of its two halves, and as the halves below and
-    above ``at``. ``at`` is a plane of nodes.
+    """Returns a bar along z twice: as one mesh, whose tets are in the order of its two halves, and as the halves below
+    and above ``at``. The coordinate ``at`` is that of a plane of nodes.
     """
     mesh = block(cells, size, shake)
     points = mesh.points.copy()
@@ -43,8 +43,8 @@ def bar(cells: tuple[int, int, int], size: float, at: float, shake: float = 0.1)
 
 
 def joint(materials: tuple[str, str], bond: dict[str, Any] | None = None, **keys: Any) -> Case:
-    """Returns a case of two parts ``lower`` and ``upper`` from files, joined by a bond; ``keys`` of the case,
-    ``own`` materials; ``lower``, ``upper``: keys of the parts.
+    """Returns a case of two parts ``lower`` and ``upper`` from files, joined by a bond. The arguments are ``keys`` of
+    the case, ``own`` materials, and keys of the parts ``lower`` and ``upper``.
     """
     own = keys.pop("own", {})
     parts = [

@@ -68,7 +68,7 @@ DUMMY = bodies.Box(shape="box", low=(0.0, 0.0, 0.0), high=(1.0, 1.0, 1.0), eleme
 
 
 def scene(material: materials.Material = STEEL, form: Form = "standard", end: float = 1.0, **keys: Any) -> schema.Case:
-    """Returns a case of one part ``body``, without viscosity; ``keys``: keys of the part, of ``numerics`` or of the
+    """Returns a case of one part ``body`` without viscosity; ``keys`` are keys of the part, of ``numerics`` or of the
     case."""
     own = ("velocity", "spin", "stretch", "jitter", "temperature", "erosion")
     of_part = {key: keys.pop(key) for key in own if key in keys}
@@ -83,7 +83,7 @@ def scene(material: materials.Material = STEEL, form: Form = "standard", end: fl
 
 
 def build(case: schema.Case, meshes: Iterable[TetMesh]) -> Simulation:
-    """Returns the simulation of a case whose parts have these meshes, on one rank; ``simulations.on`` uses several
+    """Returns the simulation on one rank of a case whose parts have the given meshes; ``simulations.on`` uses several
     ranks."""
     ready = iter(meshes)
     with patch.object(assembly, "build_mesh", lambda *_, **__: next(ready)):
@@ -97,7 +97,7 @@ def whole_of(mesh: TetMesh, case: schema.Case | None = None) -> assembly.Whole:
 
 
 def pieces_of(pieces: list[domain.Piece], case: schema.Case | None = None) -> list[tuple[domain.Piece, state.Model]]:
-    """Returns each piece of the cut with the model that its rank makes of the piece."""
+    """Returns each piece of the cut mesh with the model that its rank makes of the piece."""
     return [(piece, domain._model(case or scene(), piece)) for piece in pieces]
 
 
@@ -118,11 +118,11 @@ class Patch:
         self.block = self.sim.model.blocks[0]
         self.tets = np.asarray(self.block.tets, np.int64)
         self.scale = scale
-        """``quanta`` per newton; 0: chosen for the present forces, as in a run."""
+        """Number of quanta of ``quanta`` per newton; 0 chooses the quantum for the present forces, as in a run."""
 
     def advance(self, dt: float) -> None:
-        """Makes one pass over the tets: ``nodes`` contain x(n+1) and v(n+1/2); afterwards stress and forces are at
-        n+1."""
+        """Makes one pass over the tets. Before the pass, ``nodes`` contain x(n+1) and v(n+1/2); after the pass, stress
+        and forces are at n+1."""
         if self.block.params[law.ORDER] == law.FROM_SHAPE:
             self.put(rows.TET_VOLUME, formulas.volumes(self.corners(self.nodes.x - dt * self.nodes.v)))
         self._used = self.scale or self.sim.next_scale()
@@ -136,13 +136,13 @@ class Patch:
             self.elements.finish()
 
     def corners(self, values: Floats | None = None) -> Floats:
-        """Returns (n, 4, 3) nodal values of the tets (by default positions)."""
+        """Returns (n, 4, 3) nodal values of the tets, by default positions."""
         return np.asarray((self.nodes.x if values is None else values)[self.tets])
 
     def strain(self, L: Floats, dt: float) -> None:
         """Deforms free tets with velocity gradients L, (3, 3) or (n, 3, 3), 1/s, about the origin. The present
-        positions are used as those of the middle of the step; the positions of the end of the step, ``dt`` s, are
-        set.
+        positions count as the positions in the middle of the step; the function sets the positions at the end of the
+        step, ``dt`` s.
         """
         middle = self.corners()
         self.nodes.v[self.tets] = np.einsum("ij,naj->nai" if L.ndim == 2 else "nij,naj->nai", L, middle)
@@ -222,7 +222,9 @@ def around(boundary: Boundary, look: Callable[[Floats, Floats], None]) -> None:
 
 
 def run(sim: Simulation, watch: Watch | None = None, steps: int = -1) -> Simulation:
-    """Makes steps to the end time, or ``steps`` steps; ``watch`` is called at each time n with v(n-1/2)."""
+    """Makes steps to the end time, or ``steps`` steps; the function ``watch`` is called at each time n with
+    v(n-1/2).
+    """
     step.prepare(sim)
     while True:
         before = sim.model.nodes.v.copy()

@@ -18,10 +18,10 @@ REGULAR = np.array(
 def block(
     cells: tuple[int, int, int], size: float = 1.0, shake: float = 0.2, seed: int = 1, mirrored: bool = False
 ) -> TetMesh:
-    """Returns a block of cubes of edge ``size``, m, each cut into six tets, whose nodes are moved by up to ``shake``
-    of the edge. Nodes on a face of the block stay in its plane, so that the block keeps its shape. ``mirrored``:
-    every cube is cut as the mirror image of its neighbours; the block is then symmetric about its planes of
-    symmetry.
+    """Returns a block of cubes of edge ``size``, m, each cut into six tets. The nodes are moved by up to ``shake`` of
+    the edge. Nodes on a face of the block stay in the plane of the face, so that the block keeps its shape. With
+    ``mirrored`` every cube is cut as the mirror image of its neighbours; the block is then symmetric about its planes
+    of symmetry.
     """
     steps = [np.arange(n + 1) for n in cells]
     grid = np.stack(np.meshgrid(*steps, indexing="ij"), axis=-1).reshape(-1, 3).astype(float)
@@ -48,7 +48,7 @@ def ring(radial: int, around: int, inner: float, outer: float, width: float) -> 
 
 
 def _paths(ways: npt.NDArray[np.int64]) -> list[npt.NDArray[np.int64]]:
-    """Returns (cubes, 4) six paths from the first corner of a cube to the opposite corner; ``ways`` (cubes, 3):
+    """Returns (cubes, 4) six paths from the first corner of a cube to the opposite corner; ``ways`` (cubes, 3) are the
     strides of the edges of the cube."""
     start, end = np.zeros(len(ways), np.int64), ways.sum(axis=1)
     return [
@@ -67,9 +67,9 @@ def positive(points: Floats, tets: npt.NDArray[np.integer]) -> npt.NDArray[np.in
 
 
 def free_tets(n: int, seed: int, flattest: float = 0.05) -> TetMesh:
-    """Returns ``n`` tets without common nodes, with edges from 0.1 to 10 mm in random directions and a flatness of
-    at least ``flattest``. Flatness is the volume over that of a regular tet with the same root mean square of the
-    edges.
+    """Returns ``n`` tets without common nodes, with edges from 0.1 to 10 mm in random directions and a flatness of at
+    least ``flattest``. Flatness is the volume of a tet over the volume of a regular tet with the same root mean square
+    of the edges.
     """
     random = np.random.default_rng(seed)
     kept: list[Floats] = []

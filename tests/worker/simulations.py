@@ -33,7 +33,7 @@ def wear_out(sim: Simulation, gone: "np.ndarray") -> None:
 
 
 def tick(sim: Simulation, gone: "np.ndarray | None" = None) -> float:
-    """Makes a step that begins with the removal of these tets; returns its residual."""
+    """Makes a step that begins with the removal of the given tets; returns the energy residual of the step."""
     if gone is not None:
         wear_out(sim, gone)
     before = sim.model.nodes.v.copy()
@@ -44,7 +44,7 @@ def tick(sim: Simulation, gone: "np.ndarray | None" = None) -> float:
 
 
 def on(ranks: int, case: schema.Case, meshes: Sequence[TetMesh], work: Callable[[Simulation], T]) -> list[T]:
-    """Return the result of ``work`` on the simulation of each rank."""
+    """Returns the result of ``work`` on the simulation of each rank."""
     ready = iter(meshes)
     with patch.object(assembly, "build_mesh", lambda *_, **__: next(ready)):
         return on_ranks(ranks, lambda comm: work(simulation.build(case, Path(), comm)))

@@ -1,5 +1,5 @@
 """Barrier pressure that prevents the collapse of a tet in the averaged pressure forms, and scenes in which tets were
-crushed without it."""
+crushed without the barrier."""
 
 from itertools import pairwise
 from pathlib import Path
@@ -24,7 +24,7 @@ DT = 1e-8
 
 @pytest.mark.parametrize("material", [STEEL, HARD])
 def test_it_is_a_potential_of_the_own_volume(material: object) -> None:
-    """A tet is compressed to 8 % of its volume and released: the pressure agrees with its formula, and the work with
+    """A tet is compressed to 8 % of its volume and released. The pressure agrees with its formula, and the work with
     the integral of the pressure."""
     mesh = free_tets(1, 3)
     patch = Patch(mesh, material, "nodal")  # type: ignore[arg-type]
@@ -50,7 +50,7 @@ def test_it_is_a_potential_of_the_own_volume(material: object) -> None:
 
 def test_a_plate_that_meets_another_is_not_crushed_at_its_edge() -> None:
     """Plates of copper collide at 1.5 km/s each with `nodal`. Without the barrier the volume of a tet in the contact
-    plane became zero at 2.18 us, and with it the time step.
+    plane, and thus the time step, became zero at 2.18 us.
     """
     bodies = {"upper": (0.01, 2.01, -1500.0), "lower": (-3.0, 0.0, 1500.0)}
     plates = [

@@ -1,5 +1,5 @@
-"""Walls, planes of symmetry, prescribed motions, gravity and tractions: their effect on velocities, and the booking
-of their work."""
+"""Walls, planes of symmetry, prescribed motions, gravity and tractions: the effect on velocities, and the booking of
+the work."""
 
 import math
 from pathlib import Path
@@ -92,8 +92,8 @@ def test_no_node_ends_behind_the_wall(gap: float) -> None:
 @pytest.mark.parametrize("gap", [1e-5, 0.0])
 @pytest.mark.parametrize("name", ["floor", None])
 def test_the_force_of_walls_is_what_changes_the_momentum(name: str | None, gap: float) -> None:
-    """The force of one of two walls, and of both walls, times time, summed over all lines of the history, is the
-    change of momentum, with and without contact at the start."""
+    """The force of one of two walls, and of both walls, times time, summed over all lines of the history, is the change
+    of momentum. The bodies touch the walls at the start or touch them later."""
     walls = [
         {**wall(gap), "name": "floor"},
         {"kind": "wall", "name": "x", "point": (-gap, 0, 0), "normal": (1, 0, 0)},
@@ -120,8 +120,8 @@ def test_the_force_of_walls_is_what_changes_the_momentum(name: str | None, gap: 
 
 
 def test_the_wall_pushes_only() -> None:
-    """Each impulse acts along the normal and away from the wall. Where no node would pass the wall, all velocities
-    are unchanged to the bit."""
+    """Each impulse of the wall acts along the normal and away from the wall. Where no node would pass the wall, all
+    velocities are unchanged to the bit."""
     n = np.array(TILTED) / np.linalg.norm(TILTED)
     sim = with_boundary(wall(1e-5), velocity=tuple((-100.0 * n).tolist()))
     pushes = []
@@ -139,8 +139,8 @@ def test_the_wall_pushes_only() -> None:
 
 
 def test_impulses_of_the_wall_are_booked() -> None:
-    """A cube hits a wall. The booked work is impulse times mean velocity, summed over steps and nodes; for the last
-    impulse only the half with the velocity before it is booked.
+    """In this test a cube hits a wall. The booked work is the impulse times the mean velocity, summed over steps and
+    nodes; for the last impulse only the half with the velocity before the impulse is booked.
     """
     sim = with_boundary(wall(2e-6, (0.0, 0.0, 1.0)), end=3e-7, velocity=(0.0, 0.0, -100.0))
     impulses: list[Floats] = []
@@ -191,7 +191,7 @@ def test_nodes_on_a_symmetry_plane_stay_on_it(axis: str, at: float) -> None:
 
 
 def test_a_body_through_a_symmetry_plane_is_refused() -> None:
-    """The body would overlap its own mirror image."""
+    """The body of this case would overlap its own mirror image."""
     even = block((2, 2, 2), 1e-3)
     for at in (0.4e-3, 1.3e-3):
         message = (
@@ -221,7 +221,9 @@ def test_motion_across_a_symmetry_plane_is_refused(drive: dict[str, Any]) -> Non
 
 
 def test_a_body_may_fly_at_a_symmetry_plane() -> None:
-    """No node starts on the plane, which gives a warning. Nodes that reach the plane are reflected."""
+    """No node starts on the plane of symmetry, which gives a warning. Nodes that reach the plane of symmetry are
+    reflected.
+    """
     plane = {"kind": "symmetry", "axis": "z", "at": -1e-5}
     sim = with_boundary(plane, velocity=(0.0, 0.0, -100.0), end=1.5e-6)
     assert sim.warnings[-1] == (
@@ -242,9 +244,9 @@ def test_motion_that_a_symmetry_plane_stops_at_the_start_is_reported() -> None:
 
 @pytest.mark.parametrize("order", [1, -1], ids=["plane first", "wall first"])
 def test_a_wall_across_a_symmetry_plane_pushes_along_it(order: int) -> None:
-    """Half a block falls on a wall whose normal is at 37 degrees to the plane of symmetry. Its nodes stay on the
-    plane and in front of the wall, and the energy balance closes. Without the plane the same wall moves the nodes
-    away from it.
+    """Half a block falls on a wall whose normal is at 37 degrees to the plane of symmetry. The nodes of the half block
+    stay on the plane and in front of the wall, and the energy balance closes. Without the plane of symmetry the same
+    wall moves the nodes away from this plane.
     """
     slope = math.radians(37.0)
     low = MESH.points.min(axis=0)
@@ -266,8 +268,8 @@ def test_a_wall_across_a_symmetry_plane_pushes_along_it(order: int) -> None:
 
 
 def test_a_wall_along_a_symmetry_plane_cannot_push_what_is_on_it() -> None:
-    """The plane of symmetry holds the nodes. Their velocities along the plane agree to the bit with those that the
-    forces give."""
+    """The plane of symmetry holds the nodes on the plane. The velocities of the nodes along the plane agree to the bit
+    with the velocities that the forces give."""
     bounds = ({"kind": "symmetry", "axis": "z", "at": 0.0}, wall(0.0, (0.0, 0.0, 1.0)))
     sims = [build(scene(STEEL, end=1e-6, velocity=(3.0, 0.0, 9.0), boundaries=bounds[:n]), [MESH]) for n in (1, 2)]
     for sim in sims:
@@ -276,8 +278,8 @@ def test_a_wall_along_a_symmetry_plane_cannot_push_what_is_on_it() -> None:
 
 
 def test_prescribed_velocity_and_its_work() -> None:
-    """One end of a block is pulled. Prescribed velocity components are equal to the given values to the bit, the
-    other components are free, and the work is in the external energy."""
+    """In this test one end of a block is pulled. Prescribed velocity components are equal to the given values to the
+    bit, the other components are free, and the work is in the external energy."""
     spec = {"kind": "velocity", "low": (0.0, 0.0, 2.9e-3), "high": (1.0, 1.0, 1.0), "z": 20.0}
     sim = with_boundary(spec, end=1e-5)
     top = MESH.points[:, 2] > 2.9e-3
@@ -396,8 +398,8 @@ def test_the_ledger_of_a_free_fall_closes_to_round_off() -> None:
     ids=["plane", "prescribed"],
 )  # fmt: skip
 def test_gravity_does_not_move_what_is_held(hold: dict[str, Any], rows: Flags, axes: list[int]) -> None:
-    """The result does not depend on the order of the two boundaries in the case, and the energy balance closes with
-    the work of both."""
+    """The result does not depend on the order of the two boundaries in the case, and the energy balance closes with the
+    work of both boundaries."""
     sim = build(scene(STEEL, end=5e-6, boundaries=(hold, GRAVITY)), [MESH])
     held = [hold.get("xyz"[axis], 0.0) for axis in axes]
 
@@ -483,8 +485,8 @@ def test_a_traction_without_a_face_is_refused() -> None:
 
 @pytest.mark.parametrize("ranks", [1, 3])
 def test_a_traction_leaves_with_the_tets_of_its_faces(ranks: int) -> None:
-    """Nodes of removed tets get no force of the traction any more. With a remaining force these nodes would be
-    accelerated without limit, because their mass is tiny.
+    """Nodes of removed tets get no force from the traction. With such a force these nodes would be accelerated without
+    limit, because their mass is tiny.
     """
     top = {frozenset(face.tolist()) for face in boundary_faces(MESH.tets) if (MESH.points[face][:, 2] > 2.9e-3).all()}
     loaded = {e: [c for c in top if c <= set(tet.tolist())] for e, tet in enumerate(MESH.tets)}
@@ -507,8 +509,7 @@ def test_a_traction_leaves_with_the_tets_of_its_faces(ranks: int) -> None:
 
 
 def test_a_cylinder_and_a_box_have_what_is_in_both() -> None:
-    """The selection is the top of the cube, and of these faces only those with all nodes within 1.5 mm of a line
-    through a corner."""
+    """The selection contains the faces on top of the cube with all nodes within 1.5 mm of a line through a corner."""
     near = {"cylinder": {"base": (3e-3, 3e-3, 0.0), "radius": 1.5e-3}}
     load = pushed(with_boundary({**PULL, **TOP, **near}))
     x, y, z = MESH.points.T
@@ -521,8 +522,8 @@ def test_a_cylinder_and_a_box_have_what_is_in_both() -> None:
 
 
 def test_a_free_body_under_traction_is_accelerated_exactly() -> None:
-    """The positions x(n) and velocities v(n+1/2) of the centre of mass are exact for steps of any size, and the work of
-    the traction closes the energy balance.
+    """The positions x(n) and velocities v(n+1/2) of the centre of mass are exact for steps of any size, and the energy
+    balance closes with the work of the traction.
     """
     sim = with_boundary({**PULL, **TOP}, end=3e-6, velocity=(3.0, 0.0, -5.0), dt_growth=2.0)
     nodes, flight = sim.model.nodes, np.array([3.0, 0.0, -5.0])
@@ -559,8 +560,8 @@ def ramped(t: float) -> tuple[float, float]:
 
 @pytest.mark.parametrize("steps", ["even", "uneven"])
 def test_a_velocity_over_time_leads_nodes_along_its_integral(steps: str) -> None:
-    """The positions at every n are exact for steps of any size, and the energy balance closes except for the energy of
-    unequal steps.
+    """The positions at every time level n are exact for steps of any size, and the energy balance closes except for the
+    energy of unequal steps.
     """
     spec = {"kind": "velocity", "low": (0.0, 0.0, 2.9e-3), "high": (1.0, 1.0, 1.0), "z": 7.0, "course": RAMP}
     sim = build(scene(STEEL, end=3e-6, boundaries=(spec,), dt_growth=2.0), [MESH])
@@ -590,8 +591,8 @@ def test_a_traction_over_time_gives_its_integral_as_impulse() -> None:
 
 
 def test_a_pressure_pushes_against_the_faces() -> None:
-    """On the whole surface the sum of the forces is zero, and each node gets a third of the force of each of its
-    faces, against their normals."""
+    """The sum of the forces on the whole surface is zero, and each node gets a third of the force on each of its faces,
+    against the normals of the faces."""
     assert np.abs(pushed(with_boundary({"kind": "traction", "pressure": 1e8})).force.sum(axis=0)).max() < 1e-8
     load = pushed(with_boundary({"kind": "traction", "pressure": 1e8, **TOP}))
     assert load.force.sum(axis=0) == pytest.approx([0.0, 0.0, -900.0], abs=1e-9)
@@ -607,7 +608,7 @@ def pulled(length: float, end: float, **keys: Any) -> Simulation:
 
 
 def test_a_bar_carries_the_traction_at_its_end() -> None:
-    """The bar is damped until it is at rest: the stress in every tet is then the traction."""
+    """The bar is damped until it is at rest: at rest the stress in every tet is equal to the traction."""
     sim = pulled(4e-3, 1e-4, viscosity={"linear": 1.0})
     run(sim)
     stress = sim.model.blocks[0].row(S_ZZ) - sim.model.blocks[0].row(PRESSURE)
@@ -644,8 +645,8 @@ def test_gravity_acts_on_its_parts_only() -> None:
 
 
 def test_a_body_on_a_wall_carries_its_weight() -> None:
-    """The block is damped until it is at rest: the stress in the middle of each layer of tets is then the weight
-    above it per area."""
+    """The block is damped until it is at rest: at rest the stress in the middle of each layer of tets is the weight
+    above this layer per area."""
     down = {"kind": "gravity", "acceleration": (0.0, 0.0, -1e6)}
     boundaries = (
         wall(0.0, (0.0, 0.0, 1.0)),

@@ -11,7 +11,7 @@ from conoid.worker.clock import Clock
 
 
 def steps_of(clock: Clock, limits: list[float]) -> list[tuple[float, float, bool]]:
-    """Run the clock to its end in the same way as the loop; return the time, the next step and whether a frame is
+    """Runs the clock to its end in the same way as the loop; returns the time, the next step and whether a frame is
     scheduled, at each n.
     """
     seen = []
@@ -76,7 +76,7 @@ def test_steps_to_an_output_time_are_equal_and_as_few_as_are_stable() -> None:
 
 
 def test_time_is_compensated_over_a_million_steps() -> None:
-    """After a million unequal steps the time is the exact sum of the steps to its last bits; a plain sum has larger
+    """After a million unequal steps the time is the exact sum of the steps to the last bits; a plain sum has larger
     errors."""
     random = np.random.default_rng(1)
     limits = (1e7 * random.uniform(0.5, 2.0, 997)).tolist()

@@ -1,4 +1,4 @@
-"""Columns of a table: new rows have the values of their rules, in spare rows, in objects that may be replaced."""
+"""Columns of a table: new rows get values by the rules of the columns, in spare rows of arrays that may be replaced."""
 
 from types import SimpleNamespace
 

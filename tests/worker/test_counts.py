@@ -57,7 +57,7 @@ def clock(monkeypatch: pytest.MonkeyPatch) -> Clock:
 
 
 def breaking(clock: Clock, cost: float) -> Any:
-    """Return the parts of a simulation that the counter reads; a search of fragments takes ``cost``, s."""
+    """Returns the parts of a simulation that the counter reads; a search of fragments takes ``cost``, s."""
     model = SimpleNamespace(elements_global=10, nodes_global=5, parts=["one"], blocks=[], nodes=None)
 
     def look() -> None:

@@ -63,7 +63,7 @@ def test_the_return_of_random_states(dt: float) -> None:
 
 
 def solved(over: Floats, static: Floats, material: tuple[float, float, float], fast: float) -> tuple[Floats, int]:
-    """Returns the increments of the kernel, and its number of iterations; ``material``: G, H and q."""
+    """Returns the increments of the kernel, and the number of iterations; ``material`` has G, H and q."""
     w, params, n = np.zeros(SCRATCH), np.zeros(SIZE), len(over)
     w[OVER : OVER + n], w[STATIC : STATIC + n] = over, static
     params[SHEAR], params[FIRST], params[FIRST + 2] = material
@@ -72,7 +72,9 @@ def solved(over: Floats, static: Floats, material: tuple[float, float, float], f
 
 @pytest.mark.parametrize("q", [1.0, 4.0, 5.0, 20.0, 100.0])
 def test_increments_of_any_constants_equal_halved_brackets(q: float) -> None:
-    """Overstress from 1e-12 to 1e3 of the strength, D dt from 1e-14 to 1e3, hardening 0 or 1e-6 to 100 times G."""
+    """The overstress is 1e-12 to 1e3 of the strength, D dt is 1e-14 to 1e3, and the hardening is 0 or 1e-6 to 100 times
+    G.
+    """
     random, most = np.random.default_rng(int(q)), 0
     for _ in range(200):
         static, shear = 10.0 ** random.uniform(6.0, 10.0, CHUNK), 10.0 ** random.uniform(9.0, 11.5)
@@ -104,8 +106,8 @@ def test_a_step_without_time_does_not_flow() -> None:
 
 @pytest.mark.parametrize("rate", [1.0, 40.4, 1e4])
 def test_steady_flow_has_the_flow_stress_of_the_formula(rate: float) -> None:
-    """In isochoric tension at a constant rate the plastic rate is rate - (d sigma/dt) / 3 G. At the rate D the
-    stress is twice that of slow flow.
+    """In isochoric tension at a constant rate the plastic rate is rate - (d sigma/dt) / 3 G. At the rate D the stress
+    is twice the stress of slow flow.
     """
     point = drive(MILD_STEEL, np.diag([1.0, -0.5, -0.5]) * rate, 0.1 / rate / 2000, 2000)
     strain, stress = point.get(PLASTIC_STRAIN), formulas.mises(point.deviator)

@@ -28,7 +28,7 @@ DEVIATOR = (S_XX, S_YY, S_ZZ, S_YZ, S_ZX, S_XY)
 
 
 def chunks(stress: Floats) -> Floats:
-    """Returns the state of tets with these stresses (n, 3, 3), Pa, positive in tension."""
+    """Returns the state of tets with the given stresses (n, 3, 3), Pa, positive in tension."""
     n, s = len(stress), formulas.deviator(stress)
     state = np.zeros((-(-n // CHUNK), PRESSURE + 1, CHUNK))
     rows = [s[:, 0, 0], s[:, 1, 1], s[:, 2, 2], s[:, 1, 2], s[:, 2, 0], s[:, 0, 1]]
@@ -56,7 +56,9 @@ def beyond(stress: Floats) -> Floats:
 
 
 def test_principal_pressures_are_those_of_numpy() -> None:
-    """The tolerance for two equal principal values is the square root of round-off, because they are a double root."""
+    """The tolerance for two equal principal values is the square root of round-off, because equal values are a double
+    root.
+    """
     stress = stresses(2000)
     state, known = chunks(stress), -np.linalg.eigvalsh(stress)
     found = np.array([principal(state[i // CHUNK].reshape(-1), i % CHUNK) for i in range(len(stress))])
@@ -68,7 +70,7 @@ def test_no_stress_has_none() -> None:
 
 
 def test_the_hardest_is_that_of_all_tets() -> None:
-    """The bounds exclude no tet that has the largest value, for any largest value so far and any position of this
+    """The bounds do not exclude the tet with the largest value, for any largest value so far and any position of this
     tet."""
     stress = stresses(1500)
     for last in (1500, 700, 300, 40, 5, 1):
@@ -87,7 +89,9 @@ def test_of_equal_tets_the_smallest_id_is_named() -> None:
 
 
 def test_a_plane_wave_and_a_bar_reach_the_criterion_at_the_warned_strength() -> None:
-    """The value is griffith() in a plane wave, from which on ``conoid validate`` gives a warning, and 8 T in a bar."""
+    """In a plane wave the value is griffith(), from which on ``conoid validate`` gives a warning; in a bar the
+    criterion is 1 at 8 T.
+    """
     k = 0.22 / 0.78
     wave = griffith(BRITTLE) * np.diag([-1.0, -k, -k])
     bar = 8.0 * STRENGTH * np.diag([-1.0, 0.0, 0.0])
@@ -99,7 +103,7 @@ def test_a_plane_wave_and_a_bar_reach_the_criterion_at_the_warned_strength() -> 
     ([1e9, 1e9, 1e9], 0.0), ([3e9, 1e9, 0.0], 0.0), ([-1e9, -1e9, -1e9], 0.0), ([5e9, -8e8, 0.0], 1e8 / STRENGTH),
 ])  # fmt: skip
 def test_tension_and_equal_pressures_crush_nothing(stress: list[float], times: float) -> None:
-    """Tension in another direction than the pressure has no effect, because the tensile law covers it."""
+    """Tension in another direction than the pressure has no effect, because the tensile law covers this tension."""
     assert hardest(chunks(np.diag(stress)[None]), np.arange(1), 1, STRENGTH, 0.0, 0, 1)[1] == pytest.approx(
         times, abs=1e-9
     )
@@ -112,7 +116,7 @@ STEPS = 12
 
 
 def met(sim: Simulation, steps: int = STEPS) -> list[Compressed]:
-    """Returns the largest values after the given number of steps."""
+    """Returns the largest values of the criterion after the given number of steps."""
     if sim.clock.step == 0:
         step.prepare(sim)
     assert sim.crushing is not None
@@ -124,13 +128,15 @@ def met(sim: Simulation, steps: int = STEPS) -> list[Compressed]:
 
 @pytest.fixture(scope="module")
 def alone() -> Compressed:
-    """Return the result of one rank."""
+    """Returns the result of one rank."""
     ((found,),) = on(1, CASE, [MESH], met)
     return found
 
 
 def test_a_body_that_hits_a_wall_has_the_stress_of_the_wave(alone: Compressed) -> None:
-    """In front of the wall the stress is density times wave speed times speed, 5.4 GPa; a coarse mesh overshoots."""
+    """In front of the wall the stress is density times wave speed times impact speed, 5.4 GPa; a coarse mesh
+    overshoots.
+    """
     wave = 2500.0 * 400.0 * (72e9 * 0.78 / (1.22 * 0.56) / 2500.0) ** 0.5
     assert 0.9 * wave < alone.most < 1.5 * wave
     assert alone.x < 2e-3
@@ -148,7 +154,7 @@ def test_several_ranks_print_the_output_of_one_rank(ranks: int, alone: Compresse
 
 
 def test_a_resumed_run_restores_its_state(tmp_path: Path, alone: Compressed) -> None:
-    """The restarted run reports the largest value also if it occurred before the checkpoint."""
+    """The restarted run also reports the largest value if this value occurred before the checkpoint."""
 
     def work(sim: Simulation) -> list[Compressed]:
         met(sim, STEPS)

@@ -1,4 +1,4 @@
-"""Contact of nodes without tets with the part to which their tets belonged."""
+"""Contact of nodes without tets with the part to which their removed tets belonged."""
 
 from typing import Any
 
@@ -24,8 +24,8 @@ EROSION = schema.Erosion()
 def fallen(
     contact: dict[str, Any], until: float = 7e-6, erosion: schema.Erosion = EROSION
 ) -> tuple[Simulation, int]:  # fmt: skip
-    """Returns a simulation of a block of 4 x 4 x 4 mm whose upper middle node has lost its tets and moves down and
-    to the side, and this node."""
+    """Returns a simulation of a block of 4 x 4 x 4 mm and a node. The node is the upper middle node of the block, which
+    has lost its tets and moves down and to the side."""
     beside = moved(block((1, 1, 1), MM), (9 * MM, 0.0, 0.0))
     case = meeting_of([{"erosion": erosion}, {}], contact, material=STEEL)
     sim = build(case, [block((4, 4, 4), MM, shake=0.0), beside])
@@ -55,8 +55,8 @@ def test_a_node_without_tets_stays_outside_of_the_part_that_it_comes_from() -> N
     ids=["in flight", "after it has struck", "for ever"],
 )
 def test_a_node_without_tets_leaves_after_it_has_struck(nodes: Any, until: float, leaves: bool) -> None:
-    """The slope that the node hits gets most of its momentum. The rest, along the slope, is booked when the node is
-    removed."""
+    """The slope that the node hits gets most of the momentum of the node. The rest of the momentum, along the slope, is
+    booked when the node is removed."""
     sim, node = fallen({}, until, schema.Erosion(nodes=nodes))
     state, erosion = sim.model.nodes, sim.erosion
     assert erosion is not None

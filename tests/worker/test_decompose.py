@@ -24,7 +24,7 @@ def cloud(n: int, seed: int) -> Floats:
 
 @pytest.mark.parametrize("parts", PARTS)
 def test_equal_weights_are_shared_evenly(parts: int) -> None:
-    """Each cut has an error below the weight of one point, so a part has an error below two."""
+    """Each cut has an error below the weight of one point, so a part has an error below the weight of two points."""
     owner = bisect(cloud(1000, 1), np.ones(1000), parts)
     counts = np.bincount(owner, minlength=parts)
     assert len(counts) == parts
@@ -104,16 +104,16 @@ def test_directions_are_unit_normals_that_differ() -> None:
 
 
 def nosed(n: int, tip: float) -> tuple[Floats, Floats]:
-    """Returns a bar along z; each point has the weight 1 in the first phase, and a weight of 3 in the second phase
-    below ``tip`` times x."""
+    """Returns a bar along z. Each point has the weight 1 in the first phase; in the second phase points below ``tip``
+    times x have the weight 3."""
     points = np.random.default_rng(12).uniform(size=(n, 3)) * [1.0, 1.0, 3.0]
     return points, np.column_stack([np.ones(n), 3.0 * (points[:, 2] < 1.0 + tip * (points[:, 0] - 0.5))])
 
 
 @pytest.mark.parametrize("parts", [2, 3, 4])
 def test_every_phase_is_shared_evenly(parts: int) -> None:
-    """The weight of one phase is at one end, as that of contact: a cut normal to the axis would give all of it to
-    one part."""
+    """The weight of one phase is at one end of the bar, like the weight of contact: a cut normal to the axis would give
+    all of this weight to one part."""
     points, weights = nosed(20_000, 0.5)
     owner, _ = decompose.bisect(points, np.arange(len(points)), weights, parts, SerialComm())
     shares = np.array([np.bincount(owner, w, parts) for w in weights.T])

@@ -13,8 +13,8 @@ from .meshes import block
 
 
 class Strict(SerialComm):
-    """Communicator that accepts only what the interface allows: a maximum is over float64. With other types MPI
-    would mix up the bits."""
+    """Communicator that accepts only types that the interface allows: the type of a maximum is float64. With other
+    types MPI would misread the bit patterns."""
 
     def maximum(self, values: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
         assert values.dtype == np.float64

@@ -29,8 +29,8 @@ def glass(psi: float, **keys: float) -> materials.Material:
 
 def multipliers(flow: Floats, apart: "np.ndarray", psi: float) -> Floats:
     """Returns (n, 2) the amounts of flow of two mechanisms in each plastic strain (n, 3), sorted with the largest
-    first. The mechanisms are (1 + sin psi, 0, sin psi - 1) and the mechanism on the other side of the edge of the
-    yield surface on which the stress is, ``apart`` (n, 2).
+    amount first. One mechanism is (1 + sin psi, 0, sin psi - 1). The other mechanism is on the other side of the edge
+    of the yield surface on which the stress is, ``apart`` (n, 2).
     """
     s = math.sin(psi)
     one, low, high = np.array([[1 + s, 0, s - 1], [0, 1 + s, s - 1], [1 + s, s - 1, 0]])
@@ -46,8 +46,8 @@ def multipliers(flow: Floats, apart: "np.ndarray", psi: float) -> Floats:
 
 @pytest.mark.parametrize("psi", ANGLES)
 def test_a_return_is_on_the_surface_by_flow_along_the_potential(psi: float) -> None:
-    """Returns to the plane and to the edges have positive amounts of flow, for stresses of 0.2 to 200 times the
-    strength."""
+    """Returns to the plane and to the edges of the yield surface have positive amounts of flow, for stresses of 0.2 to
+    200 times the strength."""
     n, random = 4_000, np.random.default_rng(7)
     trial = random_deviators(n, random)
     q = formulas.mises(trial)
@@ -82,10 +82,10 @@ def elastic_work(patch: Patch, form: Form) -> Floats:
 @pytest.mark.parametrize("form", FORMS)
 @pytest.mark.parametrize("psi", ANGLES)
 def test_the_triaxial_path(form: Form, psi: float) -> None:
-    """A block under the lateral pressure s is shortened along z. The block is elastic up to the stress f + s (1 + sin
-    phi) / (1 - sin phi). After that no stress changes if the volume grows by 2 sin psi / (1 - sin psi) of the
-    shortening, half of it on each lateral axis. The work is that of the stress. The stored energy is p^2 / 2K + q^2 /
-    6G per present volume; the rest of the work is plastic.
+    """In this test a block under the lateral pressure s is shortened along z. The block is elastic up to the stress f +
+    s (1 + sin phi) / (1 - sin phi). Beyond this stress no stress changes if the volume grows by 2 sin psi / (1 - sin
+    psi) of the shortening, half of this growth on each lateral axis. The work on the block is the work of this stress.
+    The stored energy is p^2 / 2K + q^2 / 6G per present volume; the rest of the work is plastic.
     """
     patch, lateral, steps = Patch(block((2, 2, 2)), glass(psi), form), 100e6, 200
     patch.put(PRESSURE, lateral)
@@ -111,8 +111,8 @@ def test_the_triaxial_path(form: Form, psi: float) -> None:
 
 
 def test_the_apex_removes_the_deviator_and_no_strength_returns() -> None:
-    """The deviator becomes zero for a pressure far beyond the apex, and the pressure rises at most by the amount of
-    this flow.
+    """The deviator becomes zero for a pressure far beyond the apex, and the pressure rises at most by the amount of the
+    flow to the apex.
     """
     trial = random_deviators(500, np.random.default_rng(3))
     patch = free(500, glass(ANGLES[0]), trial, -1e12)
@@ -125,7 +125,9 @@ def test_the_apex_removes_the_deviator_and_no_strength_returns() -> None:
 
 
 def test_failed_material_keeps_its_volume() -> None:
-    """In shear at constant volume the pressure rises until the failure strain is reached, and not afterwards."""
+    """In shear at constant volume the pressure rises until the failure strain is reached; afterwards the pressure is
+    constant.
+    """
     law = glass(ANGLES[0], failure_strain=0.02)
     patch = Patch(TetMesh(REGULAR, np.array([[0, 1, 2, 3]], np.int32)), law)
     patch.put(PRESSURE, 0.5e9)
@@ -143,7 +145,9 @@ def test_failed_material_keeps_its_volume() -> None:
 
 
 def plastic(sim: simulation.Simulation) -> tuple[float, float]:
-    """Returns logarithmic volume and height of the cube minus their elastic parts from the mean stress."""
+    """Returns the logarithmic volume and the logarithmic height of the cube minus their elastic parts from the mean
+    stress.
+    """
     nodes, (tets,) = sim.model.nodes, sim.model.blocks
     volume = TetMesh(nodes.x, tets.tets.astype(np.int32)).volumes()
     p, s = (float(tets.row(row) @ volume / volume.sum()) for row in (PRESSURE, S_ZZ))
@@ -153,7 +157,7 @@ def plastic(sim: simulation.Simulation) -> tuple[float, float]:
 
 @pytest.mark.parametrize("form", FORMS)
 def test_a_cube_swells_as_it_should_and_keeps_its_energy(form: Form) -> None:
-    """The shipped triaxial test with a dilation angle of 20 degrees: the ratio of plastic volume to plastic height
+    """In the shipped triaxial test with a dilation angle of 20 degrees, the ratio of plastic volume to plastic height
     in the flow agrees with the formula."""
     data = load.read_data(load.shipped_path("triaxial_glass"))
     made = library()["soda_lime_mohr_coulomb"].model_dump(exclude_none=True)

@@ -1,4 +1,4 @@
-"""The cut of the mesh: each tet is on one rank, each shared node is listed on all its ranks and owned by one, and
+"""The cut of the mesh: each tet is on one rank, each shared node is listed on all its ranks and owned by one rank, and
 shared sums are complete."""
 
 import contextlib
@@ -146,8 +146,8 @@ class Round:
 
 @pytest.mark.parametrize("ranks", RANKS)
 def test_shared_sums_are_those_of_one_rank(ranks: int) -> None:
-    """The nodal sums are random integers of each tet. After the sums of the neighbours were added, every rank has
-    the sum of the whole mesh."""
+    """The nodal sums of the test are random integers of each tet. After the sums of the neighbour ranks were added,
+    every rank has the sum of the whole mesh."""
     whole, pieces = cut(ranks)
     words = np.random.default_rng(7).integers(-(2**52), 2**52, (len(whole.tets), 4, 3))
     total = np.zeros((len(whole.points), 3), np.int64)

@@ -27,7 +27,7 @@ def powers(x: Floats) -> Floats:
 
 @pytest.mark.parametrize("reach", REACHES)
 def test_they_are_right_to_the_last_bits(reach: tuple[float, float]) -> None:
-    """The reference has the 80 bits of a long double."""
+    """The reference values have the 80 bits of a long double."""
     random = np.random.default_rng(1)
     for _ in range(100):
         y = random.uniform(*reach, CHUNK)

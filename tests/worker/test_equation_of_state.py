@@ -32,8 +32,8 @@ def cold(ratio: Floats | float) -> Floats:
 
 
 def compressed(seed: int, rate: float) -> tuple[Patch, Floats, Floats]:
-    """Returns copper tets in random states, without shear stress, that expand or shrink equally in all directions;
-    also their strains and mean volumes in the step.
+    """Returns copper tets in random states, without shear stress, that expand or shrink equally in all directions; also
+    returns the strains and the mean volumes of the tets in the step.
     """
     patch = Patch(free_tets(N, seed), COPPER_GAS)
     random = np.random.default_rng(seed)
@@ -49,7 +49,9 @@ def compressed(seed: int, rate: float) -> tuple[Patch, Floats, Floats]:
 
 
 def test_linear_pressure_is_logarithmic() -> None:
-    """p = -K ln(V / V0); to second order in the step its work is K V0 times the energy of a logarithmic spring."""
+    """The pressure is p = -K ln(V / V0); to second order in the step its work is K V0 times the energy of a logarithmic
+    spring.
+    """
     wrong = []
     for steps in (20, 40):
         tet = free_tets(1, 3)
@@ -70,7 +72,7 @@ def test_linear_pressure_is_logarithmic() -> None:
 
 def test_mie_gruneisen_solves_the_energy_equation() -> None:
     """The new pressure is the equation of state at the new energy, which includes the work of the mean pressure. The
-    equation is solved exactly, without iteration."""
+    equation for the new pressure is solved exactly, without iteration."""
     patch, strain, volume = compressed(1, 0.05)
     old, work, ratio = patch.get(PRESSURE), patch.get(WORK), patch.get(VOLUME_RATIO)
     viscous = patch.get(WORK_VISCOUS)
@@ -129,8 +131,8 @@ def speed_of_sound(patch: Patch) -> float:
 @pytest.mark.parametrize("ratio", [1.05, 1.0, 0.95, 0.8, 0.72])
 @pytest.mark.parametrize("energy", [0.0, 3e5])
 def test_speed_of_sound_is_the_slope_of_the_adiabat(ratio: float, energy: float) -> None:
-    """rho c^2 = dp / dln(rho) at constant entropy + 4/3 G / J; the slope is computed from a small adiabatic step in
-    each direction."""
+    """The speed of sound satisfies rho c^2 = dp / dln(rho) at constant entropy + 4/3 G / J; the slope is computed from
+    a small adiabatic step in each direction."""
     pressures, strain = [], 1e-5
     for sign in (-1.0, 0.0, 1.0):
         patch = Patch(free_tets(1, 6), COPPER_GAS)
@@ -155,8 +157,8 @@ def test_speed_of_sound_of_a_linear_solid() -> None:
 
 
 def test_there_is_no_pressure_beyond_the_pole() -> None:
-    """p_H is infinite at the compression 1 / S. Beyond this compression the law returns no pressure, instead of a
-    finite pressure that decreases."""
+    """The Hugoniot pressure p_H is infinite at the compression 1 / S. Beyond this compression the law returns no
+    pressure, instead of a finite pressure that decreases."""
     for ratio, finite in ((1.0 - 0.99 / GAS.S, True), (1.0 - 1.01 / GAS.S, False), (-0.1, False)):
         patch = Patch(free_tets(1, 5), COPPER_GAS)
         patch.put(VOLUME_RATIO, ratio)
@@ -168,8 +170,8 @@ def test_there_is_no_pressure_beyond_the_pole() -> None:
 @pytest.mark.parametrize("spall", [None, 1e9])
 @pytest.mark.parametrize("form", FORMS)
 def test_a_tet_that_passes_the_pole_ends_the_run(form: Form, spall: float | None) -> None:
-    """The message names the tet and its compression. Without this check the run would continue with a meaningless
-    pressure."""
+    """The message names the tet and the compression of the tet. Without this check the run would continue with a
+    meaningless pressure."""
     case = scene(COPPER_GAS.model_copy(update={"spall": spall}), form)
     sim = build(case, [free_tets(1, 5)])
     step.prepare(sim)

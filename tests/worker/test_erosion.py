@@ -50,7 +50,7 @@ def crash(erosion: schema.Erosion, form: Form, speed: float = 600.0) -> Simulati
 
 
 def nodes_of_tets(sim: Simulation) -> "np.ndarray":
-    """Returns (nodes,) whether a node has tets."""
+    """Returns flags (nodes,): True if a node has tets."""
     has = np.zeros(sim.model.nodes.n, bool)
     for part in sim.model.blocks:
         has[part.tets] = True
@@ -60,7 +60,9 @@ def nodes_of_tets(sim: Simulation) -> "np.ndarray":
 @pytest.mark.parametrize("nodes", ["strike", "particles", "remove"])
 @pytest.mark.parametrize("form", FORMS)
 def test_the_accounts_close_while_tets_leave(form: Form, nodes: Any) -> None:
-    """The energy balance closes as well as without erosion, momentum to round-off and mass to the last bits (H11)."""
+    """The energy balance closes as well as without erosion, momentum is conserved to round-off and mass to the last
+    bits (H11).
+    """
     sim = crash(schema.Erosion(plastic_strain=0.3, nodes=nodes), form)
     mass, first, elements = sim.model.nodes.mass.copy(), sim.model.nodes.v.copy(), sim.model.elements_global
     momentum = (mass[:, None] * first).sum(axis=0)
@@ -104,8 +106,8 @@ SPIN = {"centre": (1.5 * MM, 1.5 * MM, 1.5 * MM), "rate": (4e4, 0.0, 5e4)}
 @pytest.mark.parametrize("nodes", ["particles", "remove"])
 @pytest.mark.parametrize("form", FORMS)
 def test_the_accounts_close_for_a_spinning_body_without_contact(form: Form, nodes: Any) -> None:
-    """A copper cube that spins at its elastic limit: the work, kinetic energy and momentum of removed tets leave the
-    model."""
+    """Test body is a copper cube that spins at its elastic limit: the work, kinetic energy and momentum of removed tets
+    leave the model."""
     case = meeting_of([{"erosion": schema.Erosion(nodes=nodes), "spin": SPIN}], material=COPPER, form=form)
     sim = build(case.model_copy(update={"contact": None}), [block((3, 3, 3), MM)])
     momentum = (sim.model.nodes.mass[:, None] * sim.model.nodes.v).sum(axis=0)
@@ -121,8 +123,8 @@ def test_the_accounts_close_for_a_spinning_body_without_contact(form: Form, node
 
 @pytest.mark.parametrize("material", [COPPER_GAS, COPPER, STEEL_42CRMO4])
 def test_the_heat_of_eroded_tets_is_counted_if_their_pressure_depends_on_heat(material: Material) -> None:
-    """The lower bound of the line ``eroded`` is minus 2 J of viscous heat for each tet, and zero for a pressure
-    without heat."""
+    """The lower bound of the term ``eroded`` is minus 2 J of viscous heat for each tet, and zero for a pressure without
+    heat."""
     sim = alone(block((2, 2, 2), MM), material=material)
     part = sim.model.blocks[0]
     part.state[:, rows.WORK_VISCOUS] = 2.0
@@ -145,8 +147,8 @@ WALL = {"kind": "wall", "point": (0.0, 0.0, 0.0), "normal": (0.0, 0.0, 1.0)}
     ids=["gravity", "driven", "mirror", "wall"],
 )
 def test_removed_nodes_are_not_moved(bounds: tuple[Any, ...]) -> None:
-    """Neither gravity nor a prescribed motion moves removed nodes, and their momentum and energy stay as at the time
-    of removal."""
+    """Neither gravity nor a prescribed motion moves removed nodes, and the momentum and the energy of these nodes stay
+    as at the time of removal."""
     residuals, sim = pulled(alone(block((3, 3, 3), MM), REMOVE, (0, 0, 100), boundaries=bounds))
     assert sim.erosion is not None
     assert sim.erosion.removed.any()
@@ -160,8 +162,8 @@ def test_removed_nodes_are_not_moved(bounds: tuple[Any, ...]) -> None:
 def test_a_tet_that_turns_inside_out_books_no_work_that_it_has_not_done(
     material: Material, far: float, form: Form
 ) -> None:
-    """A node passes the adjacent tets in one step; the stress of these tets at the end of the step has never acted
-    on a node."""
+    """A node passes the adjacent tets in one step; the stress of these tets at the end of the step has never acted on a
+    node."""
     sim = alone(block((3, 3, 3), MM), form=form, material=material)
     nodes = sim.model.nodes
     node = np.argmin(np.abs(nodes.x0 - 0.9 * MM).sum(axis=1))
@@ -177,8 +179,8 @@ def test_a_tet_that_turns_inside_out_books_no_work_that_it_has_not_done(
 @pytest.mark.parametrize("form", ["standard", "nodal"])
 @pytest.mark.parametrize("material", [STEEL, COPPER, COPPER_GAS], ids=["elastic", "copper", "gas"])
 def test_the_first_step_has_the_speeds_of_approaching_nodes(material: Material, form: Form) -> None:
-    """One node of a cube starts at 10 km/s. Without a bound of the step by the motion 20 to 209 % of the energy was
-    wrong."""
+    """In this test one node of a cube starts at 10 km/s. Without a bound of the step by the motion of the node 20 to
+    209 % of the energy was wrong."""
     sim = alone(block((3, 3, 3), MM), form=form, material=material, viscosity={})
     nodes = sim.model.nodes
     node = np.argmin(np.abs(nodes.x0 - 0.9 * MM).sum(axis=1))
@@ -199,7 +201,7 @@ def scene_of_two() -> tuple[schema.Case, list[TetMesh]]:
 
 
 def wearing(case: schema.Case, erosion: schema.Erosion) -> schema.Case:
-    """Returns the same scene with erosion in all parts."""
+    """Returns the scene with erosion in all parts."""
     parts = tuple(part.model_copy(update={"erosion": erosion}) for part in case.parts)
     return case.model_copy(update={"parts": parts})
 
@@ -256,7 +258,7 @@ def test_the_surface_follows_what_is_left(ranks: int) -> None:
 
 
 def test_a_node_that_loses_all_its_tets_at_once_meets_others() -> None:
-    """A node from the inside of the body, which was never on the surface, meets other nodes too."""
+    """A node from the inside of the body, which was never on the surface, also meets other nodes."""
     case, meshes = scene_of_two()
     sim = build(wearing(case, EROSION), meshes)
     step.prepare(sim)
@@ -271,7 +273,7 @@ def test_a_node_that_loses_all_its_tets_at_once_meets_others() -> None:
 
 def test_exposed_faces_have_contact_in_the_same_step() -> None:
     """The search in the step of the removal includes the inner faces of the removed tet as candidates of the nodes
-    above it."""
+    above this tet."""
     case, meshes = scene_of_two()
     sim = build(case, meshes)
     step.prepare(sim)
@@ -328,7 +330,7 @@ def test_faces_covered_by_a_worn_tet_become_surface_without_a_search() -> None:
 
 def test_a_body_without_its_support_is_held_by_the_one_below() -> None:
     """A driven tip is about to touch a tet when this tet is removed: in the same step the tip is in contact with the
-    slope behind it."""
+    slope behind the removed tet."""
     speed, aside = 1000.0, 3e-3
     points = np.array([[2.0 - aside, 1.5, 2.14], [1.5, 1.0, 3.0], [2.5, 1.0, 3.0], [2.0, 2.2, 3.0]]) * MM
     ground, tip = block((3, 3, 2), MM, shake=0.0), TetMesh(points, positive(points, np.arange(4)[None, :]))
@@ -351,7 +353,7 @@ def test_a_body_without_its_support_is_held_by_the_one_below() -> None:
 
 
 def node_at(sim: Simulation, place: Sequence[float]) -> int:
-    """Returns the node that started at this position, mm."""
+    """Returns the node that started at the given position, mm."""
     return int(np.abs(sim.model.nodes.x0 - np.array(place) * MM).sum(axis=1).argmin())
 
 
@@ -361,7 +363,7 @@ def node_at(sim: Simulation, place: Sequence[float]) -> int:
 @pytest.mark.parametrize("form", FORMS)
 @pytest.mark.parametrize("ranks", [2, 3])
 def test_a_rank_that_has_lost_all_its_tets_goes_on(ranks: int, form: Form) -> None:
-    """The answer is that of one rank."""
+    """The result is equal to that of one rank."""
     case, meshes = scene_of_two()
     case = case.model_copy(update={"numerics": case.numerics.model_copy(update={"pressure": form})})
     lost = on(ranks, case, meshes, lambda sim: np.concatenate([part.id for part in sim.model.blocks]))[1]
@@ -419,7 +421,9 @@ def test_probes_of_what_has_left_are_no_number() -> None:
 
 @pytest.mark.parametrize("erosion", [EROSION, REMOVE], ids=["particles", "remove"])
 def test_no_reference_of_what_has_left_is_met(erosion: schema.Erosion) -> None:
-    """No reference of a part without tets passes, for any tolerance; particles still have a speed."""
+    """No reference of a part without tets passes, for any tolerance; the particles of such a part still have a
+    speed.
+    """
     quantities: tuple[Any, ...] = ("plastic_strain_max", "stress_max", "extent", "radius", "speed_mean")
     wide: dict[str, Any] = {"part": "body0", "value": 0.0, "tolerance": 1e9, "source": "-"}
     specs = [schema.Reference(quantity=q, axis="z" if q in quantities[2:] else None, **wide) for q in quantities]
@@ -451,7 +455,7 @@ def flying(velocity: float, side: float) -> Simulation:
 
 @pytest.mark.parametrize("side", [1.0, -1.0])
 def test_a_particle_turns_round_at_a_symmetry_plane(side: float) -> None:
-    """The particle keeps all of its energy. A node that starts on the plane is held on it before its tets are
+    """The particle keeps all of its energy. A node that starts on the plane is held on the plane before its tets are
     removed, and has no energy across the plane."""
     sim = flying(-side * 2000.0, side)
     nodes, part = sim.model.nodes, sim.model.blocks[0]
@@ -473,8 +477,8 @@ def test_mirrors_hold_what_starts_off_the_plane_or_may_leave_it() -> None:
 
 @pytest.mark.parametrize("ranks", [1, 2])
 def test_an_erosion_limit_that_removes_no_tet_is_reported(ranks: int) -> None:
-    """The damage is in a band narrower than a tet. A small damage gives no warning, and there is no warning after a
-    removal."""
+    """The damage in this test is in a band narrower than a tet. A small damage gives no warning, and after a removal of
+    tets there is no warning."""
     damaged = materials.JohnsonCookDamage(D1=0.05, D2=3.44, D3=-2.12, D4=0.002, D5=0.61)
     assert STEEL_42CRMO4.strength is not None
     law = STEEL_42CRMO4.strength.model_copy(update={"damage": damaged})

@@ -1,4 +1,4 @@
-"""Files of frames and histories: fields, units, times."""
+"""Files of frames and histories: fields, units and times."""
 
 import csv
 import math
@@ -103,7 +103,9 @@ def test_files_removed_during_a_run_are_reported_once(tmp_path: Path) -> None:
 
 
 def test_a_journal_and_a_history_that_are_removed_take_no_more_lines(tmp_path: Path) -> None:
-    """Lines written to an open file that was removed would be lost, and the run would end as if they existed."""
+    """Lines that are written to an open file after its removal would be lost, and the run would end as if these lines
+    existed.
+    """
     journal, table = Journal(tmp_path, "r"), History(tmp_path, {})
     journal.starting("at first")
     (tmp_path / layout.JOURNAL).unlink()
@@ -128,7 +130,9 @@ def test_a_journal_and_a_history_that_are_removed_take_no_more_lines(tmp_path: P
 def test_a_resumed_run_reports_lines_of_a_history_that_are_lost(
     damage: Callable[[bytes], bytes], kept: int, tmp_path: Path
 ) -> None:
-    """Extremes of probes are read from the history: without its lines they would be wrong without a message."""
+    """Extremes of probes are read from the history: without the lost lines the extremes would be wrong without a
+    message.
+    """
     write_history(tmp_path)
     path = tmp_path / layout.HISTORY
     path.write_bytes(damage(path.read_bytes()))
@@ -165,8 +169,8 @@ def test_parquet_has_the_same_numbers_and_the_units(tmp_path: Path) -> None:
 
 
 def without_tets(nodes: int) -> Model:
-    """Return the model of a rank without tets, because other ranks have all tets or all have eroded; ``nodes`` of
-    all ranks."""
+    """Returns the model of a rank without tets, because other ranks have all tets or all tets have eroded; ``nodes``
+    are the nodes of all ranks."""
     none, points, force, no = np.zeros(0, np.int32), np.zeros((0, 3)), np.zeros((0, 3), np.int64), np.zeros(0)
     mine = Nodes(np.zeros(0, np.int64), none, none, np.zeros(0, bool), points, points, points, no, force, no)
     return Model(mine, nodes_global=nodes)
@@ -193,14 +197,14 @@ def test_a_frame_may_come_from_ranks_without_tets(tmp_path: Path) -> None:
 
 
 def test_principal_stresses() -> None:
-    """The stresses are pure shear in yz, compression along x with tension along z, and a pressure."""
+    """The stresses of the tets are pure shear in yz, compression along x with tension along z, and a pressure."""
     stresses = np.array([[0, 0, 0, 0, 5.0, 0], [-3.0, 0, 2.0, 0, 0, 0], [-1.0, -1.0, -1.0, 0, 0, 0]])
     assert principal(stresses) == pytest.approx([5.0, 2.0, -1.0])
 
 
 def test_a_facet_is_damaged_by_the_energy_that_it_has_spent() -> None:
-    """The facet is whole; opened to half of the critical opening (a quarter of the area under the law is left); and
-    failed."""
+    """The facet has three states: whole; opened to half of the critical opening (a quarter of the area under the law is
+    left); and failed."""
     m, strength, critical, knee = 3, 2.0, 6.0, 1.0
     three, nine = np.zeros((m, 3)), np.zeros((m, 3, 3))
     tops = np.repeat([[knee], [knee + 0.5 * critical], [knee + critical]], 3, axis=1)

@@ -1,5 +1,5 @@
-"""Sums that do not depend on the order of their terms, and the quantum of the forces: its choice, its overflow, and
-the repetition of a sum."""
+"""Sums that do not depend on the order of their terms, and the quantum of the forces: its choice, its overflow, and the
+repetition of a sum."""
 
 import math
 from fractions import Fraction
@@ -30,7 +30,9 @@ from .meshes import Floats, block
 
 
 def values(n: int, seed: int) -> Floats:
-    """Returns columns of equal size, of sizes over 30 decades, of numbers that nearly cancel, and of zeros."""
+    """Returns columns of numbers of equal size, of sizes over 30 decades, of numbers that nearly cancel, and of
+    zeros.
+    """
     random = np.random.default_rng(seed)
     even = random.normal(size=n)
     mixed = random.normal(size=n) * 10.0 ** random.uniform(-20.0, 10.0, n)
@@ -59,7 +61,7 @@ def test_sums_do_not_depend_on_the_order() -> None:
 
 
 def test_plain_sums_do_depend_on_it() -> None:
-    """Control of the test: plain sums of the same shuffled terms differ in their bits."""
+    """Control of the test: plain sums of the shuffled terms differ in their bit patterns."""
     columns = values(5000, 2)
     sums = {columns[np.random.default_rng(seed).permutation(5000), 1].cumsum()[-1] for seed in range(5)}
     assert len(sums) > 1
@@ -72,8 +74,8 @@ def test_sums_of_nothing_and_of_one() -> None:
 
 @pytest.mark.parametrize("largest", [1e-9, 0.75, 1.0, 3.0, 1e5, 2.0**40, 1e300])
 def test_scale_leaves_the_stated_headroom(largest: float) -> None:
-    """The scale is a power of two. The largest contribution uses all bits except the headroom, so it may grow
-    32-fold."""
+    """The scale of a sum is a power of two. The largest contribution to the sum uses all bits except the headroom, so
+    it may grow 32-fold."""
     scale = scale_for(largest)
     assert math.frexp(scale)[0] == 0.5
     bits = CONTRIBUTION_BITS - HEADROOM_BITS
@@ -97,8 +99,8 @@ def test_contributions_are_rounded_to_the_nearest_even_integer() -> None:
 
 
 def collision(form: Form, floor: float) -> tuple[Simulation, int]:
-    """Returns a copper cube without stress that flies and then hits a wall, and the number of repeated sums.
-    ``floor``: force, N, below which the quantum is not refined.
+    """Returns a copper cube without stress that flies and then hits a wall, and the number of repeated sums. The
+    argument ``floor`` is the force, N, below which the quantum is not refined.
     """
     wall = {"kind": "wall", "point": (0.0, 0.0, -1e-4), "normal": (0.0, 0.0, 1.0)}
     case = scene(COPPER, form, end=1.5e-6, velocity=(0.0, 0.0, -200.0), boundaries=(wall,))
@@ -121,8 +123,8 @@ def collision(form: Form, floor: float) -> tuple[Simulation, int]:
 
 @pytest.mark.parametrize("form", FORMS)
 def test_a_sum_that_outgrows_its_quantum_is_repeated(form: Form) -> None:
-    """Forces grow more than 64-fold at the impact. Repeated sums are equal to the sums with a coarse quantum from
-    the start."""
+    """Forces in this scene grow more than 64-fold at the impact. Repeated sums are equal to sums with a coarse quantum
+    from the start."""
     fine, repeats = collision(form, 0.0)
     coarse, none = collision(form, 1e4)
     assert 1 <= repeats <= 4
@@ -147,8 +149,8 @@ def test_groups_have_their_own_sums_and_do_not_change_those_of_all() -> None:
 
 @pytest.mark.parametrize("odd", [math.nan, math.inf, -math.inf])
 def test_a_sum_with_a_value_that_is_not_finite_is_not_a_number(odd: float) -> None:
-    """Only the sum of this column is not a number, in the whole and in each group, for a value at the beginning or
-    at the end."""
+    """Only the sum of one column is not a number, in the whole and in each group, for a value at the beginning or at
+    the end."""
     for row in (0, 4999):
         columns = values(5000, 5)
         whole = exact_sums(SerialComm(), columns)
@@ -163,7 +165,7 @@ def test_a_sum_with_a_value_that_is_not_finite_is_not_a_number(odd: float) -> No
 @pytest.mark.parametrize("share", [0.49, -0.49])
 def test_the_low_limb_of_a_tally_does_not_grow(share: float) -> None:
     """Values far below a quantum of the high limb are in the low limb only; without a carry, 2^34 such values would
-    overflow it."""
+    overflow the low limb."""
     tally, small = Tally(np.array([1.0])), share * 2.0**-29
     for _ in range(50):
         tally.add(np.full((20, 1), small))
@@ -172,7 +174,7 @@ def test_the_low_limb_of_a_tally_does_not_grow(share: float) -> None:
 
 
 def test_where_a_tally_carries_over_changes_no_bit() -> None:
-    """A sum in many additions, or over many ranks that have each carried before, has the same bits."""
+    """A sum in many additions, or over many ranks that have each carried before, has the same bit pattern."""
     columns = values(5000, 3)[:, :2]
     whole, parts = Tally(np.array([10.0, 1e9])), [Tally(np.array([10.0, 1e9])) for _ in range(3)]
     whole.add(columns)
@@ -220,7 +222,7 @@ def test_a_value_that_is_not_finite_has_an_infinite_maximum(odd: float) -> None:
 
 
 def test_the_smallest_floats_have_sums() -> None:
-    """The quantum of these sums is that of 2^-993; smaller values are rounded to zero."""
+    """The quantum of these sums is the quantum for 2^-993; smaller values are rounded to zero."""
     tiny = np.array([[2.0**-1000, 5e-324], [2.0**-1001, 0.0]])
     assert exact_sums(SerialComm(), tiny).tolist() == [1.5 * 2.0**-1000, 0.0]
 

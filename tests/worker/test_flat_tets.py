@@ -1,4 +1,4 @@
-"""Flat tets with averaged pressures: they have the stiffness of the standard form, and other tets are not affected."""
+"""Flat tets with averaged pressures have the stiffness of the standard form, and other tets are not affected."""
 
 from functools import cache
 
@@ -46,8 +46,8 @@ def flattened(cells: tuple[int, int, int], aspect: float, seed: int = 1) -> tupl
 
 @cache
 def lowest(form: Form, aspect: float, speed: float, seed: int) -> tuple[float, float]:
-    """Returns the smallest volume over the initial volume of the flat tet of a copper block that hits a wall, and
-    the worst residual."""
+    """Returns the smallest volume over the initial volume of the flat tet of a copper block that hits a wall, and the
+    worst residual."""
     mesh, flat = flattened((4, 4, 4), aspect, seed)
     sim = build(scene(COPPER, form, end=2e-6, velocity=(0.0, 0.0, -speed), boundaries=(WALL,)), [mesh])
     (body,), least = sim.model.blocks, [1.0]
@@ -66,8 +66,8 @@ def lowest(form: Form, aspect: float, speed: float, seed: int) -> tuple[float, f
 @pytest.mark.parametrize("form", AVERAGED)
 @pytest.mark.parametrize(("aspect", "seed"), [(3e-3, 1), (3e-3, 2), (1e-2, 3)])
 def test_a_flat_tet_is_not_crushed(form: Form, aspect: float, seed: int) -> None:
-    """The tet loses no more volume than in the standard form. With the mean pressure over its nodes the flat tet was
-    crushed in each of these scenes.
+    """The flat tet loses no more volume than in the standard form. With the mean pressure over its nodes the flat tet
+    was crushed in each scene of this test.
     """
     volume, residual = lowest(form, aspect, 200.0, seed)
     assert volume > lowest("standard", aspect, 200.0, seed)[0] - 0.02
@@ -76,7 +76,7 @@ def test_a_flat_tet_is_not_crushed(form: Form, aspect: float, seed: int) -> None
 
 @pytest.mark.parametrize("form", AVERAGED)
 def test_a_flat_tet_dilates_as_in_the_standard_form(form: Form) -> None:
-    """The tet is sheared under pressure; its nodes get no part of its dilation."""
+    """The flat tet is sheared under pressure; the nodes of the tet get no part of its dilation."""
     corners = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.3, 0.7, 0.0], [0.3, 0.3, 0.01]])
     mesh = TetMesh(MM * corners, np.array([[0, 1, 2, 3]], np.int32))
     found = []
@@ -93,8 +93,8 @@ def test_a_flat_tet_dilates_as_in_the_standard_form(form: Form) -> None:
 
 
 def test_what_is_flat() -> None:
-    """A tet is flat by its smallest altitude over its longest edge. No tet of a common mesh is flat, and then the
-    state has no column for flat tets."""
+    """The smallest altitude over the longest edge decides whether a tet is flat. No tet of a common mesh is flat, and
+    the state of such a mesh has no column for flat tets."""
     for share, count in ((0.99, 1), (1.01, 0)):
         corners = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.3, 0.7, 0.0], [0.3, 0.3, share * THINNEST]])
         tet = Patch(TetMesh(corners, np.array([[0, 1, 2, 3]], np.int32)), form="nodal")
@@ -105,8 +105,8 @@ def test_what_is_flat() -> None:
 @pytest.mark.parametrize("form", AVERAGED)
 @pytest.mark.parametrize("material", [COPPER, COPPER_GAS], ids=["copper", "gas"])
 def test_an_even_compression_has_one_pressure(material: "object", form: Form) -> None:
-    """A flat tet has the pressure of its neighbours and does not change their means, up to e^2 / 12 with e = 3e-4 in
-    a step.
+    """A flat tet has the pressure of its neighbours and does not change the means of the neighbours, up to e^2 / 12
+    with e = 3e-4 in a step.
     """
     mesh, _ = flattened((3, 3, 3), 1e-3)
     patch = Patch(mesh, material, form)  # type: ignore[arg-type]
@@ -143,8 +143,8 @@ def test_the_mark_goes_with_its_tet() -> None:
 
 
 def test_rest_is_kept_to_the_bit() -> None:
-    """A bar with a flat tet, in which a wave has reached only the end, with and without the omission of chunks at
-    rest."""
+    """A wave has reached only the end of a bar with a flat tet; the results with and without the omission of chunks at
+    rest are equal."""
     mesh, _ = flattened((3, 3, 36), 1e-2)
     along = TetMesh(mesh.points, mesh.tets[np.argsort(mesh.points[mesh.tets].mean(axis=1)[:, 2])])
     answers = set()

@@ -1,5 +1,5 @@
-"""Requested fields of frames: strains and rates compared with matrix functions of scipy, contact pressure compared
-by its sum."""
+"""Requested fields of frames: strains and rates are compared with matrix functions of scipy, the contact pressure is
+compared by its sum."""
 
 from pathlib import Path
 from typing import Any
@@ -31,7 +31,7 @@ def asking(case: schema.Case, fields: tuple[str, ...], count: int = 4) -> schema
 
 
 def written(sim: Simulation, folder: Path, index: int = 1) -> dict[str, Floats]:
-    """Returns the fields of a frame on rank 0, and nothing on other ranks."""
+    """Returns the fields of a frame on rank 0, and an empty result on other ranks."""
     folder.mkdir(exist_ok=True)
     path = frames.write(folder, index, sim.clock.t, sim.model, sim.comm, wanted=wanted(sim, index))
     if path is None:
@@ -45,8 +45,8 @@ def written(sim: Simulation, folder: Path, index: int = 1) -> dict[str, Floats]:
 
 
 def test_strain_rate_and_density_are_those_of_the_deformation(tmp_path: Path) -> None:
-    """A body is sheared, stretched and rotated: the strain is ln V by scipy's matrix logarithm, and the rate d
-    follows from the velocity gradient."""
+    """A body is sheared, stretched and rotated: its strain is ln V by scipy's matrix logarithm, and the rate d follows
+    from the velocity gradient."""
     random = np.random.default_rng(3)
     change, rate = np.eye(3) + 0.4 * random.normal(size=(3, 3)), 1e4 * random.normal(size=(3, 3))
     assert np.linalg.det(change) > 0.1
@@ -83,9 +83,9 @@ def test_a_body_that_turns_has_no_strain(tmp_path: Path) -> None:
 def test_the_pressure_of_contact_carries_the_weight(
     upper: dict[str, Any], wall: dict[str, Any], tmp_path: Path
 ) -> None:
-    """One rank and three ranks give the same bits. A block lies on another block, which lies on a wall; both are
-    pressed on the wall by gravity and damped. The pressure is the mean over the time between two frames, and the run
-    continues from a checkpoint. The upper block may be rigid, and the wall may be a moving wall.
+    """One rank and three ranks give the same bit patterns. A block lies on another block, which lies on a wall; gravity
+    presses both blocks on the wall, and the blocks are damped. The contact pressure is the mean over the time between
+    two frames; the run continues from a checkpoint. The upper block may be rigid, and the wall may be a moving wall.
     """
     base = block((3, 3, 1), 1e-3, shake=0.0)
     boundaries: tuple[dict[str, Any], ...] = (
@@ -129,7 +129,7 @@ def test_the_pressure_of_contact_carries_the_weight(
 
 
 def _force(pressure: Floats, points: Floats, tets: "np.ndarray", nodes: "np.ndarray", height: float) -> float:
-    """Return the force on the face at this height, from the pressure and the areas of its nodes."""
+    """Returns the force on the face at the given height, from the pressure and the areas of its nodes."""
     total = 0.0
     for tet in tets:
         face = [n for n in tet if abs(points[n, 2] - height) < 1e-9]

@@ -1,4 +1,4 @@
-"""Gauges compared with plain numpy, with the same bits on any number of ranks: sums, contact forces of parts,
+"""Gauges compared with plain numpy, with the same bit patterns on any number of ranks: sums, contact forces of parts,
 fragments, holes, cones."""
 
 import math
@@ -98,8 +98,8 @@ def test_sums_of_any_ranks_are_the_same_bits() -> None:
 
 @pytest.mark.parametrize("ranks", [1, 3])
 def test_peaks_are_the_largest_values_of_the_tets(ranks: int) -> None:
-    """The tets are those of the part, or those that start in a box. The body starts with random velocities that exceed
-    its yield stress."""
+    """The measured tets are all tets of the part, or the tets that start in a box. The body starts with random
+    velocities that exceed the speed at which it yields."""
     fields = ("pressure_max", "pressure_min", "mises_max", "plastic_strain_max", "temperature_max", "damage_max")
     box: dict[str, Any] = {"low": (-1.0, 1.5e-3, -1.0), "high": (1.0, 1.0, 1.0)}
     probes = [probe(field) for field in fields] + [probe(field, f"box_{field}", **box) for field in fields]
@@ -152,8 +152,8 @@ def _three() -> tuple[schema.Case, list[TetMesh]]:
 
 @pytest.mark.parametrize("ranks", [1, 3])
 def test_the_impulse_between_parts_is_the_change_of_momentum(ranks: int, tmp_path: Path) -> None:
-    """The impulses of two parts are equal and opposite to the bit, and the sum over all partners is the change of
-    momentum, also after a checkpoint."""
+    """The impulses of two parts on each other are equal and opposite to the bit. The sum over all partners is the
+    change of momentum, also after a checkpoint."""
     case, meshes = _three()
 
     def momenta(sim: Simulation) -> Floats:
@@ -289,7 +289,7 @@ def test_a_cone_has_the_angle_of_the_areas_that_have_left(ranks: int) -> None:
 
 @pytest.mark.parametrize("ranks", [1, 2])
 def test_the_heaviest_fragment_beyond_a_plane_is_found(ranks: int) -> None:
-    """A bar that loses two layers consists of three pieces; the last two are beyond the plane."""
+    """A bar that loses two layers consists of three pieces; the last two pieces are beyond the plane."""
     bar = block((12, 2, 2), SIZE, shake=0.0)
     centre = bar.points[bar.tets].mean(axis=1)[:, 0] / SIZE
     gone = np.flatnonzero(((centre > 4.0) & (centre < 5.0)) | ((centre > 6.0) & (centre < 7.0)))

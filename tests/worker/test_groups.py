@@ -1,4 +1,4 @@
-"""Records of the groups of a run, and the costs of tets, candidate pairs and ranks."""
+"""Records of the groups of tets of a run, and the costs of tets, candidate pairs and ranks."""
 
 from typing import Any
 
@@ -64,7 +64,7 @@ BRITTLE = materials.Material(
 )  # fmt: skip
 MESHES = [block((4, 4, 4), MM, seed=3), moved(block((5, 5, 3), MM, seed=4), (-0.5 * MM, -0.5 * MM, 4.01 * MM))]
 TETS = Costs(np.array([1e-9, 1e-6]), 0.0, 0.0, 0.0)
-"""1 ns for a tet of the first body, 1 us for a tet of the second body."""
+"""The costs are 1 ns for a tet of the first body and 1 us for a tet of the second body."""
 
 
 def breaking() -> schema.Case:
@@ -76,8 +76,8 @@ def breaking() -> schema.Case:
 
 
 def course(sim: Simulation) -> tuple[list[dict[str, Any]], Simulation]:
-    """Returns the records of a run in which nodes separate, tets are removed twice, and the mesh is cut again in
-    between."""
+    """Returns the records of a run in which nodes separate, tets are removed twice, and the mesh is cut again between
+    the two removals."""
     balance = Balance.of(sim)
     groups = Groups(sim, 1.5)
     step.prepare(sim)
@@ -91,8 +91,8 @@ def course(sim: Simulation) -> tuple[list[dict[str, Any]], Simulation]:
 
 
 def test_groups_are_recorded_equally_on_any_number_of_ranks(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Each group contains the same tets and nodes for any number of ranks, also after motion. Removed nodes are in
-    no group, and copies are in the group of their parents."""
+    """Each group contains the same tets and nodes for any number of ranks, also after motion. Removed nodes are in no
+    group, and copies of nodes are in the group of their parents."""
     case = breaking()
     monkeypatch.setattr(Meter, "costs", lambda *_: TETS)
     (first, last), sim = on(1, case, MESHES, course)[0]
@@ -125,7 +125,7 @@ def test_a_record_is_scheduled_by_the_time_of_the_run_and_costs_little() -> None
 
 
 def test_costs_add_up_to_the_work_of_all_ranks() -> None:
-    """The costs of groups and of ranks together are all measured work."""
+    """The sum of the costs of groups and of ranks is all measured work."""
     case = breaking()
 
     def measured(sim: Simulation) -> tuple[float, float]:
@@ -163,8 +163,8 @@ def test_a_proposed_cut_is_weighed_by_earlier_measurements() -> None:
 
 
 def test_candidates_cost_what_they_have_cost_where_they_are() -> None:
-    """The cost of a candidate is within a factor of four of the mean, because a rank with few candidates measures
-    mostly noise."""
+    """The cost of a candidate pair is within a factor of four of the mean, because a rank with few candidate pairs
+    measures mostly noise."""
     assert _candidates(np.array([4.0, 1.0]), np.array([10.0, 10.0])) == pytest.approx([2.5, 10.0])
     assert _candidates(np.array([4.0, 4.0]), np.array([8.0, 12.0])) == pytest.approx([2.0, 3.0])
     assert _candidates(np.array([100.0, 0.0]), np.array([10.0, 10.0])) == pytest.approx([0.1, 0.8])

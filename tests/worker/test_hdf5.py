@@ -27,7 +27,7 @@ try:
 except OSError as error:
     print(storage.failed(error), error.filename)
 """
-"""Eight tables with 45 kB each after compression."""
+"""The file has eight tables with 45 kB each after compression."""
 
 
 @pytest.mark.parametrize("room", [0, 100, 3000, 60_000, 300_000, 370_000])

@@ -1,4 +1,4 @@
-"""Averaged pressures with an equation of state that depends on heat: heat is averaged over nodes too."""
+"""Averaged pressures with an equation of state that depends on heat: heat is also averaged over nodes."""
 
 import numpy as np
 import pytest
@@ -15,7 +15,9 @@ STEEL_4340 = library()["steel_4340"]
 
 @pytest.mark.parametrize("form", ["nodal", "split"])
 def test_a_free_tet_has_its_own_heat(form: Form) -> None:
-    """The nodes have no other tet: the pressure is that of the standard form, up to the third order of the strain."""
+    """The nodes of the tet have no other tet: the pressure is that of the standard form, up to the third order of the
+    strain.
+    """
     pressures = []
     for each in ("standard", form):
         tet = free_tets(1, 5)
@@ -46,7 +48,7 @@ def test_heat_is_a_mean_over_nodes() -> None:
 
 @pytest.mark.parametrize("form", ["nodal", "split"])
 def test_a_bar_that_is_pulled_keeps_its_elastic_energy(form: Form) -> None:
-    """The dissipation is at most the work done: the term ``elastic`` does not fall below zero."""
+    """The dissipation is at most the work that was done: the term ``elastic`` does not fall below zero."""
     low, high = {"low": (-1.0,) * 3, "high": (1.0, 1.0, 0.1 * MM)}, {"low": (-1.0, -1.0, 5.9 * MM), "high": (1.0,) * 3}
     held = [{"kind": "velocity", "x": 0.0, "y": 0.0, "z": z, **box} for z, box in ((-150.0, low), (150.0, high))]
     case = scene(STEEL_4340, form, end=15e-6, boundaries=held, velocity=(0.0, 0.0, 0.0), viscosity={})

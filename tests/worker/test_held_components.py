@@ -1,5 +1,5 @@
-"""Velocity components that a boundary holds: contact, erosion and the start of a run read them from the boundary,
-for any type of boundary.
+"""Velocity components that a boundary holds: contact, erosion and the start of a run read the held components from the
+boundary, for any type of boundary.
 """
 
 import ast
@@ -29,7 +29,7 @@ def nodes(n: int) -> Nodes:
 
 
 class Piston(Driver):
-    """A boundary that exists only in this test: it sets the velocity along y."""
+    """A boundary that exists only in this test; it sets the velocity along y."""
 
     def held_components(self) -> Bits:
         held = np.full((len(self.nodes), 3), FREE, np.uint8)

@@ -21,7 +21,9 @@ N = 400
 
 
 def deformed(seed: int, size: float) -> tuple[Patch, Floats]:
-    """Returns free tets with random displacement gradients of this size, and their deformation gradients (n, 3, 3)."""
+    """Returns free tets with random displacement gradients of the given size, and the deformation gradients (n, 3, 3)
+    of the tets.
+    """
     patch = Patch(free_tets(N, seed))
     F = np.eye(3) + size * np.random.default_rng(seed).uniform(-1.0, 1.0, (N, 3, 3))
     assert (np.linalg.det(F) > 0.05).all()
@@ -41,7 +43,7 @@ def volumes(patch: Patch) -> Floats:
 
 @pytest.mark.parametrize("power", [-24.0, -8.0, -2.0, -1.0, -0.1, 0.0, 1e-3, 0.15, 0.5, 1.0, 2.0, 4.0, 8.0, 24.0])
 def test_sixth_root(power: float) -> None:
-    """The accuracy holds also if a volume has changed by a factor of 10^12."""
+    """The accuracy also holds if a volume has changed by a factor of 10^12."""
     u = 10.0**power
     assert math.isclose(inverse_sixth_root(u), u ** (-1.0 / 6.0), rel_tol=1e-15)
 
@@ -109,7 +111,9 @@ def test_the_law_is_henckys_to_the_third_order() -> None:
 
 
 def test_a_cycle_leaves_nothing() -> None:
-    """After a strain and a return along another path, a rate form has a residual stress, but the potential has none."""
+    """After a strain and a return along another path, a rate form has a residual stress, but a potential has no
+    residual stress.
+    """
     patch = Patch(free_tets(N, 6))
     random = np.random.default_rng(6)
     for _ in range(20):
@@ -147,8 +151,9 @@ def frequency(patch: Patch) -> float:
 
 @pytest.mark.parametrize("size", [0.02, 0.1, 0.2])
 def test_bound_of_strained_tets_is_near_the_exact_limit(size: float) -> None:
-    """Tangent stiffness of strained tets of many shapes. The bound does not include the geometric stiffness of the
-    stress: 2.5 % of the step at strains of 0.2, a quarter of the margin of the default ``dt_safety``.
+    """The test compares the tangent stiffness of strained tets of many shapes. The bound does not include the geometric
+    stiffness of the stress: it would be 2.5 % of the step at strains of 0.2, a quarter of the margin of the default
+    ``dt_safety``.
     """
     random, shares = np.random.default_rng(7), []
     heap = free_tets(60, 7)
@@ -186,8 +191,8 @@ def test_a_tet_keeps_the_volume_of_its_positions(form: Form, material: Material)
 
 
 def rung(material: Material) -> tuple[float, float]:
-    """Returns kinetic plus elastic energy of free tets of 1 mm, whose nodes started with up to 30 m/s, over the
-    initial energy: the largest value of the last of 10,000 steps; and the difference between p / K and -ln J.
+    """Returns kinetic plus elastic energy of free tets of 1 mm, whose nodes started with up to 30 m/s, over the initial
+    energy (the largest value of the last of 10,000 steps), and the difference between p / K and -ln J.
     """
     heap = free_tets(60, 8)
     mesh = TetMesh(heap.points / np.repeat(np.cbrt(heap.volumes()), 4)[:, None] * 1e-3, heap.tets)

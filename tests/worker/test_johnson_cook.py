@@ -23,7 +23,7 @@ Number = Floats | float
 SHEAR = 206.9e9 / 2.6
 HEAT = 0.9 / 460.0
 ROUND_OFF = 1e-5
-"""Stress error, Pa, of the last bit of a temperature near melting, or of 2 G D dt."""
+"""Stress error, Pa, due to the last bit of a temperature near melting, or due to 2 G D dt."""
 
 
 def flow_stress(strain: Number, rate: Number, temperature: Number, law: JohnsonCook = LAW) -> Floats:
@@ -46,8 +46,8 @@ def roots(q: Floats, strain: Floats, temperature: Floats, dt: float, density: Fl
 
 
 def random_states(n: int, seed: int) -> tuple[Patch, dict[str, Floats], float]:
-    """Returns tets with random strain, temperatures up to and above melting, and a step in which they may yield. The
-    strain increments are 1e-12 to 0.05, with steps of one size; every fifth state has no plastic strain, and every
+    """Returns tets with random strain, temperatures up to and above melting, and a step in which the tets may yield.
+    The strain increments are 1e-12 to 0.05, with steps of one size; every fifth state has no plastic strain, and every
     seventh is hotter than the melting point.
     """
     random = np.random.default_rng(seed)
@@ -80,8 +80,8 @@ def random_states(n: int, seed: int) -> tuple[Patch, dict[str, Floats], float]:
 
 
 def slope(strain: Floats, d: Floats, dt: float) -> Floats:
-    """Return the slope of the flow stress of cold metal with respect to the plastic increment, over 3 G: it is large
-    at the start of hardening.
+    """Returns the slope of the flow stress of cold metal with respect to the plastic increment, over 3 G; this slope is
+    large at the start of hardening.
     """
     hardening = LAW.n * LAW.B * strain ** (LAW.n - 1.0) * (1.0 + LAW.C * np.log(np.maximum(d / dt, 1.0)))
     return np.asarray((hardening + np.where(d > dt, LAW.C * (LAW.A + LAW.B * strain**LAW.n) / d, 0.0)) / (3.0 * SHEAR))
@@ -124,9 +124,9 @@ def test_increments_equal_halved_brackets() -> None:
 
 
 def test_small_increments_are_right_by_themselves() -> None:
-    """The stress is right for increments of any size. Tested increments include d = dt times the reference rate, where
-    the rate term begins, and the first yield, where the flow stress rises a million times more steeply than the trial
-    stress falls.
+    """The stress is right for plastic increments of any size. Tested increments include d = dt times the reference
+    rate, where the rate term begins, and the first yield, where the flow stress rises a million times more steeply than
+    the trial stress falls.
     """
     patch, before, dt = random_states(100_000, 97)
     patch.advance(dt)
@@ -141,8 +141,8 @@ def test_small_increments_are_right_by_themselves() -> None:
 
 
 def test_increments_take_few_steps() -> None:
-    """Trial stresses are 1 Pa to 2 GPa above the flow stress, with and without rate term and previous plastic
-    strain. The mean number of iterations is 5.7; bisection would need 40.
+    """Trial stresses are 1 Pa to 2 GPa above the flow stress, with and without the rate term and previous plastic
+    strain. The mean number of iterations is 5.7; bisection would need 40 iterations.
     """
     random = np.random.default_rng(5)
     params = Patch(TetMesh(REGULAR, np.arange(4, dtype=np.int32)[None]), STEEL_42CRMO4).block.params
@@ -163,7 +163,7 @@ def test_increments_take_few_steps() -> None:
 
 
 def excess(d: float, q: float, strain: float, temperature: float, density: float, dt: float) -> float:
-    """Return the function whose root the return mapping finds."""
+    """Returns the function whose root the return mapping finds."""
     left = q - 3.0 * SHEAR * d
     return float(left - flow_stress(strain + d, d / dt, temperature + HEAT / density * d * left))
 
@@ -180,7 +180,7 @@ def test_the_halved_brackets_agree_with_scipy() -> None:
 
 
 def test_no_flow_below_the_static_flow_stress() -> None:
-    """At rates below the reference rate the law has no rate term: yield starts at A."""
+    """At rates below the reference rate the law has no rate term: yield starts at the stress A."""
     rate = 0.5
     L = np.array([[0.0, rate, 0.0], [rate, 0.0, 0.0], [0.0, 0.0, 0.0]])
     strain_at_yield = LAW.A / (3.0 * SHEAR) / (2.0 * rate / 3.0**0.5)

@@ -24,7 +24,7 @@ LAW = JohnsonCook(
     taylor_quinney=0.0, damage=DAMAGED,
 )  # fmt: skip
 STEEL = Material(density=7830.0, elastic=Elastic(young=205e9, poisson=0.29), strength=LAW)
-"""A steel without hardening and heating: all arguments of the fracture strain are constant."""
+"""A steel without hardening and heating, for which all arguments of the fracture strain are constant."""
 RATE, DT, TEMPERATURE = 2e4, 1e-8, 600.0
 
 
@@ -86,7 +86,7 @@ def test_damage_takes_its_share_of_the_flow_stress() -> None:
 
 
 def test_a_metal_that_hardens_heats_and_softens_follows_an_integration_of_its_law() -> None:
-    """The reference is the integral of (A + B e^n)(1 + C ln rate)(1 - T*^m)(1 - s D) over the strain, with 20,000
+    """The reference value is the integral of (A + B e^n)(1 + C ln rate)(1 - T*^m)(1 - s D) over the strain, with 20,000
     midpoints."""
     constants = {"B": 600e6, "C": 0.01, "m": 1.0, "taylor_quinney": 0.9}
     law = LAW.model_copy(update=constants)
@@ -107,8 +107,8 @@ def test_a_metal_that_hardens_heats_and_softens_follows_an_integration_of_its_la
 
 
 def fast_shear(softening: float) -> tuple[float, float]:
-    """Returns the plastic strain at which the adiabatic flow stress of weldox_460e is largest, and the strain at
-    which it breaks, in shear at RATE without pressure, by numerical integration.
+    """Returns two plastic strains of weldox_460e in shear at RATE without pressure, by numerical integration: the
+    strain at which the adiabatic flow stress is largest, and the strain at which the steel breaks.
     """
     metal = library()["weldox_460e"]
     law = metal.strength

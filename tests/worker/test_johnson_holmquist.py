@@ -19,7 +19,8 @@ from .meshes import Floats, block, free_tets
 NAMES = ("float_glass_jh2", "alumina_995_jh2", "boron_carbide_jh2", "silicon_carbide_jh2")
 RATE = 1e5
 SOFT = 2e-6
-"""Overstress of the reference over 3 G. The reference is a Maxwell element, so that one ODE gives the solution."""
+"""Overstress of the reference solution over 3 G. The reference is a Maxwell element, so that one ODE gives the
+solution."""
 
 
 def constants(name: str) -> tuple[Material, JohnsonHolmquist, float, float]:
@@ -41,8 +42,8 @@ def strengths(law: JohnsonHolmquist, p: float, rate: float) -> tuple[float, floa
 
 
 def reference(name: str, strain: float) -> tuple[Floats, Floats]:
-    """Returns times, and (5, n) deviator along z, bulking, damage, plastic strain and pressure: the law as an ODE,
-    solved by scipy. A tet is shortened to e^-strain and then released by a quarter of this strain.
+    """Returns times, and (5, n) deviator along z, bulking, damage, plastic strain and pressure, from the law as an ODE,
+    solved by scipy. The tet is shortened to e^-strain and then released by a quarter of this strain.
     """
     _, law, bulk, shear = constants(name)
 
@@ -93,8 +94,8 @@ def reference(name: str, strain: float) -> tuple[Floats, Floats]:
 
 
 def driven(name: str, strain: float, every: int) -> tuple[Floats, Patch]:
-    """Returns the same quantities of a tet of the worker, with ``every`` steps for each of the 500 times, and the
-    tet at the end."""
+    """Returns times, and the five quantities of ``reference`` for a tet of the worker, with ``every`` steps for each of
+    the 500 times, and the tet at the end."""
     made, *_ = constants(name)
     mesh = free_tets(1, 3)
     patch = Patch(mesh, made)
@@ -112,9 +113,9 @@ def driven(name: str, strain: float, every: int) -> tuple[Floats, Patch]:
 
 @pytest.mark.parametrize("name", [name for name in NAMES if not name.startswith("boron")])
 def test_uniaxial_strain_follows_an_independent_integration(name: str) -> None:
-    """The strain is twice the elastic limit, followed by a release of a quarter. Boron carbide fails at its elastic
-    limit within a few steps of any size, because its fracture strain is a tenth of the released elastic strain. During
-    this failure the pressure of boron carbide does not follow the bulking as in the ODE.
+    """The strain of the test is twice the elastic limit, followed by a release of a quarter. Boron carbide fails at its
+    elastic limit within a few steps of any size, because its fracture strain is a tenth of the released elastic strain.
+    During this failure the pressure of boron carbide does not follow the bulking as the ODE does.
     """
     _, law, bulk, shear = constants(name)
     strain = 2.0 * law.hel / (bulk + 4.0 / 3.0 * shear)
@@ -194,8 +195,8 @@ def test_the_answer_of_a_tet_does_not_depend_on_its_chunk() -> None:
 
 @pytest.mark.parametrize("form", ["nodal", "split"])
 def test_a_block_that_crumbles_keeps_its_elastic_energy(form: Form) -> None:
-    """Alumina hits a wall. With a tensile cut-off at each node the elastic energy is never negative. With a cut-off
-    at the mean strain the elastic energy reached -1.0 J of 11 J, and a tet was crushed.
+    """In this test alumina hits a wall. With a tensile cut-off at each node the elastic energy is never negative. With
+    a cut-off at the mean strain the elastic energy reached -1.0 J of 11 J, and a tet was crushed.
     """
     wall = [{"kind": "wall", "point": (0.0, 0.0, 0.0), "normal": (0.0, 0.0, 1.0)}]
     case = scene(

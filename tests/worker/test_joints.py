@@ -1,4 +1,4 @@
-"""Bonds by shared nodes: two parts of one file as one body of two materials."""
+"""Bonds by shared nodes: two parts of one file are one body of two materials."""
 
 import math
 from pathlib import Path
@@ -105,8 +105,8 @@ def _confined(material: Any) -> float:
 
 @pytest.mark.parametrize("form", FORMS)
 def test_a_wave_is_reflected_and_goes_through_as_the_impedances_have_it(form: Form) -> None:
-    """The end of a confined bar moves at v: the stress is z1 v, and from the interface on 2 z1 z2 / (z1 + z2) v
-    (Kolsky 1953)."""
+    """The end of a confined bar moves at v: the stress is z1 v in the first part, and from the interface on 2 z1 z2 /
+    (z1 + z2) v (Kolsky 1953)."""
     mesh = block((1, 1, 160), 0.1e-3, 0.0)
     second = mesh.points[mesh.tets, 2].mean(axis=1) > 8e-3
     materials = [library()[name] for name in ("aluminium_2024", "steel")]
@@ -142,7 +142,7 @@ def test_a_wave_is_reflected_and_goes_through_as_the_impedances_have_it(form: Fo
 
 
 def _mean(sim: Simulation, part: int, low: float, high: float) -> float:
-    """Return the mean axial stress of the tets of a part between two heights."""
+    """Returns the mean axial stress of the tets of a part between two heights."""
     of = sim.model.blocks[part]
     z = sim.model.nodes.x0[of.tets, 2].mean(axis=1)
     stress = of.row(S_ZZ) - of.row(PRESSURE) - of.row(VISCOUS)
@@ -182,8 +182,8 @@ def test_pressure_on_all_sides_of_two_parts_leaves_their_interface_alone() -> No
 
 
 def test_nodes_of_two_parts_are_of_both() -> None:
-    """Selections by part find the common nodes in both parts; mass, momentum and energy of each part are those of
-    its tets."""
+    """Selections by part find the common nodes in both parts; mass, momentum and energy of each part are those of the
+    tets of the part."""
     moved = {"kind": "velocity", "parts": ["upper"], "z": "7 m/s", "low": [-1, -1, -1], "high": [1, 1, 1]}
     case = joint(("alumina", "steel"), boundaries=[moved], lower={"velocity": [0, 0, "3 m/s"]},
                  upper={"velocity": [0, 0, "3 m/s"]})  # fmt: skip

@@ -1,5 +1,5 @@
-"""A run that is stored and restored twice: every line of its history is that of the uninterrupted run. Between the
-two times the run makes no step or some steps; the schedule and the halo of its searches may differ afterwards.
+"""A run is stored and restored twice: every line of its history is that of the uninterrupted run. Between the two
+restarts the run makes no step or some steps; the schedule and the halo of its searches may differ after a restart.
 """
 
 import json
@@ -24,8 +24,8 @@ from .simulations import kept_again
 
 BREAKING = Path(__file__).parents[1] / "parallel" / "breaking.toml"
 STEPS = 32
-"""Number of steps, of the 54 of the scene. After these steps contact has taken energy, facets have broken, and
-cohesive facets carry traction."""
+"""Number of steps before the run is stored; the scene has 54 steps. After this number of steps contact has taken
+energy, facets have broken, and cohesive facets carry traction."""
 OTHER = ("contact.skin=0.08", "contact.domain=box")
 
 
@@ -45,8 +45,8 @@ def case_of(*changes: str) -> schema.Case:
 
 
 def course(comm: Comm, folder: Path, cases: Sequence[schema.Case], stops: Sequence[int]) -> Course:
-    """Returns the history of a run on one rank that is stored and restored before each of the ``stops``, with the
-    next of the ``cases``."""
+    """Returns the history of a run on one rank that is stored and restored before each of the ``stops``, with the next
+    case of ``cases``."""
     sim, lines = simulation.build(cases[0], Path(), comm), list[Energy]()
     step.prepare(sim)
     for number in range(STEPS):

@@ -1,4 +1,4 @@
-"""Kernels: the name of their cache folder, their loading, and their compilation before a run."""
+"""Kernels: the name of the cache folder, the loading of kernels, and their compilation before a run."""
 
 import ast
 import fcntl
@@ -218,7 +218,7 @@ def test_all_kernels_are_compiled_and_the_progress_is_reported(tree: Path, tmp_p
 
 
 def test_modules_that_have_not_changed_are_linked_from_an_earlier_folder(tree: Path, tmp_path: Path) -> None:
-    """A process that uses the new folder loads these modules from the old folder."""
+    """A process that uses the new folder loads the kernels of unchanged modules from the old folder."""
     folders = [tmp_path / "cache" / name for name in ("first", "second", "third")]
     text = "import numpy as np; from tiny.above import scale; x = np.ones(2); scale(x); "
     text += "print(x, sum(scale.stats.cache_hits.values()))"
@@ -282,7 +282,7 @@ def test_a_child_that_fails_ends_in_one_line(tree: Path, tmp_path: Path, wrong: 
 
 
 def test_a_child_that_is_told_to_stop_has_not_failed(tree: Path, tmp_path: Path) -> None:
-    """A launcher sends a cancel to every process of a rank."""
+    """A launcher sends a cancel signal to every process of a rank."""
     with (tree / "above.py").open("a") as file:
         file.write("\n\nimport os, signal\nos.kill(os.getpid(), signal.SIGTERM)\n")
     with pytest.raises(StoppedError, match="stopped on request"):
@@ -336,7 +336,9 @@ def test_the_worker_reports_the_cause_of_its_waiting(monkeypatch: pytest.MonkeyP
 
 
 def test_numba_is_not_imported_before_its_cache_has_a_name() -> None:
-    """Otherwise numba would store kernels beside their sources, and would not detect an edited callee."""
+    """Without a separate cache folder numba would store kernels beside their sources, and would not detect an edited
+    callee.
+    """
     text = "import sys, conoid.worker.run.main; assert 'numba' not in sys.modules"
     subprocess.run([sys.executable, "-c", text], check=True)
     text = "import numba; from conoid.worker.kernels import store; store.use_cache()"

@@ -28,13 +28,13 @@ def moving(seed: int, rate: float = 1e5) -> Patch:
 
 
 def mid_gradient(patch: Patch) -> tuple[Floats, Floats]:
-    """Returns volume and velocity gradient in the middle of the step, from the formulas."""
+    """Returns the volume and the velocity gradient in the middle of the step, from the formulas."""
     volume, grad = formulas.gradients(patch.corners() - 0.5 * DT * patch.corners(patch.nodes.v))
     return volume, formulas.velocity_gradient(patch.corners(patch.nodes.v), grad)
 
 
 def relative(found: Floats, expected: Floats) -> float:
-    """Returns the largest difference of each tet over its largest magnitude."""
+    """Returns the largest difference of each tet over the largest magnitude of the tet."""
     axes = tuple(range(1, found.ndim))
     return float((np.abs(found - expected).max(axis=axes) / np.abs(expected).max(axis=axes)).max())
 
@@ -61,8 +61,8 @@ def test_rotation_is_the_cayley_transform() -> None:
 
 @pytest.mark.parametrize("rate", [1e3, 1e6, 1e7])
 def test_rotation_changes_no_invariant(rate: float) -> None:
-    """In a rigid rotation of up to a radian in a step, s rotates, and its magnitude and determinant are constant up
-    to round-off."""
+    """In a rigid rotation of up to a radian in a step, the stress s rotates, and its magnitude and determinant are
+    constant up to round-off."""
     patch = Patch(free_tets(300, 4), HARD)
     before = formulas.deviator(np.random.default_rng(5).normal(size=(300, 3, 3)) * 1e9)
     patch.deviator = before
@@ -80,8 +80,8 @@ def test_rotation_changes_no_invariant(rate: float) -> None:
 
 
 def turned_and_stretched(steps: int) -> float:
-    """Returns the error of the stress over the shear modulus, for a tet that turns by a radian and stretches along
-    axes that turn with it. The exact stress is 2 G times the logarithm of the stretch, rotated.
+    """Returns the error of the stress over the shear modulus, for a tet that turns by a radian and stretches along axes
+    that turn with the tet. The exact stress is 2 G times the logarithm of the stretch, rotated.
     """
     patch = Patch(TetMesh(REGULAR, np.array([[0, 1, 2, 3]], np.int32)), HARD)
     axis, along, start = np.array([0.36, 0.48, 0.8]), np.diag([0.2, -0.15, -0.05]), patch.nodes.x.copy()
@@ -97,8 +97,8 @@ def turned_and_stretched(steps: int) -> float:
 
 
 def test_strain_is_added_where_it_is_after_half_of_the_turn() -> None:
-    """With half the step the error is a quarter. If the strain of the middle of the step were added without
-    rotation, the error would be a half."""
+    """With half the step the error of the stress is a quarter. If the strain of the middle of the step were added
+    without rotation, the error would be a half with half the step."""
     errors = [turned_and_stretched(steps) for steps in (10, 20, 40)]
     assert errors[1] / errors[0] == pytest.approx(0.25, abs=0.02)
     assert errors[2] / errors[1] == pytest.approx(0.25, abs=0.02)

@@ -21,7 +21,7 @@ N = 300
 
 
 def named(model: str) -> Material:
-    """Returns a material with this law."""
+    """Returns a material with the given law."""
     return next(m for m in MATERIALS if ("" if m.strength is None else m.strength.model) == model)
 
 

@@ -49,8 +49,8 @@ def test_an_impact_closes_to_a_percent(material: materials.Material, form: Form)
 @pytest.mark.parametrize("frames", [0, 20])
 @pytest.mark.parametrize("keys", [FLIGHT, PULL], ids=["wall", "pull"])
 def test_every_line_closes_to_second_order(keys: dict[str, Any], frames: int) -> None:
-    """Elastic bodies, also if the step changes before a frame or at the end of the run, and if a wall stops a whole
-    face."""
+    """The energy balance of elastic bodies closes also if the step changes before a frame or at the end of the run, and
+    if a wall stops a whole face."""
     assert worst(STEEL, "standard", frames=frames, **keys) < 1e-3
 
 
@@ -71,8 +71,8 @@ def test_a_ringing_body_gains_no_energy(material: materials.Material, speed: flo
 
 
 def test_what_unequal_steps_take_has_its_line() -> None:
-    """A cube oscillates with steps of random lengths. The term derived for each node is computed in plain numpy; the
-    other terms close the balance."""
+    """A cube oscillates with steps of random lengths. The term ``stepping`` of each node is computed in plain numpy;
+    the other terms close the balance."""
     sim = build(scene(STEEL, "standard", jitter=20.0, end=4e-6, dt_growth=2.0), [block((6, 6, 6), 1e-3)])
     random, taken, seen = np.random.default_rng(4), [0.0], []
 
@@ -124,8 +124,8 @@ def test_a_free_body_keeps_its_momentum_in_the_ledger() -> None:
 
 
 def test_the_parts_are_what_the_ledger_sums_up() -> None:
-    """Two plastic bodies without contact: one moves freely, the other hits a wall. A single part has no line of its
-    own."""
+    """The scene has two plastic bodies without contact: one body moves freely, the other body hits a wall. A single
+    part has no energy column of its own."""
     one = scene(COPPER, "standard", end=4e-6, viscosity={}, **FLIGHT)
     part = one.parts[0]
     slow = part.model_copy(update={"name": "slow", "velocity": (0.0, 0.0, 40.0)})
@@ -144,7 +144,7 @@ def test_the_parts_are_what_the_ledger_sums_up() -> None:
 
 @pytest.mark.parametrize("row", [WORK, WORK_VISCOUS])
 def test_a_work_that_is_not_a_number_is_no_residual_of_nothing(row: int) -> None:
-    """A run without initial energy is tested too: the run ends by its limit of the residual."""
+    """A run without initial energy is also tested: this run ends by its limit of the residual."""
     sim = build(scene(STEEL, end=1e-6, viscosity={}), [MESH])
     run(sim)
     assert sim.ledger.close(sim.model.nodes.v).residual == 0.0
@@ -153,7 +153,7 @@ def test_a_work_that_is_not_a_number_is_no_residual_of_nothing(row: int) -> None
 
 
 def test_motion_without_a_source_of_energy_ends_the_run() -> None:
-    """The line that is below zero does not matter: here plastic work is subtracted again, and the sum of all lines
+    """A single negative term does not matter: plastic work is subtracted again here, and the sum of all terms
     closes."""
     sim = build(scene(COPPER, end=4e-6, **FLIGHT), [MESH])
     ran = False
@@ -180,8 +180,8 @@ def test_motion_without_a_source_of_energy_ends_the_run() -> None:
 
 
 def test_errors_are_shares_of_the_largest_energy_there_has_been() -> None:
-    """A pressure acts from the start and gets all its work back: the error is a fraction of the largest work that
-    the pressure has done."""
+    """A pressure acts from the start and gets all its work back: the error is a fraction of the largest work that the
+    pressure has done."""
     push = {"kind": "traction", "pressure": 1e6}
     sim = build(scene(STEEL, end=10e-6, boundaries=(push,), viscosity={}), [block((1, 1, 1), 1e-3)])
     most, biggest, worst, shares = 0.0, 0.0, 0.0, list[float]()
@@ -202,7 +202,7 @@ def test_errors_are_shares_of_the_largest_energy_there_has_been() -> None:
 
 
 def named_safety(sim: Simulation) -> float:
-    """Return the dt_safety named in the warning about ``stepping``; 0 if there is no warning."""
+    """Returns the dt_safety named in the warning about ``stepping``; 0 if there is no warning."""
     for text in sim.ledger.warnings(sim.case.numerics.dt_safety):
         if text.startswith("the line stepping"):
             return float(text.partition("numerics.dt_safety = ")[2].split()[0])
@@ -222,7 +222,7 @@ def crushed(form: Form, safety: float) -> Simulation:
 
 
 def rebounding(form: Form, safety: float) -> Simulation:
-    """Returns the same bar between walls, with several rebounds: the time step falls and recovers."""
+    """Returns this bar between walls, with several rebounds: the time step falls and recovers."""
     box = [{"kind": "wall", "point": (at,) * 3, "normal": normal} for at, normal in (
         (-1e-5, (0.0, 0.0, 1.0)), (3.01e-3, (0.0, 0.0, -1.0)),
     )]  # fmt: skip
@@ -233,7 +233,7 @@ def rebounding(form: Form, safety: float) -> Simulation:
 @pytest.mark.parametrize("made", [shattered, rebounding])
 @pytest.mark.parametrize("form", ["standard", "nodal"])
 def test_what_is_advised_against_unequal_steps_helps(made: Callable[[Form, float], Simulation], form: Form) -> None:
-    """With the safety factor that the warning names, the line ``stepping`` is within half of its limit."""
+    """With the safety factor that the warning names, the term ``stepping`` is within half of its limit."""
     sim = made(form, 0.9)
     lines(sim)
     safety = named_safety(sim)

@@ -1,4 +1,4 @@
-"""Energy that a line of the energy balance creates: the lines that are checked, the reference energy, and rounding."""
+"""Energy that a term of the energy balance creates: the checked terms, the reference energy, and rounding."""
 
 import math
 import re
@@ -14,7 +14,7 @@ from .meshes import block
 
 
 def lines(**values: float) -> Energy:
-    """Returns an energy balance with these lines, J; the other lines are 0."""
+    """Returns an energy balance with the given terms, J; the other terms are 0."""
     return Energy(**({"kinetic": 0.0, "elastic": 0.0, "plastic": 0.0, "viscous": 0.0, "contact": 0.0, "external": 0.0,
                       "initial": 1.0, "residual": 0.0} | values))  # fmt: skip
 
@@ -53,7 +53,7 @@ def test_hot_matter_that_erodes_may_have_given_its_heat() -> None:
 
 @pytest.mark.parametrize("sign", [1.0, -1.0])
 def test_unequal_steps_count_either_way_and_their_cure_is_derived(sign: float) -> None:
-    """The error is of second order in the step: with the named safety factor half of WARNED remains."""
+    """The created energy is of second order in the step: with the named safety factor half of WARNED remains."""
     making = Making(0.0)
     making.look(lines(stepping=sign * 0.04), 1.0, 1e-6)
     (text,) = making.warnings(0.9)
@@ -88,6 +88,6 @@ def test_a_resumed_run_restores_the_energy_that_was_made() -> None:
 
 
 def test_rounding_is_the_energy_of_a_strain_that_positions_hardly_have() -> None:
-    """The limit is K / 2 times the square of the strain over the whole volume: 27 mm^3 of copper."""
+    """The limit for the check is K / 2 times the square of the strain over the whole volume: 27 mm^3 of copper."""
     sim = build(scene(COPPER), [block((3, 3, 3), 1e-3)])
     assert sim.ledger.making._rounding == pytest.approx(0.5 * 117e9 / 0.9 * 1e-20 * 27e-9, rel=1e-9)

@@ -19,7 +19,7 @@ TORN = COPPER.model_copy(update={"spall": 1e9})
 
 
 def rollers(size: float, *axes: str) -> tuple[dict[str, Any], ...]:
-    """Returns planes of symmetry on both sides."""
+    """Returns planes of symmetry on both sides of the bar."""
     return tuple({"kind": "symmetry", "axis": axis, "at": at} for axis in axes for at in (0.0, size))
 
 
@@ -35,7 +35,7 @@ def to_and_fro(material: materials.Material, form: Form) -> Simulation:
 
 
 def averaging(sim: Simulation) -> float:
-    """Returns the largest magnitude of the line ``averaging`` over the largest energy."""
+    """Returns the largest magnitude of the term ``averaging`` over the largest energy."""
     worst, largest = 0.0, 0.0
 
     def look(sim: Simulation, before: Floats) -> None:

@@ -19,17 +19,17 @@ SPEED, GAP = 100.0, 0.02 * MM
 
 
 def above() -> TetMesh:
-    """Returns a cube of 2 mm above the plane y = 0, which it does not touch."""
+    """Returns a cube of 2 mm above the plane y = 0, which the cube does not touch."""
     return moved(block((4, 4, 4), 0.5 * MM, shake=0.1), (0.0, GAP, 0.0))
 
 
 def image(mesh: TetMesh) -> TetMesh:
-    """Returns the mirrored mesh below the plane."""
+    """Returns the mirror image of the mesh below the plane."""
     return TetMesh(mesh.points * [1.0, -1.0, 1.0], np.ascontiguousarray(mesh.tets[:, [0, 2, 1, 3]]))
 
 
 def mean(sim: Simulation, part: int) -> float:
-    """Returns the velocity of a part across the plane, m/s."""
+    """Returns the velocity of a part normal to the plane, m/s."""
     nodes = sim.model.nodes
     mine = nodes.part == part
     return float((nodes.mass[mine] @ nodes.v[mine, 1]) / nodes.mass[mine].sum())
@@ -37,8 +37,9 @@ def mean(sim: Simulation, part: int) -> float:
 
 @pytest.mark.parametrize(("back", "apart"), [(0.0, 1e-6), (0.6, 0.01)])
 def test_half_a_collision_is_half_of_the_whole(back: float, apart: float) -> None:
-    """Contact stops opposite nodes of equal masses in the middle, which is the plane. With restitution nodes rebound
-    several times; in the half model at other times, so that the results differ by 0.6 % for any number of sweeps.
+    """Contact stops opposite nodes of equal masses in the middle, which is the plane of symmetry. With restitution
+    nodes rebound several times; the rebounds of the half model are at other times, so that the results differ by 0.6 %
+    for any number of sweeps.
     """
     contact = {"restitution": back}
     down, up = {"velocity": (0.0, -SPEED, 0.0)}, {"velocity": (0.0, SPEED, 0.0)}
@@ -57,8 +58,8 @@ def test_half_a_collision_is_half_of_the_whole(back: float, apart: float) -> Non
 
 
 def test_nodes_on_the_plane_stay_there_and_driven_ones_are_let_through() -> None:
-    """The scene has a body with nodes on the plane and on both sides of it, and a driven body that passes through
-    the plane."""
+    """The scene has a body with nodes on the plane and on both sides of the plane, and a driven body that passes
+    through the plane."""
     both = moved(block((2, 2, 2), MM, shake=0.0), (0.0, -1.0 * MM, 0.0))
     drive = {"kind": "velocity", "parts": ["body1"], "y": -SPEED}
     case = meeting_of([{}, {}], material=STEEL, end=1.0, boundaries=(PLANE, drive))

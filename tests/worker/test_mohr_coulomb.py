@@ -24,7 +24,7 @@ LAWS = {
 
 
 def excess(s: Floats, pressure: Floats | float, law: materials.MohrCoulomb) -> Floats:
-    """Returns the larger of f and s1 - s3 - cap, Pa; f of the apex if the pressure is beyond it."""
+    """Returns the larger of f and s1 - s3 - cap, Pa; f of the apex if the pressure is beyond the apex."""
     d = np.linalg.eigvalsh(s)
     sine, cosine = math.sin(law.friction_angle), math.cos(law.friction_angle)
     most = np.maximum(2.0 * law.cohesion * cosine + 2.0 * sine * np.asarray(pressure), 0.0)
@@ -34,8 +34,8 @@ def excess(s: Floats, pressure: Floats | float, law: materials.MohrCoulomb) -> F
 
 @pytest.mark.parametrize("name", LAWS)
 def test_a_hundred_thousand_random_stresses(name: str) -> None:
-    """The new stress is on the yield surface, has the same principal directions, and results from flow along (1, 0,
-    -1) or an adjacent direction. The lost energy is booked as plastic work."""
+    """The new stress is on the yield surface, has the principal directions of the trial stress, and results from flow
+    along (1, 0, -1) or an adjacent direction. The energy that the return dissipates is booked as plastic work."""
     n, random, law = 25_000, np.random.default_rng(len(name)), LAWS[name].strength
     assert isinstance(law, materials.MohrCoulomb)
     trial, pressure = random_deviators(n, random), random.normal(size=n) * 10.0 ** random.uniform(7.0, 10.0, n)
@@ -123,8 +123,8 @@ def test_a_stress_gives_the_same_bits_in_any_place(length: int) -> None:
 @pytest.mark.parametrize("form", FORMS)
 @pytest.mark.parametrize("axial", [-1.0, 1.0])
 def test_uniaxial_strength(form: Form, axial: float) -> None:
-    """A block with free sides has the strength 2 c cos(phi) / (1 -+ sin(phi)) in compression and in tension. The
-    sides move so that their stress stays at zero; every tet of the block has the same strain.
+    """A block with free sides has the strength 2 c cos(phi) / (1 -+ sin(phi)) in compression and in tension. The sides
+    of the block move so that the stress on the sides stays at zero; every tet of the block has the same strain.
     """
     patch = Patch(block((2, 2, 2)), LAWS["glass"], form)
     side, before, steps = 0.0, 0.0, 400
@@ -141,8 +141,8 @@ def test_uniaxial_strength(form: Form, axial: float) -> None:
 
 
 def test_failed_glass_keeps_the_residual_strength() -> None:
-    """In shear at a constant pressure the strength is 2 (c cos(phi) + p sin(phi)) until the failure strain, then 2 p
-    sin(30 deg)."""
+    """In shear at a constant pressure the strength is 2 (c cos(phi) + p sin(phi)) until the failure strain, and 2 p
+    sin(30 deg) afterwards."""
     patch = Patch(TetMesh(REGULAR, np.array([[0, 1, 2, 3]], np.int32)), GLASS)
     patch.put(PRESSURE, 0.5e9)
     rate = 1e4

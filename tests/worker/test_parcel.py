@@ -82,7 +82,7 @@ HARMS: dict[str, Callable[[Path], Any]] = {
 
 
 def put(path: Path, make: Callable[[Path], None]) -> None:
-    """Replaces a file by other data."""
+    """Replaces a file with other data."""
     path.unlink()
     make(path)
 
@@ -94,7 +94,7 @@ def emptied(place: Path) -> None:
 
 
 def flipped(path: Path, old: bytes = b"", new: bytes = b"") -> None:
-    """Changes one byte, or replaces ``old`` by ``new``."""
+    """Changes one byte of a file, or replaces ``old`` by ``new``."""
     content = path.read_bytes()
     assert old in content
     middle = len(content) // 2

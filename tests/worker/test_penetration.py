@@ -22,7 +22,7 @@ MM = 1e-3
 
 
 def length(mesh: TetMesh, axis: int, at: tuple[float, float]) -> float:
-    """Return the length of a line inside of a mesh, m."""
+    """Returns the length of a line inside of a mesh, m."""
     _, span = spans(mesh.points, mesh.tets.astype(np.uint32), axis, at)
     assert (span[:, 1] > span[:, 0]).all()
     return float((span[:, 1] - span[:, 0]).sum())
@@ -52,13 +52,13 @@ def test_a_line_in_the_faces_or_edges_of_tets_is_counted_once(shares: tuple[floa
 # Depth of the hole
 
 PLATES = ((0.0, 22.0), (22.0, 44.0), (44.0, 66.0))
-"""Three plates on each other: start and end of each, mm."""
+"""Three plates on each other: start and end of each plate, mm."""
 RADIUS = 3.5
 
 
 def rows_of(left: dict[int, list[tuple[int, float, float]]]) -> Floats:
-    """Returns an artificial state: for some lines the remaining pieces of the plates (plate, from, to); the other
-    lines have the pieces of the last line."""
+    """Returns an artificial state: for some lines the remaining pieces of the plates (plate, from, to); the other lines
+    have the pieces of the last line."""
     table, last = [], left[0]
     for line in range(len(LINES)):
         last = left.get(line, last)
@@ -80,7 +80,7 @@ def test_whole_plates_have_no_hole_and_no_plates_are_pierced() -> None:
 
 
 def test_a_cavity_ahead_of_the_hole_does_not_count() -> None:
-    """A hole of 53.9 mm and a cavity of 11 mm behind 2 mm of plate do not give 64.9 mm."""
+    """A hole of 53.9 mm and a cavity of 11 mm behind 2 mm of plate do not add up to a depth of 64.9 mm."""
     assert depth_of({0: [(2, 53.9, 55.0), (2, 65.0, 66.0)]}) == pytest.approx(53.9)
 
 
@@ -96,7 +96,7 @@ def test_a_flake_in_the_hole_does_not_end_it() -> None:
 
 
 def test_plates_that_part_ahead_of_the_hole_are_whole() -> None:
-    """The second plate has moved by 3 mm; the third plate has moved by 5 mm and has a cavity of 4 mm."""
+    """In this test the second plate has moved by 3 mm; the third plate has moved by 5 mm and has a cavity of 4 mm."""
     assert depth_of({0: [(0, 10.0, 22.0), (1, 25.0, 47.0), (2, 49.0, 60.0), (2, 64.0, 71.0)]}) == pytest.approx(10.0)
 
 
@@ -105,13 +105,13 @@ def test_a_plate_that_is_pushed_along_is_not_pierced_by_that() -> None:
 
 
 def test_a_hole_through_the_last_plate_beside_the_line_is_not_one_on_it() -> None:
-    """The free space behind the plates does not connect hole and cavity."""
+    """The free space behind the plates does not connect the hole and the cavity."""
     assert depth_of({0: [(2, 60.0, 66.0)], 6: []}) == pytest.approx(60.0)
     assert np.isinf(bottoms(rows_of({0: [(2, 60.0, 66.0)], 6: []}), 1e-6)[6:]).all()
 
 
 def test_the_depth_is_the_mean_of_three_lines() -> None:
-    """The hole ends at 2, 6 and 13 mm on these lines, and at 30 mm on the other lines."""
+    """The hole ends at 2, 6 and 13 mm on three lines, and at 30 mm on the other lines."""
     ends = dict(zip(MEASURED, (2.0, 6.0, 13.0), strict=True))
     left = {line: [(0, ends[line], 22.0)] if line in ends else [(1, 30.0, 44.0)] for line in range(len(LINES))}
     solid = {line: [*some, (1, 22.0, 44.0), (2, 44.0, 66.0)] if line in ends else [*some, (2, 44.0, 66.0)]
@@ -122,9 +122,9 @@ def test_the_depth_is_the_mean_of_three_lines() -> None:
 @pytest.mark.parametrize("ranks", [1, 3])
 @pytest.mark.parametrize("way", [1.0, -1.0])
 def test_a_state_without_the_tets_of_a_cavity_and_of_a_hole(way: float, ranks: int) -> None:
-    """Two plates of 4 mm are hit from below or from above. The plates have a hole of 2 mm and, 1 mm deeper, a narrow
-    cavity of 2 mm at the rear of the first plate and the front of the second plate. Tets are removed by the position of
-    their centres; layers of the mesh are 1 mm thick.
+    """In this test two plates of 4 mm are hit from below or from above. The plates have a hole of 2 mm and, 1 mm
+    deeper, a narrow cavity: 2 mm at the rear of the first plate and 2 mm at the front of the second plate. Tets are
+    removed if their centres lie in the hole or in the cavity; layers of the mesh are 1 mm thick.
     """
     plate = block((8, 8, 4), MM, shake=0.0)
     meshes = [block((4, 4, 2), MM, shake=0.0), plate, moved(plate, (0.0, 0.0, 4 * MM))]

@@ -1,5 +1,5 @@
-"""A rod perforates a plate at three speeds: residual velocity and mass of the probes, compared with the nodes behind
-the plate."""
+"""A rod perforates a plate at three speeds: the residual velocity and the mass of the probes are compared with the
+nodes behind the plate."""
 
 from pathlib import Path
 

@@ -1,4 +1,4 @@
-"""Work of the stress and the return with linear hardening, compared with the formulas."""
+"""The work of the stress and the return with linear hardening, compared with the formulas."""
 
 import numpy as np
 
@@ -41,7 +41,9 @@ def test_work_below_the_yield_stress_is_trapezoidal() -> None:
 
 
 def test_linear_hardening_return() -> None:
-    """The increment is (q - Y) / (3 G + H), the stress is scaled to the new yield stress, and the work is booked."""
+    """The plastic increment is (q - Y) / (3 G + H), the stress is scaled to the new yield stress, and the work is
+    booked.
+    """
     patch, L = strained(2, 2e4)
     old, start = patch.deviator, np.random.default_rng(3).uniform(0.0, 2.0, N)
     patch.put(PLASTIC_STRAIN, start)
@@ -76,8 +78,8 @@ def test_the_return_is_idempotent() -> None:
 
 
 def test_work_is_elastic_energy_plus_plastic_work() -> None:
-    """The sum also equals the work if a step goes far beyond the yield stress: the work minus the plastic work is V s :
-    s / 4 G.
+    """The sum of the terms also equals the work if a step goes far beyond the yield stress: the work minus the plastic
+    work is V s : s / 4 G.
     """
     L = np.diag([1.0, -0.5, -0.5]) * 1e3
     for steps in (20, 200):

@@ -20,7 +20,7 @@ MESH = block((4, 3, 3), 1e-3, shake=0.25, seed=1)
 
 
 def quarter_sums(patch: Patch, values: Floats) -> Floats:
-    """Returns (nodes,) sums of a quarter of the value of each tet at each of its nodes."""
+    """Returns (nodes,) sums of a quarter of the value of each tet at each node of the tet."""
     return formulas.at_nodes(patch.tets, np.repeat(values[:, None] / 4.0, 4, axis=1), patch.nodes.n)
 
 
@@ -68,8 +68,8 @@ def test_uniform_strain_gives_every_form_the_same_pressure(form: Form) -> None:
 
 @pytest.mark.parametrize("form", FORMS)
 def test_work_is_that_of_the_nodal_forces(form: Form) -> None:
-    """With and without averaging, the pressure works on each tet's own change of volume: the sum is force times
-    displacement."""
+    """With and without averaging, the work of the pressure acts on each tet's own change of volume: the sum of this
+    work is force times displacement."""
     patch, volume, rate = shaken(form, 4)
     patch.advance(DT)
     pressure = patch.get(PRESSURE)
@@ -99,7 +99,9 @@ def test_a_linear_pressure_is_left_alone() -> None:
 
 
 def test_stabilisation_against_the_formula() -> None:
-    """The change is K dt^2/2 / V_a sum of V / rho grad N_a . (grad p - mean projected grad p), and its sum is zero."""
+    """The change of pressure at node a is K dt^2/2 / V_a times the sum over the tets of V / rho times the scalar
+    product of grad N_a and grad p minus the mean projected grad p. The sum of V_a times this change is zero.
+    """
     pressure = np.random.default_rng(5).normal(size=len(MESH.points)) * 1e9
     patch, change = stabilised(pressure)
     volume, grad = formulas.gradients(patch.corners())
@@ -114,7 +116,7 @@ def test_stabilisation_against_the_formula() -> None:
 
 
 def test_a_checkerboard_is_damped() -> None:
-    """An alternating pressure loses energy in each step, and does not change its sign within the stable step."""
+    """An alternating pressure loses energy in each step, and does not change its sign if the step is stable."""
     grid = np.rint(block((4, 3, 3), 1.0, shake=0.0).points).sum(axis=1)
     sign = np.where(grid % 2 == 0, 1.0, -1.0)
     patch, _ = stabilised(sign * 1e9)
@@ -129,7 +131,9 @@ def test_a_checkerboard_is_damped() -> None:
 
 
 def test_a_lone_tet_is_not_stabilised() -> None:
-    """The nodes of a single tet have its gradient, so the difference of gradients is zero for any pressures."""
+    """The nodes of a single tet have the pressure gradient of this tet, so the difference of gradients is zero for any
+    pressures.
+    """
     lone = block((1, 1, 1), 1e-3, shake=0.0)
     patch = Patch(type(lone)(lone.points[lone.tets[0]], np.array([[0, 1, 2, 3]], np.int32)), STEEL, "split")
     patch.elements.pressure[:] = [1e9, -2e9, 3e9, 5e8]

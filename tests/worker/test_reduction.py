@@ -1,5 +1,5 @@
-"""The record of the step reduction: every field returns the value that was set, and the maximum of words is correct
-for each field."""
+"""The record of the step reduction: every field returns the value that was set, and the maximum of words is correct for
+each field."""
 
 import math
 import struct

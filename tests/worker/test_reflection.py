@@ -1,5 +1,5 @@
-"""A node without tets that passes a plane of symmetry is replaced by its mirror image: compared with plain numpy,
-and in a scene."""
+"""A node without tets that passes a plane of symmetry is replaced by its mirror image: the test compares this with
+plain numpy, and in a scene."""
 
 from pathlib import Path
 from types import SimpleNamespace
@@ -41,15 +41,15 @@ def flight(x: Floats, v: Floats, axes: list[int], at: list[float], sides: Floats
 
 
 def folded(x: Floats, low: float, high: float) -> Floats:
-    """Return the position between two mirrors of a point that would be at ``x`` without them."""
+    """Returns the position between two mirrors of a point that would be at ``x`` without mirrors."""
     length = high - low
     within = np.mod(x - low, 2.0 * length)
     return np.asarray(low + np.where(within > length, 2.0 * length - within, within))
 
 
 def test_at_one_plane_the_image_comes_in() -> None:
-    """Positions and speeds are those of free flight and its image. No energy is lost, and the plane takes twice the
-    normal momentum."""
+    """Positions and speeds are those of free flight and its mirror image. No energy is lost, and the plane takes twice
+    the normal momentum of the node."""
     random = np.random.default_rng(1)
     x, v = random.uniform(0.0, 1.0, (40, 3)), random.uniform(-1.0, 1.0, (40, 3))
     x[:, 1] += 2.0
@@ -66,8 +66,8 @@ def test_at_one_plane_the_image_comes_in() -> None:
 
 
 def test_on_the_axis_both_components_turn_round() -> None:
-    """The nodes are: a node on the axis, a node that arrives there obliquely, and a node that starts on a plane and
-    stays in it."""
+    """The nodes of the test are a node on the axis, a node that arrives at the axis obliquely, and a node that starts
+    on a plane and stays in this plane."""
     x = np.array([[0.0, 0.0, 0.0], [0.3, 0.1, 0.0], [0.0, 0.5, 0.0]])
     v = np.array([[0.0, 0.0, 1.0], [-1.0, -1.0, 1.0], [0.0, -1.0, 1.0]])
     state, _ = flight(x, v, [0, 1], [0.0, 0.0], np.ones((3, 2)), 8, 0.1)
@@ -77,7 +77,7 @@ def test_on_the_axis_both_components_turn_round() -> None:
 
 @pytest.mark.parametrize("speed", [0.3, 7.0, 40.0])
 def test_between_two_planes_a_body_has_an_image_behind_each(speed: float) -> None:
-    """The images are also right for a node that passes several widths of the column in a step."""
+    """The mirror images are also right for a node that passes several widths of the column in a step."""
     x, v = np.linspace(-0.4, 0.6, 11)[:, None] * [1.0, 0.0, 0.0], np.tile([speed, 0.0, 2.0], (11, 1))
     sides = np.tile([1.0, -1.0], (11, 1))
     state, mirrors = flight(x, v, [0, 0], [-0.5, 0.7], sides, 13, 0.1)
@@ -119,8 +119,8 @@ def flown(sim: Simulation, until: float, limit: float = 1e-10) -> Simulation:
 
 @pytest.mark.parametrize("at", [0.0, 7 * MM])
 def test_debris_keeps_its_energy_at_planes(at: float) -> None:
-    """Debris that moves upwards and into the corner leaves it with the same speed. Nodes that start on a plane are
-    free."""
+    """Debris that moves upwards and into the corner leaves the corner with the same speed. Nodes that start on a plane
+    are free after the removal of their tets."""
     case, meshes = corner((-2000.0, -1500.0, 500.0), at)
     sim = build(case, meshes)
     nodes = sim.model.nodes

@@ -52,7 +52,7 @@ def test_no_bit_differs(law: str, form: Form) -> None:
 
 
 def test_a_wave_ends_the_rest() -> None:
-    """Chunks that the wave has reached are not at rest any more; the other chunks still are."""
+    """Chunks that the wave has reached are not at rest any more; the other chunks still are at rest."""
     sim, noted = struck(STEEL, "standard", skip=True)
     (bar,) = sim.model.blocks
     moving = np.asarray((sim.model.nodes.v != 0.0).sum(axis=1)[bar.tets].sum(axis=1) > 0)

@@ -1,4 +1,4 @@
-"""Ranks of the boxes of a new cut: a box goes to the rank that already has most of the box."""
+"""Ranks of the boxes of a new cut: a box is assigned to the rank that already has most of the box."""
 
 import numpy as np
 import pytest
@@ -27,8 +27,8 @@ def parcel(mine: list[int]) -> Parcel:
 @pytest.mark.parametrize("ranks", [2, 3, 5])
 @pytest.mark.parametrize("shift", [0, 1, 7])
 def test_balanced_loads_are_not_moved(ranks: int, shift: int) -> None:
-    """No tets move, for any assignment of the slabs of the row to ranks. If slabs are wrong by some tets, only these
-    tets are moved."""
+    """No tets move, for any assignment of the slabs of the row to ranks. If slabs are wrong by some tets, only the
+    wrong tets are moved."""
     order = np.random.default_rng(3).permutation(ranks)
     slab = np.minimum((np.arange(TETS) + shift) * ranks // TETS, ranks - 1)
 

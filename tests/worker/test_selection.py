@@ -55,8 +55,8 @@ def faces(whole: Whole, number: int = 0) -> int:
 
 
 class Scene:
-    """A block of cubes at any position, turned by quarter turns, and a box whose sides are planes of its nodes; mm,
-    exact."""
+    """A block of cubes at any position, rotated by quarter turns, and a box whose sides are planes of nodes of the
+    block; mm, exact."""
 
     def __init__(self, seed: int) -> None:
         rng = random.Random(seed)
@@ -77,7 +77,7 @@ class Scene:
         return [f"{(x * PER_MM[self.unit]).normalize():f} {self.unit}" for x in point]
 
     def place(self, planes: list[int]) -> list[Decimal]:
-        """Return the position of the node with these numbers after the turn."""
+        """Returns the position of the node with the given numbers after the rotation."""
         x = [a + k * self.size for a, k in zip(self.low, planes, strict=True)]
         i, j = (("xyz".index(self.axis) + k) % 3 for k in (1, 2))
         for _ in range(self.quarters):
@@ -114,7 +114,7 @@ class Scene:
         return case_of(mesh, *boundaries, turn=turn)
 
     def file(self, rounded: Any) -> TetMesh:
-        """Returns the mesh in the form of a file: coordinates in its unit, rounded."""
+        """Returns the mesh in the form of a file: rounded coordinates in the unit of the file."""
         made = structured(self.case().parts[0].mesh)  # type: ignore[arg-type]
         numbers = [[x * PER_MM[self.unit] for x in point] for point in self._points(made)]
         return TetMesh(scaled(rounded(np.array(numbers, float)), 1e-3 / float(PER_MM[self.unit])), made.tets)
@@ -127,8 +127,8 @@ class Scene:
 
 @pytest.mark.parametrize("seed", range(60))
 def test_a_box_from_plane_to_plane_has_all_nodes_and_faces_between_them(seed: int) -> None:
-    """The selection in the mesh is equal to that of ``validate``, for any position of the body and any unit of the
-    file."""
+    """The selection in the mesh is equal to the selection of ``validate``, for any position of the body and any unit of
+    the file."""
     made = Scene(seed)
     boundaries = [{**PUSH, **made.box}, *([{**PRESSURE, **made.box}] if made.faces else [])]
     case = made.case(*boundaries)
@@ -219,7 +219,7 @@ def test_no_traction_loads_the_cut_of_a_sector(sector: str, more: dict[str, Any]
 
 
 def test_a_traction_on_a_bonded_interface_is_reported(tmp_path: Path) -> None:
-    """Two boxes of 2 x 2 x 1 mm: their interface is loaded on both sides, 2 x 4 mm^2."""
+    """The interface of two boxes of 2 x 2 x 1 mm is loaded on both sides, 2 x 4 mm^2."""
     upper = {**BOX, "low": [0, 0, 1e-3], "high": [2e-3, 2e-3, 2e-3], "element_size": 5e-4}
     data = {
         "name": "two", "materials": {"m": METAL}, "run": {"end_time": "1 us"}, "boundaries": [SHEAR],
@@ -240,7 +240,7 @@ def test_the_surface_of_a_quarter_cylinder_is_estimated_without_its_cuts() -> No
 
 
 def test_a_mesh_that_differs_from_the_expected_values_is_reported(caplog: pytest.LogCaptureFixture) -> None:
-    """A whole end is expected, but the mesh ends a third of an element before it."""
+    """The selection would contain a whole end, but the mesh ends a third of an element before the selected plane."""
     caplog.set_level("INFO", "conoid.worker")
     bar = {"shape": "box", "low": [0, 0, 0], "high": [2e-3, 2e-3, 4e-3], "element_size": 5e-4}
     region = {"low": [0, 0, 3.9e-3], "high": [2e-3, 2e-3, 4.1e-3]}
@@ -299,8 +299,8 @@ BAR = {"shape": "box", "low": [0, 0, 0], "high": [2e-3, 2e-3, 2e-3], "element_si
 
 
 def beside_a_plane(points: Any, at: str) -> tuple[int, tuple[str, ...]]:
-    """Return the number of nodes of a bar from a file, given by its points, m, that start on a plane normal to x,
-    and the warnings.
+    """Returns the number of nodes that start on a plane normal to x, and the warnings; the nodes are those of a bar
+    from a file, given by its points, m.
     """
     made = structured(case_of(BAR).parts[0].mesh)  # type: ignore[arg-type]
     plane = {"kind": "symmetry", "axis": "x", "at": at}
@@ -319,7 +319,7 @@ def test_nodes_just_off_a_plane_of_symmetry_are_reported() -> None:
 
 
 def test_a_file_whose_digits_are_few_lies_on_its_plane_of_symmetry() -> None:
-    """A face at x = 1/3 m is written with six digits of a millimetre, and the plane with more digits."""
+    """A face at x = 1/3 m is written with six digits of a millimetre, and the plane is given with more digits."""
     shift = np.array([1000.0 / 3.0, 0.0, 0.0])
     assert beside_a_plane(lambda x: scaled(SIX_DIGITS(1e3 * x + shift), 1e-3), "333.333333 mm") == (25, ())
 

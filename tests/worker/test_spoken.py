@@ -15,7 +15,7 @@ ENERGY = messages.Energy(
 
 
 def printed(capsys: pytest.CaptureFixture[str]) -> list[str]:
-    """Returns the lines without the time of day."""
+    """Returns the lines of the output without the time of day."""
     return [line.split("  ", 1)[-1] for line in capsys.readouterr().out.splitlines()]
 
 

@@ -33,7 +33,7 @@ def one(mesh: TetMesh, i: int, poisson: float, **keys: Any) -> Patch:
 
 
 def exact_step(patch: Patch, poisson: float) -> float:
-    """Returns 2 / omega_max of the tet with a quarter of its mass at each node, s."""
+    """Returns 2 / omega_max of the tet with a quarter of the mass of the tet at each node, s."""
     volume, grad = formulas.gradients(patch.corners())
     stiffness = formulas.stiffness(float(volume[0]), grad[0], *moduli(poisson))
     return 2.0 / math.sqrt(np.linalg.eigvalsh(stiffness)[-1] / (DENSITY * volume[0] / 4.0))
@@ -41,7 +41,9 @@ def exact_step(patch: Patch, poisson: float) -> float:
 
 @pytest.mark.parametrize("poisson", [0.0, 0.22, 0.3, 0.49])
 def test_bound_is_never_above_the_exact_limit(poisson: float) -> None:
-    """The bound is at most the exact limit and at least 0.57 of it, for tets of all shapes, including slivers."""
+    """The bound of the step is at most the exact limit and at least 0.57 of the exact limit, for tets of all shapes,
+    including slivers.
+    """
     mesh = free_tets(300, 1, flattest=1e-3)
     shares = []
     for i in range(300):
@@ -53,9 +55,9 @@ def test_bound_is_never_above_the_exact_limit(poisson: float) -> None:
 
 
 def test_bound_of_the_regular_tet() -> None:
-    """The bound for an edge of 1 m and nu = 0.3 is derived: |grad N|^2 = 3/2 at each node, so it is 1 / (c sqrt 6). The
-    fastest mode is volumetric, with the strain energy 9/2 K V e^2 and the kinetic energy 3/16 rho V (de/dt)^2, r^2 =
-    3/8.
+    """The bound for a regular tet with an edge of 1 m and nu = 0.3 is derived: |grad N|^2 = 3/2 at each node, so the
+    bound is 1 / (c sqrt 6). The fastest mode of the regular tet is volumetric, with the strain energy 9/2 K V e^2 and
+    the kinetic energy 3/16 rho V (de/dt)^2, r^2 = 3/8.
     """
     patch = one(TetMesh(REGULAR, np.array([[0, 1, 2, 3]], np.int32)), 0, 0.3)
     patch.advance(0.0)
@@ -82,8 +84,8 @@ def squeezed(i: int, mesh: TetMesh, rate: float, poisson: float = 0.3) -> Patch:
 
 
 def viscous_law(patch: Patch, poisson: float = 0.3) -> tuple[float, float]:
-    """Returns q and its slope with respect to the rate of compression, from the formulas, at the end of the step.
-    The pass divides the change of volume by the volume at the end of the step.
+    """Returns the viscous pressure q and its slope with respect to the rate of compression, from the formulas, at the
+    end of the step. The pass divides the change of volume by the volume at the end of the step.
     """
     bulk, shear = moduli(poisson)
     volume, grad = formulas.gradients(patch.corners())
@@ -98,13 +100,13 @@ def viscous_law(patch: Patch, poisson: float = 0.3) -> tuple[float, float]:
 
 
 def growth(patch: Patch) -> float:
-    """Returns the change of volume in the step, m^3."""
+    """Returns the change of volume of the tet in the step, m^3."""
     old = formulas.volumes(patch.corners() - DT * patch.corners(patch.nodes.v))
     return float(formulas.volumes(patch.corners())[0] - old[0])
 
 
 def free_volume(patch: Patch) -> float:
-    """Returns the initial volume, m^3."""
+    """Returns the initial volume of the tet, m^3."""
     return float(patch.nodes.mass.sum()) / DENSITY
 
 
@@ -121,7 +123,7 @@ def test_bulk_viscosity(rate: float) -> None:
 
 @pytest.mark.parametrize("rate", [-1e8, -1e7, -1e5, 1e6])
 def test_viscous_bound_is_never_above_the_exact_limit(rate: float) -> None:
-    """A leapfrog scheme with the damping C of the step before is stable while M - dt/2 C - dt^2/4 K is positive."""
+    """A leapfrog scheme with the damping C of the previous step is stable while M - dt/2 C - dt^2/4 K is positive."""
     mesh = free_tets(40, 3, flattest=0.01)
     for i in range(40):
         patch = squeezed(i, mesh, rate)
@@ -135,8 +137,8 @@ def test_viscous_bound_is_never_above_the_exact_limit(rate: float) -> None:
 
 
 def test_what_may_break_is_bounded_in_tension_as_if_it_were_let_go() -> None:
-    """In a part that can break, the bound includes the viscosity at the speed |p| / (density c); otherwise only the
-    linear term."""
+    """In a part that can break, the bound includes the viscosity at the speed |p| / (density c); in other parts the
+    bound includes only the linear term."""
     mesh, found = free_tets(1, 4), []
     for breaks in (False, True):
         patch = one(mesh, 0, 0.3, viscosity={"linear": LINEAR, "shock": SHOCK, "quadratic": QUADRATIC})
@@ -167,8 +169,8 @@ def test_viscous_bound_shrinks_with_the_rate() -> None:
 @pytest.mark.parametrize("form", FORMS)
 @pytest.mark.parametrize("rate", [-1e9, 1e9])
 def test_no_tet_changes_its_volume_by_more_than_a_quarter_in_a_step(rate: float, form: Form) -> None:
-    """The limit also holds in the first step, because the first pass, of zero time, computes the rate. A slow motion
-    does not change the step.
+    """The limit by the motion also holds in the first step, because the first pass, with a step of zero, computes the
+    rate. A slow motion does not change the step.
     """
     tet = TetMesh(1e-3 * REGULAR, np.array([[0, 1, 2, 3]], np.int32))
     limits = []

@@ -1,6 +1,6 @@
-"""The term ``elastic`` of the energy balance equals the energy of the stresses, for every law and pressure form,
-after plastic flow, tension failure, crushing or erosion. The reference is p^2 / 2K + s:s / 4G per present volume,
-computed here with numpy: strains are small, and no law has heat.
+"""The term ``elastic`` of the energy balance is equal to the energy of the stresses, for every law and pressure form,
+after plastic flow, tension failure, crushing or erosion. The reference energy is p^2 / 2K + s:s / 4G per present
+volume, computed here with numpy: strains are small, and no law has heat.
 """
 
 import math
@@ -50,11 +50,11 @@ LAWS = {
 }
 SPEED = 60.0
 SHARE = 2e-3
-"""Allowed difference over the initial kinetic energy; the strains explain at most 1e-3."""
+"""Allowed difference of the two energies over the initial kinetic energy; the strains explain at most 1e-3."""
 
 
 def sheared(sim: Simulation) -> float:
-    """Return the energy of the deviatoric stresses of all tets, J."""
+    """Returns the energy of the deviatoric stresses of all tets, J."""
     (part,) = sim.model.blocks
     square = sum((1.0 if row <= S_ZZ else 2.0) * part.row(row) ** 2 for row in range(S_XX, S_XY + 1))
     volume = formulas.volumes(sim.model.nodes.x[part.tets.astype(np.int64)])
@@ -62,7 +62,7 @@ def sheared(sim: Simulation) -> float:
 
 
 def stored(sim: Simulation) -> float:
-    """Return the energy of the stresses of all tets, J; with a nodal pressure, that of the nodes."""
+    """Returns the energy of the stresses of all tets, J; with a nodal pressure, the pressure energy of the nodes."""
     (part,) = sim.model.blocks
     tets = part.tets.astype(np.int64)
     if isinstance(sim.elements, AveragedElements) and sim.elements._kinds.any():
@@ -88,8 +88,8 @@ def stored_at_corners(sim: Simulation, tension: float) -> float:
 def followed(
     sim: Simulation, v: Floats, there: Callable[[Simulation], float], every: int, steps: int
 ) -> tuple[list[tuple[Energy, float]], float]:
-    """Returns the energy balances, after every ``every`` steps, of a block whose nodes have the velocities ``v``,
-    with the energy stored at these times, and the initial energy, J.
+    """Returns the energy balances of a block whose nodes have the velocities ``v``, after every ``every`` steps, with
+    the energy stored at these times, and the initial energy, J.
     """
     nodes = sim.model.nodes
     nodes.v[:] = v
@@ -107,7 +107,7 @@ def followed(
 def shaken(
     material: Material, form: Form, erosion: Erosion | None = None, speed: float = SPEED, every: int = 10
 ) -> tuple[list[tuple[Energy, float]], float]:
-    """Returns ``followed`` of a block whose nodes move in random directions."""
+    """Returns the result of ``followed`` for a block whose nodes move in random directions."""
     sim = build(scene(material, form, viscosity={}, erosion=erosion), [block((3, 3, 3), 1e-3)])
     v = np.random.default_rng(5).normal(size=sim.model.nodes.v.shape) * speed
     return followed(sim, v, stored, every, 200)
@@ -116,9 +116,9 @@ def shaken(
 @pytest.mark.parametrize("form", FORMS)
 @pytest.mark.parametrize("name", LAWS)
 def test_the_elastic_line_is_what_the_stresses_store(name: str, form: Form) -> None:
-    """In an earlier version of the averaged pressures the difference was 1 to 9 % of the energy, and 2 % in crushed
-    alumina or torn copper."""
-    crumbles = name == "johnson_holmquist"  # within twenty steps; until then its pressure is not linear
+    """In an earlier version of the averaged pressures the difference between the two energies was 1 to 9 % of the
+    energy, and 2 % in crushed alumina or torn copper."""
+    crumbles = name == "johnson_holmquist"  # within twenty steps; until then the pressure is not linear
     seen, initial = shaken(LAWS[name], form, every=5 if crumbles else 10)
     linear = seen[10:] if crumbles else seen
     assert max(abs(energy.elastic - there) for energy, there in linear) < SHARE * initial
@@ -135,8 +135,8 @@ def test_the_elastic_line_is_what_the_stresses_store(name: str, form: Form) -> N
 
 @pytest.mark.parametrize("form", FORMS)
 def test_no_pores_pay_for_dilation(form: Form) -> None:
-    """Plastic flow takes energy, with and without tension failure. In an earlier version material that dilated into
-    its own pores created up to three times the energy of this scene.
+    """Plastic flow takes energy, with and without tension failure. In an earlier version material that dilated into its
+    own pores created up to three times the energy of this scene.
     """
     seen, initial = shaken(brittle(0.02e9, PHI, dilation_angle=PHI).model_copy(update={"spall": 0.01e9}), form)
     plastic = np.array([energy.plastic for energy, _ in seen])
@@ -147,8 +147,8 @@ def test_no_pores_pay_for_dilation(form: Form) -> None:
 
 @pytest.mark.parametrize("form", FORMS)
 def test_it_is_while_tets_leave(form: Form) -> None:
-    """The line ``eroded`` equals the energy that was stored in removed tets, without the kinetic energy of their
-    nodes, which stay in the model.
+    """The term ``eroded`` is equal to the energy that was stored in removed tets, without the kinetic energy of the
+    nodes of these tets, which stay in the model.
     """
     seen, initial = shaken(COPPER, form, Erosion(plastic_strain=0.05))
     assert max(abs(energy.elastic - there) for energy, there in seen) < SHARE * initial
@@ -159,8 +159,8 @@ def test_it_is_while_tets_leave(form: Form) -> None:
 
 @pytest.mark.parametrize("form", ["nodal", "split"])
 def test_it_is_where_what_dilates_is_crushed(form: Form) -> None:
-    """A tet flows while its neighbours do not flow: the sum of its dilation is then not the growth of any volume.
-    When this sum was treated as a volume, the line exceeded 1e7 times the energy.
+    """In this test a tet flows while its neighbours do not flow: the accumulated dilation of the tet is not the growth
+    of any volume. When this dilation was treated as a volume, the term ``elastic`` exceeded 1e7 times the energy.
     """
     soil = brittle(10e3, math.radians(35.0), dilation_angle=math.radians(10.0))
     soil = soil.model_copy(update={"density": 1800.0, "elastic": Elastic(young=50e6, poisson=0.3)})
@@ -172,9 +172,10 @@ def test_it_is_where_what_dilates_is_crushed(form: Form) -> None:
 
 @pytest.mark.parametrize("form", FORMS)
 def test_it_is_where_neighbours_have_crumbled(form: Form) -> None:
-    """Half of a block of glass is fully damaged, and the block expands. Damaged tets open and move nodes of intact
-    tets. An intact tet at its tensile cut-off stores no more energy. When this motion was treated as an opening of
-    the intact tet, the line rose to 36 % (nodal) and 97 % (split) of the energy in these steps, without a limit.
+    """Half of a block of glass is fully damaged, and the block expands. The damaged tets of the block open and move
+    nodes of intact tets. An intact tet at its tensile cut-off stores no further energy. When this motion was treated as
+    an opening of the intact tet, the term ``elastic`` rose to 36 % (nodal) and 97 % (split) of the energy in these
+    steps, without a limit.
     """
     glass = library()["float_glass_jh2"]
     assert isinstance(glass.strength, JohnsonHolmquist)
@@ -192,8 +193,8 @@ def test_it_is_where_neighbours_have_crumbled(form: Form) -> None:
 
 @pytest.mark.parametrize("form", FORMS)
 def test_beyond_its_end_tension_is_plastic_work(form: Form) -> None:
-    """A block of glass, half damaged, is stretched equally in all directions by 5 %: without a deviator the damage
-    does not grow."""
+    """A block of glass, half of it damaged, is stretched equally in all directions by 5 %: without a deviator the
+    damage does not grow."""
     glass = library()["float_glass_jh2"]
     assert isinstance(glass.strength, JohnsonHolmquist)
     patch, tension, dt, steps = Patch(block((2, 2, 2), 1e-3), glass, form), 0.5 * glass.strength.tension, 1e-9, 200

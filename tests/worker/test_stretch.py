@@ -1,4 +1,4 @@
-"""Quiet steps in one program: the same answer to the bit as with every step on its own, and the same end of a run."""
+"""Quiet steps in one compiled program give the same result to the bit as single steps, and the same end of a run."""
 
 import time
 from dataclasses import dataclass, field
@@ -76,7 +76,7 @@ class End:
 
 @dataclass
 class Programs:
-    """Counts the steps of programs."""
+    """Counts the steps that are computed by programs."""
 
     steps: list[int] = field(default_factory=list)
     run = Stretch.run
@@ -104,7 +104,7 @@ def step_by_step(text: str, folder: Path) -> Outcome:
 
 @pytest.fixture(autouse=True)
 def no_reports(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Runs write no report, however slow this machine is: every step of a report ends a program."""
+    """The runs of this test write no report, for any speed of the machine: every step with a report ends a program."""
     monkeypatch.setattr(requests, "_REPORT_EVERY", 1e6)
 
 

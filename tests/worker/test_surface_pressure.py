@@ -1,5 +1,5 @@
-"""A pressure that follows the surface: forces, work and moments compared with plain numpy, and a ring with its
-equilibrium."""
+"""Pressure that follows the surface: forces, work and moments are compared with plain numpy, and a ring is compared
+with its equilibrium."""
 
 import math
 from pathlib import Path
@@ -37,7 +37,7 @@ def pressed(sim: Simulation) -> SurfacePressure:
 
 
 def expected(x: Floats, faces: "np.ndarray", pressure: float) -> Floats:
-    """Returns (nodes, 3) a third of the force of each face for each of its nodes."""
+    """Returns (nodes, 3) the sum of a third of the force of each face over the faces of each node."""
     a, b, c = (x[faces[:, k]] for k in range(3))
     force = np.zeros_like(x)
     for k in range(3):
@@ -52,7 +52,7 @@ def moments(x: Floats, v: Floats, mass: Floats) -> tuple[Floats, Floats]:
 
 @pytest.mark.parametrize("ranks", [1, 2, 5])
 def test_the_force_is_that_of_the_present_area_against_the_present_normal(ranks: int) -> None:
-    """The block is stretched and turned; every rank has the whole force of its nodes, to the bit."""
+    """The block is stretched and turned; every rank has the whole force on its nodes, to the bit."""
     random = np.random.default_rng(5)
     change = random.normal(size=(3, 3)) + 2.0 * np.eye(3)
     faces = boundary_faces(MESH.tets)

@@ -34,8 +34,8 @@ TWO = """*NODE
 
 @pytest.fixture
 def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """Two tets of 18 mm^3 with a common face. Files are read in this process, which takes a tenth of the time of a
-    child process."""
+    """The file has two tets of 18 mm^3 with a common face. Files are read in this process, which takes a tenth of the
+    time of a child process."""
     monkeypatch.setenv("CONOID_CACHE_DIR", str(tmp_path))
 
     def read(mesh: Mesh, sources: Sources, target: Path, key: str, limits: Limits) -> None:
@@ -91,8 +91,8 @@ SHARED = r"parts: 'part0' and 'part1' share 3 nodes of 'two.inp', but would be s
 
 @pytest.mark.parametrize("contact", ["none", {}])
 def test_two_parts_that_share_nodes_of_a_file_are_refused(contact: object, folder: Path) -> None:
-    """The survey before the run refuses the parts, and so does the run. A copy of the file under another name
-    counts as the same file."""
+    """The survey before the run and the run both refuse the parts. A copy of the file under another name counts as the
+    same file."""
     (folder / "copy.inp").write_text(TWO)
     made = case(part("Upper"), part("Lower", "copy.inp"), contact=contact)
     assert surveyed(made, folder).refused[0].startswith(SHARED)

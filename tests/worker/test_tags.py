@@ -1,4 +1,6 @@
-"""Message tags come from one registry: no two are equal, and no tag is written as a number or a constant elsewhere."""
+"""Message tags come from one registry: no two tags are equal, and no tag is written as a number or a constant
+elsewhere.
+"""
 
 import ast
 from pathlib import Path
@@ -11,7 +13,7 @@ from conoid.worker.parallel.tags import Tag
 HOUSE = Path(str(conoid.worker.__file__)).parent
 SOURCES = sorted(path for path in HOUSE.rglob("*.py") if path.name != "tags.py")
 AT = {"send": 2, "Isend": 2, "Send_init": 2, "recv": 2, "Irecv": 2, "Recv_init": 2, "Improbe": 1}
-"""Calls of mpi4py that take a tag, and the position of this argument."""
+"""Calls of mpi4py that take a tag, and the position of the argument ``tag``."""
 
 
 def test_no_two_tags_are_equal() -> None:

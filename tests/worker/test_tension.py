@@ -27,7 +27,9 @@ COPPER = library()["copper_ofhc"]
 
 
 def stretched(material: Material, path: Floats) -> dict[str, Floats]:
-    """Returns pressure, pores, work, plastic work and step limit of a tet, for a sequence of scales of its edges."""
+    """Returns pressure, pores, work, plastic work and step limit of a tet, for a sequence of scales of the edges of the
+    tet.
+    """
     mesh = free_tets(1, 3)
     patch, rows = Patch(mesh, material), []
     for old, new in pairwise(path):
@@ -49,8 +51,8 @@ def there_and_back(top: float, n: int = 400) -> Floats:
 
 
 def test_the_modulus_stays_positive_however_far_copper_is_stretched() -> None:
-    """The tangent of the law is zero at 1.5 times the volume. In an earlier version the step was not a number from
-    1.73 times on."""
+    """The tangent of the law is zero at 1.5 times the initial volume. In an earlier version the step was not a number
+    from 1.73 times the initial volume on."""
     found = stretched(COPPER_GAS, np.linspace(1.0, 2.0, 600))
     assert np.isfinite(found["limit"]).all()
     assert (found["limit"] > 0.0).all()
@@ -58,7 +60,9 @@ def test_the_modulus_stays_positive_however_far_copper_is_stretched() -> None:
 
 
 def test_a_cut_off_of_a_linear_pressure_is_elastic_and_plastic_in_volume() -> None:
-    """p = -K (ln J - pores) between -spall and, while pores exist, 0; the test integrates this law independently."""
+    """The pressure is p = -K (ln J - pores) between -spall and, while pores exist, 0; the test integrates this law
+    independently.
+    """
     material = STEEL.model_copy(update={"spall": SPALL, "strength": COPPER.strength})
     path = there_and_back(1.02)
     found = stretched(material, path)
@@ -81,8 +85,8 @@ def test_a_cut_off_of_a_linear_pressure_is_elastic_and_plastic_in_volume() -> No
 
 
 def test_a_cut_off_of_mie_gruneisen_keeps_the_energy_equation() -> None:
-    """The pressure is always that of the law at the volume ratio of the material and its energy; the volume of the
-    tet includes the pores."""
+    """The pressure is always that of the law at the volume ratio of the material without pores and its energy; the
+    volume of the tet includes the pores."""
     material = COPPER_GAS.model_copy(update={"spall": SPALL})
     path = there_and_back(1.02)
     found = stretched(material, path)
@@ -119,8 +123,8 @@ def ball(spall: float | None) -> simulation.Simulation:
 
 @pytest.mark.parametrize("spall", [None, SPALL])
 def test_a_copper_sphere_that_is_torn_apart_keeps_its_energy_and_its_tets(spall: float | None) -> None:
-    """An earlier version lost 12 % of the energy and a ninth of the tets in 1 us. Without a cut-off single tets
-    still expand until erosion removes them by their volume, but the energy is conserved.
+    """An earlier version lost 12 % of the energy and a ninth of the tets of this sphere in 1 us. Without a cut-off
+    single tets still expand until erosion removes them by their volume, but the energy is conserved.
     """
     sim = ball(spall)
     residuals: list[float] = []

@@ -1,4 +1,4 @@
-"""Each second of the step loop is in one phase, as CPU time and as wall time inside or outside regions."""
+"""Each second of the step loop is in one phase, as CPU time and as wall time inside or outside parallel regions."""
 
 from dataclasses import dataclass
 

@@ -33,8 +33,8 @@ def test_the_resisted_rate_lies_between_the_mean_and_the_own_rate(
 
 
 def test_averaged_forms_lose_no_more_to_viscosity_than_the_standard_one() -> None:
-    """A copper block of 3 x 3 x 6 cubes hits a wall at 100 m/s. With each tet's own rate it lost 3.8 and 3.6 % of
-    its energy in the averaged forms, and 2.9 % in the standard form.
+    """In this test a copper block of 3 x 3 x 6 cubes hits a wall at 100 m/s. With each tet's own rate the block lost
+    3.8 and 3.6 % of its energy in the averaged forms, and 2.9 % in the standard form.
     """
 
     def lost(form: Form) -> float:
@@ -50,8 +50,8 @@ def test_averaged_forms_lose_no_more_to_viscosity_than_the_standard_one() -> Non
 
 
 def test_few_tets_that_ring_are_computed_in_steps_that_do_not_ring_with_them() -> None:
-    """A cube of steel expands on a wall. With a bound without viscosity for tets at rest or in expansion, the step
-    changed with each oscillation by the 6 % of the linear term, and one such change took 1 % of the energy.
+    """In this test a cube of steel expands on a wall. With a bound without viscosity for tets at rest or in expansion,
+    the step changed with each oscillation by the 6 % of the linear term, and one such change took 1 % of the energy.
     """
     wall = {"kind": "wall", "point": (0.0, 0.0, 0.0), "normal": (0.0, 0.0, 1.0)}
     case = scene(STEEL, "standard", viscosity={}, boundaries=(wall,), frames=0)

@@ -1,4 +1,4 @@
-"""Friction on rigid walls: Coulomb friction in every step; sliding blocks stop, or slide on steep slopes, and the
+"""Friction on rigid walls: Coulomb friction acts in every step; sliding blocks stop, or slide on steep slopes, and the
 work is booked."""
 
 from pathlib import Path
@@ -21,7 +21,7 @@ MESH = block((2, 2, 2), 1e-3, seed=2)
 TILTED = np.array([1.0, -2.0, 3.0]) / np.sqrt(14.0)
 FLOOR = float(MESH.points[:, 2].min())
 WEIGHT = 1e5
-"""Weight towards the floor, m/s^2."""
+"""Acceleration by weight towards the floor, m/s^2."""
 
 
 def tilted(friction: float) -> dict[str, Any]:
@@ -41,8 +41,8 @@ def floor(friction: float) -> dict[str, Any]:
 
 
 def resting(friction: float, speed: float, slope: float, end: float) -> schema.Case:
-    """Returns a damped block on a floor that slides along x with a ``speed``, accelerated along x by ``slope``; its
-    weight rises slowly.
+    """Returns a damped block on a floor that slides along x with a ``speed``, accelerated along x by ``slope``; the
+    weight of the block rises slowly.
     """
     down = {
         "kind": "gravity", "acceleration": (slope * WEIGHT, 0.0, -WEIGHT), "course": ((0.0, 0.0), (10e-6, 1.0)),
@@ -53,7 +53,7 @@ def resting(friction: float, speed: float, slope: float, end: float) -> schema.C
 
 
 def mean_speed(sim: Simulation) -> float:
-    """Returns the mean speed along x, m/s."""
+    """Returns the mean speed of the block along x, m/s."""
     nodes = sim.model.nodes
     return float((nodes.mass * nodes.v[:, 0]).sum() / nodes.mass.sum())
 
@@ -87,8 +87,8 @@ def test_a_push_takes_what_coulomb_allows_of_the_speed_along_the_wall(friction: 
 
 
 def test_a_sliding_body_comes_to_rest_and_friction_takes_its_energy() -> None:
-    """The deceleration is friction times weight: the block stops after 33 us and half of the 10 us in which the
-    weight rises."""
+    """The deceleration is friction times weight: the block stops after 33 us plus half of the 10 us in which the weight
+    rises."""
     lines: list[Energy] = []
     speeds: list[tuple[float, float]] = []
     sim = build(resting(0.3, 1.0, 0.0, 50e-6), [MESH])
@@ -108,7 +108,7 @@ def test_a_sliding_body_comes_to_rest_and_friction_takes_its_energy() -> None:
 
 @pytest.mark.parametrize(("slope", "slides"), [(0.4, False), (0.6, True)])
 def test_a_block_on_a_slope_slides_where_that_is_steeper_than_friction_holds(slope: float, slides: bool) -> None:
-    """With a friction of 0.5 a sliding block is accelerated by the rest of its weight along the slope."""
+    """With a friction coefficient of 0.5 a sliding block is accelerated by the rest of its weight along the slope."""
     sim = run(build(resting(0.5, 0.0, slope, 40e-6), [MESH]))
     gained = (slope - 0.5) * WEIGHT * 35e-6 if slides else 0.0
     assert mean_speed(sim) == pytest.approx(gained, abs=0.01)

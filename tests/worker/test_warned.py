@@ -47,8 +47,8 @@ def case(*boundaries: dict[str, Any], material: dict[str, Any] | None = None, **
 
 
 def write(path: Path, *shifts: tuple[float, float, float], bent: float = 0.0) -> None:
-    """Writes a file of blocks at the given positions, mm, each with its own nodes; ``bent``: distance in mm of the
-    nodes of the plane x = 0 from this plane.
+    """Writes a file of blocks at the given positions, mm, each with its own nodes; ``bent`` is the distance in mm of
+    the nodes of the plane x = 0 from this plane.
     """
     made = structured(parse_case({**case(), "parts": case()["parts"][1:]}).parts[0].mesh)  # type: ignore[arg-type]
     nodes, tets = [], []
@@ -76,8 +76,8 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 def both(data: dict[str, Any], folder: Path) -> tuple[list[str], list[str]]:
-    """Returns the warnings of an examination and those of a run up to its first step, without bare numbers, which
-    the run reports when it reads the case."""
+    """Returns the warnings of an examination and those of a run up to its first step, without warnings of bare numbers,
+    which the run gives when it reads the case."""
     examined = [str(each) for each in examine(data, folder).odd]
     begun = simulation.build(parse_case(data), folder, SerialComm())
     return [each for each in examined if "no unit, taken for" not in each], list(begun.warnings)
@@ -134,8 +134,8 @@ def test_both_refuse_the_same(data: Any, words: str, folder: Path) -> None:
 )
 @pytest.mark.parametrize("contact", ["none", {}])
 def test_a_volume_that_counts_twice_is_refused_by_both(shift: Any, contact: Any, folder: Path) -> None:
-    """The common volume is the part of 8 mm^3 that the shift leaves. The common volume is exact if the tets coincide;
-    otherwise its error is half a layer of tets.
+    """The common volume of the blocks is the part of 8 mm^3 that the shift leaves. The common volume is exact if the
+    tets coincide; otherwise its error is half a layer of tets.
     """
     write(folder / "bar.inp", (0, 0, 0), shift)
     made = parse_case(case() | {"contact": contact})
@@ -152,8 +152,8 @@ def test_a_volume_that_counts_twice_is_refused_by_both(shift: Any, contact: Any,
 
 
 def test_a_process_of_each_warns_of_the_same(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """The warnings are: a bare density, the notes of the file, its pieces, the law of tension only, and the linear
-    pressure."""
+    """The expected warnings are: a bare density, the notes of the file, its pieces, the law of tension only, and the
+    linear pressure."""
     write(tmp_path / "bar.inp", (0, 0, 0), (0, 0, 3))
     data = case({**PLANE, "parts": ["bar"]}, material={**GLASS, "density": 2500}, velocity=[0, 0, "-2 km/s"])
     (tmp_path / "case.json").write_text(json.dumps(data))

@@ -1,4 +1,4 @@
-"""Marks of worn tets, unchanged state of all other tets, and sums of a whole run."""
+"""Marks of tets to be removed, unchanged state of all other tets, and sums of a whole run."""
 
 from fractions import Fraction
 from functools import partial
@@ -28,7 +28,7 @@ VOLUME, FREQUENCY = 1e-9, 1e6
 
 
 def differ(one: Floats, two: Floats) -> "np.ndarray":
-    """Return where the bits differ."""
+    """Returns the places at which the bit patterns differ."""
     return np.asarray(one.view(np.int64) != two.view(np.int64))
 
 
@@ -110,7 +110,7 @@ def test_an_inverted_tet_is_broken_and_carries_no_stress(value: float, count: in
     ("row", "value"), [*((row, np.nan) for row in range(8)), (6, -np.inf), (rows.WORK, np.nan), (-1, np.nan)]
 )
 def test_a_nan_is_kept_and_ends_the_run(row: int, value: float, volume: float) -> None:
-    """The limit of the step becomes NaN: step.py then stops and names the tet. No NaN is replaced by zero."""
+    """The limit of the step becomes NaN: step.py stops the run and names the tet. No NaN is replaced by zero."""
     chunk = Chunk()
     chunk.w[scratch.VOLUME + 3] = volume * VOLUME if row >= 0 else np.nan
     if row >= 0:
