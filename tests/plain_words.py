@@ -31,7 +31,7 @@ WORDS_THEMSELVES = {"CONVENTIONS.md", "tests/plain_words.py", "tests/test_plain_
 LONGEST_LINE, LONGEST_SUBJECT = 130, 72
 """Chosen values: columns of a line of docs; characters of a commit subject, which ``git log`` shows in one line."""
 SUBJECTS_SINCE = "2026-11-30 14:00"
-"""Commits from this time on are checked; earlier subjects stay as they are."""
+"""Commits from this date on are checked; earlier subjects stay as they are."""
 PEOPLE = "user|reader|engineer|developer|author|person|people|somebody|someone|anybody|anyone|those|client|operator"
 ALLOWED = {
     r"due to": "the preposition, not the adjective",

@@ -247,8 +247,8 @@ for module in {modules!r}:
 
 @cache
 def is_heavy(path: Path) -> bool:
-    """Returns True if the import of a module needs VTK or a library of the worker, or another module that needs such a
-    library.
+    """Returns True if the import of a module needs VTK, a library of the worker, or another module that needs VTK or
+    such a library.
     """
     at_import = [node for node in tree(path).body if isinstance(node, ast.ImportFrom)]
     return bool(heads(path) & HEAVY) or any(is_heavy(file) for file in relatives(path, at_import))
@@ -320,15 +320,17 @@ TELLS = {
     "worker/output/frames.py", "worker/run/job.py", "worker/snapshots/decimate.py", "worker/snapshots/invariants.py",
     "worker/snapshots/table.py",
 }  # fmt: skip
-"""Files that only report, refuse or balance. No result depends on these files, except for parts that are pushed apart
-at the start (docs/theory/sums.md)."""
+"""Files that only report, refuse or balance. No result depends on the files that only report, refuse or balance, except
+for parts that are pushed apart at the start (docs/theory/sums.md)."""
 POWERS_OF_TWO, REFUSES, WINDS = "worker/mesh/occ/frame.py", "worker/mesh/frame.py", "worker/mesh/occ/shells.py"
 """Files with a rounded scale; files with a size in a message; files with the rounded winding number of a surface round
 a point."""
 
 
 def blurred(path: Path) -> set[str]:
-    """Returns lines that call such a function, multiply matrices, or raise to a power that is no integer."""
+    """Returns lines that call a function whose last bit depends on the processor, multiply matrices, or raise to a
+    power that is no integer.
+    """
     found = set()
     for node in ast.walk(tree(path)):
         if isinstance(node, ast.Call) and isinstance(node.func, ast.Attribute):

@@ -57,7 +57,7 @@ def installed(wheel: Path, folder: Path) -> Path:
 
 
 @pytest.mark.slow
-@pytest.mark.timeout(1200)  # in an environment without compiled kernels
+@pytest.mark.timeout(1200)  # the environment has no compiled kernels
 def test_a_wheel_of_the_source_distribution_runs_in_an_empty_folder(tmp_path: Path) -> None:
     source = built("sdist", checkout(tmp_path / "checkout"), tmp_path)
     shutil.unpack_archive(source, tmp_path, filter="data")

@@ -71,8 +71,8 @@ def shapes() -> dict[str, Any]:
 
 
 def _placed(mesh: Mapping[str, Any], k: int) -> dict[str, Any]:
-    """Returns the mesh of shape number k, moved to the position of this shape; the operands of a combination are moved,
-    too.
+    """Returns the mesh of shape number k, moved to the position of the shape; for a combination, the operands are also
+    moved.
     """
     x, y = _APART * MM * (k % 7), -_APART * MM * (k // 7)
     moved = {name: _moved(value, x, y) if name in _PLACES else value for name, value in mesh.items()}

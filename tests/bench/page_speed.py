@@ -3,9 +3,9 @@
 A browser with software rendering opens two runs that no solver computed: one run with a snapshot of 50,000 triangles
 and a few events, one run with 200,000 triangles and a million events. The command prints the time of the first paint,
 the time of the history of a million events (first and second request), the time of the page with this history, and the
-time from an address to the first picture of the body. It also prints script time and draw calls per frame, frames per
-second, and CPU time per frame of all processes of the browser. Other load on the machine affects the CPU time less than
-the other numbers.
+time from an address to the first picture of the body. The command also prints script time and draw calls per frame,
+frames per second, and CPU time per frame of all processes of the browser. Other load on the machine affects the CPU
+time less than the other numbers.
 """
 
 import argparse

@@ -38,7 +38,7 @@ def test_the_pieces_of_a_face_add_up_to_it(seed: int) -> None:
     masters = Delaunay(plane).simplices.astype(np.int32)
     e, f = (plane[masters[:, k]] - plane[masters[:, 0]] for k in (1, 2))
     up = e[:, 0] * f[:, 1] - e[:, 1] * f[:, 0] > 0.0
-    masters[up] = masters[up][:, ::-1]  # the two triangles are opposite to each other
+    masters[up] = masters[up][:, ::-1]  # the two triangles face each other
     corners = rng.uniform(-1.5, 1.5, (3, 2))
     d = corners[1:] - corners[0]
     corners = corners if d[0, 0] * d[1, 1] - d[0, 1] * d[1, 0] > 0.0 else corners[::-1]

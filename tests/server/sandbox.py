@@ -59,7 +59,7 @@ def enter(unit: Unit, state: Path) -> None:
         raise SystemExit(f"sandbox: settings that it does not have: {', '.join(sorted(unknown))}")
     _check(_LIBC.unshare(_NEW_MOUNTS), "unshare")
     _mount("none", "/", _PRIVATE | _RECURSIVE)
-    os.umask(0o022)  # systemd makes mount points with this file mode mask, for any mask of the caller
+    os.umask(0o022)  # systemd makes mount points with this file mode mask
     _install(state)
     for name, protect in _MOUNTS.items():
         if name in unit:

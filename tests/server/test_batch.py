@@ -218,8 +218,8 @@ def test_a_job_has_its_own_copy_of_a_mesh_file(elsewhere: Path, monkeypatch: pyt
 
 
 def evil(folder: Path, **changes: str) -> Path:
-    """Another user has made the folder of the run. The record in this folder names programs that would leave a file if
-    they ran.
+    """Another user has made the folder of the run. The record in the folder of another user names programs that would
+    leave a file if they ran.
     """
     (folder / "bin").mkdir(parents=True)
     for name in ("squeue", "scancel", "sbatch", "scontrol", "sacct"):
@@ -234,7 +234,7 @@ def evil(folder: Path, **changes: str) -> Path:
 
 
 def test_a_folder_chooses_no_program(elsewhere: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """The job number in the record belongs to another Slurm job. The Slurm commands of the site return the name of this
+    """The job number in the record belongs to another Slurm job. The Slurm commands of the site return the name of the
     other job.
     """
     monkeypatch.setenv("CONOID_SITE", str(elsewhere))
@@ -299,8 +299,8 @@ def test_a_request_to_stop_follows_no_link(tmp_path: Path) -> None:
 def test_a_folder_without_a_worker_is_neither_cancelled_nor_still_running(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """A killed worker writes no last message. Without this rule a request file of a killed worker would wait for the
-    next worker, and a command that follows the run would not end.
+    """A killed worker writes no last message. A request file of a killed worker would otherwise wait for the next
+    worker, and a command that follows the run would not end.
     """
     monkeypatch.setattr(following, "_ASK_EVERY", 0.0)
     (tmp_path / layout.JOURNAL).write_text('{"type":"status","run":"a","seq":1,"state":"running"}\n')

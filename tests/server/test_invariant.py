@@ -1,7 +1,8 @@
 """At any fault, every open run is watched, waits in the queue or has a timer, and ends in a true state.
 
 Tests call the turns of a supervisor without a thread. A fault occurs at each place at which the supervisor writes, at
-one place after the other. At each of these places the supervisor is also killed, and another supervisor continues.
+one place after the other. At each place at which the supervisor writes, the supervisor is also killed, and another
+supervisor continues.
 """
 
 import errno

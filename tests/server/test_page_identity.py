@@ -69,7 +69,7 @@ def test_fragments_are_followed_through_fifty_snapshots(seen: list[Snapshot]) ->
     followed = [steel, glass, *[label for label in heaviest if label not in {steel, glass}][:FOLLOWED]]
     for label in followed:
         born = float(last["birth"][last["id"] == label][0]) * (1.0 - 1e-6)
-        since = [one for one in seen if one.header.t >= born]  # before that frame the number was not final
+        since = [one for one in seen if one.header.t >= born]  # before its birth the number is not final
         times, masses, centres, speeds = course(since, label)
         assert len(times) == len(since), f"{label} is never away"
         assert (np.diff(masses) <= 1e-9 * masses[0]).all(), "it loses pieces and never gets any"

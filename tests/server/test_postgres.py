@@ -80,7 +80,7 @@ def _await(url: str) -> None:
 
 
 def test_a_run_lives_with_its_index_in_postgresql(url: str, tmp_path: Path) -> None:
-    """A run is submitted and ends. The next server finds this run, also with an empty database."""
+    """A run is submitted and ends. The next server finds the ended run, also with an empty database."""
     settings = Settings(
         runs=tmp_path / "runs", port=0, zenoh_port=None, slots=2, worker=FAKE, grace=0.5, caps=Caps(free_disk=0),
         database=url,

@@ -59,8 +59,8 @@ def spoken(user: User, head: str, *bodies: bytes) -> bytes:
 
 
 def test_others_are_answered_while_a_body_arrives(up: tuple[Process, User, User]) -> None:
-    """During the transfer, the server also answers other requests of the sender and receives a second file. After these
-    requests the upload continues.
+    """During the transfer, the server also answers other requests of the sender and receives a second file. After the
+    requests of the sender the upload continues.
     """
     _, ann, bob = up
     data = random.Random(1).randbytes(3 * MEGA)

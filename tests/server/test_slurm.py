@@ -313,8 +313,8 @@ def uninterrupted(tmp_path_factory: pytest.TempPathFactory) -> str:
 @pytest.mark.slow
 @pytest.mark.parametrize(("profile", "jobs"), [("standard", 1), ("pmi2", 1), ("grace", 1), ("gone", 2)])
 def test_a_preempted_run_goes_on_to_the_same_digest(solver: Site, profile: str, jobs: int, uninterrupted: str) -> None:
-    """Slurm requeues the run, the job requeues the run within a grace period, or the job ends for good. After each of
-    these ends another job continues the run.
+    """Slurm requeues the run, the job requeues the run within a grace period, or the job ends for good. After each end
+    of the job another job continues the run.
     """
     run = solver.submit(with_ranks(2, LONG), profile)
     await_progress(solver, run)
@@ -332,8 +332,8 @@ def test_a_preempted_run_goes_on_to_the_same_digest(solver: Site, profile: str, 
 def hurry(solver: Site, run: str) -> None:
     """Releases a requeued Slurm job.
 
-    Slurm lets a requeued job wait for two minutes; the test skips these two minutes. The node must have finished with
-    the old job, because Slurm mistakes a job that starts in the second in which the old job ended for the old job.
+    Slurm lets a requeued job wait for two minutes; the test skips the wait. The node must have finished with the old
+    job, because Slurm mistakes a job that starts in the second in which the old job ended for the old job.
     """
     since = dict[str, float]()
     deadline = time.monotonic() + 20.0

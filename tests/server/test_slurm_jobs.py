@@ -63,7 +63,9 @@ def test_no_job_is_submitted_while_the_queue_cannot_be_read(place: Path) -> None
     "output", [b"\xff{|||\n", b"<html>\n", b"7|\n", b"7|RUNNING|0|conoid-a|None\n8|PEND", b"a|b|c|d|e\n"]
 )
 def test_an_invalid_list_is_not_an_empty_list(place: Path, output: bytes) -> None:
-    """Without this rule a run whose job is missing in the list would be submitted again."""
+    """A damaged list of jobs is no empty list: otherwise a run whose job is missing in the list would be submitted
+    again.
+    """
     found = commands(place, "echo 101")
     (place / "queue").write_bytes(output)
     with pytest.raises(slurm_call.AwayError, match="squeue"):

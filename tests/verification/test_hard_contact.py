@@ -342,15 +342,15 @@ def test_crossed_blades_do_not_cut_into_each_other() -> None:
 
 def test_a_fine_plate_does_not_fold_into_the_rim_of_a_coarse_punch() -> None:
     """The only sharp edges in front of the rim are the edges of the plate that the rim bends by 5 to 25 degrees.
-    Without contact of these edges 54 tets ended with more than a tenth of their volume in the punch, 4.8e-4 of the
-    volume of all surface tets, and 7 nodes were 0.22 of a face deep.
+    Without contact of the sharp edges in front of the rim, 54 tets ended with more than a tenth of their volume in the
+    punch, 4.8e-4 of the volume of all surface tets, and 7 nodes were 0.22 of a face deep.
     """
     round_ = {"shape": "cylinder", "axis": "z", "sector": "quarter"}
     punch = {"base": [0, 0, 0.01e-3], "radius": 2e-3, "length": 6e-3, "element_size": 0.6e-3}
     plate = {"base": [0, 0, -1.5e-3], "radius": 8e-3, "length": 1.5e-3, "element_size": 0.22e-3}
     graded = {"grading": {"axis": "z", "near": 2.6e-3, "far": 8e-3, "far_size": 0.9e-3}}
     plate_steel = library()["weldox_460e"].model_dump()
-    plate_steel["strength"]["damage"]["softening"] = 0.0  # full strength: the rim presses on the plate
+    plate_steel["strength"]["damage"]["softening"] = 0.0  # the rim presses on the plate with full strength
     case = parse_case(
         {
             "name": "rim", "run": {"end_time": 1.7e-6, "frames": 0},
@@ -382,7 +382,8 @@ def test_a_fine_plate_does_not_fold_into_the_rim_of_a_coarse_punch() -> None:
 def test_columns_of_metal_hold_each_other_under_a_shock(metal: str, speed: float) -> None:
     """The columns are between planes of symmetry, with irregular tets and averaged pressure: behind the shock no node
     is faster than before the impact. In an earlier version nodes of the interface became faster than the columns, and
-    tets were crushed, at ridges of faces that were flat at the start. At 4 km/s this also happened with five sweeps.
+    tets were crushed, at ridges of faces that were flat at the start. At 4 km/s tets were crushed also with five
+    sweeps.
     """
     cube = {"shape": "box", "element_size": 0.5e-3, "generator": "gmsh"}
     case = parse_case(

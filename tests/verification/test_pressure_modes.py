@@ -175,7 +175,7 @@ def breathing(form: Form) -> float:
 
 
 def test_the_split_form_damps_elastic_motion_and_nodal_does_not() -> None:
-    """The texts of validate, converge and the reference describe this loss (cases/warnings/damping.py); the value for
-    6,400 tets is in docs/theory/elements.md."""
+    """The texts of validate, converge and the reference describe the damping of the split form
+    (cases/warnings/damping.py); the value for 6,400 tets is in docs/theory/elements.md."""
     assert breathing("split") > 0.08
     assert 0.0 <= breathing("nodal") < 0.03, "differences within a tet are stored, and come back"

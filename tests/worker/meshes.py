@@ -20,8 +20,8 @@ def block(
 ) -> TetMesh:
     """Returns a block of cubes of edge ``size``, m, each cut into six tets. The nodes are moved by up to ``shake`` of
     the edge. Nodes on a face of the block stay in the plane of the face, so that the block keeps its shape. With
-    ``mirrored`` every cube is cut as the mirror image of its neighbours; the block is then symmetric about its planes
-    of symmetry.
+    ``mirrored`` every cube is cut as the mirror image of its neighbours, so that the block is symmetric about its
+    planes of symmetry.
     """
     steps = [np.arange(n + 1) for n in cells]
     grid = np.stack(np.meshgrid(*steps, indexing="ij"), axis=-1).reshape(-1, 3).astype(float)

@@ -24,7 +24,7 @@ T = TypeVar("T")
 
 
 def wear_out(sim: Simulation, gone: "np.ndarray") -> None:
-    """Marks the tets with these ids for removal in the next step."""
+    """Marks the tets with the given ids for removal in the next step."""
     assert sim.erosion is not None
     for part in sim.model.blocks:
         if len(part.worn):

@@ -92,7 +92,7 @@ def test_no_node_ends_behind_the_wall(gap: float) -> None:
 @pytest.mark.parametrize("gap", [1e-5, 0.0])
 @pytest.mark.parametrize("name", ["floor", None])
 def test_the_force_of_walls_is_what_changes_the_momentum(name: str | None, gap: float) -> None:
-    """The force of one of two walls, and of both walls, times time, summed over all lines of the history, is the change
+    """The force of one of two walls, or of both walls, times time, summed over all lines of the history, is the change
     of momentum. The bodies touch the walls at the start or touch them later."""
     walls = [
         {**wall(gap), "name": "floor"},
@@ -245,8 +245,8 @@ def test_motion_that_a_symmetry_plane_stops_at_the_start_is_reported() -> None:
 @pytest.mark.parametrize("order", [1, -1], ids=["plane first", "wall first"])
 def test_a_wall_across_a_symmetry_plane_pushes_along_it(order: int) -> None:
     """Half a block falls on a wall whose normal is at 37 degrees to the plane of symmetry. The nodes of the half block
-    stay on the plane and in front of the wall, and the energy balance closes. Without the plane of symmetry the same
-    wall moves the nodes away from this plane.
+    stay on the plane and in front of the wall, and the energy balance closes. Without the plane of symmetry the wall of
+    this test moves the nodes away from the position of the plane.
     """
     slope = math.radians(37.0)
     low = MESH.points.min(axis=0)
@@ -485,8 +485,8 @@ def test_a_traction_without_a_face_is_refused() -> None:
 
 @pytest.mark.parametrize("ranks", [1, 3])
 def test_a_traction_leaves_with_the_tets_of_its_faces(ranks: int) -> None:
-    """Nodes of removed tets get no force from the traction. With such a force these nodes would be accelerated without
-    limit, because their mass is tiny.
+    """Nodes of removed tets get no force from the traction. With a remaining force the nodes of removed tets would be
+    accelerated without limit, because their mass is tiny.
     """
     top = {frozenset(face.tolist()) for face in boundary_faces(MESH.tets) if (MESH.points[face][:, 2] > 2.9e-3).all()}
     loaded = {e: [c for c in top if c <= set(tet.tolist())] for e, tet in enumerate(MESH.tets)}

@@ -83,9 +83,10 @@ def elastic_work(patch: Patch, form: Form) -> Floats:
 @pytest.mark.parametrize("psi", ANGLES)
 def test_the_triaxial_path(form: Form, psi: float) -> None:
     """In this test a block under the lateral pressure s is shortened along z. The block is elastic up to the stress f +
-    s (1 + sin phi) / (1 - sin phi). Beyond this stress no stress changes if the volume grows by 2 sin psi / (1 - sin
-    psi) of the shortening, half of this growth on each lateral axis. The work on the block is the work of this stress.
-    The stored energy is p^2 / 2K + q^2 / 6G per present volume; the rest of the work is plastic.
+    s (1 + sin phi) / (1 - sin phi). Beyond the elastic limit no stress changes if the volume grows by 2 sin psi / (1 -
+    sin psi) of the shortening, half of this growth on each lateral axis. The work on the block is the work of the
+    stress at the elastic limit. The stored energy is p^2 / 2K + q^2 / 6G per present volume; the rest of the work is
+    plastic.
     """
     patch, lateral, steps = Patch(block((2, 2, 2)), glass(psi), form), 100e6, 200
     patch.put(PRESSURE, lateral)

@@ -157,7 +157,7 @@ def test_speed_of_sound_of_a_linear_solid() -> None:
 
 
 def test_there_is_no_pressure_beyond_the_pole() -> None:
-    """The Hugoniot pressure p_H is infinite at the compression 1 / S. Beyond this compression the law returns no
+    """The Hugoniot pressure p_H is infinite at the compression 1 / S. Beyond the compression 1 / S the law returns no
     pressure, instead of a finite pressure that decreases."""
     for ratio, finite in ((1.0 - 0.99 / GAS.S, True), (1.0 - 1.01 / GAS.S, False), (-0.1, False)):
         patch = Patch(free_tets(1, 5), COPPER_GAS)
@@ -170,8 +170,8 @@ def test_there_is_no_pressure_beyond_the_pole() -> None:
 @pytest.mark.parametrize("spall", [None, 1e9])
 @pytest.mark.parametrize("form", FORMS)
 def test_a_tet_that_passes_the_pole_ends_the_run(form: Form, spall: float | None) -> None:
-    """The message names the tet and the compression of the tet. Without this check the run would continue with a
-    meaningless pressure."""
+    """The message names the tet and the compression of the tet. Without a check of the pole the run would continue with
+    a meaningless pressure."""
     case = scene(COPPER_GAS.model_copy(update={"spall": spall}), form)
     sim = build(case, [free_tets(1, 5)])
     step.prepare(sim)

@@ -173,14 +173,14 @@ def test_a_tet_that_turns_inside_out_books_no_work_that_it_has_not_done(
     tick(sim)
     volumes = tet_volumes(sim.model.blocks[0].tets, nodes.x)
     assert (volumes < 0.0).sum() > 3
-    assert max(tick(sim) for _ in range(3)) < 0.006  # other tets have strains above one in that step
+    assert max(tick(sim) for _ in range(3)) < 0.006  # other tets have strains above one in this step
 
 
 @pytest.mark.parametrize("form", ["standard", "nodal"])
 @pytest.mark.parametrize("material", [STEEL, COPPER, COPPER_GAS], ids=["elastic", "copper", "gas"])
 def test_the_first_step_has_the_speeds_of_approaching_nodes(material: Material, form: Form) -> None:
-    """In this test one node of a cube starts at 10 km/s. Without a bound of the step by the motion of the node 20 to
-    209 % of the energy was wrong."""
+    """In this test one node of a cube starts at 10 km/s. Without a limit of the step by the motion of the node, the
+    error of the energy was 20 to 209 %."""
     sim = alone(block((3, 3, 3), MM), form=form, material=material, viscosity={})
     nodes = sim.model.nodes
     node = np.argmin(np.abs(nodes.x0 - 0.9 * MM).sum(axis=1))
@@ -421,9 +421,7 @@ def test_probes_of_what_has_left_are_no_number() -> None:
 
 @pytest.mark.parametrize("erosion", [EROSION, REMOVE], ids=["particles", "remove"])
 def test_no_reference_of_what_has_left_is_met(erosion: schema.Erosion) -> None:
-    """No reference of a part without tets passes, for any tolerance; the particles of such a part still have a
-    speed.
-    """
+    """No reference of a part without tets passes, for any tolerance; the particles of the part still have a speed."""
     quantities: tuple[Any, ...] = ("plastic_strain_max", "stress_max", "extent", "radius", "speed_mean")
     wide: dict[str, Any] = {"part": "body0", "value": 0.0, "tolerance": 1e9, "source": "-"}
     specs = [schema.Reference(quantity=q, axis="z" if q in quantities[2:] else None, **wide) for q in quantities]

@@ -99,8 +99,8 @@ def test_contributions_are_rounded_to_the_nearest_even_integer() -> None:
 
 
 def collision(form: Form, floor: float) -> tuple[Simulation, int]:
-    """Returns a copper cube without stress that flies and then hits a wall, and the number of repeated sums. The
-    argument ``floor`` is the force, N, below which the quantum is not refined.
+    """Returns the number of repeated sums and a copper cube without stress that flies against a wall. The argument
+    ``floor`` is the force, N, below which the quantum is not refined.
     """
     wall = {"kind": "wall", "point": (0.0, 0.0, -1e-4), "normal": (0.0, 0.0, 1.0)}
     case = scene(COPPER, form, end=1.5e-6, velocity=(0.0, 0.0, -200.0), boundaries=(wall,))
@@ -123,8 +123,8 @@ def collision(form: Form, floor: float) -> tuple[Simulation, int]:
 
 @pytest.mark.parametrize("form", FORMS)
 def test_a_sum_that_outgrows_its_quantum_is_repeated(form: Form) -> None:
-    """Forces in this scene grow more than 64-fold at the impact. Repeated sums are equal to sums with a coarse quantum
-    from the start."""
+    """Forces of the copper cube grow more than 64-fold at the impact. Repeated sums are equal to sums with a coarse
+    quantum from the start."""
     fine, repeats = collision(form, 0.0)
     coarse, none = collision(form, 1e4)
     assert 1 <= repeats <= 4
@@ -222,7 +222,7 @@ def test_a_value_that_is_not_finite_has_an_infinite_maximum(odd: float) -> None:
 
 
 def test_the_smallest_floats_have_sums() -> None:
-    """The quantum of these sums is the quantum for 2^-993; smaller values are rounded to zero."""
+    """The quantum of sums of very small values is the quantum for 2^-993; smaller values are rounded to zero."""
     tiny = np.array([[2.0**-1000, 5e-324], [2.0**-1001, 0.0]])
     assert exact_sums(SerialComm(), tiny).tolist() == [1.5 * 2.0**-1000, 0.0]
 

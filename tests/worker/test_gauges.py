@@ -231,7 +231,7 @@ def test_a_hole_is_as_wide_as_what_the_rays_are_free_to_go(ranks: int) -> None:
     measured = on(ranks, case, [mesh], work)
     assert len({bits(each) for each in measured}) == 1
     flat = np.cos(np.pi / 96.0)
-    area = 24.0 * 0.5 * np.sin(np.pi / 48.0)  # area of the polygon, for a quarter of the circle of radius 1
+    area = 24.0 * 0.5 * np.sin(np.pi / 48.0)  # area of the polygon that replaces a quarter circle of radius 1
     width, diameter = 20e-3, 20e-3 * math.sqrt(area / (np.pi / 4.0))
     assert measured[0][0] == pytest.approx([width * flat, diameter], rel=1e-3)
     assert measured[0][1] == pytest.approx([width, diameter * math.sqrt(1.4)], rel=2e-3)
@@ -284,7 +284,7 @@ def test_a_cone_has_the_angle_of_the_areas_that_have_left(ranks: int) -> None:
     assert measured[0][1] == pytest.approx(2.0 * math.atan((radii[1] - radii[0]) / 2e-3), rel=1e-12)
     assert math.degrees(measured[0][1]) == pytest.approx(
         70.0, abs=8.0
-    )  # half a cube, with four cubes through the plate
+    )  # the hole takes half a cube, and four cubes are through the plate
 
 
 @pytest.mark.parametrize("ranks", [1, 2])

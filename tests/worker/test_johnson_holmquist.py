@@ -115,7 +115,7 @@ def driven(name: str, strain: float, every: int) -> tuple[Floats, Patch]:
 def test_uniaxial_strain_follows_an_independent_integration(name: str) -> None:
     """The strain of the test is twice the elastic limit, followed by a release of a quarter. Boron carbide fails at its
     elastic limit within a few steps of any size, because its fracture strain is a tenth of the released elastic strain.
-    During this failure the pressure of boron carbide does not follow the bulking as the ODE does.
+    During the failure at its elastic limit the pressure of boron carbide does not follow the bulking as the ODE does.
     """
     _, law, bulk, shear = constants(name)
     strain = 2.0 * law.hel / (bulk + 4.0 / 3.0 * shear)

@@ -95,7 +95,7 @@ def test_a_stress_that_two_materials_have_in_common_is_uniform_in_both(form: For
     case = joint(("alumina", "steel"), numerics={"pressure": form, "viscosity": "none"})
     (found,) = on(1, case, PARTS, stretched)
     for each in found:
-        assert each == pytest.approx(stress, rel=1e-5)  # second order in the strain, 4e-6
+        assert each == pytest.approx(stress, rel=1e-5)  # the error is of second order in the strain, 4e-6
         assert np.ptp(each) < 1e-8 * stress
 
 

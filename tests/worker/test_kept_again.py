@@ -24,8 +24,8 @@ from .simulations import kept_again
 
 BREAKING = Path(__file__).parents[1] / "parallel" / "breaking.toml"
 STEPS = 32
-"""Number of steps before the run is stored; the scene has 54 steps. After this number of steps contact has taken
-energy, facets have broken, and cohesive facets carry traction."""
+"""Number of steps before the run is stored; the scene has 54 steps. Contact has taken energy, facets have broken, and
+cohesive facets carry traction before the run is stored."""
 OTHER = ("contact.skin=0.08", "contact.domain=box")
 
 

@@ -241,7 +241,7 @@ def test_modules_that_have_not_changed_are_linked_from_an_earlier_folder(tree: P
     )
     assert below[0] == below[1] != below[2], "what it imports has changed at last"
     assert len(set(above)) == 3
-    (folders[2] / ahead.COMPLETE).unlink()  # a program that was killed after its last module
+    (folders[2] / ahead.COMPLETE).unlink()  # the program was killed after its last module
     assert ahead.compile_all(folders[2], lambda *_: None, tree, "tiny")
     assert (folders[2] / ahead.COMPLETE).exists()
 

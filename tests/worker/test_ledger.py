@@ -222,7 +222,9 @@ def crushed(form: Form, safety: float) -> Simulation:
 
 
 def rebounding(form: Form, safety: float) -> Simulation:
-    """Returns this bar between walls, with several rebounds: the time step falls and recovers."""
+    """Returns a cube of steel with random velocities between two walls, with several rebounds: its time step falls and
+    recovers.
+    """
     box = [{"kind": "wall", "point": (at,) * 3, "normal": normal} for at, normal in (
         (-1e-5, (0.0, 0.0, 1.0)), (3.01e-3, (0.0, 0.0, -1.0)),
     )]  # fmt: skip

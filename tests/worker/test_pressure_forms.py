@@ -100,7 +100,8 @@ def test_a_linear_pressure_is_left_alone() -> None:
 
 def test_stabilisation_against_the_formula() -> None:
     """The change of pressure at node a is K dt^2/2 / V_a times the sum over the tets of V / rho times the scalar
-    product of grad N_a and grad p minus the mean projected grad p. The sum of V_a times this change is zero.
+    product of grad N_a and grad p minus the mean projected grad p. and grad p minus the mean projected grad p. The sum
+    over the nodes of V_a times the change of pressure is zero.
     """
     pressure = np.random.default_rng(5).normal(size=len(MESH.points)) * 1e9
     patch, change = stabilised(pressure)

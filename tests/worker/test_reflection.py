@@ -1,5 +1,5 @@
-"""A node without tets that passes a plane of symmetry is replaced by its mirror image: the test compares this with
-plain numpy, and in a scene."""
+"""A node without tets that passes a plane of symmetry is replaced by its mirror image: the replacement is compared with
+plain numpy, and tested in a scene."""
 
 from pathlib import Path
 from types import SimpleNamespace

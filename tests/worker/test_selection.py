@@ -70,7 +70,7 @@ class Scene:
         self.first = [rng.randint(0, n) for n in self.cells]
         self.last = [rng.randint(a, n) for a, n in zip(self.first, self.cells, strict=True)]
         thin = rng.randrange(3)
-        if rng.random() < 0.5:  # a layer without thickness, on the surface
+        if rng.random() < 0.5:  # the box is a layer without thickness, on the surface
             self.first[thin] = self.last[thin] = rng.choice([0, self.cells[thin]])
 
     def written(self, point: list[Decimal]) -> list[str]:

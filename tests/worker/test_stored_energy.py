@@ -118,7 +118,7 @@ def shaken(
 def test_the_elastic_line_is_what_the_stresses_store(name: str, form: Form) -> None:
     """In an earlier version of the averaged pressures the difference between the two energies was 1 to 9 % of the
     energy, and 2 % in crushed alumina or torn copper."""
-    crumbles = name == "johnson_holmquist"  # within twenty steps; until then the pressure is not linear
+    crumbles = name == "johnson_holmquist"  # the pressure is linear from step twenty on
     seen, initial = shaken(LAWS[name], form, every=5 if crumbles else 10)
     linear = seen[10:] if crumbles else seen
     assert max(abs(energy.elastic - there) for energy, there in linear) < SHARE * initial
@@ -136,7 +136,7 @@ def test_the_elastic_line_is_what_the_stresses_store(name: str, form: Form) -> N
 @pytest.mark.parametrize("form", FORMS)
 def test_no_pores_pay_for_dilation(form: Form) -> None:
     """Plastic flow takes energy, with and without tension failure. In an earlier version material that dilated into its
-    own pores created up to three times the energy of this scene.
+    own pores created up to three times the energy of the scene.
     """
     seen, initial = shaken(brittle(0.02e9, PHI, dilation_angle=PHI).model_copy(update={"spall": 0.01e9}), form)
     plastic = np.array([energy.plastic for energy, _ in seen])
@@ -147,8 +147,8 @@ def test_no_pores_pay_for_dilation(form: Form) -> None:
 
 @pytest.mark.parametrize("form", FORMS)
 def test_it_is_while_tets_leave(form: Form) -> None:
-    """The term ``eroded`` is equal to the energy that was stored in removed tets, without the kinetic energy of the
-    nodes of these tets, which stay in the model.
+    """The term ``eroded`` is equal to the energy that was stored in removed tets. The kinetic energy of the nodes of
+    removed tets stays in the model.
     """
     seen, initial = shaken(COPPER, form, Erosion(plastic_strain=0.05))
     assert max(abs(energy.elastic - there) for energy, there in seen) < SHARE * initial
@@ -160,7 +160,8 @@ def test_it_is_while_tets_leave(form: Form) -> None:
 @pytest.mark.parametrize("form", ["nodal", "split"])
 def test_it_is_where_what_dilates_is_crushed(form: Form) -> None:
     """In this test a tet flows while its neighbours do not flow: the accumulated dilation of the tet is not the growth
-    of any volume. When this dilation was treated as a volume, the term ``elastic`` exceeded 1e7 times the energy.
+    of any volume. When the accumulated dilation was treated as a volume, the term ``elastic`` exceeded 1e7 times the
+    energy.
     """
     soil = brittle(10e3, math.radians(35.0), dilation_angle=math.radians(10.0))
     soil = soil.model_copy(update={"density": 1800.0, "elastic": Elastic(young=50e6, poisson=0.3)})
@@ -173,9 +174,9 @@ def test_it_is_where_what_dilates_is_crushed(form: Form) -> None:
 @pytest.mark.parametrize("form", FORMS)
 def test_it_is_where_neighbours_have_crumbled(form: Form) -> None:
     """Half of a block of glass is fully damaged, and the block expands. The damaged tets of the block open and move
-    nodes of intact tets. An intact tet at its tensile cut-off stores no further energy. When this motion was treated as
-    an opening of the intact tet, the term ``elastic`` rose to 36 % (nodal) and 97 % (split) of the energy in these
-    steps, without a limit.
+    nodes of intact tets. An intact tet at its tensile cut-off stores no further energy. When the motion of its nodes
+    was treated as an opening of the intact tet, the term ``elastic`` rose to 36 % (nodal) and 97 % (split) of the
+    energy in the same steps, without a limit.
     """
     glass = library()["float_glass_jh2"]
     assert isinstance(glass.strength, JohnsonHolmquist)

@@ -104,7 +104,7 @@ def test_a_cut_off_of_mie_gruneisen_keeps_the_energy_equation() -> None:
     assert found["p"][-1] > 3e9
     volume = found["mass"][0] / 8930.0
     opened = volume * (found["ratio"] * found["pores"]).max()
-    stored = SPALL**2 / (2.0 * 8930.0 * eos.c0**2)  # returns from a larger volume than before
+    stored = SPALL**2 / (2.0 * 8930.0 * eos.c0**2)  # the tet returns from a larger volume than before
     assert found["plastic"][-1] == pytest.approx((SPALL - stored) * opened, rel=0.002)
 
 
@@ -123,8 +123,8 @@ def ball(spall: float | None) -> simulation.Simulation:
 
 @pytest.mark.parametrize("spall", [None, SPALL])
 def test_a_copper_sphere_that_is_torn_apart_keeps_its_energy_and_its_tets(spall: float | None) -> None:
-    """An earlier version lost 12 % of the energy and a ninth of the tets of this sphere in 1 us. Without a cut-off
-    single tets still expand until erosion removes them by their volume, but the energy is conserved.
+    """An earlier version lost 12 % of the energy and a ninth of the tets of the copper sphere in 1 us. Without a
+    cut-off single tets still expand until erosion removes them by their volume, but the energy is conserved.
     """
     sim = ball(spall)
     residuals: list[float] = []

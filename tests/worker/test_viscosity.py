@@ -14,10 +14,10 @@ from .meshes import block
     [
         (3.0, 1.0, 1.0, 0.0, 1.0),  # the part of the rate beyond the mean is noise
         (3.0, 1.0, 1.2, -0.3, 1.0),
-        (3.0, 1.0, 0.6, 0.0, 1.8),  # except if the tet has lost volume to its neighbours
+        (3.0, 1.0, 0.6, 0.0, 1.8),  # the own rate counts if the tet has lost volume to its neighbours
         (3.0, 1.0, 0.0, 0.0, 3.0),
         (3.0, 1.0, -0.5, 0.0, 3.0),
-        (3.0, 1.0, 1.0, 0.05, 2.0),  # or under a pressure far above its strength
+        (3.0, 1.0, 1.0, 0.05, 2.0),  # the own rate counts under a pressure far above the strength
         (3.0, 1.0, 0.8, 0.05, 2.4),
         (3.0, 1.0, 1.0, 0.4, 3.0),
         (3.0, -1.0, 1.0, 0.0, 0.0),
