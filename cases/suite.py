@@ -73,7 +73,7 @@ def faults(hard: Hard, outcome: Outcome, drifted: float | None) -> list[str]:
     """Yields the errors of a run of the case; a correct run has no errors."""
     found = []
     if hard.refused:
-        if outcome.cause != "energy" or f"the line {hard.refused} of the energy" not in outcome.message:
+        if outcome.cause != "energy" or f"the term {hard.refused} of the energy ledger" not in outcome.message:
             found.append(f"not refused for the energy that {hard.refused} creates: {outcome.state}, {outcome.message}")
     elif outcome.state != "succeeded":
         found.append(f"{outcome.state}: {outcome.message}")

@@ -44,7 +44,7 @@ def test_a_run_that_ended_well_has_no_faults_and_every_fault_is_named() -> None:
 
 def test_a_case_whose_energy_is_made_must_be_refused_for_that_line() -> None:
     hard = named("closing_bore")
-    text = f"the line {hard.refused} of the energy has made 0.0213 of the largest energy"
+    text = f"the term {hard.refused} of the energy ledger has created 0.0213 of the largest energy"
     assert faults(hard, Outcome(state="failed", cause="energy", message=text, worst_residual=1e-6), None) == []
     for wrong in (GOOD, Outcome(state="failed", cause="energy", message="the energy residual", worst_residual=1e-6)):
         first = faults(hard, wrong, None)

@@ -79,11 +79,12 @@ def test_contact_that_makes_energy_ends_the_run() -> None:
     sim.ledger.close(v)
     sim.ledger.require(sim.case.run, 0.9, "soon")
     assert sim.ledger.making.worst["contact"].share == pytest.approx(0.015, rel=1e-9)
-    assert any("the line contact of the energy has made 0.015" in text for text in sim.ledger.warnings(0.9))
+    assert any("the term contact of the energy ledger has created 0.015" in text for text in sim.ledger.warnings(0.9))
     sim.contact.books.contact_loss[1] = -0.02 * sim.ledger.initial
     sim.ledger.close(v)
     message = (
-        r"the line contact of the energy has made 0\.035 of the largest energy, above run\.made_limit 0\.02, at the"
+        r"the term contact of the energy ledger has created 0\.035 of the largest energy, above run\.made_limit 0\.02, "
+        r"at the"
     )
     with pytest.raises(EnergyError, match=message):
         sim.ledger.require(sim.case.run, 0.9, "at the end")

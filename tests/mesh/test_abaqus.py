@@ -154,7 +154,9 @@ def test_a_set_that_hides_another_set_is_reported(tmp_path: Path) -> None:
 
 def test_sets_of_one_name_in_two_parts_are_not_taken_for_each_other(tmp_path: Path) -> None:
     text = PART + PART.replace("*HEADING\n a comment line, with, commas\n", "").replace("NAME=Rod", "NAME=Plate")
-    message = "may be the set 'Upper' of the part 'Rod' or the set 'Upper' of the part 'Plate', which differ; a set of"
+    message = (
+        "may be the set 'Upper' of the part 'Rod' or the set 'Upper' of the part 'Plate', which differ; write OWNER.SET"
+    )
     with pytest.raises(MeshError, match=message):
         read(text, tmp_path, "Upper")
     assert read(text, tmp_path, "Plate.Upper").names.tets.tolist() == [1]
@@ -270,8 +272,8 @@ def test_a_node_set_with_undefined_nodes_is_reported(tmp_path: Path) -> None:
     inner = PART.replace("*END PART", "*NSET, NSET=Grip\n1, 2, 98, 99\n*END PART")
     outer = "*NODE\n1, 9., 9., 9.\n*NSET, NSET=Point\n1\n*NSET, NSET=Base, INSTANCE=Left\n5, 77\n*END ASSEMBLY"
     notes = read(inner + TWO.replace("*END ASSEMBLY", outer), tmp_path).notes
-    found = [note for note in notes if "do not" in note or "does not define" in note]
-    message = "sets have members that the file does not define, and are smaller: "
+    found = [note for note in notes if "do not" in note or "undefined" in note]
+    message = "sets have undefined members; these members are left out: "
     assert found == [f"{message}the node set 'Base' (1, such as 77), the node set 'Grip' (2, such as 98)"]
 
 

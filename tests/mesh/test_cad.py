@@ -114,7 +114,7 @@ def test_a_brep_file_needs_a_unit(folder: Path, brep: bytes) -> None:
     assert made(path, brep, unit="1 mm", solids=[1]).volumes().sum() == pytest.approx(1e-9 * CUBE, rel=1e-9)
     healed = made(path, brep, unit="1 mm", heal=True, element_size=3e-3)  # surfaces after healing are slow to mesh
     assert healed.volumes().sum() == pytest.approx(1.341e-6, rel=0.01)
-    with pytest.raises(MeshError, match="a BREP file does not say in which unit it is; give the key unit"):
+    with pytest.raises(MeshError, match="a BREP file does not contain its unit; give the key unit"):
         made(path, brep)
 
 

@@ -158,8 +158,8 @@ def test_its_size_is_known_about_before_it_is_meshed() -> None:
 @pytest.mark.parametrize(
     ("request_", "message"),
     [
-        ({"shape": "intersection", "of": [JACKET, {**CORE, "base": [5.0, 0.0, 0.0]}]}, "mesh: nothing is left of it"),
-        ({"shape": "difference", "of": [CORE, JACKET]}, "mesh: nothing is left of it"),
+        ({"shape": "intersection", "of": [JACKET, {**CORE, "base": [5.0, 0.0, 0.0]}]}, "mesh: the body is empty"),
+        ({"shape": "difference", "of": [CORE, JACKET]}, "mesh: the body is empty"),
         ({"shape": "union", "of": [CORE, JACKET], "element_size": 1e-5}, "mesh.element_size = 1e-05 m: about"),
     ],
 )

@@ -175,7 +175,7 @@ def test_a_bad_tet_is_named_as_in_the_file(
 
 def test_a_group_without_tets_is_named(tmp_path: Path) -> None:
     (tmp_path / "empty.inp").write_text(INP.format(height=1) + "*ELSET, ELSET=NONE\n")
-    with pytest.raises(MeshError, match=r"^parts\[1\]\.mesh\.group = 'none': no element with a volume is in it$"):
+    with pytest.raises(MeshError, match=r"^parts\[1\]\.mesh\.group = 'none': the group has no element with a volume$"):
         read("empty.inp", tmp_path, group="none")
 
 

@@ -88,7 +88,7 @@ def test_each_group_has_its_own_tets_once(kind: str, dialect: str, folder: Path)
 def test_the_files_of_partitions_add_up_without_their_ghost_cells(binary: int, folder: Path) -> None:
     found = [read_msh(folder / f"split-4.1-{binary}_{i}.msh", None, "mesh") for i in (1, 2, 3)]
     assert sum(map(volume, found)) == pytest.approx(40.0)
-    assert found[0].notes == ("the file is a part of a mesh: of its 3 partitions it lacks 2, 3",)
+    assert found[0].notes == ("the file is a part of a mesh: of 3 partitions, these are missing: 2, 3",)
 
 
 @pytest.mark.parametrize("dialect", DIALECTS)
@@ -97,7 +97,7 @@ def test_two_groups_of_one_name_are_taken_together(dialect: str, folder: Path, t
     (tmp_path / "same.msh").write_bytes(content)
     found = read_msh(tmp_path / "same.msh", "lower", "mesh")
     assert volume(found) == pytest.approx(40.0)
-    assert found.notes == ("the name 'lower' is that of the groups 1, 2; they are taken together",)
+    assert found.notes == ("several groups have the name 'lower' and are united: 1, 2",)
     assert volume(read_msh(tmp_path / "same.msh", "2", "mesh")) == pytest.approx(20.0)
 
 
@@ -137,7 +137,7 @@ def test_groups_of_one_entity_are_distinguished(tmp_path: Path) -> None:
 
 def test_a_name_that_is_the_number_of_another_group_is_refused(tmp_path: Path) -> None:
     (tmp_path / "small.msh").write_text(SMALL.replace("$Nodes", NAMES.format("2", 'Körper "1"') + "$Nodes"))
-    with pytest.raises(MeshError, match=r"mesh\.group = '2': the name of one group and the number of another one"):
+    with pytest.raises(MeshError, match=r"mesh\.group = '2': the name of one group and the number of another group"):
         read_msh(tmp_path / "small.msh", "2", "mesh")
     assert read_msh(tmp_path / "small.msh", 'Körper "1"', "mesh").names.tets.tolist() == [101]
 
@@ -171,13 +171,13 @@ def test_other_volumes_are_refused_where_they_are_chosen(tmp_path: Path) -> None
         ("10 30 20 50", "10 30 20 60", "tet 101 uses node 60, which is not defined"),
         ("$Elements\n2", "$Elements\n3", r"the section \$Elements has fewer numbers than its counts"),
         ("101 4 2 2 1", "101 4 2.5 2 1", r"the section \$Elements has 2.5 where a whole number is expected"),
-        ("101 4 ", "101 999 ", "it has elements of the type 999 of gmsh, which is not read"),
+        ("101 4 ", "101 999 ", "the file has elements of the type 999 of gmsh, which is not supported"),
         ("$EndNodes", "$EndNode", r"the section \$Nodes has no end"),
         ("$EndNodes\n", f"$EndNodes\n{NODES}", r"the file is damaged: it has two sections \$Nodes"),
         ("$EndNodes\n", "$EndNodes\nhello\n", "the file is damaged: 'hello' stands in no section"),
         (NODES, "", r"the file has no section \$Nodes"),
         ("2.2 0 8", "2.2 0 4", "the file is damaged: its format is '2.2 0 4'"),
-        ("2.2 0 8", "2.2 1 8", "the file is damaged: the order of its bytes is not that of any machine"),
+        ("2.2 0 8", "2.2 1 8", "the file is damaged: its mark of the byte order has a wrong value"),
         ("2.2 0 8", "2 0 8", "the .msh format '2' is not read; save it as 4.1 or 2.2"),
         (
             "$Nodes",

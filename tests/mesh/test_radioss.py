@@ -91,7 +91,7 @@ def test_a_group_with_undefined_nodes_is_reported(tmp_path: Path) -> None:
     (tmp_path / "two_0000.rad").write_text(f"{TWO}/GRNOD/NODE/1\ngrip\n{row(1, 2, 98, -99)}")
     origin = taken(tmp_path / "two_0000.rad").origin
     assert origin is not None
-    assert "the file does not define, and are smaller: /GRNOD grip (2, such as 98)" in " ".join(origin.notes)
+    assert "undefined members; these members are left out: /GRNOD grip (2, such as 98)" in " ".join(origin.notes)
 
 
 @pytest.mark.parametrize(

@@ -129,8 +129,8 @@ def test_warped_faces_are_reported_with_their_lost_volume(raised: int, share: fl
     found = one(list(range(8)), points)
     assert found.mesh.volumes().sum() == pytest.approx(1 + 0.3 * share)
     lost = (0.25 - share) * 0.3 / (1 + 0.3 * share)
-    message = f"{100 * abs(lost):.2g} % {'less' if lost > 0 else 'more'} volume than between them"
-    assert found.notes[1] == f"faces that are not flat are two triangles each: {message}"
+    message = f"{100 * abs(lost):.2g} % {'less' if lost > 0 else 'more'} volume"
+    assert found.notes[1] == f"each face that is not flat becomes two triangles, with {message}"
 
 
 @pytest.mark.parametrize("other", [False, True])
@@ -228,4 +228,4 @@ def test_hexahedra_of_twenty_nodes_are_taken_by_their_corners() -> None:
     points = np.concatenate([CUBE, middles])
     found = solid(Content(np.arange(20), points, [cells(HEX20, np.array([1]), np.arange(20))]))
     assert found.mesh.volumes().sum() == pytest.approx(1.0)
-    assert found.notes[0] == "1 hexahedra of 20 nodes are taken by their corners, with 4 % less volume"
+    assert found.notes[0] == "1 hexahedra of 20 nodes are read with their corners only, with 4 % less volume"

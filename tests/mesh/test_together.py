@@ -74,7 +74,7 @@ def test_grids_that_match_are_joined_and_others_are_refused() -> None:
     assert interface(whole) == pytest.approx(4e-4)
     assert len(whole.points) == 9 * 9 * 5
     with pytest.raises(
-        InputError, match=r"^bond\[0\].parts = 'one, other': the meshes of the two have no face in common"
+        InputError, match=r"^bond\[0\].parts = 'one, other': the meshes of the two parts have no face in common"
     ):
         joined({**grid, "base": [0, 0, "5 mm"]}, {**grid, "element_size": "5 mm"})
 

@@ -216,7 +216,7 @@ def test_a_case_that_is_not_there(tmp_path: Path) -> None:
     ("case", "keys", "words"),
     [
         ("free_spin", [*LONG, "--set", "run.residual_limit=1e-14"], "energy residual"),
-        (str(BREAKING), ["--set", "run.made_limit=2e-5"], "the line stepping of the energy"),
+        (str(BREAKING), ["--set", "run.made_limit=2e-5"], "the term stepping of the energy ledger"),
     ],
 )
 def test_a_ledger_that_does_not_close_fails_the_run(case: str, keys: list[str], words: str, tmp_path: Path) -> None:

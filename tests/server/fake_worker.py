@@ -62,7 +62,7 @@ def run(options: argparse.Namespace) -> int:
 
     name = options.run
     if plan.get("end") == "refuse":
-        print("parts[0].mesh: nothing is left of it", file=sys.stderr)
+        print("parts[0].mesh: the body is empty", file=sys.stderr)
         return ExitCode.BAD_INPUT
     say(messages.Status(run=name, wall=time.time(), state="running"))
     size: dict[str, int] = {"ranks": 1, "threads": int(options.threads), "elements": 5, "nodes": 8}

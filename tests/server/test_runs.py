@@ -128,7 +128,7 @@ def test_first_come_first_served_within_the_slots(server: Running, tmp_path: Pat
         ("vanish", "failed", "service", "ended with code 0 and left no readable outcome"),
         ("garbled", "failed", "service", "outcome.json: Input data was truncated"),
         ("killed", "lost", "node", "killed from outside"),
-        ("refuse", "failed", "input", "nothing is left of it"),
+        ("refuse", "failed", "input", "the body is empty"),
         ("torn", "failed", "service", "ended with code 1"),
     ],
 )

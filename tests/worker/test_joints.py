@@ -159,7 +159,9 @@ def test_what_cannot_be_joined_is_refused_in_one_line() -> None:
     case = joint(("steel", "steel"))
     alone = [PARTS[0], TetMesh(PARTS[1].points, PARTS[1].tets, PARTS[1].origin and type(PARTS[1].origin)(
         "other", PARTS[1].origin.nodes))]  # fmt: skip
-    assert refusal(case, alone).startswith("bond[0].parts = 'lower, upper': the meshes of the two have no face in comm")
+    assert refusal(case, alone).startswith(
+        "bond[0].parts = 'lower, upper': the meshes of the two parts have no face in comm"
+    )
     mesh = block((2, 2, 2), 1e-3, 0.0)
     corner = (mesh.points[mesh.tets].mean(axis=1) > 1e-3).all(axis=1)
     other = (mesh.points[mesh.tets].mean(axis=1) < 1e-3).all(axis=1)

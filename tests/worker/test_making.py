@@ -38,7 +38,9 @@ def test_a_ledger_line_returns_no_more_than_it_has(name: str) -> None:
     making.look(lines(**{name: 0.0}), 1.0, 2e-6)
     assert making.worst == {}
     making.look(lines(**{name: -0.03}), 1.0, 3e-6)
-    with pytest.raises(EnergyError, match=re.escape(f"the line {name} of the energy has made 0.03 of the largest")):
+    with pytest.raises(
+        EnergyError, match=re.escape(f"the term {name} of the energy ledger has created 0.03 of the largest")
+    ):
         making.require(0.02, 0.9, "at step 3")
     making.require(0.04, 0.9, "at step 3")
 

@@ -104,7 +104,7 @@ def test_a_set_off_its_plane_of_symmetry_is_refused(tmp_path: Path) -> None:
 
 def test_faces_amid_a_body_bear_nothing(tmp_path: Path) -> None:
     found = survey(tmp_path, {**PULL, "on": "INNER", "parts": ["bar"]})
-    assert found.refused == ["boundaries[0]: no face of the meshes that it is for lies in its region"]
+    assert found.refused == ["boundaries[0]: no face of its meshes lies in its region"]
 
 
 def test_generated_parts_have_no_sets(tmp_path: Path) -> None:

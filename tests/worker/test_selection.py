@@ -292,7 +292,7 @@ def test_a_selection_without_nodes_is_reported() -> None:
     meshes = iter([structured(part.mesh) for part in case.parts])  # type: ignore[arg-type]
     with patch.object(assembly, "build_mesh", lambda *_, **__: next(meshes)):
         (warning,) = assembly.assemble(case, Path()).warnings
-    assert warning == "boundaries[0]: acts on nothing of part 'other', which it names"
+    assert warning == "boundaries[0]: acts on nothing of part 'other', although it names this part"
 
 
 BAR = {"shape": "box", "low": [0, 0, 0], "high": [2e-3, 2e-3, 2e-3], "element_size": 5e-4, "generator": "structured"}

@@ -152,8 +152,8 @@ def test_a_box_in_which_a_file_has_nothing_is_refused(folder: Path) -> None:
     off = {"low": [0, 0, "1 mm"], "high": ["6 mm", "6 mm", "2 mm"]}
     found = loaded(folder, {"kind": "traction", "pressure": "1 MPa", **off}, {"kind": "velocity", "x": 0, **off})
     assert found.refused == [
-        "boundaries[0]: no face of the meshes that it is for lies in its region",
-        "boundaries[1]: no node of the meshes that it is for lies in its region",
+        "boundaries[0]: no face of its meshes lies in its region",
+        "boundaries[1]: no node of its meshes lies in its region",
     ]
 
 

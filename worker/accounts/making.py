@@ -96,13 +96,13 @@ class Making:
         """
         for name, made in self.ranked()[:1]:
             if made.share > limit:
-                text = f"the line {name} of the energy has made {made.share:.3g} of the largest energy"
+                text = f"the term {name} of the energy ledger has created {made.share:.3g} of the largest energy"
                 raise EnergyError(f"{text}, above run.made_limit {limit:g}, {when}{_cure(name, made.share, safety)}")
 
     def warnings(self, safety: float) -> list[str]:
         """Return a warning for each term that has created more than WARNED."""
         return [
-            f"the line {name} of the energy has made {made.share:.2g} of the largest energy by {made.t:.3g} s"
+            f"the term {name} of the energy ledger has created {made.share:.2g} of the largest energy by {made.t:.3g} s"
             f"{_cure(name, made.share, safety)}"
             for name, made in self.ranked()
             if made.share > WARNED
@@ -117,7 +117,7 @@ def _cure(name: str, share: float, safety: float) -> str:
         left = 0.5 * min(WARNED, share)
         wanted = safety * math.sqrt(left / share)
         rest = f"numerics.dt_safety = {wanted:.2g} would leave {100.0 * left:.2g} %"
-        return f"; it falls with the square of the step: {rest}"
+        return f"; this energy decreases with the square of the step: {rest}"
     if name == "averaging":
-        return "; with numerics.pressure = 'standard' there is none, but tets lock where they flow"
+        return "; with numerics.pressure = 'standard' this energy is zero, but tets lock in plastic flow"
     return ""

@@ -78,7 +78,7 @@ def _what(nodes: Ids, points: Floats, diagonals: int) -> str:
     size = float(np.ptp(at, axis=0).max()) ** 3
     if abs(volume) <= _SEEN * size:
         return "is flat"
-    return "is inverted" if volume < 0 else "is so distorted that tets between its faces turn over"
+    return "is inverted" if volume < 0 else "is so distorted that tets between its faces would be inverted"
 
 
 def _fitting(nodes: Ids, triangles: Ids) -> Ids:
@@ -131,12 +131,12 @@ def notes_of_cut(some: Bricks, made: Cut, points: Floats, volume: float) -> Iter
     for form, many in zip(some.forms, some.counts, strict=True):
         counts[form] += many
     listed = " and ".join(f"{many:,} {form.several}" for form, many in counts.items() if many)
-    middle = f", {len(made.of):,} of them round a node in the middle" if len(made.of) else ""
-    yield f"{listed} are cut into {len(made.tets):,} tets of 4 nodes that meet face to face{middle}"
+    middle = f", {len(made.of):,} of them around an added node in the middle of an element" if len(made.of) else ""
+    yield f"{listed} are cut into {len(made.tets):,} tets of 4 nodes with matching faces{middle}"
     share = _warped(some.nodes, points) / volume if volume else 0.0
     if abs(share) > _SEEN:
         how = "less" if share > 0 else "more"
-        yield f"faces that are not flat are two triangles each: {100 * abs(share):.2g} % {how} volume than between them"
+        yield f"each face that is not flat becomes two triangles, with {100 * abs(share):.2g} % {how} volume"
 
 
 def _warped(nodes: Ids, points: Floats) -> float:
@@ -170,7 +170,7 @@ def notes_of_middles(cells: list[Cells], points: Floats, tags: Ids) -> Iterator[
             else "the same volume"
         )
         many = f"{len(each.numbers):,} {each.kind.form.several} of {each.kind.nodes} nodes"
-        yield f"{many} are taken by their corners, with {loss}"
+        yield f"{many} are read with their corners only, with {loss}"
 
 
 def _volume(cells: Cells, points: Floats) -> float:

@@ -129,7 +129,7 @@ def _address_space(process: int) -> int:
 
 
 def _too_much_memory(key: str, limits: Limits) -> str:
-    return f"{key}: needs more than the {limits.memory / 2**30:.3g} GiB of memory that it may have"
+    return f"{key}: needs more memory than its limit of {limits.memory / 2**30:.3g} GiB"
 
 
 def _reason(key: str, code: int, errors: str, limits: Limits) -> str:
@@ -140,7 +140,7 @@ def _reason(key: str, code: int, errors: str, limits: Limits) -> str:
         return f"{key}: took more than {limits.cpu} s of CPU time, or was killed; is the mesh too fine?"
     how = f"was ended by {signal.Signals(-code).name}" if code < 0 else f"ended with code {code}"
     if -code == signal.SIGALRM:
-        return f"{key}: its file keeps OpenCASCADE for more than two minutes; is it damaged?"
+        return f"{key}: OpenCASCADE has not read the file after two minutes; is the file damaged?"
     memory = limits.memory / 2**30
     return f"{key}: the mesh process {how} (memory limit {memory:.3g} GiB): {lines[-1] if lines else 'no message'}"
 

@@ -123,6 +123,6 @@ def _unbonded(case: Case, i: int, j: int) -> str:
 def _apart(case: Case, k: int) -> str:
     one, other = case.bond[k].parts
     return (
-        f"bond[{k}].parts = '{one}, {other}': the meshes of the two have no face in common; let them touch, take both "
-        "from one file in which they share nodes, or set kind = 'tied'"
+        f"bond[{k}].parts = '{one}, {other}': the meshes of the two parts have no face in common; let them touch, take "
+        "both from one file in which they share nodes, or set kind = 'tied'"
     )

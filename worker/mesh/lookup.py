@@ -26,7 +26,11 @@ def meant(sets: Sequence[NodeSet], name: str) -> NodeSet | None:
     for other in here[1:]:
         if not _same(here[0], other):
             kinds = {each.faces is None for each in here}
-            way = f"write 'nodes:{name}' or 'surface:{name}'" if len(kinds) == 2 else "write its owner, a dot and it"
+            way = (
+                f"write 'nodes:{name}' or 'surface:{name}'"
+                if len(kinds) == 2
+                else "write OWNER.NAME, where OWNER is its part or instance"
+            )
             raise MeshError(f"means {len(here)} sets that differ; {way}")
     return next(iter(here or found), None)
 

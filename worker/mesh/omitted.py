@@ -31,7 +31,7 @@ def by_corners(chosen: Iterable[Cells]) -> Iterator[str]:
     """Return notes about the chosen hexahedra of second order. Only the corners of these hexahedra are used."""
     for each in chosen:
         if each.kind.nodes > 10 and len(each.numbers):
-            yield f"{len(each.numbers):,} hexahedra of {each.kind.nodes} nodes are taken by their corners"
+            yield f"{len(each.numbers):,} hexahedra of {each.kind.nodes} nodes are read with their corners only"
 
 
 def undefined(lost: Mapping[str, Ids]) -> Iterator[str]:
@@ -40,4 +40,4 @@ def undefined(lost: Mapping[str, Ids]) -> Iterator[str]:
     if some:
         words = [f"{name} ({len(numbers)}, such as {numbers[0]})" for name, numbers in list(some.items())[:_SHOWN]]
         more = ["..."] if len(some) > _SHOWN else []
-        yield f"sets have members that the file does not define, and are smaller: {', '.join([*words, *more])}"
+        yield f"sets have undefined members; these members are left out: {', '.join([*words, *more])}"

@@ -42,7 +42,7 @@ def read(file: MeshFile, path: Path, key: str = "mesh") -> TetMesh:
     try:
         content = readers[path.suffix.lower()](path, file.group, key)
         if file.group is not None and not any(len(each.numbers) for each in content.cells):
-            raise MeshError(f"{key}.group = {file.group!r}: no element with a volume is in it")
+            raise MeshError(f"{key}.group = {file.group!r}: the group has no element with a volume")
         _refuse_unit(file, content.length, key)
         found = solid(content, None if file.second_order == "auto" else file.second_order)
         digests = [_digest(each) for each in (path, *content.included)]

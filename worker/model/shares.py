@@ -28,12 +28,11 @@ class Shares:
     part: Indices = field(default_factory=lambda: np.zeros(0, np.int32))
     """(k,) index of the part."""
     mass: Floats = field(default_factory=lambda: np.zeros(0))
+    """(k,) mass that the node has from the tets of the part, kg."""
+    rank: Ints = field(default_factory=lambda: np.zeros(0, np.int64))
     """(parts,) precedence of the parts as numbers, the smallest first; (0,) if no bond makes nodes of several parts.
     Contact and other stages count a node for one part only, its representative part, which is the part of the node with
     the smallest number."""
-    rank: Ints = field(default_factory=lambda: np.zeros(0, np.int64))
-    """(parts,) rank of each part; (0,) if no bond makes nodes of several parts. Contact and other stages count a node
-    for one part only, its representative part, which is the part of the node with the lowest rank."""
 
     @property
     def fraction(self) -> Floats:

@@ -71,7 +71,7 @@ class Choice:
         task = made.spans[0] / made.tasks
         return (
             f"the scene is too small for {self._team.threads} threads and uses {best}. A colour has "
-            f"{fixed(made.tasks / made.colours, 1)} tasks of {si(task, 's')}, and to share one costs "
+            f"{fixed(made.tasks / made.colours, 1)} tasks of {si(task, 's')}; to share a colour costs "
             f"{si(1e-9 * made.costs.turn, 's')}, to wake a thread {si(1e-9 * made.costs.wake, 's')}"
         )
 

@@ -64,4 +64,4 @@ def empty(case: Case, found: list[Load]) -> Iterator[str]:
         if not (load.faces or load.nodes):
             what = "face" if isinstance(case.boundaries[load.boundary], Traction) else "node"
             cut = "; faces on a plane of symmetry carry no load" if what == "face" and planes else ""
-            yield f"boundaries[{load.boundary}]: no {what} of the meshes that it is for lies in its region{cut}"
+            yield f"boundaries[{load.boundary}]: no {what} of its meshes lies in its region{cut}"

@@ -148,7 +148,7 @@ def missed(
     assert isinstance(spec, schema.Prescribed | schema.Traction)
     for name, some in zip([each.name for each in case.parts], took, strict=True):
         if name in spec.parts and not some:
-            yield f"boundaries[{number}]: acts on nothing of part {name!r}, which it names"
+            yield f"boundaries[{number}]: acts on nothing of part {name!r}, although it names this part"
     if spec.on is not None:
         return
     nodes, part = members

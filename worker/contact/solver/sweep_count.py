@@ -48,7 +48,7 @@ class SweepCount:
         advice = "leave contact.sweeps out, or raise it" if self._given else "compare with contact.sweeps = 100"
         return [
             f"the last sweep of contact in a step has still changed its impulses by {left:.2g} % in the mean, above "
-            f"{limit:.2g} %: what presses on each other may be too soft; {advice}"
+            f"{limit:.2g} %: bodies that press on each other may be too soft; {advice}"
         ]
 
     @property

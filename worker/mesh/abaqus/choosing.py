@@ -34,8 +34,8 @@ def grouped(deck: Deck, pieces: list[Piece], group: str, key: str) -> Chosen:
     for other, again in meant[1:]:
         if not _same(chosen, again):
             raise MeshError(
-                f"{key}.group = {group!r}: may be {what} or {other}, which differ; a set of a part or of an instance "
-                "is written as its name, a dot and the set"
+                f"{key}.group = {group!r}: may be {what} or {other}, which differ; write OWNER.SET, where OWNER "
+                "is the part or instance of the set"
             )
     return chosen
 

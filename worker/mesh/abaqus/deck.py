@@ -115,7 +115,7 @@ class Deck:
         if not isinstance(here, Instance):
             raise MeshError(f"line {block.line}: *END INSTANCE without *INSTANCE")
         if not here.empty and not here.part.empty:
-            raise MeshError(f"line {block.line}: {_named(here)} has a mesh of its own, and its part has one, too")
+            raise MeshError(f"line {block.line}: {_named(here)} has a mesh of its own, and its part also has a mesh")
         self._here = self.root
 
     # Mesh -------------------------------------------------------------------------------------------------------------

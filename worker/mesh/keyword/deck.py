@@ -95,7 +95,7 @@ class Deck:
             if not any(nodes):
                 nodes = [each for _ in range(-(-SOLIDS[option] // 10)) for each in self._row(block, card, rest)]
             elif option in ("H20", "H27"):
-                raise block.error(card, f"the nodes of *{block.name} stand in cards behind that of the number")
+                raise block.error(card, f"the nodes of *{block.name} are in the cards after the card with the number")
             for _ in range(FURTHER.get(option, 0)):
                 if next(rest, None) is None:
                     raise block.error(card, "the cards of this element are cut off")
@@ -137,5 +137,5 @@ class Deck:
 def _number(block: Block, card: Card, text: str, what: str) -> int:
     found = block.whole(card, text, what)
     if not 0 < found < _MOST:
-        raise block.error(card, f"{what} = {text!r} is no number of a node, an element or a part; the first one is 1")
+        raise block.error(card, f"{what} = {text!r} is no number of a node, an element or a part; the smallest is 1")
     return found

@@ -44,7 +44,7 @@ def read_keyword(path: Path, group: str | None, key: str) -> solid.Content:
     chosen = [each.of(some) for each, some in zip(every, np.split(wanted, ends)[:-1], strict=True)]
     if group is None and deck.volumes:
         name, many = deck.volumes.most_common(1)[0]
-        raise MeshError(f"{many} cards of *{name}, whose elements are not read; choose a part without them by group")
+        raise MeshError(f"{many} cards of *{name}, whose elements are not read; select another part by group")
     named, remarks = _named(content)
     notes = (*_notes(deck, chosen), *remarks, *omitted.undefined(content.undefined()))
     return solid.Content(tags, points, chosen, named, notes, tuple(deck.files[1:]), deck.length)

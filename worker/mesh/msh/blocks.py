@@ -77,4 +77,4 @@ def shape_of(kind: int) -> tuple[int, int]:
     for dimension, types in _TYPES.items():
         if kind in types:
             return dimension, types[kind]
-    raise MeshError(f"it has elements of the type {kind} of gmsh, which is not read")
+    raise MeshError(f"the file has elements of the type {kind} of gmsh, which is not supported")

@@ -72,7 +72,7 @@ def _wanted(names: dict[tuple[int, int], str], volumes: list[Block], group: str,
     by_name = frozenset(tag for tag, name in here.items() if name == group)
     by_number = frozenset(tag for tag in used | here.keys() if str(tag) == group)
     if by_name and by_number - by_name:
-        raise MeshError(f"{key}.group = {group!r}: the name of one group and the number of another one; rename it")
+        raise MeshError(f"{key}.group = {group!r}: the name of one group and the number of another group; rename it")
     if found := by_name or by_number:
         return found
     known = [here.get(tag) or str(tag) for tag in sorted(used | here.keys())]
@@ -110,7 +110,7 @@ def _notes(file: Sections, content: Read, wanted: frozenset[int] | None, group: 
     """Return remarks for the user: contents of the file that are not in the mesh, and groups that are united."""
     yield from content.notes
     if wanted is not None and len(wanted) > 1:
-        yield f"the name {group!r} is that of the groups {', '.join(map(str, sorted(wanted)))}; they are taken together"
+        yield f"several groups have the name {group!r} and are united: {', '.join(map(str, sorted(wanted)))}"
     left = {
         block.name: sum(len(b.numbers) for b in content.blocks if b.kind == block.kind)
         for block in content.blocks

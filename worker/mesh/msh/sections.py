@@ -94,7 +94,7 @@ def _formatted(parts: dict[str, bytes]) -> Sections:
     if kind == "1":
         order = next((sign for sign in "<>" if rest[:4] == np.array(1, f"{sign}i4").tobytes()), "")
         if not order:
-            raise MeshError("the file is damaged: the order of its bytes is not that of any machine")
+            raise MeshError("the file is damaged: its mark of the byte order has a wrong value")
     return Sections(version, parts, order)
 
 

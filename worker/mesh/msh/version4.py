@@ -121,4 +121,4 @@ def _lacking(partitions: dict[int, frozenset[int]], filled: set[int]) -> list[st
     if not lacking:
         return []
     listed = ", ".join(map(str, lacking))
-    return [f"the file is a part of a mesh: of its {len(volumes)} partitions it lacks {listed}"]
+    return [f"the file is a part of a mesh: of {len(volumes)} partitions, these are missing: {listed}"]

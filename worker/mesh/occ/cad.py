@@ -153,7 +153,7 @@ def _read(gmsh: Any, form: CadForm, path: Path, head: str) -> tuple[Solids, Frac
     if kind == "step" and 0 < len(solids) < (said_to_be := solids_in(data)):
         raise MeshError(f"{head}: {said_to_be - len(solids)} of {said_to_be} solids of the STEP file are not closed")
     if not solids:
-        raise MeshError(f"{head}: there is no solid in the file; save a closed body, no surfaces")
+        raise MeshError(f"{head}: the file has no solid; save a closed body instead of surfaces")
     return solids, unit
 
 
@@ -183,7 +183,7 @@ def _brep_unit(form: CadForm, data: bytes, head: str) -> Fraction:
     if not _BREP_END.search(data[-200:]):
         raise MeshError(f"{head}: the BREP file is cut off, or binary: it does not end as a text does")
     if form.unit is None:
-        raise MeshError(f"{head}: a BREP file does not say in which unit it is; give the key unit, as '1 mm'")
+        raise MeshError(f"{head}: a BREP file does not contain its unit; give the key unit, as '1 mm'")
     return Fraction(repr(form.unit))
 
 

@@ -90,5 +90,5 @@ def extent(gmsh: Any, form: AnyForm, sources: Sources, key: str) -> float:
         return max(found) if isinstance(form, UnionForm) else min(found)
     box = box_of(form)
     if box is None:
-        raise MeshError(f"{key}: this shape has no box")
+        raise MeshError(f"{key}: a shape of this kind has no bounding box")
     return max(b - a for a, b in zip(*box, strict=True))

@@ -28,14 +28,14 @@ def small_features(gmsh: Any, element_size: float, frame: Frame, solids: Solids)
     if short:
         yield (
             f"{len(short)} of {len(lengths)} edges are shorter than half of element_size, the shortest "
-            f"{si(min(short) * frame.scale, 'm')}: tets there are as small and hold the time step down"
+            f"{si(min(short) * frame.scale, 'm')}: tets at these edges have the same size and reduce the time step"
         )
     every = [_radius(gmsh, number) for _, number in faces]
     radii = [radius for radius in every if radius < frame.length(element_size)]
     if radii:
         yield (
             f"{len(radii)} of {len(every)} faces are round with a radius below element_size, the smallest "
-            f"{si(min(radii) * frame.scale, 'm')}: they become flat or angular"
+            f"{si(min(radii) * frame.scale, 'm')}: the mesh of these faces is flat or angular"
         )
 
 

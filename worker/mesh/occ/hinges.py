@@ -22,8 +22,8 @@ def hinges(gmsh: Any, solids: Solids) -> Iterator[str]:
     if pairs:
         where = "edges" if any(lines[i] & lines[j] for i, j in pairs) else "points"
         yield (
-            f"solids of it touch each other in {where} alone and are hinged there; let them overlap or touch with "
-            "faces, or make a part of each"
+            f"some of its solids touch each other only in {where}, which act as hinges; let these solids overlap or "
+            "touch with faces, or make each of them a part"
         )
 
 

@@ -46,7 +46,7 @@ def measured(mesh: Measured, sources: Sources, key: str) -> TetMesh:
     elif isinstance(mesh, Cad | Combination):
         made = with_surfaces(lambda exact: _meshed(mesh, sources, key, exact=exact), [mesh])
     else:
-        raise MeshError(f"{key}: gmsh does not draw this")
+        raise MeshError(f"{key}: gmsh cannot draw a body of this kind")
     points = made.mesh.points
     name = hashlib.sha256(points.tobytes() + made.mesh.tets.tobytes()).hexdigest()
     return replace(made.mesh, origin=Origin(name, np.arange(len(points), dtype=np.int64), tuple(made.notes)))
@@ -91,7 +91,7 @@ def draw_solid(
     occ = gmsh.model.occ
     solids = joined(occ, sector(occ, Drawing(gmsh, frame, sources, exact).solids(mesh, key), mesh), key)
     if not solids:
-        raise MeshError(f"{key}: nothing is left of it; check sizes and places of its shapes")
+        raise MeshError(f"{key}: the body is empty; check sizes and places of its shapes")
     occ.synchronize()
     _refuse_too_many(gmsh, solids, mesh, frame, key)
     return solids

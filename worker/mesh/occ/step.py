@@ -34,13 +34,15 @@ def length_units(data: bytes, head: str) -> set[Fraction]:
     text = _TEXT.sub(b"''", data)
     if found := _ELSEWHERE.search(text):
         what = (found[1] or found[2]).decode()
-        raise MeshError(f"{head}: the STEP file refers to other files ({what}), which are not read; save all in one")
+        raise MeshError(
+            f"{head}: the STEP file refers to other files ({what}), which are not read; save all geometry in one file"
+        )
     if lost := set(_NAME.findall(text)) - set(_DEFINED.findall(text)):
         raise MeshError(f"{head}: the STEP file is damaged: #{min(map(int, lost))} is used and not defined")
     names = {name for found in _UNITS.finditer(text) for name in _NAME.findall(found[1])}
     units = {unit for name in names if (unit := _length(text, name, 0)) is not None}
     if not units:
-        raise MeshError(f"{head}: the STEP file does not say in which unit of length it is")
+        raise MeshError(f"{head}: the STEP file does not give its unit of length")
     return units
 
 

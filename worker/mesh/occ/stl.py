@@ -38,12 +38,14 @@ def read_stl(path: Path, head: str) -> Surface:
     _refuse_open(points, faces, head)
     made = Surface(points, faces, shells(len(points), faces))
     if not made.volume() > 0.0:
-        raise MeshError(f"{head}: the facets of the STL file face inwards; turn them all round")
+        raise MeshError(
+            f"{head}: the facets of the STL file face inwards; reverse the order of the corners of all facets"
+        )
     if len(pairs := crossing(points, faces)):
         at = _place(points[faces[pairs[0, 0]]].mean(axis=0))
         raise MeshError(f"{head}: the surface crosses or touches itself: {len(pairs):,} pairs of facets, one at ({at})")
     if (place := astray(made)) is not None:
-        raise MeshError(f"{head}: its closed surfaces overlap each other, at ({_place(place)}) for one")
+        raise MeshError(f"{head}: its closed surfaces overlap each other, for example at ({_place(place)})")
     return made
 
 
@@ -62,8 +64,8 @@ def _is_binary(data: bytes) -> bool:
 def _binary(data: bytes, head: str) -> Floats:
     count = struct.unpack_from("<I", data, 80)[0]
     if len(data) != _HEAD + _FACET * count:
-        should = f"{count:,} facets take {_HEAD + _FACET * count:,} bytes, and it has {len(data):,}"
-        raise MeshError(f"{head}: the binary STL file is cut off, or is none: {should}")
+        should = f"{count:,} facets take {_HEAD + _FACET * count:,} bytes, and the file has {len(data):,}"
+        raise MeshError(f"{head}: the binary STL file is cut off, or is no STL file: {should}")
     layout = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("more", "<u2")])
     return np.frombuffer(data, layout, offset=_HEAD)["corners"].astype(np.float64)
 
@@ -78,7 +80,7 @@ def _text(data: bytes, head: str) -> Floats:
     try:
         numbers = np.array([[float(words[n + k]) for k in (1, 2, 3)] for n in at], np.float64)
     except (ValueError, IndexError) as error:
-        raise MeshError(f"{head}: a corner of the STL file is no three numbers ({error})") from error
+        raise MeshError(f"{head}: a corner in the STL file does not have three numbers ({error})") from error
     if len(numbers) % 3 or not len(numbers):
         raise MeshError(f"{head}: {len(numbers)} corners in the STL file do not make triangles")
     return numbers.reshape(-1, 3, 3)
@@ -92,7 +94,7 @@ def _refuse_open(points: Floats, faces: Triangles, head: str) -> None:
         raise MeshError(f"{head}: the STL file has no facet")
     same = np.unique(np.sort(faces, axis=1), axis=0, return_counts=True)[1]
     if (same > 1).any():
-        raise MeshError(f"{head}: {int((same > 1).sum()):,} facets of the STL file are there more than once")
+        raise MeshError(f"{head}: {int((same > 1).sum()):,} facets of the STL file occur more than once")
     edges = faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2)
     pairs, group, many = np.unique(np.sort(edges, axis=1), axis=0, return_inverse=True, return_counts=True)
     along = np.bincount(group.reshape(-1), np.where(edges[:, 0] < edges[:, 1], 1.0, -1.0))

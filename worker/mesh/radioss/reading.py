@@ -38,7 +38,7 @@ def read_radioss(path: Path, group: str | None, key: str) -> Content:
     chosen = [each.of(np.isin(of, wanted)) if wanted is not None else each for each, of in reader.both()]
     if group is None and deck.volumes:
         word, many = deck.volumes.most_common(1)[0]
-        raise MeshError(f"{many} lines of /{word}, whose elements are not read; choose a part without them by group")
+        raise MeshError(f"{many} lines of /{word}, whose elements are not read; select another part by group")
     named, remarks = reader.named()
     points = np.array(deck.points).reshape(-1, 3)[order]
     notes = (*_notes(deck, chosen), *remarks, *omitted.undefined(reader.lost))
@@ -82,7 +82,7 @@ class _Reader:
             raise MeshError(f"{key}.group = {group!r}: no such part or subset; known: {', '.join(known) or 'none'}")
         if any(set(each) != set(found[0]) for each in found[1:]):
             way = f"write 'part:{name}' or 'subset:{name}', or its number"
-            raise MeshError(f"{key}.group = {group!r}: the title of several parts or subsets, which differ; {way}")
+            raise MeshError(f"{key}.group = {group!r}: several different parts or subsets have this title; {way}")
         return np.array(sorted(found[0]), np.int64)
 
     def _called(self, kind: str, name: str) -> list[set[int]]:
@@ -95,7 +95,7 @@ class _Reader:
     def within(self, subset: int, depth: int = 0) -> set[int]:
         """Return the parts of a subset and of all subsets inside of it. Raises MeshError."""
         if subset not in self.deck.subsets or depth > _DEEPEST:
-            raise MeshError(f"the subset {subset} {'is not defined' if depth <= _DEEPEST else 'is within itself'}")
+            raise MeshError(f"the subset {subset} {'is not defined' if depth <= _DEEPEST else 'contains itself'}")
         own = {part for part, of in self.deck.subset_of.items() if of == subset}
         return own.union(*(self.within(each, depth + 1) for each in self.deck.subsets[subset][1]))
 
@@ -116,7 +116,7 @@ class _Reader:
     def _group(self, word: str, number: int, depth: int) -> Group:
         group = self.deck.groups.get((word, number))
         if group is None or depth > _DEEPEST:
-            raise MeshError(f"/{word} {number} {'is not defined' if group is None else 'is within itself'}")
+            raise MeshError(f"/{word} {number} {'is not defined' if group is None else 'contains itself'}")
         if group.kind not in KNOWN:
             raise MeshError(f"/{group.kind}/{number} is a kind that is not supported")
         return group
@@ -159,7 +159,7 @@ class _Reader:
             return [placed(self.tags, corners, lambda k: f"line {rows[k][0]}: a segment")]
         for each in (each for _, row in group.rows for each in row if each):
             if each < 0:
-                raise MeshError(f"/{group.kind}/{number} takes a part away, which is not supported")
+                raise MeshError(f"/{group.kind}/{number} removes a part, which is not supported")
             if group.kind == "SURF/SURF":
                 found += self._faces(each, depth + 1)
                 continue

@@ -45,11 +45,13 @@ class Grid:
         self._head = {"UInt32": "u4", "UInt64": "u8"}.get(root.get("header_type", "UInt32"))
         compressor = root.get("compressor")
         if self._order is None or self._head is None or compressor not in (None, "", _ZLIB):
-            raise MeshError(f"the compressor {compressor!r}, or the layout of numbers, is not read; {_ZLIB} is")
+            raise MeshError(
+                f"the compressor {compressor!r}, or the layout of numbers, is not supported; supported is {_ZLIB}"
+            )
         self._compressed = compressor == _ZLIB
         pieces = root.findall("UnstructuredGrid/Piece")
         if len(pieces) != 1:
-            raise MeshError(f"the file has {len(pieces)} pieces; write it as one, whose nodes are there once")
+            raise MeshError(f"the file has {len(pieces)} pieces; write one piece in which each node occurs once")
         self._piece = pieces[0]
         self.points_count, self.cells_count = (self._count(f"NumberOf{what}") for what in ("Points", "Cells"))
 
