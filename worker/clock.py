@@ -8,7 +8,7 @@ T, LOST, DT, LAST_DT, MEAN_DT, SHORTER, STABLE = range(7)
 """Indices of the clock's numbers in a program of steps (stretch.py). The order is that of ``Clock.numbers``."""
 
 COLLAPSE = 1e-6
-"""Ratio of the stable step to the first stable step. Below this ratio a tet counts as crushed and the run ends with an
+"""Ratio of the stable step to the first stable step; below this ratio a tet counts as crushed and the run ends with an
 error. Chosen value: a run with a million times as many steps would never end."""
 
 STARVED = 1e-3
@@ -17,7 +17,7 @@ run would take a thousand times as many steps. Chosen value: dust and penetratio
 which needs no warning."""
 
 SLOWED = 0.1
-"""Ratio of the stable step to the first stable step. Below this ratio the stable step is named as the reason why a run
+"""Ratio of the stable step to the first stable step; below this ratio the stable step is named as the reason why a run
 has reached its limit of time or of steps. Chosen value: plastic flow and dust reduce the stable step to a third in any
 run."""
 
@@ -137,8 +137,8 @@ class Clock:
         return self._growth * self.dt
 
     def choose_again(self, limit: float) -> float:
-        """Chooses the time step again, for another ``limit``. Must be called before the time step is used; see
-        ``choose``.
+        """Chooses the time step again, for another ``limit``. This function must be called before the time step is
+        used; see ``choose``.
         """
         self.dt = self.last_dt
         return self.choose(limit)

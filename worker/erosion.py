@@ -1,7 +1,7 @@
 """Erosion: removes the tets that meet an erosion criterion, makes the free faces of their neighbours surface, and sums
 the removed energy and momentum.
 
-A tet is marked in the pass over the elements (elements/wear.py). At this time its force of n+1 is already in the nodal
+A tet is marked in the pass over the elements (elements/wear.py); at this time its force of n+1 is already in the nodal
 sums. The tet is removed before the contact of the next step, so that this contact includes the exposed faces of its
 neighbours. The last force of a removed tet acts in one more velocity update. Therefore the second half of the work of
 this force is added one step later, as for a boundary. Tets that exceed only a strain or damage limit are collected for
@@ -98,8 +98,9 @@ class Erosion:
         self._release()
 
     def strikes(self) -> int:
-        """Marks nodes without tets that contact pushed in this step, in parts with ``erosion.nodes = "strike"``. Must
-        be called after contact. Returns TIRED (elements/wear.py) if nodes of this rank must be removed, else SOUND.
+        """Marks nodes without tets that contact pushed in this step, in parts with ``erosion.nodes = "strike"``. This
+        function must be called after contact. Returns TIRED (elements/wear.py) if nodes of this rank must be removed,
+        else SOUND.
         """
         if self._contact is not None:
             flying = np.flatnonzero(self._strikes & self._loose)
@@ -143,7 +144,7 @@ class Erosion:
         return not (self.due or self.account.outstanding or (self._tets_at == 0).any())
 
     def note(self, state: Nodes) -> None:
-        """Adds the second half of the work of the last removal. Must be called before the kick."""
+        """Adds the second half of the work of the last removal. This function must be called before the kick."""
         self.account.note(state)
 
     def remove(self, state: Nodes) -> None:
@@ -155,7 +156,7 @@ class Erosion:
 
     def stop_removed(self, state: Nodes) -> None:
         """Adds the nodes that are removed in this step to the account, and sets the velocities of all removed nodes to
-        zero. Must be called after the kick.
+        zero. This function must be called after the kick.
         """
         leaving, before = self._leaving
         if len(leaving):

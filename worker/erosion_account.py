@@ -51,7 +51,7 @@ class ErosionAccount:
         return bool(self._last or self._half.any())
 
     def note(self, state: Nodes) -> None:
-        """Adds the second half of the work of the last removal. Must be called before the kick."""
+        """Adds the second half of the work of the last removal. This function must be called before the kick."""
         for tets, forces in self._last:
             work = np.zeros(len(tets))
             for corner in range(4):

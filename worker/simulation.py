@@ -1,4 +1,4 @@
-"""The simulation of one rank: model, pressure form, boundaries, contact, fracture and accounts. It is built once and
+"""The simulation of one rank: model, pressure form, boundaries, contact, fracture and accounts; it is built once and
 used by the time step (step.py).
 """
 

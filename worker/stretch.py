@@ -10,7 +10,7 @@ next step, again and again, with the kernels that step.py uses:
                            |
                            +-> end of the program: step.complete executes the rows 14 and 15 of the present step
 
-``decide`` (stretch_numbers.py) is the reduction and the choice of the time step. It writes time, step and scale into
+``decide`` (stretch_numbers.py) is the reduction and the choice of the time step; it writes time, step and scale into
 the tables of the other stages. The threads stay awake between the stages, and a step costs no call from Python. The
 answer is the same to the bit. Runs with several ranks, rigid bodies, bonds or moving walls have no program.
 """
@@ -123,7 +123,7 @@ class Stretch:
         return steps
 
     def _is_quiet(self, until: Until) -> bool:
-        """Returns whether a program is useful. It is not useful if code outside of the program is needed at the end of
+        """Returns whether a program is useful; it is not useful if code outside of the program is needed at the end of
         the present step.
         """
         sim, clock = self._sim, self._sim.clock

@@ -2,7 +2,7 @@
 
 The sum of all terms can be correct although one term is wrong: if a term returns more energy than it has received, this
 energy moves the bodies or goes into another term. Therefore the energy that each term has created is checked
-separately. It is divided by the largest energy so far: the maximum of the energy received, the work of the stress, and
+separately; it is divided by the largest energy so far: the maximum of the energy received, the work of the stress, and
 the kinetic energy.
 
 ========  ==========================================  ===============================================

@@ -117,7 +117,7 @@ class Sums:
         )  # fmt: skip
 
     def _tables(self, before: Floats) -> dict[str, list[Columns]]:
-        """Return the columns to be summed, in the order of the sums. These are NODAL, WORKS, one column for each
+        """Return the columns to be summed, in the order of the sums; these are NODAL, WORKS, one column for each
         boundary with friction, one for bonds, and the columns of cohesive facets.
         """
         nodes, parts = self._model.nodes, len(self._model.parts)
@@ -188,7 +188,7 @@ class Sums:
         return float(exact_sums(self._comm, values[counted][:, None])[0])
 
     def _counted(self) -> Flags:
-        """Return (nodes,) whether this rank counts each node. It counts the nodes that it owns, except nodes of rigid
+        """Return (nodes,) whether this rank counts each node; it counts the nodes that it owns, except nodes of rigid
         parts.
         """
         nodes, rigid = self._model.nodes, self._undeformed[0]

@@ -49,7 +49,7 @@ class Spent:
     parallel: dict[str, float] = field(default_factory=_none)
     """Wall time in parallel regions, keyed by phase."""
     waiting: float = 0.0
-    """CPU time in calls that wait for other ranks. This time is also part of ``exchange`` of ``cpu``."""
+    """CPU time in calls that wait for other ranks; this time is also part of ``exchange`` of ``cpu``."""
     helped: float = 0.0
     """Time of the other threads of the rank in tasks, summed over these threads."""
     projected: dict[int, dict[str, float]] = field(default_factory=dict)
@@ -164,7 +164,7 @@ class Timers:
 
 
 class _Phase:
-    """Context of a phase. It is a class, because a step opens two dozen contexts, and a context made from a generator
+    """Context of a phase; it is a class, because a step opens two dozen contexts, and a context made from a generator
     takes longer.
     """
 

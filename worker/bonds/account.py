@@ -29,8 +29,8 @@ class BondAccount:
         """(h, 3) last impulses, quanta, and velocities v(n-1/2) of the nodes on which they act, m/s."""
 
     def note(self, v: Floats, local: Indices) -> None:
-        """Adds the second half of the work of the last impulses, and stores v(n-1/2) of the nodes ``local``. Must be
-        called before the kick.
+        """Adds the second half of the work of the last impulses, and stores v(n-1/2) of the nodes ``local``. This
+        function must be called before the kick.
         """
         self._before = v[self._local]
         self._book()

@@ -32,7 +32,7 @@ from .pieces import Pieces
 from .rows import assembled
 
 _NEAR = 10.0
-"""Factor of the largest bonded distance. Below this distance, nodes that are not tied are counted in a warning."""
+"""Factor of the largest bonded distance; below this distance, nodes that are not tied are counted in a warning."""
 _COVERED = 0.95
 """Smallest covered fraction of the area of a tied face at which the face counts as covered. Chosen value: between
 curved surfaces, whose faces are not parallel, gaps and overlaps of 1 or 2 % of the area occur."""

@@ -5,7 +5,7 @@
 Here T is the traction on the initial ellipse in the present direction. G is the fracture energy per area: 1 / G = (1 -
 B) / G_n + B / G_s, where B is the fraction of the work that is done in shear. The traction therefore decreases linearly
 with the opening delta, and opening in one direction dissipates the energy G. Below the strength the bond does not open.
-An open bond closes without resistance and transmits pressure when it is closed. It transmits tension again at its
+An open bond closes without resistance and transmits pressure when it is closed; it transmits tension again at its
 widest opening, so an open bond stores no energy. Sliding is permanent.
 """
 
@@ -31,7 +31,7 @@ from .records import (
 from .records import NODES as _NODES
 
 _FULL = 1.0 - 1e-6
-"""Ratio of a traction to the size of the ellipse. Above this ratio the traction opens the bond."""
+"""Ratio of a traction to the size of the ellipse; above this ratio the traction opens the bond."""
 _F, _I = types.float64, types.int64
 _VECTOR = types.UniTuple(_F, 3)  # type: ignore[no-untyped-call]
 

@@ -126,7 +126,7 @@ def _norms(
     bound of the l1 norm of each row of this rank, kg; the l1 norm is sum_k |w_k| S_k / m_k, where S_k is the sum of
     |w_k| over all rows.
 
-    The values of a row are 0 if none of its nodes can move. They are also 0 across ``planes`` (r, 3) of symmetry that
+    The values of a row are 0 if none of its nodes can move; they are also 0 across ``planes`` (r, 3) of symmetry that
     contain the tied node, because the mirror image of the mortar side keeps the node on the plane. ``of_bodies`` (r,):
     contribution of rigid bodies to the norms, 1/kg.
     """

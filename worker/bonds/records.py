@@ -12,7 +12,7 @@ interface, m; largest opening so far, m; unit normal out of the tied side (3).""
 STATE = 15
 """Number of places in a row of ``TiedRows.state``."""
 KEPT = 12
-"""Number of places in a row of ``TiedRows.state`` that a checkpoint contains. These are the first places."""
+"""Number of places in a row of ``TiedRows.state`` that a checkpoint contains; these are the first places."""
 STRENGTH, SHEAR_STRENGTH, ENERGY, SHEAR_ENERGY, BREAKS = range(5)
 """Columns of ``TiedRows.laws``: strengths, Pa, fracture energies, J/m^2, and 1 for a bond that may break, else 0."""
 

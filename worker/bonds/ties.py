@@ -1,4 +1,4 @@
-"""Tied rows of all ranks. They are updated from the pieces of the interface and the present corners of their faces."""
+"""Tied rows of all ranks; they are updated from the pieces of the interface and the present corners of their faces."""
 
 import numpy as np
 
@@ -118,7 +118,7 @@ class Ties:
 
 
 def _of(bonds: Ints, nodes: Ints, bond: Ints, node: Ints, states: Floats) -> Floats:
-    """Returns the states of the rows with the given ``bonds`` and ``nodes`` (k,). They are selected from ``states``,
+    """Returns the states of the rows with the given ``bonds`` and ``nodes`` (k,); they are selected from ``states``,
     whose rows belong to ``bond`` and ``node`` (r,); zero if a row is not found.
     """
     many = int(max(nodes.max(initial=0), node.max(initial=0))) + 1

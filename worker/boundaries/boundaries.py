@@ -104,7 +104,7 @@ class Boundary(ABC):
         return []
 
     def went_on(self, dt: float) -> None:  # noqa: B027 (most boundaries need no time step)
-        """Sets the last time step to ``dt``, s. Must be called after a program of steps."""
+        """Sets the last time step to ``dt``, s. This function must be called after a program of steps."""
 
     def measure(self, mass: float, speed: float) -> None:  # noqa: B027 (most add up no integers of their own)
         """Chooses the quanta from the largest nodal ``mass``, kg, and the largest ``speed``, m/s, of the scene."""

@@ -23,7 +23,7 @@ from ..scene.conditions import AXES, node_sides, part_sides
 from .boundaries import Boundary, driven, free
 
 _TOGETHER = 64
-"""Number of nodes that are tested together in one loop with vector instructions. They are tested one by one only if at
+"""Number of nodes that are tested together in one loop with vector instructions; they are tested one by one only if at
 least one of them would end beyond the plane."""
 _TURNS = 1000
 """Largest number of planes that a node without tets may pass in a step. The limit ends the loop if the velocity is

@@ -33,7 +33,7 @@ _BITS = 42
 """Binary logarithm of the number of quanta in the largest force on a node of a face at the start. Chosen value: the
 round-off is 1e-13 of the force of a face, and the area of a face may increase by a factor 2^(_MOST - _BITS)."""
 _MOST = 56
-"""Binary logarithm of the largest number of quanta on a node of a face. With this limit the sum at a node can have 64
+"""Binary logarithm of the largest number of quanta on a node of a face; with this limit the sum at a node can have 64
 faces without overflow."""
 
 

@@ -49,7 +49,7 @@ class Walls:
         )  # fmt: skip
         self.friction = np.array([each.friction for each in specs])
         self.given = np.array([each.velocity for each in specs]).reshape(n, 3)
-        """(w, 3) velocity of each wall that the case gives, m/s. It is the velocity at the start, or is multiplied by
+        """(w, 3) velocity of each wall that the case gives, m/s; it is the velocity at the start, or is multiplied by
         the factor of the wall's course."""
         self._courses = [Course(each.course) for each in specs]
         self.mass = np.array([each.mass or np.inf for each in specs])
@@ -103,7 +103,7 @@ class Walls:
         return np.concatenate([p.sum(axis=0), np.stack(about, axis=1).sum(axis=0)])
 
     def note(self) -> None:
-        """Stores v(n-1/2). Must be called before the kick."""
+        """Stores v(n-1/2). This function must be called before the kick."""
         self.before[:] = self.speed
 
     def kick(self, dt: float, t: float) -> None:

@@ -14,8 +14,8 @@ _SWEEPS = 4
 """Largest number of passes over the walls for each node. Chosen value: two walls at right angles need one pass. The
 error that remains at a sharper corner is corrected in the next step."""
 ACROSS = 1e-12
-"""Smallest squared length of the unit normal of a wall after the components held by symmetry planes are set to zero.
-Below this value the wall is parallel to a symmetry plane and cannot push the node. The chosen value is far above
+"""Smallest squared length of the unit normal of a wall after the components held by symmetry planes are set to zero;
+below this value the wall is parallel to a symmetry plane and cannot push the node. The chosen value is far above
 round-off (1e-32) and below any intended angle."""
 
 

@@ -13,7 +13,7 @@ energy that contact has returned in one step so far."""
 
 
 class Account:
-    """Sums over all contacts, steps and ranks. They are integers, so they do not depend on the order of summation and
+    """Sums over all contacts, steps and ranks; they are integers, so they do not depend on the order of summation and
     on the partition.
     """
 

@@ -94,7 +94,7 @@ class Exterior:
         return self.surface.flags & self._model.nodes.owned
 
     def _build(self, flags: Flags, turned: Ints) -> surface.Surface:
-        """Returns the surface. It includes the sides of cracks that may open, and the faces behind tets near erosion.
+        """Returns the surface; it includes the sides of cracks that may open, and the faces behind tets near erosion.
         ``flags`` (n,): nodes that have been on the surface and stay surface nodes; ``turned``: edges that have become
         sharp and stay sharp. Collective.
         """
@@ -144,14 +144,14 @@ class Exterior:
         return False
 
     def _loosen(self, loose: Flags) -> None:
-        """Updates the mobility of nodes that have lost their last tet. Such a node is held only by boundaries that act
+        """Updates the mobility of nodes that have lost their last tet; such a node is held only by boundaries that act
         on the node itself.
         """
         if (loose & ~self.motion.loose).any():
             self.motion.loose, self.motion.mobility = loose, mobilities(self._model.nodes, self._bounds)
 
     def take_up(self) -> None:
-        """Builds the surface. It includes all faces that may become surface before the next search. Collective."""
+        """Builds the surface; it includes all faces that may become surface before the next search. Collective."""
         if self._near_erosion is not None:
             self._near_erosion = exposure.near_erosion(self._model.blocks)
         if self._broken or self._near_erosion is not None:

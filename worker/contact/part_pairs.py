@@ -13,7 +13,7 @@ from ..rigid.stage import Rigid
 
 
 def friction(case: Case) -> Floats:
-    """(parts, parts) Coulomb's coefficient. It is NaN if the two parts cannot be in contact, for example parts of one
+    """(parts, parts) Coulomb's coefficient; it is NaN if the two parts cannot be in contact, for example parts of one
     body that cannot separate.
     """
     assert case.contact is not None

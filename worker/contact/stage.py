@@ -204,8 +204,8 @@ class Contact:
         self.exterior.grow(split)
 
     def note(self, state: Nodes) -> None:
-        """Stores v(n-1/2), and adds the second half of the work of the last impulses. Must be called before the
-        kick.
+        """Stores v(n-1/2), and adds the second half of the work of the last impulses. This function must be called
+        before the kick.
         """
         now = self.searches.scene
         self.books.due()
@@ -242,8 +242,8 @@ class Contact:
         return self.limit > 0.0
 
     def solve(self, state: Nodes, dt: float, t: float) -> None:
-        """Corrects v(n+1/2) by the impulses of active contacts at time ``t``, s. Must be called after the kick.
-        Collective.
+        """Corrects v(n+1/2) by the impulses of active contacts at time ``t``, s. This function must be called after the
+        kick. Collective.
         """
         if (now := self.searches.scene) is not None:
             with self._timers.phase("contact"):

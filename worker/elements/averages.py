@@ -157,7 +157,7 @@ def _more(nodes: Nodes, kinds: Indices) -> Ints:
 
 
 def volumes(averages: "Averages | None", nodes: Nodes, node_volume: Floats, density: Sequence[float]) -> Floats:
-    """(rows,) reference volumes at the start, m^3. They are ``node_volume`` (nodes,), or for nodes of several materials
+    """(rows,) reference volumes at the start, m^3; they are ``node_volume`` (nodes,), or for nodes of several materials
     the volume of each material, computed with the ``density`` of the parts, kg/m^3.
     """
     if averages is None:

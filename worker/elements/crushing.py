@@ -1,4 +1,4 @@
-"""Largest compression of brittle materials that have no law of compressive failure, divided by Griffith's criterion. It
+"""Largest compression of brittle materials that have no law of compressive failure, divided by Griffith's criterion; it
 is computed in every step, for a warning (cases/warnings/compression.py).
 
 A material without a law of compressive failure breaks in tension only and bears any compression. Each stress is

@@ -26,7 +26,7 @@ RATIO, PORES_AT, PRESSURE_AT, WORKED, TORN, OPENED, STIFF = range(7)
 per initial volume: work of the pressure, J/m^3; the part of this work that is dissipated in pores, J/m^3; volume of new
 pores. Last column: modulus of the wave speed, Pa."""
 COLUMNS = 8
-"""Number of columns. It is one more than the number of used columns, so that a row is a cache line."""
+"""Number of columns; it is one more than the number of used columns, so that a row is a cache line."""
 TETS, LINEAR = range(2)
 """Places where the pressure is computed. TETS: in the tets; LINEAR: at the nodes, for a linear pressure with a tension
 cut-off."""

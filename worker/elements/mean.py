@@ -22,10 +22,10 @@ def keep_before(w, s, params, n):  # type: ignore[no-untyped-def]
     """Sets BEFORE to the pressure before the step, CHANGE_SEEN to the change of the averaged volume, and VOLUME_SEEN to
     the averaged volume at mid-step.
 
-    Must be called before the equation of state; on entry VOLUME_SEEN is the averaged volume at the start of the step. A
-    material that dilates uses its own volume, because its pressure does not determine a volume, and its flow adds to
-    the volume of all tets around its nodes. The dilation that ``subtract_dilation`` has subtracted is the dilation of
-    the previous step.
+    This function must be called before the equation of state; on entry VOLUME_SEEN is the averaged volume at the start
+    of the step. A material that dilates uses its own volume, because its pressure does not determine a volume, and its
+    flow adds to the volume of all tets around its nodes. The dilation that ``subtract_dilation`` has subtracted is the
+    dilation of the previous step.
     """
     if params[DILATES] > 0.0:
         for i in range(n):

@@ -10,7 +10,7 @@ nodes. The stabilisation vanishes for a linear pressure. Heat and bulking are av
 strain (heat_and_bulking.py).
 
 Nodal sums are integers. Each contribution is divided by the reference volume of the node and is therefore of order one
-for any size of tets. For this reason one fixed scale, QUANTA, is sufficient for all cases.
+for any size of tets; for this reason one fixed scale, QUANTA, is sufficient for all cases.
 """
 
 import numpy as np

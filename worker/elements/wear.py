@@ -1,6 +1,6 @@
 """Tets that erosion will remove, because of their plastic strain, damage, volume or stable step.
 
-A tet that becomes flat or inverted must be removed before its altitude passes zero. Its velocity gradient is
+A tet that becomes flat or inverted must be removed before its altitude passes zero; its velocity gradient is
 proportional to 1 / altitude, so a single such tet would accelerate its nodes without bound. A marked tet is removed in
 the next step. The removal of a tet that exceeds only a strain or damage limit is delayed until several tets are removed
 together (worker/erosion.py).

@@ -24,7 +24,7 @@ ELSEWHERE = -2
 
 @dataclass
 class Body:
-    """The facets of a block of tets that break by one law. These are either all facets between tets of the block, or
+    """The facets of a block of tets that break by one law; these are either all facets between tets of the block, or
     all facets between the block and another part that a bond joins.
     """
 

@@ -36,7 +36,7 @@ _NODE_BITS = 40
 _LIMB = 2.0**30
 """Number of quanta in a limb of an exact sum, see parallel/fixed_point.py."""
 _FLAT = 1e-10
-"""Smallest ratio of a principal moment of inertia to the largest one. Below this ratio the axis counts as without
+"""Smallest ratio of a principal moment of inertia to the largest one; below this ratio the axis counts as without
 inertia."""
 
 FRAGMENT = np.dtype([

@@ -71,8 +71,8 @@ class Initiation:
         return [some for some in every if some is not None]
 
     def candidates(self) -> list[tuple[Body, Candidates]]:
-        """Returns the bodies with candidates, and their candidates. Must be called once a step, because it advances the
-        clocks. Collective in the same way as ``breaking``.
+        """Returns the bodies with candidates, and their candidates. This function must be called once a step, because
+        it advances the clocks. Collective in the same way as ``breaking``.
         """
         self.interface.exchange(self._model.nodes.x)
         x, t = self._model.nodes.x, self._clock.t

@@ -74,8 +74,8 @@ class Interface:
         self.hot = bool(self.facets.hot.any())
 
     def mark_inner(self, hot: bool) -> None:
-        """Marks the overstressed facets between two blocks of this rank. Must be called when all tets of the rank have
-        their stress. ``hot``: whether a face of the rank is overstressed.
+        """Marks the overstressed facets between two blocks of this rank. This function must be called when all tets of
+        the rank have their stress. ``hot``: whether a face of the rank is overstressed.
         """
         if len(self._inner):
             self.facets.hot[-1] = 0

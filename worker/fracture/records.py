@@ -60,7 +60,7 @@ class InterfaceFacets(NamedTuple):
     theirs: Floats
     """(m, 3) traction of the other tet on the outward normal of the tet of smaller id, Pa."""
     of: Ints
-    """(m,) index of the other rank among the neighbours. For this rank itself the value is the number of neighbours."""
+    """(m,) index of the other rank among the neighbours; for this rank itself the value is the number of neighbours."""
     hot: Ints
     """(neighbours + 1,) 1 if a facet shared with the neighbour is overstressed on at least one side, else 0. The last
     entry is for facets between two blocks of this rank."""

@@ -80,8 +80,8 @@ class Fracture:
         return self.separation.first
 
     def unload(self) -> None:
-        """Unloads cohesive facets that would release more energy than they absorbed. Must be called before the kick.
-        Collective.
+        """Unloads cohesive facets that would release more energy than they absorbed. This function must be called
+        before the kick. Collective.
         """
         if self.cohesion is not None and self.broken:
             self._unloading.apply(self._clock)

@@ -17,7 +17,7 @@ LINES = np.arange(1, 11) / 10.0
 """Distances of the measuring lines from the axis, divided by the radius of the part. Voids of neighbouring lines are
 joined."""
 MEASURED = (0, 2, 4)
-"""Indices in ``LINES`` of the lines whose depths are averaged. These are the lines at 0.1, 0.3 and 0.5 of the
+"""Indices in ``LINES`` of the lines whose depths are averaged; these are the lines at 0.1, 0.3 and 0.5 of the
 radius."""
 _TOUCHING = 1e-6
 """Largest gap that counts as closed, divided by the radius. The function ``spans`` moves lines to the side by this

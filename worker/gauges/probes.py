@@ -44,7 +44,7 @@ class Probes:
         self._gauges: list[Gauge] = [*over_tets, *(make(case, scene) for names, make in _OTHER if {*kinds} & {*names})]
         self._sums = NodeSums(case, scene)
         self.sums = any(isinstance(gauge, NodeSums) for gauge in self._gauges)
-        """Whether some probe is a sum over nodes. Such a probe needs the velocities at time n."""
+        """Whether some probe is a sum over nodes; such a probe needs the velocities at time n."""
 
     def require_tets(self, case: Case) -> None:
         """Raise InputError on every rank if a probe over tets has no tet, or if a sum over a box or a set has no

@@ -70,7 +70,7 @@ class NodeSums:
         return np.asarray(found)
 
     def _of_bodies(self, v: Floats) -> dict[int, float]:
-        """Return the values of probes of whole rigid parts. These probes are not sums over nodes, because inertia and
+        """Return the values of probes of whole rigid parts; these probes are not sums over nodes, because inertia and
         centre of a rigid part may differ from the sums over its nodes.
         """
         found: dict[int, float] = {}

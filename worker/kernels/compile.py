@@ -236,7 +236,7 @@ class _Child:
 
 @contextmanager
 def _child(folder: Path) -> Iterator[_Child]:
-    """Starts a child process. It ends when the ``with`` block ends, or when this process dies."""
+    """Starts a child process; it ends when the ``with`` block ends, or when this process dies."""
     command = [sys.executable, "-P", "-m", "conoid.worker.kernels.compile", "--child"]
     environment = os.environ | {store.VARIABLE: str(folder), "NUMBA_NUM_THREADS": "1"}
     pipe = subprocess.PIPE

@@ -42,8 +42,8 @@ _MAKERS = {
     "arange", "argsort", "array", "concatenate", "copy", "cumsum", "empty", "full", "ones", "sort", "unique", "zeros",
 }  # fmt: skip
 """Names of functions and methods that make arrays. A kernel that calls one of them needs reference counts. numba
-refuses to compile a kernel without reference counts if the kernel makes arrays in another way, or assigns whole rows.
-Such a kernel is declared with ``_nrt=True``."""
+refuses to compile a kernel without reference counts if the kernel makes arrays in another way, or assigns whole rows;
+such a kernel is declared with ``_nrt=True``."""
 DECLARED: list["Kernel"] = []
 """All kernels of the imported modules."""
 
@@ -54,7 +54,7 @@ def _folder() -> str:
 
 
 class _ModuleFolder(_CacheLocator):
-    """Locator of cache files, an interface of numba. It returns the cache folder of the module of a kernel. This folder
+    """Locator of cache files, an interface of numba; it returns the cache folder of the module of a kernel. This folder
     is inside of the folder that kernels/store.py names by the sources.
     """
 
@@ -74,7 +74,7 @@ class _ModuleFolder(_CacheLocator):
         return ""
 
     def get_disambiguator(self) -> str:
-        """Returns a part of the file name of a kernel. By default this part contains the line of the kernel. It is
+        """Returns a part of the file name of a kernel. By default this part contains the line of the kernel; it is
         empty here, because a changed docstring moves lines. Kernels with equal names share an index file, in which
         numba finds a kernel by its byte code.
         """

@@ -28,7 +28,7 @@ _CLOSE = 1e-6
 """Relative Newton step at which the iteration ends. The relative error of the strain increment is then q^2/2 times the
 square of this step: 1e-11 with q = 5."""
 _LARGE = 1e300
-"""Largest start value of u^q. It replaces the infinite start value of a step with dt = 0."""
+"""Largest start value of u^q; it replaces the infinite start value of a step with dt = 0."""
 
 
 @njit("int64(float64[::1], float64[::1], int64)", cache=True, error_model="numpy")
@@ -70,7 +70,7 @@ def increments(w, params, m, fast):  # type: ignore[no-untyped-def]
 
     The right side increases with u and is convex, so that Newton's method converges from above without a bracket. The
     iteration begins at the smaller of the two roots of the equation with only the term STATIC u and with only the term
-    (3 G + H) d. This value is above the root.
+    (3 G + H) d; this value is above the root.
     """
     stiffness, q, count = 3.0 * params[SHEAR] + params[_HARDENING], params[_Q], 0
     for j in range(m):

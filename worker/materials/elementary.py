@@ -1,7 +1,7 @@
-"""Functions log and exp whose results are bit-identical on any processor. They are used in loops over a chunk that the
+"""Functions log and exp whose results are bit-identical on any processor; they are used in loops over a chunk that the
 compiler vectorises.
 
-The functions use only + - * / and the bit pattern of a float64 as an integer. These operations give the same result in
+The functions use only + - * / and the bit pattern of a float64 as an integer; these operations give the same result in
 vector code and in scalar code, and no result depends on a C library. Derived in docs/theory/sums.md.
 """
 

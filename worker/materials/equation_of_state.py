@@ -1,4 +1,4 @@
-"""Equations of state. They compute the pressure from the volume strain, and the tangent modulus for the wave speed.
+"""Equations of state; they compute the pressure from the volume strain, and the tangent modulus for the wave speed.
 
 The scratch row SEEN has the volume strain of the step, which is that of the tet or a mean over its nodes. The scratch
 row CHANGE has the change of the volume of the tet, so that the computed work is equal to the work of the nodal forces.
@@ -35,7 +35,7 @@ _OLD, _KNOWN, _FACTOR = NODAL, NODAL + CHUNK, NODAL + 2 * CHUNK
 """Scratch rows: pressure before the step, Pa; and coefficients of the energy equation factor * (new pressure) = cold
 part + known."""
 _LEAST = 0.05
-"""Smallest bulk modulus in the wave speed, divided by the bulk modulus at rest. Chosen value. This limit can only
+"""Smallest bulk modulus in the wave speed, divided by the bulk modulus at rest. Chosen value; this limit can only
 decrease the stable step."""
 
 

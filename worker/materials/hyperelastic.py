@@ -1,7 +1,7 @@
 """Hyperelastic shear of materials without a strength law: the deviatoric stress has a potential, so that its energy is
 conserved.
 
-The potential is W = V0 G/4 (tr b + tr b^-1 - 6), with b = J^(-2/3) F F^T. It is the Mooney-Rivlin form with equal
+The potential is W = V0 G/4 (tr b + tr b^-1 - 6), with b = J^(-2/3) F F^T; it is the Mooney-Rivlin form with equal
 constants. Up to the fourth order in strain it is equal to Hencky's potential, G (ln V : ln V). Derived in
 docs/theory/materials.md.
 """
@@ -31,7 +31,7 @@ def inverse_sixth_root(u):  # type: ignore[no-untyped-def]
     applied three times, as a power series.
 
     The computation uses only + - * and the bit pattern of a float64 as an integer, with equal results in vector code
-    and in scalar code. It uses no root and no quotient, because each of them takes as long as ten products. The bit
+    and in scalar code; it uses no root and no quotient, because each of them takes as long as ten products. The bit
     pattern is a piecewise linear logarithm. The first y is found by shifts: a sixth of the distance from the bit
     pattern of 1. This y is exact at 1.
     """

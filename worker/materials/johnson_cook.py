@@ -202,7 +202,7 @@ def increments(w, params, m, dt):  # type: ignore[no-untyped-def]
 @njit("void(float64[::1], float64[::1], float64[::1], int64, int64, float64)", cache=True, error_model="numpy")
 def _return(w, s, params, m, n, dt):  # type: ignore[no-untyped-def]
     """Scales the deviatoric stress to the flow stress. Adds plastic strain, heat, and the plastic work, which is the
-    work of the mean of the rotated old stress and the new stress (as in mohr_coulomb.py). With this mean the remaining
+    work of the mean of the rotated old stress and the new stress (as in mohr_coulomb.py); with this mean the remaining
     work is equal to the elastic energy of the stress.
     """
     shear3, shear2 = 3.0 * params[SHEAR], 2.0 * params[SHEAR]

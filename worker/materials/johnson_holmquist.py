@@ -68,7 +68,7 @@ _INTACT, _FRACTURE, _CRUMBLED, _FAST = (NODAL + k * CHUNK for k in range(4))
 _TINY = 1e-300
 """Smallest argument of a logarithm; an argument of zero is replaced by this value."""
 _LEAST = 0.05
-"""Smallest bulk modulus in the wave speed, divided by the bulk modulus at rest. Chosen value. This limit can only
+"""Smallest bulk modulus in the wave speed, divided by the bulk modulus at rest. Chosen value; this limit can only
 decrease the stable step."""
 _THIRD, _TWO_THIRDS = 1.0 / 3.0, 2.0 / 3.0
 
@@ -90,7 +90,7 @@ def _pressed(params, ratio, bulking, least):  # type: ignore[no-untyped-def]
 
 @njit("float64(float64[::1], float64, float64, float64, float64)", cache=True, error_model="numpy")
 def _stored(params, ratio, p, bulking, least):  # type: ignore[no-untyped-def]
-    """Returns the elastic energy of the pressure ``p`` of ``_pressed``, per initial volume, Pa. It is the integral of
+    """Returns the elastic energy of the pressure ``p`` of ``_pressed``, per initial volume, Pa; it is the integral of
     -p over the volume ratio, from the ratio at zero pressure. Above the volume ratio at which the pressure is
     ``least``, the energy is constant; under compression the energy is computed as a triangle.
     """

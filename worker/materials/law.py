@@ -26,7 +26,7 @@ law returns the trial stress after the equation of state, because its strength d
 
 @dataclass(frozen=True)
 class Law:
-    """Strength law. Its kernel(w, s, params, n, dt) computes the deviatoric stress of a chunk at step n+1."""
+    """Strength law; its kernel(w, s, params, n, dt) computes the deviatoric stress of a chunk at step n+1."""
 
     model: str
     """Name of the law in a case; empty for the law of a material without a strength law."""
@@ -52,7 +52,7 @@ class Law:
 
 @dataclass(frozen=True)
 class Equation:
-    """Equation of state. Its kernel(w, s, params, n) computes the pressure at step n+1, the work of the pressure, and
+    """Equation of state; its kernel(w, s, params, n) computes the pressure at step n+1, the work of the pressure, and
     MODULUS.
     """
 

@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 _DIGITS = Context(prec=60)
-"""Number of decimal digits in the computation. It is more than a float64 needs after the cancellation of terms for an
+"""Number of decimal digits in the computation; it is more than a float64 needs after the cancellation of terms for an
 angle of a whole turn."""
 _MANY = Context(prec=120)
 """Number of additional decimal digits: as many as the largest angle of a case has before the decimal point."""

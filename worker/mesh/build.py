@@ -30,7 +30,7 @@ from .store import load, save
 from .structured import structured
 
 _CACHE_BYTES = 4 * 2**30
-"""Largest size of the cache, bytes. Above this size the least recently used meshes are removed."""
+"""Largest size of the cache, bytes; above this size the least recently used meshes are removed."""
 
 
 def build(

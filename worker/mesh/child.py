@@ -1,7 +1,7 @@
 """Child process that runs gmsh and reads foreign files: ``python -m conoid.worker.mesh.child``.
 
 gmsh is GPL, and gmsh and any parser may crash, hang or request all memory. Therefore meshers and readers run in a
-separate process. This process has limits of memory, CPU time and wall time, an environment without secrets, and an
+separate process; this process has limits of memory, CPU time and wall time, an environment without secrets, and an
 empty working folder. The process reads one JSON request from standard input. The process writes the mesh to an .npz
 file, and an error to standard error as one line.
 """
@@ -36,7 +36,7 @@ _LOOK = 0.2
 """Interval between two checks of a running child process, s."""
 
 _FULL = 0.97
-"""Fraction of the memory limit of a child process. Above this fraction the child may have too little memory to report
+"""Fraction of the memory limit of a child process; above this fraction the child may have too little memory to report
 an error."""
 
 _GRACE = 5

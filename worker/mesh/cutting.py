@@ -20,7 +20,7 @@ _TOGETHER = 20_000
 """Number of elements that are processed at once. The chosen value needs about 100 MB of memory."""
 _NOTHING = np.zeros((0, 4), np.int64), np.zeros(0, np.int64), np.zeros(0, np.int64)
 _WORSE = 0.5
-"""Ratio of the stable step of a cut to that of a cut with a node in the middle. Below this ratio the node in the middle
+"""Ratio of the stable step of a cut to that of a cut with a node in the middle; below this ratio the node in the middle
 is used. Chosen value: twelve tets instead of five or six cost less than twice the number of steps."""
 
 

@@ -31,7 +31,7 @@ REGULAR_STEP = 1.0 / math.sqrt(6.0)
 """Step length of the regular tet with edge 1: half its altitude."""
 
 FLAT = 1e-9
-"""Smallest ratio of the volume of a tet to (root of the sum of its squared face areas)^(3/2). Below this ratio the tet
+"""Smallest ratio of the volume of a tet to (root of the sum of its squared face areas)^(3/2); below this ratio the tet
 counts as flat. Chosen value: the ratio is 0.15 for a regular tet, and 1e-16 for the round-off of its nodes."""
 
 

@@ -1,4 +1,4 @@
-"""Check of parts that share nodes of one file without a bond. Such parts would separate at the shared nodes."""
+"""Check of parts that share nodes of one file without a bond; such parts would separate at the shared nodes."""
 
 from collections.abc import Iterator, Sequence
 from itertools import combinations

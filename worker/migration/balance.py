@@ -27,7 +27,7 @@ from .parcel import Parcel
 from .route import route
 
 _LEAST = 1e-9
-"""Smallest cost of a tet, s. With this value every rank gets tets even before any cost is measured. The chosen value is
+"""Smallest cost of a tet, s; with this value every rank gets tets even before any cost is measured. The chosen value is
 far below the measured cost of any tet."""
 
 
@@ -57,7 +57,7 @@ class Balance:
     comm: Comm
     trigger: Trigger
     _meter: Meter
-    """Meter of the costs since the last cut. It is restarted when half of the loss that triggers the next cut has
+    """Meter of the costs since the last cut; it is restarted when half of the loss that triggers the next cut has
     accumulated, because costs change as fronts move."""
     spent: float = 0.0
     """Wall time of all cuts, s."""

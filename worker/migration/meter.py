@@ -22,7 +22,7 @@ class Costs:
     tet: Floats
     """(parts,) cost of a tet of each part."""
     candidate: float
-    """Cost of a contact candidate on this rank. It is measured on this rank, because the candidates of different ranks
+    """Cost of a contact candidate on this rank; it is measured on this rank, because the candidates of different ranks
     have different costs."""
     fracture: float
     """Cost of the fracture stage on this rank."""

@@ -112,7 +112,7 @@ def _cut(parcel: Parcel, scale: Floats, comm: Comm) -> tuple[dict[int, Indices],
 
 
 def _homes(places: dict[int, Indices], comm: Comm) -> Indices:
-    """Return (boxes,) the rank to which each box is assigned. It is the rank that has most of the tets of the box,
+    """Return (boxes,) the rank to which each box is assigned; it is the rank that has most of the tets of the box,
     among the ranks that have no box yet.
 
     Collective.

@@ -1,4 +1,4 @@
-"""Buffers with spare capacity. They are used for arrays to which rows are appended, or that are filled again in every
+"""Buffers with spare capacity; they are used for arrays to which rows are appended, or that are filled again in every
 step.
 """
 

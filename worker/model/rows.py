@@ -33,7 +33,7 @@ PLASTIC_STRAIN = 15
 WORK_PLASTIC = 16
 """Plastic work since the start, J."""
 YIELD = 17
-"""Flow stress at vanishing strain rate, Pa. Below this stress there is no plastic flow."""
+"""Flow stress at vanishing strain rate, Pa; below this stress there is no plastic flow."""
 FLOW = 18
 """Flow stress of the last plastic step, Pa. The iteration of the next plastic step starts with this value."""
 BULKING = 18

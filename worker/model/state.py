@@ -200,7 +200,7 @@ class Block:
     rigid: bool = False
     """Whether the part is rigid. Passes over elements omit a rigid part."""
     seconds: float = 0.0
-    """CPU time of the passes over the block, s. It is measured only if the rank has several blocks."""
+    """CPU time of the passes over the block, s; it is measured only if the rank has several blocks."""
     group: Indices = field(default_factory=lambda: np.zeros(0, np.int32))
     """(n,) group of each tet (Model.groups); (0,) if loads of groups are not recorded."""
     moved: int = 0
@@ -279,7 +279,7 @@ class Model:
     mean_volumes: Floats = field(default_factory=lambda: np.zeros(0))
     """(parts,) mean volume of the tets of each part at the start, m^3."""
     size: float = 0.0
-    """Largest absolute coordinate of the whole mesh at the start, m. This value determines the round-off of
+    """Largest absolute coordinate of the whole mesh at the start, m; this value determines the round-off of
     positions."""
     slack: Floats = field(default_factory=lambda: np.zeros(0))
     """(parts,) distance, m, outside of a region at which a node still counts as inside (cases/shapes/region.py)."""

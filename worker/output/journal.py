@@ -50,7 +50,7 @@ class Journal:
         self.frames: set[int] = set()
         """Indices of the frames of which the journal has a message."""
         self.snapshots = 0
-        """Number of the next snapshot. It continues the numbers of the snapshots in the journal."""
+        """Number of the next snapshot; it continues the numbers of the snapshots in the journal."""
         self._file = whole.appended(path)
         self._seq, content = 0, whole.read(path, _MOST)
         for line in content.splitlines():
@@ -85,7 +85,7 @@ class Journal:
         self.write(messages.Status, state=State.STARTING, message=what)
 
     def close(self) -> None:
-        """Close the file. After this call the journal is complete."""
+        """Close the file; after this call the journal is complete."""
         self._file.close()
 
 

@@ -1,4 +1,4 @@
-"""Standard output of a worker that runs without a server. It prints the start, a line for each percent of progress,
+"""Standard output of a worker that runs without a server; it prints the start, a line for each percent of progress,
 warnings, and the end.
 """
 

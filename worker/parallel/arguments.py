@@ -28,7 +28,7 @@ _DATA = 40
 
 
 class Follow(NamedTuple):
-    """A number of a stage that changes from round to round. It is the product of a number of the program and a constant
+    """A number of a stage that changes from round to round; it is the product of a number of the program and a constant
     factor.
     """
 

@@ -26,7 +26,7 @@ are chosen. Chosen value."""
 
 
 class Choice:
-    """Measures and sets the number of threads of a rank. It must be called once in each step."""
+    """Measures and sets the number of threads of a rank; it must be called once in each step."""
 
     def __init__(self, team: Team) -> None:
         self._team, self._reported = team, False

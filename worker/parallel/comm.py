@@ -34,7 +34,7 @@ class Sent:
         self.bytes += size
 
     def collective(self, size: int = 0, number: int = 1) -> None:
-        """Count ``number`` collectives. This rank contributes ``size`` bytes to them."""
+        """Count ``number`` collectives; this rank contributes ``size`` bytes to them."""
         self.collectives += number
         self.collective_bytes += size
 

@@ -29,7 +29,7 @@ _DIGIT = 8
 """Number of bits of a sorting key that are determined by one sum over the ranks. With the chosen value a sum has 256
 counts for each box, and eight sums are needed."""
 _FINEST = 2.0**30
-"""Value of the largest weight in quanta. With this value sums of four billion weights are exact."""
+"""Value of the largest weight in quanta; with this value sums of four billion weights are exact."""
 _BINS = 128
 """Number of slices into which the weights along a direction are binned when directions are compared."""
 _SHORT = 0.2
@@ -61,12 +61,12 @@ def _directions() -> Floats:
 
 DIRECTIONS = _directions()
 _AXES = 3
-"""Number of normals that are axes x, y and z. They are the first normals."""
+"""Number of normals that are axes x, y and z; they are the first normals."""
 
 
 @dataclass
 class Cut:
-    """A cut between ranks. It divides the ranks from ``first`` to ``first + parts - 1``. Points whose key along a
+    """A cut between ranks; it divides the ranks from ``first`` to ``first + parts - 1``. Points whose key along a
     normal is below ``key`` are on the lower side.
     """
 
@@ -264,7 +264,7 @@ def _slice(sums, points, quanta, chosen, directions, low, scale):  # type: ignor
 
 
 def _search(cuts: list[Cut], keys: list[Ints], quanta: list[Ints], comm: Comm) -> None:
-    """Set the key of every cut. It is the smallest key at which the weight below the cut exceeds the weight that the
+    """Set the key of every cut; it is the smallest key at which the weight below the cut exceeds the weight that the
     lower side must have.
 
     Collective.

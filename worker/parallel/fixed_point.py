@@ -139,7 +139,7 @@ def _whole(words: Ints) -> Floats:
 
 
 class Tally:
-    """Sums that are accumulated over a whole run. They are integers in two limbs, independent of the order of the terms
+    """Sums that are accumulated over a whole run; they are integers in two limbs, independent of the order of the terms
     and of ranks.
     """
 

@@ -160,7 +160,7 @@ class MpiComm:
 
 
 class _Waiting:
-    """Context of a block that waits. It is a class, because every step opens dozens of contexts, and a context made
+    """Context of a block that waits; it is a class, because every step opens dozens of contexts, and a context made
     from a generator takes longer.
     """
 

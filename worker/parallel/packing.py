@@ -66,7 +66,7 @@ class Packing:
         """Copy the results of a pass over the range from 0 to ``n`` from ``source`` to ``out``. The two arrays have
         rows of one type.
 
-        The task that begins at index f has written ``counts`` rows to ``source``, from row ``spread`` * f on. They are
+        The task that begins at index f has written ``counts`` rows to ``source``, from row ``spread`` * f on; they are
         copied to ``out``, from the row on that ``begins`` has for the task.
         """
         if n:

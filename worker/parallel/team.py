@@ -185,7 +185,7 @@ def _repeat_long(spent, job, semaphore, stages, rounds, stop):  # type: ignore[n
 
 @dataclass(frozen=True)
 class Stage:
-    """A pass of a program. It has the arguments of ``Team.run``."""
+    """A pass of a program; it has the arguments of ``Team.run``."""
 
     kernel: Kernel
     table: int
@@ -196,7 +196,7 @@ class Stage:
 
 
 class Timed(Protocol):
-    """A replacement for a team. It runs tasks one after the other, and sums the time that teams of the sizes ``crews``
+    """A replacement for a team; it runs tasks one after the other, and sums the time that teams of the sizes ``crews``
     would take.
     """
 

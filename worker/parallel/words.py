@@ -90,19 +90,19 @@ def _library(name: str, signature: Any) -> Any:
 
 call_task: Any = intrinsic(_call)
 add: Any = intrinsic(_added)
-"""Function for kernels. It adds to a word atomically and returns the old value of the word. Two threads that add at the
+"""Function for kernels; it adds to a word atomically and returns the old value of the word. Two threads that add at the
 same time never get the same old value."""
 swap: Any = intrinsic(_swapped)
-"""Function for kernels. It sets a word and returns the old value of the word. Threads that read the new value also see
+"""Function for kernels; it sets a word and returns the old value of the word. Threads that read the new value also see
 all earlier writes of the thread."""
 load: Any = intrinsic(_loaded)
-"""Function for kernels. It reads a word that other threads may write."""
+"""Function for kernels; it reads a word that other threads may write."""
 now: Any = intrinsic(_read_clock)
-"""Function for kernels. It returns the time, ns, and uses two words at the address ``at`` as temporary memory."""
+"""Function for kernels; it returns the time, ns, and uses two words at the address ``at`` as temporary memory."""
 word_at: Any = intrinsic(_read)
-"""Function for kernels. It returns word number ``k`` at an address."""
+"""Function for kernels; it returns word number ``k`` at an address."""
 write_real: Any = intrinsic(_write)
-"""Function for kernels. It writes a float64 to an address."""
+"""Function for kernels; it writes a float64 to an address."""
 sched_yield: Any = intrinsic(lambda _: _library("sched_yield", types.void()))
 sem_wait: Any = intrinsic(lambda _, semaphore: _library("sem_wait", types.void(semaphore)))
 sem_post: Any = intrinsic(lambda _, semaphore: _library("sem_post", types.void(semaphore)))

@@ -40,8 +40,8 @@ class BodyAccount:
             setattr(self, _KEPT[name], values.copy())
 
     def note(self) -> None:
-        """Adds the second halves of the energies of the last step, and stores the motion at n-1/2. Must be called
-        before the kick.
+        """Adds the second halves of the energies of the last step, and stores the motion at n-1/2. This function must
+        be called before the kick.
         """
         self.contact_loss += self.later[0]
         self.external_work += self.later[1]

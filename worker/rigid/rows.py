@@ -46,7 +46,7 @@ def weigh(words, active, slots, body, arms, owned, reach):  # type: ignore[no-un
 
 @njit(types.void(NODES, _I2, _N1, _N1, _F2, _F1, _F2, _F3), cache=True, error_model="numpy")
 def norms(active, words, slots, body, arms, reach, lightness, yielding):  # type: ignore[no-untyped-def]
-    """Sets row weights and mobilities of ``slots``. Their products bound a row of the contact matrix: sum_i |n_i| Q_i
+    """Sets row weights and mobilities of ``slots``; their products bound a row of the contact matrix: sum_i |n_i| Q_i
     along a normal n, and Q for any direction across. ``words``: sums of ``weigh`` over all ranks; ``lightness`` (b, 3):
     1 / mass, 1/kg; ``yielding`` (b, 3, 3): inverse of the inertia along the axes of space; zero for held motion.
     """

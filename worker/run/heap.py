@@ -1,4 +1,4 @@
-"""Settings of the memory allocator of the C library. With these settings the memory of large freed arrays is returned
+"""Settings of the memory allocator of the C library; with these settings the memory of large freed arrays is returned
 to the operating system at once."""
 
 import ctypes

@@ -40,7 +40,7 @@ checkpoint, s."""
 
 @dataclass
 class Relay:
-    """Handler that sends the signal TERM of the batch system to the ranks as USR1. It is not sent as TERM, because srun
+    """Handler that sends the signal TERM of the batch system to the ranks as USR1; it is not sent as TERM, because srun
     takes a TERM as a request to end itself.
     """
 

@@ -1,4 +1,4 @@
-"""The time loop. It advances the simulation, runs the scheduled outputs, and ends the run."""
+"""The time loop; it advances the simulation, runs the scheduled outputs, and ends the run."""
 
 import gc
 import time
@@ -32,7 +32,7 @@ from .signals import Signals
 
 @dataclass(frozen=True)
 class Start:
-    """Sizes, counters and warnings at the first step of this process. They are stored in checkpoints for a resumed
+    """Sizes, counters and warnings at the first step of this process; they are stored in checkpoints for a resumed
     run.
     """
 

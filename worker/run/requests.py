@@ -48,7 +48,7 @@ class Requests:
         step.
 
         If the scheduled simulated time of a request is before ``t``, s, the request waits only because snapshots have a
-        smallest interval in wall time. Such a request has no bound in simulated time.
+        smallest interval in wall time; such a request has no bound in simulated time.
         """
         return self._wall, self._time if self._time > t else math.inf, self._run.max_steps - 1
 

@@ -18,7 +18,7 @@ STOPS = {
 
 
 def reason(sim: Simulation, stop: int) -> str:
-    """Return the message for an early stop. It contains the reason, the time reached, and the stable step if that has
+    """Return the message for an early stop; it contains the reason, the time reached, and the stable step if that has
     decreased much.
 
     Collective.

@@ -124,7 +124,7 @@ def of_parts(spec: schema.Boundary, model: Model) -> Flags:
 
 def heights(case: schema.Case, spec: schema.Symmetry, model: Model) -> Floats:
     """Return (n,) the heights of nodes above a symmetry plane at the start, m. The height is 0 for nodes within
-    round-off of the plane. It is also 0 for nodes of the plane's set that are within the slack of their part.
+    round-off of the plane; it is also 0 for nodes of the plane's set that are within the slack of their part.
     """
     found, part = model.nodes.x0[:, AXES[spec.axis]] - spec.at, model.nodes.part
     within = model.rounding[part]

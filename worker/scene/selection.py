@@ -1,4 +1,4 @@
-"""Nodes and faces that the regions of a case select. Their numbers are compared with the numbers that ``conoid
+"""Nodes and faces that the regions of a case select; their numbers are compared with the numbers that ``conoid
 validate`` predicts.
 """
 
@@ -198,7 +198,7 @@ def counted(
 def _cut(
     case: schema.Case, x: Floats, faces: tuple[Indices, Indices], near: Nearness, marked: Marks
 ) -> Flags:  # fmt: skip
-    """Return (m,) whether each of the exposed faces (m, 3), with their parts (m,), lies on a symmetry plane. Such a
+    """Return (m,) whether each of the exposed faces (m, 3), with their parts (m,), lies on a symmetry plane; such a
     face is a cut through the whole body, and no traction loads it.
     """
     (corners, of), names = faces, [each.name for each in case.parts]

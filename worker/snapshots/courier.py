@@ -1,4 +1,4 @@
-"""Side thread of a rank (courier). It writes the copied state of the rank to disk. On rank 0 it also sends tasks to the
+"""Side thread of a rank (courier); it writes the copied state of the rank to disk. On rank 0 it also sends tasks to the
 packer, the process that makes snapshots from the copies of all ranks.
 """
 

@@ -81,7 +81,7 @@ def _extents(outline: Outline, fragments: int) -> Floats:
 
 
 def _level(outline: Outline, longest: float, most: int) -> int:
-    """Return the level of cell size at which the search begins. At this level there are about as many cell faces as the
+    """Return the level of cell size at which the search begins; at this level there are about as many cell faces as the
     budget has triangles.
     """
     a, b, c = (outline.points[outline.triangles[:, k]] for k in range(3))

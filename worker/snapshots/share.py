@@ -95,7 +95,7 @@ class Whole:
     numbers: Ints
     """(tets,) number of the fragment of each tet in the last frame."""
     initial: int
-    """Number of fragments at the start. These fragments have the first numbers. The number is 0 if no part
+    """Number of fragments at the start; these fragments have the first numbers. The number is 0 if no part
     fractures."""
     next: int
     """Number that the next new fragment will get."""

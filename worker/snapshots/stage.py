@@ -46,7 +46,7 @@ class Snapshots:
         self._n: int = sim.comm.broadcast(journal.snapshots if journal is not None else 0)
         self._courier = Courier(folder, sim.comm.rank)
         self.next_time = math.inf
-        """Simulated time before which no snapshot is scheduled, s. This time does not limit snapshots that a user
+        """Simulated time before which no snapshot is scheduled, s; this time does not limit snapshots that a user
         requests."""
         self._wait(self._place(sim.clock) + 1)
         self._taken = self._took = self._packed = 0.0

@@ -20,7 +20,7 @@ from ...parallel.passes import Pass
 from ...parallel.team import TASK, Team
 
 _MOST = 2.0**20
-"""Largest number of cells along an axis. With this number the codes of three axes are far below 2^63."""
+"""Largest number of cells along an axis; with this number the codes of three axes are far below 2^63."""
 _WIDE = 512
 """Largest number of cells of a box that is entered in the buckets. A box with more cells is compared with all other
 boxes."""
@@ -51,11 +51,11 @@ class Table(NamedTuple):
     code: Ints
     """(m,) code of the cell of each entry."""
     wide: Indices
-    """(w,) boxes that touch too many cells. These boxes have no entries."""
+    """(w,) boxes that touch too many cells; these boxes have no entries."""
 
 
 class Cells(NamedTuple):
-    """Grid of cells. Its fields are the first columns of a Table."""
+    """Grid of cells; its fields are the first columns of a Table."""
 
     origin: Floats
     inverse: float

@@ -18,7 +18,7 @@ from ...parallel.tags import Tag
 from ...parallel.team import TASK, Team
 
 _QUANTA = 2.0**16
-"""Number of quanta per m/s. With this value sums up to 1e14 m/s do not overflow."""
+"""Number of quanta per m/s; with this value sums up to 1e14 m/s do not overflow."""
 _THIN = 1e-9
 """Smallest determinant of the inertia of a tet, divided by the cube of its trace. For a smaller value the rotation of
 the tet is not computed."""

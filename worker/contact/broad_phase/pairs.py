@@ -26,7 +26,7 @@ from ..narrow_phase.node_face import chain
 from ..narrow_phase.tables import Pairs
 
 _FRESH = {"until": -np.inf, "speed": np.nan, "turned": False, "kept": 0.0, "next": -1}
-"""Initial values of a pair. With these values the pair is tested in the next step."""
+"""Initial values of a pair; with these values the pair is tested in the next step."""
 
 
 @dataclass

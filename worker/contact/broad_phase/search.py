@@ -19,7 +19,7 @@ _FEW, _SAMPLE = 8, 256
 """Ratio of the numbers of large and small primitives above which larger cells are faster; and number of sampled boxes
 from which the size of the cells is computed."""
 _WORTHWHILE = 1024
-"""Number of primitives of the smaller set. Above this number, the primitives that are far from the other set are
+"""Number of primitives of the smaller set; above this number, the primitives that are far from the other set are
 removed before the search. Chosen value: one task of boxes.py."""
 _ANY = np.zeros(0, np.int64)
 """Rank of primitives if the order of a pair has no meaning."""

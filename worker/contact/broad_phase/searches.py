@@ -115,8 +115,8 @@ class Searches:
         return self._fractures and self._clock.step % AGE == 0
 
     def begin(self, nodes: Nodes) -> None:
-        """Recomputes the mean normals every EVERY steps, and searches if a search is scheduled. Must be called before a
-        step. Collective.
+        """Recomputes the mean normals every EVERY steps, and searches if a search is scheduled. This function must be
+        called before a step. Collective.
         """
         if self._clock.step % normals.EVERY == 0:
             self._exterior.turn()

@@ -2,12 +2,12 @@
 Nodes inside of their own part are counted even if the part has no contact with itself.
 
 A node in a tet of another fragment has passed through the surface of that fragment. The depth of the node is computed
-from the tet alone. It is the depth below the nearest exposed face of the tet. If the tet has no exposed face but a
+from the tet alone; it is the depth below the nearest exposed face of the tet. If the tet has no exposed face but a
 corner on the surface, it is the depth below the nearest of all its faces. The depth is at most the distance from a
 corner on the surface. In a tet without a corner on the surface the node is deeper than the outermost layer of tets. If
 that layer was compressed to nearly zero thickness, the nearest exposed faces of the body determine the depth. A node on
 an edge between two corners on the surface counts as touching, because a tet with an edge on the surface may have no
-exposed face there. Such edges may run through a plate that is one tet thick. Nodes of the surface and separated nodes
+exposed face there; such edges may run through a plate that is one tet thick. Nodes of the surface and separated nodes
 are tested against the tets of all ranks, so that the result does not depend on the partition.
 """
 
@@ -33,7 +33,7 @@ _WORDS = 5
 _AT_ONCE = 1 << 14
 """Number of pairs of a node and a tet that are tested together. The number limits the size of temporary arrays."""
 _ROUNDING = 1e-9
-"""Tolerance of the volume coordinates. Within this tolerance a node on the face between two tets counts as being in
+"""Tolerance of the volume coordinates; within this tolerance a node on the face between two tets counts as being in
 each of them."""
 DEEP = 0.25
 """Ratio of the depth to the typical size of a face, above which a warning is given. Chosen value: about half of the
@@ -114,7 +114,7 @@ def look(contact: Contact, model: Model, labels: list[Ints] | None, comm: Comm) 
 
 
 def _may(contact: Contact) -> Flags:
-    """(parts, parts) pairs of parts that are tested. These are the pairs that may be in contact, and each part of such
+    """(parts, parts) pairs of parts that are tested; these are the pairs that may be in contact, and each part of such
     a pair with its own nodes without tets.
     """
     meet = ~np.isnan(contact.searches.mu)
@@ -184,7 +184,7 @@ def _exposed(block: Block, contact: Contact) -> Flags:
 
 
 def _open(block: Block, contact: Contact, outer: Flags) -> Flags:
-    """(n, 4) whether each face of a tet is used for depths. These are the faces that are ``_exposed``; in a tet without
+    """(n, 4) whether each face of a tet is used for depths; these are the faces that are ``_exposed``; in a tet without
     such a face but with a corner on the surface, all faces are used."""
     opened = _exposed(block, contact)
     touching = np.asarray(outer[block.tets].any(axis=1))
@@ -193,7 +193,7 @@ def _open(block: Block, contact: Contact, outer: Flags) -> Flags:
 
 def _depths(points: Floats, corners: Floats, opened: Flags, outer: Flags) -> Floats:
     """(p,) depth of points (p, 3) in tets (p, 4, 3), m. The depth is the distance from the nearest ``opened`` face (p,
-    4) or from the nearest corner on the surface, ``outer`` (p, 4). It is infinite if the tet has neither; it is
+    4) or from the nearest corner on the surface, ``outer`` (p, 4); it is infinite if the tet has neither; it is
     negative outside of the tet and in a tet without volume.
     """
     edges = corners[:, 1:] - corners[:, :1]

@@ -207,7 +207,7 @@ def _inward(corners: Floats) -> Floats:
 def _clear(normals: Floats, ways: Floats) -> Flags:
     """(f,) whether a node lies on each plane, because no tet of the node reaches behind the plane. The planes go
     through the node and have the unit ``normals`` (f, 3); ``ways`` (w, 3): vectors from the node to the corners of its
-    tets. The test holds for any mean normal of the node. It is needed because a corner at the rim of two slanted sides
+    tets. The test holds for any mean normal of the node; it is needed because a corner at the rim of two slanted sides
     may face neither side.
     """
     return np.asarray((normals @ ways.T).min(axis=1) >= -_ROUNDING * np.linalg.norm(ways, axis=1).max())

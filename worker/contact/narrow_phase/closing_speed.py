@@ -1,4 +1,4 @@
-"""Closing speed of active contacts. It bounds the next time step, because no node may pass more than a fixed fraction
+"""Closing speed of active contacts; it bounds the next time step, because no node may pass more than a fixed fraction
 of a tet in one step.
 """
 
@@ -24,7 +24,7 @@ def bound(box, row, v, first, stop):  # type: ignore[no-untyped-def]
 
 @njit("float64(float64[:, ::1], int64)", cache=True)
 def spread(boxes, many):  # type: ignore[no-untyped-def]
-    """Upper bound of the difference of any two velocities in the first ``many`` of ``boxes`` (k, 6), m/s. It is the
+    """Upper bound of the difference of any two velocities in the first ``many`` of ``boxes`` (k, 6), m/s; it is the
     diagonal of the box that contains these boxes (``bound``).
     """
     square = 0.0

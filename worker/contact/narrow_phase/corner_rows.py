@@ -10,7 +10,7 @@ limit for sharp edges."""
 MANY = 64
 """Number of corners in one block of rows. A block has 10 kB, which fit into the first-level cache."""
 WORD = 8
-"""Number of flags in a word. It is the number of float64 in the longest vector register."""
+"""Number of flags in a word; it is the number of float64 in the longest vector register."""
 CORNER, TO_F, TO_G, INWARD = (MANY * row for row in (0, 3, 6, 9))
 """First rows of three vectors with three components, and of the position of the corner: the vectors from the corner to
 the other two nodes of the side, clockwise seen from outside; the inward normal of the side."""

@@ -56,7 +56,7 @@ class Cracks:
     families: Families
     """Families of all local nodes. A family is all copies of one original node."""
     _corners: dict[int, Corners] = field(default_factory=dict)
-    """Corners of the narrow sides, keyed by block. They are kept until cracks or families change."""
+    """Corners of the narrow sides, keyed by block; they are kept until cracks or families change."""
     _rooms: Rooms = field(default_factory=lambda: Rooms(*_COLUMNS), init=False, repr=False)
 
     @classmethod

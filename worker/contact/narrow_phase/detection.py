@@ -37,7 +37,7 @@ _FACES, _EDGES, _CRACKS, _CORNERS = 0, 1, 2, 3
 separate number for contacts at corners."""
 _JOIN = 0.6
 """Fraction of the distance from its line at which a slot must be registered again. In a step in which a rank must
-register slots, all other ranks register their slots beyond this fraction. With this rule ranks register in the same
+register slots, all other ranks register their slots beyond this fraction; with this rule ranks register in the same
 steps and wait for each other less often. The answer does not depend on this fraction."""
 
 _NONE: Ints = np.zeros(0, np.int64)

@@ -13,7 +13,7 @@ from .tables import CONTACT_ROWS, DEEP, DEEP_SELF, EDGES, NEAR, PAIRS, STEP, bon
 
 _PARALLEL = 1e-3
 """Sine of the smallest angle between two edges in edge-edge contact. At smaller angles only nodes and faces are in
-contact, and two nearly parallel ridges could penetrate by this fraction of the length of an edge. At this angle the
+contact, and two nearly parallel ridges could penetrate by this fraction of the length of an edge; at this angle the
 crossing point is accurate to 1e-10 of the length of an edge."""
 _END = 1e-4
 """Fraction of the length of an edge, at each end, in which the edge has no edge-edge contact, because the node at the
@@ -25,7 +25,7 @@ _FLUSH = 0.05
 two faces. If two faces lie on each other, their edges cross with normals slightly outside of this sector. Chosen value,
 by tests of fragments that are pressed together (docs/theory/contact.md, "Face on face")."""
 _ROUND = 0.01
-"""Tolerance for round-off, as a fraction of the length of an edge. It is added to the distance of contact."""
+"""Tolerance for round-off, as a fraction of the length of an edge; it is added to the distance of contact."""
 _WORTH = 0.02
 """Smallest slack, as a fraction of the length of an edge, for which a pair is deactivated. A pair with less slack is
 tested in every step, which takes less time than the computation of its slack."""
@@ -102,7 +102,7 @@ def _fastest(course, a, b, c, d):  # type: ignore[no-untyped-def]
 
 @njit(f"float64({VECTOR}, {VECTOR}, {VECTOR}, float64, float64)", cache=True, error_model="numpy")
 def beyond_ends(u, w, r, s, t):  # type: ignore[no-untyped-def]
-    """Returns a bound of the motion of the ends of edge u relative to the ends of edge w, m. Up to this motion the
+    """Returns a bound of the motion of the ends of edge u relative to the ends of edge w, m; up to this motion the
     edges cross beyond an end of u or w. The result is 0 if they cross within both edges. Now they cross at ``s`` of u
     and ``t`` of w; ``r``: vector from the beginning of u to the beginning of w.
 
@@ -130,7 +130,7 @@ def beyond_ends(u, w, r, s, t):  # type: ignore[no-untyped-def]
 
 @njit(types.float64(types.float64[:, :], EDGES, types.int64), cache=True, error_model="numpy")
 def _deep(x, edges, e):  # type: ignore[no-untyped-def]
-    """Greatest depth of a contact of edge e, m. It is at most DEEP times the lowest height of the tets of the faces of
+    """Greatest depth of a contact of edge e, m; it is at most DEEP times the lowest height of the tets of the faces of
     the edge.
     """
     least = DEEP_SELF * edges.size[e]

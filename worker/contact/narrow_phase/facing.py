@@ -1,4 +1,4 @@
-"""Tests that determine on which side of a body a node is. The tests use the orientation of nodes to faces. They also
+"""Tests that determine on which side of a body a node is. The tests use the orientation of nodes to faces; they also
 treat nodes beside a convex edge, and nodes in front of another face at the edge (docs/theory/contact.md, "Which point"
 and "Beside a free edge").
 """
@@ -36,7 +36,7 @@ _BEHIND = 0.1
 neighbouring face. If the sum is above this value, the common edge is convex. The chosen value is below the sum for an
 angle of 25 degrees between the faces, and above round-off."""
 _OVER = 0.1
-"""Smallest component along a face of the mean direction from a node to the midpoints of its own faces. Above this value
+"""Smallest component along a face of the mean direction from a node to the midpoints of its own faces; above this value
 the faces of the node reach over that face. The faces of a blunt edge have a component below this value. Chosen value: a
 third of the component for the corner of a cube."""
 _F, _VECTOR = types.float64, types.UniTuple(types.float64, 3)  # type: ignore[no-untyped-call]
@@ -46,7 +46,7 @@ _F, _VECTOR = types.float64, types.UniTuple(types.float64, 3)  # type: ignore[no
 def facing(normals, s, m):  # type: ignore[no-untyped-def]
     """Returns two angle measures, as differences of cosines, by which the normal m must turn until a condition is
     satisfied: until node s faces a face with this normal (FACING); and until node s or one of its own faces faces that
-    face (_SOME). A measure is at most 0 if its condition is satisfied already. It is -1 for a node without faces,
+    face (_SOME). A measure is at most 0 if its condition is satisfied already; it is -1 for a node without faces,
     because such a node faces any face.
     """
     mean, square, length, rise = 0.0, 0.0, 0.0, 0.0

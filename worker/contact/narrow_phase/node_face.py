@@ -14,7 +14,7 @@ from .facing import RIM, TOUCHING, facing, in_front, outside, plane, reaches_ove
 from .tables import CONTACT_ROWS, DEEP, DEEP_SELF, FACES, NEAR, PAIRS, SLOTS, STEP, bonded, needed
 
 _ROUND = 0.01
-"""Tolerance for round-off, as a fraction of the size of a face. It is added to the distance of contact."""
+"""Tolerance for round-off, as a fraction of the size of a face; it is added to the distance of contact."""
 _WORTH = 0.02
 """Smallest slack, as a fraction of the size of a face, for which a pair is deactivated. A pair with less slack is
 tested in every step, which takes less time than the computation of its slack."""

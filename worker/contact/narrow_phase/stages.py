@@ -1,4 +1,4 @@
-"""Stages of the narrow phase: kernels over slots, faces, edges, cracks, pairs and contacts. Their tables are in
+"""Stages of the narrow phase: kernels over slots, faces, edges, cracks, pairs and contacts; their tables are in
 layout.py.
 
 Each task writes its rows from its own offset on, and writes the number of its rows to its element of the sums. Kernels

@@ -68,7 +68,7 @@ class ContactRows(NamedTuple):
 
 
 class StepRoom(Scratch):
-    """Working arrays of a step. They are reused for many steps, because the operating system must clear new pages of
+    """Working arrays of a step; they are reused for many steps, because the operating system must clear new pages of
     memory. Tables of arguments stay valid while the number of slots does not change.
     """
 
@@ -99,7 +99,7 @@ class Step(NamedTuple):
     """State of the slots (contact nodes) in the present step."""
 
     x: Floats
-    """(slots, 3) positions at the beginning of the step, m. They are in one cache line with ``ahead``."""
+    """(slots, 3) positions at the beginning of the step, m; they are in one cache line with ``ahead``."""
     v: Floats
     """(slots, 3) velocities without contact, m/s."""
     ahead: Floats

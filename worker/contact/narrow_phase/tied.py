@@ -21,7 +21,7 @@ class Ties(Protocol):
 
 
 class Tied:
-    """Tied bonds of the slots of a scene. They are updated when the bonds or the slots change."""
+    """Tied bonds of the slots of a scene; they are updated when the bonds or the slots change."""
 
     def __init__(self, bonds: Ties) -> None:
         self._bonds, self._ids, self._version, self._found = bonds, NOTHING, -1, NOTHING

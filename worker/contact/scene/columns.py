@@ -63,7 +63,7 @@ class SceneSlots:
     """Columns with one value for each slot."""
 
     owned: Flags
-    """(slots,) whether each node is a surface node that this rank owns. This rank computes the contacts of such nodes
+    """(slots,) whether each node is a surface node that this rank owns; this rank computes the contacts of such nodes
     with faces."""
     pushes: Flags
     """(slots,) whether a contact of this rank may apply an impulse to each node."""
@@ -74,7 +74,7 @@ class SceneSlots:
     fresh: Flags
     """(slots,) whether the pairs of each node must be tested because its mean normals have changed."""
     tracked: Flags
-    """(slots,) whether the motion of each node is measured. It is measured for nodes in the broad phase, and for nodes
+    """(slots,) whether the motion of each node is measured; it is measured for nodes in the broad phase, and for nodes
     of faces and edges in the broad phase."""
     on_surface: Flags
     """(slots,) whether each node is a local node on the surface. Only these nodes are in contact with faces."""

@@ -72,7 +72,7 @@ def members(used: Ints, owners: Indices, holders: list[Neighbour], nodes: Nodes,
     """Returns, for every other rank, the ids, ascending, of the nodes for which the two ranks need the sum of impulses.
 
     ``used`` (k,): ids of the nodes to which contacts of this rank may apply impulses; ``owners`` (k,): owners of these
-    nodes; ``holders``: shared nodes. The owner of a node collects the ranks with such contacts. It sends the list of
+    nodes; ``holders``: shared nodes. The owner of a node collects the ranks with such contacts; it sends the list of
     these ranks to all ranks in the list, and to all ranks that have the node.
     """
     pushed, rows = np.zeros(nodes.n, bool), [used[:0]]

@@ -1,4 +1,4 @@
-"""Table from corners to faces and edges. With this table the rows of a scene that a node separation can change are
+"""Table from corners to faces and edges; with this table the rows of a scene that a node separation can change are
 found without a pass over the whole scene.
 
 The rows of faces and edges of a scene do not change between two searches. When nodes separate, corners are replaced by

@@ -19,7 +19,7 @@ Chosen values: a task takes 10 to 20 us, compared with 2 us to start a parallel 
 _AHEAD = 16
 """Distance, in nodes, by which data of nodes are prefetched."""
 _SPARSE = 32
-"""Largest ratio of the largest id to the number of wanted ids for which a table of all ids is used. Above this ratio
+"""Largest ratio of the largest id to the number of wanted ids for which a table of all ids is used; above this ratio
 the ids are found by bisection, because the table takes longer to fill (model/ids.py)."""
 _I, _I1, _B1, _U2, _F2, _N1, _N2 = (
     types.int64, types.int64[::1], types.boolean[::1], types.uint8[:, ::1], types.float64[:, ::1], types.int32[::1],

@@ -98,7 +98,7 @@ class Scene:
             messages.copies.take(sends, receives)
 
     def store_before(self, nodes: Nodes) -> None:
-        """Stores v(n-1/2). Must be called before the kick."""
+        """Stores v(n-1/2). This function must be called before the kick."""
         own = self.own
         self.passes.store.run(len(own.local), self.slots.before, nodes.v, own.slots, own.local)
         self.messages.copies.note(nodes)

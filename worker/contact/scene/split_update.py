@@ -226,7 +226,7 @@ def _renew(mobility, place, family, here):  # type: ignore[no-untyped-def]
 
 @njit("void(int32[:, ::1], boolean[::1], int64[::1], int32[:, ::1], int32[:, :, ::1], int32[::1])", cache=True)
 def _place(places, pushes, rows, nodes, sides, place):  # type: ignore[no-untyped-def]
-    """Finds the slots of the nodes of those cracks ``rows`` that this rank computes. These cracks have separated nodes,
+    """Finds the slots of the nodes of those cracks ``rows`` that this rank computes; these cracks have separated nodes,
     and their first side is on this rank. Flags the separated nodes in ``pushes``.
     """
     for c in rows:

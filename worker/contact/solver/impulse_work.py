@@ -1,4 +1,4 @@
-"""Work of the contact impulses of a step. It is computed for the normal impulses, for friction, and for the supports of
+"""Work of the contact impulses of a step; it is computed for the normal impulses, for friction, and for the supports of
 held nodes.
 """
 

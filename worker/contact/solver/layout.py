@@ -1,7 +1,7 @@
 """Tables of the solver, under one handle for all stages of a step (parallel/arguments.py), and the numbers that the
 stages share.
 
-A table is set by the owner of its arrays. It changes only if one of its arrays is replaced.
+A table is set by the owner of its arrays; it changes only if one of its arrays is replaced.
 """
 
 import numpy as np

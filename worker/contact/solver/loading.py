@@ -1,7 +1,7 @@
 """Selection of the contacts that are swept. A contact is loaded if it has needed an impulse in the step; all other
 contacts are idle.
 
-An idle contact closes more slowly than allowed. It needs no new test until sweeps have changed the velocities of its
+An idle contact closes more slowly than allowed; it needs no new test until sweeps have changed the velocities of its
 nodes by more than a margin, its ``reach``. The reach of loaded contacts is infinite. The data of loaded contacts are
 contiguous in memory.
 """

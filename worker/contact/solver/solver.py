@@ -39,8 +39,8 @@ class Bodies(Protocol):
         """Finds the slots that belong to rigid bodies."""
 
     def weigh(self, active: ActiveNodes) -> None:
-        """Sets the row weights of the slots of rigid bodies. Must be called after all contacts have added their row
-        weights. Collective.
+        """Sets the row weights of the slots of rigid bodies. This function must be called after all contacts have added
+        their row weights. Collective.
         """
 
     def give(self, active: ActiveNodes) -> None:
@@ -75,7 +75,9 @@ class ActiveSet:
         self._stored = True
 
     def go_on(self, scale: float, sides: Floats) -> None:
-        """Sets the scale, and the ``sides`` of the stops. Must be called after a restart or a repartition."""
+        """Sets the scale, and the ``sides`` of the stops. This function must be called after a restart or a
+        repartition.
+        """
         self.scale, self._stored = scale, True
         self.stops = self.stops._replace(sides=sides.reshape(self.stops.sides.shape))
 

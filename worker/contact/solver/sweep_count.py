@@ -1,4 +1,4 @@
-"""Number of sweeps in a step. It is adapted to the residual of the previous step."""
+"""Number of sweeps in a step; it is adapted to the residual of the previous step."""
 
 import numpy as np
 
@@ -19,7 +19,7 @@ _WARNED = 2.0
 
 
 class SweepCount:
-    """Number of sweeps. It is determined by integer sums over all nodes, so it is equal for any number of ranks."""
+    """Number of sweeps; it is determined by integer sums over all nodes, so it is equal for any number of ranks."""
 
     def __init__(self, bounds: Sweeps) -> None:
         self._bounds = bounds

@@ -27,7 +27,7 @@ and its nodes."""
 
 
 class Exposure(NamedTuple):
-    """Faces that the erosion of tets of all ranks exposes. They are given by ids, ascending."""
+    """Faces that the erosion of tets of all ranks exposes; they are given by ids, ascending."""
 
     gone: Ints
     """Ids of the faces of the eroded tets."""

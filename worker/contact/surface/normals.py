@@ -26,7 +26,7 @@ EVERY = 16
 COLUMNS, SHARE = 12, 18
 """Number of sums at a node; and number of words that a face contributes to the sums of its three nodes."""
 _NOTHING = 1e-300
-"""Smallest area, m^2. It prevents a division by zero for a degenerate face."""
+"""Smallest area, m^2; it prevents a division by zero for a degenerate face."""
 _I2, _F2, _N1, _N2 = types.int64[:, ::1], types.float64[:, ::1], types.int32[::1], types.int32[:, ::1]
 _EXPOSED = (
     _I2, _F2, types.uint32[:, ::1], _N2, types.uint8[:, ::1], types.boolean[:, ::1], types.float64,

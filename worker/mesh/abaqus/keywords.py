@@ -43,7 +43,7 @@ REFUSED = _words(
     SUBSTRUCTURELOADCASE SYMMETRICMODELGENERATION SYMMETRICRESULTSTRANSFER SYSTEM
     """
 )
-"""Keywords that make, move or copy nodes and elements, or change their numbers. These keywords are not supported."""
+"""Keywords that make, move or copy nodes and elements, or change their numbers; these keywords are not supported."""
 
 ANALYSIS = _words(
     """
@@ -167,8 +167,8 @@ JOINING = {
         "TIE",
     )
 }
-"""Keywords of ``ANALYSIS``, in full, that join, hold, crack or remove bodies, or move nodes of bodies to each other.
-These keywords have no effect on the mesh."""
+"""Keywords of ``ANALYSIS``, in full, that join, hold, crack or remove bodies, or move nodes of bodies to each other;
+these keywords have no effect on the mesh."""
 
 
 def known(block: Block, in_step: bool = False) -> str:

@@ -24,7 +24,7 @@ _NONE = np.zeros(0, np.int64)
 def named_sets(model: Placed) -> tuple[list[Named], list[str]]:
     """Return the sets, and remarks on the sets that are not read.
 
-    The set ``CLAMP`` of the part ``Bar`` has the name ``Bar.CLAMP``, or ``Bar-1.CLAMP`` in an instance. It also has the
+    The set ``CLAMP`` of the part ``Bar`` has the name ``Bar.CLAMP``, or ``Bar-1.CLAMP`` in an instance; it also has the
     name ``CLAMP`` if the assembly has no set of this name.
     """
     remarks, lost = nodes_of_elements(model.deck), dict[str, Ids]()

@@ -19,11 +19,11 @@ REFUSED = (
     "NODE_TRANSFORM", "NODE_MERGE", "NODE_REFLECT", "PART_DUPLICATE", "PART_MOVE", "PART_STACKED", "ELEMENT_GENERATE",
     "ELEMENT_SOLID", "ELEMENT_BLANKING", "STRUCTURED_MESH", "ALE_STRUCTURED_MESH", "MESH", "IGA",
 )  # fmt: skip
-"""Beginnings of the keywords that make, move or join nodes and elements. These keywords are not supported."""
+"""Beginnings of the keywords that make, move or join nodes and elements; these keywords are not supported."""
 VOLUMES = ("ELEMENT_TSHELL", "ELEMENT_SPH", "ELEMENT_LANCING")
 """Keywords of volume elements or particles that are not read."""
 JOINING = ("CONSTRAINED", "CONTACT", "RIGIDWALL", "RIGID", "ELEMENT_MASS", "ELEMENT_INERTIA")
-"""Beginnings of the keywords that join or hold bodies, or give them mass. These keywords have no effect on the mesh."""
+"""Beginnings of the keywords that join or hold bodies, or give them mass; these keywords have no effect on the mesh."""
 FAMILIES = _words(
     """
     AIRBAG ALE BATTERY BOUNDARY CASE CHEMISTRY CESE COMMENT COMPONENT CONSTRAINED CONTACT CONTROL CPM DAMPING DATABASE

@@ -1,4 +1,4 @@
-"""Solids of one body that touch in edges or points only. These solids have common nodes there, and such a joint carries
+"""Solids of one body that touch in edges or points only; these solids have common nodes there, and such a joint carries
 no moment.
 """
 

@@ -10,7 +10,7 @@ from .frame import Frame
 from .sliding import Cut
 
 GMSH_SIZE = 0.87
-"""Size given to gmsh, divided by ``element_size``. In a cube of this size HXT makes 4 tets. With this factor it makes 6
+"""Size given to gmsh, divided by ``element_size``. In a cube of this size HXT makes 4 tets; with this factor it makes 6
 tets in element_size^3, as the structured generator does, and the mean edge is 1.15 element_size."""
 _FINEST = 400
 """Largest number of points of a face, in each direction, from which distances are measured. With the chosen value gmsh

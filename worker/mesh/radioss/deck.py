@@ -25,10 +25,10 @@ VOLUMES = ("SHEL16", "SPHCEL", "QUAD", "TRIA")
 PLATES = ("SHELL", "SH3N", "BEAM", "TRUSS", "SPRING", "XELEM", "RIVET")
 """Keywords of elements without volume."""
 REFUSED = ("TRANSFORM", "CNODE", "MERGE", "SUBMODEL", "ADMESH", "MADYMO", "XREF", "REFSTA", "EREF", "INISTA")
-"""Keywords that make, move or join nodes and elements, or read their state from a file. These keywords are not
+"""Keywords that make, move or join nodes and elements, or read their state from a file; these keywords are not
 supported."""
 JOINING = ("INTER", "RBODY", "RBE2", "RBE3", "RWALL", "RLINK", "MPC", "GJOINT", "CYL_JOINT", "BCS", "ADMAS", "LAG_MUL")
-"""Keywords that join or hold bodies, or give them mass. These keywords have no effect on the mesh."""
+"""Keywords that join or hold bodies, or give them mass; these keywords have no effect on the mesh."""
 GROUPS = ("GRNOD", "SURF")
 """First words of the keywords of groups of nodes and of surfaces."""
 FAMILIES = _words(
