@@ -13,7 +13,7 @@ error. Chosen value: a run with a million times as many steps would never end.""
 
 STARVED = 1e-3
 """Ratio of the stable step to the first stable step below which a warning is given. With such a step the rest of the
-run would take a thousand times as many steps. Chosen value: dust and penetration reduce the stable step to a hundredth,
+run would take a thousand times as many steps; chosen value: dust and penetration reduce the stable step to a hundredth,
 which needs no warning."""
 
 SLOWED = 0.1

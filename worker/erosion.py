@@ -3,7 +3,7 @@ the removed energy and momentum.
 
 A tet is marked in the pass over the elements (elements/wear.py); at this time its force of n+1 is already in the nodal
 sums. The tet is removed before the contact of the next step, so that this contact includes the exposed faces of its
-neighbours. The last force of a removed tet acts in one more velocity update. Therefore the second half of the work of
+neighbours; the last force of a removed tet acts in one more velocity update. Therefore the second half of the work of
 this force is added one step later, as for a boundary. Tets that exceed only a strain or damage limit are collected for
 some steps, because each removal requires new mean normals. If a part has ``erosion.nodes = "strike"``, nodes of the
 part without tets that got a contact impulse are collected in the same steps.
@@ -28,7 +28,7 @@ from .parallel.ownership import Neighbour, complete
 from .parallel.tags import Tag
 
 GATHERED = 10
-"""Number of steps for which marked tets are collected before they are removed together. Chosen value: it is above 1,
+"""Number of steps for which marked tets are collected before they are removed together; chosen value: it is above 1,
 because each removal requires new mean normals and tests of all candidate pairs."""
 UNDECIDED = 0.25
 """Ratio of the largest damage to ``erosion.damage`` above which a warning reports that no tet was removed. Chosen

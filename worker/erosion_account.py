@@ -69,7 +69,7 @@ class ErosionAccount:
         self.work.add(_energies(block, worn))
 
     def add_nodes(self, state: Nodes, leaving: Ints, before: Floats) -> None:
-        """Adds energy and momentum of the nodes ``leaving`` after the kick, and sets their forces to zero. ``before``:
+        """Adds energy and momentum of the nodes ``leaving`` after the kick, and sets their forces to zero; ``before``:
         velocities v(n-1/2) of these nodes.
         """
         owned = leaving[state.owned[leaving]]

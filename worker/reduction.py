@@ -28,7 +28,7 @@ class Fields:
     def __init__(self) -> None:
         """Sets all fields to zero, which means no limit and no request."""
         self.limit = 0.0
-        """Largest value of 1 / stable step of all tets, 1/s. The value is NaN if some tet is inverted or has a value
+        """Largest value of 1 / stable step of all tets, 1/s; the value is NaN if some tet is inverted or has a value
         that is not a number."""
         self.force = 0.0
         """Largest contribution to a nodal force, N."""

@@ -11,7 +11,7 @@ from .model.state import Model
 from .parallel.comm import Comm
 
 _SMALLEST_STRAIN = 1e-12
-"""Smallest strain that the force quantum must resolve in the nodal forces. Chosen value: in steel, the stress at this
+"""Smallest strain that the force quantum must resolve in the nodal forces; chosen value: in steel, the stress at this
 strain is 0.2 Pa."""
 
 
@@ -29,7 +29,7 @@ def extremes(model: Model, comm: Comm) -> tuple[float, float, float]:
 
 
 def force_floor(model: Model, comm: Comm) -> float:
-    """Returns the nodal force of the largest tet at the strain _SMALLEST_STRAIN, N. The force quantum is refined down
+    """Returns the nodal force of the largest tet at the strain _SMALLEST_STRAIN, N; the force quantum is refined down
     to this force.
 
     Collective.

@@ -54,7 +54,7 @@ from .stretch_numbers import (
 )
 
 _POLL = 0.05
-"""Largest wall time of a program, s. With the chosen value the answer to a signal comes after a time that no user
+"""Largest wall time of a program, s; with the chosen value the answer to a signal comes after a time that no user
 notices."""
 _SHORT, _PAUSE = 4, 16
 """A program is begun only if no output is scheduled within _SHORT steps. After an event in a program of fewer steps,

@@ -1,7 +1,7 @@
 """The energy ledger (energy balance). Every energy is in exactly one term, and the residual shows the error of the sum
 of all terms.
 
-Kinetic energy is the form that the leapfrog step conserves together with the trapezoidal work of the forces. For equal
+Kinetic energy is the form that the leapfrog step conserves together with the trapezoidal work of the forces; for equal
 steps this form is 1/2 m v(n-1/2) . v(n+1/2). With the steps dt- before n and dt+ after n, seen from before n, the form
 is 1/2 m v(n-1/2) . v(n+1/2) + 1/4 (dt- - dt+) v(n-1/2) . f(n). Seen from after n the form is less by 1/4 (dt- - dt+)
 f(n) . (v(n-1/2) - v(n+1/2)). The energy that unequal steps create is an error of the method, and is added for each node

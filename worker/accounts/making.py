@@ -28,10 +28,10 @@ LASTING = ("plastic", "viscous", "friction", "fracture")
 RETURNED = ("contact", "averaging", "eroded", "cohesive")
 STEPPING = "stepping"
 WARNED = 0.01
-"""Energy that a term may create without a warning, divided by the largest energy. The chosen value is the usual
+"""Energy that a term may create without a warning, divided by the largest energy; the chosen value is the usual
 accuracy of reference values."""
 STRAIN = 1e-10
-"""Volume strain of the whole model. Energies below the energy of this strain count as round-off: positions are rounded
+"""Volume strain of the whole model; energies below the energy of this strain count as round-off: positions are rounded
 to some 1e-16 of a coordinate, so strains are rounded to 1e-15, and the energy of this strain has a relative error of
 1e-5."""
 

@@ -130,7 +130,7 @@ class Timers:
 
     def divide(self, inside: dict[str, float], outside: dict[str, float]) -> None:
         """End the present phase, in which a program of several phases ran, and divide its time among these phases.
-        ``inside``, ``outside``: wall time of the program in and outside of parallel regions, s, keyed by phase. The
+        ``inside``, ``outside``: wall time of the program in and outside of parallel regions, s, keyed by phase; the
         rest of the time belongs to the present phase.
         """
         cpu, wall, spent = cpu_time(), wall_time(), self.spent

@@ -34,10 +34,10 @@ from .rows import assembled
 _NEAR = 10.0
 """Factor of the largest bonded distance; below this distance, nodes that are not tied are counted in a warning."""
 _COVERED = 0.95
-"""Smallest covered fraction of the area of a tied face at which the face counts as covered. Chosen value: between
+"""Smallest covered fraction of the area of a tied face at which the face counts as covered; chosen value: between
 curved surfaces, whose faces are not parallel, gaps and overlaps of 1 or 2 % of the area occur."""
 _LEAST = 1e-9
-"""Smallest ratio of a common area to the area of the tied face. Smaller common areas are ignored."""
+"""Smallest ratio of a common area to the area of the tied face; smaller common areas are ignored."""
 _ON = 1e-6
 """Tolerance of the area coordinates. A node that is outside of a face by less than the tolerance counts as lying on the
 face."""
@@ -210,7 +210,7 @@ def _dual(own: Floats, lumped: Floats) -> Floats:
 
 
 def _collocate(weights: Floats, cut: _Cut, some: Flags, lumped: Floats) -> None:
-    """Sets the weights on tied faces that are covered in part. The weights of a corner are those in the piece in which
+    """Sets the weights on tied faces that are covered in part; the weights of a corner are those in the piece in which
     the corner lies deepest.
     """
     rows = np.flatnonzero(some)

@@ -21,7 +21,7 @@ from .records import BREAKS, KEPT, NORMAL, STATE, TiedNodes, TiedRows
 from .rows import Rows, chain
 
 _SETTLED = 1e-7
-"""Ratio of the residual of the sweeps of a step to the change of the impulses in the step. Chosen value: the energy
+"""Ratio of the residual of the sweeps of a step to the change of the impulses in the step; chosen value: the energy
 dissipated by the bond is then below 1e-9 of the energy transmitted through the bond (docs/theory/bonds.md)."""
 _SLOWEST = 0.02
 """Smallest value that is used as ratio of the smallest to the largest eigenvalue of the tied rows; it gives 60 sweeps.

@@ -31,7 +31,7 @@ class TiedRows(NamedTuple):
     area: Floats
     """(r,) area of the interface that belongs to each row, m^2."""
     inverse: Floats
-    """(r, 3) 1 / bound of the l1 norm of each row, for each axis, kg. The value is 0 for an axis that the row does not
+    """(r, 3) 1 / bound of the l1 norm of each row, for each axis, kg; the value is 0 for an axis that the row does not
     constrain. In a row that may break, the values of all other axes are equal."""
     bond: Indices
     """(r,) index in ``laws`` of the bond of each row."""

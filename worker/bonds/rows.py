@@ -11,7 +11,7 @@ from ..model.state import Flags, Floats, Ints
 from .pieces import Pieces
 
 _NOTHING = 1e-12
-"""Fraction of the area of a row. Smaller weights are treated as round-off."""
+"""Fraction of the area of a row; smaller weights are treated as round-off."""
 
 
 @dataclass

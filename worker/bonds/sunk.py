@@ -1,4 +1,4 @@
-"""Overlap at the start of two parts with a tied bond. Contact does not detect this overlap."""
+"""Overlap at the start of two parts with a tied bond; contact does not detect this overlap."""
 
 from collections.abc import Iterator
 

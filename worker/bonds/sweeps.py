@@ -34,7 +34,7 @@ from .records import (
 _F1 = types.float64[::1]
 _F, _I, _F2, _I2, _N1 = types.float64, types.int64, types.float64[:, ::1], types.int64[:, ::1], types.int32[::1]
 TASK_SIZE = 256
-"""Number of rows or nodes in a task. Chosen value: a task takes about 20 us, compared with 2 us to start a parallel
+"""Number of rows or nodes in a task; chosen value: a task takes about 20 us, compared with 2 us to start a parallel
 region."""
 ACT = ROWS, NODES, _F, _F, _F, _F
 GIVE = ROWS, NODES, _F

@@ -39,7 +39,7 @@ class Boundary(ABC):
     """True if the boundary acts after contact, because contact must not change the velocities that the boundary has
     corrected."""
     mirrors = False
-    """True if all nodes of the boundary lie on one plane in which the body is mirrored. Exposed faces in this plane do
+    """True if all nodes of the boundary lie on one plane in which the body is mirrored; exposed faces in this plane do
     not belong to the surface."""
     on_faces = False
     """True if the boundary acts on faces of tets, not on nodes."""
@@ -235,7 +235,7 @@ class SymmetryPlane(Boundary):
 
 @dataclass(frozen=True)
 class Acts:
-    """Boundaries sorted by their position in the time step. Within a position they have the order in which they act."""
+    """Boundaries sorted by their position in the time step; within a position they have the order in which they act."""
 
     boundaries: int
     """Number of all boundaries."""

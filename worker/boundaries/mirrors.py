@@ -26,8 +26,8 @@ _TOGETHER = 64
 """Number of nodes that are tested together in one loop with vector instructions; they are tested one by one only if at
 least one of them would end beyond the plane."""
 _TURNS = 1000
-"""Largest number of planes that a node without tets may pass in a step. The limit ends the loop if the velocity is
-not finite."""
+"""Largest number of planes that a node without tets may pass in a step; the limit ends the loop if the velocity is not
+finite."""
 
 
 _F, _F1, _F2, _I1 = types.float64, types.float64[::1], types.float64[:, ::1], types.int64[::1]
@@ -59,7 +59,7 @@ class Mirrors(Boundary):
         """Places of the nodes without tets, as indices in the arrays of the boundary."""
         self._reflected: Ints = np.zeros(0, np.int64)
         self._aside = np.zeros((0, 3))
-        """Places of the nodes that are reflected in this step. Also vectors from the new positions of these nodes to
+        """Places of the nodes that are reflected in this step; also vectors from the new positions of these nodes to
         the positions of their images, m."""
         self._takes, self._stops = Arguments(*_TAKE), Arguments(*_STOP)
 

@@ -11,7 +11,7 @@ from .boundaries import KEPT, Boundary, Stopping, free, mirrored
 from .impulses import book
 
 _SWEEPS = 4
-"""Largest number of passes over the walls for each node. Chosen value: two walls at right angles need one pass. The
+"""Largest number of passes over the walls for each node; chosen value: two walls at right angles need one pass. The
 error that remains at a sharper corner is corrected in the next step."""
 ACROSS = 1e-12
 """Smallest squared length of the unit normal of a wall after the components held by symmetry planes are set to zero;
@@ -36,7 +36,7 @@ class RigidWalls(Stopping):
     ) -> None:  # fmt: skip
         """``reports``: whether ``since_last_report`` will be called."""
         self._pushed = np.zeros((1, _PADDED))
-        """(threads, 8) table in which column 0 is the time of the last impulse that each thread applied, s. The other
+        """(threads, 8) table in which column 0 is the time of the last impulse that each thread applied, s; the other
         columns are padding."""
         super().__init__(nodes, len(points), reports=reports)
         self._friction = np.zeros(len(points)) if friction is None else friction

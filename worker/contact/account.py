@@ -1,4 +1,4 @@
-"""Account of the energy that contact has taken from the bodies. When contact corrects penetrations, it may return at
+"""Account of the energy that contact has taken from the bodies; when contact corrects penetrations, it may return at
 most this energy to the bodies.
 """
 

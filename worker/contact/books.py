@@ -18,7 +18,7 @@ from .scene.scene import Scene
 from .solver.impulse_work import book
 
 _SLOTS = 2048
-"""Number of slots in a task. Chosen value: a task takes some 20 us, compared with 2 us to start a parallel region."""
+"""Number of slots in a task; chosen value: a task takes some 20 us, compared with 2 us to start a parallel region."""
 _F1, _F2, _N1 = types.float64[::1], types.float64[:, ::1], types.int32[::1]
 _BOOK = _F1, _F1, _N1, _N1, _F2, types.int64[:, ::1], _F2, types.float64
 _read = reader(*_BOOK)
@@ -33,7 +33,7 @@ def _book(table, first, stop, thread):  # type: ignore[no-untyped-def]
 
 class Books:
     """Sums of the energies and impulses of contact. Half of the work of an impulse, computed with v(n-1/2), is added in
-    the step that applies the impulse. The other half, computed with v(n+1/2), is added in the next step.
+    the step that applies the impulse; the other half, computed with v(n+1/2), is added in the next step.
     """
 
     def __init__(self, nodes: Nodes, case: Case, impulse: float, energy: float, team: Team) -> None:

@@ -158,7 +158,7 @@ class Exterior:
             self.surface = self._build(self.surface.flags, self.surface.turned)
 
     def age(self) -> bool:
-        """Admits the edges of all present cracks to edge-edge contact, if the run has edge-edge contact. Returns
+        """Admits the edges of all present cracks to edge-edge contact, if the run has edge-edge contact; returns
         whether a search must add these edges. Collective.
         """
         return self._edges and self.cracks.age(self._comm.sum(self.cracks.ages))

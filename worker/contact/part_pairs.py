@@ -42,7 +42,7 @@ def self_contact(case: Case, mu: Floats) -> Flags:
 
 def lighter(mu: Floats, nodes: Nodes, mobility: Floats, comm: Comm, rigid: Rigid | None = None) -> float:
     """Returns a mass, kg, that bounds contact impulses: the heaviest node of the lighter of two parts, maximum over all
-    pairs in contact. For ``rigid`` bodies the mass is that of the whole body. The result is 0 if there is no pair.
+    pairs in contact. For ``rigid`` bodies the mass is that of the whole body; the result is 0 if there is no pair.
     Collective.
 
     No impulse exceeds this mass times a speed, because the lighter part has no more momentum. A part with a held

@@ -89,7 +89,7 @@ class Contact:
         self.last_push = 0.0
         """Time of the last contact impulse on a node of this rank, s."""
         self._mean_dt = 0.0
-        """Mean time step at the last step with a scene, s. The kick of this step took this time."""
+        """Mean time step at the last step with a scene, s; the kick of this step took this time."""
 
     def keep(self, parcel: Parcel) -> None:
         """Adds the state of contact to the ``parcel`` of a checkpoint or migration message. Candidate pairs are not

@@ -102,7 +102,7 @@ class Averages:
             left = np.delete(left, first)
 
     def of_nodes(self, columns: dict[str, "np.ndarray"]) -> dict[str, "np.ndarray"]:
-        """Returns (nodes, ...) values of ``columns`` (rows, ...). The value of a node is that of one of its materials:
+        """Returns (nodes, ...) values of ``columns`` (rows, ...); the value of a node is that of one of its materials:
         the material of the part that represents the node.
         """
         nodes = self._model.nodes

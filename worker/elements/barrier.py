@@ -20,10 +20,10 @@ from ..model.state import CHUNK
 from .scratch import CHANGE, LIMIT, MODULUS, VOLUME
 
 SQUEEZED = 0.2
-"""Ratio of the volume of a tet to its initial volume below which the barrier acts. Chosen value: the smallest ratio of
+"""Ratio of the volume of a tet to its initial volume below which the barrier acts; chosen value: the smallest ratio of
 tets is 0.56 in Taylor bars, and 0.28 in a long rod without erosion."""
 STIFF = 0.1
-"""Stiffness of the barrier, divided by the bulk modulus. Chosen value: compression to half of SQUEEZED requires a
+"""Stiffness of the barrier, divided by the bulk modulus; chosen value: compression to half of SQUEEZED requires a
 pressure of 10 % of the bulk modulus, which is far more than the yield stress of metals."""
 
 _ROUNDING = 1e-9
@@ -59,7 +59,7 @@ def resist(w, s, params, n):  # type: ignore[no-untyped-def]
     """Adds the barrier pressure to the row VISCOUS, which is recomputed in every step. Adds the work of the barrier to
     the row WORK, and the stiffness of the barrier to the row LIMIT.
 
-    The function for the viscosity has added half of the work of the old row VISCOUS to its own account. The barrier's
+    The function for the viscosity has added half of the work of the old row VISCOUS to its own account; the barrier's
     share in this work is subtracted.
     """
     if not _any_squeezed(w, s, params[DENSITY], n):

@@ -4,7 +4,7 @@ is computed in every step, for a warning (cases/warnings/compression.py).
 A material without a law of compressive failure breaks in tension only and bears any compression. Each stress is
 compared with the criterion of Griffith (1924): the ratio (s1 - s3)^2 / (8 T (s1 + s3)), with the largest principal
 pressure s1, the smallest principal pressure s3 and the tensile strength T. A material of this strength cracks at a
-ratio of 1. The ratio is proportional to the stress. A tension s3 < 0 counts as zero, because the tensile criterion
+ratio of 1; the ratio is proportional to the stress. A tension s3 < 0 counts as zero, because the tensile criterion
 covers tension. The stress is that of the tets at the end of a step, without its viscous part.
 """
 
@@ -31,13 +31,13 @@ _SXX, _SYY, _SZZ = S_XX * CHUNK, S_YY * CHUNK, S_ZZ * CHUNK
 _SYZ, _SZX, _SXY = S_YZ * CHUNK, S_ZX * CHUNK, S_XY * CHUNK
 _P = PRESSURE * CHUNK
 _MOST = 100
-"""Largest number of Newton iterations. Chosen value: in general 6 iterations are enough. If two principal stresses are
+"""Largest number of Newton iterations; chosen value: in general 6 iterations are enough. If two principal stresses are
 nearly equal, each iteration only halves the error, and 30 iterations reduce the error to round-off."""
 _ROUNDING = 1e-15
 """Residual, divided by the cube of the root, at which the Newton iteration ends: a few last bits of a float64. The
 relative error of a double root is then the square root of this value."""
 CHUNKS_OF_A_TASK = 16
-"""Number of chunks in a task. Chosen value: a task takes at least 10 us, compared with 2 us to start a parallel
+"""Number of chunks in a task; chosen value: a task takes at least 10 us, compared with 2 us to start a parallel
 region."""
 _I, _F, _I1, _F1, _F3 = types.int64, types.float64, types.int64[::1], types.float64[::1], types.float64[:, :, ::1]
 _LOOK = _I1, _F1, _F3, _I1, _I, _F, _F
@@ -102,7 +102,7 @@ def _above(s, i, least):  # type: ignore[no-untyped-def]
 
 @njit("int64(float64[::1], int64, float64)", cache=True, error_model="numpy")
 def _not_below(s, n, least):  # type: ignore[no-untyped-def]
-    """Returns the number of the ``n`` tets of a chunk for which ``_below`` is not true. The loop has no branch, so that
+    """Returns the number of the ``n`` tets of a chunk for which ``_below`` is not true; the loop has no branch, so that
     it uses vector instructions.
     """
     some = 0
@@ -195,7 +195,7 @@ class Met:
 
 
 class Crushing:
-    """Largest compression so far in each part of a brittle material that has no law of compressive failure. The stored
+    """Largest compression so far in each part of a brittle material that has no law of compressive failure; the stored
     values are those of this rank; ``keep`` and ``found`` compute the maximum over the ranks.
     """
 

@@ -3,7 +3,7 @@ do not contribute to the nodal means.
 
 The volume of a flat tet is small compared with the volume of its neighbours, so it has little influence on a nodal
 mean. A motion along the altitude of a flat tet hardly strains the neighbours but may reduce its volume to zero; after
-yield no stress resists this motion. With its own pressure the flat tet resists as in the ``standard`` form. The number
+yield no stress resists this motion. With its own pressure the flat tet resists as in the ``standard`` form; the number
 of flat tets is small, so they cause no locking.
 """
 
@@ -22,7 +22,7 @@ from .scratch import CHANGE, MODULUS, SEEN, VOLUME, VOLUME_MID
 
 THINNEST = 0.1
 """Smallest ratio of altitude to longest edge of a tet whose volume strain is averaged; a tet with a smaller ratio is
-flat. The ratio of a regular tet is 0.82. Chosen value: at this ratio a motion that strains the neighbours by a tenth
+flat. The ratio of a regular tet is 0.82; chosen value: at this ratio a motion that strains the neighbours by a tenth
 reduces the volume of the tet to zero (docs/theory/elements.md)."""
 
 _HEAT, _NODAL_WORK, _MASS, _GROWN = HEAT * CHUNK, NODAL_WORK * CHUNK, MASS * CHUNK, DILATION * CHUNK

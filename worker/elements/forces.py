@@ -33,7 +33,7 @@ def _whole(x):  # type: ignore[no-untyped-def]
 
 @njit("UniTuple(int64, 3)(float64, float64, float64, float64)", cache=True, error_model="numpy")
 def quanta(a, b, c, scale):  # type: ignore[no-untyped-def]
-    """Returns three numbers in quanta of 1 / ``scale``, rounded to the nearest integer. The result is undefined for
+    """Returns three numbers in quanta of 1 / ``scale``, rounded to the nearest integer; the result is undefined for
     numbers above fixed_point.CONTRIBUTION_BITS."""
     return _whole(a * scale), _whole(b * scale), _whole(c * scale)
 

@@ -41,7 +41,7 @@ class FlagExchange(Protocol):
     """Flags for the neighbour ranks. The flags are sent together with the forces of shared nodes."""
 
     def words(self, hot: bool) -> Ints:
-        """(neighbours,) flags to send, computed after the tets of shared nodes. ``hot``: whether a face of these tets
+        """(neighbours,) flags to send, computed after the tets of shared nodes; ``hot``: whether a face of these tets
         is overstressed.
         """
 
@@ -86,7 +86,7 @@ class Elements:
 
     @property
     def limit(self) -> float:
-        """The largest 1 / stable step of this rank's tets, 1/s. The value is NaN if a tet is inverted or has a value
+        """The largest 1 / stable step of this rank's tets, 1/s; the value is NaN if a tet is inverted or has a value
         that is not a number.
         """
         return self._reals[records.LARGEST_LIMIT]

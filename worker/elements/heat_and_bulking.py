@@ -80,7 +80,7 @@ def scatter_bulking(sums, w, s, params, weight, tets, n):  # type: ignore[no-unt
     cache=True,
 )
 def scatter_more(sums, w, s, params, weight, tets, rows, n):  # type: ignore[no-untyped-def]
-    """Adds heat or bulking to the sums of the nodes. The number of state ``rows`` determines which of the two."""
+    """Adds heat or bulking to the sums of the nodes; the number of state ``rows`` determines which of the two."""
     if rows == HEATED:
         scatter_heat(sums, w, s, params, weight, tets, n)
     else:

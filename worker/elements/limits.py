@@ -9,7 +9,7 @@ from .scratch import AREAS, LIMIT, MODULUS, SPEED, VOLUME
 
 _MASS = MASS * CHUNK
 CLOSING = 4.0
-"""Smallest number of steps in which the volume of a tet may go to zero at the rate of the last step. Chosen value:
+"""Smallest number of steps in which the volume of a tet may go to zero at the rate of the last step; chosen value:
 close to 4.3, which the default viscosity requires. After a step of this size the error of p = -K ln J is 0.5 %
 (docs/theory/time_integration.md)."""
 LENGTH_FACTOR = 1.2009369551760027

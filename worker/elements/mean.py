@@ -46,7 +46,7 @@ def book_averaged(w, s, params, n):  # type: ignore[no-untyped-def]
     """Adds to WORK_AVERAGED the work of the mean pressure of the step on the volume of the tet, less its work on the
     averaged volume.
 
-    The stress of a material that dilates acts on its own volume. If the dilation of neighbours increases this volume,
+    The stress of a material that dilates acts on its own volume; if the dilation of neighbours increases this volume,
     more energy is stored.
     """
     dilates = params[DILATES] > 0.0

@@ -21,7 +21,7 @@ _complete, _project = reader(*COMPLETE), reader(*PROJECT)
 
 @njit(TASK, cache=True, error_model="numpy")
 def complete(table, begin, end, thread):  # type: ignore[no-untyped-def]
-    """Task: computes nodal values from completed sums, and sets the sums to zero. The values are the volume strain of
+    """Task: computes nodal values from completed sums, and sets the sums to zero; the values are the volume strain of
     the step, heat or bulking, nodal pressures at n+1, and nodal volumes, m^3, for ``project``. A node without tets has
     the strain zero.
     """

@@ -120,7 +120,7 @@ class Means(NamedTuple):
     more: Floats
     """(rows,) mean heat or bulking of the step."""
     split: bool
-    """True if pressure gradients stabilise. If False, the arrays after this field have one row."""
+    """True if pressure gradients stabilise; if False, the arrays after this field have one row."""
     pressure: Floats
     """(rows,) nodal pressure, Pa."""
     projected: Floats

@@ -61,7 +61,7 @@ def _prefetch_tet(ahead, i, rows):  # type: ignore[no-untyped-def]
 def gather(rows, values, tets, ahead, n):  # type: ignore[no-untyped-def]
     """Sets nine ``rows`` to the values of nodes 1, 2, 3 less the value of node 0; ``values`` (nodes, 3): nodal values.
 
-    With positions the result is the edges, in the rows from EDGE on. With velocities it is the velocity differences, in
+    With positions the result is the edges, in the rows from EDGE on; with velocities it is the velocity differences, in
     the rows from RATE on. ``ahead``: state rows to be prefetched into the cache, or an empty array.
     """
     first, second, third = rows, rows[3 * CHUNK :], rows[6 * CHUNK :]

@@ -44,7 +44,7 @@ _MASS, _STRAIN, _DAMAGE = MASS * CHUNK, PLASTIC_STRAIN * CHUNK, DAMAGE * CHUNK
 
 
 def life(erosion: Erosion | None) -> Floats:
-    """(5,) limits beyond which erosion removes tets of a part. The limit of the stable step is set after the first
+    """(5,) limits beyond which erosion removes tets of a part; the limit of the stable step is set after the first
     step.
     """
     if erosion is None:

@@ -32,7 +32,7 @@ class Softening(NamedTuple):
     knee: Floats
     """(m, 3) size D of the opening at which softening begins, m."""
     lent: Floats
-    """(m, 3) effective opening D at insertion, e, m. A pair that closes below this value would release more energy than
+    """(m, 3) effective opening D at insertion, e, m; a pair that closes below this value would release more energy than
     it absorbed. Unloading of the pair decreases the value, possibly to 0."""
     offset: Floats
     """(m, 3, 3) offset of the opening, m, in three components: along the normal, along the first edge, and across both
@@ -43,7 +43,7 @@ class PairState(NamedTuple):
     """Present state of each pair of nodes. Every step changes the state."""
 
     top: Floats
-    """(m, 3) largest effective opening D so far, including the offset, m. The value is never below the opening at which
+    """(m, 3) largest effective opening D so far, including the offset, m; the value is never below the opening at which
     softening begins."""
     size: Floats
     """(m, 3) present effective opening D, m."""

@@ -19,7 +19,7 @@ _PART = 1 << 62
 """Offset above all tet ids. The graph has one more node for each part without facets, which connects all tets of the
 part; the number of this node is the offset plus the number of the part."""
 _TETS = 4096
-"""Number of tets in a task. Chosen value: in a bar of 55,000 tets, 7 % of the facets are between tets of two tasks; a
+"""Number of tets in a task; chosen value: in a bar of 55,000 tets, 7 % of the facets are between tets of two tasks; a
 single thread joins the tets at these facets."""
 _NOWHERE, _ELSEWHERE = -1, -2
 """Values for the place of a tet: no tet, and a tet on another rank."""
@@ -102,7 +102,7 @@ def _beside(where: IdIndex, block: Block) -> Indices:
 
 
 def count(model: Model, labels: list[Ints], comm: Comm) -> int:
-    """Returns the number of fragments. The number is counted by the tets whose id is the label of their fragment: each
+    """Returns the number of fragments; the number is counted by the tets whose id is the label of their fragment: each
     fragment has exactly one. Collective.
     """
     named = sum(int((block.id == of).sum()) for block, of in zip(model.blocks, labels, strict=True))

@@ -116,7 +116,7 @@ def _of_tet(out, n, end, e, hot, mesh):  # type: ignore[no-untyped-def]
 @njit(types.int64(CANDIDATES, types.int64, types.int64, types.uint8[::1], MESH, types.int64, types.int64), cache=True)
 def overstressed(out, begin, end, hot, mesh, first, stop):  # type: ignore[no-untyped-def]
     """Writes the overstressed facets between tets of this rank, for the tets from ``first`` to ``stop``, to the rows of
-    ``out`` from ``begin`` to ``end``. Returns the number of these facets, even if it is larger than the number of rows.
+    ``out`` from ``begin`` to ``end``; returns the number of these facets, even if it is larger than the number of rows.
 
     ``hot`` (tets,): bit k is set if face k is overstressed. The values of eight tets are read at once.
     """

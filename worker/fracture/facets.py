@@ -17,9 +17,9 @@ from .records import FacetTable, Law, Mesh
 from .strength import Toughness
 
 _BATCH = 10_000
-"""Number of tets that are initialised in one call. The number limits the temporary memory."""
+"""Number of tets that are initialised in one call; the number limits the temporary memory."""
 ELSEWHERE = -2
-"""Value for the place of a tet that is on another rank. The value -1 means that there is no tet."""
+"""Value for the place of a tet that is on another rank; the value -1 means that there is no tet."""
 
 
 @dataclass
@@ -37,7 +37,7 @@ class Body:
     """Range of the global ids of the tets on the other side of the facets: first id, and last id plus 1."""
     mesh: Mesh
     facets: FacetTable
-    """The tets of the block. All bodies of the block share this record and the record ``facets``."""
+    """The tets of the block; all bodies of the block share this record and the record ``facets``."""
     law: Law
     own: bool = True
     """True if the two tets of each facet are in the same part."""

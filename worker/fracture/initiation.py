@@ -48,7 +48,7 @@ class Initiation:
         self._heaviest = comm.maximum(heaviest)
         """(parts,) mass of the heaviest tet of all ranks, kg; 0 for a part that does not fracture."""
         self._step = 1
-        """Number of the step, as stored with the clocks. The number of the first step is 1."""
+        """Number of the step, as stored with the clocks; the number of the first step is 1."""
 
     @property
     def smooth(self) -> bool:

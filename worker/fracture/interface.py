@@ -1,8 +1,8 @@
-"""Shared facets: facets whose two tets are on different ranks, or in two blocks of tets of one rank. The two ranks at a
+"""Shared facets: facets whose two tets are on different ranks, or in two blocks of tets of one rank; the two ranks at a
 facet compute the same mean traction.
 
 A facet breaks only if the traction of one of its tets reaches the strength. Therefore two ranks exchange tractions only
-in steps in which a facet shared by them is overstressed. A flag that shows this is sent with the forces of shared
+in steps in which a facet shared by them is overstressed; a flag that shows this is sent with the forces of shared
 nodes.
 """
 

@@ -24,7 +24,7 @@ from ..parallel.words import add
 from .columns import COLUMNS, FACETS, Facets
 
 _SLACK = 1e-6
-"""Largest energy, divided by the fracture energy, that a pair may release beyond the energy that it absorbed. The
+"""Largest energy, divided by the fracture energy, that a pair may release beyond the energy that it absorbed; the
 chosen value is above round-off."""
 _EXHAUSTED = 1e-6
 """Smallest energy, divided by the fracture energy, that remains to a pair after unloading. Chosen value."""
@@ -37,7 +37,7 @@ UNLOAD = *COLUMNS, _I1, _F2, _F2, _I2, _F1, _F1, _F, types.boolean
 FORESEE = *COLUMNS, _F2, _I2, _F1, _F
 _read_open, _read_unload, _read_foresee = reader(*OPEN), reader(*UNLOAD), reader(*FORESEE)
 FACETS_OF_A_TASK = 256
-"""Number of facets in a task. Chosen value: a task takes 10 to 20 us, compared with 2 us to start a parallel region."""
+"""Number of facets in a task; chosen value: a task takes 10 to 20 us, compared with 2 us to start a parallel region."""
 
 
 @njit(types.void(_F2, _F2, types.int32[::1]), cache=True, error_model="numpy")

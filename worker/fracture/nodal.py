@@ -2,7 +2,7 @@
 smoother than the mean of its two tets.
 
 The stress of a node is the mean stress of its tets, weighted with their initial volumes. The sums are sums of integers,
-so that the two sides of a facet compute the same traction on any ranks. A facet is a candidate only if it also passes
+so that the two sides of a facet compute the same traction on any ranks; a facet is a candidate only if it also passes
 the criterion with the stress of its two tets (criterion.py).
 """
 

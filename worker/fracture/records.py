@@ -40,8 +40,8 @@ class FacetTable(NamedTuple):
     since: Floats
     """(n, 4) start time of the clock of the delayed criterion, s."""
     seen: Ints
-    """(n, 4) number of the last step in which the facet was overstressed. The clock continues if this was the
-    previous step."""
+    """(n, 4) number of the last step in which the facet was overstressed; the clock continues if this was the previous
+    step."""
 
 
 class InterfaceFacets(NamedTuple):
@@ -62,7 +62,7 @@ class InterfaceFacets(NamedTuple):
     of: Ints
     """(m,) index of the other rank among the neighbours; for this rank itself the value is the number of neighbours."""
     hot: Ints
-    """(neighbours + 1,) 1 if a facet shared with the neighbour is overstressed on at least one side, else 0. The last
+    """(neighbours + 1,) 1 if a facet shared with the neighbour is overstressed on at least one side, else 0; the last
     entry is for facets between two blocks of this rank."""
     there: Indices
     """(m, 3) block, place and face of the other tet of a facet between two blocks of this rank; -1 for other facets."""

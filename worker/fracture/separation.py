@@ -58,7 +58,7 @@ class Separation:
         """Local nodes, ascending, of the facets that break in this step."""
 
     def survey(self, broken: list[Indices], count: int, touched: Ints) -> None:
-        """Marks facets as broken. Sets ``touched`` (ranks,) to 1 for each rank that has a node of a broken facet. The
+        """Marks facets as broken. Sets ``touched`` (ranks,) to 1 for each rank that has a node of a broken facet; the
         value for this rank is 1 + ``count``, where ``count`` is the number of broken facets whose first side is here.
 
         ``broken``: tables (m, 2, 3) of block, place and face of each side; -1 for a side on another rank.

@@ -49,7 +49,7 @@ _DESCRIBE = _I2, _I2, _I1, _I1, _N1, _N1, _N1, _I1, MESH, types.int64, types.int
 _CUT = _I1, _I1, _I1, _I2, _I1
 _read_describe, _read_cut = reader(*_DESCRIBE), reader(*_CUT)
 _NODES = 8
-"""Number of nodes in a task. Chosen value: a task takes 10 to 20 us, compared with 2 us to start a parallel region."""
+"""Number of nodes in a task; chosen value: a task takes 10 to 20 us, compared with 2 us to start a parallel region."""
 
 
 class Stars:

@@ -31,7 +31,7 @@ class Toughness:
     energy: float
     scatter: Scatter | None
     delay: float
-    """Characteristic time t_c times the square of the strength, Pa^2 s. The time t_c of a facet is this value divided
+    """Characteristic time t_c times the square of the strength, Pa^2 s; the time t_c of a facet is this value divided
     by the square of its own strength."""
     zone: float
     """Length of the cohesive zone, m, 9 pi / 32 E' G_c / strength^2 with E' = E / (1 - nu^2)."""

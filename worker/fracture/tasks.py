@@ -7,7 +7,7 @@ from . import criterion
 from .records import CANDIDATES, LAW, MESH, POINTS, TABLE
 
 TETS_OF_A_TASK = 4096
-"""Number of tets in a task. With the chosen value a task takes 5 us if no facet is overstressed."""
+"""Number of tets in a task; with the chosen value a task takes 5 us if no facet is overstressed."""
 _I1, _U1 = types.int64[::1], types.uint8[::1]
 COUNT = CANDIDATES, _U1, MESH, _I1
 SEARCH = CANDIDATES, _I1, _I1, _U1, MESH, TABLE, POINTS, LAW

@@ -3,7 +3,7 @@
 When the module is called, nodal forces are complete. Therefore the opening of a pair of nodes in the next step is
 known, except for the change by contact. Unloading of one facet changes the openings of the neighbouring facets.
 Therefore two passes over all facets are made; each pass uses the forces from before the pass. The first pass lowers the
-traction of each pair as far as this pair alone requires. The second pass completely unloads the pairs that still close
+traction of each pair as far as this pair alone requires; the second pass completely unloads the pairs that still close
 too far.
 """
 

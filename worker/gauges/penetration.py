@@ -1,7 +1,7 @@
 """Depth of the hole that a part has made in the other parts, measured on straight lines parallel to the axis.
 
 A line is cut into spans inside of tets and voids between the tets. The hole is the void in front of the bodies and all
-voids joined to this void. Voids of neighbouring lines are joined where they overlap. A cavity that opens ahead of the
+voids joined to this void; voids of neighbouring lines are joined where they overlap. A cavity that opens ahead of the
 hole is not joined to the hole, and a flake in the hole does not end the hole. The free space beyond the bodies is not a
 void.
 """

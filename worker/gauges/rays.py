@@ -9,7 +9,7 @@ from ..mesh.faces import FACES
 from ..model.state import Floats, Tets
 
 RAYS = 360
-"""Number of rays. Chosen value: a hole with a hundred tets on its circumference has three or four rays for each tet."""
+"""Number of rays; chosen value: a hole with a hundred tets on its circumference has three or four rays for each tet."""
 
 
 def directions(axis: int) -> Floats:

@@ -19,7 +19,7 @@ from .gauge import Scene
 
 _AXES = "xyz"
 _DAMAGED = 0.5
-"""Damage of a tet above which the tet counts as broken. Chosen value: damage increases from 0 to 1 within few steps."""
+"""Damage of a tet above which the tet counts as broken; chosen value: damage increases from 0 to 1 within few steps."""
 
 
 class Shapes:

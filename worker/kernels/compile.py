@@ -28,11 +28,11 @@ Tell = Callable[[int, int], None]
 """Callback that receives the progress every few seconds: number of compiled kernels, and number of all kernels."""
 
 COMPLETE = "complete"
-"""File in the cache folder. If it exists, all kernels are compiled."""
+"""File in the cache folder; if it exists, all kernels are compiled."""
 WORD_EVERY = 3.0
 """Interval between two reports of the progress, s. Chosen value."""
 _MOST = 4
-"""Largest number of child processes. Chosen value: the longest chain of imports has 27 % of the machine code."""
+"""Largest number of child processes; chosen value: the longest chain of imports has 27 % of the machine code."""
 _MOST_WORDS = 500
 """Number of characters that are kept of an error report of numba. The error is at the beginning of the report."""
 _PATIENCE = 900.0

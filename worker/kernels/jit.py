@@ -74,7 +74,7 @@ class _ModuleFolder(_CacheLocator):
         return ""
 
     def get_disambiguator(self) -> str:
-        """Returns a part of the file name of a kernel. By default this part contains the line of the kernel; it is
+        """Returns a part of the file name of a kernel; by default this part contains the line of the kernel; it is
         empty here, because a changed docstring moves lines. Kernels with equal names share an index file, in which
         numba finds a kernel by its byte code.
         """
@@ -132,7 +132,7 @@ class Kernel(CPUDispatcher):
         return int(compiled.library.get_pointer_to_function(compiled.fndesc.llvm_cfunc_wrapper_name))
 
     def compile(self, sig: Any) -> Any:
-        """Returns the entry point of this kernel, when numba compiles a call of the kernel in another kernel. For any
+        """Returns the entry point of this kernel, when numba compiles a call of the kernel in another kernel; for any
         ``sig`` it is the entry point of the declared signature.
         """
         self.load()

@@ -11,12 +11,12 @@ from ..kernels.jit import njit
 from ..model.state import CHUNK
 
 _LN2_HIGH, _LN2_LOW = 0.693147180369123816490, 1.90821492927058770002e-10
-"""The number ln 2 as a sum of two float64. The first has 33 bits, so that its product with an exponent is exact;
+"""The number ln 2 as a sum of two float64; the first has 33 bits, so that its product with an exponent is exact;
 together they have 86 bits."""
 _INVERSE_LN2 = 1.4426950408889634
 """The number 1 / ln 2."""
 NEAREST = 6755399441055744.0
-"""1.5 times 2^52. If this constant is added to a smaller number, the last bits of the sum contain the nearest
+"""1.5 times 2^52; if this constant is added to a smaller number, the last bits of the sum contain the nearest
 integer."""
 _ROOT_HALF = 0x3FE6A09E667F3BCD
 """Bit pattern of sqrt(1/2). An argument is divided by a power of two such that the result is between sqrt(1/2) and
@@ -65,7 +65,7 @@ def _reduced(x):  # type: ignore[no-untyped-def]
 
 @njit("float64(float64, float64)", cache=True, error_model="numpy", forceinline=True)
 def _doubled(x, shifted):  # type: ignore[no-untyped-def]
-    """Returns 2^k x. The last bits of ``shifted`` contain k."""
+    """Returns 2^k x; the last bits of ``shifted`` contain k."""
     return np.int64(np.float64(x).view(np.int64) + (np.float64(shifted).view(np.int64) << 52)).view(np.float64)
 
 
@@ -90,7 +90,7 @@ def exp_less_one(x):  # type: ignore[no-untyped-def]
 
 @njit("float64(float64, float64)", cache=True, error_model="numpy")
 def power(x, exponent):  # type: ignore[no-untyped-def]
-    """Returns x to the power ``exponent``, for a positive exponent. x must be zero or a positive normal number. The
+    """Returns x to the power ``exponent``, for a positive exponent. x must be zero or a positive normal number; the
     result is limited to the range from e^LEAST to e^MOST, or is 0 for x = 0.
     """
     return exp(max(min(exponent * log(x), MOST), LEAST)) if x > 0.0 else 0.0

@@ -35,7 +35,7 @@ _OLD, _KNOWN, _FACTOR = NODAL, NODAL + CHUNK, NODAL + 2 * CHUNK
 """Scratch rows: pressure before the step, Pa; and coefficients of the energy equation factor * (new pressure) = cold
 part + known."""
 _LEAST = 0.05
-"""Smallest bulk modulus in the wave speed, divided by the bulk modulus at rest. Chosen value; this limit can only
+"""Smallest bulk modulus in the wave speed, divided by the bulk modulus at rest; chosen value; this limit can only
 decrease the stable step."""
 
 
@@ -55,7 +55,7 @@ def linear(w, s, params, n):  # type: ignore[no-untyped-def]
 
 @njit("void(float64[::1], float64[::1], float64[::1], int64, float64, float64)", cache=True, error_model="numpy")
 def _book_pores(w, s, params, i, strain, mean):  # type: ignore[no-untyped-def]
-    """Adds the plastic work of pores that have grown by the volume strain ``strain``. As for the total work, it is the
+    """Adds the plastic work of pores that have grown by the volume strain ``strain``; as for the total work, it is the
     ``mean`` pressure of the step times ``strain``. Corrects the elastic energy, because after the growth its density
     belongs to another volume.
     """

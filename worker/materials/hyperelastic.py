@@ -32,7 +32,7 @@ def inverse_sixth_root(u):  # type: ignore[no-untyped-def]
 
     The computation uses only + - * and the bit pattern of a float64 as an integer, with equal results in vector code
     and in scalar code; it uses no root and no quotient, because each of them takes as long as ten products. The bit
-    pattern is a piecewise linear logarithm. The first y is found by shifts: a sixth of the distance from the bit
+    pattern is a piecewise linear logarithm; the first y is found by shifts: a sixth of the distance from the bit
     pattern of 1. This y is exact at 1.
     """
     far = np.float64(u).view(np.int64) - _ONE
@@ -77,7 +77,7 @@ def _strains(w, n):  # type: ignore[no-untyped-def]
 
 @njit("void(float64[::1], int64, float64)", cache=True, error_model="numpy")
 def _roots(w, n, shear):  # type: ignore[no-untyped-def]
-    """Sets the rows k = det(1 + A)^(-1/3), k - 1 without cancellation, and G / 2J. A separate loop computes these rows,
+    """Sets the rows k = det(1 + A)^(-1/3), k - 1 without cancellation, and G / 2J; a separate loop computes these rows,
     so that the long chains of operations of several tets overlap.
 
     The result is NaN if the determinant is not positive because of round-off.
@@ -96,7 +96,7 @@ def _roots(w, n, shear):  # type: ignore[no-untyped-def]
 
 @njit("void(float64[::1], float64[::1], float64[::1], int64, float64)", cache=True, error_model="numpy")
 def hyperelastic(w, s, params, n, dt):  # type: ignore[no-untyped-def]
-    """Computes the deviatoric stress G / 2J dev(b - b^-1) of a chunk, Pa. The work of this stress is the change of its
+    """Computes the deviatoric stress G / 2J dev(b - b^-1) of a chunk, Pa; the work of this stress is the change of its
     potential.
 
     ``w`` has V grad N at the end of the step, and from MOVED on the displacements. The stress is computed from A, and

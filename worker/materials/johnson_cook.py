@@ -53,7 +53,7 @@ the stress."""
 _PATIENT = 20
 """Number of iterations after which every second iteration halves the bracket, because with softening Newton's method
 may alternate between two values. First yield, with increments between 1e-2 and 1e-21, takes up to 20 iterations without
-halving. Smaller increments, for a trial stress less than 1e5 Pa above the flow stress, take up to 100 iterations with
+halving; smaller increments, for a trial stress less than 1e5 Pa above the flow stress, take up to 100 iterations with
 halving."""
 _BELOW = 1.0 - 2.0**-40
 """Factor slightly below 1. The rate term begins at a certain increment, where the flow stress has a kink; the product
@@ -66,7 +66,7 @@ _MOST_TENSE = 1.5
 """Largest ratio of tension to flow stress in the formula for the fracture strain. Johnson and Cook 1985 have no
 measurements at larger ratios."""
 _LEAST_STRAIN = 1e-6
-"""Smallest fracture strain. Chosen value: if the constants give a negative fracture strain, a tet breaks at first
+"""Smallest fracture strain; chosen value: if the constants give a negative fracture strain, a tet breaks at first
 yield."""
 _TWO_THIRDS = 2.0 / 3.0
 _TINY = 1e-300

@@ -68,7 +68,7 @@ _INTACT, _FRACTURE, _CRUMBLED, _FAST = (NODAL + k * CHUNK for k in range(4))
 _TINY = 1e-300
 """Smallest argument of a logarithm; an argument of zero is replaced by this value."""
 _LEAST = 0.05
-"""Smallest bulk modulus in the wave speed, divided by the bulk modulus at rest. Chosen value; this limit can only
+"""Smallest bulk modulus in the wave speed, divided by the bulk modulus at rest; chosen value; this limit can only
 decrease the stable step."""
 _THIRD, _TWO_THIRDS = 1.0 / 3.0, 2.0 / 3.0
 
@@ -128,7 +128,7 @@ def crumbling(w, s, params, n):  # type: ignore[no-untyped-def]
     """Computes the pressure of ``_pressed`` for a chunk. In the averaged pressure forms the pressure is the mean over
     the four nodes, each with its own cut-off, and the energy is summed over the nodes (elements/heat_and_bulking.py).
 
-    The plastic work has two parts. The first part is the difference between the work of the pressure of step n and the
+    The plastic work has two parts; the first part is the difference between the work of the pressure of step n and the
     work at the same ratio with the present bulking and damage. The second part is the work of the expansion beyond the
     tension cut-off. Beyond the cut-off the pressure does not determine a volume ratio. The work is therefore computed
     from the opening of the tet itself, not from the ratio at its nodes, which also contains the opening of neighbours

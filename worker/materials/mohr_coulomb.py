@@ -93,7 +93,7 @@ def returned(d1, d2, d3, strength, sine, cap):  # type: ignore[no-untyped-def]
     below the surface.
 
     The yield surface is (1 + sine) d1 - (1 - sine) d3 <= strength and d1 - d3 <= cap. For the two planes the flow is
-    along (1, 0, -1), at constant d2. If this flow would change the order of the three values, two of the values are set
+    along (1, 0, -1), at constant d2; if this flow would change the order of the three values, two of the values are set
     equal, which gives a single point.
     """
     new = min(0.5 * (strength - (1.0 - sine) * d2), 0.5 * (cap - d2))

@@ -15,7 +15,7 @@ from .model import Floats, Ids
 from .patterns import QUADS, skin
 
 _SEEN = 1e-6
-"""Share of the volume below which no note is given. Chosen value: the round-off of coordinates with six digits."""
+"""Share of the volume below which no note is given; chosen value: the round-off of coordinates with six digits."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -99,7 +99,7 @@ def run_child(mesh: Mesh | Mapping[str, Mesh], sources: Sources, target: Path, k
 
 
 def _watched(child: subprocess.Popen[bytes], request: bytes, key: str, limits: Limits) -> bytes:
-    """Wait for the end of the child process and return its standard error. If the child exceeds a limit, end it and
+    """Wait for the end of the child process and return its standard error; if the child exceeds a limit, end it and
     raise MeshError.
 
     The parent also checks the memory of the child, because Python can loop for ever if not even an exception fits into

@@ -17,7 +17,7 @@ from .model import FLAT, Floats, Ids, step_lengths, volume_and_area
 from .patterns import QUADS, cuts, skin
 
 _TOGETHER = 20_000
-"""Number of elements that are processed at once. The chosen value needs about 100 MB of memory."""
+"""Number of elements that are processed at once; the chosen value needs about 100 MB of memory."""
 _NOTHING = np.zeros((0, 4), np.int64), np.zeros(0, np.int64), np.zeros(0, np.int64)
 _WORSE = 0.5
 """Ratio of the stable step of a cut to that of a cut with a node in the middle; below this ratio the node in the middle

@@ -22,7 +22,7 @@ def boundary_faces(tets: Ints) -> Ints:
 
 
 def same_side(tets: Ints) -> NDArray[np.int64]:
-    """Return (k, 2) pairs of positively oriented tets on the same side of a common face. The two tets of a pair
+    """Return (k, 2) pairs of positively oriented tets on the same side of a common face; the two tets of a pair
     overlap.
 
     If more than two tets are on one side, every two successive tets form a pair.

@@ -15,7 +15,7 @@ from .model import Floats, Ids, Ints, Origin
 from .sharing import same_places
 
 _SAME = 1e-9
-"""Distance, divided by the size of a body, below which nodes of structured meshes are merged. The chosen value is far
+"""Distance, divided by the size of a body, below which nodes of structured meshes are merged; the chosen value is far
 above round-off."""
 
 Placed = tuple[int, Origin | None, Floats]

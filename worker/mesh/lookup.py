@@ -10,7 +10,7 @@ from .model import NodeSet
 _KINDS = {"nodes": False, "surface": True}
 """Words before a colon, in a name such as ``nodes:NAME``, that select the kind of a set."""
 _SHOWN = 20
-"""Largest number of names in a message. The chosen value gives three lines of a terminal."""
+"""Largest number of names in a message; the chosen value gives three lines of a terminal."""
 
 
 def meant(sets: Sequence[NodeSet], name: str) -> NodeSet | None:

@@ -14,7 +14,7 @@ from ..model.hashing import uniform
 from .model import Floats, TetMesh
 
 _CORNERS = np.array([[1, 1, 1], [1, -1, -1], [-1, -1, 1], [-1, 1, -1]]) / math.sqrt(8.0)
-"""Corners of the regular tet of edge 1, relative to its centre. In this order the volume is positive."""
+"""Corners of the regular tet of edge 1, relative to its centre; in this order the volume is positive."""
 
 _RANDOM = 15
 """Count of random numbers for a shard: 3 for its rotation, 12 for shifts of its nodes."""

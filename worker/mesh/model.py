@@ -60,7 +60,7 @@ class NodeSet:
     faces: Ints | None = None
     """(n, 3) faces of a surface that are outer faces of the mesh; None for a set of nodes."""
     inner: int = 0
-    """Number of faces of the surface that are inside of the mesh. All nodes of such a face are nodes of the mesh."""
+    """Number of faces of the surface that are inside of the mesh; all nodes of such a face are nodes of the mesh."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -16,10 +16,10 @@ from .model import FLAT, Floats, Ids, step_lengths, volume_and_area
 Way = Literal["eight", "corners"]
 
 LOST = 1e-3
-"""Fraction of the volume that may be lost if edges are made straight. If more would be lost, tets are cut into eight.
-Chosen value: the mass has the same error, and eight tets with half the step cost 16 times as much as one tet."""
+"""Fraction of the volume that may be lost if edges are made straight. If more would be lost, tets are cut into eight;
+chosen value: the mass has the same error, and eight tets with half the step cost 16 times as much as one tet."""
 _OFF = 0.4
-"""Largest distance of a midside node from the middle of its edge, divided by the length of the edge. Chosen value: the
+"""Largest distance of a midside node from the middle of its edge, divided by the length of the edge; chosen value: the
 ratio is 0.25 for quarter points, and 0.21 for an arc of 90 degrees. A ratio of 0.5 means that the file has another
 order of nodes: the node is in the middle of another edge of a regular tet."""
 _CORNERS = ((0, 4, 6, 7), (4, 1, 5, 8), (6, 5, 2, 9), (7, 8, 9, 3))
@@ -72,7 +72,7 @@ def _area(corners: Sequence[Floats]) -> Floats:
 def eight(nodes: Ids, points: Floats) -> Ids:
     """Return (m, 8, 4) the eight tets of each of the tets (m, 10).
 
-    Four of the eight tets are at the corners. The other four surround one of the three diagonals of the octahedron
+    Four of the eight tets are at the corners; the other four surround one of the three diagonals of the octahedron
     between the corner tets. The diagonal with the longest stable step is used; most often it is the shortest diagonal.
     """
     every = np.stack([nodes[:, [*_CORNERS, *_inner(*long)]] for long in _LONG], axis=1)

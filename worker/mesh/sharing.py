@@ -12,7 +12,7 @@ from conoid.cases.model.schema import Case
 from .model import Floats, Ids, Origin
 
 _SAME = 1e-9
-"""Distance, divided by the largest coordinate, below which two nodes coincide. Chosen value: the round-off in files is
+"""Distance, divided by the largest coordinate, below which two nodes coincide; chosen value: the round-off in files is
 a millionth."""
 
 Placed = tuple[int, Origin, Floats]

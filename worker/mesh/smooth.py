@@ -25,7 +25,7 @@ _MOST, _PATIENCE = 10_000, 4
 too small."""
 
 _AHEAD = 1.25
-"""Largest ratio of the step length of a processed tet to that of a tet that cannot be improved. A tet above this ratio
+"""Largest ratio of the step length of a processed tet to that of a tet that cannot be improved; a tet above this ratio
 is not processed, because the tet that cannot be improved limits the time step."""
 
 
@@ -70,7 +70,7 @@ class _Smoothing:
         self.first = np.concatenate([[0], np.cumsum(np.bincount(mesh.tets.ravel(), minlength=len(mesh.points)))])
 
     def raise_tet(self, tet: int) -> Ids:
-        """Move one node of ``tet`` if this improves the worst tet at the node. Return the changed tets at this node."""
+        """Move one node of ``tet`` if this improves the worst tet at the node; return the changed tets at this node."""
         for node in self.tets[tet].tolist():
             if self.skin.movable(node):
                 star = self.by_node[self.first[node] : self.first[node + 1]]

@@ -14,7 +14,7 @@ from .second_order import Way
 from .sets import Named, members
 
 _SEEN = 1e-6
-"""Share of the volume below which no note is given. Chosen value: the round-off of coordinates with six digits."""
+"""Share of the volume below which no note is given; chosen value: the round-off of coordinates with six digits."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,7 +43,7 @@ class _Tets:
     numbers: Ids
     lines: Ids
     middles: Floats = field(default_factory=lambda: np.zeros((0, 3)))
-    """(j, 3) positions of the added nodes in the middle of elements. The indices of these nodes follow the indices of
+    """(j, 3) positions of the added nodes in the middle of elements; the indices of these nodes follow the indices of
     the nodes of the file."""
     of: Ids = field(default_factory=lambda: np.zeros(0, np.int64))
     """(j,) element of each added node."""

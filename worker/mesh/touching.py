@@ -16,7 +16,7 @@ from .model import Floats, Ids, Ints
 
 _MOST = 20_000
 """Largest number of faces that are tested against the surface of a generated body. The faces are inside of its bounding
-box. With the chosen value the test takes half a second."""
+box; with the chosen value the test takes half a second."""
 
 Surface = tuple[Floats, Ints]
 """Surface of a part: its nodes (n, 3), m, and its faces (k, 3) with outward normals."""

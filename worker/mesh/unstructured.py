@@ -64,7 +64,7 @@ def draw(gmsh: Any, body: Generated, scale: float) -> None:
 def _draw_quarters(gmsh: Any, body: Plate | Cylinder | Tube | Sphere, scale: float) -> None:
     """Draw a quarter of a body and its mirror images, with common faces; they form a half or the whole body.
 
-    gmsh puts nodes on the common faces and on the axis. After the smoothing most of these nodes are still near the
+    gmsh puts nodes on the common faces and on the axis; after the smoothing most of these nodes are still near the
     faces and the axis.
     """
     occ = gmsh.model.occ

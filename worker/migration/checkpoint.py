@@ -44,7 +44,7 @@ from ..parallel.comm import Comm
 from .parcel import Parcel, Table, take
 
 _KEPT = 2
-"""Number of checkpoints that are kept. Chosen value: one more than the latest checkpoint, which may be damaged."""
+"""Number of checkpoints that are kept; chosen value: one more than the latest checkpoint, which may be damaged."""
 _FREE = {
     "run": {
         "ranks", "threads", "profile", "cut_scale", "max_steps", "max_wall_time", "checkpoint_every", "residual_limit",
@@ -136,7 +136,7 @@ def require_same(case: Case, manifest: Manifest) -> None:
 
 
 def _differences(now: Any, then: Any, location: Location) -> Iterator[tuple[Location, object, object]]:
-    """Yield the location and the two values of each key that differs. The value of a missing key is Ellipsis."""
+    """Yield the location and the two values of each key that differs; the value of a missing key is Ellipsis."""
     if isinstance(now, dict) and isinstance(then, dict):
         for key in sorted({*now, *then}):
             yield from _differences(now.get(key, ...), then.get(key, ...), (*location, key))

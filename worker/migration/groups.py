@@ -2,7 +2,7 @@
 computed.
 
 ``conoid replay-balance`` reads the records (docs/performance/balance.md). A group is a fixed set of tets, cut at the
-start, with a set of nodes and their copies. When tets and nodes move between ranks, they stay in their group. Counts
+start, with a set of nodes and their copies; when tets and nodes move between ranks, they stay in their group. Counts
 are integers and equal for any number of ranks; an exception are candidate pairs of edges and cracks whose nodes are on
 several ranks.
 """

@@ -12,7 +12,7 @@ from ..simulation import Simulation
 
 _FARTHEST = 4.0
 """Largest ratio of the cost of a candidate pair on one rank to the mean cost, and of the mean cost to the cost on one
-rank. Chosen value: with few candidate pairs the measurement is mostly noise."""
+rank; chosen value: with few candidate pairs the measurement is mostly noise."""
 
 
 @dataclass(frozen=True)

@@ -98,7 +98,7 @@ class Columns:
         fill(self._words, self._words.ctypes.data, n, more)
 
     def copy(self, sources: "npt.NDArray[Any]", targets: "npt.NDArray[Any]") -> None:
-        """Copies the COPIED columns of the rows ``sources`` (k,) to the rows ``targets`` (k,). The two arrays are
+        """Copies the COPIED columns of the rows ``sources`` (k,) to the rows ``targets`` (k,); the two arrays are
         int64.
         """
         from .inheriting import copy

@@ -61,7 +61,7 @@ def same_memory(one: np.ndarray, two: np.ndarray) -> bool:
 
 
 class Rooms:
-    """Buffers of some columns of a table. If a column has spare capacity, it is not copied when rows are appended."""
+    """Buffers of some columns of a table; if a column has spare capacity, it is not copied when rows are appended."""
 
     def __init__(self, *names: str) -> None:
         """``names``: names of the attributes of the table that are columns."""

@@ -44,7 +44,7 @@ def among(known: _Ids, wanted: _Ids) -> npt.NDArray[np.bool_]:
 
 
 def unique(ids: _Ids) -> npt.NDArray[np.int64]:
-    """Return the distinct ids, ascending. The value -1 is omitted, because it means that there is no id."""
+    """Return the distinct ids, ascending; the value -1 is omitted, because it means that there is no id."""
     largest = int(ids.max(initial=-1))
     if ids.size * _BISECTION < largest:
         return np.unique(ids[ids >= 0]).astype(np.int64)

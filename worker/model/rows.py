@@ -21,13 +21,13 @@ DISTORTION = 11
 VOLUME_FLUX = 12
 """Rate of change of the volume at mid-step, m^3/s (averaged pressure forms)."""
 TET_VOLUME = 12
-"""Volume at the end of the last pass, m^3 (materials without a strength law). The first pass, for which the time step
+"""Volume at the end of the last pass, m^3 (materials without a strength law); the first pass, for which the time step
 is zero, sets this volume."""
 WORK_AVERAGED = 13
 """Difference between the work of the pressure on the tet and its work on the averaged volume, J; WORK contains the
 difference (averaged pressure forms; elements/mean.py)."""
 VOLUME_RATIO = 14
-"""Ratio of the current to the initial volume. The value is computed from the same dilatation as the pressure."""
+"""Ratio of the current to the initial volume; the value is computed from the same dilatation as the pressure."""
 PLASTIC_STRAIN = 15
 """Effective plastic strain."""
 WORK_PLASTIC = 16

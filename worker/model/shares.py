@@ -1,4 +1,4 @@
-"""Nodes with tets of several parts, and the mass that each part has in such a node. Bonds by shared nodes make these
+"""Nodes with tets of several parts, and the mass that each part has in such a node; bonds by shared nodes make these
 nodes.
 """
 

@@ -53,7 +53,7 @@ class Nodes:
     id: Ints
     """(n,) global ids of the nodes."""
     part: Indices
-    """(n,) index of the part of each node. For a node of several parts (``shares``) it is the representative part."""
+    """(n,) index of the part of each node; for a node of several parts (``shares``) it is the representative part."""
     owner: Indices
     """(n,) rank that owns each node. Sums over nodes count a node only on the rank that owns it."""
     owned: npt.NDArray[np.bool_]
@@ -81,7 +81,7 @@ class Nodes:
     shares: Shares = field(default_factory=Shares)
     """Masses that each part has in the nodes that belong to several parts."""
     columns: Columns = field(default_factory=Columns, init=False, repr=False, compare=False)
-    """Columns, by node, of all stages. A stage declares its columns when it is built."""
+    """Columns, by node, of all stages; a stage declares its columns when it is built."""
 
     def __post_init__(self) -> None:
         """Declares the columns of this table."""
@@ -158,7 +158,7 @@ class Copies:
 
 @dataclass
 class Block:
-    """The elements of one part on one rank. The first ``border_chunks`` chunks contain all tets that have a shared
+    """The elements of one part on one rank; the first ``border_chunks`` chunks contain all tets that have a shared
     node.
     """
 
@@ -180,7 +180,7 @@ class Block:
     temperature: float = 293.15
     """Initial temperature, K. If the material has no row for the temperature, it is the temperature of every tet."""
     across: Indices = field(default_factory=lambda: np.zeros((0, 4), np.int32))
-    """(n, 4) the neighbour of each face at the start, 4 * global tet id + local face. The value is -1 for a face
+    """(n, 4) the neighbour of each face at the start, 4 * global tet id + local face; the value is -1 for a face
     exposed at the start, and LAID_BARE for a face exposed by erosion. (0, 4) in scenes without contact and fracture."""
     bond: Bits = field(default_factory=lambda: np.zeros((0, 4), np.uint8))
     """(n, 4) state of the facet at each face, INTACT, BROKEN or WIDE; (0, 4) if the part does not fracture."""
@@ -273,7 +273,7 @@ class Model:
     elements_global: int = 0
     """Number of tets on all ranks that are not eroded."""
     nodes_global: int = 0
-    """Number of nodes on all ranks. ``StepReduction.nodes`` describes when this number is up to date."""
+    """Number of nodes on all ranks; ``StepReduction.nodes`` describes when this number is up to date."""
     part_starts: Ints = field(default_factory=lambda: np.zeros(1, np.int64))
     """(parts,) global id of the first tet of each part."""
     mean_volumes: Floats = field(default_factory=lambda: np.zeros(0))
@@ -291,7 +291,7 @@ class Model:
 
 
 def chunked(values: Floats) -> Floats:
-    """Return (n,) values in the shape (chunks, CHUNK). The last value, a safe divisor, pads the last chunk."""
+    """Return (n,) values in the shape (chunks, CHUNK); the last value, a safe divisor, pads the last chunk."""
     chunks = -(-len(values) // CHUNK)
     filled = np.empty(chunks * CHUNK)
     filled[: len(values)] = values

@@ -28,10 +28,10 @@ from ..simulation import Simulation
 from ..snapshots.table import by_size
 
 SHARE = 1.0 / 50.0
-"""Fraction of the wall time that the search for fragments between frames may take. Chosen value: a run of a minute
+"""Fraction of the wall time that the search for fragments between frames may take; chosen value: a run of a minute
 takes one second longer."""
 _TETS = 4096
-"""Number of tets in a task. Chosen value: a task takes some 20 us."""
+"""Number of tets in a task; chosen value: a task takes some 20 us."""
 _MEASURE = (
     types.int64[::1], types.float64[:, ::1], types.int64[::1], types.int64[::1], types.uint32[:, ::1],
     types.float64[:, ::1],

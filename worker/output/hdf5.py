@@ -49,7 +49,7 @@ def _at_once(path: str, flags: int) -> int:
 
 
 class _Disk:
-    """A file object for HDF5. After a failure of the disk it discards the data to be written, and reports success to
+    """A file object for HDF5; after a failure of the disk it discards the data to be written, and reports success to
     HDF5.
     """
 

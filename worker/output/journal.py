@@ -19,7 +19,7 @@ from . import storage
 
 M = TypeVar("M", bound=messages.Message)
 _MOST = 1 << 40
-"""Largest size of a journal that is read, bytes. The value is so large that it is practically no limit."""
+"""Largest size of a journal that is read, bytes; the value is so large that it is practically no limit."""
 
 
 class _Head(msgspec.Struct):
@@ -33,7 +33,7 @@ _head = msgspec.json.Decoder(_Head)
 
 
 class Listener(Protocol):
-    """Interface of receivers of messages. A message is received after it was written to the journal."""
+    """Interface of receivers of messages; a message is received after it was written to the journal."""
 
     def tell(self, message: messages.AnyMessage, blob: bytes = b"") -> None:
         """Receive a message without blocking; ``blob``: the bytes of a snapshot, or empty."""

@@ -93,7 +93,7 @@ class Arguments:
 
     def bind(self, *values: Any) -> tuple[int, tuple[Tie, ...]]:
         """Write the arguments as ``set`` does, but some of the numbers are ``Follow``. Return the address of the table,
-        and the words that the program writes. The next ``set`` writes these words again.
+        and the words that the program writes; the next ``set`` writes these words again.
         """
         address = self.set(*(0.0 if isinstance(value, Follow) else value for value in values))
         ties = []
@@ -138,7 +138,7 @@ class Arguments:
 
 
 class Handle:
-    """Tables of arguments for the stages of a program, under one address. A kernel reads the tables that it needs."""
+    """Tables of arguments for the stages of a program, under one address; a kernel reads the tables that it needs."""
 
     def __init__(self, *kinds: tuple[Any, ...]) -> None:
         """``kinds``: numba types of the arguments of each table."""

@@ -18,7 +18,7 @@ _STEPS, _SECONDS = 10, 0.1
 """Length of a measurement, in steps and in s. The measurement ends at the limit that is reached first, but takes at
 least one step. Chosen values."""
 _AGAIN = 20.0
-"""Interval between two measurements, s. Chosen value: a measurement takes less than a hundredth of the interval, unless
+"""Interval between two measurements, s; chosen value: a measurement takes less than a hundredth of the interval, unless
 the steps are very long."""
 _WORTH = 0.98
 """Largest ratio of the time in parallel regions with more threads to the time with fewer threads, at which more threads

@@ -26,7 +26,7 @@ _LEVELS = 2.0**31 - 1.0
 _ID_BITS = 32
 """Number of bits for the id in a sorting key of 63 bits. The 31 higher bits have the position. Ids are below 2^32."""
 _DIGIT = 8
-"""Number of bits of a sorting key that are determined by one sum over the ranks. With the chosen value a sum has 256
+"""Number of bits of a sorting key that are determined by one sum over the ranks; with the chosen value a sum has 256
 counts for each box, and eight sums are needed."""
 _FINEST = 2.0**30
 """Value of the largest weight in quanta; with this value sums of four billion weights are exact."""
@@ -39,7 +39,7 @@ _SURFACE = 0.05
 """Penalty for a cut that goes through twice as much weight as the cut in the direction with the least weight. The
 penalty is a fraction of the time."""
 _TOGETHER = 8
-"""Number of boxes whose slices are summed over the ranks in one call. The number is fixed, so that the memory does not
+"""Number of boxes whose slices are summed over the ranks in one call; the number is fixed, so that the memory does not
 increase with the number of ranks."""
 _THICK = 2
 """Number of slices on each side of a cut from which the weight at the cut is computed."""

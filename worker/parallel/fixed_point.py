@@ -48,7 +48,7 @@ def bits_of(value: float) -> int:
 
 @njit("float64(float64)", cache=True)
 def scale_for(largest):  # type: ignore[no-untyped-def]
-    """Return the number of quanta per newton for contributions up to ``largest``, N. The result includes the
+    """Return the number of quanta per newton for contributions up to ``largest``, N; the result includes the
     headroom.
     """
     return math.ldexp(1.0, CONTRIBUTION_BITS - HEADROOM_BITS - math.frexp(largest)[1])
@@ -127,7 +127,7 @@ def _limbs_by_group(words, columns, group, scale):  # type: ignore[no-untyped-de
 
 
 def _whole(words: Ints) -> Floats:
-    """Return (..., k) the values of the sums of limbs (..., 2, k), in quanta of the low limb. The result is rounded
+    """Return (..., k) the values of the sums of limbs (..., 2, k), in quanta of the low limb; the result is rounded
     once.
     """
     high, low = words[..., 0, :], words[..., 1, :]
@@ -165,9 +165,9 @@ class Tally:
         self.carry()
 
     def carry(self) -> None:
-        """Move the overflow of the low limbs to the high limbs. The values of the sums do not change.
+        """Move the overflow of the low limbs to the high limbs; the values of the sums do not change.
 
-        A low limb gets at most 2^29 quanta from each value. Without ``carry`` it would overflow after 2^34 values;
+        A low limb gets at most 2^29 quanta from each value; without ``carry`` it would overflow after 2^34 values;
         contact may add as many values in a long run.
         """
         high, low = self.words

@@ -15,7 +15,7 @@ from .comm import Comm, Exchange, Pending, Sent, SerialComm
 from .tags import Tag
 
 _NAP = 0.01
-"""Interval between two checks in a wait that leaves the core to other processes, s. Chosen value: a hundredth of the
+"""Interval between two checks in a wait that leaves the core to other processes, s; chosen value: a hundredth of the
 start time of a rank."""
 
 

@@ -56,14 +56,14 @@ def _copy(table, first, stop, thread):  # type: ignore[no-untyped-def]
 
 
 class Packing:
-    """Passes that pack the results of other passes. All tasks of these passes have one length."""
+    """Passes that pack the results of other passes; all tasks of these passes have one length."""
 
     def __init__(self, team: Team, size: int) -> None:
         """``size``: length of a task."""
         self._size, self._pass = size, Pass(team, _copy, *_PACK, size=size)
 
     def run(self, n: int, out: Any, source: Any, begins: Ints, counts: Ints, spread: int = 1) -> None:
-        """Copy the results of a pass over the range from 0 to ``n`` from ``source`` to ``out``. The two arrays have
+        """Copy the results of a pass over the range from 0 to ``n`` from ``source`` to ``out``; the two arrays have
         rows of one type.
 
         The task that begins at index f has written ``counts`` rows to ``source``, from row ``spread`` * f on; they are

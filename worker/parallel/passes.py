@@ -10,7 +10,7 @@ from .arguments import Arguments, Tie
 from .team import Stage, Team
 
 NODES_OF_A_TASK = 4096
-"""Number of nodes in a task. Chosen value: a task takes 10 us, compared with 2 us to start a parallel region."""
+"""Number of nodes in a task; chosen value: a task takes 10 us, compared with 2 us to start a parallel region."""
 
 
 class _Range:
@@ -44,7 +44,7 @@ class _Range:
 class Ranges(_Range):
     """Runs kernels of the signature team.TASK over ranges on a team of threads.
 
-    Tasks may run at the same time, so they must not write to the same memory. The number of the task that begins at
+    Tasks may run at the same time, so they must not write to the same memory; the number of the task that begins at
     index ``first`` is ``first`` divided by ``size``.
     """
 

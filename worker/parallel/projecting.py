@@ -20,11 +20,11 @@ from .team import Team
 from .words import TASK, call_task, now
 
 _PAUSE = 100_000
-"""Time after which threads without a task sleep, ns. Chosen value: twice the time for which such threads poll
+"""Time after which threads without a task sleep, ns; chosen value: twice the time for which such threads poll
 (team.py)."""
 _REPEATS = 50
 _ROUNDS = 100_000
-"""Number of iterations of a task that takes longer than the waking of a thread. With the chosen value the task takes
+"""Number of iterations of a task that takes longer than the waking of a thread; with the chosen value the task takes
 some 100 us."""
 _WORDS = types.int64[::1], types.int64
 _words = reader(*_WORDS)
@@ -46,7 +46,7 @@ class Costs:
 
 @njit("void(boolean, int64[::1], int64[::1], int64[:, ::1])", cache=True)
 def _ready(asleep, costs, crews, free):  # type: ignore[no-untyped-def]
-    """Set the time at which each thread of each crew can begin the first task of a colour. The last column is the time
+    """Set the time at which each thread of each crew can begin the first task of a colour; the last column is the time
     at which the last task of a crew ends.
     """
     for c in range(len(crews)):

@@ -46,10 +46,10 @@ _LINE = 8
 _WAKES = 2
 """Largest number of threads that one thread wakes."""
 _LONG = 1000
-"""Smallest number of rounds of a program that allows other Python threads to run meanwhile. The chosen value is far
+"""Smallest number of rounds of a program that allows other Python threads to run meanwhile; the chosen value is far
 above the number of sweeps of contact and far below the number of steps in a second."""
 _POLLS = 4000
-"""Number of polls before a helper sleeps, and before the calling thread yields its core. With the chosen value polling
+"""Number of polls before a helper sleeps, and before the calling thread yields its core; with the chosen value polling
 takes some 50 us, which is longer than the gap between two colours and much shorter than a step."""
 
 
@@ -239,7 +239,7 @@ class Team:
 
     @property
     def within(self) -> float:
-        """Wall time in ``run`` so far, s. More threads would shorten this time."""
+        """Wall time in ``run`` so far, s; more threads would shorten this time."""
         return self._words[WITHIN] / SECOND
 
     @property

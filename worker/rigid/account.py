@@ -86,8 +86,8 @@ class BodyAccount:
         return np.asarray(0.5 * (linear + dot(momentum, bodies.rates(bodies.momentum))))
 
     def quantity(self, body: int, field: str, axis: int, share: float) -> float:
-        """Returns the kinetic energy of a body, J, or a component of ``momentum``, ``centre`` or ``centre_velocity``.
-        The result contains the fraction ``share`` of the change by the last impulses.
+        """Returns the kinetic energy of a body, J, or a component of ``momentum``, ``centre`` or ``centre_velocity``;
+        the result contains the fraction ``share`` of the change by the last impulses.
         """
         bodies, (speed, momentum) = self._bodies, self.before
         if field == "centre":

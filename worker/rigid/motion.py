@@ -21,7 +21,7 @@ class Held:
     free: Floats = field(default_factory=lambda: np.ones(3))
     """(3,) 1 for axes along which impulses may move the body, else 0."""
     turns: Floats = field(default_factory=lambda: np.ones(3))
-    """(3,) 1 for axes about which impulses may rotate the body, else 0. The values are 1 for all axes, for one axis, or
+    """(3,) 1 for axes about which impulses may rotate the body, else 0; the values are 1 for all axes, for one axis, or
     for none."""
     driven: dict[int, tuple[float, Course]] = field(default_factory=dict)
     """Prescribed velocity along an axis, m/s, and its factor over time, keyed by the axis."""

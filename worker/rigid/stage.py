@@ -1,7 +1,7 @@
 """Rigid bodies in the time step.
 
-At the start of a step the bodies are at their positions of n. External loads change v(n-1/2) to v*(n+1/2) (``kick``).
-Impulses of contact and walls change it to v(n+1/2) (``contacts``, ``settle``). Then positions and orientations of n+1
+At the start of a step the bodies are at their positions of n. External loads change v(n-1/2) to v*(n+1/2) (``kick``);
+impulses of contact and walls change it to v(n+1/2) (``contacts``, ``settle``). Then positions and orientations of n+1
 are computed (``move``).
 
 Impulses act at the arms of n, and rotation vectors are computed from the angular momentum in the orientation of n.

@@ -26,9 +26,9 @@ from ..model.state import Flags, Floats, Indices, Ints
 from .bodies import Bodies, dot
 
 _NEAR = 2.0
-"""Ratio of a distance to the motion of a body in a step. The walls within this distance of the body are checked."""
+"""Ratio of a distance to the motion of a body in a step; the walls within this distance of the body are checked."""
 _CLOSE = 1e-3
-"""Length, divided by the reach of a body. The length is added to the distance within which walls are checked. If a node
+"""Length, divided by the reach of a body. The length is added to the distance within which walls are checked; if a node
 ends deeper than this length behind a wall, the run ends."""
 _MOST, _ENOUGH = 200, 1e-12
 """Largest number of passes over the rows; and relative change of an impulse at which the passes end."""
@@ -88,7 +88,7 @@ class BodyStops:
         """(walls, b, 3) impulse of each wall on each body in the step, N s; and the part of it that is friction."""
 
     def begin(self, dt: float) -> None:
-        """Finds the pairs of a node and a wall for a step of length ``dt``, s. Positions are those of n, velocities
+        """Finds the pairs of a node and a wall for a step of length ``dt``, s; positions are those of n, velocities
         those before the impulses.
         """
         bodies = self._bodies

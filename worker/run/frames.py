@@ -26,7 +26,7 @@ class Frames:
         """Warnings about output files that were removed during the run. Only on rank 0."""
 
     def write(self, sim: Simulation) -> None:
-        """Write the frame of the present time. If the journal has no message of this frame, write the message."""
+        """Write the frame of the present time; if the journal has no message of this frame, write the message."""
         clock, index, journal = sim.clock, sim.clock.frame, self._notices.journal
         sim.count_nodes()
         self.report_losses(sim)

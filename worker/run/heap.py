@@ -7,8 +7,8 @@ import sys
 _TRIM_THRESHOLD, _MMAP_THRESHOLD = -1, -3
 """Parameters of mallopt(3) of glibc."""
 LARGE = 1 << 20
-"""Smallest size in bytes of an array whose memory is returned to the operating system at once when the array is freed.
-By default glibc raises this bound, up to 32 MB, to the size of the largest array that was freed. Arrays that grow while
+"""Smallest size in bytes of an array whose memory is returned to the operating system at once when the array is freed;
+by default glibc raises this bound, up to 32 MB, to the size of the largest array that was freed. Arrays that grow while
 a body breaks then leave holes in the heap, and the case of docs/tutorial/first_case.md took 540 MB; with this setting
 it took 380 MB. The setting does not change the CPU time, even for a bar with 62,000 tets."""
 _SPARE = 32 << 20

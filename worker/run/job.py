@@ -31,7 +31,7 @@ from .lock import hold
 
 _ONE_THREAD = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
 _ASK_FOR = 20.0
-"""Longest time for which Slurm's controller is asked for the cause of a signal, s. Chosen value: KillWait, 30 s by
+"""Longest time for which Slurm's controller is asked for the cause of a signal, s; chosen value: KillWait, 30 s by
 default, after which Slurm ends this process."""
 _EARLY = 90.0
 """Longest time before the time limit at which Slurm may send the signal (60 s, sbatch(1)), plus a margin for the

@@ -170,7 +170,7 @@ def _parse(arguments: list[str]) -> argparse.Namespace:
 
 
 def _case(options: argparse.Namespace, comm: Comm) -> tuple[Case, list[str]]:
-    """Returns the case with its overrides, and warnings about its text. The number of ranks in the case is set to the
+    """Returns the case with its overrides, and warnings about its text; the number of ranks in the case is set to the
     number that MPI has started.
 
     Rank 0 reads the case. All ranks receive the case, or raise the error of rank 0.

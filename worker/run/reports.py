@@ -33,7 +33,7 @@ class _Load(NamedTuple):
     others: dict[str, float]
     """Waiting times, messages and outside nodes, keyed by the names in messages.Load."""
     counting: bool
-    """Whether fragments must be found. The value of rank 0 is used."""
+    """Whether fragments must be found; the value of rank 0 is used."""
     projected: dict[int, dict[str, float]]
     """Estimated CPU seconds, keyed by the number of threads and then by phase."""
 

@@ -17,7 +17,7 @@ from .signals import Signals
 from .stops import CANCELLED, MAX_STEPS, WALL_TIME
 
 _REPORT_EVERY = 0.25
-"""Wall time between two reports, s. Chosen value: a display that is updated four times a second moves smoothly."""
+"""Wall time between two reports, s; chosen value: a display that is updated four times a second moves smoothly."""
 
 
 class Requests:

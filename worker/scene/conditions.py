@@ -36,8 +36,8 @@ def loads(parcel: Parcel) -> list[Load | LoadedFaces]:
 def walls_of(case: schema.Case) -> Walls:
     """Return the walls of a case in their initial position.
 
-    If parts are rigid, each symmetry plane adds two walls: one for bodies above the plane and one for bodies below it.
-    A contact between a body and such a wall represents the contact between the body and its mirror image.
+    If parts are rigid, each symmetry plane adds two walls: one for bodies above the plane and one for bodies below it;
+    a contact between a body and such a wall represents the contact between the body and its mirror image.
     """
     planes = case.boundaries_of(schema.Symmetry) if case.rigid else []
     images = [_image(spec, sign) for _, spec in planes for sign in (1.0, -1.0)]

@@ -18,7 +18,7 @@ from ..mesh.model import TetMesh
 from ..model.state import Indices
 
 _MANY = 1_000
-"""Largest number of pieces of a part for which overlaps between the pieces are searched for. Chosen value: the size of
+"""Largest number of pieces of a part for which overlaps between the pieces are searched for; chosen value: the size of
 the table of pairs is proportional to the square of this number."""
 UNSEEN = "overlaps of bodies are checked when the run starts, because kernels are not compiled yet"
 """Warning that overlaps are not searched for."""

@@ -11,7 +11,7 @@ from ..materials.elementary import power
 from ..model.state import Floats, Indices
 
 _STRAIN = 1e-6
-"""Smallest strain by round-off that gives a warning. Chosen value: it corresponds to 0.2 MPa in steel."""
+"""Smallest strain by round-off that gives a warning; chosen value: it corresponds to 0.2 MPa in steel."""
 
 
 def remote(case: Case, x: Floats, tets: Indices, part: Indices, volumes: Floats) -> list[str]:

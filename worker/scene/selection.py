@@ -22,7 +22,7 @@ log = logging.getLogger("conoid.worker")
 
 _CLOSE = 0.5
 """Distance outside of a region, divided by the shortest edge, within which nodes are counted to detect a layer of
-nodes. Chosen value: the next layer of a regular mesh is at twice this distance."""
+nodes; chosen value: the next layer of a regular mesh is at twice this distance."""
 _LAYER, _FEWEST = 0.5, 4
 """Smallest fraction of the counted nodes within region.MOST at which these nodes count as a layer, and smallest number
 of such nodes. Chosen values: of randomly placed nodes a fifth is within that distance."""

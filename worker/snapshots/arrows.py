@@ -6,7 +6,7 @@ from ..model.state import Floats, Ints
 from .outline import Outline
 
 _MOST = 1000
-"""Largest number of arrows in a snapshot. Chosen value: more arrows would hide the body."""
+"""Largest number of arrows in a snapshot; chosen value: more arrows would hide the body."""
 MOST_BYTES = _MOST * (4 + 3 * 4)
 _LEVELS = 6
 """Level of the finest grid that is tried. This grid has 2^6 cells along the longest side; the coarsest grid has one

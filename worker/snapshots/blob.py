@@ -96,7 +96,7 @@ def _numbers(whole: Whole, labels: Ints) -> Ints:
     """Return (tets,) the number of the fragment of each tet.
 
     If only erosion can separate bodies, there is no record of fragments. In that case the largest piece of each part
-    has the number of the part. The number of every other piece is the number of parts plus the index of the first tet
+    has the number of the part; the number of every other piece is the number of parts plus the index of the first tet
     of the piece.
     """
     if whole.initial:

@@ -22,7 +22,7 @@ from . import share
 from .share import Share
 
 _FAREWELL = 30.0
-"""Longest time for which the last snapshots are awaited after the last step, s. Chosen value: a hundred times the
+"""Longest time for which the last snapshots are awaited after the last step, s; chosen value: a hundred times the
 duration of one snapshot of 150,000 tets."""
 _SECRETS = ("CONOID_ZENOH_USER", "CONOID_ZENOH_PASSWORD")
 

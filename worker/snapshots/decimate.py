@@ -15,9 +15,9 @@ from ..model.state import Floats, Ints
 from .outline import Outline
 
 _FINENESS = 2.0**0.25
-"""Ratio of two successive cell sizes. Chosen value: at most a third of the budget of triangles is unused."""
+"""Ratio of two successive cell sizes; chosen value: at most a third of the budget of triangles is unused."""
 _LEAST = 8
-"""Smallest number of triangles that the budget has for each fragment. Chosen value: the number of triangles of two
+"""Smallest number of triangles that the budget has for each fragment; chosen value: the number of triangles of two
 tets."""
 _SIMPLE = 8
 """Largest number of triangles of a fragment that is not decimated. Chosen value."""

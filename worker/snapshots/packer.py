@@ -25,12 +25,12 @@ from .births import Births
 
 _NICE, _LOWEST = 10, 19
 """Decrease of the priority of this process, and the lowest priority. With a decrease of 10, a rank on the core of this
-process gets nine times as much CPU time as this process. Chosen value: the remaining CPU time is sufficient."""
+process gets nine times as much CPU time as this process; chosen value: the remaining CPU time is sufficient."""
 _TETS = 256_000_000
 """Approximate limit of the bytes of all tets in all snapshots of a run. Early snapshots use only a part of the limit,
-so that later snapshots are also possible. Chosen value: a hundred snapshots of 150,000 tets in 2,900 fragments."""
+so that later snapshots are also possible; chosen value: a hundred snapshots of 150,000 tets in 2,900 fragments."""
 _PATIENCE = 60.0
-"""Longest time until the share (copied state) of a rank must appear, s. Chosen value: many times the duration of
+"""Longest time until the share (copied state) of a rank must appear, s; chosen value: many times the duration of
 writing it to a slow disk."""
 _LOOK = 0.005
 """Interval between two checks for the share (copied state) of a rank, s. Chosen value."""

@@ -24,16 +24,16 @@ from .courier import Courier
 from .share import copied
 
 _APART = 1.0
-"""Smallest wall time between two scheduled snapshots, s. Chosen value: users do not need more frequent snapshots."""
+"""Smallest wall time between two scheduled snapshots, s; chosen value: users do not need more frequent snapshots."""
 _SHARE = 1.0 / 200.0
 """Fraction of the time of a run that copies may take."""
 _CROWDED = 1.0 / 20.0
 """Fraction of a core that the process that makes snapshots may use, if ranks use all cores. All ranks wait for the rank
-on the core of this process. Chosen value: a run takes at most a twentieth longer, and a body of 150,000 tets still has
+on the core of this process; chosen value: a run takes at most a twentieth longer, and a body of 150,000 tets still has
 a snapshot every 6 s."""
 
 _EARLY = 1e-6
-"""Largest time by which a snapshot may be early, divided by the time between two snapshots. The value is far above
+"""Largest time by which a snapshot may be early, divided by the time between two snapshots; the value is far above
 round-off."""
 
 
@@ -120,7 +120,7 @@ class Snapshots:
         self._comm.await_all()
 
     def _wait(self, place: int) -> None:
-        """Set the number of the next of the evenly spaced times. Set also the time at which this is tested, which is
+        """Set the number of the next of the evenly spaced times; set also the time at which this is tested, which is
         slightly earlier.
         """
         self._next = place

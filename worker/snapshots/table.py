@@ -14,13 +14,13 @@ from ..parallel.comm import SerialComm
 from .share import Whole
 
 MOST_ROWS = 2048
-"""Largest number of fragments that have a row of their own in the table. Chosen value: these rows take a tenth of the
+"""Largest number of fragments that have a row of their own in the table; chosen value: these rows take a tenth of the
 bytes of a snapshot, and a user selects fewer fragments."""
 
 
 @dataclass
 class Table:
-    """All fragments of a model, in ascending order of their labels. The values are bit-identical to those of
+    """All fragments of a model, in ascending order of their labels; the values are bit-identical to those of
     ``fragments.table``.
     """
 

@@ -12,13 +12,13 @@ import numpy as np
 from ..model.state import Floats, Ints
 
 MOST_TETS = 1_000_000
-"""Largest number of tets of a model for which the file is written. Chosen value: a page cuts this number of tets in
-20 ms, and their file is made in 0.9 s of CPU time."""
+"""Largest number of tets of a model for which the file is written; chosen value: a page cuts this number of tets in 20
+ms, and their file is made in 0.9 s of CPU time."""
 _BITS = 10
-"""Number of bits of a coordinate on the Z-curve. With the chosen value the resolution is finer than meshes of
+"""Number of bits of a coordinate on the Z-curve; with the chosen value the resolution is finer than meshes of
 ``MOST_TETS`` tets."""
 _LEVEL = 1
-"""Compression level of gzip. Chosen value: level 6 takes three times as long and saves 5 % of the bytes."""
+"""Compression level of gzip; chosen value: level 6 takes three times as long and saves 5 % of the bytes."""
 
 
 def ordered(places: "np.ndarray", tets: Ints) -> tuple["np.ndarray", Ints, Ints]:
@@ -47,7 +47,7 @@ def _along(places: "np.ndarray") -> Ints:
 
 
 def steps(corners: Ints) -> "np.ndarray":
-    """Return (4, 4, n) bytes (uint8) of differences modulo 2^32. The first index is the byte of the 32 bits, lowest
+    """Return (4, 4, n) bytes (uint8) of differences modulo 2^32; the first index is the byte of the 32 bits, lowest
     first; the second index is the corner.
 
     The first node of a tet is compared with the first node of the previous tet; each other node is compared with the

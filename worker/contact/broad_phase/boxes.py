@@ -14,7 +14,7 @@ from ...parallel.passes import Pass
 from ...parallel.team import TASK, Team
 
 _PRIMITIVES = 1024
-"""Number of primitives in a task. Chosen value: a task takes some 30 us, compared with 2 us to start a parallel
+"""Number of primitives in a task; chosen value: a task takes some 30 us, compared with 2 us to start a parallel
 region."""
 _EVERYWHERE = np.full((1, 2, 3), (((-np.inf,) * 3, (np.inf,) * 3)))
 """Hull that touches every box."""
@@ -133,7 +133,7 @@ def _clear(hull):  # type: ignore[no-untyped-def]
 
 @njit(_I(*_BOX, types.float64[:, :, ::1], _N1, _I, _I), cache=True)
 def _box(out, reach, lines, allowed, hull, own, some, first, stop):  # type: ignore[no-untyped-def]
-    """Sets the boxes and rows of the primitives ``some``, from ``first`` to ``stop``. A primitive is used only if it
+    """Sets the boxes and rows of the primitives ``some``, from ``first`` to ``stop``; a primitive is used only if it
     touches the ``hull`` (parts, 2, 3) of a part with which its own part may be in contact. Returns the number of used
     primitives. Sets ``own`` (parts, 2, 3) to the hulls of the parts of these primitives.
     """

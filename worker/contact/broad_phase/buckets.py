@@ -27,7 +27,7 @@ boxes."""
 _CURVE_BITS = 12
 """Number of bits of each coordinate in the code of the space-filling curve."""
 _LEAST_BITS = 6
-"""Smallest number of bits of the hash. Entries are first sorted by this number of upper bits; then each range of hashes
+"""Smallest number of bits of the hash; entries are first sorted by this number of upper bits; then each range of hashes
 is sorted separately."""
 _BOXES, _RANGES = 512, 4
 """Number of boxes in a task that enters boxes, and number of ranges of hashes in a task. Chosen values: a task takes
@@ -169,7 +169,7 @@ def _count(table, first, stop, thread):  # type: ignore[no-untyped-def]
 
 @njit("int64(int32[::1], int64[::1])", cache=True)
 def _together(wide, widths):  # type: ignore[no-untyped-def]
-    """Moves the boxes without entries of all tasks to the front. Returns the number of these boxes."""
+    """Moves the boxes without entries of all tasks to the front; returns the number of these boxes."""
     n = 0
     for k in range(len(widths)):
         for at in range(k * _BOXES, k * _BOXES + widths[k]):

@@ -65,7 +65,7 @@ def _cell(x, edge):  # type: ignore[no-untyped-def]
 
 @njit("int64(int64, int64, int64)", cache=True)
 def _code(ix, iy, iz):  # type: ignore[no-untyped-def]
-    """Returns the code of a cell. Two cells have equal codes only if they are 2^20 cells apart. The only effect of
+    """Returns the code of a cell; two cells have equal codes only if they are 2^20 cells apart. The only effect of
     equal codes is that an unneeded ghost is sent.
     """
     return (ix << 42) + (iy << 21) + iz

@@ -13,7 +13,7 @@ from .boxes import SOUGHT, Sought
 from .buckets import TABLE, Table, bucket_at, bucket_of
 
 _LARGE = 128
-"""Number of large primitives in a task. Chosen value: a task takes some 30 us, compared with 2 us to start a parallel
+"""Number of large primitives in a task; chosen value: a task takes some 30 us, compared with 2 us to start a parallel
 region."""
 _EACH, _MOST = 8, 64
 """Number of pairs for each large primitive for which memory is first reserved, on average over a task; and the largest

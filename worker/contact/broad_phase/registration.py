@@ -1,7 +1,7 @@
 """Registration: the search for the candidate pairs of changed nodes, faces and edges on one rank, without
 communication. Registration finds each pair once.
 
-The pairs of a changed node, face or edge are removed. Then pairs of it are searched among all nodes, faces and edges in
+The pairs of a changed node, face or edge are removed; then pairs of it are searched among all nodes, faces and edges in
 the broad phase. A node, face or edge counts as changed if it has departed from its line (reference_motion.py) or is new
 on the surface. A complete search is a registration in which all nodes, faces and edges are changed. Candidates that do
 not become active have no effect on the answer.

@@ -34,11 +34,11 @@ _LONGEST = 80.0
 """Largest horizon of a search, in steps, if bodies break. With a horizon of 300 steps the additional pairs between
 fragments would cost a quarter more than the omitted searches save (docs/performance/bench.md, the bar to 40 us)."""
 _AHEAD = 2.0
-"""Number of steps before the end of the horizon at which the next search is scheduled. The second of these steps is
+"""Number of steps before the end of the horizon at which the next search is scheduled; the second of these steps is
 needed because the narrow phase also detects the contacts of the step after the present one."""
 _LEAST = 3.0 + _AHEAD
 """Smallest remaining horizon, in steps, for which the candidates of the last search are kept. With a shorter horizon
-the next search would follow immediately. Chosen value: three steps more than _AHEAD; one of the three allows for a time
+the next search would follow immediately; chosen value: three steps more than _AHEAD; one of the three allows for a time
 step that increases."""
 
 

@@ -2,7 +2,7 @@
 
 The box around a face or an edge is much larger than the face or edge. A pair of edges is removed if a single direction
 separates the two edges over the whole horizon. For a node and a face, the height over the face and the distances from
-its sides are computed at the beginning, middle and end of the horizon. Each of these distances is nearly a parabola in
+its sides are computed at the beginning, middle and end of the horizon; each of these distances is nearly a parabola in
 time. Between two of the three moments it deviates from the straight line by an eighth of its second difference; the
 filter allows twice this deviation. A pair is removed only if a single one of the distances excludes contact over the
 whole horizon, with the skin and the depth of contacts as margin.
@@ -22,7 +22,7 @@ from .boxes import LINES, Lines
 
 _V2 = "float64[:, ::1]"
 _PAIRS = 1024
-"""Number of pairs in a task. Chosen value: a task takes some 50 us, compared with 2 us to start a parallel region."""
+"""Number of pairs in a task; chosen value: a task takes some 50 us, compared with 2 us to start a parallel region."""
 _N2 = types.int32[:, ::1]
 _KEEP = _N2, types.int64[::1], _N2, types.float64[::1], LINES, types.float64
 _read = reader(*_KEEP)

@@ -153,7 +153,7 @@ def _determinant(tet):  # type: ignore[no-untyped-def]
 
 @njit("float64(float64[:, :], int64, float64[:, :], int64)", cache=True)
 def _height(tet, face, other, k):  # type: ignore[no-untyped-def]
-    """Returns ``_triple`` of corner ``k`` of ``other`` and the face opposite to a corner of a tet. The value is
+    """Returns ``_triple`` of corner ``k`` of ``other`` and the face opposite to a corner of a tet; the value is
     positive on the inner side of the face.
     """
     return -_triple(tet, FACES[face, 0], FACES[face, 1], FACES[face, 2], other, k)
@@ -224,7 +224,7 @@ def _in_front(out, n, tet, height, wedge, order):  # type: ignore[no-untyped-def
 
 @njit("float64(float64[:, :, ::1], float64[:, :, ::1], float64[:, ::1], float64[:, ::1])", cache=True)
 def intersection(pieces, others, one, other):  # type: ignore[no-untyped-def]
-    """Six times the common volume, m^3, of two tets (4, 3), neither of which is inverted. The first tet is cut by the
+    """Six times the common volume, m^3, of two tets (4, 3), neither of which is inverted; the first tet is cut by the
     face planes of the second tet, one after the other. ``pieces``, ``others`` (_PIECES, 4, 3): working arrays.
     """
     n, height, wedge, order = 1, np.empty(4), np.empty((6, 3)), np.empty(4, np.int64)

@@ -26,17 +26,17 @@ from ..stage import Contact
 from .overlap import to_borders
 
 SLIGHT = 0.05
-"""Ratio of the depth to the typical size of a face. Depths below this ratio count as 0. The chosen value is above the
+"""Ratio of the depth to the typical size of a face; depths below this ratio count as 0. The chosen value is above the
 residual of the contact sweeps."""
 _WORDS = 5
 """Number of words of a node in a message."""
 _AT_ONCE = 1 << 14
-"""Number of pairs of a node and a tet that are tested together. The number limits the size of temporary arrays."""
+"""Number of pairs of a node and a tet that are tested together; the number limits the size of temporary arrays."""
 _ROUNDING = 1e-9
 """Tolerance of the volume coordinates; within this tolerance a node on the face between two tets counts as being in
 each of them."""
 DEEP = 0.25
-"""Ratio of the depth to the typical size of a face, above which a warning is given. Chosen value: about half of the
+"""Ratio of the depth to the typical size of a face, above which a warning is given; chosen value: about half of the
 altitude of a regular tet."""
 
 
@@ -47,7 +47,7 @@ class Inside:
     tested: int
     """Number of tested nodes."""
     nodes: int
-    """Number of nodes that are deeper than SLIGHT inside of another body or fragment. Nodes without tets are also
+    """Number of nodes that are deeper than SLIGHT inside of another body or fragment; nodes without tets are also
     counted if they are inside of their own part."""
     own: int
     """Number of penetrated nodes that have no tets and are inside of their own part only."""

@@ -1,5 +1,5 @@
 """Overlap of bodies before the first step. The module finds place and depth of an overlap and can remove the overlap by
-moving nodes. If an overlap remains, it reports an error.
+moving nodes; if an overlap remains, it reports an error.
 """
 
 from collections.abc import Iterator
@@ -17,7 +17,7 @@ from ..narrow_phase.facing import FACING
 _INSIDE = 1e-9
 """Tolerance of the volume coordinates for a node inside of a tet."""
 _ROUNDING = 1e-6
-"""Ratio of the depth to the size of a face. Depths below this ratio count as 0."""
+"""Ratio of the depth to the size of a face; depths below this ratio count as 0."""
 _TRIES = 30
 """Largest number of passes in which overlapping bodies are moved apart. Chosen value."""
 
@@ -57,7 +57,7 @@ class Overlaps:
 
 
 def find(points: Floats, tets: Indices, part: Indices, surface: Surface, allowed: Flags) -> Overlaps:
-    """Finds surface nodes that are inside of the tets (k, 4) of another part. The two parts must be ``allowed`` to be
+    """Finds surface nodes that are inside of the tets (k, 4) of another part; the two parts must be ``allowed`` to be
     in contact. ``points`` (n, 3), m.
     """
     others = allowed & ~np.eye(len(allowed), dtype=bool)

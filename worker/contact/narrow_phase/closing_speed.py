@@ -51,7 +51,7 @@ def fastest_of(step, corners, s, f):  # type: ignore[no-untyped-def]
 @njit(_F(STEP, types.int32[:, ::1], types.int64, types.int64, _F), cache=True, error_model="numpy")
 def closing_rate(step, corners, s, f, fastest):  # type: ignore[no-untyped-def]
     """Square of a rate, 1/s^2, of node s and face f: the largest velocity change by contact, divided by the least
-    altitude of their tets. The result is 0 if they do not approach by more than ``step.fast`` in a step. ``fastest``:
+    altitude of their tets; the result is 0 if they do not approach by more than ``step.fast`` in a step. ``fastest``:
     result of ``fastest_of``.
     """
     if not fastest * step.beyond**2 > step.fast**2:

@@ -8,7 +8,7 @@ side that is above the copy and contains its foot (docs/theory/fracture.md, "Con
 
 These sides are called narrow sides; their corners are processed family by family; a family is all copies of one
 original node. The positions of each member relative to all corners of its family are computed in loops over rows of a
-few kilobytes, which the compiler vectorizes. The few corners that pass this test are then tested one by one.
+few kilobytes, which the compiler vectorizes; the few corners that pass this test are then tested one by one.
 """
 
 from typing import NamedTuple
@@ -211,8 +211,8 @@ def entering(out, base, each, narrow, of, step, first, stop):  # type: ignore[no
     """Writes contacts of separated nodes with the narrow sides at their former corner, of the families ``of`` a block
     from ``first`` to ``stop``.
 
-    The contacts are written to rows of ``out``. The first row is ``base`` plus ``each`` times the number of corners
-    before the first family; there are ``each`` rows for each corner on average. Returns the number of contacts. If this
+    The contacts are written to rows of ``out``; the first row is ``base`` plus ``each`` times the number of corners
+    before the first family; there are ``each`` rows for each corner on average. Returns the number of contacts; if this
     number is larger than the number of rows, some contacts have no row. The comments have the numbers of the conditions
     in the drawing.
     """

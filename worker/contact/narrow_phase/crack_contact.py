@@ -66,7 +66,7 @@ def across(out, base, opening, cracks, typical, step, first, stop):  # type: ign
     contacts are rows of ``out`` from ``base + 3 first`` on.
 
     ``typical``: size of a face, m. Returns the number of contacts, and the number of cracks that have become wide
-    enough to open. Writes the numbers of these cracks to ``opening`` (m,), from ``first`` on.
+    enough to open; writes the numbers of these cracks to ``opening`` (m,), from ``first`` on.
     """
     x, v, part, mu, dt = step.x, step.v, step.part, step.mu, step.dt
     n, wide = base + 3 * first, first

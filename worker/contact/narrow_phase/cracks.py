@@ -4,7 +4,7 @@ The two sides of a broken facet coincide, so no search is needed to find contact
 of separation on, the two copies of a node on opposite sides are in contact along the normal of the facet, with an
 initial gap of exactly zero. Another body could reach the faces of a crack only by entering the crack. Therefore the
 faces are not surface until the width of the crack is a fixed fraction of the size of a facet. In the step in which the
-width reaches this fraction, the crack opens: its faces, nodes and edges are surface from the next step on. The last
+width reaches this fraction, the crack opens: its faces, nodes and edges are surface from the next step on; the last
 search has included these faces, so that opening needs no search. Cracks that do not widen never cause a search.
 """
 
@@ -162,7 +162,7 @@ class Cracks:
         self._corners = {}
 
     def open(self, faces: Ints, blocks: list[Block]) -> None:
-        """Removes cracks from the table because their sides are now surface. ``faces``: first sides of these cracks,
+        """Removes cracks from the table because their sides are now surface; ``faces``: first sides of these cracks,
         ascending. The last rows of the table are moved to the free rows.
         """
         rows = named(self.faces[:, 0], faces)
@@ -217,7 +217,7 @@ def _families_beside(found, marks, rows, nodes, ring):  # type: ignore[no-untype
     cache=True,
 )
 def _tets_beside(found, n, marks, rows, nodes, sides, block, tets):  # type: ignore[no-untyped-def]
-    """Adds nodes to a list of ``n`` nodes and returns the new number of nodes. The added nodes are those of the local
+    """Adds nodes to a list of ``n`` nodes and returns the new number of nodes; the added nodes are those of the local
     tets of one block at the cracks ``rows`` with separated nodes.
     """
     for r in rows:

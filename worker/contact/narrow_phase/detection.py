@@ -253,7 +253,7 @@ class Detection:
         ]  # fmt: skip
 
     def _corners(self, now: Scene, narrow: list[tuple[Block, Corners]], cracks: Cracks, step: Step) -> int:
-        """Adds the contacts at the corners of all blocks. Returns the number of these contacts."""
+        """Adds the contacts at the corners of all blocks; returns the number of these contacts."""
         if len(narrow) != len(self._corner_tables):
             self._prepare(len(narrow))
         n = 0

@@ -46,7 +46,7 @@ _I, _F, _N1 = types.int64, types.float64, types.int32[::1]
 
 @njit(f"{_SECTOR}({VECTOR}, {_X2}, {_V2}, {_N2}, int64, float64)", cache=True, error_model="numpy")
 def _sector(u, x, v, edges, e, h):  # type: ignore[no-untyped-def]
-    """Four numbers of edge e after a time ``h``. The first is the sense of rotation from the normal of its first face
+    """Four numbers of edge e after a time ``h``; the first is the sense of rotation from the normal of its first face
     to that of its second face; 0 for an edge that is not convex. The others are the cross products of u with the two
     normals, along u.
     """
@@ -87,7 +87,7 @@ def _apart(m, x, v, a, b, c, d, s, t, h):  # type: ignore[no-untyped-def]
 
 @njit(f"float64({VECTOR}, {VECTOR}, {VECTOR})", cache=True)
 def _volume(u, w, r):  # type: ignore[no-untyped-def]
-    """Returns u x w . r, which is six times the volume, m^3, between two edges. The value changes sign when the lines
+    """Returns u x w . r, which is six times the volume, m^3, between two edges; the value changes sign when the lines
     of the edges cross.
     """
     return dot(cross(u, w), r)
@@ -103,10 +103,10 @@ def _fastest(course, a, b, c, d):  # type: ignore[no-untyped-def]
 @njit(f"float64({VECTOR}, {VECTOR}, {VECTOR}, float64, float64)", cache=True, error_model="numpy")
 def beyond_ends(u, w, r, s, t):  # type: ignore[no-untyped-def]
     """Returns a bound of the motion of the ends of edge u relative to the ends of edge w, m; up to this motion the
-    edges cross beyond an end of u or w. The result is 0 if they cross within both edges. Now they cross at ``s`` of u
+    edges cross beyond an end of u or w. The result is 0 if they cross within both edges; now they cross at ``s`` of u
     and ``t`` of w; ``r``: vector from the beginning of u to the beginning of w.
 
-    Derivation: the edges cross beyond an end of edge a, at a fraction S of its length from this end. Let k be the
+    Derivation: the edges cross beyond an end of edge a, at a fraction S of its length from this end; let k be the
     vector from this end to an end of the other edge b, and n = a x b. Then (k x b) . n = -S n . n, and the edges cross
     there while this number is negative. If ends move by h relative to each other, a and b change by 2 h, and k changes
     by h. Then n changes by at most B h, and k x b by at most A h, with the bounds A and B in the code, if h is a small
@@ -143,7 +143,7 @@ def _deep(x, edges, e):  # type: ignore[no-untyped-def]
 
 @njit(f"boolean({_N2}, int64, int64)", cache=True)
 def _opposite(edges, one, two):  # type: ignore[no-untyped-def]
-    """Returns True if an edge joins the third nodes of the two faces of another edge. The two edges are then opposite
+    """Returns True if an edge joins the third nodes of the two faces of another edge; the two edges are then opposite
     edges of one tet.
     """
     a, b, c, d = edges[one, 2], edges[one, 3], edges[two, 0], edges[two, 1]

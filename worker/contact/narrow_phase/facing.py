@@ -33,11 +33,11 @@ projectile would be detected one step late (test_hard_contact). Chosen value: tw
 sliding."""
 _BEHIND = 0.1
 """Fraction of the size of a face, which is compared with the sum of the depths of the corners of the face behind a
-neighbouring face. If the sum is above this value, the common edge is convex. The chosen value is below the sum for an
+neighbouring face; if the sum is above this value, the common edge is convex. The chosen value is below the sum for an
 angle of 25 degrees between the faces, and above round-off."""
 _OVER = 0.1
 """Smallest component along a face of the mean direction from a node to the midpoints of its own faces; above this value
-the faces of the node reach over that face. The faces of a blunt edge have a component below this value. Chosen value: a
+the faces of the node reach over that face. The faces of a blunt edge have a component below this value; chosen value: a
 third of the component for the corner of a cube."""
 _F, _VECTOR = types.float64, types.UniTuple(types.float64, 3)  # type: ignore[no-untyped-call]
 

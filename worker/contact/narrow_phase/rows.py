@@ -19,7 +19,7 @@ as active contacts. More spare rows take memory; fewer spare rows require new al
 @dataclass
 class ActiveRows:
     """Rows of active contacts. Every kind of contact has a range of the allocated rows, and every task has a part of
-    this range. Rows are not moved. The first ``n`` elements of ``found`` are the numbers of the rows with active
+    this range. Rows are not moved; the first ``n`` elements of ``found`` are the numbers of the rows with active
     contacts.
     """
 

@@ -52,14 +52,14 @@ from .rows import collected
 from .tables import CONTACT_ROWS, STEP
 
 PAIRS_OF_A_TASK = 1024
-"""Number of candidate pairs in a task. Chosen value: a task takes about 20 us, compared with 2 us to start a parallel
+"""Number of candidate pairs in a task; chosen value: a task takes about 20 us, compared with 2 us to start a parallel
 region."""
 CRACKS_OF_A_TASK, FAMILIES_OF_A_TASK, CONTACTS_OF_A_TASK, SLOTS_OF_A_TASK, SIDES_OF_A_TASK = 512, 128, 1024, 2048, 8192
 """Numbers of cracks, of families, of contacts, of slots, and of faces or edges in a task. Chosen values: a task takes
 about 20 us, compared with 2 us to start a parallel region."""
 TAKE, AHEAD, SPREAD, LEAVE, LARGEST_FACES, LARGEST_EDGES, CHECK, ACROSS, DUE, NODE_FACE, NEAREST, APPROACH = range(12)
 EDGE_EDGE, COLLECT, RETARGET, CORNERS_FROM = range(12, 16)
-"""Numbers of the stages, in the order of execution. The last number is that of the first of the stages over corners;
+"""Numbers of the stages, in the order of execution; the last number is that of the first of the stages over corners;
 each block has one such stage."""
 AT_CORNERS = CONTACT_ROWS, types.int64, types.int64, NARROW, CORNERS, STEP, types.int64[::1]
 _at_corners = reader(*AT_CORNERS)

@@ -31,7 +31,7 @@ FAST = 0.1
 if it is active. The altitude of a tet of the typical size is several times this distance."""
 PUSH_OUT = 0.1
 """Largest fraction of a penetration that is corrected in a step, and largest fraction of the closing speed that is
-returned for the correction. The two fractions are 0 while contact has no energy to return (``account.Account``)."""
+returned for the correction; the two fractions are 0 while contact has no energy to return (``account.Account``)."""
 CRACK = -2
 """Number of the first pair of nodes across a crack. The numbers of further pairs of nodes across cracks decrease from
 this negative number."""
@@ -115,7 +115,7 @@ class Step(NamedTuple):
     beyond: float
     """Largest length of the next step, s, for which closing pairs are detected; 0 if no pair is fast enough."""
     fast: float
-    """Distance, m. Pairs whose distance decreases by less than this in the next step are ignored."""
+    """Distance, m; pairs whose distance decreases by less than this in the next step are ignored."""
     rebound: float
     """Largest ratio of the velocity change by contact to the closing speed: 1 + restitution."""
     least: Floats

@@ -77,7 +77,7 @@ class SceneSlots:
     """(slots,) whether the motion of each node is measured; it is measured for nodes in the broad phase, and for nodes
     of faces and edges in the broad phase."""
     on_surface: Flags
-    """(slots,) whether each node is a local node on the surface. Only these nodes are in contact with faces."""
+    """(slots,) whether each node is a local node on the surface; only these nodes are in contact with faces."""
     first: Indices
     """(slots,) first pair of each slot with a face, -1 for none."""
     root: Indices
@@ -109,7 +109,7 @@ class SceneFaces:
     """Columns with one value for each face."""
 
     corners: Indices
-    """(f, 4) slots of the corners of each face. The last slot is the opposite node of the tet."""
+    """(f, 4) slots of the corners of each face; the last slot is the opposite node of the tet."""
     id: Ints
     """(f,) global ids of the faces, ascending."""
     size: Floats
@@ -130,7 +130,7 @@ class SceneFaces:
 
     @cached_property
     def incidence(self) -> Incidence:
-        """Rows of the table at each slot of the last search. The first call must be made before any corner has become a
+        """Rows of the table at each slot of the last search; the first call must be made before any corner has become a
         copy.
         """
         return Incidence(self.corners)
@@ -194,14 +194,14 @@ class SceneEdges:
 
     @cached_property
     def incidence(self) -> Incidence:
-        """Rows of the table at each slot of the last search. The first call must be made before any corner has become a
+        """Rows of the table at each slot of the last search; the first call must be made before any corner has become a
         copy.
         """
         return Incidence(self.corners)
 
     @property
     def names(self) -> Ints:
-        """(e,) ids of the two faces of each edge, combined into one number. The number identifies the edge, because two
+        """(e,) ids of the two faces of each edge, combined into one number; the number identifies the edge, because two
         faces have at most one edge in common.
         """
         return (self.sides[:, 0] << 32) + self.sides[:, 1]

@@ -15,8 +15,8 @@ from ..surface.records import Edges, Faces, SurfaceNodes
 _CROWD_WORDS = 15
 """Number of words for a node in a message (``pack``)."""
 _ROOM = 32
-"""Number of rows by which the message of a rank is enlarged, so that separated nodes rarely require a new message.
-Chosen value: 2 kB."""
+"""Number of rows by which the message of a rank is enlarged, so that separated nodes rarely require a new message;
+chosen value: 2 kB."""
 
 
 def pack(faces: Faces, edges: Edges, surface_nodes: SurfaceNodes) -> Ints:

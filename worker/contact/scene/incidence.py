@@ -21,7 +21,7 @@ class Incidence:
         self._begin, self._row = _by_slot(corners, int(corners.max(initial=-1)) + 1)
 
     def at(self, slots: Indices) -> Ints:
-        """Returns the rows, ascending, with a corner that was among the ``slots`` (m,) at the search. The value -1 in
+        """Returns the rows, ascending, with a corner that was among the ``slots`` (m,) at the search; the value -1 in
         ``slots`` is ignored.
         """
         return np.asarray(_at(self._begin, self._row, slots))

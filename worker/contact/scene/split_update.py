@@ -85,7 +85,7 @@ class SplitUpdate:
         cracks.arrange()
 
     def _across(self, cracks: Cracks, rows: Ints, near: Indices) -> None:
-        """Finds the slots of the nodes of those cracks ``rows`` that this rank computes. Marks the separated nodes of
+        """Finds the slots of the nodes of those cracks ``rows`` that this rank computes; marks the separated nodes of
         these cracks, and the separated nodes among ``near``, as nodes that may get impulses.
         """
         scene = self._scene

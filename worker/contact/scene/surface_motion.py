@@ -18,7 +18,7 @@ from .near_surface import HALO, NearSurface
 _HORIZONS = np.array([10.0, 20.0, 40.0, 80.0, 160.0, 300.0])
 """Smallest horizon and largest horizon of a search, in steps."""
 _SWEPT = 8.0
-"""Largest mean number of cells that a node may sweep in a horizon. Chosen value: two cells along each axis."""
+"""Largest mean number of cells that a node may sweep in a horizon; chosen value: two cells along each axis."""
 _SPENT = 0.4
 """Fraction of the width of the halo. If a node departs further from its extrapolated position, all ranks must
 search."""

@@ -68,7 +68,7 @@ def heat(words, loaded, active, before, places, joule, k):  # type: ignore[no-un
 @njit(types.void(types.int64[:, :, ::1], LOADED, _N1, _N1, _F, _I), cache=True)
 def between(words, loaded, places, part, scale, k):  # type: ignore[no-untyped-def]
     """Adds the impulses of the contacts of set ``k`` between two parts to ``words`` (parts, parts, 3), in quanta of 1 /
-    ``scale`` N s. The two parts get opposite signs. ``part`` (surface_nodes,): part of each node; ``places``: rows of
+    ``scale`` N s; the two parts get opposite signs. ``part`` (surface_nodes,): part of each node; ``places``: rows of
     the slots.
     """
     normal, tangent, slots = loaded.normal, loaded.tangent, loaded.slots

@@ -1,4 +1,4 @@
-"""Selection of the contacts that are swept. A contact is loaded if it has needed an impulse in the step; all other
+"""Selection of the contacts that are swept; a contact is loaded if it has needed an impulse in the step; all other
 contacts are idle.
 
 An idle contact closes more slowly than allowed; it needs no new test until sweeps have changed the velocities of its
@@ -24,7 +24,7 @@ _ROWS, _F1, _F, _I = types.int32[::1], types.float64[::1], types.float64, types.
 
 @njit(types.void(LOADED, CONTACTS, NODES, _I, _I), cache=True, error_model="numpy")
 def fill(loaded, contacts, active, first, end):  # type: ignore[no-untyped-def]
-    """Writes the data of the loaded contacts from ``first`` to ``end``, with zero impulses. On entry ``loaded.row`` has
+    """Writes the data of the loaded contacts from ``first`` to ``end``, with zero impulses; on entry ``loaded.row`` has
     the numbers of these contacts, on return their rows.
 
     The row norms are bounds of the l1 norms along the normal and across it, 1/kg; infinite if all nodes are held.

@@ -18,8 +18,8 @@ from ..narrow_phase.rows import ActiveRows
 _WORD = 63
 """Number of bits used in a word of flags."""
 _ROOM = 4
-"""Number of words by which the messages of a rank are enlarged. Chosen value: about 250 separated nodes fit before
-new messages are needed."""
+"""Number of words by which the messages of a rank are enlarged; chosen value: about 250 separated nodes fit before new
+messages are needed."""
 _COLUMNS = 4
 """Largest number of columns summed at once (active.ActiveNodes.row_weights)."""
 

@@ -35,7 +35,7 @@ def take(x, v, held, node_x, node_v, local, first, stop):  # type: ignore[no-unt
 
 @njit(types.void(_U1, _N1, _N2, _N1, _N1, _U1, _I2, _I, _I, _I), cache=True)
 def mark(touched, set_of, nodes, found, zone, shared, many, task, first, stop):  # type: ignore[no-untyped-def]
-    """Task: writes the number of the set of each contact in ``found[first:stop]`` to ``set_of``. Counts the contacts of
+    """Task: writes the number of the set of each contact in ``found[first:stop]`` to ``set_of``; counts the contacts of
     this task in each set, in ``many`` (tasks, sets).
 
     A contact belongs to the smallest box (zones.py) with all its nodes; ``zone`` (surface_nodes,): zone of each node.
@@ -138,7 +138,7 @@ def load(active, places, v, mobility, first, stop):  # type: ignore[no-untyped-d
 def leave(node_v, parts, unsettled, total, active, places, index, part, owned, first, stop):  # type: ignore[no-untyped-def]
     """Copies the velocities of the slots from ``first`` to ``stop`` to the local nodes, and the impulses of the step to
     ``total`` (surface_nodes, 3). Adds the impulses of owned nodes to the sums of their parts and to the residual
-    ``unsettled`` (3,). The first two words of the residual are those of sweep_count.py; the third word is the number of
+    ``unsettled`` (3,); the first two words of the residual are those of sweep_count.py; the third word is the number of
     local nodes with an impulse.
     """
     moving, words = active.moving, active.fixed_words

@@ -24,7 +24,7 @@ _NONE: Indices = np.zeros(0, np.int32)
 _ROW_WEIGHTS = 4
 """Number of columns of ``ActiveNodes.row_weights``."""
 _SPARE = 1.25
-"""Ratio of the allocated rows to the present number of nodes or contacts. While a body breaks, these numbers increase
+"""Ratio of the allocated rows to the present number of nodes or contacts; while a body breaks, these numbers increase
 in nearly every step, and each new allocation takes time because the operating system clears new pages. Chosen value: a
 bar of glass has a quarter more rows after 400 steps."""
 

@@ -20,7 +20,7 @@ class SolverStep:
     before: Floats
     """(surface_nodes, 3) v(n-1/2), m/s."""
     total: Ints
-    """(surface_nodes, 3) impulses of the step, quanta. The solver writes this array."""
+    """(surface_nodes, 3) impulses of the step, quanta; the solver writes this array."""
     state: Nodes
     """Nodes of the rank. The solver writes their velocities."""
     loose: Flags
@@ -28,9 +28,9 @@ class SolverStep:
     books: Books
     """Accounts of energies and impulses. The solver adds to them."""
     unsettled: Ints
-    """(2,) residual of the sweeps (sweep_count.py). The solver writes this array."""
+    """(2,) residual of the sweeps (sweep_count.py); the solver writes this array."""
     kept: Kept
-    """Stored impulses of the last step. The solver replaces them by those of this step."""
+    """Stored impulses of the last step; the solver replaces them by those of this step."""
     ratio: float
     """Factor of the stored impulses at the start of the step."""
     sweeps: int

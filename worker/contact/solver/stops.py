@@ -24,7 +24,7 @@ from ...scene.selection import named
 from .active import MOBILITY, NODES, V
 
 _NEAR = 0.25
-"""Ratio of the distance from a plane to the typical size of a face. Nodes with a larger ratio are ignored. Chosen
+"""Ratio of the distance from a plane to the typical size of a face. Nodes with a larger ratio are ignored; chosen
 value: no step moves a node so far (clock.py). If a step did, the boundary would still stop the node."""
 
 

@@ -11,7 +11,7 @@ _SETTLED = 0.0015
 step. Chosen value: with it, rubble between a ram and walls is as stiff as with many more sweeps
 (docs/theory/contact.md, "Sweeps by need"). Metals are below the target with the smallest number of sweeps."""
 _ENOUGH = 0.5
-"""Fraction of the target. If the residual is below this fraction, the number of sweeps is reduced by one."""
+"""Fraction of the target; if the residual is below this fraction, the number of sweeps is reduced by one."""
 _MORE = 4
 """Inverse of the fraction by which the number of sweeps is increased in a step."""
 _WARNED = 2.0

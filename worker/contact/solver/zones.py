@@ -3,7 +3,7 @@
 Every surface node belongs to the zone in which it enters the scene. Zones are made by recursive halving of boxes. A
 contact belongs to the smallest box that contains all its nodes. All contacts of a box are a set. Boxes of the same
 level have no node in common, so different threads can sweep their sets. First the sets of the zones are swept, then the
-sets of contacts across the border of two zones, and so on. The last set has the contacts across the border of the first
+sets of contacts across the border of two zones, and so on; the last set has the contacts across the border of the first
 two halves. With one thread there is one zone. The answer does not depend on zones.
 
 Box 1 has all nodes, its halves are the boxes 2 and 3, and the halves of box k are the boxes 2 k and 2 k + 1; the zones
@@ -18,8 +18,8 @@ from ..surface.records import SurfaceNodes
 _SAMPLE = 8192
 """Largest number of sampled nodes by which boxes are halved."""
 _PER_THREAD = 4
-"""Number of zones for each thread. The number is above 1 because contacts are not distributed evenly: a thread that
-has finished its zones computes a zone of another thread. Chosen value."""
+"""Number of zones for each thread; the number is above 1 because contacts are not distributed evenly: a thread that has
+finished its zones computes a zone of another thread. Chosen value."""
 
 
 class Zones:
@@ -28,7 +28,7 @@ class Zones:
     """
 
     def __init__(self, threads: int) -> None:
-        """``threads``: number of threads, from which the number of zones is chosen. The number of zones is a power of
+        """``threads``: number of threads, from which the number of zones is chosen; the number of zones is a power of
         two.
         """
         self.many = 1 if threads == 1 else 1 << (_PER_THREAD * threads - 1).bit_length()

@@ -22,7 +22,7 @@ _CRACKS, _BITS, _RANGES = 512, 6, 4
 """Number of cracks in a task; number of bits of the index of a range of leaders; number of ranges in a task. Chosen
 values: a task takes 5 to 10 us with 20,000 cracks, compared with 2 us to start a parallel region."""
 _ROWS = 4096
-"""Number of cracks in a task. Chosen value: a task takes 10 to 20 us, compared with 2 us to start a parallel region."""
+"""Number of cracks in a task; chosen value: a task takes 10 to 20 us, compared with 2 us to start a parallel region."""
 _SPARE = 1 << 15
 """Number of items of which the lengths of working arrays are multiples."""
 

@@ -135,7 +135,7 @@ def _add_exposed(table, first, stop, thread):  # type: ignore[no-untyped-def]
 
 @njit("void(int64[:, ::1], int64[:, ::1], int32[:, ::1])", cache=True)
 def add(sums, some, faces):  # type: ignore[no-untyped-def]
-    """Adds contributions ``some`` (f, SHARE) to the sums of the nodes of ``faces`` (f, 3). The value -1 in ``faces`` is
+    """Adds contributions ``some`` (f, SHARE) to the sums of the nodes of ``faces`` (f, 3); the value -1 in ``faces`` is
     a node that is not on this rank.
     """
     for f in range(len(faces)):

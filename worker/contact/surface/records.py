@@ -1,7 +1,7 @@
 """Tables of a surface: faces and edges, given by global node ids, and nodes with their state.
 
 A face has three nodes, counter-clockwise seen from outside, and the opposite node of its tet. An edge has its two nodes
-and, for each of its two faces, the third node and the opposite node of the tet. Ranks exchange these rows unchanged.
+and, for each of its two faces, the third node and the opposite node of the tet; ranks exchange these rows unchanged.
 """
 
 from collections.abc import Sequence
@@ -86,7 +86,7 @@ class Edges(Rows):
 
     @property
     def names(self) -> Ints:
-        """(n,) ids of the two faces of each edge, combined into one number. The number identifies the edge, because two
+        """(n,) ids of the two faces of each edge, combined into one number; the number identifies the edge, because two
         faces have at most one edge in common.
         """
         return (self.sides[:, 0] << 32) + self.sides[:, 1]
@@ -97,9 +97,9 @@ class CrackSides:
     """Sides of cracks on a rank. Each row has block, tet and face of a side."""
 
     young: Indices
-    """(k, 3) sides of young cracks. The edges of these sides are not in edge-edge contact yet."""
+    """(k, 3) sides of young cracks; the edges of these sides are not in edge-edge contact yet."""
     aged: Indices
-    """(m, 3) sides of aged cracks. The edges of these sides are in edge-edge contact."""
+    """(m, 3) sides of aged cracks; the edges of these sides are in edge-edge contact."""
 
 
 @dataclass

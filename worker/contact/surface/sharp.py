@@ -40,7 +40,7 @@ _A, _B, _C, _D, _OWNER, _TOP, _FACE, _OPEN, _LENGTH, _LOW, _NORMAL = range(11)
 owners of the last two, the face, its state, initial length, m, lowest initial height of its tet, m, and the unit normal
 of the face. Floats are sent as bit patterns."""
 _EDGES = 1024
-"""Number of edges in a task. Chosen value: a task takes some 30 us, compared with 2 us to start a parallel region."""
+"""Number of edges in a task; chosen value: a task takes some 30 us, compared with 2 us to start a parallel region."""
 _I1, _I2, _U1, _U2, _N2, _F1, _F2 = (
     types.int64[::1], types.int64[:, ::1], types.uint8[::1], types.uint8[:, ::1], types.int32[:, ::1],
     types.float64[::1], types.float64[:, ::1],

@@ -13,7 +13,7 @@ from .elements import ElementType, Kind
 _AXIS = 7
 """Number of values of a rotation: two points and an angle."""
 _MOST_MADE = 20_000_000
-"""Largest number of members that one GENERATE line may make. The chosen value is more than the elements of a mesh that
+"""Largest number of members that one GENERATE line may make; the chosen value is more than the elements of a mesh that
 fits into some 100 GB of memory."""
 
 

@@ -32,7 +32,7 @@ MESH: dict[str, dict[str, bool]] = {
         "UNSORTED": False,
     },
 }
-"""Keywords that are read, with their parameters. The value of a parameter is True if the parameter has a value in the
+"""Keywords that are read, with their parameters; the value of a parameter is True if the parameter has a value in the
 file. ``*SURFACE`` is also read; its parameters that are missing here do not affect a mesh."""
 SURFACE = "SURFACE"
 
@@ -123,7 +123,7 @@ ANALYSIS = _words(
     VOIDNUCLEATION VOLUMETRICTESTDATA WAVE WEARCONTROLS WIND XFEM
     """
 )
-"""Keywords of materials, loads, steps and output. The reader skips these keywords and their data lines."""
+"""Keywords of materials, loads, steps and output; the reader skips these keywords and their data lines."""
 
 
 JOINING = {
@@ -192,7 +192,7 @@ def known(block: Block, in_step: bool = False) -> str:
 
 
 def options(block: Block, word: str) -> dict[str, str]:
-    """Return the parameters of a mesh keyword, keyed by their full names. The value of a parameter without value is an
+    """Return the parameters of a mesh keyword, keyed by their full names; the value of a parameter without value is an
     empty text.
 
     Raises MeshError.

@@ -48,7 +48,7 @@ class Labelled(Generic[T]):
         return value
 
     def get(self, name: Label) -> T | None:
-        """Return the value of ``name``. If this name is missing, return the value of the only name that differs from it
+        """Return the value of ``name``; if this name is missing, return the value of the only name that differs from it
         in the case of letters alone.
         """
         if name.key in self._found:

@@ -11,7 +11,7 @@ from .deck import Deck
 from .sets import Set
 
 DEEPEST = 20
-"""Largest depth of sets that contain sets. The chosen value is above the three levels that decks have."""
+"""Largest depth of sets that contain sets; the chosen value is above the three levels that decks have."""
 _KINDS = {"part": "PART", "set_part": "PART", "set_solid": "SOLID"}
 """Words before a colon, in a name such as ``part:NAME``, that select what the name refers to."""
 

@@ -121,7 +121,7 @@ class Deck:
         rows.lines.append(0 if block.file else card.number)
 
     def _part(self, block: Block, single: bool) -> None:
-        """Read parts. A part has two cards; with options it has further cards, and the block has one part only."""
+        """Read parts; a part has two cards; with options it has further cards, and the block has one part only."""
         rows = list(block.cards)
         while rows and not rows[-1].text.strip():
             rows.pop()

@@ -17,7 +17,7 @@ from .choosing import DEEPEST, Content
 from .deck import Deck, Solids
 
 _KINDS = {4: TET4, 8: HEX8, 10: TET10, 20: Kind(Form.HEXAHEDRON, 20), 27: Kind(Form.HEXAHEDRON, 27)}
-"""Kinds of elements, keyed by the number of nodes. The first eight nodes of a hexahedron of second order are its
+"""Kinds of elements, keyed by the number of nodes; the first eight nodes of a hexahedron of second order are its
 corners."""
 
 

@@ -14,7 +14,7 @@ _GENERAL = {"NODE": ("ALL", "NODE", "DNODE", "PART", "DPART"), "PART": ("ALL", "
 """First words of the cards of a set with the option ``_GENERAL`` that are supported. A word that begins with ``D``
 removes members."""
 MOST = 20_000_000
-"""Largest count of the numbers of one range. The chosen value is more than the elements of a mesh that fits into some
+"""Largest count of the numbers of one range; the chosen value is more than the elements of a mesh that fits into some
 100 GB of memory."""
 
 

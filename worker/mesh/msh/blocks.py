@@ -33,7 +33,7 @@ KINDS = {
 """Kinds of volume elements that are read; their node order is given in the gmsh reference manual, "Node ordering"."""
 TRIANGLES = frozenset((2, 9, 20, 21, 22, 23, 24, 25, 42, 43, 44, 45, 46))
 QUADRILATERALS = frozenset((3, 10, 16, 36, 37, 38, 39, 40, 41, 47, 48, 49, 50, 51))
-"""Numbers by which gmsh identifies triangles and quadrilaterals. The first three or four nodes of an element are its
+"""Numbers by which gmsh identifies triangles and quadrilaterals; the first three or four nodes of an element are its
 corners."""
 
 

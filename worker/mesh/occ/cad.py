@@ -24,13 +24,13 @@ from .printed import captured
 from .step import length_units, solids_in, surfaces_in
 
 MOST_BYTES = 256 * 2**20
-"""Largest size of a CAD file, bytes. The chosen value is the size of an assembly of thousands of parts. OpenCASCADE
+"""Largest size of a CAD file, bytes; the chosen value is the size of an assembly of thousands of parts. OpenCASCADE
 needs some ten times as much memory."""
 _MILLIMETRE = Fraction(1, 1000)
 """Unit into which OpenCASCADE converts STEP files."""
 _STEP = b"ISO-10303-21;"
 _SYNTAX = b"Incorrect Syntax"
-"""Text of the OpenCASCADE error for incorrect syntax. OpenCASCADE continues after this error."""
+"""Text of the OpenCASCADE error for incorrect syntax; openCASCADE continues after this error."""
 _BREP, _BREP_END = b"CASCADE Topology V", re.compile(rb"\*\s*[+-]\d+ \d+\s*$")
 """Texts by which a BREP file is recognised: one within its first lines, and its end, which is the last shape and the
 shape that contains all others."""
@@ -40,7 +40,7 @@ value."""
 
 _SAME = 0.25
 """Largest change of the volume of solids by a general transformation, relative. A lens of two spherical faces had 0.31
-before and 0.80 after it. Chosen value: above the error of the integration over splines, 0.1 of two joined balls."""
+before and 0.80 after it; chosen value: above the error of the integration over splines, 0.1 of two joined balls."""
 
 
 def imported(gmsh: Any, form: CadForm, path: Path, frame: Frame, head: str, *, exact: bool = False) -> Solids:
@@ -87,7 +87,7 @@ def _scaled(
 
 
 def size_of(gmsh: Any, form: CadForm, path: Path, head: str) -> float:
-    """Return the largest extent of the chosen solids of a file, m. The solids keep the position that they have in the
+    """Return the largest extent of the chosen solids of a file, m; the solids keep the position that they have in the
     file.
     """
     gmsh.model.add("size")
@@ -204,7 +204,7 @@ def _chosen(gmsh: Any, form: CadForm, solids: Solids, head: str) -> Solids:
 
 
 def _names(label: str) -> list[str]:
-    """Return the names of a solid, which are made from its label. From ``Shapes/Bullet/Core`` they are the label, every
+    """Return the names of a solid, which are made from its label; from ``Shapes/Bullet/Core`` they are the label, every
     end of the label, and every part of it.
     """
     steps = label.split("/")

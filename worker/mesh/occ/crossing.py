@@ -13,10 +13,10 @@ from numpy.typing import NDArray
 from ..model import Floats
 
 _DEEP = 1e-6
-"""Largest overlap of the projections of two triangles that only touch, divided by the extent of the surface. Chosen
+"""Largest overlap of the projections of two triangles that only touch, divided by the extent of the surface; chosen
 value: the coordinates in files have six or seven digits."""
 _MOST = 10_000_000
-"""Largest number of cell entries. The cells are enlarged until the number of entries is below this limit. The chosen
+"""Largest number of cell entries. The cells are enlarged until the number of entries is below this limit; the chosen
 value needs a quarter of a GiB."""
 _CHUNK = 200_000
 """Number of pairs that are tested at once."""

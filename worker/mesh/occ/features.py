@@ -12,7 +12,7 @@ from .draw import Solids
 from .frame import Frame
 
 _SHORT = 0.5
-"""Length of an edge, divided by the element size, below which the edge is reported. Chosen value: a tet at an edge of
+"""Length of an edge, divided by the element size, below which the edge is reported; chosen value: a tet at an edge of
 this length has half the time step."""
 
 

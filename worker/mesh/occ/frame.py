@@ -56,5 +56,5 @@ class Frame:
 
 
 def scale_of(extent: float) -> float:
-    """Return a power of two near a length, m. A division by this power is exact."""
+    """Return a power of two near a length, m; a division by this power is exact."""
     return 2.0 ** round(math.log2(extent))

@@ -15,7 +15,7 @@ from .frame import Frame
 from .sliding import Cut, Sliding
 
 WANTED = 0.75
-"""Step length, divided by the step length of a regular tet with edge ``element_size``. Smaller step lengths are raised
+"""Step length, divided by the step length of a regular tet with edge ``element_size``; smaller step lengths are raised
 where possible."""
 _CHORD = 0.25
 """Largest mean distance of flat faces from a round surface, divided by the element size. Faces with edges e are on

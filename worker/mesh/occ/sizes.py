@@ -10,13 +10,13 @@ from .frame import Frame
 from .sliding import Cut
 
 GMSH_SIZE = 0.87
-"""Size given to gmsh, divided by ``element_size``. In a cube of this size HXT makes 4 tets; with this factor it makes 6
+"""Size given to gmsh, divided by ``element_size``; in a cube of this size HXT makes 4 tets; with this factor it makes 6
 tets in element_size^3, as the structured generator does, and the mean edge is 1.15 element_size."""
 _FINEST = 400
-"""Largest number of points of a face, in each direction, from which distances are measured. With the chosen value gmsh
+"""Largest number of points of a face, in each direction, from which distances are measured; with the chosen value gmsh
 needs a second for the 160,000 points of a face."""
 _FLAT = 1e-6
-"""Largest thickness, in units of the model, of a face that counts as lying on a cut plane of a sector. The value is
+"""Largest thickness, in units of the model, of a face that counts as lying on a cut plane of a sector; the value is
 above the tolerance of OpenCASCADE, 1e-7."""
 
 

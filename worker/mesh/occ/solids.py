@@ -53,7 +53,7 @@ def measured(mesh: Measured, sources: Sources, key: str) -> TetMesh:
 
 
 def with_surfaces(make: Callable[[bool], T], bodies: Iterable[object]) -> T:
-    """Return ``make(False)``. If gmsh cannot mesh the splines that it has made of the surfaces of a CAD body among the
+    """Return ``make(False)``; if gmsh cannot mesh the splines that it has made of the surfaces of a CAD body among the
     ``bodies``, return ``make(True)``, which keeps these surfaces.
     """
     try:

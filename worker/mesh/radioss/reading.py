@@ -16,7 +16,7 @@ from .deck import KNOWN, Deck, Group
 
 _KINDS = {"BRICK": HEX8, "TETRA4": TET4, "TETRA10": TET10, "PENTA6": WEDGE6, "BRIC20": Kind(Form.HEXAHEDRON, 20)}
 _DEEPEST = 20
-"""Largest depth of groups within groups, and of subsets within subsets. The chosen value is above the five levels that
+"""Largest depth of groups within groups, and of subsets within subsets; the chosen value is above the five levels that
 decks have."""
 
 

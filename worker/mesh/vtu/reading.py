@@ -27,7 +27,7 @@ _FACES = {5: 3, 9: 4, 22: 3, 23: 4, 28: 4, 8: 4}
 _EMPTY = frozenset((0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 21, 22, 23, 28, 30, 34, 35, 36))
 """Numbers of the VTK types without volume."""
 _VOXEL, _PIXEL = 11, 8
-"""Numbers of the VTK types voxel and pixel. The corners of these cells are ordered first by x, then by y, then by z."""
+"""Numbers of the VTK types voxel and pixel; the corners of these cells are ordered first by x, then by y, then by z."""
 _ORDER = {_VOXEL: [0, 1, 3, 2, 4, 5, 7, 6], _PIXEL: [0, 1, 3, 2]}
 _MIRRORED = {6: [0, 2, 1, 3, 5, 4], 15: [0, 2, 1, 3, 5, 4, 8, 7, 6, 11, 10, 9, 12, 14, 13]}
 """Order of the nodes of a wedge. In the documentation of VTK the first triangle of a wedge faces outwards, but most
