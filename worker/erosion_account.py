@@ -36,7 +36,7 @@ class ErosionAccount:
         mass, speed, arm = extremes
         energy, momentum, spin = mass * speed * speed, mass * speed, mass * speed * arm
         self.work = Tally(np.full(len(WORKS) + 1, energy))
-        """Sums of WORKS over the removed tets, J. Also the sum of the heat of removed tets whose equation of state
+        """Sums of WORKS over the removed tets, J; also the sum of the heat of removed tets whose equation of state
         depends on heat, J."""
         self.nodal = Tally(np.array([energy, mass, *[momentum] * 3, *[spin] * 3]))
         """Energy, J, mass, kg, momentum, kg m/s, and angular momentum, kg m^2/s, of the removed nodes."""

@@ -66,7 +66,7 @@ class SurfacePressure(Forcing):
         self._sharing: list[Indices] = []
         """Nodes shared with each neighbour at the last planning of the exchange."""
         self._watched: list[tuple[Block, Ints, Ints]] | None = None
-        """Blocks of parts that fracture, with the faces of each block and the places of the tets of the faces. None
+        """Blocks of parts that fracture, with the faces of each block and the places of the tets of the faces; none
         before the first use."""
 
     @property

@@ -73,7 +73,7 @@ def recall_flux(w, s, n, dt):  # type: ignore[no-untyped-def]
 
 @njit("void(float64[::1], float64[::1], int64, float64)", cache=True, error_model="numpy")
 def recall_growth(w, s, n, dt):  # type: ignore[no-untyped-def]
-    """Does the same as ``recall_flux`` for tets that store their volume. Also stores the present volume."""
+    """Does the same as ``recall_flux`` for tets that store their volume; also stores the present volume."""
     frequency = 1.0 / dt if dt > 0.0 else 0.0
     for i in range(n):
         volume = w[VOLUME + i]
@@ -176,7 +176,7 @@ def own_strains(w, n, dt):  # type: ignore[no-untyped-def]
 
 @njit("void(float64[::1], float64[::1], int64, float64)", cache=True, error_model="numpy")
 def own_growth(w, s, n, dt):  # type: ignore[no-untyped-def]
-    """Does the same as ``own_strains`` for tets that store their volume. Also stores the present volume."""
+    """Does the same as ``own_strains`` for tets that store their volume; also stores the present volume."""
     frequency = 1.0 / dt if dt > 0.0 else 0.0
     for i in range(n):
         volume = w[VOLUME + i]

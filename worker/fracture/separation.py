@@ -129,7 +129,7 @@ class Separation:
         return every
 
     def _stars(self, touched: Ints) -> tuple[Ints, Ints, Ints]:
-        """Returns the rows of the complete stars of the touched nodes, ordered by node and tet. Also returns the places
+        """Returns the rows of the complete stars of the touched nodes, ordered by node and tet; also returns the places
         of the tets, and the first row of each node.
         """
         ids, rank = self._model.nodes.id, self._comm.rank

@@ -41,7 +41,7 @@ def resisted(own, mean, kept, squeezed):  # type: ignore[no-untyped-def]
 )
 def bulk_viscosity(w, s, n, linear, shock, quadratic, rate_of_change, breaks, initial):  # type: ignore[no-untyped-def]
     """Computes the bulk viscosity under compression, q = density u ((linear + shock S) c + quadratic u), u = l |rate|,
-    Pa. Also computes the work of q, and LIMIT, 1/s.
+    Pa; also computes the work of q, and LIMIT, 1/s.
 
     von Neumann and Richtmyer 1950 (quadratic), Landshoff 1955 (linear); S = u / (u + HALF c) distinguishes a shock from
     an elastic wave. ``rate_of_change`` converts CHANGE to a volume flux, 1/s. With G = sqrt(sum |grad N|^2) and the

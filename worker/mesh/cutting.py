@@ -75,7 +75,7 @@ def _portions(diagonals: Ids) -> Iterator[Ids]:
 
 
 def _cut_alike(nodes: Ids, points: Floats, some: Ids, diagonals: Ids) -> tuple[Ids, Ids, Ids]:
-    """Return the tets of the elements ``some`` and the element of each tet. Also return the elements for which a cut
+    """Return the tets of the elements ``some`` and the element of each tet; also return the elements for which a cut
     with a middle node is better.
     """
     table = cuts(int(diagonals[some[0]]))

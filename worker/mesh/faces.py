@@ -65,7 +65,7 @@ def normals(points: Floats, faces: NDArray[np.integer]) -> Floats:
 
 
 def _groups(faces: Ints) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Return, for each row, the number of its face among the distinct faces. Also return the number of rows of each
+    """Return, for each row, the number of its face among the distinct faces; also return the number of rows of each
     distinct face.
     """
     low, middle, high = np.sort(faces, axis=1).astype(np.int64).T

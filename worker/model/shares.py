@@ -72,7 +72,7 @@ class Shares:
         return nodes, self.part[order][first]
 
     def follow(self, node: Indices, part: Indices, mass: Floats) -> "tuple[Shares, Indices, Indices]":
-        """Return the shares after a separation of nodes. Also return the changed nodes with their representative parts.
+        """Return the shares after a separation of nodes; also return the changed nodes with their representative parts.
 
         Each argument has one entry for each tet at each changed node: the new ``node`` (r,), the ``part`` of the tet,
         and the mass that the node has from the tet, kg. The order of the entries does not depend on the division of the

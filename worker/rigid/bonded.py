@@ -105,7 +105,7 @@ class BodyBonds:
 
 @njit(types.void(_I2, _I2, _N1, _N1, _F2, _F1), cache=True)
 def gather(sums, words, places, body, arms, reach):  # type: ignore[no-untyped-def]
-    """Adds the impulses ``words`` (n, 3) on the points at ``places`` to ``sums`` (b, WORDS). Also adds their moments,
+    """Adds the impulses ``words`` (n, 3) on the points at ``places`` to ``sums`` (b, WORDS); also adds their moments,
     divided by the reach of the body.
     """
     for k in range(len(places)):

@@ -129,7 +129,7 @@ class BodyContacts:
         return both
 
     def of_contact(self, parts: Ints) -> None:
-        """Adds the impulses of the step to ``parts`` (parts, 3), which are the impulses on the parts, quanta. Only on
+        """Adds the impulses of the step to ``parts`` (parts, 3), which are the impulses on the parts, quanta; only on
         rank 0.
         """
         if self._comm.rank == 0:

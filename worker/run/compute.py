@@ -57,7 +57,7 @@ def compute(
     one thread, and the outcome has the estimated time with more threads. Raises ConoidError.
     """
     say = journal.starting if journal is not None else quiet
-    threads = team(case.run.threads)  # an earlier run of this process may have changed its settings
+    threads = team(case.run.threads)  # an earlier run may have changed the settings of the team
     threads.most = threads.threads
     threads.projecting = Projecting(threads.threads) if use == PROJECT else None
     if comm.size > 1:

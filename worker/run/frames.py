@@ -23,7 +23,7 @@ class Frames:
         self._folder, self._notices, self._counter = folder, notices, counter
         self._losses = Losses(folder) if notices.journal is not None else None
         self.lost: list[str] = []
-        """Warnings about output files that were removed during the run. Only on rank 0."""
+        """Warnings about output files that were removed during the run; only on rank 0."""
 
     def write(self, sim: Simulation) -> None:
         """Write the frame of the present time; if the journal has no message of this frame, write the message."""

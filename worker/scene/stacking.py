@@ -42,7 +42,7 @@ class Stacked:
     """(m, 4) neighbours of the faces of each tet (state.Block.across); (0, 4) if no stage needs the neighbours."""
     warnings: list[str]
     read: dict[int, tuple[TetMesh, Ints]]
-    """Meshes from files, keyed by part number, with the global indices of their nodes. Empty if the case refers to no
+    """Meshes from files, keyed by part number, with the global indices of their nodes; empty if the case refers to no
     set."""
 
     def any_of_body(self, allowed: Flags) -> Flags:

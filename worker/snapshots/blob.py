@@ -49,7 +49,7 @@ class Made:
 
     data: bytes
     tets: bytes
-    """All tets for sections, packed. Empty if there are no tets, or more than ``volume.MOST_TETS``."""
+    """All tets for sections, packed; empty if there are no tets, or more than ``volume.MOST_TETS``."""
     triangles: int
     fragments: int
     smallest: int

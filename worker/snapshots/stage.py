@@ -93,7 +93,7 @@ class Snapshots:
         self._took = self._taken - began
 
     def tell(self) -> None:
-        """Write the messages about finished snapshots. Only on rank 0."""
+        """Write the messages about finished snapshots; only on rank 0."""
         answers = self._courier.answers
         while answers:
             answer, data = answers.popleft()

@@ -198,7 +198,7 @@ def _gather(w, rest, corners, head, many, cracks, among, place, ahead):  # type:
 #                                      twin of p across the facet (under): that one has a contact across the crack.
 #                                   3. d is not above another open side of the corner, or nearer to it (_beside).
 #                                   4. d was no deeper than DEEP_SELF at the beginning of the step (_pushed_out).
-# A node of the side that has not separated is common to both pieces and gets the weight 0. Its weight is
+# A node of the side that has not separated is common to both pieces and has the weight 0; its former weight is
 # redistributed to the other nodes (docs/theory/fracture.md, "Contact").
 
 

@@ -175,7 +175,7 @@ class SlotTable(NamedTuple):
 
     normals: Floats
     """(slots, 12) means over the faces of each node: of their normal n, of n n (xx, yy, zz, yz, zx, xy), and of the
-    unit vector to the midpoint of the opposite edge. Zero for a node without faces."""
+    unit vector to the midpoint of the opposite edge; zero for a node without faces."""
     on_surface: Flags
     """(slots,) whether each node is on the surface. Only nodes on the surface are in contact with faces."""
     first: Indices
@@ -194,7 +194,7 @@ class FaceTable(NamedTuple):
     corners: Indices
     """(f, 4) slots of each face, counter-clockwise seen from outside; the node opposite to the face is last."""
     size: Floats
-    """(f,) square root of twice the initial area, m."""
+    """(f,) size of each face, m: the square root of twice its initial area."""
     id: Ints
     exposed: Flags
     """(f,) whether each face is exposed. Only exposed faces have contacts."""

@@ -102,7 +102,7 @@ def follow_faces(near, corners, fresh, faces, first, ids, key, became):  # type:
 
 @njit(several(_I1, _N2, _B1)(_I1, _N2, _B1, _I2, _N1, _I1, _I1, _N1), cache=True)
 def follow_edges(near, corners, fresh, sides, first, ids, key, became):  # type: ignore[no-untyped-def]
-    """Replaces nodes of edges by copies of separated nodes, in the same way as ``follow_faces``. Also returns which
+    """Replaces nodes of edges by copies of separated nodes, in the same way as ``follow_faces``; also returns which
     edges are removed because their two faces have separated there. ``sides`` (e, 2): ids of the two faces of each edge.
     """
     rows = _torn(corners, first, near)

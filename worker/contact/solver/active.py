@@ -59,7 +59,7 @@ class Kept(NamedTuple):
 
 
 class ActiveNodes(NamedTuple):
-    """Data of the slots. The float view and the integer view of a cache line use the same memory."""
+    """Data of the nodes of active contacts (slots). The float view and the integer view of a cache line use the same memory."""
 
     moving: Floats
     """(slots, 8) velocities and impulses, which a sweep reads and writes. A row is a cache line."""

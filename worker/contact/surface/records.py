@@ -58,7 +58,7 @@ class Faces(Rows):
     nodes: Ints
     """(n, 4) global ids of the three corners of each face, and of the opposite node."""
     size: Floats
-    """(n,) square root of twice the initial area, m."""
+    """(n,) size of each face, m: the square root of twice its initial area."""
     exposed: Flags
     """(n,) whether each face is exposed; False for a side of a crack that is not open yet."""
 

@@ -61,7 +61,7 @@ class Placed:
             yield placed(tags.numbers, nodes[chosen], _called(kind, numbers[chosen])) + tags.first
 
     def nodes(self, place: int, numbers: Ids) -> Ids:
-        """Return the indices of the nodes ``numbers`` of a piece. Undefined nodes are omitted."""
+        """Return the indices of the nodes ``numbers`` of a piece; undefined nodes are omitted."""
         tags = self.tags[place]
         there = tags.numbers[np.isin(tags.numbers, numbers)]
         return np.asarray(np.searchsorted(tags.numbers, there) + tags.first, np.int64)

@@ -23,7 +23,7 @@ from .scopes import Piece, Scope
 
 
 def read_inp(path: Path, group: str | None, key: str) -> Content:
-    """Return the elements of ``group`` in an .inp file, or all elements, in the unit of the file. Also return the sets
+    """Return the elements of ``group`` in an .inp file, or all elements, in the unit of the file; also return the sets
     of the file.
 
     ``group`` is an element set of the model or of the assembly, ``Bar-1.Set-1`` (a set of an instance or of a part), an

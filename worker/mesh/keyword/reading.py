@@ -22,7 +22,7 @@ corners."""
 
 
 def read_keyword(path: Path, group: str | None, key: str) -> solid.Content:
-    """Return the solid elements of ``group``, or all solid elements of a deck. Also return the sets of nodes and
+    """Return the solid elements of ``group``, or all solid elements of a deck; also return the sets of nodes and
     segments of the deck.
 
     ``group`` is a part, a ``*SET_PART`` or a ``*SET_SOLID``, by its title or id. A group that is a number is the id of

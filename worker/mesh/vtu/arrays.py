@@ -149,7 +149,7 @@ class Grid:
 
 
 def _divided(data: bytes) -> tuple[bytes, bytes, bytes]:
-    """Return the XML of a file without the appended bytes. Also return the appended bytes after ``_`` and their
+    """Return the XML of a file without the appended bytes; also return the appended bytes after ``_`` and their
     encoding.
     """
     start = data.find(_START)

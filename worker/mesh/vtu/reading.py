@@ -35,7 +35,7 @@ programs write it facing inwards."""
 
 
 def read_vtu(path: Path, group: str | None, key: str) -> Content:
-    """Return the volume elements of ``group``, or all volume elements of a .vtu file. Also return the sets of the file.
+    """Return the volume elements of ``group``, or all volume elements of a .vtu file; also return the sets of the file.
 
     ``group`` is ``array:value``, or only a value if exactly one array of cells has integers. An integer array of points
     is a set of the nodes with a value other than 0. Each value of an array of cells is a surface. In messages nodes and
