@@ -5,7 +5,7 @@ import math
 from .kernels.jit import njit
 
 T, LOST, DT, LAST_DT, MEAN_DT, SHORTER, STABLE = range(7)
-"""Indices of the clock's numbers in a program of steps (stretch.py). The order is that of ``Clock.numbers``."""
+"""Indices of the clock's numbers in a program of steps (stretch.py); the order is that of ``Clock.numbers``."""
 
 COLLAPSE = 1e-6
 """Ratio of the stable step to the first stable step; below this ratio a tet counts as crushed and the run ends with an

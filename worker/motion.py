@@ -56,7 +56,7 @@ class Leapfrog:
 
     def move(self, nodes: Nodes, dt: float, shorter: float) -> None:
         """Computes x(n+1) from x(n) with the time step ``dt``, s. Adds to ``stepping`` the second part of the work of
-        f(n) that is caused by unequal steps. Then sets the forces to zero.
+        f(n) that is caused by unequal steps; then sets the forces to zero.
         """
         self._move.run(nodes.n, nodes.x, nodes.v, nodes.force, nodes.stepping, dt, shorter)
 

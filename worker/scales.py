@@ -1,4 +1,4 @@
-"""Orders of magnitude of a model. The quanta of integer sums are computed from them."""
+"""Orders of magnitude of a model; the quanta of integer sums are computed from them."""
 
 import math
 

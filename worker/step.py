@@ -102,7 +102,7 @@ def between(sim: Simulation, before: Floats) -> Floats:
 
 
 def _before_kick(sim: Simulation, acts: Acts) -> None:
-    """Executes rows 2 to 4 of the table. The velocities are v(n-1/2)."""
+    """Executes rows 2 to 4 of the table; the velocities are v(n-1/2)."""
     nodes, erosion, contact, bonds = sim.model.nodes, sim.erosion, sim.contact, sim.bonds
     for boundary in acts.noting:
         boundary.note(nodes)  # Row 2: add half of the last impulse times v(n-1/2) to the work.

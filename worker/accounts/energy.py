@@ -46,8 +46,8 @@ class Ledger:
         is also the divisor of ``residual``. If the difference is positive, the sum of all other terms of the ledger is
         negative."""
         self.unpaid = 0.0
-        """Largest decrease of the energy lost to fracture so far, divided by the energy that all broken facets
-        absorb. A decrease means that facets released more energy than they had absorbed."""
+        """Largest decrease of the energy lost to fracture so far, divided by the energy that all broken facets absorb;
+        a decrease means that facets released more energy than they had absorbed."""
         self._taken = 0.0
         """Largest energy that was lost to fracture so far, J."""
         self.came = self.initial

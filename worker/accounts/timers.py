@@ -2,7 +2,7 @@
 
 MPI uses CPU time while it waits. The time in calls that wait for other ranks counts as ``exchange``; the time of the
 other phases is work. The loading of kernels at their first call counts in no phase. A parallel region is a call of
-``Team.run``; all threads of the rank share its tasks. The wall time in parallel regions is ``parallel``. The wall time
+``Team.run``; all threads of the rank share its tasks. The wall time in parallel regions is ``parallel``; the wall time
 outside of them, without the waiting, is ``serial``: one thread of the rank works and the other threads are idle.
 """
 

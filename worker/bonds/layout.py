@@ -103,7 +103,7 @@ def laid_out(
 
 
 def _name(row: Ints) -> Ints:
-    """Returns, for each tied row, the table id of the point of a rigid body to which the row is tied. Nodes have ids
+    """Returns, for each tied row, the table id of the point of a rigid body to which the row is tied; nodes have ids
     from 0.
     """
     return -1 - row

@@ -13,7 +13,7 @@ from .records import DAMAGE, KEPT, PUSH
 from .rows import Rows, assembled
 
 _BITS = 62
-"""Number of bonds that contact distinguishes by a bit of their own. Further bonds share one bit."""
+"""Number of bonds that contact distinguishes by a bit of their own; further bonds share one bit."""
 Known = tuple[Ints, Ints, Floats]
 """Bonds (r,), nodes (r,) and states (r, KEPT) of tied rows."""
 

@@ -86,7 +86,7 @@ class Forcing(Driver):
         self._last_dt = dt
 
     def _duration(self, dt: float, t: float) -> float:
-        """Returns the mean of the last and the present time step at time ``t``, times the mean factor, s. Stores ``dt``
+        """Returns the mean of the last and the present time step at time ``t``, times the mean factor, s; stores ``dt``
         as the last step.
         """
         mean_dt = 0.5 * (self._last_dt + dt)

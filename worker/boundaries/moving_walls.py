@@ -9,7 +9,7 @@ r"""Rigid walls that move or are round. The walls stop the nodes of deformable b
         ==|=====.=======> dt V  wall     mirrored components: held by planes of symmetry, no impulse
 
 As at a fixed plane (walls.py), impulses never pull. A wall with a mass M ends the step with the velocity V that all
-impulses give it. V is the solution of
+impulses give it; v is the solution of
 
     M (V - V(n-1/2)) + sum of the impulses, which increase with V, = 0
 

@@ -124,7 +124,7 @@ class Books:
 
     def book(self, scene: Scene, places: Indices) -> None:
         """Adds half of the work of the last impulses at the ``places`` of the scene, computed with the velocities
-        ``before``. The solver adds the other half.
+        ``before``; the solver adds the other half.
         """
         self._book.run(
             len(places), self.contact_loss, self.external_work, places, scene.surface_nodes.local, scene.slots.before,

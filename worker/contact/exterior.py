@@ -44,7 +44,7 @@ class Exterior:
         self.motion = SurfaceMotion(self.surface, model.nodes, mobilities(model.nodes, bounds), self.size, comm)
         self._moments = np.zeros((model.nodes.n, normals.COLUMNS), np.int64)
         self._broken = False
-        """True if facets of any rank have broken. Then cracks may open."""
+        """True if facets of any rank have broken; then cracks may open."""
         columns = model.nodes.columns
         columns.declare(self, _moments=COPIED)
         columns.declare(self, "motion", **SurfaceMotion.COLUMNS)
@@ -244,7 +244,7 @@ class Exterior:
 @njit("void(float64[:, ::1], float64[::1], int64[::1], int64)", cache=True)
 def _lighten(mobility, mass, parents, first):  # type: ignore[no-untyped-def]
     """Sets the mobilities of ``parents`` (k,) and of their copies to the inverse of their masses. The copies have
-    numbers from ``first`` on. Components that are held stay 0.
+    numbers from ``first`` on; components that are held stay 0.
     """
     for c in range(len(parents)):
         for i in range(3):

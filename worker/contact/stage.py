@@ -92,7 +92,7 @@ class Contact:
         """Mean time step at the last step with a scene, s; the kick of this step took this time."""
 
     def keep(self, parcel: Parcel) -> None:
-        """Adds the state of contact to the ``parcel`` of a checkpoint or migration message. Candidate pairs are not
+        """Adds the state of contact to the ``parcel`` of a checkpoint or migration message; candidate pairs are not
         added, because a search finds them again."""
         books = self.books
         parcel.known["contact"] = (

@@ -45,7 +45,7 @@ def _barrier(ratio, bulk):  # type: ignore[no-untyped-def]
 @njit("boolean(float64[::1], float64[::1], float64, int64)", cache=True, error_model="numpy")
 def _any_squeezed(w, s, density, n):  # type: ignore[no-untyped-def]
     """Returns True if the volume of a tet, before or after the step, is below SQUEEZED or equal to SQUEEZED within
-    round-off. The loop uses vector instructions.
+    round-off; the loop uses vector instructions.
     """
     per_mass, found = density / (SQUEEZED * (1.0 + _ROUNDING)), 0
     for i in range(n):

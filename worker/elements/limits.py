@@ -31,7 +31,7 @@ def step_limit(w, s, n):  # type: ignore[no-untyped-def]
 
 @njit("void(float64[::1], int64)", cache=True)
 def motion_limit(w, n):  # type: ignore[no-untyped-def]
-    """Raises LIMIT to CLOSING times SPEED, the rate of change of the volume divided by the volume, 1/s. A NaN does not
+    """Raises LIMIT to CLOSING times SPEED, the rate of change of the volume divided by the volume, 1/s; a NaN does not
     change.
     """
     for i in range(n):

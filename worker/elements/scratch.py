@@ -1,4 +1,4 @@
-"""First places of the rows in the scratch memory of a thread. A row has CHUNK float64 numbers.
+"""First places of the rows in the scratch memory of a thread; a row has CHUNK float64 numbers.
 
 Each pass and each law uses the rows from NODAL to MOVED for its own values; the second pass of the averaged pressure
 forms uses the four rows from CORNER_CHANGE on.

@@ -1,4 +1,4 @@
-r"""Passes over the elements of a block of tets, chunk by chunk. The time step calls the passes.
+r"""Passes over the elements of a block of tets, chunk by chunk; the time step calls the passes.
 
 ::
 
@@ -40,7 +40,7 @@ _F, _I = types.float64, types.int64
 
 @njit(types.void(MOTION, BODY, MARKS, SCRATCH, _I, _I, _F, _F), cache=True, error_model="numpy")
 def standard_pass(motion, body, marks, room, begin, end, dt, scale):  # type: ignore[no-untyped-def]
-    """Computes stress and forces at n+1 of the chunks from ``begin`` to ``end``. Each tet has its own pressure."""
+    """Computes stress and forces at n+1 of the chunks from ``begin`` to ``end``; each tet has its own pressure."""
     x0, x, v, force = motion.x0, motion.x, motion.v, motion.force
     tets, state, params, rows, strength, eos = body.tets, body.state, body.params, body.rows, body.strength, body.eos
     w, wi, bits, peaks, noted = room.w, room.wi, room.bits, room.peaks, body.quiet
@@ -92,8 +92,8 @@ def strain_pass(motion, body, marks, room, means, begin, end, dt):  # type: igno
     """Computes the nodal sums of volume and volume change, which include the stabilising fluxes if the form is
     ``split``. Computes the deviatoric stress at n+1, if the law does not need the pressure.
 
-    A law from the undeformed shape is applied here if the nodes need its work for their heat, else in ``force_pass``.
-    For a chunk noted as at rest only the volumes are computed, because the nodal means need them.
+    A law from the undeformed shape is applied here if the nodes need its work for their heat, else in ``force_pass``;
+    for a chunk noted as at rest only the volumes are computed, because the nodal means need them.
     """
     x0, x, v, w = motion.x0, motion.x, motion.v, room.w
     tets, state, params, rows, strength = body.tets, body.state, body.params, body.rows, body.strength

@@ -48,7 +48,7 @@ from .columns import FacetConstants, Facets, PairState, Softening
 
 
 class Cohesion:
-    """Cohesive facets of one rank. Updates their openings and tractions, and sums the work done on them."""
+    """Cohesive facets of one rank; updates their openings and tractions, and sums the work done on them."""
 
     def __init__(self, energy: float, threads: Team) -> None:
         """``energy``: order of magnitude of the work on a facet, J, from which the quantum of the sums is chosen;

@@ -23,7 +23,7 @@ class FacetConstants(NamedTuple):
 
 
 class Softening(NamedTuple):
-    """Traction-separation law of each pair of nodes. Only unloading changes the law (law.py)."""
+    """Traction-separation law of each pair of nodes; only unloading changes the law (law.py)."""
 
     strength: Floats
     """(m, 3) traction at which softening begins, Pa."""

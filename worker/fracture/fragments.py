@@ -49,8 +49,8 @@ FRAGMENT = np.dtype([
 
 
 class Groups:
-    """Fragments of the tets of one rank, and sums over each fragment. The sums do not depend on the order of the terms.
-    All methods are collective.
+    """Fragments of the tets of one rank, and sums over each fragment. The sums do not depend on the order of the terms;
+    all methods are collective.
     """
 
     def __init__(self, labels: Ints, comm: Comm) -> None:

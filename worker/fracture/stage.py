@@ -1,6 +1,6 @@
 """Fracture in the time step: initiation, separation of nodes, and update of all tables that depend on the topology.
 
-The stage acts at the end of a step, with the stress at n+1. Facets that pass the criterion break. A node whose star is
+The stage acts at the end of a step, with the stress at n+1; facets that pass the criterion break. A node whose star is
 no longer connected gets copies. The forces of the tets of a copy are moved, as integers, from the parent to the copy.
 Every table by node is extended by the copies. In ``cohesive`` parts a broken facet keeps its traction, which decreases
 with the opening.

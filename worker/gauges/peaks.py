@@ -15,7 +15,7 @@ from .gauge import Scene
 
 
 class Peaks:
-    """The probes on this rank that are largest or smallest values. The probes have no state."""
+    """The probes on this rank that are largest or smallest values; the probes have no state."""
 
     def __init__(self, case: Case, scene: Scene, numbers: Sequence[int]) -> None:
         """``numbers``: indices of the probes in the case."""

@@ -1,6 +1,6 @@
 """Depth of the hole that a part has made in the other parts, measured on straight lines parallel to the axis.
 
-A line is cut into spans inside of tets and voids between the tets. The hole is the void in front of the bodies and all
+A line is cut into spans inside of tets and voids between the tets; the hole is the void in front of the bodies and all
 voids joined to this void; voids of neighbouring lines are joined where they overlap. A cavity that opens ahead of the
 hole is not joined to the hole, and a flake in the hole does not end the hole. The free space beyond the bodies is not a
 void.
@@ -14,7 +14,7 @@ from ..model.state import Floats, Ints, Model, Tets
 from ..parallel.comm import Comm
 
 LINES = np.arange(1, 11) / 10.0
-"""Distances of the measuring lines from the axis, divided by the radius of the part. Voids of neighbouring lines are
+"""Distances of the measuring lines from the axis, divided by the radius of the part; voids of neighbouring lines are
 joined."""
 MEASURED = (0, 2, 4)
 """Indices in ``LINES`` of the lines whose depths are averaged; these are the lines at 0.1, 0.3 and 0.5 of the

@@ -1,4 +1,4 @@
-"""Probes, which are the columns of history.csv. The probes are grouped by the way in which they are measured."""
+"""Probes, which are the columns of history.csv; the probes are grouped by the way in which they are measured."""
 
 import logging
 from collections.abc import Callable

@@ -31,7 +31,7 @@ def way(beyond: Beyond) -> float:
 
 
 class NodeSums:
-    """The probes on this rank that are sums over nodes. The probes have no state."""
+    """The probes on this rank that are sums over nodes; the probes have no state."""
 
     def __init__(self, case: Case, scene: Scene) -> None:
         self._scene, self._bits = scene, bits(case)

@@ -2,9 +2,9 @@
 
 ``numba.njit`` compiles a function with a signature at its declaration, or loads it from the cache. With ``numba.njit``
 every rank would load every kernel of the worker at its start, for any scene. ``njit`` of this module compiles or loads
-a kernel at its first call, from Python or from another kernel. No other module imports numba.
+a kernel at its first call, from Python or from another kernel; no other module imports numba.
 
-numba counts references to every array of every record that one kernel passes to another, with atomic operations. A
+numba counts references to every array of every record that one kernel passes to another, with atomic operations; a
 kernel that makes no array needs no reference counts and is compiled without them. In the narrow phase of a stack of
 plates, reference counts took three quarters of the time.
 """
@@ -113,7 +113,7 @@ class Kernel(CPUDispatcher):
         self._cache = _Cache(self.py_func)  # type: ignore[no-untyped-call]
 
     def load(self) -> None:
-        """Compiles the kernel and the kernels that it calls, or loads them from the cache. This is done only once, in
+        """Compiles the kernel and the kernels that it calls, or loads them from the cache; this is done only once, in
         the thread that calls the kernel first.
         """
         with global_compiler_lock:

@@ -52,7 +52,7 @@ def called(module: ModuleType) -> Iterator[Kernel]:
 
 
 def _functions(code: CodeType, kernels: set[CodeType]) -> Iterator[CodeType]:
-    """Yields the functions that are defined in a code object, at any depth. Functions among ``kernels`` are left
+    """Yields the functions that are defined in a code object, at any depth; functions among ``kernels`` are left
     out.
     """
     for constant in code.co_consts:

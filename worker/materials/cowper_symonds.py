@@ -1,7 +1,7 @@
 """J2 plasticity with linear hardening and the rate factor of Cowper and Symonds. The stress is returned radially to the
 yield surface.
 
-sigma = (Y + H e) (1 + (rate / D)^(1/q)). Cowper and Symonds 1957. Derived in docs/theory/materials.md.
+sigma = (Y + H e) (1 + (rate / D)^(1/q)); cowper and Symonds 1957. Derived in docs/theory/materials.md.
 
 The yielding tets of a chunk are copied side by side into the scratch memory and solved together, as in johnson_cook.py.
 """

@@ -294,4 +294,4 @@ def _begin(law: JohnsonCook, temperature: float) -> dict[int, float]:
 
 
 LAW = Law("johnson_cook", BEFORE_PRESSURE, _rows, _constants, _begin, johnson_cook)
-"""Johnson-Cook strength law with heat from plastic work and with damage. Erosion removes tets by their damage."""
+"""Johnson-Cook strength law with heat from plastic work and with damage; erosion removes tets by their damage."""

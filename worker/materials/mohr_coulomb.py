@@ -189,7 +189,7 @@ def with_values(xx, yy, zz, yz, zx, xy, d1, d2, d3, e1, e2, e3):  # type: ignore
 
 @njit("void(float64[::1], float64[::1], float64[::1], int64, float64)", cache=True, error_model="numpy")
 def mohr_coulomb(w, s, params, n, dt):  # type: ignore[no-untyped-def]
-    """Returns the trial stress of tets above the yield surface to the yield surface at their new pressure. Adds the
+    """Returns the trial stress of tets above the yield surface to the yield surface at their new pressure; adds the
     plastic work.
 
     The plastic work is the work of the mean of the rotated old stress and the new stress, as for the total work. The

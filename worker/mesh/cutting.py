@@ -52,7 +52,7 @@ def cut(nodes: Ids, points: Floats, diagonals: Ids) -> Cut:
 
 
 def pattern(nodes: Ids) -> Ids:
-    """Return (m,) the diagonals of the faces (``patterns.cuts``). The diagonal of a face contains its smallest node
+    """Return (m,) the diagonals of the faces (``patterns.cuts``); the diagonal of a face contains its smallest node
     number; if numbers are equal, the first of them counts.
     """
     rank = np.argsort(np.argsort(nodes, axis=1, kind="stable"), axis=1, kind="stable")

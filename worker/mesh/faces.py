@@ -12,7 +12,7 @@ FACES = np.array([[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]], np.int32)
 
 
 def boundary_faces(tets: Ints) -> Ints:
-    """Return (k, 3) nodes of the faces that belong to one tet only, in the order of tet and local face. The normals
+    """Return (k, 3) nodes of the faces that belong to one tet only, in the order of tet and local face; the normals
     point outward.
     """
     faces = tets[:, FACES].reshape(-1, 3)

@@ -58,7 +58,7 @@ def tet_mesh(gmsh: Any) -> TetMesh:
 
 
 def named_mesh(gmsh: Any) -> NamedMesh:
-    """Return the tets and nodes of the current gmsh model, with the numbers that gmsh gives them. The nodes are ordered
+    """Return the tets and nodes of the current gmsh model, with the numbers that gmsh gives them; the nodes are ordered
     by number.
     """
     tags, corners = gmsh.model.mesh.getElementsByType(_TET)

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from .model import Floats, TetMesh
 
 _BITS = 21
-"""Number of bits of a coordinate in a Morton code. Three coordinates need 63 bits."""
+"""Number of bits of a coordinate in a Morton code; three coordinates need 63 bits."""
 _SPREAD = [
     (32, 0x1F00000000FFFF),
     (16, 0x1F0000FF0000FF),

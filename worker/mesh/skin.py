@@ -36,7 +36,7 @@ class Skin:
     @classmethod
     def of(cls, body: Generated, mesh: TetMesh, scale: float) -> tuple[Self, Floats]:
         """Return the constraints of a ``mesh`` in the frame of the body, and the points of the mesh, projected onto the
-        surface of the body. Lengths are divided by ``scale``.
+        surface of the body; lengths are divided by ``scale``.
         """
         points, round_in = mesh.points.copy(), 3 if isinstance(body, Sphere) else 2
         skin = np.zeros(len(points), bool)

@@ -1,7 +1,7 @@
 """Loads of groups of tets, recorded at intervals. From the records the effect of other balance policies can be
 computed.
 
-``conoid replay-balance`` reads the records (docs/performance/balance.md). A group is a fixed set of tets, cut at the
+``conoid replay-balance`` reads the records (docs/performance/balance.md); a group is a fixed set of tets, cut at the
 start, with a set of nodes and their copies; when tets and nodes move between ranks, they stay in their group. Counts
 are integers and equal for any number of ranks; an exception are candidate pairs of edges and cracks whose nodes are on
 several ranks.
@@ -42,7 +42,7 @@ class Groups:
         self._meter = Meter.of(sim)
 
     def due(self, t: float, now: float) -> bool:
-        """Return whether a record is scheduled at the simulated time ``t`` and the wall time ``now``. Only rank 0 calls
+        """Return whether a record is scheduled at the simulated time ``t`` and the wall time ``now``; only rank 0 calls
         this method.
         """
         since = now - self._recorded

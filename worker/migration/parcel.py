@@ -49,7 +49,7 @@ class Parcel:
     known: dict[str, Any] = field(default_factory=dict)
     """Numbers and small arrays that are equal on all ranks."""
     sums: dict[str, Ints] = field(default_factory=dict)
-    """Integers of this rank that are terms of sums over the ranks. Only the sums have a meaning."""
+    """Integers of this rank that are terms of sums over the ranks; only the sums have a meaning."""
     nodes: Table = field(default_factory=dict)
     """Table with one row for each node. The column ``id`` (n,) is ascending after routing. If there is a column
     ``family`` (n,), a tet is sent together with all nodes that have the family of one of its corners."""

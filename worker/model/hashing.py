@@ -15,7 +15,7 @@ _GOLDEN = 0x9E3779B97F4A7C15
 
 
 def splitmix64(numbers: npt.NDArray[np.integer], seed: int) -> npt.NDArray[np.uint64]:
-    """Return the elements with the indices ``numbers`` (from 0) of the sequence that starts at ``seed``. An element has
+    """Return the elements with the indices ``numbers`` (from 0) of the sequence that starts at ``seed``; an element has
     64 random bits.
     """
     z = (np.asarray(numbers).astype(np.uint64) + np.uint64(1)) * np.uint64(_GOLDEN) + np.uint64(seed)

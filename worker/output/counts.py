@@ -54,7 +54,7 @@ class Counter:
         self._fragments, self._smallest, self._sizes = 0, 0, list[int]()
 
     def due(self, sim: Simulation, now: float, *, ending: bool) -> bool:
-        """Return whether fragments must be searched. Only rank 0 calls this method.
+        """Return whether fragments must be searched; only rank 0 calls this method.
 
         ``ending``: whether this is the last report.
         """
@@ -123,7 +123,7 @@ def of_bodies(sim: Simulation) -> list[Ints]:
 
 
 def _connected(sim: Simulation) -> bool:
-    """Return whether the neighbours of the tets are stored (``Block.across``). Fragments are found by the
+    """Return whether the neighbours of the tets are stored (``Block.across``); fragments are found by the
     neighbours.
     """
     return sim.record is not None or sim.contact is not None

@@ -2,7 +2,7 @@
 
 After a failed write HDF5 continues with the data that it could not write. HDF5 then fails again at each object that is
 freed; Python can only print this error, and at last the process ends with a segmentation fault. In other cases an
-incomplete file can be opened as if it were complete. Therefore this module records the failures of the disk and does
+incomplete file can be opened as if it were complete; therefore this module records the failures of the disk and does
 not report them to HDF5.
 """
 

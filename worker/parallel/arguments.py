@@ -3,8 +3,8 @@ argument instead of records of arrays.
 
 A call with records as arguments costs 4 us or more, because numba unpacks each array of each record. A call with an
 address as argument costs 0.2 us, and any thread can make such a call. An array takes 1 + ndim words, its address and
-its shape. If the layout of the array is not C, ndim further words have its strides. A number or a flag takes one word.
-Arrays that a kernel reads from the table have no owner and no reference counts; ``Arguments`` holds references to them.
+its shape. If the layout of the array is not C, ndim further words have its strides. A number or a flag takes one word;
+arrays that a kernel reads from the table have no owner and no reference counts; ``Arguments`` holds references to them.
 """
 
 import ctypes
@@ -47,7 +47,7 @@ class Tie(NamedTuple):
 
 
 class Arguments:
-    """A table for arguments of the numba types ``kinds``. A record is one argument."""
+    """A table for arguments of the numba types ``kinds``; a record is one argument."""
 
     def __init__(self, *kinds: Any) -> None:
         self._kinds = list(_leaves(several(*kinds)))
@@ -186,7 +186,7 @@ def _words(kind: Any) -> int:
 
 
 def reader(*kinds: Any) -> Any:
-    """Return a function for kernels. The function reads arguments of the given types at an address, and returns them as
+    """Return a function for kernels; the function reads arguments of the given types at an address, and returns them as
     a tuple.
     """
     kind = several(*kinds)
@@ -201,7 +201,7 @@ def reader(*kinds: Any) -> Any:
 
 
 def table_of(k: int, *kinds: Any) -> Any:
-    """Return a function for kernels. The function reads the arguments of table ``k`` of a ``Handle``, and returns them
+    """Return a function for kernels; the function reads the arguments of table ``k`` of a ``Handle``, and returns them
     as a tuple. The arguments have the given types; the function takes the address of the handle.
     """
     kind = several(*kinds)

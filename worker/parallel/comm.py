@@ -120,7 +120,7 @@ class Comm(Protocol):
 
 
 class Exchange(Protocol):
-    """A set of messages with fixed partners and buffers. The messages can be sent repeatedly."""
+    """A set of messages with fixed partners and buffers; the messages can be sent repeatedly."""
 
     def begin(self) -> None:
         """Start all sends and receives."""

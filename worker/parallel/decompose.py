@@ -24,7 +24,7 @@ from .comm import Comm
 _LEVELS = 2.0**31 - 1.0
 """Number of distinct positions along a normal. Points at equal positions are ordered by their ids."""
 _ID_BITS = 32
-"""Number of bits for the id in a sorting key of 63 bits. The 31 higher bits have the position. Ids are below 2^32."""
+"""Number of bits for the id in a sorting key of 63 bits. The 31 higher bits have the position; ids are below 2^32."""
 _DIGIT = 8
 """Number of bits of a sorting key that are determined by one sum over the ranks; with the chosen value a sum has 256
 counts for each box, and eight sums are needed."""

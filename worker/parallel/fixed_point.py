@@ -144,7 +144,7 @@ class Tally:
     """
 
     def __init__(self, largest: Floats) -> None:
-        """``largest`` (k,): order of magnitude of the values that are added to each sum. The quantum is 2^-60 of
+        """``largest`` (k,): order of magnitude of the values that are added to each sum; the quantum is 2^-60 of
         ``largest``.
         """
         self.scale = np.ldexp(1.0, 30 - np.frexp(largest)[1])

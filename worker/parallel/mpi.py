@@ -208,7 +208,7 @@ class _MpiExchange:
 
 
 def leave(code: int) -> NoReturn:
-    """End this rank with an exit code, after all ranks have finished. No rank is aborted.
+    """End this rank with an exit code, after all ranks have finished; no rank is aborted.
 
     The process must end normally (no ``os._exit``). Otherwise MPICH does not deregister from the launcher, and the
     launcher kills the other ranks.

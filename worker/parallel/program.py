@@ -1,7 +1,7 @@
 """Programs. A program consists of stages that the threads of a rank run one after the other, in one call without Python
 code between them.
 
-A stage is a kernel with its table of arguments and its tasks. The tasks are either given before the call (``Stage``),
+A stage is a kernel with its table of arguments and its tasks; the tasks are either given before the call (``Stage``),
 or they are a range (``Span``). The length of the range is a word of memory that is read when the stage begins, so an
 earlier stage may write it. A stage with the length 0 is skipped. A kernel may also choose the next stage: it writes the
 number of this stage to ``Program.control``. A stage number beyond the last stage ends the call.

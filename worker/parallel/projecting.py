@@ -1,10 +1,10 @@
 """Estimate of the time that parallel regions would take with more threads than the machine has cores.
 
-The tasks are run and timed one after the other. For each number of threads (crew) the tasks are assigned as a team
+The tasks are run and timed one after the other; for each number of threads (crew) the tasks are assigned as a team
 would assign them: colour by colour, the next task goes to the thread that is free first. The costs of parallel regions
-are measured before, with two threads. Each colour costs the time ``turn``. After a pause, waking a thread costs the
+are measured before, with two threads; each colour costs the time ``turn``. After a pause, waking a thread costs the
 calling thread the time ``call``, and the woken thread begins to work after the time ``wake``. Each woken thread wakes
-two more threads (team.py). The estimate does not include that simultaneous tasks slow each other down by the memory
+two more threads (team.py); the estimate does not include that simultaneous tasks slow each other down by the memory
 that they share.
 """
 

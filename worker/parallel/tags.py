@@ -1,6 +1,6 @@
 """Tags of the messages between two ranks.
 
-Two exchanges that may be in progress at the same time never have the same tag. All trades have one tag, because
+Two exchanges that may be in progress at the same time never have the same tag; all trades have one tag, because
 messages between two ranks arrive in the order in which they were sent, and the two ranks trade in the same order.
 """
 

@@ -1,7 +1,7 @@
 """The threads of a rank. A pass is cut into tasks, and the next free thread takes the next task.
 
 A task is a range of a pass: a range of chunks of tets, or of nodes. Tasks of one colour write to no common memory, so
-threads need no locks and no separate sums. Colours run one after the other. All sums are of integers, so the answer is
+threads need no locks and no separate sums; colours run one after the other. All sums are of integers, so the answer is
 the same on any number of threads.
 
 The calling thread also runs tasks; the other threads are called helpers. At the end of a pass the calling thread waits
@@ -96,7 +96,7 @@ def _wake(job, semaphore):  # type: ignore[no-untyped-def]
 
 @njit("void(int64[::1], int64, int64)", cache=True, nogil=True)
 def _help(job, semaphore, thread):  # type: ignore[no-untyped-def]
-    """Run tasks in an endless loop. Sleep after a time without tasks."""
+    """Run tasks in an endless loop; sleep after a time without tasks."""
     idle = 0
     while True:
         if _do_one(job, thread):

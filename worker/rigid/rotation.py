@@ -92,7 +92,7 @@ def _apply(out, tensor, b, vector):  # type: ignore[no-untyped-def]
 
 @njit("void(float64[:, ::1], int64, float64, float64, float64, boolean)", cache=True)
 def multiply(q, b, x, y, z, in_space):  # type: ignore[no-untyped-def]
-    """Multiplies the quaternion ``q[b]`` by (1, x, y, z) and normalises it. This is a rotation about the axis (x, y, z)
+    """Multiplies the quaternion ``q[b]`` by (1, x, y, z) and normalises it; this is a rotation about the axis (x, y, z)
     by twice the arc tangent of its length. The axis is given in the body, or in space if ``in_space``.
     """
     a, c, d, e = q[b, 0], q[b, 1], q[b, 2], q[b, 3]

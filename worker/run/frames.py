@@ -1,4 +1,4 @@
-"""Frames of a run. The module writes the files of the whole field and the messages about them, and warns if files were
+"""Frames of a run; the module writes the files of the whole field and the messages about them, and warns if files were
 removed.
 """
 

@@ -12,7 +12,7 @@ by default glibc raises this bound, up to 32 MB, to the size of the largest arra
 a body breaks then leave holes in the heap, and the case of docs/tutorial/first_case.md took 540 MB; with this setting
 it took 380 MB. The setting does not change the CPU time, even for a bar with 62,000 tets."""
 _SPARE = 32 << 20
-"""Number of free bytes at the end of the heap that stay allocated. With 0, each step of a bar with 62,000 tets returns
+"""Number of free bytes at the end of the heap that stay allocated; with 0, each step of a bar with 62,000 tets returns
 large arrays and requests them again, which takes 2 s of 28 s."""
 
 

@@ -1,6 +1,6 @@
 """``python -m conoid.worker.run.job FOLDER NAME``: one attempt of a run inside a job of a batch system.
 
-The script of the job becomes this process. The program starts the ranks, sends the signal of the batch system to them,
+The script of the job becomes this process; the program starts the ranks, sends the signal of the batch system to them,
 and finds the cause of the signal. If the job was cancelled, the run ends. After a preemption or a time limit the same
 job is queued again, and the run resumes from its checkpoint. If the cause is unknown, the folder gets a checkpoint and
 no outcome; the server or the command that submitted the job then decides whether the run continues.

@@ -33,7 +33,7 @@ class Requests:
         self._active = True
         """Whether this rank wrote a request into the last reduction that it filled."""
         self._every_step = case.balance.policy == "outside"
-        """Whether the requests are written in every step. This is necessary if the number of outside nodes is compared
+        """Whether the requests are written in every step; this is necessary if the number of outside nodes is compared
         with its limit in every step."""
         self._wall = self._time = 0.0
         """Wall time, s, and simulated time, s, before which no request can begin."""

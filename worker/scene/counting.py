@@ -22,7 +22,7 @@ Meshes = Mapping[int, TetMesh]
 
 
 def loads(case: Case, meshes: Meshes) -> Iterator[Load]:
-    """Yield the count of each boundary whose parts all have a mesh in ``meshes``. The run gives the same counts.
+    """Yield the count of each boundary whose parts all have a mesh in ``meshes``; the run gives the same counts.
 
     Raises InputError if a bond has no common nodes.
     """

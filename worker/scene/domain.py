@@ -225,7 +225,7 @@ def _block(case: schema.Case, piece: Piece, index: int) -> Block:
 def block(
     case: schema.Case, index: int, ids: Ints, tets: Tets, state: Floats, across: Indices, border: int
 ) -> Block:  # fmt: skip
-    """Return the block of tets of part ``index``, made from the case and from the arrays of its tets. The ``border``
+    """Return the block of tets of part ``index``, made from the case and from the arrays of its tets; the ``border``
     tets come first.
     """
     part = case.parts[index]

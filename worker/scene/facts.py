@@ -16,7 +16,7 @@ from .setting import turned, velocities
 
 
 class Facts:
-    """Measurements of the parts of a case. Meshes are added one by one."""
+    """Measurements of the parts of a case; meshes are added one by one."""
 
     def __init__(self, case: Case) -> None:
         """Start with no measured part."""

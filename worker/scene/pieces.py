@@ -1,4 +1,4 @@
-"""Pieces of a part from a mesh file. Two pieces of a part have no common node. The module detects overlaps between
+"""Pieces of a part from a mesh file. Two pieces of a part have no common node; the module detects overlaps between
 pieces, and allows contact between them.
 """
 

@@ -115,7 +115,7 @@ class Selected:
 
 
 def compared(case: schema.Case, found: Sequence[Selected]) -> Iterator[str]:
-    """Log the selected numbers and the numbers that ``conoid validate`` predicts. Yield a warning for each
+    """Log the selected numbers and the numbers that ``conoid validate`` predicts; yield a warning for each
     difference.
     """
     expected = {load.boundary: load for load in loaded.loads(case)}
@@ -141,7 +141,7 @@ def missed(
 ) -> Iterator[str]:  # fmt: skip
     """Yield warnings for a boundary whose region selects nodes or faces of the parts ``took`` (parts,).
 
-    A warning is given if the boundary names a part of which it selects no node. Another warning is given for layers of
+    A warning is given if the boundary names a part of which it selects no node; another warning is given for layers of
     nodes that are so close to the region that the user may have meant them.
     """
     spec = case.boundaries[number]

@@ -1,4 +1,4 @@
-"""Start of the boundary conditions. The boundary conditions change the initial velocities. Contradictions between
+"""Start of the boundary conditions. The boundary conditions change the initial velocities; contradictions between
 boundary conditions are errors.
 """
 

@@ -1,7 +1,7 @@
 """Decimation of the outline: vertices in one cell of a grid are merged (Rossignac and Borrel 1993).
 
 The cells for a fragment are at most half as large as the fragment, so that a small fragment keeps a shape while a large
-fragment becomes coarser. Fragments with few triangles are unchanged. If there are more fragments than the budget of
+fragment becomes coarser; fragments with few triangles are unchanged. If there are more fragments than the budget of
 triangles allows, the smallest fragments are omitted. All decisions depend on the whole model, not on the number of
 ranks.
 """
@@ -64,7 +64,7 @@ def _fewest(outline: Outline, mass: Floats, fits: Fits) -> Outline:
 
 
 def _heaviest(mass: Floats, most: int) -> "np.ndarray":
-    """Return (fragments,) whether each fragment is among the heaviest fragments. If several fragments have the same
+    """Return (fragments,) whether each fragment is among the heaviest fragments; if several fragments have the same
     mass, the first of them is chosen.
     """
     chosen = np.zeros(len(mass), bool)
@@ -91,7 +91,7 @@ def _level(outline: Outline, longest: float, most: int) -> int:
 
 
 def _merged(outline: Outline, extent: Floats, longest: float, level: int) -> Outline:
-    """Return the outline with one vertex for each cell, at the mean position of the vertices in the cell. Degenerate
+    """Return the outline with one vertex for each cell, at the mean position of the vertices in the cell; degenerate
     and duplicate triangles are removed.
     """
     size = np.minimum(longest * _FINENESS**-level, 0.5 * extent)

@@ -13,7 +13,7 @@ from ..model.state import WIDE, Block, Floats, Ints, Model
 
 @dataclass
 class Outline:
-    """Triangles of the outline. Each vertex belongs to one fragment."""
+    """Triangles of the outline; each vertex belongs to one fragment."""
 
     points: Floats
     """(v, 3) positions of the vertices, m."""

@@ -59,7 +59,7 @@ class Snapshots:
         sim.comm.barrier()
 
     def due(self, clock: Clock, now: float, *, look: bool) -> bool:
-        """Return whether a snapshot of the next state must be made. Only rank 0 calls this method.
+        """Return whether a snapshot of the next state must be made; only rank 0 calls this method.
 
         ``look``: whether to check for a request of a user.
         """

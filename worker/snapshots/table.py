@@ -96,7 +96,7 @@ def _rest(table: Table, rest: Ints) -> dict[str, "np.ndarray"]:
 def by_size(size: Floats) -> tuple[int, list[int]]:
     """Return a histogram of the sizes ``size`` (g,), m, of fragments: a first number k, and counts.
 
-    Count i is the number of fragments with sizes from 2^((k+i)/2) m up to the next bound. Fragments without extent are
+    Count i is the number of fragments with sizes from 2^((k+i)/2) m up to the next bound; fragments without extent are
     omitted.
     """
     steps = np.floor(2.0 * np.log2(size[size > 0.0])).astype(np.int64)

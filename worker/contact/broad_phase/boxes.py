@@ -231,7 +231,7 @@ class Boxing:
 
 
 def swept(things: Primitives, x: Floats, v: Floats, horizon: float) -> Boxes:
-    """Bounding boxes of the searched primitives over the horizon. The boxes include the reach. ``x`` and ``v`` (nodes,
+    """Bounding boxes of the searched primitives over the horizon; the boxes include the reach. ``x`` and ``v`` (nodes,
     3).
     """
     some, n = things.searched, len(things.searched)

@@ -1,4 +1,4 @@
-"""Search for the boxes near a box, by a bucket sort with position codes (Oldenburg and Nilsson 1994). No grid is stored
+"""Search for the boxes near a box, by a bucket sort with position codes (Oldenburg and Nilsson 1994); no grid is stored
 in memory.
 
 The code of a cell is ix + nx (iy + ny iz) (the paper's eq. 10). Every box is entered under the codes of the cells that

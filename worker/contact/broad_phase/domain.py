@@ -73,7 +73,7 @@ def _code(ix, iy, iz):  # type: ignore[no-untyped-def]
 
 @njit("int64[::1](float64[:, ::1], float64[:, ::1], boolean[::1], float64)", cache=True)
 def _cells(low, high, some, edge):  # type: ignore[no-untyped-def]
-    """Returns the codes of all cells that the boxes ``some`` touch. Each code is returned once."""
+    """Returns the codes of all cells that the boxes ``some`` touch; each code is returned once."""
     bits, n = 6, 0
     codes, used, found = np.empty(1 << bits, np.int64), np.zeros(1 << bits, np.bool_), np.empty(1 << bits, np.int64)
     for j in range(len(low)):

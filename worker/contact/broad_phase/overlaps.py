@@ -114,7 +114,7 @@ def _ask(out, n, end, table, small, large, rank, part, allowed, asked, stop):  #
 def _pairs(arguments, first, stop, thread):  # type: ignore[no-untyped-def]
     """Task: runs ``_ask``, in two passes.
 
-    In the first pass there are no places in ``out``. The task counts the pairs and writes them to ``found``, which has
+    In the first pass there are no places in ``out``; the task counts the pairs and writes them to ``found``, which has
     memory for ``each`` pairs of a large primitive. In the second pass the task copies its pairs to their places, which
     begin at ``begins``; if ``found`` was too small, the task finds the pairs again.
     """

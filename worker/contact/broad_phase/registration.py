@@ -1,5 +1,5 @@
 """Registration: the search for the candidate pairs of changed nodes, faces and edges on one rank, without
-communication. Registration finds each pair once.
+communication; registration finds each pair once.
 
 The pairs of a changed node, face or edge are removed; then pairs of it are searched among all nodes, faces and edges in
 the broad phase. A node, face or edge counts as changed if it has departed from its line (reference_motion.py) or is new

@@ -87,7 +87,7 @@ class Searches:
         )
 
     def keep(self, parcel: Parcel) -> None:
-        """Adds the stored impulses of pairs to the ``parcel`` (a checkpoint or migration message). The candidate pairs
+        """Adds the stored impulses of pairs to the ``parcel`` (a checkpoint or migration message); the candidate pairs
         are not added, because a search finds them again.
         """
         keys, kept = self._kept if self.scene is None else self.scene.kept

@@ -22,7 +22,7 @@ _SOME = 0.25
 the cosines is below -_SOME, because then at least one face of the node faces the face. If no cosine is negative,
 mean minus deviation is at least (1 - sqrt(2)) / 2 = -0.207."""
 RIM = 0.01
-"""Fraction of the size of a face. A node is beside a convex edge if it faces both faces of the edge, slides along one
+"""Fraction of the size of a face; a node is beside a convex edge if it faces both faces of the edge, slides along one
 of them, and is not deeper below that face than this fraction. Chosen value: twice the penetration of a sharp edge that
 slides along another edge, 1e-3 to 4e-3, at the moment when the end of the edge reaches the other edge. A node can be
 deeper than this below a face at a rim because edges have no contact at their ends."""

@@ -197,7 +197,7 @@ class FaceTable(NamedTuple):
     """(f,) size of each face, m: the square root of twice its initial area."""
     id: Ints
     exposed: Flags
-    """(f,) whether each face is exposed. Only exposed faces have contacts."""
+    """(f,) whether each face is exposed; only exposed faces have contacts."""
     left: Floats
     """(f,) largest distance of a corner from its reference motion, m."""
     fresh: Flags
@@ -205,7 +205,7 @@ class FaceTable(NamedTuple):
 
 
 class EdgeTable(NamedTuple):
-    """Edges of the scene. Only sharp edges have candidate pairs."""
+    """Edges of the scene; only sharp edges have candidate pairs."""
 
     corners: Indices
     """(e, 6) slots of each edge; see records.Edges."""
@@ -245,7 +245,7 @@ def needed(gap0, gap1, speed, give, dt):  # type: ignore[no-untyped-def]
 
 @njit(types.boolean(STEP, _I, _I, _I, _I), cache=True)
 def bonded(step, a, b, c, d):  # type: ignore[no-untyped-def]
-    """Returns True if one bond ties all four slots. The slots belong to two parts."""
+    """Returns True if one bond ties all four slots; the slots belong to two parts."""
     tied, part = step.tied, step.part
     return tied[a] & tied[b] & tied[c] & tied[d] != 0 and not part[a] == part[b] == part[c] == part[d]
 

@@ -114,7 +114,7 @@ class SceneFaces:
     """(f,) global ids of the faces, ascending."""
     size: Floats
     exposed: Flags
-    """(f,) whether each face is exposed. Only exposed faces have contacts."""
+    """(f,) whether each face is exposed; only exposed faces have contacts."""
     live: Flags
     """(f,) whether each face is in the broad phase. Exposed faces are in the broad phase, and faces that may be exposed
     soon."""

@@ -20,7 +20,7 @@ chosen value: 2 kB."""
 
 
 def pack(faces: Faces, edges: Edges, surface_nodes: SurfaceNodes) -> Ints:
-    """Packs faces, edges and their nodes into one flat message. Floats are packed as bit patterns."""
+    """Packs faces, edges and their nodes into one flat message; floats are packed as bit patterns."""
     return np.concatenate([
         np.array([faces.n, edges.n], np.int64),
         faces.id, faces.nodes.reshape(-1), faces.size.view(np.int64), faces.exposed,

@@ -67,7 +67,7 @@ class SplitUpdate:
         _renew(scene.surface_nodes.mobility, scene.own.place, family, here.mobility)
 
     def _join_ghosts(self, received: SplitOfGhosts) -> None:
-        """Adds the families of ghosts to the scene. Updates the mobilities of separated ghosts."""
+        """Adds the families of ghosts to the scene; updates the mobilities of separated ghosts."""
         have, rows = self.places(received.family[:, 0]) >= 0, received.rows
         new = rows.take(_joining(rows.id, self.places(rows.id), received.family, have))
         if new.n:

@@ -62,7 +62,7 @@ class ActiveNodes(NamedTuple):
     """Data of the nodes of active contacts (slots). The float view and the integer view of a cache line use the same memory."""
 
     moving: Floats
-    """(slots, 8) velocities and impulses, which a sweep reads and writes. A row is a cache line."""
+    """(slots, 8) velocities and impulses, which a sweep reads and writes; a row is a cache line."""
     moving_words: Ints
     fixed: Floats
     """(slots, 8) mobilities, and impulses of the step."""

@@ -106,7 +106,7 @@ class ActiveSum:
 
 
 def _parts(words: Ints, ranks: list[int], counts: Ints) -> list[tuple[int, Ints]]:
-    """Returns the range of rows of each rank. Ranks without rows are left out."""
+    """Returns the range of rows of each rank; ranks without rows are left out."""
     parts, end = [], 0
     for rank, many in zip(ranks, counts.tolist(), strict=True):
         end += many

@@ -87,8 +87,8 @@ def set_offsets(begin, begins, many, tasks):  # type: ignore[no-untyped-def]
 
 @njit(types.void(_N1, _N1, _U1, _I, _I, _I), cache=True)
 def number(places, slot, touched, n, first, stop):  # type: ignore[no-untyped-def]
-    """Numbers the ``touched`` surface nodes from ``first`` to ``stop`` in their order, with numbers from ``n`` on.
-    Clears the flags ``touched``. ``slot`` (surface_nodes,) becomes the inverse of ``places``.
+    """Numbers the ``touched`` surface nodes from ``first`` to ``stop`` in their order, with numbers from ``n`` on;
+    clears the flags ``touched``. ``slot`` (surface_nodes,) becomes the inverse of ``places``.
     """
     for a in range(first, stop):
         if touched[a]:

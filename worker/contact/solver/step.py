@@ -22,11 +22,11 @@ class SolverStep:
     total: Ints
     """(surface_nodes, 3) impulses of the step, quanta; the solver writes this array."""
     state: Nodes
-    """Nodes of the rank. The solver writes their velocities."""
+    """Nodes of the rank; the solver writes their velocities."""
     loose: Flags
     """(nodes,) whether each node has no tets."""
     books: Books
-    """Accounts of energies and impulses. The solver adds to them."""
+    """Accounts of energies and impulses; the solver adds to them."""
     unsettled: Ints
     """(2,) residual of the sweeps (sweep_count.py); the solver writes this array."""
     kept: Kept

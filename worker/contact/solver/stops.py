@@ -3,7 +3,7 @@
 The boundaries for walls and mirror images act after contact (walls.py, mirrors.py), on each node alone. Without stops,
 the sweeps would treat a node between a body and a wall as free, and the wall would then cancel the result of the
 sweeps. Therefore each node that would end the step behind a plane gets an impulse that stops the node at the plane, and
-a friction impulse along the plane. Later sweeps may reduce the normal impulse, but not below zero. After the last sweep
+a friction impulse along the plane. Later sweeps may reduce the normal impulse, but not below zero; after the last sweep
 the impulses of stops are removed, because the boundary applies them and computes their work. Every rank with a copy of
 a node computes the same stop.
 """
@@ -148,7 +148,7 @@ def stop(active, braced, task, begin):  # type: ignore[no-untyped-def]
     """Stops those nodes of a ``task`` that would end the step behind a plane. Reduces the impulse of nodes that would
     not. The rows of the task begin at ``begin``.
 
-    The formula is push = max(0, push + (least - n.v) / n.n). Friction is limited to mu push.
+    The formula is push = max(0, push + (least - n.v) / n.n); friction is limited to mu push.
     """
     v, path, slide = active.moving, active.path, np.empty(3)
     for r in range(begin, begin + braced.many[task]):

@@ -6,7 +6,7 @@ Kolev and Yang 2011): the sum over its nodes k and axes i of |w_k| |n_i| S_ki / 
 over all contacts at the node. The correction is exact for a single contact and for any number of contacts along one
 normal, and never overshoots when contacts share nodes. If many contacts share a node, the bound is far above the
 diagonal of the matrix, and plain sweeps converge slowly. Therefore normal impulses are extrapolated by Nesterov's
-``momentum``. Normal impulses are never negative. Friction is Coulomb friction and is limited by the normal impulse
+``momentum``; normal impulses are never negative. Friction is Coulomb friction and is limited by the normal impulse
 summed over the sweeps. Impulses are integers: the impulses of a contact add up to zero, and the result does not depend
 on the order of contacts or ranks. Node-face pairs and node pairs across a crack start from their impulses of the last
 step (warm start). With the warm start, for any number of sweeps, sticking contacts do not creep and the penetration of

@@ -69,7 +69,7 @@ def _insert(ring, parents, first):  # type: ignore[no-untyped-def]
 
 
 class Corners(NamedTuple):
-    """Corners of narrow sides, at nodes that have separated into three pieces or more. The corners are ordered by
+    """Corners of narrow sides, at nodes that have separated into three pieces or more; the corners are ordered by
     family.
     """
 

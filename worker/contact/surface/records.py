@@ -124,7 +124,7 @@ class SurfaceNodes(Rows):
     """(n, 3) extrapolated velocity for a search, m/s; see extrapolation.py."""
 
     def places(self, ids: Ints) -> Indices:
-        """Returns the rows of the nodes with the global ids ``ids``, in the shape of ``ids``. All nodes must be
+        """Returns the rows of the nodes with the global ids ``ids``, in the shape of ``ids``; all nodes must be
         present.
         """
         return located(self.id, ids)

@@ -1,4 +1,4 @@
-"""Edges between two faces of the surface. The module finds the edges and determines which of them are sharp; sharp
+"""Edges between two faces of the surface; the module finds the edges and determines which of them are sharp; sharp
 edges are in edge-edge contact.
 
 A half edge is an edge of one face, (a, b) of the face abc. Two half edges of opposite direction between the same nodes

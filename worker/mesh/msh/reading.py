@@ -24,7 +24,7 @@ _LISTED = {
     "MeshFormat", "NodeData", "Nodes", "ParametricNodes", "Parametrizations", "PartitionedEntities", "Periodic",
     "PhysicalNames",
 }  # fmt: skip
-"""Sections that the format defines. Sections without mesh data are skipped."""
+"""Sections that the format defines; sections without mesh data are skipped."""
 
 
 def read_msh(path: Path, group: str | None, key: str) -> Content:

@@ -73,7 +73,7 @@ def _scaled(
     gmsh: Any, form: CadForm, path: Path, head: str, factor: float, every: Solids, chosen: Solids
 ) -> tuple[Solids, Solids]:  # fmt: skip
     """Replace the solids ``every`` of a file by the same solids, read again and scaled by ``factor``. Return all
-    solids, and the solids in place of ``chosen``. The order in the file identifies them, because gmsh loses the names
+    solids, and the solids in place of ``chosen``; the order in the file identifies them, because gmsh loses the names
     of solids that it scales.
     """
     numbers = [every.index(each) for each in chosen]

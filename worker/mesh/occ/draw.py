@@ -150,7 +150,7 @@ def _in_thirds(occ: Any, sides: list[int]) -> Solids:
 
 
 def _swept(occ: Any, sides: list[int], begin: float, end: float) -> Solids:
-    """Return the volume that the area within ``sides`` sweeps between two angles, rad. The drawn area is removed."""
+    """Return the volume that the area within ``sides`` sweeps between two angles, rad; the drawn area is removed."""
     area = occ.addPlaneSurface([occ.addCurveLoop(sides)])
     if begin:
         occ.rotate([(2, area)], 0, 0, 0, 0, 0, 1, begin)

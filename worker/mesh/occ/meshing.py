@@ -1,4 +1,4 @@
-"""Meshing of a drawn model whose element sizes are set. First gmsh makes the tets. Then nodes are moved to increase the
+"""Meshing of a drawn model whose element sizes are set; first gmsh makes the tets. Then nodes are moved to increase the
 smallest step lengths.
 """
 

@@ -52,7 +52,7 @@ def solids_in(data: bytes) -> int:
 
 
 def surfaces_in(data: bytes) -> int:
-    """Return the number of surface bodies that the file defines. A surface body has no volume."""
+    """Return the number of surface bodies that the file defines; a surface body has no volume."""
     return len(_OPEN.findall(_TEXT.sub(b"''", data)))
 
 

@@ -122,7 +122,7 @@ class _Reader:
         return group
 
     def _nodes(self, number: int, depth: int = 0) -> Ids:
-        """Return the indices of the nodes of a group. A negative number removes a node."""
+        """Return the indices of the nodes of a group; a negative number removes a node."""
         group, found = self._group("GRNOD", number, depth), np.zeros(len(self.tags), bool)
         for _, row in group.rows:
             if group.kind == "GRNOD/GENE":
