@@ -50,7 +50,7 @@ class Samples:
         """Write energies, momenta and probes at time n to the history. Raises PhysicsError if the energy balance has a
         too large error.
 
-        Collective; ``before``: (nodes, 3) v(n-1/2); ``ending``: whether this is the sample after the last step.
+        Collective. ``before``: (nodes, 3) v(n-1/2); ``ending``: whether this is the sample after the last step.
         """
         clock, (end, samples) = sim.clock, self._every
         self.energy, self.parts, self.time = sim.ledger.close(before), sim.ledger.parts, clock.t

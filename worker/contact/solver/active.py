@@ -59,7 +59,9 @@ class Kept(NamedTuple):
 
 
 class ActiveNodes(NamedTuple):
-    """Data of the nodes of active contacts (slots). The float view and the integer view of a cache line use the same memory."""
+    """Data of the nodes of active contacts (slots). The float view and the integer view of a cache line use the same
+    memory.
+    """
 
     moving: Floats
     """(slots, 8) velocities and impulses, which a sweep reads and writes; a row is a cache line."""
