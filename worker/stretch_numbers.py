@@ -77,8 +77,8 @@ def _ends(words, numbers, peaks):  # type: ignore[no-untyped-def]
 
 @njit(TASK, cache=True, error_model="numpy")
 def decide(table, begin, end, thread):  # type: ignore[no-untyped-def]
-    """Task: the stage after the elements. It advances the time; then it either sets STOP, or chooses the next step as
-    step.py does and prepares all tables for this step.
+    """Task: the stage after the elements. The stage advances the time; then it either sets STOP, or chooses the next
+    step as step.py does and prepares all tables for this step.
     """
     words, numbers, peaks, ties = _of_decide(table)
     gather_peaks(peaks)

@@ -20,8 +20,8 @@ from ..model.state import CHUNK
 from .scratch import CHANGE, LIMIT, MODULUS, VOLUME
 
 SQUEEZED = 0.2
-"""Ratio of the volume of a tet to its initial volume below which the barrier acts; chosen value: the smallest ratio of
-tets is 0.56 in Taylor bars, and 0.28 in a long rod without erosion."""
+"""Ratio of the volume of a tet to its initial volume below which the barrier acts; chosen value: the smallest volume
+ratio of tets is 0.56 in Taylor bars, and 0.28 in a long rod without erosion."""
 STIFF = 0.1
 """Stiffness of the barrier, divided by the bulk modulus; chosen value: compression to half of SQUEEZED requires a
 pressure of 10 % of the bulk modulus, which is far more than the yield stress of metals."""
@@ -34,7 +34,9 @@ _Q, _MASS, _WORK, _WORK_VISCOUS = VISCOUS * CHUNK, MASS * CHUNK, WORK * CHUNK, W
 
 @njit("UniTuple(float64, 2)(float64, float64)", cache=True, error_model="numpy")
 def _barrier(ratio, bulk):  # type: ignore[no-untyped-def]
-    """Returns b and -J db/dJ, Pa. Both are zero if the volume is not positive; the stable step of such a tet is NaN."""
+    """Returns b and -J db/dJ, Pa. If the volume of the tet is not positive, b and its derivative are zero; the stable
+    step of such a tet is NaN.
+    """
     if not 0.0 < ratio < SQUEEZED:
         return 0.0, 0.0
     times = SQUEEZED / ratio

@@ -4,10 +4,10 @@ One-point tets with their own pressure lock in plastic flow. ``nodal`` replaces 
 of the values of its nodes; the value of a node is the volume-weighted mean over the tets around the node (averaged
 nodal pressure, Bonet and Burton 1998, in rate form). The pressure is stored for each tet, so that any equation of state
 can be used and the separation of a node changes no pressure. ``split`` adds the projection form of the operator split
-for pressure gradients to the nodal balance (Zienkiewicz et al. 1998). This is an Oñate-Codina stabilisation: it is
-proportional to the difference between the pressure gradient of a tet and the mean of the projected gradients of its
-nodes. The stabilisation vanishes for a linear pressure. Heat and bulking are averaged in the same way as the volume
-strain (heat_and_bulking.py).
+for pressure gradients to the nodal balance (Zienkiewicz et al. 1998). The term of ``split`` is an Oñate-Codina
+stabilisation: it is proportional to the difference between the pressure gradient of a tet and the mean of the projected
+gradients of its nodes. The stabilisation vanishes for a linear pressure. Heat and bulking are averaged in the same way
+as the volume strain (heat_and_bulking.py).
 
 Nodal sums are integers. Each contribution is divided by the reference volume of the node and is therefore of order one
 for any size of tets; for this reason one fixed scale, QUANTA, is sufficient for all cases.

@@ -80,7 +80,7 @@ class Probes:
     def measure(self, v: Floats | None = None) -> Floats:
         """Return (probes,) the present values, equal for any number of ranks.
 
-        Collective. ``v`` (nodes, 3): velocities at time n, for probes that are sums. They are needed if the velocities
+        Collective. ``v`` (nodes, 3): velocities at time n, for probes that are sums. The velocities are needed if those
         of the model are half a step ahead.
         """
         found: dict[int, float] = {}

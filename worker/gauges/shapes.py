@@ -1,4 +1,4 @@
-"""Probes of shapes: depth of penetration, size of holes and cones. They are measured with rays, lines and faces."""
+"""Probes of shapes: depth of penetration, size of holes and cones. Shapes are measured with rays, lines and faces."""
 
 import math
 from typing import Any

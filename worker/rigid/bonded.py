@@ -2,9 +2,10 @@
 the bodies.
 
 In each sweep of the bonds (bonds/sweeps.py) the impulses on the points of a body, and their moments about the centre of
-the body, are summed as integers over the ranks. These sums change the motion of the body, and the velocities of the
-points are set to this motion. In a step a point moves along the chord of its arc. Therefore a tied row uses arm and
-rotation vector at mid-step, V + (w + dt/2 w') x (r + dt/2 w x r), where w' = W (l x w) is that of a free rotation.
+the body, are summed as integers over the ranks. The sums of the impulses change the motion of the body, and the
+velocities of the points are set to this motion. In a step a point moves along the chord of its arc. Therefore a tied
+row uses arm and rotation vector at mid-step, V + (w + dt/2 w') x (r + dt/2 w x r), where w' = W (l x w) is that of a
+free rotation.
 """
 
 import numpy as np

@@ -2,10 +2,10 @@
 
 Active contacts apply integer impulses to slots (contact/solver/sweeps.py), and the sums of shared slots are completed
 as for other nodes. The impulses on the slots of a body, and their moments about its centre, are summed as integers:
-first on the rank that owns the node of each slot, then over the ranks. These sums change the motion of the body, and
-the velocities of its slots are set to this motion. Therefore mass and inertia of a body couple all its contact rows.
-The sweeps are Jacobi sweeps, as for shared nodes: the norm of a row is bounded by the l1 norm over all rows of the body
-(``norms``), and the result does not depend on the order of contacts and ranks.
+first on the rank that owns the node of each slot, then over the ranks. The sums of the impulses change the motion of
+the body, and the velocities of its slots are set to this motion. Therefore mass and inertia of a body couple all its
+contact rows. The sweeps are Jacobi sweeps, as for shared nodes: the norm of a row is bounded by the l1 norm over all
+rows of the body (``norms``), and the result does not depend on the order of contacts and ranks.
 """
 
 import numpy as np

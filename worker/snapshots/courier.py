@@ -1,5 +1,5 @@
-"""Side thread of a rank (courier); it writes the copied state of the rank to disk. On rank 0 it also sends tasks to the
-packer, the process that makes snapshots from the copies of all ranks.
+"""Side thread of a rank (courier); it writes the copied state of the rank to disk. On rank 0 the side thread also sends
+tasks to the packer, the process that makes snapshots from the copies of all ranks.
 """
 
 import contextlib

@@ -6,9 +6,9 @@ moment of separation the copy lies on all sides of these pieces (faces of broken
 a gap of zero. The position of the copy at the end of the step determines which side the copy would enter: the nearest
 side that is above the copy and contains its foot (docs/theory/fracture.md, "Contact").
 
-These sides are called narrow sides; their corners are processed family by family; a family is all copies of one
-original node. The positions of each member relative to all corners of its family are computed in loops over rows of a
-few kilobytes, which the compiler vectorizes; the few corners that pass this test are then tested one by one.
+Such sides are called narrow sides. The corners of narrow sides are processed family by family; a family is all copies
+of one original node. The positions of each member relative to all corners of its family are computed in loops over rows
+of a few kilobytes, which the compiler vectorizes; the few corners that pass this test are then tested one by one.
 """
 
 from typing import NamedTuple

@@ -1,4 +1,5 @@
-"""Stages of the solver: kernels over contacts, nodes, slots and sets of contacts. Their tables are in layout.py.
+"""Stages of the solver: kernels over contacts, nodes, slots and sets of contacts. The tables of the stages are in
+layout.py.
 
 The kernel ``number`` and kernels without a range are run by one thread.
 """

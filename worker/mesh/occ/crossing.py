@@ -1,8 +1,8 @@
 """Triangles of a surface that cross each other. Candidate pairs are found by cells and tested by separating axes.
 
-Two convex bodies do not overlap if their projections on some axis do not overlap. For two triangles it is sufficient to
-test their normals, the cross products of an edge of one with an edge of the other, and the normals of the edges in the
-planes of both triangles (Gottschalk, Lin and Manocha 1996, SIGGRAPH, 171).
+Two convex bodies do not overlap if their projections on some axis do not overlap. For two triangles only some axes must
+be tested: their normals, the cross products of an edge of one with an edge of the other, and the normals of the edges
+in the planes of both triangles (Gottschalk, Lin and Manocha 1996, SIGGRAPH, 171).
 """
 
 import math
