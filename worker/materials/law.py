@@ -31,7 +31,7 @@ class Law:
     model: str
     """Name of the law in a case; empty for the law of a material without a strength law."""
     order: int
-    """FROM_SHAPE, BEFORE_PRESSURE or AFTER_PRESSURE."""
+    """Position in the time step: FROM_SHAPE, BEFORE_PRESSURE or AFTER_PRESSURE."""
     rows: Callable[[Any], int]
     """Function that returns the number of state rows of a tet (worker/model/rows.py) from the law's table in the
     case."""

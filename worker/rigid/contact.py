@@ -120,8 +120,8 @@ class BodyContacts:
         pressed[self._slots.node[mine]] += self._slots.impulse[mine]
 
     def unsettled(self) -> Ints:
-        """(2,) two l1 norms over all ranks, on rank 0: of the impulses and moments in the step, and of their changes in
-        the last sweep (sweep_count.py in contact/solver).
+        """(2,) two l1 norms over all ranks, on rank 0: of the changes of impulses and moments in the last sweep, and of
+        the impulses and moments in the step (sweep_count.py in contact/solver).
         """
         both = np.zeros(2, np.int64)
         if self._comm.rank == 0 and self.active:
