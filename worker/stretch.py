@@ -1,8 +1,8 @@
 """Quiet steps as one compiled program.
 
 A step is quiet if no other code than its kernels is needed: no output, no request, no tet removed, no facet
-overstressed. The program (``Team.repeat``) executes the rows 11 to 14 of step.py, and after them the rows 1 to 9 of the
-next step, again and again, with the kernels that step.py uses:
+overstressed. The program (parallel/program.py) executes the rows 11 to 14 of step.py, and after them the rows 1 to 9 of
+the next step, again and again, with the kernels that step.py uses:
 
 ::
 
@@ -26,10 +26,12 @@ from .boundaries.boundaries import Boundary
 from .clock import DT
 from .model.state import Block, Floats, Ints
 from .parallel.arguments import Arguments, Follow
+from .parallel.program import Program, Span
 from .parallel.team import Stage
 from .parallel.words import SECOND
 from .simulation import Simulation
 from .stretch_numbers import (
+    CONTROL,
     DEADLINE,
     DECIDE,
     EVENT,
@@ -62,6 +64,10 @@ the next _PAUSE steps are executed without a program, so that a scene that is qu
 on programs. Chosen values: to begin a program takes as long as a step of a small scene."""
 
 
+_ONE: Ints = np.ones(1, np.int64)
+"""Length of the range of a stage that one thread runs."""
+
+
 class Until(NamedTuple):
     """First time at which code outside of the program is needed."""
 
@@ -78,10 +84,8 @@ class _Part:
     """A stage of the program with its phase and, if it computes elements, the block of these elements."""
 
     phase: str
-    stage: Stage
+    stage: Stage | Span
     block: Block | None = None
-    alone: bool = False
-    """Whether the stage is outside of parallel regions, because only one thread can compute it."""
 
 
 class Stretch:
@@ -116,8 +120,9 @@ class Stretch:
             return 0
         self._begin(until)
         self._tie(parts)
-        spent = sim.elements.team.repeat([each.stage for each in parts], 2**62, self._words[STOP : STOP + 1])
-        self._end(parts, spent)
+        program = Program(sim.elements.team, [each.stage for each in parts], self._words[CONTROL : CONTROL + 1])
+        program.repeat()
+        self._end(parts, program.spent)
         steps = int(self._words[STEPS])
         self._pause = _PAUSE if steps < _SHORT and self._words[STOP] == EVENT else 0
         return steps
@@ -143,7 +148,7 @@ class Stretch:
         some = [
             _Part("nodes", sim.leapfrog.moving(nodes, Follow(DT), Follow(SHORTER_QUANTUM))),
             *(_Part("elements", *each) for each in sim.elements.advancing(Follow(DT), Follow(NEXT_SCALE))),
-            _Part("nodes", self._deciding(), alone=True),
+            _Part("nodes", self._deciding()),
             *(_Part("exchange", each) for each in ending),
         ]  # fmt: skip
         noting = [stage for bound in sim.acts.noting for stage in bound.noting(nodes)]
@@ -156,10 +161,9 @@ class Stretch:
             return None
         return [stage for each in found if each is not None for stage in each]
 
-    def _deciding(self) -> Stage:
-        one = np.array([[0, 1]]), np.array([0, 1])
+    def _deciding(self) -> Span:
         peaks = self._sim.elements.scratches.peaks
-        return Stage(decide, self._decide.set(self._words, self._numbers, peaks, self._ties), *one)
+        return Span(decide, self._decide.set(self._words, self._numbers, peaks, self._ties), _ONE, 0, 1)
 
     def _begin(self, until: Until) -> None:
         """Sets the words and numbers of the program to the present state of the simulation."""
@@ -175,7 +179,7 @@ class Stretch:
 
     def _tie(self, parts: list[_Part]) -> None:
         """Connects the tables of all stages with the numbers."""
-        ties = [tie for each in parts for tie in each.stage.ties]
+        ties = [tie for each in parts if isinstance(each.stage, Stage) for tie in each.stage.ties]
         self._ties = Ties(
             np.array([tie.number for tie in ties]), np.array([tie.factor for tie in ties]),
             np.array([tie.address for tie in ties]),
@@ -185,7 +189,9 @@ class Stretch:
         self._sim.elements.scratches.peaks[:] = 0
 
     def _end(self, parts: list[_Part], spent: Ints) -> None:
-        """Sets the simulation to the state in which the program ended. ``spent`` (parts,): time of each stage, ns."""
+        """Sets the simulation to the state in which the program ended; ``spent`` (parts, 2): time of each
+        stage outside of regions and in regions, ns.
+        """
         sim, steps = self._sim, int(self._words[STEPS])
         sim.clock.go_on(steps, self._numbers[: len(sim.clock.numbers)].tolist())
         sim.scale = float(self._numbers[SCALE])
@@ -195,8 +201,9 @@ class Stretch:
         if sim.fracture is not None:
             sim.fracture.went_on(steps - 1)
         inside, outside = dict.fromkeys(PHASES, 0.0), dict.fromkeys(PHASES, 0.0)
-        for each, time_of in zip(parts, (spent / SECOND).tolist(), strict=True):
-            (outside if each.alone else inside)[each.phase] += time_of
+        for each, (alone, shared) in zip(parts, (spent / SECOND).tolist(), strict=True):
+            outside[each.phase] += alone
+            inside[each.phase] += shared
             if each.block is not None:
-                each.block.seconds += time_of
+                each.block.seconds += alone + shared
         sim.timers.divide(inside, outside)

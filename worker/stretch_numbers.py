@@ -20,15 +20,17 @@ SCALE, NEXT_SCALE, IMPULSE_QUANTUM, SHORTER_QUANTUM = range(STABLE + 1, STABLE +
 mean of two steps divided by the scale, N s; a quarter of the difference of two steps divided by the scale
 (motion.py)."""
 SAFETY, GROWTH, LEAST_STABLE, LANDING, NEXT, FLOOR, MANY = range(SHORTER_QUANTUM + 1, SHORTER_QUANTUM + 8)
-"""Indices of numbers that are constant in a program: limits of the clock (``Clock.limits``); time of the first output
-or request, s; force, N, down to which the scale is refined. MANY: the number of all numbers."""
-STOP, STEPS, MOST_STEPS, DEADLINE, TIME = range(5)
-"""Indices of the words of a program: 0, or the reason why the program ends; number of steps so far, and largest number
-of steps; wall time at which the program ends, ns; two words for reading the clock."""
+"""Numbers that are constant in a program: limits of the clock (``Clock.limits``); time of the first output or request,
+s; force, N, down to which the scale is refined. MANY: the number of all numbers."""
+STOP, CONTROL, STEPS, MOST_STEPS, DEADLINE, TIME = range(6)
+"""Words of a program: 0, or the reason for which the program ends; number of the next stage (parallel/program.py);
+steps so far, and largest number of steps; wall time at which the program ends, ns; two words for reading the clock."""
 SCHEDULED, EVENT = 1, 2
 """Reasons why a program ends."""
 SIZE = TIME + 2
 """Number of words."""
+_END = 1 << 62
+"""Number of a stage beyond the last one: ends the program."""
 
 
 class Ties(NamedTuple):
@@ -77,8 +79,8 @@ def _ends(words, numbers, peaks):  # type: ignore[no-untyped-def]
 
 @njit(TASK, cache=True, error_model="numpy")
 def decide(table, begin, end, thread):  # type: ignore[no-untyped-def]
-    """Task: the stage after the elements. The stage advances the time; then it either sets STOP, or chooses the next
-    step as step.py does and prepares all tables for this step.
+    """Stage after the elements: advances the time, then either ends the program, or chooses the next step as step.py
+    does and prepares all tables for it.
     """
     words, numbers, peaks, ties = _of_decide(table)
     gather_peaks(peaks)
@@ -87,12 +89,13 @@ def decide(table, begin, end, thread):  # type: ignore[no-untyped-def]
     words[STEPS] += 1
     words[STOP] = _ends(words, numbers, peaks[0])
     if words[STOP] != 0:
+        words[CONTROL] = _END
         return
     limit = np.int64(peaks[0, LARGEST_LIMIT]).view(np.float64)
     last_dt, left = numbers[DT], numbers[LANDING] - numbers[T]
     stable, dt, mean_dt, shorter = chosen(limit, numbers[SAFETY], numbers[GROWTH], numbers[STABLE], last_dt, left)
     if stable < numbers[LEAST_STABLE]:
-        words[STOP] = EVENT
+        words[STOP], words[CONTROL] = EVENT, _END
         return
     numbers[STABLE], numbers[LAST_DT], numbers[DT] = stable, last_dt, dt
     numbers[MEAN_DT], numbers[SHORTER] = mean_dt, shorter

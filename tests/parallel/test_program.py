@@ -72,6 +72,30 @@ def test_a_range_is_read_when_its_stage_begins_and_a_kernel_ends_the_program(thr
         assert (done == expected(11)).all()
 
 
+@njit(TASK, cache=False)
+def gather(table, first, stop, thread):  # type: ignore[no-untyped-def]
+    """Adds to each number of its range the next number of the first half; ends the program after ten rounds."""
+    done, _, control = _words(table)
+    for k in range(first, stop):
+        done[100 + k] += done[(k + 1) % 100]
+    if first == 0 and done[1] % 10 == 0:
+        control[0] = END
+
+
+@pytest.mark.parametrize("threads", [1, 2, 5])
+def test_the_stages_of_a_program_come_one_after_the_other_in_every_round(threads: int) -> None:
+    done, lengths, control = np.zeros(200, np.int64), np.array([100]), np.zeros(1, np.int64)
+    table, tasks = Arguments(*KINDS), np.column_stack([np.arange(0, 100, 6), np.minimum(np.arange(6, 106, 6), 100)])
+    address = table.set(done, lengths, control)
+    one_by_one = Stage(count, address, tasks, np.array([0, 1, 9, 9, len(tasks)]))
+    program = Program(team(threads), [one_by_one, Span(gather, address, lengths, 0, SIZE)], control)
+    for _ in range(20):
+        program.repeat()
+    assert (done[:100] == 200).all()
+    assert (done[100:] == 200 * 201 // 2).all()  # each has the counts of the first stage only
+    assert (program.spent[:, 1] > 0).all()
+
+
 @pytest.mark.parametrize("threads", [1, 2])
 def test_a_program_is_run_in_parts(threads: int) -> None:
     program, done, lengths = made(team(threads))

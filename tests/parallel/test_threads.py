@@ -12,7 +12,7 @@ from conoid.worker.kernels.jit import njit, several, types
 from conoid.worker.mesh.structured import structured
 from conoid.worker.model.state import CHUNK, Block
 from conoid.worker.parallel.arguments import Arguments, Handle, reader, table_of
-from conoid.worker.parallel.team import TASK, Stage, team
+from conoid.worker.parallel.team import TASK, team
 from conoid.worker.run import main
 from tests.bench.scene import box
 
@@ -90,30 +90,6 @@ def test_every_task_is_done_once_in_each_of_many_passes(threads: int) -> None:
     assert (done == 2000).all()
     assert who.min() >= 0
     assert who.max() < threads
-
-
-@njit(TASK, cache=False)
-def gather(table, first, end, thread):  # type: ignore[no-untyped-def]
-    """Adds to each number of the range the count of the next number."""
-    done, who = _counts(table)
-    for k in range(first, end):
-        who[k] += done[(k + 1) % len(done)]
-
-
-@pytest.mark.parametrize("threads", [1, 2, 5])
-def test_the_stages_of_a_program_come_one_after_the_other_in_every_round(threads: int) -> None:
-    done, seen = np.zeros((2, 600), np.int64)
-    tasks = np.column_stack([np.arange(0, 600, 6), np.arange(6, 606, 6)])
-    table, other = Arguments(*COUNTS), Arguments(*COUNTS)
-    who = np.zeros(600, np.int64)
-    stages = [
-        Stage(count, table.set(done, who), tasks, np.array([0, 1, 40, 40, 100])),
-        Stage(gather, other.set(done, seen), tasks, np.array([0, 100])),
-    ]
-    for _ in range(20):
-        team(threads).repeat(stages, 10)
-    assert (done == 200).all()
-    assert (seen == 200 * 201 // 2).all()  # each number has the counts of the first stage only
 
 
 def test_helpers_take_part_and_are_there_once() -> None:

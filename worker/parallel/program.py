@@ -43,30 +43,41 @@ def _of_range(job, semaphore, stage):  # type: ignore[no-untyped-def]
 def _of_tasks(job, semaphore, stage):  # type: ignore[no-untyped-def]
     """Run a stage whose tasks are given."""
     tasks, starts, colours = stage[2], stage[3], stage[4]
-    if job[MOST] > 1:
+    first, end = word_at(starts, 0), word_at(starts, colours)
+    if job[MOST] > 1 and end - first > 1:
         share(job, semaphore, stage[0], stage[1], tasks, starts, colours)
     else:
-        for k in range(word_at(starts, 0), word_at(starts, colours)):
+        for k in range(first, end):
             call_task(stage[0], stage[1], word_at(tasks, 2 * k), word_at(tasks, 2 * k + 1), 0)
 
 
-@njit("int64(int64[::1], int64, int64[:, ::1], int64[::1], int64, int64)", cache=True)
-def _run(job, semaphore, stages, control, first, end):  # type: ignore[no-untyped-def]
-    """Run the stages from ``first`` to ``end``. Return the number of the stage that would come next. The time of a
-    range with one task does not count as time in parallel regions.
+@njit("int64(int64[:, ::1], int64[::1], int64, int64[:, ::1], int64[::1], int64, int64, boolean)", cache=True)
+def _run(spent, job, semaphore, stages, control, first, end, again):  # type: ignore[no-untyped-def]
+    """Run the stages from ``first`` to ``end``, with ``again`` in a loop until a kernel writes a number beyond ``end``
+    to ``control``; return the number of the stage that would come next. Adds the time of each stage, ns, to ``spent``
+    (stages, 2).
     """
     k, begin = first, now(job, CLOCK)
     while k < end:
-        stage, shared = stages[k], True
+        stage, shared = stages[k], 1
         if stage[6] > 0:
-            shared = _of_range(job, semaphore, stage)
+            shared = np.int64(_of_range(job, semaphore, stage))
         else:
             _of_tasks(job, semaphore, stage)
         done = now(job, CLOCK)
+        spent[k, shared] += done - begin
         if shared:
             job[WITHIN] += done - begin
         k, control[0], begin = control[0] if control[0] >= 0 else k + 1, -1, done
+        if again and k == end:
+            k = first
     return k
+
+
+@njit("int64(int64[:, ::1], int64[::1], int64, int64[:, ::1], int64[::1], int64, int64)", cache=True, nogil=True)
+def _repeat(spent, job, semaphore, stages, control, first, end):  # type: ignore[no-untyped-def]
+    """``_run`` in a loop; other threads of Python run meanwhile."""
+    return _run(spent, job, semaphore, stages, control, first, end, True)
 
 
 @dataclass(frozen=True)
@@ -106,6 +117,8 @@ class Program:
         self._team, self._stages, self.control = team, list(stages), control
         words = [each.words() if isinstance(each, Span) else _words(each) for each in stages]
         self._words = np.array(words, np.int64).reshape(-1, _WORDS)
+        self.spent: Ints = np.zeros((len(stages), 2), np.int64)
+        """(stages, 2) time of each stage so far, ns: of ranges of one task, and in regions."""
         control[0] = -1
 
     def run(self, first: int = 0, end: int | None = None) -> int:
@@ -115,13 +128,21 @@ class Program:
         end = len(self._stages) if end is None else end
         team = self._team
         if team.projecting is None:
-            return int(_run(team.job, team.semaphore, self._words, self.control, first, end))
+            control = self.control
+            return int(_run(self.spent, team.job, team.semaphore, self._words, control, first, end, False))
         k = first
         while k < end:
             self._timed(self._stages[k])
             k = int(self.control[0]) if self.control[0] >= 0 else k + 1
             self.control[0] = -1
         return k
+
+    def repeat(self) -> None:
+        """Run all stages again and again until a kernel writes a number beyond the last stage to ``control``. The
+        threads stay awake between the stages.
+        """
+        team = self._team
+        _repeat(self.spent, team.job, team.semaphore, self._words, self.control, 0, len(self._stages))
 
     def _timed(self, stage: Stage | Span) -> None:
         """Run a stage while the times of tasks are measured (projecting.py)."""

@@ -16,7 +16,6 @@ threads while there are tasks.
 
 import ctypes
 import threading
-from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache
 from typing import Protocol
@@ -44,10 +43,7 @@ bits are the number of tasks."""
 _LINE = 8
 """Number of words in a cache line."""
 _WAKES = 2
-"""Largest number of threads that one thread wakes."""
-_LONG = 1000
-"""Smallest number of rounds of a program that allows other Python threads to run meanwhile; the chosen value is far
-above the number of sweeps of contact and far below the number of steps in a second."""
+"""Largest number of threads that a thread wakes."""
 _POLLS = 4000
 """Number of polls before a helper sleeps, and before the calling thread yields its core; with the chosen value polling
 takes some 50 us, which is longer than the gap between two colours and much shorter than a step."""
@@ -153,36 +149,6 @@ def _alone(job, kernel, table, tasks):  # type: ignore[no-untyped-def]
     job[WITHIN] += now(job, CLOCK) - begin
 
 
-@njit("void(int64[::1], int64[::1], int64, int64[:, ::1], int64, int64[::1])", cache=True)
-def _repeat(spent, job, semaphore, stages, rounds, stop):  # type: ignore[no-untyped-def]
-    """Run all stages one after the other, ``rounds`` times, or until a stage has set ``stop`` (1,) to a number other
-    than 0. ``stages`` (n, 5): arguments of each pass. Adds the time of each stage, ns, to ``spent`` (n,).
-    """
-    begin = last = now(job, CLOCK)
-    for _ in range(rounds):
-        for k in range(len(stages)):
-            kernel, table, tasks = stages[k, 0], stages[k, 1], stages[k, 2]
-            starts, colours = stages[k, 3], stages[k, 4]
-            if job[MOST] == 1 or word_at(starts, colours) - word_at(starts, 0) == 1:
-                for t in range(word_at(starts, 0), word_at(starts, colours)):
-                    call_task(kernel, table, word_at(tasks, 2 * t), word_at(tasks, 2 * t + 1), 0)
-            else:
-                share(job, semaphore, kernel, table, tasks, starts, colours)
-            time = now(job, CLOCK)
-            spent[k] += time - last
-            last = time
-            if stop[0] != 0:
-                job[WITHIN] += last - begin
-                return
-    job[WITHIN] += last - begin
-
-
-@njit("void(int64[::1], int64[::1], int64, int64[:, ::1], int64, int64[::1])", cache=True, nogil=True)
-def _repeat_long(spent, job, semaphore, stages, rounds, stop):  # type: ignore[no-untyped-def]
-    """Does the same as ``_repeat`` for a long program, while other Python threads may run."""
-    _repeat(spent, job, semaphore, stages, rounds, stop)
-
-
 @dataclass(frozen=True)
 class Stage:
     """A pass of a program; it has the arguments of ``Team.run``."""
@@ -260,28 +226,6 @@ class Team:
         else:
             places = address_of(tasks), address_of(starts), len(starts) - 1
             _ask(self.job, self.semaphore, kernel.address, table, *places)
-
-    def repeat(self, stages: Sequence[Stage], rounds: int, stop: Ints | None = None) -> Ints:
-        """Run all ``stages`` one after the other, ``rounds`` times, in one call. End early after a stage that sets
-        ``stop`` (1,) to a number other than 0. Return (stages,) the time of each stage, ns.
-
-        Threads stay awake between the stages, and no Python code runs between the stages. If a kernel needs the number
-        of the round, it stores the number in its table.
-        """
-        spent, stop = np.zeros(len(stages), np.int64), np.zeros(1, np.int64) if stop is None else stop
-        if self.projecting is not None:
-            for k in [*range(len(stages))] * rounds:
-                self.run(stages[k].kernel, stages[k].table, stages[k].tasks, stages[k].starts)
-                if stop[0]:
-                    break
-            return spent
-        words = [
-            (each.kernel.address, each.table, address_of(each.tasks), address_of(each.starts), len(each.starts) - 1)
-            for each in stages
-        ]
-        kernel = _repeat if rounds < _LONG else _repeat_long
-        kernel(spent, self.job, self.semaphore, np.array(words), rounds, stop)
-        return spent
 
 
 @cache
