@@ -9,6 +9,7 @@ import numpy as np
 from conoid.worker.contact.broad_phase.pairs import PairTable
 from conoid.worker.contact.narrow_phase import edge_edge as edge_kernels
 from conoid.worker.contact.narrow_phase import node_face as face_kernels
+from conoid.worker.contact.narrow_phase import single_contact
 from conoid.worker.contact.narrow_phase.rows import ActiveRows
 from conoid.worker.contact.narrow_phase.tables import (
     DEEP,
@@ -131,9 +132,11 @@ def faces_met(pairs: Pairs, slots: SlotTable, faces: FaceTable, step: Step, end:
     room, depth, found = ContactRows.room(n), np.zeros(n), np.arange(n, dtype=np.int32)
     tested = int(face_kernels.due(pairs, slots, faces, end + step.beyond, 0, n))
     met, _ = face_kernels.node_face(room, depth, 0, pairs, slots, faces, step, end, 0, tested)
-    holder = np.full(len(step.x), -1, np.int32)
-    held = face_kernels.nearest(found[:met], room, depth, pairs, faces, step.part, holder)
-    assert (holder == -1).all()
+    earlier, last, listed = np.empty(n, np.int32), np.full(len(step.x), -1, np.int32), found[:met]
+    single_contact.link(earlier, last, listed, room.nodes)
+    single_contact.admitted(room, depth, pairs, slots, faces, step, listed, earlier, last, end, 0, met)
+    held = single_contact.nearest(listed, room, depth, pairs, faces, step.part, earlier, last)
+    assert (last == -1).all()
     return taken(room, found[:held]), tested
 
 

@@ -13,23 +13,29 @@ from ..bench.sectors import MM, End, case_of, run
 
 
 @cache
-def end(sector: str, nodes: str) -> End:
-    """Returns the results at the end of the run; the structured meshes are mirror images of each other."""
+def end(sector: str, nodes: str, safety: float = 0.6) -> End:
+    """Returns the results at the end; the structured meshes are mirror images of each other. ``safety``: share of the
+    stable time step.
+    """
     target = 6.25 * MM, 10.0 * MM
-    case = case_of(sector, 1.25 * MM, 16e-6, 7.5 * MM, target, 0.6, nodes, generator="structured")
+    case = case_of(sector, 1.25 * MM, 16e-6, 7.5 * MM, target, safety, nodes, generator="structured")
     return run(simulation.build(case, Path(), SerialComm()))
 
 
 @pytest.mark.parametrize("sector", ["quarter", "half"])
 def test_a_sector_is_the_whole_while_a_rod_is_used_up(sector: str) -> None:
-    """The momentum and the energy of the three scenes agree. In an earlier version debris stopped on the planes, which
-    left 1.5 % more energy in the quarter, and nine times as much mass near the axis as in the whole.
+    """Momentum, energy, and the mass near the axis agree in the mean of three runs. In an earlier version debris
+    stopped on the planes, which left 1.5 % more energy in the quarter, and nine times as much mass near the axis as in
+    the whole.
+
+    With a time step that is 2 % shorter, single runs change their momentum by 2 %, and the mass near the axis, the mass
+    of a few nodes, by a factor of three.
     """
-    part, whole = end(sector, "particles"), end("full", "particles")
-    assert whole.near[1] > 1e-3
-    assert part.near[0] < 3.0 * whole.near[0]
-    assert part.rod == pytest.approx(whole.rod, rel=0.02)
-    assert part.kinetic == pytest.approx(whole.kinetic, rel=0.01)
+    part, whole = ([end(each, "particles", 0.6 - 0.01 * k) for k in range(3)] for each in (sector, "full"))
+    assert min(each.near[1] for each in whole) > 1e-3
+    assert sum(each.near[0] for each in part) < 3.0 * sum(each.near[0] for each in whole)
+    assert sum(each.rod for each in part) == pytest.approx(sum(each.rod for each in whole), rel=0.02)
+    assert sum(each.kinetic for each in part) == pytest.approx(sum(each.kinetic for each in whole), rel=0.01)
 
 
 @pytest.mark.parametrize("sector", ["quarter", "half"])

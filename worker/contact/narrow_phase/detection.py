@@ -109,7 +109,8 @@ class Detection:
             (stages.leave, layout.SLOTS_N, slots), (stages.largest_faces, layout.FACES_N, sides),
             (stages.largest_edges, layout.EDGES_N, sides), (stages.check, layout.ONE, 1),
             (stages.across, layout.CRACKS_N, CRACKS_OF_A_TASK), (stages.due, layout.FACE_PAIRS_N, pairs),
-            (stages.on_faces, layout.FACE_PAIRS_N, pairs), (stages.nearest, layout.ONE, 1),
+            (stages.on_faces, layout.FACE_PAIRS_N, pairs), (stages.link, layout.ONE, 1),
+            (stages.admit, layout.ON_FACES, some), (stages.nearest, layout.ONE, 1),
             (stages.approach, layout.ON_FACES, some), (stages.on_edges, layout.EDGE_PAIRS_N, pairs),
             (stages.collect, layout.ONE, 1), (stages.retarget, layout.RETARGETED, some),
         ]  # fmt: skip
@@ -230,7 +231,7 @@ class Detection:
             self._sizes, self._sums = sizes, self._rooms(*sizes)
         (opening, due, *_, tested, _, _, _), one, two = self._sums, now.node_face.arrays(), now.edge_edge.arrays()
         self._handle.set(
-            layout.ROWS, *rows.room, rows.found, rows.depth, rows.holder(now.surface_nodes.n), *step,
+            layout.ROWS, *rows.room, rows.found, rows.depth, rows.earlier, rows.holder(now.surface_nodes.n), *step,
             *one, *now.slot_table(), *now.face_table(), *two, *now.edge_table(), now.reference.short.course,
             now.cracks, *self._sums,
         )  # fmt: skip

@@ -20,7 +20,7 @@ _KINDS = {
     LINES: (_F1, _F2, _F2, _F1, _F2, _F2, _B1, _F1),
     SIDES: (_F1, _N2, _F1, _N2),
     NUMBERS: (_I1, _F1, _I1),
-    ROWS: (CONTACT_ROWS, _N1, _F1, _N1),
+    ROWS: (CONTACT_ROWS, _N1, _F1, _N1, _N1),
     NOW: (STEP,),
     FACE_PAIRS: (PAIRS, SLOTS, FACES),
     EDGE_PAIRS: (PAIRS, EDGES, _F2),
@@ -41,7 +41,7 @@ sides_of = table_of(SIDES, *_KINDS[SIDES])
 numbers_of = table_of(NUMBERS, *_KINDS[NUMBERS])
 """Fields of the table NUMBERS: integers, floating point numbers, control word of the program."""
 rows_of = table_of(ROWS, *_KINDS[ROWS])
-"""Fields of the table ROWS: ContactRows, numbers of the active rows, depths, working array (rows.py)."""
+"""ContactRows, numbers of the active rows, depths, two working arrays (rows.py)."""
 now_of = table_of(NOW, *_KINDS[NOW])
 """Fields of the table NOW: those of Step."""
 face_pairs_of = table_of(FACE_PAIRS, *_KINDS[FACE_PAIRS])

@@ -10,8 +10,8 @@ from ...kernels.jit import njit, prefetch, types
 from ...model.cache_lines import LINE
 from ..geometry import VECTOR, at, beyond, distance, dot, foot, height, minus, off
 from .closing_speed import closing_rate, fastest_of
-from .facing import RIM, TOUCHING, facing, in_front, outside, plane, reaches_over
-from .tables import CONTACT_ROWS, DEEP, DEEP_SELF, FACES, NEAR, PAIRS, SLOTS, STEP, bonded, needed
+from .facing import facing, plane
+from .tables import CONTACT_ROWS, DEEP, DEEP_SELF, FACES, NEAR, PAIRS, SLOTS, STEP, bonded
 
 _ROUND = 0.01
 """Tolerance for round-off, as a fraction of the size of a face; it is added to the distance of contact."""
@@ -161,8 +161,8 @@ def due(pairs, slots, faces, end, first, stop):  # type: ignore[no-untyped-def]
 #             \                        gap: dt m . sum(w_k v_k) + const with w = (1, -b_i, -b_j, -b_k) of s, i, j, k
 #              o s (n+1)                    (docs/theory/contact.md, "Impulses, not springs")
 #
-# Conditions of a contact, in the order of the tests in node_face (docs/theory/contact.md, "Which point", "Beside a free
-# edge" and "Face on face"):
+# Conditions of a contact, in the order of the tests in node_face, the first five, and in ``admitted``
+# (docs/theory/contact.md, "Which point", "Beside a free edge" and "Face on face"):
 # 1. No bond ties all four nodes.
 # 2. The gap is at most NEAR of the face at the end of the step.
 # 3. The normals are compatible: node s faces the face (facing.facing), so that the rim of a bar is not in contact with
@@ -170,9 +170,11 @@ def due(pairs, slots, faces, end, first, stop):  # type: ignore[no-untyped-def]
 # 4. If only one of the faces at node s faces the face, s passes the face from outside: gap0 >= -NEAR of the face.
 # 5. The foot of s at tau is on the face, and s is no deeper than ``reach`` of the face and half the altitude of its
 #    tet.
-# 6. The node is not beside a convex edge, in front of another face there (facing.in_front).
-# 7. If s is inside by more than TOUCHING, s is not nearer to the front of another face (facing.outside).
-# A node behind several faces of a part keeps its contact with the nearest face (``nearest``).
+# 6. No face of lower id has the same contact (single_contact.same): a node over an edge or a corner of a flat patch of
+#    faces has one contact with the patch, not one with each face.
+# 7. The node is not beside a convex edge, in front of another face there (facing.in_front).
+# 8. If s is inside by more than TOUCHING, s is not nearer to the front of another face (facing.outside).
+# A node behind several faces of a part keeps its contact with the nearest face (single_contact.nearest).
 
 
 @njit(f"void({_N2}, {_N2}, {_V2}, {_X2}, int32[::1], int64, int64)", cache=True, forceinline=True)
@@ -193,20 +195,21 @@ def _bring(rows, corners, normals, x, active, q, last):  # type: ignore[no-untyp
     error_model="numpy",
 )
 def node_face(out, depth, base, pairs, slots, faces, step, end, first, stop):  # type: ignore[no-untyped-def]
-    """Writes contacts of nodes with faces to the rows of ``out`` from ``base + first`` on, for the pairs in
-    ``pairs.active`` from ``first`` to ``stop``. Returns the number of contacts, and the largest square of speed /
-    altitude of a tet, 1/s^2, of the pairs that will be in contact in the next step (``_coming``).
+    """Writes possible contacts of nodes with faces, which fulfil the first five conditions, of the pairs in
+    ``pairs.active`` from ``first`` to ``stop``: rows of ``out`` from ``base + first`` on. Returns their number, and the
+    largest square of a speed over the altitude of a tet, 1/s^2, of the pairs that will be in contact in the next step
+    (``_coming``).
 
-    ``depth`` (rows,): depth of a node that is inside of a body, m, else 0; only the nearest face of a part keeps its
-    contact (``nearest``). ``end``: time of the end of the step, s after the search. The comments have the numbers of
-    the conditions in the drawing.
+    ``depth`` (room,): gap at the beginning of the step, m; ``out.wanted`` is the gap at the end without contact, m.
+    ``admitted`` (single_contact.py) completes the rows. ``end``: end of the step, s after the search. Numbers at the
+    ends of lines: conditions listed above.
     """
     rows, until, speed, turned, active = pairs.rows, pairs.until, pairs.speed, pairs.turned, pairs.active
     corners, size, left = faces.corners, faces.size, faces.left
-    normals, strayed, other, course = slots.normals, slots.left, slots.fresh, slots.course
+    normals, strayed, course = slots.normals, slots.left, slots.course
     nodes, weights, out_normals, wanted, pair = out.nodes, out.weights, out.normals, out.wanted, out.pair
-    x, v, ahead, part = step.x, step.v, step.ahead, step.part
-    chains, n, most = slots.first, base + first, 0.0
+    x, ahead, part = step.x, step.ahead, step.part
+    n, most = base + first, 0.0
     for q in range(first, stop):
         p = active[q]
         _bring(rows, corners, normals, x, active, q, stop - 1)
@@ -243,53 +246,9 @@ def node_face(out, depth, base, pairs, slots, faces, step, end, first, stop):  #
         passes, b = _passes(x, ahead, corners, s, f, now, gap0, gap1, reach * size[f])
         if not passes:  # condition 5: foot and depth
             continue
-        leaves, until_end = np.inf if other[s] else strayed[s], end + step.dt
-        sides = minus(at(x, j), at(x, i)), minus(at(x, k), at(x, i))
-        beside = min(b[0], b[1], b[2]) <= RIM and not reaches_over(normals, s, b, sides[0], sides[1], size[f])
-        if beside and in_front(pairs, chains, faces, step, normals, p, gap0, gap1, leaves, until_end):  # condition 6
-            continue
-        depth[n] = 0.0
-        if gap0 < -TOUCHING * size[f]:
-            if outside(pairs, chains, faces, x, part, p, -gap0, leaves, until_end):  # condition 7: nearer elsewhere
-                continue
-            depth[n] = -gap0
         nodes[n, 0], nodes[n, 1], nodes[n, 2], nodes[n, 3] = s, i, j, k
         weights[n, 0], weights[n, 1], weights[n, 2], weights[n, 3] = 1.0, -b[0], -b[1], -b[2]
-        rate = 0.0  # normal velocity m . sum(w_k v_k)
-        for a in range(3):
-            out_normals[n, a] = m[a]
-            rate += m[a] * (v[s, a] - (b[0] * v[i, a] + b[1] * v[j, a] + b[2] * v[k, a]))
-        wanted[n] = rate + needed(gap0, gap1, rate, step.give, step.dt)
-        out.friction[n], pair[n] = step.mu[part[s], part[i]], p
+        out_normals[n, 0], out_normals[n, 1], out_normals[n, 2] = m
+        depth[n], wanted[n], pair[n] = gap0, gap1, p
         n += 1
     return n - base - first, most
-
-
-@njit(_I(_N1, CONTACT_ROWS, types.float64[::1], PAIRS, FACES, _N1, _N1), cache=True)
-def nearest(found, out, depth, pairs, faces, part, holder):  # type: ignore[no-untyped-def]
-    """Removes contacts from ``found``, which has numbers of rows of ``out``. A node that is behind several faces of a
-    part keeps only its contact with the nearest face; of two faces at the same depth, with the face of lower id.
-    Returns the number of remaining contacts. ``holder`` (slots,): working array, -1 before and after the call.
-    """
-    earlier, m = np.empty(len(found), np.int32), 0
-    for q in range(len(found)):
-        row = found[q]
-        found[m] = row
-        if depth[row] == 0.0:
-            m += 1
-            continue
-        s = out.nodes[row, 0]
-        h = holder[s]
-        while h >= 0 and part[out.nodes[found[h], 1]] != part[out.nodes[row, 1]]:
-            h = earlier[h]
-        if h < 0:
-            earlier[m], holder[s] = holder[s], m
-            m += 1
-            continue
-        same = depth[row] == depth[found[h]]
-        lower = faces.id[pairs.rows[out.pair[row], 1]] < faces.id[pairs.rows[out.pair[found[h]], 1]]
-        if depth[row] < depth[found[h]] or (same and lower):
-            found[h] = row
-    for q in range(m):
-        holder[out.nodes[found[q], 0]] = -1
-    return m

@@ -26,7 +26,9 @@ class ActiveRows:
     room: ContactRows = field(default_factory=lambda: ContactRows.room(0))
     found: Indices = field(default_factory=lambda: np.zeros(0, np.int32))
     depth: Floats = field(default_factory=lambda: np.zeros(0))
-    """(rows,) depth of a node behind a face, m; see node_face."""
+    """(room,) depth of a node behind a face, m; see node_face."""
+    earlier: Indices = field(default_factory=lambda: np.zeros(0, np.int32))
+    """(room,) working array: lists of the rows of each node (single_contact.py)."""
     n: int = 0
     _ends: list[int] = field(default_factory=lambda: [0], init=False)
     _holder: Indices = field(default_factory=lambda: np.zeros(0, np.int32), init=False)
@@ -57,7 +59,8 @@ class ActiveRows:
         """Allocates at least ``most`` rows. Only the rows with active contacts are copied."""
         if most > len(self.found):
             found, room, depth, many = self.found[: self.n], self.room, self.depth, most + most // _SPARE
-            self.room, self.depth, self.found = ContactRows.room(many), np.empty(many), np.empty(many, np.int32)
+            self.room, self.depth = ContactRows.room(many), np.empty(many)
+            self.found, self.earlier = np.empty((2, many), np.int32)
             for name in room._fields:
                 getattr(self.room, name)[found] = getattr(room, name)[found]
             self.depth[found] = depth[found]

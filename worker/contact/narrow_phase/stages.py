@@ -11,7 +11,7 @@ from ...parallel.team import TASK
 from ..broad_phase import reference_motion
 from ..solver import restitution, slot_numbers
 from ..surface.families import CORNERS
-from . import closing_speed, corner_contact, crack_contact, edge_edge, node_face, tables
+from . import closing_speed, corner_contact, crack_contact, edge_edge, node_face, single_contact, tables
 from .corner_contact import NARROW
 from .layout import (
     BEYOND,
@@ -55,12 +55,11 @@ PAIRS_OF_A_TASK = 1024
 """Number of candidate pairs in a task; chosen value: a task takes about 20 us, compared with 2 us to start a parallel
 region."""
 CRACKS_OF_A_TASK, FAMILIES_OF_A_TASK, CONTACTS_OF_A_TASK, SLOTS_OF_A_TASK, SIDES_OF_A_TASK = 512, 128, 1024, 2048, 8192
-"""Numbers of cracks, of families, of contacts, of slots, and of faces or edges in a task. Chosen values: a task takes
-about 20 us, compared with 2 us to start a parallel region."""
-TAKE, AHEAD, SPREAD, LEAVE, LARGEST_FACES, LARGEST_EDGES, CHECK, ACROSS, DUE, NODE_FACE, NEAREST, APPROACH = range(12)
-EDGE_EDGE, COLLECT, RETARGET, CORNERS_FROM = range(12, 16)
-"""Numbers of the stages, in the order of execution; the last number is that of the first of the stages over corners;
-each block has one such stage."""
+"""Numbers of cracks, families, contacts, slots, and of faces or edges in a task. Chosen values, by the same comparison
+as PAIRS_OF_A_TASK."""
+TAKE, AHEAD, SPREAD, LEAVE, LARGEST_FACES, LARGEST_EDGES, CHECK, ACROSS, DUE, NODE_FACE, LINK, ADMIT = range(12)
+NEAREST, APPROACH, EDGE_EDGE, COLLECT, RETARGET, CORNERS_FROM = range(12, 18)
+"""Numbers of the stages, in their order; the last is the first of the stages over corners, one for each block."""
 AT_CORNERS = CONTACT_ROWS, types.int64, types.int64, NARROW, CORNERS, STEP, types.int64[::1]
 _at_corners = reader(*AT_CORNERS)
 
@@ -154,8 +153,8 @@ def due(table, first, stop, thread):  # type: ignore[no-untyped-def]
 
 @njit(TASK, cache=True)
 def on_faces(table, first, stop, thread):  # type: ignore[no-untyped-def]
-    """Task: runs ``node_face.node_face`` for the pairs to be tested."""
-    (out, _, depth, _), (pairs, slots, faces), (step,) = rows_of(table), face_pairs_of(table), now_of(table)
+    """``node_face.node_face`` of the pairs to be tested."""
+    (out, _, depth, _, _), (pairs, slots, faces), (step,) = rows_of(table), face_pairs_of(table), now_of(table)
     (counts, reals, _), (many, found, coming, _, _, _, _, _) = numbers_of(table), sums_of(table)
     k = first // PAIRS_OF_A_TASK
     found[k], coming[k] = node_face.node_face(
@@ -164,23 +163,41 @@ def on_faces(table, first, stop, thread):  # type: ignore[no-untyped-def]
 
 
 @njit(TASK, cache=True)
-def nearest(table, first, stop, thread):  # type: ignore[no-untyped-def]
-    """Lists the contacts of nodes with faces, and runs ``node_face.nearest``."""
-    (out, found, depth, holder), (pairs, _, faces) = rows_of(table), face_pairs_of(table)
-    (counts, reals, _), (_, many, coming, _, _, _, _, _) = numbers_of(table), sums_of(table)
+def link(table, first, stop, thread):  # type: ignore[no-untyped-def]
+    """Lists the possible contacts of nodes with faces; ``single_contact.link``."""
+    (out, found, _, earlier, last), (counts, reals, _) = rows_of(table), numbers_of(table)
+    _, many, coming, _, _, _, _, _ = sums_of(table)
     tasks = tasks_of(counts[FACE_PAIRS_N], PAIRS_OF_A_TASK)
     n = collected(found, counts[FIRST], counts[FACE_ROWS], PAIRS_OF_A_TASK, many, tasks)
-    listed = found[counts[FIRST] : n]
-    counts[ON_FACES] = node_face.nearest(listed, out, depth, pairs, faces, now_of(table)[0].part, holder)
-    reals[LIMIT] = 0.0
+    single_contact.link(earlier, last, found[counts[FIRST] : n], out.nodes)
+    counts[ON_FACES], reals[LIMIT] = n - counts[FIRST], 0.0
     for k in range(tasks):
         reals[LIMIT] = max(reals[LIMIT], coming[k])
 
 
 @njit(TASK, cache=True)
+def admit(table, first, stop, thread):  # type: ignore[no-untyped-def]
+    """``single_contact.admitted``."""
+    (out, found, depth, earlier, last), (pairs, slots, faces) = rows_of(table), face_pairs_of(table)
+    (step,), (counts, reals, _) = now_of(table), numbers_of(table)
+    single_contact.admitted(
+        out, depth, pairs, slots, faces, step, found[counts[FIRST] :], earlier, last, reals[END], first, stop
+    )
+
+
+@njit(TASK, cache=True)
+def nearest(table, first, stop, thread):  # type: ignore[no-untyped-def]
+    """``single_contact.nearest``."""
+    (out, found, depth, earlier, last), (pairs, _, faces) = rows_of(table), face_pairs_of(table)
+    counts, begin = numbers_of(table)[0], numbers_of(table)[0][FIRST]
+    listed = found[begin : begin + counts[ON_FACES]]
+    counts[ON_FACES] = single_contact.nearest(listed, out, depth, pairs, faces, now_of(table)[0].part, earlier, last)
+
+
+@njit(TASK, cache=True)
 def approach(table, first, stop, thread):  # type: ignore[no-untyped-def]
-    """Task: runs ``closing_speed.approach``."""
-    (out, found, _, _), (pairs, _, faces) = rows_of(table), face_pairs_of(table)
+    """``closing_speed.approach``."""
+    (out, found, _, _, _), (pairs, _, faces) = rows_of(table), face_pairs_of(table)
     most, begin = sums_of(table)[3], numbers_of(table)[0][FIRST]
     most[first // CONTACTS_OF_A_TASK] = closing_speed.approach(
         out, found, pairs, faces, now_of(table)[0], begin + first, begin + stop
@@ -189,8 +206,8 @@ def approach(table, first, stop, thread):  # type: ignore[no-untyped-def]
 
 @njit(TASK, cache=True)
 def on_edges(table, first, stop, thread):  # type: ignore[no-untyped-def]
-    """Task: runs ``edge_edge.edge_edge``."""
-    (out, _, _, _), (pairs, edges, course), (step,) = rows_of(table), edge_pairs_of(table), now_of(table)
+    """``edge_edge.edge_edge``."""
+    (out, _, _, _, _), (pairs, edges, course), (step,) = rows_of(table), edge_pairs_of(table), now_of(table)
     (counts, reals, _), (_, _, _, _, tested, found, _, _) = numbers_of(table), sums_of(table)
     k = first // PAIRS_OF_A_TASK
     found[k], tested[k] = edge_edge.edge_edge(
@@ -200,10 +217,8 @@ def on_edges(table, first, stop, thread):  # type: ignore[no-untyped-def]
 
 @njit(TASK, cache=True)
 def collect(table, first, stop, thread):  # type: ignore[no-untyped-def]
-    """Lists all other contacts. Combines the results of the tasks: the limit of the next step, and the cracks that
-    open.
-    """
-    (_, found, _, _), (counts, reals, _) = rows_of(table), numbers_of(table)
+    """Lists the other contacts, and sums up over the tasks: the limit of the next step, and the cracks that open."""
+    (_, found, _, _, _), (counts, reals, _) = rows_of(table), numbers_of(table)
     _, _, _, most, _, on_edge, on_crack, wide = sums_of(table)
     for k in range(tasks_of(counts[ON_FACES], CONTACTS_OF_A_TASK)):
         reals[LIMIT] = max(reals[LIMIT], most[k])
@@ -218,8 +233,12 @@ def collect(table, first, stop, thread):  # type: ignore[no-untyped-def]
 
 @njit(TASK, cache=True)
 def retarget(table, first, stop, thread):  # type: ignore[no-untyped-def]
-    """Task: runs ``restitution.rebound`` and ``restitution.hold_back``."""
-    (out, found, _, _), (_, v, _, before, _), (counts, reals, _) = rows_of(table), places_of(table), numbers_of(table)
+    """``restitution.rebound`` and ``restitution.hold_back``."""
+    (out, found, _, _, _), (_, v, _, before, _), (counts, reals, _) = (
+        rows_of(table),
+        places_of(table),
+        numbers_of(table),
+    )
     if counts[RETARGETS] & 1:
         restitution.rebound(out, found, v, before, reals[SHARE], first, stop)
     if counts[RETARGETS] & 2:
