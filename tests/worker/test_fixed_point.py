@@ -14,7 +14,6 @@ from conoid.worker.parallel.comm import SerialComm
 from conoid.worker.parallel.fixed_point import (
     CONTRIBUTION_BITS,
     HEADROOM_BITS,
-    Grouped,
     Ragged,
     Tally,
     exact_sums,
@@ -23,6 +22,8 @@ from conoid.worker.parallel.fixed_point import (
     scale_for,
     totals_and_words,
 )
+from conoid.worker.parallel.grouped import Grouped, GroupedSums
+from conoid.worker.parallel.team import team
 from conoid.worker.simulation import Simulation
 
 from .kernels import COPPER, FORMS, Form, build, run, scene
@@ -39,6 +40,11 @@ def values(n: int, seed: int) -> Floats:
     half = random.normal(size=n // 2) * 1e6
     cancel = np.concatenate([half, -half * (1.0 + 1e-12)])
     return np.column_stack([even, mixed, cancel, np.zeros(n)])
+
+
+def grouped(columns: Floats, group: "np.ndarray", groups: int) -> Grouped:
+    """Returns ``columns`` (n, k) whose row i belongs to ``group`` i, summed by two threads."""
+    return GroupedSums(team(2)).of(np.ascontiguousarray(columns.T), group, groups)
 
 
 def test_sums_are_within_the_stated_error() -> None:
@@ -140,7 +146,7 @@ def test_a_sum_that_outgrows_its_quantum_is_repeated(form: Form) -> None:
 def test_groups_have_their_own_sums_and_do_not_change_those_of_all() -> None:
     columns = values(5000, 3)
     group = np.random.default_rng(4).integers(0, 3, 5000).astype(np.int32)
-    total, each = exact_totals(SerialComm(), Grouped(columns, group, 4))
+    total, each = exact_totals(SerialComm(), grouped(columns, group, 4))
     assert total.tobytes() == exact_sums(SerialComm(), columns).tobytes()
     for k in range(4):
         assert each[k] == pytest.approx([math.fsum(column[group == k]) for column in columns.T], rel=1e-12, abs=1e-3)
@@ -156,7 +162,7 @@ def test_a_sum_with_a_value_that_is_not_finite_is_not_a_number(odd: float) -> No
         whole = exact_sums(SerialComm(), columns)
         columns[row, 1] = odd
         group = (np.arange(5000, dtype=np.int32) > 2500).astype(np.int32)
-        total, each = exact_totals(SerialComm(), Grouped(columns, group, 2))
+        total, each = exact_totals(SerialComm(), grouped(columns, group, 2))
         assert np.isnan(total).tolist() == [False, True, False, False]
         assert np.isnan(each).tolist() == [[False, True, False, False]] * 2
         assert total[[0, 2, 3]].tobytes() == whole[[0, 2, 3]].tobytes()
@@ -244,7 +250,7 @@ def test_ragged_columns_and_integers_go_along() -> None:
     columns = [values(300, 8)[:, 0], np.zeros(0), values(70, 9)[:, 1]]
     ragged = Ragged(np.concatenate(columns), np.array([0, 300, 300, 370]), 2)
     group = (np.arange(40) % 2).astype(np.int32)
-    beside = Grouped(values(40, 10), group, 2)
+    beside = grouped(values(40, 10), group, 2)
     sums, each, more = totals_and_words(SerialComm(), [ragged, beside], np.array([7, -(2**60)]))
     alone = [float(exact_sums(SerialComm(), column[:, None])[0]) for column in columns]
     assert sums[:3].tolist() == each[0, :3].tolist() == alone

@@ -21,7 +21,8 @@ from ..materials.law import BULK, DENSITY
 from ..model.rows import WORKS
 from ..model.state import Flags, Floats, Indices, Model, Nodes
 from ..parallel.comm import Comm
-from ..parallel.fixed_point import Columns, Grouped, Table, Tally, exact_sums, totals_and_words
+from ..parallel.fixed_point import Columns, Table, Tally, exact_sums, totals_and_words
+from ..parallel.grouped import GroupedSums
 from ..parallel.passes import Pass
 from ..parallel.team import Team
 from ..rigid.stage import Rigid
@@ -78,6 +79,7 @@ class Sums:
     ) -> None:  # fmt: skip
         """``undeformed``: rigid parts and walls; ``team``: threads that pass over the nodes."""
         self._pass, self._columns = Pass(team, of_nodes, *OF_NODES), np.empty(0)
+        self._by_part, self._work = GroupedSums(team), ElementWork(team)
         self._model, self._boundaries, self._contact, self._bonds = model, boundaries, contact, bonds
         self._erosion, self._undeformed, self._comm, self._clock = erosion, undeformed, comm, clock
         self._cohesion = fracture.cohesion if fracture is not None else None
@@ -122,8 +124,8 @@ class Sums:
         """
         nodes, parts = self._model.nodes, len(self._model.parts)
         tables: dict[str, list[Columns]] = {
-            "nodes": [Grouped(*_by_part(self._of_nodes(before), nodes), parts)],
-            "tets": [ElementWork(self._model.blocks, parts)],
+            "nodes": [self._by_part.of(*_with_shares(self._of_nodes(before), nodes), parts)],
+            "tets": [self._work.of(self._model.blocks, parts)],
             "boundaries": [
                 Table(np.where(nodes.owned[each.nodes], each.friction_loss, 0.0)[:, None], parts)
                 for each in self._boundaries if each.friction_loss is not None
@@ -195,13 +197,13 @@ class Sums:
         return nodes.owned if rigid is None else nodes.owned & (rigid.of_part[nodes.part] < 0)
 
 
-def _by_part(columns: Floats, nodes: Nodes) -> tuple[Floats, Indices]:
-    """Return (n, NODAL) rows of ``columns`` (NODAL, nodes), and their parts (n,). A node of several parts has one row
-    for each of its parts; its values are divided among the parts in proportion to mass.
+def _with_shares(columns: Floats, nodes: Nodes) -> tuple[Floats, Indices]:
+    """Return (NODAL, n) the ``columns`` (NODAL, nodes), and the part of each row (n,). A node of several parts has a
+    row for each of its parts; its values are divided by mass.
     """
     shares = nodes.shares
     if not len(shares.node):
-        return columns.T, nodes.part
+        return columns, nodes.part
     more = columns[:, shares.node] * shares.fraction
     columns[:, shares.node] = 0.0
-    return np.concatenate([columns, more], axis=1).T, np.concatenate([nodes.part, shares.part])
+    return np.concatenate([columns, more], axis=1), np.concatenate([nodes.part, shares.part])

@@ -15,7 +15,7 @@ import numpy as np
 
 from ..kernels.jit import njit
 from ..materials.elementary import NEAREST
-from ..model.state import Floats, Indices, Ints
+from ..model.state import Floats, Ints
 from .comm import Comm
 
 CONTRIBUTION_BITS = 51
@@ -107,23 +107,6 @@ def _limbs(words, values, starts, scale):  # type: ignore[no-untyped-def]
     """Set ``words`` (2, k) to the sums of the high limbs and of the low limbs of each column."""
     for j in range(len(scale)):
         words[0, j], words[1, j] = limbs(values[starts[j] : starts[j + 1]], scale[j])
-
-
-@njit("void(int64[:, :, ::1], float64[:, ::1], int32[::1], float64[::1])", cache=True, error_model="numpy")
-def _limbs_by_group(words, columns, group, scale):  # type: ignore[no-untyped-def]
-    """Add the limbs of each column of ``columns`` (k, n) to the sums of its ``group`` (n,), ``words`` (groups, 2, k).
-    Successive rows of one group are summed together.
-    """
-    begin = 0
-    while begin < len(group):
-        end = begin + 1
-        while end < len(group) and group[end] == group[begin]:
-            end += 1
-        for j in range(len(scale)):
-            high, low = limbs(columns[j, begin:end], scale[j])
-            words[group[begin], 0, j] += high
-            words[group[begin], 1, j] += low
-        begin = end
 
 
 def _whole(words: Ints) -> Floats:
@@ -223,21 +206,6 @@ class Table(Ragged):
         self._columns = np.ascontiguousarray(values.T)
         n, k = values.shape
         super().__init__(self._columns.reshape(-1), np.arange(k + 1) * n, groups)
-
-
-class Grouped(Table):
-    """The columns of an array whose row i belongs to the group ``group[i]``. Sums are fast if neighbouring rows are in
-    one group.
-    """
-
-    def __init__(self, values: Floats, group: Indices, groups: int) -> None:
-        super().__init__(values, groups)
-        self._group = group
-
-    def limbs(self, scale: Floats) -> Ints:
-        words = np.zeros((self._groups, 2, len(scale)), np.int64)
-        _limbs_by_group(words, self._columns, self._group, scale)
-        return words
 
 
 def exact_sums(comm: Comm, *tables: Floats) -> Floats:
