@@ -189,8 +189,8 @@ class Stretch:
         self._sim.elements.scratches.peaks[:] = 0
 
     def _end(self, parts: list[_Part], spent: Ints) -> None:
-        """Sets the simulation to the state in which the program ended; ``spent`` (parts, 2): time of each
-        stage outside of regions and in regions, ns.
+        """Sets the simulation to the state in which the program ended. ``spent`` (parts, 2): time of each stage outside
+        of parallel regions and in parallel regions, ns.
         """
         sim, steps = self._sim, int(self._words[STEPS])
         sim.clock.go_on(steps, self._numbers[: len(sim.clock.numbers)].tolist())

@@ -20,11 +20,12 @@ SCALE, NEXT_SCALE, IMPULSE_QUANTUM, SHORTER_QUANTUM = range(STABLE + 1, STABLE +
 mean of two steps divided by the scale, N s; a quarter of the difference of two steps divided by the scale
 (motion.py)."""
 SAFETY, GROWTH, LEAST_STABLE, LANDING, NEXT, FLOOR, MANY = range(SHORTER_QUANTUM + 1, SHORTER_QUANTUM + 8)
-"""Numbers that are constant in a program: limits of the clock (``Clock.limits``); time of the first output or request,
-s; force, N, down to which the scale is refined. MANY: the number of all numbers."""
+"""Indices of numbers that are constant in a program: limits of the clock (``Clock.limits``); time of the first output
+or request, s; force, N, down to which the scale is refined. MANY: the number of all numbers."""
 STOP, CONTROL, STEPS, MOST_STEPS, DEADLINE, TIME = range(6)
-"""Words of a program: 0, or the reason for which the program ends; number of the next stage (parallel/program.py);
-steps so far, and largest number of steps; wall time at which the program ends, ns; two words for reading the clock."""
+"""Indices of the words of a program: 0, or the reason why the program ends; number of the next stage
+(parallel/program.py); number of steps so far, and largest number of steps; wall time at which the program ends, ns; two
+words for reading the clock."""
 SCHEDULED, EVENT = 1, 2
 """Reasons why a program ends."""
 SIZE = TIME + 2
@@ -79,8 +80,8 @@ def _ends(words, numbers, peaks):  # type: ignore[no-untyped-def]
 
 @njit(TASK, cache=True, error_model="numpy")
 def decide(table, begin, end, thread):  # type: ignore[no-untyped-def]
-    """Stage after the elements: advances the time, then either ends the program, or chooses the next step as step.py
-    does and prepares all tables for it.
+    """Task: the stage after the elements. It advances the time. Then it either ends the program, or chooses the next
+    step as step.py does and prepares all tables for this step.
     """
     words, numbers, peaks, ties = _of_decide(table)
     gather_peaks(peaks)

@@ -198,8 +198,8 @@ class Sums:
 
 
 def _with_shares(columns: Floats, nodes: Nodes) -> tuple[Floats, Indices]:
-    """Return (NODAL, n) the ``columns`` (NODAL, nodes), and the part of each row (n,). A node of several parts has a
-    row for each of its parts; its values are divided by mass.
+    """Return (NODAL, n) the ``columns`` (NODAL, nodes), and the part of each row (n,). A node of several parts has one
+    row for each of its parts; its values are divided among the parts in proportion to mass.
     """
     shares = nodes.shares
     if not len(shares.node):

@@ -54,14 +54,14 @@ def _of_tasks(job, semaphore, stage):  # type: ignore[no-untyped-def]
 @njit("int64(int64[:, ::1], int64[::1], int64, int64[:, ::1], int64[::1], int64, int64, boolean)", cache=True)
 def _run(spent, job, semaphore, stages, control, first, end, again):  # type: ignore[no-untyped-def]
     """Run the stages from ``first`` to ``end``, with ``again`` in a loop until a kernel writes a number beyond ``end``
-    to ``control``; return the number of the stage that would come next. Adds the time of each stage, ns, to ``spent``
-    (stages, 2).
+    to ``control``. Return the number of the stage that would come next. Add the time of each stage, ns, to ``spent``
+    (stages, 2): to column 0 if the stage was a range with one task, else to column 1, the time in parallel regions.
     """
     k, begin = first, now(job, CLOCK)
     while k < end:
         stage, shared = stages[k], 1
         if stage[6] > 0:
-            shared = np.int64(_of_range(job, semaphore, stage))
+            shared = 1 if _of_range(job, semaphore, stage) else 0
         else:
             _of_tasks(job, semaphore, stage)
         done = now(job, CLOCK)
@@ -76,7 +76,7 @@ def _run(spent, job, semaphore, stages, control, first, end, again):  # type: ig
 
 @njit("int64(int64[:, ::1], int64[::1], int64, int64[:, ::1], int64[::1], int64, int64)", cache=True, nogil=True)
 def _repeat(spent, job, semaphore, stages, control, first, end):  # type: ignore[no-untyped-def]
-    """``_run`` in a loop; other threads of Python run meanwhile."""
+    """Run the stages in a loop (``_run``), while other Python threads may run."""
     return _run(spent, job, semaphore, stages, control, first, end, True)
 
 
@@ -118,7 +118,7 @@ class Program:
         words = [each.words() if isinstance(each, Span) else _words(each) for each in stages]
         self._words = np.array(words, np.int64).reshape(-1, _WORDS)
         self.spent: Ints = np.zeros((len(stages), 2), np.int64)
-        """(stages, 2) time of each stage so far, ns: of ranges of one task, and in regions."""
+        """(stages, 2) time of each stage so far, ns: as a range with one task, and in parallel regions."""
         control[0] = -1
 
     def run(self, first: int = 0, end: int | None = None) -> int:

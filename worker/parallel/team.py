@@ -43,7 +43,7 @@ bits are the number of tasks."""
 _LINE = 8
 """Number of words in a cache line."""
 _WAKES = 2
-"""Largest number of threads that a thread wakes."""
+"""Largest number of threads that one thread wakes."""
 _POLLS = 4000
 """Number of polls before a helper sleeps, and before the calling thread yields its core; with the chosen value polling
 takes some 50 us, which is longer than the gap between two colours and much shorter than a step."""

@@ -41,7 +41,7 @@ sides_of = table_of(SIDES, *_KINDS[SIDES])
 numbers_of = table_of(NUMBERS, *_KINDS[NUMBERS])
 """Fields of the table NUMBERS: integers, floating point numbers, control word of the program."""
 rows_of = table_of(ROWS, *_KINDS[ROWS])
-"""ContactRows, numbers of the active rows, depths, two working arrays (rows.py)."""
+"""Fields of the table ROWS: ContactRows, numbers of the active rows, depths, two working arrays (rows.py)."""
 now_of = table_of(NOW, *_KINDS[NOW])
 """Fields of the table NOW: those of Step."""
 face_pairs_of = table_of(FACE_PAIRS, *_KINDS[FACE_PAIRS])

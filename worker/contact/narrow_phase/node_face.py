@@ -161,8 +161,8 @@ def due(pairs, slots, faces, end, first, stop):  # type: ignore[no-untyped-def]
 #             \                        gap: dt m . sum(w_k v_k) + const with w = (1, -b_i, -b_j, -b_k) of s, i, j, k
 #              o s (n+1)                    (docs/theory/contact.md, "Impulses, not springs")
 #
-# Conditions of a contact, in the order of the tests in node_face, the first five, and in ``admitted``
-# (docs/theory/contact.md, "Which point", "Beside a free edge" and "Face on face"):
+# Conditions of a contact. ``node_face`` tests the conditions 1 to 5 in this order, and ``single_contact.admitted`` the
+# conditions 6 to 8 (docs/theory/contact.md, "Which point", "Beside a free edge" and "Face on face"):
 # 1. No bond ties all four nodes.
 # 2. The gap is at most NEAR of the face at the end of the step.
 # 3. The normals are compatible: node s faces the face (facing.facing), so that the rim of a bar is not in contact with
@@ -170,8 +170,8 @@ def due(pairs, slots, faces, end, first, stop):  # type: ignore[no-untyped-def]
 # 4. If only one of the faces at node s faces the face, s passes the face from outside: gap0 >= -NEAR of the face.
 # 5. The foot of s at tau is on the face, and s is no deeper than ``reach`` of the face and half the altitude of its
 #    tet.
-# 6. No face of lower id has the same contact (single_contact.same): a node over an edge or a corner of a flat patch of
-#    faces has one contact with the patch, not one with each face.
+# 6. No face of lower id has an equal contact with the node: a node over an edge or a corner of a flat patch of faces
+#    has one contact with the patch, and not one contact with each face.
 # 7. The node is not beside a convex edge, in front of another face there (facing.in_front).
 # 8. If s is inside by more than TOUCHING, s is not nearer to the front of another face (facing.outside).
 # A node behind several faces of a part keeps its contact with the nearest face (single_contact.nearest).
@@ -195,14 +195,14 @@ def _bring(rows, corners, normals, x, active, q, last):  # type: ignore[no-untyp
     error_model="numpy",
 )
 def node_face(out, depth, base, pairs, slots, faces, step, end, first, stop):  # type: ignore[no-untyped-def]
-    """Writes possible contacts of nodes with faces, which fulfil the first five conditions, of the pairs in
-    ``pairs.active`` from ``first`` to ``stop``: rows of ``out`` from ``base + first`` on. Returns their number, and the
-    largest square of a speed over the altitude of a tet, 1/s^2, of the pairs that will be in contact in the next step
-    (``_coming``).
+    """Writes possible contacts of nodes with faces to the rows of ``out`` from ``base + first`` on, for the pairs in
+    ``pairs.active`` from ``first`` to ``stop``. A possible contact fulfils the conditions 1 to 5. Returns the number of
+    possible contacts, and the largest square of speed / altitude of a tet, 1/s^2, of the pairs that will be in contact
+    in the next step (``_coming``).
 
-    ``depth`` (room,): gap at the beginning of the step, m; ``out.wanted`` is the gap at the end without contact, m.
-    ``admitted`` (single_contact.py) completes the rows. ``end``: end of the step, s after the search. Numbers at the
-    ends of lines: conditions listed above.
+    ``depth`` (rows,): gap of node and face at the beginning of the step, m. ``out.wanted``: gap at the end of the step
+    without contact, m. ``single_contact.admitted`` completes the rows. ``end``: time of the end of the step, s after
+    the search. The comments have the numbers of the conditions in the drawing.
     """
     rows, until, speed, turned, active = pairs.rows, pairs.until, pairs.speed, pairs.turned, pairs.active
     corners, size, left = faces.corners, faces.size, faces.left

@@ -26,9 +26,9 @@ class ActiveRows:
     room: ContactRows = field(default_factory=lambda: ContactRows.room(0))
     found: Indices = field(default_factory=lambda: np.zeros(0, np.int32))
     depth: Floats = field(default_factory=lambda: np.zeros(0))
-    """(room,) depth of a node behind a face, m; see node_face."""
+    """(rows,) depth of a node behind a face, m; see single_contact.admitted."""
     earlier: Indices = field(default_factory=lambda: np.zeros(0, np.int32))
-    """(room,) working array: lists of the rows of each node (single_contact.py)."""
+    """(rows,) working array: lists of the rows of each node (single_contact.py)."""
     n: int = 0
     _ends: list[int] = field(default_factory=lambda: [0], init=False)
     _holder: Indices = field(default_factory=lambda: np.zeros(0, np.int32), init=False)

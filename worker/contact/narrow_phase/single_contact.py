@@ -1,8 +1,8 @@
-"""One contact of a node with each part of a surface: selection among the possible contacts of node and faces.
+"""Selection among the possible contacts of a node with faces, the last part of the node-face contact of a step.
 
-A node over an edge or a corner of a flat patch of faces has its foot on all faces there, so it has a possible contact
-with each of them: with equal meshes on both sides of a flush interface, five contacts for each node on average. These
-contacts have the same normal and the same weights, and one of them suffices.
+A node over an edge or a corner of a flat patch of faces has its foot on all faces there, and a possible contact with
+each of these faces. If two flush surfaces have equal meshes, a node has five possible contacts on average. Contacts
+with equal normals and equal weights act as one contact, so only one of these contacts remains.
 """
 
 import numpy as np
@@ -13,8 +13,8 @@ from .facing import RIM, TOUCHING, in_front, outside, reaches_over
 from .tables import CONTACT_ROWS, FACES, PAIRS, SLOTS, STEP, needed
 
 _FLAT = 1.0 - 1e-4
-"""Smallest cosine of the angle, 0.8 degrees, between the normals of two faces of a flat patch. Chosen value: the
-direction of a contact impulse is not known better while the faces of a curved surface are flat."""
+"""Smallest cosine of the angle between the normals of two faces of a flat patch; the angle is 0.8 degrees. Chosen
+value: flat faces approximate the normals of a curved surface with a larger error."""
 _NO_CONTACT = -1.0
 """Depth of a row without contact."""
 _I, _F, _N1, _F1 = types.int64, types.float64, types.int32[::1], types.float64[::1]
@@ -67,11 +67,12 @@ def _repeated(out, pairs, faces, found, earlier, last, row):  # type: ignore[no-
     error_model="numpy",
 )
 def admitted(out, depth, pairs, slots, faces, step, found, earlier, last, end, first, stop):  # type: ignore[no-untyped-def]
-    """Completes the rows of ``node_face`` (node_face.py), ``found`` from ``first`` to ``stop``, that fulfil its
-    conditions 6 to 8; ``end``: end of the step, s after the search.
+    """Tests the conditions 6 to 8 (drawing in node_face.py) of the possible contacts ``found`` from ``first`` to
+    ``stop``, and completes the rows of the contacts that fulfil these conditions. ``end``: time of the end of the step,
+    s after the search.
 
-    ``depth`` (room,): on entry the gap at the beginning of the step, m; on return the depth of a node that is inside,
-    m, else 0; _NO_CONTACT for rows that do not fulfil the conditions.
+    ``depth`` (rows,): on entry the gap of node and face at the beginning of the step, m. On return the depth of a node
+    that is inside of the body, m; 0 for another contact; _NO_CONTACT for a row that does not fulfil the conditions.
     """
     nodes, weights, normals, x, v, part = out.nodes, out.weights, out.normals, step.x, step.v, step.part
     chains, until_end = slots.first, end + step.dt
@@ -102,9 +103,9 @@ def admitted(out, depth, pairs, slots, faces, step, found, earlier, last, end, f
 
 @njit(_I(_N1, CONTACT_ROWS, _F1, PAIRS, FACES, _N1, _N1, _N1), cache=True)
 def nearest(found, out, depth, pairs, faces, part, earlier, last):  # type: ignore[no-untyped-def]
-    """Removes rows without contact from ``found``, and contacts of a node that is behind several faces of a part with
-    all of them except the nearest face; of two faces at the same depth, the face of lower id remains. Returns the
-    number of contacts; ``earlier`` (n,) and ``last`` (slots,): lists of ``link``; ``last`` is -1 on return.
+    """Removes rows without contact from ``found``. A node that is behind several faces of a part keeps only its contact
+    with the nearest face; of two faces at the same depth, with the face of lower id. Returns the number of remaining
+    contacts. ``earlier`` (n,) and ``last`` (slots,): lists of ``link``; ``last`` is -1 on return.
     """
     for row in found:
         last[out.nodes[row, 0]] = -1

@@ -55,11 +55,12 @@ PAIRS_OF_A_TASK = 1024
 """Number of candidate pairs in a task; chosen value: a task takes about 20 us, compared with 2 us to start a parallel
 region."""
 CRACKS_OF_A_TASK, FAMILIES_OF_A_TASK, CONTACTS_OF_A_TASK, SLOTS_OF_A_TASK, SIDES_OF_A_TASK = 512, 128, 1024, 2048, 8192
-"""Numbers of cracks, families, contacts, slots, and of faces or edges in a task. Chosen values, by the same comparison
-as PAIRS_OF_A_TASK."""
+"""Numbers of cracks, of families, of contacts, of slots, and of faces or edges in a task. Chosen values: a task takes
+about 20 us, compared with 2 us to start a parallel region."""
 TAKE, AHEAD, SPREAD, LEAVE, LARGEST_FACES, LARGEST_EDGES, CHECK, ACROSS, DUE, NODE_FACE, LINK, ADMIT = range(12)
 NEAREST, APPROACH, EDGE_EDGE, COLLECT, RETARGET, CORNERS_FROM = range(12, 18)
-"""Numbers of the stages, in their order; the last is the first of the stages over corners, one for each block."""
+"""Numbers of the stages, in the order of execution; the last number is that of the first of the stages over corners;
+each block has one such stage."""
 AT_CORNERS = CONTACT_ROWS, types.int64, types.int64, NARROW, CORNERS, STEP, types.int64[::1]
 _at_corners = reader(*AT_CORNERS)
 
@@ -153,7 +154,7 @@ def due(table, first, stop, thread):  # type: ignore[no-untyped-def]
 
 @njit(TASK, cache=True)
 def on_faces(table, first, stop, thread):  # type: ignore[no-untyped-def]
-    """``node_face.node_face`` of the pairs to be tested."""
+    """Task: runs ``node_face.node_face`` for the pairs to be tested."""
     (out, _, depth, _, _), (pairs, slots, faces), (step,) = rows_of(table), face_pairs_of(table), now_of(table)
     (counts, reals, _), (many, found, coming, _, _, _, _, _) = numbers_of(table), sums_of(table)
     k = first // PAIRS_OF_A_TASK
@@ -164,7 +165,7 @@ def on_faces(table, first, stop, thread):  # type: ignore[no-untyped-def]
 
 @njit(TASK, cache=True)
 def link(table, first, stop, thread):  # type: ignore[no-untyped-def]
-    """Lists the possible contacts of nodes with faces; ``single_contact.link``."""
+    """Lists the possible contacts of nodes with faces, and runs ``single_contact.link``."""
     (out, found, _, earlier, last), (counts, reals, _) = rows_of(table), numbers_of(table)
     _, many, coming, _, _, _, _, _ = sums_of(table)
     tasks = tasks_of(counts[FACE_PAIRS_N], PAIRS_OF_A_TASK)
@@ -177,7 +178,7 @@ def link(table, first, stop, thread):  # type: ignore[no-untyped-def]
 
 @njit(TASK, cache=True)
 def admit(table, first, stop, thread):  # type: ignore[no-untyped-def]
-    """``single_contact.admitted``."""
+    """Task: runs ``single_contact.admitted``."""
     (out, found, depth, earlier, last), (pairs, slots, faces) = rows_of(table), face_pairs_of(table)
     (step,), (counts, reals, _) = now_of(table), numbers_of(table)
     single_contact.admitted(
@@ -187,7 +188,7 @@ def admit(table, first, stop, thread):  # type: ignore[no-untyped-def]
 
 @njit(TASK, cache=True)
 def nearest(table, first, stop, thread):  # type: ignore[no-untyped-def]
-    """``single_contact.nearest``."""
+    """Runs ``single_contact.nearest`` for all contacts of nodes with faces."""
     (out, found, depth, earlier, last), (pairs, _, faces) = rows_of(table), face_pairs_of(table)
     counts, begin = numbers_of(table)[0], numbers_of(table)[0][FIRST]
     listed = found[begin : begin + counts[ON_FACES]]
@@ -196,7 +197,7 @@ def nearest(table, first, stop, thread):  # type: ignore[no-untyped-def]
 
 @njit(TASK, cache=True)
 def approach(table, first, stop, thread):  # type: ignore[no-untyped-def]
-    """``closing_speed.approach``."""
+    """Task: runs ``closing_speed.approach``."""
     (out, found, _, _, _), (pairs, _, faces) = rows_of(table), face_pairs_of(table)
     most, begin = sums_of(table)[3], numbers_of(table)[0][FIRST]
     most[first // CONTACTS_OF_A_TASK] = closing_speed.approach(
@@ -206,7 +207,7 @@ def approach(table, first, stop, thread):  # type: ignore[no-untyped-def]
 
 @njit(TASK, cache=True)
 def on_edges(table, first, stop, thread):  # type: ignore[no-untyped-def]
-    """``edge_edge.edge_edge``."""
+    """Task: runs ``edge_edge.edge_edge``."""
     (out, _, _, _, _), (pairs, edges, course), (step,) = rows_of(table), edge_pairs_of(table), now_of(table)
     (counts, reals, _), (_, _, _, _, tested, found, _, _) = numbers_of(table), sums_of(table)
     k = first // PAIRS_OF_A_TASK
@@ -217,7 +218,9 @@ def on_edges(table, first, stop, thread):  # type: ignore[no-untyped-def]
 
 @njit(TASK, cache=True)
 def collect(table, first, stop, thread):  # type: ignore[no-untyped-def]
-    """Lists the other contacts, and sums up over the tasks: the limit of the next step, and the cracks that open."""
+    """Lists all other contacts. Combines the results of the tasks: the limit of the next step, and the cracks that
+    open.
+    """
     (_, found, _, _, _), (counts, reals, _) = rows_of(table), numbers_of(table)
     _, _, _, most, _, on_edge, on_crack, wide = sums_of(table)
     for k in range(tasks_of(counts[ON_FACES], CONTACTS_OF_A_TASK)):
@@ -233,12 +236,9 @@ def collect(table, first, stop, thread):  # type: ignore[no-untyped-def]
 
 @njit(TASK, cache=True)
 def retarget(table, first, stop, thread):  # type: ignore[no-untyped-def]
-    """``restitution.rebound`` and ``restitution.hold_back``."""
-    (out, found, _, _, _), (_, v, _, before, _), (counts, reals, _) = (
-        rows_of(table),
-        places_of(table),
-        numbers_of(table),
-    )
+    """Task: runs ``restitution.rebound`` and ``restitution.hold_back``."""
+    (out, found, _, _, _), (_, v, _, before, _) = rows_of(table), places_of(table)
+    counts, reals, _ = numbers_of(table)
     if counts[RETARGETS] & 1:
         restitution.rebound(out, found, v, before, reals[SHARE], first, stop)
     if counts[RETARGETS] & 2:
