@@ -95,9 +95,7 @@ class Detection:
         self._corner_tables: list[Arguments] = []
         self._families = np.zeros(0, np.int64)
         """(blocks,) number of families in each block."""
-        self._scratch = StepRoom()
-        self._sizes: tuple[int, ...] = ()
-        self._sums: list[np.ndarray] = []
+        self._scratch, self._sizes, self._sums = StepRoom(), tuple[int, ...](), list[np.ndarray]()
         self._rows_of_corner = 1
         """Number of rows that are reserved for each corner of a narrow side, on average over a task."""
 
