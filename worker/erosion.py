@@ -19,6 +19,7 @@ from .contact.stage import Contact
 from .contact.surface import exposure
 from .elements.wear import BROKEN, DAMAGED, FREQUENCY, SOUND, TIRED, life
 from .erosion_account import ErosionAccount
+from .fracture.removal import Removal
 from .migration.parcel import Parcel
 from .model.columns import COPIED
 from .model.rows import DAMAGE
@@ -50,16 +51,15 @@ class Erosion:
         self._bounds = bounds
         self._comm, self._clock = comm, clock
         self._specs = [part.erosion for part in case.parts]
-        self._leaves, self._strikes = (
-            np.array([spec is not None and spec.nodes == kind for spec in self._specs])[model.nodes.part]
-            for kind in ("remove", "strike")
-        )
+        self._struck = np.zeros(model.nodes.n, bool)
+        """(nodes,) particles that are removed because contact has pushed them."""
+        self.removal: Removal | None = None
+        """Removal from bodies that break, if the case has such bodies."""
         self.removed = np.zeros(model.nodes.n, bool)
         """(nodes,) whether each node is removed. The velocity of a removed node is zero."""
         self._tets_at = self._completed([block.tets.astype(np.int64) for block in model.blocks])
-        # Parts that fracture do not erode (cases/checks/checks.py), so no tet of a separated node is removed. Therefore
-        # the number of tets of a copy is never used; it must only be different from zero.
-        model.nodes.columns.declare(self, removed=COPIED, _leaves=COPIED, _strikes=COPIED, _tets_at=COPIED)
+        # A copy and its parent have tets. The tets of a copy are counted before their number is used.
+        model.nodes.columns.declare(self, removed=COPIED, _struck=COPIED, _tets_at=COPIED)
         self._leaving: tuple[Ints, Floats] = np.zeros(0, np.int64), np.zeros((0, 3))
         """Nodes that are removed in this step, and their velocities v(n-1/2), m/s."""
         self.account = ErosionAccount(clock, extremes)
@@ -83,7 +83,7 @@ class Erosion:
         account = self.account
         parcel.known["erosion"] = self._limit, self.due, account.work.scale, account.nodal.scale
         parcel.nodes["erosion.removed"], parcel.nodes["erosion.tets_at"] = self.removed, self._tets_at
-        parcel.nodes["erosion.leaves"] = self._leaves
+        parcel.nodes["erosion.struck"] = self._struck
         alone = np.flatnonzero((self._tets_at == 0) & nodes.owned)
         parcel.rows["erosion.alone"] = {"at": nodes.x[alone], "with": ids[alone][:, None]}
         account.keep(parcel, nodes.x)
@@ -93,7 +93,7 @@ class Erosion:
         limit, self.due, self.account.work.scale, self.account.nodal.scale = parcel.known["erosion"]
         self.begin(limit)
         self.removed, self._tets_at = parcel.nodes["erosion.removed"], parcel.nodes["erosion.tets_at"]
-        self._leaves = parcel.nodes["erosion.leaves"]
+        self._struck = parcel.nodes["erosion.struck"]
         self.account.resume(parcel)
         self._release()
 
@@ -102,10 +102,11 @@ class Erosion:
         function must be called after contact. Returns TIRED (elements/wear.py) if nodes of this rank must be removed,
         else SOUND.
         """
+        loose = np.flatnonzero(self._loose)
         if self._contact is not None:
-            flying = np.flatnonzero(self._strikes & self._loose)
-            self._leaves[flying[self._contact.searches.pushed(flying)]] = True
-        return TIRED if (self._leaves & self._loose).any() else SOUND
+            flying = loose[self._of_kind("strike")[self._model.nodes.part[loose]]]
+            self._struck[flying[self._contact.searches.pushed(flying)]] = True
+        return TIRED if len(loose) and self._leaves[loose].any() else SOUND
 
     def decide(self, found: int) -> None:
         """Decides whether the next step removes tets or nodes. ``found``: maximum over all ranks of SOUND, TIRED and
@@ -167,26 +168,58 @@ class Erosion:
         """Removes the marked tets. Removes also the nodes that have lost all their tets, if their part requires this.
         Collective.
         """
-        gone, left, ids = [np.zeros((0, exposure.WORDS), np.int64)], [], [np.zeros(0, np.int64)]
-        for block in self._model.blocks:
-            worn = np.flatnonzero(block.worn)
-            if len(worn):
-                if self._contact is not None:
-                    gone.append(exposure.leaving(block, worn, state.id))
-                left.append(block.tets[worn].astype(np.int64))
-                ids.append(block.id[worn])
-                self.account.add_tets(block, worn, state.x)
-                block.drop(worn)
+        blocks, none = self._model.blocks, np.zeros((0, exposure.WORDS), np.int64)
+        worn = [np.flatnonzero(block.worn) for block in blocks]
+        if self.removal is not None:
+            self.removal.begin(worn)
+        some = [(block, places) for block, places in zip(blocks, worn, strict=True) if len(places)]
+        left = [block.tets[places].astype(np.int64) for block, places in some]
+        ids = [np.zeros(0, np.int64), *(block.id[places] for block, places in some)]
+        known = some if self._contact is not None or self.removal is not None else []
+        gone = np.concatenate([none, *(exposure.leaving(block, places, state.id) for block, places in known)])
+        self._drop(worn, state.x)
         self._unload(np.concatenate(ids))
-        self._tets_at -= self._completed(left)
-        self._model.elements_global -= int(self._comm.sum(np.array([sum(len(tets) for tets in left)]))[0])
-        alone = self._tets_at == 0
-        leaving = self._leaves & alone & ~self.removed
-        some = np.flatnonzero(leaving)
-        self._leaving, self.removed = (some, state.v[some]), self.removed | leaving
+        self._count(left)
+        self._choose_nodes(state)
         self._release()
         if self._contact is not None:
-            self._contact.uncover(np.concatenate(gone), self._loose, self.removed)
+            self._contact.uncover(gone, self._loose, self.removed)
+        if self.removal is not None:
+            self.removal.end(gone, self._tets_at > 0)
+
+    def _drop(self, worn: list[Ints], x: Floats) -> None:
+        """Books and removes the tets ``worn`` of each block; ``x`` (nodes, 3): positions."""
+        for index, (block, places) in enumerate(zip(self._model.blocks, worn, strict=True)):
+            if len(places):
+                self.account.add_tets(block, places, x)
+                moves = block.drop(places)
+                if self.removal is not None:
+                    self.removal.drop(index, moves)
+
+    def _count(self, left: list[Ints]) -> None:
+        """Updates the numbers of tets after the removal of the tets ``left``. The number of a copy of a node is not
+        known before: if nodes can separate, all tets are counted. Collective.
+        """
+        if self.removal is None:
+            self._tets_at -= self._completed(left)
+        else:
+            self._tets_at = self._completed([block.tets.astype(np.int64) for block in self._model.blocks])
+        self._model.elements_global -= int(self._comm.sum(np.array([sum(len(tets) for tets in left)]))[0])
+
+    def _choose_nodes(self, state: Nodes) -> None:
+        """Chooses the nodes that are removed in this step."""
+        leaving = self._leaves & self._loose
+        some = np.flatnonzero(leaving)
+        self._leaving, self.removed = (some, state.v[some]), self.removed | leaving
+
+    @property
+    def _leaves(self) -> Flags:
+        """(nodes,) nodes that are removed as soon as they have no tets."""
+        return np.asarray(self._struck | self._of_kind("remove")[self._model.nodes.part])
+
+    def _of_kind(self, kind: str) -> Flags:
+        """(parts,) parts whose ``erosion.nodes`` is this ``kind``."""
+        return np.array([spec is not None and spec.nodes == kind for spec in self._specs])
 
     @property
     def _loose(self) -> Flags:

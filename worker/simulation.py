@@ -234,6 +234,8 @@ def _assemble(
     if case.fractures:
         by_node: list[KeptByNode] = [*scene, *([contact] if contact is not None else [])]
         fracture = Fracture(case, model, neighbours, elements, by_node, contact, comm, clock, threads)
+        if erosion is not None:
+            erosion.removal = fracture.removal(case, contact)
     stopping = tuple(bound for bound in scene if bound.given is not None)
     probes = Probes(case, Scene(model, contact, stopping, rigid, moving, erosion, fracture, clock, comm))
     sums = Sums(model, scene, contact, bonds, erosion, fracture, (rigid, moving), comm, clock, threads)

@@ -5,7 +5,7 @@ from collections.abc import Iterator
 from ..model.bodies import Box, Loose, MeshFile, Plate
 from ..model.bonds import Bonded, SharedBond
 from ..model.boundaries import Gravity
-from ..model.joined import bodies, breakable, shared_bonds
+from ..model.joined import bodies
 from ..model.schema import Case, Part
 from ..model.solids import Stl
 from ..reading.problems import Location, Problem, problem
@@ -15,7 +15,7 @@ from ..reading.similar import choices, nearest
 def check_bonds(case: Case) -> Iterator[Problem]:
     """Yields every problem of the bonds of a case."""
     found = list(_each(case))
-    yield from found or (*_wearing(case), *_pulled(case))
+    yield from found or _pulled(case)
 
 
 def _each(case: Case) -> Iterator[Problem]:
@@ -34,20 +34,7 @@ def _each(case: Case) -> Iterator[Problem]:
         elif not unknown:
             yield from _twice(case, i)
             if isinstance(bond, SharedBond):
-                yield from _meshes(parts[bond.parts[0]], parts[bond.parts[1]], bond.breaks, (*location, "parts"))
-
-
-def _wearing(case: Case) -> Iterator[Problem]:
-    """Yields a problem if a part that erodes and a part that fractures belong to the same body."""
-    breaks = breakable(case)
-    for k, _, one, other in shared_bonds(case):
-        worn = [case.parts[i].name for i in (one, other) if case.parts[i].erosion is not None and breaks[i]]
-        if worn:
-            message = (
-                f"{choices(worn)}: a part that erodes cannot form one body with parts or bonds that break; remove "
-                "erosion or fracture, or set kind = 'tied'"
-            )
-            yield problem(("bond", k, "parts"), _both(case.bond[k]), message)
+                yield from _meshes(parts[bond.parts[0]], parts[bond.parts[1]], (*location, "parts"))
 
 
 def _pulled(case: Case) -> Iterator[Problem]:
@@ -91,8 +78,8 @@ def _twice(case: Case, number: int) -> Iterator[Problem]:
             yield problem(("bond", number, "parts"), _both(bond), message)
 
 
-def _meshes(one: Part, other: Part, breaks: bool, location: Location) -> Iterator[Problem]:
-    """Yields a problem for bonded parts whose meshes cannot have common nodes, or whose bond cannot break."""
+def _meshes(one: Part, other: Part, location: Location) -> Iterator[Problem]:
+    """Yields a problem for parts whose meshes cannot have common nodes."""
     names, pair = f"{one.name}, {other.name}", (one.mesh, other.mesh)
     way = "set kind = 'tied'"
     loose = [part.name for part in (one, other) if isinstance(part.mesh, Loose)]
@@ -109,13 +96,6 @@ def _meshes(one: Part, other: Part, breaks: bool, location: Location) -> Iterato
         yield problem(location, names, message)
     elif any(isinstance(mesh, Stl) for mesh in pair):
         message = f"a body from an STL file is meshed separately; take both from one STEP or mesh file, or {way}"
-        yield problem(location, names, message)
-    worn = [part.name for part in (one, other) if part.erosion is not None]
-    if breaks and worn:
-        message = (
-            f"{choices(worn)}: a part that erodes cannot have a shared bond that breaks; {way}, or remove erosion or "
-            "strength"
-        )
         yield problem(location, names, message)
     if one.turn != other.turn:
         yield problem(location, names, f"the two parts are turned differently; their nodes would separate; {way}")

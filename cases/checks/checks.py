@@ -156,8 +156,6 @@ def _fracture(part: Part, made: Material, location: Location) -> Iterator[Proble
         yield problem(where, made.brittle.scatter.minimum, message)
     if spec.model == "cohesive" and spec.shear_weight == 0.0:
         yield problem((*location, "shear_weight"), 0.0, "must be above 0 with model = 'cohesive', which includes shear")
-    if part.erosion is not None:
-        yield problem(location, ..., "a part cannot erode and fracture; remove erosion or fracture")
 
 
 def _sectors(case: Case) -> Iterator[Problem]:

@@ -9,11 +9,13 @@ from .tables import Model, Positive
 
 
 class Erosion(Model):
-    """Erosion: tets that exceed a limit are deleted, and the free faces of their neighbours become contact surface. The
-    table ``erosion`` must not be combined with ``fracture``.
+    """Erosion: tets that exceed a limit are deleted, and the free faces of their neighbours become contact surface. A
+    part may have both ``erosion`` and ``fracture``.
 
     A tet that exceeds a limit of strain or damage is deleted within ten time steps; a tet that exceeds another limit is
-    deleted at once. The elastic energy of a deleted tet is booked as eroded energy.
+    deleted at once. The elastic energy of a deleted tet is booked as eroded energy. In a body that can break, by
+    ``fracture`` or by a bond with ``strength``, the remaining tets are connected only through faces: nodes separate
+    where a deletion leaves a connection through an edge or a node.
     """
 
     plastic_strain: Annotated[Ratio, Positive] | None = None
@@ -34,7 +36,7 @@ class Erosion(Model):
 
 class Fracture(Model):
     """Fracture: facets between tets break, nodes separate, and the fragments are in contact with each other. The table
-    ``fracture`` needs ``brittle`` in the material, and must not be combined with ``erosion``.
+    ``fracture`` needs ``brittle`` in the material.
     """
 
     model: Literal["instant", "cohesive"] = "instant"

@@ -52,6 +52,11 @@ def breakable(case: Joined) -> list[bool]:
     return [body in some for body in of]
 
 
+def wearing(case: Joined) -> bool:
+    """Returns whether tets may erode from a body whose facets can break."""
+    return any(breaks and part.erosion is not None for part, breaks in zip(case.parts, breakable(case), strict=True))
+
+
 def cohesive(case: Joined) -> set[int]:
     """Returns the indices of the parts that can have cohesive facets, inside of the part or at a bond."""
     own = {i for i, part in enumerate(case.parts) if part.fracture is not None and part.fracture.model == "cohesive"}

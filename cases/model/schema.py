@@ -58,11 +58,10 @@ class Part(Model):
     temperature: Annotated[Temperature, Field(ge=0)] = 293.15
     """Initial temperature of the body. The temperature is used only by ``strength`` with ``model = "johnson_cook"``."""
     erosion: Erosion | None = None
-    """Criteria for the deletion of tets. Without the table ``erosion`` no tet of the part is deleted. The table
-    ``erosion`` must not be combined with ``fracture``."""
+    """Criteria for the deletion of tets. Without the table ``erosion`` no tet of the part is deleted."""
     fracture: Fracture | None = None
     """Criteria for the fracture of facets between tets. Without the table ``fracture`` the part does not fracture. The
-    table ``fracture`` needs ``brittle`` in the material of the part, and must not be combined with ``erosion``."""
+    table ``fracture`` needs ``brittle`` in the material of the part."""
     rigid: Annotated[Rigid | None, BeforeValidator(read_rigid), Flag()] = None
     """Whether the part is rigid: ``true``, or a table with mass, centre of mass and inertia. A rigid part has six
     degrees of freedom and no stress; it costs only the contact of its surface and does not limit the time step. Gravity

@@ -5,6 +5,7 @@ from typing import Any
 import pytest
 
 from conoid.cases.load import CaseError, apply_overrides, parse_case
+from conoid.cases.model.joined import wearing
 
 PLATE = {"shape": "plate", "width": "20 mm", "height": "20 mm", "thickness": "5 mm", "element_size": "1 mm"}
 FILE = {"shape": "file", "path": "joint.inp", "unit": "1 mm"}
@@ -58,8 +59,6 @@ def test_a_bond_has_one_strength_and_one_energy_in_both_modes_by_default() -> No
          "bond[0].parts = 'tile, backing': a mesh from a file and a generated mesh have no nodes in common"),
         ({}, ["parts[1].mesh={shape='two_tets', element_size=1}"],
          "bond[0].parts = 'tile, backing': 'backing': single tets have no nodes in common with other parts"),
-        ({}, ["parts[0].fracture={model='cohesive'}", "parts[1].erosion={volume=[0.5, 2]}"],
-         "bond[0].parts = 'tile, backing': 'backing': a part that erodes cannot form one body with parts or bonds"),
         ({}, ['boundaries=[{kind="gravity", acceleration=[0, 0, -10], parts=["tile"]}]'],
          "boundaries[0].parts = 'tile': these parts and 'backing' are one body with common nodes; name all"),
     ],
@@ -68,6 +67,14 @@ def test_a_slip_is_one_line(bond: dict[str, Any], overrides: list[str], line: st
     found = problems_of(bond, *overrides)
     assert len(found) == 1
     assert found[0].startswith(line)
+
+
+def test_erosion_of_a_body_that_breaks_is_known_from_the_case() -> None:
+    wears = "parts[1].erosion={volume=[0.5, 2]}"
+    assert not wearing(parse_case(joint({}, wears)))
+    assert not wearing(parse_case(joint({"kind": "tied", "strength": "30 MPa"}, wears)))
+    assert wearing(parse_case(joint({"strength": "30 MPa"}, wears)))
+    assert wearing(parse_case(joint({}, wears, "parts[0].fracture={model='cohesive'}")))
 
 
 def test_gravity_acts_on_one_of_two_tied_parts() -> None:

@@ -13,13 +13,10 @@ from conoid.worker import step
 from conoid.worker.accounts import digest
 from conoid.worker.simulation import Simulation
 
-from ..worker.joints import bar, joint
+from ..worker.joints import joint
 from ..worker.kernels import FORMS, Form
 from ..worker.simulations import kept_again, on
-
-AREA = 9e-6
-_, PARTS = bar((3, 3, 6), 1e-3, 3e-3, 0.1)
-BOND = {"strength": "20 MPa", "shear_strength": "30 MPa", "energy": "10 J/m^2", "shear_energy": "25 J/m^2"}
+from .pulled import AREA, BOND, PARTS, drawn
 
 
 class Ended(NamedTuple):
@@ -32,15 +29,6 @@ class Ended(NamedTuple):
     digest: str | None
     fragments: int
     momentum: tuple[float, ...]
-
-
-def drawn(x: str, z: str) -> list[dict[str, Any]]:
-    """Returns a scene whose lower end is fixed and whose upper end is driven, without motion along y."""
-    below, above = [-1, -1, "0.1 mm"], [-1, -1, "5.9 mm"]
-    return [
-        {"kind": "velocity", "x": 0, "z": 0, "low": [-1, -1, -1], "high": [1, 1, below[2]]},
-        {"kind": "velocity", "x": x, "z": z, "low": above, "high": [1, 1, 1]},
-    ]
 
 
 def run(sim: Simulation) -> Ended:

@@ -103,6 +103,7 @@ class SurfacePressure(Forcing):
 
     def drop(self, tets: Ints) -> None:
         self._take(~np.isin(self._faces.tets, tets))
+        self._watched = None
 
     def free(self) -> None:
         if self._shared is not None:
@@ -141,9 +142,7 @@ class SurfacePressure(Forcing):
         return self._shared
 
     def _within(self, block: Block) -> tuple[Block, Ints, Ints]:
-        """Returns the faces of a block of a part that fractures, and the places of their tets, together with the block.
-        A part that fractures does not erode.
-        """
+        """Returns a block of a part that fractures, its loaded faces, and the places of the tets of these faces."""
         at = IdIndex(block.id).places(self._faces.tets)
         rows = np.flatnonzero(at >= 0)
         return block, rows, at[rows].astype(np.int64)

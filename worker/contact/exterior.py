@@ -132,6 +132,7 @@ class Exterior:
         flags |= loose
         flags &= ~removed
         self.motion.forget(removed)
+        self.cracks.forget(removed, self._model.nodes.id)
         self._loosen(loose)
         self.turn()
         if scene is not None:

@@ -180,9 +180,10 @@ class Elements:
 
     def attach(self, flags: FlagExchange) -> None:
         """Sends the given flags with the forces from now on. Collective among neighbours."""
-        self.free()
-        self._flags = flags
-        self._connect()
+        first, self._flags = self._flags is None, flags
+        if first:
+            self.free()
+            self._connect()
 
     def finish(self) -> None:
         """Waits until the forces of shared nodes are complete."""

@@ -18,7 +18,7 @@ class CandidateSearch:
 
     def __init__(self, bodies: int, interface: Interface, team: Team) -> None:
         """``bodies``: number of bodies; ``interface``: facets shared with other ranks and blocks."""
-        self._interface = interface
+        self.interface = interface
         self._count = Pass(team, tasks.count, *tasks.COUNT, size=tasks.TETS_OF_A_TASK)
         self._search = Pass(team, tasks.search, *tasks.SEARCH, size=tasks.TETS_OF_A_TASK)
         self._scratch = Scratch()
@@ -30,7 +30,7 @@ class CandidateSearch:
         ``t``, s, because their clock has run long enough. If ``step`` is 0, returns all candidates. ``x`` (nodes, 3):
         positions, m.
         """
-        rows, mesh, table, law, hot = self._interface.of_body[k], body.mesh, body.facets, body.law, body.hot
+        rows, mesh, table, law, hot = self.interface.of_body[k], body.mesh, body.facets, body.law, body.hot
         many = self._count.many(len(hot))
         begins, counts = self._scratch.of(f"begins {k}", many), self._scratch.of(f"counts {k}", many)
         self._count.run(len(hot), self._rooms[k], hot, mesh, counts)
@@ -39,5 +39,5 @@ class CandidateSearch:
             self._rooms[k] = Candidates.of(2 * needed)
         room = self._rooms[k]
         self._search.run(len(hot), room, begins, counts, hot, mesh, table, x, law)
-        n = criterion.breaking(room, begins, counts, self._interface.facets, rows, mesh, table, x, law, step, t)
+        n = criterion.breaking(room, begins, counts, self.interface.facets, rows, mesh, table, x, law, step, t)
         return room.first(int(n))

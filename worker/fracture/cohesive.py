@@ -38,6 +38,7 @@ this node cancel.
 import numpy as np
 
 from ..migration.parcel import Parcel
+from ..model.ids import among
 from ..model.state import Flags, Floats, Indices, Ints, Nodes
 from ..model.topology import Split
 from ..parallel.fixed_point import Tally
@@ -65,6 +66,13 @@ class Cohesion:
     def insert(self, new: Facets) -> None:
         """Adds facets that broke in this step."""
         self.facets = self.facets.and_more(new)
+
+    def close(self, gone: Ints) -> None:
+        """Ends the facets of the tets ``gone`` (k,), ids, ascending: their present traction acts until the next
+        ``open``, which books its work and removes them.
+        """
+        of, law = among(gone, self.facets.tets).any(axis=1), self.facets.softening
+        law.strength[of] = law.critical[of] = law.knee[of] = 0.0
 
     def follow(self, split: Split, ids: Ints) -> Ints:
         """Replaces nodes of facets by the copies of these nodes; ``ids``: global ids of the local nodes. Returns the

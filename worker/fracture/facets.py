@@ -10,6 +10,7 @@ from conoid.cases.model.schema import Fracture as Spec
 
 from ..migration.parcel import Table
 from ..model.ids import IdIndex
+from ..model.moves import Moves
 from ..model.state import INTACT, Bits, Block, Flags, Floats, Indices, Ints
 from ..model.topology import Split
 from . import criterion
@@ -102,11 +103,19 @@ def shear_weight(spec: Spec) -> float:
     return spec.shear_weight if spec.shear_weight is not None else float(spec.model == "cohesive")
 
 
-def mesh_of(block: Block) -> Mesh:
-    """Returns the record of a block of tets that the kernels read."""
-    beside, state = _beside(block), block.state.reshape(-1)
+def mesh_of(block: Block, beside: Indices | None = None) -> Mesh:
+    """Returns the record of a block of tets that the kernels read. ``beside``: column of Mesh; if it is None, the tets
+    behind the faces are found by their ids.
+    """
+    beside, state = _beside(block) if beside is None else beside, block.state.reshape(-1)
     intact = np.packbits((block.bond == INTACT) & (beside >= 0), axis=1, bitorder="little")[:, 0].copy()
     return Mesh(block.tets, block.id, block.across, beside, block.bond, intact, state, block.state.shape[1])
+
+
+def without(mesh: Mesh, block: Block, moves: Moves) -> Mesh:
+    """Returns the record of a block from which tets were removed, from its record before."""
+    beside = moves.applied(mesh.beside)
+    return mesh_of(block, np.where(beside >= 0, moves.places[beside], beside))
 
 
 def _beside(block: Block) -> Indices:

@@ -6,6 +6,7 @@ from conoid.cases.model.schema import Fracture
 
 from ..clock import Clock
 from ..migration.parcel import Parcel
+from ..model.moves import Moves
 from ..model.rows import MASS
 from ..model.state import Flags, Model
 from ..model.topology import Split
@@ -18,7 +19,7 @@ from .candidates import CandidateSearch
 from .facets import Body
 from .interface import Interface
 from .order import strongest
-from .records import Candidates
+from .records import Candidates, FacetTable, Mesh
 from .stars import Stars
 
 
@@ -46,7 +47,7 @@ class Initiation:
         for body in bodies:
             heaviest[body.block.part] = body.block.row(MASS).max(initial=0.0)
         self._heaviest = comm.maximum(heaviest)
-        """(parts,) mass of the heaviest tet of all ranks, kg; 0 for a part that does not fracture."""
+        """(parts,) mass of the heaviest tet of all ranks at the start, kg; 0 for a part that does not fracture."""
         self._step = 1
         """Number of the step, as stored with the clocks; the number of the first step is 1."""
 
@@ -99,20 +100,36 @@ class Initiation:
         left = iter(ends)
         return [b.take(next(left)) if b.body.spec.order == "local_maximum" else b for b in broken]
 
+    def drop(self, block: int, mesh: Mesh, moves: Moves) -> None:
+        """Removes tets of the block with the index ``block``; ``mesh``: record of the block without these tets."""
+        some = [body for body in self.bodies if body.index == block]
+        table = FacetTable(*(moves.applied(column) for column in some[0].facets))
+        for body in some:
+            body.mesh, body.facets = mesh, table
+
+    def reconnect(self) -> None:
+        """Makes the tables of the facets between ranks and between blocks again, after the removal of tets.
+        Collective.
+        """
+        self.interface.free()
+        self.interface = self._search.interface = Interface(self.bodies, self._neighbours, self._comm)
+
     def follow(self, split: Split) -> None:
         """Updates the bodies after a separation of nodes."""
         for body in self.bodies:
             body.follow(split, self._model.nodes.x0)
 
     def keep(self, parcel: Parcel) -> None:
-        """Adds the clocks to a parcel (a checkpoint or migration message)."""
+        """Adds the clocks and the masses of the heaviest tets to a parcel (a checkpoint or migration message)."""
         tables = [facets.clocks(body, self._step) for body in self.bodies if body.own]
         none = {"tet": np.zeros(0, np.int64), "key": np.zeros(0, np.int64), "since": np.zeros(0)}
         every = {name: np.concatenate([column, *(table[name] for table in tables)]) for name, column in none.items()}
         parcel.rows["fracture.since"] = every
+        parcel.known["heaviest"] = self._heaviest
 
     def resume(self, parcel: Parcel) -> None:
-        """Restores the clocks from a parcel (a checkpoint or migration message)."""
+        """Restores the state from a parcel (a checkpoint or migration message)."""
+        self._heaviest = parcel.known["heaviest"]
         for body in (body for body in self.bodies if body.own):
             facets.set_clocks(body, parcel.rows["fracture.since"], self._step)
 

@@ -6,7 +6,8 @@ sides of a facet, on any rank that computes one of the sides. Only the ranks tha
 the steps 1 to 6. All ranks receive the list of these ranks in the reduction of the step; a rank that is not in the list
 continues with its next step.
 
-    1. mark the broken facets and their nodes                  survey
+    1. mark the broken facets and their nodes, and the         survey
+       nodes of tets that erosion has removed in this step
     2. exchange the touched nodes with neighbours              _touched
     3. exchange the stars of shared touched nodes              _stars: each rank has the complete stars
     4. cut each star into pieces                               stars.pieces: each rank by itself, with equal result
@@ -22,6 +23,7 @@ import numpy as np
 
 from ..kernels.jit import njit, several, types
 from ..mesh.faces import FACES
+from ..model.ids import among
 from ..model.state import BROKEN, Copies, Indices, Ints, Model, extended
 from ..model.topology import KEY, Split, keys
 from ..parallel.comm import Comm
@@ -42,20 +44,23 @@ class Separation:
     def __init__(
         self, model: Model, neighbours: list[Neighbour], meshes: dict[int, Mesh], comm: Comm, threads: Team
     ) -> None:
-        """``meshes``: meshes of the parts that fracture, by index of the block of tets."""
+        """``meshes``: meshes of the parts that fracture, by index of the block of tets. The removal of tets replaces
+        the meshes.
+        """
         self._model, self._neighbours, self._comm = model, neighbours, comm
         self.stars = {b: Stars(mesh.tets, model.nodes.n, threads) for b, mesh in meshes.items()}
         """Stars of the nodes, by index of the block of tets."""
         for star in self.stars.values():
             model.nodes.columns.declare(star, **Stars.COLUMNS)
         self._pieces = Pieces(threads)
-        self._meshes = meshes
+        self.meshes = meshes
         self.broken = 0
         """Number of broken facets on all ranks."""
         self.first = math.nan
         """Time at which the first facet broke, s."""
-        self._mine = _NO_NODES
-        """Local nodes, ascending, of the facets that break in this step."""
+        self._mine = self.cut = _NO_NODES
+        """Local nodes, ascending, whose stars may be cut in this step: of the facets that break, and of removed tets.
+        """
 
     def survey(self, broken: list[Indices], count: int, touched: Ints) -> None:
         """Marks facets as broken. Sets ``touched`` (ranks,) to 1 for each rank that has a node of a broken facet; the
@@ -63,8 +68,10 @@ class Separation:
 
         ``broken``: tables (m, 2, 3) of block, place and face of each side; -1 for a side on another rank.
         """
-        found = [_broken(mesh, b, sides) for sides in broken for b, mesh in self._meshes.items()]
+        found = [_broken(mesh, b, sides) for sides in broken for b, mesh in self.meshes.items()]
         mine = found[0] if len(found) == 1 else distinct(np.concatenate([_NO_NODES, *found]))
+        if len(self.cut):
+            mine, self.cut = distinct(np.concatenate([mine, self.cut])), _NO_NODES
         self._mine = mine
         if len(mine):
             touched[self._comm.rank] = 1 + count
@@ -100,14 +107,16 @@ class Separation:
         if len(model.nodes.shares.node):
             self._split_shares(rows, of, some, new)
         for b, star in self.stars.items():
-            star.reconnect(self._meshes[b].tets, some, rows, places, of, new, b)
+            star.reconnect(self.meshes[b].tets, some, rows, places, of, new, b)
         return Split(copies, new, touched, *_leaving(rows, places, of, new))
 
     def _split_shares(self, rows: Ints, of: Ints, some: Ints, new: int) -> None:
-        """Updates the mass that each part has in a node of several parts, and in the copies of this node. ``rows``:
-        rows of the stars of the nodes ``some``.
+        """Updates the mass that each part has in a separated node of several parts, and in the copies of this node.
+        ``rows``: rows of the stars of the nodes ``some``.
         """
         nodes = self._model.nodes
+        apart = among(np.unique(rows[of >= 0, stars.NODE]), rows[:, stars.NODE])
+        rows, of = rows[apart], of[apart]
         node = np.where(of >= 0, new + of, some[np.searchsorted(nodes.id[some], rows[:, stars.NODE])])
         part = np.searchsorted(self._model.part_starts, rows[:, stars.TET], side="right") - 1
         quarters = 0.25 * rows[:, stars.MASS].copy().view(np.float64)
@@ -133,7 +142,7 @@ class Separation:
         of the tets, and the first row of each node.
         """
         ids, rank = self._model.nodes.id, self._comm.rank
-        found = [star.describe(touched, ids, self._meshes[b], b, rank) for b, star in self.stars.items()]
+        found = [star.describe(touched, ids, self.meshes[b], b, rank) for b, star in self.stars.items()]
         received = self._received(touched, found) if self._neighbours else []
         if len(found) == 1 and not received:
             return found[0]

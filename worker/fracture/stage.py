@@ -14,7 +14,7 @@ import math
 
 import numpy as np
 
-from conoid.cases.model.joined import breakable, cohesive
+from conoid.cases.model.joined import breakable, cohesive, wearing
 from conoid.cases.model.schema import Case
 
 from ..clock import Clock
@@ -33,6 +33,7 @@ from .facets import Body
 from .handover import Handover
 from .initiation import Initiation
 from .insertion import Insertion
+from .removal import Removal
 from .separation import Separation
 from .terms import Terms
 from .unloading import Unloading
@@ -79,6 +80,13 @@ class Fracture:
         """Time at which the first facet of all ranks broke, s; NaN if no facet has broken."""
         return self.separation.first
 
+    def removal(self, case: Case, contact: Contact | None) -> Removal | None:
+        """Returns the removal of tets from bodies that break; None if no part of these bodies erodes."""
+        if not wearing(case):
+            return None
+        of = self._model, self.initiation, self.separation, self.cohesion
+        return Removal(*of, self._elements, contact, self._comm)
+
     def unload(self) -> None:
         """Unloads cohesive facets that would release more energy than they absorbed. This function must be called
         before the kick. Collective.
@@ -103,10 +111,11 @@ class Fracture:
         self.initiation.begin_step()
         hot, self._found, touched[:] = self._elements.hot, None, 0
         self.initiation.interface.mark_inner(hot)
+        cuts = len(self.separation.cut) > 0
         if self.initiation.smooth:
-            return BREAKS if hot else NOTHING
+            return BREAKS if hot or cuts else NOTHING
         self._found = self.initiation.breaking(hot)
-        if not self._found:
+        if not (self._found or cuts):
             return OVERSTRESSED if hot else NOTHING
         if not self.initiation.one_by_one:
             self._survey(self._found, touched)

@@ -72,6 +72,16 @@ class Stars:
         """(nodes,) start of the range of each node in the pool."""
         self._describe, self._scratch = Pass(threads, _describe, *_DESCRIBE, size=_NODES), Scratch()
 
+    def drop(self, places: Indices) -> None:
+        """Removes tets; ``places`` (n,): new place of each tet of the block, -1 for a removed tet."""
+        moved = places[self.pool]
+        kept = moved >= 0
+        before = np.concatenate([[0], np.cumsum(kept)]).astype(np.int32)
+        end = self.first + self.count
+        self.count[:] = before[end] - before[self.first]
+        self.first[:] = before[self.first]
+        self.pool = moved[kept]
+
     def describe(self, nodes: Ints, ids: Ints, mesh: Mesh, block: int, rank: int) -> tuple[Ints, Ints, Ints]:
         """Returns three arrays that are valid until the next call: the rows (r, COLUMNS) of the stars of ``nodes`` in
         this block, ordered by node and tet; the places (r, 3) of the tets; and (k + 1,) the first row of each node.

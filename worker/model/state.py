@@ -13,6 +13,7 @@ import numpy.typing as npt
 
 from . import ids as ids_of
 from .columns import COPIED, ZERO, Columns
+from .moves import Moves
 from .shares import Shares
 
 Floats = npt.NDArray[np.float64]
@@ -28,6 +29,8 @@ CHUNK = 376
 
 INTACT, BROKEN, WIDE = range(3)
 """States of a facet between two tets: intact; broken; broken and so wide open that its two sides are surface."""
+_OF_TETS = "tets", "id", "across", "bond", "weakest", "hot", "worn", "group", "flat", "own_averages"
+"""Attributes of a block that are tables with a row for each tet, or have no rows."""
 LAID_BARE = -2
 """Value of ``Block.across`` for a face that erosion has exposed. A face that was exposed at the start has -1."""
 
@@ -245,22 +248,18 @@ class Block:
         bare: Flags = self.across < 0
         return bare | (self.bond == WIDE) if len(self.bond) else bare
 
-    def drop(self, gone: Ints) -> None:
-        """Remove the tets with the local indices ``gone``. Tets from the end of the block fill the gaps."""
-        left = self.n - len(gone)
-        holes, movers = gone[gone < left], np.setdiff1d(np.arange(left, self.n), gone)
-        tables = self.tets, self.id, self.across, self.worn, self.group, self.flat, self.own_averages
-        for table in tables:
-            if table is not None and len(table):
-                table[holes] = table[movers]
+    def drop(self, gone: Ints) -> Moves:
+        """Remove the tets with the local indices ``gone``, ascending. Return the new places of the other tets."""
+        moves = Moves.of(self.n, gone)
+        for name in _OF_TETS:
+            if (table := getattr(self, name)) is not None:
+                setattr(self, name, moves.applied(table))
+        holes, movers = moves.holes, moves.movers
         self.state[holes // CHUNK, :, holes % CHUNK] = self.state[movers // CHUNK, :, movers % CHUNK]
-        self.n, self.quiet[:] = left, 0
+        self.n, self.quiet[:] = moves.left, 0
         self.moved += len(gone)
-        self.tets, self.id = self.tets[:left], self.id[:left]
-        self.across, self.worn, self.group = self.across[:left], self.worn[:left], self.group[:left]
-        self.flat = self.flat[:left]
-        self.own_averages = None if self.own_averages is None else self.own_averages[:left]
         self.border_chunks = min(self.border_chunks, self.chunks)
+        return moves
 
 
 @dataclass

@@ -15,6 +15,7 @@ import numpy as np
 from ...kernels.jit import njit
 from ...migration.parcel import Table, once
 from ...model.growing import Rooms
+from ...model.ids import among
 from ...model.state import WIDE, Block, Flags, Floats, Indices, Ints, Nodes
 from ...model.topology import KEY, Split
 from ..surface.families import CornerLists, Corners, Families, TouchingRows
@@ -160,6 +161,25 @@ class Cracks:
         for column in self._columns().values():
             column[:] = column.take(order, axis=0)
         self._corners = {}
+
+    def at_tets(self, tets: Ints) -> Ints:
+        """Returns the rows of the cracks at ``tets``, ids, ascending, whose first side is on this rank."""
+        return np.flatnonzero(among(tets, self.faces // 4).any(axis=1) & (self.sides[:, 0, 1] >= 0))
+
+    def drop(self, block: int, places: Indices) -> None:
+        """Follows a removal of tets without cracks from a block; ``places``: new places of its tets."""
+        here = (self.sides[:, :, 0] == block) & (self.sides[:, :, 1] >= 0)
+        self.sides[here, 1] = places[self.sides[here, 1]]
+
+    def forget(self, removed: Flags, ids: Ints) -> None:
+        """Takes ``removed`` nodes (nodes,) out of their families: they are corners of no contact; ``ids`` of the local
+        nodes.
+        """
+        families = self.families
+        some = np.flatnonzero(removed & (families.ring != np.arange(len(removed))))
+        if len(some):
+            families.root[some] = -1 - ids[some]
+            self.families, self._corners = Families.of(families.root), {}
 
     def open(self, faces: Ints, blocks: list[Block]) -> None:
         """Removes cracks from the table because their sides are now surface; ``faces``: first sides of these cracks,

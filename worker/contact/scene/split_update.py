@@ -55,7 +55,7 @@ class SplitUpdate:
 
     def _join(self, near: Indices, family: Indices, neighbours: list[Neighbour]) -> None:
         """Adds nodes to the scene: the local nodes ``near``, and the families of nodes that are in the scene or on
-        other ranks. Updates the mobilities of all separated nodes.
+        other ranks. Updates the mobilities and parts of all separated nodes.
         """
         scene, here = self._scene, self._here
         have = np.zeros(len(family), bool)
@@ -64,7 +64,8 @@ class SplitUpdate:
         lacking = _lacking(near, family, have, scene.own.place)
         if len(lacking):
             scene.add_slots(here.take(lacking))
-        _renew(scene.surface_nodes.mobility, scene.own.place, family, here.mobility)
+        held = family[scene.own.place[family] >= 0]
+        scene.surface_nodes.renew(scene.own.place[held], here, held)
 
     def _join_ghosts(self, received: SplitOfGhosts) -> None:
         """Adds the families of ghosts to the scene; updates the mobilities of separated ghosts."""
@@ -73,7 +74,7 @@ class SplitUpdate:
         if new.n:
             self._scene.add_slots(new)
         at = self.places(rows.id)
-        self._scene.surface_nodes.mobility[at[at >= 0]] = rows.mobility[at >= 0]
+        self._scene.surface_nodes.renew(at[at >= 0], rows, np.flatnonzero(at >= 0))
 
     def cracks(self, cracks: Cracks, blocks: list[Block]) -> None:
         """Finds the slots of the nodes of all cracks that this rank computes."""
@@ -209,19 +210,6 @@ def _lacking(near, family, have, place):  # type: ignore[no-untyped-def]
         if n == 0 or some[i] != some[n - 1]:
             some[n], n = some[i], n + 1
     return some[:n].copy()
-
-
-@njit("void(float64[:, ::1], int32[::1], int32[:, ::1], float64[:, ::1])", cache=True)
-def _renew(mobility, place, family, here):  # type: ignore[no-untyped-def]
-    """Sets the ``mobility`` (slots, 3) of the local nodes of a ``family`` (c, 2) to the values in ``here`` (nodes, 3),
-    if the nodes have slots.
-    """
-    for c in range(len(family)):
-        for k in range(2):
-            a = family[c, k]
-            for i in range(3):
-                if place[a] >= 0:
-                    mobility[place[a], i] = here[a, i]
 
 
 @njit("void(int32[:, ::1], boolean[::1], int64[::1], int32[:, ::1], int32[:, :, ::1], int32[::1])", cache=True)

@@ -14,7 +14,7 @@ from ...elements.wear import DAMAGED, STRAIN
 from ...mesh.faces import FACES
 from ...model.ids import among
 from ...model.rows import DAMAGE, PLASTIC_STRAIN
-from ...model.state import LAID_BARE, Block, Flags, Indices, Ints
+from ...model.state import LAID_BARE, WIDE, Block, Flags, Indices, Ints
 from ...parallel.comm import Comm
 from ...parallel.ownership import Neighbour
 
@@ -63,8 +63,11 @@ def covered(blocks: list[Block], tired: Ints, neighbours: list[Neighbour], comm:
 
 
 def leaving(block: Block, worn: Ints, ids: Ints) -> Ints:
-    """(k, WORDS) words of the tets in the rows ``worn`` (k,). ``ids``: global ids of the local nodes."""
-    return np.column_stack([block.id[worn], block.across[worn], ids[block.tets[worn]]])
+    """(k, WORDS) words of the tets in the rows ``worn`` (k,). ``ids``: global ids of the local nodes. A face across an
+    open crack has the word -1, because the face is surface already.
+    """
+    behind = np.where(block.bond[worn] == WIDE, -1, block.across[worn]) if len(block.bond) else block.across[worn]
+    return np.column_stack([block.id[worn], behind, ids[block.tets[worn]]])
 
 
 def exposed_by(rows: Ints) -> Exposure:

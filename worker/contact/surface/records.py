@@ -129,6 +129,10 @@ class SurfaceNodes(Rows):
         """
         return located(self.id, ids)
 
+    def renew(self, places: Indices, others: "SurfaceNodes", chosen: "np.ndarray") -> None:
+        """Sets mobility and part of the rows ``places`` (k,) to those of the rows ``chosen`` (k,) of ``others``."""
+        self.mobility[places], self.part[places] = others.mobility[chosen], others.part[chosen]
+
 
 def merged(groups: list[SurfaceNodes]) -> SurfaceNodes:
     """Returns all nodes once, by ascending id. A node that is in several groups has the row of the first group."""
