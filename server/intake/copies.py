@@ -36,8 +36,11 @@ def of_run(folder: Path) -> Source:
     """
 
     def put(file: FileName, target: Path) -> None:
+        copy = folder / layout.FILES / copy_of(file.path, file.sha256)
         try:
-            give(folder / layout.FILES / copy_of(file.path, file.sha256), target)
+            if copy.is_symlink() or (copy.exists() and not copy.is_file()):
+                raise FileNotFoundError
+            give(copy, target)
         except FileNotFoundError:
             detail = f"run {folder.name}: its copy of {shown(file.path)} is gone"
             raise ServiceError(409, "no_file", detail) from None

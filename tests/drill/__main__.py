@@ -18,7 +18,7 @@ from dataclasses import asdict
 from functools import partial
 from pathlib import Path
 
-from . import clients, cluster, crowds, damage, odd, operator, strike, strikes, workers
+from . import bodies, clients, cluster, crowds, damage, odd, operator, strike, strikes, workers
 from .grounds import Grounds, grounds
 from .judge import TRUE, Row
 from .table import write
@@ -33,7 +33,7 @@ def groups() -> dict[str, Group]:
     found: dict[str, Group] = {}
     for one in [*strikes.everything(), *odd.everything(), *cluster.everything(), *operator.strikes()]:
         found[one.name] = (one.stand, partial(_struck, one))
-    families = (damage.groups(), odd.groups(), crowds.groups(), clients.groups(), operator.groups())
+    families = (damage.groups(), odd.groups(), crowds.groups(), clients.groups(), operator.groups(), bodies.groups())
     for name, (kind, deed) in [group for family in families for group in family.items()]:
         found[name] = (kind, partial(_on, kind, deed))
     for adopted in (False, True):

@@ -9,7 +9,7 @@ from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 
 from ..server import real_slurm
-from . import cluster
+from . import bodies, cluster
 from .stand import UNPRIVILEGED, Stand, can_drop
 
 DISK = "size=1100m,nr_inodes=4000"
@@ -32,7 +32,7 @@ class Grounds:
             "odd": lambda root: Stand(_odd(root)),
             "narrow": lambda root: Stand(root, slots=3, before=UNPRIVILEGED),
             "unprivileged": lambda root: Stand(root, before=UNPRIVILEGED), "disk": self._on_a_disk, "clock": _clock,
-            "slurm": lambda root: cluster.stand(root, self._slurm()),
+            "solver": bodies.stand, "slurm": lambda root: cluster.stand(root, self._slurm()),
         }  # fmt: skip
 
     def lacks(self, kind: str) -> str:

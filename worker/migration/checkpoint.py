@@ -203,9 +203,11 @@ def _columns(group: "h5py.Group") -> Table:
 
 
 def _plain(value: Any) -> Any:
-    """Return a value that JSON can represent. The representation of an array contains its type."""
+    """Return a value that JSON can represent. The representation of an array contains its type and its shape, because
+    the list of an array without values lacks dimensions.
+    """
     if isinstance(value, np.ndarray):
-        return {"dtype": str(value.dtype), "values": value.tolist()}
+        return {"dtype": str(value.dtype), "values": value.tolist(), "shape": list(value.shape)}
     if isinstance(value, dict):
         return {key: _plain(item) for key, item in value.items()}
     if isinstance(value, list | tuple):
@@ -216,8 +218,9 @@ def _plain(value: Any) -> Any:
 def _rich(value: Any) -> Any:
     """Return the value from which ``_plain`` made its result. Lists become tuples."""
     if isinstance(value, dict):
-        if value.keys() == {"dtype", "values"}:
-            return np.array(value["values"], value["dtype"])
+        if value.keys() >= {"dtype", "values"}:
+            made = np.array(value["values"], value["dtype"])
+            return made.reshape(value.get("shape", made.shape))
         return {key: _rich(item) for key, item in value.items()}
     return [_rich(item) for item in value] if isinstance(value, list) else value
 
