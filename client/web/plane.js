@@ -2,6 +2,7 @@
 
 import { within } from "./section.js";
 
+const BESIDE = 0.02; // Distance of the first section from a plane of symmetry, as a fraction of the extent of the body.
 const AXES = ["x", "y", "z"];
 export const HOLLOW = "this snapshot has no file of all tets, so its section is not filled";
 
@@ -10,8 +11,8 @@ export class SectionPlane {
     Object.assign(this, { tools, on: false });
   }
 
-  // Moves the plane to the middle of the region that a camera frames; `box` is the box of all tets. The side towards
-  // the camera is cut away.
+  // Moves the plane close to a plane of symmetry with this normal or, without one, to the middle of the region that a camera
+  // frames; `box` is the box of all tets. The side towards the camera is cut away.
   choose(eye, box) {
     const { tools } = this;
     const name = tools.across.value;
@@ -22,7 +23,9 @@ export class SectionPlane {
     this.normal = axis < 0 ? way : [0, 1, 2].map((i) => (i === axis ? 1 : 0));
     tools.flipped = axis >= 0 && way[axis] < 0;
     const along = eye.along(this.normal);
-    return tools.slide(...along, within((along[0] + along[1]) / 2, box, this.normal));
+    const mirror = eye.framed().cuts.find((one) => one.axis === axis);
+    const far = mirror && (mirror.at > (along[0] + along[1]) / 2 ? along[0] : along[1]);
+    return tools.slide(...along, within(mirror ? mirror.at + BESIDE * (far - mirror.at) : (along[0] + along[1]) / 2, box, this.normal));
   }
 
   // Returns { normal, at } for View3d.slice, or null without a section.

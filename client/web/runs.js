@@ -199,20 +199,20 @@ export class RunsPage {
     return groups.flatMap(({ key, rows: own }) => {
       const open = kept.open.has(`${by} ${key}`);
       const varied = key && groups.length <= MOST_TOLD ? ranges(own, columns) : "";
-      const group = { ...this.heading(by, key, own), key: `${by} ${key}`, varied, rows: own, open };
+      const group = { ...this.heading(by, key, own, columns), key: `${by} ${key}`, varied, rows: own, open };
       const content = JSON.stringify([group.title, group.note, varied, own.length, open]);
       return [{ key: `${by} ${key}`, content, group }, ...(open ? own.map((row) => ({ key: row.id, content: row.content, row })) : [])];
     });
   }
 
-  heading(by, key, rows) {
+  heading(by, key, rows, columns) {
     if (by === "case") return { title: key };
     if (!key) return { title: "no sweep" };
     const sweep = this.sweeps.get(key);
     const done = rows.filter(({ state }) => FINAL.has(state)).length;
     const brief = shorts(this.sweeps.keys()).get(key) ?? key;
     const failed = rows.filter(({ state }) => FINAL.has(state) && state !== "succeeded").length;
-    if (sweep?.search) return { title: `${sweep.name}, adaptive`, brief, href: `#/sweeps/${encodeURIComponent(key)}`, note: soughtFor(sweep.search) };
+    if (sweep?.search) return { title: `${sweep.name}, adaptive`, brief, href: `#/sweeps/${encodeURIComponent(key)}`, note: soughtFor(sweep.search, (name) => columns.find(({ full }) => full === name)?.title ?? name) };
     const note = `${done} of ${count(sweep?.total ?? rows.length)} done${failed ? `, ${count(failed)} without a result` : ""}`;
     return { title: sweep?.name ?? rows[0].name, brief, href: `#/sweeps/${encodeURIComponent(key)}`, note };
   }
@@ -276,10 +276,10 @@ export class RunsPage {
   }
 }
 
-// Returns a text with the goal of an adaptive sweep and its present answer.
-function soughtFor({ key, result, threshold, result_unit: up, bracket, unit }) {
+// Returns a text with the goal of an adaptive sweep and its present answer; `titled(name)` is the title of a column.
+function soughtFor({ key, result, threshold, result_unit: up, bracket, unit }, titled) {
   const found = bracket ? vector([(bracket[0] + bracket[1]) / 2, (bracket[1] - bracket[0]) / 2], unit, 4, " ± ") : "not bracketed";
-  return `${result} = ${exact(threshold, up)} at ${key} ${found}`;
+  return `${titled(result)} = ${exact(threshold, up)} at ${titled(key)} ${found}`;
 }
 
 // Returns a text with the changed keys of a group, such as "velocity[2] 60 to 300 m/s".
