@@ -77,7 +77,7 @@ class Entry:
         return f"line {self.line} of {self.file}" if self.file else f"line {self.line}"
 
     def refusals(self) -> Iterator[str]:
-        """Returns the reasons for which the keyword refuses the import, a line each."""
+        """Returns the reasons for which the keyword refuses the import, one text line each."""
         if self.barred:
             yield f"{self.place}, {self.keyword}: {'; '.join(self.reasons)}"
         for each in self.details:

@@ -293,7 +293,7 @@ class Session(Http):
 
 def connect(url: str | None = None, token: str | None = None) -> Session:
     """Opens a session with a server. Address and token are the arguments, else CONOID_URL and CONOID_TOKEN, else
-    from the configuration file.
+    those of the configuration file.
     """
     chosen = target(url, token)
     return Session(chosen.url, chosen.token)

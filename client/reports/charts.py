@@ -22,7 +22,7 @@ _COLOURS = {
 _RANKS = ["#4c78a8", "#f58518", "#54a24b", "#e45756", "#72b7b2", "#b279a2", "#eeca3b", "#9d755d"]
 _INK, _FAINT = "#1d2733", "#b5bcc4"
 _NAMED = len(_RANKS)
-"""Largest number of ranks that have colours of their own. With more ranks, only the ranks with the most and the
+"""Largest number of ranks that have colours of their own. If a run has more ranks, only the ranks with the most and the
 fewest nodes at the end have a colour."""
 PAPER = {
     "glass_steel_bar": (

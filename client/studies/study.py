@@ -145,8 +145,8 @@ def _by_tasks(study: Study) -> str:
     predicted, was = study.error
     so, there = study.speed_up(predicted), study.speed_up(was)
     off = percent(so / there - 1.0, 0)
-    told_so = f"Two threads are {fixed(so)} times as fast as one so, and {fixed(there)} times when they are there"
-    return f"{text} {told_so}: {off} off."
+    compared = f"Two threads are {fixed(so)} times as fast as one thread if projected, {fixed(there)} times if measured"
+    return f"{text} {compared}: {off} off."
 
 
 def _serial(study: Study) -> list[str]:

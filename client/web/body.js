@@ -142,7 +142,7 @@ export class Body {
     this.tools.edgeNote.textContent = header.surface_triangles > arrays.triangles.length / 3 ? `the surface is simplified: ${counted(header.surface_triangles, "face")} of the mesh` : "";
   }
 
-  // Colour, section, camera ---------------------------------------------------------------------------------------------
+  // Choices -------------------------------------------------------------------------------------------------------------
 
   paint() {
     if (!this.view?.snapshot) return;

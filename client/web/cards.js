@@ -62,8 +62,8 @@ export class Cards {
     this.cards.get(name).move.focus();
   }
 
-  // Moves every card to its place. Cards at their place are not touched, because a moved element loses focus and
-  // canvas.
+  // Moves every card to its place in the grid or beside the body. Cards at their place are not touched, because a moved
+  // element loses focus and canvas.
   place() {
     const { closed, chosen } = this;
     const open = [...this.cards].filter(([name, { there }]) => there && !closed.includes(name));

@@ -73,7 +73,7 @@ export class NewPage {
           h("section.card", { "aria-label": "files of the case" }, h("h2", {}, "Files"), this.files))));
   }
 
-  // Source of the case -----------------------------------------------------------------------------------------------------
+  // Case source ------------------------------------------------------------------------------------------------------------
 
   async begin(shipped) {
     this.draw();

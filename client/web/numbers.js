@@ -76,7 +76,7 @@ export function ended(progress, outcome) {
   return { t: outcome?.time ?? progress?.t, step: outcome?.steps ?? progress?.step, residual: Number.isFinite(value) ? [value, beyond] : null };
 }
 
-// Returns the present time and "of …" the end time, both in one unit.
+// Returns two texts, the present simulated time and "of" with the end time, both in one unit.
 function timed(now, end) {
   const [first, last] = alike([now, end], "s");
   return first === last ? last : `${first} of ${last}`;

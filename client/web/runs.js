@@ -60,7 +60,7 @@ export class RunsPage {
     this.say("Loading …");
   }
 
-  // Requests to the server ------------------------------------------------------------------------------------------
+  // Server requests -------------------------------------------------------------------------------------------------
 
   async start() {
     addEventListener("resize", this.resized = () => this.read && this.draw());

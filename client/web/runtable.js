@@ -1,4 +1,4 @@
-// Rows of many runs (GET /v1/table), merged page by page. The module creates no elements.
+// Rows of many runs (GET /v1/table), merged page by page. The module creates no HTML elements.
 
 // Fraction of common keys above which two cases are similar, so that their values are compared; the server has the same
 // number.

@@ -140,7 +140,7 @@ export class SideBySide {
     for (const { view } of panes) view.colour(by, ends, field ? choice.bands : 0);
   }
 
-  // Section, camera, display -----------------------------------------------------------------------------------------------
+  // Choices ----------------------------------------------------------------------------------------------------------------
 
   choose() {
     const [first] = this.shown.filter(({ snapshot }) => snapshot);

@@ -1,4 +1,4 @@
-// Sorting, filters and groups of the rows of a table. The module creates no elements.
+// Sorting, filters and groups of the rows of a table. The module creates no HTML elements.
 
 const collator = new Intl.Collator("en", { numeric: true });
 

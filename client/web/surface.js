@@ -53,7 +53,7 @@ export class Surface {
     this.shared[name].value = texture;
   }
 
-  // State of the drawing ----------------------------------------------------------------------------------------------------
+  // Drawing state -----------------------------------------------------------------------------------------------------------
 
   show(snapshot) {
     const [low, high] = snapshot.header.box;

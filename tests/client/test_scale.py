@@ -98,7 +98,7 @@ def test_a_projection_by_tasks_takes_the_work_of_so_many_threads() -> None:
     assert "10.0 parallel regions per step, 3.0 colours per region, 4.0 tasks per colour" in text
     assert "off." not in text, "nothing was measured with two threads"
     two = to_markdown(study(one, two_threads(), by_tasks(2), run))
-    assert "Two threads are 1.40 times as fast as one so, and 1.75 times when they are there: -20 % off." in two
+    assert "Two threads are 1.40 times as fast as one thread if projected, 1.75 times if measured: -20 % off." in two
     alone = study(one, by_tasks(1), run)
     assert (run.time, by_tasks(1).time, alone.speed_up(run)) == (3.5, 8.0, 8.0 / 3.5)
 

@@ -1,4 +1,4 @@
-"""Cards with named fields."""
+"""Fields of LS-DYNA cards by their names in the manual."""
 
 from collections.abc import Sequence
 
