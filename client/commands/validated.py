@@ -57,7 +57,7 @@ def _up_to(
     value: float | None,
     more: float,
     shown: Callable[[float], str],
-    when: str = "all breakable parts break into single tets",
+    when: str = "breakable parts become single tets",
 ) -> str:
     """Returns the memory as text. With ``more``, the text also has the larger memory that is needed ``when`` bodies
     break into single tets.

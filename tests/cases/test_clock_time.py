@@ -43,5 +43,5 @@ def test_the_assumptions_are_printed_with_the_time() -> None:
         Console(file=out, width=200).print(estimate_table(case, estimate(case)))
         return next(line for line in out.getvalue().splitlines() if line.startswith("clock time"))
 
-    assert "on 2 ranks x 4 threads; assumed: ranks 66 % efficient, threads share 8" in note(2, 4)
+    assert "on 2 ranks x 4 threads; assumed: ranks 66 % efficient, 8" in note(2, 4)
     assert note(1, 1).rstrip().endswith("on 1 rank")

@@ -111,8 +111,8 @@ def endless(first: bytes, piece: bytes) -> Answer:
         (endless(head(500, None), b"x" * 65536), "is longer than 1.05 MB"),
         (endless(head(200, 1 << 60), b"[" * 65536), "is longer than 1.05 MB"),
         (drip(b"HTTP/1.1 200 OK\r\nA: "), "did not answer completely within"),
-        (drip(head(200, 3000)), "comes too slowly"),
-        (drip(head(200, None)), "comes too slowly"),
+        (drip(head(200, 3000)), "is too slow"),
+        (drip(head(200, None)), "is too slow"),
     ],
 )
 def test_an_answer_without_end_is_given_up(

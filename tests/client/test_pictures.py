@@ -189,7 +189,7 @@ def test_arrows_bands_and_a_dark_ground(frame: Path, tmp_path: Path) -> None:
     light, dark = (imread(tmp_path / name)[:, :, :3] for name in ("a.png", "b.png"))
     assert light[2, 2].min() == 1.0
     assert dark[2, 2].max() < 0.15
-    with pytest.raises(LookError, match="bands = 1: 2 to 64"):
+    with pytest.raises(LookError, match="bands = 1: allowed: 2 to 64"):
         drawn(frame, "speed", tmp_path / "c.png", bands=1)
     with pytest.raises(LookError, match="vectors = 'force': allowed: velocity, displacement"):
         drawn(frame, "speed", tmp_path / "c.png", vectors="force")

@@ -44,7 +44,7 @@ def test_a_damaged_file_of_a_server_is_named_by_its_run() -> None:
     """
     session = served(lambda _: httpx2.Response(200, content=b"{"))
     for name, noun in (("case.resolved.json", "case"), ("outcome.json", "outcome")):
-        with pytest.raises(ClientError, match=f"^{name} of run r1 at http://conoid.test: this {noun} cannot be read: "):
+        with pytest.raises(ClientError, match=f"^{name} of run r1 at http://conoid.test: the {noun} cannot be read: "):
             _ = Run(session, "r1").result().case if noun == "case" else Run(session, "r1").result().outcome
 
 

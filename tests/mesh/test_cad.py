@@ -164,7 +164,7 @@ def test_surface_bodies_of_a_file_are_reported(folder: Path, step: str) -> None:
         (lambda step: step[: len(step) // 2], "the STEP file is cut off"),
         (lambda step: os.urandom(4000), "neither a STEP file (it begins with ISO-10303-21;) nor a BREP file"),
         (lambda step: "", "neither a STEP file"),
-        (lambda step: step.replace("SI_UNIT(.MILLI.,.METRE.)", "$"), "the STEP file does not say in which unit"),
+        (lambda step: step.replace("SI_UNIT(.MILLI.,.METRE.)", "$"), "the STEP file does not give its unit of length"),
         (lambda step: _without(step, "PLANE('"), "the STEP file is damaged: #"),
         (lambda step: step.replace("ENDSEC;\nEND-ISO", "#9 9 = (\nENDSEC;\nEND-ISO"), "the STEP file is damaged: "),
         (_open, "1 of 3 solids of the STEP file are not closed"),

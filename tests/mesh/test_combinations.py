@@ -214,4 +214,4 @@ def test_solids_that_touch_only_in_an_edge_or_a_point_are_reported(low: tuple[in
     request = {"shape": "union", "of": boxes, "element_size": 2e-3}
     origin = measured(TypeAdapter[Mesh](Mesh).validate_python(request), {}, "mesh").origin  # type: ignore[arg-type]
     assert origin is not None
-    assert [f"in {message} alone" in note for note in origin.notes] == [True] * bool(message)
+    assert [f"touch each other only in {message}, which" in note for note in origin.notes] == [True] * bool(message)

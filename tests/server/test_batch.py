@@ -304,7 +304,7 @@ def test_a_folder_without_a_worker_is_neither_cancelled_nor_still_running(
     """
     monkeypatch.setattr(following, "_ASK_EVERY", 0.0)
     (tmp_path / layout.JOURNAL).write_text('{"type":"status","run":"a","seq":1,"state":"running"}\n')
-    assert "no worker writes into it" in conoid("cancel", tmp_path).stdout
+    assert "no worker writes into this folder" in conoid("cancel", tmp_path).stdout
     assert not (tmp_path / layout.STOP_REQUEST).exists()
     running, lost = FolderRun(tmp_path).messages(pause=lambda _: None)
     assert (running.seq, getattr(lost, "state", ""), getattr(lost, "cause", "")) == (1, State.LOST, Cause.NODE)

@@ -204,7 +204,7 @@ def test_errors_are_shares_of_the_largest_energy_there_has_been() -> None:
 def named_safety(sim: Simulation) -> float:
     """Returns the dt_safety named in the warning about ``stepping``; 0 if there is no warning."""
     for text in sim.ledger.warnings(sim.case.numerics.dt_safety):
-        if text.startswith("the line stepping"):
+        if text.startswith("the term stepping"):
             return float(text.partition("numerics.dt_safety = ")[2].split()[0])
     return 0.0
 

@@ -188,7 +188,7 @@ def test_it_is_where_neighbours_have_crumbled(form: Form) -> None:
     assert max(abs(energy.elastic - there) for energy, there in seen) < SHARE * initial
     assert max(energy.residual for energy, _ in seen) < 5e-4
     assert np.diff([energy.plastic for energy, _ in seen]).min() >= 0.0
-    warned = [text for text in patch.sim.ledger.warnings(0.9) if text.startswith("the line averaging ")]
+    warned = [text for text in patch.sim.ledger.warnings(0.9) if text.startswith("the term averaging ")]
     assert len(warned) == (form != "standard")
 
 

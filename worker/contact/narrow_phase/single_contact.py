@@ -43,16 +43,24 @@ def _covers(nodes, weights, r, t):  # type: ignore[no-untyped-def]
     return True
 
 
+@njit("float64(float64[:, ::1], int64)", cache=True, forceinline=True)
+def _margin(weights, row):  # type: ignore[no-untyped-def]
+    """Returns the smallest area coordinate of the foot of contact ``row``; it is negative outside of the face."""
+    return min(-weights[row, 1], -weights[row, 2], -weights[row, 3])
+
+
 @njit(types.boolean(CONTACT_ROWS, PAIRS, FACES, _N1, _N1, _N1, _I), cache=True)
 def _repeated(out, pairs, faces, found, earlier, last, row):  # type: ignore[no-untyped-def]
-    """Returns whether a face of lower id has the same contact with the node of ``row``: weights that differ by at most
-    RIM, and a normal within _FLAT.
+    """Returns whether the node of ``row`` has an equal contact with a face that contains the foot better. Equal
+    contacts have weights that differ by at most RIM, and normals within _FLAT. Of two faces that contain the foot
+    equally well, the face of lower id is the better one.
     """
     nodes, weights, m = out.nodes, out.weights, out.normals
-    name, q = faces.id[pairs.rows[out.pair[row], 1]], last[nodes[row, 0]]
+    name, q, inside = faces.id[pairs.rows[out.pair[row], 1]], last[nodes[row, 0]], _margin(weights, row)
     while q >= 0:
         t, q = found[q], earlier[q]
-        if t == row or faces.id[pairs.rows[out.pair[t], 1]] > name:
+        better = _margin(weights, t)
+        if better < inside or (better == inside and faces.id[pairs.rows[out.pair[t], 1]] >= name):
             continue
         if m[t, 0] * m[row, 0] + m[t, 1] * m[row, 1] + m[t, 2] * m[row, 2] < _FLAT:
             continue
